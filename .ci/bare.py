@@ -1,0 +1,35 @@
+"""The installed package with its base dependencies and nothing else: does it import, register, step?
+
+`.ci/run` starts this as `python -I`, so that the checkout is out of sight and only the wheel can answer.
+"""
+
+from importlib.metadata import distribution, version
+from importlib.util import find_spec
+
+import gymnasium as gym
+import numpy as np
+
+for absent in ("agents", "train", "torch", "stable_baselines3", "matplotlib", "pygame"):
+    assert find_spec(absent) is None, f"a bare environment holds {absent}"
+
+files = distribution("seastar-gym").files or []
+strangers = [str(file) for file in files if not str(file).startswith(("seastar_gym/", "seastar_gym-"))]
+assert files
+assert not strangers, f"the wheel installs {strangers}"
+
+env = gym.make("seastar_gym:SeastarSwim-v0")
+observation, _ = env.reset(seed=0)
+assert observation in env.observation_space
+env.action_space.seed(0)
+alone = [env.step(env.action_space.sample()) for _ in range(3)]
+assert all(np.isfinite(observation).all() and np.isfinite(reward) for observation, reward, *_ in alone)
+
+batch = gym.make_vec("SeastarSwim-v0", num_envs=9, vectorization_mode="vector_entry_point")
+batch.reset(seed=0)
+batch.action_space.seed(0)
+observations, rewards, *_ = batch.step(batch.action_space.sample())
+assert observations.shape == (9, *observation.shape)
+assert np.isfinite(observations).all()
+assert np.isfinite(rewards).all()
+
+print(*(f"{name} {version(name)}" for name in ("gymnasium", "numba", "numpy", "scipy")), sep=", ")

@@ -1,0 +1,1 @@
+"""Actuators: how far every limb is turned at the hub, and when."""

@@ -1,0 +1,308 @@
+"""`Lanes`: one float64 per robot in one SIMD register, for kernels that read like scalar code.
+
+A kernel written on `Lanes` runs on `N_LANES` robots at once:
+
+    @kernel
+    def edge_length(q, tail, head):
+        ex = load(q, 2 * head) - load(q, 2 * tail)
+        ey = load(q, 2 * head + 1) - load(q, 2 * tail + 1)
+        return sqrt(ex * ex + ey * ey)
+
+Here `q` has shape (rows, N_LANES): row r holds the same number of every robot. From an array of shape (rows,)
+`load` reads one number for all robots, so a coefficient may be shared or differ from robot to robot without a
+change in the kernel.
+
+Arithmetic is strict IEEE (no fastmath; a fused multiply-add only where `add_product` or `subtract_product` says
+so), so a robot's bits depend neither on its lane nor on its neighbours. Comparisons give a `Mask`; `select` picks
+by mask. Loads and stores are unaligned on purpose: numpy does not align to 64 bytes.
+"""
+
+import operator
+import os
+from collections.abc import Callable
+
+import llvmlite.binding
+from llvmlite import ir
+from numba.core import types
+from numba.core.datamodel import models
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, register_model
+
+
+def _lanes_for_this_processor() -> int:
+    """Eight float64 fill an AVX-512 register, four an AVX2 or two NEON registers."""
+    forced = os.environ.get("SEASTAR_LANES")
+    if forced is not None:
+        if forced not in {"2", "4", "8", "16"}:
+            raise ValueError(f"SEASTAR_LANES={forced!r} is not a lane width: use 2, 4, 8 or 16.")
+        return int(forced)
+    return 8 if llvmlite.binding.get_host_cpu_features().get("avx512f", False) else 4
+
+
+N_LANES = _lanes_for_this_processor()
+I1, I32, F64 = ir.IntType(1), ir.IntType(32), ir.DoubleType()
+VECTOR = ir.VectorType(F64, N_LANES)
+MASK = ir.VectorType(I1, N_LANES)
+
+
+class Lanes(types.Type):
+    def __init__(self):
+        super().__init__(name=f"Lanes({N_LANES})")
+
+
+class Mask(types.Type):
+    def __init__(self):
+        super().__init__(name=f"Mask({N_LANES})")
+
+
+lanes = Lanes()
+mask = Mask()
+
+
+@register_model(Lanes)
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, dmm, fe_type):
+        super().__init__(dmm, fe_type, VECTOR)
+
+
+@register_model(Mask)
+class _MaskModel(models.PrimitiveModel):
+    def __init__(self, dmm, fe_type):
+        super().__init__(dmm, fe_type, MASK)
+
+
+def _broadcast(builder, vector_type, value):
+    undefined = ir.Constant(vector_type, ir.Undefined)
+    first = builder.insert_element(undefined, value, ir.Constant(I32, 0))
+    return builder.shuffle_vector(first, undefined, ir.Constant(ir.VectorType(I32, N_LANES), [0] * N_LANES))
+
+
+def _as_vector(builder, numba_type, value):
+    return value if numba_type == lanes else _broadcast(builder, VECTOR, value)
+
+
+def _lanes_signature(result, args):
+    """`result(args)` with plain numbers taken as float64, or None where an argument is neither lanes nor number."""
+    if lanes in args and all(a == lanes or isinstance(a, types.Number) for a in args):
+        return signature(result, *(a if a == lanes else types.float64 for a in args))
+    return None
+
+
+def _define_binary(op: Callable, result: types.Type, build: Callable) -> None:
+    """Teach numba `op` on lanes and numbers; `build(builder, a, b)` emits the instruction."""
+
+    @infer_global(op)
+    class Typing(AbstractTemplate):
+        def generic(self, args, kws):
+            return _lanes_signature(result, args) if len(args) == 2 else None
+
+    def lower(context, builder, sig, args):
+        return build(builder, *(_as_vector(builder, t, a) for t, a in zip(sig.args, args, strict=True)))
+
+    for operands in ((Lanes, Lanes), (Lanes, types.float64), (types.float64, Lanes)):
+        lower_builtin(op, *operands)(lower)
+
+
+for _op, _instruction in (
+    (operator.add, "fadd"),
+    (operator.iadd, "fadd"),
+    (operator.sub, "fsub"),
+    (operator.isub, "fsub"),
+    (operator.mul, "fmul"),
+    (operator.imul, "fmul"),
+    (operator.truediv, "fdiv"),
+    (operator.itruediv, "fdiv"),
+):
+    _define_binary(_op, lanes, lambda builder, a, b, name=_instruction: getattr(builder, name)(a, b))
+
+# Ordered comparisons: a NaN compares false with everything, so it never passes a test for being good.
+for _op, _symbol in (
+    (operator.lt, "<"),
+    (operator.le, "<="),
+    (operator.gt, ">"),
+    (operator.ge, ">="),
+    (operator.eq, "=="),
+):
+    _define_binary(_op, mask, lambda builder, a, b, symbol=_symbol: builder.fcmp_ordered(symbol, a, b))
+
+
+@infer_global(operator.neg)
+class _Negation(AbstractTemplate):
+    def generic(self, args, kws):
+        return signature(lanes, lanes) if args == (lanes,) else None
+
+
+@lower_builtin(operator.neg, Lanes)
+def _lower_negation(context, builder, sig, args):
+    return builder.fsub(ir.Constant(VECTOR, [-0.0] * N_LANES), args[0])
+
+
+def _define_mask_operator(op: Callable, n_args: int, build: Callable) -> None:
+    @infer_global(op)
+    class Typing(AbstractTemplate):
+        def generic(self, args, kws):
+            return signature(mask, *args) if args == (mask,) * n_args else None
+
+    @lower_builtin(op, *(Mask,) * n_args)
+    def lower(context, builder, sig, args):
+        return build(builder, *args)
+
+
+_define_mask_operator(operator.and_, 2, lambda builder, a, b: builder.and_(a, b))
+_define_mask_operator(operator.or_, 2, lambda builder, a, b: builder.or_(a, b))
+_define_mask_operator(operator.invert, 1, lambda builder, a: builder.not_(a))
+
+
+def _row_pointer(context, builder, array_type, array, row):
+    """Pointer to row `row`: of N_LANES numbers in a two-dimensional array, of one number in a one-dimensional one."""
+    data = context.make_array(array_type)(context, builder, array).data
+    if array_type.ndim == 1:
+        return builder.gep(data, [row])
+    element = builder.gep(data, [builder.mul(row, ir.Constant(row.type, N_LANES))])
+    return builder.bitcast(element, VECTOR.as_pointer())
+
+
+def _is_rows(array, dimensions):
+    return (
+        isinstance(array, types.Array)
+        and array.dtype == types.float64
+        and array.layout == "C"
+        and array.ndim in dimensions
+    )
+
+
+@intrinsic
+def load(typing_context, array, row):
+    """Row `row` of `array`: one number per robot from (rows, N_LANES), one for all robots from (rows,)."""
+    if not (_is_rows(array, (1, 2)) and isinstance(row, types.Integer)):
+        return None
+
+    def codegen(context, builder, sig, args):
+        value = builder.load(_row_pointer(context, builder, sig.args[0], *args))
+        value.align = 8
+        return _broadcast(builder, VECTOR, value) if sig.args[0].ndim == 1 else value
+
+    return lanes(array, types.intp), codegen
+
+
+@intrinsic
+def store(typing_context, array, row, value):
+    """Write `value` (lanes, or one number for all robots) to row `row` of `array`, shape (rows, N_LANES)."""
+    if not (_is_rows(array, (2,)) and isinstance(row, types.Integer)):
+        return None
+    if not (value == lanes or isinstance(value, types.Number)):
+        return None
+
+    def codegen(context, builder, sig, args):
+        pointer = _row_pointer(context, builder, sig.args[0], args[0], args[1])
+        builder.store(_as_vector(builder, sig.args[2], args[2]), pointer).align = 8
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, lanes if value == lanes else types.float64), codegen
+
+
+@intrinsic
+def splat(typing_context, value):
+    """One number for all robots, as lanes."""
+    if not isinstance(value, types.Number):
+        return None
+
+    def codegen(context, builder, sig, args):
+        return _broadcast(builder, VECTOR, args[0])
+
+    return lanes(types.float64), codegen
+
+
+@intrinsic
+def select(typing_context, condition, when_true, when_false):
+    """`when_true` for the robots in the mask `condition`, `when_false` for the others."""
+    if condition != mask or lanes not in (when_true, when_false):
+        return None
+
+    def codegen(context, builder, sig, args):
+        chosen = (_as_vector(builder, t, a) for t, a in zip(sig.args[1:], args[1:], strict=True))
+        return builder.select(args[0], *chosen)
+
+    choices = (lanes if a == lanes else types.float64 for a in (when_true, when_false))
+    return lanes(mask, *choices), codegen
+
+
+def _vector_function(name, n_args):
+    """An intrinsic that calls LLVM's vector function `name`, exact or correctly rounded for every lane."""
+
+    def build(builder, args):
+        function_type = ir.FunctionType(VECTOR, [VECTOR] * n_args)
+        function_name = f"llvm.{name}.v{N_LANES}f64"
+        function = builder.module.globals.get(function_name)
+        if function is None:
+            function = ir.Function(builder.module, function_type, name=function_name)
+        return builder.call(function, args)
+
+    return build
+
+
+@intrinsic
+def sqrt(typing_context, x):
+    """Square root, correctly rounded."""
+    if x != lanes:
+        return None
+    return lanes(lanes), lambda context, builder, sig, args: _vector_function("sqrt", 1)(builder, args)
+
+
+@intrinsic
+def absolute(typing_context, x):
+    """|x|."""
+    if x != lanes:
+        return None
+    return lanes(lanes), lambda context, builder, sig, args: _vector_function("fabs", 1)(builder, args)
+
+
+def _product_sum(typing_args, negate):
+    sig = _lanes_signature(lanes, typing_args)
+    if sig is None:
+        return None
+
+    def codegen(context, builder, sig, args):
+        c, a, b = (_as_vector(builder, t, x) for t, x in zip(sig.args, args, strict=True))
+        if negate:
+            a = builder.fsub(ir.Constant(VECTOR, [-0.0] * N_LANES), a)
+        return _vector_function("fma", 3)(builder, [a, b, c])
+
+    return sig, codegen
+
+
+@intrinsic
+def add_product(typing_context, c, a, b):
+    """c + a b, rounded once."""
+    return _product_sum((c, a, b), negate=False)
+
+
+@intrinsic
+def subtract_product(typing_context, c, a, b):
+    """c - a b, rounded once."""
+    return _product_sum((c, a, b), negate=True)
+
+
+def _mask_reduction(bits_test):
+    def codegen(context, builder, sig, args):
+        bits = builder.bitcast(args[0], ir.IntType(N_LANES))
+        return bits_test(builder, bits, ir.IntType(N_LANES))
+
+    return codegen
+
+
+@intrinsic
+def any_lane(typing_context, condition):
+    """True if the mask holds for at least one robot."""
+    if condition != mask:
+        return None
+    return types.boolean(mask), _mask_reduction(lambda b, bits, i: b.icmp_unsigned("!=", bits, ir.Constant(i, 0)))
+
+
+@intrinsic
+def all_lanes(typing_context, condition):
+    """True if the mask holds for every robot."""
+    if condition != mask:
+        return None
+    full = 2**N_LANES - 1
+    return types.boolean(mask), _mask_reduction(lambda b, bits, i: b.icmp_unsigned("==", bits, ir.Constant(i, full)))

@@ -1,0 +1,131 @@
+"""The numbers of a star of rods as the kernels read them, and the memory that the kernels work in.
+
+A star has `n_limbs` chains of nodes that share node 0, the hub. Node {j, i} (limb j from 0, i from 1) has index
+j (nodes_per_limb - 1) + i. Edge e ends at node e + 1; it starts at the hub if it is the root edge of its limb, else
+at node e. Hinge e ends with edge e: within a limb it sits at the tail of edge e, and for a root edge of limb j it is
+the hub hinge from limb j to limb j + 1, whose first edge is the root edge of limb j.
+
+Coefficients have shape (rows,) if all robots share them and (rows, N_LANES) if they differ from robot to robot:
+`load` reads either.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from seastar_gym.der.lanes import N_LANES
+
+FACTOR_ROWS = 11  # what the elimination of a node leaves for the substitution, see star_matrix.py
+ROOT_EDGE_ROWS = 5  # the geometry of a root edge, see geometry.py
+
+
+class Rods(NamedTuple):
+    """Coefficients of a star of rods.
+
+    EA: Stretching stiffness per edge [N].
+    EA_over_l: The same over the edge's natural length, per edge [N/m].
+    l_over_EA: Its reciprocal, per edge [m/N].
+    EI_over_dl: Bending stiffness over Voronoi length, per hinge [N m].
+    dl_over_EI: Its reciprocal, per hinge [1/(N m)].
+    EI_kappa_bar: Natural moment, per hinge [N m]; that of hub hinges comes from the actuators instead.
+    hub_side: +1 if hub hinges are measured by the opening angle, -1 if by the interior turning angle.
+    hub_angle: The angle of an unactuated hub hinge, measured that way [rad].
+    mass: Lumped mass, per node [kg].
+    drag: 1/2 rho_f C_d D dl_i of (13.8), per node [kg/m].
+    """
+
+    n_limbs: int
+    nodes_per_limb: int
+    EA: np.ndarray
+    EA_over_l: np.ndarray
+    l_over_EA: np.ndarray
+    EI_over_dl: np.ndarray
+    dl_over_EI: np.ndarray
+    EI_kappa_bar: np.ndarray
+    hub_side: float
+    hub_angle: float
+    mass: np.ndarray
+    drag: np.ndarray
+
+
+class Work(NamedTuple):
+    """Memory of one lane group; every array has shape (rows, N_LANES).
+
+    q, q_hat, v_hat, q_free: Iterate, start of the stage, its velocity, and its force-free end, per coordinate [m, m/s].
+    step, solution: Last Newton step taken, and the solution of the current linear system, per coordinate [m].
+    factors: Rows of the eliminated nodes, see star_matrix.py.
+    root_edges: Geometry of the root edges, see geometry.py.
+    hub_moment, hub_stiffness: Sums over the hub hinges of a limb's root edge, per limb [N m].
+    hub_coupling: 2 x 2 block of every hub hinge, four rows per limb [N/m].
+    hub_EI_kappa_bar: Natural moment of the hub hinges, per limb [N m].
+    hub_t: tan(phi/2) of the hub hinges, per limb.
+    roots, roots_rhs: Dense system of root nodes and hub, see star_matrix.py.
+    stage_v, stage_a: Velocities and accelerations of the stages of a time step [m/s, m/s^2].
+    """
+
+    q: np.ndarray
+    q_hat: np.ndarray
+    v_hat: np.ndarray
+    q_free: np.ndarray
+    step: np.ndarray
+    solution: np.ndarray
+    factors: np.ndarray
+    root_edges: np.ndarray
+    hub_moment: np.ndarray
+    hub_stiffness: np.ndarray
+    hub_coupling: np.ndarray
+    hub_EI_kappa_bar: np.ndarray
+    hub_t: np.ndarray
+    roots: np.ndarray
+    roots_rhs: np.ndarray
+    stage_v: np.ndarray
+    stage_a: np.ndarray
+
+
+class Actuation(NamedTuple):
+    """delta_psi_start, delta_psi_end: rotation of every limb at the ends of an interval [rad], shape (n_limbs, N_LANES);
+    linear in between."""
+
+    delta_psi_start: np.ndarray
+    delta_psi_end: np.ndarray
+
+
+# Rows of a lane group's report, shape (len(REPORT_ROWS), N_LANES): what happened to its robots.
+REPORT_ROWS = (
+    "newton_iterations",
+    "repairs",  # Newton steps that needed the convex matrix
+    "backtracks",  # halvings of a Newton step by the line search
+    "halvings",  # halvings of a time step
+    "covered",  # time [s]
+    "smallest_hub_t",  # smallest tan(phi/2) of a hub hinge
+)
+NEWTON_ITERATIONS, REPAIRS, BACKTRACKS, HALVINGS, COVERED, SMALLEST_HUB_T = range(len(REPORT_ROWS))
+
+
+def make_work(n_limbs: int, nodes_per_limb: int, n_stages: int) -> Work:
+    """Zeroed memory for one lane group and a scheme of `n_stages` stages."""
+    n_nodes = n_limbs * (nodes_per_limb - 1) + 1
+    n_root_rows = 2 * (n_limbs + 1)
+
+    def rows(count):
+        return np.zeros((count, N_LANES))
+
+    return Work(
+        q=rows(2 * n_nodes),
+        q_hat=rows(2 * n_nodes),
+        v_hat=rows(2 * n_nodes),
+        q_free=rows(2 * n_nodes),
+        step=rows(2 * n_nodes),
+        solution=rows(2 * n_nodes),
+        factors=rows(FACTOR_ROWS * n_nodes),
+        root_edges=rows(ROOT_EDGE_ROWS * n_limbs),
+        hub_moment=rows(n_limbs),
+        hub_stiffness=rows(n_limbs),
+        hub_coupling=rows(4 * n_limbs),
+        hub_EI_kappa_bar=rows(n_limbs),
+        hub_t=rows(n_limbs),
+        roots=rows(n_root_rows * (n_root_rows + 1) // 2),
+        roots_rhs=rows(n_root_rows),
+        stage_v=rows(2 * n_nodes * n_stages),
+        stage_a=rows(2 * n_nodes * n_stages),
+    )

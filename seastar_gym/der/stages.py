@@ -1,0 +1,135 @@
+"""Time steps: a scheme's implicit stages, and the halving of steps that do not converge."""
+
+from seastar_gym.der.compilation import kernel
+from seastar_gym.der.geometry import tangent
+from seastar_gym.der.lanes import add_product, any_lane, load, select, splat, store
+from seastar_gym.der.newton import minimise
+from seastar_gym.der.rods import BACKTRACKS, COVERED, HALVINGS, NEWTON_ITERATIONS, REPAIRS, SMALLEST_HUB_T
+
+SMALLEST_FRACTION = 2.0**-12  # of an interval: a robot whose step would have to be shorter has failed
+
+
+@kernel
+def set_natural_hub_angles(rods, work, actuation, fraction):
+    """Natural moments of the hub hinges at `fraction` (lanes) of an interval, (13.13).
+
+    The hinge from limb j to limb j + 1 has the natural angle hub_angle + delta_psi_{j+1} - delta_psi_j.
+    """
+    for a in range(rods.n_limbs):
+        b = (a + 1) % rods.n_limbs
+        start = load(actuation.delta_psi_start, b) - load(actuation.delta_psi_start, a)
+        end = load(actuation.delta_psi_end, b) - load(actuation.delta_psi_end, a)
+        angle = rods.hub_angle + add_product(start, fraction, end - start)
+        natural_moment = 2.0 * load(rods.EI_over_dl, a * (rods.nodes_per_limb - 1)) * tangent(0.5 * angle)
+        store(work.hub_EI_kappa_bar, a, natural_moment)
+
+
+@kernel
+def begin_stage(work, scheme, stage, q_0, v_0, h):
+    """q_hat, v_hat and q_free of a stage; the iterate starts at the force-free motion (13.10)."""
+    gamma = scheme.a[stage, stage] * h
+    rows = work.q.shape[0]
+    for row in range(rows):
+        q_hat, v_hat = load(q_0, row), load(v_0, row)
+        for other in range(stage):
+            weight = scheme.a[stage, other] * h
+            q_hat = add_product(q_hat, weight, load(work.stage_v, other * rows + row))
+            v_hat = add_product(v_hat, weight, load(work.stage_a, other * rows + row))
+        q_free = add_product(q_hat, gamma, v_hat)
+        store(work.q_hat, row, q_hat)
+        store(work.v_hat, row, v_hat)
+        store(work.q_free, row, q_free)
+        store(work.q, row, q_free)
+    return gamma
+
+
+@kernel
+def end_stage(work, stage, gamma):
+    """V = (Q - q_hat)/gamma and A = (V - v_hat)/gamma of a solved stage."""
+    inverse_gamma = 1.0 / gamma
+    rows = work.q.shape[0]
+    for row in range(rows):
+        velocity = (load(work.q, row) - load(work.q_hat, row)) * inverse_gamma
+        store(work.stage_v, stage * rows + row, velocity)
+        store(work.stage_a, stage * rows + row, (velocity - load(work.v_hat, row)) * inverse_gamma)
+
+
+@kernel
+def accept_step(work, scheme, q_0, v_0, h, accepted):
+    """Write the result of a step over the state (q_0, v_0) of the robots in the mask `accepted`."""
+    n_stages = scheme.b.shape[0]
+    rows = work.q.shape[0]
+    for row in range(rows):
+        q, v = load(q_0, row), load(v_0, row)
+        if scheme.stiffly_accurate:
+            q_1, v_1 = load(work.q, row), load(work.stage_v, (n_stages - 1) * rows + row)
+        else:
+            q_1, v_1 = q, v
+            for stage in range(n_stages):
+                weight = scheme.b[stage] * h
+                q_1 = add_product(q_1, weight, load(work.stage_v, stage * rows + row))
+                v_1 = add_product(v_1, weight, load(work.stage_a, stage * rows + row))
+        store(q_0, row, select(accepted, q_1, q))
+        store(v_0, row, select(accepted, v_1, v))
+
+
+@kernel
+def try_step(rods, work, scheme, actuation, q, v, start, size, h, active, tolerance, max_iterations, report):
+    """One step of length h from `start`, `size` of the interval long, for the robots in `active`.
+
+    Returns the mask of the robots whose stages all converged; their state has moved, that of the others has not.
+    """
+    going = active
+    for stage in range(scheme.b.shape[0]):
+        gamma = begin_stage(work, scheme, stage, q, v, h)
+        set_natural_hub_angles(rods, work, actuation, start + scheme.c[stage] * size)
+        going, iterations, repairs, backtracks = minimise(rods, work, gamma, going, tolerance, max_iterations)
+        end_stage(work, stage, gamma)
+        add_to_report(report, NEWTON_ITERATIONS, iterations)
+        add_to_report(report, REPAIRS, repairs)
+        add_to_report(report, BACKTRACKS, backtracks)
+    accept_step(work, scheme, q, v, h, going)
+    return going
+
+
+@kernel
+def add_to_report(report, row, amount):
+    store(report, row, load(report, row) + amount)
+
+
+@kernel
+def note_hub_angles(work, report, accepted):
+    """Keep the smallest tan(phi/2) of every robot's hub hinges."""
+    smallest = load(report, SMALLEST_HUB_T)
+    for limb in range(work.hub_t.shape[0]):
+        t = load(work.hub_t, limb)
+        smallest = select(accepted & (t < smallest), t, smallest)
+    store(report, SMALLEST_HUB_T, smallest)
+
+
+@kernel
+def cover_interval(rods, work, scheme, actuation, q, v, duration, alive, tolerance, max_iterations, report):
+    """Advance the robots in `alive` over an interval of `duration` [s], in place.
+
+    A robot whose step does not converge halves it, alone, as often as it takes, and still covers the whole interval;
+    below SMALLEST_FRACTION it has failed and keeps its last good state. Fractions are dyadic, so their sums are
+    exact. Returns the mask of the robots that arrived.
+    """
+    zero, one = splat(0.0), splat(1.0)
+    start, size = zero, one
+    moving = alive
+    while any_lane(moving):
+        h = size * duration
+        accepted = try_step(
+            rods, work, scheme, actuation, q, v, start, size, h, moving, tolerance, max_iterations, report
+        )
+        note_hub_angles(work, report, accepted)
+        rejected = moving & ~accepted
+        add_to_report(report, HALVINGS, select(rejected, one, zero))
+        add_to_report(report, COVERED, select(accepted, h, zero))
+        start = select(accepted, start + size, start)
+        size = select(rejected, 0.5 * size, size)
+        failed = rejected & (size < SMALLEST_FRACTION)
+        alive = alive & ~failed
+        moving = moving & ~failed & (start < 1.0)
+    return alive

@@ -1,0 +1,30 @@
+"""A whole sequence of time intervals for many robots, in one compiled call."""
+
+from seastar_gym.der.compilation import entry_point
+from seastar_gym.der.lanes import load, select, splat, store
+from seastar_gym.der.stages import cover_interval
+
+
+@entry_point
+def advance(rods, work, scheme, actuation, q, v, peaks, times, shape, failed, report, tolerance, max_iterations):
+    """Advance lane groups through the intervals between `times`, in place.
+
+    q, v: Positions and velocities [m, m/s], shape (n_groups, 2 n_nodes, N_LANES).
+    peaks: Rotation of every limb at full shape [rad], shape (n_groups, n_limbs, N_LANES).
+    times: Ends of the intervals [s], shape (n_intervals + 1,). shape: Share of the peak at those times, same shape.
+    failed: 0 for robots that go on, 1 for those that have failed, shape (n_groups, 1, N_LANES).
+    report: Counts and extremes, added to, shape (n_groups, len(REPORT_ROWS), N_LANES).
+    tolerance: Largest node move of the last Newton update [m].
+    """
+    for group in range(q.shape[0]):
+        alive = load(failed[group], 0) < 1.0
+        for k in range(times.shape[0] - 1):
+            for limb in range(rods.n_limbs):
+                peak = load(peaks[group], limb)
+                store(actuation.delta_psi_start, limb, peak * shape[k])
+                store(actuation.delta_psi_end, limb, peak * shape[k + 1])
+            alive = cover_interval(
+                rods, work, scheme, actuation, q[group], v[group], times[k + 1] - times[k], alive, tolerance,
+                max_iterations, report[group],
+            )  # fmt: skip
+        store(failed[group], 0, select(alive, splat(0.0), 1.0))

@@ -1,0 +1,124 @@
+"""Waypoint paths: where the hub is asked to swim, and how far it strays.
+
+A path is an array of waypoints [m], shape (n, 2), that the hub visits in order. It starts from the origin, where the
+hub rests after a reset; the origin is the start, not a waypoint, so a path that closes on itself ends with the waypoint
+(0, 0).
+"""
+
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+PathName: TypeAlias = Literal["pentagon", "square", "triangle", "line", "figure-eight", "random"]
+PATH_NAMES: tuple[PathName, ...] = get_args(PathName)
+
+PENTAGON_SIDE = 0.1636
+"""Side [m] of the pentagon that the scripted gait (13.15) traces: 45 strokes, then 5 at rest, per side."""
+SQUARE_SIDE = 0.2
+TRIANGLE_SIDE = 0.25
+LINE_LENGTH = 0.3
+
+FIGURE_EIGHT_WIDTH = 0.4
+FIGURE_EIGHT_WAYPOINTS = 16
+
+RANDOM_WAYPOINTS = 5
+RANDOM_LEG = (0.1, 0.2)
+"""Shortest and longest leg [m] of a random path."""
+RANDOM_TURN = np.radians(120.0)
+"""Largest turn [rad], to either side, from one leg of a random path to the next; the first leg is turned from +x."""
+
+
+def make_path(path: PathName | ArrayLike, rng: np.random.Generator) -> NDArray[np.float64]:
+    """The waypoints [m], shape (n, 2), of a path given by its name or as an array of waypoints [m].
+
+    Only "random" draws from `rng`. The result is a fresh array. ValueError: an unknown name, or an array that is not
+    one or more finite points of the plane.
+    """
+    if not isinstance(path, str):
+        return _checked_waypoints(path)
+    match path:
+        case "pentagon":
+            return _regular_polygon(5, PENTAGON_SIDE)
+        case "square":
+            return _regular_polygon(4, SQUARE_SIDE)
+        case "triangle":
+            return _regular_polygon(3, TRIANGLE_SIDE)
+        case "line":
+            return np.array([[LINE_LENGTH, 0.0]])
+        case "figure-eight":
+            return _figure_eight(FIGURE_EIGHT_WIDTH, FIGURE_EIGHT_WAYPOINTS)
+        case "random":
+            return _random_path(rng)
+        case _:
+            names = ", ".join(PATH_NAMES)
+            raise ValueError(f"Unknown path {path!r}: choose one of {names}, or give an array of waypoints.")
+
+
+def cross_track_error(position: ArrayLike, start: ArrayLike, end: ArrayLike) -> NDArray[np.float64]:
+    """Distance [m], shape (...), of a position from the segment between start and end [m], each of shape (..., 2).
+
+    Beyond an end of the segment, or where the segment is a single point, it is the distance from that end.
+    """
+    position, start, end = (np.asarray(point, dtype=np.float64) for point in (position, start, end))
+    # Written out by component: the same bits for one robot and for a batch of them.
+    leg_x, leg_y = end[..., 0] - start[..., 0], end[..., 1] - start[..., 1]
+    away_x, away_y = position[..., 0] - start[..., 0], position[..., 1] - start[..., 1]
+    leg_squared = leg_x * leg_x + leg_y * leg_y
+    along = away_x * leg_x + away_y * leg_y
+    fraction = np.divide(along, leg_squared, out=np.zeros(np.shape(along)), where=leg_squared > 0.0)
+    fraction = np.clip(fraction, 0.0, 1.0)
+    distance: NDArray[np.float64] = np.hypot(away_x - fraction * leg_x, away_y - fraction * leg_y)
+    return distance
+
+
+def path_length(start: ArrayLike, waypoints: ArrayLike) -> NDArray[np.float64]:
+    """Length [m], shape (...), of the way from start [m], shape (..., 2), through waypoints [m], shape (..., n, 2)."""
+    start, waypoints = np.asarray(start, dtype=np.float64), np.asarray(waypoints, dtype=np.float64)
+    first_leg = waypoints[..., 0, :] - start
+    later_legs = np.diff(waypoints, axis=-2)
+    lengths: NDArray[np.float64] = np.hypot(later_legs[..., 0], later_legs[..., 1]).sum(axis=-1)
+    return lengths + np.hypot(first_leg[..., 0], first_leg[..., 1])
+
+
+def _checked_waypoints(path: ArrayLike) -> NDArray[np.float64]:
+    try:
+        waypoints = np.array(path)
+    except ValueError as ragged:
+        raise ValueError("A path must have shape (n, 2): one x and one y [m] for every waypoint.") from ragged
+    if waypoints.size == 0:
+        raise ValueError("A path needs at least one waypoint.")
+    if waypoints.dtype.kind not in "iuf":
+        raise ValueError(f"A path must be a name or an array of numbers [m], not {waypoints.dtype} values.")
+    if waypoints.ndim != 2 or waypoints.shape[1] != 2:
+        raise ValueError(f"A path must have shape (n, 2), x and y [m] of every waypoint, not {waypoints.shape}.")
+    if not np.isfinite(waypoints).all():
+        raise ValueError("Every waypoint of a path must be finite: this one has NaN or infinite coordinates.")
+    return waypoints.astype(np.float64)
+
+
+def _regular_polygon(n_sides: int, side: float) -> NDArray[np.float64]:
+    """The corners from the second one round to the origin again: the first side along +x, turning left."""
+    headings = 2.0 * np.pi / n_sides * np.arange(n_sides, dtype=np.float64)
+    waypoints = _walk(np.full(n_sides, side), headings)
+    waypoints[-1] = 0.0  # closes exactly, not to rounding
+    return waypoints
+
+
+def _figure_eight(width: float, n_waypoints: int) -> NDArray[np.float64]:
+    """Gerono's lemniscate, from its crossing at the origin through both loops and back; n_waypoints must be even."""
+    t = 2.0 * np.pi * np.arange(1, n_waypoints + 1) / n_waypoints
+    waypoints = width / 2.0 * np.column_stack([np.sin(t), np.sin(t) * np.cos(t)])
+    waypoints[[n_waypoints // 2 - 1, -1]] = 0.0  # the crossing, exactly
+    return waypoints
+
+
+def _random_path(rng: np.random.Generator) -> NDArray[np.float64]:
+    legs = rng.uniform(*RANDOM_LEG, size=RANDOM_WAYPOINTS)
+    turns = rng.uniform(-RANDOM_TURN, RANDOM_TURN, size=RANDOM_WAYPOINTS)
+    return _walk(legs, np.cumsum(turns))
+
+
+def _walk(legs: NDArray[np.float64], headings: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Where a walk from the origin, with legs [m] along headings [rad], turns."""
+    return np.cumsum(legs[:, None] * np.column_stack([np.cos(headings), np.sin(headings)]), axis=0)

@@ -1,0 +1,1 @@
+"""Robots as stars of rods: nodes, edges, hinges and their coefficients."""

@@ -1,0 +1,196 @@
+"""What is modelled: robot, fluid, actuator and numerics, as frozen dataclasses in SI units with the chapter's values.
+
+Each part checks itself, and a `Scene` checks what the parts can be together; what cannot be modelled is refused with
+a sentence that says why.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+import numpy as np
+
+from seastar_gym.actuation.sma import pulse
+from seastar_gym.morphology.seastar import make_rods, rest_positions
+
+HubHinge = Literal["opening", "turning"]
+SchemeName = Literal["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
+
+
+def _require_number(name: str, value: float, unit: str, *, zero_allowed: bool = False) -> None:
+    is_number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    if not is_number or not math.isfinite(value) or value < 0 or (value == 0 and not zero_allowed):
+        kind = "a finite number, not negative" if zero_allowed else "a positive, finite number"
+        raise ValueError(f"{name} must be {kind} [{unit}], not {value!r}.")
+
+
+def _require_count(name: str, value: int, smallest: int, largest: int) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not smallest <= value <= largest:
+        raise ValueError(f"{name} must be a whole number from {smallest} to {largest}, not {value!r}.")
+
+
+def _require_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}, not {value!r}.")
+
+
+@dataclass(frozen=True)
+class Seastar:
+    """A robot of straight, equal, uniform limbs around a hub (Fig. 13.4a).
+
+    n_limbs: Number of limbs. nodes_per_limb: N, with the hub. limb_length: L [m]. rod_radius: r_0 [m].
+    youngs_modulus: E [Pa]. density: rho_m [kg/m^3].
+    hub_hinge: "opening" measures a hub hinge by the angle psi between its two limbs; "turning" by the interior
+        turning angle pi - psi, as the published codes of the chapter's authors do.
+    """
+
+    n_limbs: int = 5
+    nodes_per_limb: int = 10
+    limb_length: float = 0.1
+    rod_radius: float = 1.6e-3
+    youngs_modulus: float = 1e6
+    density: float = 1000.0
+    hub_hinge: HubHinge = "opening"
+
+    def __post_init__(self):
+        _require_count("n_limbs", self.n_limbs, 3, 12)
+        _require_count("nodes_per_limb", self.nodes_per_limb, 2, 10_000)
+        _require_number("limb_length", self.limb_length, "m")
+        _require_number("rod_radius", self.rod_radius, "m")
+        _require_number("youngs_modulus", self.youngs_modulus, "Pa")
+        _require_number("density", self.density, "kg/m^3")
+        _require_choice("hub_hinge", self.hub_hinge, get_args(HubHinge))
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes, n_limbs (N - 1) + 1."""
+        return self.n_limbs * (self.nodes_per_limb - 1) + 1
+
+    @property
+    def edge_length(self) -> float:
+        """Natural length of an edge [m]."""
+        return self.limb_length / (self.nodes_per_limb - 1)
+
+    @property
+    def opening_angle(self) -> float:
+        """Angle between neighbouring limbs at rest [rad]."""
+        return 2.0 * math.pi / self.n_limbs
+
+    def nodes(self) -> np.ndarray:
+        """Node positions at rest [m], shape (n_nodes, 2): hub, {1,1}..{1,N-1}, {2,1}.. ; limb 1 along +x."""
+        return rest_positions(self.n_limbs, self.nodes_per_limb, self.limb_length)
+
+
+@dataclass(frozen=True)
+class Water:
+    """A fluid at rest with the quadratic drag of (13.8). density: rho_f [kg/m^3]. drag_coefficient: C_d."""
+
+    density: float = 1000.0
+    drag_coefficient: float = 1.0
+
+    def __post_init__(self):
+        _require_number("density", self.density, "kg/m^3", zero_allowed=True)
+        _require_number("drag_coefficient", self.drag_coefficient, "1", zero_allowed=True)
+
+
+@dataclass(frozen=True)
+class SmaPulse:
+    """The actuator of Fig. 13.5b. peak_angle [rad], heating_time: Delta t_1 [s], cooling_time: Delta t_2 [s]."""
+
+    peak_angle: float = math.pi / 5
+    heating_time: float = 0.1
+    cooling_time: float = 0.9
+
+    def __post_init__(self):
+        _require_number("peak_angle", self.peak_angle, "rad", zero_allowed=True)
+        _require_number("heating_time", self.heating_time, "s")
+        _require_number("cooling_time", self.cooling_time, "s")
+
+    @property
+    def period(self) -> float:
+        """Delta t_0 [s], the length of a stroke."""
+        return self.heating_time + self.cooling_time
+
+    @property
+    def corners(self) -> tuple[float, float, float]:
+        """Times within a stroke [s] that no time step may straddle."""
+        return 0.0, self.heating_time, self.period
+
+    def delta_psi(self, t):
+        """Rotation of a limb with command 1 at time t [s] of a stroke [rad]; t of any shape."""
+        return self.peak_angle * pulse(t, self.heating_time, self.cooling_time)
+
+
+@dataclass(frozen=True)
+class Numerics:
+    """Time stepping.
+
+    scheme: "implicit-euler" is the chapter's (13.9). step: h [s]; the last step before a corner of the pulse is
+        shortened.
+    newton_tolerance: Largest node move of the last Newton update, over the limb length.
+    max_iterations: Newton iterations per stage before the robot's step is halved.
+    """
+
+    scheme: SchemeName = "implicit-euler"
+    step: float = 3e-3
+    newton_tolerance: float = 1e-8
+    max_iterations: int = 60
+
+    def __post_init__(self):
+        _require_choice("scheme", self.scheme, get_args(SchemeName))
+        _require_number("step", self.step, "s")
+        _require_number("newton_tolerance", self.newton_tolerance, "limb lengths")
+        _require_count("max_iterations", self.max_iterations, 2, 10_000)
+        if self.newton_tolerance > 1e-2:
+            raise ValueError(f"newton_tolerance must be at most 0.01 limb lengths, not {self.newton_tolerance!r}.")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A robot, the fluid around it (None: vacuum), its actuator and the numerics."""
+
+    robot: Seastar = field(default_factory=Seastar)
+    fluid: Water | None = field(default_factory=Water)
+    actuator: SmaPulse = field(default_factory=SmaPulse)
+    numerics: Numerics = field(default_factory=Numerics)
+
+    def __post_init__(self):
+        for name, value, kinds in (
+            ("robot", self.robot, Seastar),
+            ("fluid", self.fluid, Water | None),
+            ("actuator", self.actuator, SmaPulse),
+            ("numerics", self.numerics, Numerics),
+        ):
+            if not isinstance(value, kinds):
+                raise ValueError(f"Scene.{name} must be a {kinds}, not {value!r}.")
+        self._check_hub_hinges()
+
+    def _check_hub_hinges(self) -> None:
+        """Neighbours turned apart open their hub hinge by two peak angles; at pi its curvature is infinite."""
+        rest, peak = self.robot.opening_angle, self.actuator.peak_angle
+        limit = 0.5 * (math.pi - rest)
+        if peak >= limit:
+            raise ValueError(
+                f"A peak angle of {peak:.4g} rad lets the natural angle of a hub hinge reach pi, where its curvature "
+                f"is infinite: for {self.robot.n_limbs} limbs the peak angle must stay below {limit:.4g} rad."
+            )
+        if self.robot.hub_hinge == "turning" and 2.0 * peak > rest * (1.0 + 1e-12):
+            raise ValueError(
+                f'With hub_hinge="turning" the natural opening angle must stay above zero: for {self.robot.n_limbs} '
+                f"limbs the peak angle must be at most {0.5 * rest:.4g} rad, not {peak:.4g} rad."
+            )
+
+    def rods(self):
+        """The scene's coefficients for the kernels, see der/rods.py."""
+        robot, fluid = self.robot, self.fluid
+        return make_rods(
+            n_limbs=robot.n_limbs,
+            nodes_per_limb=robot.nodes_per_limb,
+            limb_length=robot.limb_length,
+            rod_radius=robot.rod_radius,
+            youngs_modulus=robot.youngs_modulus,
+            density=robot.density,
+            hub_hinge=robot.hub_hinge,
+            fluid_density=0.0 if fluid is None else fluid.density,
+            drag_coefficient=0.0 if fluid is None else fluid.drag_coefficient,
+        )

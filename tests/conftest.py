@@ -1,0 +1,25 @@
+"""Options and settings that every test shares."""
+
+import os
+
+import pytest
+from hypothesis import settings
+
+# Before anything imports matplotlib, here or in a subprocess: the tests have no display.
+os.environ["MPLBACKEND"] = "Agg"
+
+# A first example may wait for the compiler, and continuous integration shall fail for the change, not for the draw.
+settings.register_profile("seastar", deadline=None, derandomize="CI" in os.environ)
+settings.load_profile("seastar")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--slow", action="store_true", help="also run the tests marked slow")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if config.getoption("--slow"):
+        return
+    for item in items:
+        if item.get_closest_marker("slow"):
+            item.add_marker(pytest.mark.skip(reason="slow: runs with --slow"))

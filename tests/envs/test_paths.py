@@ -1,0 +1,187 @@
+"""Paths visit what their names say, refuse what is no path, and measure distance along and across themselves."""
+
+import numpy as np
+import pytest
+
+from seastar_gym.envs.paths import PATH_NAMES, cross_track_error, make_path, path_length
+
+ORIGIN = np.zeros(2)
+
+
+def path_of(path, seed=0):
+    return make_path(path, np.random.default_rng(seed))
+
+
+def legs_and_turns(waypoints):
+    legs = np.diff(np.vstack([ORIGIN, waypoints]), axis=0)
+    headings = np.arctan2(legs[:, 1], legs[:, 0])
+    turns = (np.diff(np.concatenate([[0.0], headings])) + np.pi) % (2 * np.pi) - np.pi
+    return np.hypot(*legs.T), turns
+
+
+def test_names_are_the_documented_ones():
+    assert PATH_NAMES == ("pentagon", "square", "triangle", "line", "figure-eight", "random")
+
+
+@pytest.mark.parametrize("name", PATH_NAMES)
+def test_every_name_makes_finite_waypoints_away_from_each_other(name):
+    waypoints = path_of(name)
+    assert waypoints.dtype == np.float64
+    assert waypoints.ndim == 2 and waypoints.shape[1] == 2 and len(waypoints) >= 1
+    assert np.isfinite(waypoints).all()
+    lengths, _ = legs_and_turns(waypoints)
+    assert lengths.min() > 0.03
+
+
+@pytest.mark.parametrize("name, n_sides, side", [("pentagon", 5, 0.1636), ("square", 4, 0.2), ("triangle", 3, 0.25)])
+def test_polygons_have_equal_sides_equal_left_turns_and_close_exactly(name, n_sides, side):
+    waypoints = path_of(name)
+    lengths, turns = legs_and_turns(waypoints)
+    assert len(waypoints) == n_sides
+    np.testing.assert_allclose(lengths, side, rtol=1e-12)
+    np.testing.assert_allclose(turns[0], 0.0, atol=1e-15)
+    np.testing.assert_allclose(turns[1:], 2 * np.pi / n_sides, rtol=1e-12)
+    np.testing.assert_array_equal(waypoints[-1], ORIGIN)
+
+
+def test_line_is_one_waypoint_ahead():
+    np.testing.assert_array_equal(path_of("line"), [[0.3, 0.0]])
+
+
+def test_figure_eight_passes_the_origin_twice_and_is_symmetric():
+    waypoints = path_of("figure-eight")
+    assert len(waypoints) == 16
+    np.testing.assert_array_equal(waypoints[[7, 15]], np.zeros((2, 2)))
+    np.testing.assert_allclose(np.ptp(waypoints[:, 0]), 0.4, rtol=1e-12)
+    np.testing.assert_allclose(waypoints[8:] * [-1, 1], waypoints[:8], atol=1e-15)
+
+
+def test_figure_eight_turns_smoothly():
+    _, turns = legs_and_turns(path_of("figure-eight"))
+    assert np.abs(np.degrees(turns[1:])).max() < 60.0
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_random_legs_and_turns_stay_in_their_ranges(seed):
+    waypoints = path_of("random", seed)
+    lengths, turns = legs_and_turns(waypoints)
+    assert len(waypoints) == 5
+    assert lengths.min() >= 0.1 - 1e-12 and lengths.max() <= 0.2 + 1e-12
+    assert np.abs(np.degrees(turns)).max() <= 120.0 + 1e-9
+
+
+def test_random_turns_fill_their_range():
+    turns = np.degrees([legs_and_turns(path_of("random", seed))[1] for seed in range(200)])
+    assert turns.min() < -115.0 and turns.max() > 115.0
+    assert abs(turns.mean()) < 3 * 240.0 / np.sqrt(12 * turns.size)
+
+
+def test_random_paths_follow_their_seed():
+    np.testing.assert_array_equal(path_of("random", 7), path_of("random", 7))
+    assert not np.array_equal(path_of("random", 7), path_of("random", 8))
+
+
+@pytest.mark.parametrize("name", [name for name in PATH_NAMES if name != "random"])
+def test_only_random_paths_draw_from_the_generator(name):
+    rng = np.random.default_rng(3)
+    before = rng.bit_generator.state
+    make_path(name, rng)
+    assert rng.bit_generator.state == before
+
+
+@pytest.mark.parametrize("given", [[[0.1, 0.2]], [(1, 2), (3, 4)], np.array([[0.1, 0.2]], dtype=np.float32)])
+def test_an_array_of_waypoints_is_its_own_path(given):
+    waypoints = path_of(given)
+    assert waypoints.dtype == np.float64
+    np.testing.assert_array_equal(waypoints, np.asarray(given, dtype=np.float64))
+
+
+def test_a_path_shares_no_memory_with_the_array_given():
+    given = np.array([[0.1, 0.2], [0.3, 0.4]])
+    assert not np.shares_memory(path_of(given), given)
+
+
+@pytest.mark.parametrize(
+    "path, sentence",
+    [
+        ("hexagon", r"Unknown path 'hexagon': choose one of pentagon, square, triangle, line, figure-eight, random"),
+        ("", r"Unknown path '': choose one of pentagon"),
+        ([[0.1, np.nan]], r"must be finite"),
+        ([[0.1, 0.0], [np.inf, 0.0]], r"must be finite"),
+        ([0.1, 0.2], r"must have shape \(n, 2\).*not \(2,\)"),
+        ([[0.1, 0.2, 0.3]], r"must have shape \(n, 2\).*not \(1, 3\)"),
+        (np.zeros((2, 3, 2)), r"must have shape \(n, 2\).*not \(2, 3, 2\)"),
+        ([[0.1, 0.2], [0.3]], r"must have shape \(n, 2\)"),
+        ([], r"at least one waypoint"),
+        (np.zeros((0, 2)), r"at least one waypoint"),
+        ([["a", "b"]], r"array of numbers"),
+        (None, r"array of numbers"),
+        ([[1j, 0.0]], r"array of numbers"),
+        ({"x": 1.0}, r"array of numbers"),
+    ],
+)
+def test_what_is_no_path_is_refused_with_a_sentence(path, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        path_of(path)
+
+
+@pytest.mark.parametrize(
+    "position, distance",
+    [
+        ([1.0, 0.5], 0.5),  # beside the segment
+        ([1.0, -0.5], 0.5),
+        ([2.0, 0.0], 0.0),  # on it
+        ([-3.0, 4.0], 5.0),  # behind its start
+        ([7.0, 4.0], 5.0),  # beyond its end
+    ],
+)
+def test_cross_track_error_is_the_distance_from_the_segment(position, distance):
+    assert cross_track_error(position, [0.0, 0.0], [4.0, 0.0]) == pytest.approx(distance, abs=1e-15)
+
+
+def test_cross_track_error_of_a_point_is_the_distance_from_it():
+    assert cross_track_error([3.0, 5.0], [0.0, 1.0], [0.0, 1.0]) == 5.0
+
+
+def test_cross_track_error_turns_and_mirrors_with_its_arguments():
+    rng = np.random.default_rng(0)
+    position, start, end = rng.normal(size=(3, 100, 2))
+    angle = 1.234
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]) @ np.diag([1.0, -1.0])
+    turned = cross_track_error(position @ turn.T, start @ turn.T, end @ turn.T)
+    np.testing.assert_allclose(turned, cross_track_error(position, start, end), atol=1e-14)
+    np.testing.assert_allclose(turned, cross_track_error(position @ turn.T, end @ turn.T, start @ turn.T), atol=1e-14)
+
+
+def test_cross_track_error_is_the_least_distance_over_the_segment():
+    rng = np.random.default_rng(1)
+    position, start, end = rng.normal(size=(3, 50, 2))
+    on_segment = start + np.linspace(0.0, 1.0, 20001)[:, None, None] * (end - start)
+    least = np.hypot(*np.moveaxis(position - on_segment, -1, 0)).min(axis=0)
+    np.testing.assert_allclose(cross_track_error(position, start, end), least, atol=1e-4)
+
+
+def test_a_batch_of_cross_track_errors_has_the_bits_of_single_ones():
+    rng = np.random.default_rng(2)
+    position, start, end = rng.normal(size=(3, 7, 3, 2))
+    start[0, 0] = end[0, 0]
+    batch = cross_track_error(position, start, end)
+    assert batch.shape == (7, 3)
+    for index in np.ndindex(7, 3):
+        assert cross_track_error(position[index], start[index], end[index]) == batch[index]
+
+
+def test_cross_track_error_broadcasts_one_segment_over_many_positions():
+    assert cross_track_error(np.zeros((4, 2)), [1.0, -1.0], [1.0, 1.0]).tolist() == [1.0] * 4
+
+
+def test_path_length_sums_the_legs_from_the_start():
+    assert path_length(ORIGIN, path_of("pentagon")) == pytest.approx(5 * 0.1636, rel=1e-12)
+    assert path_length([0.3, 0.4], path_of("line")) == pytest.approx(0.4, rel=1e-12)
+
+
+def test_path_length_takes_leading_batch_axes():
+    starts, waypoints = np.zeros((6, 2)), np.tile(path_of("square"), (6, 1, 1))
+    lengths = path_length(starts, waypoints)
+    assert lengths.shape == (6,)
+    np.testing.assert_allclose(lengths, 0.8, rtol=1e-12)

@@ -1,0 +1,387 @@
+"""The physics of the chapter once more: dense, slow and obvious, as the oracle of the fast kernels.
+
+Nothing here is shared with the package, and where there are two ways to write a formula this file takes the one that
+the kernels do not take: the turning angle comes from ``arctan2``, its derivatives from those of the edges' directions,
+every matrix is dense, and every edge reaches its nodes through its own difference matrix e = D q.
+
+States are arrays of shape (n_nodes, 2): positions q [m] and velocities v [m/s], nodes ordered hub, {1,1}..{1,N-1},
+{2,1}... Gradients have that shape too; Hessians and Jacobians are (2 n_nodes, 2 n_nodes), in the order of (13.1).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Star:
+    """A star of limbs in a fluid, with the values of section 13.4; SI units, drag_coefficient = 0 is vacuum."""
+
+    n_limbs: int = 5
+    nodes_per_limb: int = 10
+    limb_length: float = 0.1
+    rod_radius: float = 1.6e-3
+    youngs_modulus: float = 1e6
+    density: float = 1000.0
+    fluid_density: float = 1000.0
+    drag_coefficient: float = 1.0
+    hub_hinge: str = "opening"
+
+    @property
+    def n_nodes(self) -> int:
+        """The hub and the nodes_per_limb - 1 own nodes of every limb: 46 in the chapter."""
+        return 1 + self.n_limbs * (self.nodes_per_limb - 1)
+
+    @property
+    def edge_length(self) -> float:
+        """Undeformed length l of every edge [m]; also the Voronoi length dl of every hinge (13.3)."""
+        return self.limb_length / (self.nodes_per_limb - 1)
+
+    @property
+    def EA(self) -> float:
+        """Axial stiffness [N] (13.2)."""
+        return self.youngs_modulus * np.pi * self.rod_radius**2
+
+    @property
+    def EI(self) -> float:
+        """Bending stiffness [N m2] (13.3), with I = pi r0^4 / 4."""
+        return self.youngs_modulus * np.pi * self.rod_radius**4 / 4.0
+
+    def node(self, limb: int, i: int) -> int:
+        """Row of node {limb, i}, limb counted from 0; i = 0 is the hub."""
+        return 0 if i == 0 else limb * (self.nodes_per_limb - 1) + i
+
+    def edge(self, limb: int, i: int) -> int:
+        """Index of the edge from node {limb, i} to {limb, i + 1}."""
+        return limb * (self.nodes_per_limb - 1) + i
+
+    @cached_property
+    def edges(self) -> list[tuple[int, int]]:
+        """Edges as (tail, head), limb by limb, from the hub outwards."""
+        return [
+            (self.node(limb, i), self.node(limb, i + 1))
+            for limb in range(self.n_limbs)
+            for i in range(self.nodes_per_limb - 1)
+        ]
+
+    @cached_property
+    def hinges(self) -> list[tuple[int, int, int]]:
+        """Hinges as (edge_a, edge_b, sign): those inside the limbs, then those of the hub.
+
+        The turning angle goes from sign * edge_a to edge_b. sign is -1 at a turning-angle hub alone, where edge_a is
+        walked inwards before edge_b is walked outwards.
+        """
+        inner = [
+            (self.edge(limb, i), self.edge(limb, i + 1), 1)
+            for limb in range(self.n_limbs)
+            for i in range(self.nodes_per_limb - 2)
+        ]
+        sign = {"opening": 1, "turning": -1}[self.hub_hinge]
+        hub = [(self.edge(j, 0), self.edge((j + 1) % self.n_limbs, 0), sign) for j in range(self.n_limbs)]
+        return inner + hub
+
+    @cached_property
+    def rest(self) -> Array:
+        """Rest positions [m], shape (n_nodes, 2): straight limbs, limb 1 along +x, the others anti-clockwise."""
+        q = np.zeros((self.n_nodes, 2))
+        for limb in range(self.n_limbs):
+            angle = 2.0 * np.pi * limb / self.n_limbs
+            for i in range(1, self.nodes_per_limb):
+                q[self.node(limb, i)] = i * self.edge_length * np.array([np.cos(angle), np.sin(angle)])
+        return q
+
+    @cached_property
+    def voronoi_lengths(self) -> Array:
+        """Length that belongs to each node [m], shape (n_nodes,): half of every edge it ends."""
+        lengths = np.zeros(self.n_nodes)
+        for tail, head in self.edges:
+            lengths[tail] += self.edge_length / 2.0
+            lengths[head] += self.edge_length / 2.0
+        return lengths
+
+    @cached_property
+    def masses(self) -> Array:
+        """Lumped masses [kg], shape (n_nodes,)."""
+        return self.density * np.pi * self.rod_radius**2 * self.voronoi_lengths
+
+    @cached_property
+    def drag(self) -> Array:
+        """1/2 rho_f C_d D dl_i of (13.8) [kg/m], shape (n_nodes,)."""
+        return 0.5 * self.fluid_density * self.drag_coefficient * 2.0 * self.rod_radius * self.voronoi_lengths
+
+    @cached_property
+    def differences(self) -> list[Array]:
+        """For each edge the matrix D, shape (2, 2 n_nodes), with e = D q for a flat q."""
+        matrices = []
+        for tail, head in self.edges:
+            D = np.zeros((2, 2 * self.n_nodes))
+            D[:, 2 * tail : 2 * tail + 2] = -np.eye(2)
+            D[:, 2 * head : 2 * head + 2] = np.eye(2)
+            matrices.append(D)
+        return matrices
+
+
+def stretching_energy(e: Array, EA: float, length: float) -> float:
+    """Stretching energy of one edge [J] (13.2)."""
+    strain = np.linalg.norm(e) / length - 1.0
+    return float(0.5 * EA * strain**2 * length)
+
+
+def stretching_gradient(e: Array, EA: float, length: float) -> Array:
+    """Derivative of (13.2) in the edge vector [N], shape (2,): the axial force along the edge."""
+    size = float(np.linalg.norm(e))
+    return EA * (size / length - 1.0) * e / size
+
+
+def stretching_hessian(e: Array, EA: float, length: float) -> Array:
+    """Second derivative of (13.2) in the edge vector [N/m], shape (2, 2): along the edge, and across it."""
+    size = float(np.linalg.norm(e))
+    strain = size / length - 1.0
+    along = np.outer(e, e) / size**2
+    return EA / length * along + EA * strain / size * (np.eye(2) - along)
+
+
+def direction_gradient(e: Array) -> Array:
+    """Gradient of theta(e) = atan2(e_y, e_x) [rad/m], shape (2,)."""
+    return np.array([-e[1], e[0]]) / (e @ e)
+
+
+def direction_hessian(e: Array) -> Array:
+    """Hessian of theta(e) = atan2(e_y, e_x) [rad/m2], shape (2, 2)."""
+    x, y = e
+    return np.array([[2.0 * x * y, y * y - x * x], [y * y - x * x, -2.0 * x * y]]) / (e @ e) ** 2
+
+
+def turning_angle(a: Array, b: Array) -> float:
+    """Angle from a to b [rad], in (-pi, pi] (13.4)."""
+    return float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b))
+
+
+def curvature(phi: float, dl: float) -> float:
+    """kappa = 2 tan(phi/2) / dl [1/m], below (13.3)."""
+    return float(2.0 * np.tan(phi / 2.0) / dl)
+
+
+def natural_angles(star: Star, delta_psi: ArrayLike) -> Array:
+    """Natural angle of every hinge [rad], shape (n_hinges,), for limbs turned by delta_psi [rad], shape (n_limbs,).
+
+    Zero inside a limb. At the hub psi_bar = 2 pi / n_limbs + delta_psi_{j+1} - delta_psi_j, or psi_bar - pi when the
+    hinge is measured by its turning angle.
+    """
+    delta = np.asarray(delta_psi, dtype=float)
+    psi_bar = 2.0 * np.pi / star.n_limbs + np.roll(delta, -1) - delta
+    hub = psi_bar if star.hub_hinge == "opening" else psi_bar - np.pi
+    return np.concatenate([np.zeros(len(star.hinges) - star.n_limbs), hub])
+
+
+def edge_vectors(star: Star, q: Array) -> list[Array]:
+    """Edge vectors e = D q [m]."""
+    return [D @ q.ravel() for D in star.differences]
+
+
+def hinge_terms(star: Star, q: Array, delta_psi: ArrayLike) -> Iterator[tuple[int, int, float, float]]:
+    """For every hinge: edge_a, edge_b, phi [rad] and kappa - kappa_bar [1/m]."""
+    e = edge_vectors(star, q)
+    for (a, b, sign), phi_bar in zip(star.hinges, natural_angles(star, delta_psi), strict=True):
+        phi = turning_angle(sign * e[a], e[b])
+        yield a, b, phi, curvature(phi, star.edge_length) - curvature(phi_bar, star.edge_length)
+
+
+def elastic_energy(star: Star, q: Array, delta_psi: ArrayLike) -> float:
+    """Total elastic energy [J] (13.14), each hub hinge with the length dl that (13.13) lacks."""
+    stretching = sum(stretching_energy(e, star.EA, star.edge_length) for e in edge_vectors(star, q))
+    bending = sum(0.5 * star.EI * bent**2 * star.edge_length for _, _, _, bent in hinge_terms(star, q, delta_psi))
+    return stretching + bending
+
+
+def elastic_gradient(star: Star, q: Array, delta_psi: ArrayLike) -> Array:
+    """Gradient of (13.14) [N], shape (n_nodes, 2): minus the internal force (13.6)."""
+    D, e, dl = star.differences, edge_vectors(star, q), star.edge_length
+    gradient = np.zeros(2 * star.n_nodes)
+    for i in range(len(e)):
+        gradient += D[i].T @ stretching_gradient(e[i], star.EA, dl)
+    for a, b, phi, bent in hinge_terms(star, q, delta_psi):
+        kappa_phi = (1.0 + np.tan(phi / 2.0) ** 2) / dl
+        phi_q = D[b].T @ direction_gradient(e[b]) - D[a].T @ direction_gradient(e[a])
+        gradient += star.EI * dl * bent * kappa_phi * phi_q
+    return gradient.reshape(-1, 2)
+
+
+def elastic_hessian(star: Star, q: Array, delta_psi: ArrayLike) -> Array:
+    """Hessian of (13.14) [N/m], shape (2 n_nodes, 2 n_nodes): the second term of (13.12)."""
+    D, e, dl = star.differences, edge_vectors(star, q), star.edge_length
+    hessian = np.zeros((2 * star.n_nodes, 2 * star.n_nodes))
+    for i in range(len(e)):
+        hessian += D[i].T @ stretching_hessian(e[i], star.EA, dl) @ D[i]
+    for a, b, phi, bent in hinge_terms(star, q, delta_psi):
+        t = np.tan(phi / 2.0)
+        kappa_phi, kappa_phi_phi = (1.0 + t**2) / dl, t * (1.0 + t**2) / dl
+        phi_q = D[b].T @ direction_gradient(e[b]) - D[a].T @ direction_gradient(e[a])
+        phi_qq = D[b].T @ direction_hessian(e[b]) @ D[b] - D[a].T @ direction_hessian(e[a]) @ D[a]
+        hessian += star.EI * dl * (kappa_phi**2 + bent * kappa_phi_phi) * np.outer(phi_q, phi_q)
+        hessian += star.EI * dl * bent * kappa_phi * phi_qq
+    return hessian
+
+
+def drag_potential(star: Star, v: Array) -> float:
+    """Dissipation potential 1/6 rho_f C_d D |v|^3 dl, summed over the nodes [W]."""
+    return float(np.sum(star.drag * np.linalg.norm(v, axis=1) ** 3 / 3.0))
+
+
+def drag_force(star: Star, v: Array) -> Array:
+    """Drag force on every node [N], shape (n_nodes, 2) (13.8)."""
+    speed: Array = np.linalg.norm(v, axis=1)
+    return -(star.drag * speed)[:, None] * v
+
+
+def drag_jacobian(star: Star, v: Array) -> Array:
+    """Derivative of (13.8) in the velocities [N s/m], shape (2 n_nodes, 2 n_nodes); zero for a node at rest."""
+    jacobian = np.zeros((2 * star.n_nodes, 2 * star.n_nodes))
+    for i, v_i in enumerate(v):
+        speed = np.linalg.norm(v_i)
+        if speed > 0.0:
+            block = -star.drag[i] * (speed * np.eye(2) + np.outer(v_i, v_i) / speed)
+            jacobian[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = block
+    return jacobian
+
+
+def kinetic_energy(star: Star, v: Array) -> float:
+    """1/2 v M v [J]."""
+    return float(0.5 * np.sum(star.masses[:, None] * v**2))
+
+
+def incremental_potential(
+    star: Star, q: Array, q_hat: Array, v_hat: Array, gamma: float, delta_psi: ArrayLike
+) -> float:
+    """Phi(q) [J], whose stationary point solves (13.9) for v = (q - q_hat) / gamma."""
+    inertia = kinetic_energy(star, (q - q_hat) / gamma - v_hat)
+    return inertia + elastic_energy(star, q, delta_psi) + gamma * drag_potential(star, (q - q_hat) / gamma)
+
+
+def incremental_gradient(star: Star, q: Array, q_hat: Array, v_hat: Array, gamma: float, delta_psi: ArrayLike) -> Array:
+    """Gradient of Phi [N], shape (n_nodes, 2): the residual f of (13.9)."""
+    v = (q - q_hat) / gamma
+    return star.masses[:, None] * (v - v_hat) / gamma + elastic_gradient(star, q, delta_psi) - drag_force(star, v)
+
+
+def incremental_hessian(star: Star, q: Array, q_hat: Array, gamma: float, delta_psi: ArrayLike) -> Array:
+    """Hessian of Phi [N/m], shape (2 n_nodes, 2 n_nodes): the Jacobian J of (13.12)."""
+    inertia = np.diag(np.repeat(star.masses, 2)) / gamma**2
+    return inertia + elastic_hessian(star, q, delta_psi) - drag_jacobian(star, (q - q_hat) / gamma) / gamma
+
+
+def descent(hessian: Array, gradient: Array) -> Array:
+    """Newton's update (13.11) [m], shape (n_nodes, 2); the diagonal is raised until a Cholesky factor exists."""
+    smallest = 1e-3 * np.min(np.abs(np.diag(hessian)))
+    for shift in (0.0, *smallest * 10.0 ** np.arange(20)):
+        shifted = hessian + shift * np.eye(len(hessian))
+        try:
+            np.linalg.cholesky(shifted)
+        except np.linalg.LinAlgError:
+            continue
+        update: Array = -np.linalg.solve(shifted, gradient.ravel())
+        return update.reshape(-1, 2)
+    raise RuntimeError("no diagonal shift makes the Hessian of the incremental potential positive definite")
+
+
+def backtracked(star: Star, q: Array, update: Array, slope: float, *stage_data: Any) -> float:
+    """Largest fraction 1, 1/2, 1/4.. of the update along which Phi falls by 1e-4 of what its slope [J] promises.
+
+    The slack is what rounding can do to the comparison of two values of Phi; it only counts next to the minimum.
+    """
+    phi = incremental_potential(star, q, *stage_data)
+    slack = 1e-14 * phi + 1e-12 * star.EI / star.limb_length
+    for fraction in 0.5 ** np.arange(60):
+        if incremental_potential(star, q + fraction * update, *stage_data) <= phi + 1e-4 * fraction * slope + slack:
+            return float(fraction)
+    raise RuntimeError("no fraction of the Newton update lowers the incremental potential")
+
+
+def stage(
+    star: Star, q_hat: Array, v_hat: Array, gamma: float, delta_psi: ArrayLike, max_iterations: int = 500
+) -> tuple[Array, Array]:
+    """Positions [m] and velocities [m/s] of one implicit stage: the minimum of Phi, from the guess (13.10).
+
+    Newton with backtracking on Phi, until a full update moves no node by more than 1e-12 limb lengths.
+    """
+    q = q_hat + gamma * v_hat
+    for _ in range(max_iterations):
+        gradient = incremental_gradient(star, q, q_hat, v_hat, gamma, delta_psi)
+        update = descent(incremental_hessian(star, q, q_hat, gamma, delta_psi), gradient)
+        fraction = backtracked(star, q, update, float(np.sum(gradient * update)), q_hat, v_hat, gamma, delta_psi)
+        q = q + fraction * update
+        if fraction == 1.0 and np.max(np.abs(update)) <= 1e-12 * star.limb_length:
+            return q, (q - q_hat) / gamma
+    raise RuntimeError(f"the stage with gamma = {gamma} s did not converge in {max_iterations} Newton iterations")
+
+
+G2 = 1.0 - 1.0 / np.sqrt(2.0)
+G3 = 0.43586652150845899942
+TABLEAUS: dict[str, list[list[float]]] = {
+    "implicit-euler": [[1.0]],
+    "sdirk2": [[G2], [1.0 - G2, G2]],
+    "sdirk3": [
+        [G3],
+        [(1.0 - G3) / 2.0, G3],
+        [-(6.0 * G3**2 - 16.0 * G3 + 1.0) / 4.0, (6.0 * G3**2 - 20.0 * G3 + 5.0) / 4.0, G3],
+    ],
+    "implicit-midpoint": [[0.5]],
+}
+"""Rows of the Runge-Kutta matrix of each scheme; a row's sum is the time c of its stage."""
+
+
+def pulse(t: float, peak_angle: float = np.pi / 5.0, heating_time: float = 0.1, cooling_time: float = 0.9) -> float:
+    """delta_psi [rad] of a limb with command 1 at the time t [s] (Fig. 13.5b), repeated every period."""
+    t = t % (heating_time + cooling_time)
+    if t < heating_time:
+        return peak_angle * t / heating_time
+    return peak_angle * (heating_time + cooling_time - t) / cooling_time
+
+
+def step(
+    star: Star, q: Array, v: Array, t: float, h: float, command: ArrayLike, scheme: str, **pulse_shape: float
+) -> tuple[Array, Array]:
+    """State at t + h from the state (q, v) at t [s], with delta_psi taken at the times of the stages.
+
+    ``pulse_shape`` goes to ``pulse``. A stage starts from q_hat, v_hat, the state advanced by the velocities and
+    accelerations of the stages before it. The last stage is the new state; the implicit midpoint extrapolates it.
+    """
+    velocities: list[Array] = []
+    accelerations: list[Array] = []
+    for *row, diagonal in TABLEAUS[scheme]:
+        q_hat = q + h * sum(a * v_j for a, v_j in zip(row, velocities, strict=True))
+        v_hat = v + h * sum(a * a_j for a, a_j in zip(row, accelerations, strict=True))
+        delta_psi = np.asarray(command) * pulse(t + (sum(row) + diagonal) * h, **pulse_shape)
+        q_new, v_new = stage(star, q_hat, v_hat, diagonal * h, delta_psi)
+        velocities.append(v_new)
+        accelerations.append((v_new - v_hat) / (diagonal * h))
+    if scheme == "implicit-midpoint":
+        return 2.0 * q_new - q, 2.0 * v_new - v
+    return q_new, v_new
+
+
+def stroke_steps(h: float, heating_time: float = 0.1, cooling_time: float = 0.9) -> list[tuple[float, float]]:
+    """Start and length [s] of the steps of one stroke; the last step before a corner of Fig. 13.5b is shortened."""
+    steps = []
+    for start, duration in ((0.0, heating_time), (heating_time, cooling_time)):
+        count = int(np.ceil(duration / h - 1e-9))
+        for k in range(count):
+            steps.append((start + k * h, duration - k * h if k == count - 1 else h))
+    return steps
+
+
+def swim(star: Star, command: ArrayLike, n_strokes: int, h: float, scheme: str) -> Array:
+    """Hub positions [m], shape (n_strokes + 1, 2), at rest and after every stroke with the chapter's pulse."""
+    q, v = star.rest, np.zeros_like(star.rest)
+    path = [q[0]]
+    for _ in range(n_strokes):
+        for t, length in stroke_steps(h):
+            q, v = step(star, q, v, t, length, command, scheme)
+        path.append(q[0])
+    return np.array(path)

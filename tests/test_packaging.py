@@ -1,0 +1,181 @@
+"""What the project says about itself (dependencies, versions, README commands) is true."""
+
+import ast
+import importlib.metadata
+import re
+import runpy
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import hatchling.build
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+from packaging.version import Version
+
+ROOT = Path(__file__).resolve().parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+DISTRIBUTION_OF = {"PIL": "pillow", "pygame": "pygame-ce"}  # where the import name does not say it
+# Torch's wheels for CUDA name these; its wheels for the CPU do not.
+ONLY_WITH_CUDA = re.compile(r"(nvidia|cuda|triton)\b")
+
+quick_start_commands = runpy.run_path(str(ROOT / ".ci" / "quick_start.py"))["quick_start_commands"]
+
+
+def requirements(*extras: str) -> list[Requirement]:
+    """The base dependencies and those of the extras, which may name each other."""
+    lines = [*PROJECT["dependencies"], *(line for extra in extras for line in PROJECT["optional-dependencies"][extra])]
+    found = []
+    for requirement in map(Requirement, lines):
+        if requirement.name == PROJECT["name"]:
+            found += requirements(*requirement.extras)
+        else:
+            found.append(requirement)
+    return found
+
+
+def names(found: list[Requirement]) -> set[str]:
+    return {canonicalize_name(requirement.name) for requirement in found}
+
+
+def pins(file: str) -> dict[str, Version]:
+    """Name and version of every line of a constraints file."""
+    lines = (line.partition("#")[0].strip() for line in (ROOT / file).read_text(encoding="utf-8").splitlines())
+    pairs = [line.split("==") for line in lines if line]
+    found = {canonicalize_name(name): Version(version) for name, version in pairs}
+    assert len(found) == len(pairs), f"{file} pins a name twice"
+    return found
+
+
+def installed_with(found: list[Requirement]) -> set[str]:
+    """Names of all that these requirements bring along on this machine, by the metadata of what is installed."""
+    waiting, seen = list(found), set()
+    while waiting:
+        requirement = waiting.pop()
+        key = canonicalize_name(requirement.name), frozenset(requirement.extras)
+        if key in seen or ONLY_WITH_CUDA.match(key[0]):
+            continue
+        seen.add(key)
+        for inner in map(Requirement, importlib.metadata.requires(requirement.name) or []):
+            if inner.marker is None or any(inner.marker.evaluate({"extra": e}) for e in requirement.extras or {""}):
+                waiting.append(inner)
+    return {name for name, _ in seen}
+
+
+def imports_of(*paths: Path) -> set[str]:
+    """Distributions that these files and folders import from outside this project, at the top or later."""
+    files = [file for path in paths for file in ([path] if path.is_file() else sorted(path.rglob("*.py")))]
+    assert files
+    modules = set()
+    for node in (node for file in files for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"), str(file)))):
+        if isinstance(node, ast.Import):
+            modules |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            modules.add(node.module)
+    own = {"seastar_gym", "agents", "train", *(file.stem for file in (ROOT / "tests").glob("*.py"))}
+    packages = {module.partition(".")[0] for module in modules} - sys.stdlib_module_names - own
+    return {canonicalize_name(DISTRIBUTION_OF.get(package, package)) for package in packages}
+
+
+def test_wheel_holds_the_package_and_nothing_else(tmp_path, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    wheel = tmp_path / hatchling.build.build_wheel(str(tmp_path))
+    files = zipfile.ZipFile(wheel).namelist()
+    assert {file.partition("/")[0] for file in files} == {"seastar_gym", f"seastar_gym-{PROJECT['version']}.dist-info"}
+    assert "seastar_gym/__init__.py" in files
+    assert "seastar_gym/py.typed" in files  # the annotations are for its users too
+
+
+def test_every_base_dependency_is_imported_by_the_package():
+    assert names(requirements()) <= imports_of(ROOT / "seastar_gym")
+
+
+@pytest.mark.parametrize(
+    ("folders", "extras"),
+    [
+        (["seastar_gym"], ["render", "studies"]),
+        (["agents", "train.py"], ["train"]),
+        (["tests"], ["test"]),
+    ],
+)
+def test_every_import_has_its_requirement(folders, extras):
+    assert imports_of(*(ROOT / folder for folder in folders)) <= names(requirements(*extras))
+
+
+def test_importing_the_package_leaves_out_what_it_does_not_need():
+    code = "import sys, seastar_gym; print(*sys.modules)"
+    answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    loaded = set(answer.stdout.split())
+    assert "seastar_gym" in loaded
+    assert loaded.isdisjoint({"torch", "stable_baselines3", "matplotlib", "plotly", "pygame", "imageio", "rich"})
+
+
+@pytest.mark.parametrize("requirement", requirements("test"), ids=str)
+def test_tested_version_lies_in_the_declared_range(requirement):
+    assert pins("constraints.txt")[canonicalize_name(requirement.name)] in requirement.specifier
+
+
+def test_constraints_pin_all_that_gets_installed():
+    assert installed_with(requirements("test")) <= set(pins("constraints.txt"))
+
+
+def test_constraints_fit_every_build_of_a_version():
+    """A local tag such as +cpu would match one index only."""
+    assert all(version.local is None for version in pins("constraints.txt").values())
+
+
+def test_lowest_versions_are_those_of_the_declared_ranges():
+    lowest = pins(".ci/lowest.txt")
+    assert set(lowest) == names(requirements())
+    for requirement in requirements():
+        (bound,) = (Version(s.version) for s in requirement.specifier if s.operator == ">=")
+        assert lowest[canonicalize_name(requirement.name)] == bound
+
+
+@pytest.mark.parametrize("version", ["1.2.2", "1.4.0"])
+def test_both_gymnasium_versions_are_allowed(version):
+    """RLlib pins the first."""
+    (gymnasium,) = (requirement for requirement in requirements() if requirement.name == "gymnasium")
+    assert version in gymnasium.specifier
+
+
+def test_readme_has_two_quick_starts_that_do_their_own_set_up():
+    commands = quick_start_commands((ROOT / "README.md").read_text(encoding="utf-8"))
+    assert set(commands) == {"train", "test"}
+    for command in commands.values():
+        assert command.startswith("python3 -m venv .venv && .venv/bin/pip install ")
+        assert "-c constraints.txt" in command
+    assert commands["train"].endswith(" .venv/bin/python train.py")
+    assert " && .venv/bin/pytest" in commands["test"]
+
+
+@pytest.mark.parametrize(
+    ("readme", "complaint"),
+    [
+        ("<!-- quick-start: test -->\n```bash\none\ntwo\n```\n", "exactly one command line"),
+        ("<!-- quick-start: test -->\n```bash\n```\n", "exactly one command line"),
+        ("<!-- quick-start: test -->\nSome words first.\n```bash\none\n```\n", "exactly one command line"),
+        ("<!-- quick-start: test -->\n```bash\none\n```\n" * 2, "appears twice"),
+    ],
+)
+def test_unclear_quick_starts_are_refused(readme, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        quick_start_commands(readme)
+
+
+def test_quick_start_is_taken_byte_for_byte():
+    line = 'a -c b.txt -e ".[c]" && d  # e'
+    readme = f"# Title\n\n<!-- quick-start: test -->\n\n```bash\n{line}\n```\n\n```bash\nanother\n```\n"
+    assert quick_start_commands(readme) == {"test": line}
+
+
+@pytest.mark.parametrize(
+    ("file", "pattern"), [("CITATION.cff", r"^version: (\S+)$"), ("CHANGELOG.md", r"^## \[([\d.]+)\]")]
+)
+def test_version_is_the_same_everywhere(file, pattern):
+    match = re.search(pattern, (ROOT / file).read_text(encoding="utf-8"), re.MULTILINE)
+    assert match is not None
+    assert match[1] == PROJECT["version"]
