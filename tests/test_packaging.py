@@ -31,7 +31,7 @@ def requirements(*extras: str) -> list[Requirement]:
     found = []
     for requirement in map(Requirement, lines):
         if requirement.name == PROJECT["name"]:
-            found += requirements(*requirement.extras)
+            found += requirements(*sorted(requirement.extras))
         else:
             found.append(requirement)
     return found
@@ -113,7 +113,7 @@ def test_importing_the_package_leaves_out_what_it_does_not_need():
     assert loaded.isdisjoint({"torch", "stable_baselines3", "matplotlib", "plotly", "pygame", "imageio", "rich"})
 
 
-@pytest.mark.parametrize("requirement", requirements("test"), ids=str)
+@pytest.mark.parametrize("requirement", requirements("test"), ids=lambda requirement: requirement.name)
 def test_tested_version_lies_in_the_declared_range(requirement):
     assert pins("constraints.txt")[canonicalize_name(requirement.name)] in requirement.specifier
 

@@ -8,9 +8,9 @@ A kernel written on `Lanes` runs on `N_LANES` robots at once:
         ey = load(q, 2 * head + 1) - load(q, 2 * tail + 1)
         return sqrt(ex * ex + ey * ey)
 
-Here `q` has shape (rows, N_LANES): row r holds the same number of every robot. From an array of shape (rows,)
-`load` reads one number for all robots, so a coefficient may be shared or differ from robot to robot without a
-change in the kernel.
+Here `q` is borrowed (see `borrow`) from an array of shape (rows, N_LANES): row r holds the same number of every robot.
+From an array of shape (rows,) `load` reads one number for all robots, so a coefficient may be shared or differ from
+robot to robot without a change in the kernel.
 
 Arithmetic is strict IEEE (no fastmath; a fused multiply-add only where `add_product` or `subtract_product` says
 so), so a robot's bits depend neither on its lane nor on its neighbours. Comparisons give a `Mask`; `select` picks
@@ -23,7 +23,7 @@ from collections.abc import Callable
 
 import llvmlite.binding
 from llvmlite import ir
-from numba.core import types
+from numba.core import cgutils, types
 from numba.core.datamodel import models
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, register_model
@@ -153,52 +153,108 @@ _define_mask_operator(operator.or_, 2, lambda builder, a, b: builder.or_(a, b))
 _define_mask_operator(operator.invert, 1, lambda builder, a: builder.not_(a))
 
 
-def _row_pointer(context, builder, array_type, array, row):
-    """Pointer to row `row`: of N_LANES numbers in a two-dimensional array, of one number in a one-dimensional one."""
-    data = context.make_array(array_type)(context, builder, array).data
-    if array_type.ndim == 1:
-        return builder.gep(data, [row])
-    element = builder.gep(data, [builder.mul(row, ir.Constant(row.type, N_LANES))])
-    return builder.bitcast(element, VECTOR.as_pointer())
+class Rows(types.Type):
+    """A borrowed pointer to the rows of an array: of N_LANES numbers each, or of one number shared by all robots.
+
+    Numba counts references to arrays at every call, which costs more than a small kernel does; a pointer is free. The
+    array must outlive it, as the arguments of an entry point do.
+    """
+
+    def __init__(self, shared):
+        self.shared = shared
+        super().__init__(name=f"Rows(shared={shared})")
 
 
-def _is_rows(array, dimensions):
-    return (
-        isinstance(array, types.Array)
-        and array.dtype == types.float64
-        and array.layout == "C"
-        and array.ndim in dimensions
-    )
+@register_model(Rows)
+class _RowsModel(models.PrimitiveModel):
+    def __init__(self, dmm, fe_type):
+        super().__init__(dmm, fe_type, F64.as_pointer())
+
+
+def _borrowed(field):
+    """Type of a borrowed array or bundle of arrays; numbers stay what they are; None for anything else."""
+    if isinstance(field, types.Array):
+        is_rows = field.dtype == types.float64 and field.layout == "C" and field.ndim in (1, 2)
+        return Rows(shared=field.ndim == 1) if is_rows else None
+    if isinstance(field, types.BaseNamedTuple):
+        fields = [_borrowed(f) for f in field]
+        return None if None in fields else types.BaseTuple.from_types(fields, field.instance_class)
+    return field if isinstance(field, types.Number | types.Boolean) else None
+
+
+def _borrow_value(context, builder, field, value):
+    if isinstance(field, types.Array):
+        return context.make_array(field)(context, builder, value).data
+    if isinstance(field, types.BaseNamedTuple):
+        parts = cgutils.unpack_tuple(builder, value, len(field))
+        values = [_borrow_value(context, builder, f, part) for f, part in zip(field, parts, strict=True)]
+        return context.make_tuple(builder, _borrowed(field), values)
+    return value
 
 
 @intrinsic
-def load(typing_context, array, row):
-    """Row `row` of `array`: one number per robot from (rows, N_LANES), one for all robots from (rows,)."""
-    if not (_is_rows(array, (1, 2)) and isinstance(row, types.Integer)):
+def borrow(typing_context, bundle):
+    """Pointers to the rows of an array, or of every array in a named tuple, for kernels to `load` from.
+
+    Arrays are C-contiguous float64 of shape (rows, N_LANES), or (rows,) for rows that all robots share.
+    """
+    result = _borrowed(bundle)
+    if result is None:
         return None
 
     def codegen(context, builder, sig, args):
-        value = builder.load(_row_pointer(context, builder, sig.args[0], *args))
-        value.align = 8
-        return _broadcast(builder, VECTOR, value) if sig.args[0].ndim == 1 else value
+        return _borrow_value(context, builder, sig.args[0], args[0])
 
-    return lanes(array, types.intp), codegen
+    return result(bundle), codegen
+
+
+def _vector_pointer(builder, pointer, row):
+    element = builder.gep(pointer, [builder.mul(row, ir.Constant(row.type, N_LANES))])
+    return builder.bitcast(element, VECTOR.as_pointer())
 
 
 @intrinsic
-def store(typing_context, array, row, value):
-    """Write `value` (lanes, or one number for all robots) to row `row` of `array`, shape (rows, N_LANES)."""
-    if not (_is_rows(array, (2,)) and isinstance(row, types.Integer)):
+def load(typing_context, rows, row):
+    """Row `row`: one number per robot, or one number for all robots if the rows are shared."""
+    if not (isinstance(rows, Rows) and isinstance(row, types.Integer)):
+        return None
+
+    def codegen(context, builder, sig, args):
+        if sig.args[0].shared:
+            return _broadcast(builder, VECTOR, builder.load(builder.gep(args[0], [args[1]])))
+        value = builder.load(_vector_pointer(builder, *args))
+        value.align = 8
+        return value
+
+    return lanes(rows, types.intp), codegen
+
+
+@intrinsic
+def load_number(typing_context, rows, row):
+    """Row `row` of shared rows, as a plain number."""
+    if not (isinstance(rows, Rows) and rows.shared and isinstance(row, types.Integer)):
+        return None
+
+    def codegen(context, builder, sig, args):
+        return builder.load(builder.gep(args[0], [args[1]]))
+
+    return types.float64(rows, types.intp), codegen
+
+
+@intrinsic
+def store(typing_context, rows, row, value):
+    """Write `value` (lanes, or one number for all robots) to row `row` of rows that are not shared."""
+    if not (isinstance(rows, Rows) and not rows.shared and isinstance(row, types.Integer)):
         return None
     if not (value == lanes or isinstance(value, types.Number)):
         return None
 
     def codegen(context, builder, sig, args):
-        pointer = _row_pointer(context, builder, sig.args[0], args[0], args[1])
+        pointer = _vector_pointer(builder, args[0], args[1])
         builder.store(_as_vector(builder, sig.args[2], args[2]), pointer).align = 8
         return context.get_dummy_value()
 
-    return types.void(array, types.intp, lanes if value == lanes else types.float64), codegen
+    return types.void(rows, types.intp, lanes if value == lanes else types.float64), codegen
 
 
 @intrinsic

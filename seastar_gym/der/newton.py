@@ -7,6 +7,7 @@ is frozen by a mask, and nothing that one robot needs (a repair, a shorter step)
 from seastar_gym.der.compilation import kernel
 from seastar_gym.der.lanes import add_product, any_lane, load, select, splat, sqrt, store
 from seastar_gym.der.potential import newton_direction
+from seastar_gym.der.rods import n_nodes
 
 SUFFICIENT_DECREASE = 1e-4  # Armijo's constant
 ROUNDING = 1e-11  # an increase of Phi below this share of it is taken for rounding, not for ascent
@@ -39,7 +40,7 @@ def minimise(rods, work, gamma, active, tolerance, max_iterations):
         stepping = running & low_enough & (pivot > 0.0)
         shortening = running & ~low_enough & (fraction > SHORTEST_STEP) & (iterations > 0.0)
         fraction = select(stepping, one, select(shortening, 0.5 * fraction, fraction))
-        move = take_step(work, stepping, shortening, fraction)
+        move = take_step(rods, work, stepping, shortening, fraction)
         best = select(stepping, phi, best)
         expected = select(stepping, decrement, expected)
         convex = convex & ~stepping
@@ -53,13 +54,13 @@ def minimise(rods, work, gamma, active, tolerance, max_iterations):
 
 
 @kernel
-def take_step(work, stepping, shortening, fraction):
+def take_step(rods, work, stepping, shortening, fraction):
     """Move q by the full new Newton step where `stepping`, back by half the last move where `shortening`.
 
     Returns the largest node move [m].
     """
     largest = splat(0.0)
-    for node in range(work.q.shape[0] // 2):
+    for node in range(n_nodes(rods)):
         moved = splat(0.0)
         for row in range(2 * node, 2 * node + 2):
             step = select(stepping, -load(work.solution, row), load(work.step, row))

@@ -229,7 +229,8 @@ def newton_direction(rods, work, gamma, inverse_gamma, convex):
     which is not positive (or NaN) where the Hessian is not positive definite.
     """
     n_limbs = rods.n_limbs
-    clear_roots(work)
+    n_roots = 2 * (n_limbs + 1)
+    clear_roots(work, n_roots)
     energy = assemble_hub_hinges(rods, work, convex)
     decrement, pivot = splat(0.0), splat(np.inf)
     for limb in range(n_limbs):
@@ -238,7 +239,7 @@ def newton_direction(rods, work, gamma, inverse_gamma, convex):
         decrement += limb_decrement
         pivot = smaller(pivot, limb_pivot)
     energy += add_hub(rods, work, gamma, inverse_gamma)
-    root_decrement, root_pivot = solve_roots(work)
+    root_decrement, root_pivot = solve_roots(work, n_roots)
     edges = rods.nodes_per_limb - 1
     for axis in range(2):
         store(work.solution, axis, load(work.roots_rhs, 2 * n_limbs + axis))

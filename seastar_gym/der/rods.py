@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from seastar_gym.der.compilation import kernel
 from seastar_gym.der.lanes import N_LANES
 
 FACTOR_ROWS = 11  # what the elimination of a node leaves for the substitution, see star_matrix.py
@@ -46,6 +47,12 @@ class Rods(NamedTuple):
     hub_angle: float
     mass: np.ndarray
     drag: np.ndarray
+
+
+@kernel
+def n_nodes(rods):
+    """Number of nodes of a star, with the hub."""
+    return rods.n_limbs * (rods.nodes_per_limb - 1) + 1
 
 
 class Work(NamedTuple):

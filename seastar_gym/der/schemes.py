@@ -10,8 +10,9 @@ import numpy as np
 
 
 class Scheme(NamedTuple):
-    """a, b, c: the tableau. stiffly_accurate: the last stage is the step's result, because b is the last row of a."""
+    """a (row by row), b, c: the tableau. stiffly_accurate: b is the last row of a, so the last stage is the result."""
 
+    n_stages: int
     a: np.ndarray
     b: np.ndarray
     c: np.ndarray
@@ -20,7 +21,7 @@ class Scheme(NamedTuple):
 
 def _scheme(a: list[list[float]], b: list[float] | None = None) -> Scheme:
     rows = np.array(a)
-    return Scheme(rows, rows[-1].copy() if b is None else np.array(b), rows.sum(axis=1), b is None)
+    return Scheme(len(rows), rows.ravel(), rows[-1].copy() if b is None else np.array(b), rows.sum(axis=1), b is None)
 
 
 _G2 = 1.0 - 0.5 * np.sqrt(2.0)

@@ -2,9 +2,9 @@
 
 from seastar_gym.der.compilation import kernel
 from seastar_gym.der.geometry import tangent
-from seastar_gym.der.lanes import add_product, any_lane, load, select, splat, store
+from seastar_gym.der.lanes import add_product, any_lane, load, load_number, select, splat, store
 from seastar_gym.der.newton import minimise
-from seastar_gym.der.rods import BACKTRACKS, COVERED, HALVINGS, NEWTON_ITERATIONS, REPAIRS, SMALLEST_HUB_T
+from seastar_gym.der.rods import BACKTRACKS, COVERED, HALVINGS, NEWTON_ITERATIONS, REPAIRS, SMALLEST_HUB_T, n_nodes
 
 SMALLEST_FRACTION = 2.0**-12  # of an interval: a robot whose step would have to be shorter has failed
 
@@ -25,14 +25,14 @@ def set_natural_hub_angles(rods, work, actuation, fraction):
 
 
 @kernel
-def begin_stage(work, scheme, stage, q_0, v_0, h):
+def begin_stage(rods, work, scheme, stage, q_0, v_0, h):
     """q_hat, v_hat and q_free of a stage; the iterate starts at the force-free motion (13.10)."""
-    gamma = scheme.a[stage, stage] * h
-    rows = work.q.shape[0]
+    gamma = load_number(scheme.a, stage * scheme.n_stages + stage) * h
+    rows = 2 * n_nodes(rods)
     for row in range(rows):
         q_hat, v_hat = load(q_0, row), load(v_0, row)
         for other in range(stage):
-            weight = scheme.a[stage, other] * h
+            weight = load_number(scheme.a, stage * scheme.n_stages + other) * h
             q_hat = add_product(q_hat, weight, load(work.stage_v, other * rows + row))
             v_hat = add_product(v_hat, weight, load(work.stage_a, other * rows + row))
         q_free = add_product(q_hat, gamma, v_hat)
@@ -44,10 +44,10 @@ def begin_stage(work, scheme, stage, q_0, v_0, h):
 
 
 @kernel
-def end_stage(work, stage, gamma):
+def end_stage(rods, work, stage, gamma):
     """V = (Q - q_hat)/gamma and A = (V - v_hat)/gamma of a solved stage."""
     inverse_gamma = 1.0 / gamma
-    rows = work.q.shape[0]
+    rows = 2 * n_nodes(rods)
     for row in range(rows):
         velocity = (load(work.q, row) - load(work.q_hat, row)) * inverse_gamma
         store(work.stage_v, stage * rows + row, velocity)
@@ -55,10 +55,10 @@ def end_stage(work, stage, gamma):
 
 
 @kernel
-def accept_step(work, scheme, q_0, v_0, h, accepted):
+def accept_step(rods, work, scheme, q_0, v_0, h, accepted):
     """Write the result of a step over the state (q_0, v_0) of the robots in the mask `accepted`."""
-    n_stages = scheme.b.shape[0]
-    rows = work.q.shape[0]
+    n_stages = scheme.n_stages
+    rows = 2 * n_nodes(rods)
     for row in range(rows):
         q, v = load(q_0, row), load(v_0, row)
         if scheme.stiffly_accurate:
@@ -66,7 +66,7 @@ def accept_step(work, scheme, q_0, v_0, h, accepted):
         else:
             q_1, v_1 = q, v
             for stage in range(n_stages):
-                weight = scheme.b[stage] * h
+                weight = load_number(scheme.b, stage) * h
                 q_1 = add_product(q_1, weight, load(work.stage_v, stage * rows + row))
                 v_1 = add_product(v_1, weight, load(work.stage_a, stage * rows + row))
         store(q_0, row, select(accepted, q_1, q))
@@ -80,15 +80,15 @@ def try_step(rods, work, scheme, actuation, q, v, start, size, h, active, tolera
     Returns the mask of the robots whose stages all converged; their state has moved, that of the others has not.
     """
     going = active
-    for stage in range(scheme.b.shape[0]):
-        gamma = begin_stage(work, scheme, stage, q, v, h)
-        set_natural_hub_angles(rods, work, actuation, start + scheme.c[stage] * size)
+    for stage in range(scheme.n_stages):
+        gamma = begin_stage(rods, work, scheme, stage, q, v, h)
+        set_natural_hub_angles(rods, work, actuation, start + load_number(scheme.c, stage) * size)
         going, iterations, repairs, backtracks = minimise(rods, work, gamma, going, tolerance, max_iterations)
-        end_stage(work, stage, gamma)
+        end_stage(rods, work, stage, gamma)
         add_to_report(report, NEWTON_ITERATIONS, iterations)
         add_to_report(report, REPAIRS, repairs)
         add_to_report(report, BACKTRACKS, backtracks)
-    accept_step(work, scheme, q, v, h, going)
+    accept_step(rods, work, scheme, q, v, h, going)
     return going
 
 
@@ -98,10 +98,10 @@ def add_to_report(report, row, amount):
 
 
 @kernel
-def note_hub_angles(work, report, accepted):
+def note_hub_angles(rods, work, report, accepted):
     """Keep the smallest tan(phi/2) of every robot's hub hinges."""
     smallest = load(report, SMALLEST_HUB_T)
-    for limb in range(work.hub_t.shape[0]):
+    for limb in range(rods.n_limbs):
         t = load(work.hub_t, limb)
         smallest = select(accepted & (t < smallest), t, smallest)
     store(report, SMALLEST_HUB_T, smallest)
@@ -123,7 +123,7 @@ def cover_interval(rods, work, scheme, actuation, q, v, duration, alive, toleran
         accepted = try_step(
             rods, work, scheme, actuation, q, v, start, size, h, moving, tolerance, max_iterations, report
         )
-        note_hub_angles(work, report, accepted)
+        note_hub_angles(rods, work, report, accepted)
         rejected = moving & ~accepted
         add_to_report(report, HALVINGS, select(rejected, one, zero))
         add_to_report(report, COVERED, select(accepted, h, zero))

@@ -109,10 +109,11 @@ def triangle_row(row, column):
 
 
 @kernel
-def clear_roots(work):
-    for k in range(work.roots.shape[0]):
+def clear_roots(work, n):
+    """Set the dense system of n rows to zero."""
+    for k in range(triangle_row(n, 0)):
         store(work.roots, k, 0.0)
-    for k in range(work.roots_rhs.shape[0]):
+    for k in range(n):
         store(work.roots_rhs, k, 0.0)
 
 
@@ -155,12 +156,11 @@ def add_coupling(work, block, other, B):
 
 
 @kernel
-def solve_roots(work):
-    """Solve the dense system by L D L^T in place; the solution replaces roots_rhs.
+def solve_roots(work, n):
+    """Solve the dense system of n rows by L D L^T in place; the solution replaces roots_rhs.
 
     Returns its part of the Newton decrement and the smallest pivot.
     """
-    n = work.roots_rhs.shape[0]
     decrement = splat(0.0)
     pivot = load(work.roots, 0)
     for k in range(n):

@@ -1,7 +1,7 @@
 """A whole sequence of time intervals for many robots, in one compiled call."""
 
 from seastar_gym.der.compilation import entry_point
-from seastar_gym.der.lanes import load, select, splat, store
+from seastar_gym.der.lanes import borrow, load, select, splat, store
 from seastar_gym.der.stages import cover_interval
 
 
@@ -16,15 +16,18 @@ def advance(rods, work, scheme, actuation, q, v, peaks, times, shape, failed, re
     report: Counts and extremes, added to, shape (n_groups, len(REPORT_ROWS), N_LANES).
     tolerance: Largest node move of the last Newton update [m].
     """
+    rods_rows, memory, tableau, rotation = borrow(rods), borrow(work), borrow(scheme), borrow(actuation)
     for group in range(q.shape[0]):
-        alive = load(failed[group], 0) < 1.0
+        q_rows, v_rows, peak_rows = borrow(q[group]), borrow(v[group]), borrow(peaks[group])
+        failed_rows, report_rows = borrow(failed[group]), borrow(report[group])
+        alive = load(failed_rows, 0) < 1.0
         for k in range(times.shape[0] - 1):
             for limb in range(rods.n_limbs):
-                peak = load(peaks[group], limb)
-                store(actuation.delta_psi_start, limb, peak * shape[k])
-                store(actuation.delta_psi_end, limb, peak * shape[k + 1])
+                peak = load(peak_rows, limb)
+                store(rotation.delta_psi_start, limb, peak * shape[k])
+                store(rotation.delta_psi_end, limb, peak * shape[k + 1])
             alive = cover_interval(
-                rods, work, scheme, actuation, q[group], v[group], times[k + 1] - times[k], alive, tolerance,
-                max_iterations, report[group],
+                rods_rows, memory, tableau, rotation, q_rows, v_rows, times[k + 1] - times[k], alive, tolerance,
+                max_iterations, report_rows,
             )  # fmt: skip
-        store(failed[group], 0, select(alive, splat(0.0), 1.0))
+        store(failed_rows, 0, select(alive, splat(0.0), 1.0))

@@ -77,13 +77,14 @@ def path_length(start: ArrayLike, waypoints: ArrayLike) -> NDArray[np.float64]:
     start, waypoints = np.asarray(start, dtype=np.float64), np.asarray(waypoints, dtype=np.float64)
     first_leg = waypoints[..., 0, :] - start
     later_legs = np.diff(waypoints, axis=-2)
-    lengths: NDArray[np.float64] = np.hypot(later_legs[..., 0], later_legs[..., 1]).sum(axis=-1)
-    return lengths + np.hypot(first_leg[..., 0], first_leg[..., 1])
+    lengths: NDArray[np.float64] = np.hypot(first_leg[..., 0], first_leg[..., 1])
+    lengths = lengths + np.hypot(later_legs[..., 0], later_legs[..., 1]).sum(axis=-1)
+    return lengths
 
 
 def _checked_waypoints(path: ArrayLike) -> NDArray[np.float64]:
     try:
-        waypoints = np.array(path)
+        waypoints = np.asarray(path)
     except ValueError as ragged:
         raise ValueError("A path must have shape (n, 2): one x and one y [m] for every waypoint.") from ragged
     if waypoints.size == 0:

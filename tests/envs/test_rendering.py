@@ -1,0 +1,341 @@
+"""Pictures show what the robot does, need no display, and depend on nothing but what they are given."""
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from seastar_gym.envs.paths import PATH_NAMES, make_path
+from seastar_gym.envs.rendering import (
+    CURRENT,
+    HEATED_MINUS,
+    HEATED_PLUS,
+    STATE_COLOURS,
+    Frame,
+    Renderer,
+    _waypoint_labels,
+)
+
+pygame = pytest.importorskip("pygame")
+
+LIMB_NODES = np.array([[0, *range(1 + 9 * limb, 10 + 9 * limb)] for limb in range(5)])
+
+
+def resting_robot(hub=(0.0, 0.0)):
+    along = np.linspace(0.1 / 9, 0.1, 9)
+    angles = 2 * np.pi / 5 * np.arange(5)
+    limbs = along[None, :, None] * np.column_stack([np.cos(angles), np.sin(angles)])[:, None, :]
+    return np.concatenate([np.zeros((1, 2)), limbs.reshape(45, 2)]) + hub
+
+
+def frame_of(hub=(0.0, 0.0), command=(0, 0, 0, 0, 0), trail=((0.0, 0.0),), waypoint_index=0, time=0.0):
+    return Frame(resting_robot(hub), np.array(command, dtype=float), np.array(trail, dtype=float), waypoint_index, time)
+
+
+def renderer_of(path="pentagon", size=(480, 360)):
+    waypoints = make_path(path, np.random.default_rng(0))
+    return Renderer(LIMB_NODES, waypoints, limb_length=0.1, rod_radius=1.6e-3, waypoint_radius=0.01, size=size)
+
+
+def colour_at(picture, renderer, point):
+    column, row = np.floor(renderer.camera.to_pixels(point)).astype(int)
+    return picture[row, column].astype(int)
+
+
+def mid_limb(limb):
+    return resting_robot()[LIMB_NODES[limb - 1, 5]]
+
+
+def is_blue(colour):
+    red, green, blue = colour
+    return blue > 150 and blue > red + 100 and blue > green + 50
+
+
+@pytest.fixture
+def dummy_window(monkeypatch):
+    pygame.display.quit()
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    yield
+    pygame.display.quit()
+
+
+@pytest.mark.parametrize("size", [(480, 360), (960, 720), (321, 247)])
+def test_a_picture_is_rgb_of_the_size_asked_for(size):
+    picture = renderer_of(size=size).draw(frame_of())
+    assert picture.dtype == np.uint8
+    assert picture.shape == (size[1], size[0], 3)
+    assert picture.flags.writeable
+
+
+def test_drawing_needs_no_display():
+    script = (
+        "import numpy as np; import pygame\n"
+        "from seastar_gym.envs.rendering import Frame, Renderer\n"
+        "renderer = Renderer([[0, 1], [0, 2]], [[0.1, 0.0]], limb_length=0.1, rod_radius=1e-3, waypoint_radius=0.01)\n"
+        "positions = np.array([[0.0, 0.0], [0.1, 0.0], [-0.1, 0.0]])\n"
+        "picture = renderer.draw(Frame(positions, np.array([1.0, 0.0]), positions[:1], 0, 0.0))\n"
+        "assert not pygame.display.get_init()\n"
+        "print(picture.shape, len(np.unique(picture)) > 20)\n"
+    )
+    environment = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in ("SDL_VIDEODRIVER", "DISPLAY", "WAYLAND_DISPLAY")
+    }
+    environment["PYTHONPATH"] = os.pathsep.join(sys.path)
+    result = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, timeout=60)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.split("\n")[-2] == "(720, 960, 3) True"
+
+
+def test_importing_the_module_does_not_import_pygame():
+    script = "import sys; import seastar_gym.envs.rendering; print('pygame' in sys.modules)"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    result = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, timeout=60)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.strip() == "False"
+
+
+@pytest.mark.parametrize("size", [(480, 360), (960, 720)])
+def test_heated_limbs_are_blue_and_the_others_are_not(size):
+    renderer = renderer_of(size=size)
+    picture = renderer.draw(frame_of(command=(0, 1, 0, 0, -1)))
+    colours = {limb: colour_at(picture, renderer, mid_limb(limb)) for limb in range(1, 6)}
+    assert [limb for limb, colour in colours.items() if is_blue(colour)] == [2, 5]
+    np.testing.assert_allclose(colours[2], HEATED_PLUS, atol=30)
+    np.testing.assert_allclose(colours[5], HEATED_MINUS, atol=30)
+    for limb in (1, 3, 4):
+        assert np.ptp(colours[limb]) < 40 and colours[limb].max() < 170  # dark grey
+
+
+def test_a_fraction_of_a_command_is_heat_too():
+    renderer = renderer_of()
+    picture = renderer.draw(frame_of(command=(0, 0, 0.25, 0, 0)))
+    assert is_blue(colour_at(picture, renderer, mid_limb(3)))
+
+
+def test_heated_limbs_are_bolder():
+    renderer = renderer_of("line", size=(960, 720))
+
+    def thickness(command):
+        column, row = np.floor(renderer.camera.to_pixels(mid_limb(1))).astype(int)
+        picture = renderer.draw(frame_of(command=command)).astype(int)
+        return (picture[row - 12 : row + 13, column, 0] < 150).sum()
+
+    assert thickness((1, 0, 0, 0, 0)) >= 1.3 * thickness((0, 0, 0, 0, 0))
+
+
+def test_limbs_are_equally_thick_in_every_direction():
+    renderer = renderer_of("line", size=(960, 720))
+    background = renderer.draw(frame_of(hub=(0.3, 0.0))).astype(int)
+    picture = renderer.draw(frame_of(hub=(0.0, 0.0))).astype(int)
+    ink = []
+    for limb in (2, 3, 4, 5):  # limb 1 lies on the dashed line
+        columns, rows = np.meshgrid(np.arange(960), np.arange(720))
+        middle = renderer.camera.to_pixels(mid_limb(limb))
+        near = np.hypot(columns - middle[0], rows - middle[1]) < 30
+        ink.append((background - picture)[..., 0][near].sum())
+    assert np.ptp(ink) < 0.06 * np.mean(ink)
+
+
+def test_the_same_frame_gives_the_same_pixels():
+    renderer, frame = renderer_of(), frame_of(hub=(0.02, 0.01), command=(1, 0, -1, 0, 0), time=3.0)
+    first = renderer.draw(frame)
+    np.testing.assert_array_equal(renderer.draw(frame), first)
+    np.testing.assert_array_equal(renderer_of().draw(frame), first)
+
+
+def test_pictures_share_no_memory():
+    renderer = renderer_of()
+    first = renderer.draw(frame_of())
+    kept = first.copy()
+    renderer.draw(frame_of(hub=(0.05, 0.05)))
+    np.testing.assert_array_equal(first, kept)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"time": 1.0},
+        {"waypoint_index": 1},
+        {"waypoint_index": 5},
+        {"command": np.array([1.0, 0, 0, 0, 0])},
+        {"trail": np.array([[0.0, 0.0], [0.1, 0.1]])},
+        {"positions": resting_robot((0.01, 0.0))},
+    ],
+    ids=lambda change: "-".join(change),
+)
+def test_everything_in_a_frame_shows(change):
+    renderer = renderer_of()
+    assert not np.array_equal(renderer.draw(frame_of()), renderer.draw(replace(frame_of(), **change)))
+
+
+def test_the_current_waypoint_has_its_own_colour():
+    renderer = renderer_of("square", size=(960, 720))
+    picture = renderer.draw(frame_of(waypoint_index=1))
+    ring = {
+        index: colour_at(picture, renderer, waypoint + np.array([0.0, 0.01]))
+        for index, waypoint in enumerate(make_path("square", np.random.default_rng(0))[:3])
+    }
+    for index, expected in enumerate(STATE_COLOURS[state] for state in (0, CURRENT, 1)):
+        np.testing.assert_allclose(ring[index], expected, atol=40)
+
+
+@pytest.mark.parametrize("name", PATH_NAMES)
+@pytest.mark.parametrize("size", [(480, 360), (960, 720)])
+def test_the_robot_is_in_view_at_the_start_and_at_every_waypoint(name, size):
+    renderer = renderer_of(name, size)
+    for waypoint in [[0.0, 0.0], *make_path(name, np.random.default_rng(0))]:
+        assert renderer.camera.sees(resting_robot(waypoint))
+
+
+def test_the_view_keeps_proportions_and_has_y_up():
+    camera = renderer_of().camera
+    origin, right, above = camera.to_pixels([[0.0, 0.0], [0.1, 0.0], [0.0, 0.1]])
+    np.testing.assert_allclose(right - origin, [0.1 * camera.scale, 0.0], atol=1e-9)
+    np.testing.assert_allclose(above - origin, [0.0, -0.1 * camera.scale], atol=1e-9)
+
+
+def test_the_view_follows_a_robot_that_leaves_it_and_still_shows_the_path():
+    renderer = renderer_of("line")
+    before, far_away = renderer.camera, frame_of(hub=(-1.0, 2.0))
+    assert not before.sees(far_away.positions)
+    renderer.draw(far_away)
+    assert renderer.camera.sees(far_away.positions)
+    assert renderer.camera.sees(np.array([[0.0, 0.0], [0.3, 0.0]]))
+
+
+def test_the_view_stands_still_while_the_robot_is_in_it():
+    renderer = renderer_of()
+    before = renderer.camera
+    renderer.draw(frame_of(hub=(0.1, 0.1)))
+    assert renderer.camera is before
+
+
+def test_a_new_path_is_drawn_as_by_a_new_renderer():
+    renderer = renderer_of("line")
+    renderer.draw(frame_of(hub=(2.0, 2.0)))
+    renderer.reset(make_path("square", np.random.default_rng(0)))
+    np.testing.assert_array_equal(renderer.draw(frame_of()), renderer_of("square").draw(frame_of()))
+
+
+def test_a_place_visited_twice_carries_both_numbers():
+    path = np.concatenate([np.zeros((1, 2)), make_path("figure-eight", np.random.default_rng(0))])
+    numbers = [[index + 1 for index in label.indices] for label in _waypoint_labels(path)]
+    assert [8, 16] in numbers
+    assert sorted(index for together in numbers for index in together) == list(range(1, 17))
+
+
+def test_corners_are_numbered_on_their_outer_side():
+    path = np.concatenate([np.zeros((1, 2)), make_path("pentagon", np.random.default_rng(0))])
+    for label in _waypoint_labels(path):
+        outward = label.place - path[1:].mean(axis=0)
+        assert label.direction @ outward > 0.99 * np.hypot(*outward)
+
+
+@pytest.mark.parametrize("path", [[[0.0, 0.0]], [[0.1, 0.0], [0.1, 0.0]], [[0.0, 0.0], [0.1, 0.1], [0.0, 0.0]]])
+def test_paths_that_stay_in_place_are_drawn(path):
+    assert renderer_of(path).draw(frame_of()).any()
+
+
+def test_long_and_empty_trails_are_drawn():
+    renderer = renderer_of()
+    assert renderer.draw(frame_of(trail=np.zeros((0, 2)))).any()
+    assert renderer.draw(frame_of(trail=np.random.default_rng(0).normal(0.0, 0.1, (5000, 2)))).any()
+
+
+def test_drawing_survives_a_stranger_who_quits_pygame():
+    renderer = renderer_of()
+    before = renderer.draw(frame_of())
+    pygame.quit()
+    np.testing.assert_array_equal(renderer.draw(frame_of()), before)
+
+
+@pytest.mark.parametrize(
+    "change, sentence",
+    [
+        ({"positions": np.full((46, 2), np.nan)}, r"Positions to draw must be finite and of shape \(46, 2\)"),
+        ({"positions": np.zeros((45, 2))}, r"Positions to draw must be finite and of shape \(46, 2\)"),
+        ({"command": np.zeros(4)}, r"command to draw must have shape \(5,\), not \(4,\)"),
+        ({"trail": np.full((3, 2), np.inf)}, r"trail to draw must be finite and of shape \(k, 2\)"),
+        ({"trail": np.zeros(2)}, r"trail to draw must be finite and of shape \(k, 2\)"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused_with_a_sentence(change, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        renderer_of().draw(replace(frame_of(), **change))
+
+
+def test_a_picture_too_small_to_read_is_refused():
+    with pytest.raises(ValueError, match="at least 320 x 240 pixels, not 100 x 100"):
+        renderer_of(size=(100, 100))
+
+
+def test_without_pygame_one_sentence_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pygame", None)
+    with pytest.raises(ImportError, match=r'pip install "seastar-gym\[render\]"'):
+        renderer_of()
+
+
+def test_a_window_opens_shows_the_picture_and_closes(dummy_window):
+    renderer, frame = renderer_of(), frame_of(command=(1, -1, 0, 0, 0))
+    assert renderer.show(frame)
+    shown = pygame.surfarray.array3d(pygame.display.get_surface()).swapaxes(0, 1)
+    np.testing.assert_array_equal(shown, renderer.draw(frame))
+    renderer.close()
+    assert not pygame.display.get_init()
+    renderer.close()
+
+
+def test_a_closed_renderer_can_show_again(dummy_window):
+    renderer = renderer_of()
+    renderer.show(frame_of())
+    renderer.close()
+    assert renderer.show(frame_of())
+    renderer.close()
+
+
+def test_a_window_closed_by_the_user_stays_closed(dummy_window):
+    renderer = renderer_of()
+    assert renderer.show(frame_of())
+    pygame.event.post(pygame.event.Event(pygame.QUIT))
+    assert not renderer.show(frame_of())
+    assert not pygame.display.get_init()
+    assert not renderer.show(frame_of())
+    assert not pygame.display.get_init()
+
+
+def test_a_window_survives_a_stranger_who_quits_pygame(dummy_window):
+    renderer = renderer_of()
+    renderer.show(frame_of())
+    pygame.quit()
+    assert renderer.show(frame_of())
+    renderer.close()
+
+
+def test_two_renderers_may_take_turns_in_the_window(dummy_window):
+    small, large = renderer_of(), renderer_of(size=(640, 480))
+    assert small.show(frame_of()) and large.show(frame_of()) and small.show(frame_of())
+    small.close()
+    assert large.show(frame_of())
+    large.close()
+
+
+def test_frames_are_shown_no_faster_than_asked(dummy_window):
+    renderer = renderer_of()
+    renderer.show(frame_of(), fps=20)
+    start = pygame.time.get_ticks()
+    for _ in range(4):
+        renderer.show(frame_of(), fps=20)
+    assert pygame.time.get_ticks() - start >= 190
+    renderer.close()
+
+
+def test_no_display_for_a_window_is_one_sentence(monkeypatch):
+    pygame.display.quit()
+    monkeypatch.setenv("SDL_VIDEODRIVER", "no-such-driver")
+    with pytest.raises(RuntimeError, match=r'No window can be opened here .*render_mode="rgb_array"'):
+        renderer_of().show(frame_of())
