@@ -1,0 +1,317 @@
+"""`Simulator`: a batch of robots of one scene, advanced by whole strokes."""
+
+import os
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seastar_gym.actuation.schedule import step_times
+from seastar_gym.der.energy import energies
+from seastar_gym.der.lanes import N_LANES
+from seastar_gym.der.rods import REPORT_ROWS, SMALLEST_HUB_T, Actuation, make_work
+from seastar_gym.der.schemes import SCHEMES
+from seastar_gym.der.stroke import advance
+from seastar_gym.scene import Scene
+
+Floats = NDArray[np.float64]
+
+
+class SolverStatus(IntEnum):
+    """Whether a robot's stroke was computed, and if not, why."""
+
+    CONVERGED = 0
+    NOT_CONVERGED = 1
+
+    @property
+    def sentence(self) -> str:
+        """What to tell the user."""
+        return {
+            SolverStatus.CONVERGED: "The stroke converged.",
+            SolverStatus.NOT_CONVERGED: (
+                "A time step did not converge even after it was halved to its floor; the robot stays at its last good "
+                "state until it is reset: use a smaller Numerics.step, a softer robot or slower initial velocities."
+            ),
+        }[self]
+
+
+class StrokeReport(NamedTuple):
+    """What a stroke cost and how it ended; every array has shape (n_robots,).
+
+    status: SolverStatus of every robot. newton_iterations, repairs, backtracks, halvings: counts of Newton steps, of
+    those that needed the convex matrix, of line-search halvings and of time-step halvings. covered: time covered [s].
+    smallest_opening_angle: smallest angle between neighbouring limbs at the hub [rad]; below zero, limbs crossed.
+    """
+
+    status: NDArray[np.int64]
+    newton_iterations: NDArray[np.int64]
+    repairs: NDArray[np.int64]
+    backtracks: NDArray[np.int64]
+    halvings: NDArray[np.int64]
+    covered: Floats
+    smallest_opening_angle: Floats
+
+
+class State(NamedTuple):
+    """Everything that a simulator's future depends on, besides its commands.
+
+    positions, velocities: [m], [m/s], shape (n_robots, n_nodes, 2). time: [s], shape (n_robots,).
+    """
+
+    positions: Floats
+    velocities: Floats
+    time: Floats
+
+
+class Simulator:
+    """`n_robots` robots of one scene, at rest with the hub at the origin until told otherwise.
+
+    scene: What is modelled.
+    n_robots: Size of the batch.
+    threads: Lane groups are shared out over this many threads; all processors if None. A robot's trajectory is the
+        same to the last bit whatever the batch, the lane and the number of threads.
+    """
+
+    def __init__(self, scene: Scene, n_robots: int = 1, threads: int | None = None):
+        if not isinstance(scene, Scene):
+            raise ValueError(f"Simulator needs a Scene, not {scene!r}.")
+        if isinstance(n_robots, bool) or not isinstance(n_robots, int | np.integer) or n_robots < 1:
+            raise ValueError(f"n_robots must be a whole number of at least 1, not {n_robots!r}.")
+        self.scene = scene
+        self.n_robots = int(n_robots)
+        n_groups = -(-self.n_robots // N_LANES)
+        available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        self.threads = min(n_groups, available if threads is None else max(1, threads))
+        self._rods = scene.rods()
+        self._scheme = SCHEMES[scene.numerics.scheme]
+        self._times = step_times(scene.actuator.corners, scene.numerics.step)
+        self._shape = np.asarray(scene.actuator.delta_psi(self._times))
+        n_limbs, n_rows = scene.robot.n_limbs, 2 * scene.robot.n_nodes
+        self._q = np.empty((n_groups, n_rows, N_LANES))
+        self._v = np.zeros((n_groups, n_rows, N_LANES))
+        self._q[:] = scene.robot.nodes().reshape(-1, 1)
+        self._commands = np.zeros((n_groups, n_limbs, N_LANES))
+        self._failed = np.zeros((n_groups, 1, N_LANES))
+        self._report = np.zeros((n_groups, len(REPORT_ROWS), N_LANES))
+        self._start_time = np.zeros(self.n_robots)
+        self._strokes = np.zeros(self.n_robots, dtype=np.int64)
+        self._since_stroke = np.zeros(self.n_robots)
+        self._delta_psi_end = 0.0  # per unit of command, now [rad]
+        self._make_threads()
+
+    def _make_threads(self) -> None:
+        robot = self.scene.robot
+        self._memory = [
+            (
+                make_work(robot.n_limbs, robot.nodes_per_limb, self._scheme.n_stages),
+                Actuation(np.zeros((robot.n_limbs, N_LANES)), np.zeros((robot.n_limbs, N_LANES))),
+            )
+            for _ in range(self.threads)
+        ]
+        self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
+
+    def __getstate__(self):
+        return {name: value for name, value in self.__dict__.items() if name not in {"_memory", "_pool"}}
+
+    def __setstate__(self, state):
+        self.__dict__.update(state)
+        self._make_threads()
+
+    # --- state -------------------------------------------------------------------------------------------------
+
+    def reset(self, mask: ArrayLike | None = None, heading: ArrayLike = 0.0) -> None:
+        """Put robots at rest with the hub at the origin and limb 1 in direction `heading`.
+
+        mask: Which robots, shape (n_robots,), all if None. heading: [rad], a number or shape (n_robots,).
+        """
+        chosen = np.ones(self.n_robots, bool) if mask is None else np.asarray(mask)
+        if chosen.dtype != bool or chosen.shape != (self.n_robots,):
+            raise ValueError(f"mask must be boolean of shape ({self.n_robots},), not {chosen.dtype} {chosen.shape}.")
+        angles = np.broadcast_to(np.asarray(heading, float), (self.n_robots,))
+        if not np.isfinite(angles[chosen]).all():
+            raise ValueError("heading must be finite [rad].")
+        nodes = self.scene.robot.nodes()
+        for robot in np.flatnonzero(chosen):
+            # At heading zero the nodes are exactly those of rest, so that symmetric scenes stay symmetric.
+            c, s = np.cos(angles[robot]), np.sin(angles[robot])
+            turned = np.stack([c * nodes[:, 0] - s * nodes[:, 1], s * nodes[:, 0] + c * nodes[:, 1]], axis=1)
+            group, lane = divmod(robot, N_LANES)
+            self._q[group, :, lane] = turned.reshape(-1)
+            self._v[group, :, lane] = 0.0
+            self._failed[group, 0, lane] = 0.0
+        self._set_time(chosen, 0.0)
+
+    def _set_time(self, chosen, time) -> None:
+        self._start_time[chosen] = time
+        self._strokes[chosen] = 0
+        self._since_stroke[chosen] = 0.0
+
+    def get_state(self) -> State:
+        """A copy of the state; `set_state` continues from it to the last bit (at the ends of strokes)."""
+        return State(self.positions, self.velocities, self.time)
+
+    def set_state(self, state: State) -> None:
+        """Put all robots into a state; robots that had failed are well again."""
+        shape = (self.n_robots, self.scene.robot.n_nodes, 2)
+        arrays = []
+        for name, value, wanted in zip(State._fields, state, (shape, shape, shape[:1]), strict=True):
+            array = np.asarray(value, float)
+            if array.shape != wanted:
+                raise ValueError(f"State.{name} must have shape {wanted}, not {array.shape}.")
+            if not np.isfinite(array).all():
+                raise ValueError(f"State.{name} must be finite.")
+            arrays.append(array)
+        self._write_nodes(self._q, arrays[0])
+        self._write_nodes(self._v, arrays[1])
+        self._failed[:] = 0.0
+        self._set_time(slice(None), arrays[2])
+
+    def _write_nodes(self, rows, nodes) -> None:
+        groups, lanes = np.divmod(np.arange(self.n_robots), N_LANES)
+        rows[groups, :, lanes] = nodes.reshape(self.n_robots, -1)
+
+    def _read(self, rows) -> np.ndarray:
+        """Rows (n_groups, k, N_LANES) as (n_robots, k), a copy."""
+        return np.ascontiguousarray(rows.transpose(0, 2, 1)).reshape(-1, rows.shape[1])[: self.n_robots]
+
+    @property
+    def positions(self) -> Floats:
+        """Node positions [m], shape (n_robots, n_nodes, 2), a copy."""
+        return self._read(self._q).reshape(self.n_robots, -1, 2)
+
+    @property
+    def velocities(self) -> Floats:
+        """Node velocities [m/s], shape (n_robots, n_nodes, 2), a copy."""
+        return self._read(self._v).reshape(self.n_robots, -1, 2)
+
+    @property
+    def time(self) -> Floats:
+        """Simulated time of every robot [s], shape (n_robots,), counted in strokes."""
+        return self._start_time + self._strokes * self.scene.actuator.period + self._since_stroke
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Robots whose solver has given up and that wait for a reset, shape (n_robots,)."""
+        return self._read(self._failed)[:, 0] > 0.0
+
+    def hub_position(self) -> Floats:
+        """Position of the hub [m], world frame, shape (n_robots, 2)."""
+        return self._read(self._q[:, :2])
+
+    def hub_velocity(self) -> Floats:
+        """Velocity of the hub [m/s], world frame, shape (n_robots, 2)."""
+        return self._read(self._v[:, :2])
+
+    def elastic_energy(self) -> Floats:
+        """Stretching and bending energy (13.14) at the present actuation [J], shape (n_robots,)."""
+        return self._energies()[0]
+
+    def kinetic_energy(self) -> Floats:
+        """Kinetic energy [J], shape (n_robots,)."""
+        return self._energies()[1]
+
+    def _energies(self):
+        work, actuation = self._memory[0]
+        both = np.zeros((2, len(self._q), 1, N_LANES))
+        for group in range(len(self._q)):
+            actuation.delta_psi_end[:] = self._delta_psi_end * self._commands[group]
+            energies(
+                self._rods, work, actuation, self._q[group], self._v[group], both[0, group], both[1, group]
+            )
+        return self._read(both[0])[:, 0], self._read(both[1])[:, 0]
+
+    # --- motion ------------------------------------------------------------------------------------------------
+
+    def stroke(self, commands: ArrayLike) -> StrokeReport:
+        """Advance all robots by one actuation period.
+
+        commands: Share of the peak angle per limb, in [-1, 1], + is anti-clockwise, shape (n_robots, n_limbs).
+        """
+        self._begin_stroke(commands)
+        self._advance(0, len(self._times) - 1)
+        return self._end_stroke()
+
+    def stroke_in_parts(self, commands: ArrayLike, parts: int) -> Iterator[float]:
+        """A stroke that pauses `parts` times, after about equal times, to be looked at; the same bits as `stroke`.
+
+        Yields the time since the stroke began [s]. Its StrokeReport is the generator's return value.
+        """
+        self._begin_stroke(commands)
+        wanted = self._times[-1] * np.arange(1, parts + 1) / parts
+        ends = np.unique(np.clip(np.searchsorted(self._times, wanted - 1e-12), 1, len(self._times) - 1))
+        begin = 0
+        for end in ends:
+            self._advance(begin, end)
+            begin = end
+            self._since_stroke[:] = self._read(self._report)[:, REPORT_ROWS.index("covered")]
+            self._delta_psi_end = self._shape[end]
+            yield float(self._times[end])
+        return self._end_stroke()
+
+    def _begin_stroke(self, commands: ArrayLike) -> None:
+        self._write_nodes(self._commands, self._checked_commands(commands))
+        self._report[:] = 0.0
+        self._report[:, SMALLEST_HUB_T] = np.inf
+
+    def _checked_commands(self, commands: ArrayLike) -> Floats:
+        array = np.asarray(commands, float)
+        wanted = (self.n_robots, self.scene.robot.n_limbs)
+        if array.shape != wanted:
+            raise ValueError(f"commands must have shape (n_robots, n_limbs) = {wanted}, not {array.shape}.")
+        good = np.abs(array) <= 1.0
+        if not good.all():
+            robot, limb = np.argwhere(~good)[0]
+            raise ValueError(
+                f"commands must be numbers in [-1, 1]; robot {robot} has {array[robot, limb]!r} for limb {limb + 1}."
+            )
+        if self.scene.robot.hub_hinge == "turning":
+            self._check_turning_hub(array)
+        return array
+
+    def _check_turning_hub(self, commands: Floats) -> None:
+        turn = self.scene.actuator.peak_angle * (np.roll(commands, -1, axis=1) - commands)
+        closed = self.scene.robot.opening_angle + turn < 1e-9
+        if closed.any():
+            robot, limb = np.argwhere(closed)[0]
+            raise ValueError(
+                f"With hub_hinge=\"turning\" the command of robot {robot} closes the hub hinge between limbs {limb + 1} "
+                f'and {(limb + 1) % commands.shape[1] + 1}, where its curvature is infinite: use hub_hinge="opening".'
+            )
+
+    def _advance(self, begin: int, end: int) -> None:
+        numerics = self.scene.numerics
+        times, shape = self._times[begin : end + 1], self._shape[begin : end + 1]
+        tolerance = numerics.newton_tolerance * self.scene.robot.limb_length
+
+        def run(thread: int) -> None:
+            part = slice(*(len(self._q) * np.array([thread, thread + 1]) // self.threads))
+            work, actuation = self._memory[thread]
+            advance(
+                self._rods, work, self._scheme, actuation, self._q[part], self._v[part], self._commands[part], times,
+                shape, self._failed[part], self._report[part], tolerance, numerics.max_iterations,
+            )  # fmt: skip
+
+        if self._pool is None:
+            run(0)
+        else:
+            list(self._pool.map(run, range(self.threads)))
+
+    def _end_stroke(self) -> StrokeReport:
+        rows = dict(zip(REPORT_ROWS, self._read(self._report).T, strict=True))
+        failed = self.failed
+        self._strokes += ~failed
+        self._since_stroke = np.where(failed, self._since_stroke, 0.0)
+        self._delta_psi_end = 0.0
+        counts = {name: rows[name].astype(np.int64) for name in ("newton_iterations", "repairs", "backtracks", "halvings")}
+        angle = 2.0 * np.arctan(rows["smallest_hub_t"])
+        if self.scene.robot.hub_hinge == "turning":
+            angle += np.pi
+        return StrokeReport(
+            status=np.where(failed, SolverStatus.NOT_CONVERGED, SolverStatus.CONVERGED),
+            covered=rows["covered"],
+            smallest_opening_angle=angle,
+            **counts,
+        )
