@@ -1,5 +1,11 @@
-"""A five-limb soft robot that learns to swim: planar discrete elastic rods behind a Gymnasium environment."""
+"""A five-limb soft robot that learns to swim: planar discrete elastic rods behind a Gymnasium environment.
 
+Importing this package registers `SeastarSwim-v0`.
+"""
+
+from gymnasium.envs.registration import register
+
+from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water
 from seastar_gym.simulator import Simulator, SolverStatus, State, StrokeReport
 
@@ -7,6 +13,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Numerics",
+    "RewardWeights",
     "Scene",
     "Seastar",
     "Simulator",
@@ -17,3 +24,10 @@ __all__ = [
     "Water",
     "__version__",
 ]
+
+register(
+    id="SeastarSwim-v0",
+    entry_point="seastar_gym.envs.seastar_swim:SeastarSwimEnv",
+    vector_entry_point="seastar_gym.envs.vector:SeastarSwimVectorEnv",
+    max_episode_steps=400,
+)

@@ -9,15 +9,18 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.actuation.sma import pulse
+from seastar_gym.der.rods import Rods
 from seastar_gym.morphology.seastar import make_rods, rest_positions
 
 HubHinge = Literal["opening", "turning"]
 SchemeName = Literal["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
+Fidelity = Literal["fast", "balanced", "accurate", "reference", "chapter"]
 
 
-def _require_number(name: str, value: float, unit: str, *, zero_allowed: bool = False) -> None:
+def require_number(name: str, value: float, unit: str, *, zero_allowed: bool = False) -> None:
     is_number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
     if not is_number or not math.isfinite(value) or value < 0 or (value == 0 and not zero_allowed):
         kind = "a finite number, not negative" if zero_allowed else "a positive, finite number"
@@ -52,13 +55,13 @@ class Seastar:
     density: float = 1000.0
     hub_hinge: HubHinge = "opening"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         _require_count("n_limbs", self.n_limbs, 3, 12)
         _require_count("nodes_per_limb", self.nodes_per_limb, 2, 10_000)
-        _require_number("limb_length", self.limb_length, "m")
-        _require_number("rod_radius", self.rod_radius, "m")
-        _require_number("youngs_modulus", self.youngs_modulus, "Pa")
-        _require_number("density", self.density, "kg/m^3")
+        require_number("limb_length", self.limb_length, "m")
+        require_number("rod_radius", self.rod_radius, "m")
+        require_number("youngs_modulus", self.youngs_modulus, "Pa")
+        require_number("density", self.density, "kg/m^3")
         _require_choice("hub_hinge", self.hub_hinge, get_args(HubHinge))
 
     @property
@@ -76,7 +79,7 @@ class Seastar:
         """Angle between neighbouring limbs at rest [rad]."""
         return 2.0 * math.pi / self.n_limbs
 
-    def nodes(self) -> np.ndarray:
+    def nodes(self) -> NDArray[np.float64]:
         """Node positions at rest [m], shape (n_nodes, 2): hub, {1,1}..{1,N-1}, {2,1}.. ; limb 1 along +x."""
         return rest_positions(self.n_limbs, self.nodes_per_limb, self.limb_length)
 
@@ -88,9 +91,9 @@ class Water:
     density: float = 1000.0
     drag_coefficient: float = 1.0
 
-    def __post_init__(self):
-        _require_number("density", self.density, "kg/m^3", zero_allowed=True)
-        _require_number("drag_coefficient", self.drag_coefficient, "1", zero_allowed=True)
+    def __post_init__(self) -> None:
+        require_number("density", self.density, "kg/m^3", zero_allowed=True)
+        require_number("drag_coefficient", self.drag_coefficient, "1", zero_allowed=True)
 
 
 @dataclass(frozen=True)
@@ -101,10 +104,10 @@ class SmaPulse:
     heating_time: float = 0.1
     cooling_time: float = 0.9
 
-    def __post_init__(self):
-        _require_number("peak_angle", self.peak_angle, "rad", zero_allowed=True)
-        _require_number("heating_time", self.heating_time, "s")
-        _require_number("cooling_time", self.cooling_time, "s")
+    def __post_init__(self) -> None:
+        require_number("peak_angle", self.peak_angle, "rad", zero_allowed=True)
+        require_number("heating_time", self.heating_time, "s")
+        require_number("cooling_time", self.cooling_time, "s")
 
     @property
     def period(self) -> float:
@@ -116,7 +119,7 @@ class SmaPulse:
         """Times within a stroke [s] that no time step may straddle."""
         return 0.0, self.heating_time, self.period
 
-    def delta_psi(self, t):
+    def delta_psi(self, t: ArrayLike) -> NDArray[np.float64]:
         """Rotation of a limb with command 1 at time t [s] of a stroke [rad]; t of any shape."""
         return self.peak_angle * pulse(t, self.heating_time, self.cooling_time)
 
@@ -136,13 +139,29 @@ class Numerics:
     newton_tolerance: float = 1e-8
     max_iterations: int = 60
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         _require_choice("scheme", self.scheme, get_args(SchemeName))
-        _require_number("step", self.step, "s")
-        _require_number("newton_tolerance", self.newton_tolerance, "limb lengths")
+        require_number("step", self.step, "s")
+        require_number("newton_tolerance", self.newton_tolerance, "limb lengths")
         _require_count("max_iterations", self.max_iterations, 2, 10_000)
         if self.newton_tolerance > 1e-2:
             raise ValueError(f"newton_tolerance must be at most 0.01 limb lengths, not {self.newton_tolerance!r}.")
+
+    @classmethod
+    def preset(cls, fidelity: Fidelity) -> "Numerics":
+        """The numerics that a fidelity stands for: "chapter" is the chapter's, the others go from fast to exact."""
+        _require_choice("fidelity", fidelity, get_args(Fidelity))
+        scheme, step = _PRESETS[fidelity]
+        return cls(scheme=scheme, step=step)
+
+
+_PRESETS: dict[Fidelity, tuple[SchemeName, float]] = {
+    "fast": ("sdirk2", 20e-3),
+    "balanced": ("implicit-midpoint", 5e-3),
+    "accurate": ("implicit-midpoint", 1e-3),
+    "reference": ("implicit-midpoint", 0.25e-3),
+    "chapter": ("implicit-euler", 3e-3),
+}
 
 
 @dataclass(frozen=True)
@@ -154,7 +173,7 @@ class Scene:
     actuator: SmaPulse = field(default_factory=SmaPulse)
     numerics: Numerics = field(default_factory=Numerics)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name, value, kinds in (
             ("robot", self.robot, Seastar),
             ("fluid", self.fluid, Water | None),
@@ -180,7 +199,7 @@ class Scene:
                 f"limbs the peak angle must be at most {0.5 * rest:.4g} rad, not {peak:.4g} rad."
             )
 
-    def rods(self):
+    def rods(self) -> Rods:
         """The scene's coefficients for the kernels, see der/rods.py."""
         robot, fluid = self.robot, self.fluid
         return make_rods(

@@ -73,6 +73,8 @@ class Simulator:
     n_robots: Size of the batch.
     threads: Lane groups are shared out over this many threads; all processors if None. A robot's trajectory is the
         same to the last bit whatever the batch, the lane and the number of threads.
+
+    q, v: The node positions and velocities as the kernels keep them, shape (n_groups, 2 n_nodes, N_LANES), not copies.
     """
 
     def __init__(self, scene: Scene, n_robots: int = 1, threads: int | None = None):
@@ -90,9 +92,9 @@ class Simulator:
         self._times = step_times(scene.actuator.corners, scene.numerics.step)
         self._shape = np.asarray(scene.actuator.delta_psi(self._times))
         n_limbs, n_rows = scene.robot.n_limbs, 2 * scene.robot.n_nodes
-        self._q = np.empty((n_groups, n_rows, N_LANES))
-        self._v = np.zeros((n_groups, n_rows, N_LANES))
-        self._q[:] = scene.robot.nodes().reshape(-1, 1)
+        self.q = np.empty((n_groups, n_rows, N_LANES))
+        self.v = np.zeros((n_groups, n_rows, N_LANES))
+        self.q[:] = scene.robot.nodes().reshape(-1, 1)
         self._commands = np.zeros((n_groups, n_limbs, N_LANES))
         self._failed = np.zeros((n_groups, 1, N_LANES))
         self._report = np.zeros((n_groups, len(REPORT_ROWS), N_LANES))
@@ -139,8 +141,8 @@ class Simulator:
             c, s = np.cos(angles[robot]), np.sin(angles[robot])
             turned = np.stack([c * nodes[:, 0] - s * nodes[:, 1], s * nodes[:, 0] + c * nodes[:, 1]], axis=1)
             group, lane = divmod(robot, N_LANES)
-            self._q[group, :, lane] = turned.reshape(-1)
-            self._v[group, :, lane] = 0.0
+            self.q[group, :, lane] = turned.reshape(-1)
+            self.v[group, :, lane] = 0.0
             self._failed[group, 0, lane] = 0.0
         self._set_time(chosen, 0.0)
 
@@ -164,28 +166,34 @@ class Simulator:
             if not np.isfinite(array).all():
                 raise ValueError(f"State.{name} must be finite.")
             arrays.append(array)
-        self._write_nodes(self._q, arrays[0])
-        self._write_nodes(self._v, arrays[1])
+        self._write_nodes(self.q, arrays[0])
+        self._write_nodes(self.v, arrays[1])
         self._failed[:] = 0.0
         self._set_time(slice(None), arrays[2])
 
-    def _write_nodes(self, rows, nodes) -> None:
+    def to_rows(self, values: Floats) -> Floats:
+        """Numbers of every robot, shape (n_robots, k), as rows for kernels, shape (n_groups, k, N_LANES)."""
+        padded = np.zeros((len(self.q) * N_LANES, values.shape[1]))
+        padded[: self.n_robots] = values
+        return np.ascontiguousarray(padded.reshape(len(self.q), N_LANES, -1).transpose(0, 2, 1))
+
+    def _write_nodes(self, rows: Floats, nodes: Floats) -> None:
         groups, lanes = np.divmod(np.arange(self.n_robots), N_LANES)
         rows[groups, :, lanes] = nodes.reshape(self.n_robots, -1)
 
-    def _read(self, rows) -> np.ndarray:
+    def _read(self, rows: Floats) -> Floats:
         """Rows (n_groups, k, N_LANES) as (n_robots, k), a copy."""
         return np.ascontiguousarray(rows.transpose(0, 2, 1)).reshape(-1, rows.shape[1])[: self.n_robots]
 
     @property
     def positions(self) -> Floats:
         """Node positions [m], shape (n_robots, n_nodes, 2), a copy."""
-        return self._read(self._q).reshape(self.n_robots, -1, 2)
+        return self._read(self.q).reshape(self.n_robots, -1, 2)
 
     @property
     def velocities(self) -> Floats:
         """Node velocities [m/s], shape (n_robots, n_nodes, 2), a copy."""
-        return self._read(self._v).reshape(self.n_robots, -1, 2)
+        return self._read(self.v).reshape(self.n_robots, -1, 2)
 
     @property
     def time(self) -> Floats:
@@ -199,11 +207,11 @@ class Simulator:
 
     def hub_position(self) -> Floats:
         """Position of the hub [m], world frame, shape (n_robots, 2)."""
-        return self._read(self._q[:, :2])
+        return self._read(self.q[:, :2])
 
     def hub_velocity(self) -> Floats:
         """Velocity of the hub [m/s], world frame, shape (n_robots, 2)."""
-        return self._read(self._v[:, :2])
+        return self._read(self.v[:, :2])
 
     def elastic_energy(self) -> Floats:
         """Stretching and bending energy (13.14) at the present actuation [J], shape (n_robots,)."""
@@ -215,12 +223,10 @@ class Simulator:
 
     def _energies(self):
         work, actuation = self._memory[0]
-        both = np.zeros((2, len(self._q), 1, N_LANES))
-        for group in range(len(self._q)):
+        both = np.zeros((2, len(self.q), 1, N_LANES))
+        for group in range(len(self.q)):
             actuation.delta_psi_end[:] = self._delta_psi_end * self._commands[group]
-            energies(
-                self._rods, work, actuation, self._q[group], self._v[group], both[0, group], both[1, group]
-            )
+            energies(self._rods, work, actuation, self.q[group], self.v[group], both[0, group], both[1, group])
         return self._read(both[0])[:, 0], self._read(both[1])[:, 0]
 
     # --- motion ------------------------------------------------------------------------------------------------
@@ -277,7 +283,7 @@ class Simulator:
         if closed.any():
             robot, limb = np.argwhere(closed)[0]
             raise ValueError(
-                f"With hub_hinge=\"turning\" the command of robot {robot} closes the hub hinge between limbs {limb + 1} "
+                f'With hub_hinge="turning" the command of robot {robot} closes the hub hinge between limbs {limb + 1} '
                 f'and {(limb + 1) % commands.shape[1] + 1}, where its curvature is infinite: use hub_hinge="opening".'
             )
 
@@ -287,10 +293,10 @@ class Simulator:
         tolerance = numerics.newton_tolerance * self.scene.robot.limb_length
 
         def run(thread: int) -> None:
-            part = slice(*(len(self._q) * np.array([thread, thread + 1]) // self.threads))
+            part = slice(*(len(self.q) * np.array([thread, thread + 1]) // self.threads))
             work, actuation = self._memory[thread]
             advance(
-                self._rods, work, self._scheme, actuation, self._q[part], self._v[part], self._commands[part], times,
+                self._rods, work, self._scheme, actuation, self.q[part], self.v[part], self._commands[part], times,
                 shape, self._failed[part], self._report[part], tolerance, numerics.max_iterations,
             )  # fmt: skip
 
@@ -305,7 +311,9 @@ class Simulator:
         self._strokes += ~failed
         self._since_stroke = np.where(failed, self._since_stroke, 0.0)
         self._delta_psi_end = 0.0
-        counts = {name: rows[name].astype(np.int64) for name in ("newton_iterations", "repairs", "backtracks", "halvings")}
+        counts = {
+            name: rows[name].astype(np.int64) for name in ("newton_iterations", "repairs", "backtracks", "halvings")
+        }
         angle = 2.0 * np.arctan(rows["smallest_hub_t"])
         if self.scene.robot.hub_hinge == "turning":
             angle += np.pi

@@ -165,7 +165,12 @@ def sweep_limb(rods, work, limb, gamma, inverse_gamma, convex):
             work,
             node,
             diagonal_block(D, K, outer_K, P, S, V),
-            (-K[0] - P[0] - R[0] - T[0], -K[1] - P[1] - R[1] - T[1], -K[1] - P[2] - R[2] - T[2], -K[2] - P[3] - R[3] - T[3]),
+            (
+                -K[0] - P[0] - R[0] - T[0],
+                -K[1] - P[1] - R[1] - T[1],
+                -K[1] - P[2] - R[2] - T[2],
+                -K[2] - P[3] - R[3] - T[3],
+            ),
             R,
             (r[0] + f[0] - outer_f[0] - h[0] - w[0], r[1] + f[1] - outer_f[1] - h[1] - w[1]),
         )

@@ -174,7 +174,11 @@ def solve_roots(work, n):
             factor = w * inverse
             for column in range(k + 1, row + 1):
                 at = triangle_row(row, column)
-                store(work.roots, at, subtract_product(load(work.roots, at), factor, load(work.roots, triangle_row(column, k))))
+                store(
+                    work.roots,
+                    at,
+                    subtract_product(load(work.roots, at), factor, load(work.roots, triangle_row(column, k))),
+                )
             store(work.roots_rhs, row, subtract_product(load(work.roots_rhs, row), factor, z))
         store(work.roots_rhs, k, z * inverse)
         store(work.roots, triangle_row(k, k), inverse)

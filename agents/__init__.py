@@ -1,0 +1,1 @@
+"""Agents for SeastarSwim-v0: scripted gaits, PPO, and their evaluation."""

@@ -1,0 +1,1 @@
+"""The Gymnasium environments: one robot (`SeastarSwimEnv`) and a native batch (`SeastarSwimVectorEnv`)."""

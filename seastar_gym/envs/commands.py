@@ -1,0 +1,53 @@
+"""What an action means: which limbs are heated, and which way they turn."""
+
+import itertools
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+Actions: TypeAlias = Literal["limbs", "joint", "pairs"]
+
+LIMB_COMMANDS = np.array([0.0, 1.0, -1.0])
+"""Command of a limb for its action 0, 1, 2: leave it alone, actuate + (anti-clockwise), actuate -."""
+
+
+def action_space(actions: Actions, n_limbs: int) -> spaces.MultiDiscrete | spaces.Discrete:
+    """The space of one robot's actions."""
+    if actions == "limbs":
+        return spaces.MultiDiscrete([3] * n_limbs)
+    return spaces.Discrete(len(command_table(actions, n_limbs)))
+
+
+def command_table(actions: Actions, n_limbs: int) -> NDArray[np.float64]:
+    """Command of every action of a `Discrete` space, shape (n_actions, n_limbs), values -1, 0, 1.
+
+    "joint": every command, limb 1 varying slowest, each limb in the order 0, +, -. "pairs": no limb, then every pair
+    of one + and one - limb. "limbs" has no table: it is one action per limb.
+    """
+    if actions not in get_args(Actions):
+        raise ValueError(f"actions must be one of {', '.join(map(repr, get_args(Actions)))}, not {actions!r}.")
+    if actions == "limbs":
+        raise ValueError('actions="limbs" has one action per limb, not a table of commands: use LIMB_COMMANDS.')
+    if actions == "joint":
+        return np.array(list(itertools.product(LIMB_COMMANDS, repeat=n_limbs)))
+    table = np.zeros((1 + n_limbs * (n_limbs - 1), n_limbs))
+    for row, (plus, minus) in enumerate(itertools.permutations(range(n_limbs), 2), start=1):
+        table[row, [plus, minus]] = 1.0, -1.0
+    return table
+
+
+def to_commands(actions: Actions, n_limbs: int, action: object, n_robots: int) -> NDArray[np.float64]:
+    """Commands of `n_robots` robots, shape (n_robots, n_limbs), or ValueError for what is not an action of theirs."""
+    array = np.asarray(action)
+    shape = (n_robots, n_limbs) if actions == "limbs" else (n_robots,)
+    n_choices = 3 if actions == "limbs" else len(command_table(actions, n_limbs))
+    if array.dtype.kind not in "iu" or array.shape != shape:
+        raise ValueError(
+            f'With actions="{actions}" the actions of {n_robots} robot(s) are whole numbers of shape {shape}, '
+            f"not {array.dtype} of shape {array.shape}."
+        )
+    if array.size and (array.min() < 0 or array.max() >= n_choices):
+        raise ValueError(f'With actions="{actions}" an action is from 0 to {n_choices - 1}, not {array.tolist()}.')
+    return (LIMB_COMMANDS if actions == "limbs" else command_table(actions, n_limbs))[array]

@@ -1,0 +1,91 @@
+"""What a controller sees: node states, hub velocity and waypoints, in a frame that turns with the robot.
+
+The body frame has its origin at the hub; its x axis is the direction of limb 1 of the rest shape after the rotation
+that fits the rest shape best to the nodes (least squares over all nodes). Every number is of order one:
+
+index                 what                                              unit
+0 .. 2m-1             node positions relative to the hub, x and y       limb lengths
+2m .. 4m-1            node velocities relative to the hub, x and y      VELOCITY_SCALE
+4m, 4m+1              hub velocity, x and y                             VELOCITY_SCALE
+4m+2, 4m+3            current waypoint relative to the hub, x and y     limb lengths
+4m+4, 4m+5            next waypoint relative to the hub, x and y        limb lengths
+
+with m = n_nodes - 1 nodes in the order {1,1}..{1,N-1}, {2,1}.. (m = 45 for the chapter's robot: 186 numbers). On the
+last leg the next waypoint is the current one. The waypoint's distance is not clipped: its full length can be read.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.der.compilation import entry_point, kernel
+from seastar_gym.der.lanes import add_product, borrow, load, select, splat, sqrt, store
+
+VELOCITY_SCALE = 0.025
+"""[m/s]: nodes and hub move at 12 to 24 mm/s root mean square after strokes of random commands."""
+
+
+def observation_size(n_nodes: int) -> int:
+    """Length of the observation of a robot of n_nodes nodes."""
+    return 4 * (n_nodes - 1) + 6
+
+
+@kernel
+def body_axis(rest, q, n_nodes):
+    """(cos, sin) of the rotation that fits the rest shape best to the nodes around the hub; (1, 0) if none does."""
+    c, s = splat(0.0), splat(0.0)
+    hub_x, hub_y = load(q, 0), load(q, 1)
+    for node in range(1, n_nodes):
+        rest_x, rest_y = load(rest, 2 * node), load(rest, 2 * node + 1)
+        x, y = load(q, 2 * node) - hub_x, load(q, 2 * node + 1) - hub_y
+        c = add_product(add_product(c, rest_x, x), rest_y, y)
+        s = add_product(s, rest_x, y) - rest_y * x
+    norm = sqrt(c * c + s * s)
+    lost = norm == 0.0
+    return select(lost, 1.0, c / norm), select(lost, 0.0, s / norm)
+
+
+@kernel
+def store_turned(out, row, x, y, c, s):
+    """Write the vector (x, y) as seen in a frame whose x axis is (c, s)."""
+    store(out, row, x * c + y * s)
+    store(out, row + 1, y * c - x * s)
+
+
+@entry_point
+def observe(rest, q, v, targets, length_scale, velocity_scale, out):
+    """Fill the observations of lane groups.
+
+    rest: Rest positions [m], shape (2 n_nodes,). q, v: [m], [m/s], shape (n_groups, 2 n_nodes, N_LANES).
+    targets: Current and next waypoint in the world frame [m], shape (n_groups, 4, N_LANES).
+    out: Observations, shape (n_groups, observation size, N_LANES).
+    """
+    n_nodes = rest.shape[0] // 2
+    per_length, per_velocity = 1.0 / length_scale, 1.0 / velocity_scale
+    rest_rows = borrow(rest)
+    for group in range(q.shape[0]):
+        position, velocity, target, rows = (
+            borrow(q[group]),
+            borrow(v[group]),
+            borrow(targets[group]),
+            borrow(out[group]),
+        )
+        c, s = body_axis(rest_rows, position, n_nodes)
+        hub_x, hub_y = load(position, 0), load(position, 1)
+        hub_vx, hub_vy = load(velocity, 0), load(velocity, 1)
+        velocities = 2 * (n_nodes - 1)
+        for node in range(1, n_nodes):
+            row = 2 * (node - 1)
+            x, y = load(position, 2 * node) - hub_x, load(position, 2 * node + 1) - hub_y
+            store_turned(rows, row, x * per_length, y * per_length, c, s)
+            vx, vy = load(velocity, 2 * node) - hub_vx, load(velocity, 2 * node + 1) - hub_vy
+            store_turned(rows, velocities + row, vx * per_velocity, vy * per_velocity, c, s)
+        row = 2 * velocities
+        store_turned(rows, row, hub_vx * per_velocity, hub_vy * per_velocity, c, s)
+        for k in range(2):
+            x, y = load(target, 2 * k) - hub_x, load(target, 2 * k + 1) - hub_y
+            store_turned(rows, row + 2 + 2 * k, x * per_length, y * per_length, c, s)
+
+
+def to_float32(rows: NDArray[np.float64], n_robots: int) -> NDArray[np.float32]:
+    """Rows (n_groups, size, N_LANES) as a fresh float32 array of shape (n_robots, size)."""
+    return rows.transpose(0, 2, 1).reshape(-1, rows.shape[1])[:n_robots].astype(np.float32)

@@ -1,0 +1,184 @@
+"""The task behind both environments: a batch of robots, each on a path of its own, advanced by strokes."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seastar_gym.envs.observation import VELOCITY_SCALE, observation_size, observe, to_float32
+from seastar_gym.envs.paths import PathName, cross_track_error, make_path
+from seastar_gym.envs.reward import RewardWeights, reward_terms
+from seastar_gym.scene import Fidelity, Numerics, Scene, require_number
+from seastar_gym.simulator import Simulator, SolverStatus, StrokeReport
+
+Floats = NDArray[np.float64]
+Path = PathName | ArrayLike
+
+
+class Outcome(NamedTuple):
+    """What a stroke did for the task; arrays over robots."""
+
+    reward: Floats
+    terminated: NDArray[np.bool_]
+    info: dict[str, NDArray[Any]]
+
+
+def make_scene(scene: Scene | None, fidelity: Fidelity | None) -> Scene:
+    """The scene with the numerics of `fidelity`; "balanced" if neither is given."""
+    if scene is None:
+        return Scene(numerics=Numerics.preset("balanced" if fidelity is None else fidelity))
+    if not isinstance(scene, Scene):
+        raise ValueError(f"scene must be a Scene, not {scene!r}.")
+    return scene if fidelity is None else replace(scene, numerics=Numerics.preset(fidelity))
+
+
+class SwimTask:
+    """`n_robots` robots that swim along waypoints.
+
+    Every robot has its own path and its own generator, so a robot of a batch does what it would do alone.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        n_robots: int,
+        path: Path,
+        reward: RewardWeights,
+        waypoint_radius: float,
+        random_heading: bool,
+        threads: int | None,
+    ):
+        require_number("waypoint_radius", waypoint_radius, "m")
+        if not isinstance(reward, RewardWeights):
+            raise ValueError(f"reward must be RewardWeights, not {reward!r}.")
+        make_path(path, np.random.default_rng(0))  # refuses a bad path now, not at the first reset
+        self.simulator = Simulator(scene, n_robots, threads)
+        if scene.robot.hub_hinge == "turning" and 2 * scene.actuator.peak_angle >= scene.robot.opening_angle * (
+            1 - 1e-9
+        ):
+            raise ValueError(
+                'With hub_hinge="turning" some actions would close a hub hinge, where its curvature is infinite: use '
+                'hub_hinge="opening" or a smaller peak angle.'
+            )
+        self.path, self.reward, self.waypoint_radius, self.random_heading = (
+            path,
+            reward,
+            waypoint_radius,
+            random_heading,
+        )
+        self.n_robots = n_robots
+        self._rest = scene.robot.nodes().reshape(-1)
+        self.waypoints = np.zeros((n_robots, 1, 2))
+        self._way_after = np.zeros((n_robots, 1))  # from waypoint k to the last [m]
+        self.n_waypoints = np.ones(n_robots, np.int64)
+        self.waypoint_index = np.zeros(n_robots, np.int64)
+        self._way_to_go = np.zeros(n_robots)
+
+    @property
+    def observation_size(self) -> int:
+        """Length of one robot's observation."""
+        return observation_size(self.simulator.scene.robot.n_nodes)
+
+    def reset(self, robots: NDArray[np.bool_], generators: list[np.random.Generator], path: Path | None = None) -> None:
+        """Begin a new episode for the robots in the mask; their generators draw path, then heading."""
+        headings = np.zeros(self.n_robots)
+        for robot in np.flatnonzero(robots):
+            self._set_path(robot, make_path(self.path if path is None else path, generators[robot]))
+            if self.random_heading:
+                headings[robot] = generators[robot].uniform(-np.pi, np.pi)
+        self.simulator.reset(robots, headings)
+        self.waypoint_index[robots] = 0
+        self._way_to_go[robots] = self._measure_way_to_go(self.simulator.hub_position())[robots]
+
+    def _set_path(self, robot: int, waypoints: Floats) -> None:
+        missing = len(waypoints) - self.waypoints.shape[1]
+        if missing > 0:
+            self.waypoints = np.pad(self.waypoints, ((0, 0), (0, missing), (0, 0)))
+            self._way_after = np.pad(self._way_after, ((0, 0), (0, missing)))
+        n = len(waypoints)
+        self.waypoints[robot, :n] = waypoints
+        self.waypoints[robot, n:] = waypoints[-1]
+        legs = _length(np.diff(waypoints, axis=0))
+        self._way_after[robot] = 0.0
+        self._way_after[robot, : n - 1] = np.cumsum(legs[::-1])[::-1]
+        self.n_waypoints[robot] = n
+
+    def _waypoint(self, k: NDArray[np.int64]) -> Floats:
+        """Waypoint k of every robot [m], the last one beyond the end, the origin at -1; shape (n_robots, 2)."""
+        robots = np.arange(self.n_robots)
+        found = self.waypoints[robots, np.clip(k, 0, self.n_waypoints - 1)]
+        return np.where((k < 0)[:, None], 0.0, found)
+
+    def _measure_way_to_go(self, hub: Floats) -> Floats:
+        k = np.minimum(self.waypoint_index, self.n_waypoints - 1)
+        return _length(self._waypoint(k) - hub) + self._way_after[np.arange(self.n_robots), k]
+
+    def observe(self) -> NDArray[np.float32]:
+        """Observations, shape (n_robots, size), a fresh array; see observation.py."""
+        simulator = self.simulator
+        targets = np.concatenate([self._waypoint(self.waypoint_index), self._waypoint(self.waypoint_index + 1)], axis=1)
+        target_rows = simulator.to_rows(targets)
+        out = np.empty((len(target_rows), self.observation_size, target_rows.shape[2]))
+        length = simulator.scene.robot.limb_length
+        observe(self._rest, simulator.q, simulator.v, target_rows, length, VELOCITY_SCALE, out)
+        return to_float32(out, self.n_robots)
+
+    def step(self, commands: Floats) -> Outcome:
+        """One stroke of every robot."""
+        return self._judge(commands, self.simulator.stroke(commands))
+
+    def step_in_parts(self, commands: Floats, parts: int) -> Iterator[float]:
+        """One stroke that pauses to be looked at; yields the time in it [s]. The Outcome is its return value."""
+        report = yield from self.simulator.stroke_in_parts(commands, parts)
+        return self._judge(commands, report)
+
+    def _judge(self, commands: Floats, report: StrokeReport) -> Outcome:
+        hub = self.simulator.hub_position()
+        reached = self._pass_waypoints(hub)
+        before = self._way_to_go
+        self._way_to_go = self._measure_way_to_go(hub)
+        success = self.waypoint_index == self.n_waypoints
+        limbs_heated = np.count_nonzero(commands, axis=1)
+        terms = reward_terms(self.reward, before - self._way_to_go, reached, limbs_heated)
+        reward = terms["reward_progress"] + terms["reward_waypoint"] + terms["reward_effort"]
+        info = {
+            **self.facts(hub),
+            "is_success": success,
+            "limbs_heated": limbs_heated,
+            "newton_iterations": report.newton_iterations,
+            "solver_status": report.status,
+            "smallest_opening_angle": report.smallest_opening_angle,
+            **terms,
+        }
+        return Outcome(reward, success | (report.status != SolverStatus.CONVERGED), info)
+
+    def _pass_waypoints(self, hub: Floats) -> NDArray[np.int64]:
+        """Move on to the next waypoint as often as the current one is within reach; returns how often."""
+        reached = np.zeros(self.n_robots, np.int64)
+        while True:
+            near = _length(self._waypoint(self.waypoint_index) - hub) <= self.waypoint_radius
+            near &= self.waypoint_index < self.n_waypoints
+            if not near.any():
+                return reached
+            self.waypoint_index += near
+            reached += near
+
+    def facts(self, hub: Floats | None = None) -> dict[str, NDArray[Any]]:
+        """Where every robot is on its path; arrays over robots, units as in the environment's docstring."""
+        hub = self.simulator.hub_position() if hub is None else hub
+        current = self._waypoint(self.waypoint_index)
+        leg = np.minimum(self.waypoint_index, self.n_waypoints - 1)
+        return {
+            "time": self.simulator.time,
+            "hub_position": hub.copy(),
+            "waypoint_index": self.waypoint_index.copy(),
+            "distance": _length(current - hub),
+            "cross_track_error": cross_track_error(hub, self._waypoint(leg - 1), self._waypoint(leg)),
+        }
+
+
+def _length(vectors: Floats) -> Floats:
+    """Euclidean length over the last axis, of size 2."""
+    return np.hypot(vectors[..., 0], vectors[..., 1])
