@@ -1,10 +1,10 @@
 """`Simulator`: a batch of robots of one scene, advanced by whole strokes."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Generator
 from concurrent.futures import ThreadPoolExecutor
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -115,10 +115,10 @@ class Simulator:
         ]
         self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
 
-    def __getstate__(self):
+    def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name not in {"_memory", "_pool"}}
 
-    def __setstate__(self, state):
+    def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._make_threads()
 
@@ -146,7 +146,7 @@ class Simulator:
             self._failed[group, 0, lane] = 0.0
         self._set_time(chosen, 0.0)
 
-    def _set_time(self, chosen, time) -> None:
+    def _set_time(self, chosen: NDArray[np.bool_] | slice, time: Floats | float) -> None:
         self._start_time[chosen] = time
         self._strokes[chosen] = 0
         self._since_stroke[chosen] = 0.0
@@ -221,7 +221,7 @@ class Simulator:
         """Kinetic energy [J], shape (n_robots,)."""
         return self._energies()[1]
 
-    def _energies(self):
+    def _energies(self) -> tuple[Floats, Floats]:
         work, actuation = self._memory[0]
         both = np.zeros((2, len(self.q), 1, N_LANES))
         for group in range(len(self.q)):
@@ -240,7 +240,7 @@ class Simulator:
         self._advance(0, len(self._times) - 1)
         return self._end_stroke()
 
-    def stroke_in_parts(self, commands: ArrayLike, parts: int) -> Iterator[float]:
+    def stroke_in_parts(self, commands: ArrayLike, parts: int) -> Generator[float, None, StrokeReport]:
         """A stroke that pauses `parts` times, after about equal times, to be looked at; the same bits as `stroke`.
 
         Yields the time since the stroke began [s]. Its StrokeReport is the generator's return value.

@@ -1,5 +1,7 @@
 """The times between which a simulator steps through one actuation period."""
 
+from itertools import pairwise
+
 import numpy as np
 
 SAME_TIME = 1e-9  # of a step: shorter remainders are rounding of the division, not a step
@@ -12,7 +14,7 @@ def step_times(corners: tuple[float, ...], step: float) -> np.ndarray:
     Fig. 13.5b has its corners at 0, 0.1 and 1.0 s, and no step may straddle one.
     """
     times = [np.array([corners[0]])]
-    for begin, end in zip(corners[:-1], corners[1:], strict=True):
+    for begin, end in pairwise(corners):
         n_whole = int(np.floor((end - begin) / step + SAME_TIME))
         whole = begin + step * np.arange(1, n_whole + 1)
         if n_whole and end - whole[-1] <= SAME_TIME * step:

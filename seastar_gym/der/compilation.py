@@ -7,6 +7,7 @@ defines kernels, the versions of numba, llvmlite and numpy and the lane width: w
 be found.
 """
 
+import contextlib
 import functools
 import hashlib
 from pathlib import Path
@@ -65,9 +66,7 @@ class _DigestCache(FunctionCache):
 def entry_point(function):
     """Compile `function` for calls from Python, with the GIL released and the machine code kept on disk."""
     compiled = kernel(function)
-    try:
+    # RuntimeError: no folder can be written (a read-only home), so the function is compiled anew in every process.
+    with contextlib.suppress(RuntimeError):
         compiled._cache = _DigestCache(function)
-    except RuntimeError:
-        # No folder can be written (a read-only home): the function is compiled anew in every process.
-        pass
     return compiled

@@ -90,8 +90,7 @@ class Work(NamedTuple):
 
 
 class Actuation(NamedTuple):
-    """delta_psi_start, delta_psi_end: rotation of every limb at the ends of an interval [rad], shape (n_limbs, N_LANES);
-    linear in between."""
+    """Rotation of every limb at the ends of an interval [rad], shape (n_limbs, N_LANES), linear in between."""
 
     delta_psi_start: np.ndarray
     delta_psi_end: np.ndarray

@@ -36,6 +36,6 @@ def reward_terms(
     """The terms by name, each of shape (n_robots,); `progress` in [m]."""
     return {
         "reward_progress": weights.progress * progress,
-        "reward_waypoint": weights.waypoint * waypoints_reached,
-        "reward_effort": -weights.effort * limbs_heated,
+        "reward_waypoint": weights.waypoint * waypoints_reached.astype(np.float64),
+        "reward_effort": -weights.effort * limbs_heated.astype(np.float64),
     }

@@ -1,6 +1,6 @@
 """`SeastarSwim-v0`: one robot."""
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from typing import Any, Literal
 
 import gymnasium as gym
@@ -25,11 +25,11 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     ## Action
     One step is one stroke: the chosen limbs are heated for 0.1 s and cool for 0.9 s (Fig. 13.5b).
 
-    | `actions`           | space                       | meaning                                                         |
-    |---------------------|-----------------------------|-----------------------------------------------------------------|
-    | `"limbs"` (default) | `MultiDiscrete([3] * n)`    | per limb: 0 leave it alone, 1 actuate + (anti-clockwise), 2 -   |
-    | `"joint"`           | `Discrete(3**n)`            | one whole command; `command_table` lists them                   |
-    | `"pairs"`           | `Discrete(1 + n (n - 1))`   | no limb, or one + and one - limb; `command_table` lists them    |
+    | `actions`           | space                     | meaning                                                    |
+    |---------------------|---------------------------|------------------------------------------------------------|
+    | `"limbs"` (default) | `MultiDiscrete([3] * n)`  | per limb: 0 rest, 1 actuate + (anti-clockwise), 2 actuate - |
+    | `"joint"`           | `Discrete(3**n)`          | one whole command; `command_table` lists them              |
+    | `"pairs"`           | `Discrete(1 + n (n - 1))` | no limb, or one + and one - limb; see `command_table`      |
 
     ## Observation
     A `float32` vector in a body frame that turns with the robot; the table stands in `envs/observation.py`. For the
@@ -48,11 +48,11 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     reached) + `reward_effort` (minus the limbs heated), with the weights in `RewardWeights`; the terms are in `info`.
 
     ## Info
-    `time` [s], `hub_position` [m], `waypoint_index` (waypoints reached so far), `distance` [m] from the hub to the current
-    waypoint, `cross_track_error` [m] from the leg it is on, `is_success`, `limbs_heated`, `newton_iterations`,
+    `time` [s], `hub_position` [m], `waypoint_index` (waypoints reached so far), `distance` [m] from the hub to the
+    current waypoint, `cross_track_error` [m] from the leg it is on, `is_success`, `limbs_heated`, `newton_iterations`,
     `solver_status` (0: converged), `smallest_opening_angle` [rad] between neighbouring limbs during the stroke (below
-    zero: limbs crossed, which this scene allows), and the reward's terms. `solver_message` says what to do about a status
-    other than 0.
+    zero: limbs crossed, which this scene allows), and the reward's terms. `solver_message` says what to do about a
+    status other than 0.
 
     ## Episode
     Starts at rest with the hub at the origin. `terminated` when the last waypoint is reached, or when the solver gave
@@ -153,7 +153,7 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
             return outcome
         return self._draw_while_swimming(self._task.step_in_parts(command, FRAMES_PER_STROKE))
 
-    def _draw_while_swimming(self, parts: Iterator[float]) -> Outcome:
+    def _draw_while_swimming(self, parts: Generator[float, None, Outcome]) -> Outcome:
         while True:
             try:
                 time_in_stroke = next(parts)

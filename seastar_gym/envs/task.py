@@ -1,6 +1,6 @@
 """The task behind both environments: a batch of robots, each on a path of its own, advanced by strokes."""
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -92,7 +92,7 @@ class SwimTask:
         self.waypoint_index[robots] = 0
         self._way_to_go[robots] = self._measure_way_to_go(self.simulator.hub_position())[robots]
 
-    def _set_path(self, robot: int, waypoints: Floats) -> None:
+    def _set_path(self, robot: np.intp, waypoints: Floats) -> None:
         missing = len(waypoints) - self.waypoints.shape[1]
         if missing > 0:
             self.waypoints = np.pad(self.waypoints, ((0, 0), (0, missing), (0, 0)))
@@ -129,7 +129,7 @@ class SwimTask:
         """One stroke of every robot."""
         return self._judge(commands, self.simulator.stroke(commands))
 
-    def step_in_parts(self, commands: Floats, parts: int) -> Iterator[float]:
+    def step_in_parts(self, commands: Floats, parts: int) -> Generator[float, None, Outcome]:
         """One stroke that pauses to be looked at; yields the time in it [s]. The Outcome is its return value."""
         report = yield from self.simulator.stroke_in_parts(commands, parts)
         return self._judge(commands, report)

@@ -1,12 +1,15 @@
 """The seastar of Fig. 13.4a: straight limbs of equal length around a hub, and its coefficients as rods."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seastar_gym.der.rods import Rods
 
+Floats = NDArray[np.float64]
 
-def rest_positions(n_limbs: int, nodes_per_limb: int, limb_length: float) -> np.ndarray:
-    """Nodes of the undeformed robot [m], shape (n_nodes, 2): hub at the origin, limb 1 along +x, then anti-clockwise."""
+
+def rest_positions(n_limbs: int, nodes_per_limb: int, limb_length: float) -> Floats:
+    """Nodes of the undeformed robot [m], shape (n_nodes, 2): hub at the origin, limb 1 along +x, anti-clockwise."""
     angles = 2.0 * np.pi * np.arange(n_limbs) / n_limbs
     directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     distances = limb_length * np.arange(1, nodes_per_limb) / (nodes_per_limb - 1)
@@ -14,7 +17,7 @@ def rest_positions(n_limbs: int, nodes_per_limb: int, limb_length: float) -> np.
     return np.concatenate([np.zeros((1, 2)), limbs.reshape(-1, 2)])
 
 
-def voronoi_lengths(n_limbs: int, nodes_per_limb: int, limb_length: float) -> np.ndarray:
+def voronoi_lengths(n_limbs: int, nodes_per_limb: int, limb_length: float) -> Floats:
     """Length of rod that belongs to every node [m], shape (n_nodes,): half of each edge that meets there.
 
     The hub has n_limbs half edges.
@@ -45,7 +48,7 @@ def make_rods(
     dl = voronoi_lengths(n_limbs, nodes_per_limb, limb_length)
     turning = hub_hinge == "turning"
 
-    def per_edge(value):
+    def per_edge(value: float) -> Floats:
         return np.full(n_edges, value)
 
     return Rods(
