@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from seastar_gym.actuation.schedule import step_times
 from seastar_gym.der.energy import energies
 from seastar_gym.der.lanes import N_LANES
-from seastar_gym.der.rods import REPORT_ROWS, SMALLEST_HUB_T, Actuation, make_work
+from seastar_gym.der.rods import REPORT_ROWS, SMALLEST_HUB_T, Actuation, aligned_rows, make_work
 from seastar_gym.der.schemes import SCHEMES
 from seastar_gym.der.stroke import advance
 from seastar_gym.scene import Scene
@@ -92,9 +92,10 @@ class Simulator:
         self._times = step_times(scene.actuator.corners, scene.numerics.step)
         self._shape = np.asarray(scene.actuator.delta_psi(self._times))
         n_limbs, n_rows = scene.robot.n_limbs, 2 * scene.robot.n_nodes
-        self.q = np.empty((n_groups, n_rows, N_LANES))
-        self.v = np.zeros((n_groups, n_rows, N_LANES))
+        self.q = aligned_rows(n_groups, n_rows, N_LANES)
+        self.v = aligned_rows(n_groups, n_rows, N_LANES)
         self.q[:] = scene.robot.nodes().reshape(-1, 1)
+        self._a = aligned_rows(n_groups, n_rows * self._scheme.n_stages, N_LANES)
         self._commands = np.zeros((n_groups, n_limbs, N_LANES))
         self._failed = np.zeros((n_groups, 1, N_LANES))
         self._report = np.zeros((n_groups, len(REPORT_ROWS), N_LANES))
@@ -259,6 +260,7 @@ class Simulator:
 
     def _begin_stroke(self, commands: ArrayLike) -> None:
         self._write_nodes(self._commands, self._checked_commands(commands))
+        self._a[:] = 0.0  # a stroke depends on the state at its beginning only
         self._report[:] = 0.0
         self._report[:, SMALLEST_HUB_T] = np.inf
 
@@ -296,8 +298,9 @@ class Simulator:
             part = slice(*(len(self.q) * np.array([thread, thread + 1]) // self.threads))
             work, actuation = self._memory[thread]
             advance(
-                self._rods, work, self._scheme, actuation, self.q[part], self.v[part], self._commands[part], times,
-                shape, self._failed[part], self._report[part], tolerance, numerics.max_iterations,
+                self._rods, work, self._scheme, actuation, self.q[part], self.v[part], self._a[part],
+                self._commands[part], times, shape, self._failed[part], self._report[part], tolerance,
+                numerics.max_iterations,
             )  # fmt: skip
 
         if self._pool is None:

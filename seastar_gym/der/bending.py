@@ -6,13 +6,13 @@ With t = tan(phi/2): d kappa/d phi = (1 + t^2)/dl and d^2 kappa/d phi^2 = t (1 +
 """
 
 from seastar_gym.der.compilation import kernel
-from seastar_gym.der.lanes import load, select
+from seastar_gym.der.lanes import add_product, load, select
 
 
 @kernel
 def moment(rods, hinge, t, EI_kappa_bar):
     """EI (kappa - kappa_bar) [N m]."""
-    return 2.0 * load(rods.EI_over_dl, hinge) * t - EI_kappa_bar
+    return add_product(-EI_kappa_bar, 2.0 * load(rods.EI_over_dl, hinge), t)
 
 
 @kernel
@@ -27,7 +27,7 @@ def bending_slopes(rods, hinge, t, moment, convex):
 
     For the robots in the mask `convex` the second is the Gauss-Newton part alone, which is never negative.
     """
-    growth = 1.0 + t * t
+    growth = add_product(1.0, t, t)
     slope = moment * growth
     gauss_newton = load(rods.EI_over_dl, hinge) * growth * growth
-    return slope, select(convex, gauss_newton, gauss_newton + slope * t)
+    return slope, select(convex, gauss_newton, add_product(gauss_newton, slope, t))

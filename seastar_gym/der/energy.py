@@ -25,9 +25,7 @@ def hinge_energy(rods, work, q, e):
     else:
         a, b = e - 1, e
         side, EI_kappa_bar = 1.0, load(rods.EI_kappa_bar, e)
-    ax, ay, a_length, _, _ = edge_geometry(q, tail_node(rods, a), a + 1)
-    bx, by, b_length, _, _ = edge_geometry(q, tail_node(rods, b), b + 1)
-    t = half_angle(ax, ay, a_length, bx, by, b_length, side)
+    t = half_angle(edge_geometry(q, tail_node(rods, a), a + 1), edge_geometry(q, tail_node(rods, b), b + 1), side)
     return bending_energy(rods, e, moment(rods, e, t, EI_kappa_bar))
 
 
@@ -39,7 +37,7 @@ def energies(rods, work, actuation, q, v, elastic, kinetic):
     set_natural_hub_angles(rods, work, actuation, splat(1.0))
     total = splat(0.0)
     for e in range(rods.n_limbs * (rods.nodes_per_limb - 1)):
-        _, _, length, _, _ = edge_geometry(q, tail_node(rods, e), e + 1)
+        length = edge_geometry(q, tail_node(rods, e), e + 1)[2]
         total += stretching_energy(rods, e, tension(rods, e, length)) + hinge_energy(rods, work, q, e)
     store(borrow(elastic), 0, total)
     total = splat(0.0)

@@ -1,7 +1,9 @@
 """Edges of a planar rod and the angles between them."""
 
 from seastar_gym.der.compilation import kernel
-from seastar_gym.der.lanes import load, sqrt
+from seastar_gym.der.lanes import add_product, load, sqrt, subtract_product
+
+EDGE_ROWS = 7  # what edge_geometry returns
 
 
 @kernel
@@ -12,26 +14,26 @@ def edge_vector(q, tail, head):
 
 @kernel
 def edge_geometry(q, tail, head):
-    """(e_x, e_y, |e|, u_x, u_y) with u = e/|e|^2 [1/m].
+    """(e_x, e_y, |e|, |e|^2, |u|^2, u_x, u_y) with u = e/|e|^2 [1/m], so that |u|^2 = 1/|e|^2.
 
     The gradient of the edge's direction angle theta is (-u_y, u_x), its Hessian
     [[2 u_x u_y, u_y^2 - u_x^2], [u_y^2 - u_x^2, -2 u_x u_y]].
     """
     ex, ey = edge_vector(q, tail, head)
-    squared = ex * ex + ey * ey
+    squared = add_product(ex * ex, ey, ey)
     inverse = 1.0 / squared
-    return ex, ey, sqrt(squared), ex * inverse, ey * inverse
+    return ex, ey, sqrt(squared), squared, inverse, ex * inverse, ey * inverse
 
 
 @kernel
-def half_angle(ax, ay, a_length, bx, by, b_length, side):
-    """t = tan(phi/2) of the angle phi from edge a to edge b, from (13.4) without trigonometry.
+def half_angle(a, b, side):
+    """t = tan(phi/2) of the angle phi from edge a to edge b (geometries), from (13.4) without trigonometry.
 
     side = -1 turns edge a round: the angle is then the interior turning angle at a hub whose edges both point out.
     """
-    cross = ax * by - ay * bx
-    dot = ax * bx + ay * by
-    return side * cross / (a_length * b_length + side * dot)
+    cross = subtract_product(a[0] * b[1], a[1], b[0])
+    dot = add_product(a[0] * b[0], a[1], b[1])
+    return side * cross / add_product(side * dot, a[2], b[2])
 
 
 @kernel

@@ -271,16 +271,18 @@ def splat(typing_context, value):
 
 @intrinsic
 def select(typing_context, condition, when_true, when_false):
-    """`when_true` for the robots in the mask `condition`, `when_false` for the others."""
-    if condition != mask or lanes not in (when_true, when_false):
+    """`when_true` for the robots in the mask `condition`, `when_false` for the others; no mask (None): no robot."""
+    if condition not in (mask, types.none) or lanes not in (when_true, when_false):
         return None
 
     def codegen(context, builder, sig, args):
+        if condition == types.none:
+            return _as_vector(builder, sig.args[2], args[2])
         chosen = (_as_vector(builder, t, a) for t, a in zip(sig.args[1:], args[1:], strict=True))
         return builder.select(args[0], *chosen)
 
     choices = (lanes if a == lanes else types.float64 for a in (when_true, when_false))
-    return lanes(mask, *choices), codegen
+    return lanes(condition, *choices), codegen
 
 
 def _vector_function(name, n_args):

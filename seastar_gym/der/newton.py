@@ -5,12 +5,13 @@ is frozen by a mask, and nothing that one robot needs (a repair, a shorter step)
 """
 
 from seastar_gym.der.compilation import kernel
-from seastar_gym.der.lanes import add_product, any_lane, load, select, splat, sqrt, store
-from seastar_gym.der.potential import newton_direction
-from seastar_gym.der.rods import n_nodes
+from seastar_gym.der.lanes import add_product, any_lane, load, select, splat, sqrt
+from seastar_gym.der.potential import factorise
+from seastar_gym.der.star_matrix import load_pair, store_pair, substitute_node
 
 SUFFICIENT_DECREASE = 1e-4  # Armijo's constant
 ROUNDING = 1e-11  # an increase of Phi below this share of it is taken for rounding, not for ascent
+CURVATURE = 4.0  # the update after one of size d is at most about this times d^2 over the edge length, see minimise
 SHORTEST_STEP = 2.0**-30  # of the Newton step: shorter ones move nothing
 
 
@@ -18,18 +19,25 @@ SHORTEST_STEP = 2.0**-30  # of the Newton step: shorter ones move nothing
 def minimise(rods, work, gamma, active, tolerance, max_iterations):
     """Minimise Phi over work.q, in place, for the robots in the mask `active`.
 
-    tolerance: Largest node move of the last Newton step [m].
+    tolerance: Largest node move of the last Newton step [m], or of the next one as far as it can be foreseen. Newton's
+    method converges quadratically: turning an edge of length l by a move d across it stretches it by d^2/2 l, and the
+    next step takes back that much. So after a full step d of the full matrix, a robot is done if 4 d^2/l is within
+    the tolerance.
 
     Returns (converged, iterations, repairs, backtracks): a mask and three counts per robot.
     """
     zero, one = splat(0.0), splat(1.0)
     inverse_gamma = 1.0 / gamma
+    quadratic_length = rods.shortest_edge / CURVATURE
     nobody = one < zero
     running, converged, convex = active, nobody, nobody
     iterations, repairs, backtracks = zero, zero, zero
     best, expected, fraction = splat(1e300), zero, one
     while any_lane(running):
-        phi, decrement, pivot = newton_direction(rods, work, gamma, inverse_gamma, convex)
+        if any_lane(convex):
+            phi, decrement, pivot = factorise(rods, work, gamma, inverse_gamma, convex)
+        else:
+            phi, decrement, pivot = factorise(rods, work, gamma, inverse_gamma, None)
         low_enough = phi <= best - SUFFICIENT_DECREASE * fraction * expected + ROUNDING * best
         indefinite = running & low_enough & ~(pivot > 0.0) & ~convex
         if any_lane(indefinite):
@@ -43,30 +51,50 @@ def minimise(rods, work, gamma, active, tolerance, max_iterations):
         move = take_step(rods, work, stepping, shortening, fraction)
         best = select(stepping, phi, best)
         expected = select(stepping, decrement, expected)
-        convex = convex & ~stepping
         count = select(stepping, one, zero)
         iterations += count
         backtracks += select(shortening, one, zero)
-        done = stepping & (move <= tolerance)
+        done = stepping & ((move <= tolerance) | (~convex & (move * move <= tolerance * quadratic_length)))
         converged = converged | done
+        convex = convex & ~stepping
         running = (stepping | shortening) & ~done & (iterations < max_iterations)
     return converged, iterations, repairs, backtracks
 
 
 @kernel
 def take_step(rods, work, stepping, shortening, fraction):
-    """Move q by the full new Newton step where `stepping`, back by half the last move where `shortening`.
+    """Substitute, and move q by the whole new Newton step where `stepping`, back by half the last where `shortening`.
 
     Returns the largest node move [m].
     """
-    largest = splat(0.0)
-    for node in range(n_nodes(rods)):
-        moved = splat(0.0)
-        for row in range(2 * node, 2 * node + 2):
-            step = select(stepping, -load(work.solution, row), load(work.step, row))
-            move = select(stepping, step, select(shortening, -fraction * step, 0.0))
-            store(work.step, row, step)
-            store(work.q, row, load(work.q, row) + move)
-            moved = add_product(moved, move, move)
-        largest = select(moved > largest, moved, largest)
+    edges = rods.nodes_per_limb - 1
+    scale = select(shortening, -fraction, 0.0)
+    hub = load_pair(work.root_solution, 2 * rods.n_limbs)
+    largest = move_node(work, 0, hub, stepping, scale)
+    for limb in range(rods.n_limbs):
+        first = limb * edges
+        before, here = hub, load_pair(work.root_solution, 2 * limb)
+        largest = larger(largest, move_node(work, first + 1, here, stepping, scale))
+        for i in range(2, edges + 1):
+            before, here = here, substitute_node(work, first + i, here[0], here[1], before[0], before[1])
+            largest = larger(largest, move_node(work, first + i, here, stepping, scale))
     return sqrt(largest)
+
+
+@kernel
+def move_node(work, node, solution, stepping, scale):
+    """Move a node by -solution where `stepping`, else by `scale` times its last step; returns the squared move."""
+    x, y = (
+        select(stepping, -solution[0], load(work.step, 2 * node)),
+        select(stepping, -solution[1], load(work.step, 2 * node + 1)),
+    )
+    share = select(stepping, 1.0, scale)
+    move_x, move_y = share * x, share * y
+    store_pair(work.step, 2 * node, (x, y))
+    store_pair(work.q, 2 * node, (load(work.q, 2 * node) + move_x, load(work.q, 2 * node + 1) + move_y))
+    return add_product(move_x * move_x, move_y, move_y)
+
+
+@kernel
+def larger(a, b):
+    return select(a > b, a, b)

@@ -14,10 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from seastar_gym.der.compilation import kernel
+from seastar_gym.der.geometry import EDGE_ROWS
 from seastar_gym.der.lanes import N_LANES
+from seastar_gym.der.star_matrix import NODE_ROWS, RING_ROWS, ROOT_ROWS
 
-FACTOR_ROWS = 11  # what the elimination of a node leaves for the substitution, see star_matrix.py
-ROOT_EDGE_ROWS = 5  # the geometry of a root edge, see geometry.py
+CACHE_LINE = 64  # bytes
 
 
 class Rods(NamedTuple):
@@ -33,6 +34,7 @@ class Rods(NamedTuple):
     hub_angle: The angle of an unactuated hub hinge, measured that way [rad].
     mass: Lumped mass, per node [kg].
     drag: 1/2 rho_f C_d D dl_i of (13.8), per node [kg/m].
+    shortest_edge: Smallest natural length of an edge [m].
     """
 
     n_limbs: int
@@ -47,6 +49,7 @@ class Rods(NamedTuple):
     hub_angle: float
     mass: np.ndarray
     drag: np.ndarray
+    shortest_edge: float
 
 
 @kernel
@@ -58,35 +61,32 @@ def n_nodes(rods):
 class Work(NamedTuple):
     """Memory of one lane group; every array has shape (rows, N_LANES).
 
-    q, q_hat, v_hat, q_free: Iterate, start of the stage, its velocity, and its force-free end, per coordinate [m, m/s].
-    step, solution: Last Newton step taken, and the solution of the current linear system, per coordinate [m].
-    factors: Rows of the eliminated nodes, see star_matrix.py.
+    q, q_hat, v_hat: Iterate, start of the stage and its velocity, per coordinate [m, m/s].
+    step: Last Newton step taken, per coordinate [m].
+    factors, ring, root_factors, root_solution: The linear system, see star_matrix.py.
     root_edges: Geometry of the root edges, see geometry.py.
     hub_moment, hub_stiffness: Sums over the hub hinges of a limb's root edge, per limb [N m].
     hub_coupling: 2 x 2 block of every hub hinge, four rows per limb [N/m].
     hub_EI_kappa_bar: Natural moment of the hub hinges, per limb [N m].
     hub_t: tan(phi/2) of the hub hinges, per limb.
-    roots, roots_rhs: Dense system of root nodes and hub, see star_matrix.py.
-    stage_v, stage_a: Velocities and accelerations of the stages of a time step [m/s, m/s^2].
+    stage_v: Velocities of the stages of a time step [m/s].
     """
 
     q: np.ndarray
     q_hat: np.ndarray
     v_hat: np.ndarray
-    q_free: np.ndarray
     step: np.ndarray
-    solution: np.ndarray
     factors: np.ndarray
+    ring: np.ndarray
+    root_factors: np.ndarray
+    root_solution: np.ndarray
     root_edges: np.ndarray
     hub_moment: np.ndarray
     hub_stiffness: np.ndarray
     hub_coupling: np.ndarray
     hub_EI_kappa_bar: np.ndarray
     hub_t: np.ndarray
-    roots: np.ndarray
-    roots_rhs: np.ndarray
     stage_v: np.ndarray
-    stage_a: np.ndarray
 
 
 class Actuation(NamedTuple):
@@ -108,30 +108,35 @@ REPORT_ROWS = (
 NEWTON_ITERATIONS, REPAIRS, BACKTRACKS, HALVINGS, COVERED, SMALLEST_HUB_T = range(len(REPORT_ROWS))
 
 
+def aligned_rows(*shape: int) -> np.ndarray:
+    """Zeros that begin at a cache line: with numpy alone most rows would straddle two."""
+    size = int(np.prod(shape))
+    buffer = np.zeros(size + CACHE_LINE // 8)
+    start = -buffer.ctypes.data % CACHE_LINE // 8
+    return buffer[start : start + size].reshape(shape)
+
+
 def make_work(n_limbs: int, nodes_per_limb: int, n_stages: int) -> Work:
     """Zeroed memory for one lane group and a scheme of `n_stages` stages."""
     n_nodes = n_limbs * (nodes_per_limb - 1) + 1
-    n_root_rows = 2 * (n_limbs + 1)
 
     def rows(count):
-        return np.zeros((count, N_LANES))
+        return aligned_rows(count, N_LANES)
 
     return Work(
         q=rows(2 * n_nodes),
         q_hat=rows(2 * n_nodes),
         v_hat=rows(2 * n_nodes),
-        q_free=rows(2 * n_nodes),
         step=rows(2 * n_nodes),
-        solution=rows(2 * n_nodes),
-        factors=rows(FACTOR_ROWS * n_nodes),
-        root_edges=rows(ROOT_EDGE_ROWS * n_limbs),
+        factors=rows(NODE_ROWS * n_nodes),
+        ring=rows(RING_ROWS * n_limbs),
+        root_factors=rows(ROOT_ROWS * n_limbs),
+        root_solution=rows(2 * (n_limbs + 1)),
+        root_edges=rows(EDGE_ROWS * n_limbs),
         hub_moment=rows(n_limbs),
         hub_stiffness=rows(n_limbs),
         hub_coupling=rows(4 * n_limbs),
         hub_EI_kappa_bar=rows(n_limbs),
         hub_t=rows(n_limbs),
-        roots=rows(n_root_rows * (n_root_rows + 1) // 2),
-        roots_rhs=rows(n_root_rows),
         stage_v=rows(2 * n_nodes * n_stages),
-        stage_a=rows(2 * n_nodes * n_stages),
     )

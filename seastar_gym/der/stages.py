@@ -25,8 +25,8 @@ def set_natural_hub_angles(rods, work, actuation, fraction):
 
 
 @kernel
-def begin_stage(rods, work, scheme, stage, q_0, v_0, h):
-    """q_hat, v_hat and q_free of a stage; the iterate starts at the force-free motion (13.10)."""
+def begin_stage(rods, work, scheme, stage, q_0, v_0, a, h):
+    """q_hat and v_hat of a stage; the iterate starts at (13.10), plus what the last step's acceleration adds."""
     gamma = load_number(scheme.a, stage * scheme.n_stages + stage) * h
     rows = 2 * n_nodes(rods)
     for row in range(rows):
@@ -34,28 +34,27 @@ def begin_stage(rods, work, scheme, stage, q_0, v_0, h):
         for other in range(stage):
             weight = load_number(scheme.a, stage * scheme.n_stages + other) * h
             q_hat = add_product(q_hat, weight, load(work.stage_v, other * rows + row))
-            v_hat = add_product(v_hat, weight, load(work.stage_a, other * rows + row))
-        q_free = add_product(q_hat, gamma, v_hat)
+            v_hat = add_product(v_hat, weight, load(a, other * rows + row))
         store(work.q_hat, row, q_hat)
         store(work.v_hat, row, v_hat)
-        store(work.q_free, row, q_free)
-        store(work.q, row, q_free)
+        velocity = add_product(v_hat, gamma, load(a, stage * rows + row))
+        store(work.q, row, add_product(q_hat, gamma, velocity))
     return gamma
 
 
 @kernel
-def end_stage(rods, work, stage, gamma):
+def end_stage(rods, work, stage, a, gamma):
     """V = (Q - q_hat)/gamma and A = (V - v_hat)/gamma of a solved stage."""
     inverse_gamma = 1.0 / gamma
     rows = 2 * n_nodes(rods)
     for row in range(rows):
         velocity = (load(work.q, row) - load(work.q_hat, row)) * inverse_gamma
         store(work.stage_v, stage * rows + row, velocity)
-        store(work.stage_a, stage * rows + row, (velocity - load(work.v_hat, row)) * inverse_gamma)
+        store(a, stage * rows + row, (velocity - load(work.v_hat, row)) * inverse_gamma)
 
 
 @kernel
-def accept_step(rods, work, scheme, q_0, v_0, h, accepted):
+def accept_step(rods, work, scheme, q_0, v_0, a, h, accepted):
     """Write the result of a step over the state (q_0, v_0) of the robots in the mask `accepted`."""
     n_stages = scheme.n_stages
     rows = 2 * n_nodes(rods)
@@ -68,27 +67,36 @@ def accept_step(rods, work, scheme, q_0, v_0, h, accepted):
             for stage in range(n_stages):
                 weight = load_number(scheme.b, stage) * h
                 q_1 = add_product(q_1, weight, load(work.stage_v, stage * rows + row))
-                v_1 = add_product(v_1, weight, load(work.stage_a, stage * rows + row))
+                v_1 = add_product(v_1, weight, load(a, stage * rows + row))
         store(q_0, row, select(accepted, q_1, q))
         store(v_0, row, select(accepted, v_1, v))
 
 
 @kernel
-def try_step(rods, work, scheme, actuation, q, v, start, size, h, active, tolerance, max_iterations, report):
+def forget_accelerations(rods, scheme, a, robots):
+    """Robots whose step was rejected start their next one without a prediction, which may be far off or not finite."""
+    for row in range(2 * n_nodes(rods) * scheme.n_stages):
+        store(a, row, select(robots, 0.0, load(a, row)))
+
+
+@kernel
+def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, tolerance, max_iterations, report):
     """One step of length h from `start`, `size` of the interval long, for the robots in `active`.
+
+    a: Accelerations of the stages of the last step, then of this one.
 
     Returns the mask of the robots whose stages all converged; their state has moved, that of the others has not.
     """
     going = active
     for stage in range(scheme.n_stages):
-        gamma = begin_stage(rods, work, scheme, stage, q, v, h)
+        gamma = begin_stage(rods, work, scheme, stage, q, v, a, h)
         set_natural_hub_angles(rods, work, actuation, start + load_number(scheme.c, stage) * size)
         going, iterations, repairs, backtracks = minimise(rods, work, gamma, going, tolerance, max_iterations)
-        end_stage(rods, work, stage, gamma)
+        end_stage(rods, work, stage, a, gamma)
         add_to_report(report, NEWTON_ITERATIONS, iterations)
         add_to_report(report, REPAIRS, repairs)
         add_to_report(report, BACKTRACKS, backtracks)
-    accept_step(rods, work, scheme, q, v, h, going)
+    accept_step(rods, work, scheme, q, v, a, h, going)
     return going
 
 
@@ -108,7 +116,7 @@ def note_hub_angles(rods, work, report, accepted):
 
 
 @kernel
-def cover_interval(rods, work, scheme, actuation, q, v, duration, alive, tolerance, max_iterations, report):
+def cover_interval(rods, work, scheme, actuation, q, v, a, duration, alive, tolerance, max_iterations, report):
     """Advance the robots in `alive` over an interval of `duration` [s], in place.
 
     A robot whose step does not converge halves it, alone, as often as it takes, and still covers the whole interval;
@@ -121,10 +129,12 @@ def cover_interval(rods, work, scheme, actuation, q, v, duration, alive, toleran
     while any_lane(moving):
         h = size * duration
         accepted = try_step(
-            rods, work, scheme, actuation, q, v, start, size, h, moving, tolerance, max_iterations, report
+            rods, work, scheme, actuation, q, v, a, start, size, h, moving, tolerance, max_iterations, report
         )
         note_hub_angles(rods, work, report, accepted)
         rejected = moving & ~accepted
+        if any_lane(rejected):
+            forget_accelerations(rods, scheme, a, rejected)
         add_to_report(report, HALVINGS, select(rejected, one, zero))
         add_to_report(report, COVERED, select(accepted, h, zero))
         start = select(accepted, start + size, start)

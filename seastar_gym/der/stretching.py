@@ -1,13 +1,13 @@
 """Stretching (13.2): E_s = 1/2 EA (|e|/l - 1)^2 l."""
 
 from seastar_gym.der.compilation import kernel
-from seastar_gym.der.lanes import load
+from seastar_gym.der.lanes import add_product, load
 
 
 @kernel
 def tension(rods, e, length):
     """T = EA (|e|/l - 1) [N] of edge e, whose length is `length` [m]."""
-    return load(rods.EA_over_l, e) * length - load(rods.EA, e)
+    return add_product(-load(rods.EA, e), load(rods.EA_over_l, e), length)
 
 
 @kernel

@@ -6,10 +6,11 @@ from seastar_gym.der.stages import cover_interval
 
 
 @entry_point
-def advance(rods, work, scheme, actuation, q, v, peaks, times, shape, failed, report, tolerance, max_iterations):
+def advance(rods, work, scheme, actuation, q, v, a, peaks, times, shape, failed, report, tolerance, max_iterations):
     """Advance lane groups through the intervals between `times`, in place.
 
     q, v: Positions and velocities [m, m/s], shape (n_groups, 2 n_nodes, N_LANES).
+    a: Accelerations of the stages of the last step [m/s^2], shape (n_groups, n_stages 2 n_nodes, N_LANES).
     peaks: Rotation of every limb at full shape [rad], shape (n_groups, n_limbs, N_LANES).
     times: Ends of the intervals [s], shape (n_intervals + 1,). shape: Share of the peak at those times, same shape.
     failed: 0 for robots that go on, 1 for those that have failed, shape (n_groups, 1, N_LANES).
@@ -18,7 +19,7 @@ def advance(rods, work, scheme, actuation, q, v, peaks, times, shape, failed, re
     """
     rods_rows, memory, tableau, rotation = borrow(rods), borrow(work), borrow(scheme), borrow(actuation)
     for group in range(q.shape[0]):
-        q_rows, v_rows, peak_rows = borrow(q[group]), borrow(v[group]), borrow(peaks[group])
+        q_rows, v_rows, a_rows, peak_rows = borrow(q[group]), borrow(v[group]), borrow(a[group]), borrow(peaks[group])
         failed_rows, report_rows = borrow(failed[group]), borrow(report[group])
         alive = load(failed_rows, 0) < 1.0
         for k in range(times.shape[0] - 1):
@@ -27,7 +28,7 @@ def advance(rods, work, scheme, actuation, q, v, peaks, times, shape, failed, re
                 store(rotation.delta_psi_start, limb, peak * shape[k])
                 store(rotation.delta_psi_end, limb, peak * shape[k + 1])
             alive = cover_interval(
-                rods_rows, memory, tableau, rotation, q_rows, v_rows, times[k + 1] - times[k], alive, tolerance,
+                rods_rows, memory, tableau, rotation, q_rows, v_rows, a_rows, times[k + 1] - times[k], alive, tolerance,
                 max_iterations, report_rows,
             )  # fmt: skip
         store(failed_rows, 0, select(alive, splat(0.0), 1.0))

@@ -63,5 +63,6 @@ def make_rods(
         hub_side=-1.0 if turning else 1.0,
         hub_angle=2.0 * np.pi / n_limbs - (np.pi if turning else 0.0),
         mass=density * area * dl,
+        shortest_edge=edge_length,
         drag=0.5 * fluid_density * drag_coefficient * 2.0 * rod_radius * dl,
     )
