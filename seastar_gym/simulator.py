@@ -95,7 +95,7 @@ class Simulator:
         self.q = aligned_rows(n_groups, n_rows, N_LANES)
         self.v = aligned_rows(n_groups, n_rows, N_LANES)
         self.q[:] = scene.robot.nodes().reshape(-1, 1)
-        self._a = aligned_rows(n_groups, n_rows * self._scheme.n_stages, N_LANES)
+        self._a = aligned_rows(n_groups, (n_rows + 1) * self._scheme.n_stages, N_LANES)
         self._commands = np.zeros((n_groups, n_limbs, N_LANES))
         self._failed = np.zeros((n_groups, 1, N_LANES))
         self._report = np.zeros((n_groups, len(REPORT_ROWS), N_LANES))

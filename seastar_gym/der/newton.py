@@ -16,13 +16,15 @@ SHORTEST_STEP = 2.0**-30  # of the Newton step: shorter ones move nothing
 
 
 @kernel
-def minimise(rods, work, gamma, active, tolerance, max_iterations):
+def minimise(rods, work, gamma, active, tolerance, patience):
     """Minimise Phi over work.q, in place, for the robots in the mask `active`.
 
     tolerance: Largest node move of the last Newton step [m], or of the next one as far as it can be foreseen. Newton's
     method converges quadratically: turning an edge of length l by a move d across it stretches it by d^2/2 l, and the
     next step takes back that much. So after a full step d of the full matrix, a robot is done if 4 d^2/l is within
     the tolerance.
+
+    patience: Most Newton steps per robot.
 
     Returns (converged, iterations, repairs, backtracks): a mask and three counts per robot.
     """
@@ -57,7 +59,7 @@ def minimise(rods, work, gamma, active, tolerance, max_iterations):
         done = stepping & ((move <= tolerance) | (~convex & (move * move <= tolerance * quadratic_length)))
         converged = converged | done
         convex = convex & ~stepping
-        running = (stepping | shortening) & ~done & (iterations < max_iterations)
+        running = (stepping | shortening) & ~done & (iterations < patience)
     return converged, iterations, repairs, backtracks
 
 

@@ -26,9 +26,10 @@ def set_natural_hub_angles(rods, work, actuation, fraction):
 
 @kernel
 def begin_stage(rods, work, scheme, stage, q_0, v_0, a, h):
-    """q_hat and v_hat of a stage; the iterate starts at (13.10), plus what the last step's acceleration adds."""
+    """q_hat and v_hat of a stage; the iterate starts at (13.10) plus a share of what the last acceleration adds."""
     gamma = load_number(scheme.a, stage * scheme.n_stages + stage) * h
     rows = 2 * n_nodes(rods)
+    share = gamma * load(a, scheme.n_stages * rows + stage)
     for row in range(rows):
         q_hat, v_hat = load(q_0, row), load(v_0, row)
         for other in range(stage):
@@ -37,20 +38,31 @@ def begin_stage(rods, work, scheme, stage, q_0, v_0, a, h):
             v_hat = add_product(v_hat, weight, load(a, other * rows + row))
         store(work.q_hat, row, q_hat)
         store(work.v_hat, row, v_hat)
-        velocity = add_product(v_hat, gamma, load(a, stage * rows + row))
+        velocity = add_product(v_hat, share, load(a, stage * rows + row))
         store(work.q, row, add_product(q_hat, gamma, velocity))
     return gamma
 
 
 @kernel
-def end_stage(rods, work, stage, a, gamma):
-    """V = (Q - q_hat)/gamma and A = (V - v_hat)/gamma of a solved stage."""
+def end_stage(rods, work, scheme, stage, a, gamma):
+    """V = (Q - q_hat)/gamma and A = (V - v_hat)/gamma of a solved stage.
+
+    Behind the accelerations stands the share of the last one that would have fit this one best (least squares), from
+    0 to 1: the next step's guess uses it. Ringing that a step does not resolve changes its sign, and has the share 0.
+    """
     inverse_gamma = 1.0 / gamma
     rows = 2 * n_nodes(rods)
+    along, squared = splat(0.0), splat(0.0)
     for row in range(rows):
         velocity = (load(work.q, row) - load(work.q_hat, row)) * inverse_gamma
+        acceleration = (velocity - load(work.v_hat, row)) * inverse_gamma
+        last = load(a, stage * rows + row)
+        along = add_product(along, last, acceleration)
+        squared = add_product(squared, last, last)
         store(work.stage_v, stage * rows + row, velocity)
-        store(a, stage * rows + row, (velocity - load(work.v_hat, row)) * inverse_gamma)
+        store(a, stage * rows + row, acceleration)
+    share = select(along > 0.0, along / squared, 0.0)
+    store(a, scheme.n_stages * rows + stage, select(share < 1.0, share, 1.0))
 
 
 @kernel
@@ -75,12 +87,12 @@ def accept_step(rods, work, scheme, q_0, v_0, a, h, accepted):
 @kernel
 def forget_accelerations(rods, scheme, a, robots):
     """Robots whose step was rejected start their next one without a prediction, which may be far off or not finite."""
-    for row in range(2 * n_nodes(rods) * scheme.n_stages):
+    for row in range((2 * n_nodes(rods) + 1) * scheme.n_stages):
         store(a, row, select(robots, 0.0, load(a, row)))
 
 
 @kernel
-def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, tolerance, max_iterations, report):
+def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, tolerance, patience, report):
     """One step of length h from `start`, `size` of the interval long, for the robots in `active`.
 
     a: Accelerations of the stages of the last step, then of this one.
@@ -91,8 +103,8 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, tol
     for stage in range(scheme.n_stages):
         gamma = begin_stage(rods, work, scheme, stage, q, v, a, h)
         set_natural_hub_angles(rods, work, actuation, start + load_number(scheme.c, stage) * size)
-        going, iterations, repairs, backtracks = minimise(rods, work, gamma, going, tolerance, max_iterations)
-        end_stage(rods, work, stage, a, gamma)
+        going, iterations, repairs, backtracks = minimise(rods, work, gamma, going, tolerance, patience)
+        end_stage(rods, work, scheme, stage, a, gamma)
         add_to_report(report, NEWTON_ITERATIONS, iterations)
         add_to_report(report, REPAIRS, repairs)
         add_to_report(report, BACKTRACKS, backtracks)
@@ -119,18 +131,16 @@ def note_hub_angles(rods, work, report, accepted):
 def cover_interval(rods, work, scheme, actuation, q, v, a, duration, alive, tolerance, max_iterations, report):
     """Advance the robots in `alive` over an interval of `duration` [s], in place.
 
-    A robot whose step does not converge halves it, alone, as often as it takes, and still covers the whole interval;
-    below SMALLEST_FRACTION it has failed and keeps its last good state. Fractions are dyadic, so their sums are
-    exact. Returns the mask of the robots that arrived.
+    A robot whose step does not converge in `max_iterations` halves it, alone, as often as it takes, with as many more
+    iterations each time, and still covers the whole interval; below SMALLEST_FRACTION it has failed and keeps its last
+    good state. Fractions are dyadic, so their sums are exact. Returns the mask of the robots that arrived.
     """
     zero, one = splat(0.0), splat(1.0)
-    start, size = zero, one
+    start, size, patience = zero, one, splat(1.0 * max_iterations)
     moving = alive
     while any_lane(moving):
         h = size * duration
-        accepted = try_step(
-            rods, work, scheme, actuation, q, v, a, start, size, h, moving, tolerance, max_iterations, report
-        )
+        accepted = try_step(rods, work, scheme, actuation, q, v, a, start, size, h, moving, tolerance, patience, report)
         note_hub_angles(rods, work, report, accepted)
         rejected = moving & ~accepted
         if any_lane(rejected):
@@ -139,6 +149,7 @@ def cover_interval(rods, work, scheme, actuation, q, v, a, duration, alive, tole
         add_to_report(report, COVERED, select(accepted, h, zero))
         start = select(accepted, start + size, start)
         size = select(rejected, 0.5 * size, size)
+        patience = select(rejected, patience + max_iterations, patience)
         failed = rejected & (size < SMALLEST_FRACTION)
         alive = alive & ~failed
         moving = moving & ~failed & (start < 1.0)

@@ -10,7 +10,8 @@ def advance(rods, work, scheme, actuation, q, v, a, peaks, times, shape, failed,
     """Advance lane groups through the intervals between `times`, in place.
 
     q, v: Positions and velocities [m, m/s], shape (n_groups, 2 n_nodes, N_LANES).
-    a: Accelerations of the stages of the last step [m/s^2], shape (n_groups, n_stages 2 n_nodes, N_LANES).
+    a: Accelerations of the stages of the last step [m/s^2] and their shares in the next guess, shape
+        (n_groups, n_stages (2 n_nodes + 1), N_LANES).
     peaks: Rotation of every limb at full shape [rad], shape (n_groups, n_limbs, N_LANES).
     times: Ends of the intervals [s], shape (n_intervals + 1,). shape: Share of the peak at those times, same shape.
     failed: 0 for robots that go on, 1 for those that have failed, shape (n_groups, 1, N_LANES).
