@@ -16,7 +16,7 @@ SHORTEST_STEP = 2.0**-30  # of the Newton step: shorter ones move nothing
 
 
 @kernel
-def minimise(rods, work, gamma, active, tolerance, patience):
+def minimise(rods, work, stage, active, tolerance, patience):
     """Minimise Phi over work.q, in place, for the robots in the mask `active`.
 
     tolerance: Largest node move of the last Newton step [m], or of the next one as far as it can be foreseen. Newton's
@@ -29,7 +29,6 @@ def minimise(rods, work, gamma, active, tolerance, patience):
     Returns (converged, iterations, repairs, backtracks): a mask and three counts per robot.
     """
     zero, one = splat(0.0), splat(1.0)
-    inverse_gamma = 1.0 / gamma
     quadratic_length = rods.shortest_edge / CURVATURE
     nobody = one < zero
     running, converged, convex = active, nobody, nobody
@@ -37,9 +36,9 @@ def minimise(rods, work, gamma, active, tolerance, patience):
     best, expected, fraction = splat(1e300), zero, one
     while any_lane(running):
         if any_lane(convex):
-            phi, decrement, pivot = factorise(rods, work, gamma, inverse_gamma, convex)
+            phi, decrement, pivot = factorise(rods, work, stage, convex)
         else:
-            phi, decrement, pivot = factorise(rods, work, gamma, inverse_gamma, None)
+            phi, decrement, pivot = factorise(rods, work, stage, None)
         low_enough = phi <= best - SUFFICIENT_DECREASE * fraction * expected + ROUNDING * best
         indefinite = running & low_enough & ~(pivot > 0.0) & ~convex
         if any_lane(indefinite):
@@ -50,7 +49,10 @@ def minimise(rods, work, gamma, active, tolerance, patience):
         stepping = running & low_enough & (pivot > 0.0)
         shortening = running & ~low_enough & (fraction > SHORTEST_STEP) & (iterations > 0.0)
         fraction = select(stepping, one, select(shortening, 0.5 * fraction, fraction))
-        move = take_step(rods, work, stepping, shortening, fraction)
+        if any_lane(shortening):
+            move = take_step(rods, work, stepping, shortening, fraction)
+        else:
+            move = take_step(rods, work, stepping, None, fraction)
         best = select(stepping, phi, best)
         expected = select(stepping, decrement, expected)
         count = select(stepping, one, zero)
@@ -67,31 +69,30 @@ def minimise(rods, work, gamma, active, tolerance, patience):
 def take_step(rods, work, stepping, shortening, fraction):
     """Substitute, and move q by the whole new Newton step where `stepping`, back by half the last where `shortening`.
 
+    shortening: None if no robot's step is to be shortened.
+
     Returns the largest node move [m].
     """
     edges = rods.nodes_per_limb - 1
-    scale = select(shortening, -fraction, 0.0)
+    scale = select(stepping, splat(1.0), select(shortening, -fraction, 0.0))
     hub = load_pair(work.root_solution, 2 * rods.n_limbs)
-    largest = move_node(work, 0, hub, stepping, scale)
+    largest = move_node(work, 0, hub, shortening, scale)
     for limb in range(rods.n_limbs):
         first = limb * edges
         before, here = hub, load_pair(work.root_solution, 2 * limb)
-        largest = larger(largest, move_node(work, first + 1, here, stepping, scale))
+        largest = larger(largest, move_node(work, first + 1, here, shortening, scale))
         for i in range(2, edges + 1):
             before, here = here, substitute_node(work, first + i, here[0], here[1], before[0], before[1])
-            largest = larger(largest, move_node(work, first + i, here, stepping, scale))
+            largest = larger(largest, move_node(work, first + i, here, shortening, scale))
     return sqrt(largest)
 
 
 @kernel
-def move_node(work, node, solution, stepping, scale):
-    """Move a node by -solution where `stepping`, else by `scale` times its last step; returns the squared move."""
-    x, y = (
-        select(stepping, -solution[0], load(work.step, 2 * node)),
-        select(stepping, -solution[1], load(work.step, 2 * node + 1)),
-    )
-    share = select(stepping, 1.0, scale)
-    move_x, move_y = share * x, share * y
+def move_node(work, node, solution, shortening, scale):
+    """Move a node by `scale` times its step, the last one where `shortening`, else -solution; returns the move squared."""
+    x = select(shortening, load(work.step, 2 * node), -solution[0])
+    y = select(shortening, load(work.step, 2 * node + 1), -solution[1])
+    move_x, move_y = scale * x, scale * y
     store_pair(work.step, 2 * node, (x, y))
     store_pair(work.q, 2 * node, (load(work.q, 2 * node) + move_x, load(work.q, 2 * node + 1) + move_y))
     return add_product(move_x * move_x, move_y, move_y)

@@ -74,20 +74,20 @@ def positive_part(x):
 
 
 @kernel
-def node_slopes(rods, work, node, gamma, inverse_gamma):
+def node_slopes(rods, work, stage, node):
     """(energy, gradient, Hessian) of a node's inertia and drag."""
     qx, qy = load(work.q, 2 * node), load(work.q, 2 * node + 1)
-    vx = (qx - load(work.q_hat, 2 * node)) * inverse_gamma
-    vy = (qy - load(work.q_hat, 2 * node + 1)) * inverse_gamma
-    dx, dy = vx - load(work.v_hat, 2 * node), vy - load(work.v_hat, 2 * node + 1)
+    vx = (qx - load(stage.q_hat, 2 * node)) * stage.inverse_gamma
+    vy = (qy - load(stage.q_hat, 2 * node + 1)) * stage.inverse_gamma
+    dx, dy = vx - load(stage.v_hat, 2 * node), vy - load(stage.v_hat, 2 * node + 1)
     m = load(rods.mass, node)
-    m_over_gamma = m * inverse_gamma
+    m_over_gamma = m * stage.inverse_gamma
     potential, c_speed, c_over_speed = drag_slopes(load(rods.drag, node), vx, vy)
-    c_over_speed *= inverse_gamma
+    c_over_speed *= stage.inverse_gamma
     wx, wy = c_over_speed * vx, c_over_speed * vy
-    diagonal = (m_over_gamma + c_speed) * inverse_gamma
+    diagonal = (m_over_gamma + c_speed) * stage.inverse_gamma
     return (
-        add_product(0.5 * m * add_product(dx * dx, dy, dy), gamma, potential),
+        add_product(0.5 * m * add_product(dx * dx, dy, dy), stage.gamma, potential),
         (add_product(c_speed * vx, m_over_gamma, dx), add_product(c_speed * vy, m_over_gamma, dy)),
         (add_product(diagonal, wx, vx), wx * vy, add_product(diagonal, wy, vy)),
     )
@@ -156,7 +156,7 @@ def inner_edge(work, limb, first, i):
 
 
 @kernel
-def sweep_limb(rods, work, limb, gamma, inverse_gamma, convex, D_hub, r_hub):
+def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
     """Assemble and eliminate a limb from its tip to node 2, and put its root node into the ring.
 
     Returns the hub's block and right-hand side (D_hub, r_hub), updated, the limb's part of Phi and of the Newton
@@ -179,7 +179,7 @@ def sweep_limb(rods, work, limb, gamma, inverse_gamma, convex, D_hub, r_hub):
         bend = moment(rods, e, t, load(rods.EI_kappa_bar, e))
         slope_before, s_before = bending_slopes(rods, e, t, bend, convex)
         E_s, f, K = edge_slopes(rods, e, edge, slope_before - slope, s_before + s, convex)
-        E_n, g, inertia = node_slopes(rods, work, node, gamma, inverse_gamma)
+        E_n, g, inertia = node_slopes(rods, work, stage, node)
         energy += (E_s + E_n) + bending_energy(rods, e, bend)
         P = coupling(s_before, edge, before)
         D_1 = (D_before[0] + K[0] + 2.0 * P[0], D_before[1] + K[1] + (P[1] + P[2]), D_before[2] + K[2] + 2.0 * P[3])
@@ -202,7 +202,7 @@ def sweep_limb(rods, work, limb, gamma, inverse_gamma, convex, D_hub, r_hub):
         slope, s, edge = slope_before, s_before, before
     net_moment, stiffness = load(work.hub_moment, limb) - slope, load(work.hub_stiffness, limb) + s
     E_s, f, K = edge_slopes(rods, first, edge, net_moment, stiffness, convex)
-    E_n, g, inertia = node_slopes(rods, work, first + 1, gamma, inverse_gamma)
+    E_n, g, inertia = node_slopes(rods, work, stage, first + 1)
     store_root(
         work,
         limb,
@@ -220,7 +220,7 @@ def sweep_limb(rods, work, limb, gamma, inverse_gamma, convex, D_hub, r_hub):
 
 
 @kernel
-def factorise(rods, work, gamma, inverse_gamma, convex):
+def factorise(rods, work, stage, convex):
     """Assemble and eliminate the Hessian and gradient of Phi at work.q; substitution is left to newton.py.
 
     convex: Mask of the robots whose matrix is made from convex parts alone, or None for none.
@@ -229,12 +229,12 @@ def factorise(rods, work, gamma, inverse_gamma, convex):
     which is not positive (or NaN) where the Hessian is not positive definite.
     """
     energy = assemble_hub_hinges(rods, work, convex)
-    E_n, r_hub, D_hub = node_slopes(rods, work, 0, gamma, inverse_gamma)
+    E_n, r_hub, D_hub = node_slopes(rods, work, stage, 0)
     energy += E_n
     decrement, pivot = splat(0.0), splat(np.inf)
     for limb in range(rods.n_limbs):
         D_hub, r_hub, limb_energy, limb_decrement, limb_pivot = sweep_limb(
-            rods, work, limb, gamma, inverse_gamma, convex, D_hub, r_hub
+            rods, work, stage, limb, convex, D_hub, r_hub
         )
         energy += limb_energy
         decrement += limb_decrement

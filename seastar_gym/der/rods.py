@@ -9,7 +9,7 @@ Coefficients have shape (rows,) if all robots share them and (rows, N_LANES) if 
 `load` reads either.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -87,6 +87,15 @@ class Work(NamedTuple):
     hub_EI_kappa_bar: np.ndarray
     hub_t: np.ndarray
     stage_v: np.ndarray
+
+
+class Stage(NamedTuple):
+    """An implicit stage: q_hat [m] and v_hat [m/s], rows per coordinate, gamma [s] and its reciprocal, lanes."""
+
+    q_hat: Any
+    v_hat: Any
+    gamma: Any
+    inverse_gamma: Any
 
 
 class Actuation(NamedTuple):

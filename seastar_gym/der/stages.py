@@ -4,7 +4,16 @@ from seastar_gym.der.compilation import kernel
 from seastar_gym.der.geometry import tangent
 from seastar_gym.der.lanes import add_product, any_lane, load, load_number, select, splat, store
 from seastar_gym.der.newton import minimise
-from seastar_gym.der.rods import BACKTRACKS, COVERED, HALVINGS, NEWTON_ITERATIONS, REPAIRS, SMALLEST_HUB_T, n_nodes
+from seastar_gym.der.rods import (
+    BACKTRACKS,
+    COVERED,
+    HALVINGS,
+    NEWTON_ITERATIONS,
+    REPAIRS,
+    SMALLEST_HUB_T,
+    Stage,
+    n_nodes,
+)
 
 SMALLEST_FRACTION = 2.0**-12  # of an interval: a robot whose step would have to be shorter has failed
 
@@ -25,63 +34,83 @@ def set_natural_hub_angles(rods, work, actuation, fraction):
 
 
 @kernel
-def begin_stage(rods, work, scheme, stage, q_0, v_0, a, h):
-    """q_hat and v_hat of a stage; the iterate starts at (13.10) plus a share of what the last acceleration adds."""
-    gamma = load_number(scheme.a, stage * scheme.n_stages + stage) * h
+def begin_stage(rods, work, scheme, k, q_0, v_0, a, h):
+    """Stage k of a step; the iterate starts at (13.10) plus a share of what the last acceleration adds."""
+    gamma = load_number(scheme.a, k * scheme.n_stages + k) * h
     rows = 2 * n_nodes(rods)
-    share = gamma * load(a, scheme.n_stages * rows + stage)
+    share = gamma * load(a, scheme.n_stages * rows + k)
     for row in range(rows):
         q_hat, v_hat = load(q_0, row), load(v_0, row)
-        for other in range(stage):
-            weight = load_number(scheme.a, stage * scheme.n_stages + other) * h
+        for other in range(k):
+            weight = load_number(scheme.a, k * scheme.n_stages + other) * h
             q_hat = add_product(q_hat, weight, load(work.stage_v, other * rows + row))
             v_hat = add_product(v_hat, weight, load(a, other * rows + row))
-        store(work.q_hat, row, q_hat)
-        store(work.v_hat, row, v_hat)
-        velocity = add_product(v_hat, share, load(a, stage * rows + row))
+        if k > 0:
+            store(work.q_hat, row, q_hat)
+            store(work.v_hat, row, v_hat)
+        velocity = add_product(v_hat, share, load(a, k * rows + row))
         store(work.q, row, add_product(q_hat, gamma, velocity))
-    return gamma
+    if k > 0:
+        return Stage(work.q_hat, work.v_hat, gamma, 1.0 / gamma)
+    return Stage(q_0, v_0, gamma, 1.0 / gamma)
 
 
 @kernel
-def end_stage(rods, work, scheme, stage, a, gamma):
-    """V = (Q - q_hat)/gamma and A = (V - v_hat)/gamma of a solved stage.
+def stage_motion(work, stage, row):
+    """(V, A) of a coordinate: V = (Q - q_hat)/gamma and A = (V - v_hat)/gamma."""
+    velocity = (load(work.q, row) - load(stage.q_hat, row)) * stage.inverse_gamma
+    return velocity, (velocity - load(stage.v_hat, row)) * stage.inverse_gamma
 
-    Behind the accelerations stands the share of the last one that would have fit this one best (least squares), from
-    0 to 1: the next step's guess uses it. Ringing that a step does not resolve changes its sign, and has the share 0.
+
+@kernel
+def store_share(a, row, along, squared):
+    """The share, from 0 to 1, of a stage's last acceleration that would have fit its new one best (least squares).
+
+    The next step's first guess uses it. Ringing that a step does not resolve changes its sign, and has the share 0.
     """
-    inverse_gamma = 1.0 / gamma
+    share = select(along > 0.0, along / squared, 0.0)
+    store(a, row, select(share < 1.0, share, 1.0))
+
+
+@kernel
+def end_stage(rods, work, scheme, k, stage, a):
+    """Keep velocity and acceleration of a solved stage that is not the last."""
     rows = 2 * n_nodes(rods)
     along, squared = splat(0.0), splat(0.0)
     for row in range(rows):
-        velocity = (load(work.q, row) - load(work.q_hat, row)) * inverse_gamma
-        acceleration = (velocity - load(work.v_hat, row)) * inverse_gamma
-        last = load(a, stage * rows + row)
+        velocity, acceleration = stage_motion(work, stage, row)
+        last = load(a, k * rows + row)
         along = add_product(along, last, acceleration)
         squared = add_product(squared, last, last)
-        store(work.stage_v, stage * rows + row, velocity)
-        store(a, stage * rows + row, acceleration)
-    share = select(along > 0.0, along / squared, 0.0)
-    store(a, scheme.n_stages * rows + stage, select(share < 1.0, share, 1.0))
+        store(work.stage_v, k * rows + row, velocity)
+        store(a, k * rows + row, acceleration)
+    store_share(a, scheme.n_stages * rows + k, along, squared)
 
 
 @kernel
-def accept_step(rods, work, scheme, q_0, v_0, a, h, accepted):
-    """Write the result of a step over the state (q_0, v_0) of the robots in the mask `accepted`."""
-    n_stages = scheme.n_stages
-    rows = 2 * n_nodes(rods)
+def end_step(rods, work, scheme, stage, q_0, v_0, a, h, accepted):
+    """After the last stage: write the step's result over the state (q_0, v_0) of the robots in the mask `accepted`."""
+    rows, k = 2 * n_nodes(rods), scheme.n_stages - 1
+    along, squared = splat(0.0), splat(0.0)
     for row in range(rows):
+        velocity, acceleration = stage_motion(work, stage, row)
+        last = load(a, k * rows + row)
+        along = add_product(along, last, acceleration)
+        squared = add_product(squared, last, last)
         q, v = load(q_0, row), load(v_0, row)
         if scheme.stiffly_accurate:
-            q_1, v_1 = load(work.q, row), load(work.stage_v, (n_stages - 1) * rows + row)
+            q_1, v_1 = load(work.q, row), velocity
         else:
-            q_1, v_1 = q, v
-            for stage in range(n_stages):
-                weight = load_number(scheme.b, stage) * h
-                q_1 = add_product(q_1, weight, load(work.stage_v, stage * rows + row))
-                v_1 = add_product(v_1, weight, load(a, stage * rows + row))
+            weight = load_number(scheme.b, k) * h
+            q_1, v_1 = add_product(q, weight, velocity), add_product(v, weight, acceleration)
+            for other in range(k):
+                weight = load_number(scheme.b, other) * h
+                q_1 = add_product(q_1, weight, load(work.stage_v, other * rows + row))
+                v_1 = add_product(v_1, weight, load(a, other * rows + row))
+        store(a, k * rows + row, acceleration)
         store(q_0, row, select(accepted, q_1, q))
         store(v_0, row, select(accepted, v_1, v))
+    store_share(a, scheme.n_stages * rows + k, along, squared)
 
 
 @kernel
@@ -100,15 +129,18 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, tol
     Returns the mask of the robots whose stages all converged; their state has moved, that of the others has not.
     """
     going = active
-    for stage in range(scheme.n_stages):
-        gamma = begin_stage(rods, work, scheme, stage, q, v, a, h)
-        set_natural_hub_angles(rods, work, actuation, start + load_number(scheme.c, stage) * size)
-        going, iterations, repairs, backtracks = minimise(rods, work, gamma, going, tolerance, patience)
-        end_stage(rods, work, scheme, stage, a, gamma)
+    last = scheme.n_stages - 1
+    for k in range(scheme.n_stages):
+        stage = begin_stage(rods, work, scheme, k, q, v, a, h)
+        set_natural_hub_angles(rods, work, actuation, start + load_number(scheme.c, k) * size)
+        going, iterations, repairs, backtracks = minimise(rods, work, stage, going, tolerance, patience)
         add_to_report(report, NEWTON_ITERATIONS, iterations)
         add_to_report(report, REPAIRS, repairs)
         add_to_report(report, BACKTRACKS, backtracks)
-    accept_step(rods, work, scheme, q, v, a, h, going)
+        if k < last:
+            end_stage(rods, work, scheme, k, stage, a)
+        else:
+            end_step(rods, work, scheme, stage, q, v, a, h, going)
     return going
 
 
