@@ -202,6 +202,11 @@ class Simulator:
         return self._start_time + self._strokes * self.scene.actuator.period + self._since_stroke
 
     @property
+    def stroke_time(self) -> float:
+        """What a stroke takes [s], as the last pause of stroke_in_parts says it."""
+        return float(self._times[-1])
+
+    @property
     def failed(self) -> NDArray[np.bool_]:
         """Robots whose solver has given up and that wait for a reset, shape (n_robots,)."""
         return self._read(self._failed)[:, 0] > 0.0

@@ -89,7 +89,7 @@ def take_step(rods, work, stepping, shortening, fraction):
 
 @kernel
 def move_node(work, node, solution, shortening, scale):
-    """Move a node by `scale` times its step, the last one where `shortening`, else -solution; returns the move squared."""
+    """Move a node by `scale` times its step: its last where `shortening`, else -solution; returns the move squared."""
     x = select(shortening, load(work.step, 2 * node), -solution[0])
     y = select(shortening, load(work.step, 2 * node + 1), -solution[1])
     move_x, move_y = scale * x, scale * y

@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 from seastar_gym.der.compilation import entry_point, kernel
 from seastar_gym.der.lanes import add_product, borrow, load, select, splat, sqrt, store
 
+OBSERVATION_LAYOUT = 1
+"""Number of this table. A change of order, unit or frame makes it another one: saved policies say which they know."""
 VELOCITY_SCALE = 0.025
 """[m/s]: nodes and hub move at 12 to 24 mm/s root mean square after strokes of random commands."""
 

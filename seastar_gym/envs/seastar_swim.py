@@ -68,8 +68,9 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     reward: Weights of the reward's terms.
     waypoint_radius: A waypoint is reached within this distance [m].
     random_heading: Turn the robot at random at the start of every episode; otherwise limb 1 points along +x.
-    render_mode: "rgb_array" draws the end of a stroke, "rgb_array_list" collects FRAMES_PER_STROKE frames in every
+    render_mode: "rgb_array" draws the end of a stroke, "rgb_array_list" collects `frames_per_stroke` frames in every
         stroke, "human" shows as many in a window.
+    frames_per_stroke: See render_mode; at equal times, the last one at the end of the stroke.
     """
 
     metadata = {"render_modes": ["human", "rgb_array", "rgb_array_list"], "render_fps": FRAMES_PER_STROKE}
@@ -84,10 +85,15 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
         waypoint_radius: float = 0.01,
         random_heading: bool = False,
         render_mode: Literal["human", "rgb_array", "rgb_array_list"] | None = None,
+        frames_per_stroke: int = FRAMES_PER_STROKE,
     ):
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise ValueError(f"render_mode must be one of {self.metadata['render_modes']}, not {render_mode!r}.")
+        if isinstance(frames_per_stroke, bool) or not isinstance(frames_per_stroke, int) or frames_per_stroke < 1:
+            raise ValueError(f"frames_per_stroke must be a whole number of at least 1, not {frames_per_stroke!r}.")
         self.render_mode = render_mode
+        self.frames_per_stroke = frames_per_stroke
+        self.metadata = {**self.metadata, "render_fps": frames_per_stroke}
         self.actions = actions
         self._task = SwimTask(make_scene(scene, fidelity), 1, path, reward, waypoint_radius, random_heading, threads=1)
         n_limbs = self.scene.robot.n_limbs
@@ -128,7 +134,7 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
         self._frames = []
         if self._renderer is not None:
             self._renderer.reset(self.waypoints)
-        self._draw_frame(0.0)
+        self._draw_frame()
         return self._task.observe()[0], _of_one_robot(self._task.facts())
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -151,16 +157,18 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
             outcome = self._task.step(command)
             self._extend_trail()
             return outcome
-        return self._draw_while_swimming(self._task.step_in_parts(command, FRAMES_PER_STROKE))
+        return self._draw_while_swimming(self._task.step_in_parts(command, self.frames_per_stroke))
 
     def _draw_while_swimming(self, parts: Generator[float, None, Outcome]) -> Outcome:
         while True:
             try:
                 time_in_stroke = next(parts)
             except StopIteration as finished:
+                self._draw_frame()  # now that it is known whether a waypoint was reached
                 return finished.value
             self._extend_trail()
-            self._draw_frame(time_in_stroke)
+            if time_in_stroke < self.simulator.stroke_time:
+                self._draw_frame()
 
     def _extend_trail(self) -> None:
         if self.render_mode is not None:
@@ -175,9 +183,9 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
             time=float(self.simulator.time[0]),
         )
 
-    def _draw_frame(self, time_in_stroke: float) -> None:
+    def _draw_frame(self) -> None:
         if self.render_mode == "human":
-            self._get_renderer().show(self._frame(), fps=FRAMES_PER_STROKE)
+            self._get_renderer().show(self._frame(), fps=self.frames_per_stroke)
         elif self.render_mode == "rgb_array_list":
             self._frames.append(self._get_renderer().draw(self._frame()))
 

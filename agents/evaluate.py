@@ -1,0 +1,258 @@
+"""Runs any set of agents on any path: one table, the same as CSV, a picture of their traces, a video of each.
+
+    python -m agents.evaluate --agents pentagon straight 4+,1- runs/mine/model.zip --path pentagon
+
+From Python, `evaluate({"mine": policy, "script": scripted("pentagon")}, path)` does the same.
+"""
+
+import csv
+import re
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tyro
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from agents.pictures import FRAMES_PER_STROKE, draw_traces, film
+from agents.scripted import scripted
+from agents.swim import Policy, Swim, swim
+from seastar_gym.envs.commands import Actions
+from seastar_gym.envs.paths import PATH_NAMES, make_path
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.scene import Fidelity, require_number
+
+MM = 1000.0
+
+
+def evaluate(
+    agents: Mapping[str, Policy],
+    path: Any = "pentagon",
+    *,
+    seed: int | None = 0,
+    reset_options: dict[str, Any] | None = None,
+    max_strokes: int = 400,
+    waypoint_radius: float = 0.01,
+    out: Path | str | None = None,
+    video: bool = True,
+    console: Console | None = None,
+    **environment: Any,
+) -> list[Swim]:
+    """Let every agent swim the path, print the table, and return the swims in the order of the agents.
+
+    agents: Policies by name; see `Policy` for what they must be able to do.
+    path: A name, or waypoints [m], shape (n, 2). seed, reset_options: Of every agent's `reset`.
+    max_strokes: Time limit [strokes]. waypoint_radius: [m].
+    out: Folder for evaluation.csv, traces.png and, with `video`, an MP4 of every agent; nothing is written if None.
+    environment: Further arguments of `SeastarSwimEnv`: fidelity, scene, random_heading, ...
+    """
+    if not agents:
+        raise ValueError("There is nothing to evaluate: name at least one agent.")
+    if max_strokes < 1:
+        raise ValueError(f"max_strokes must be at least 1, not {max_strokes!r}.")
+    console = Console() if console is None else console
+    folder = None if out is None else Path(out)
+    videos = {} if folder is None or not video else _video_files(agents, folder)
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+    environment |= {"path": path, "waypoint_radius": waypoint_radius}
+    episode = {"seed": seed, "reset_options": reset_options, "max_strokes": max_strokes}
+    swims = []
+    for name, policy in agents.items():
+        with console.status(Text(f"{name} swims")):
+            swims.append(_swim_once(name, policy, environment, episode, videos.get(name)))
+    console.print(_table(swims))
+    for done in swims:
+        if done.solver_message is not None:
+            console.print(Text(f"{done.agent}: {done.solver_message}"))
+    if folder is not None:
+        _write_csv(swims, folder / "evaluation.csv")
+        draw_traces(swims, waypoint_radius, folder / "traces.png")
+        files = ["evaluation.csv", "traces.png", *(file.name for file in videos.values())]
+        console.print(Text(f"Written to {folder}: {', '.join(files)}"), soft_wrap=True)
+    return swims
+
+
+def _swim_once(
+    name: str, policy: Policy, environment: dict[str, Any], episode: dict[str, Any], video: Path | None
+) -> Swim:
+    actions: Actions = getattr(policy, "actions", "limbs")
+    if video is None:
+        return swim(name, policy, SeastarSwimEnv(actions=actions, **environment), **episode)
+    filmed = SeastarSwimEnv(
+        actions=actions, render_mode="rgb_array_list", frames_per_stroke=FRAMES_PER_STROKE, **environment
+    )
+    with film(video) as watch:
+        swum = swim(name, policy, filmed, **episode, watch=watch)
+    filmed.close()
+    return swum
+
+
+def _video_files(agents: Mapping[str, Policy], folder: Path) -> dict[str, Path]:
+    files = {name: folder / (re.sub(r"[^\w.,+-]+", "_", name) + ".mp4") for name in agents}
+    if len(set(files.values())) < len(files):
+        raise ValueError("The names of two agents make the same file name: give them names that differ in more.")
+    return files
+
+
+# --- the table -------------------------------------------------------------------------------------------------------
+
+COLUMNS = {
+    "agent": "agent",
+    "strokes_to_finish": "strokes\nto\nfinish",
+    "simulated_time_s": "simulated\ntime\n[s]",
+    "waypoints_reached": "waypoints\nreached",
+    "mean_cross_track_error_mm": "mean\ncross-track\nerror [mm]",
+    "largest_cross_track_error_mm": "largest\ncross-track\nerror [mm]",
+    "limbs_heated_per_metre": "limbs\nheated per\nmetre [1/m]",
+}
+"""Columns of the table: their names in the CSV, their titles in print."""
+
+
+def results(swims: Sequence[Swim]) -> list[dict[str, str | int | float | None]]:
+    """The table's numbers by the CSV's names; None where there is no number, as for who did not finish."""
+    return [
+        {
+            "agent": done.agent,
+            "strokes_to_finish": done.strokes if done.finished else None,
+            "simulated_time_s": float(done.time[-1]),
+            "waypoints_reached": done.waypoints_reached,
+            "waypoints": len(done.waypoints),
+            "mean_cross_track_error_mm": MM * float(done.cross_track_errors.mean()),
+            "largest_cross_track_error_mm": MM * float(done.cross_track_errors.max()),
+            "limbs_heated_per_metre": done.heated_per_metre,
+        }
+        for done in swims
+    ]
+
+
+def _table(swims: Sequence[Swim]) -> Table:
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False, pad_edge=False)
+    for name, title in COLUMNS.items():
+        if name == "agent":
+            table.add_column(title, vertical="bottom", overflow="fold")
+        else:
+            table.add_column(Text(title), justify="right", no_wrap=True)
+    for row in results(swims):
+        row["waypoints_reached"] = f"{row['waypoints_reached']} of {row['waypoints']}"
+        table.add_row(*(_cell(row[name]) for name in COLUMNS))
+    return table
+
+
+def _cell(value: str | int | float | None) -> Text:
+    if value is None:
+        return Text("\u2013")
+    return Text(f"{value:.1f}" if isinstance(value, float) else str(value))
+
+
+def _write_csv(swims: Sequence[Swim], file: Path) -> None:
+    rows = results(swims)
+    with file.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.DictWriter(stream, fieldnames=list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+# --- the command line ------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Options:
+    """Compare agents on a path: a table, the same as CSV, a picture of their traces, and a video of each."""
+
+    agents: tuple[str, ...] = ("pentagon", "straight")
+    """Scripted agents (pentagon, straight, rest, random, or a pair such as 4+,1-) and files of saved models (.zip)."""
+    path: str = "pentagon"
+    """pentagon, square, triangle, line, figure-eight, random, or a text file with x, y [m] of one waypoint per line."""
+    fidelity: Fidelity = "balanced"
+    """How exactly the swims are computed."""
+    out: Path = Path("runs/evaluate")
+    """Folder of the results."""
+    seed: int = 0
+    """Of a random path, a random heading and the random agent; every agent gets the same path and heading."""
+    max_strokes: int = 400
+    """Time limit [strokes]."""
+    waypoint_radius: float = 0.01
+    """A waypoint is reached within this distance [m]."""
+    random_heading: bool = False
+    """Turn the robot at random at the start; otherwise limb 1 points along +x."""
+    video: bool = True
+    """Film every agent."""
+
+    def __post_init__(self) -> None:
+        if self.max_strokes < 1:
+            raise ValueError(f"max_strokes must be at least 1, not {self.max_strokes}.")
+        require_number("waypoint_radius", self.waypoint_radius, "m")
+
+
+def load_agents(names: Sequence[str], seed: int = 0) -> dict[str, Policy]:
+    """Policies by name: scripted ones, and saved models (.zip) under the names of their files without the ending."""
+    agents: dict[str, Policy] = {}
+    for name in names:
+        label = Path(name).stem if _is_model(name) else name
+        label = str(Path(name).with_suffix("")) if label in agents else label
+        if label in agents:
+            raise ValueError(f"The agent {name!r} is named twice.")
+        agents[label] = _load_model(name) if _is_model(name) else scripted(name, rng=np.random.default_rng(seed))
+    return agents
+
+
+def _is_model(name: str) -> bool:
+    return name.endswith(".zip") or len(Path(name).parts) > 1
+
+
+def _load_model(file: str) -> Policy:
+    if not Path(file).is_file():
+        raise ValueError(f"There is no model file {file}.")
+    try:
+        from agents.ppo import load
+    except ModuleNotFoundError as missing:
+        raise ValueError(f'A saved model needs {missing.name}: pip install "seastar-gym[train]".') from missing
+    model: Policy = load(file)
+    return model
+
+
+def _load_path(name: str) -> Any:
+    """The name of a path, or the waypoints [m] of a text file."""
+    if name in PATH_NAMES or not Path(name).is_file():
+        make_path(name, np.random.default_rng(0))
+        return name
+    lines = Path(name).read_text(encoding="utf-8").splitlines()
+    try:
+        return make_path(
+            [[float(x) for x in line.split(",")] for line in lines if line.strip()], np.random.default_rng(0)
+        )
+    except ValueError as bad:
+        raise ValueError(f"{name}: {bad}") from bad
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line; returns the exit code."""
+    options = tyro.cli(Options, args=arguments)
+    try:
+        agents, path = load_agents(options.agents, options.seed), _load_path(options.path)
+    except (ValueError, OSError) as bad_input:
+        print(bad_input, file=sys.stderr)
+        return 2
+    evaluate(
+        agents,
+        path,
+        seed=options.seed,
+        max_strokes=options.max_strokes,
+        waypoint_radius=options.waypoint_radius,
+        out=options.out,
+        video=options.video,
+        fidelity=options.fidelity,
+        random_heading=options.random_heading,
+    )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

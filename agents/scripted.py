@@ -1,0 +1,155 @@
+"""Gaits that swim by the clock: the straight gait, the pairs of Fig. 13.8, and the pentagon gait (13.15).
+
+A gait looks at no observation. What it has to remember, how many strokes it has swum, is the recurrent state of
+Stable-Baselines3's `predict`, so one gait may drive any number of robots:
+
+    gait, state = scripted("pentagon"), None
+    action, state = gait.predict(observation, state)
+"""
+
+import re
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, command_table
+
+Floats = NDArray[np.float64]
+PolicyState = tuple[NDArray[np.int64], ...] | None
+
+SWIMMING_STROKES, RESTING_STROKES = 45, 5
+"""Strokes of a side of the pentagon: of swimming, then of rest "to bring the robot to a complete stop"."""
+SCRIPTED_NAMES = ("pentagon", "straight", "rest", "random")
+
+_PAIR = re.compile(r"\{?(\d+)([+-]),(\d+)([+-])\}?")
+
+
+# --- gaits: commands per stroke, shape (n_strokes, n_limbs) ----------------------------------------------------------
+
+
+def pair_gait(plus: int, minus: int, n_limbs: int = 5) -> Floats:
+    """One stroke of the pair {plus+, minus-}: two limbs, numbered from 1, turned against each other (Fig. 13.8)."""
+    if plus == minus or not {plus, minus} <= set(range(1, n_limbs + 1)):
+        raise ValueError(f"A pair needs two different limbs from 1 to {n_limbs}, not {plus} and {minus}.")
+    command = np.zeros((1, n_limbs))
+    command[0, [plus - 1, minus - 1]] = 1.0, -1.0
+    return command
+
+
+def straight_gait(n_limbs: int = 5) -> Floats:
+    """One stroke of {2+, 5-}, the neighbours of limb 1: the robot moves along +x."""
+    return pair_gait(2, n_limbs, n_limbs)
+
+
+def pentagon_gait() -> Floats:
+    """The 250 strokes of (13.15): {2,5}; {1,3}; {2,4}; {3,5}; {1,4}, with a rest after each.
+
+    The chapter leaves the signs open. The straight gait fixes the first pair, {2+, 5-}; every further side is turned by
+    72 degrees, which moves both limbs on by one: {3+, 1-}, {4+, 2-}, {5+, 3-}, {1+, 4-}.
+    """
+    sides = []
+    for side in range(5):
+        command = np.roll(straight_gait(), side, axis=1)
+        sides += [np.repeat(command, SWIMMING_STROKES, axis=0), np.zeros((RESTING_STROKES, 5))]
+    return np.concatenate(sides)
+
+
+# --- policies --------------------------------------------------------------------------------------------------------
+
+
+def to_actions(commands: ArrayLike, actions: Actions, n_limbs: int) -> NDArray[np.int64]:
+    """The actions that mean these commands: shape (..., n_limbs) -> the same for "limbs", else (...)."""
+    commands = np.asarray(commands, dtype=np.float64)
+    if actions == "limbs":
+        means = commands[..., None] == LIMB_COMMANDS
+    else:
+        means = (commands[..., None, :] == command_table(actions, n_limbs)).all(axis=-1)
+    if not means.any(axis=-1).all():
+        raise ValueError(f'Some of these commands have no action with actions="{actions}".')
+    return np.argmax(means, axis=-1)
+
+
+class OpenLoopPolicy:
+    """A gait, over and over: a policy in Stable-Baselines3's form whose state counts the strokes.
+
+    commands: Values -1, 0, 1, shape (n_strokes, n_limbs).
+    actions: How the environment is told: its argument of the same name.
+    """
+
+    def __init__(self, commands: ArrayLike, actions: Actions = "limbs"):
+        commands = np.asarray(commands, dtype=np.float64)
+        if commands.ndim != 2 or commands.size == 0:
+            raise ValueError(f"A gait needs commands of shape (n_strokes, n_limbs), not {commands.shape}.")
+        self.actions: Actions = actions
+        self._gait = to_actions(commands, actions, commands.shape[1])
+
+    def predict(
+        self,
+        observation: NDArray[np.float32],
+        state: PolicyState = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = False,
+    ) -> tuple[NDArray[np.int64], PolicyState]:
+        """Action of the next stroke, and the state to hand in for the one after.
+
+        observation: Of one robot, shape (size,), or of a batch, shape (n, size); only its shape is looked at.
+        state: What the last call returned, None before the first: strokes swum, shape (n,), in a tuple.
+        episode_start: Where an episode begins with this stroke, shape (n,); the gait then starts again.
+        """
+        alone = np.ndim(observation) == 1
+        swum = np.zeros(1 if alone else len(observation), dtype=np.int64) if state is None else state[0]
+        if episode_start is not None:
+            swum = np.where(episode_start, 0, swum)
+        action = self._gait[swum % len(self._gait)]
+        return action[0] if alone else action, (swum + 1,)
+
+
+class RandomPolicy:
+    """Uniformly random actions, the baseline that any gait has to beat."""
+
+    def __init__(self, rng: np.random.Generator, actions: Actions = "limbs", n_limbs: int = 5):
+        self.actions: Actions = actions
+        self._rng = rng
+        self._n_choices = len(LIMB_COMMANDS if actions == "limbs" else command_table(actions, n_limbs))
+        self._shape = (n_limbs,) if actions == "limbs" else ()
+
+    def predict(
+        self,
+        observation: NDArray[np.float32],
+        state: PolicyState = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = False,
+    ) -> tuple[NDArray[np.int64], PolicyState]:
+        """An action of one robot for an observation of shape (size,), of n robots for (n, size)."""
+        batch = np.shape(observation)[:-1]
+        return np.asarray(self._rng.integers(self._n_choices, size=batch + self._shape)), None
+
+
+def scripted(
+    name: str, actions: Actions = "limbs", n_limbs: int = 5, rng: np.random.Generator | None = None
+) -> OpenLoopPolicy | RandomPolicy:
+    """The policy of a name: "pentagon", "straight", "rest", "random", or a pair such as "4+,1-".
+
+    actions: How the environment is told: its argument of the same name.
+    rng: What the random policy draws from; a generator with seed 0 if None.
+    """
+    if name == "random":
+        return RandomPolicy(np.random.default_rng(0) if rng is None else rng, actions, n_limbs)
+    return OpenLoopPolicy(_gait(name, n_limbs), actions)
+
+
+def _gait(name: str, n_limbs: int) -> Floats:
+    pair = _PAIR.fullmatch(name.replace(" ", ""))
+    if pair is not None and pair[2] != pair[4]:
+        limbs = {pair[2]: int(pair[1]), pair[4]: int(pair[3])}
+        return pair_gait(limbs["+"], limbs["-"], n_limbs)
+    if name == "straight":
+        return straight_gait(n_limbs)
+    if name == "rest":
+        return np.zeros((1, n_limbs))
+    if name == "pentagon":
+        if n_limbs != 5:
+            raise ValueError(f"The pentagon gait (13.15) is for five limbs, not {n_limbs}.")
+        return pentagon_gait()
+    names = ", ".join(SCRIPTED_NAMES)
+    raise ValueError(f'Unknown scripted agent {name!r}: choose one of {names}, or a pair of a + and a - limb: "4+,1-".')

@@ -1,0 +1,122 @@
+"""One agent swims one episode: `swim`, and what can be measured on it afterwards."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.envs.paths import cross_track_error, path_length
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+
+Floats = NDArray[np.float64]
+
+
+class Policy(Protocol):
+    """Anything with Stable-Baselines3's `predict`. An attribute `actions` names the environment's action mode that it
+    is made for; without one it is "limbs"."""
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
+    ) -> tuple[Any, Any]:
+        """Action for an observation, and the recurrent state for the next call."""
+
+
+@dataclass(frozen=True, eq=False)
+class Swim:
+    """What one agent did on one path.
+
+    hub, waypoint_index and time are those at the start and after every stroke, strokes + 1 of them.
+    """
+
+    agent: str
+    waypoints: Floats
+    """[m], shape (n, 2)."""
+    hub: Floats
+    """Hub positions [m], shape (strokes + 1, 2)."""
+    waypoint_index: NDArray[np.int64]
+    """Waypoints reached, shape (strokes + 1,)."""
+    time: Floats
+    """Simulated time [s], shape (strokes + 1,)."""
+    limbs_heated: NDArray[np.int64]
+    """Shape (strokes,)."""
+    solver_message: str | None
+    """Why the solver gave up, where it did."""
+
+    @property
+    def strokes(self) -> int:
+        """Strokes swum."""
+        return len(self.limbs_heated)
+
+    @property
+    def waypoints_reached(self) -> int:
+        """Waypoints reached at the end."""
+        return int(self.waypoint_index[-1])
+
+    @property
+    def finished(self) -> bool:
+        """Whether the last waypoint was reached."""
+        return self.waypoints_reached == len(self.waypoints)
+
+    @cached_property
+    def cross_track_errors(self) -> Floats:
+        """Distance [m] of the hub from the path at the end of every stroke, shape (strokes,).
+
+        The path there is the leg that the hub is on and the one before: a waypoint counts as reached a waypoint radius
+        early, and a hub that then still follows the old leg into the corner does not stray.
+        """
+        corners = np.concatenate([np.zeros((1, 2)), self.waypoints])
+        leg = np.minimum(self.waypoint_index[1:], len(self.waypoints) - 1)
+        now = cross_track_error(self.hub[1:], corners[leg], corners[leg + 1])
+        leg = np.maximum(leg - 1, 0)
+        return np.minimum(now, cross_track_error(self.hub[1:], corners[leg], corners[leg + 1]))
+
+    @property
+    def hub_path_length(self) -> float:
+        """Length [m] of the hub's way from the end of one stroke to the end of the next."""
+        return float(path_length(self.hub[0], self.hub))
+
+    @property
+    def heated_per_metre(self) -> float | None:
+        """Limbs heated per metre of the hub's way [1/m]; None where the hub did not move."""
+        length = self.hub_path_length
+        return float(self.limbs_heated.sum() / length) if length > 0.0 else None
+
+
+def swim(
+    agent: str,
+    policy: Policy,
+    env: SeastarSwimEnv,
+    *,
+    max_strokes: int,
+    seed: int | None = None,
+    reset_options: dict[str, Any] | None = None,
+    watch: Callable[[SeastarSwimEnv], None] | None = None,
+) -> Swim:
+    """One episode, with deterministic actions, to the last waypoint or for `max_strokes` strokes.
+
+    watch: Called with `env` after its reset and after every stroke, to film it for instance.
+    """
+    observation, info = env.reset(seed=seed, options=reset_options)
+    infos = [info]
+    state, over = None, False
+    if watch is not None:
+        watch(env)
+    while not over and len(infos) <= max_strokes:
+        begins = np.array([len(infos) == 1])
+        action, state = policy.predict(observation, state=state, episode_start=begins, deterministic=True)
+        observation, _, over, _, info = env.step(action)
+        infos.append(info)
+        if watch is not None:
+            watch(env)
+    return Swim(
+        agent=agent,
+        waypoints=env.waypoints,
+        hub=np.array([info["hub_position"] for info in infos]),
+        waypoint_index=np.array([info["waypoint_index"] for info in infos]),
+        time=np.array([info["time"] for info in infos]),
+        limbs_heated=np.array([info["limbs_heated"] for info in infos[1:]], dtype=np.int64),
+        solver_message=infos[-1].get("solver_message"),
+    )

@@ -1,0 +1,307 @@
+"""Evaluation: the measures of a swim, and the table, CSV, picture and videos made of them."""
+
+import csv
+import io
+import subprocess
+import sys
+from pathlib import Path
+
+import imageio.v3 as imageio
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from rich.console import Console
+
+from agents.evaluate import evaluate, load_agents, main
+from agents.pictures import CLOSING_SECONDS, COLOURS, FPS, FRAMES_PER_STROKE
+from agents.scripted import scripted
+from agents.swim import Swim, swim
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+
+ROOT = Path(__file__).resolve().parents[2]
+SHORT = [[0.02, 0.0]]
+EASY = {"fidelity": "fast", "waypoint_radius": 2e-3, "console": Console(quiet=True)}
+
+
+def made_up_swim(hub, waypoint_index, waypoints=((0.1, 0.0), (0.1, 0.1)), limbs_heated=None):
+    hub = np.array(hub, dtype=float)
+    return Swim(
+        agent="made up",
+        waypoints=np.array(waypoints),
+        hub=hub,
+        waypoint_index=np.array(waypoint_index),
+        time=np.arange(float(len(hub))),
+        limbs_heated=np.full(len(hub) - 1, 2) if limbs_heated is None else np.array(limbs_heated),
+        solver_message=None,
+    )
+
+
+# --- measures of a swim ----------------------------------------------------------------------------------------------
+
+
+def test_following_the_path_round_a_corner_is_no_error():
+    hub = [(0.0, 0.0), (0.095, 0.0), (0.1, 0.0), (0.1, 0.05), (0.1, 0.1)]
+    done = made_up_swim(hub, [0, 1, 1, 1, 2])  # the first waypoint is reached 5 mm early
+    np.testing.assert_allclose(done.cross_track_errors, 0.0, atol=1e-15)
+    assert done.finished
+
+
+def test_straying_is_measured_from_the_legs_at_hand():
+    hub = [(0.0, 0.0), (0.05, 0.02), (0.11, 0.0), (0.13, 0.05)]
+    done = made_up_swim(hub, [0, 0, 1, 1])
+    np.testing.assert_allclose(done.cross_track_errors, [0.02, 0.01, 0.03])
+    assert not done.finished
+
+
+def test_a_leg_that_is_yet_to_come_does_not_count_as_the_path():
+    done = made_up_swim([(0.0, 0.0), (0.05, 0.05)], [0, 0], waypoints=((0.1, 0.0), (0.1, 0.1), (0.0, 0.0)))
+    np.testing.assert_allclose(done.cross_track_errors, [0.05])
+
+
+def test_heating_is_counted_per_metre_of_the_hubs_way():
+    done = made_up_swim([(0.0, 0.0), (0.03, 0.0), (0.03, 0.04)], [0, 0, 0], limbs_heated=[2, 5])
+    assert done.heated_per_metre == pytest.approx(7 / 0.07)
+    assert made_up_swim([(0.0, 0.0), (0.0, 0.0)], [0, 0]).heated_per_metre is None
+
+
+class Recorder:
+    """A policy that writes down what it is asked."""
+
+    def __init__(self):
+        self.asked = []
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        self.asked.append((state, bool(episode_start[0]), deterministic))
+        return np.array([0, 1, 0, 0, 2]), len(self.asked)
+
+
+def test_a_policy_gets_its_state_back_and_hears_of_the_start_once():
+    recorder = Recorder()
+    done = swim("recorder", recorder, SeastarSwimEnv(fidelity="fast"), max_strokes=3, seed=0)
+    assert recorder.asked == [(None, True, True), (1, False, True), (2, False, True)]
+    assert done.strokes == 3
+    np.testing.assert_array_equal(done.time, [0.0, 1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(done.limbs_heated, [2, 2, 2])
+
+
+def test_the_scripted_pentagon_rounds_the_pentagon():
+    (done,) = evaluate({"script": scripted("pentagon")}, "pentagon", fidelity="balanced", console=Console(quiet=True))
+    assert done.waypoints_reached == 5
+    assert 240 <= done.strokes <= 242  # it enters the last waypoint's radius before it stops
+    assert done.cross_track_errors.mean() < 1e-3
+    assert done.cross_track_errors.max() < 6e-3  # it overshoots the corners, and drifts back while it rests
+
+
+def test_an_agent_swims_the_same_in_every_action_mode():
+    agents = {actions: scripted("straight", actions) for actions in ("limbs", "joint", "pairs")}
+    limbs, joint, pairs = evaluate(agents, SHORT, **EASY)
+    np.testing.assert_array_equal(joint.hub, limbs.hub)
+    np.testing.assert_array_equal(pairs.hub, limbs.hub)
+
+
+def test_every_agent_gets_the_same_random_path_and_heading():
+    agents = {"a": scripted("straight"), "b": scripted("rest")}
+    a, b = evaluate(agents, "random", seed=5, max_strokes=2, random_heading=True, **EASY)
+    np.testing.assert_array_equal(a.waypoints, b.waypoints)
+    (again,) = evaluate({"a": agents["a"]}, "random", seed=5, max_strokes=2, random_heading=True, **EASY)
+    (other,) = evaluate({"a": agents["a"]}, "random", seed=6, max_strokes=2, random_heading=True, **EASY)
+    np.testing.assert_array_equal(again.hub, a.hub)
+    assert not np.array_equal(other.hub, a.hub)
+
+
+def test_a_path_may_come_with_the_reset():
+    (done,) = evaluate({"a": scripted("straight")}, reset_options={"path": SHORT}, **EASY)
+    np.testing.assert_array_equal(done.waypoints, SHORT)
+    assert done.finished
+
+
+# --- what is written -------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Folder, swims and printed text of an evaluation of one agent that finishes and one that does not."""
+    folder = tmp_path_factory.mktemp("evaluation")
+    console = Console(width=80, file=io.StringIO())
+    agents = {"straight": scripted("straight"), "2-,5+": scripted("2-,5+")}
+    swims = evaluate(agents, SHORT, max_strokes=8, out=folder, **EASY | {"console": console})
+    return folder, swims, console.file.getvalue()
+
+
+def test_csv_holds_the_measures(written):
+    folder, (finished, astray), _ = written
+    with (folder / "evaluation.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["agent"] for row in rows] == ["straight", "2-,5+"]
+    assert rows[0]["strokes_to_finish"] == str(finished.strokes)
+    assert rows[1]["strokes_to_finish"] == ""
+    assert [row["waypoints_reached"] for row in rows] == ["1", "0"]
+    assert [row["waypoints"] for row in rows] == ["1", "1"]
+    for row, done in zip(rows, (finished, astray), strict=True):
+        assert float(row["simulated_time_s"]) == done.strokes
+        assert float(row["mean_cross_track_error_mm"]) == pytest.approx(1e3 * done.cross_track_errors.mean())
+        assert float(row["largest_cross_track_error_mm"]) == pytest.approx(1e3 * done.cross_track_errors.max())
+        way = np.hypot(*np.diff(done.hub, axis=0).T).sum()
+        assert float(row["limbs_heated_per_metre"]) == pytest.approx(2 * done.strokes / way)
+
+
+def test_table_fits_eighty_columns_and_says_who_did_not_finish(written):
+    _, (finished, astray), text = written
+    assert max(map(len, text.splitlines()[:-1])) <= 80  # the last line names the folder
+    assert "\u2026" not in text  # nothing is cut off
+    (first,) = (line.split() for line in text.splitlines() if line.startswith("straight"))
+    (second,) = (line.split() for line in text.splitlines() if line.startswith("2-,5+"))
+    assert first[1:6] == [str(finished.strokes), f"{finished.strokes}.0", "1", "of", "1"]
+    assert second[1:6] == ["\u2013", f"{astray.strokes}.0", "0", "of", "1"]
+
+
+def test_picture_shows_every_trace_in_its_colour(written):
+    folder, _, _ = written
+    pixels = imageio.imread(folder / "traces.png")[..., :3].astype(float) / 255.0
+    assert min(pixels.shape[:2]) > 200
+    for colour in COLOURS[:2]:
+        assert np.count_nonzero(np.abs(pixels - to_rgb(colour)).max(axis=-1) < 0.02) > 100
+
+
+def test_picture_is_not_stretched_by_who_swims_far_away(tmp_path):
+    agents = {"pentagon": scripted("pentagon"), "straight": scripted("straight")}
+    evaluate({"pentagon": agents["pentagon"]}, out=tmp_path / "one", video=False, **EASY)
+    evaluate(agents, out=tmp_path / "both", video=False, **EASY)
+    one, both = (imageio.imread(tmp_path / name / "traces.png").shape for name in ("one", "both"))
+    assert both[0] > 0.7 * one[0]
+
+
+def frames_of(video):
+    """Frames, shape (n, height, width, 3), as signed numbers."""
+    with imageio.imopen(video, "r", plugin="FFMPEG") as reader:
+        assert reader.metadata()["fps"] == FPS
+        return np.stack(list(reader.iter())).astype(np.int16)
+
+
+def test_a_path_that_ends_where_it_starts_can_be_drawn(tmp_path):
+    (done,) = evaluate({"a": scripted("rest")}, [[0.0, 0.0]], out=tmp_path, video=False, **EASY)
+    assert done.finished
+    assert (tmp_path / "traces.png").is_file()
+
+
+# imageio does not close the pipes of the process that it reads from.
+@pytest.mark.filterwarnings("ignore:Exception ignored in:pytest.PytestUnraisableExceptionWarning")
+def test_videos_show_every_stroke_and_rest_on_the_end_of_the_path(written):
+    folder, swims, _ = written
+    closing = round(CLOSING_SECONDS * FPS)
+    for done, name in zip(swims, ("straight", "2-,5+"), strict=True):
+        frames = frames_of(folder / f"{name}.mp4")
+        assert frames.shape == (1 + FRAMES_PER_STROKE * done.strokes + closing, 720, 960, 3)
+        assert np.abs(frames[1] - frames[0]).max() > 100
+        np.testing.assert_allclose(frames[-1], frames[-10], atol=20)
+        # The upper right corner counts the waypoints, or says that the path is completed.
+        progress = frames[:, :40, 700:]
+        assert np.abs(progress[-closing - 1] - progress[0]).max() < 40
+        assert (np.abs(progress[-1] - progress[0]).max() > 100) == done.finished
+
+
+def test_nothing_is_written_without_a_folder_and_no_video_on_request(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    evaluate({"a": scripted("straight")}, SHORT, max_strokes=1, **EASY)
+    assert not list(tmp_path.iterdir())
+    evaluate({"a": scripted("straight")}, SHORT, max_strokes=1, out="there", video=False, **EASY)
+    assert {file.name for file in (tmp_path / "there").iterdir()} == {"evaluation.csv", "traces.png"}
+
+
+@pytest.mark.parametrize("frames_per_stroke", [1, 3])
+def test_an_environment_draws_as_many_frames_per_stroke_as_asked(frames_per_stroke):
+    env = SeastarSwimEnv(fidelity="fast", render_mode="rgb_array_list", frames_per_stroke=frames_per_stroke)
+    env.reset(seed=0)
+    env.render()
+    env.step(np.array([0, 1, 0, 0, 2]))
+    assert len(env.render()) == frames_per_stroke
+    assert env.metadata["render_fps"] == frames_per_stroke
+
+
+@pytest.mark.parametrize("frames_per_stroke", [0, -1, 2.5, True])
+def test_frames_per_stroke_that_cannot_be_drawn_are_refused(frames_per_stroke):
+    with pytest.raises(ValueError, match="frames_per_stroke must be a whole number"):
+        SeastarSwimEnv(frames_per_stroke=frames_per_stroke)
+
+
+@pytest.mark.parametrize(
+    ("agents", "more", "complaint"),
+    [
+        ({}, {}, "at least one agent"),
+        ({"a": scripted("rest")}, {"max_strokes": 0}, "max_strokes must be at least 1"),
+        ({"a b": scripted("rest"), "a/b": scripted("rest")}, {"out": "x"}, "same file name"),
+    ],
+)
+def test_what_cannot_be_evaluated_is_refused(agents, more, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        evaluate(agents, SHORT, **EASY, **more)
+
+
+# --- the command line ------------------------------------------------------------------------------------------------
+
+
+def test_command_line_evaluates_scripted_agents(tmp_path, capsys):
+    path = tmp_path / "path.csv"
+    path.write_text("0.01, 0.0\n0.02, 0.0\n")
+    arguments = ["--agents", "straight", "2-,5+", "--path", str(path), "--fidelity", "fast", "--no-video"]
+    assert main([*arguments, "--max-strokes", "5", "--out", str(tmp_path / "out")]) == 0
+    printed = capsys.readouterr().out
+    assert "straight" in printed
+    assert "of 2" in printed
+    assert {file.name for file in (tmp_path / "out").iterdir()} == {"evaluation.csv", "traces.png"}
+
+
+def test_scripted_agents_are_evaluated_without_torch():
+    code = "import sys, agents.evaluate as e; e.load_agents(['pentagon', 'random']); print(*sys.modules)"
+    answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    loaded = set(answer.stdout.split())
+    assert "agents.scripted" in loaded
+    assert loaded.isdisjoint({"torch", "stable_baselines3", "matplotlib", "pygame"})
+
+
+def damaged_model(folder):
+    (folder / "damaged.zip").write_bytes(b"PK\x03\x04 and then nothing of use")
+    return str(folder / "damaged.zip")
+
+
+def ragged_path(folder):
+    (folder / "ragged.csv").write_text("0.1, 0.0\n0.2\n")
+    return str(folder / "ragged.csv")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (lambda folder: ["--agents", str(folder / "none.zip")], "There is no model file"),
+        (lambda folder: ["--agents", damaged_model(folder)], "damaged"),
+        (lambda folder: ["--agents", "pentagram"], "Unknown scripted agent 'pentagram'"),
+        (lambda folder: ["--agents", "rest", "rest"], "'rest' is named twice"),
+        (lambda folder: ["--path", "hexagon"], "Unknown path 'hexagon'"),
+        (lambda folder: ["--path", ragged_path(folder)], "ragged.csv: A path must have shape"),
+    ],
+)
+def test_bad_input_is_answered_with_one_sentence(tmp_path, capsys, arguments, complaint):
+    assert main([*arguments(tmp_path), "--out", str(tmp_path / "out")]) == 2
+    printed = capsys.readouterr()
+    assert complaint in printed.err
+    assert printed.err.count("\n") == 1
+    assert not printed.out
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("arguments", [["--max-strokes", "0"], ["--waypoint-radius", "-1"], ["--fidelity", "none"]])
+def test_options_out_of_range_are_refused(arguments, capsys):
+    with pytest.raises(SystemExit) as refusal:
+        main(arguments)
+    assert refusal.value.code == 2
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_models_go_by_the_names_of_their_files(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    files = ["best.zip", "runs/last.zip", "runs/best.zip"]
+    (tmp_path / "runs").mkdir()
+    for file in files:
+        Path(file).touch()
+    monkeypatch.setattr("agents.ppo.load", lambda file: file)
+    assert load_agents(files) == {"best": "best.zip", "last": "runs/last.zip", "runs/best": "runs/best.zip"}
