@@ -134,7 +134,7 @@ def film(file: Path) -> Generator[Callable[[SeastarSwimEnv], None], None, None]:
     """
     import imageio.v2 as imageio
 
-    filmed: list[SeastarSwimEnv] = []
+    frames: list[Any] = []
     fast = ["-preset", "veryfast"]
     movie: Any = imageio.get_writer(
         file, format="FFMPEG", mode="I", fps=FPS, codec="libx264", quality=7, output_params=fast
@@ -142,13 +142,10 @@ def film(file: Path) -> Generator[Callable[[SeastarSwimEnv], None], None, None]:
     with movie:
 
         def add(env: SeastarSwimEnv) -> None:
-            filmed[:] = [env]
-            for frame in env.render() or ():
+            frames[:] = env.render() or ()
+            for frame in frames:
                 movie.append_data(frame)
 
         yield add
-        for env in filmed:
-            env.render_mode = "rgb_array"  # the end as it was judged: frames of a stroke are drawn before that
-            closing = env.render()
-            for _ in range(round(CLOSING_SECONDS * FPS)):
-                movie.append_data(closing)
+        for closing in frames[-1:] * round(CLOSING_SECONDS * FPS):
+            movie.append_data(closing)

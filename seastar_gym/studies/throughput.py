@@ -17,6 +17,7 @@ import time
 import tracemalloc
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import gymnasium as gym
@@ -98,7 +99,7 @@ def cost_over_nodes(scene: Scene, seconds: float) -> list[tuple[int, float]]:
         finer = replace(scene, robot=replace(scene.robot, nodes_per_limb=n))
         simulator = Simulator(finer, N_LANES, threads=1)
         commands = np.zeros((N_LANES, 5))  # one Newton iteration per step for any N: what is compared is its cost
-        duration = float(np.median(repeat(lambda s=simulator, c=commands: s.stroke(c), seconds)))  # type: ignore[misc]
+        duration = float(np.median(repeat(partial(simulator.stroke, commands), seconds)))
         iterations = int(simulator.stroke(commands).newton_iterations.max())
         rows.append((n, duration / N_LANES / iterations * 1e6))
     return rows

@@ -196,7 +196,7 @@ def test_videos_show_every_stroke_and_rest_on_the_end_of_the_path(written):
         np.testing.assert_allclose(frames[-1], frames[-10], atol=20)
         # The upper right corner counts the waypoints, or says that the path is completed.
         progress = frames[:, :40, 700:]
-        assert np.abs(progress[-closing - 1] - progress[0]).max() < 40
+        assert np.abs(progress[-closing - 2] - progress[0]).max() < 40
         assert (np.abs(progress[-1] - progress[0]).max() > 100) == done.finished
 
 
