@@ -1,0 +1,52 @@
+"""The work of a Newton iteration, counted: it grows with the number of nodes and not without our knowing."""
+
+import numpy as np
+import pytest
+
+from seastar_gym import Numerics, Scene, Seastar
+from seastar_gym.studies.operations import count_operations, flops
+
+
+def iteration_flops(**robot):
+    return flops(count_operations(Scene(robot=Seastar(**robot)))["iteration"])
+
+
+def test_an_iteration_of_the_chapter_scene_costs_no_more_than_when_it_was_tuned():
+    # The one number that says the kernels became slower on every machine. Lower it when they become faster.
+    parts = count_operations(Scene(numerics=Numerics.preset("chapter")))
+    assert flops(parts["iteration"]) <= 11_600
+    assert parts["iteration"]["divide"] <= 227
+    assert parts["iteration"]["root"] <= 91
+    assert flops(parts["step"]) <= 1_300
+
+
+def test_parts_add_up_to_the_iteration():
+    parts = count_operations(Scene())
+    names = ("hub hinges", "limbs", "ring", "substitution")
+    assert sum(flops(parts[name]) for name in names) == flops(parts["iteration"])
+
+
+def test_every_node_of_a_limb_costs_the_same():
+    counts = [iteration_flops(nodes_per_limb=n) for n in (10, 20, 40)]
+    assert counts[2] - counts[1] == 2 * (counts[1] - counts[0])
+
+
+def test_every_limb_costs_the_same():
+    counts = [iteration_flops(n_limbs=n, nodes_per_limb=4) for n in (4, 6, 8)]
+    assert counts[2] - counts[1] == counts[1] - counts[0]
+
+
+def test_a_count_does_not_depend_on_the_scenes_numbers():
+    assert iteration_flops(youngs_modulus=1e4, limb_length=0.2) == iteration_flops()
+
+
+@pytest.mark.parametrize("fluid_scene", [Scene(), Scene(fluid=None)], ids=["water", "vacuum"])
+def test_counting_leaves_the_real_kernels_as_they_are(fluid_scene):
+    import seastar_gym.der.potential as potential
+
+    before = potential.factorise
+    count_operations(fluid_scene)
+    import seastar_gym.der.potential as again
+
+    assert again.factorise is before
+    assert np.isfinite(flops(count_operations(fluid_scene)["iteration"]))

@@ -1,0 +1,42 @@
+"""The speed study measures what it says and writes it; how fast this machine is, it reports and no test asserts."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from seastar_gym import Scene
+from seastar_gym.studies import throughput
+
+
+def test_exponent_of_a_linear_cost_is_one():
+    nodes = np.array([5, 10, 20, 40])
+    assert throughput.exponent([(n, 3.0 * (5 * n - 4)) for n in nodes]) == pytest.approx(1.0)
+
+
+def test_real_time_factor_counts_all_robots():
+    one = throughput.real_time_factors(Scene(), 1, 1, 0.02)
+    assert all(factor > 0 for factor in one)
+    assert len(one) >= 5
+
+
+def test_a_robot_is_small_and_a_stroke_leaves_nothing_behind():
+    held, left = throughput.memory_per_robot(Scene())
+    assert held < 64.0  # KiB
+    assert left < 8.0  # B: less than one number per robot
+
+
+def test_table_csv_and_picture_are_written(tmp_path):
+    figures = [throughput.median("a", "x", [1.0, 2.0, 3.0]), throughput.Figure("b", 4.0, "s")]
+    curves = {
+        "batch, 1 thread": [(n, 1000.0) for n in throughput.BATCHES],
+        "batch, 2 threads": [(n, 1900.0) for n in throughput.BATCHES],
+        "us per step over N": [(n, 0.03 * n) for n in throughput.NODES_PER_LIMB],
+    }
+    throughput.write_csv(figures, curves, tmp_path / "t.csv")
+    throughput.draw(curves, tmp_path / "t.png")
+    rows = list(csv.DictReader((tmp_path / "t.csv").read_text().splitlines()))
+    assert rows[0] == {"what": "a", "x": "", "value": "2.0", "unit": "x", "quartile_1": "1.5", "quartile_3": "2.5"}
+    assert len(rows) == 2 + sum(map(len, curves.values()))
+    assert (tmp_path / "t.png").stat().st_size > 10_000
+    assert throughput.as_table(figures).row_count == 2
