@@ -27,12 +27,12 @@ def require_number(name: str, value: float, unit: str, *, zero_allowed: bool = F
         raise ValueError(f"{name} must be {kind} [{unit}], not {value!r}.")
 
 
-def _require_count(name: str, value: int, smallest: int, largest: int) -> None:
+def require_count(name: str, value: int, smallest: int, largest: int) -> None:
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not smallest <= value <= largest:
         raise ValueError(f"{name} must be a whole number from {smallest} to {largest}, not {value!r}.")
 
 
-def _require_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
+def require_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
     if value not in choices:
         raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}, not {value!r}.")
 
@@ -56,13 +56,13 @@ class Seastar:
     hub_hinge: HubHinge = "opening"
 
     def __post_init__(self) -> None:
-        _require_count("n_limbs", self.n_limbs, 3, 12)
-        _require_count("nodes_per_limb", self.nodes_per_limb, 2, 10_000)
+        require_count("n_limbs", self.n_limbs, 3, 12)
+        require_count("nodes_per_limb", self.nodes_per_limb, 2, 10_000)
         require_number("limb_length", self.limb_length, "m")
         require_number("rod_radius", self.rod_radius, "m")
         require_number("youngs_modulus", self.youngs_modulus, "Pa")
         require_number("density", self.density, "kg/m^3")
-        _require_choice("hub_hinge", self.hub_hinge, get_args(HubHinge))
+        require_choice("hub_hinge", self.hub_hinge, get_args(HubHinge))
 
     @property
     def n_nodes(self) -> int:
@@ -140,17 +140,17 @@ class Numerics:
     max_iterations: int = 60
 
     def __post_init__(self) -> None:
-        _require_choice("scheme", self.scheme, get_args(SchemeName))
+        require_choice("scheme", self.scheme, get_args(SchemeName))
         require_number("step", self.step, "s")
         require_number("newton_tolerance", self.newton_tolerance, "limb lengths")
-        _require_count("max_iterations", self.max_iterations, 2, 10_000)
+        require_count("max_iterations", self.max_iterations, 2, 10_000)
         if self.newton_tolerance > 1e-2:
             raise ValueError(f"newton_tolerance must be at most 0.01 limb lengths, not {self.newton_tolerance!r}.")
 
     @classmethod
     def preset(cls, fidelity: Fidelity) -> "Numerics":
         """The numerics that a fidelity stands for: "chapter" is the chapter's, the others go from fast to exact."""
-        _require_choice("fidelity", fidelity, get_args(Fidelity))
+        require_choice("fidelity", fidelity, get_args(Fidelity))
         scheme, step = _PRESETS[fidelity]
         return cls(scheme=scheme, step=step)
 
@@ -166,12 +166,18 @@ _PRESETS: dict[Fidelity, tuple[SchemeName, float]] = {
 
 @dataclass(frozen=True)
 class Scene:
-    """A robot, the fluid around it (None: vacuum), its actuator and the numerics."""
+    """A robot, the fluid around it (None: vacuum), its actuator and the numerics.
+
+    held_nodes: Indices of nodes that stay where they are; hub and root node held clamp a limb.
+    loads: Dead loads on nodes, (node, F_x, F_y) [N] each.
+    """
 
     robot: Seastar = field(default_factory=Seastar)
     fluid: Water | None = field(default_factory=Water)
     actuator: SmaPulse = field(default_factory=SmaPulse)
     numerics: Numerics = field(default_factory=Numerics)
+    held_nodes: tuple[int, ...] = ()
+    loads: tuple[tuple[int, float, float], ...] = ()
 
     def __post_init__(self) -> None:
         for name, value, kinds in (
@@ -183,6 +189,15 @@ class Scene:
             if not isinstance(value, kinds):
                 raise ValueError(f"Scene.{name} must be a {kinds}, not {value!r}.")
         self._check_hub_hinges()
+        self._check_holds_and_loads()
+
+    def _check_holds_and_loads(self) -> None:
+        last = self.robot.n_nodes - 1
+        for node in (*self.held_nodes, *(load[0] for load in self.loads)):
+            require_count("a held or loaded node", node, 0, last)
+        for load in self.loads:
+            if len(load) != 3 or not np.isfinite(load[1:]).all():
+                raise ValueError(f"A load is (node, F_x, F_y) with finite forces [N], not {load!r}.")
 
     def _check_hub_hinges(self) -> None:
         """Neighbours turned apart open their hub hinge by two peak angles; at pi its curvature is infinite."""
@@ -212,4 +227,6 @@ class Scene:
             hub_hinge=robot.hub_hinge,
             fluid_density=0.0 if fluid is None else fluid.density,
             drag_coefficient=0.0 if fluid is None else fluid.drag_coefficient,
+            held_nodes=self.held_nodes,
+            loads=self.loads,
         )

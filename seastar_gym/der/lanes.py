@@ -179,7 +179,7 @@ def _borrowed(field):
     if isinstance(field, types.BaseNamedTuple):
         fields = [_borrowed(f) for f in field]
         return None if None in fields else types.BaseTuple.from_types(fields, field.instance_class)
-    return field if isinstance(field, types.Number | types.Boolean) else None
+    return field if isinstance(field, types.Number | types.Boolean | types.NoneType) else None
 
 
 def _borrow_value(context, builder, field, value):

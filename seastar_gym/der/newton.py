@@ -5,7 +5,7 @@ is frozen by a mask, and nothing that one robot needs (a repair, a shorter step)
 """
 
 from seastar_gym.der.compilation import kernel
-from seastar_gym.der.lanes import add_product, any_lane, load, select, splat, sqrt
+from seastar_gym.der.lanes import absolute, add_product, any_lane, load, select, splat, sqrt
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.star_matrix import load_pair, store_pair, substitute_node
 
@@ -39,7 +39,7 @@ def minimise(rods, work, stage, active, tolerance, patience):
             phi, decrement, pivot = factorise(rods, work, stage, convex)
         else:
             phi, decrement, pivot = factorise(rods, work, stage, None)
-        low_enough = phi <= best - SUFFICIENT_DECREASE * fraction * expected + ROUNDING * best
+        low_enough = phi <= best - SUFFICIENT_DECREASE * fraction * expected + ROUNDING * absolute(best)
         indefinite = running & low_enough & ~(pivot > 0.0) & ~convex
         if any_lane(indefinite):
             # Their matrices are made again from convex parts; the others wait and find the same numbers again.

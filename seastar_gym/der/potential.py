@@ -74,8 +74,24 @@ def positive_part(x):
 
 
 @kernel
+def nodal_load(loads, node):
+    """Dead load on a node [N]; zero, and gone when compiled, in scenes without loads (None)."""
+    if loads is None:
+        return splat(0.0), splat(0.0)
+    return load(loads, 2 * node), load(loads, 2 * node + 1)
+
+
+@kernel
+def load_power(loads, node, vx, vy):
+    """Power of a node's dead load at the velocity (vx, vy) [W]."""
+    if loads is None:
+        return splat(0.0)
+    return add_product(load(loads, 2 * node) * vx, load(loads, 2 * node + 1), vy)
+
+
+@kernel
 def node_slopes(rods, work, stage, node):
-    """(energy, gradient, Hessian) of a node's inertia and drag."""
+    """(energy, gradient, Hessian) of a node's inertia, drag and load."""
     qx, qy = load(work.q, 2 * node), load(work.q, 2 * node + 1)
     vx = (qx - load(stage.q_hat, 2 * node)) * stage.inverse_gamma
     vy = (qy - load(stage.q_hat, 2 * node + 1)) * stage.inverse_gamma
@@ -86,9 +102,12 @@ def node_slopes(rods, work, stage, node):
     c_over_speed *= stage.inverse_gamma
     wx, wy = c_over_speed * vx, c_over_speed * vy
     diagonal = (m_over_gamma + c_speed) * stage.inverse_gamma
+    Fx, Fy = nodal_load(rods.load, node)
     return (
-        add_product(0.5 * m * add_product(dx * dx, dy, dy), stage.gamma, potential),
-        (add_product(c_speed * vx, m_over_gamma, dx), add_product(c_speed * vy, m_over_gamma, dy)),
+        add_product(
+            0.5 * m * add_product(dx * dx, dy, dy), stage.gamma, potential - load_power(rods.load, node, vx, vy)
+        ),
+        (add_product(c_speed * vx, m_over_gamma, dx) - Fx, add_product(c_speed * vy, m_over_gamma, dy) - Fy),
         (add_product(diagonal, wx, vx), wx * vy, add_product(diagonal, wy, vy)),
     )
 

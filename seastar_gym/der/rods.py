@@ -34,6 +34,7 @@ class Rods(NamedTuple):
     hub_angle: The angle of an unactuated hub hinge, measured that way [rad].
     mass: Lumped mass, per node [kg].
     drag: 1/2 rho_f C_d D dl_i of (13.8), per node [kg/m].
+    load: Dead load per coordinate [N], or None.
     shortest_edge: Smallest natural length of an edge [m].
     """
 
@@ -49,6 +50,7 @@ class Rods(NamedTuple):
     hub_angle: float
     mass: np.ndarray
     drag: np.ndarray
+    load: np.ndarray | None
     shortest_edge: float
 
 

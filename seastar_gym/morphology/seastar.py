@@ -7,6 +7,9 @@ from seastar_gym.der.rods import Rods
 
 Floats = NDArray[np.float64]
 
+HELD = 1e15
+"""A held node has this many times its mass: it moves by less than rounding, and the kernels need not know of it."""
+
 
 def rest_positions(n_limbs: int, nodes_per_limb: int, limb_length: float) -> Floats:
     """Nodes of the undeformed robot [m], shape (n_nodes, 2): hub at the origin, limb 1 along +x, anti-clockwise."""
@@ -38,8 +41,13 @@ def make_rods(
     hub_hinge: str,
     fluid_density: float,
     drag_coefficient: float,
+    held_nodes: tuple[int, ...] = (),
+    loads: tuple[tuple[int, float, float], ...] = (),
 ) -> Rods:
-    """Coefficients of the seastar in a fluid (density or drag coefficient zero: vacuum); SI units."""
+    """Coefficients of the seastar in a fluid (density or drag coefficient zero: vacuum); SI units.
+
+    held_nodes: Nodes that stay where they are. loads: Dead loads (node, F_x, F_y) [N].
+    """
     n_edges = n_limbs * (nodes_per_limb - 1)
     edge_length = limb_length / (nodes_per_limb - 1)
     area = np.pi * rod_radius**2
@@ -47,6 +55,11 @@ def make_rods(
     EI = youngs_modulus * np.pi * rod_radius**4 / 4.0
     dl = voronoi_lengths(n_limbs, nodes_per_limb, limb_length)
     turning = hub_hinge == "turning"
+    mass = density * area * dl
+    mass[list(held_nodes)] *= HELD
+    forces = np.zeros((len(dl), 2))
+    for node, *force in loads:
+        forces[node] += force
 
     def per_edge(value: float) -> Floats:
         return np.full(n_edges, value)
@@ -62,7 +75,8 @@ def make_rods(
         EI_kappa_bar=per_edge(0.0),
         hub_side=-1.0 if turning else 1.0,
         hub_angle=2.0 * np.pi / n_limbs - (np.pi if turning else 0.0),
-        mass=density * area * dl,
-        shortest_edge=edge_length,
+        mass=mass,
         drag=0.5 * fluid_density * drag_coefficient * 2.0 * rod_radius * dl,
+        load=forces.reshape(-1) if loads else None,
+        shortest_edge=edge_length,
     )

@@ -1,8 +1,8 @@
 """How fast the simulator is on this machine: `python -m seastar_gym.studies.throughput`.
 
-Measures what the README's table of speed states, prints it beside the chapter's figure, and writes `throughput.csv` and
-`throughput.png`. Real-time factor: simulated seconds of all robots over seconds of computing. Every figure is the median
-of several repeats after a warm-up; the spread beside it is the range of the middle half of the repeats.
+Measures what the README states about speed, prints it beside the chapter's figure, and writes `throughput.csv` and
+`throughput.png`. Real-time factor: simulated seconds of all robots over seconds of computing. Figures are medians
+of several repeats after a warm-up; the spread beside them is the range of the middle half of the repeats.
 """
 
 import argparse
@@ -29,7 +29,7 @@ from tqdm import tqdm
 
 from seastar_gym.der.compilation import entry_point
 from seastar_gym.der.lanes import N_LANES, add_product, borrow, load, store
-from seastar_gym.scene import Numerics, Scene, Seastar
+from seastar_gym.scene import Numerics, Scene
 from seastar_gym.simulator import Simulator
 from seastar_gym.studies.operations import count_operations, flops
 
@@ -140,7 +140,7 @@ def iteration_seconds(scene: Scene, seconds: float) -> list[float]:
     return [d / iterations for d in repeat(lambda: simulator.stroke(commands), seconds)]
 
 
-# --- the environment and the process -----------------------------------------------------------------------------------
+# --- the environment and the process ---------------------------------------------------------------------------------
 
 
 def environment_share(n_robots: int, seconds: float) -> list[float]:
@@ -218,10 +218,14 @@ def measure(seconds: float, progress: bool = True) -> tuple[list[Figure], dict[s
     steps = {
         "batch": lambda: [median("batch, one core", "x real time", real_time_factors(chapter, 512, 1, 4 * seconds))],
         "threads": lambda: [median("two cores over one", "x", threads_speedup(chapter, 512, seconds))],
-        "alone": lambda: [median("one robot alone, one core", "x real time", real_time_factors(chapter, 1, 1, seconds))],
+        "alone": lambda: [
+            median("one robot alone, one core", "x real time", real_time_factors(chapter, 1, 1, seconds))
+        ],
         "peak": lambda: peak_figures(chapter, seconds),
         "environment": lambda: [
-            median("environment's share of a step, preset fast", "%", [100 * s for s in environment_share(512, seconds)])
+            median(
+                "environment's share of a step, preset fast", "%", [100 * s for s in environment_share(512, seconds)]
+            )
         ],
         "memory": lambda: memory_figures(chapter),
         "start": start_up_figures,
@@ -310,7 +314,9 @@ def draw(curves: dict[str, list[tuple[int, float]]], path: Path) -> None:
         left.loglog(x, y, "o-", color=colour, label=f"{threads} thread{'s' * (threads > 1)}")
     left.axhline(CHAPTER, color="0.4", ls="--", lw=1)
     left.text(BATCHES[-1], CHAPTER * 1.15, "the chapter", ha="right", color="0.3")
-    left.set(xlabel="robots in the batch", ylabel="simulated over computing seconds", title="Real-time factor, h = 3 ms")
+    left.set(
+        xlabel="robots in the batch", ylabel="simulated over computing seconds", title="Real-time factor, h = 3 ms"
+    )
     left.legend(frameon=False)
     n, cost = np.array(curves["us per step over N"]).T
     right.loglog(n, cost, "o-", color="#4477aa", label="measured")
