@@ -39,6 +39,8 @@ class Counted:
         return _result("add", self.value + _value(other))
 
     def __sub__(self, other: Any) -> "Counted":
+        if isinstance(other, Constant) and other.value == 0.0:
+            return self  # the compiler leaves it out, too
         return _result("add", self.value - _value(other))
 
     def __rsub__(self, other: Any) -> "Counted":
@@ -70,6 +72,12 @@ class Counted:
 
     __radd__ = __add__
     __rmul__ = __mul__
+
+
+class Constant(Counted):
+    """A number that the compiler knows."""
+
+    __slots__ = ()
 
 
 def _value(x: Any) -> float:
@@ -116,7 +124,7 @@ def _counting_lanes() -> ModuleType:
         load=_load,
         load_number=lambda rows, row: float(rows[row]),
         store=_store,
-        splat=Counted,
+        splat=Constant,
         select=_select,
         sqrt=lambda x: _result("root", math.sqrt(x.value)),
         absolute=lambda x: Counted(abs(x.value)),
