@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.actuation.sma import pulse
-from seastar_gym.der.rods import Rods
+from seastar_gym.der.rods import Limits, Rods
 from seastar_gym.morphology.seastar import make_rods, rest_positions
 
 HubHinge = Literal["opening", "turning"]
@@ -132,12 +132,15 @@ class Numerics:
         shortened.
     newton_tolerance: Largest node move of the last Newton update, over the limb length.
     max_iterations: Newton iterations per stage before the robot's step is halved.
+    path_tolerance: Adapt the steps, up to `step`, so that the hub's path errs by about this share of its length at
+        most; for scheme "implicit-midpoint". None for steps of one length.
     """
 
     scheme: SchemeName = "implicit-euler"
     step: float = 3e-3
     newton_tolerance: float = 1e-8
     max_iterations: int = 60
+    path_tolerance: float | None = None
 
     def __post_init__(self) -> None:
         require_choice("scheme", self.scheme, get_args(SchemeName))
@@ -146,6 +149,10 @@ class Numerics:
         require_count("max_iterations", self.max_iterations, 2, 10_000)
         if self.newton_tolerance > 1e-2:
             raise ValueError(f"newton_tolerance must be at most 0.01 limb lengths, not {self.newton_tolerance!r}.")
+        if self.path_tolerance is not None:
+            require_number("path_tolerance", self.path_tolerance, "1")
+            if self.scheme != "implicit-midpoint":
+                raise ValueError(f'path_tolerance needs the scheme "implicit-midpoint", not {self.scheme!r}.')
 
     @classmethod
     def preset(cls, fidelity: Fidelity) -> "Numerics":
@@ -154,6 +161,9 @@ class Numerics:
         scheme, step = _PRESETS[fidelity]
         return cls(scheme=scheme, step=step)
 
+
+ADAPTATION = (0.04, 2.0)
+"""(c, p): steps with an error rate of (tolerance/c)^p limb lengths per stroke keep the path's tolerance."""
 
 _PRESETS: dict[Fidelity, tuple[SchemeName, float]] = {
     "fast": ("sdirk2", 20e-3),
@@ -213,6 +223,21 @@ class Scene:
                 f'With hub_hinge="turning" the natural opening angle must stay above zero: for {self.robot.n_limbs} '
                 f"limbs the peak angle must be at most {0.5 * rest:.4g} rad, not {peak:.4g} rad."
             )
+
+    def limits(self) -> Limits:
+        """What a solution has to keep, for the kernels.
+
+        The error that a step may make per second is `error_rate` limb lengths per stroke; how it follows from the
+        tolerance on the path was measured, see ADAPTATION.
+        """
+        numerics, speed = self.numerics, self.robot.limb_length / self.actuator.period
+        tolerance = numerics.path_tolerance
+        return Limits(
+            tolerance=numerics.newton_tolerance * self.robot.limb_length,
+            max_iterations=numerics.max_iterations,
+            adaptive=tolerance is not None,
+            error_rate=0.0 if tolerance is None else speed * (tolerance / ADAPTATION[0]) ** ADAPTATION[1],
+        )
 
     def rods(self) -> Rods:
         """The scene's coefficients for the kernels, see der/rods.py."""

@@ -38,19 +38,28 @@ class SolverStatus(IntEnum):
         }[self]
 
 
+COUNTS = ("newton_iterations", "repairs", "backtracks", "steps", "halvings", "rejections")
+
+
 class StrokeReport(NamedTuple):
     """What a stroke cost and how it ended; every array has shape (n_robots,).
 
-    status: SolverStatus of every robot. newton_iterations, repairs, backtracks, halvings: counts of Newton steps, of
-    those that needed the convex matrix, of line-search halvings and of time-step halvings. covered: time covered [s].
-    smallest_opening_angle: smallest angle between neighbouring limbs at the hub [rad]; below zero, limbs crossed.
+    status: SolverStatus of every robot.
+    newton_iterations, repairs, backtracks: Counts of Newton steps, of those that needed the convex matrix, and of
+        halvings by the line search.
+    steps, halvings, rejections: Counts of time steps taken, of those that did not converge and were halved, and of
+        those whose error was too large and were halved (Numerics.path_tolerance).
+    covered: Time covered [s].
+    smallest_opening_angle: Smallest angle between neighbouring limbs at the hub [rad]; below zero, limbs crossed.
     """
 
     status: NDArray[np.int64]
     newton_iterations: NDArray[np.int64]
     repairs: NDArray[np.int64]
     backtracks: NDArray[np.int64]
+    steps: NDArray[np.int64]
     halvings: NDArray[np.int64]
+    rejections: NDArray[np.int64]
     covered: Floats
     smallest_opening_angle: Floats
 
@@ -89,13 +98,14 @@ class Simulator:
         self.threads = min(n_groups, available if threads is None else max(1, threads))
         self._rods = scene.rods()
         self._scheme = SCHEMES[scene.numerics.scheme]
+        self._limits = scene.limits()
         self._times = step_times(scene.actuator.corners, scene.numerics.step)
         self._shape = np.asarray(scene.actuator.delta_psi(self._times))
         n_limbs, n_rows = scene.robot.n_limbs, 2 * scene.robot.n_nodes
         self.q = aligned_rows(n_groups, n_rows, N_LANES)
         self.v = aligned_rows(n_groups, n_rows, N_LANES)
         self.q[:] = scene.robot.nodes().reshape(-1, 1)
-        self._a = aligned_rows(n_groups, (n_rows + 1) * self._scheme.n_stages, N_LANES)
+        self._a = aligned_rows(n_groups, (n_rows + 1) * self._scheme.n_stages + 2, N_LANES)
         self._commands = np.zeros((n_groups, n_limbs, N_LANES))
         self._failed = np.zeros((n_groups, 1, N_LANES))
         self._report = np.zeros((n_groups, len(REPORT_ROWS), N_LANES))
@@ -295,17 +305,15 @@ class Simulator:
             )
 
     def _advance(self, begin: int, end: int) -> None:
-        numerics = self.scene.numerics
         times, shape = self._times[begin : end + 1], self._shape[begin : end + 1]
-        tolerance = numerics.newton_tolerance * self.scene.robot.limb_length
 
         def run(thread: int) -> None:
             part = slice(*(len(self.q) * np.array([thread, thread + 1]) // self.threads))
             work, actuation = self._memory[thread]
             advance(
                 self._rods, work, self._scheme, actuation, self.q[part], self.v[part], self._a[part],
-                self._commands[part], times, shape, self._failed[part], self._report[part], tolerance,
-                numerics.max_iterations,
+                self._commands[part], times, shape, self._failed[part], self._report[part],
+                self._limits,
             )  # fmt: skip
 
         if self._pool is None:
@@ -319,9 +327,7 @@ class Simulator:
         self._strokes += ~failed
         self._since_stroke = np.where(failed, self._since_stroke, 0.0)
         self._delta_psi_end = 0.0
-        counts = {
-            name: rows[name].astype(np.int64) for name in ("newton_iterations", "repairs", "backtracks", "halvings")
-        }
+        counts = {name: rows[name].astype(np.int64) for name in COUNTS}
         angle = 2.0 * np.arctan(rows["smallest_hub_t"])
         if self.scene.robot.hub_hinge == "turning":
             angle += np.pi

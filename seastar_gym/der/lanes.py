@@ -308,6 +308,14 @@ def sqrt(typing_context, x):
 
 
 @intrinsic
+def floor(typing_context, x):
+    """Largest whole number not above x."""
+    if x != lanes:
+        return None
+    return lanes(lanes), lambda context, builder, sig, args: _vector_function("floor", 1)(builder, args)
+
+
+@intrinsic
 def absolute(typing_context, x):
     """|x|."""
     if x != lanes:

@@ -100,6 +100,21 @@ class Stage(NamedTuple):
     inverse_gamma: Any
 
 
+class Limits(NamedTuple):
+    """What a solution has to keep.
+
+    tolerance: Largest node move of the last Newton update [m].
+    max_iterations: Newton steps per stage before a time step is halved.
+    adaptive: Whether time steps are adapted to their error.
+    error_rate: Largest error per time [m/s].
+    """
+
+    tolerance: float
+    max_iterations: int
+    adaptive: bool
+    error_rate: float
+
+
 class Actuation(NamedTuple):
     """Rotation of every limb at the ends of an interval [rad], shape (n_limbs, N_LANES), linear in between."""
 
@@ -112,11 +127,13 @@ REPORT_ROWS = (
     "newton_iterations",
     "repairs",  # Newton steps that needed the convex matrix
     "backtracks",  # halvings of a Newton step by the line search
-    "halvings",  # halvings of a time step
+    "steps",  # time steps taken
+    "halvings",  # halvings of a time step that did not converge
+    "rejections",  # halvings of a time step whose error was too large
     "covered",  # time [s]
     "smallest_hub_t",  # smallest tan(phi/2) of a hub hinge
 )
-NEWTON_ITERATIONS, REPAIRS, BACKTRACKS, HALVINGS, COVERED, SMALLEST_HUB_T = range(len(REPORT_ROWS))
+NEWTON_ITERATIONS, REPAIRS, BACKTRACKS, STEPS, HALVINGS, REJECTIONS, COVERED, SMALLEST_HUB_T = range(len(REPORT_ROWS))
 
 
 def aligned_rows(*shape: int) -> np.ndarray:

@@ -2,20 +2,34 @@
 
 from seastar_gym.der.compilation import kernel
 from seastar_gym.der.geometry import tangent
-from seastar_gym.der.lanes import add_product, any_lane, load, load_number, select, splat, store
+from seastar_gym.der.lanes import add_product, any_lane, floor, load, load_number, select, splat, sqrt, store
 from seastar_gym.der.newton import minimise
 from seastar_gym.der.rods import (
     BACKTRACKS,
     COVERED,
     HALVINGS,
     NEWTON_ITERATIONS,
+    REJECTIONS,
     REPAIRS,
     SMALLEST_HUB_T,
+    STEPS,
     Stage,
     n_nodes,
 )
 
 SMALLEST_FRACTION = 2.0**-12  # of an interval: a robot whose step would have to be shorter has failed
+FIRST_FRACTION = 2.0**-3  # of an interval: an adapted stroke begins with this step
+GROWTH_MARGIN = 5.0  # a step is doubled when its error rate is this many times below the limit
+
+# Rows of `a` behind the accelerations and their shares, where steps are adapted: the length of the last step [s], and
+# the next step's share of its interval.
+LAST_STEP, SIZE = 0, 1
+
+
+@kernel
+def memory_row(rods, scheme, which):
+    """Row of `a` where a step leaves LAST_STEP or SIZE for the next."""
+    return (2 * n_nodes(rods) + 1) * scheme.n_stages + which
 
 
 @kernel
@@ -107,7 +121,7 @@ def end_step(rods, work, scheme, stage, q_0, v_0, a, h, accepted):
                 weight = load_number(scheme.b, other) * h
                 q_1 = add_product(q_1, weight, load(work.stage_v, other * rows + row))
                 v_1 = add_product(v_1, weight, load(a, other * rows + row))
-        store(a, k * rows + row, acceleration)
+        store(a, k * rows + row, select(accepted, acceleration, last))
         store(q_0, row, select(accepted, q_1, q))
         store(v_0, row, select(accepted, v_1, v))
     store_share(a, scheme.n_stages * rows + k, along, squared)
@@ -115,33 +129,58 @@ def end_step(rods, work, scheme, stage, q_0, v_0, a, h, accepted):
 
 @kernel
 def forget_accelerations(rods, scheme, a, robots):
-    """Robots whose step was rejected start their next one without a prediction, which may be far off or not finite."""
+    """Robots whose step did not converge start the next one without a prediction, which may be far off or infinite."""
     for row in range((2 * n_nodes(rods) + 1) * scheme.n_stages):
         store(a, row, select(robots, 0.0, load(a, row)))
 
 
 @kernel
-def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, tolerance, patience, report):
+def step_error(rods, work, stage, a, h, last_h):
+    """Position error of a step of the implicit midpoint rule [m], largest over the nodes.
+
+    The rule takes the acceleration in the middle for the whole step, so it errs by h^3/12 times its rate of change, and
+    that is the difference to the last step's over the time between the two middles.
+    """
+    largest = splat(0.0)
+    for node in range(n_nodes(rods)):
+        squared = splat(0.0)
+        for row in range(2 * node, 2 * node + 2):
+            _, acceleration = stage_motion(work, stage, row)
+            change = acceleration - load(a, row)
+            squared = add_product(squared, change, change)
+        largest = select(squared > largest, squared, largest)
+    return h * h * h * sqrt(largest) / (6.0 * (h + last_h))
+
+
+@kernel
+def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, limits, patience, report):
     """One step of length h from `start`, `size` of the interval long, for the robots in `active`.
 
-    a: Accelerations of the stages of the last step, then of this one.
+    a: What the last step left for this one, see LAST_STEP and SIZE; then what this one leaves for the next.
 
-    Returns the mask of the robots whose stages all converged; their state has moved, that of the others has not.
+    Returns (converged, accepted, error rate): the mask of the robots whose stages all converged, that of those whose
+    error is small enough besides, whose state has moved, and the error per time [m/s], zero if steps are not adapted.
     """
-    going = active
-    last = scheme.n_stages - 1
+    going = accepted = active
+    last, last_h = scheme.n_stages - 1, memory_row(rods, scheme, LAST_STEP)
+    error_rate = splat(0.0)
     for k in range(scheme.n_stages):
         stage = begin_stage(rods, work, scheme, k, q, v, a, h)
         set_natural_hub_angles(rods, work, actuation, start + load_number(scheme.c, k) * size)
-        going, iterations, repairs, backtracks = minimise(rods, work, stage, going, tolerance, patience)
+        going, iterations, repairs, backtracks = minimise(rods, work, stage, going, limits.tolerance, patience)
         add_to_report(report, NEWTON_ITERATIONS, iterations)
         add_to_report(report, REPAIRS, repairs)
         add_to_report(report, BACKTRACKS, backtracks)
         if k < last:
             end_stage(rods, work, scheme, k, stage, a)
         else:
-            end_step(rods, work, scheme, stage, q, v, a, h, going)
-    return going
+            accepted = going
+            if limits.adaptive:
+                error_rate = step_error(rods, work, stage, a, h, load(a, last_h)) / h
+                accepted = going & ((error_rate <= limits.error_rate) | (size <= SMALLEST_FRACTION))
+                store(a, last_h, select(accepted, h, load(a, last_h)))
+            end_step(rods, work, scheme, stage, q, v, a, h, accepted)
+    return going, accepted, error_rate
 
 
 @kernel
@@ -160,29 +199,48 @@ def note_hub_angles(rods, work, report, accepted):
 
 
 @kernel
-def cover_interval(rods, work, scheme, actuation, q, v, a, duration, alive, tolerance, max_iterations, report):
+def cover_interval(rods, work, scheme, actuation, q, v, a, duration, alive, limits, report):
     """Advance the robots in `alive` over an interval of `duration` [s], in place.
 
-    A robot whose step does not converge in `max_iterations` halves it, alone, as often as it takes, with as many more
-    iterations each time, and still covers the whole interval; below SMALLEST_FRACTION it has failed and keeps its last
-    good state. Fractions are dyadic, so their sums are exact. Returns the mask of the robots that arrived.
+    A robot whose step does not converge in `limits.max_iterations` halves it, alone, as often as it takes, with as many
+    more iterations each time, and still covers the whole interval; below SMALLEST_FRACTION it has failed and keeps its
+    last good state. If steps are adapted, a robot also halves a step whose error is too large (not below
+    SMALLEST_FRACTION), doubles it when the error allows, and goes on with it in the next interval. Steps are dyadic
+    fractions of the interval, on the grid of their own size, so their sums are exact.
+
+    Returns the mask of the robots that arrived.
     """
     zero, one = splat(0.0), splat(1.0)
-    start, size, patience = zero, one, splat(1.0 * max_iterations)
+    start, size, patience = zero, one, splat(1.0 * limits.max_iterations)
+    if limits.adaptive:
+        last_size = load(a, memory_row(rods, scheme, SIZE))
+        size = select(last_size > 0.0, last_size, FIRST_FRACTION)
     moving = alive
     while any_lane(moving):
         h = size * duration
-        accepted = try_step(rods, work, scheme, actuation, q, v, a, start, size, h, moving, tolerance, patience, report)
+        converged, accepted, error_rate = try_step(
+            rods, work, scheme, actuation, q, v, a, start, size, h, moving, limits, patience, report
+        )
         note_hub_angles(rods, work, report, accepted)
+        stuck = moving & ~converged
         rejected = moving & ~accepted
-        if any_lane(rejected):
-            forget_accelerations(rods, scheme, a, rejected)
-        add_to_report(report, HALVINGS, select(rejected, one, zero))
+        if any_lane(stuck):
+            forget_accelerations(rods, scheme, a, stuck)
+        add_to_report(report, STEPS, select(accepted, one, zero))
+        add_to_report(report, HALVINGS, select(stuck, one, zero))
+        add_to_report(report, REJECTIONS, select(converged & rejected, one, zero))
         add_to_report(report, COVERED, select(accepted, h, zero))
         start = select(accepted, start + size, start)
         size = select(rejected, 0.5 * size, size)
-        patience = select(rejected, patience + max_iterations, patience)
+        patience = select(stuck, patience + limits.max_iterations, patience)
+        if limits.adaptive:
+            # The error of a step of twice the length is about eight times as large, per time four times.
+            pairs = start / (2.0 * size)
+            fits = accepted & (GROWTH_MARGIN * error_rate <= limits.error_rate) & (pairs == floor(pairs))
+            size = select(fits & (size < 1.0), 2.0 * size, size)
         failed = rejected & (size < SMALLEST_FRACTION)
         alive = alive & ~failed
         moving = moving & ~failed & (start < 1.0)
+    if limits.adaptive:
+        store(a, memory_row(rods, scheme, SIZE), size)
     return alive
