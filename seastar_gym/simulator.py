@@ -83,6 +83,7 @@ class Simulator:
     threads: Lane groups are shared out over this many threads; all processors if None. A robot's trajectory is the
         same to the last bit whatever the batch, the lane and the number of threads.
 
+    memory: What every thread works in, (Work, Actuation) of der/rods.py.
     q, v: The node positions and velocities as the kernels keep them, shape (n_groups, 2 n_nodes, N_LANES), not copies.
     """
 
@@ -117,7 +118,7 @@ class Simulator:
 
     def _make_threads(self) -> None:
         robot = self.scene.robot
-        self._memory = [
+        self.memory = [
             (
                 make_work(robot.n_limbs, robot.nodes_per_limb, self._scheme.n_stages),
                 Actuation(np.zeros((robot.n_limbs, N_LANES)), np.zeros((robot.n_limbs, N_LANES))),
@@ -127,7 +128,7 @@ class Simulator:
         self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name not in {"_memory", "_pool"}}
+        return {name: value for name, value in self.__dict__.items() if name not in {"memory", "_pool"}}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -238,7 +239,7 @@ class Simulator:
         return self._energies()[1]
 
     def _energies(self) -> tuple[Floats, Floats]:
-        work, actuation = self._memory[0]
+        work, actuation = self.memory[0]
         both = np.zeros((2, len(self.q), 1, N_LANES))
         for group in range(len(self.q)):
             actuation.delta_psi_end[:] = self._delta_psi_end * self._commands[group]
@@ -309,7 +310,7 @@ class Simulator:
 
         def run(thread: int) -> None:
             part = slice(*(len(self.q) * np.array([thread, thread + 1]) // self.threads))
-            work, actuation = self._memory[thread]
+            work, actuation = self.memory[thread]
             advance(
                 self._rods, work, self._scheme, actuation, self.q[part], self.v[part], self._a[part],
                 self._commands[part], times, shape, self._failed[part], self._report[part],

@@ -32,6 +32,7 @@ from seastar_gym.der.lanes import N_LANES, add_product, borrow, load, store
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.simulator import Simulator
 from seastar_gym.studies.operations import count_operations, flops
+from seastar_gym.studies.parts import part_seconds
 
 CHAPTER = 1.0
 """The chapter's real-time factor at h = 3 ms: one robot, one thread of an AMD Ryzen 1950X (Fig. 13.9)."""
@@ -256,9 +257,11 @@ def peak_figures(scene: Scene, seconds: float) -> list[Figure]:
     operations = flops(count_operations(scene)["iteration"])
     peak, duration = peak_gigaflops(seconds), iteration_seconds(scene, 4 * seconds)
     reached = operations / float(np.median(duration)) / 1e9
+    parts = part_seconds(scene, seconds / 4)
     return [
-        Figure("operations per robot and Newton iteration", operations / 1e3, "kflop"),
         median("time per robot and Newton iteration, all included", "us", [1e6 * d for d in duration]),
+        *(median(f"- of this, {name}", "us", [1e6 * d for d in durations]) for name, durations in parts.items()),
+        Figure("operations per robot and Newton iteration", operations / 1e3, "kflop"),
         median("peak of one core, fused products alone", "Gflop/s", peak),
         Figure("share of the peak that strokes reach", 100 * reached / float(np.median(peak)), "%"),
     ]
