@@ -20,9 +20,17 @@ SchemeName = Literal["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
 Fidelity = Literal["fast", "balanced", "accurate", "reference", "chapter"]
 
 
-def require_number(name: str, value: float, unit: str, *, zero_allowed: bool = False) -> None:
+MAX_STEPS = 10_000_000
+"""Of a stroke: more take minutes even for one robot."""
+
+
+def _is_finite_number(value: object) -> bool:
     is_number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
-    if not is_number or not math.isfinite(value) or value < 0 or (value == 0 and not zero_allowed):
+    return is_number and math.isfinite(value)  # type: ignore[arg-type]
+
+
+def require_number(name: str, value: float, unit: str, *, zero_allowed: bool = False) -> None:
+    if not _is_finite_number(value) or value < 0 or (value == 0 and not zero_allowed):
         kind = "a finite number, not negative" if zero_allowed else "a positive, finite number"
         raise ValueError(f"{name} must be {kind} [{unit}], not {value!r}.")
 
@@ -133,7 +141,7 @@ class Numerics:
     newton_tolerance: Largest node move of the last Newton update, over the limb length.
     max_iterations: Newton iterations per stage before the robot's step is halved.
     path_tolerance: Adapt the steps, up to `step`, so that the hub's path errs by about this share of its length at
-        most; for scheme "implicit-midpoint". None for steps of one length.
+        most, from 0.001 to 0.02; for scheme "implicit-midpoint". None for steps of one length.
     """
 
     scheme: SchemeName = "implicit-euler"
@@ -150,7 +158,8 @@ class Numerics:
         if self.newton_tolerance > 1e-2:
             raise ValueError(f"newton_tolerance must be at most 0.01 limb lengths, not {self.newton_tolerance!r}.")
         if self.path_tolerance is not None:
-            require_number("path_tolerance", self.path_tolerance, "1")
+            if not _is_finite_number(self.path_tolerance) or not 1e-3 <= self.path_tolerance <= 0.02:
+                raise ValueError(f"path_tolerance must be from 0.001 to 0.02, not {self.path_tolerance!r}.")
             if self.scheme != "implicit-midpoint":
                 raise ValueError(f'path_tolerance needs the scheme "implicit-midpoint", not {self.scheme!r}.')
 
@@ -200,14 +209,36 @@ class Scene:
                 raise ValueError(f"Scene.{name} must be a {kinds}, not {value!r}.")
         self._check_hub_hinges()
         self._check_holds_and_loads()
+        self._check_coefficients()
 
     def _check_holds_and_loads(self) -> None:
-        last = self.robot.n_nodes - 1
-        for node in (*self.held_nodes, *(load[0] for load in self.loads)):
-            require_count("a held or loaded node", node, 0, last)
+        if not isinstance(self.held_nodes, tuple) or not isinstance(self.loads, tuple):
+            raise ValueError(f"held_nodes and loads must be tuples, not {self.held_nodes!r} and {self.loads!r}.")
         for load in self.loads:
-            if len(load) != 3 or not np.isfinite(load[1:]).all():
+            if not isinstance(load, tuple) or len(load) != 3 or not all(map(_is_finite_number, load[1:])):
                 raise ValueError(f"A load is (node, F_x, F_y) with finite forces [N], not {load!r}.")
+        for node in (*self.held_nodes, *(load[0] for load in self.loads)):
+            require_count("a held or loaded node", node, 0, self.robot.n_nodes - 1)
+
+    def _check_coefficients(self) -> None:
+        """What is finite alone may overflow or vanish together."""
+        if self.actuator.period / self.numerics.step > MAX_STEPS:
+            raise ValueError(
+                f"A step of {self.numerics.step:.4g} s makes more than {MAX_STEPS:,} steps of a stroke of "
+                f"{self.actuator.period:.4g} s: use a longer step."
+            )
+        try:
+            with np.errstate(all="ignore"):
+                rods, squared_edge = self.rods(), np.array(self.robot.edge_length**2)
+            coefficients = (rods.EA_over_l, rods.l_over_EA, rods.EI_over_dl, rods.dl_over_EI, rods.mass, squared_edge)
+            sound = all(np.isfinite(one).all() and (one > 0.0).all() for one in coefficients)
+        except (OverflowError, ZeroDivisionError):
+            sound = False
+        if not sound:
+            raise ValueError(
+                f"The stiffnesses or masses of {self.robot!r} overflow or vanish in double precision: use numbers "
+                "closer to those of a robot."
+            )
 
     def _check_hub_hinges(self) -> None:
         """Neighbours turned apart open their hub hinge by two peak angles; at pi its curvature is infinite."""

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from seastar_gym.actuation.schedule import step_times
 from seastar_gym.der.energy import energies
 from seastar_gym.der.lanes import N_LANES
-from seastar_gym.der.rods import REPORT_ROWS, SMALLEST_HUB_T, Actuation, aligned_rows, make_work
+from seastar_gym.der.rods import REPORT_ROWS, SMALLEST_HUB_T, Actuation, Work, aligned_rows, make_work
 from seastar_gym.der.schemes import SCHEMES
 from seastar_gym.der.stroke import advance
-from seastar_gym.scene import Scene
+from seastar_gym.scene import MAX_STEPS, Scene, require_count
 
 Floats = NDArray[np.float64]
 
@@ -75,6 +75,12 @@ class State(NamedTuple):
     time: Floats
 
 
+MAX_ROBOTS, MAX_THREADS = 100_000_000, 4096
+ROW_ARRAYS = ("q", "v", "_a", "_commands", "_failed", "_report")
+CLOCK = ("_start_time", "_strokes", "_since_stroke", "_delta_psi_end")
+"""What a simulator is made of besides its arguments: rows of numbers per robot, and its clock."""
+
+
 class Simulator:
     """`n_robots` robots of one scene, at rest with the hub at the origin until told otherwise.
 
@@ -90,13 +96,14 @@ class Simulator:
     def __init__(self, scene: Scene, n_robots: int = 1, threads: int | None = None):
         if not isinstance(scene, Scene):
             raise ValueError(f"Simulator needs a Scene, not {scene!r}.")
-        if isinstance(n_robots, bool) or not isinstance(n_robots, int | np.integer) or n_robots < 1:
-            raise ValueError(f"n_robots must be a whole number of at least 1, not {n_robots!r}.")
+        require_count("n_robots", n_robots, 1, MAX_ROBOTS)
+        if threads is not None:
+            require_count("threads", threads, 1, MAX_THREADS)
         self.scene = scene
         self.n_robots = int(n_robots)
         n_groups = -(-self.n_robots // N_LANES)
         available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-        self.threads = min(n_groups, available if threads is None else max(1, threads))
+        self.threads = min(n_groups, available if threads is None else int(threads))
         self._rods = scene.rods()
         self._scheme = SCHEMES[scene.numerics.scheme]
         self._limits = scene.limits()
@@ -114,25 +121,31 @@ class Simulator:
         self._strokes = np.zeros(self.n_robots, dtype=np.int64)
         self._since_stroke = np.zeros(self.n_robots)
         self._delta_psi_end = 0.0  # per unit of command, now [rad]
-        self._make_threads()
+        self._pool: tuple[int, ThreadPoolExecutor] | None = None
+        self.memory = [self._make_memory() for _ in range(self.threads)]
 
-    def _make_threads(self) -> None:
+    def _make_memory(self) -> tuple[Work, Actuation]:
         robot = self.scene.robot
-        self.memory = [
-            (
-                make_work(robot.n_limbs, robot.nodes_per_limb, self._scheme.n_stages),
-                Actuation(np.zeros((robot.n_limbs, N_LANES)), np.zeros((robot.n_limbs, N_LANES))),
-            )
-            for _ in range(self.threads)
-        ]
-        self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
+        rotations = Actuation(np.zeros((robot.n_limbs, N_LANES)), np.zeros((robot.n_limbs, N_LANES)))
+        return make_work(robot.n_limbs, robot.nodes_per_limb, self._scheme.n_stages), rotations
+
+    def _get_pool(self) -> ThreadPoolExecutor:
+        """The threads of this process: a fork inherits the pool of its parent, but not the threads in it."""
+        if self._pool is None or self._pool[0] != os.getpid():
+            self._pool = os.getpid(), ThreadPoolExecutor(self.threads)
+        return self._pool[1]
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name not in {"memory", "_pool"}}
+        # By robot, not by lane: whoever reads it may have another lane width.
+        rows = {name: self._read(getattr(self, name)) for name in ROW_ARRAYS}
+        numbers = {name: getattr(self, name) for name in CLOCK}
+        return {"arguments": (self.scene, self.n_robots, self.threads), "rows": rows, "clock": numbers}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        self._make_threads()
+        self.__init__(*state["arguments"])  # type: ignore[misc]
+        for name, values in state["rows"].items():
+            self._write(getattr(self, name), values)
+        self.__dict__.update(state["clock"])
 
     # --- state -------------------------------------------------------------------------------------------------
 
@@ -144,7 +157,10 @@ class Simulator:
         chosen = np.ones(self.n_robots, bool) if mask is None else np.asarray(mask)
         if chosen.dtype != bool or chosen.shape != (self.n_robots,):
             raise ValueError(f"mask must be boolean of shape ({self.n_robots},), not {chosen.dtype} {chosen.shape}.")
-        angles = np.broadcast_to(np.asarray(heading, float), (self.n_robots,))
+        angles = _as_floats("heading", heading)
+        if angles.shape not in ((), (self.n_robots,)):
+            raise ValueError(f"heading must be a number or of shape ({self.n_robots},), not {angles.shape}.")
+        angles = np.broadcast_to(angles, (self.n_robots,))
         if not np.isfinite(angles[chosen]).all():
             raise ValueError("heading must be finite [rad].")
         nodes = self.scene.robot.nodes()
@@ -155,6 +171,7 @@ class Simulator:
             group, lane = divmod(robot, N_LANES)
             self.q[group, :, lane] = turned.reshape(-1)
             self.v[group, :, lane] = 0.0
+            self._commands[group, :, lane] = 0.0
             self._failed[group, 0, lane] = 0.0
         self._set_time(chosen, 0.0)
 
@@ -169,17 +186,20 @@ class Simulator:
 
     def set_state(self, state: State) -> None:
         """Put all robots into a state; robots that had failed are well again."""
+        if not isinstance(state, tuple | list) or len(state) != len(State._fields):
+            raise ValueError(f"A State of {', '.join(State._fields)} is needed, not {type(state).__name__}.")
         shape = (self.n_robots, self.scene.robot.n_nodes, 2)
         arrays = []
         for name, value, wanted in zip(State._fields, state, (shape, shape, shape[:1]), strict=True):
-            array = np.asarray(value, float)
+            array = _as_floats(f"State.{name}", value)
             if array.shape != wanted:
                 raise ValueError(f"State.{name} must have shape {wanted}, not {array.shape}.")
             if not np.isfinite(array).all():
                 raise ValueError(f"State.{name} must be finite.")
             arrays.append(array)
-        self._write_nodes(self.q, arrays[0])
-        self._write_nodes(self.v, arrays[1])
+        self._write(self.q, arrays[0])
+        self._write(self.v, arrays[1])
+        self._commands[:] = 0.0
         self._failed[:] = 0.0
         self._set_time(slice(None), arrays[2])
 
@@ -189,7 +209,8 @@ class Simulator:
         padded[: self.n_robots] = values
         return np.ascontiguousarray(padded.reshape(len(self.q), N_LANES, -1).transpose(0, 2, 1))
 
-    def _write_nodes(self, rows: Floats, nodes: Floats) -> None:
+    def _write(self, rows: Floats, nodes: Floats) -> None:
+        """Write numbers of every robot, shape (n_robots, ...), over rows (n_groups, k, N_LANES)."""
         groups, lanes = np.divmod(np.arange(self.n_robots), N_LANES)
         rows[groups, :, lanes] = nodes.reshape(self.n_robots, -1)
 
@@ -262,6 +283,7 @@ class Simulator:
 
         Yields the time since the stroke began [s]. Its StrokeReport is the generator's return value.
         """
+        require_count("parts", parts, 1, MAX_STEPS)
         self._begin_stroke(commands)
         wanted = self._times[-1] * np.arange(1, parts + 1) / parts
         ends = np.unique(np.clip(np.searchsorted(self._times, wanted - 1e-12), 1, len(self._times) - 1))
@@ -275,13 +297,13 @@ class Simulator:
         return self._end_stroke()
 
     def _begin_stroke(self, commands: ArrayLike) -> None:
-        self._write_nodes(self._commands, self._checked_commands(commands))
+        self._write(self._commands, self._checked_commands(commands))
         self._a[:] = 0.0  # a stroke depends on the state at its beginning only
         self._report[:] = 0.0
         self._report[:, SMALLEST_HUB_T] = np.inf
 
     def _checked_commands(self, commands: ArrayLike) -> Floats:
-        array = np.asarray(commands, float)
+        array = _as_floats("commands", commands)
         wanted = (self.n_robots, self.scene.robot.n_limbs)
         if array.shape != wanted:
             raise ValueError(f"commands must have shape (n_robots, n_limbs) = {wanted}, not {array.shape}.")
@@ -317,10 +339,10 @@ class Simulator:
                 self._limits,
             )  # fmt: skip
 
-        if self._pool is None:
+        if self.threads == 1:
             run(0)
         else:
-            list(self._pool.map(run, range(self.threads)))
+            list(self._get_pool().map(run, range(self.threads)))
 
     def _end_stroke(self) -> StrokeReport:
         rows = dict(zip(REPORT_ROWS, self._read(self._report).T, strict=True))
@@ -338,3 +360,14 @@ class Simulator:
             smallest_opening_angle=angle,
             **counts,
         )
+
+
+def _as_floats(name: str, value: object) -> Floats:
+    """The value as an array of numbers, or one sentence."""
+    try:
+        array = np.asarray(value)
+    except ValueError as ragged:
+        raise ValueError(f"{name} must be an array of numbers, not rows of different lengths.") from ragged
+    if array.dtype.kind not in "biuf":
+        raise ValueError(f"{name} must be numbers, not {array.dtype} values.")
+    return array.astype(float)

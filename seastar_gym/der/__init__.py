@@ -21,7 +21,7 @@ M              m, mass          kg      lumped masses
 h, gamma       h, gamma         s       time step; coefficient of a stage times h
 Phi            phi, energy      J       incremental potential of a stage, see potential.py
 
-Work of a Newton iteration of the chapter's robot (46 nodes), counted by seastar_gym.studies.operations; the shares of the
+Work of a Newton iteration of the chapter's robot (46 nodes), counted by seastar_gym.studies.operations; shares of the
 time are those of an AVX-512 processor, `python -m seastar_gym.studies.throughput` measures them on any:
 
 part            kflop   time    what

@@ -55,7 +55,8 @@ class _DigestLocator(UserWideCacheLocator):
         self._cache_path = str(root / f"seastar_gym-{_digest_of_this_process()}")
 
     def get_source_stamp(self):
-        return _digest_of_this_process()
+        # An entry point may stand outside the package.
+        return _digest_of_this_process(), hashlib.sha256(Path(self._py_file).read_bytes()).hexdigest()
 
 
 class _DigestCache(FunctionCache):

@@ -70,7 +70,6 @@ class Work(NamedTuple):
     hub_moment, hub_stiffness: Sums over the hub hinges of a limb's root edge, per limb [N m].
     hub_coupling: 2 x 2 block of every hub hinge, four rows per limb [N/m].
     hub_EI_kappa_bar: Natural moment of the hub hinges, per limb [N m].
-    hub_t: tan(phi/2) of the hub hinges, per limb.
     stage_v: Velocities of the stages of a time step [m/s].
     """
 
@@ -87,7 +86,6 @@ class Work(NamedTuple):
     hub_stiffness: np.ndarray
     hub_coupling: np.ndarray
     hub_EI_kappa_bar: np.ndarray
-    hub_t: np.ndarray
     stage_v: np.ndarray
 
 
@@ -165,6 +163,5 @@ def make_work(n_limbs: int, nodes_per_limb: int, n_stages: int) -> Work:
         hub_stiffness=rows(n_limbs),
         hub_coupling=rows(4 * n_limbs),
         hub_EI_kappa_bar=rows(n_limbs),
-        hub_t=rows(n_limbs),
         stage_v=rows(2 * n_nodes * n_stages),
     )

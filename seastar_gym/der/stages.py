@@ -1,7 +1,7 @@
 """Time steps: a scheme's implicit stages, and the halving of steps that do not converge."""
 
 from seastar_gym.der.compilation import kernel
-from seastar_gym.der.geometry import tangent
+from seastar_gym.der.geometry import edge_geometry, half_angle, tangent
 from seastar_gym.der.lanes import add_product, any_lane, floor, load, load_number, select, splat, sqrt, store
 from seastar_gym.der.newton import minimise
 from seastar_gym.der.rods import (
@@ -77,18 +77,18 @@ def stage_motion(work, stage, row):
 
 
 @kernel
-def store_share(a, row, along, squared):
+def store_share(a, row, along, squared, robots):
     """The share, from 0 to 1, of a stage's last acceleration that would have fit its new one best (least squares).
 
     The next step's first guess uses it. Ringing that a step does not resolve changes its sign, and has the share 0.
     """
     share = select(along > 0.0, along / squared, 0.0)
-    store(a, row, select(share < 1.0, share, 1.0))
+    store(a, row, select(robots, select(share < 1.0, share, 1.0), load(a, row)))
 
 
 @kernel
-def end_stage(rods, work, scheme, k, stage, a):
-    """Keep velocity and acceleration of a solved stage that is not the last."""
+def end_stage(rods, work, scheme, k, stage, a, robots):
+    """Keep velocity and acceleration of a solved stage that is not the last, for the robots in the mask `robots`."""
     rows = 2 * n_nodes(rods)
     along, squared = splat(0.0), splat(0.0)
     for row in range(rows):
@@ -97,8 +97,8 @@ def end_stage(rods, work, scheme, k, stage, a):
         along = add_product(along, last, acceleration)
         squared = add_product(squared, last, last)
         store(work.stage_v, k * rows + row, velocity)
-        store(a, k * rows + row, acceleration)
-    store_share(a, scheme.n_stages * rows + k, along, squared)
+        store(a, k * rows + row, select(robots, acceleration, last))
+    store_share(a, scheme.n_stages * rows + k, along, squared, robots)
 
 
 @kernel
@@ -124,7 +124,7 @@ def end_step(rods, work, scheme, stage, q_0, v_0, a, h, accepted):
         store(a, k * rows + row, select(accepted, acceleration, last))
         store(q_0, row, select(accepted, q_1, q))
         store(v_0, row, select(accepted, v_1, v))
-    store_share(a, scheme.n_stages * rows + k, along, squared)
+    store_share(a, scheme.n_stages * rows + k, along, squared, accepted)
 
 
 @kernel
@@ -172,7 +172,7 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, lim
         add_to_report(report, REPAIRS, repairs)
         add_to_report(report, BACKTRACKS, backtracks)
         if k < last:
-            end_stage(rods, work, scheme, k, stage, a)
+            end_stage(rods, work, scheme, k, stage, a, active)
         else:
             accepted = going
             if limits.adaptive:
@@ -189,12 +189,16 @@ def add_to_report(report, row, amount):
 
 
 @kernel
-def note_hub_angles(rods, work, report, accepted):
+def note_hub_angles(rods, q, report):
     """Keep the smallest tan(phi/2) of every robot's hub hinges."""
     smallest = load(report, SMALLEST_HUB_T)
+    edges = rods.nodes_per_limb - 1
+    first = edge_geometry(q, 0, (rods.n_limbs - 1) * edges + 1)
     for limb in range(rods.n_limbs):
-        t = load(work.hub_t, limb)
-        smallest = select(accepted & (t < smallest), t, smallest)
+        second = edge_geometry(q, 0, limb * edges + 1)
+        t = half_angle(first, second, rods.hub_side)
+        smallest = select(t < smallest, t, smallest)
+        first = second
     store(report, SMALLEST_HUB_T, smallest)
 
 
@@ -221,7 +225,7 @@ def cover_interval(rods, work, scheme, actuation, q, v, a, duration, alive, limi
         converged, accepted, error_rate = try_step(
             rods, work, scheme, actuation, q, v, a, start, size, h, moving, limits, patience, report
         )
-        note_hub_angles(rods, work, report, accepted)
+        note_hub_angles(rods, q, report)
         stuck = moving & ~converged
         rejected = moving & ~accepted
         if any_lane(stuck):

@@ -53,7 +53,7 @@ class SwimTask:
         require_number("waypoint_radius", waypoint_radius, "m")
         if not isinstance(reward, RewardWeights):
             raise ValueError(f"reward must be RewardWeights, not {reward!r}.")
-        make_path(path, np.random.default_rng(0))  # refuses a bad path now, not at the first reset
+        waypoints = make_path(path, np.random.default_rng(0))  # refuses a bad path now, not at the first reset
         self.simulator = Simulator(scene, n_robots, threads)
         if scene.robot.hub_hinge == "turning" and 2 * scene.actuator.peak_angle >= scene.robot.opening_angle * (
             1 - 1e-9
@@ -62,12 +62,8 @@ class SwimTask:
                 'With hub_hinge="turning" some actions would close a hub hinge, where its curvature is infinite: use '
                 'hub_hinge="opening" or a smaller peak angle.'
             )
-        self.path, self.reward, self.waypoint_radius, self.random_heading = (
-            path,
-            reward,
-            waypoint_radius,
-            random_heading,
-        )
+        self.path: Path = path if isinstance(path, str) else waypoints
+        self.reward, self.waypoint_radius, self.random_heading = reward, waypoint_radius, random_heading
         self.n_robots = n_robots
         self._rest = scene.robot.nodes().reshape(-1)
         self.waypoints = np.zeros((n_robots, 1, 2))

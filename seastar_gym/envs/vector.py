@@ -15,7 +15,7 @@ from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.seastar_swim import checked_options
 from seastar_gym.envs.task import Path, SwimTask, make_scene
 from seastar_gym.scene import Fidelity, Scene
-from seastar_gym.simulator import Simulator
+from seastar_gym.simulator import Simulator, SolverStatus
 
 Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]
@@ -98,7 +98,8 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
                 self._generators[robot] = seeding.np_random(seeds[robot])[0]
         self._begin_episodes(mask, chosen.get("path"))
         self._has_begun = True
-        return self._task.observe(), _with_masks(self._task.facts(), mask)
+        facts = self._task.facts()
+        return self._task.observe(), {**facts, **{f"_{name}": mask.copy() for name in facts}}
 
     def _checked_mask(self, mask: Any) -> Flags:
         if mask is None:
@@ -131,43 +132,49 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
         terminated = outcome.terminated & ~resting
         out_of_time = self.max_episode_steps is not None and self._elapsed >= self.max_episode_steps
         truncated = np.asarray(out_of_time & ~resting) & np.ones(self.num_envs, bool)
-        reward, info = np.where(resting, 0.0, outcome.reward), outcome.info
+        reward = np.where(resting, 0.0, outcome.reward)
         if resting.any():
             self._begin_episodes(resting)
-            info = {name: _replaced(values, self._task.facts().get(name), resting) for name, values in info.items()}
         self._needs_reset = terminated | truncated
-        info = _with_masks(info, np.ones(self.num_envs, bool))
-        observations = self._task.observe()
+        observations, info = self._task.observe(), self._with_masks(outcome.info, resting)
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._needs_reset.any():
-            observations, info = self._begin_next_episodes(observations, info)
+            observations, info = self._begin_next_episodes(observations, outcome.info)
         return observations, reward, terminated, truncated, info
 
-    def _begin_next_episodes(self, observations: Observations, info: Info) -> tuple[Observations, Info]:
+    def _begin_next_episodes(
+        self, observations: Observations, strokes: dict[str, NDArray[Any]]
+    ) -> tuple[Observations, Info]:
         """SAME_STEP: put away the last observations and infos of the episodes that are over, and begin the next."""
         over = self._needs_reset.copy()
         final_obs = np.full(self.num_envs, None, dtype=object)
         for robot in np.flatnonzero(over):
             final_obs[robot] = observations[robot]
-        final_info = {name: values for name, values in info.items() if not name.startswith("_")}
+        final_info = self._with_masks(strokes, ~over, begun_anew=False)
         self._begin_episodes(over)
-        facts = self._task.facts()
-        info = {name: _replaced(values, facts.get(name), over) for name, values in final_info.items()}
         return self._task.observe(), {
-            **_with_masks(info, np.ones(self.num_envs, bool)),
+            **self._with_masks(strokes, over),
             "final_obs": final_obs,
             "_final_obs": over,
-            "final_info": _with_masks(final_info, over),
+            "final_info": final_info,
             "_final_info": over,
         }
 
+    def _with_masks(self, strokes: dict[str, NDArray[Any]], others: Flags, begun_anew: bool = True) -> Info:
+        """Gymnasium's form of a batch's info: beside every array a mask of the robots that it tells about.
 
-def _replaced(values: NDArray[Any], fresh: NDArray[Any] | None, robots: Flags) -> NDArray[Any]:
-    """Values with those of robots whose episode just began: fresh ones, or zero for what only a stroke has."""
-    result = values.copy()
-    result[robots] = 0 if fresh is None else fresh[robots]
-    return result
-
-
-def _with_masks(info: dict[str, NDArray[Any]], robots: Flags) -> Info:
-    """Gymnasium's form of a batch's info: beside every array, whose entries count."""
-    return {**info, **{f"_{name}": robots.copy() for name in info}}
+        strokes: What a stroke says of all robots; of `others` only what a reset says counts, if they have begun anew.
+        """
+        facts = self._task.facts() if begun_anew and others.any() else {}
+        info: Info = {}
+        for name, values in strokes.items():
+            values = values.copy()
+            if others.any():
+                values[others] = facts[name][others] if name in facts else 0
+            info[name], info[f"_{name}"] = values, np.ones_like(others) if name in facts else ~others
+        failed = (strokes["solver_status"] != SolverStatus.CONVERGED) & ~others
+        if failed.any():
+            messages = np.full(self.num_envs, None, dtype=object)
+            for robot in np.flatnonzero(failed):
+                messages[robot] = SolverStatus(strokes["solver_status"][robot]).sentence
+            info["solver_message"], info["_solver_message"] = messages, failed
+        return info

@@ -128,6 +128,7 @@ def _counting_lanes() -> ModuleType:
         select=_select,
         sqrt=lambda x: _result("root", math.sqrt(x.value)),
         absolute=lambda x: Counted(abs(x.value)),
+        floor=lambda x: Counted(math.floor(x.value)),
         add_product=lambda c, a, b: _result("fused", _value(c) + _value(a) * _value(b)),
         subtract_product=lambda c, a, b: _result("fused", _value(c) - _value(a) * _value(b)),
         any_lane=bool,

@@ -1,0 +1,94 @@
+"""The pulse is the ramp of Fig. 13.5b, and no time step straddles one of its corners."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+import oracle
+from seastar_gym import Numerics, Scene, Simulator, SmaPulse
+from seastar_gym.actuation.schedule import step_times
+from seastar_gym.actuation.sma import pulse
+
+CHAPTER = (0.0, 0.1, 1.0)
+durations = st.floats(1e-3, 10.0)
+
+
+# The pulse
+
+
+def test_pulse_rises_while_heated_and_falls_while_cooling():
+    times = np.array([0.0, 0.025, 0.05, 0.1, 0.55, 0.775, 1.0])
+    np.testing.assert_allclose(pulse(times, 0.1, 0.9), [0.0, 0.25, 0.5, 1.0, 0.5, 0.25, 0.0], rtol=0.0, atol=1e-15)
+
+
+def test_pulse_is_exact_at_its_corners_and_that_of_the_oracle_between_them():
+    actuator = SmaPulse()
+    assert actuator.corners == CHAPTER and actuator.period == 1.0
+    assert actuator.delta_psi(CHAPTER).tolist() == [0.0, np.pi / 5, 0.0]
+    times = np.linspace(0.0, 0.999, 1000)
+    np.testing.assert_allclose(actuator.delta_psi(times), [oracle.pulse(t) for t in times], rtol=0.0, atol=1e-15)
+
+
+@given(durations, durations, st.lists(st.floats(-20.0, 40.0), min_size=1, max_size=20))
+def test_pulse_stays_between_zero_and_one_whatever_the_time(heating_time, cooling_time, times):
+    share = pulse(times, heating_time, cooling_time)
+    assert share.shape == (len(times),)
+    assert np.all((share >= 0.0) & (share <= 1.0))
+
+
+def test_pulse_takes_numbers_and_arrays_of_any_shape():
+    assert SmaPulse().delta_psi(0.05) == pytest.approx(np.pi / 10)
+    assert SmaPulse().delta_psi(np.zeros((2, 3))).shape == (2, 3)
+
+
+# The steps
+
+
+@pytest.mark.parametrize("step, n_heating, n_cooling", [(0.01, 10, 90), (0.003, 34, 300), (0.02, 5, 45), (0.25, 1, 4)])
+def test_a_stroke_takes_as_few_steps_as_its_corners_allow(step, n_heating, n_cooling):
+    times = step_times(CHAPTER, step)
+    assert len(times) == n_heating + n_cooling + 1
+    assert np.searchsorted(times, 0.1) == n_heating
+
+
+@pytest.mark.parametrize("step", [1.0 / 3.0, 0.1, 0.05, 0.03, 0.003, 0.001, 0.0007, 1e-4])
+def test_steps_are_those_of_the_oracle(step):
+    starts, lengths = np.array(oracle.stroke_steps(step)).T
+    times = step_times(CHAPTER, step)
+    np.testing.assert_allclose(times[:-1], starts, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(np.diff(times), lengths, rtol=0.0, atol=1e-13)
+
+
+@given(durations, durations, st.floats(1e-3, 20.0))
+def test_steps_end_on_every_corner_are_equal_and_only_the_last_before_a_corner_is_shorter(heating, cooling, step):
+    corners = (0.0, heating, heating + cooling)
+    assume((heating + cooling) / step < 1e4)
+    times = step_times(corners, step)
+    lengths = np.diff(times)
+    assert set(corners) <= set(times.tolist())
+    assert np.all(lengths > 0.0)
+    assert np.all(lengths <= step * (1.0 + 1e-8))
+    before_corner = np.isin(times[1:], corners)
+    np.testing.assert_allclose(lengths[~before_corner], step, rtol=1e-9, atol=1e-14)
+    assert before_corner.sum() == 2
+
+
+@given(st.integers(1, 1000), st.integers(1, 1000), st.floats(1e-4, 0.1))
+def test_a_step_that_divides_the_ramps_up_to_rounding_leaves_no_sliver(n_heating, n_cooling, step):
+    heating, cooling = n_heating * step, n_cooling * step
+    times = step_times((0.0, heating, heating + cooling), step)
+    assert len(times) == n_heating + n_cooling + 1
+    np.testing.assert_allclose(np.diff(times), step, rtol=1e-8)
+
+
+@pytest.mark.parametrize("scheme", ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"])
+def test_a_step_longer_than_the_ramps_still_sees_both_corners(scheme):
+    """The robot ends where it ends with steps of exactly the ramps' lengths."""
+    ends = []
+    for step in (0.9, 5.0):
+        simulator = Simulator(Scene(numerics=Numerics(scheme, step)))
+        report = simulator.stroke([[0.0, 0.5, 0.0, 0.0, -0.5]])
+        assert report.covered[0] == pytest.approx(1.0)
+        ends.append(simulator.positions)
+    np.testing.assert_array_equal(*ends)

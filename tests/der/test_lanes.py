@@ -1,0 +1,419 @@
+"""Kernels on `Lanes` compute, for every robot, the numbers that float64 arithmetic gives, to the last bit."""
+
+import os
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import numba
+import numpy as np
+import pytest
+from numba.core.errors import TypingError
+
+from seastar_gym.der import lanes
+from seastar_gym.der.geometry import tangent
+from seastar_gym.der.lanes import N_LANES, all_lanes, any_lane, borrow, load, load_number, splat, store
+
+ROOT = Path(__file__).resolve().parents[2]
+SPECIAL = [0.0, -0.0, 1.0, -1.0, np.inf, -np.inf, np.nan, 5e-324, -2.2e-308, 1.8e308, 1e-160, 1e200, 1.0 + 2**-52]
+
+
+def rows_of(values) -> np.ndarray:
+    """Numbers as rows of N_LANES, the last row filled up with ones."""
+    flat = np.ravel(values)
+    padded = np.ones((-(-len(flat) // N_LANES), N_LANES))
+    padded.reshape(-1)[: len(flat)] = flat
+    return padded
+
+
+@pytest.fixture(scope="module")
+def operands():
+    """Three columns of numbers: every pair of special values with every third one, and random ones of all sizes."""
+    special = np.array(np.meshgrid(SPECIAL, SPECIAL, SPECIAL)).reshape(3, -1)
+    rng = np.random.default_rng(0)
+    random = rng.standard_normal((3, 4000)) * 10.0 ** rng.integers(-30, 30, (3, 4000))
+    a, b, c = np.concatenate([special, random], axis=1)
+    return SimpleNamespace(a=rows_of(a), b=rows_of(b), c=rows_of(c))
+
+
+def assert_same_bits(found, expected):
+    """Equal numbers, equal signs of zero, NaN where NaN is expected."""
+    np.testing.assert_array_equal(found, expected)
+    known = ~np.isnan(expected)
+    np.testing.assert_array_equal(np.signbit(found)[known], np.signbit(expected)[known])
+
+
+ARITHMETIC = {
+    "a + b": lambda a, b, c: a + b,
+    "a - b": lambda a, b, c: a - b,
+    "a * b": lambda a, b, c: a * b,
+    "a / b": lambda a, b, c: a / b,
+    "-a": lambda a, b, c: -a,
+    "a + 0.1": lambda a, b, c: a + 0.1,
+    "0.1 + a": lambda a, b, c: 0.1 + a,
+    "a - 3": lambda a, b, c: a - 3,
+    "3 - a": lambda a, b, c: 3 - a,
+    "0.1 * a": lambda a, b, c: 0.1 * a,
+    "a * 3": lambda a, b, c: a * 3,
+    "1.0 / a": lambda a, b, c: 1.0 / a,
+    "a / 3": lambda a, b, c: a / 3,
+    "a * b + c": lambda a, b, c: a * b + c,
+    "a * b - a * c": lambda a, b, c: a * b - a * c,
+}
+COMPARISONS = {
+    "a < b": lambda a, b: a < b,
+    "a <= b": lambda a, b: a <= b,
+    "a > b": lambda a, b: a > b,
+    "a >= b": lambda a, b: a >= b,
+    "a == b": lambda a, b: a == b,
+    "a < 1.0": lambda a, b: a < 1.0,
+    "1.0 < a": lambda a, b: a > 1.0,
+    "a <= 1.0": lambda a, b: a <= 1.0,
+    "1 <= a": lambda a, b: a >= 1,
+    "a > 1": lambda a, b: a > 1,
+    "1.0 > a": lambda a, b: a < 1.0,
+    "a >= 1.0": lambda a, b: a >= 1.0,
+    "1.0 >= a": lambda a, b: a <= 1.0,
+    "a == 0.0": lambda a, b: a == 0.0,
+    "0 == a": lambda a, b: a == 0,
+    "(a < b) & (a > 0.0)": lambda a, b: (a < b) & (a > 0.0),
+    "(a < b) | (a > 0.0)": lambda a, b: (a < b) | (a > 0.0),
+    "~(a < b)": lambda a, b: ~(a < b),
+}
+
+
+def compiled(template: str, body: str, lines: list[str]):
+    """A function made of one line of `template` for every line: `store` its value in a row of its own."""
+    stores = "".join(
+        f"        store(out, {len(lines)} * r + {k}, {template.format(line)})\n" for k, line in enumerate(lines)
+    )
+    source = f"def function(a_rows, b_rows, c_rows, out_rows):\n{body}{stores}"
+    namespace = dict(vars(lanes))
+    exec(source, namespace)
+    return numba.njit(error_model="numpy")(namespace["function"])
+
+
+LOOP = """\
+    a_in, b_in, c_in, out = borrow(a_rows), borrow(b_rows), borrow(c_rows), borrow(out_rows)
+    for r in range(a_rows.shape[0]):
+        a, b, c = load(a_in, r), load(b_in, r), load(c_in, r)
+"""
+
+
+def run_all(template: str, lines: list[str], operands) -> np.ndarray:
+    """Values of every line for every row of operands, shape (n_lines, n_rows, N_LANES)."""
+    out = np.full((len(lines) * len(operands.a), N_LANES), 0.5)
+    compiled(template, LOOP, lines)(operands.a, operands.b, operands.c, out)
+    return out.reshape(len(operands.a), len(lines), N_LANES).transpose(1, 0, 2)
+
+
+# Arithmetic
+
+
+def test_arithmetic_is_that_of_float64_to_the_last_bit_with_no_hidden_contraction(operands):
+    found = run_all("{}", list(ARITHMETIC), operands)
+    with np.errstate(all="ignore"):
+        for value, (line, function) in zip(found, ARITHMETIC.items(), strict=True):
+            expected = function(operands.a, operands.b, operands.c)
+            known = ~np.isnan(expected)
+            np.testing.assert_array_equal(value, expected, err_msg=line)
+            np.testing.assert_array_equal(np.signbit(value)[known], np.signbit(expected)[known], err_msg=line)
+
+
+def test_augmented_assignments_are_the_operators(operands):
+    @numba.njit(error_model="numpy")
+    def function(a_rows, b_rows, out_rows):
+        a_in, b_in, out = borrow(a_rows), borrow(b_rows), borrow(out_rows)
+        for r in range(a_rows.shape[0]):
+            x, y, z, w = load(a_in, r), load(a_in, r), load(a_in, r), load(a_in, r)
+            x += load(b_in, r)
+            y -= load(b_in, r)
+            z *= load(b_in, r)
+            w /= load(b_in, r)
+            x += 1.0
+            y -= 2
+            z *= 3.0
+            w /= 7
+            store(out, 4 * r, x)
+            store(out, 4 * r + 1, y)
+            store(out, 4 * r + 2, z)
+            store(out, 4 * r + 3, w)
+
+    a, b, out = operands.a, operands.b, np.zeros((4 * len(operands.a), N_LANES))
+    function(a, b, out)
+    with np.errstate(all="ignore"):
+        for k, expected in enumerate([a + b + 1.0, a - b - 2, a * b * 3.0, a / b / 7]):
+            assert_same_bits(out[k::4], expected)
+
+
+def test_square_root_and_absolute_value_are_exactly_rounded(operands):
+    root, size = run_all("{}", ["sqrt(a)", "absolute(a)"], operands)
+    with np.errstate(invalid="ignore"):
+        assert_same_bits(root, np.sqrt(operands.a))
+    assert_same_bits(size, np.abs(operands.a))
+
+
+def exact_product_sum(c: float, a: float, b: float) -> float:
+    """c + a b rounded once: a fraction has no rounding of its own, and its conversion rounds to nearest."""
+    return float(Fraction(c) + Fraction(a) * Fraction(b))
+
+
+def test_product_sums_are_rounded_once():
+    rng = np.random.default_rng(1)
+    a, b = rng.standard_normal((2, 400 * N_LANES))
+    c = -a * b * (1.0 + 2.0 ** -rng.integers(20, 60, a.size))  # cancels: the second rounding would show
+    operands = SimpleNamespace(a=rows_of(a), b=rows_of(b), c=rows_of(c))
+    lines = [
+        "add_product(c, a, b)",
+        "subtract_product(c, a, -b)",
+        "add_product(0.5, a, b)",
+        "subtract_product(c, 3, b)",
+    ]
+    found = run_all("{}", lines, operands).reshape(len(lines), -1)
+    twice = c + a * b
+    assert np.count_nonzero(found[0] != twice) > 300
+    assert found[0].tolist() == [exact_product_sum(*x) for x in zip(c, a, b, strict=True)]
+    assert found[1].tolist() == found[0].tolist()
+    assert found[2].tolist() == [exact_product_sum(0.5, *x) for x in zip(a, b, strict=True)]
+    assert found[3].tolist() == [exact_product_sum(x, -3.0, y) for x, y in zip(c, b, strict=True)]
+
+
+def test_product_sums_keep_the_signs_of_zero_and_pass_nan_on(operands):
+    plus, minus = run_all("{}", ["add_product(c, a, b)", "subtract_product(c, a, b)"], operands)
+    # Where neither the product nor the sum is rounded, two operations give what one gives.
+    small = np.isin(operands.a, [0, 1, -1, np.inf, -np.inf, np.nan]) & np.isin(operands.c, SPECIAL)
+    with np.errstate(all="ignore"):
+        exact = small & (np.abs(operands.b) != 5e-324)
+        assert exact.sum() > 500
+        for found, expected in (
+            (plus, operands.c + operands.a * operands.b),
+            (minus, operands.c - operands.a * operands.b),
+        ):
+            assert_same_bits(found[exact], expected[exact])
+
+
+# Masks
+
+
+def test_comparisons_and_masks_are_those_of_numpy_and_nan_compares_false(operands):
+    found = run_all("select({}, 1.0, splat(0.0))", list(COMPARISONS), operands)
+    for value, (line, function) in zip(found, COMPARISONS.items(), strict=True):
+        np.testing.assert_array_equal(value == 1.0, function(operands.a, operands.b), err_msg=line)
+        assert set(np.unique(value)) == {0.0, 1.0}
+
+
+def test_select_takes_lanes_or_numbers_on_either_side(operands):
+    lines = ["select(a < b, a, b)", "select(a < b, 2, b)", "select(a < b, a, 2.0)"]
+    both, left, right = run_all("{}", lines, operands)
+    below = operands.a < operands.b
+    assert_same_bits(both, np.where(below, operands.a, operands.b))
+    assert_same_bits(left, np.where(below, 2.0, operands.b))
+    assert_same_bits(right, np.where(below, operands.a, 2.0))
+
+
+def test_any_and_all_look_at_every_lane():
+    @numba.njit
+    def function(rows):
+        pointer = borrow(rows)
+        condition = load(pointer, 0) > 0.0
+        return any_lane(condition), all_lanes(condition)
+
+    assert function(np.zeros((1, N_LANES))) == (False, False)
+    assert function(np.ones((1, N_LANES))) == (True, True)
+    for lane in range(N_LANES):
+        only = np.zeros((1, N_LANES))
+        only[0, lane] = 1.0
+        assert function(only) == (True, False)
+        assert function(1.0 - only) == (True, False)
+
+
+# Memory
+
+
+class Bundle(NamedTuple):
+    count: int
+    flag: bool
+    per_robot: np.ndarray
+    shared: np.ndarray
+
+
+def test_load_reads_per_robot_and_shared_rows_and_store_writes_lanes_or_one_number():
+    @numba.njit
+    def function(bundle, rows):
+        fields, out = borrow(bundle), borrow(rows)
+        store(out, 0, load(fields.per_robot, 1))
+        store(out, 1, load(fields.shared, 2))
+        store(out, 2, splat(load_number(fields.shared, 0)))
+        store(out, 3, 7)
+        if fields.flag:
+            store(out, fields.count, 0.25)
+
+    per_robot, shared, out = (
+        np.random.default_rng(0).random((2, N_LANES)),
+        np.array([1.5, 2.5, 3.5]),
+        np.ones((6, N_LANES)),
+    )
+    function(Bundle(4, True, per_robot, shared), out)
+    np.testing.assert_array_equal(out[0], per_robot[1])
+    np.testing.assert_array_equal(out[1:].T, np.tile([3.5, 1.5, 7.0, 0.25, 1.0], (N_LANES, 1)))
+
+
+def test_rows_need_no_alignment(operands):
+    n = operands.a.size
+    shifted = [np.empty(n + 1)[1:].reshape(operands.a.shape) for _ in range(4)]
+    for array, values in zip(shifted, (operands.a, operands.b, operands.c), strict=False):
+        array[:] = values
+    assert any(array.ctypes.data % 64 for array in shifted)
+    out = shifted[3]
+    compiled("{}", LOOP, ["a + b"])(*shifted[:3], out)
+    with np.errstate(all="ignore"):
+        assert_same_bits(out, operands.a + operands.b)
+
+
+# Refusals
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "a ** 2",
+        "a // 2.0",
+        "a % 2.0",
+        "a + None",
+        "a + 'one'",
+        "a + True",
+        "a + 1j",
+        "select(a < b, a, 1j)",
+        "a + (a < b)",
+        "(a < b) + 1.0",
+        "(a < b) & True",
+        "a & b",
+        "~a",
+        "-(a < b)",
+        "(a < b) == (a < c)",
+        "a != b",
+        "abs(a)",
+        "max(a, b)",
+        "a if a < b else b",
+        "(a < b) and (a < c)",
+        "select(a, b, c)",
+        "select(True, a, b)",
+        "select(a < b, 1.0, 2.0)",
+        "select(a < b, a < b, a < c)",
+        "sqrt(2.0)",
+        "absolute(a < b)",
+        "add_product(1.0, 2.0, 3.0)",
+        "add_product(a, b, a < b)",
+        "splat('one')",
+        "splat(True)",
+        "load(a_in, 1.5)",
+        "load(a_rows, 0)",
+        "load_number(a_in, 0)",
+        "splat(any_lane(a))",
+        "splat(all_lanes(1.0))",
+        "a < b",
+    ],
+)
+def test_what_lanes_cannot_do_is_a_typing_error_at_compilation(line):
+    one = np.ones((1, N_LANES))
+    with pytest.raises(TypingError):
+        compiled("{}", LOOP, [line])(one, one, one, one.copy())
+
+
+@pytest.mark.parametrize(
+    "array",
+    [
+        np.ones((1, N_LANES), np.float32),
+        np.ones((1, N_LANES), np.int64),
+        np.ones((N_LANES, 2)).T,
+        np.ones((2, 2 * N_LANES))[:, ::2],
+        np.ones((1, 1, N_LANES)),
+        (np.ones(3), np.ones(4)),
+        "rows",
+    ],
+    ids=["float32", "int64", "transposed", "strided", "three axes", "plain tuple", "string"],
+)
+def test_only_contiguous_float64_rows_and_named_tuples_of_them_can_be_borrowed(array):
+    @numba.njit
+    def function(rows):
+        return any_lane(load(borrow(rows), 0) > 0.0)
+
+    with pytest.raises(TypingError):
+        function(array)
+
+
+def test_shared_rows_cannot_be_written():
+    @numba.njit
+    def function(rows):
+        store(borrow(rows), 0, 1.0)
+
+    with pytest.raises(TypingError):
+        function(np.zeros(3))
+
+
+# The tangent
+
+
+def tangents(x: np.ndarray) -> np.ndarray:
+    @numba.njit(error_model="numpy")
+    def function(rows_in, rows_out):
+        source, target = borrow(rows_in), borrow(rows_out)
+        for r in range(rows_in.shape[0]):
+            store(target, r, tangent(load(source, r)))
+
+    rows = rows_of(x)
+    out = np.zeros_like(rows)
+    function(rows, out)
+    return out.reshape(-1)[: x.size]
+
+
+def test_tangent_is_that_of_numpy_to_a_few_units_in_the_last_place():
+    """Up to 1.3 rad: the chapter's hub hinges, opened by two peaks, need pi/5 + pi/5 = 1.26 rad."""
+    x = np.concatenate([np.linspace(-1.3, 1.3, 200_001), [0.0, -0.0, 1e-300, -1e-9]])
+    exact = np.tan(x.astype(np.longdouble))
+    found = tangents(x)
+    assert np.max(np.abs(found - exact) / np.spacing(np.abs(exact.astype(float)))) < 5.0
+    assert not np.signbit(found[-4])
+
+
+def test_tangent_is_that_of_an_angle_a_few_units_in_the_last_place_away_up_to_the_pole():
+    x = 0.5 * np.pi - np.geomspace(1e-6, 0.4, 10_000)
+    exact = np.tan(x.astype(np.longdouble))
+    # d tan x = (1 + tan^2 x) dx: the pole magnifies what rounding does to the angle.
+    error_in_angle = (tangents(x) - exact) / (1.0 + exact**2)
+    assert np.max(np.abs(error_in_angle)) < 4.0 * np.spacing(1.5)
+
+
+def test_tangent_is_odd():
+    x = np.linspace(0.0, 1.5, 1001)
+    np.testing.assert_array_equal(tangents(-x), -tangents(x))
+
+
+# The width
+
+
+def test_vectors_and_masks_have_the_same_possible_width():
+    assert N_LANES in {2, 4, 8, 16}
+    assert lanes.VECTOR.count == lanes.MASK.count == N_LANES
+
+
+def in_subprocess(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("width", ["3", "eight", ""])
+def test_an_impossible_width_is_refused_with_one_sentence(width):
+    answer = in_subprocess("import seastar_gym", SEASTAR_LANES=width)
+    assert answer.returncode == 1
+    last = answer.stderr.strip().splitlines()[-1]
+    assert last == f"ValueError: SEASTAR_LANES={width!r} is not a lane width: use 2, 4, 8 or 16."

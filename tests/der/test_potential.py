@@ -1,0 +1,327 @@
+"""The kernels agree with the dense oracle: potential, gradient and Hessian of a stage, whole stages and steps."""
+
+from types import SimpleNamespace
+
+import numba
+import numpy as np
+import pytest
+
+import oracle
+from oracle import Star
+from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, StrokeReport, Water
+from seastar_gym.der.lanes import N_LANES, any_lane, borrow, load, splat, store
+from seastar_gym.der.newton import take_step
+from seastar_gym.der.potential import factorise
+from seastar_gym.der.rods import Rods, Stage, make_work
+
+HUBS = ("opening", "turning")
+SHAPES = [(5, 10), (5, 2), (3, 3), (4, 4), (6, 5), (12, 3)]  # n_limbs, nodes_per_limb
+
+
+@pytest.fixture(scope="module")
+def compiled_direction():
+    @numba.njit(error_model="numpy")
+    def direction(rods, work, gamma, convex, result):
+        rods_rows, memory, out = borrow(rods), borrow(work), borrow(result)
+        h, mask = splat(gamma), load(borrow(convex), 0) > 0.0
+        stage = Stage(memory.q_hat, memory.v_hat, h, 1.0 / h)
+        if any_lane(mask):
+            phi, decrement, pivot = factorise(rods_rows, memory, stage, mask)
+        else:
+            phi, decrement, pivot = factorise(rods_rows, memory, stage, None)
+        store(out, 0, phi)
+        store(out, 1, decrement)
+        store(out, 2, pivot)
+        store(out, 3, take_step(rods_rows, memory, h > 0.0, h < 0.0, splat(1.0)))
+
+    return direction
+
+
+def robot_and_star(n_limbs=5, nodes_per_limb=10, hub_hinge="opening", fluid=True):
+    """The same robot for the kernels and for the oracle."""
+    robot = Seastar(n_limbs=n_limbs, nodes_per_limb=nodes_per_limb, hub_hinge=hub_hinge)
+    star = Star(
+        n_limbs=n_limbs, nodes_per_limb=nodes_per_limb, hub_hinge=hub_hinge, drag_coefficient=1.0 if fluid else 0.0
+    )
+    return robot, star
+
+
+def rods_of(robot: Seastar, fluid: bool = True) -> Rods:
+    return Scene(robot=robot, fluid=Water() if fluid else None, actuator=SmaPulse(peak_angle=0.1)).rods()
+
+
+class RandomStages:
+    """One random stage per lane, moderate: limbs bent by some degrees, edges strained by some per mille."""
+
+    def __init__(self, star: Star, gamma: float, bend=0.15, stretch=2e-3, speed=0.1, seed=0):
+        rng = np.random.default_rng(seed)
+        self.star, self.gamma = star, gamma
+        self.q = np.array([random_shape(star, bend, stretch, rng) for _ in range(N_LANES)])
+        self.v_hat = speed * rng.standard_normal(self.q.shape)
+        self.q_hat = self.q - gamma * speed * rng.standard_normal(self.q.shape)
+        self.delta_psi = rng.uniform(-0.1, 0.1, (N_LANES, star.n_limbs))
+
+    def data(self, lane: int):
+        return self.q_hat[lane], self.v_hat[lane], self.gamma, self.delta_psi[lane]
+
+    def hessian(self, lane: int) -> np.ndarray:
+        return oracle.incremental_hessian(self.star, self.q[lane], self.q_hat[lane], self.gamma, self.delta_psi[lane])
+
+    def convex_hessian(self, lane: int) -> np.ndarray:
+        """The Hessian without what may be negative: compression, curvature of the angles, bending's second part."""
+        star, q, dl = self.star, self.q[lane], self.star.edge_length
+        hessian = np.diag(np.repeat(star.masses, 2)) / self.gamma**2
+        hessian -= oracle.drag_jacobian(star, (q - self.q_hat[lane]) / self.gamma) / self.gamma
+        D, edges = star.differences, oracle.edge_vectors(star, q)
+        for D_e, e in zip(D, edges, strict=True):
+            size = np.linalg.norm(e)
+            along = np.outer(e, e) / size**2
+            pull = max(star.EA * (size / dl - 1.0), 0.0) / size
+            hessian += D_e.T @ (star.EA / dl * along + pull * (np.eye(2) - along)) @ D_e
+        for a, b, phi, _ in oracle.hinge_terms(star, q, self.delta_psi[lane]):
+            kappa_q = D[b].T @ oracle.direction_gradient(edges[b]) - D[a].T @ oracle.direction_gradient(edges[a])
+            kappa_q *= (1.0 + np.tan(phi / 2.0) ** 2) / dl
+            hessian += star.EI * dl * np.outer(kappa_q, kappa_q)
+        return hessian
+
+    def run(self, compiled, rods: Rods, convex=0.0, q=None):
+        """Phi, decrement and pivot per lane, and the Newton direction, shape (N_LANES, n_nodes, 2)."""
+        star, q = self.star, self.q if q is None else q
+        work = make_work(star.n_limbs, star.nodes_per_limb, 1)
+        for rows, nodes in ((work.q, q), (work.q_hat, self.q_hat), (work.v_hat, self.v_hat)):
+            rows[:] = nodes.reshape(N_LANES, -1).T
+        natural = np.array([oracle.natural_angles(star, d)[-star.n_limbs :] for d in self.delta_psi])
+        work.hub_EI_kappa_bar[:] = star.EI * 2.0 * np.tan(natural.T / 2.0) / star.edge_length
+        result = np.zeros((4, N_LANES))
+        compiled(rods, work, self.gamma, np.full((1, N_LANES), convex), result)
+        return SimpleNamespace(
+            phi=result[0],
+            decrement=result[1],
+            pivot=result[2],
+            largest=result[3],
+            direction=-work.step.T.reshape(N_LANES, -1, 2),
+            moved=work.q.T.reshape(N_LANES, -1, 2) - q,
+        )
+
+
+def random_shape(star: Star, bend: float, stretch: float, rng: np.random.Generator) -> np.ndarray:
+    """Limbs whose hinges turn by about `bend` [rad] and whose edges are strained by about `stretch`."""
+    q = np.zeros((star.n_nodes, 2)) + 0.05 * rng.standard_normal(2)
+    for limb in range(star.n_limbs):
+        angle = 2.0 * np.pi * limb / star.n_limbs
+        for i in range(1, star.nodes_per_limb):
+            angle += bend * rng.standard_normal()
+            length = star.edge_length * (1.0 + stretch * rng.standard_normal())
+            step = length * np.array([np.cos(angle), np.sin(angle)])
+            q[star.node(limb, i)] = q[star.node(limb, i - 1)] + step
+    return q
+
+
+# Every shape with both hubs in water, and the chapter's shape in vacuum.
+VARIANTS = [(*shape, hub, True) for shape in SHAPES for hub in HUBS] + [(5, 10, hub, False) for hub in HUBS]
+
+
+# Potential, gradient, Hessian
+
+
+@pytest.mark.parametrize("gamma", [1e-3, 1e-2])
+@pytest.mark.parametrize("n_limbs, nodes_per_limb, hub_hinge, fluid", VARIANTS)
+def test_potential_and_newton_direction_are_those_of_the_oracle(
+    compiled_direction, n_limbs, nodes_per_limb, hub_hinge, fluid, gamma
+):
+    robot, star = robot_and_star(n_limbs, nodes_per_limb, hub_hinge, fluid)
+    stages = RandomStages(star, gamma, bend=0.05)
+    found = stages.run(compiled_direction, rods_of(robot, fluid))
+    for lane in range(N_LANES):
+        phi = oracle.incremental_potential(star, stages.q[lane], *stages.data(lane))
+        gradient = oracle.incremental_gradient(star, stages.q[lane], *stages.data(lane))
+        hessian = stages.hessian(lane)
+        direction = np.linalg.solve(hessian, gradient.ravel()).reshape(-1, 2)
+        assert found.phi[lane] == pytest.approx(phi, rel=1e-12)
+        assert found.decrement[lane] == pytest.approx(np.sum(gradient * direction), rel=1e-11)
+        np.testing.assert_allclose(found.direction[lane], direction, rtol=0.0, atol=1e-11 * np.abs(direction).max())
+    np.testing.assert_allclose(found.moved, -found.direction, rtol=0.0, atol=1e-16)
+    np.testing.assert_allclose(found.largest, np.linalg.norm(found.direction, axis=2).max(axis=1), rtol=1e-14)
+
+
+@pytest.mark.parametrize("hub_hinge", HUBS)
+def test_newton_direction_of_wildly_bent_robots_is_as_good_as_their_matrix_allows(compiled_direction, hub_hinge):
+    robot, star = robot_and_star(hub_hinge=hub_hinge)
+    stages = RandomStages(star, 1e-3, bend=0.8, stretch=0.1, speed=1.0)
+    found = stages.run(compiled_direction, rods_of(robot))
+    for lane in range(N_LANES):
+        gradient = oracle.incremental_gradient(star, stages.q[lane], *stages.data(lane))
+        hessian = stages.hessian(lane)
+        direction = np.linalg.solve(hessian, gradient.ravel()).reshape(-1, 2)
+        error = np.abs(found.direction[lane] - direction).max() / np.abs(direction).max()
+        assert error < 1e-14 * np.linalg.cond(hessian)
+
+
+@pytest.mark.parametrize("hub_hinge", HUBS)
+@pytest.mark.parametrize("convex", [0.0, 1.0])
+def test_potential_falls_along_the_newton_direction_at_the_rate_of_the_decrement(compiled_direction, hub_hinge, convex):
+    robot, star = robot_and_star(hub_hinge=hub_hinge)
+    stages, rods = RandomStages(star, 0.01), rods_of(robot)
+    found = stages.run(compiled_direction, rods, convex)
+    move = 1e-3 * found.direction
+    ahead = stages.run(compiled_direction, rods, q=stages.q - move)
+    behind = stages.run(compiled_direction, rods, q=stages.q + move)
+    assert np.all(found.decrement > 0.0)
+    np.testing.assert_allclose((ahead.phi - behind.phi) / 2e-3, -found.decrement, rtol=1e-4)
+
+
+@pytest.mark.parametrize("hub_hinge", HUBS)
+@pytest.mark.parametrize("gamma", [3e-3, 5e-3, 7e-3])
+def test_smallest_pivot_is_positive_exactly_where_the_hessian_is_positive_definite(
+    compiled_direction, hub_hinge, gamma
+):
+    robot, star = robot_and_star(nodes_per_limb=4, hub_hinge=hub_hinge)
+    definite = []
+    for seed in range(8):
+        stages = RandomStages(star, gamma, bend=0.3, stretch=0.02, seed=seed)
+        found = stages.run(compiled_direction, rods_of(robot))
+        smallest = [np.linalg.eigvalsh(stages.hessian(lane))[0] for lane in range(N_LANES)]
+        np.testing.assert_array_equal(found.pivot > 0.0, np.array(smallest) > 0.0)
+        definite += list(found.pivot > 0.0)
+    assert 0 < sum(definite) < len(definite)
+
+
+@pytest.mark.parametrize("hub_hinge", HUBS)
+def test_repaired_matrix_is_the_sum_of_the_convex_parts_and_is_always_positive_definite(compiled_direction, hub_hinge):
+    robot, star = robot_and_star(nodes_per_limb=5, hub_hinge=hub_hinge)
+    stages = RandomStages(star, 0.05, bend=0.8, stretch=0.2, speed=1.0)
+    found = stages.run(compiled_direction, rods_of(robot), convex=1.0)
+    assert np.all(found.pivot > 0.0)
+    assert not all(np.linalg.eigvalsh(stages.hessian(lane))[0] > 0.0 for lane in range(N_LANES))
+    for lane in range(N_LANES):
+        gradient = oracle.incremental_gradient(star, stages.q[lane], *stages.data(lane))
+        direction = np.linalg.solve(stages.convex_hessian(lane), gradient.ravel()).reshape(-1, 2)
+        assert found.decrement[lane] == pytest.approx(np.sum(gradient * direction), rel=1e-9)
+        np.testing.assert_allclose(found.direction[lane], direction, rtol=0.0, atol=1e-9 * np.abs(direction).max())
+
+
+def test_a_matrix_that_is_not_a_number_does_not_pass_for_positive_definite(compiled_direction):
+    robot, star = robot_and_star(nodes_per_limb=4)
+    for node in range(star.n_nodes):
+        stages = RandomStages(star, 0.01)
+        stages.q[1, node] = np.nan
+        found = stages.run(compiled_direction, rods_of(robot))
+        assert not found.pivot[1] > 0.0
+        others = np.arange(N_LANES) != 1
+        assert np.all(found.pivot[others] > 0.0) and np.isfinite(found.direction[others]).all()
+
+
+def test_every_robot_may_have_coefficients_of_its_own(compiled_direction):
+    robot = Seastar(nodes_per_limb=4)
+    shared = Scene(robot=robot).rods()
+    stiffness, weight = np.linspace(0.5, 2.0, N_LANES), np.linspace(1.0, 3.0, N_LANES)
+    scales = {"mass": weight} | dict.fromkeys(("EA", "EA_over_l", "EI_over_dl"), stiffness)
+    scales |= dict.fromkeys(("l_over_EA", "dl_over_EI"), 1.0 / stiffness)
+    own = shared._replace(**{name: getattr(shared, name)[:, None] * scale for name, scale in scales.items()})
+    stages = RandomStages(Star(nodes_per_limb=4), 0.01)
+    for lane in range(N_LANES):
+        star = Star(nodes_per_limb=4, youngs_modulus=1e6 * stiffness[lane], density=1000.0 * weight[lane])
+        stages.star = star
+        gradient = oracle.incremental_gradient(star, stages.q[lane], *stages.data(lane))
+        direction = np.linalg.solve(stages.hessian(lane), gradient.ravel()).reshape(-1, 2)
+        found = stages.run(compiled_direction, own)
+        np.testing.assert_allclose(found.direction[lane], direction, rtol=0.0, atol=1e-11 * np.abs(direction).max())
+
+
+# Energies
+
+
+@pytest.mark.parametrize("n_limbs, nodes_per_limb, hub_hinge, fluid", VARIANTS)
+def test_energies_are_those_of_the_oracle(n_limbs, nodes_per_limb, hub_hinge, fluid):
+    robot, star = robot_and_star(n_limbs, nodes_per_limb, hub_hinge, fluid)
+    simulator = Simulator(Scene(robot=robot, actuator=SmaPulse(peak_angle=0.1)), n_robots=3)
+    rng = np.random.default_rng(0)
+    q = np.array([random_shape(star, 0.3, 0.05, rng) for _ in range(3)])
+    v = rng.standard_normal(q.shape)
+    simulator.set_state((q, v, np.zeros(3)))
+    still = np.zeros(n_limbs)
+    np.testing.assert_allclose(
+        simulator.elastic_energy(), [oracle.elastic_energy(star, x, still) for x in q], rtol=1e-12
+    )
+    np.testing.assert_allclose(simulator.kinetic_energy(), [oracle.kinetic_energy(star, x) for x in v], rtol=1e-13)
+
+
+def test_elastic_energy_within_a_stroke_is_that_of_the_present_actuation():
+    simulator, star = Simulator(Scene(numerics=Numerics(step=0.01)), n_robots=2), Star()
+    commands = np.array([[0.0, 1.0, 0.0, 0.0, -1.0], [0.3, 0.0, 0.0, -0.7, 0.0]])
+    for time in simulator.stroke_in_parts(commands, 10):
+        delta_psi = commands * oracle.pulse(round(time, 9))
+        expected = [oracle.elastic_energy(star, q, d) for q, d in zip(simulator.positions, delta_psi, strict=True)]
+        np.testing.assert_allclose(simulator.elastic_energy(), expected, rtol=1e-9, atol=1e-16)
+
+
+# Steps
+
+TIGHT = 1e-13
+
+
+def short_stroke(scheme: str, robot: Seastar, fluid: bool, h: float) -> Scene:
+    """Two steps of heating and two of cooling."""
+    return Scene(
+        robot=robot,
+        fluid=Water() if fluid else None,
+        actuator=SmaPulse(peak_angle=0.3, heating_time=2.0 * h, cooling_time=2.0 * h),
+        numerics=Numerics(scheme, h, newton_tolerance=TIGHT),
+    )
+
+
+@pytest.mark.parametrize("scheme", oracle.TABLEAUS)
+@pytest.mark.parametrize(
+    "n_limbs, nodes_per_limb, hub_hinge, fluid",
+    [(5, 10, "opening", True), (5, 3, "turning", True), (4, 4, "opening", False), (3, 2, "opening", True)],
+)
+def test_four_steps_from_a_moving_bent_robot_are_those_of_the_oracle(scheme, n_limbs, nodes_per_limb, hub_hinge, fluid):
+    h = 0.01
+    robot, star = robot_and_star(n_limbs, nodes_per_limb, hub_hinge, fluid)
+    simulator = Simulator(short_stroke(scheme, robot, fluid, h))
+    rng = np.random.default_rng(3)
+    q, v = random_shape(star, 0.05, 1e-3, rng), 0.02 * rng.standard_normal((star.n_nodes, 2))
+    commands = rng.uniform(-1.0, 1.0, n_limbs)
+    simulator.set_state((q[None], v[None], np.zeros(1)))
+    report = simulator.stroke(commands[None])
+    for k in range(4):
+        pulse = {"peak_angle": 0.3, "heating_time": 2.0 * h, "cooling_time": 2.0 * h}
+        q, v = oracle.step(star, q, v, k * h, h, commands, scheme, **pulse)
+    assert report.status[0] == 0 and report.halvings[0] == 0
+    np.testing.assert_allclose(simulator.positions[0], q, rtol=0.0, atol=1e-11 * robot.limb_length)
+    np.testing.assert_allclose(simulator.velocities[0], v, rtol=0.0, atol=1e-9 * np.abs(v).max())
+
+
+def the_rest(stroke) -> StrokeReport:
+    """Finish a stroke in parts."""
+    while True:
+        try:
+            next(stroke)
+        except StopIteration as finished:
+            return finished.value
+
+
+@pytest.mark.parametrize("hub_hinge", HUBS)
+def test_stages_where_plain_newton_diverges_end_at_a_minimum_of_the_oracles_potential(hub_hinge):
+    """Velocities of 1 m/s at h = 10 ms, as in tests/test_oracle.py: line search and repairs do the work."""
+    h, n_robots = 0.01, 12
+    robot, star = robot_and_star(hub_hinge=hub_hinge)
+    actuator = SmaPulse(peak_angle=0.0, heating_time=h, cooling_time=h)
+    numerics = Numerics("implicit-euler", h, newton_tolerance=TIGHT, max_iterations=500)
+    simulator = Simulator(Scene(robot=robot, actuator=actuator, numerics=numerics), n_robots)
+    v_hat = np.random.default_rng(0).standard_normal((n_robots, star.n_nodes, 2))
+    simulator.set_state((np.tile(star.rest, (n_robots, 1, 1)), v_hat, np.zeros(n_robots)))
+    stroke = simulator.stroke_in_parts(np.zeros((n_robots, 5)), 2)
+    next(stroke)
+    q, v = simulator.positions, simulator.velocities
+    report = the_rest(stroke)
+    whole = report.halvings == 0
+    assert whole.sum() >= n_robots // 2
+    assert report.repairs[whole].min() > 0 and report.backtracks.sum() > 0
+    for k in np.flatnonzero(whole):
+        phi = oracle.incremental_potential(star, star.rest + h * v_hat[k], star.rest, v_hat[k], h, np.zeros(5))
+        assert oracle.incremental_potential(star, q[k], star.rest, v_hat[k], h, np.zeros(5)) < phi
+        residual = oracle.incremental_gradient(star, q[k], star.rest, v_hat[k], h, np.zeros(5))
+        inertia = star.masses[:, None] * (v[k] - v_hat[k]) / h
+        np.testing.assert_allclose(residual, 0.0, atol=1e-9 * np.abs(inertia).max())
+        assert np.linalg.eigvalsh(oracle.incremental_hessian(star, q[k], star.rest, h, np.zeros(5)))[0] > 0.0

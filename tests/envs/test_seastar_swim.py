@@ -1,0 +1,525 @@
+"""One robot behind Gymnasium: spaces, reward, episodes and refusals are what the docstring says."""
+
+import copy
+import math
+import pickle
+import warnings
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import seastar_gym
+from seastar_gym import Numerics, RewardWeights, Scene, Seastar, SmaPulse, SolverStatus
+from seastar_gym.envs.paths import PATH_NAMES, cross_track_error
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+
+STRAIGHT = np.array([0, 1, 0, 0, 2])
+REST = np.zeros(5, int)
+FACTS = {"time", "hub_position", "waypoint_index", "distance", "cross_track_error"}
+OF_A_STROKE = {
+    "is_success", "limbs_heated", "newton_iterations", "solver_status", "smallest_opening_angle", "reward_progress",
+    "reward_waypoint", "reward_effort",
+}  # fmt: skip
+
+
+def fast(**arguments) -> SeastarSwimEnv:
+    return SeastarSwimEnv(fidelity="fast", **arguments)
+
+
+def random_episode(env, n_strokes: int, seed: int = 0, **options):
+    """Observations, rewards and infos of strokes with random actions."""
+    rng = np.random.default_rng(seed)
+    observation, info = env.reset(seed=seed, **options)
+    observations, rewards, infos = [observation], [], [info]
+    for _ in range(n_strokes):
+        observation, reward, terminated, truncated, info = env.step(rng.integers(0, 3, 5))
+        assert not terminated and not truncated
+        observations.append(observation)
+        rewards.append(reward)
+        infos.append(info)
+    return np.array(observations), np.array(rewards), infos
+
+
+# Contracts
+
+
+@pytest.mark.parametrize("actions", ["limbs", "joint", "pairs"])
+@pytest.mark.parametrize("arguments", [{}, {"path": "random", "random_heading": True}])
+def test_gymnasiums_checker_passes(actions, arguments):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", "A Box observation space|.*Box observation space (minimum|maximum)")
+        check_env(fast(actions=actions, **arguments), skip_render_check=True)
+
+
+def test_gymnasiums_checker_passes_with_pictures():
+    pytest.importorskip("pygame")
+    check_env(gym.make("SeastarSwim-v0", render_mode="rgb_array", fidelity="fast").unwrapped)
+
+
+@pytest.mark.parametrize("actions", ["limbs", "joint", "pairs"])
+def test_stable_baselines_checker_passes(actions):
+    sb3 = pytest.importorskip("stable_baselines3.common.env_checker")
+    sb3.check_env(fast(actions=actions), warn=True, skip_render_check=True)
+
+
+def test_make_gives_the_documented_environment():
+    env = gym.make("SeastarSwim-v0")
+    assert isinstance(env.unwrapped, SeastarSwimEnv)
+    assert env.action_space == gym.spaces.MultiDiscrete([3] * 5)
+    assert env.observation_space == gym.spaces.Box(-np.inf, np.inf, (186,), np.float32)
+    assert env.unwrapped.scene == Scene(numerics=Numerics.preset("balanced"))
+    assert env.spec.max_episode_steps == 400
+    assert env.unwrapped.simulator.n_robots == 1
+    assert "SeastarSwim-v0" in gym.registry and seastar_gym.__version__
+
+
+@pytest.mark.parametrize("n_limbs, nodes_per_limb", [(3, 4), (6, 10)])
+def test_spaces_follow_the_robot(n_limbs, nodes_per_limb):
+    scene = Scene(Seastar(n_limbs, nodes_per_limb), actuator=SmaPulse(0.3), numerics=Numerics.preset("fast"))
+    env = SeastarSwimEnv(scene=scene)
+    assert env.action_space == gym.spaces.MultiDiscrete([3] * n_limbs)
+    observation, _ = env.reset(seed=0)
+    assert observation.shape == env.observation_space.shape == (4 * n_limbs * (nodes_per_limb - 1) + 6,)
+    assert env.step([1] + [2] * (n_limbs - 1))[0].shape == observation.shape
+
+
+def test_fidelity_replaces_the_numerics_of_a_scene_and_nothing_else():
+    scene = Scene(Seastar(density=1100.0), numerics=Numerics("sdirk3", 0.05))
+    assert SeastarSwimEnv(scene=scene).scene == scene
+    assert SeastarSwimEnv(scene=scene, fidelity="chapter").scene == Scene(
+        scene.robot, numerics=Numerics.preset("chapter")
+    )
+
+
+def test_types_of_a_step_are_plain():
+    env = fast()
+    env.reset(seed=0)
+    observation, reward, terminated, truncated, info = env.step(STRAIGHT)
+    assert observation.dtype == np.float32
+    assert type(reward) is float and type(terminated) is bool and type(truncated) is bool
+    assert set(info) == FACTS | OF_A_STROKE
+    for name, value in info.items():
+        if name == "hub_position":
+            assert value.shape == (2,) and value.dtype == np.float64
+        else:
+            assert type(value) in (int, float, bool), name
+    assert env.reset()[1].keys() == FACTS
+
+
+# Physics behind the step
+
+
+def test_a_step_is_one_stroke_of_the_simulator():
+    env = SeastarSwimEnv(scene=Scene(numerics=Numerics("implicit-euler", 0.01)))
+    env.reset(seed=0)
+    for _ in range(10):
+        info = env.step(STRAIGHT)[4]
+    assert info["hub_position"][0] == pytest.approx(36.025e-3, rel=1e-3)
+    assert info["time"] == 10.0
+
+
+@pytest.mark.parametrize("actions", ["joint", "pairs"])
+def test_table_actions_do_what_the_limb_actions_they_stand_for_do(actions):
+    by_table, by_limb = fast(actions=actions), fast()
+    row = np.flatnonzero((by_table.command_table == [0, 1, 0, 0, -1]).all(axis=1))
+    assert by_limb.command_table is None and len(row) == 1
+    by_table.reset(seed=0)
+    by_limb.reset(seed=0)
+    for action, limbs in ((row[0], STRAIGHT), (0, REST)):
+        one, other = by_table.step(action), by_limb.step(limbs)
+        np.testing.assert_array_equal(one[0], other[0])
+        assert one[1:4] == other[1:4]
+
+
+# Observation
+
+
+def test_observation_is_that_of_the_simulators_state():
+    """Recomputed from positions and velocities with complex numbers, index by index."""
+    env, rng = fast(path="random", random_heading=True), np.random.default_rng(0)
+    observation, _ = env.reset(seed=3)
+    rest = env.scene.robot.nodes() @ [1.0, 1j]
+    for _ in range(10):
+        q, v = env.simulator.positions[0] @ [1.0, 1j], env.simulator.velocities[0] @ [1.0, 1j]
+        turn = np.exp(-1j * np.angle(np.sum(np.conj(rest) * (q - q[0]))))
+        way = env.waypoints @ [1.0, 1j]
+        expected = (
+            np.concatenate([(q[1:] - q[0]) / 0.1, (v[1:] - v[0]) / 0.025, v[:1] / 0.025, (way[:2] - q[0]) / 0.1]) * turn
+        )
+        np.testing.assert_allclose(observation[0::2], expected.real, rtol=2e-7, atol=1e-6)
+        np.testing.assert_allclose(observation[1::2], expected.imag, rtol=2e-7, atol=1e-6)
+        observation, _, _, _, info = env.step(rng.integers(0, 3, 5))
+        assert info["waypoint_index"] == 0
+
+
+def test_next_waypoint_is_the_current_one_on_the_last_leg():
+    env = fast(path=[[0.004, 0.0], [0.3, 0.1]], waypoint_radius=0.005)
+    observation, _ = env.reset(seed=0)
+    np.testing.assert_allclose(observation[182:], [0.04, 0.0, 3.0, 1.0], atol=1e-6)
+    observation, _, _, _, info = env.step(STRAIGHT)
+    assert info["waypoint_index"] == 1
+    np.testing.assert_array_equal(observation[182:184], observation[184:186])
+
+
+@pytest.mark.parametrize("far", [0.05, 0.3, 12.0])
+def test_distance_to_the_target_can_be_read_from_the_observation(far):
+    env = fast(path=[[0.0, far]])
+    observation, info = env.reset(seed=0)
+    for _ in range(3):
+        assert 0.1 * np.hypot(*observation[182:184].astype(float)) == pytest.approx(info["distance"], rel=1e-6)
+        observation, _, _, _, info = env.step(STRAIGHT)
+
+
+def test_the_same_episode_under_another_heading_looks_the_same():
+    """random_heading draws the heading after the path; an array as path draws nothing."""
+    path = np.array([[0.1, 0.02], [0.2, -0.05]])
+    heading = gym.utils.seeding.np_random(5)[0].uniform(-np.pi, np.pi)
+    assert abs(heading) > 0.1
+    c, s = np.cos(heading), np.sin(heading)
+    here, there = fast(path=path), fast(path=path @ [[c, s], [-s, c]], random_heading=True)
+    seen_here, rewards_here, _ = random_episode(here, 20, seed=5)
+    seen_there, rewards_there, _ = random_episode(there, 20, seed=5)
+    np.testing.assert_allclose(seen_there, seen_here, rtol=0.0, atol=1e-5)
+    np.testing.assert_allclose(rewards_there, rewards_here, rtol=0.0, atol=1e-8)
+    assert np.abs(there.simulator.positions - here.simulator.positions).max() > 0.01
+
+
+def test_no_number_of_the_observation_is_constant():
+    env = fast(path=[[0.003, 0.0], [0.2, 0.1]], waypoint_radius=0.005)
+    observations, _, _ = random_episode(env, 20)
+    assert np.ptp(observations, axis=0).min() > 1e-6
+    assert min(len(np.unique(column)) for column in observations.T) > 10
+    assert np.isfinite(observations).all()
+
+
+def test_no_observation_shares_memory_with_the_next_or_with_the_simulator():
+    env = fast()
+    first, info = env.reset(seed=0)
+    kept, kept_info = first.copy(), copy.deepcopy(info)
+    second = env.step(STRAIGHT)[0]
+    assert not np.shares_memory(first, second)
+    np.testing.assert_array_equal(first, kept)
+    np.testing.assert_array_equal(info["hub_position"], kept_info["hub_position"])
+    state, table = env.simulator.get_state(), env.waypoints
+    second[:], info["hub_position"][:], table[:] = 7.0, 7.0, 7.0
+    np.testing.assert_array_equal(env.simulator.positions, state.positions)
+    assert np.abs(env.waypoints).max() < 1.0
+
+
+# Reward and waypoints
+
+
+def test_reward_is_the_sum_of_its_terms_and_they_are_what_their_names_say():
+    path = np.array([[0.002, 0.001], [0.004, 0.0], [0.15, 0.1]])
+    weights = RewardWeights(progress=150.0, waypoint=2.5, effort=0.03)
+    env, rng = fast(path=path, waypoint_radius=0.004, reward=weights), np.random.default_rng(0)
+    env.reset(seed=0)
+    hub, index = np.zeros(2), 0
+
+    def way_to_go(hub: np.ndarray, index: int) -> float:
+        points = np.vstack([hub, path[index:]])
+        return np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+
+    indices = []
+    for _ in range(15):
+        action = rng.integers(0, 3, 5)
+        _, reward, _, _, info = env.step(action)
+        new_hub, new_index = info["hub_position"], index
+        while new_index < 3 and np.linalg.norm(path[new_index] - new_hub) <= 0.004:
+            new_index += 1
+        assert info["waypoint_index"] == new_index
+        assert info["limbs_heated"] == np.count_nonzero(action)
+        assert info["reward_progress"] == pytest.approx(150.0 * (way_to_go(hub, index) - way_to_go(new_hub, new_index)))
+        assert info["reward_waypoint"] == 2.5 * (new_index - index)
+        assert info["reward_effort"] == pytest.approx(-0.03 * np.count_nonzero(action))
+        assert reward == pytest.approx(
+            info["reward_progress"] + info["reward_waypoint"] + info["reward_effort"], rel=1e-14
+        )
+        assert info["distance"] == pytest.approx(np.linalg.norm(path[new_index] - new_hub))
+        start = path[new_index - 1] if new_index else np.zeros(2)
+        assert info["cross_track_error"] == pytest.approx(float(cross_track_error(new_hub, start, path[new_index])))
+        hub, index = new_hub, new_index
+        indices.append(index)
+    assert indices[-1] == 2
+
+
+def test_progress_adds_up_to_the_way_the_robot_came_nearer():
+    """The sum telescopes: no reward is to be had by swimming to and fro."""
+    env = fast(path=[[0.3, 0.0]], reward=RewardWeights(progress=1.0, waypoint=0.0, effort=0.0))
+    _, rewards, infos = random_episode(env, 30)
+    assert rewards.sum() == pytest.approx(infos[0]["distance"] - infos[-1]["distance"], abs=1e-12)
+
+
+def test_one_stroke_passes_all_the_waypoints_in_reach():
+    env = fast(path=[[0.004, 0.0], [0.005, 0.0], [0.006, 0.0], [0.3, 0.0]], waypoint_radius=0.005)
+    assert env.reset(seed=0)[1]["waypoint_index"] == 0  # passing takes a stroke
+    _, _, terminated, _, info = env.step(STRAIGHT)
+    assert info["waypoint_index"] == 3 and not terminated and not info["is_success"]
+    assert info["reward_waypoint"] == 3.0
+
+
+def test_waypoints_count_in_order_only():
+    env = fast(path=[[0.3, 0.0], [0.004, 0.0]], waypoint_radius=0.005)
+    env.reset(seed=0)
+    assert env.step(STRAIGHT)[4]["waypoint_index"] == 0
+
+
+def test_an_episode_is_over_with_success_at_the_last_waypoint():
+    env = fast(path=[[0.012, 0.0]], waypoint_radius=0.005)
+    env.reset(seed=0)
+    ends = [env.step(STRAIGHT) for _ in range(2)]
+    assert [terminated for _, _, terminated, _, _ in ends] == [False, True]
+    info = ends[1][4]
+    assert info["is_success"] is True and info["waypoint_index"] == 1 and ends[0][4]["is_success"] is False
+    assert info["distance"] == pytest.approx(abs(0.012 - info["hub_position"][0]), rel=1e-6)
+    with pytest.raises(gym.error.ResetNeeded, match=r"reset\(\)"):
+        env.step(STRAIGHT)
+    env.reset()
+    assert env.step(STRAIGHT)[2] is False
+
+
+def test_waypoint_radius_is_the_distance_within_which_a_waypoint_counts():
+    probe = fast(path=[[0.3, 0.0]])
+    probe.reset(seed=0)
+    x = probe.step(STRAIGHT)[4]["hub_position"][0]
+    for radius, reached in ((0.01, True), (0.0099, False)):
+        env = fast(path=[[x + 0.00999, 0.0]], waypoint_radius=radius)
+        env.reset(seed=0)
+        assert env.step(STRAIGHT)[2] is reached
+
+
+# Episodes
+
+
+def test_time_limit_truncates():
+    env = gym.make("SeastarSwim-v0", max_episode_steps=3, fidelity="fast")
+    env.reset(seed=0)
+    ends = [env.step(REST)[2:4] for _ in range(3)]
+    assert ends == [(False, False), (False, False), (False, True)]
+
+
+def test_seeds_decide_everything():
+    def episode(seed):
+        return random_episode(fast(path="random", random_heading=True), 5, seed=seed)[0]
+
+    np.testing.assert_array_equal(episode(1), episode(1))
+    assert np.abs(episode(1)[0] - episode(2)[0]).max() > 1e-3
+
+
+def test_episodes_without_a_new_seed_differ():
+    env = fast(path="random", random_heading=True)
+    env.reset(seed=0)
+    first, heading = env.waypoints, env.simulator.positions
+    env.reset()
+    assert np.abs(env.waypoints - first).max() > 1e-3
+    assert np.abs(env.simulator.positions - heading).max() > 1e-3
+
+
+def test_no_state_leaks_across_a_reset():
+    used, new = fast(), fast()
+    random_episode(used, 5, seed=7)
+    one, other = random_episode(used, 5, seed=1), random_episode(new, 5, seed=1)
+    np.testing.assert_array_equal(one[0], other[0])
+    np.testing.assert_array_equal(one[1], other[1])
+
+
+@pytest.mark.parametrize("path", [*PATH_NAMES, [[0.1, 0.2]], np.array([[1, 2], [3, 4]])], ids=str)
+def test_every_path_can_be_asked_for_at_making_and_at_a_reset(path):
+    made, asked = fast(path=path), fast(path="line")
+    made.reset(seed=4)
+    asked.reset(seed=4, options={"path": path})
+    np.testing.assert_array_equal(made.waypoints, asked.waypoints)
+    asked.reset(seed=4)
+    np.testing.assert_array_equal(asked.waypoints, [[0.3, 0.0]])
+
+
+def test_a_path_is_copied_when_the_environment_is_made():
+    path = np.array([[0.1, 0.2]])
+    env = fast(path=path)
+    path[:] = 9.0
+    env.reset(seed=0)
+    np.testing.assert_array_equal(env.waypoints, [[0.1, 0.2]])
+
+
+def test_random_heading_turns_the_robot_and_its_absence_does_not():
+    env = fast(random_heading=True)
+    env.reset(seed=0)
+    tip = env.simulator.positions[0, 9]
+    assert np.hypot(*tip) == pytest.approx(0.1) and abs(tip[1]) > 1e-3
+    plain = fast()
+    plain.reset(seed=0)
+    np.testing.assert_array_equal(plain.simulator.positions[0], Seastar().nodes())
+
+
+def test_pickled_environments_continue_to_the_same_bits():
+    env = gym.make("SeastarSwim-v0", path="random", random_heading=True, max_episode_steps=8)
+    env.reset(seed=0)
+    env.step(STRAIGHT)
+    twins = [env, pickle.loads(pickle.dumps(env)), copy.deepcopy(env)]
+    rng = np.random.default_rng(0)
+    for k in range(12):
+        action = rng.integers(0, 3, 5)
+        results = [twin.reset() if k == 7 else twin.step(action) for twin in twins]
+        for other in results[1:]:
+            np.testing.assert_array_equal(results[0][0], other[0])
+            if k != 7:
+                assert results[0][1:4] == other[1:4]
+
+
+# Failure
+
+
+def break_robot(env: SeastarSwimEnv) -> None:
+    """Put all nodes into one point, where no angle is defined."""
+    state = env.simulator.get_state()
+    env.simulator.set_state(state._replace(positions=np.full_like(state.positions, 0.02)))
+
+
+def test_a_solver_that_gives_up_ends_the_episode_with_a_status_and_a_sentence():
+    env = fast()
+    env.reset(seed=0)
+    break_robot(env)
+    observation, reward, terminated, truncated, info = env.step(STRAIGHT)
+    assert terminated is True and truncated is False
+    assert SolverStatus(info["solver_status"]) is SolverStatus.NOT_CONVERGED
+    assert info["solver_message"] == SolverStatus.NOT_CONVERGED.sentence
+    assert info["is_success"] is False
+    assert np.isfinite(observation).all() and math.isfinite(reward)
+    assert all(np.isfinite(value).all() for name, value in info.items() if name != "solver_message")
+    with pytest.raises(gym.error.ResetNeeded):
+        env.step(STRAIGHT)
+    env.reset(seed=0)
+    fresh = fast()
+    fresh.reset(seed=0)
+    np.testing.assert_array_equal(env.step(STRAIGHT)[0], fresh.step(STRAIGHT)[0])
+
+
+def test_a_converged_stroke_has_no_message():
+    env = fast()
+    env.reset(seed=0)
+    info = env.step(STRAIGHT)[4]
+    assert info["solver_status"] == SolverStatus.CONVERGED and "solver_message" not in info
+
+
+# Refusals
+
+
+def test_a_step_before_the_first_reset_is_refused():
+    with pytest.raises(gym.error.ResetNeeded, match=r"reset\(\) before step\(\)\.$"):
+        fast().step(REST)
+
+
+@pytest.mark.parametrize(
+    "action", [[0.0] * 5, [np.nan] * 5, [0] * 4, 0, [[0] * 5], [3] * 5, [-1] * 5, None, [True] * 5], ids=str
+)
+def test_what_is_no_action_is_refused_and_changes_nothing(action):
+    env = fast()
+    env.reset(seed=0)
+    env.step(STRAIGHT)
+    before = env.simulator.get_state()
+    with pytest.raises(ValueError, match=r'^With actions="limbs" .*\.$'):
+        env.step(action)
+    for one, other in zip(env.simulator.get_state(), before, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        ({"path": "hexagon"}, "hexagon"),
+        ({"path": []}, "at least one waypoint"),
+        ({"path": [[0.0, np.nan]]}, "finite"),
+        ({"path": [1.0, 2.0]}, "shape"),
+        ({"path": None}, "path"),
+        ({"actions": "binary"}, "actions"),
+        ({"fidelity": "exact"}, "fidelity"),
+        ({"scene": "chapter"}, "Scene"),
+        ({"scene": Seastar()}, "Scene"),
+        ({"reward": {"progress": 1.0}}, "RewardWeights"),
+        ({"waypoint_radius": 0.0}, "waypoint_radius"),
+        ({"waypoint_radius": np.nan}, "waypoint_radius"),
+        ({"waypoint_radius": "10 mm"}, "waypoint_radius"),
+        ({"render_mode": "ansi"}, "render_mode"),
+        ({"frames_per_stroke": 0}, "frames_per_stroke"),
+        ({"scene": Scene(Seastar(hub_hinge="turning"))}, "turning"),
+    ],
+    ids=str,
+)
+def test_arguments_that_mean_nothing_are_refused_with_a_sentence(arguments, words):
+    with pytest.raises(ValueError, match=words) as caught:
+        SeastarSwimEnv(**arguments)
+    assert str(caught.value).endswith(".") and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["progress", "waypoint", "effort"])
+@pytest.mark.parametrize("value", [-1.0, np.nan, np.inf, "1", None])
+def test_weights_are_finite_and_not_negative(name, value):
+    with pytest.raises(ValueError, match=rf"RewardWeights\.{name} .*\.$"):
+        RewardWeights(**{name: value})
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        ({"heading": 1.0}, "heading"),
+        ({"Path": "line"}, "Path"),
+        ({"path": "hexagon"}, "hexagon"),
+        ({"path": [[np.nan, 0]]}, "finite"),
+        ({"path": []}, "at least one"),
+    ],
+)
+def test_reset_options_that_mean_nothing_are_refused_and_the_episode_goes_on(options, words):
+    env = fast()
+    env.reset(seed=0)
+    env.step(STRAIGHT)
+    before, waypoints = env.simulator.positions, env.waypoints
+    with pytest.raises(ValueError, match=words) as caught:
+        env.reset(options=options)
+    assert str(caught.value).endswith(".")
+    np.testing.assert_array_equal(env.simulator.positions, before)
+    np.testing.assert_array_equal(env.waypoints, waypoints)
+    assert env.step(STRAIGHT)[4]["time"] == 2.0
+
+
+# Pictures
+
+
+@pytest.fixture
+def no_display(monkeypatch):
+    pygame = pytest.importorskip("pygame")
+    pygame.display.quit()
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    yield
+    pygame.display.quit()
+
+
+@pytest.mark.parametrize("render_mode", ["rgb_array", "rgb_array_list", "human"])
+def test_being_watched_changes_no_bit(render_mode, no_display):
+    watched, alone = fast(render_mode=render_mode, frames_per_stroke=3), fast()
+    pictures, actions = [], [STRAIGHT, [1, 2, 0, 1, 0]]
+    for env in (watched, alone):
+        env.reset(seed=0)
+    for action in actions[:1] if render_mode == "human" else actions:  # a window shows a stroke in a second
+        one, other = watched.step(action), alone.step(action)
+        np.testing.assert_array_equal(one[0], other[0])
+        assert one[1:4] == other[1:4]
+        pictures.append(watched.render())
+    match render_mode:
+        case "rgb_array":
+            assert pictures[0].dtype == np.uint8 and pictures[0].ndim == 3 and np.any(pictures[0] != pictures[1])
+        case "rgb_array_list":
+            assert [len(frames) for frames in pictures] == [4, 3]  # the first with that of the reset
+        case "human":
+            assert pictures == [None]
+    watched.close()
+    watched.close()
+
+
+def test_rendering_without_a_mode_warns_and_draws_nothing():
+    env = fast()
+    env.reset(seed=0)
+    with pytest.warns(UserWarning, match="render_mode"):
+        assert env.render() is None

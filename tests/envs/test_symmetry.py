@@ -1,0 +1,348 @@
+"""A robot turned by a sector or mirrored is the same robot: observations, commands and actions say so."""
+
+import pickle
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+from hypothesis import given
+from hypothesis import strategies as st
+
+from seastar_gym import Numerics, Scene, Seastar
+from seastar_gym.envs import symmetry
+from seastar_gym.envs.commands import command_table, to_commands
+from seastar_gym.envs.observation import observation_size
+from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
+
+N_LIMBS = (3, 4, 5, 7, 8)
+MODES = ("limbs", "joint", "pairs")
+ROUNDING = 2e-6  # of float32 observations of order one
+
+
+def observations_of(n_limbs, n=50, nodes_per_limb=4, dtype=np.float64, seed=0):
+    size = observation_size(n_limbs * (nodes_per_limb - 1) + 1)
+    return np.random.default_rng(seed).normal(size=(n, size)).astype(dtype)
+
+
+def matrix(element, n_limbs):
+    """Of an element, from its definition."""
+    k = (element + 1) // 2
+    c, s = np.cos(2 * np.pi * k / n_limbs), np.sin(2 * np.pi * k / n_limbs)
+    turn = np.array([[c, s], [-s, c]])
+    return turn if element % 2 == 0 else np.diag([1.0, -1.0]) @ turn
+
+
+def random_actions(mode, n_limbs, n, seed=1):
+    rng = np.random.default_rng(seed)
+    if mode == "limbs":
+        return rng.integers(0, 3, (n, n_limbs))
+    return rng.integers(0, len(command_table(mode, n_limbs)), n)
+
+
+def direction(observations):
+    return np.arctan2(observations[..., -3], observations[..., -4])
+
+
+# --- the group -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("n_limbs", N_LIMBS)
+def test_elements_multiply_as_their_matrices(n_limbs):
+    for first in range(2 * n_limbs):
+        for second in range(2 * n_limbs):
+            product = symmetry.compose(second, first, n_limbs)
+            np.testing.assert_allclose(
+                matrix(product, n_limbs), matrix(second, n_limbs) @ matrix(first, n_limbs), atol=1e-12
+            )
+
+
+@pytest.mark.parametrize("n_limbs", N_LIMBS)
+def test_inverse_undoes(n_limbs):
+    elements = np.arange(2 * n_limbs)
+    undone = symmetry.inverse(elements, n_limbs)
+    np.testing.assert_array_equal(symmetry.compose(undone, elements, n_limbs), 0)
+    np.testing.assert_array_equal(symmetry.compose(elements, undone, n_limbs), 0)
+
+
+@pytest.mark.parametrize("n_limbs", N_LIMBS)
+def test_limbs_go_where_the_rest_shape_goes(n_limbs):
+    """Carrying every node of the rest shape by the matrix gives the rest shape with its limbs in `limb_order`."""
+    tips = Seastar(n_limbs=n_limbs, nodes_per_limb=2).nodes()[1:]
+    for element in range(2 * n_limbs):
+        carried = tips @ matrix(element, n_limbs).T
+        np.testing.assert_allclose(carried[symmetry.limb_order(n_limbs)[element]], tips, atol=1e-15)
+
+
+# --- observations ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("n_limbs", N_LIMBS)
+def test_every_vector_is_carried_by_the_matrix_and_moves_with_its_limb(n_limbs):
+    observations = observations_of(n_limbs, n=2 * n_limbs)
+    carried = symmetry.transform_observations(observations, np.arange(2 * n_limbs), n_limbs)
+    for element in range(2 * n_limbs):
+        before, after = (one[element].reshape(-1, 2) for one in (observations, carried))
+        expected = before @ matrix(element, n_limbs).T
+        n_nodes = (len(expected) - 3) // 2
+        order = symmetry.limb_order(n_limbs)[element]
+        for block in (slice(0, n_nodes), slice(n_nodes, 2 * n_nodes)):
+            limbs = expected[block].reshape(n_limbs, -1, 2)
+            np.testing.assert_allclose(after[block].reshape(n_limbs, -1, 2), limbs[order], atol=1e-14)
+        np.testing.assert_allclose(after[2 * n_nodes :], expected[2 * n_nodes :], atol=1e-14)
+
+
+@pytest.mark.parametrize("n_limbs", N_LIMBS)
+@pytest.mark.parametrize("dtype, atol", [(np.float64, 1e-13), (np.float32, ROUNDING)])
+def test_reduced_waypoints_lie_in_sector_zero(n_limbs, dtype, atol):
+    reduced, elements = symmetry.reduce_observations(observations_of(n_limbs, 500, dtype=dtype), n_limbs)
+    assert reduced.dtype == dtype
+    assert set(elements) == set(range(2 * n_limbs))
+    assert direction(reduced).min() >= -atol
+    assert direction(reduced).max() <= np.pi / n_limbs + atol
+
+
+@pytest.mark.parametrize("n_limbs", N_LIMBS)
+def test_reduced_observations_are_restored_by_the_inverse(n_limbs):
+    observations = observations_of(n_limbs)
+    reduced, elements = symmetry.reduce_observations(observations, n_limbs)
+    restored = symmetry.transform_observations(reduced, symmetry.inverse(elements, n_limbs), n_limbs)
+    np.testing.assert_allclose(restored, observations, atol=1e-14)
+
+
+@pytest.mark.parametrize("n_limbs", N_LIMBS)
+def test_reduction_does_not_tell_carried_robots_apart(n_limbs):
+    observations = observations_of(n_limbs)
+    reduced, _ = symmetry.reduce_observations(observations, n_limbs)
+    for element in range(2 * n_limbs):
+        carried = symmetry.transform_observations(observations, element * np.ones(len(observations), int), n_limbs)
+        np.testing.assert_allclose(symmetry.reduce_observations(carried, n_limbs)[0], reduced, atol=1e-13)
+
+
+def test_element_zero_changes_no_bit_and_shares_no_memory():
+    observations = observations_of(5, dtype=np.float32)
+    same = symmetry.transform_observations(observations, np.zeros(len(observations), int), 5)
+    np.testing.assert_array_equal(same, observations)
+    assert not np.shares_memory(same, observations)
+
+
+def test_one_observation_is_a_batch_without_an_axis():
+    observations = observations_of(5)
+    batch, elements = symmetry.reduce_observations(observations, 5)
+    for one, reduced, element in zip(observations, batch, elements, strict=True):
+        alone, its_element = symmetry.reduce_observations(one, 5)
+        np.testing.assert_array_equal(alone, reduced)
+        assert its_element == element and its_element.shape == ()
+
+
+def test_observations_of_another_robot_are_refused():
+    with pytest.raises(ValueError, match="not that of a robot of 7 limbs"):
+        symmetry.reduce_observations(observations_of(5), 7)
+
+
+# --- boundaries ------------------------------------------------------------------------------------------------------
+
+
+def aimed(n_limbs, current, following, distance=1.0):
+    """An observation with the waypoints in these directions [rad]."""
+    observation = observations_of(n_limbs, n=1, dtype=np.float32)[0]
+    observation[-4:] = np.array([np.cos(current), np.sin(current), np.cos(following), np.sin(following)]) * distance
+    return observation
+
+
+@given(n_limbs=st.sampled_from(N_LIMBS), boundary=st.integers(0, 30), left=st.booleans(), noise=st.floats(-2e-7, 2e-7))
+def test_on_a_boundary_the_next_waypoint_decides_and_rounding_does_not(n_limbs, boundary, left, noise):
+    width = np.pi / n_limbs
+    angle = boundary * width
+    observation = aimed(n_limbs, angle + noise, angle + (1.0 if left else -1.0))
+    assert symmetry.sectors(observation, n_limbs) == (boundary if left else boundary - 1) % (2 * n_limbs)
+
+
+@pytest.mark.parametrize("n_limbs", N_LIMBS)
+@pytest.mark.parametrize("behind", [0.0, np.pi])
+def test_where_nothing_decides_the_sector_is_that_anticlockwise_of_the_boundary(n_limbs, behind):
+    for boundary in range(2 * n_limbs):
+        angle = boundary * np.pi / n_limbs
+        assert symmetry.sectors(aimed(n_limbs, angle, angle + behind), n_limbs) == boundary
+
+
+def test_a_waypoint_at_the_hub_lies_in_sector_zero():
+    assert symmetry.sectors(aimed(5, 0.0, 0.0, distance=0.0), 5) == 0
+
+
+# --- commands and actions --------------------------------------------------------------------------------------------
+
+
+def test_a_mirror_swaps_plus_and_minus():
+    straight = np.array([0.0, 1.0, 0.0, 0.0, -1.0])  # {2+, 5-} swims along limb 1, which a mirror at it keeps
+    mirror_at_limb_1 = 2 * 5 - 1
+    np.testing.assert_array_equal(symmetry.transform_commands(straight, mirror_at_limb_1), straight)
+    turn_limb_2_onto_limb_1 = 2
+    np.testing.assert_array_equal(
+        symmetry.transform_commands(straight, turn_limb_2_onto_limb_1), [1.0, 0.0, 0.0, -1.0, 0.0]
+    )
+
+
+@pytest.mark.parametrize("n_limbs", [3, 4, 5])
+@pytest.mark.parametrize("mode", MODES)
+def test_action_maps_say_what_the_command_map_says(mode, n_limbs):
+    actions = random_actions(mode, n_limbs, 200)
+    elements = np.random.default_rng(2).integers(0, 2 * n_limbs, 200)
+    carried = symmetry.transform_actions(actions, elements, mode, n_limbs)
+    np.testing.assert_array_equal(
+        to_commands(mode, n_limbs, carried, 200),
+        symmetry.transform_commands(to_commands(mode, n_limbs, actions, 200), elements),
+    )
+
+
+@pytest.mark.parametrize("n_limbs", [3, 4, 5])
+@pytest.mark.parametrize("mode", MODES)
+def test_action_maps_are_a_group_action(mode, n_limbs):
+    actions = random_actions(mode, n_limbs, 30)
+    everywhere = np.ones(30, int)
+
+    def carry(actions, element):
+        return symmetry.transform_actions(actions, element * everywhere, mode, n_limbs)
+
+    np.testing.assert_array_equal(carry(actions, 0), actions)
+    for first in range(2 * n_limbs):
+        for second in range(2 * n_limbs):
+            at_once = carry(actions, symmetry.compose(second, first, n_limbs))
+            np.testing.assert_array_equal(carry(carry(actions, first), second), at_once)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_restored_actions_are_those_before_the_reduction(mode):
+    actions, elements = random_actions(mode, 5, 100), np.random.default_rng(3).integers(0, 10, 100)
+    reduced = symmetry.transform_actions(actions, elements, mode, 5)
+    np.testing.assert_array_equal(symmetry.restore_actions(reduced, elements, mode, 5), actions)
+
+
+@pytest.mark.parametrize("action", [-1, 243, 0.5])
+def test_an_action_that_is_none_is_refused(action):
+    with pytest.raises(ValueError, match="an action is a whole number from 0 to 242"):
+        symmetry.restore_actions(np.array([action]), np.zeros(1, int), "joint", 5)
+
+
+def test_cached_tables_cannot_be_changed():
+    for table in (symmetry.turns(5), symmetry.limb_order(5), symmetry.action_table("pairs", 5)):
+        with pytest.raises(ValueError, match="read-only"):
+            table[0] = table[1]
+
+
+# --- a policy behind it ----------------------------------------------------------------------------------------------
+
+
+def a_policy(reduced):
+    """Any function of the reduced observation, and a sensitive one."""
+    weights = np.random.default_rng(5).normal(size=(reduced.shape[-1], 243))
+    return np.argmax(reduced @ weights, axis=-1)
+
+
+def swim(path, element, n_strokes=8):
+    """Commands and hub positions [m] of a policy behind the reduction, from a crooked state in motion.
+
+    The commands of the first strokes, which are not the policy's, are carried by the element.
+    """
+    env = gym.make("SeastarSwim-v0", path=path, actions="joint", fidelity="fast").unwrapped
+    env.reset(seed=0)
+    for action in symmetry.transform_actions(random_actions("joint", 5, 4), element, "joint", 5):
+        observation, *_ = env.step(action)
+    hubs, commands = [], []
+    for _ in range(n_strokes):
+        reduced, its_element = symmetry.reduce_observations(observation, 5)
+        action = symmetry.restore_actions(a_policy(reduced), its_element, "joint", 5)
+        observation, *_, info = env.step(action)
+        hubs.append(info["hub_position"])
+        commands.append(env.command_table[action])
+    return np.array(hubs), np.array(commands)
+
+
+@pytest.mark.parametrize("element", range(1, 10))
+def test_a_policy_behind_the_reduction_is_equivariant(element):
+    """With its world carried by an element, the robot makes the carried swim, with the carried commands."""
+    carry = matrix(element, 5)
+    path = np.array([[0.03, 0.05], [-0.04, 0.06], [0.02, -0.03]])
+    hubs, commands = swim(path, 0)
+    assert np.ptp(hubs, axis=0).min() > 1e-3 and len(np.unique(commands, axis=0)) > 1
+    carried_hubs, carried_commands = swim(path @ carry.T, element)
+    np.testing.assert_array_equal(carried_commands, symmetry.transform_commands(commands, element))
+    np.testing.assert_allclose(carried_hubs, hubs @ carry.T, atol=1e-9)
+
+
+# --- wrappers --------------------------------------------------------------------------------------------------------
+
+SQUARE_ROBOT = Scene(robot=Seastar(n_limbs=4, nodes_per_limb=4), numerics=Numerics.preset("fast"))
+SETTINGS = {"path": "random", "random_heading": True, "scene": SQUARE_ROBOT}
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_the_wrapper_does_what_the_functions_do(mode):
+    plain, wrapped = (gym.make("SeastarSwim-v0", actions=mode, **SETTINGS) for _ in range(2))
+    wrapped = SymmetryReduction(wrapped)
+    observation, info = plain.reset(seed=3)
+    reduced, its_info = wrapped.reset(seed=3)
+    for action in random_actions(mode, 4, 6):
+        expected, element = symmetry.reduce_observations(observation, 4)
+        np.testing.assert_array_equal(reduced, expected)
+        assert wrapped.observation_space.contains(reduced)
+        observation, *outcome, info = plain.step(symmetry.restore_actions(action, element, mode, 4))
+        reduced, *its_outcome, its_info = wrapped.step(action)
+        assert its_outcome == outcome
+        np.testing.assert_array_equal(its_info["hub_position"], info["hub_position"])
+
+
+@pytest.mark.parametrize("autoreset", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+def test_the_batch_does_what_single_environments_do(autoreset):
+    """Over the end of the episodes, with the last observations reduced by elements of their own."""
+    n, limit = 3, 5
+    batch = VectorSymmetryReduction(
+        gym.make_vec(
+            "SeastarSwim-v0", n, "vector_entry_point", max_episode_steps=limit, autoreset_mode=autoreset,
+            actions="pairs", **SETTINGS,
+        )
+    )  # fmt: skip
+    make = lambda: SymmetryReduction(  # noqa: E731
+        gym.make("SeastarSwim-v0", max_episode_steps=limit, actions="pairs", **SETTINGS)
+    )
+    singles = gym.vector.SyncVectorEnv([make] * n, autoreset_mode=autoreset)
+    observations, _ = batch.reset(seed=7)
+    np.testing.assert_array_equal(observations, singles.reset(seed=7)[0])
+    ends = 0
+    for actions in random_actions("pairs", 4, 3 * limit * n).reshape(-1, n):
+        observations, *outcome, info = batch.step(actions)
+        expected, *expected_outcome, expected_info = singles.step(actions)
+        np.testing.assert_array_equal(observations, expected)
+        np.testing.assert_array_equal(outcome, expected_outcome)
+        for robot in np.flatnonzero(info.get("_final_obs", [])):
+            ends += 1
+            final = info["final_obs"][robot]
+            np.testing.assert_array_equal(final, expected_info["final_obs"][robot])
+            assert 0.0 <= direction(final) <= np.pi / 4
+            assert not np.array_equal(final, observations[robot])
+    assert ends == (9 if autoreset is AutoresetMode.SAME_STEP else 0)
+
+
+def test_observations_of_the_batch_are_fresh_every_step():
+    batch = VectorSymmetryReduction(gym.make_vec("SeastarSwim-v0", 2, "vector_entry_point", **SETTINGS))
+    first, _ = batch.reset(seed=0)
+    kept = first.copy()
+    second, *_ = batch.step(np.ones((2, 4), int))
+    np.testing.assert_array_equal(first, kept)
+    assert not np.shares_memory(first, second)
+
+
+def test_the_wrapped_environment_can_be_copied_and_made_again():
+    env = SymmetryReduction(gym.make("SeastarSwim-v0", **SETTINGS))
+    there = pickle.loads(pickle.dumps(env))
+    here, _ = env.reset(seed=1)
+    np.testing.assert_array_equal(there.reset(seed=1)[0], here)
+    again = gym.make(env.spec)
+    np.testing.assert_array_equal(again.reset(seed=1)[0], here)
+
+
+def test_the_wrapper_refuses_an_action_that_is_none():
+    env = SymmetryReduction(gym.make("SeastarSwim-v0", disable_env_checker=True, **SETTINGS))
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match="an action is a whole number from 0 to 2"):
+        env.step(np.array([0, 1, 2, 3]))

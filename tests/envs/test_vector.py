@@ -1,0 +1,432 @@
+"""The native batch does, to the last bit, what the same environments do one by one."""
+
+import copy
+import pickle
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_match import check_environments_match
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+from seastar_gym import Numerics, RewardWeights, Scene, Seastar, SmaPulse, SolverStatus
+from seastar_gym.der.lanes import N_LANES
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
+
+NEXT_STEP, SAME_STEP, DISABLED = AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP, AutoresetMode.DISABLED
+SHORT_PATH = [[0.004, 0.0], [0.009, 0.0]]  # some two strokes of the straight gait
+
+
+def native(num_envs=3, **arguments) -> SeastarSwimVectorEnv:
+    arguments = {"fidelity": "fast"} | arguments
+    return gym.make_vec("SeastarSwim-v0", num_envs, "vector_entry_point", **arguments)
+
+
+def one_by_one(num_envs=3, autoreset_mode=NEXT_STEP, **arguments) -> SyncVectorEnv:
+    arguments = {"fidelity": "fast"} | arguments
+    return gym.make_vec(
+        "SeastarSwim-v0", num_envs, "sync", vector_kwargs={"autoreset_mode": autoreset_mode}, **arguments
+    )
+
+
+def both(num_envs=3, autoreset_mode=NEXT_STEP, **arguments):
+    return native(num_envs, autoreset_mode=autoreset_mode, **arguments), one_by_one(
+        num_envs, autoreset_mode, **arguments
+    )
+
+
+def assert_same_infos(found: dict, expected: dict, apart_from: str | None = "smallest_opening_angle") -> None:
+    """Equal values and types wherever the sub-environments' infos have a value.
+
+    The smallest opening angle has a test of its own.
+    """
+    for key in [key for key in expected if key.startswith("_") and key != f"_{apart_from}"]:
+        name, mask = key.removeprefix("_"), expected[key]
+        assert np.all(found[key][mask]), name
+        if name in ("final_obs", "solver_message"):
+            for one, other in zip(found[name][mask], expected[name][mask], strict=True):
+                np.testing.assert_array_equal(one, other)
+        elif name == "final_info":
+            assert_same_infos(found[name], expected[name])
+        else:
+            assert found[name].dtype == expected[name].dtype, name
+            np.testing.assert_array_equal(found[name][mask], expected[name][mask], err_msg=name)
+
+
+def assert_same_steps(found: tuple, expected: tuple) -> None:
+    for one, other in zip(found[:4], expected[:4], strict=True):
+        assert one.dtype == other.dtype
+        np.testing.assert_array_equal(one, other)
+    assert_same_infos(found[4], expected[4])
+
+
+def swim_both(batch, singles, n_strokes: int, seed: int = 0) -> list[tuple]:
+    """Steps with the same random actions, straight ones among them; asserts that all they give is the same."""
+    rng, steps = np.random.default_rng(seed), []
+    (observations, info), (expected, expected_info) = (env.reset(seed=seed) for env in (batch, singles))
+    np.testing.assert_array_equal(observations, expected)
+    assert_same_infos(info, expected_info)
+    for _ in range(n_strokes):
+        actions = rng.integers(0, 3, (batch.num_envs, 5))
+        actions[rng.random(batch.num_envs) < 0.7] = [0, 1, 0, 0, 2]
+        steps.append(batch.step(actions))
+        assert_same_steps(steps[-1], singles.step(actions))
+    return steps
+
+
+# The same bits
+
+
+@pytest.mark.parametrize("autoreset_mode", [NEXT_STEP, SAME_STEP])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"max_episode_steps": 4, "path": "random", "random_heading": True},
+        {"max_episode_steps": 5, "path": SHORT_PATH, "waypoint_radius": 0.003},
+        {"max_episode_steps": 2, "path": SHORT_PATH, "waypoint_radius": 0.003},  # both ends at once
+        {"path": SHORT_PATH, "reward": RewardWeights(100.0, 3.0, 0.2)},
+    ],
+    ids=["random", "short", "both", "weights"],
+)
+def test_a_batch_gives_the_bits_of_single_environments_across_resets(autoreset_mode, arguments):
+    batch, singles = both(N_LANES + 1, autoreset_mode, **arguments)
+    steps = swim_both(batch, singles, 12)
+    ends = np.array([step[2] | step[3] for step in steps])
+    assert ends.any(axis=0).all()
+
+
+def test_a_batch_without_autoreset_gives_the_bits_of_single_environments():
+    batch, singles = both(3, DISABLED, path=SHORT_PATH, max_episode_steps=4, waypoint_radius=0.003)
+    rng, over = np.random.default_rng(0), np.zeros(3, bool)
+    np.testing.assert_array_equal(batch.reset(seed=0)[0], singles.reset(seed=0)[0])
+    for _ in range(15):
+        if over.any():
+            with pytest.raises(gym.error.ResetNeeded, match="reset_mask"):
+                batch.step(np.zeros((3, 5), int))
+            (one, one_info), (other, other_info) = (
+                env.reset(options={"reset_mask": over.copy()}) for env in (batch, singles)
+            )
+            np.testing.assert_array_equal(one[over], other[over])
+            np.testing.assert_array_equal(one, other)
+            assert_same_infos(one_info, other_info)
+        actions = rng.integers(0, 3, (3, 5))
+        actions[rng.random(3) < 0.7] = [0, 1, 0, 0, 2]
+        found = batch.step(actions)
+        assert_same_steps(found, singles.step(actions))
+        over = found[2] | found[3]
+
+
+def test_gymnasiums_comparison_of_environments_passes():
+    """It compares flags as numbers, so it takes batches of one; infos are compared above."""
+    for autoreset_mode in (NEXT_STEP, SAME_STEP):
+        batch, singles = both(1, autoreset_mode, path="random", random_heading=True, max_episode_steps=3)
+        check_environments_match(singles, batch, num_steps=10, info_comparison="keys-superset")
+
+
+@pytest.mark.parametrize("actions", ["joint", "pairs"])
+def test_table_actions_give_the_bits_of_single_environments(actions):
+    batch, singles = both(4, actions=actions, max_episode_steps=3)
+    assert batch.single_action_space == singles.single_action_space
+    assert batch.action_space == singles.action_space
+    batch.reset(seed=1)
+    singles.reset(seed=1)
+    singles.action_space.seed(0)
+    for _ in range(5):
+        chosen = singles.action_space.sample()
+        assert_same_steps(batch.step(chosen), singles.step(chosen))
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_threads_change_no_bit(threads):
+    n = 2 * N_LANES + 1
+    one, other = (
+        native(n, path="random", max_episode_steps=3, threads=threads),
+        native(n, path="random", max_episode_steps=3),
+    )
+    one.reset(seed=0)
+    other.reset(seed=0)
+    for k in range(5):
+        actions = np.random.default_rng(k).integers(0, 3, (n, 5))
+        assert_same_steps(one.step(actions), other.step(actions))
+
+
+def test_a_pickled_batch_continues_to_the_same_bits():
+    batch = native(5, path="random", random_heading=True, max_episode_steps=4)
+    batch.reset(seed=0)
+    batch.step(np.ones((5, 5), int))
+    twins = [batch, pickle.loads(pickle.dumps(batch)), copy.deepcopy(batch)]
+    for k in range(8):
+        actions = np.random.default_rng(k).integers(0, 3, (5, 5))
+        results = [twin.step(actions) for twin in twins]
+        for other in results[1:]:
+            assert_same_steps(other, results[0])
+
+
+# Contracts
+
+
+def test_make_vec_gives_the_native_batch_with_the_registered_time_limit():
+    batch = gym.make_vec("SeastarSwim-v0", num_envs=2)
+    assert isinstance(batch, SeastarSwimVectorEnv)
+    assert batch.max_episode_steps == 400 and batch.num_envs == 2
+    assert batch.simulator.scene == Scene(numerics=Numerics.preset("balanced"))
+
+
+@pytest.mark.parametrize("autoreset_mode", [NEXT_STEP, SAME_STEP, DISABLED])
+def test_metadata_says_how_episodes_begin_again(autoreset_mode):
+    assert native().metadata["autoreset_mode"] is NEXT_STEP
+    assert native(autoreset_mode=autoreset_mode).metadata["autoreset_mode"] is autoreset_mode
+    assert SeastarSwimVectorEnv.metadata["autoreset_mode"] is NEXT_STEP
+
+
+def test_spaces_are_those_of_single_environments():
+    batch, singles = both(4)
+    for name in ("single_observation_space", "observation_space", "single_action_space", "action_space"):
+        assert getattr(batch, name) == getattr(singles, name)
+    observations, _ = batch.reset(seed=0)
+    assert observations in batch.observation_space
+    assert batch.step(batch.action_space.sample())[0] in batch.observation_space
+
+
+def test_nothing_that_was_returned_changes_later():
+    batch = native(4, path=SHORT_PATH, autoreset_mode=SAME_STEP, max_episode_steps=2)
+    returned = [batch.reset(seed=0)]
+    for k in range(5):
+        kept = copy.deepcopy(returned)
+        returned.append(batch.step(np.random.default_rng(k).integers(0, 3, (4, 5))))
+        for before, after in zip(kept, returned, strict=False):
+            for one, other in zip(before[:-1], after[:-1], strict=True):
+                np.testing.assert_array_equal(one, other)
+            for name in before[-1]:
+                if not isinstance(before[-1][name], dict) and before[-1][name].dtype != object:
+                    np.testing.assert_array_equal(before[-1][name], after[-1][name])
+
+
+def test_what_a_caller_does_to_the_arrays_changes_no_robot():
+    meddled, left = native(3, max_episode_steps=2), native(3, max_episode_steps=2)
+    meddled.reset(seed=0)
+    left.reset(seed=0)
+    actions = np.ones((3, 5), int)
+    for _ in range(5):
+        found, expected = meddled.step(actions), left.step(actions)
+        assert_same_steps(found, expected)
+        for array in found[:4]:
+            array[:] = True
+        for name, array in found[4].items():
+            array[:] = not name.startswith("_")
+    assert actions.min() == 1
+
+
+# Episodes
+
+
+def test_next_step_ignores_the_action_after_an_end_and_gives_the_next_first_observation():
+    batch = native(2, path="random", max_episode_steps=2)
+    batch.reset(seed=0)
+    actions = np.ones((2, 5), int)
+    batch.step(actions)
+    _, _, terminated, truncated, _ = batch.step(actions)
+    assert truncated.all() and not terminated.any()
+    observations, reward, terminated, truncated, info = batch.step(actions)
+    assert not (terminated | truncated).any() and not reward.any()
+    assert not info["time"].any() and not info["hub_position"].any()
+    np.testing.assert_allclose(0.1 * np.hypot(*observations[:, 182:184].T), info["distance"], rtol=1e-6)
+    assert batch.step(actions)[4]["time"].tolist() == [1.0, 1.0]
+
+
+def test_same_step_puts_the_last_observation_and_info_away():
+    batch, alone = (
+        native(2, path=SHORT_PATH, waypoint_radius=0.003, autoreset_mode=SAME_STEP),
+        native(2, path=SHORT_PATH, waypoint_radius=0.003),
+    )
+    batch.reset(seed=0)
+    alone.reset(seed=0)
+    actions = np.array([[0, 1, 0, 0, 2], [0, 0, 0, 0, 0]])
+    for _ in range(5):
+        found, expected = batch.step(actions), alone.step(actions)
+        if expected[2].any():
+            break
+    assert found[2].tolist() == [True, False]
+    info = found[4]
+    assert info["_final_obs"].tolist() == info["_final_info"].tolist() == [True, False]
+    np.testing.assert_array_equal(info["final_obs"][0], expected[0][0])
+    assert info["final_obs"][1] is None
+    assert info["final_info"]["is_success"][0] and info["final_info"]["waypoint_index"][0] == 2
+    assert info["waypoint_index"].tolist() == [0, 0] and info["time"][0] == 0.0
+    np.testing.assert_array_equal(found[0][1], expected[0][1])
+    np.testing.assert_array_equal(found[1], expected[1])
+    assert "final_obs" not in batch.step(actions)[4]
+
+
+def test_robot_i_has_seed_plus_i_or_a_seed_of_its_own():
+    batch = native(3, path="random", random_heading=True)
+    first = batch.reset(seed=5)[0]
+    np.testing.assert_array_equal(batch.reset(seed=[7, 5, 6])[0][1:], first[:2])
+    np.testing.assert_array_equal(batch.reset(seed=[None, 5, 6])[0][1:], first[:2])
+    assert np.abs(batch.reset()[0] - first).max() > 1e-3
+
+
+def test_paths_may_have_different_lengths_and_change_with_a_reset():
+    batch, singles = both(3, max_episode_steps=3)
+    for path in ("line", "figure-eight", [[0.1, 0.0], [0.2, 0.0]], "random"):
+        found, expected = (env.reset(seed=2, options={"path": path}) for env in (batch, singles))
+        np.testing.assert_array_equal(found[0], expected[0])
+        for _ in range(5):  # beyond the time limit: then the environment's own path again
+            actions = np.ones((3, 5), int)
+            assert_same_steps(batch.step(actions), singles.step(actions))
+
+
+def test_a_reset_of_some_robots_leaves_the_others_alone():
+    batch = native(4)
+    batch.reset(seed=0)
+    before = batch.step(np.ones((4, 5), int))
+    mask = np.array([True, False, False, True])
+    observations, info = batch.reset(options={"reset_mask": mask, "path": "line"})
+    np.testing.assert_array_equal(observations[~mask], before[0][~mask])
+    assert info["_time"].tolist() == mask.tolist()
+    assert batch.step(np.ones((4, 5), int))[4]["time"].tolist() == [1.0, 2.0, 2.0, 1.0]
+
+
+# Infos
+
+
+@pytest.mark.parametrize("autoreset_mode", [NEXT_STEP, SAME_STEP])
+def test_masks_say_which_infos_count_as_those_of_single_environments_do(autoreset_mode):
+    batch, singles = both(3, autoreset_mode, path=SHORT_PATH, waypoint_radius=0.003)
+    rng = np.random.default_rng(0)
+    batch.reset(seed=0)
+    singles.reset(seed=0)
+    for _ in range(10):
+        actions = np.where(rng.random((3, 1)) < 0.5, [0, 1, 0, 0, 2], 0)
+        found, expected = batch.step(actions)[4], singles.step(actions)[4]
+        for name, mask in expected.items():
+            if name.startswith("_"):
+                np.testing.assert_array_equal(found[name], mask, err_msg=name)
+
+
+def test_a_robots_smallest_opening_angle_does_not_depend_on_its_neighbours():
+    batch, singles = both(N_LANES)
+    batch.reset(seed=0)
+    singles.reset(seed=0)
+    actions = np.random.default_rng(0).integers(0, 3, (N_LANES, 5))
+    assert_same_infos(batch.step(actions)[4], singles.step(actions)[4], apart_from=None)
+
+
+# Failure
+
+
+def break_robot(batch: SeastarSwimVectorEnv, robot: int) -> None:
+    """Put all nodes of one robot into one point, where no angle is defined."""
+    state = batch.simulator.get_state()
+    state.positions[robot] = 0.02
+    batch.simulator.set_state(state)
+
+
+@pytest.mark.parametrize("autoreset_mode", [NEXT_STEP, SAME_STEP])
+def test_a_robot_that_cannot_be_solved_ends_its_episode_and_no_other(autoreset_mode):
+    well, ill = native(5, autoreset_mode=autoreset_mode), native(5, autoreset_mode=autoreset_mode)
+    others = np.arange(5) != 2
+    for batch in (well, ill):
+        batch.reset(seed=0)
+        batch.step(np.ones((5, 5), int))
+    break_robot(ill, 2)
+    actions = np.random.default_rng(0).integers(0, 3, (5, 5))
+    for k in range(4):
+        observations, reward, terminated, truncated, info = ill.step(actions)
+        expected = well.step(actions)
+        assert terminated.tolist() == (~others & (k == 0)).tolist() and not truncated.any()
+        assert np.isfinite(observations).all() and np.isfinite(reward).all()
+        np.testing.assert_array_equal(observations[others], expected[0][others])
+        np.testing.assert_array_equal(reward[others], expected[1][others])
+        if k == 0:
+            final = info if autoreset_mode is NEXT_STEP else info["final_info"]
+            assert final["solver_status"][2] == SolverStatus.NOT_CONVERGED
+            assert not final["is_success"][2]
+        else:
+            assert not info["solver_status"].any()
+
+
+def test_the_message_of_a_failed_robot_is_that_of_a_single_environment():
+    batch = native(2)
+    batch.reset(seed=0)
+    break_robot(batch, 1)
+    info = batch.step(np.zeros((2, 5), int))[4]
+    assert info["solver_message"][1] == SolverStatus.NOT_CONVERGED.sentence
+    assert info["_solver_message"].tolist() == [False, True]
+
+
+# Refusals
+
+
+def test_a_step_before_the_first_reset_is_refused():
+    with pytest.raises(gym.error.ResetNeeded, match=r"reset\(\) before step\(\)\.$"):
+        native().step(np.zeros((3, 5), int))
+
+
+def test_the_first_reset_is_of_all_robots():
+    with pytest.raises(gym.error.ResetNeeded, match="first reset"):
+        native().reset(options={"reset_mask": np.array([True, False, True])})
+
+
+@pytest.mark.parametrize(
+    "actions",
+    [np.zeros((3, 5)), np.full((3, 5), np.nan), np.zeros((2, 5), int), np.zeros(5, int), np.full((3, 5), 3), None],
+    ids=str,
+)
+def test_what_is_no_action_is_refused_and_changes_nothing(actions):
+    batch, twin = native(max_episode_steps=2), native(max_episode_steps=2)
+    batch.reset(seed=0)
+    twin.reset(seed=0)
+    for _ in range(4):
+        with pytest.raises(ValueError, match=r'^With actions="limbs" .*\.$'):
+            batch.step(actions)
+        good = np.ones((3, 5), int)
+        assert_same_steps(batch.step(good), twin.step(good))
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        ({"heading": 1.0}, "heading"),
+        ({"path": "hexagon"}, "hexagon"),
+        ({"path": [[0.0, np.inf]]}, "finite"),
+        ({"reset_mask": [1, 0, 0]}, "reset_mask"),
+        ({"reset_mask": np.array([True])}, "reset_mask"),
+        ({"reset_mask": np.zeros(3, bool)}, "reset_mask"),
+    ],
+    ids=str,
+)
+def test_reset_options_that_mean_nothing_are_refused(options, words):
+    batch = native()
+    batch.reset(seed=0)
+    with pytest.raises(ValueError, match=words) as caught:
+        batch.reset(options=options)
+    assert str(caught.value).endswith(".")
+
+
+def test_a_list_of_seeds_has_one_for_every_robot():
+    with pytest.raises(ValueError, match=r"seed must be one number or 3 of them, not 2\.$"):
+        native().reset(seed=[1, 2])
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        ({"num_envs": 0}, "whole number"),
+        ({"num_envs": 2.5}, "whole number"),
+        ({"max_episode_steps": 0}, "max_episode_steps"),
+        ({"render_mode": "rgb_array"}, "draws nothing"),
+        ({"autoreset_mode": "sometimes"}, "sometimes"),
+        ({"path": "hexagon"}, "hexagon"),
+        ({"actions": "binary"}, "actions"),
+        ({"fidelity": "exact"}, "fidelity"),
+        ({"scene": Seastar()}, "Scene"),
+        ({"reward": 1.0}, "RewardWeights"),
+        ({"waypoint_radius": np.nan}, "waypoint_radius"),
+        ({"scene": Scene(Seastar(hub_hinge="turning"), actuator=SmaPulse())}, "turning"),
+    ],
+    ids=str,
+)
+def test_arguments_that_mean_nothing_are_refused(arguments, words):
+    with pytest.raises(ValueError, match=words):
+        SeastarSwimVectorEnv(**({"num_envs": 2} | arguments))

@@ -1,0 +1,637 @@
+"""A robot's trajectory depends on its state and its commands, to the last bit, and on nothing else."""
+
+import multiprocessing
+import os
+import pickle
+import subprocess
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State, StrokeReport, Water
+from seastar_gym.der.lanes import N_LANES
+
+ROOT = Path(__file__).resolve().parent.parent
+SCHEMES = ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
+EVERY_WAY = [*SCHEMES, "adaptive"]
+STRAIGHT = np.array([[0.0, 1.0, 0.0, 0.0, -1.0]])
+
+
+def scene_of(scheme="implicit-midpoint", step=0.01, **numerics) -> Scene:
+    """The chapter's robot; "adaptive" is the implicit midpoint rule with steps adapted to their error."""
+    if scheme == "adaptive":
+        return Scene(numerics=Numerics("implicit-midpoint", step, path_tolerance=0.02, **numerics))
+    return Scene(numerics=Numerics(scheme, step, **numerics))
+
+
+def random_commands(n_robots: int, n_strokes: int = 3, seed: int = 0) -> np.ndarray:
+    """Commands of the chapter, -1, 0 and 1, and others in between; shape (n_strokes, n_robots, 5)."""
+    rng = np.random.default_rng(seed)
+    whole = rng.integers(-1, 2, (n_strokes, n_robots, 5)).astype(float)
+    return np.where(rng.random(whole.shape) < 0.5, whole, rng.uniform(-1.0, 1.0, whole.shape))
+
+
+def random_velocities(n_robots: int, size: float, seed: int = 0) -> np.ndarray:
+    return size * np.random.default_rng(seed).standard_normal((n_robots, 46, 2))
+
+
+def set_motion(simulator: Simulator, velocities: np.ndarray) -> None:
+    """Keep positions and time, and give the robots other velocities [m/s]."""
+    state = simulator.get_state()
+    simulator.set_state(state._replace(velocities=velocities))
+
+
+def assert_same_bits(one: State, other: State) -> None:
+    for name, a, b in zip(State._fields, one, other, strict=True):
+        np.testing.assert_array_equal(a, b, err_msg=name)
+
+
+def robots(state: State, chosen) -> State:
+    return State(*(field[chosen] for field in state))
+
+
+@contextmanager
+def refused(*words: str):
+    """Assert a ValueError whose text is one sentence with these words in it."""
+    with pytest.raises(ValueError, match=r"\.$") as caught:
+        yield
+    text = str(caught.value)
+    assert "\n" not in text and len(text) < 300, text
+    for word in words:
+        assert word in text, text
+
+
+# Robots at rest
+
+
+def test_robots_begin_at_rest_with_the_hub_at_the_origin():
+    simulator = Simulator(Scene(), n_robots=3)
+    np.testing.assert_array_equal(simulator.positions, np.tile(Seastar().nodes(), (3, 1, 1)))
+    for zero in (simulator.velocities, simulator.time, simulator.hub_position(), simulator.hub_velocity()):
+        assert not zero.any()
+    assert simulator.positions.shape == simulator.velocities.shape == (3, 46, 2)
+    assert simulator.time.shape == simulator.elastic_energy().shape == simulator.kinetic_energy().shape == (3,)
+    assert simulator.hub_position().shape == simulator.hub_velocity().shape == (3, 2)
+
+
+@pytest.mark.parametrize("scheme", EVERY_WAY)
+def test_a_robot_left_alone_stays_where_it_is(scheme):
+    simulator = Simulator(scene_of(scheme))
+    for _ in range(3):
+        simulator.stroke(np.zeros((1, 5)))
+    np.testing.assert_allclose(simulator.positions[0], Seastar().nodes(), rtol=0.0, atol=1e-13)
+    assert simulator.elastic_energy()[0] < 1e-25
+
+
+def test_what_is_read_is_a_copy():
+    simulator = Simulator(scene_of(), n_robots=2)
+    simulator.stroke(random_commands(2)[0])
+    before = simulator.get_state()
+    for array in (
+        simulator.positions, simulator.velocities, simulator.time, simulator.hub_position(), simulator.hub_velocity(),
+        *simulator.get_state(), simulator.elastic_energy(),
+    ):  # fmt: skip
+        array[:] = 7.0
+    assert_same_bits(simulator.get_state(), before)
+
+
+def test_time_counts_strokes():
+    simulator = Simulator(Scene(actuator=SmaPulse(heating_time=0.1, cooling_time=0.2), numerics=Numerics(step=0.05)))
+    for _ in range(1000):
+        simulator.stroke(np.zeros((1, 5)))
+    assert simulator.time[0] == 1000 * (0.1 + 0.2)
+
+
+def test_reset_puts_the_chosen_robots_at_rest_and_touches_no_other():
+    simulator, commands = Simulator(scene_of(), n_robots=11), random_commands(11)
+    simulator.stroke(commands[0])
+    before, mask = simulator.get_state(), np.arange(11) % 3 == 0
+    simulator.reset(mask)
+    after = simulator.get_state()
+    assert_same_bits(robots(after, ~mask), robots(before, ~mask))
+    np.testing.assert_array_equal(after.positions[mask], np.tile(Seastar().nodes(), (mask.sum(), 1, 1)))
+    assert not after.velocities[mask].any() and not after.time[mask].any()
+
+
+def test_no_state_leaks_across_a_reset():
+    fresh, used, commands = Simulator(scene_of(), 3), Simulator(scene_of(), 3), random_commands(3)
+    set_motion(used, random_velocities(3, 1.0))
+    used.stroke(commands[2])
+    used.reset()
+    for command in commands:
+        reports = [simulator.stroke(command) for simulator in (fresh, used)]
+        assert_same_bits(fresh.get_state(), used.get_state())
+        for one, other in zip(*reports, strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+def test_heading_turns_the_robot_at_rest():
+    simulator, headings = Simulator(Scene(), n_robots=3), np.array([0.0, 0.7, -3.0])
+    simulator.reset(heading=headings)
+    for nodes, heading in zip(simulator.positions, headings, strict=True):
+        c, s = np.cos(heading), np.sin(heading)
+        np.testing.assert_allclose(nodes, Seastar().nodes() @ [[c, s], [-s, c]], rtol=0.0, atol=1e-16)
+    simulator.reset(np.array([False, True, False]), heading=1.0)
+    np.testing.assert_allclose(simulator.positions[1, 9], [0.1 * np.cos(1.0), 0.1 * np.sin(1.0)], rtol=1e-14)
+
+
+# Bits: batch, lane, threads
+
+
+@pytest.mark.parametrize("scheme", [*SCHEMES, "adaptive"])
+def test_a_robot_moves_to_the_same_bits_alone_as_in_any_lane_of_any_batch(scheme):
+    n_robots = 2 * N_LANES + 3
+    commands, velocities = random_commands(n_robots), random_velocities(n_robots, 0.05)
+    batch = Simulator(scene_of(scheme, 0.02), n_robots)
+    set_motion(batch, velocities)
+    shuffled = np.random.default_rng(1).permutation(n_robots)
+    other = Simulator(scene_of(scheme, 0.02), n_robots)
+    set_motion(other, velocities[shuffled])
+    alone = [Simulator(scene_of(scheme, 0.02)) for _ in range(n_robots)]
+    for k, single in enumerate(alone):
+        set_motion(single, velocities[k : k + 1])
+    for command in commands:
+        batch.stroke(command)
+        other.stroke(command[shuffled])
+        for k, single in enumerate(alone):
+            single.stroke(command[k : k + 1])
+            assert_same_bits(single.get_state(), robots(batch.get_state(), slice(k, k + 1)))
+        assert_same_bits(other.get_state(), robots(batch.get_state(), shuffled))
+
+
+COUNTS = [name for name in StrokeReport._fields if name != "smallest_opening_angle"]
+
+
+def reports_alone_and_in_a_batch() -> list[tuple[StrokeReport, StrokeReport]]:
+    """Reports of two strokes, of robots one by one and of their batch."""
+    n_robots = N_LANES
+    commands, found = random_commands(n_robots, 2), []
+    batch, alone = Simulator(scene_of(), n_robots), [Simulator(scene_of()) for _ in range(n_robots)]
+    for command in commands:
+        singles = [single.stroke(command[k : k + 1]) for k, single in enumerate(alone)]
+        found.append((StrokeReport(*map(np.concatenate, zip(*singles, strict=True))), batch.stroke(command)))
+    return found
+
+
+def test_a_robots_counts_do_not_depend_on_its_neighbours():
+    for alone, batch in reports_alone_and_in_a_batch():
+        for name in COUNTS:
+            np.testing.assert_array_equal(getattr(alone, name), getattr(batch, name), err_msg=name)
+
+
+def test_a_robots_smallest_opening_angle_does_not_depend_on_its_neighbours():
+    for alone, batch in reports_alone_and_in_a_batch():
+        np.testing.assert_array_equal(alone.smallest_opening_angle, batch.smallest_opening_angle)
+
+
+@pytest.mark.parametrize("threads", [2, 3, 7])
+def test_any_number_of_threads_gives_the_same_bits(threads):
+    n_robots = 4 * N_LANES + 1
+    one, many = Simulator(scene_of(), n_robots, threads=1), Simulator(scene_of(), n_robots, threads=threads)
+    assert many.threads == min(threads, 5)
+    for command in random_commands(n_robots):
+        reports = [simulator.stroke(command) for simulator in (one, many)]
+        assert_same_bits(one.get_state(), many.get_state())
+        for a, b in zip(*reports, strict=True):
+            np.testing.assert_array_equal(a, b)
+
+
+def test_a_neighbour_that_halves_its_steps_changes_no_other_robots_bits():
+    """Two iterations suffice for a robot that swims, not for one whose nodes fly about."""
+    scene, n_robots = scene_of("implicit-midpoint", 5e-3, max_iterations=3), N_LANES
+    calm, mixed = Simulator(scene, n_robots), Simulator(scene, n_robots)
+    velocities = np.zeros((n_robots, 46, 2))
+    velocities[1] = random_velocities(1, 1.0)[0]
+    set_motion(mixed, velocities)
+    others = np.arange(n_robots) != 1
+    for command in random_commands(n_robots, 4):
+        calm_report, report = calm.stroke(command), mixed.stroke(command)
+        assert_same_bits(robots(calm.get_state(), others), robots(mixed.get_state(), others))
+        for name in COUNTS:
+            np.testing.assert_array_equal(
+                getattr(calm_report, name)[others], getattr(report, name)[others], err_msg=name
+            )
+    assert report.halvings[1] > 0
+
+
+def wild_swim() -> list[np.ndarray]:
+    """Two strokes of nine robots, six of which fly about: positions, velocities and counts."""
+    simulator, velocities = Simulator(scene_of("sdirk3", 0.02), 9), random_velocities(9, 0.1)
+    velocities[:3] = 0.0
+    set_motion(simulator, velocities)
+    for command in random_commands(9, 2):
+        report = simulator.stroke(command)
+    counts = [report.status, report.newton_iterations, report.repairs, report.backtracks, report.halvings]
+    return [simulator.positions, simulator.velocities, np.array(counts)]
+
+
+@pytest.mark.parametrize(
+    "width", [4 if N_LANES == 8 else 8, *(pytest.param(width, marks=pytest.mark.slow) for width in (2, 16))]
+)
+def test_any_lane_width_gives_the_same_bits(tmp_path, width):
+    code = (
+        "import sys; sys.path[:0] = ['.', 'tests']; import numpy as np, test_simulator; "
+        "np.savez(sys.argv[1], *test_simulator.wild_swim())"
+    )
+    command = [sys.executable, "-c", code, str(tmp_path / "swim.npz")]
+    subprocess.run(command, cwd=ROOT, env={**os.environ, "SEASTAR_LANES": str(width)}, check=True)
+    with np.load(tmp_path / "swim.npz") as found:
+        for name, expected in zip(found.files, wild_swim(), strict=True):
+            np.testing.assert_array_equal(found[name], expected)
+
+
+# Bits: parts, states, pickles
+
+
+def finish(parts):
+    """Times at which a stroke in parts paused, and its report."""
+    times = []
+    while True:
+        try:
+            times.append(next(parts))
+        except StopIteration as finished:
+            return times, finished.value
+
+
+@pytest.mark.parametrize("scheme", EVERY_WAY)
+@pytest.mark.parametrize("parts", [1, 2, 7, 10, 100])
+def test_a_stroke_in_parts_gives_the_same_bits_as_a_whole_one(scheme, parts):
+    whole, cut = Simulator(scene_of(scheme), 3), Simulator(scene_of(scheme), 3)
+    for command in random_commands(3):
+        report = whole.stroke(command)
+        times, cut_report = finish(cut.stroke_in_parts(command, parts))
+        assert len(times) == parts and times[-1] == 1.0
+        np.testing.assert_allclose(times, np.arange(1, parts + 1) / parts, atol=0.01)
+        assert_same_bits(whole.get_state(), cut.get_state())
+        for one, other in zip(report, cut_report, strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+def test_time_runs_on_within_a_stroke_in_parts():
+    simulator = Simulator(scene_of(), 2)
+    simulator.stroke(random_commands(2)[0])
+    for time in simulator.stroke_in_parts(random_commands(2)[1], 4):
+        np.testing.assert_allclose(simulator.time, 1.0 + time, rtol=1e-12)
+    assert simulator.time.tolist() == [2.0, 2.0]
+
+
+@pytest.mark.parametrize("scheme", EVERY_WAY)
+def test_a_state_set_again_continues_to_the_same_bits(scheme):
+    first, second, commands = Simulator(scene_of(scheme), 3), Simulator(scene_of(scheme), 3), random_commands(3, 4)
+    for command in commands[:2]:
+        first.stroke(command)
+    second.stroke(commands[3])
+    second.set_state(first.get_state())
+    for command in commands[2:]:
+        first.stroke(command)
+        second.stroke(command)
+        assert_same_bits(first.get_state(), second.get_state())
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_pickled_simulator_continues_to_the_same_bits(threads):
+    n_robots = N_LANES + 1
+    first, commands = Simulator(scene_of("sdirk3"), n_robots, threads=threads), random_commands(n_robots)
+    first.stroke(commands[0])
+    second = pickle.loads(pickle.dumps(first))
+    for command in commands[1:]:
+        first.stroke(command)
+        second.stroke(command)
+        assert_same_bits(first.get_state(), second.get_state())
+
+
+def test_a_pickled_simulator_swims_on_under_another_lane_width(tmp_path):
+    """Pickles travel: to a processor without AVX-512, say."""
+    simulator, file = Simulator(scene_of("sdirk3", 0.02), 9), tmp_path / "simulator.pickle"
+    file.write_bytes(pickle.dumps(simulator))
+    simulator.stroke(np.ones((9, 5)) * STRAIGHT)
+    width = 4 if N_LANES != 4 else 8
+    code = (
+        "import pickle, sys, numpy as np; simulator = pickle.load(open(sys.argv[1], 'rb'))\n"
+        "simulator.stroke(np.tile([0.0, 1.0, 0.0, 0.0, -1.0], (9, 1))); np.save(sys.argv[2], simulator.positions)"
+    )
+    command = [sys.executable, "-c", code, str(file), str(tmp_path / "positions.npy")]
+    subprocess.run(command, cwd=ROOT, env={**os.environ, "SEASTAR_LANES": str(width)}, check=True, capture_output=True)
+    np.testing.assert_array_equal(np.load(tmp_path / "positions.npy"), simulator.positions)
+
+
+def stroke_in_a_child(simulator: Simulator, answers) -> None:
+    simulator.stroke(np.zeros((simulator.n_robots, 5)))
+    answers.put(simulator.time[0])
+
+
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="no fork on this system")
+@pytest.mark.filterwarnings("ignore:This process.*is multi-threaded:DeprecationWarning")
+def test_a_forked_process_swims_on_with_threads():
+    simulator = Simulator(scene_of(), 2 * N_LANES, threads=2)
+    simulator.stroke(np.zeros((2 * N_LANES, 5)))
+    context = multiprocessing.get_context("fork")
+    answers = context.Queue()
+    child = context.Process(target=stroke_in_a_child, args=(simulator, answers))
+    child.start()
+    child.join(60.0)
+    if child.is_alive():
+        child.kill()
+        child.join()
+    assert child.exitcode == 0
+    assert answers.get(timeout=1.0) == 2.0
+
+
+def test_a_simulator_pickled_within_a_stroke_knows_its_actuation():
+    simulator = Simulator(scene_of())
+    parts = simulator.stroke_in_parts(STRAIGHT, 10)
+    next(parts)
+    assert pickle.loads(pickle.dumps(simulator)).elastic_energy() == simulator.elastic_energy()
+    finish(parts)
+
+
+@pytest.mark.parametrize(
+    "begin_again", [Simulator.reset, lambda simulator: simulator.set_state(Simulator(scene_of()).get_state())]
+)
+def test_a_robot_put_at_rest_half_way_through_a_stroke_is_not_actuated(begin_again):
+    simulator = Simulator(scene_of())
+    parts = simulator.stroke_in_parts(STRAIGHT, 10)
+    next(parts)
+    begin_again(simulator)
+    assert simulator.elastic_energy()[0] < 1e-25
+
+
+# Work and outcome
+
+
+def test_a_report_says_what_a_stroke_cost():
+    simulator = Simulator(scene_of("sdirk2", 0.02), n_robots=2)
+    report = simulator.stroke(np.array([[0.0] * 5, [0.0, 1.0, 0.0, 0.0, -1.0]]))
+    for field in report:
+        assert field.shape == (2,)
+    assert report.status.tolist() == [SolverStatus.CONVERGED, SolverStatus.CONVERGED]
+    assert report.newton_iterations[1] > report.newton_iterations[0] >= 2 * 50
+    np.testing.assert_allclose(report.covered, 1.0, rtol=1e-12)
+    assert report.smallest_opening_angle[0] == pytest.approx(2.0 * np.pi / 5.0)
+
+
+def test_adapted_steps_are_short_where_the_swim_is_hard_and_long_where_it_is_easy():
+    simulator = Simulator(scene_of("adaptive", 0.05), 2)
+    for _ in range(3):
+        report = simulator.stroke(np.array([[0.0] * 5, [-1.0, 1.0, 0.0, 0.0, 0.0]]))
+    assert report.steps[0] < 50 < report.steps[1]
+    assert report.rejections[0] == 0
+    np.testing.assert_allclose(report.covered, 1.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("hub_hinge, peak", [("opening", np.pi / 5), ("turning", 0.5), ("opening", 0.9)])
+def test_smallest_opening_angle_is_that_of_the_limbs_during_the_stroke(hub_hinge, peak):
+    scene = Scene(Seastar(hub_hinge=hub_hinge), actuator=SmaPulse(peak), numerics=Numerics("implicit-euler", 0.01))
+    simulator, smallest = Simulator(scene), []
+    parts = simulator.stroke_in_parts([[1.0, -1.0, 0.0, 0.3, 0.0]], 100)
+    while True:
+        try:
+            next(parts)
+        except StopIteration as finished:
+            report = finished.value
+            break
+        roots = simulator.positions[0, 1::9] - simulator.positions[0, 0]
+        after = np.roll(roots, -1, axis=0)
+        cross, dot = roots[:, 0] * after[:, 1] - roots[:, 1] * after[:, 0], np.sum(roots * after, axis=1)
+        smallest.append(np.arctan2(cross, dot).min())
+    assert report.smallest_opening_angle[0] == pytest.approx(min(smallest), abs=1e-4)
+    assert (report.smallest_opening_angle[0] < 0.0) == (peak == 0.9)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("speed", [0.1, 1.0, 10.0])
+def test_robots_with_wild_velocities_arrive(scheme, speed):
+    """Where plain Newton ends in NaN; see design.md, section 3."""
+    simulator = Simulator(scene_of(scheme), n_robots=8)
+    set_motion(simulator, random_velocities(8, speed))
+    for command in random_commands(8):
+        report = simulator.stroke(command)
+        assert not report.status.any()
+        np.testing.assert_allclose(report.covered, 1.0, rtol=1e-12)
+    assert np.isfinite(simulator.positions).all() and np.isfinite(simulator.velocities).all()
+
+
+@pytest.mark.parametrize(
+    "robot, step", [(Seastar(nodes_per_limb=40), 0.05), (Seastar(), 0.01), (Seastar(n_limbs=12), 0.02)]
+)
+def test_scenes_that_defeat_plain_newton_arrive(robot, step):
+    commands = np.resize([1.0, -1.0], (1, robot.n_limbs))
+    simulator = Simulator(Scene(robot, actuator=SmaPulse(min(np.pi / 5, 1.2)), numerics=Numerics(step=step)))
+    for _ in range(3):
+        assert simulator.stroke(commands).status[0] == SolverStatus.CONVERGED
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_nodes_are_within_the_tolerance_as_a_rule_and_nowhere_far_beyond_it(scheme):
+    """One step of robots that swim, against the same step at a far tighter tolerance.
+
+    The last Newton step is foreseen, not taken (see minimise), and now and then it is longer than foreseen.
+    """
+    n_robots, h = 128, 0.01
+    swimmers = Simulator(scene_of("implicit-midpoint", 5e-3), n_robots)
+    for command in random_commands(n_robots, 2):
+        swimmers.stroke(command)
+    actuator, ends = SmaPulse(heating_time=h, cooling_time=h), {}
+    for tolerance in (1e-6, 1e-8, 1e-13):
+        numerics = Numerics(scheme, h, newton_tolerance=tolerance)
+        simulator = Simulator(Scene(actuator=actuator, numerics=numerics), n_robots)
+        simulator.set_state(swimmers.get_state())
+        parts = simulator.stroke_in_parts(random_commands(n_robots, seed=1)[0], 2)
+        next(parts)
+        ends[tolerance] = simulator.positions
+        finish(parts)
+    for tolerance in (1e-6, 1e-8):
+        error = np.linalg.norm(ends[tolerance] - ends[1e-13], axis=2).max(axis=1) / (tolerance * 0.1)
+        assert np.median(error) < 1.0 and error.max() < 100.0
+
+
+def test_a_step_that_does_not_converge_is_two_steps_of_half_its_length():
+    """Steps of 10 ms need more than two iterations, and their halves do not."""
+    h, ends, halvings = 0.01, {}, {}
+    for step, max_iterations in ((h, 2), (h / 2, 60), (h, 60)):
+        numerics = Numerics("implicit-euler", step, newton_tolerance=1e-4, max_iterations=max_iterations)
+        simulator = Simulator(Scene(actuator=SmaPulse(0.1, h, h), numerics=numerics))
+        set_motion(simulator, random_velocities(1, 0.01))
+        report = simulator.stroke(STRAIGHT)
+        halvings[step, max_iterations], ends[step, max_iterations] = report.halvings[0], simulator.positions
+        assert report.covered[0] == pytest.approx(2 * h, rel=1e-12)
+    assert halvings == {(h, 2): 2, (h / 2, 60): 0, (h, 60): 0}
+    np.testing.assert_allclose(ends[h, 2], ends[h / 2, 60], rtol=0.0, atol=1e-4 * 0.1)
+    assert np.abs(ends[h, 60] - ends[h / 2, 60]).max() > 10 * 1e-4 * 0.1
+
+
+# Failure is a value
+
+
+def broken_state(n_robots: int, broken: int) -> State:
+    """Robots at rest, one of them with all its nodes in one point: no angle, no direction, no way on."""
+    state = Simulator(scene_of(), n_robots).get_state()
+    state.positions[broken] = 0.25
+    return state
+
+
+def test_a_robot_that_cannot_be_solved_fails_alone_with_a_status_and_a_finite_state():
+    n_robots, broken = N_LANES + 2, 1
+    well, ill = Simulator(scene_of(), n_robots), Simulator(scene_of(), n_robots)
+    ill.set_state(broken_state(n_robots, broken))
+    others = np.arange(n_robots) != broken
+    for k, command in enumerate(random_commands(n_robots), start=1):
+        well.stroke(command)
+        report = ill.stroke(command)
+        assert report.status[broken] == SolverStatus.NOT_CONVERGED and not report.status[others].any()
+        assert report.covered[broken] == 0.0
+        assert ill.failed.tolist() == (~others).tolist()
+        assert_same_bits(robots(well.get_state(), others), robots(ill.get_state(), others))
+        np.testing.assert_array_equal(ill.positions[broken], 0.25)
+        assert ill.time[broken] == 0.0 and ill.time[0] == k
+    for field in report:
+        assert np.isfinite(field).all()
+
+
+def test_a_failed_robot_is_well_again_after_a_reset_or_a_new_state():
+    fresh, simulator, command = Simulator(scene_of(), 3), Simulator(scene_of(), 3), random_commands(3)[0]
+    fresh.stroke(command)
+    for cure in (
+        lambda: simulator.reset(simulator.failed),
+        lambda: simulator.set_state(Simulator(scene_of(), 3).get_state()),
+    ):
+        simulator.set_state(broken_state(3, 1))
+        assert simulator.stroke(np.zeros((3, 5))).status.tolist() == [0, 1, 0]
+        cure()
+        assert not simulator.failed.any()
+        simulator.stroke(command)
+        np.testing.assert_array_equal(simulator.positions[1], fresh.positions[1])
+
+
+@pytest.mark.parametrize("speed", [1e30, 1e160, 1e300])
+def test_velocities_beyond_all_bounds_end_in_a_status_not_in_nan(speed):
+    simulator = Simulator(scene_of(), n_robots=4)
+    velocities = np.zeros((4, 46, 2))
+    velocities[2] = random_velocities(1, speed)[0]
+    set_motion(simulator, velocities)
+    report = simulator.stroke(np.zeros((4, 5)))
+    assert report.status.tolist() == [0, 0, 1, 0]
+    assert np.isfinite(simulator.positions).all() and np.isfinite(simulator.velocities).all()
+
+
+def test_every_status_is_one_sentence():
+    for status in SolverStatus:
+        assert status.sentence.endswith(".") and "\n" not in status.sentence
+
+
+# Refusals
+
+
+@pytest.mark.parametrize("value", [0, -1, 2.5, "2", None, True], ids=repr)
+def test_a_batch_has_one_robot_or_more(value):
+    with refused("n_robots", repr(value)):
+        Simulator(Scene(), value)
+
+
+@pytest.mark.parametrize("scene", [None, Scene, Seastar(), "chapter"])
+def test_a_simulator_needs_a_scene(scene):
+    with refused("Scene"):
+        Simulator(scene)
+
+
+@pytest.mark.parametrize("value", ["two", 1.5, -1, True], ids=repr)
+def test_threads_are_a_whole_number(value):
+    with refused("threads"):
+        Simulator(Scene(), 3 * N_LANES, threads=value)
+
+
+@pytest.mark.parametrize("shape", [(5,), (1, 5), (2, 4), (2, 6), (5, 2), (2, 5, 1), ()])
+def test_commands_of_another_shape_are_refused(shape):
+    with refused("(n_robots, n_limbs) = (2, 5)", str(shape)):
+        Simulator(Scene(), 2).stroke(np.zeros(shape))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1.0000001, -2.0])
+def test_commands_beyond_one_or_not_numbers_are_refused_before_anything_moves(value):
+    simulator = Simulator(scene_of(), 2)
+    simulator.stroke(random_commands(2)[0])
+    before, commands = simulator.get_state(), np.zeros((2, 5))
+    commands[1, 2] = value
+    with refused("[-1, 1]", "robot 1", "limb 3"):
+        simulator.stroke(commands)
+    with refused("[-1, 1]"):
+        next(simulator.stroke_in_parts(commands, 2))
+    assert_same_bits(simulator.get_state(), before)
+
+
+@pytest.mark.parametrize("commands", ["abc", [[1, 2], [3]], [["a"] * 5] * 2, np.full((2, 5), 1j)], ids=str)
+def test_commands_that_are_no_numbers_at_all_are_refused_with_a_sentence(commands):
+    with refused("commands"):
+        Simulator(Scene(), 2).stroke(commands)
+
+
+def test_a_turning_hub_refuses_the_command_that_closes_it():
+    simulator = Simulator(Scene(Seastar(hub_hinge="turning")), 2)
+    with refused("robot 1", "limbs 2 and 3", "opening"):
+        simulator.stroke([[0.0] * 5, [0.0, 1.0, -1.0, 0.0, 0.0]])
+    assert not simulator.stroke([[0.0] * 5, [0.0, -1.0, 1.0, 0.0, 0.0]]).status.any()
+
+
+@pytest.mark.parametrize("field", range(3))
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_states_that_are_not_finite_are_refused_and_change_nothing(field, value):
+    simulator = Simulator(scene_of(), 2)
+    simulator.stroke(random_commands(2)[0])
+    before, state = simulator.get_state(), simulator.get_state()
+    state[field].reshape(-1)[-1] = value
+    with refused(f"State.{State._fields[field]}", "finite"):
+        simulator.set_state(state)
+    assert_same_bits(simulator.get_state(), before)
+
+
+@pytest.mark.parametrize(
+    "field, shape", [(0, (2, 45, 2)), (0, (1, 46, 2)), (1, (2, 46, 3)), (1, (2, 92)), (2, ()), (2, (3,))]
+)
+def test_states_of_another_shape_are_refused(field, shape):
+    simulator = Simulator(Scene(), 2)
+    state = list(simulator.get_state())
+    state[field] = np.zeros(shape)
+    with refused(f"State.{State._fields[field]}", str(shape)):
+        simulator.set_state(state)
+
+
+@pytest.mark.parametrize("state", [(np.zeros((1, 46, 2)),), 3, None], ids=["one field", "number", "None"])
+def test_what_is_no_state_is_refused_with_a_sentence(state):
+    with refused("State"):
+        Simulator(Scene()).set_state(state)
+
+
+@pytest.mark.parametrize("mask", [[1, 0], [True], [[True, False]], "both", np.ones(3, bool)], ids=str)
+def test_masks_of_another_shape_or_kind_are_refused(mask):
+    with refused("mask", "(2,)"):
+        Simulator(Scene(), 2).reset(mask)
+
+
+@pytest.mark.parametrize("heading", [np.nan, [0.0, np.inf]], ids=str)
+def test_headings_that_are_not_finite_are_refused(heading):
+    with refused("heading", "finite"):
+        Simulator(Scene(), 2).reset(heading=heading)
+
+
+@pytest.mark.parametrize("heading", [[0.0, 1.0, 2.0], "north", [[0.0], [1.0]]], ids=str)
+def test_headings_of_another_shape_are_refused_with_a_sentence(heading):
+    with refused("heading"):
+        Simulator(Scene(), 2).reset(heading=heading)
+
+
+@pytest.mark.parametrize("parts", [0, -1, 2.5, None], ids=repr)
+def test_a_stroke_has_one_part_or_more(parts):
+    with refused("parts"):
+        finish(Simulator(Scene()).stroke_in_parts(STRAIGHT, parts))
+
+
+def test_vacuum_and_water_without_density_give_the_same_bits():
+    ends = []
+    for fluid in (None, Water(density=0.0)):
+        simulator = Simulator(Scene(fluid=fluid, numerics=Numerics(step=0.01)))
+        simulator.stroke(STRAIGHT)
+        ends.append(simulator.positions)
+    np.testing.assert_array_equal(*ends)
