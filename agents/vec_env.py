@@ -1,0 +1,150 @@
+"""Stable-Baselines3's `VecEnv` over the native batch."""
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.vec_env.base_vec_env import VecEnv, VecEnvIndices, VecEnvObs, VecEnvStepReturn
+
+Info = dict[str, Any]
+
+
+class BatchVecEnv(VecEnv):
+    """A Gymnasium vector environment that returns fresh arrays, autoreset SAME_STEP, for Stable-Baselines3.
+
+    Gives what its `DummyVecEnv` of single environments behind a `Monitor` gives: fresh arrays every step, and at the
+    end of an episode `terminal_observation`, `TimeLimit.truncated` and `episode` (return `r`, length `l`, seconds `t`)
+    in that robot's info. The robots share one environment, so attributes and methods are the batch's own: the same
+    for every robot, and settable for all of them only.
+
+    seconds_in_steps: Time spent in the steps so far [s], the simulator's share of a training.
+    """
+
+    actions: NDArray[Any]
+
+    def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any]):
+        mode = env.metadata.get("autoreset_mode")
+        if mode is not AutoresetMode.SAME_STEP:
+            raise ValueError(f"Stable-Baselines3 needs autoreset_mode=AutoresetMode.SAME_STEP, not {mode}.")
+        self.env = env
+        super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
+        self.seconds_in_steps = 0.0
+        self._started = time.time()
+        self._returns = np.zeros(self.num_envs)
+        self._lengths = np.zeros(self.num_envs, np.int64)
+        self._first_info_names: list[str] = []
+
+    def reset(self) -> VecEnvObs:
+        """Begin episodes of all robots, with the seeds and options set for this reset."""
+        options = self._options[0]
+        if any(other is not options for other in self._options if other or options):
+            raise ValueError("The robots share one environment: set_options takes one dictionary for all of them.")
+        seeds = None if self._seeds[0] is None else list(self._seeds)
+        observations, info = self.env.reset(seed=seeds, options=options or None)  # type: ignore[arg-type]
+        self._reset_seeds()
+        self._reset_options()
+        self._returns[:] = 0.0
+        self._lengths[:] = 0
+        self._first_info_names = _names(info)
+        self.reset_infos = _one_per_robot(info, self.num_envs)
+        return observations
+
+    def step_async(self, actions: NDArray[Any]) -> None:
+        """Keep the actions of the next `step_wait`."""
+        self.actions = actions
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """One stroke of every robot."""
+        began = time.perf_counter()
+        observations, rewards, terminated, truncated, info = self.env.step(self.actions)
+        self.seconds_in_steps += time.perf_counter() - began
+        dones = terminated | truncated
+        self._returns += rewards
+        self._lengths += 1
+        infos = _one_per_robot(info, self.num_envs)
+        if dones.any():
+            final_infos = _one_per_robot(info["final_info"], self.num_envs)
+            for robot in np.flatnonzero(dones).tolist():
+                self.reset_infos[robot] = {name: infos[robot][name] for name in self._first_info_names}
+                infos[robot] = {
+                    **final_infos[robot],
+                    "terminal_observation": info["final_obs"][robot],
+                    "episode": self._end_episode(robot),
+                }
+        for robot, only_truncated in enumerate((truncated & ~terminated).tolist()):
+            infos[robot]["TimeLimit.truncated"] = only_truncated
+        return observations, rewards.astype(np.float32), dones, infos
+
+    def _end_episode(self, robot: int) -> Info:
+        """The statistics that a `Monitor` gives."""
+        statistics = {
+            "r": round(float(self._returns[robot]), 6),
+            "l": int(self._lengths[robot]),
+            "t": round(time.time() - self._started, 6),
+        }
+        self._returns[robot] = 0.0
+        self._lengths[robot] = 0
+        return statistics
+
+    def close(self) -> None:
+        """Close the batch."""
+        self.env.close()
+
+    def _layers(self) -> list[gym.vector.VectorEnv[Any, Any, Any]]:
+        """The environment and what it wraps, outermost first."""
+        layers = [self.env]
+        while isinstance(layers[-1], gym.vector.VectorWrapper):
+            layers.append(layers[-1].env)
+        return layers
+
+    def _owner(self, name: str) -> gym.vector.VectorEnv[Any, Any, Any]:
+        for layer in self._layers():
+            if hasattr(layer, name):
+                return layer
+        raise AttributeError(f"{self.env} has no attribute {name!r}.")
+
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
+        """The batch's attribute, once for every robot asked for."""
+        return [getattr(self._owner(attr_name), attr_name)] * len(list(self._get_indices(indices)))
+
+    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
+        """Set an attribute of the batch, on the layer that has it."""
+        if len(set(self._get_indices(indices))) != self.num_envs:
+            raise ValueError("The robots share one environment: an attribute can only be set for all of them.")
+        layers = [layer for layer in self._layers() if hasattr(layer, attr_name)]
+        setattr(layers[0] if layers else self.env.unwrapped, attr_name, value)
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Call the batch's method, once; its result, once for every robot asked for."""
+        result = getattr(self._owner(method_name), method_name)(*method_args, **method_kwargs)
+        return [result] * len(list(self._get_indices(indices)))
+
+    def env_is_wrapped(self, wrapper_class: type[Any], indices: VecEnvIndices = None) -> list[bool]:
+        """Whether the batch is wrapped so; a Monitor counts as present, because its statistics are."""
+        wrapped = issubclass(wrapper_class, Monitor) or any(isinstance(one, wrapper_class) for one in self._layers())
+        return [wrapped] * len(list(self._get_indices(indices)))
+
+    def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
+        """The batch draws nothing."""
+        return [None] * self.num_envs
+
+
+def _names(info: Info) -> list[str]:
+    """What an info tells about robots; the masks beside it and the final values are for the adapter."""
+    return [name for name in info if not name.startswith("_") and name not in ("final_obs", "final_info")]
+
+
+def _one_per_robot(info: Info, n_robots: int) -> list[Info]:
+    """A batch's info as one per robot: plain numbers, and an array for a vector."""
+    names = _names(info)
+    if not names:
+        return [{} for _ in range(n_robots)]
+    columns = [info[name].tolist() if info[name].ndim == 1 else list(info[name]) for name in names]
+    return [dict(zip(names, values, strict=True)) for values in zip(*columns, strict=True)]

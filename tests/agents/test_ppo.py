@@ -1,0 +1,297 @@
+"""A saved policy is all it takes to swim on, or to learn on; what is no such policy is refused with a sentence."""
+
+import json
+import random
+import zipfile
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import torch
+from stable_baselines3.common.evaluation import evaluate_policy
+
+from agents import ppo
+from agents.ppo import Description, Hyperparameters, LearnedPolicy, load, make_model, make_training_env, resume, save
+from agents.vec_env import BatchVecEnv
+from seastar_gym import Numerics, Scene, Seastar, Water
+from seastar_gym.envs import symmetry
+
+FAST = Numerics.preset("fast")
+SMALL = Hyperparameters(num_envs=8, rollout=8, batch_size=32, epochs=2, hidden=(16, 8), max_episode_steps=10)
+OTHER = Hyperparameters(
+    actions="limbs", symmetry=False, num_envs=4, rollout=4, batch_size=16, epochs=1, hidden=(12,), max_episode_steps=5
+)
+OTHER_SCENE = Scene(robot=Seastar(n_limbs=4, nodes_per_limb=4), fluid=Water(drag_coefficient=1.5), numerics=FAST)
+
+
+def make_learner(hyperparameters=SMALL, scene=None, seed=0):
+    env = make_training_env(
+        hyperparameters, "random", random_heading=True, scene=Scene(numerics=FAST) if scene is None else scene
+    )
+    return make_model(env, hyperparameters, seed)
+
+
+def observations_of(learner, n_strokes=3):
+    """Raw observations of robots on their way, (n, size)."""
+    batch = learner.get_env().env.unwrapped
+    batch.reset(seed=11)
+    batch.action_space.seed(12)
+    for _ in range(n_strokes):
+        observations, *_ = batch.step(batch.action_space.sample())
+    return observations
+
+
+@pytest.fixture(scope="module")
+def learner():
+    """Has learned a little."""
+    learner = make_learner()
+    return learner.learn(3 * 64)
+
+
+@pytest.fixture
+def file(learner, tmp_path):
+    save(learner, tmp_path / "model.zip")
+    return tmp_path / "model.zip"
+
+
+# --- a policy on disk ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("hyperparameters, scene", [(SMALL, None), (OTHER, OTHER_SCENE)])
+def test_a_loaded_policy_acts_as_the_learner_did(hyperparameters, scene, tmp_path):
+    learner = make_learner(hyperparameters, scene)
+    learner.learn(hyperparameters.num_envs * hyperparameters.rollout)
+    save(learner, tmp_path / "model.zip")
+    policy = load(tmp_path / "model.zip")
+    assert policy.actions == hyperparameters.actions
+    assert policy.scene == (Scene(numerics=FAST) if scene is None else scene)
+    observations = observations_of(learner)
+    actions, state = policy.predict(observations, deterministic=True)
+    assert state is None
+    expected, _ = LearnedPolicy.of(learner).predict(observations, deterministic=True)
+    np.testing.assert_array_equal(actions, expected)
+    if not hyperparameters.symmetry:
+        np.testing.assert_array_equal(actions, learner.predict(observations, deterministic=True)[0])
+
+
+def test_a_loaded_policy_drives_the_plain_environment(file):
+    policy = load(file)
+    env = gym.make("SeastarSwim-v0", actions=policy.actions, scene=policy.scene, max_episode_steps=4)
+    observation, _ = env.reset(seed=0)
+    over = False
+    while not over:
+        action, state = policy.predict(observation, state=None, episode_start=np.ones(1, bool), deterministic=True)
+        assert env.action_space.contains(np.int64(action)) and state is None
+        observation, _, terminated, truncated, _ = env.step(action)
+        over = terminated or truncated
+
+
+def test_one_observation_gets_the_action_that_it_gets_in_a_batch(learner, file):
+    policy = load(file)
+    observations = observations_of(learner)
+    together, _ = policy.predict(observations, deterministic=True)
+    alone = [policy.predict(observation, deterministic=True)[0] for observation in observations]
+    np.testing.assert_array_equal(alone, together)
+    assert np.shape(alone[0]) == ()
+
+
+def test_a_loaded_policy_is_equivariant(learner, file):
+    policy = load(file)
+    observations = observations_of(learner)
+    actions, _ = policy.predict(observations, deterministic=True)
+    for element in range(10):
+        elements = np.full(len(observations), element)
+        carried, _ = policy.predict(symmetry.transform_observations(observations, elements, 5), deterministic=True)
+        np.testing.assert_array_equal(carried, symmetry.transform_actions(actions, elements, "joint", 5))
+
+
+def test_without_deterministic_it_explores(learner, file):
+    torch.manual_seed(0)
+    policy, observation = load(file), observations_of(learner)[0]
+    assert len({int(policy.predict(observation)[0]) for _ in range(30)}) > 5
+    assert len({int(policy.predict(observation, deterministic=True)[0]) for _ in range(30)}) == 1
+
+
+def test_the_learner_and_its_policy_score_the_same(learner):
+    """The reduced batch under the learner and the raw batch under its policy are one and the same experiment."""
+    env = learner.get_env()
+    raw = BatchVecEnv(env.env.env)
+    scores = []
+    for policy, its_env in ((learner, env), (LearnedPolicy.of(learner), raw)):
+        its_env.seed(5)
+        scores.append(evaluate_policy(policy, its_env, n_eval_episodes=8, return_episode_rewards=True))
+    assert scores[0] == scores[1]
+
+
+def test_an_observation_of_another_robot_is_refused(file):
+    with pytest.raises(ValueError, match=r"robot of 5 limbs of 10 nodes: it sees 186 numbers, not .* shape \(54,\)"):
+        load(file).predict(np.zeros(54, np.float32))
+
+
+def test_loading_unpickles_nothing(file, tmp_path):
+    """Stable-Baselines3's pickles are not even looked at."""
+    without = tmp_path / "without.zip"
+    with zipfile.ZipFile(file) as old, zipfile.ZipFile(without, "w") as new:
+        for name in (ppo.DESCRIPTION, ppo.WEIGHTS):
+            new.writestr(name, old.read(name))
+    assert load(without).actions == "joint"
+
+
+# --- saving ----------------------------------------------------------------------------------------------------------
+
+
+def test_saving_replaces_the_file_in_one_go(learner, file, monkeypatch):
+    before = file.read_bytes()
+
+    def fail(source, target):
+        assert target == file and source.parent == file.parent
+        assert zipfile.ZipFile(source).testzip() is None  # complete before it takes the place
+        raise OSError("the disk is gone")
+
+    with monkeypatch.context() as broken:
+        broken.setattr(ppo.os, "replace", fail)
+        with pytest.raises(OSError, match="the disk is gone"):
+            save(learner, file)
+    assert file.read_bytes() == before
+    save(learner, file)
+    assert [one.name for one in file.parent.iterdir()] == ["model.zip"]
+
+
+def test_the_description_says_what_the_policy_expects(learner, file):
+    with zipfile.ZipFile(file) as archive:
+        facts = json.loads(archive.read(ppo.DESCRIPTION))
+    assert facts["observation_layout"] == 1
+    assert (facts["actions"], facts["symmetry"], facts["hidden"]) == ("joint", True, [16, 8])
+    assert facts["scene"]["numerics"]["scheme"] == FAST.scheme
+    assert facts["strokes_trained"] == learner.num_timesteps
+
+
+@pytest.mark.parametrize("scene", [Scene(), OTHER_SCENE, Scene(fluid=None)])
+def test_a_description_survives_its_text(scene):
+    description = Description("pairs", False, scene, (3, 4, 5))
+    assert Description.from_json(description.to_json()) == description
+
+
+# --- files that are no policy ----------------------------------------------------------------------------------------
+
+
+def rewritten(file, **changes):
+    """The file with other facts in its description, or without one of its entries (None)."""
+    with zipfile.ZipFile(file) as archive:
+        entries = {name: archive.read(name) for name in archive.namelist()}
+    facts = json.loads(entries[ppo.DESCRIPTION])
+    for name, value in changes.items():
+        entry = name.replace("__", ".")
+        if entry in entries:
+            del entries[entry]
+        else:
+            facts[name] = value
+    if ppo.DESCRIPTION in entries:
+        entries[ppo.DESCRIPTION] = json.dumps(facts).encode()
+    with zipfile.ZipFile(file, "w") as archive:
+        for name, data in entries.items():
+            archive.writestr(name, data)
+
+
+def assert_one_sentence(error, file):
+    text = str(error.value)
+    assert str(file) in text and "\n" not in text and text.endswith("."), text
+
+
+def test_a_missing_file_is_said_to_be_missing(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"There is no trained policy at .*nothing\.zip") as error:
+        load(tmp_path / "nothing.zip")
+    assert_one_sentence(error, tmp_path / "nothing.zip")
+
+
+@pytest.mark.parametrize("keep", [0, 10, 0.5, 0.99])
+def test_a_cut_file_is_said_to_be_damaged(file, keep):
+    data = file.read_bytes()
+    file.write_bytes(data[: keep if isinstance(keep, int) else int(keep * len(data))])
+    with pytest.raises(ValueError, match="is damaged") as error:
+        load(file)
+    assert_one_sentence(error, file)
+
+
+def test_a_flipped_bit_is_found(file):
+    data = bytearray(file.read_bytes())
+    with zipfile.ZipFile(file) as archive:
+        data[archive.getinfo(ppo.WEIGHTS).header_offset + 5000] ^= 1
+    file.write_bytes(bytes(data))
+    with pytest.raises(ValueError, match=r"is damaged.*Bad CRC-32"):
+        load(file)
+
+
+@pytest.mark.parametrize(
+    "change, sentence",
+    [
+        ({"policy__json": None}, "no policy saved by this project: There is no item"),
+        ({"policy__pth": None}, "no policy saved by this project: There is no item"),
+        ({"observation_layout": 0}, "its observation_layout is 0, this version of seastar_gym knows 1"),
+        ({"format": 99}, "its format is 99"),
+        ({"actions": "waves"}, "actions must be one of"),
+        ({"hidden": [16, 9]}, "does not fit"),
+        ({"scene": {"robot": {"n_limbs": 1}}}, "n_limbs must be a whole number from 3"),
+        ({"scene": {"robot": {"n_arms": 5}}}, "does not fit"),
+    ],
+)
+def test_what_does_not_fit_is_said_in_one_sentence(file, change, sentence):
+    rewritten(file, **change)
+    with pytest.raises(ValueError, match=sentence) as error:
+        load(file)
+    assert_one_sentence(error, file)
+
+
+# --- learning on -----------------------------------------------------------------------------------------------------
+
+
+def numbers_of(learner):
+    """Every number that the learner's future depends on, besides the environment's."""
+    optimiser = learner.policy.optimizer.state_dict()["state"]
+    moments = [moment for state in optimiser.values() for moment in state.values()]
+    return [number.detach().numpy() for number in [*learner.policy.state_dict().values(), *moments]]
+
+
+def test_a_resumed_learner_is_where_it_was(tmp_path):
+    learner = make_learner(seed=3).learn(2 * 64)
+    save(learner, tmp_path / "model.zip")
+    draws = torch.rand(5), np.random.random(5), random.random()  # noqa: NPY002
+    resumed = resume(tmp_path / "model.zip", make_learner(seed=9).get_env())
+    again = torch.rand(5), np.random.random(5), random.random()  # noqa: NPY002
+    for draw, its_draw in zip(draws, again, strict=True):
+        np.testing.assert_array_equal(draw, its_draw)
+    assert resumed.num_timesteps == learner.num_timesteps == 128
+    assert resumed.seed == 3
+    numbers, its_numbers = numbers_of(learner), numbers_of(resumed)
+    assert len(numbers) == len(its_numbers) > 20
+    for number, its_number in zip(numbers, its_numbers, strict=True):
+        np.testing.assert_array_equal(number, its_number)
+    for name in ("n_steps", "batch_size", "n_epochs", "gamma", "gae_lambda", "ent_coef"):
+        assert getattr(resumed, name) == getattr(learner, name)
+    resumed.learn(64, reset_num_timesteps=False)
+    assert resumed.num_timesteps == 192
+    assert resumed.lr_schedule(1.0) == SMALL.learning_rate
+
+
+def test_a_resumed_learner_meets_new_paths(file):
+    env = make_learner(seed=0).get_env()
+    env.seed(0)
+    first = env.reset()
+    resume(file, env)
+    assert env._seeds == [192 + robot for robot in range(8)]
+    assert not np.array_equal(env.reset(), first)
+
+
+def test_another_environment_is_refused(file):
+    env = make_learner(scene=Scene(numerics=Numerics.preset("chapter"))).get_env()
+    with pytest.raises(ValueError, match=r"was trained for .*sdirk2.* not for .*implicit-euler"):
+        resume(file, env)
+    with pytest.raises(ValueError, match=r"was trained for .*joint.* not for .*limbs"):
+        resume(file, make_learner(OTHER, OTHER_SCENE).get_env())
+
+
+def test_the_same_seed_trains_the_same_policy():
+    first, second, other = (make_learner(seed=seed).learn(128) for seed in (1, 1, 2))
+    for number, same in zip(numbers_of(first), numbers_of(second), strict=True):
+        np.testing.assert_array_equal(number, same)
+    assert any(not np.array_equal(*pair) for pair in zip(numbers_of(first), numbers_of(other), strict=True))

@@ -1,0 +1,357 @@
+"""Trains a swimmer with PPO, then compares it with the scripted pentagon gait.
+
+    python train.py                        a few minutes on two cores
+    python train.py --quick                the whole way in short, in under a minute
+    python train.py --resume runs/FOLDER   continues a run that was stopped (Ctrl-C), or trains it for more --strokes
+
+Everything is written to a folder of its own: the model, checkpoints, the options and the command, TensorBoard logs,
+and the comparison with its table, pictures, videos and report.md.
+"""
+
+import csv
+import json
+import os
+import platform
+import shlex
+import shutil
+import signal
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from types import FrameType
+from typing import Annotated
+
+import gymnasium
+import numba
+import numpy as np
+import stable_baselines3
+import torch
+import tyro
+from matplotlib.figure import Figure
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import configure
+from tqdm import tqdm
+
+import seastar_gym
+from agents.evaluate import COLUMNS, evaluate, results
+from agents.ppo import Hyperparameters, LearnedPolicy, load, make_model, make_training_env, resume, save
+from agents.scripted import scripted
+from agents.swim import Swim, swim
+from agents.vec_env import BatchVecEnv
+from seastar_gym import RewardWeights
+from seastar_gym.envs.paths import PathName
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.scene import Fidelity
+
+MAX_STROKES = 400
+"""Time limit of a swim round the pentagon; the scripted gait takes 250."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """Train a swimmer with PPO and compare it with the scripted pentagon gait."""
+
+    strokes: int = 600_000
+    """Strokes to train for, of all robots together."""
+    path: PathName = "random"
+    """What to train on. Random paths teach every direction and every turn; the pentagon is then just one of them."""
+    random_heading: bool = True
+    """Turn the robots at random at the start of every episode."""
+    fidelity: Fidelity = "balanced"
+    """How exactly the swims are computed, in training and in the comparison."""
+    seed: int = 0
+    """Of the network, of the exploration and of the paths."""
+    num_threads: int | None = None
+    """Threads of the simulator; all processors by default. The network always uses one: more are slower."""
+    device: str = "cpu"
+    """Where the network is: cpu, cuda or auto. It is small: a GPU is no faster."""
+    save_freq: int = 50_000
+    """Strokes between checkpoints."""
+    video: bool = True
+    """Film the swims of the comparison."""
+    out: Path | None = None
+    """Folder of the run; runs/ and the time by default."""
+    resume: Path | None = None
+    """Continue the run in this folder, with its options; only strokes, num_threads, device, save_freq and video may be
+    given anew."""
+    quick: bool = False
+    """A short form that goes all the way in under a minute, at fidelity "fast"."""
+    ppo: Annotated[Hyperparameters, tyro.conf.arg(name="")] = Hyperparameters()
+
+    def __post_init__(self) -> None:
+        if self.strokes < 1 or self.save_freq < 1:
+            raise ValueError("strokes and save_freq must be at least 1.")
+
+
+CHANGEABLE = {"strokes", "num_threads", "device", "save_freq", "video", "out", "resume", "quick"}
+"""Options that may change when a run is continued."""
+
+
+# --- options and their folder ----------------------------------------------------------------------------------------
+
+
+def read_options(arguments: Sequence[str]) -> Options:
+    """The options of the command line; with --resume, those of the run unless given anew."""
+    options = tyro.cli(Options, args=arguments)
+    if options.resume is None:
+        return replace(options, strokes=65_536, save_freq=32_768, fidelity="fast") if options.quick else options
+    saved = replace(saved_options(options.resume), out=options.resume, resume=options.resume)
+    options = tyro.cli(Options, args=arguments, default=saved)
+    changed = [name for name in saved.__dict__ if getattr(options, name) != getattr(saved, name)]
+    if forbidden := sorted(set(changed) - CHANGEABLE):
+        raise ValueError(f"The run in {options.resume} cannot continue with another {', '.join(forbidden)}.")
+    return replace(options, out=options.resume)
+
+
+def saved_options(folder: Path) -> Options:
+    """The options of the run in a folder."""
+    file = folder / "config.json"
+    if not file.is_file():
+        raise FileNotFoundError(f"There is no run to continue in {folder}: it has no config.json.")
+    try:
+        options = json.loads(file.read_text(encoding="utf-8"))["options"]
+        ppo = options.pop("ppo")
+        ppo |= {"hidden": tuple(ppo["hidden"]), "reward": RewardWeights(**ppo["reward"])}
+        return Options(**{**options, "out": folder, "resume": None, "ppo": Hyperparameters(**ppo)})
+    except (json.JSONDecodeError, KeyError, TypeError) as damaged:
+        raise ValueError(f"{file} is damaged or from another version: {damaged}.") from damaged
+
+
+def write_config(options: Options, arguments: Sequence[str], folder: Path) -> None:
+    """What was asked for, by which commands, with which versions and on which machine."""
+    file = folder / "config.json"
+    earlier = [] if options.resume is None else json.loads(file.read_text(encoding="utf-8"))["commands"]
+    modules = (seastar_gym, gymnasium, numba, np, stable_baselines3, torch)
+    config = {
+        "commands": [*earlier, shlex.join(["python", "train.py", *arguments])],
+        "options": asdict(options),
+        "versions": {"python": platform.python_version(), **{one.__name__: one.__version__ for one in modules}},
+        "machine": {"system": platform.platform(), "processors": os.cpu_count()},
+    }
+    file.write_text(json.dumps(config, indent=2, default=str) + "\n", encoding="utf-8")
+
+
+# --- training --------------------------------------------------------------------------------------------------------
+
+
+class Interruption:
+    """Within it, a first Ctrl-C asks for an orderly stop; a second one stops at once."""
+
+    def __enter__(self) -> "Interruption":
+        self.requested = False
+        self._before = signal.signal(signal.SIGINT, self._request)
+        return self
+
+    def _request(self, number: int, frame: FrameType | None) -> None:
+        self.requested = True
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    def __exit__(self, *exception: object) -> None:
+        signal.signal(signal.SIGINT, self._before)
+
+
+class Watch(BaseCallback):
+    """Progress bar, logs and checkpoints; stops the training when `stop` says so."""
+
+    def __init__(self, options: Options, folder: Path, learner: PPO, batch: BatchVecEnv, stop: Callable[[], bool]):
+        super().__init__()
+        self.options, self.folder, self.learner, self.batch, self.stop = options, folder, learner, batch, stop
+        self.strokes = 0  # of this session
+        self.seconds = {"simulator": 0.0, "policy": 0.0, "update": 0.0}
+        self.pentagon = SeastarSwimEnv("pentagon", actions=options.ppo.actions, fidelity=options.fidelity)
+
+    def _on_training_start(self) -> None:
+        # On a terminal only: elsewhere, a line at every checkpoint says how far it is.
+        total, done = self.options.strokes, self.learner.num_timesteps
+        self.bar = tqdm(total=total, initial=done, unit=" strokes", unit_scale=True, disable=None, smoothing=0.1)
+        self.next_save = done + self.options.save_freq
+        self.clock = time.perf_counter()
+
+    def _on_rollout_start(self) -> None:
+        self.seconds["update"] += self._lap()
+        if self.learner.num_timesteps >= self.next_save:
+            self.next_save += self.options.save_freq
+            self.checkpoint()
+            self._lap()
+        self.simulator_seconds = self.batch.seconds_in_steps
+
+    def _on_step(self) -> bool:
+        self.strokes += self.batch.num_envs
+        self.bar.update(self.batch.num_envs)
+        return not self.stop()
+
+    def _on_rollout_end(self) -> None:
+        simulator = self.batch.seconds_in_steps - self.simulator_seconds
+        self.seconds["simulator"] += simulator
+        self.seconds["policy"] += self._lap() - simulator
+        for name, share in self.shares().items():
+            self.logger.record(f"time/share_{name}", share)
+
+    def _on_training_end(self) -> None:
+        self.bar.close()
+
+    def _lap(self) -> float:
+        """Seconds since the last lap."""
+        before, self.clock = self.clock, time.perf_counter()
+        return self.clock - before
+
+    def shares(self) -> dict[str, float]:
+        """Of the training's time: in the simulator, in the policy and in the update."""
+        total = sum(self.seconds.values())
+        return {name: seconds / total if total else 0.0 for name, seconds in self.seconds.items()}
+
+    def checkpoint(self) -> None:
+        """Save the model, and see how it swims round the pentagon."""
+        strokes = self.learner.num_timesteps
+        save(self.learner, self.folder / "model.zip")
+        (self.folder / "checkpoints").mkdir(exist_ok=True)
+        shutil.copyfile(self.folder / "model.zip", self.folder / "checkpoints" / f"model_{strokes:09d}.zip")
+        done = swim("learned", LearnedPolicy.of(self.learner), self.pentagon, max_strokes=MAX_STROKES)
+        self.logger.record("eval/pentagon_strokes", done.strokes)
+        self.logger.record("eval/pentagon_waypoints", done.waypoints_reached)
+        with (self.folder / "progress.csv").open("a", newline="", encoding="utf-8") as file:
+            csv.writer(file).writerow([strokes, done.strokes, done.waypoints_reached])
+        reached = "" if done.finished else f" (only {done.waypoints_reached} waypoints)"
+        self.bar.set_postfix_str(f"pentagon in {done.strokes}{reached}")
+        if self.bar.disable:
+            print(f"{strokes} strokes trained: the pentagon takes {done.strokes}{reached}.", flush=True)
+
+
+def train(options: Options, folder: Path, stop: Callable[[], bool]) -> tuple[PPO, Watch]:
+    """The learner after the strokes asked for, or when `stop` said so; saved as model.zip in either case."""
+    env = make_training_env(
+        options.ppo, options.path, options.random_heading, fidelity=options.fidelity, threads=options.num_threads
+    )
+    if options.resume is None:
+        model = make_model(env, options.ppo, options.seed, options.device)
+    else:
+        model = resume(folder / "model.zip", env, options.device)
+    model.set_logger(configure(str(folder / "tensorboard"), ["tensorboard"]))
+    watch = Watch(options, folder, model, env, stop)
+    left = options.strokes - model.num_timesteps
+    if left > 0:
+        model.learn(left, watch, log_interval=1, reset_num_timesteps=options.resume is None)
+        watch.checkpoint()
+    env.close()
+    return model, watch
+
+
+# --- comparison and report -------------------------------------------------------------------------------------------
+
+
+def compare(options: Options, folder: Path) -> list[Swim]:
+    """The learned policy and the scripted gait round the pentagon: table, CSV, picture and videos."""
+    return evaluate(
+        {"learned": load(folder / "model.zip", options.device), "script": scripted("pentagon")},
+        "pentagon",
+        max_strokes=MAX_STROKES,
+        fidelity=options.fidelity,
+        video=options.video,
+        out=folder / "evaluation",
+    )
+
+
+def draw_learning_curve(folder: Path, script: Swim) -> None:
+    """Strokes round the pentagon over the course of the training."""
+    trained, pentagon, waypoints = np.loadtxt(folder / "progress.csv", delimiter=",", ndmin=2).T
+    finished = waypoints == len(script.waypoints)
+    figure = Figure(figsize=(7.0, 3.6), layout="constrained")
+    axes = figure.add_subplot()
+    axes.axhline(script.strokes, color="#d55e00", linestyle="--", label="script")
+    axes.plot(trained / 1e3, np.where(finished, pentagon, np.nan), "o-", color="#0072b2", label="learned")
+    axes.set(xlabel="strokes trained [thousand]", ylabel="strokes round the pentagon")
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(frameon=False)
+    figure.savefig(folder / "learning_curve.png", dpi=160)
+
+
+def write_report(options: Options, folder: Path, swims: Sequence[Swim], trained: int, watch: Watch) -> None:
+    """report.md: how the learned policy compares, and how it was made. trained: Strokes in all."""
+    lines = [
+        "# Learned against scripted",
+        "",
+        f'Round the pentagon at fidelity "{options.fidelity}":',
+        "",
+        "| " + " | ".join(" ".join(title.split()) for title in COLUMNS.values()) + " |",
+        "|---" * len(COLUMNS) + "|",
+    ]
+    for row in results(swims):
+        row["waypoints_reached"] = f"{row['waypoints_reached']} of {row['waypoints']}"
+        numbers = (row[name] for name in COLUMNS)
+        cells = (f"{number:.1f}" if isinstance(number, float) else str(number) for number in numbers)
+        lines.append("| " + " | ".join(cells) + " |")
+    lines += ["", "![Traces](evaluation/traces.png)", ""]
+    lines += [f"- [{file.stem}](evaluation/{file.name})" for file in sorted(folder.glob("evaluation/*.mp4"))]
+    commands = json.loads((folder / "config.json").read_text(encoding="utf-8"))["commands"]
+    lines += [
+        "",
+        f"Trained for {trained} strokes, seed {options.seed}, by",
+        "",
+        *(f"    {one}" for one in commands),
+        "",
+    ]
+    if seconds := sum(watch.seconds.values()):
+        shares = ", ".join(f"{name} {share:.0%}" for name, share in watch.shares().items())
+        lines += [f"The last session took {seconds:.0f} s, {watch.strokes / seconds:.0f} strokes per second: {shares}."]
+    lines += [
+        "",
+        "![Learning curve](learning_curve.png)",
+        "",
+        "See the logs, compare again, train on:",
+        "",
+        f"    tensorboard --logdir {folder}",
+        f"    python -m agents.evaluate --agents {folder / 'model.zip'} pentagon --fidelity {options.fidelity}",
+        f"    {resume_command(folder)} --strokes {2 * trained}",
+    ]
+    (folder / "report.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def resume_command(folder: Path) -> str:
+    """What continues the run in a folder."""
+    return shlex.join(["python", "train.py", "--resume", str(folder)])
+
+
+# --- the experiment --------------------------------------------------------------------------------------------------
+
+
+def run(options: Options, arguments: Sequence[str]) -> int:
+    """Train, compare, report; returns the exit code."""
+    torch.set_num_threads(1)  # two threads are slower on so small a network, and the simulator has the processors
+    folder = options.out or Path("runs") / time.strftime("%Y-%m-%d_%H-%M-%S")
+    if folder.exists() and options.resume is None:
+        raise ValueError(f"{folder} exists already: give another --out, or continue the run in it with --resume.")
+    folder.mkdir(parents=True, exist_ok=True)
+    write_config(options, arguments, folder)
+    print(f"The run is in {folder}.", flush=True)
+    with Interruption() as interruption:
+        model, watch = train(options, folder, lambda: interruption.requested)
+    if interruption.requested:
+        print(
+            f"Stopped after {model.num_timesteps} strokes; {folder / 'model.zip'} is the policy so far. Continue with"
+        )
+        print(f"    {resume_command(folder)}")
+        return 130
+    swims = compare(options, folder)
+    draw_learning_curve(folder, swims[-1])
+    write_report(options, folder, swims, model.num_timesteps, watch)
+    print(f"Report:  {folder / 'report.md'}\nModel:   {folder / 'model.zip'}\nLogs:    tensorboard --logdir {folder}")
+    return 0
+
+
+def main(arguments: Sequence[str]) -> int:
+    """The command line; returns the exit code."""
+    try:
+        return run(read_options(arguments), arguments)
+    except (ValueError, FileNotFoundError) as wrong:
+        print(wrong, file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("Stopped at once: what was written until then is in the run's folder.", file=sys.stderr)
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
