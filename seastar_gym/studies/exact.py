@@ -88,4 +88,4 @@ def falling_speed(k: float, acceleration: float, time: float) -> float:
 
 def coasting(k: float, speed: float, time: float) -> Floats:
     """(speed [m/s], way [m]) after a time [s] without a force, from a speed [m/s]."""
-    return np.array([speed / (1.0 + k * speed * time), np.log1p(k*time*speed)])
+    return np.array([speed / (1.0 + k * speed * time), np.log1p(k * speed * time) / k])

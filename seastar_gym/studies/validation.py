@@ -131,8 +131,8 @@ def elastica() -> Section:
     return Section(
         "Clamped limb under a tip load",
         "Limb 1 is clamped by holding the hub and its root node, and carries a dead load P across its tip; implicit "
-        "Euler in water with 16 steps of 0.5 s comes to rest. The root hinge turns from the middle of the held edge to the "
-        "middle of the next, so the clamp is at l/2 and the free length is L - l/2; coordinates count from there. "
+        "Euler in water with 16 steps of 0.5 s comes to rest. The root hinge turns from the middle of the held edge to "
+        "the middle of the next, so the clamp is at l/2 and the free length is L - l/2; coordinates count from there. "
         "Reference: the extensible elastica of that length, by shooting.",
         rows,
     )

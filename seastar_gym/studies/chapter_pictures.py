@@ -1,0 +1,355 @@
+"""Draws the chapter's figures from recorded swims. matplotlib is imported where something is drawn.
+
+Wherever a figure depends on the numerics, the converged swim (dark) stands beside the chapter's setting (orange).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.scene import Scene, SmaPulse
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Floats = NDArray[np.float64]
+
+INK, FAINT_INK, GRID = "#3a404a", "#80868f", "#eceff3"
+LIMB, ACTUATED = "#9aa1ab", "#1f4fd8"
+PLUS, MINUS = "#d62728", "#1f4fd8"
+DARK, ORANGE = "#1b1f26", "#e07b00"
+CONVERGED: dict[str, Any] = {"color": DARK, "linestyle": "-", "linewidth": 1.3, "zorder": 2.2}
+CHAPTER: dict[str, Any] = {"color": ORANGE, "linestyle": (0, (4, 2)), "linewidth": 1.3, "zorder": 2.4}
+CONVERGED_PATH: dict[str, Any] = {"color": INK, "linewidth": 2.4, "zorder": 3.5}
+CHAPTER_PATH: dict[str, Any] = {"color": ORANGE, "linewidth": 1.1, "zorder": 3.6}
+"""Of paths, which a robot swims to and fro: dashes would fill up."""
+PAIR_COLOURS = ("#0072b2", "#009e73", "#cc3d7a", "#8c6d1f")
+DPI = 150
+MM, MS = 1e3, 1e3
+CHAPTER_REAL_TIME, CHAPTER_TROUBLE = 3e-3, 20e-3
+"""The time steps [s] from which the chapter's code runs faster than real time, and meets numerical issues."""
+
+
+@dataclass(frozen=True)
+class Swim:
+    """Robots of one scene, followed over strokes.
+
+    label: What solved it, for legends. scene: What was modelled. commands: Of every stroke, shape (n_strokes, n_robots,
+    n_limbs). time: Of the samples [s], shape (n,), the first one before the first stroke. positions, velocities: Of
+    all nodes [m], [m/s], shape (n, n_robots, n_nodes, 2).
+    """
+
+    label: str
+    scene: Scene
+    commands: Floats
+    time: Floats
+    positions: Floats
+    velocities: Floats
+
+    def hub(self, robot: int = 0) -> Floats:
+        """Hub positions [m], shape (n, 2)."""
+        return self.positions[:, robot, 0]
+
+    def hub_velocity(self, robot: int = 0) -> Floats:
+        """Hub velocities [m/s], shape (n, 2)."""
+        return self.velocities[:, robot, 0]
+
+    def at(self, time: float) -> int:
+        """The first sample that is not before a time [s]."""
+        return int(np.searchsorted(self.time, time - 1e-9))
+
+    def at_strokes(self) -> NDArray[np.intp]:
+        """The samples at rest and at the end of every stroke, shape (n_strokes + 1,)."""
+        ends = np.arange(len(self.commands) + 1) * self.scene.actuator.period
+        return np.searchsorted(self.time, ends - 1e-9)
+
+    def actuated(self, time: float, robot: int = 0) -> NDArray[np.bool_]:
+        """Limbs that are turned at a time [s], shape (n_limbs,)."""
+        stroke, since = divmod(time + 1e-9, self.scene.actuator.period)
+        turned = stroke < len(self.commands) and self.scene.actuator.delta_psi(since) > 1e-6
+        active: NDArray[np.bool_] = turned & (self.commands[int(stroke) if turned else 0, robot] != 0.0)
+        return active
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Computing time over simulated time, against the time step.
+
+    steps: h [s], shape (n,). alone: Of one robot. in_batch: Of one of n_robots, shape (n,) each. n_robots: Size of
+    the batch. repaired: Where Newton's matrix was not positive definite in some steps, shape (n,).
+    """
+
+    steps: Floats
+    alone: Floats
+    in_batch: Floats
+    n_robots: int
+    repaired: NDArray[np.bool_]
+
+
+# --- axes ------------------------------------------------------------------------------------------------------------
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure, sizes in inches."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def style(axes: Axes, **labels: Any) -> None:
+    """Axes in the manner of this project; labels go to `axes.set`."""
+    axes.set(**labels)
+    axes.tick_params(labelcolor=INK, color=FAINT_INK)
+    axes.grid(color=GRID, linewidth=0.8)
+    axes.set_axisbelow(True)
+    axes.title.set(color=INK, fontsize=10)
+    for label in (axes.xaxis.label, axes.yaxis.label):
+        label.set_color(INK)
+    for side, spine in axes.spines.items():
+        spine.set_visible(side in ("left", "bottom"))
+        spine.set_color(FAINT_INK)
+
+
+def save(figure: Figure, file: Path) -> None:
+    """Writes a PNG."""
+    figure.savefig(file, dpi=DPI)
+
+
+def draw_robot(axes: Axes, swim: Swim, time: float, size: float = 1.0) -> None:
+    """The robot at a time [s] on axes in millimetres, actuated limbs bold and blue. size: Of its lines."""
+    n = swim.scene.robot.nodes_per_limb
+    nodes, active = MM * swim.positions[swim.at(time), 0], swim.actuated(time)
+    for limb in range(swim.scene.robot.n_limbs):
+        line = nodes[[0, *range(1 + limb * (n - 1), 1 + (limb + 1) * (n - 1))]]
+        colour, width, level = (ACTUATED, 3.2, 4.0) if active[limb] else (LIMB, 1.8, 3.0)
+        axes.plot(*line.T, color=colour, linewidth=size * width, solid_capstyle="round", zorder=level)
+    axes.plot(*nodes[0], marker="o", markersize=size * 4.5, color=INK, zorder=5.0)
+
+
+# --- Fig. 13.5b: the actuation signal --------------------------------------------------------------------------------
+
+
+def draw_pulse(actuator: SmaPulse, file: Path) -> None:
+    """Fig. 13.5b: rotation of limbs #2 and #5 over one actuation period."""
+    figure = new_figure(5.6, 3.6)
+    axes = figure.subplots()
+    heating, period, peak = actuator.heating_time, actuator.period, actuator.peak_angle
+    corners = np.array(actuator.corners)
+    axes.plot(corners, actuator.delta_psi(corners), color=PLUS, label="limb 2")
+    axes.plot(corners, -actuator.delta_psi(corners), color=MINUS, linestyle="--", label="limb 5")
+    style(axes, xlabel="time t [s]", ylabel="rotation δψ [rad]", xlim=(0.0, period), ylim=(-1.5 * peak, 1.65 * peak))
+    axes.set_xticks([0.0, heating, *np.arange(0.2, period, 0.2), period])
+    axes.set_yticks([-peak, 0.0, peak], [f"−{peak:.3f}\n(−π/5)", "0", f"{peak:.3f}\n(π/5)"])
+    for begin, end, text in ((0.0, heating, f"Δt₁ = {heating:g} s\nheated"), (heating, period, "Δt₂ = 0.9 s\ncools")):
+        axes.annotate(
+            "", (begin, 1.12 * peak), (end, 1.12 * peak),
+            arrowprops={"arrowstyle": "<->", "color": FAINT_INK, "shrinkA": 0, "shrinkB": 0},
+        )  # fmt: skip
+        place = max(0.5 * (begin + end), 0.1)
+        axes.text(place, 1.2 * peak, text, ha="center", va="bottom", color=INK, fontsize=9)
+    axes.legend(frameon=False, loc="lower right")
+    save(figure, file)
+
+
+# --- Fig. 13.6: the straight swim ------------------------------------------------------------------------------------
+
+STRAIGHT_TIMES = (0.0, 2.2, 5.5, 10.0)
+"""Of the snapshots of Fig. 13.6 [s]."""
+
+
+def draw_straight(converged: Swim, chapter: Swim, file: Path) -> None:
+    """Fig. 13.6: snapshots, hub position and hub velocity of ten strokes of {2+,5-}."""
+    figure = new_figure(9.0, 7.6)
+    panels = figure.subplot_mosaic([["a1", "a2", "a3", "a4"], ["b"] * 4, ["c"] * 4], height_ratios=[1.15, 1.0, 1.0])
+    for name, time in zip(("a1", "a2", "a3", "a4"), STRAIGHT_TIMES, strict=True):
+        axes = panels[name]
+        draw_robot(axes, converged, time)
+        axes.axvline(0.0, color=FAINT_INK, linewidth=0.8, linestyle=":", zorder=1.0)
+        style(axes, aspect="equal", xlim=(-100.0, 155.0), ylim=(-115.0, 115.0), title=f"({name})  t = {time:.1f} s")
+        axes.set(xticks=[-100, 0, 100], yticks=[-100, 0, 100], xlabel="x [mm]")
+    panels["a1"].set_ylabel("y [mm]")
+    for name, converged_values, chapter_values in (
+        ("b", converged.hub(), chapter.hub()),
+        ("c", converged.hub_velocity(), chapter.hub_velocity()),
+    ):
+        axes = panels[name]
+        axes.plot(converged.time, MM * converged_values[:, 0], **CONVERGED, label=f"x, {converged.label}")
+        axes.plot(chapter.time, MM * chapter_values[:, 0], **CHAPTER, label=f"x, {chapter.label}")
+        axes.plot(converged.time, MM * converged_values[:, 1], color=ACTUATED, linewidth=1.3, label="y, both")
+        for stroke in range(len(converged.commands)):
+            begin = stroke * converged.scene.actuator.period
+            axes.axvspan(begin, begin + converged.scene.actuator.heating_time, color="#f7e3e1", linewidth=0, zorder=0.5)
+        axes.set_xticks(range(11))
+    span = (0.0, converged.time[-1])
+    style(panels["b"], ylabel="hub position [mm]", title="(b)  pink: limbs 2 and 5 are heated", xlim=span)
+    style(panels["c"], ylabel="hub velocity [mm/s]", xlabel="time [s]", title="(c)", xlim=span)
+    panels["b"].legend(frameon=False, loc="upper left", fontsize=9)
+    figure.align_ylabels([panels["b"], panels["c"]])
+    save(figure, file)
+
+
+# --- Figs. 13.2 and 13.7: the pentagon -------------------------------------------------------------------------------
+
+PENTAGON_TIMES = (22.1, 72.1, 122.1, 172.1, 222.1)
+"""Of the snapshots of Fig. 13.2 [s]: limbs at their farthest, in the middle of every side."""
+
+
+def draw_pentagon_snapshots(converged: Swim, chapter: Swim, file: Path) -> None:
+    """Fig. 13.2: the robot on its way around the pentagon."""
+    figure = new_figure(6.6, 7.0)
+    axes = figure.subplots()
+    axes.plot(*MM * converged.hub().T, **CONVERGED_PATH, label=f"hub, {converged.label}")
+    axes.plot(*MM * chapter.hub().T, **CHAPTER_PATH, label=f"hub, {chapter.label}")
+    for time in PENTAGON_TIMES:
+        draw_robot(axes, converged, time)
+        hub, ahead = (converged.hub()[converged.at(t)] for t in (time, time + 10.0))
+        heading = np.arctan2(*(ahead - hub)[::-1])
+        free = 58.0 * np.array([np.cos(heading - np.pi / 6.0), np.sin(heading - np.pi / 6.0)])  # between two limbs
+        axes.annotate(
+            f"{time:.1f} s", MM * hub, MM * hub + free, color=INK, fontsize=10, ha="center", va="center", zorder=6.0
+        )
+    axes.plot([], [], color=ACTUATED, linewidth=3.2, label="actuated limbs")
+    style(axes, aspect="equal", xlabel="x [mm]", ylabel="y [mm]", ylim=(-108.0, 355.0))
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_ticks(range(-100, 301, 100))
+    axes.legend(frameon=False, loc="upper left", fontsize=9)
+    save(figure, file)
+
+
+def draw_pentagon(converged: Swim, chapter: Swim, file: Path) -> None:
+    """Fig. 13.7a: the hub's path around the pentagon."""
+    figure = new_figure(6.4, 6.4)
+    axes = figure.subplots()
+    for swim, look in ((converged, CONVERGED_PATH), (chapter, CHAPTER_PATH)):
+        path = MM * swim.hub()
+        axes.plot(*path.T, **look, label=f"{swim.label}: sides of {np.hypot(*path[swim.at(50.0)]):.1f} mm")
+    path = MM * converged.hub()
+    corners = path[[converged.at(50.0 * k) for k in range(5)]]
+    middle = corners.mean(axis=0)
+    for k, corner in enumerate(corners):
+        axes.plot(*corner, marker="o", color=DARK, markersize=6, zorder=3.7)
+        x, y = (corner - middle) / np.hypot(*(corner - middle))
+        beside = (20.0 * (0.88 * x + 0.48 * y), 20.0 * (0.88 * y - 0.48 * x))  # beside the spur of the last stroke
+        axes.annotate(f"{50 * k} s", tuple(corner), beside, textcoords="offset points", color=INK, ha="center",
+                      va="center")  # fmt: skip
+    for k, name in enumerate(("{2⁺, 5⁻}", "{3⁺, 1⁻}", "{4⁺, 2⁻}", "{5⁺, 3⁻}", "{1⁺, 4⁻}")):
+        side = 0.5 * (corners[k] + corners[(k + 1) % 5])
+        x, y = side + 0.21 * (middle - side)
+        axes.text(x, y, name, color=INK, ha="center", va="center")
+    spur = path[: converged.at(50.0), 0].max() - corners[1, 0]
+    note = (
+        f"spurs at the corners: strokes carry the hub forth and back,\nthe last of a side {spur:.0f} mm beyond its end"
+    )
+    axes.text(-80.0, -37.0, note, color=INK, fontsize=9, va="center")
+    style(axes, aspect="equal", xlabel="x [mm]", ylabel="y [mm]", xlim=(-85.0, 240.0), ylim=(-50.0, 305.0))
+    axes.legend(frameon=False, loc="upper center", fontsize=9)
+    save(figure, file)
+
+
+def signal_curves(swim: Swim, limb: int) -> tuple[Floats, Floats, Floats]:
+    """(time [s], positive rotation, negative rotation [rad]) of a limb with all corners of its pulses."""
+    actuator = swim.scene.actuator
+    corners = np.array(actuator.corners)
+    time = (np.arange(len(swim.commands))[:, None] * actuator.period + corners).ravel()
+    rotation = (swim.commands[:, 0, limb, None] * actuator.delta_psi(corners)).ravel()
+    return time, np.maximum(rotation, 0.0), np.minimum(rotation, 0.0)
+
+
+def draw_pentagon_signals(swim: Swim, file: Path, zoom: tuple[float, float] = (43.0, 53.0)) -> None:
+    """Fig. 13.7b: the actuation signals of the pentagon. zoom: The time [s] that is shown in detail."""
+    n_limbs, peak = swim.scene.robot.n_limbs, swim.scene.actuator.peak_angle
+    figure = new_figure(9.6, 5.8)
+    panels = figure.subplots(n_limbs, 2, sharex="col", sharey=True, width_ratios=[2.0, 1.0])
+    for limb, row in enumerate(panels):
+        time, plus, minus = signal_curves(swim, limb)
+        for axes, width in zip(row, (0.5, 1.4), strict=True):
+            for values, colour, dashes in ((plus, PLUS, "-"), (minus, MINUS, (0, (3, 1.2)))):
+                pulses = np.where(np.abs(np.gradient(values)) + np.abs(values) > 0.0, values, np.nan)
+                axes.fill_between(time, values, color=colour, alpha=0.15, linewidth=0)
+                axes.plot(time, pulses, color=colour, linestyle=dashes, linewidth=width)
+            axes.axhline(0.0, color=FAINT_INK, linewidth=0.6, zorder=0.9)
+            style(axes, ylim=(-1.25 * peak, 1.25 * peak))
+        row[0].set_ylabel(f"limb {limb + 1}\nδψ [rad]")
+        row[0].set_yticks([-peak, 0.0, peak], ["−π/5", "0", "π/5"])
+        row[0].axvspan(*zoom, color="#e3e8ee", linewidth=0, zorder=0.5)
+    style(panels[0, 0], xlim=(0.0, 250.0), title="red, solid: anti-clockwise (+)     blue, dashed: clockwise (−)")
+    style(panels[0, 1], xlim=zoom, title="the shaded ten seconds")
+    for axes in panels[-1]:
+        axes.set_xlabel("time [s]")
+    panels[0, 0].set_xticks(range(0, 251, 25))
+    save(figure, file)
+
+
+# --- Fig. 13.8: pairs ------------------------------------------------------------------------------------------------
+
+
+PAIR_LABELS = ((42.0, 22.0), (26.0, 50.0), (-18.0, 60.0), (-46.0, 12.0))
+"""Where the names of the pairs stand [mm]."""
+
+
+def draw_pairs(converged: Swim, chapter: Swim, names: Sequence[str], file: Path) -> None:
+    """Fig. 13.8: where the pairs of limbs take the robot in ten strokes. names: Of the pairs, one per robot."""
+    robot = converged.scene.robot
+    figure = new_figure(9.0, 4.6)
+    left, right = figure.subplots(1, 2, width_ratios=[1.05, 1.0])
+    for limb, tip in enumerate(MM * robot.nodes()[robot.nodes_per_limb - 1 :: robot.nodes_per_limb - 1]):
+        left.plot([0.0, tip[0]], [0.0, tip[1]], color="#dfe3e8", linewidth=4.0, solid_capstyle="round", zorder=1.0)
+        left.text(1.07 * tip[0], 1.07 * tip[1], str(limb + 1), color=FAINT_INK, ha="center", va="center")
+    left.text(0.98, 0.02, "a dot per stroke", transform=left.transAxes, ha="right", color=INK, fontsize=9)
+    for number, (name, colour, place) in enumerate(zip(names, PAIR_COLOURS, PAIR_LABELS, strict=True)):
+        path, other = MM * converged.hub(number), MM * chapter.hub(number)
+        distance = np.hypot(*path[-1])
+        ahead = path[-1] / distance
+        left.plot(*path.T, color=colour, linewidth=1.2, zorder=2.0)
+        left.plot(*path[converged.at_strokes()].T, color=colour, linestyle="", marker="o", markersize=4.0, zorder=3.0)
+        left.text(*place, f"{name}\n{distance:.1f} mm", color=colour, zorder=4.0, va="center",
+                  ha="left" if place[0] > 0.0 else "right")  # fmt: skip
+        right.plot(converged.time, path @ ahead, color=colour, linewidth=1.3)
+        right.plot(chapter.time, other @ ahead, **{**CHAPTER, "color": colour, "linewidth": 1.0})
+    style(left, aspect="equal", xlabel="x [mm]", ylabel="y [mm]", xlim=(-98.0, 112.0), ylim=(-108.0, 108.0))
+    style(right, xlabel="time [s]", ylabel="hub along the bisector [mm]", xlim=(0.0, converged.time[-1]))
+    right.set_ylim(0.0, 60.0)
+    right.plot([], [], color=INK, linewidth=1.3, label=converged.label)
+    right.plot([], [], **{**CHAPTER, "color": INK, "linewidth": 1.0}, label=chapter.label)
+    right.legend(frameon=False, fontsize=9, loc="upper left")
+    save(figure, file)
+
+
+# --- Fig. 13.9: cost -------------------------------------------------------------------------------------------------
+
+
+def draw_cost(cost: Cost, file: Path) -> None:
+    """Fig. 13.9: computing time over wall-clock time against the time step."""
+    figure = new_figure(7.2, 5.0)
+    axes = figure.subplots()
+    steps, trouble, real_time = MS * cost.steps, MS * CHAPTER_TROUBLE, MS * CHAPTER_REAL_TIME
+    line = np.array([steps.min(), trouble])
+    axes.axvspan(trouble, 1.3 * steps.max(), color="#fbeedd", linewidth=0, zorder=0.5)
+    axes.axhline(1.0, color=FAINT_INK, linewidth=0.8)
+    axes.loglog(line, real_time / line, **CHAPTER, label="the chapter: proportional to 1/h, real time at 3 ms")
+    axes.plot(real_time, 1.0, marker="D", color=ORANGE, zorder=3.0)
+    for values, marker, colour, name in (
+        (cost.alone, "o", "#0072b2", "ours, one robot alone"),
+        (cost.in_batch, "s", "#009e73", f"ours, per robot of a batch of {cost.n_robots}"),
+    ):
+        axes.loglog(steps, values, color=colour, marker=marker, label=name)
+        axes.loglog(steps[cost.repaired], values[cost.repaired], color=colour, marker=marker, linestyle="",
+                    markerfacecolor="w", zorder=3.0)  # fmt: skip
+    axes.plot([], [], color=INK, marker="o", linestyle="", markerfacecolor="w",
+              label="open: Newton's matrix indefinite in some steps, repaired")  # fmt: skip
+    axes.text(steps.min(), 1.15, "real time", va="bottom", color=INK, fontsize=9)
+    axes.text(1.06 * trouble, 2.0, "the chapter:\nnumerical\nissues", va="bottom", color="#9a5a00", fontsize=9)
+    style(axes, xlabel="time step h [ms]", ylabel="computing time over simulated time",
+          xlim=(0.8 * steps.min(), 1.3 * steps.max()), ylim=(0.02 * cost.in_batch.min(), 60.0))  # fmt: skip
+    ticks = [tick for tick in (0.1, 0.3, 1.0, 3.0, 10.0, 20.0, 40.0) if steps.min() <= tick <= steps.max()]
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.minorticks_off()
+    axes.legend(frameon=False, fontsize=9, loc="lower left")
+    save(figure, file)

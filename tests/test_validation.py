@@ -1,0 +1,161 @@
+"""The simulator against exact solutions and published codes, and those solutions against independent formulas."""
+
+import functools
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
+
+from oracle import Star, elastic_hessian
+from seastar_gym import Scene, Seastar
+from seastar_gym.studies import exact, validation
+
+PAGE = Path(__file__).parents[1] / "docs" / "validation.md"
+
+section = functools.cache(lambda name: validation.SECTIONS[name]())
+
+
+@pytest.mark.parametrize("name", validation.SECTIONS)
+def test_every_line_of_the_page_is_within_its_bound(name):
+    outside = [row for row in section(name).rows if not row.holds]
+    assert section(name).rows and not outside
+
+
+@pytest.mark.parametrize("name", validation.SECTIONS)
+def test_bounds_are_not_generous(name):
+    """Half of a section's lines would not hold if the simulator were off by a hundredth more than it is."""
+    worse = [replace(row, ours=row.ours + 1e-2 * row.reference * np.sign(row.difference)) for row in section(name).rows]
+    assert sum(not row.holds for row in worse) >= 0.5 * len(worse)
+
+
+# The elastica
+
+
+@pytest.mark.parametrize("tip_angle", [0.1, 0.7, 1.4])
+def test_shooting_finds_the_elastica_of_the_elliptic_integrals(tip_angle):
+    """Inextensible, load across the clamp: p^2 = (1 + sin theta_tip) / 2, Bisshopp and Drucker (1945)."""
+    m = 0.5 * (1.0 + np.sin(tip_angle))
+    start = np.arcsin(np.sqrt(0.5 / m))
+    root_k = ellipk(m) - ellipkinc(start, m)
+    x = np.sqrt(2.0 * np.sin(tip_angle)) / root_k
+    y = 1.0 - 2.0 * (ellipe(m) - ellipeinc(start, m)) / root_k
+    np.testing.assert_allclose(exact.elastica_tip(root_k**2, 1.0, 1.0), [x, y], rtol=1e-9)
+
+
+def test_a_stretchable_rod_reaches_farther_than_the_elastica():
+    stiff, soft = exact.elastica_tip(3.0, 1.0, 1.0), exact.elastica_tip(3.0, 1.0, 1.0, EA=1e3)
+    assert np.hypot(*soft) > np.hypot(*stiff)
+
+
+def test_a_limb_held_by_hub_and_root_node_is_clamped_at_the_middle_of_the_held_edge():
+    """Against an elastica of the full length from the hub, the error falls with the first power of l only."""
+    robots = [Seastar(nodes_per_limb=n) for n in (20, 40, 80)]
+    EI, EA = exact.bending_stiffness(robots[0]), exact.stretching_stiffness(robots[0])
+    load = EI / 0.1**2
+    from_hub = exact.elastica_tip(load, EI, 0.1, EA)
+    at_hub = [validation.loaded_tip(r, load) + [0.5 * r.edge_length, 0.0] - from_hub for r in robots]
+    lengths = [robot.edge_length for robot in robots]
+    order = validation.order_row("", lengths, [np.hypot(*error) for error in at_hub], 0.0).ours
+    assert order == pytest.approx(1.0, abs=0.1)
+
+
+# Natural frequencies
+
+
+def test_the_shape_of_a_mode_satisfies_the_beam_equation_and_its_ends():
+    s, d = np.linspace(0.0, 1.0, 2001), 1.0 / 2000
+    for root in exact.CANTILEVER_ROOTS:
+        shape = exact.cantilever_shape(root, s)
+        slope, bend = np.gradient(shape, d), np.diff(shape, 2) / d**2
+        assert np.cos(root) * np.cosh(root) == pytest.approx(-1.0, abs=1e-9)
+        assert shape[0] == pytest.approx(0.0, abs=1e-12) and shape[-1] == pytest.approx(1.0)
+        assert abs(slope[0]) < 1e-2 * root and abs(bend[-1]) < 1e-2 * root**2
+        np.testing.assert_allclose(np.diff(bend, 2)[::100] / d**2, (root**4 * shape[2:-2])[::100], atol=2e-2 * root**4)
+
+
+@pytest.mark.parametrize("nodes_per_limb", [10, 20])
+def test_the_limb_rings_with_the_eigenvalues_of_its_stiffness(nodes_per_limb):
+    """The dense oracle's Hessian at rest between the free nodes of limb 1, and their masses."""
+    star = Star(nodes_per_limb=nodes_per_limb)
+    across = 2 * np.arange(2, nodes_per_limb) + 1  # y of the free nodes: along x the straight limb only stretches
+    stiffness = elastic_hessian(star, star.rest, np.zeros(5))[np.ix_(across, across)]
+    root_mass = np.sqrt(star.masses[2:nodes_per_limb])
+    eigenvalues = np.linalg.eigvalsh(stiffness / np.outer(root_mass, root_mass))
+    robot = Seastar(nodes_per_limb=nodes_per_limb)
+    ours = [validation.ringing_frequency(robot, mode) for mode in range(3)]
+    np.testing.assert_allclose(ours, np.sqrt(eigenvalues[:3]) / (2.0 * np.pi), rtol=5e-5)
+
+
+def test_a_fitted_frequency_is_that_of_the_signal():
+    time = np.linspace(0.0, 12.0, 301)
+    signal = 0.3 * np.sin(2.0 * np.pi * 1.037 * time + 0.4) + 1e-4 * np.sin(2.0 * np.pi * 6.2 * time)
+    assert validation.fitted_frequency(time, signal, 1.0) == pytest.approx(1.037, rel=1e-6)
+
+
+# Drag
+
+
+def test_exact_drag_solutions_satisfy_their_equations():
+    k, a, v0, t, d = 199.0, 1.0, 0.1, 0.07, 1e-6
+    speed = exact.falling_speed(k, a, t)
+    assert (exact.falling_speed(k, a, t + d) - speed) / d == pytest.approx(a - k * speed**2, rel=1e-4)
+    change = (exact.coasting(k, v0, t + d) - exact.coasting(k, v0, t)) / d
+    speed = exact.coasting(k, v0, t)[0]
+    np.testing.assert_allclose(change, [-k * speed**2, speed], rtol=1e-4)
+
+
+def test_drag_over_mass_is_that_of_every_node():
+    rods = Scene().rods()
+    k = exact.drag_over_mass(Seastar(), Scene().fluid)
+    np.testing.assert_allclose(rods.drag / rods.mass, k, rtol=1e-13)
+
+
+# Waves
+
+
+def test_a_pulse_has_the_dispersion_of_the_discrete_rod():
+    """omega = 4/l^2 sin^2(k l / 2) sqrt(EI / (rho_m A)): what the continuous k^2 becomes on nodes a length l apart."""
+    robot = Seastar(n_limbs=3, nodes_per_limb=201, limb_length=1.0)
+    pulse, h = validation.bending_pulse(robot), 1e-4
+    for k in (70.0, 80.0, 90.0):
+        omega = (2.0 / robot.edge_length * np.sin(0.5 * k * robot.edge_length)) ** 2 * exact.beam_constant(robot)
+        omega = 2.0 / h * np.arctan(0.5 * omega * h)  # as slow as the implicit midpoint rule makes it
+        assert validation.pulse_frequency(robot, k, *pulse) == pytest.approx(omega, rel=5e-4)
+
+
+# Published codes
+
+
+def test_published_swims_have_a_hundred_times_and_agree_with_each_other():
+    time, x_a, x_b = validation.published_swim()
+    np.testing.assert_allclose(time, 0.1 * np.arange(1, 101))
+    np.testing.assert_allclose(x_a, x_b, rtol=1e-6)
+
+
+def test_a_missing_file_of_published_figures_is_named(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"nothing\.csv is missing"):
+        validation.published_swim(tmp_path / "nothing.csv")
+
+
+# The page
+
+
+def test_the_page_in_the_repository_is_the_one_that_the_study_writes():
+    """But for the last digits of ours, which belong to the machine."""
+    page = PAGE.read_text(encoding="utf-8")
+    for name in validation.SECTIONS:
+        assert section(name).title in page
+        for row in section(name).rows:
+            what, reference, *_ = validation.as_cells(row)
+            assert f"| {what} | {reference} |" in page
+
+
+def test_a_row_is_written_with_its_unit_and_difference():
+    row = validation.Row("speed", 2.0, 2.001, "m/s", allowed=1e-4)
+    assert validation.as_cells(row) == ("speed [m/s]", "2.00000", "2.00100", "+1.0e-03 (+5.0e-04)")
+    assert not row.holds
+    shown = validation.Section("Speeds", "How.", [row])
+    assert "| speed [m/s] | 2.00000 | 2.00100 | +1.0e-03 (+5.0e-04) |" in validation.as_page([shown])
+    assert validation.as_table(shown).row_count == 1
