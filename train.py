@@ -1,6 +1,6 @@
 """Trains a swimmer with PPO, then compares it with the scripted pentagon gait.
 
-    python train.py                        a few minutes on two cores
+    python train.py                        a minute or two on two cores
     python train.py --quick                the whole way in short, in under a minute
     python train.py --resume runs/FOLDER   continues a run that was stopped (Ctrl-C), or trains it for more --strokes
 
@@ -54,7 +54,7 @@ MAX_STROKES = 400
 class Options:
     """Train a swimmer with PPO and compare it with the scripted pentagon gait."""
 
-    strokes: int = 600_000
+    strokes: int = 300_000
     """Strokes to train for, of all robots together."""
     path: PathName = "random"
     """What to train on. Random paths teach every direction and every turn; the pentagon is then just one of them."""
@@ -68,7 +68,7 @@ class Options:
     """Threads of the simulator; all processors by default. The network always uses one: more are slower."""
     device: str = "cpu"
     """Where the network is: cpu, cuda or auto. It is small: a GPU is no faster."""
-    save_freq: int = 50_000
+    save_freq: int = 25_000
     """Strokes between checkpoints."""
     video: bool = True
     """Film the swims of the comparison."""
@@ -97,7 +97,7 @@ def read_options(arguments: Sequence[str]) -> Options:
     """The options of the command line; with --resume, those of the run unless given anew."""
     options = tyro.cli(Options, args=arguments)
     if options.resume is None:
-        return replace(options, strokes=65_536, save_freq=32_768, fidelity="fast") if options.quick else options
+        return replace(options, strokes=32_768, save_freq=16_384, fidelity="fast") if options.quick else options
     saved = replace(saved_options(options.resume), out=options.resume, resume=options.resume)
     options = tyro.cli(Options, args=arguments, default=saved)
     changed = [name for name in saved.__dict__ if getattr(options, name) != getattr(saved, name)]

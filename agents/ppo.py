@@ -52,13 +52,13 @@ class Hyperparameters:
     symmetry: bool = True
     """Waypoints turned and mirrored into one sector: every stroke teaches ten directions at once. Without, it takes
     twice the strokes to learn."""
-    num_envs: int = 512
-    """Robots side by side, each somewhere else on its way: learns from a third of the strokes that 256 robots with
-    rollouts twice as long take."""
+    num_envs: int = 128
+    """Robots side by side. Small rollouts, so frequent updates: it learns from a third of the strokes that 512 robots
+    take. Fewer still learn from yet fewer strokes, but keep the simulator's lanes and threads less busy."""
     rollout: int = 16
     """Strokes of every robot between updates: three times the horizon 1/(1 - discount)."""
-    batch_size: int = 2048
-    """A quarter of a rollout. Larger ones leave too few gradient steps: with halves it stayed at 194 strokes."""
+    batch_size: int = 512
+    """A quarter of a rollout. Half of one leaves too few gradient steps: it stayed at 194 strokes."""
     epochs: int = 6
     """Passes over a rollout: 4 are enough for the pentagon, not quite for random paths; 10 only take longer."""
     learning_rate: float = 1e-3
