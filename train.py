@@ -21,7 +21,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import FrameType
-from typing import Annotated
+from typing import Annotated, Literal
 
 import gymnasium
 import numba
@@ -66,8 +66,8 @@ class Options:
     """Of the network, of the exploration and of the paths."""
     num_threads: int | None = None
     """Threads of the simulator; all processors by default. The network always uses one: more are slower."""
-    device: str = "cpu"
-    """Where the network is: cpu, cuda or auto. It is small: a GPU is no faster."""
+    device: Literal["cpu", "cuda", "auto"] = "cpu"
+    """Where the network is. It is small: a GPU is no faster."""
     save_freq: int = 25_000
     """Strokes between checkpoints."""
     video: bool = True
@@ -138,19 +138,25 @@ def write_config(options: Options, arguments: Sequence[str], folder: Path) -> No
 
 
 class Interruption:
-    """Within it, a first Ctrl-C asks for an orderly stop; a second one stops at once."""
+    """Within it, a first Ctrl-C (or a termination) asks for an orderly stop; a second one stops at once."""
+
+    SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
     def __enter__(self) -> "Interruption":
         self.requested = False
-        self._before = signal.signal(signal.SIGINT, self._request)
+        self._before = {number: signal.signal(number, self._request) for number in self.SIGNALS}
         return self
 
     def _request(self, number: int, frame: FrameType | None) -> None:
         self.requested = True
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        self._restore()
+
+    def _restore(self) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
 
     def __exit__(self, *exception: object) -> None:
-        signal.signal(signal.SIGINT, self._before)
+        self._restore()
 
 
 class Watch(BaseCallback):

@@ -24,7 +24,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
 from stable_baselines3.common.policies import ActorCriticPolicy
-from stable_baselines3.common.utils import LinearSchedule
+from stable_baselines3.common.utils import LinearSchedule, get_device
 
 import seastar_gym
 from agents.vec_env import BatchVecEnv
@@ -78,6 +78,22 @@ class Hyperparameters:
     """Time limit of a training episode [strokes]: a random path takes about 160."""
     reward: RewardWeights = RewardWeights()
     """Progress dominates: a stroke of the best gaits earns about 1, and a heated limb costs 0.01."""
+
+    def __post_init__(self) -> None:
+        for name in ("num_envs", "rollout", "batch_size", "epochs", "max_episode_steps"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}.")
+        if self.num_envs * self.rollout % self.batch_size:
+            raise ValueError(
+                f"batch_size must divide the {self.num_envs * self.rollout} strokes of a rollout of all robots, "
+                f"{self.batch_size} does not."
+            )
+        if not (0.0 <= self.discount < 1.0 and 0.0 <= self.gae_lambda <= 1.0):
+            raise ValueError("discount must be in [0, 1) and gae_lambda in [0, 1].")
+        if not (self.learning_rate > 0.0 and self.clip_range > 0.0 and self.entropy >= 0.0):
+            raise ValueError("learning_rate and clip_range must be positive, entropy not negative.")
+        if not self.hidden or min(self.hidden) < 1:
+            raise ValueError(f"hidden must be widths of at least 1, not {self.hidden}.")
 
 
 def make_training_env(
@@ -276,8 +292,10 @@ class LearnedPolicy:
         return restore_actions(chosen, elements, self.actions, robot.n_limbs), None
 
 
-def load(path: str | os.PathLike[str], device: str = "cpu") -> LearnedPolicy:
+def load(path: str | os.PathLike[str], device: str | torch.device = "cpu") -> LearnedPolicy:
     """The policy in a file that `save` wrote. FileNotFoundError or ValueError, with one sentence, if there is none."""
+
+    device = get_device(device)
 
     def read(archive: zipfile.ZipFile) -> LearnedPolicy:
         description = Description.from_json(archive.read(DESCRIPTION).decode())

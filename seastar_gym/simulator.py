@@ -298,6 +298,8 @@ class Simulator:
 
     def _begin_stroke(self, commands: ArrayLike) -> None:
         self._write(self._commands, self._checked_commands(commands))
+        self._start_time += self._since_stroke  # of a stroke that failed or was left half-way
+        self._since_stroke[:] = 0.0
         self._a[:] = 0.0  # a stroke depends on the state at its beginning only
         self._report[:] = 0.0
         self._report[:, SMALLEST_HUB_T] = np.inf
@@ -348,7 +350,7 @@ class Simulator:
         rows = dict(zip(REPORT_ROWS, self._read(self._report).T, strict=True))
         failed = self.failed
         self._strokes += ~failed
-        self._since_stroke = np.where(failed, self._since_stroke, 0.0)
+        self._since_stroke = np.where(failed, rows["covered"], 0.0)
         self._delta_psi_end = 0.0
         counts = {name: rows[name].astype(np.int64) for name in COUNTS}
         angle = 2.0 * np.arctan(rows["smallest_hub_t"])

@@ -506,6 +506,31 @@ def test_a_failed_robot_is_well_again_after_a_reset_or_a_new_state():
         np.testing.assert_array_equal(simulator.positions[1], fresh.positions[1])
 
 
+@pytest.mark.parametrize("how", ["whole", "in parts"])
+def test_time_of_a_robot_that_fails_within_a_stroke_is_that_of_its_state_and_stands_still(how):
+    """Velocities so large that rounding ends the stroke some tenths of a second after its beginning."""
+    simulator = Simulator(scene_of(max_iterations=2), 2)
+    velocities = np.zeros((2, 46, 2))
+    velocities[1] = random_velocities(1, 1e14)[0]
+    set_motion(simulator, velocities)
+    times = []
+    for _ in range(2):
+        commands = np.repeat(STRAIGHT, 2, axis=0)
+        report = simulator.stroke(commands) if how == "whole" else finish(simulator.stroke_in_parts(commands, 4))[1]
+        assert report.status.tolist() == [0, 1]
+        times.append((simulator.time[1], report.covered[1]))
+    assert times[0][1] > 0.0 and times[1][1] == 0.0
+    assert times[0][0] == pytest.approx(times[0][1]) and times[1][0] == times[0][0]
+
+
+def test_time_of_a_stroke_that_was_left_half_way_counts():
+    simulator = Simulator(scene_of())
+    parts = simulator.stroke_in_parts(STRAIGHT, 2)
+    assert next(parts) == 0.5
+    simulator.stroke(STRAIGHT)
+    assert simulator.time[0] == pytest.approx(1.5)
+
+
 @pytest.mark.parametrize("speed", [1e30, 1e160, 1e300])
 def test_velocities_beyond_all_bounds_end_in_a_status_not_in_nan(speed):
     simulator = Simulator(scene_of(), n_robots=4)

@@ -108,14 +108,15 @@ def test_a_finished_run_can_be_trained_for_more_strokes(finished, tmp_path, caps
         assert "cannot continue with another" in capsys.readouterr().err
 
 
-def test_ctrl_c_leaves_a_usable_model_and_says_how_to_go_on(tmp_path):
+@pytest.mark.parametrize("request_to_stop", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_leaves_a_usable_model_and_says_how_to_go_on(tmp_path, request_to_stop):
     folder = tmp_path / "stopped"
     command = [sys.executable, "train.py", *TINY, "--strokes", "10000000", "--out", str(folder)]
     with subprocess.Popen(command, cwd=REPOSITORY, stdout=subprocess.PIPE, text=True) as process:
         deadline = time.monotonic() + 120
         while not (folder / "progress.csv").exists() and time.monotonic() < deadline:
             time.sleep(0.1)
-        os.kill(process.pid, signal.SIGINT)
+        os.kill(process.pid, request_to_stop)
         output, _ = process.communicate(timeout=60)
     assert process.returncode == 130
     assert f"python train.py --resume {folder}" in output

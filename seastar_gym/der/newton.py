@@ -11,7 +11,8 @@ from seastar_gym.der.star_matrix import load_pair, store_pair, substitute_node
 
 SUFFICIENT_DECREASE = 1e-4  # Armijo's constant
 ROUNDING = 1e-11  # an increase of Phi below this share of it is taken for rounding, not for ascent
-CURVATURE = 4.0  # the update after one of size d is at most about this times d^2 over the edge length, see minimise
+CURVATURE = 40.0  # for light edges, the step after one of size d is below this times d^2 over the edge length
+EASY = 3.0  # Newton steps: a stage that took more had trouble
 SHORTEST_STEP = 2.0**-30  # of the Newton step: shorter ones move nothing
 
 
@@ -19,17 +20,16 @@ SHORTEST_STEP = 2.0**-30  # of the Newton step: shorter ones move nothing
 def minimise(rods, work, stage, active, tolerance, patience):
     """Minimise Phi over work.q, in place, for the robots in the mask `active`.
 
-    tolerance: Largest node move of the last Newton step [m], or of the next one as far as it can be foreseen. Newton's
-    method converges quadratically: turning an edge of length l by a move d across it stretches it by d^2/2 l, and the
-    next step takes back that much. So after a full step d of the full matrix, a robot is done if 4 d^2/l is within
-    the tolerance.
+    tolerance: Largest node move of the last Newton step [m], or of the one that is left out because it can be foreseen:
+    Newton's method converges quadratically, so after one of its first steps, of size d, and without trouble, the next
+    is at most d^2/(foreseeable length).
 
     patience: Most Newton steps per robot.
 
     Returns (converged, iterations, repairs, backtracks): a mask and three counts per robot.
     """
     zero, one = splat(0.0), splat(1.0)
-    quadratic_length = rods.shortest_edge / CURVATURE
+    quadratic_length = foreseeable_length(rods, stage)
     nobody = one < zero
     running, converged, convex = active, nobody, nobody
     iterations, repairs, backtracks = zero, zero, zero
@@ -58,11 +58,22 @@ def minimise(rods, work, stage, active, tolerance, patience):
         count = select(stepping, one, zero)
         iterations += count
         backtracks += select(shortening, one, zero)
-        done = stepping & ((move <= tolerance) | (~convex & (move * move <= tolerance * quadratic_length)))
+        calm = (repairs + backtracks <= 0.0) & (iterations <= EASY)
+        done = stepping & ((move <= tolerance) | (calm & (move * move <= tolerance * quadratic_length)))
         converged = converged | done
         convex = convex & ~stepping
         running = (stepping | shortening) & ~done & (iterations < patience)
     return converged, iterations, repairs, backtracks
+
+
+@kernel
+def foreseeable_length(rods, stage):
+    """Length [m] that the square of a Newton step is divided by to foresee the size of the next one.
+
+    Turning an edge stretches it, and the tension that this makes moves nodes the farther, the stiffer the edges are
+    against the nodes' inertia.
+    """
+    return rods.shortest_edge / (CURVATURE + rods.curvature_rate * stage.gamma * stage.gamma)
 
 
 @kernel

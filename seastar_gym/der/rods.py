@@ -36,6 +36,7 @@ class Rods(NamedTuple):
     drag: 1/2 rho_f C_d D dl_i of (13.8), per node [kg/m].
     load: Dead load per coordinate [N], or None.
     shortest_edge: Smallest natural length of an edge [m].
+    curvature_rate: How fast Newton's foreseeable_length shrinks with the step [1/s^2], see newton.py.
     """
 
     n_limbs: int
@@ -52,6 +53,7 @@ class Rods(NamedTuple):
     drag: np.ndarray
     load: np.ndarray | None
     shortest_edge: float
+    curvature_rate: float
 
 
 @kernel

@@ -79,4 +79,5 @@ def make_rods(
         drag=0.5 * fluid_density * drag_coefficient * 2.0 * rod_radius * dl,
         load=forces.reshape(-1) if loads else None,
         shortest_edge=edge_length,
+        curvature_rate=youngs_modulus / (density * edge_length**2) * min(1.0, (edge_length / rod_radius) ** 2 / 5000.0),
     )

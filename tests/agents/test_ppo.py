@@ -3,6 +3,7 @@
 import json
 import random
 import zipfile
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
@@ -52,6 +53,22 @@ def learner():
 def file(learner, tmp_path):
     save(learner, tmp_path / "model.zip")
     return tmp_path / "model.zip"
+
+
+@pytest.mark.parametrize(
+    "change, sentence",
+    [
+        ({"num_envs": 0}, "num_envs must be at least 1, not 0"),
+        ({"batch_size": 7}, "batch_size must divide the 64 strokes"),
+        ({"discount": 1.0}, r"discount must be in \[0, 1\)"),
+        ({"learning_rate": float("nan")}, "learning_rate and clip_range must be positive"),
+        ({"entropy": -0.1}, "entropy not negative"),
+        ({"hidden": ()}, "hidden must be widths"),
+    ],
+)
+def test_hyperparameters_that_cannot_be_are_refused(change, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        replace(SMALL, **change)
 
 
 # --- a policy on disk ------------------------------------------------------------------------------------------------
