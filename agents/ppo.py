@@ -64,8 +64,8 @@ class Hyperparameters:
     learning_rate: float = 1e-3
     """At first; it falls linearly to zero, so that the last policy is a settled one."""
     discount: float = 0.8
-    """Per stroke. What a stroke does to the swimming is over after a few: 0.7 to 0.9 learn the same, 0.95 only adds
-    noise and stays at 182 strokes."""
+    """Per stroke. What a stroke does to the swimming is over after a few. 0.9 is as good on average, but less even over
+    seeds (161.4 to 164.3 strokes on random paths, against 162.3 to 162.5); 0.95 stays at 182 round the pentagon."""
     gae_lambda: float = 0.9
     """Little depends on it with so short a horizon."""
     clip_range: float = 0.2
