@@ -25,6 +25,7 @@ class SolverStatus(IntEnum):
 
     CONVERGED = 0
     NOT_CONVERGED = 1
+    NOT_FINITE = 2
 
     @property
     def sentence(self) -> str:
@@ -35,10 +36,14 @@ class SolverStatus(IntEnum):
                 "A time step did not converge even after it was halved to its floor; the robot stays at its last good "
                 "state until it is reset: use a smaller Numerics.step, a softer robot or slower initial velocities."
             ),
+            SolverStatus.NOT_FINITE: (
+                "The robot's positions or velocities were not finite when the stroke began; it lies at rest where its "
+                "hub was before, until it is reset: write finite numbers into Simulator.q and Simulator.v only."
+            ),
         }[self]
 
 
-COUNTS = ("newton_iterations", "repairs", "backtracks", "steps", "halvings", "rejections")
+COUNTS = ("newton_iterations", "repairs", "backtracks", "steps", "halvings", "rejections", "energy_cuts")
 
 
 class StrokeReport(NamedTuple):
@@ -47,8 +52,9 @@ class StrokeReport(NamedTuple):
     status: SolverStatus of every robot.
     newton_iterations, repairs, backtracks: Counts of Newton steps, of those that needed the convex matrix, and of
         halvings by the line search.
-    steps, halvings, rejections: Counts of time steps taken, of those that did not converge and were halved, and of
-        those whose error was too large and were halved (Numerics.path_tolerance).
+    steps, halvings, rejections: Counts of time steps taken, of those that did not converge or created energy and were
+        halved, and of those whose error was too large and were halved (Numerics.path_tolerance).
+    energy_cuts: Steps after which velocities were cut, because the energy had grown a little, see der/guard.py.
     covered: Time covered [s].
     smallest_opening_angle: Smallest angle between neighbouring limbs at the hub [rad]; below zero, limbs crossed.
     """
@@ -60,6 +66,7 @@ class StrokeReport(NamedTuple):
     steps: NDArray[np.int64]
     halvings: NDArray[np.int64]
     rejections: NDArray[np.int64]
+    energy_cuts: NDArray[np.int64]
     covered: Floats
     smallest_opening_angle: Floats
 
@@ -121,6 +128,7 @@ class Simulator:
         self._strokes = np.zeros(self.n_robots, dtype=np.int64)
         self._since_stroke = np.zeros(self.n_robots)
         self._delta_psi_end = 0.0  # per unit of command, now [rad]
+        self._last_hub = self.hub_position()
         self._pool: tuple[int, ThreadPoolExecutor] | None = None
         self.memory = [self._make_memory() for _ in range(self.threads)]
 
@@ -146,6 +154,7 @@ class Simulator:
         for name, values in state["rows"].items():
             self._write(getattr(self, name), values)
         self.__dict__.update(state["clock"])
+        self._last_hub = self.hub_position()
 
     # --- state -------------------------------------------------------------------------------------------------
 
@@ -173,6 +182,7 @@ class Simulator:
             self.v[group, :, lane] = 0.0
             self._commands[group, :, lane] = 0.0
             self._failed[group, 0, lane] = 0.0
+            self._last_hub[robot] = 0.0
         self._set_time(chosen, 0.0)
 
     def _set_time(self, chosen: NDArray[np.bool_] | slice, time: Floats | float) -> None:
@@ -201,6 +211,7 @@ class Simulator:
         self._write(self.v, arrays[1])
         self._commands[:] = 0.0
         self._failed[:] = 0.0
+        self._last_hub = self.hub_position()
         self._set_time(slice(None), arrays[2])
 
     def to_rows(self, values: Floats) -> Floats:
@@ -336,9 +347,8 @@ class Simulator:
             part = slice(*(len(self.q) * np.array([thread, thread + 1]) // self.threads))
             work, actuation = self.memory[thread]
             advance(
-                self._rods, work, self._scheme, actuation, self.q[part], self.v[part], self._a[part],
-                self._commands[part], times, shape, self._failed[part], self._report[part],
-                self._limits,
+                self._rods, work, self._scheme, SCHEMES["implicit-euler"], actuation, self.q[part], self.v[part],
+                self._a[part], self._commands[part], times, shape, self._failed[part], self._report[part], self._limits,
             )  # fmt: skip
 
         if self.threads == 1:
@@ -349,6 +359,10 @@ class Simulator:
     def _end_stroke(self) -> StrokeReport:
         rows = dict(zip(REPORT_ROWS, self._read(self._report).T, strict=True))
         failed = self.failed
+        status = np.where(failed, SolverStatus.NOT_CONVERGED, SolverStatus.CONVERGED)
+        if failed.any():
+            status[self._lay_out_lost(failed)] = SolverStatus.NOT_FINITE
+        self._last_hub = self.hub_position()
         self._strokes += ~failed
         self._since_stroke = np.where(failed, rows["covered"], 0.0)
         self._delta_psi_end = 0.0
@@ -357,11 +371,20 @@ class Simulator:
         if self.scene.robot.hub_hinge == "turning":
             angle += np.pi
         return StrokeReport(
-            status=np.where(failed, SolverStatus.NOT_CONVERGED, SolverStatus.CONVERGED),
+            status=status,
             covered=rows["covered"],
             smallest_opening_angle=angle,
             **counts,
         )
+
+    def _lay_out_lost(self, failed: NDArray[np.bool_]) -> NDArray[np.intp]:
+        """Put the failed robots whose state is not finite at rest where their hub was last; returns which."""
+        lost = np.flatnonzero(failed & ~np.isfinite(self._read(self.q) + self._read(self.v)).all(axis=1))
+        for robot in lost:
+            group, lane = divmod(robot, N_LANES)
+            self.q[group, :, lane] = (self._last_hub[robot] + self.scene.robot.nodes()).reshape(-1)
+            self.v[group, :, lane] = 0.0
+        return lost
 
 
 def _as_floats(name: str, value: object) -> Floats:

@@ -1,11 +1,11 @@
 """Elastic and kinetic energy of a lane group."""
 
+from seastar_gym.der.actuation import set_natural_hub_angles
 from seastar_gym.der.bending import bending_energy, moment
 from seastar_gym.der.compilation import entry_point, kernel
 from seastar_gym.der.geometry import edge_geometry, half_angle
-from seastar_gym.der.lanes import borrow, load, splat, store
+from seastar_gym.der.lanes import add_product, borrow, load, splat, store, subtract_product
 from seastar_gym.der.rods import n_nodes
-from seastar_gym.der.stages import set_natural_hub_angles
 from seastar_gym.der.stretching import stretching_energy, tension
 
 
@@ -16,32 +16,65 @@ def tail_node(rods, e):
 
 
 @kernel
+def hinge_edges(rods, e):
+    """(a, b, side): the edges of the hinge that ends with edge e, and how its angle is measured, see geometry.py."""
+    edges = rods.nodes_per_limb - 1
+    if e % edges == 0:
+        return e, (e + edges) % (rods.n_limbs * edges), rods.hub_side
+    return e - 1, e, 1.0
+
+
+@kernel
+def edge_of(rods, q, e):
+    """Geometry of edge e."""
+    return edge_geometry(q, tail_node(rods, e), e + 1)
+
+
+@kernel
 def hinge_energy(rods, work, q, e):
     """Energy of the hinge that ends with edge e [J]."""
     edges = rods.nodes_per_limb - 1
-    if e % edges == 0:
-        a, b = e, (e + edges) % (rods.n_limbs * edges)
-        side, EI_kappa_bar = rods.hub_side, load(work.hub_EI_kappa_bar, e // edges)
-    else:
-        a, b = e - 1, e
-        side, EI_kappa_bar = 1.0, load(rods.EI_kappa_bar, e)
-    t = half_angle(edge_geometry(q, tail_node(rods, a), a + 1), edge_geometry(q, tail_node(rods, b), b + 1), side)
+    EI_kappa_bar = load(work.hub_EI_kappa_bar, e // edges) if e % edges == 0 else load(rods.EI_kappa_bar, e)
+    a, b, side = hinge_edges(rods, e)
+    t = half_angle(edge_of(rods, q, a), edge_of(rods, q, b), side)
     return bending_energy(rods, e, moment(rods, e, t, EI_kappa_bar))
+
+
+@kernel
+def elastic_energy(rods, work, q):
+    """Stretching and bending energy (13.14) at the natural hub angles in `work` [J]."""
+    total = splat(0.0)
+    for e in range(rods.n_limbs * (rods.nodes_per_limb - 1)):
+        length = edge_of(rods, q, e)[2]
+        total += stretching_energy(rods, e, tension(rods, e, length)) + hinge_energy(rods, work, q, e)
+    return total
+
+
+@kernel
+def kinetic_energy(rods, v):
+    """[J]."""
+    total = splat(0.0)
+    for node in range(n_nodes(rods)):
+        vx, vy = load(v, 2 * node), load(v, 2 * node + 1)
+        total = add_product(total, 0.5 * load(rods.mass, node), vx * vx + vy * vy)
+    return total
+
+
+@kernel
+def load_energy(loads, q, nodes):
+    """Potential of the dead loads on nodes [J]; zero, and gone when compiled, in scenes without loads (None)."""
+    if loads is None:
+        return splat(0.0)
+    total = splat(0.0)
+    for row in range(2 * nodes):
+        total = subtract_product(total, load(loads, row), load(q, row))
+    return total
 
 
 @entry_point
 def energies(rods, work, actuation, q, v, elastic, kinetic):
     """Fill `elastic` (13.14) and `kinetic` [J], shape (1, N_LANES), at the rotations `actuation.delta_psi_end`."""
     rods, work, actuation = borrow(rods), borrow(work), borrow(actuation)
-    q, v = borrow(q), borrow(v)
     set_natural_hub_angles(rods, work, actuation, splat(1.0))
-    total = splat(0.0)
-    for e in range(rods.n_limbs * (rods.nodes_per_limb - 1)):
-        length = edge_geometry(q, tail_node(rods, e), e + 1)[2]
-        total += stretching_energy(rods, e, tension(rods, e, length)) + hinge_energy(rods, work, q, e)
-    store(borrow(elastic), 0, total)
-    total = splat(0.0)
-    for node in range(n_nodes(rods)):
-        vx, vy = load(v, 2 * node), load(v, 2 * node + 1)
-        total += 0.5 * load(rods.mass, node) * (vx * vx + vy * vy)
-    store(borrow(kinetic), 0, total)
+    store(borrow(elastic), 0, elastic_energy(rods, work, borrow(q)))
+    store(borrow(kinetic), 0, kinetic_energy(rods, borrow(v)))

@@ -13,6 +13,8 @@ SUFFICIENT_DECREASE = 1e-4  # Armijo's constant
 ROUNDING = 1e-11  # an increase of Phi below this share of it is taken for rounding, not for ascent
 CURVATURE = 40.0  # for light edges, the step after one of size d is below this times d^2 over the edge length
 EASY = 3.0  # Newton steps: a stage that took more had trouble
+LATE = 10.0  # times CURVATURE for the last of the easy steps
+FORESEEABLE_T = 4.0  # larger values of tan(phi/2) are too near its pole for that
 SHORTEST_STEP = 2.0**-30  # of the Newton step: shorter ones move nothing
 
 
@@ -26,7 +28,8 @@ def minimise(rods, work, stage, active, tolerance, patience):
 
     patience: Most Newton steps per robot.
 
-    Returns (converged, iterations, repairs, backtracks): a mask and three counts per robot.
+    Returns (converged, Phi, iterations, repairs, backtracks), per robot: a mask, the potential before the last step
+    [J], and three counts.
     """
     zero, one = splat(0.0), splat(1.0)
     quadratic_length = foreseeable_length(rods, stage)
@@ -58,22 +61,34 @@ def minimise(rods, work, stage, active, tolerance, patience):
         count = select(stepping, one, zero)
         iterations += count
         backtracks += select(shortening, one, zero)
-        calm = (repairs + backtracks <= 0.0) & (iterations <= EASY)
-        done = stepping & ((move <= tolerance) | (calm & (move * move <= tolerance * quadratic_length)))
+        easy = (repairs + backtracks <= 0.0) & (iterations <= EASY) & (phi <= rods.calm)
+        late = select(iterations < EASY, one, LATE)
+        foreseen = late * move * move <= tolerance * quadratic_length
+        foreseen = easy & foreseen & (largest_hub_t(rods, work) < FORESEEABLE_T)
+        done = stepping & ((move <= tolerance) | (~convex & foreseen))
         converged = converged | done
         convex = convex & ~stepping
         running = (stepping | shortening) & ~done & (iterations < patience)
-    return converged, iterations, repairs, backtracks
+    return converged, best, iterations, repairs, backtracks
 
 
 @kernel
 def foreseeable_length(rods, stage):
-    """Length [m] that the square of a Newton step is divided by to foresee the size of the next one.
+    """Length [m] that a Newton step's square is divided by to foresee the size of the next one.
 
-    Turning an edge stretches it, and the tension that this makes moves nodes the farther, the stiffer the edges are
-    against the nodes' inertia.
+    Measured over stiff, soft, slender and thick robots in random strokes: turning an edge stretches it, and the tension
+    that this makes moves nodes the farther, the stiffer the edges are against the nodes' inertia.
     """
     return rods.shortest_edge / (CURVATURE + rods.curvature_rate * stage.gamma * stage.gamma)
+
+
+@kernel
+def largest_hub_t(rods, work):
+    """Largest tan(phi/2) of the hub hinges, as last assembled."""
+    largest = load(work.hub_t, 0)
+    for limb in range(1, rods.n_limbs):
+        largest = larger(load(work.hub_t, limb), largest)
+    return largest
 
 
 @kernel

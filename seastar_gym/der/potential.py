@@ -155,6 +155,7 @@ def assemble_hub_hinges(rods, work, convex):
         bend = moment(rods, hinge, t, load(work.hub_EI_kappa_bar, a))
         slope, s = bending_slopes(rods, hinge, t, bend, convex)
         energy += bending_energy(rods, hinge, bend)
+        store(work.hub_t, a, t)
         store(work.hub_moment, a, load(work.hub_moment, a) - slope)
         store(work.hub_moment, b, load(work.hub_moment, b) + slope)
         store(work.hub_stiffness, a, load(work.hub_stiffness, a) + s)

@@ -37,6 +37,8 @@ class Rods(NamedTuple):
     load: Dead load per coordinate [N], or None.
     shortest_edge: Smallest natural length of an edge [m].
     curvature_rate: How fast Newton's foreseeable_length shrinks with the step [1/s^2], see newton.py.
+    calm: Potential [J] up to which a step without trouble needs no look at its energy, see guard.py.
+    damping: Share of it that is left where drag is weak: 1 in water, 0 in vacuum.
     """
 
     n_limbs: int
@@ -54,6 +56,8 @@ class Rods(NamedTuple):
     load: np.ndarray | None
     shortest_edge: float
     curvature_rate: float
+    calm: float
+    damping: float
 
 
 @kernel
@@ -72,6 +76,7 @@ class Work(NamedTuple):
     hub_moment, hub_stiffness: Sums over the hub hinges of a limb's root edge, per limb [N m].
     hub_coupling: 2 x 2 block of every hub hinge, four rows per limb [N/m].
     hub_EI_kappa_bar: Natural moment of the hub hinges, per limb [N m].
+    hub_t: tan(phi/2) of the hub hinges, per limb.
     stage_v: Velocities of the stages of a time step [m/s].
     """
 
@@ -88,6 +93,7 @@ class Work(NamedTuple):
     hub_stiffness: np.ndarray
     hub_coupling: np.ndarray
     hub_EI_kappa_bar: np.ndarray
+    hub_t: np.ndarray
     stage_v: np.ndarray
 
 
@@ -130,10 +136,13 @@ REPORT_ROWS = (
     "steps",  # time steps taken
     "halvings",  # halvings of a time step that did not converge
     "rejections",  # halvings of a time step whose error was too large
+    "energy_cuts",  # steps after which velocities were cut, see guard.py
     "covered",  # time [s]
     "smallest_hub_t",  # smallest tan(phi/2) of a hub hinge
 )
-NEWTON_ITERATIONS, REPAIRS, BACKTRACKS, STEPS, HALVINGS, REJECTIONS, COVERED, SMALLEST_HUB_T = range(len(REPORT_ROWS))
+NEWTON_ITERATIONS, REPAIRS, BACKTRACKS, STEPS, HALVINGS, REJECTIONS, ENERGY_CUTS, COVERED, SMALLEST_HUB_T = range(
+    len(REPORT_ROWS)
+)
 
 
 def aligned_rows(*shape: int) -> np.ndarray:
@@ -165,5 +174,6 @@ def make_work(n_limbs: int, nodes_per_limb: int, n_stages: int) -> Work:
         hub_stiffness=rows(n_limbs),
         hub_coupling=rows(4 * n_limbs),
         hub_EI_kappa_bar=rows(n_limbs),
+        hub_t=rows(n_limbs),
         stage_v=rows(2 * n_nodes * n_stages),
     )

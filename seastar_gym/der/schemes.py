@@ -10,18 +10,31 @@ import numpy as np
 
 
 class Scheme(NamedTuple):
-    """a (row by row), b, c: the tableau. stiffly_accurate: b is the last row of a, so the last stage is the result."""
+    """A tableau.
+
+    a (row by row), b, c: Its coefficients.
+    stiffly_accurate: b is the last row of a, so the last stage is the result.
+    dissipative: A step whose elastic energy is convex takes energy from the robot, see guard.py.
+    """
 
     n_stages: int
     a: np.ndarray
     b: np.ndarray
     c: np.ndarray
     stiffly_accurate: bool
+    dissipative: bool
 
 
 def _scheme(a: list[list[float]], b: list[float] | None = None) -> Scheme:
     rows = np.array(a)
-    return Scheme(len(rows), rows.ravel(), rows[-1].copy() if b is None else np.array(b), rows.sum(axis=1), b is None)
+    return Scheme(
+        n_stages=len(rows),
+        a=rows.ravel(),
+        b=rows[-1].copy() if b is None else np.array(b),
+        c=rows.sum(axis=1),
+        stiffly_accurate=b is None,
+        dissipative=a == [[1.0]],
+    )
 
 
 _G2 = 1.0 - 0.5 * np.sqrt(2.0)

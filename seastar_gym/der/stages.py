@@ -1,12 +1,15 @@
-"""Time steps: a scheme's implicit stages, and the halving of steps that do not converge."""
+"""Time steps: a scheme's implicit stages, and the halving of steps that do not converge or create energy."""
 
+from seastar_gym.der.actuation import set_natural_hub_angles
 from seastar_gym.der.compilation import kernel
-from seastar_gym.der.geometry import edge_geometry, half_angle, tangent
+from seastar_gym.der.geometry import edge_geometry, half_angle
+from seastar_gym.der.guard import LARGEST_CUT, allowed_energy, hold_to_energy, put_back, set_aside, through_poles
 from seastar_gym.der.lanes import add_product, any_lane, floor, load, load_number, select, splat, sqrt, store
 from seastar_gym.der.newton import minimise
 from seastar_gym.der.rods import (
     BACKTRACKS,
     COVERED,
+    ENERGY_CUTS,
     HALVINGS,
     NEWTON_ITERATIONS,
     REJECTIONS,
@@ -17,7 +20,12 @@ from seastar_gym.der.rods import (
     n_nodes,
 )
 
-SMALLEST_FRACTION = 2.0**-12  # of an interval: a robot whose step would have to be shorter has failed
+SWING = 2.0  # times its energy may a violent robot end with whose step was no trouble, see guard.py
+MOST_HALVINGS = 12.0  # in an interval: a robot that is stuck once more has failed
+TURNABLE = 8.0  # after so many halvings, hinges may go through their poles, see guard.py
+CAUTIOUS = 4.0  # from so many halvings in an interval on, its steps are implicit Euler's
+
+SMALLEST_FRACTION = 2.0**-12  # of an interval: a shorter step is not made for the sake of its error
 FIRST_FRACTION = 2.0**-3  # of an interval: an adapted stroke begins with this step
 GROWTH_MARGIN = 5.0  # a step is doubled when its error rate is this many times below the limit
 
@@ -30,21 +38,6 @@ LAST_STEP, SIZE = 0, 1
 def memory_row(rods, scheme, which):
     """Row of `a` where a step leaves LAST_STEP or SIZE for the next."""
     return (2 * n_nodes(rods) + 1) * scheme.n_stages + which
-
-
-@kernel
-def set_natural_hub_angles(rods, work, actuation, fraction):
-    """Natural moments of the hub hinges at `fraction` (lanes) of an interval, (13.13).
-
-    The hinge from limb j to limb j + 1 has the natural angle hub_angle + delta_psi_{j+1} - delta_psi_j.
-    """
-    for a in range(rods.n_limbs):
-        b = (a + 1) % rods.n_limbs
-        start = load(actuation.delta_psi_start, b) - load(actuation.delta_psi_start, a)
-        end = load(actuation.delta_psi_end, b) - load(actuation.delta_psi_end, a)
-        angle = rods.hub_angle + add_product(start, fraction, end - start)
-        natural_moment = 2.0 * load(rods.EI_over_dl, a * (rods.nodes_per_limb - 1)) * tangent(0.5 * angle)
-        store(work.hub_EI_kappa_bar, a, natural_moment)
 
 
 @kernel
@@ -153,34 +146,66 @@ def step_error(rods, work, stage, a, h, last_h):
 
 
 @kernel
-def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, limits, patience, report):
+def start_standing(rods, work, stage, robots):
+    """Start the iterate of the robots in the mask at q_hat: Phi is finite there, and no velocity leads it astray."""
+    for row in range(2 * n_nodes(rods)):
+        store(work.q, row, select(robots, load(stage.q_hat, row), load(work.q, row)))
+
+
+@kernel
+def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, wary, limits, patience, report):
     """One step of length h from `start`, `size` of the interval long, for the robots in `active`.
 
     a: What the last step left for this one, see LAST_STEP and SIZE; then what this one leaves for the next.
+    wary: Mask of the robots that had to halve a step of this interval.
 
-    Returns (converged, accepted, error rate): the mask of the robots whose stages all converged, that of those whose
-    error is small enough besides, whose state has moved, and the error per time [m/s], zero if steps are not adapted.
+    Returns (good, accepted, error rate): the mask of the robots whose stages all converged and created no energy, that
+    of those whose error is small enough besides, whose state has moved, and the error per time [m/s], zero if steps are
+    not adapted.
     """
-    going = accepted = active
+    one, zero = splat(1.0), splat(0.0)
+    good = accepted = active
+    trouble, violent = wary, good & ~good
+    calm = rods.calm * rods.damping if scheme.dissipative else rods.calm
     last, last_h = scheme.n_stages - 1, memory_row(rods, scheme, LAST_STEP)
-    error_rate = splat(0.0)
+    error_rate = zero
     for k in range(scheme.n_stages):
         stage = begin_stage(rods, work, scheme, k, q, v, a, h)
+        if any_lane(wary):
+            start_standing(rods, work, stage, wary)
         set_natural_hub_angles(rods, work, actuation, start + load_number(scheme.c, k) * size)
-        going, iterations, repairs, backtracks = minimise(rods, work, stage, going, limits.tolerance, patience)
+        good, phi, iterations, repairs, backtracks = minimise(rods, work, stage, good, limits.tolerance, patience)
+        trouble = trouble | (repairs + backtracks > 0.0)
+        violent = violent | (phi > calm)
         add_to_report(report, NEWTON_ITERATIONS, iterations)
         add_to_report(report, REPAIRS, repairs)
         add_to_report(report, BACKTRACKS, backtracks)
         if k < last:
             end_stage(rods, work, scheme, k, stage, a, active)
         else:
-            accepted = going
-            if limits.adaptive:
+            accepted = good
+            if limits.adaptive and not scheme.dissipative:
                 error_rate = step_error(rods, work, stage, a, h, load(a, last_h)) / h
-                accepted = going & ((error_rate <= limits.error_rate) | (size <= SMALLEST_FRACTION))
+                accepted = good & ((error_rate <= limits.error_rate) | (size <= SMALLEST_FRACTION))
                 store(a, last_h, select(accepted, h, load(a, last_h)))
+            guarded = accepted & (trouble | violent)
+            watch, allowed = any_lane(guarded), zero
+            if watch:
+                set_aside(rods, work, scheme, q, v)
+                allowed = allowed_energy(rods, work, scheme, actuation, start, start + size, q, v)
+                if not scheme.dissipative:
+                    allowed = select(trouble, allowed, SWING * allowed)
             end_step(rods, work, scheme, stage, q, v, a, h, accepted)
-    return going, accepted, error_rate
+            if watch:
+                largest_cut = select(patience > MOST_HALVINGS * limits.max_iterations, one, LARGEST_CUT)
+                refused, cut = hold_to_energy(rods, work, q, v, h, guarded, allowed, largest_cut)
+                turnable = guarded & (patience <= TURNABLE * limits.max_iterations)
+                refused = refused | through_poles(rods, work, q, turnable)
+                if any_lane(refused):
+                    put_back(rods, work, scheme, q, v, refused)
+                good, accepted = good & ~refused, accepted & ~refused
+                add_to_report(report, ENERGY_CUTS, select(cut, one, zero))
+    return good, accepted, error_rate
 
 
 @kernel
@@ -203,46 +228,53 @@ def note_hub_angles(rods, q, report):
 
 
 @kernel
-def cover_interval(rods, work, scheme, actuation, q, v, a, duration, alive, limits, report):
+def cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, alive, limits, report):
     """Advance the robots in `alive` over an interval of `duration` [s], in place.
 
-    A robot whose step does not converge in `limits.max_iterations` halves it, alone, as often as it takes, with as many
-    more iterations each time, and still covers the whole interval; below SMALLEST_FRACTION it has failed and keeps its
-    last good state. If steps are adapted, a robot also halves a step whose error is too large (not below
-    SMALLEST_FRACTION), doubles it when the error allows, and goes on with it in the next interval. Steps are dyadic
-    fractions of the interval, on the grid of their own size, so their sums are exact.
+    A robot whose step does not converge in `limits.max_iterations`, or creates energy, halves it, alone, as often as it
+    takes, and still covers the whole interval. After each halving it has as many more iterations and starts them where
+    it stands; after CAUTIOUS halvings it goes on with the scheme `fallback` (implicit Euler); after MOST_HALVINGS it
+    has failed and keeps its last good state. If steps are adapted, a robot also halves a step whose error is too large
+    (not below SMALLEST_FRACTION), doubles it when the error allows, and goes on with it in the next interval. Steps are
+    dyadic fractions of the interval, on the grid of their own size, so their sums are exact.
 
     Returns the mask of the robots that arrived.
     """
     zero, one = splat(0.0), splat(1.0)
-    start, size, patience = zero, one, splat(1.0 * limits.max_iterations)
+    start, size, halvings = zero, one, zero
     if limits.adaptive:
         last_size = load(a, memory_row(rods, scheme, SIZE))
         size = select(last_size > 0.0, last_size, FIRST_FRACTION)
     moving = alive
     while any_lane(moving):
-        h = size * duration
-        converged, accepted, error_rate = try_step(
-            rods, work, scheme, actuation, q, v, a, start, size, h, moving, limits, patience, report
+        # Robots do not wait for each other: those that are cautious go on when no other is left.
+        steady = moving & (halvings < CAUTIOUS)
+        going, tableau = moving, fallback
+        if any_lane(steady):
+            going, tableau = steady, scheme
+        h, patience, wary = size * duration, (1.0 + halvings) * limits.max_iterations, going & (halvings > 0.0)
+        good, accepted, error_rate = try_step(
+            rods, work, tableau, actuation, q, v, a, start, size, h, going, wary, limits, patience, report
         )
         note_hub_angles(rods, q, report)
-        stuck = moving & ~converged
-        rejected = moving & ~accepted
-        if any_lane(stuck):
-            forget_accelerations(rods, scheme, a, stuck)
+        stuck = going & ~good
+        rejected = going & ~accepted
+        cautious = going & ~steady
+        if any_lane(stuck | cautious):
+            forget_accelerations(rods, scheme, a, stuck | cautious)
         add_to_report(report, STEPS, select(accepted, one, zero))
         add_to_report(report, HALVINGS, select(stuck, one, zero))
-        add_to_report(report, REJECTIONS, select(converged & rejected, one, zero))
+        add_to_report(report, REJECTIONS, select(good & rejected, one, zero))
         add_to_report(report, COVERED, select(accepted, h, zero))
         start = select(accepted, start + size, start)
         size = select(rejected, 0.5 * size, size)
-        patience = select(stuck, patience + limits.max_iterations, patience)
+        failed = stuck & (halvings >= MOST_HALVINGS)
+        halvings += select(stuck, one, zero)
         if limits.adaptive:
             # The error of a step of twice the length is about eight times as large, per time four times.
             pairs = start / (2.0 * size)
-            fits = accepted & (GROWTH_MARGIN * error_rate <= limits.error_rate) & (pairs == floor(pairs))
+            fits = accepted & ~wary & (GROWTH_MARGIN * error_rate <= limits.error_rate) & (pairs == floor(pairs))
             size = select(fits & (size < 1.0), 2.0 * size, size)
-        failed = rejected & (size < SMALLEST_FRACTION)
         alive = alive & ~failed
         moving = moving & ~failed & (start < 1.0)
     if limits.adaptive:

@@ -6,9 +6,10 @@ from seastar_gym.der.stages import cover_interval
 
 
 @entry_point
-def advance(rods, work, scheme, actuation, q, v, a, peaks, times, shape, failed, report, limits):
+def advance(rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shape, failed, report, limits):
     """Advance lane groups through the intervals between `times`, in place.
 
+    scheme, fallback: How time steps are made, and how they are made where they give trouble (with one stage).
     q, v: Positions and velocities [m, m/s], shape (n_groups, 2 n_nodes, N_LANES).
     a: What a time step leaves for the next: accelerations of its stages [m/s^2], their shares in the next guess, length
         and size, shape (n_groups, n_stages (2 n_nodes + 1) + 2, N_LANES).
@@ -18,7 +19,8 @@ def advance(rods, work, scheme, actuation, q, v, a, peaks, times, shape, failed,
     report: Counts and extremes, added to, shape (n_groups, len(REPORT_ROWS), N_LANES).
     limits: What the solution has to keep.
     """
-    rods_rows, memory, tableau, rotation = borrow(rods), borrow(work), borrow(scheme), borrow(actuation)
+    rods_rows, memory, rotation = borrow(rods), borrow(work), borrow(actuation)
+    tableau, fallback_tableau = borrow(scheme), borrow(fallback)
     for group in range(q.shape[0]):
         q_rows, v_rows, a_rows, peak_rows = borrow(q[group]), borrow(v[group]), borrow(a[group]), borrow(peaks[group])
         failed_rows, report_rows = borrow(failed[group]), borrow(report[group])
@@ -29,7 +31,7 @@ def advance(rods, work, scheme, actuation, q, v, a, peaks, times, shape, failed,
                 store(rotation.delta_psi_start, limb, peak * shape[k])
                 store(rotation.delta_psi_end, limb, peak * shape[k + 1])
             alive = cover_interval(
-                rods_rows, memory, tableau, rotation, q_rows, v_rows, a_rows, times[k + 1] - times[k], alive, limits,
-                report_rows,
+                rods_rows, memory, tableau, fallback_tableau, rotation, q_rows, v_rows, a_rows, times[k + 1] - times[k],
+                alive, limits, report_rows,
             )  # fmt: skip
         store(failed_rows, 0, select(alive, splat(0.0), 1.0))

@@ -11,6 +11,10 @@ HELD = 1e15
 """A held node has this many times its mass: it moves by less than rounding, and the kernels need not know of it."""
 
 
+CALM_STRAIN_ENERGY = 1e-3
+"""Of EA times the length of all limbs: more energy than that strains or moves a robot violently."""
+
+
 def rest_positions(n_limbs: int, nodes_per_limb: int, limb_length: float) -> Floats:
     """Nodes of the undeformed robot [m], shape (n_nodes, 2): hub at the origin, limb 1 along +x, anti-clockwise."""
     angles = 2.0 * np.pi * np.arange(n_limbs) / n_limbs
@@ -54,6 +58,7 @@ def make_rods(
     EA = youngs_modulus * area
     EI = youngs_modulus * np.pi * rod_radius**4 / 4.0
     dl = voronoi_lengths(n_limbs, nodes_per_limb, limb_length)
+    drag_per_length = 0.5 * fluid_density * drag_coefficient * 2.0 * rod_radius
     turning = hub_hinge == "turning"
     mass = density * area * dl
     mass[list(held_nodes)] *= HELD
@@ -76,8 +81,10 @@ def make_rods(
         hub_side=-1.0 if turning else 1.0,
         hub_angle=2.0 * np.pi / n_limbs - (np.pi if turning else 0.0),
         mass=mass,
-        drag=0.5 * fluid_density * drag_coefficient * 2.0 * rod_radius * dl,
+        drag=drag_per_length * dl,
         load=forces.reshape(-1) if loads else None,
         shortest_edge=edge_length,
         curvature_rate=youngs_modulus / (density * edge_length**2) * min(1.0, (edge_length / rod_radius) ** 2 / 5000.0),
+        calm=CALM_STRAIN_ENERGY * EA * n_limbs * limb_length,
+        damping=min(1.0, drag_per_length * limb_length / (density * area)),
     )

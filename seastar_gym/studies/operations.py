@@ -142,7 +142,10 @@ def _load_counting_modules() -> dict[str, ModuleType]:
     folder = Path(seastar_gym.der.__file__).parent
     compilation = ModuleType("compilation")
     vars(compilation).update(kernel=lambda function: function, entry_point=lambda function: function)
-    names = ("rods", "geometry", "stretching", "bending", "drag", "star_matrix", "potential", "newton", "stages")
+    names = (
+        "rods", "geometry", "stretching", "bending", "drag", "star_matrix", "potential", "newton", "actuation",
+        "energy", "guard", "stages",
+    )  # fmt: skip
     saved = {f"{COUNTED}.{name}": sys.modules.get(f"{COUNTED}.{name}") for name in (*names, "lanes", "compilation")}
     for name in names:
         sys.modules.pop(f"{COUNTED}.{name}", None)

@@ -1,0 +1,115 @@
+"""What the atlas of stability tries: eight quantities against the time step, and how a reader sees their values."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+from seastar_gym.scene import Seastar, Water
+
+STEPS = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 2e-2, 5e-2, 1e-1, 3e-1, 1.0)
+"""Time steps [s]."""
+QUICK_STEPS = (1e-4, 1e-3, 2e-2, 3e-1)
+CHAPTER_TROUBLE = 2e-2
+"""The chapter reports numerical issues from this time step on [s]."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene but for its time step, and how its robots begin.
+
+    speed: Standard deviation of the random initial velocities, per component and node [m/s].
+    shift: Largest random initial displacement of nodes, per component, over the length of an edge.
+    all_commands: One robot for every command of -1, 0, +1 per limb.
+    """
+
+    robot: Seastar = field(default_factory=Seastar)
+    fluid: Water | None = field(default_factory=Water)
+    peak_angle: float = math.pi / 5
+    speed: float = 0.0
+    shift: float = 0.0
+    all_commands: bool = False
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A quantity that is varied. values: In `unit`; None is vacuum. chapter: Its value in the chapter."""
+
+    name: str
+    label: str
+    unit: str
+    values: tuple[float | None, ...]
+    case: Callable[[float | None], Case]
+    chapter: float
+
+
+def _robot(**changes: float | int) -> Case:
+    return Case(robot=replace(Seastar(), **changes))  # type: ignore[arg-type]
+
+
+def _number(value: float | None) -> float:
+    assert value is not None
+    return value
+
+
+SWEEPS = (
+    Sweep(
+        "youngs_modulus", "Young's modulus", "Pa", tuple(10.0**k for k in range(2, 12)),
+        lambda E: _robot(youngs_modulus=_number(E)), 1e6,
+    ),
+    Sweep(
+        "rod_radius", "rod radius", "mm", (0.01, 0.03, 0.1, 0.3, 0.8, 1.6, 4.0, 10.0, 20.0),
+        lambda r: _robot(rod_radius=1e-3 * _number(r)), 1.6,
+    ),
+    Sweep(
+        "nodes_per_limb", "nodes per limb", "", (2, 3, 5, 10, 20, 40, 80, 160, 320, 640),
+        lambda N: _robot(nodes_per_limb=int(_number(N))), 10,
+    ),
+    Sweep(
+        "drag_coefficient", "drag coefficient", "", (None, 0.0, 0.01, 0.1, 1.0, 10.0, 100.0, 1e3, 1e4),
+        lambda c: Case(fluid=None if c is None else Water(drag_coefficient=c)), 1.0,
+    ),
+    Sweep(
+        "density_ratio", "density of limbs over water", "", (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0),
+        lambda ratio: _robot(density=1000.0 * _number(ratio)), 1.0,
+    ),
+    Sweep(
+        "speed", "random velocities of nodes", "m/s", (0.0, 0.001, 0.01, 0.1, 1.0, 10.0, 30.0, 100.0),
+        lambda speed: Case(speed=_number(speed)), 0.0,
+    ),
+    Sweep(
+        "shift", "random shifts of nodes", "% of an edge", (0.0, 0.3, 1.0, 3.0, 10.0, 20.0, 30.0),
+        lambda shift: Case(shift=0.01 * _number(shift)), 0.0,
+    ),
+    Sweep(
+        "peak_angle", "peak angle, all 243 commands", "degrees",
+        (9.0, 18.0, 27.0, 36.0, 45.0, 50.0, 53.0, 53.9, 54.0, 60.0),
+        lambda angle: Case(peak_angle=math.radians(_number(angle)), all_commands=True), 36.0,
+    ),
+)  # fmt: skip
+
+
+def quick_sweeps() -> tuple[Sweep, ...]:
+    """Every third value, the ends and the chapter's."""
+    return tuple(
+        replace(sweep, values=tuple(v for k, v in enumerate(sweep.values) if _stays(sweep, k, v))) for sweep in SWEEPS
+    )
+
+
+def _stays(sweep: Sweep, k: int, value: float | None) -> bool:
+    return k % 3 == 0 or k == len(sweep.values) - 1 or value == sweep.chapter
+
+
+def format_value(sweep: Sweep, value: float | None) -> str:
+    """As a reader expects it: 10⁶ Pa, 1.6 mm, vacuum."""
+    if value is None:
+        return "vacuum"
+    if value >= 1e4:
+        return "10" + str(round(math.log10(value))).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"{value:g}"
+
+
+def format_step(step: float) -> str:
+    """With the unit that makes it a number from 1 to 999."""
+    if step < 1e-3:
+        return f"{1e6 * step:g} µs"
+    return f"{1e3 * step:g} ms" if step < 1.0 else f"{step:g} s"
