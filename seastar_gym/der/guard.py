@@ -15,7 +15,7 @@ the scheme's own error.
 
 Schemes of higher order take the energy in the middle of a step and promise no such balance. In a step that had trouble
 they are held to the larger of the energies that the robot standing still has at the step's ends, and what moving the
-natural hub angles alone can store; where a robot is violent without giving trouble, to SWING times that.
+natural hub angles alone can store.
 
 At phi = pi a hinge would store infinite energy, but a Newton step may jump over that pole, and the robot then stays
 folded over itself. Such steps are refused, too, while they are not very short: an edge that collapses turns its hinges

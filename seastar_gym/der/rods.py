@@ -37,8 +37,8 @@ class Rods(NamedTuple):
     load: Dead load per coordinate [N], or None.
     shortest_edge: Smallest natural length of an edge [m].
     curvature_rate: How fast Newton's foreseeable_length shrinks with the step [1/s^2], see newton.py.
-    calm: Potential [J] up to which a step without trouble needs no look at its energy, see guard.py.
-    damping: Share of it that is left where drag is weak: 1 in water, 0 in vacuum.
+    calm: Potential [J] up to which Newton steps can be foreseen, see newton.py.
+    damped: Potential [J] up to which drag takes more energy than a step without trouble may create, see guard.py.
     """
 
     n_limbs: int
@@ -57,7 +57,7 @@ class Rods(NamedTuple):
     shortest_edge: float
     curvature_rate: float
     calm: float
-    damping: float
+    damped: float
 
 
 @kernel

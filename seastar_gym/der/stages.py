@@ -20,7 +20,6 @@ from seastar_gym.der.rods import (
     n_nodes,
 )
 
-SWING = 2.0  # times its energy may a violent robot end with whose step was no trouble, see guard.py
 MOST_HALVINGS = 12.0  # in an interval: a robot that is stuck once more has failed
 TURNABLE = 8.0  # after so many halvings, hinges may go through their poles, see guard.py
 CAUTIOUS = 4.0  # from so many halvings in an interval on, its steps are implicit Euler's
@@ -165,8 +164,7 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, war
     """
     one, zero = splat(1.0), splat(0.0)
     good = accepted = active
-    trouble, violent = wary, good & ~good
-    calm = rods.calm * rods.damping if scheme.dissipative else rods.calm
+    trouble = wary
     last, last_h = scheme.n_stages - 1, memory_row(rods, scheme, LAST_STEP)
     error_rate = zero
     for k in range(scheme.n_stages):
@@ -176,7 +174,8 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, war
         set_natural_hub_angles(rods, work, actuation, start + load_number(scheme.c, k) * size)
         good, phi, iterations, repairs, backtracks = minimise(rods, work, stage, good, limits.tolerance, patience)
         trouble = trouble | (repairs + backtracks > 0.0)
-        violent = violent | (phi > calm)
+        if scheme.dissipative:
+            trouble = trouble | (phi > rods.damped)
         add_to_report(report, NEWTON_ITERATIONS, iterations)
         add_to_report(report, REPAIRS, repairs)
         add_to_report(report, BACKTRACKS, backtracks)
@@ -188,13 +187,11 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, war
                 error_rate = step_error(rods, work, stage, a, h, load(a, last_h)) / h
                 accepted = good & ((error_rate <= limits.error_rate) | (size <= SMALLEST_FRACTION))
                 store(a, last_h, select(accepted, h, load(a, last_h)))
-            guarded = accepted & (trouble | violent)
+            guarded = accepted & trouble
             watch, allowed = any_lane(guarded), zero
             if watch:
                 set_aside(rods, work, scheme, q, v)
                 allowed = allowed_energy(rods, work, scheme, actuation, start, start + size, q, v)
-                if not scheme.dissipative:
-                    allowed = select(trouble, allowed, SWING * allowed)
             end_step(rods, work, scheme, stage, q, v, a, h, accepted)
             if watch:
                 largest_cut = select(patience > MOST_HALVINGS * limits.max_iterations, one, LARGEST_CUT)

@@ -59,6 +59,7 @@ def make_rods(
     EI = youngs_modulus * np.pi * rod_radius**4 / 4.0
     dl = voronoi_lengths(n_limbs, nodes_per_limb, limb_length)
     drag_per_length = 0.5 * fluid_density * drag_coefficient * 2.0 * rod_radius
+    calm = CALM_STRAIN_ENERGY * EA * n_limbs * limb_length
     turning = hub_hinge == "turning"
     mass = density * area * dl
     mass[list(held_nodes)] *= HELD
@@ -85,6 +86,6 @@ def make_rods(
         load=forces.reshape(-1) if loads else None,
         shortest_edge=edge_length,
         curvature_rate=youngs_modulus / (density * edge_length**2) * min(1.0, (edge_length / rod_radius) ** 2 / 5000.0),
-        calm=CALM_STRAIN_ENERGY * EA * n_limbs * limb_length,
-        damping=min(1.0, drag_per_length * limb_length / (density * area)),
+        calm=calm,
+        damped=calm * min(1.0, drag_per_length * limb_length / (density * area)),
     )
