@@ -82,6 +82,7 @@ class State(NamedTuple):
     time: Floats
 
 
+PARTS_PER_THREAD = 8
 MAX_ROBOTS, MAX_THREADS = 100_000_000, 4096
 ROW_ARRAYS = ("q", "v", "_a", "_commands", "_failed", "_report")
 CLOCK = ("_start_time", "_strokes", "_since_stroke", "_delta_psi_end")
@@ -343,13 +344,19 @@ class Simulator:
     def _advance(self, begin: int, end: int) -> None:
         times, shape = self._times[begin : end + 1], self._shape[begin : end + 1]
 
+        # More parts than threads, and whoever is ready takes the next: another process may hold up one of the threads.
+        n_parts = 1 if self.threads == 1 else min(len(self.q), PARTS_PER_THREAD * self.threads)
+        bounds = len(self.q) * np.arange(n_parts + 1) // n_parts
+        parts = map(slice, bounds[:-1], bounds[1:])
+
         def run(thread: int) -> None:
-            part = slice(*(len(self.q) * np.array([thread, thread + 1]) // self.threads))
             work, actuation = self.memory[thread]
-            advance(
-                self._rods, work, self._scheme, SCHEMES["implicit-euler"], actuation, self.q[part], self.v[part],
-                self._a[part], self._commands[part], times, shape, self._failed[part], self._report[part], self._limits,
-            )  # fmt: skip
+            for part in parts:
+                advance(
+                    self._rods, work, self._scheme, SCHEMES["implicit-euler"], actuation, self.q[part], self.v[part],
+                    self._a[part], self._commands[part], times, shape, self._failed[part], self._report[part],
+                    self._limits,
+                )  # fmt: skip
 
         if self.threads == 1:
             run(0)

@@ -16,6 +16,7 @@ import tempfile
 import time
 import tracemalloc
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -133,6 +134,18 @@ def peak_gigaflops(seconds: float) -> list[float]:
     return [8 * 2 * N_LANES * n / d / 1e9 for d in repeat(lambda: fused_products(values, n), seconds)]
 
 
+def peak_speedup(seconds: float) -> list[float]:
+    """What the second core is worth to fused products alone, in turn: no batch can gain more."""
+    chains, n = [np.full((18, N_LANES), 0.5) for _ in range(2)], 2_000_000
+    ratios = []
+    with ThreadPoolExecutor(2) as pool:
+        for _ in range(max(5, int(seconds * 4))):
+            one = repeat(lambda: [fused_products(chain, n) for chain in chains], 0.0, 1)[0]
+            two = repeat(lambda: list(pool.map(fused_products, chains, [n, n])), 0.0, 1)[0]
+            ratios.append(one / two)
+    return ratios
+
+
 def iteration_seconds(scene: Scene, seconds: float) -> list[float]:
     """Seconds per robot and Newton iteration, everything else that a stroke does included."""
     simulator = Simulator(scene, 8 * N_LANES, threads=1)
@@ -218,7 +231,10 @@ def measure(seconds: float, progress: bool = True) -> tuple[list[Figure], dict[s
     chapter = Scene(numerics=Numerics.preset("chapter"))
     steps = {
         "batch": lambda: [median("batch, one core", "x real time", real_time_factors(chapter, 512, 1, 4 * seconds))],
-        "threads": lambda: [median("two cores over one", "x", threads_speedup(chapter, 512, seconds))],
+        "threads": lambda: [
+            median("two cores over one", "x", threads_speedup(chapter, 512, seconds)),
+            median("two cores over one, fused products alone", "x", peak_speedup(seconds)),
+        ],
         "alone": lambda: [
             median("one robot alone, one core", "x real time", real_time_factors(chapter, 1, 1, seconds))
         ],
