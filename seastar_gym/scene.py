@@ -6,13 +6,14 @@ a sentence that says why.
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.actuation.sma import pulse
 from seastar_gym.der.rods import Limits, Rods
+from seastar_gym.fidelity import cheapest
 from seastar_gym.morphology.seastar import make_rods, rest_positions
 
 HubHinge = Literal["opening", "turning"]
@@ -138,7 +139,8 @@ class Numerics:
 
     scheme: "implicit-euler" is the chapter's (13.9). step: h [s]; the last step before a corner of the pulse is
         shortened.
-    newton_tolerance: Largest node move of the last Newton update, over the limb length.
+    newton_tolerance: Largest node move of the last Newton update, or of the one that is left out because it can be
+        foreseen, over the limb length.
     max_iterations: Newton iterations per stage before the robot's step is halved.
     path_tolerance: Adapt the steps, up to `step`, so that the hub's path errs by about this share of its length at
         most, from 0.001 to 0.02; for scheme "implicit-midpoint". None for steps of one length.
@@ -165,21 +167,33 @@ class Numerics:
 
     @classmethod
     def preset(cls, fidelity: Fidelity) -> "Numerics":
-        """The numerics that a fidelity stands for: "chapter" is the chapter's, the others go from fast to exact."""
+        """The numerics that a fidelity stands for: "chapter" is the chapter's, the others go from fast to exact.
+
+        `seastar_gym.fidelity.promise` tells how far off each is, and how fast.
+        """
         require_choice("fidelity", fidelity, get_args(Fidelity))
-        scheme, step = _PRESETS[fidelity]
-        return cls(scheme=scheme, step=step)
+        return _PRESETS[fidelity]
+
+    @classmethod
+    def for_error(cls, error: float, any_gait: bool = False) -> "Numerics":
+        """The fastest measured setting whose path error is at most `error`, a share of the path's length.
+
+        ValueError if none can promise it. Measured for the chapter's robot, see `seastar_gym.fidelity`; any_gait asks
+        it of any command that is repeated, too, the hardest that a robot can be asked.
+        """
+        best = cheapest(error, any_gait)
+        return cls(cast(SchemeName, best.scheme), best.step, best.newton_tolerance, path_tolerance=best.path_tolerance)
 
 
 ADAPTATION = (0.04, 2.0)
 """(c, p): steps with an error rate of (tolerance/c)^p limb lengths per stroke keep the path's tolerance."""
 
-_PRESETS: dict[Fidelity, tuple[SchemeName, float]] = {
-    "fast": ("sdirk2", 20e-3),
-    "balanced": ("implicit-midpoint", 5e-3),
-    "accurate": ("implicit-midpoint", 1e-3),
-    "reference": ("implicit-midpoint", 0.25e-3),
-    "chapter": ("implicit-euler", 3e-3),
+_PRESETS: dict[Fidelity, Numerics] = {
+    "fast": Numerics("sdirk2", 20e-3, newton_tolerance=1e-6),
+    "balanced": Numerics("implicit-midpoint", 5e-3, newton_tolerance=1e-6),
+    "accurate": Numerics("implicit-midpoint", 5e-3, path_tolerance=0.015),
+    "reference": Numerics("implicit-midpoint", 0.3e-3, newton_tolerance=1e-9),
+    "chapter": Numerics("implicit-euler", 3e-3),
 }
 
 

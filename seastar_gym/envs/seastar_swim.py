@@ -52,7 +52,8 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     current waypoint, `cross_track_error` [m] from the leg it is on, `is_success`, `limbs_heated`, `newton_iterations`,
     `solver_status` (0: converged), `smallest_opening_angle` [rad] between neighbouring limbs during the stroke (below
     zero: limbs crossed, which this scene allows), and the reward's terms. `solver_message` says what to do about a
-    status other than 0.
+    status other than 0. `path_error` (by what share of its length the hub's path may be off) and `real_time_factor` (in
+    batch, on one core) are what was measured of the fidelity, see `seastar_gym.fidelity`; NaN in other scenes.
 
     ## Episode
     Starts at rest with the hub at the origin. `terminated` when the last waypoint is reached, or when the solver gave

@@ -1,5 +1,6 @@
 """The task behind both environments: a batch of robots, each on a path of its own, advanced by strokes."""
 
+import math
 from collections.abc import Generator
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from seastar_gym.envs.observation import VELOCITY_SCALE, observation_size, observe, to_float32
 from seastar_gym.envs.paths import PathName, cross_track_error, make_path
 from seastar_gym.envs.reward import RewardWeights, reward_terms
+from seastar_gym.fidelity import measured
 from seastar_gym.scene import Fidelity, Numerics, Scene, require_number
 from seastar_gym.simulator import Simulator, SolverStatus, StrokeReport
 
@@ -34,6 +36,15 @@ def make_scene(scene: Scene | None, fidelity: Fidelity | None) -> Scene:
     return scene if fidelity is None else replace(scene, numerics=Numerics.preset(fidelity))
 
 
+def promised(scene: Scene) -> dict[str, float]:
+    """What was measured of the scene's numerics, see `fidelity.Promise`; NaN for other scenes than the chapter's."""
+    known = measured(scene.numerics) if replace(scene, numerics=Numerics()) == Scene() else None
+    return {
+        "path_error": math.nan if known is None else known.path_error,
+        "real_time_factor": math.nan if known is None else known.speed,
+    }
+
+
 class SwimTask:
     """`n_robots` robots that swim along waypoints.
 
@@ -55,6 +66,7 @@ class SwimTask:
             raise ValueError(f"reward must be RewardWeights, not {reward!r}.")
         waypoints = make_path(path, np.random.default_rng(0))  # refuses a bad path now, not at the first reset
         self.simulator = Simulator(scene, n_robots, threads)
+        self._promised = {name: np.full(n_robots, value) for name, value in promised(scene).items()}
         if scene.robot.hub_hinge == "turning" and 2 * scene.actuator.peak_angle >= scene.robot.opening_angle * (
             1 - 1e-9
         ):
@@ -172,6 +184,7 @@ class SwimTask:
             "waypoint_index": self.waypoint_index.copy(),
             "distance": _length(current - hub),
             "cross_track_error": cross_track_error(hub, self._waypoint(leg - 1), self._waypoint(leg)),
+            **{name: values.copy() for name, values in self._promised.items()},
         }
 
 

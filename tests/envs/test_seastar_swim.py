@@ -14,10 +14,13 @@ import seastar_gym
 from seastar_gym import Numerics, RewardWeights, Scene, Seastar, SmaPulse, SolverStatus
 from seastar_gym.envs.paths import PATH_NAMES, cross_track_error
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.fidelity import promise
 
 STRAIGHT = np.array([0, 1, 0, 0, 2])
 REST = np.zeros(5, int)
-FACTS = {"time", "hub_position", "waypoint_index", "distance", "cross_track_error"}
+FACTS = {
+    "time", "hub_position", "waypoint_index", "distance", "cross_track_error", "path_error", "real_time_factor",
+}  # fmt: skip
 OF_A_STROKE = {
     "is_success", "limbs_heated", "newton_iterations", "solver_status", "smallest_opening_angle", "reward_progress",
     "reward_waypoint", "reward_effort",
@@ -84,6 +87,18 @@ def test_spaces_follow_the_robot(n_limbs, nodes_per_limb):
     observation, _ = env.reset(seed=0)
     assert observation.shape == env.observation_space.shape == (4 * n_limbs * (nodes_per_limb - 1) + 6,)
     assert env.step([1] + [2] * (n_limbs - 1))[0].shape == observation.shape
+
+
+@pytest.mark.parametrize("fidelity", ["fast", "chapter"])
+def test_info_tells_what_was_measured_of_the_fidelity(fidelity):
+    _, info = SeastarSwimEnv(fidelity=fidelity).reset(seed=0)
+    assert (info["path_error"], info["real_time_factor"]) == (promise(fidelity).path_error, promise(fidelity).speed)
+
+
+@pytest.mark.parametrize("scene", [Scene(Seastar(youngs_modulus=2e6)), Scene(fluid=None)])
+def test_info_promises_nothing_for_scenes_that_were_not_measured(scene):
+    _, info = SeastarSwimEnv(scene=scene, fidelity="fast").reset(seed=0)
+    assert np.isnan([info["path_error"], info["real_time_factor"]]).all()
 
 
 def test_fidelity_replaces_the_numerics_of_a_scene_and_nothing_else():

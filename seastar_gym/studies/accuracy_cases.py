@@ -1,0 +1,176 @@
+"""What the accuracy study swims: command sequences, how robots swim them, and how far off a swim is."""
+
+import itertools
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.scene import Numerics, Scene, Seastar
+from seastar_gym.simulator import Simulator, SolverStatus
+
+Floats = NDArray[np.float64]
+Kind = Literal["straight", "pair", "pentagon", "random", "gait"]
+
+STRAIGHT = np.array([0.0, 1.0, 0.0, 0.0, -1.0])
+"""{2+, 5-}, the straight swim along limb 1."""
+PAIRS = {
+    "{1-,2+}": np.array([-1.0, 1.0, 0.0, 0.0, 0.0]),
+    "{1-,3+}": np.array([-1.0, 0.0, 1.0, 0.0, 0.0]),
+    "{1-,4+}": np.array([-1.0, 0.0, 0.0, 1.0, 0.0]),
+    "{1-,5+}": np.array([-1.0, 0.0, 0.0, 0.0, 1.0]),
+}
+"""The pairs of Fig. 13.8."""
+STROKES = 10
+
+
+@dataclass(frozen=True)
+class Cases:
+    """Command sequences of equal length, one per robot.
+
+    names, kinds: Of every robot. commands: In [-1, 1], shape (n_strokes, n_robots, n_limbs).
+    """
+
+    names: tuple[str, ...]
+    kinds: tuple[Kind, ...]
+    commands: Floats
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def first(self, n: int) -> "Cases":
+        """The first n of them."""
+        return Cases(self.names[:n], self.kinds[:n], self.commands[:, :n])
+
+
+class Swim(NamedTuple):
+    """What robots did and what it cost.
+
+    hub: Positions after every stroke [m], shape (n_strokes, n_robots, 2). heading: After every stroke [rad], shape
+    (n_strokes, n_robots). iterations, steps: Newton iterations and time steps per stroke, means over all. rejections,
+    halvings: Steps taken back because of their error and because Newton did not converge, in all. failed: Robots whose
+    solver gave up.
+    """
+
+    hub: Floats
+    heading: Floats
+    iterations: float
+    steps: float
+    rejections: int
+    halvings: int
+    failed: int
+
+
+class Errors(NamedTuple):
+    """Of every robot, shape (n_robots,): path and end error over the length of the path, heading error [rad]."""
+
+    path: Floats
+    heading: Floats
+    end: Floats
+
+
+# --- command sequences -----------------------------------------------------------------------------------------------
+
+
+def repeated(names: list[str], kinds: list[Kind], commands: Floats) -> Cases:
+    """Every robot repeats its command, commands of shape (n_robots, n_limbs)."""
+    return Cases(tuple(names), tuple(kinds), np.repeat(commands[None], STROKES, axis=0))
+
+
+def swims() -> Cases:
+    """The straight swim and the four pairs of Fig. 13.8."""
+    kinds: list[Kind] = ["straight", "pair", "pair", "pair", "pair"]
+    return repeated(["straight", *PAIRS], kinds, np.array([STRAIGHT, *PAIRS.values()]))
+
+
+def random_sequences(n: int, rng: np.random.Generator) -> Cases:
+    """Half of them of commands -1, 0, 1, which an environment's actions mean; half of any in [-1, 1]."""
+    commands = rng.uniform(-1.0, 1.0, (STROKES, n, 5))
+    commands[:, ::2] = rng.integers(-1, 2, commands[:, ::2].shape)
+    kinds: list[Kind] = ["random"] * n
+    return Cases(tuple(f"random {k + 1}" for k in range(n)), tuple(kinds), commands)
+
+
+def gaits() -> Cases:
+    """Every command of -, 0 and + over and over, but for those of `swims`, those that others mirror, and those at rest.
+
+    Turning the robot moves a command on by limbs; mirroring it exchanges limbs and signs. All limbs alike only twist.
+    """
+    known = {symmetric_form(command) for command in (*PAIRS.values(), np.zeros(5), np.ones(5))}
+    forms = sorted({symmetric_form(np.array(command)) for command in itertools.product((-1, 0, 1), repeat=5)} - known)
+    names = ["".join("-0+"[sign + 1] for sign in form) for form in forms]
+    return repeated(names, ["gait"] * len(forms), np.array(forms, float))
+
+
+def symmetric_form(command: Floats) -> tuple[int, ...]:
+    """The first of all commands that are this one, turned or mirrored."""
+    mirrored = -command[[0, 4, 3, 2, 1]]
+    return min(tuple(int(c) for c in np.roll(form, turn)) for form in (command, mirrored) for turn in range(5))
+
+
+def pentagon(swimming: int, resting: int) -> Cases:
+    """The sides of (13.15), with so many strokes of swimming and of rest each."""
+    sides = [
+        [np.roll(STRAIGHT, side)] * swimming + [np.zeros(5)] * resting for side in range(5)
+    ]  # {2+,5-}; {3+,1-}; {4+,2-}; ...
+    return Cases(("pentagon",), ("pentagon",), np.array(sides).reshape(-1, 1, 5))
+
+
+def joined(*cases: Cases) -> Cases:
+    """Cases of equal length as one batch."""
+    names = tuple(name for each in cases for name in each.names)
+    kinds = tuple(kind for each in cases for kind in each.kinds)
+    return Cases(names, kinds, np.concatenate([each.commands for each in cases], axis=1))
+
+
+# --- swimming --------------------------------------------------------------------------------------------------------
+
+
+def scene_of(numerics: Numerics, nodes_per_limb: int = 10) -> Scene:
+    """The chapter's scene."""
+    return Scene(robot=Seastar(nodes_per_limb=nodes_per_limb), numerics=numerics)
+
+
+def swim(cases: Cases, numerics: Numerics, nodes_per_limb: int = 10, threads: int | None = 1) -> Swim:
+    """All robots from rest through their commands."""
+    simulator = Simulator(scene_of(numerics, nodes_per_limb), len(cases), threads)
+    hub, heading, reports = [], [], []
+    for commands in cases.commands:
+        reports.append(simulator.stroke(commands))
+        hub.append(simulator.hub_position())
+        heading.append(headings(simulator))
+    return Swim(
+        np.array(hub),
+        np.array(heading),
+        iterations=float(np.mean([report.newton_iterations for report in reports])),
+        steps=float(np.mean([report.steps for report in reports])),
+        rejections=int(np.sum([report.rejections for report in reports])),
+        halvings=int(np.sum([report.halvings for report in reports])),
+        failed=int(np.count_nonzero(reports[-1].status != SolverStatus.CONVERGED)),
+    )
+
+
+def headings(simulator: Simulator) -> Floats:
+    """Direction of the body's x axis [rad]: the rotation that fits the rest shape best to the nodes around the hub."""
+    rest, nodes = simulator.scene.robot.nodes(), simulator.positions
+    x, y = np.moveaxis(nodes - nodes[:, :1], -1, 0)
+    return np.arctan2(y @ rest[:, 0] - x @ rest[:, 1], x @ rest[:, 0] + y @ rest[:, 1])
+
+
+# --- errors ----------------------------------------------------------------------------------------------------------
+
+
+def path_lengths(hub: Floats) -> Floats:
+    """Lengths of the hubs' paths from the origin, stroke end to stroke end [m], shape (n_robots,)."""
+    return np.asarray(np.linalg.norm(np.diff(hub, axis=0, prepend=0.0), axis=-1).sum(axis=0))
+
+
+def errors(swum: Swim, converged: Swim) -> Errors:
+    """How far off a swim is; infinite for all if a robot failed."""
+    if swum.failed:
+        return Errors(*np.full((3, swum.hub.shape[1]), np.inf))
+    distance = np.linalg.norm(swum.hub - converged.hub, axis=-1)
+    turn = np.angle(np.exp(1j * (swum.heading - converged.heading)))
+    length = path_lengths(converged.hub)
+    return Errors(distance.max(axis=0) / length, np.abs(turn).max(axis=0), distance[-1] / length)
