@@ -72,7 +72,8 @@ class Cell:
     failed: Robots whose status was not CONVERGED, or whose state was not finite, in any of the runs.
     iterations: Newton iterations per time step of `step`, on average over the stroke and its robots.
     repairs, backtracks, halvings, energy_cuts: See StrokeReport; all robots together.
-    folded: Robots whose opening angles do not add up to a full turn after the stroke: a hub hinge went through its pole.
+    folded: Robots whose opening angles do not add up to a full turn after the stroke: a hub hinge went through its
+        pole.
     strain, speed: Largest at the stroke's end. opening_angle: Smallest, see StrokeReport.
     growth, growth_in_vacuum: Largest growth of a robot's energy in one step without commands, over its energy (or a
         billionth of its first one, if that is more). gain, gain_in_vacuum: Largest energy over the first, less 1.

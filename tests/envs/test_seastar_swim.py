@@ -387,20 +387,24 @@ def test_pickled_environments_continue_to_the_same_bits():
 # Failure
 
 
-def break_robot(env: SeastarSwimEnv) -> None:
-    """Put all nodes into one point, where no angle is defined."""
+def break_robot(env: SeastarSwimEnv, status: SolverStatus) -> None:
+    """Put all nodes into one point, where no angle is defined, or write a coordinate that is no number."""
+    if status == SolverStatus.NOT_FINITE:
+        env.simulator.q[0, 7, 0] = np.nan
+        return
     state = env.simulator.get_state()
     env.simulator.set_state(state._replace(positions=np.full_like(state.positions, 0.02)))
 
 
-def test_a_solver_that_gives_up_ends_the_episode_with_a_status_and_a_sentence():
+@pytest.mark.parametrize("status", [SolverStatus.NOT_CONVERGED, SolverStatus.NOT_FINITE])
+def test_a_solver_that_gives_up_ends_the_episode_with_a_status_and_a_sentence(status):
     env = fast()
     env.reset(seed=0)
-    break_robot(env)
+    break_robot(env, status)
     observation, reward, terminated, truncated, info = env.step(STRAIGHT)
     assert terminated is True and truncated is False
-    assert SolverStatus(info["solver_status"]) is SolverStatus.NOT_CONVERGED
-    assert info["solver_message"] == SolverStatus.NOT_CONVERGED.sentence
+    assert SolverStatus(info["solver_status"]) is status
+    assert info["solver_message"] == status.sentence
     assert info["is_success"] is False
     assert np.isfinite(observation).all() and math.isfinite(reward)
     assert all(np.isfinite(value).all() for name, value in info.items() if name != "solver_message")

@@ -315,21 +315,25 @@ def test_a_robots_smallest_opening_angle_does_not_depend_on_its_neighbours():
 # Failure
 
 
-def break_robot(batch: SeastarSwimVectorEnv, robot: int) -> None:
-    """Put all nodes of one robot into one point, where no angle is defined."""
+def break_robot(batch: SeastarSwimVectorEnv, robot: int, status: SolverStatus = SolverStatus.NOT_CONVERGED) -> None:
+    """Put all nodes of one robot into one point, where no angle is defined, or write a coordinate that is no number."""
+    if status == SolverStatus.NOT_FINITE:
+        batch.simulator.q[0, 7, robot] = np.nan
+        return
     state = batch.simulator.get_state()
     state.positions[robot] = 0.02
     batch.simulator.set_state(state)
 
 
+@pytest.mark.parametrize("status", [SolverStatus.NOT_CONVERGED, SolverStatus.NOT_FINITE])
 @pytest.mark.parametrize("autoreset_mode", [NEXT_STEP, SAME_STEP])
-def test_a_robot_that_cannot_be_solved_ends_its_episode_and_no_other(autoreset_mode):
+def test_a_robot_that_cannot_be_solved_ends_its_episode_and_no_other(autoreset_mode, status):
     well, ill = native(5, autoreset_mode=autoreset_mode), native(5, autoreset_mode=autoreset_mode)
     others = np.arange(5) != 2
     for batch in (well, ill):
         batch.reset(seed=0)
         batch.step(np.ones((5, 5), int))
-    break_robot(ill, 2)
+    break_robot(ill, 2, status)
     actions = np.random.default_rng(0).integers(0, 3, (5, 5))
     for k in range(4):
         observations, reward, terminated, truncated, info = ill.step(actions)
@@ -340,7 +344,7 @@ def test_a_robot_that_cannot_be_solved_ends_its_episode_and_no_other(autoreset_m
         np.testing.assert_array_equal(reward[others], expected[1][others])
         if k == 0:
             final = info if autoreset_mode is NEXT_STEP else info["final_info"]
-            assert final["solver_status"][2] == SolverStatus.NOT_CONVERGED
+            assert final["solver_status"][2] == status
             assert not final["is_success"][2]
         else:
             assert not info["solver_status"].any()

@@ -1,0 +1,214 @@
+"""The guard's parts: energies are the oracle's, cuts keep the momenta, hinges that go through their poles are seen."""
+
+from types import SimpleNamespace
+
+import numba
+import numpy as np
+import pytest
+
+import oracle
+from oracle import Star
+from seastar_gym import Scene, Seastar, SmaPulse
+from seastar_gym.der.guard import allowed_energy, hold_to_energy, put_back, rigid_motion, set_aside, through_poles
+from seastar_gym.der.lanes import N_LANES, borrow, load, select, splat, store
+from seastar_gym.der.rods import Actuation, aligned_rows, make_work
+from seastar_gym.der.schemes import SCHEMES
+
+STAR = Star()
+RODS = Scene(actuator=SmaPulse(0.5)).rods()
+
+
+@numba.njit(error_model="numpy")
+def allowed(rods, work, scheme, actuation, q, v, result):
+    rows, memory, tableau, rotation = borrow(rods), borrow(work), borrow(scheme), borrow(actuation)
+    start, end = splat(0.25), splat(0.75)
+    store(borrow(result), 0, allowed_energy(rows, memory, tableau, rotation, start, end, borrow(q), borrow(v)))
+
+
+@numba.njit(error_model="numpy")
+def hold(rods, work, q, v, robots, limit, largest_cut, result):
+    rows, memory, out, one = borrow(rods), borrow(work), borrow(result), splat(1.0)
+    mask = load(borrow(robots), 0) > 0.0
+    q_rows, v_rows = borrow(q), borrow(v)
+    store(out, 0, rigid_motion(rows, q_rows, v_rows)[6])
+    refused, cut = hold_to_energy(
+        rows, memory, q_rows, v_rows, splat(0.01), mask, load(borrow(limit), 0), splat(largest_cut)
+    )
+    store(out, 1, select(refused, one, 0.0))
+    store(out, 2, select(cut, one, 0.0))
+
+
+@numba.njit(error_model="numpy")
+def jump(rods, work, scheme, q, v, q_1, robots, result):
+    """Put (q, v) aside, move to q_1, look for poles, and put the robots back that came through one."""
+    rows, memory, tableau, q_rows, v_rows = borrow(rods), borrow(work), borrow(scheme), borrow(q), borrow(v)
+    set_aside(rows, memory, tableau, q_rows, v_rows)
+    for row in range(q.shape[0]):
+        store(q_rows, row, load(borrow(q_1), row))
+        store(v_rows, row, splat(0.0))
+    through = through_poles(rows, memory, q_rows, load(borrow(robots), 0) > 0.0)
+    put_back(rows, memory, tableau, q_rows, v_rows, through)
+    store(borrow(result), 0, select(through, splat(1.0), 0.0))
+
+
+def rows_of(nodes: np.ndarray) -> np.ndarray:
+    """Nodes of N_LANES robots as rows of lanes."""
+    rows = aligned_rows(2 * STAR.n_nodes, N_LANES)
+    rows[:] = nodes.reshape(N_LANES, -1).T
+    return rows
+
+
+def nodes_of(rows: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(rows.T).reshape(N_LANES, -1, 2)
+
+
+def moving_robots(seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Bent robots away from the origin that fly, spin and ring: (q, v), shape (N_LANES, n_nodes, 2)."""
+    rng = np.random.default_rng(seed)
+    shape = (N_LANES, STAR.n_nodes, 2)
+    q = STAR.rest + 1e-3 * rng.standard_normal(shape) + 0.3
+    return q, 0.2 * rng.standard_normal(shape) + [0.5, -0.2] + 2.0 * (q - 0.3) @ [[0.0, 1.0], [-1.0, 0.0]]
+
+
+def work_at(delta_psi: np.ndarray, scheme: str = "implicit-euler"):
+    """Memory with the natural hub angles of these rotations [rad], shape (N_LANES, 5)."""
+    work = make_work(5, 10, SCHEMES[scheme].n_stages)
+    natural = np.array([oracle.natural_angles(STAR, one)[-5:] for one in delta_psi])
+    work.hub_EI_kappa_bar[:] = STAR.EI * 2.0 * np.tan(natural.T / 2.0) / STAR.edge_length
+    return work
+
+
+def momenta(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    spin = q[..., 0] * v[..., 1] - q[..., 1] * v[..., 0]
+    return np.concatenate([np.einsum("n,rnd->rd", STAR.masses, v), (spin @ STAR.masses)[:, None]], axis=1)
+
+
+# Energies
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_allowed_energy_is_that_of_the_robot_standing_still_while_its_actuators_move(scheme):
+    """At a step from a quarter to three quarters of an interval; from the larger end and with what moving stores."""
+    q, v = moving_robots()
+    begin, end = np.random.default_rng(1).uniform(-0.4, 0.4, (2, N_LANES, 5))
+    result = np.zeros((1, N_LANES))
+    tableau, actuation = SCHEMES[scheme], Actuation(begin.T.copy(), end.T.copy())
+    allowed(RODS, make_work(5, 10, tableau.n_stages), tableau, actuation, rows_of(q), rows_of(v), result)
+    for lane in range(N_LANES):
+        first, last = (begin[lane] + share * (end[lane] - begin[lane]) for share in (0.25, 0.75))
+        at_start, at_end = (oracle.elastic_energy(STAR, q[lane], one) for one in (first, last))
+        kappa = [2.0 * np.tan(oracle.natural_angles(STAR, one)[-5:] / 2.0) / STAR.edge_length for one in (first, last)]
+        moved = 0.5 * STAR.EI * STAR.edge_length * np.sum((kappa[1] - kappa[0]) ** 2)
+        expected = at_end if tableau.dissipative else max(at_start, at_end) + moved
+        assert result[0, lane] == pytest.approx(expected + oracle.kinetic_energy(STAR, v[lane]), rel=1e-12)
+
+
+def held(share: float, largest_cut: float = 0.01, robots: np.ndarray | None = None) -> SimpleNamespace:
+    """Robots held to their potential energy, that of their rigid motion, and `share` of the rest."""
+    q, v = moving_robots()
+    rows, work, result = (rows_of(q), rows_of(v)), work_at(np.zeros((N_LANES, 5))), np.zeros((3, N_LANES))
+    chosen, limit = np.ones((1, N_LANES)) if robots is None else robots[None], np.full((1, N_LANES), 1e9)
+    hold(RODS, work, *rows, chosen, limit, largest_cut, result)  # high above: says the rigid energy, changes nothing
+    assert not result[1:].any()
+    np.testing.assert_array_equal(nodes_of(rows[1]), v)
+    rigid, kinetic = result[0].copy(), np.array([oracle.kinetic_energy(STAR, one) for one in v])
+    potential = np.array([oracle.elastic_energy(STAR, one, np.zeros(5)) for one in q])
+    limit[0] = potential + rigid + share * (kinetic - rigid)
+    hold(RODS, work, *rows, chosen, limit, largest_cut, result)
+    np.testing.assert_array_equal(nodes_of(rows[0]), q)
+    after = nodes_of(rows[1])
+    return SimpleNamespace(
+        q=q, v=v, after=after, rigid=rigid, refused=result[1] > 0.0, cut=result[2] > 0.0,
+        allowed=limit[0] - potential, kinetic=np.array([oracle.kinetic_energy(STAR, one) for one in after]),
+    )  # fmt: skip
+
+
+def test_rigid_motion_has_the_least_energy_with_the_same_momenta():
+    found = held(0.995)
+    for lane in range(N_LANES):
+        q, v = found.q[lane], found.v[lane]
+        r = q - STAR.masses @ q / STAR.masses.sum()
+        motions = np.zeros((3, *q.shape))
+        motions[0, :, 0], motions[1, :, 1], motions[2] = 1.0, 1.0, np.stack([-r[:, 1], r[:, 0]], axis=1)
+        inner = np.einsum("and,n,bnd->ab", motions, STAR.masses, motions)
+        projected = np.linalg.solve(inner, np.einsum("and,n,nd->a", motions, STAR.masses, v))
+        assert found.rigid[lane] == pytest.approx(0.5 * projected @ inner @ projected, rel=1e-12)
+
+
+# Cuts and refusals
+
+
+def test_a_small_excess_of_energy_is_cut_and_the_momenta_stay():
+    found = held(0.995)
+    assert found.cut.all() and not found.refused.any()
+    np.testing.assert_allclose(found.kinetic, found.allowed, rtol=1e-9)
+    before, after = momenta(found.q, found.v), momenta(found.q, found.after)
+    np.testing.assert_allclose(after, before, rtol=1e-13)
+    assert np.abs(found.after - found.v).max() > 1e-4
+
+
+@pytest.mark.parametrize("share, refused", [(0.98, True), (-0.01, True), (1.0 + 1e-9, False)])
+def test_more_than_the_largest_cut_is_refused_and_what_is_allowed_left_alone(share, refused):
+    found = held(share)
+    assert not found.cut.any() and np.all(found.refused == refused)
+    np.testing.assert_array_equal(found.after, found.v)
+
+
+def test_at_the_last_halving_any_share_may_be_cut():
+    found = held(0.2, largest_cut=1.0)
+    assert found.cut.all()
+    np.testing.assert_allclose(found.kinetic, found.allowed, rtol=1e-9)
+    np.testing.assert_allclose(momenta(found.q, found.after), momenta(found.q, found.v), rtol=1e-13)
+
+
+def test_robots_that_are_not_held_keep_their_bits():
+    chosen = np.arange(N_LANES) % 2.0
+    found = held(0.995, robots=chosen)
+    np.testing.assert_array_equal(found.cut, chosen > 0.0)
+    np.testing.assert_array_equal(found.after[chosen == 0.0], found.v[chosen == 0.0])
+
+
+# Poles
+
+
+def turned_about(q: np.ndarray, node: int, nodes: slice, angle: float) -> np.ndarray:
+    """The robot with some nodes turned about another one by an angle [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    result = np.array(q)
+    result[nodes] = q[node] + (q[nodes] - q[node]) @ [[c, s], [-s, c]]
+    return result
+
+
+TIP, LIMB = (3, slice(4, 10)), (0, slice(1, 10))
+"""What turns about which node: the end of limb 1 about a hinge within it, and limb 1 about the hub."""
+TURNS = [
+    ("opening", TIP, 0, 170, False),
+    ("opening", TIP, 160, 170, False),
+    ("opening", TIP, 160, 200, True),
+    ("opening", TIP, -160, -200, True),
+    ("opening", LIMB, 0, 100, False),  # from 72 degrees, on either side of limb 1
+    ("opening", LIMB, 60, 80, False),
+    ("opening", LIMB, 100, 120, True),
+    ("turning", LIMB, 50, 70, False),
+    ("turning", LIMB, 50, 80, True),
+    ("turning", LIMB, -60, -90, True),
+]
+
+
+@pytest.mark.parametrize("scheme", ["implicit-euler", "sdirk3"])
+@pytest.mark.parametrize("hub_hinge, part, before, after, through", TURNS)
+def test_a_hinge_that_turned_through_its_pole_is_seen_and_the_robot_put_back(
+    hub_hinge, part, before, after, through, scheme
+):
+    """The last lane holds a robot that nobody asks about."""
+    rods, tableau = Scene(Seastar(hub_hinge=hub_hinge), actuator=SmaPulse(0.5)).rods(), SCHEMES[scheme]
+    q, q_1 = (turned_about(STAR.rest, *part, np.radians(angle)) for angle in (before, after))
+    everywhere, v = np.ones((N_LANES, STAR.n_nodes, 2)), np.ones((N_LANES, STAR.n_nodes, 2))
+    rows, v_rows, result = rows_of(q * everywhere), rows_of(v), np.zeros((1, N_LANES))
+    asked = np.arange(N_LANES) < N_LANES - 1
+    work = make_work(5, 10, tableau.n_stages)
+    jump(rods, work, tableau, rows, v_rows, rows_of(q_1 * everywhere), 1.0 * asked[None], result)
+    np.testing.assert_array_equal(result[0] > 0.0, asked & through)
+    back = (asked & through)[:, None, None]
+    np.testing.assert_array_equal(nodes_of(rows), np.where(back, q, q_1))
+    np.testing.assert_array_equal(nodes_of(v_rows), np.where(back, v, 0.0))
