@@ -9,7 +9,8 @@ from rest or rattled. Strokes of more than MOST_STEPS steps are cut short: the p
 turns back after MOST_STEPS/10 steps. Two more runs, without commands, in the cell's fluid and in vacuum, of rattled
 robots look at the energy after every step.
 
-`--long` instead makes 10,000 strokes of random commands with 256 robots.
+`--long` instead makes 10,000 strokes of random commands with 256 robots; `--cost` measures what never breaking costs a
+healthy robot, see hardening.py.
 """
 
 import argparse
@@ -26,6 +27,7 @@ from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
@@ -33,6 +35,7 @@ from tqdm import tqdm
 from seastar_gym.actuation.schedule import step_times
 from seastar_gym.scene import Fidelity, Numerics, Scene, SchemeName, SmaPulse, Water
 from seastar_gym.simulator import Simulator, State, StrokeReport
+from seastar_gym.studies.hardening import SETTINGS, cost_table, measure_cost
 from seastar_gym.studies.stability_cases import (
     CHAPTER_TROUBLE,
     QUICK_STEPS,
@@ -270,7 +273,7 @@ def _weight(sweep: Sweep, value: float | None) -> float:
 
 
 SUMMARY = (
-    "against", "from ... to", "cells", "refused", "strokes", "failed", "Newton iterations per step", "cells with halvings",
+    "against", "cells", "refused", "strokes", "failed", "Newton iterations per step (most)", "steps halved",
     "energy grew", "error at 3, 20 ms",
 )  # fmt: skip
 
@@ -282,8 +285,8 @@ def summarise(cells: Iterable[Cell], sweeps: Sequence[Sweep]) -> list[list[str]]
     for sweep in sweeps:
         first, last = format_value(sweep, sweep.values[0]), format_value(sweep, sweep.values[-1])
         own = [cell for cell in everything if cell.sweep == sweep.name]
-        rows.append([sweep.label, f"{first} ... {last} {sweep.unit}".strip(), *_figures(own), _errors(own, sweep)])
-    return [*rows, ["all", "", *_figures(everything), ""]]
+        rows.append([f"{sweep.label}: {first} ... {last} {sweep.unit}".strip(), *_figures(own), _errors(own, sweep)])
+    return [*rows, ["all", *_figures(everything), ""]]
 
 
 def _figures(cells: list[Cell]) -> list[str]:
@@ -293,8 +296,8 @@ def _figures(cells: list[Cell]) -> list[str]:
     grew = sum(max(cell.growth, cell.growth_in_vacuum) > GROWTH_ROUNDING for cell in ran)
     return [
         str(len(cells)), str(len(cells) - len(ran)), str(sum(cell.robots for cell in ran)),
-        str(sum(cell.failed for cell in ran)), f"{np.median(iterations):.2g}, at most {max(iterations):.0f}",
-        str(sum(cell.halvings > 0 for cell in ran)), f"in {grew} cells" if grew else "nowhere",
+        str(sum(cell.failed for cell in ran)), f"{np.median(iterations):.2g} ({max(iterations):.0f})",
+        f"{sum(cell.halvings > 0 for cell in ran)} cells", f"{grew} cells" if grew else "nowhere",
     ]  # fmt: skip
 
 
@@ -302,14 +305,16 @@ def _errors(cells: list[Cell], sweep: Sweep) -> str:
     """At the chapter's value."""
     found = {cell.step: cell.error for cell in cells if cell.value == sweep.chapter}
     errors = [found.get(step, math.nan) for step in (3e-3, CHAPTER_TROUBLE)]
-    return ", ".join(f"{100 * error:.2g} %" if math.isfinite(error) else "-" for error in errors)
+    return ", ".join(f"{100 * error:.2g}" if math.isfinite(error) else "-" for error in errors) + " %"
 
 
 def as_table(rows: Sequence[Sequence[str]]) -> Table:
-    """The summary for a terminal."""
-    table = Table(title="Stability: one stroke per robot, from 10 µs to 1 s of time step")
-    for k, name in enumerate(SUMMARY):
-        table.add_column(name, justify="left" if k == 0 else "right", min_width=max(map(len, name.split())))
+    """The summary for a terminal of 100 columns or more."""
+    title = "Stability: one stroke per robot, from 10 µs to 1 s of time step"
+    table = Table(title=title, box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
+    table.add_column(SUMMARY[0])
+    for name, column in zip(SUMMARY[1:], list(zip(*rows, strict=True))[1:], strict=True):
+        table.add_column(name, justify="right", width=max(map(len, [*name.split(), *column])))
     for row in rows[:-1]:
         table.add_row(*row)
     table.add_section()
@@ -403,11 +408,15 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="a coarser grid, in a fraction of the time")
     parser.add_argument("--scheme", choices=get_args(SchemeName), default="implicit-euler")
     parser.add_argument("--long", action="store_true", help="10,000 strokes of 256 robots instead of the atlas")
+    parser.add_argument("--cost", action="store_true", help="what hardening costs, instead of the atlas")
     parser.add_argument("--out", type=Path, default=Path("runs/stability"), help="folder for CSV and pictures")
     options = parser.parse_args()
     console = Console()
     if options.long:
         console.print(long_table(long_run(1000 if options.quick else 10_000)))
+        return
+    if options.cost:
+        console.print(cost_table([measure_cost(numerics) for numerics in SETTINGS]))
         return
     from seastar_gym.studies.stability_pictures import draw_atlas
 
@@ -416,12 +425,12 @@ def main() -> None:
     cells = atlas(sweeps, steps, options.scheme)
     options.out.mkdir(parents=True, exist_ok=True)
     rows = summarise(cells, sweeps)
-    write_csv(cells, options.out / "stability.csv")
-    write_markdown(rows, options.out / "stability.md")
-    files = draw_atlas(cells, sweeps, steps, options.scheme, options.out)
+    files = [options.out / "stability.csv", options.out / "stability.md"]
+    write_csv(cells, files[0])
+    write_markdown(rows, files[1])
+    files += draw_atlas(cells, sweeps, steps, options.scheme, options.out)
     console.print(as_table(rows))
-    console.print(f"{time.perf_counter() - start:.0f} s. Written: {options.out / 'stability.csv'}, "
-                  f"{', '.join(map(str, files))}")  # fmt: skip
+    console.print(f"{time.perf_counter() - start:.0f} s. In {options.out}: {', '.join(one.name for one in files)}")
 
 
 if __name__ == "__main__":

@@ -81,7 +81,7 @@ SWEEPS = (
         lambda shift: Case(shift=0.01 * _number(shift)), 0.0,
     ),
     Sweep(
-        "peak_angle", "peak angle, all 243 commands", "degrees",
+        "peak_angle", "peak angle, all 243 commands", "°",
         (9.0, 18.0, 27.0, 36.0, 45.0, 50.0, 53.0, 53.9, 54.0, 60.0),
         lambda angle: Case(peak_angle=math.radians(_number(angle)), all_commands=True), 36.0,
     ),

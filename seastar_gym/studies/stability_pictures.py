@@ -29,7 +29,9 @@ NAMES = {
     "sdirk2": "SDIRK2",
     "sdirk3": "SDIRK3",
 }
-DPI = 110
+FRAME: dict[str, Any] = {"fill": False, "edgecolor": INK, "linewidth": 1.4}
+DASHES: dict[str, Any] = {"color": MARK, "linewidth": 1.6, "linestyle": (0, (4, 2))}
+DPI = 120
 
 
 def draw_atlas(
@@ -41,7 +43,7 @@ def draw_atlas(
         _draw_needs(cells, sweeps, steps, f"{name}: what it took to converge", folder / "stability_needs.png"),
         _draw_numbers(
             cells, sweeps, steps, f"{name}: Newton iterations per time step", folder / "stability_iterations.png",
-            lambda cell: cell.iterations, "viridis", (1.0, 300.0), "{:g}", "Newton iterations per time step",
+            lambda cell: cell.iterations, "viridis_r", (1.0, 300.0), "{:g}", "Newton iterations per time step",
         ),
         _draw_numbers(
             cells, sweeps, steps, f"{name}: error of the hub's path against the converged run",
@@ -113,10 +115,14 @@ def _panels(sweeps: Sequence[Sweep], title: str) -> tuple[Figure, list[Axes], Ax
 
     columns = min(4, len(sweeps))
     rows = math.ceil(len(sweeps) / columns)
-    figure = Figure(figsize=(3.55 * columns + 0.3, 3.25 * rows + 1.0), layout="constrained")
+    figure = Figure(figsize=(3.1 * columns + 0.3, 2.75 * rows + 1.2), layout="constrained")
     figure.suptitle(title, x=0.01, ha="left", color=INK, fontsize=13)
+    note = "Strokes with steps below 1 ms are cut short after 2000 steps."
+    figure.text(0.99, 0.975, note, ha="right", fontsize=8.5, color=FAINT_INK)
     grid = figure.add_gridspec(rows + 1, columns, height_ratios=[*[1.0] * rows, 0.16])
     panels = [figure.add_subplot(grid[k // columns, k % columns]) for k in range(len(sweeps))]
+    for axes in panels[-columns:]:
+        axes.set_xlabel("time step h", fontsize=8.5, color=INK)
     foot = figure.add_subplot(grid[rows, :])
     foot.axis("off")
     return figure, panels, foot
@@ -143,17 +149,23 @@ def _finish(axes: Axes, cells: Sequence[Cell], sweep: Sweep, steps: Sequence[flo
     axes.set_yticks(np.arange(len(sweep.values)) + 0.5, [format_value(sweep, value) for value in sweep.values])
     axes.tick_params(length=0, labelsize=8, labelcolor=INK)
     axes.set_title(f"{sweep.label} [{sweep.unit}]" if sweep.unit else sweep.label, fontsize=10, color=INK, loc="left")
-    axes.set_xlabel("time step h", fontsize=8.5, color=INK)
     for spine in axes.spines.values():
         spine.set_visible(False)
     if sweep.chapter in sweep.values:
         row = sweep.values.index(sweep.chapter)
-        axes.add_patch(Rectangle((0, row), len(steps), 1, fill=False, edgecolor=INK, linewidth=1.2, clip_on=False))
+        axes.add_patch(Rectangle((0, row), len(steps), 1, clip_on=False, path_effects=_halo(), **FRAME))
         axes.get_yticklabels()[row].set_fontweight("bold")
     if CHAPTER_TROUBLE in steps:
         column = steps.index(CHAPTER_TROUBLE)
-        axes.axvline(column, color=MARK, linewidth=1.4, linestyle=(0, (4, 2)))
+        axes.axvline(column, path_effects=_halo(), **DASHES)
         axes.get_xticklabels()[column].set_color(MARK)
+
+
+def _halo() -> list[Any]:
+    """A white seam around lines, so that they show on any colour."""
+    from matplotlib.patheffects import withStroke
+
+    return [withStroke(linewidth=3.2, foreground="white")]
 
 
 def _refused_patch() -> Any:
@@ -167,20 +179,9 @@ def _legend(foot: Axes, patches: list[Any], left: float = 0.0) -> None:
     from matplotlib.patches import Patch
 
     marks = [
-        Patch(fill=False, edgecolor=INK, linewidth=1.2, label="the chapter's value"),
-        Line2D(
-            [],
-            [],
-            color=MARK,
-            linewidth=1.4,
-            linestyle=(0, (4, 2)),
-            label="the chapter's trouble begins: 20 ms",
-        ),
+        Patch(label="the chapter's value", **FRAME),
+        Line2D([], [], label="the chapter's trouble begins: 20 ms", **DASHES),
     ]
-    foot.text(
-        1.0, -0.05, "Strokes with steps below 1 ms are cut short after 2000 steps.", fontsize=8.5, color=FAINT_INK,
-        ha="right", va="top",
-    )  # fmt: skip
     foot.legend(
         handles=[*patches, *marks], loc="upper left", bbox_to_anchor=(left, 1.0), ncols=4 if left == 0.0 else 2,
         frameon=False, fontsize=9, labelcolor=INK, borderaxespad=0.0,

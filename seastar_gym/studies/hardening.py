@@ -1,0 +1,155 @@
+"""What it costs a healthy robot that the solver never breaks: `python -m seastar_gym.studies.stability --cost`.
+
+Paired in one run: strokes by the simulator's kernel, and the same strokes by plain Newton, made of the same parts but
+without line search, repair, guard, halving, status and report. Neither has anything to repair in these strokes, and
+both end in the same bits, so what differs is the time.
+"""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.table import Table
+
+from seastar_gym.actuation.schedule import step_times
+from seastar_gym.der.actuation import set_natural_hub_angles
+from seastar_gym.der.compilation import entry_point, kernel
+from seastar_gym.der.lanes import any_lane, borrow, load, load_number, select, splat, store
+from seastar_gym.der.newton import EASY, LATE, foreseeable_length, take_step
+from seastar_gym.der.potential import factorise
+from seastar_gym.der.rods import NEWTON_ITERATIONS, REPORT_ROWS
+from seastar_gym.der.schemes import SCHEMES
+from seastar_gym.der.stages import begin_stage, end_stage, end_step
+from seastar_gym.der.stroke import advance
+from seastar_gym.scene import Numerics, Scene
+from seastar_gym.simulator import Simulator
+
+Floats = NDArray[np.float64]
+
+SETTINGS = (
+    Numerics("implicit-euler", 3e-3),
+    Numerics("sdirk2", 20e-3),
+    Numerics("implicit-midpoint", 5e-3),
+)
+ROBOTS = 64
+
+
+@kernel
+def newton(rods, work, stage, tolerance, patience):
+    """(13.11) and nothing else: whole steps of the matrix as it is, until one is small; returns their number."""
+    one, zero = splat(1.0), splat(0.0)
+    iterations, running = zero, zero < one
+    quadratic_length = foreseeable_length(rods, stage)
+    while any_lane(running):
+        factorise(rods, work, stage, None)
+        move = take_step(rods, work, running, None, zero)
+        iterations += select(running, one, zero)
+        late = select(iterations < EASY, one, LATE)
+        foreseen = (iterations <= EASY) & (late * move * move <= tolerance * quadratic_length)
+        running = running & ~((move <= tolerance) | foreseen) & (iterations < patience)
+    return iterations
+
+
+@entry_point
+def advance_plainly(rods, work, scheme, actuation, q, v, a, peaks, times, shape, report, limits):
+    """As `advance` of der/stroke.py, with nothing in case of trouble; counts Newton iterations only."""
+    rods_rows, memory, rotation, tableau = borrow(rods), borrow(work), borrow(actuation), borrow(scheme)
+    zero, last = splat(0.0), scheme.n_stages - 1
+    everyone = zero < splat(1.0)
+    for group in range(q.shape[0]):
+        q_rows, v_rows, a_rows, peak_rows = borrow(q[group]), borrow(v[group]), borrow(a[group]), borrow(peaks[group])
+        report_rows = borrow(report[group])
+        for k in range(times.shape[0] - 1):
+            for limb in range(rods.n_limbs):
+                peak = load(peak_rows, limb)
+                store(rotation.delta_psi_start, limb, peak * shape[k])
+                store(rotation.delta_psi_end, limb, peak * shape[k + 1])
+            h = splat(times[k + 1] - times[k])
+            for i in range(scheme.n_stages):
+                stage = begin_stage(rods_rows, memory, tableau, i, q_rows, v_rows, a_rows, h)
+                set_natural_hub_angles(rods_rows, memory, rotation, zero + load_number(tableau.c, i))
+                n = newton(rods_rows, memory, stage, limits.tolerance, 1.0 * limits.max_iterations)
+                store(report_rows, NEWTON_ITERATIONS, load(report_rows, NEWTON_ITERATIONS) + n)
+                if i < last:
+                    end_stage(rods_rows, memory, tableau, i, stage, a_rows, everyone)
+                else:
+                    end_step(rods_rows, memory, tableau, stage, q_rows, v_rows, a_rows, h, everyone)
+
+
+class Pair:
+    """The same stroke, again and again, by either kernel. numerics: The scene's; all else is the chapter's."""
+
+    def __init__(self, numerics: Numerics):
+        self.scene = Scene(numerics=numerics)
+        simulator = Simulator(self.scene, ROBOTS, threads=1)
+        commands = np.random.default_rng(0).integers(-1, 2, (4, ROBOTS, self.scene.robot.n_limbs)).astype(float)
+        for command in commands[:-1]:
+            simulator.stroke(command)
+        self.start = simulator.q.copy(), simulator.v.copy()
+        self.peaks = simulator.to_rows(commands[-1])
+        self.q, self.v, self.memory = simulator.q, simulator.v, simulator.memory[0]
+        n_groups, rows, lanes = self.q.shape
+        scheme = self.scheme = SCHEMES[numerics.scheme]
+        self.a = np.zeros((n_groups, (rows + 1) * scheme.n_stages + 2, lanes))
+        self.failed, self.report = np.zeros((n_groups, 1, lanes)), np.zeros((n_groups, len(REPORT_ROWS), lanes))
+        self.rods, self.limits = self.scene.rods(), self.scene.limits()
+        self.times = step_times(self.scene.actuator.corners, numerics.step)
+        self.shape = np.asarray(self.scene.actuator.delta_psi(self.times))
+
+    def seconds(self, hardened: bool) -> float:
+        """Duration of a stroke [s]; leaves its end in q and v, and its counts in `report`."""
+        self.q[:], self.v[:] = self.start
+        self.a[:], self.report[:] = 0.0, 0.0
+        work, actuation = self.memory
+        begin = time.perf_counter()
+        if hardened:
+            advance(
+                self.rods, work, self.scheme, SCHEMES["implicit-euler"], actuation, self.q, self.v, self.a, self.peaks,
+                self.times, self.shape, self.failed, self.report, self.limits,
+            )  # fmt: skip
+        else:
+            advance_plainly(
+                self.rods, work, self.scheme, actuation, self.q, self.v, self.a, self.peaks, self.times, self.shape,
+                self.report, self.limits,
+            )  # fmt: skip
+        return time.perf_counter() - begin
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Of one setting. plain: Median duration of a stroke by plain Newton, per robot and time step [s].
+
+    ratio: Median, over rounds, of the hardened stroke's duration over the plain one's; quartiles: of the same.
+    """
+
+    numerics: Numerics
+    plain: float
+    ratio: float
+    quartiles: tuple[float, float]
+
+
+def measure_cost(numerics: Numerics, rounds: int = 200) -> Cost:
+    """Strokes in pairs, each first in every other pair."""
+    pair, durations = Pair(numerics), np.zeros((rounds, 2))
+    pair.seconds(True), pair.seconds(False)
+    for k in range(rounds):
+        for hardened in (k % 2 == 0, k % 2 == 1):
+            durations[k, int(hardened)] = pair.seconds(hardened)
+    low, middle, high = np.percentile(durations[:, 1] / durations[:, 0], [25, 50, 75])
+    steps = len(pair.times) - 1
+    return Cost(numerics, float(np.median(durations[:, 0])) / ROBOTS / steps, middle, (low, high))
+
+
+def cost_table(costs: list[Cost]) -> Table:
+    """For a terminal."""
+    table = Table(title="What hardening costs a healthy robot")
+    for name in ("scheme, step", "plain Newton, per step", "hardened over plain", "middle half of the rounds"):
+        table.add_column(name, justify="left" if name.startswith("scheme") else "right")
+    for cost in costs:
+        table.add_row(
+            f"{cost.numerics.scheme}, {1e3 * cost.numerics.step:g} ms", f"{1e6 * cost.plain:.3f} µs",
+            f"{100.0 * (cost.ratio - 1.0):+.1f} %",
+            " ... ".join(f"{100.0 * (one - 1.0):+.1f}" for one in cost.quartiles) + " %",
+        )  # fmt: skip
+    return table

@@ -1,0 +1,131 @@
+"""The atlas of stability on a tiny grid: every cell arrives or says why it was refused, and what is written is so."""
+
+import csv
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from seastar_gym.studies import stability
+from seastar_gym.studies.stability_cases import SWEEPS, format_step, format_value, quick_sweeps
+from seastar_gym.studies.stability_pictures import draw_atlas
+
+STEPS = (3e-3, 2e-2, 0.3)
+VALUES = {"youngs_modulus": (1e2, 1e6, 1e11), "drag_coefficient": (None, 1.0), "speed": (0.0, 10.0),
+          "peak_angle": (36.0, 54.0)}  # fmt: skip
+GRID = tuple(replace(sweep, values=VALUES[sweep.name]) for sweep in SWEEPS if sweep.name in VALUES)
+
+
+@pytest.fixture(scope="module")
+def cells():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(stability, "REFERENCE_STEPS", 1000)
+        return stability.atlas(GRID, STEPS, progress=False, workers=1)
+
+
+@pytest.fixture(scope="module")
+def folder(cells, tmp_path_factory):
+    """What a run leaves behind."""
+    out = tmp_path_factory.mktemp("stability")
+    stability.write_csv(cells, out / "cells.csv")
+    stability.write_markdown(stability.summarise(cells, GRID), out / "summary.md")
+    draw_atlas(cells, GRID, STEPS, "implicit-euler", out)
+    return out
+
+
+def test_the_grid_is_that_of_the_issue():
+    """The default grid goes from one end of every range to the other, and the quick one keeps the ends."""
+    ends = {sweep.name: (sweep.values[0], sweep.values[-1]) for sweep in SWEEPS}
+    assert ends == {
+        "youngs_modulus": (1e2, 1e11), "rod_radius": (0.01, 20.0), "nodes_per_limb": (2, 640),
+        "drag_coefficient": (None, 1e4), "density_ratio": (0.1, 100.0), "speed": (0.0, 100.0), "shift": (0.0, 30.0),
+        "peak_angle": (9.0, 60.0),
+    }  # fmt: skip
+    assert (stability.STEPS[0], stability.STEPS[-1]) == (1e-5, 1.0)
+    for sweep, quick in zip(SWEEPS, quick_sweeps(), strict=True):
+        assert {sweep.values[0], sweep.values[-1], sweep.chapter} <= set(quick.values) < set(sweep.values)
+
+
+def test_every_cell_arrives_with_finite_numbers_or_was_refused_with_a_sentence(cells):
+    assert len(cells) == len(STEPS) * sum(len(sweep.values) for sweep in GRID)
+    refused = [cell for cell in cells if cell.refused]
+    assert {(cell.sweep, cell.value) for cell in refused} == {("peak_angle", 54.0)}
+    assert all("reach pi" in cell.refused and cell.refused.endswith(".") for cell in refused)
+    for cell in (cell for cell in cells if not cell.refused):
+        assert cell.failed == 0 and cell.robots == (243 if cell.sweep == "peak_angle" else 8)
+        assert all(math.isfinite(x) for x in (cell.iterations, cell.strain, cell.speed, cell.opening_angle))
+        assert max(cell.growth, cell.growth_in_vacuum) < stability.GROWTH_ROUNDING
+        assert cell.gain < stability.GROWTH_ROUNDING
+    assert any(cell.halvings for cell in cells) and any(cell.backtracks for cell in cells)
+
+
+def test_error_at_the_chapters_setting_grows_with_the_step(cells):
+    errors = {cell.step: cell.error for cell in cells if (cell.sweep, cell.value) == ("youngs_modulus", 1e6)}
+    assert 0.005 < errors[3e-3] < 0.03 < errors[2e-2] < 0.1 < errors[0.3]
+
+
+def test_the_csv_has_every_cell_and_the_summary_counts_it(cells, folder):
+    lines = list(csv.DictReader((folder / "cells.csv").read_text(encoding="utf-8").splitlines()))
+    assert [(one["sweep"], float(one["step"])) for one in lines] == [(cell.sweep, cell.step) for cell in cells]
+    assert lines[9]["value"] == "vacuum"
+    table = [line.strip("| ").split(" | ") for line in (folder / "summary.md").read_text(encoding="utf-8").splitlines()]
+    assert table[0] == list(stability.SUMMARY) and len(table) == 2 + len(GRID) + 1
+    names = [sweep.name for sweep in GRID]
+    for name, row in zip([*names, None], table[2:], strict=True):
+        own = [line for line in lines if name is None or line["sweep"] == name]
+        ran = [line for line in own if not line["refused"]]
+        figures = dict(zip(stability.SUMMARY, row, strict=False))
+        assert figures["cells"] == str(len(own)) and figures["refused"] == str(len(own) - len(ran))
+        assert figures["strokes"] == str(sum(int(line["robots"]) for line in ran))
+        assert figures["failed"] == str(sum(int(line["failed"]) for line in ran)) == "0"
+        assert figures["steps halved"] == f"{sum(int(line['halvings']) > 0 for line in ran)} cells"
+        iterations = [float(line["iterations"]) for line in ran]
+        wanted = f"{np.median(iterations):.2g} ({max(iterations):.0f})"
+        assert figures["Newton iterations per step (most)"] == wanted
+        assert figures["energy grew"] == "nowhere"
+
+
+def test_pictures_are_written(folder):
+    for name in ("needs", "iterations", "error"):
+        assert (folder / f"stability_{name}.png").stat().st_size > 20_000
+
+
+def test_the_table_can_be_read_in_100_columns(cells):
+    console = Console(width=100)
+    with console.capture() as capture:
+        console.print(stability.as_table(stability.summarise(cells, GRID)))
+    text = capture.get()
+    assert "…" not in text
+    for word in ("against", "failed", "iterations", "3, 20 ms", "nowhere", "36 ... 54 °"):
+        assert word in text
+
+
+def test_a_failure_is_counted_in_its_cell(cells):
+    rows = stability.summarise([replace(cells[0], failed=2), *cells[1:]], GRID)
+    assert rows[0][4] == rows[-1][4] == "2"
+
+
+def test_values_and_steps_are_written_as_a_reader_expects_them():
+    sweep = SWEEPS[0]
+    assert [format_value(sweep, value) for value in (None, 1e11, 1.6, 0.01)] == ["vacuum", "10¹¹", "1.6", "0.01"]
+    assert [format_step(step) for step in (1e-5, 3e-3, 0.3, 1.0)] == ["10 µs", "3 ms", "300 ms", "1 s"]
+
+
+def test_a_long_run_keeps_strain_and_speed_bounded():
+    run = stability.long_run(strokes=20, robots=16, threads=1, progress=False)
+    assert run.failed == 0 and 0.0 < run.strain < 0.05 and 0.0 < run.speed < 1.0
+    assert run.strain_late <= run.strain and run.speed_late <= run.speed
+    assert stability.long_table(run).row_count == 13
+
+
+def test_the_study_writes_its_files_and_prints_its_table(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(stability, "REFERENCE_STEPS", 100)
+    monkeypatch.setattr(stability, "quick_sweeps", lambda: GRID)
+    monkeypatch.setattr(stability, "QUICK_STEPS", (2e-2, 0.3))
+    monkeypatch.setattr("sys.argv", ["stability", "--quick", "--scheme", "sdirk2", "--out", str(tmp_path / "out")])
+    stability.main()
+    assert "stability.csv" in capsys.readouterr().out
+    names = {"stability.csv", "stability.md", "stability_needs.png", "stability_iterations.png", "stability_error.png"}
+    assert {file.name for file in (tmp_path / "out").iterdir()} == names
