@@ -4,8 +4,9 @@
     python train.py --quick                the whole way in short, in under a minute
     python train.py --resume runs/FOLDER   continues a run that was stopped (Ctrl-C), or trains it for more --strokes
 
-Everything is written to a folder of its own: the model, checkpoints, the options and the command, TensorBoard logs,
-and the comparison with its table, pictures, videos and report.md.
+Everything is written to a folder of its own: the policy, the learner and its checkpoints, the options and the command,
+TensorBoard logs, and the comparison with its table, pictures, videos and report.html. With --ship the policy becomes
+the one in the box.
 """
 
 import csv
@@ -29,17 +30,21 @@ import numpy as np
 import stable_baselines3
 import torch
 import tyro
-from matplotlib.figure import Figure
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 from tqdm import tqdm
 
 import seastar_gym
-from agents.evaluate import COLUMNS, evaluate, results
-from agents.ppo import Hyperparameters, LearnedPolicy, load, make_model, make_training_env, resume, save
+from agents.charts import Curve, read_progress
+from agents.evaluate import evaluate
+from agents.policy import SHIPPED
+from agents.policy import load as load_policy
+from agents.policy import save as save_policy
+from agents.ppo import Hyperparameters, make_model, make_training_env, policy_of, resume, save
+from agents.report import Remarks
 from agents.scripted import scripted
-from agents.swim import Swim, swim
+from agents.swim import swim
 from agents.vec_env import BatchVecEnv
 from seastar_gym import RewardWeights
 from seastar_gym.envs.paths import PathName
@@ -74,9 +79,11 @@ class Options:
     """Film the swims of the comparison."""
     out: Path | None = None
     """Folder of the run; runs/ and the time by default."""
+    ship: bool = False
+    """Make the policy the one in the box, which agents.evaluate takes by default."""
     resume: Path | None = None
-    """Continue the run in this folder, with its options; only strokes, num_threads, device, save_freq and video may be
-    given anew."""
+    """Continue the run in this folder, with its options; only strokes, num_threads, device, save_freq, video and ship
+    may be given anew."""
     quick: bool = False
     """A short form that goes all the way in under a minute, at fidelity "fast"."""
     ppo: Annotated[Hyperparameters, tyro.conf.arg(name="")] = Hyperparameters()
@@ -86,7 +93,7 @@ class Options:
             raise ValueError("strokes and save_freq must be at least 1.")
 
 
-CHANGEABLE = {"strokes", "num_threads", "device", "save_freq", "video", "out", "resume", "quick"}
+CHANGEABLE = {"strokes", "num_threads", "device", "save_freq", "video", "ship", "out", "resume", "quick"}
 """Options that may change when a run is continued."""
 
 
@@ -132,6 +139,21 @@ def write_config(options: Options, arguments: Sequence[str], folder: Path) -> No
         "machine": {"system": platform.platform(), "processors": os.cpu_count()},
     }
     file.write_text(json.dumps(config, indent=2, default=str) + "\n", encoding="utf-8")
+
+
+def export(model: PPO, folder: Path, ship: bool) -> None:
+    """policy.safetensors and policy.json: what was learned and how, without the learner; `ship` puts it in the box."""
+    config = json.loads((folder / "config.json").read_text(encoding="utf-8"))
+    learned = policy_of(model)
+    for file in (folder / "policy.safetensors", *([SHIPPED] if ship else [])):
+        save_policy(
+            learned,
+            file,
+            strokes=model.num_timesteps,
+            seed=model.seed,
+            progress=read_progress(folder),
+            **{name: config[name] for name in ("commands", "options", "versions")},
+        )
 
 
 # --- training --------------------------------------------------------------------------------------------------------
@@ -215,7 +237,7 @@ class Watch(BaseCallback):
         save(self.learner, self.folder / "model.zip")
         (self.folder / "checkpoints").mkdir(exist_ok=True)
         shutil.copyfile(self.folder / "model.zip", self.folder / "checkpoints" / f"model_{strokes:09d}.zip")
-        done = swim("learned", LearnedPolicy.of(self.learner), self.pentagon, max_strokes=MAX_STROKES)
+        done = swim("learned", policy_of(self.learner), self.pentagon, max_strokes=MAX_STROKES)
         self.logger.record("eval/pentagon_strokes", done.strokes)
         self.logger.record("eval/pentagon_waypoints", done.waypoints_reached)
         with (self.folder / "progress.csv").open("a", newline="", encoding="utf-8") as file:
@@ -248,71 +270,43 @@ def train(options: Options, folder: Path, stop: Callable[[], bool]) -> tuple[PPO
 # --- comparison and report -------------------------------------------------------------------------------------------
 
 
-def compare(options: Options, folder: Path) -> list[Swim]:
-    """The learned policy and the scripted gait round the pentagon: table, CSV, picture and videos."""
-    return evaluate(
-        {"learned": load(folder / "model.zip", options.device), "script": scripted("pentagon")},
+def compare(options: Options, folder: Path, remarks: Remarks) -> None:
+    """The learned policy and the scripted gait round the pentagon: table, CSV, picture, videos and report."""
+    evaluate(
+        {"learned": load_policy(folder / "policy.safetensors"), "script": scripted("pentagon")},
         "pentagon",
         max_strokes=MAX_STROKES,
         fidelity=options.fidelity,
         video=options.video,
+        report=remarks,
         out=folder / "evaluation",
     )
 
 
-def draw_learning_curve(folder: Path, script: Swim) -> None:
-    """Strokes round the pentagon over the course of the training."""
-    trained, pentagon, waypoints = np.loadtxt(folder / "progress.csv", delimiter=",", ndmin=2).T
-    finished = waypoints == len(script.waypoints)
-    figure = Figure(figsize=(7.0, 3.6), layout="constrained")
-    axes = figure.add_subplot()
-    axes.axhline(script.strokes, color="#d55e00", linestyle="--", label="script")
-    axes.plot(trained / 1e3, np.where(finished, pentagon, np.nan), "o-", color="#0072b2", label="learned")
-    axes.set(xlabel="strokes trained [thousand]", ylabel="strokes round the pentagon")
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False)
-    figure.savefig(folder / "learning_curve.png", dpi=160)
-
-
-def write_report(options: Options, folder: Path, swims: Sequence[Swim], trained: int, watch: Watch) -> None:
-    """report.md: how the learned policy compares, and how it was made. trained: Strokes in all."""
-    lines = [
-        "# Learned against scripted",
-        "",
-        f'Round the pentagon at fidelity "{options.fidelity}":',
-        "",
-        "| " + " | ".join(" ".join(title.split()) for title in COLUMNS.values()) + " |",
-        "|---" * len(COLUMNS) + "|",
-    ]
-    for row in results(swims):
-        row["waypoints_reached"] = f"{row['waypoints_reached']} of {row['waypoints']}"
-        numbers = (row[name] for name in COLUMNS)
-        cells = (f"{number:.1f}" if isinstance(number, float) else str(number) for number in numbers)
-        lines.append("| " + " | ".join(cells) + " |")
-    lines += ["", "![Traces](evaluation/traces.png)", ""]
-    lines += [f"- [{file.stem}](evaluation/{file.name})" for file in sorted(folder.glob("evaluation/*.mp4"))]
-    commands = json.loads((folder / "config.json").read_text(encoding="utf-8"))["commands"]
-    lines += [
-        "",
-        f"Trained for {trained} strokes, seed {options.seed}, by",
-        "",
-        *(f"    {one}" for one in commands),
-        "",
+def describe(options: Options, folder: Path, trained: int, watch: Watch) -> Remarks:
+    """What the report says about the training. trained: Strokes in all."""
+    sentences = [
+        f'Swum at fidelity "{options.fidelity}".',
+        f"Trained for {trained} strokes, seed {options.seed}, by the first of these commands; the last three show the "
+        "logs, compare again, and train on.",
     ]
     if seconds := sum(watch.seconds.values()):
         shares = ", ".join(f"{name} {share:.0%}" for name, share in watch.shares().items())
-        lines += [f"The last session took {seconds:.0f} s, {watch.strokes / seconds:.0f} strokes per second: {shares}."]
-    lines += [
-        "",
-        "![Learning curve](learning_curve.png)",
-        "",
-        "See the logs, compare again, train on:",
-        "",
-        f"    tensorboard --logdir {folder}",
-        f"    python -m agents.evaluate --agents {folder / 'model.zip'} pentagon --fidelity {options.fidelity}",
-        f"    {resume_command(folder)} --strokes {2 * trained}",
-    ]
-    (folder / "report.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        sentences.append(
+            f"The last session took {seconds:.0f} s, {watch.strokes / seconds:.0f} strokes per second: {shares}."
+        )
+    policy = shlex.quote(str(folder / "policy.safetensors"))
+    return Remarks(
+        title="Learned against scripted round the pentagon",
+        sentences=sentences,
+        commands=[
+            *json.loads((folder / "config.json").read_text(encoding="utf-8"))["commands"],
+            f"tensorboard --logdir {shlex.quote(str(folder))}",
+            f"python -m agents.evaluate --agents {policy} pentagon --fidelity {options.fidelity} --report",
+            f"{resume_command(folder)} --strokes {2 * trained}",
+        ],
+        curves=[Curve.of("learned", read_progress(folder))],
+    )
 
 
 def resume_command(folder: Path) -> str:
@@ -334,16 +328,16 @@ def run(options: Options, arguments: Sequence[str]) -> int:
     print(f"The run is in {folder}.", flush=True)
     with Interruption() as interruption:
         model, watch = train(options, folder, lambda: interruption.requested)
+    export(model, folder, options.ship and not interruption.requested)
     if interruption.requested:
         print(
             f"Stopped after {model.num_timesteps} strokes; {folder / 'model.zip'} is the policy so far. Continue with"
         )
         print(f"    {resume_command(folder)}")
         return 130
-    swims = compare(options, folder)
-    draw_learning_curve(folder, swims[-1])
-    write_report(options, folder, swims, model.num_timesteps, watch)
-    print(f"Report:  {folder / 'report.md'}\nModel:   {folder / 'model.zip'}\nLogs:    tensorboard --logdir {folder}")
+    compare(options, folder, describe(options, folder, model.num_timesteps, watch))
+    print(f"Report:  {folder / 'evaluation' / 'report.html'}\nPolicy:  {folder / 'policy.safetensors'}")
+    print(f"Logs:    tensorboard --logdir {folder}")
     return 0
 
 

@@ -1,14 +1,17 @@
 """Runs any set of agents on any path: one table, the same as CSV, a picture of their traces, a video of each.
 
-    python -m agents.evaluate --agents pentagon straight 4+,1- runs/mine/model.zip --path pentagon
+    python -m agents.evaluate                                      the policy in the box and the scripted pentagon
+    python -m agents.evaluate --agents learned straight 4+,1- runs/mine/policy.safetensors --path square
 
 From Python, `evaluate({"mine": policy, "script": scripted("pentagon")}, path)` does the same.
 """
 
 import csv
 import re
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,13 +23,16 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from agents import policy as learned
+from agents.charts import Curve, read_progress
 from agents.pictures import FRAMES_PER_STROKE, draw_traces, film
+from agents.playback import Playback, RecordingEnv
+from agents.report import Remarks, ResultsTable, number, write_report
 from agents.scripted import scripted
 from agents.swim import Policy, Swim, swim
-from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.paths import PATH_NAMES, make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.scene import Fidelity, require_number
+from seastar_gym.scene import Fidelity, Scene, require_number
 
 MM = 1000.0
 
@@ -39,8 +45,10 @@ def evaluate(
     reset_options: dict[str, Any] | None = None,
     max_strokes: int = 400,
     waypoint_radius: float = 0.01,
+    scene: Scene | None = None,
     out: Path | str | None = None,
     video: bool = True,
+    report: Remarks | None = None,
     console: Console | None = None,
     **environment: Any,
 ) -> list[Swim]:
@@ -49,8 +57,10 @@ def evaluate(
     agents: Policies by name; see `Policy` for what they must be able to do.
     path: A name, or waypoints [m], shape (n, 2). seed, reset_options: Of every agent's `reset`.
     max_strokes: Time limit [strokes]. waypoint_radius: [m].
+    scene: What is modelled; the chapter's robot in water if None.
     out: Folder for evaluation.csv, traces.png and, with `video`, an MP4 of every agent; nothing is written if None.
-    environment: Further arguments of `SeastarSwimEnv`: fidelity, scene, random_heading, ...
+    report: Write report.html there too, a page with all of it, playbacks of the swims and these remarks.
+    environment: Further arguments of `SeastarSwimEnv`: fidelity, random_heading, ...
     """
     if not agents:
         raise ValueError("There is nothing to evaluate: name at least one agent.")
@@ -61,37 +71,45 @@ def evaluate(
     videos = {} if folder is None or not video else _video_files(agents, folder)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-    environment |= {"path": path, "waypoint_radius": waypoint_radius}
+    environment |= {"path": path, "waypoint_radius": waypoint_radius, "scene": scene}
     episode = {"seed": seed, "reset_options": reset_options, "max_strokes": max_strokes}
-    swims = []
+    swims, playbacks = [], []
     for name, policy in agents.items():
         with console.status(Text(f"{name} swims")):
-            swims.append(_swim_once(name, policy, environment, episode, videos.get(name)))
+            swum, playback = _swim_once(name, policy, environment, episode, videos.get(name), report is not None)
+        swims.append(swum)
+        if playback is not None:
+            playbacks.append(playback)
     console.print(_table(swims))
     for done in swims:
         if done.solver_message is not None:
             console.print(Text(f"{done.agent}: {done.solver_message}"))
+    for name, policy in agents.items():
+        if isinstance(policy, learned.LearnedPolicy) and (differences := policy.differences(scene or Scene())):
+            console.print(Text(f"{name}: {differences}"))
     if folder is not None:
         _write_csv(swims, folder / "evaluation.csv")
         draw_traces(swims, waypoint_radius, folder / "traces.png")
         files = ["evaluation.csv", "traces.png", *(file.name for file in videos.values())]
+        if report is not None:
+            _write_report(swims, playbacks, path, waypoint_radius, report, folder / "report.html")
+            files.append("report.html")
         console.print(Text(f"Written to {folder}: {', '.join(files)}"), soft_wrap=True)
     return swims
 
 
 def _swim_once(
-    name: str, policy: Policy, environment: dict[str, Any], episode: dict[str, Any], video: Path | None
-) -> Swim:
-    actions: Actions = getattr(policy, "actions", "limbs")
-    if video is None:
-        return swim(name, policy, SeastarSwimEnv(actions=actions, **environment), **episode)
-    filmed = SeastarSwimEnv(
-        actions=actions, render_mode="rgb_array_list", frames_per_stroke=FRAMES_PER_STROKE, **environment
-    )
-    with film(video) as watch:
-        swum = swim(name, policy, filmed, **episode, watch=watch)
-    filmed.close()
-    return swum
+    name: str, policy: Policy, environment: dict[str, Any], episode: dict[str, Any], video: Path | None, record: bool
+) -> tuple[Swim, Playback | None]:
+    """The swim; filmed if there is a file for the video, with a playback if it is to be recorded."""
+    environment = {"actions": getattr(policy, "actions", "limbs"), **environment}
+    if video is None and not record:
+        return swim(name, policy, SeastarSwimEnv(**environment), **episode), None
+    env = RecordingEnv(film=video is not None, frames_per_stroke=FRAMES_PER_STROKE, **environment)
+    with film(video) if video is not None else nullcontext() as watch:
+        swum = swim(name, policy, env, **episode, watch=watch)
+    env.close()
+    return swum, env.playback(name)
 
 
 def _video_files(agents: Mapping[str, Policy], folder: Path) -> dict[str, Path]:
@@ -139,16 +157,14 @@ def _table(swims: Sequence[Swim]) -> Table:
             table.add_column(title, vertical="bottom", overflow="fold")
         else:
             table.add_column(Text(title), justify="right", no_wrap=True)
-    for row in results(swims):
-        row["waypoints_reached"] = f"{row['waypoints_reached']} of {row['waypoints']}"
-        table.add_row(*(_cell(row[name]) for name in COLUMNS))
+    for row in _shown(swims):
+        table.add_row(*(Text(number(row[name])) for name in COLUMNS))
     return table
 
 
-def _cell(value: str | int | float | None) -> Text:
-    if value is None:
-        return Text("\u2013")
-    return Text(f"{value:.1f}" if isinstance(value, float) else str(value))
+def _shown(swims: Sequence[Swim]) -> list[dict[str, str | int | float | None]]:
+    """The results with the waypoints in words."""
+    return [{**row, "waypoints_reached": f"{row['waypoints_reached']} of {row['waypoints']}"} for row in results(swims)]
 
 
 def _write_csv(swims: Sequence[Swim], file: Path) -> None:
@@ -159,6 +175,28 @@ def _write_csv(swims: Sequence[Swim], file: Path) -> None:
         writer.writerows(rows)
 
 
+def _write_report(
+    swims: Sequence[Swim],
+    playbacks: Sequence[Playback],
+    path: Any,
+    waypoint_radius: float,
+    remarks: Remarks,
+    file: Path,
+) -> None:
+    finished = {done.agent: done.strokes for done in swims if done.finished}
+    curves = {curve.name for curve in remarks.curves}
+    baselines = {agent: strokes for agent, strokes in finished.items() if agent not in curves}
+    write_report(
+        file,
+        [ResultsTable("Results", COLUMNS, _shown(swims))],
+        swims,
+        playbacks,
+        waypoint_radius,
+        baselines if isinstance(path, str) and path == "pentagon" else {},
+        remarks,
+    )
+
+
 # --- the command line ------------------------------------------------------------------------------------------------
 
 
@@ -166,8 +204,9 @@ def _write_csv(swims: Sequence[Swim], file: Path) -> None:
 class Options:
     """Compare agents on a path: a table, the same as CSV, a picture of their traces, and a video of each."""
 
-    agents: tuple[str, ...] = ("pentagon", "straight")
-    """Scripted agents (pentagon, straight, rest, random, or a pair such as 4+,1-) and files of saved models (.zip)."""
+    agents: tuple[str, ...] = ("learned", "pentagon")
+    """The policy in the box (learned), scripted agents (pentagon, straight, rest, random, or a pair such as 4+,1-), and
+    files of policies (.safetensors, or a training's model.zip)."""
     path: str = "pentagon"
     """pentagon, square, triangle, line, figure-eight, random, or a text file with x, y [m] of one waypoint per line."""
     fidelity: Fidelity = "balanced"
@@ -184,6 +223,10 @@ class Options:
     """Turn the robot at random at the start; otherwise limb 1 points along +x."""
     video: bool = True
     """Film every agent."""
+    report: bool = False
+    """Write report.html: all of it on one page, with playbacks of the swims."""
+    runs: tuple[Path, ...] = ()
+    """Folders of trainings whose learning curves the report shows beside those of the learned agents."""
 
     def __post_init__(self) -> None:
         if self.max_strokes < 1:
@@ -192,30 +235,33 @@ class Options:
 
 
 def load_agents(names: Sequence[str], seed: int = 0) -> dict[str, Policy]:
-    """Policies by name: scripted ones, and saved models (.zip) under the names of their files without the ending."""
+    """Policies by name: the one in the box, scripted ones, and files under their names without the ending."""
     agents: dict[str, Policy] = {}
     for name in names:
-        label = Path(name).stem if _is_model(name) else name
+        label = Path(name).stem if _is_file(name) else name
         label = str(Path(name).with_suffix("")) if label in agents else label
         if label in agents:
             raise ValueError(f"The agent {name!r} is named twice.")
-        agents[label] = _load_model(name) if _is_model(name) else scripted(name, rng=np.random.default_rng(seed))
+        agents[label] = _load_agent(name, seed)
     return agents
 
 
-def _is_model(name: str) -> bool:
-    return name.endswith(".zip") or len(Path(name).parts) > 1
+def _is_file(name: str) -> bool:
+    return name.endswith((".zip", ".safetensors")) or len(Path(name).parts) > 1
 
 
-def _load_model(file: str) -> Policy:
-    if not Path(file).is_file():
-        raise ValueError(f"There is no model file {file}.")
+def _load_agent(name: str, seed: int) -> Policy:
+    if name == "learned":
+        return learned.load()
+    if not _is_file(name):
+        return scripted(name, rng=np.random.default_rng(seed))
+    if not name.endswith(".zip"):
+        return learned.load(name)
     try:
-        from agents.ppo import load
+        from agents import ppo
     except ModuleNotFoundError as missing:
-        raise ValueError(f'A saved model needs {missing.name}: pip install "seastar-gym[train]".') from missing
-    model: Policy = load(file)
-    return model
+        raise ValueError(f'A model.zip needs {missing.name}: pip install "seastar-gym[train]".') from missing
+    return ppo.load(name)
 
 
 def _load_path(name: str) -> Any:
@@ -232,11 +278,27 @@ def _load_path(name: str) -> Any:
         raise ValueError(f"{name}: {bad}") from bad
 
 
+def _remarks(agents: Mapping[str, Policy], options: Options, arguments: Sequence[str]) -> Remarks:
+    """What the report says about the agents, and how it was made."""
+    trainings = {name: one.training for name, one in agents.items() if isinstance(one, learned.LearnedPolicy)}
+    curves = [Curve.of(name, how["progress"]) for name, how in trainings.items() if "progress" in how]
+    curves += [Curve.of(folder.name, read_progress(folder)) for folder in options.runs]
+    commands = dict.fromkeys(command for how in trainings.values() for command in how.get("commands", ()))
+    return Remarks(
+        title=f"Evaluation: {options.path}",
+        sentences=[f'Computed at fidelity "{options.fidelity}".'],
+        commands=[*commands, shlex.join(["python", "-m", "agents.evaluate", *arguments])],
+        curves=curves,
+    )
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
+    arguments = sys.argv[1:] if arguments is None else arguments
     options = tyro.cli(Options, args=arguments)
     try:
         agents, path = load_agents(options.agents, options.seed), _load_path(options.path)
+        remarks = _remarks(agents, options, arguments) if options.report else None
     except (ValueError, OSError) as bad_input:
         print(bad_input, file=sys.stderr)
         return 2
@@ -248,6 +310,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         waypoint_radius=options.waypoint_radius,
         out=options.out,
         video=options.video,
+        report=remarks,
         fidelity=options.fidelity,
         random_heading=options.random_heading,
     )

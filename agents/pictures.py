@@ -41,7 +41,7 @@ def draw_traces(swims: Sequence[Swim], waypoint_radius: float, file: Path) -> No
     from matplotlib.figure import Figure
 
     path = MM * np.concatenate([np.zeros((1, 2)), swims[0].waypoints])
-    low, high = _view(path, MM * np.concatenate([swim.hub for swim in swims]))
+    low, high = view(path, MM * np.concatenate([swim.hub for swim in swims]))
     width, height = high - low
     figure = Figure(figsize=(6.0, 6.0 * height / width))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
@@ -56,7 +56,7 @@ def draw_traces(swims: Sequence[Swim], waypoint_radius: float, file: Path) -> No
     figure.savefig(file, dpi=160, bbox_inches="tight", pad_inches=0.15)
 
 
-def _view(path: Floats, hubs: Floats) -> tuple[Floats, Floats]:
+def view(path: Floats, hubs: Floats) -> tuple[Floats, Floats]:
     """Corners of the picture [mm]; a swim that goes astray may widen it by STRAY path extents, no more."""
     extent = max(float(np.ptp(path, axis=0).max()), 50.0)
     low = np.maximum(np.minimum(path.min(axis=0), hubs.min(axis=0)), path.min(axis=0) - STRAY * extent)

@@ -1,42 +1,36 @@
-"""PPO on the native batch: its hyperparameters, its training environment, and policies on disk.
+"""PPO on the native batch: its hyperparameters, its training environment, and learners on disk.
 
-A saved policy is Stable-Baselines3's own zip file with two more entries: `policy.json` says what the policy expects
+A saved learner is Stable-Baselines3's own zip file with two more entries: `policy.json` says what the policy expects
 (observation layout, scene, action mode, symmetry), `random_states.npz` holds what `resume` continues from. `load` reads
-only `policy.json` and the network's weights, and unpickles nothing.
+only `policy.json` and the network's weights, and unpickles nothing. What policies are and how they are kept without
+their learner stands in policy.py.
 """
 
 import io
-import json
 import os
 import random
 import zipfile
 import zlib
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import gymnasium as gym
 import numpy as np
 import torch
-from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
-from numpy.typing import NDArray
 from stable_baselines3 import PPO
-from stable_baselines3.common.policies import ActorCriticPolicy
-from stable_baselines3.common.utils import LinearSchedule, get_device
+from stable_baselines3.common.utils import LinearSchedule
 
-import seastar_gym
+from agents.policy import Description, LearnedPolicy, Weights
 from agents.vec_env import BatchVecEnv
 from seastar_gym import RewardWeights
-from seastar_gym.envs.commands import Actions, action_space
-from seastar_gym.envs.observation import OBSERVATION_LAYOUT, observation_size
-from seastar_gym.envs.symmetry import VectorSymmetryReduction, reduce_observations, restore_actions
+from seastar_gym.envs.commands import Actions
+from seastar_gym.envs.symmetry import VectorSymmetryReduction
 from seastar_gym.envs.task import Path as SwimPath
-from seastar_gym.scene import Fidelity, Numerics, Scene, Seastar, SmaPulse, Water
+from seastar_gym.scene import Fidelity, Scene
 
-FORMAT = 1
-"""Version of what `policy.json` says."""
 DESCRIPTION, WEIGHTS, RANDOM_STATES = "policy.json", "policy.pth", "random_states.npz"
 
 Loaded = TypeVar("Loaded")
@@ -148,62 +142,33 @@ def make_model(
     )
 
 
-# --- what a policy expects -------------------------------------------------------------------------------------------
+# --- what is learned -------------------------------------------------------------------------------------------------
 
 
-class Description(NamedTuple):
-    """What a saved policy expects of its environment, and its network's shape."""
+def describe(env: BatchVecEnv, hidden: tuple[int, ...]) -> Description:
+    """What a policy with these hidden layers expects that learns here."""
+    batch: Any = env.env.unwrapped
+    return Description(batch.actions, env.env_is_wrapped(VectorSymmetryReduction)[0], batch.simulator.scene, hidden)
 
-    actions: Actions
-    symmetry: bool
-    scene: Scene
-    hidden: tuple[int, ...]
 
-    @classmethod
-    def of(cls, model: PPO) -> "Description":
-        """That of a learner on a `BatchVecEnv`."""
-        env = model.get_env()
-        if not isinstance(env, BatchVecEnv):
-            raise ValueError(f"Only a learner on a BatchVecEnv says what its policy expects, not one on {env}.")
-        return cls.of_environment(env, tuple(model.policy_kwargs["net_arch"]))
+def policy_of(model: PPO) -> LearnedPolicy:
+    """What a learner on a `BatchVecEnv` has learned so far."""
+    env = model.get_env()
+    if not isinstance(env, BatchVecEnv):
+        raise ValueError(f"Only a learner on a BatchVecEnv says what its policy expects, not one on {env}.")
+    description = describe(env, tuple(model.policy_kwargs["net_arch"]))
+    return LearnedPolicy(description, _actor(model.policy.state_dict()))
 
-    @classmethod
-    def of_environment(cls, env: BatchVecEnv, hidden: tuple[int, ...]) -> "Description":
-        """What a policy with these hidden layers expects that learns here."""
-        batch: Any = env.env.unwrapped
-        return cls(batch.actions, env.env_is_wrapped(VectorSymmetryReduction)[0], batch.simulator.scene, hidden)
 
-    def to_json(self, **more: Any) -> str:
-        """As text; `more` is for people to read."""
-        facts = {
-            "format": FORMAT,
-            "observation_layout": OBSERVATION_LAYOUT,
-            **self._asdict(),
-            "scene": asdict(self.scene),
-            "seastar_gym": seastar_gym.__version__,
-            **more,
-        }
-        return json.dumps(facts, indent=2)
-
-    @classmethod
-    def from_json(cls, text: str) -> "Description":
-        """From `to_json`. ValueError: another format or observation layout, or a scene that is none."""
-        facts = json.loads(text)
-        for name, ours in (("format", FORMAT), ("observation_layout", OBSERVATION_LAYOUT)):
-            if facts[name] != ours:
-                raise ValueError(f"its {name} is {facts[name]!r}, this version of seastar_gym knows {ours}")
-        scene = facts["scene"]
-        return cls(
-            actions=facts["actions"],
-            symmetry=bool(facts["symmetry"]),
-            scene=Scene(
-                robot=Seastar(**scene["robot"]),
-                fluid=None if scene["fluid"] is None else Water(**scene["fluid"]),
-                actuator=SmaPulse(**scene["actuator"]),
-                numerics=Numerics(**scene["numerics"]),
-            ),
-            hidden=tuple(facts["hidden"]),
-        )
+def _actor(weights: Mapping[str, torch.Tensor]) -> Weights:
+    """The policy's part of Stable-Baselines3's network, as `LearnedPolicy` names it."""
+    hidden = sorted({int(name.split(".")[2]) for name in weights if name.startswith("mlp_extractor.policy_net.")})
+    layers = [*(f"mlp_extractor.policy_net.{number}" for number in hidden), "action_net"]
+    return {
+        f"{layer}.{kind}": weights[f"{name}.{kind}"].detach().cpu().numpy().copy()
+        for layer, name in enumerate(layers)
+        for kind in ("weight", "bias")
+    }
 
 
 # --- saving ----------------------------------------------------------------------------------------------------------
@@ -214,7 +179,8 @@ def save(model: PPO, path: str | os.PathLike[str]) -> None:
     buffer = io.BytesIO()
     model.save(buffer)
     with zipfile.ZipFile(buffer, "a") as archive:
-        archive.writestr(DESCRIPTION, Description.of(model).to_json(strokes_trained=model.num_timesteps))
+        description = policy_of(model).description
+        archive.writestr(DESCRIPTION, description.to_json(strokes_trained=model.num_timesteps))
         archive.writestr(RANDOM_STATES, _random_states())
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -252,70 +218,15 @@ def _restore_random_states(data: bytes) -> None:
 # --- loading ---------------------------------------------------------------------------------------------------------
 
 
-class LearnedPolicy:
-    """A trained policy in Stable-Baselines3's form: raw observations of the environment in, its actions out.
-
-    actions: Action mode of the environment that it is for: `gym.make("SeastarSwim-v0", actions=policy.actions)`.
-    scene: What was modelled when it was trained.
-    """
-
-    def __init__(self, description: Description, network: ActorCriticPolicy):
-        self.actions = description.actions
-        self.scene = description.scene
-        self.symmetry = description.symmetry
-        self._network = network
-
-    @classmethod
-    def of(cls, model: PPO) -> "LearnedPolicy":
-        """What a learner on a `BatchVecEnv` has learned; it goes on learning if the learner does."""
-        return cls(Description.of(model), model.policy)
-
-    def predict(
-        self,
-        observation: NDArray[np.float32],
-        state: tuple[NDArray[Any], ...] | None = None,
-        episode_start: NDArray[np.bool_] | None = None,
-        deterministic: bool = False,
-    ) -> tuple[NDArray[Any], tuple[NDArray[Any], ...] | None]:
-        """Actions for observations of shape (size,) or (n, size); there is no state."""
-        observation, robot = np.asarray(observation), self.scene.robot
-        size = observation_size(robot.n_nodes)
-        if observation.ndim not in (1, 2) or observation.shape[-1] != size:
-            raise ValueError(
-                f"This policy was trained on a robot of {robot.n_limbs} limbs of {robot.nodes_per_limb} nodes: "
-                f"it sees {size} numbers, not an observation of shape {observation.shape}."
-            )
-        if not self.symmetry:
-            return self._network.predict(observation, deterministic=deterministic)[0], None
-        reduced, elements = reduce_observations(observation, robot.n_limbs)
-        chosen, _ = self._network.predict(reduced, deterministic=deterministic)
-        return restore_actions(chosen, elements, self.actions, robot.n_limbs), None
-
-
-def load(path: str | os.PathLike[str], device: str | torch.device = "cpu") -> LearnedPolicy:
+def load(path: str | os.PathLike[str]) -> LearnedPolicy:
     """The policy in a file that `save` wrote. FileNotFoundError or ValueError, with one sentence, if there is none."""
-
-    device = get_device(device)
 
     def read(archive: zipfile.ZipFile) -> LearnedPolicy:
         description = Description.from_json(archive.read(DESCRIPTION).decode())
-        network = _make_network(description).to(device)
-        weights = torch.load(io.BytesIO(archive.read(WEIGHTS)), map_location=device, weights_only=True)
-        network.load_state_dict(weights)
-        network.set_training_mode(False)
-        return LearnedPolicy(description, network)
+        weights = torch.load(io.BytesIO(archive.read(WEIGHTS)), map_location="cpu", weights_only=True)
+        return LearnedPolicy(description, _actor(weights))
 
     return _read(path, read)
-
-
-def _make_network(description: Description) -> ActorCriticPolicy:
-    robot = description.scene.robot
-    return ActorCriticPolicy(
-        spaces.Box(-np.inf, np.inf, (observation_size(robot.n_nodes),), np.float32),
-        action_space(description.actions, robot.n_limbs),
-        lambda _: 0.0,
-        net_arch=list(description.hidden),
-    )
 
 
 def resume(path: str | os.PathLike[str], env: BatchVecEnv, device: str = "cpu") -> PPO:
@@ -329,7 +240,7 @@ def resume(path: str | os.PathLike[str], env: BatchVecEnv, device: str = "cpu") 
         return Description.from_json(archive.read(DESCRIPTION).decode()), archive.read(RANDOM_STATES)
 
     description, random_states = _read(path, read)
-    ours = Description.of_environment(env, description.hidden)
+    ours = describe(env, description.hidden)
     if description != ours:
         raise ValueError(f"{os.fspath(path)} was trained for {description}, not for {ours}.")
     model = PPO.load(Path(path), env=env, device=device)

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.policy import LearnedPolicy
 from seastar_gym.envs.paths import cross_track_error, path_length
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 
@@ -97,8 +98,11 @@ def swim(
 ) -> Swim:
     """One episode, with deterministic actions, to the last waypoint or for `max_strokes` strokes.
 
+    ValueError, before it begins, where a learned policy was made for another robot.
     watch: Called with `env` after its reset and after every stroke, to film it for instance.
     """
+    if isinstance(policy, LearnedPolicy):
+        policy.require_fit(env.scene, env.actions)
     observation, info = env.reset(seed=seed, options=reset_options)
     infos = [info]
     state, over = None, False

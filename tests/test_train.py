@@ -1,6 +1,7 @@
 """train.py goes all the way, stops in good order, and continues where it stopped."""
 
 import csv
+import html
 import json
 import os
 import shlex
@@ -16,6 +17,7 @@ import pytest
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 import train
+from agents import policy as policies
 from agents.ppo import load
 
 REPOSITORY = Path(train.__file__).parent
@@ -42,9 +44,9 @@ def scalars(folder):
 def test_a_run_leaves_everything_in_its_folder(finished):
     files = {str(file.relative_to(finished)) for file in finished.rglob("*") if file.is_file()}
     expected = {
-        "config.json", "model.zip", "progress.csv", "report.md", "learning_curve.png",
+        "config.json", "model.zip", "progress.csv", "policy.json", "policy.safetensors",
         "checkpoints/model_000000256.zip", "checkpoints/model_000000512.zip",
-        "evaluation/evaluation.csv", "evaluation/traces.png",
+        "evaluation/evaluation.csv", "evaluation/traces.png", "evaluation/report.html",
     }  # fmt: skip
     logs = {file for file in files if file.startswith("tensorboard/")}
     assert files - logs == expected
@@ -72,22 +74,45 @@ def test_logs_have_the_customary_names(finished):
 
 
 def test_the_report_has_the_numbers_of_the_table(finished):
-    report = (finished / "report.md").read_text()
+    report = (finished / "evaluation" / "report.html").read_text()
     with (finished / "evaluation" / "evaluation.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [row["agent"] for row in rows] == ["learned", "script"]
     for row in rows:
-        (line,) = [line for line in report.splitlines() if line.startswith(f"| {row['agent']} ")]
-        assert f" {float(row['mean_cross_track_error_mm']):.1f} " in line
+        first_cell = f'<tr><td data-name="agent">{row["agent"]}<'
+        (line,) = [line for line in report.splitlines() if line.startswith(first_cell)]
+        assert f">{float(row['mean_cross_track_error_mm']):.1f}<" in line
     assert int(rows[1]["strokes_to_finish"]) <= 250
-    for link in ("evaluation/traces.png", "learning_curve.png"):
-        assert f"({link})" in report
+    assert "Trained for 512 strokes, seed 4" in report
+    assert html.escape(json.loads((finished / "config.json").read_text())["commands"][0]) in report
+    assert 'id="curves"' in report
 
 
 def test_the_model_is_that_of_the_last_checkpoint(finished):
     model = (finished / "model.zip").read_bytes()
     assert model == (finished / "checkpoints" / "model_000000512.zip").read_bytes()
     assert load(finished / "model.zip").actions == "joint"
+
+
+def test_the_exported_policy_is_the_model_s(finished):
+    policy, model = policies.load(finished / "policy.safetensors"), load(finished / "model.zip")
+    for name, array in model.weights.items():
+        np.testing.assert_array_equal(policy.weights[name], array)
+    config = json.loads((finished / "config.json").read_text())
+    assert policy.training["commands"] == config["commands"]
+    assert policy.training["versions"] == config["versions"]
+    assert (policy.training["seed"], policy.training["strokes"]) == (4, 512)
+    assert [trained for trained, *_ in policy.training["progress"]] == [256, 512]
+
+
+def test_one_option_puts_the_policy_in_the_box(finished, tmp_path, monkeypatch):
+    shutil.copytree(finished, tmp_path / "tiny")
+    monkeypatch.setattr(train, "SHIPPED", tmp_path / "box" / "seastar.safetensors")
+    assert train.main(["--resume", str(tmp_path / "tiny")]) == 0
+    assert not (tmp_path / "box").exists()
+    assert train.main(["--resume", str(tmp_path / "tiny"), "--ship"]) == 0
+    shipped = policies.load(tmp_path / "box" / "seastar.safetensors")
+    assert shipped.training["seed"] == 4
 
 
 def test_a_finished_run_can_be_trained_for_more_strokes(finished, tmp_path, capsys):
@@ -121,12 +146,12 @@ def test_ctrl_c_leaves_a_usable_model_and_says_how_to_go_on(tmp_path, request_to
     assert process.returncode == 130
     assert f"python train.py --resume {folder}" in output
     assert not list(folder.rglob("*.part"))
-    policy = load(folder / "model.zip")
+    policy = policies.load(folder / "policy.safetensors")
     assert policy.predict(np.zeros(186, np.float32), deterministic=True)[0].shape == ()
     trained = int((folder / "progress.csv").read_text().splitlines()[-1].split(",")[0])
     assert f"Stopped after {trained} strokes" in output
     assert train.main(["--resume", str(folder), "--strokes", str(trained + 128)]) == 0
-    assert "Learned against scripted" in (folder / "report.md").read_text()
+    assert "Learned against scripted" in (folder / "evaluation" / "report.html").read_text()
 
 
 def test_a_kill_leaves_the_last_checkpoint(tmp_path):

@@ -251,8 +251,8 @@ def test_command_line_evaluates_scripted_agents(tmp_path, capsys):
     assert {file.name for file in (tmp_path / "out").iterdir()} == {"evaluation.csv", "traces.png"}
 
 
-def test_scripted_agents_are_evaluated_without_torch():
-    code = "import sys, agents.evaluate as e; e.load_agents(['pentagon', 'random']); print(*sys.modules)"
+def test_the_policy_in_the_box_and_scripted_agents_are_evaluated_without_torch():
+    code = "import sys, agents.evaluate as e; e.load_agents(['pentagon', 'random', 'learned']); print(*sys.modules)"
     answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     loaded = set(answer.stdout.split())
     assert "agents.scripted" in loaded
@@ -264,6 +264,12 @@ def damaged_model(folder):
     return str(folder / "damaged.zip")
 
 
+def damaged_policy(folder):
+    (folder / "damaged.safetensors").write_bytes(b"nothing of use")
+    (folder / "damaged.json").write_text("{}")
+    return str(folder / "damaged.safetensors")
+
+
 def ragged_path(folder):
     (folder / "ragged.csv").write_text("0.1, 0.0\n0.2\n")
     return str(folder / "ragged.csv")
@@ -272,7 +278,9 @@ def ragged_path(folder):
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (lambda folder: ["--agents", str(folder / "none.zip")], "There is no model file"),
+        (lambda folder: ["--agents", str(folder / "none.zip")], "There is no trained policy at"),
+        (lambda folder: ["--agents", str(folder / "none.safetensors")], "There is no trained policy at"),
+        (lambda folder: ["--agents", damaged_policy(folder)], "is damaged"),
         (lambda folder: ["--agents", damaged_model(folder)], "damaged"),
         (lambda folder: ["--agents", "pentagram"], "Unknown scripted agent 'pentagram'"),
         (lambda folder: ["--agents", "rest", "rest"], "'rest' is named twice"),
@@ -299,9 +307,10 @@ def test_options_out_of_range_are_refused(arguments, capsys):
 
 def test_models_go_by_the_names_of_their_files(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    files = ["best.zip", "runs/last.zip", "runs/best.zip"]
+    files = ["best.zip", "runs/last.safetensors", "runs/best.zip"]
     (tmp_path / "runs").mkdir()
     for file in files:
         Path(file).touch()
     monkeypatch.setattr("agents.ppo.load", lambda file: file)
-    assert load_agents(files) == {"best": "best.zip", "last": "runs/last.zip", "runs/best": "runs/best.zip"}
+    monkeypatch.setattr("agents.policy.load", lambda file: file)
+    assert load_agents(files) == {"best": "best.zip", "last": "runs/last.safetensors", "runs/best": "runs/best.zip"}

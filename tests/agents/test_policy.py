@@ -1,0 +1,250 @@
+"""A policy in its two files swims as its learner did; what does not fit is refused with a sentence."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import safetensors.numpy
+import torch
+
+from agents import policy as policies
+from agents.policy import SHIPPED, Description, LearnedPolicy, load, save
+from agents.ppo import Hyperparameters, make_model, make_training_env, policy_of
+from agents.swim import swim
+from seastar_gym import Numerics, Scene, Seastar, Water
+from seastar_gym.envs import symmetry
+from seastar_gym.envs.commands import command_table
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+
+ROOT = Path(__file__).resolve().parents[2]
+FAST = Numerics.preset("fast")
+SMALL = Hyperparameters(num_envs=8, rollout=8, batch_size=32, epochs=2, hidden=(16, 8), max_episode_steps=10)
+FOUR_LIMBS = Scene(robot=Seastar(n_limbs=4, nodes_per_limb=4), numerics=FAST)
+
+
+def random_policy(description, seed=0):
+    rng = np.random.default_rng(seed)
+    shapes = description.shapes().items()
+    return LearnedPolicy(description, {name: rng.normal(size=shape).astype(np.float32) for name, shape in shapes})
+
+
+@pytest.fixture
+def policy():
+    return random_policy(Description("joint", True, Scene(numerics=FAST), (16, 8)))
+
+
+@pytest.fixture
+def file(policy, tmp_path):
+    save(policy, tmp_path / "policy.safetensors", seed=7)
+    return tmp_path / "policy.safetensors"
+
+
+def observations(scene=Scene(), n=2000, seed=0):
+    size = policies.observation_size(scene.robot.n_nodes)
+    return np.random.default_rng(seed).normal(size=(n, size)).astype(np.float32)
+
+
+# --- the network -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("actions", ["joint", "pairs", "limbs"])
+@pytest.mark.parametrize("reduced", [True, False])
+@pytest.mark.parametrize("scene", [Scene(numerics=FAST), FOUR_LIMBS])
+def test_a_saved_policy_acts_as_stable_baselines_does(actions, reduced, scene, tmp_path):
+    hyperparameters = replace(SMALL, actions=actions, symmetry=reduced)
+    learner = make_model(make_training_env(hyperparameters, "random", True, scene=scene), hyperparameters, seed=0)
+    learner.learn(64)
+    save(policy_of(learner), tmp_path / "policy.safetensors")
+    policy, n_limbs = load(tmp_path / "policy.safetensors"), scene.robot.n_limbs
+    seen = observations(scene)
+    shown, elements = symmetry.reduce_observations(seen, n_limbs) if reduced else (seen, np.zeros(len(seen), int))
+    chosen = learner.predict(shown, deterministic=True)[0]
+    actual, state = policy.predict(seen, deterministic=True)
+    best, second = np.moveaxis(np.sort(policy.logits(shown), axis=-1)[..., :-3:-1], -1, 0)
+    clear = (best - second > 1e-6).all(axis=-1)  # elsewhere rounding decides
+    assert clear.mean() > 0.95
+    np.testing.assert_array_equal(actual[clear], symmetry.restore_actions(chosen, elements, actions, n_limbs)[clear])
+    assert state is None
+
+
+def test_its_logits_are_those_of_torch(policy):
+    linear = [torch.nn.Linear(186, 16), torch.nn.Linear(16, 8), torch.nn.Linear(8, 243)]
+    network = torch.nn.Sequential(linear[0], torch.nn.Tanh(), linear[1], torch.nn.Tanh(), linear[2])
+    for number, layer in enumerate(linear):
+        layer.weight.data[:] = torch.from_numpy(policy.weights[f"{number}.weight"])
+        layer.bias.data[:] = torch.from_numpy(policy.weights[f"{number}.bias"])
+    seen = observations(n=10)
+    expected = network(torch.from_numpy(seen)).detach().numpy()
+    np.testing.assert_allclose(policy.logits(seen)[:, 0], expected, rtol=1e-4, atol=1e-4)
+
+
+def test_random_actions_follow_the_logits():
+    """Over many draws, as often as their probability says."""
+    description = Description("pairs", False, FOUR_LIMBS, (4,))
+    policy = random_policy(description)
+    seen = np.repeat(observations(FOUR_LIMBS, n=1), 20_000, axis=0) * np.float32(0.3)
+    logits = policy.logits(seen[0])[0]
+    probabilities = np.exp(logits - logits.max()) / np.exp(logits - logits.max()).sum()
+    drawn, _ = policy.predict(seen)
+    frequencies = np.bincount(drawn, minlength=len(command_table("pairs", 4))) / len(drawn)
+    np.testing.assert_allclose(frequencies, probabilities, atol=0.02)
+
+
+def test_any_network_behind_the_symmetry_is_equivariant(policy):
+    seen = observations(n=200)
+    actions, _ = policy.predict(seen, deterministic=True)
+    for element in range(10):
+        elements = np.full(len(seen), element)
+        carried, _ = policy.predict(symmetry.transform_observations(seen, elements, 5), deterministic=True)
+        np.testing.assert_array_equal(carried, symmetry.transform_actions(actions, elements, "joint", 5))
+
+
+# --- on disk ---------------------------------------------------------------------------------------------------------
+
+
+def test_weights_and_description_survive_the_disk_to_the_last_bit(policy, file):
+    again = load(file)
+    assert again.description == policy.description
+    assert again.training == {"seed": 7}
+    for name, array in policy.weights.items():
+        np.testing.assert_array_equal(again.weights[name], array)
+
+
+@pytest.mark.parametrize("scene", [Scene(), FOUR_LIMBS, Scene(fluid=None), Scene(fluid=Water(drag_coefficient=1.5))])
+def test_a_description_survives_its_text(scene):
+    description = Description("pairs", False, scene, (3, 4, 5))
+    assert Description.from_json(description.to_json()) == description
+
+
+def test_the_weights_can_be_read_by_anyone(policy, file):
+    """The file is plain safetensors; there is nothing to unpickle in it."""
+    weights = safetensors.numpy.load_file(file)
+    assert {name: array.shape for name, array in weights.items()} == policy.description.shapes()
+    facts = json.loads(file.with_suffix(".json").read_text())
+    assert (facts["observation_size"], facts["actions"], facts["hidden"]) == (186, "joint", [16, 8])
+
+
+def assert_refused(file, sentence):
+    with pytest.raises((ValueError, FileNotFoundError), match=sentence) as error:
+        load(file)
+    text = str(error.value)
+    assert str(file) in text and "\n" not in text and text.endswith("."), text
+
+
+@pytest.mark.parametrize("missing", [".safetensors", ".json"])
+def test_a_missing_file_is_named(file, missing):
+    file.with_suffix(missing).unlink()
+    assert_refused(file, rf"There is no trained policy at .*policy\{missing} is missing")
+
+
+def test_another_kind_of_file_is_refused(tmp_path):
+    assert_refused(tmp_path / "model.pkl", "A policy is in a file named .safetensors")
+
+
+@pytest.mark.parametrize("keep", [0, 7, 0.5, 0.999])
+def test_cut_weights_are_said_to_be_damaged(file, keep):
+    data = file.read_bytes()
+    file.write_bytes(data[: keep if isinstance(keep, int) else int(keep * len(data))])
+    assert_refused(file, "is damaged, or no policy of this version: the weights are not those")
+
+
+def test_a_flipped_bit_is_found(file):
+    data = bytearray(file.read_bytes())
+    data[-100] ^= 1
+    file.write_bytes(bytes(data))
+    assert_refused(file, "is damaged.*the weights are not those that its .json file describes")
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "3", "{}", '{"sha256": null}', "\0"])
+def test_a_description_that_is_none_is_said_to_be_damaged(file, text):
+    file.with_suffix(".json").write_text(text)
+    assert_refused(file, "is damaged, or no policy of this version")
+
+
+@pytest.mark.parametrize(
+    "change, sentence",
+    [
+        ({"observation_layout": 0}, "its observation_layout is 0, this version of seastar_gym knows 1"),
+        ({"format": 99}, "its format is 99"),
+        ({"actions": "waves"}, "actions must be one of"),
+        ({"hidden": [16, 9]}, r"its weights have the shapes .*\(16, 186\)"),
+        ({"hidden": "wide"}, "is damaged"),
+        ({"scene": {"robot": {"n_limbs": 1}, "fluid": None}}, "n_limbs must be a whole number from 3"),
+        ({"scene": {"robot": {"n_arms": 5}}}, "n_arms"),
+    ],
+)
+def test_what_does_not_fit_is_said_in_one_sentence(file, change, sentence):
+    facts = json.loads(file.with_suffix(".json").read_text())
+    file.with_suffix(".json").write_text(json.dumps(facts | change))
+    assert_refused(file, sentence)
+
+
+def test_bytes_that_are_no_safetensors_are_refused_even_if_described(file):
+    file.write_bytes(b"\x80\x04}\x94.")  # a pickle
+    facts = json.loads(file.with_suffix(".json").read_text())
+    facts["sha256"] = policies.hashlib.sha256(file.read_bytes()).hexdigest()
+    file.with_suffix(".json").write_text(json.dumps(facts))
+    assert_refused(file, "is damaged")
+
+
+# --- in an environment -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "robot, actions, sentence",
+    [
+        (Seastar(n_limbs=4), "joint", r"robot of 5 limbs of 10 nodes, the environment's has 4 limbs of 10 nodes\."),
+        (Seastar(n_limbs=9, nodes_per_limb=6), "pairs", r"environment's has 9 limbs of 6 nodes\."),
+        (Seastar(), "limbs", r'answers with actions="joint", the environment takes actions="limbs"\.'),
+    ],
+)
+def test_an_environment_that_does_not_fit_is_refused_before_the_first_stroke(policy, robot, actions, sentence):
+    env = SeastarSwimEnv(actions=actions, scene=Scene(robot=robot, numerics=FAST))
+    with pytest.raises(ValueError, match=sentence):
+        swim("learned", policy, env, max_strokes=1)
+
+
+def test_an_observation_of_another_robot_is_refused(policy):
+    with pytest.raises(ValueError, match=r"robot of 5 limbs of 10 nodes: it sees 186 numbers, not .* shape \(54,\)"):
+        policy.predict(np.zeros(54, np.float32))
+
+
+def test_another_scene_is_told_but_other_numerics_are_not(policy):
+    assert policy.differences(Scene(numerics=Numerics.preset("reference"))) == ""
+    other = Scene(robot=Seastar(youngs_modulus=2e6), fluid=Water(drag_coefficient=1.5))
+    assert policy.differences(other) == (
+        "trained in another scene, with fluid.drag_coefficient 1.0 (here 1.5), "
+        "robot.youngs_modulus 1000000.0 (here 2000000.0)."
+    )
+    assert "fluid.density 1000.0 (here None)" in policy.differences(Scene(fluid=None))
+
+
+# --- the policy in the box -------------------------------------------------------------------------------------------
+
+
+def test_the_policy_in_the_box_says_how_it_was_made():
+    shipped = load()
+    assert shipped.scene.robot == Seastar() and shipped.scene.fluid == Water()
+    assert shipped.training["strokes"] > 0 and isinstance(shipped.training["seed"], int)
+    assert shipped.training["commands"][0].startswith("python train.py")
+    assert {"seastar_gym", "numpy", "torch", "stable_baselines3"} <= set(shipped.training["versions"])
+    assert SHIPPED.stat().st_size < 1_000_000
+
+
+def test_the_policy_in_the_box_beats_the_script_round_the_pentagon():
+    shipped = load()
+    env = gym.make("SeastarSwim-v0", actions=shipped.actions, scene=shipped.scene).unwrapped
+    done = swim("learned", shipped, env, max_strokes=300)
+    assert done.finished
+    assert done.strokes < 200 < 241
+
+
+def test_it_needs_neither_torch_nor_stable_baselines():
+    code = "import sys; from agents.policy import load; load(); print(*sys.modules)"
+    answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert set(answer.stdout.split()).isdisjoint({"torch", "stable_baselines3", "pickle5", "matplotlib"})
