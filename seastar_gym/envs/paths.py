@@ -22,6 +22,9 @@ LINE_LENGTH = 0.3
 FIGURE_EIGHT_WIDTH = 0.4
 FIGURE_EIGHT_WAYPOINTS = 16
 
+TOUCH_BISECTIONS = 12
+"""Of the arc on which a way touches a waypoint's circle: the way errs by less than 1e-6 radii."""
+
 RANDOM_WAYPOINTS = 5
 RANDOM_LEG = (0.1, 0.2)
 """Shortest and longest leg [m] of a random path."""
@@ -80,6 +83,30 @@ def path_length(start: ArrayLike, waypoints: ArrayLike) -> NDArray[np.float64]:
     lengths: NDArray[np.float64] = np.hypot(first_leg[..., 0], first_leg[..., 1])
     lengths = lengths + np.hypot(later_legs[..., 0], later_legs[..., 1]).sum(axis=-1)
     return lengths
+
+
+def shortest_way(position: ArrayLike, waypoint: ArrayLike, after: ArrayLike, radius: float) -> NDArray[np.float64]:
+    """Length [m], shape (...), of the shortest way from position to `after` that comes within `radius` of waypoint.
+
+    position, waypoint, after: [m], shape (..., 2). The way touches the circle where it is reflected, between the
+    directions of position and `after`: bisection. It is straight where a straight way comes near enough.
+    """
+    p, w, n = (np.asarray(point, dtype=np.float64) for point in (position, waypoint, after))
+    p_x, p_y, n_x, n_y = p[..., 0] - w[..., 0], p[..., 1] - w[..., 1], n[..., 0] - w[..., 0], n[..., 1] - w[..., 1]
+    begin = np.arctan2(p_y, p_x)
+    arc = np.remainder(np.arctan2(n_y, n_x) - begin + np.pi, 2.0 * np.pi) - np.pi
+    lower, upper = np.zeros(np.shape(arc)), np.ones(np.shape(arc))
+    for _ in range(TOUCH_BISECTIONS):
+        middle = 0.5 * (lower + upper)
+        angle = begin + middle * arc
+        c, s = np.cos(angle), np.sin(angle)
+        to_p, to_n = np.hypot(p_x - radius * c, p_y - radius * s), np.hypot(n_x - radius * c, n_y - radius * s)
+        # Along the arc, |p - touch| grows by what |n - touch| has to lose.
+        too_far = (p_x * s - p_y * c) * to_n * np.sign(arc) + (n_x * s - n_y * c) * to_p * np.sign(arc) > 0.0
+        lower, upper = np.where(too_far, lower, middle), np.where(too_far, middle, upper)
+    straight: NDArray[np.float64] = np.hypot(n_x - p_x, n_y - p_y)
+    is_near = cross_track_error(w, p, n) <= radius
+    return np.where(is_near, straight, to_p + to_n)
 
 
 def _checked_waypoints(path: ArrayLike) -> NDArray[np.float64]:

@@ -12,8 +12,8 @@ from seastar_gym.scene import require_number
 class RewardWeights:
     """Weights of the reward's terms, none negative.
 
-    progress: Per metre by which the way to go along the path became shorter [1/m]; one stroke of the best gaits, about
-        5 mm, earns about 1.
+    progress: Per metre by which the way to go, through the circle of the current waypoint, became shorter [1/m]; one
+        stroke of the best gaits, about 5 mm, earns about 1.
     waypoint: Per waypoint reached.
     effort: Price of every heated limb and stroke.
     """

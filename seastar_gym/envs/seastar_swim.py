@@ -44,8 +44,9 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     | 184, 185 | next waypoint relative to the hub (on the last leg the current) | 0.1 m      | (-inf, inf) |
 
     ## Reward
-    `reward_progress` (metres by which the way to go along the path became shorter) + `reward_waypoint` (waypoints
-    reached) + `reward_effort` (minus the limbs heated), with the weights in `RewardWeights`; the terms are in `info`.
+    `reward_progress` (metres by which the way to go became shorter: the shortest one that passes the current waypoint
+    within `waypoint_radius`, then from waypoint to waypoint) + `reward_waypoint` (waypoints reached) + `reward_effort`
+    (minus the limbs heated), with the weights in `RewardWeights`; the terms are in `info`.
 
     ## Info
     `time` [s], `hub_position` [m], `waypoint_index` (waypoints reached so far), `distance` [m] from the hub to the

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.envs.observation import VELOCITY_SCALE, observation_size, observe, to_float32
-from seastar_gym.envs.paths import PathName, cross_track_error, make_path
+from seastar_gym.envs.paths import PathName, cross_track_error, make_path, shortest_way
 from seastar_gym.envs.reward import RewardWeights, reward_terms
 from seastar_gym.fidelity import measured
 from seastar_gym.scene import Fidelity, Numerics, Scene, require_number
@@ -120,8 +120,16 @@ class SwimTask:
         return np.where((k < 0)[:, None], 0.0, found)
 
     def _measure_way_to_go(self, hub: Floats) -> Floats:
+        """The shortest way through the current waypoint's circle to the next waypoint, then from centre to centre.
+
+        A way to the centre of every waypoint would pay for corners that need not be swum.
+        """
         k = np.minimum(self.waypoint_index, self.n_waypoints - 1)
-        return _length(self._waypoint(k) - hub) + self._way_after[np.arange(self.n_robots), k]
+        after = np.minimum(k + 1, self.n_waypoints - 1)
+        current, robots = self._waypoint(k), np.arange(self.n_robots)
+        last = np.maximum(_length(current - hub) - self.waypoint_radius, 0.0)
+        through = shortest_way(hub, current, self._waypoint(after), self.waypoint_radius)
+        return np.where(k == after, last, through + self._way_after[robots, after])
 
     def observe(self) -> NDArray[np.float32]:
         """Observations, shape (n_robots, size), a fresh array; see observation.py."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seastar_gym.envs.paths import PATH_NAMES, cross_track_error, make_path, path_length
+from seastar_gym.envs.paths import PATH_NAMES, cross_track_error, make_path, path_length, shortest_way
 
 ORIGIN = np.zeros(2)
 
@@ -185,3 +185,24 @@ def test_path_length_takes_leading_batch_axes():
     lengths = path_length(starts, waypoints)
     assert lengths.shape == (6,)
     np.testing.assert_allclose(lengths, 0.8, rtol=1e-12)
+
+
+# The way through a waypoint's circle
+
+
+def test_the_shortest_way_is_the_shortest_of_those_by_any_point_of_the_circle():
+    rng, radius = np.random.default_rng(0), 0.01
+    away = radius + rng.exponential([0.001, 0.01, 0.1], size=(2, 200, 3)).reshape(2, 600)
+    angles = rng.uniform(-np.pi, np.pi, size=(2, 600))
+    waypoints = rng.normal(size=(600, 2))
+    begin, end = waypoints + away[..., None] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    circle = 2.0 * np.pi * np.arange(5000)[:, None] / 5000
+    touch = waypoints + radius * np.stack([np.cos(circle), np.sin(circle)], axis=-1)
+    by_touch = (np.linalg.norm(touch - begin, axis=-1) + np.linalg.norm(touch - end, axis=-1)).min(axis=0)
+    ways = shortest_way(begin, waypoints, end, radius)
+    straight = np.linalg.norm(end - begin, axis=1)
+    near = cross_track_error(waypoints, begin, end) <= radius
+    assert 20 < near.sum() < 580
+    np.testing.assert_allclose(ways[near], straight[near], rtol=1e-14)
+    np.testing.assert_allclose(ways[~near], by_touch[~near], atol=2e-6)
+    assert (ways >= straight * (1.0 - 1e-14)).all()

@@ -1,0 +1,121 @@
+"""The greedy agent: the command that closes best on the waypoint, by a map of what every command does on average.
+
+    python -m agents.evaluate --agents greedy planner pentagon
+
+The map says, for every command, how far and which way the hub moves in the body frame, and how far the robot turns, per
+stroke once the gait has settled. It is computed once for every scene and kept in the user's cache folder.
+"""
+
+import hashlib
+import os
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.envs.commands import Actions, command_table
+from seastar_gym.envs.observation import OBSERVATION_LAYOUT
+from seastar_gym.envs.paths import shortest_way
+from seastar_gym.scene import Scene
+from seastar_gym.simulator import Simulator
+
+Floats = NDArray[np.float64]
+
+SETTLING_STROKES, MEASURED_STROKES = 6, 4
+"""A repeated command swims steadily, to 1 %, after about six strokes."""
+
+
+class Displacements(NamedTuple):
+    """What a stroke of every command of a table does. hub: [m], body frame, shape (n, 2). turn: [rad], shape (n,)."""
+
+    hub: Floats
+    turn: Floats
+
+
+def headings(positions: Floats, rest: Floats) -> Floats:
+    """Turn [rad] of the rest shape that fits best to the nodes; positions: [m], shape (n, n_nodes, 2)."""
+    x, y = np.moveaxis(positions - positions[:, :1], -1, 0)
+    return np.asarray(np.arctan2(y @ rest[:, 0] - x @ rest[:, 1], x @ rest[:, 0] + y @ rest[:, 1]))
+
+
+def turned(vectors: Floats, angles: Floats) -> Floats:
+    """Vectors, shape (n, 2), turned by angles [rad], shape (n,)."""
+    c, s = np.cos(angles), np.sin(angles)
+    return np.stack([c * vectors[:, 0] - s * vectors[:, 1], s * vectors[:, 0] + c * vectors[:, 1]], axis=1)
+
+
+def measure_gaits(scene: Scene, commands: Floats, settling: int, measured: int) -> Displacements:
+    """Mean displacement and turn per stroke of periodic gaits, in the body frame when the measured strokes begin.
+
+    commands: Of every gait and stroke of its period, shape (n, period, n_limbs). settling, measured: Strokes, measured
+    a multiple of the period.
+    """
+    simulator, rest = Simulator(scene, len(commands)), scene.robot.nodes()
+    for stroke in range(settling + measured):
+        if stroke == settling:
+            hub, heading = simulator.hub_position(), headings(simulator.positions, rest)
+        simulator.stroke(commands[:, stroke % commands.shape[1]])
+    turn = headings(simulator.positions, rest) - heading
+    turn -= 2.0 * np.pi * np.rint(turn / (2.0 * np.pi))
+    return Displacements(turned(simulator.hub_position() - hub, -heading) / measured, turn / measured)
+
+
+def displacement_map(scene: Scene, actions: Actions = "joint") -> Displacements:
+    """The map of a scene, from the cache or measured now."""
+    key = hashlib.sha256(repr((scene, actions, SETTLING_STROKES, MEASURED_STROKES)).encode()).hexdigest()[:24]
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "seastar-gym"
+    file = cache / f"displacements-{key}.npz"
+    if file.is_file():
+        with np.load(file, allow_pickle=False) as known:
+            return Displacements(known["hub"], known["turn"])
+    commands = command_table(actions, scene.robot.n_limbs)[:, None]
+    measured = measure_gaits(scene, commands, SETTLING_STROKES, MEASURED_STROKES)
+    cache.mkdir(parents=True, exist_ok=True)
+    part = file.with_name(f"{file.stem}.{os.getpid()}.npz")  # whoever looks finds the whole file or none
+    np.savez(part, hub=measured.hub, turn=measured.turn)
+    os.replace(part, file)
+    return measured
+
+
+def remaining_way(hub: Floats, current: Floats, after: Floats, radius: float) -> Floats:
+    """Way [m] from hub through the circle of the current waypoint to the next one, to the circle itself if it is last.
+
+    All of shape (..., 2), in any one frame; `after` equals `current` on the last leg, as in an observation.
+    """
+    to_current = np.hypot(hub[..., 0] - current[..., 0], hub[..., 1] - current[..., 1])
+    last = (current == after).all(axis=-1)
+    return np.where(last, np.maximum(to_current - radius, 0.0), shortest_way(hub, current, after, radius))
+
+
+def waypoints_of(observations: NDArray[np.float32], scene: Scene) -> tuple[Floats, Floats]:
+    """Current and next waypoint [m] relative to the hub in the body frame, (n, 2) each, by observation layout 1."""
+    assert OBSERVATION_LAYOUT == 1
+    waypoints = scene.robot.limb_length * observations[:, -4:].astype(np.float64)
+    return waypoints[:, :2], waypoints[:, 2:]
+
+
+class GreedyPolicy:
+    """The command whose mean displacement leaves the least way to go; in Stable-Baselines3's form.
+
+    scene: What the map is made of; the environment's own for a fair comparison. waypoint_radius: [m].
+    """
+
+    actions: Actions = "joint"
+
+    def __init__(self, scene: Scene, waypoint_radius: float = 0.01):
+        self.scene, self.waypoint_radius = scene, waypoint_radius
+        self._hub = displacement_map(scene, self.actions).hub
+
+    def predict(
+        self,
+        observation: NDArray[np.float32],
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = False,
+    ) -> tuple[NDArray[np.int64], None]:
+        """Actions for observations of shape (size,) or (n, size); there is no state."""
+        current, after = waypoints_of(np.atleast_2d(observation), self.scene)
+        way = remaining_way(self._hub, current[:, None], after[:, None], self.waypoint_radius)
+        chosen = np.argmin(way, axis=1)
+        return (chosen[0] if np.ndim(observation) == 1 else chosen), None

@@ -1,0 +1,125 @@
+"""The planner: an online controller that tries sequences of commands on a batch of the simulator before every stroke.
+
+It sees what every agent sees. An observation is the whole state of the robot, to single precision, so the search begins
+from there: all pairs of limbs, from the best few states of the stroke before, for a few strokes; then it swims the
+first command of the sequence that leaves the least way to go.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.greedy import remaining_way, waypoints_of
+from seastar_gym.envs.commands import Actions, command_table
+from seastar_gym.envs.observation import VELOCITY_SCALE
+from seastar_gym.scene import Numerics, Scene
+from seastar_gym.simulator import Simulator, State
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What the search may cost: at most 21 + 21 beam (depth - 1) simulated strokes per stroke of a five-limb robot."""
+
+    depth: int = 3
+    """Strokes looked ahead. One is short-sighted by a stroke per lap of the pentagon; more than three gain nothing."""
+    beam: int = 8
+    """States kept from one stroke to the next."""
+
+    def __post_init__(self) -> None:
+        if self.depth < 1 or self.beam < 1:
+            raise ValueError(f"depth and beam must be at least 1, not {self.depth} and {self.beam}.")
+
+
+def state_of(observations: NDArray[np.float32], scene: Scene) -> State:
+    """The state that observations, shape (n, size), were made from: in the body frame, the hub at its origin."""
+    n, robot = len(observations), scene.robot
+    vectors = observations[:, :-4].astype(np.float64).reshape(n, -1, 2)
+    nodes, velocities = np.split(vectors[:, :-1], 2, axis=1)
+    hub_velocity, zero = vectors[:, -1:], np.zeros((n, 1, 2))
+    return State(
+        positions=robot.limb_length * np.concatenate([zero, nodes], axis=1),
+        velocities=VELOCITY_SCALE * (hub_velocity + np.concatenate([zero, velocities], axis=1)),
+        time=np.zeros(n),
+    )
+
+
+class Planner:
+    """Beam search over pairs of limbs, anew before every stroke; in Stable-Baselines3's form.
+
+    scene: What the search swims in, the environment's own by default of whoever makes it. waypoint_radius: [m].
+    """
+
+    actions: Actions = "pairs"
+
+    def __init__(
+        self,
+        scene: Scene | None = None,
+        waypoint_radius: float = 0.01,
+        budget: Budget = Budget(),
+        threads: int | None = None,
+    ):
+        self.scene = Scene(numerics=Numerics.preset("fast")) if scene is None else scene
+        self.waypoint_radius, self.budget, self.threads = waypoint_radius, budget, threads
+        self._commands = command_table(self.actions, self.scene.robot.n_limbs)
+        self._simulators: dict[int, Simulator] = {}
+
+    def predict(
+        self,
+        observation: NDArray[np.float32],
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = False,
+    ) -> tuple[NDArray[np.int64], None]:
+        """Actions for observations of shape (size,) or (n, size); there is no state."""
+        observations = np.atleast_2d(observation)
+        chosen = self._search(state_of(observations, self.scene), *waypoints_of(observations, self.scene))
+        return (chosen[0] if np.ndim(observation) == 1 else chosen), None
+
+    def _search(self, start: State, current: Floats, after: Floats) -> NDArray[np.int64]:
+        """The first action of the best sequence for every robot, shape (n,)."""
+        robots, n_commands = np.arange(len(current))[:, None], len(self._commands)
+        states, width = start, 1
+        passed = np.zeros((len(current), 1), bool)
+        first = np.zeros((len(current), 1), np.int64)
+        chosen, arrived = np.zeros(len(current), np.int64), np.zeros(len(current), bool)
+        for stroke in range(self.budget.depth):
+            states = self._swim_all(states)
+            hub = states.positions[:, 0].reshape(len(current), -1, 2)
+            way, passed, there = self._judge(hub, np.repeat(passed, n_commands, axis=1), current, after)
+            first = (
+                np.tile(np.arange(n_commands), (len(current), 1)) if stroke == 0 else np.repeat(first, n_commands, 1)
+            )
+            best = np.argsort(way, axis=1)[:, : self.budget.beam]
+            # Who arrives within this stroke cannot arrive sooner by a longer sequence.
+            chosen = np.where(arrived, chosen, first[robots[:, 0], best[:, 0]])
+            arrived |= there.any(axis=1)
+            first, passed = first[robots, best], passed[robots, best]
+            rows = (robots * width * n_commands + best).reshape(-1)
+            states, width = State(*(part[rows] for part in states)), best.shape[1]
+        return chosen
+
+    def _swim_all(self, states: State) -> State:
+        """Every state after every command, shape (states * commands, ...)."""
+        n_commands = len(self._commands)
+        n = len(states.time) * n_commands
+        if n not in self._simulators:
+            self._simulators[n] = Simulator(self.scene, n, self.threads)
+        simulator = self._simulators[n]
+        simulator.set_state(State(*(np.repeat(part, n_commands, axis=0) for part in states)))
+        simulator.stroke(np.tile(self._commands, (len(states.time), 1)))
+        return simulator.get_state()
+
+    def _judge(
+        self, hub: Floats, passed: NDArray[np.bool_], current: Floats, after: Floats
+    ) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+        """Way to go [m], whether the current waypoint is passed, and whether it was the last; shape (n, candidates)."""
+        current, after = current[:, None], after[:, None]
+        passed = passed | (np.hypot(*np.moveaxis(hub - current, -1, 0)) <= self.waypoint_radius)
+        way = remaining_way(hub, current, after, self.waypoint_radius)
+        beyond = np.hypot(*np.moveaxis(hub - after, -1, 0))
+        last = (current == after).all(axis=-1)
+        return np.where(passed & ~last, beyond, way), passed, passed & last
