@@ -98,7 +98,7 @@ def test_every_base_dependency_is_imported_by_the_package():
     [
         (["seastar_gym"], ["render", "studies"]),
         (["agents", "train.py"], ["train"]),
-        (["tests"], ["test"]),
+        (["tests"], ["test", "browser"]),
     ],
 )
 def test_every_import_has_its_requirement(folders, extras):
@@ -113,7 +113,7 @@ def test_importing_the_package_leaves_out_what_it_does_not_need():
     assert loaded.isdisjoint({"torch", "stable_baselines3", "matplotlib", "plotly", "pygame", "imageio", "rich"})
 
 
-@pytest.mark.parametrize("requirement", requirements("test"), ids=lambda requirement: requirement.name)
+@pytest.mark.parametrize("requirement", requirements("test", "browser"), ids=lambda requirement: requirement.name)
 def test_tested_version_lies_in_the_declared_range(requirement):
     assert pins("constraints.txt")[canonicalize_name(requirement.name)] in requirement.specifier
 

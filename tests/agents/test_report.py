@@ -1,0 +1,311 @@
+"""The report of an evaluation: what stands on the page, and that it works in a browser, from disk and offline."""
+
+import csv
+import json
+import re
+import shutil
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from agents.charts import Curve, curves_figure, read_progress, to_html
+from agents.evaluate import COLUMNS, evaluate, main
+from agents.playback import UNIT, RecordingEnv
+from agents.report import Remarks, number
+from agents.scripted import scripted
+from agents.swim import swim
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+
+MM = 1000.0
+SHORT = [[0.02, 0.0], [0.02, 0.02]]
+MINUS = "\u2212"
+STRAY = '</script><b>"stray" & co</b>'
+PROGRESS = [[1000, 400, 3], [2000, 200, 5], [3000, 170, 5]]
+
+
+class ForthAndBack:
+    """Two strokes {2+, 5-}, a rest, then {1+, 3-} for ever; its recurrent state counts."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        stroke = 0 if state is None else state
+        return np.array([[0, 1, 0, 0, 2]] * 2 + [[0] * 5, [1, 0, 2, 0, 0]])[min(stroke, 3)], stroke + 1
+
+
+@pytest.fixture(scope="module")
+def evaluated(tmp_path_factory):
+    """Folder and swims of an evaluation with a report."""
+    folder = tmp_path_factory.mktemp("report")
+    swims = evaluate(
+        {"straight": scripted("straight"), STRAY: ForthAndBack()},
+        SHORT,
+        max_strokes=9,
+        waypoint_radius=2e-3,
+        fidelity="fast",
+        video=False,
+        out=folder,
+        report=Remarks("Test", ["It was <easy>."], ["python one", "python two"], [Curve.of("straight", PROGRESS)]),
+        console=Console(quiet=True),
+    )
+    return folder, swims
+
+
+@pytest.fixture(scope="module")
+def text(evaluated):
+    return (evaluated[0] / "report.html").read_text(encoding="utf-8")
+
+
+# --- recording -------------------------------------------------------------------------------------------------------
+
+
+def test_a_recording_is_the_swim_in_frames():
+    env = RecordingEnv(path=SHORT, fidelity="fast", frames_per_stroke=4)
+    done = swim("a", ForthAndBack(), env, max_strokes=5)
+    packed = env.playback("a").packed()
+    assert packed["stroke"] == [0] + [stroke for stroke in range(1, 6) for _ in range(4)]
+    ends = np.array(packed["nodes"])[::4]
+    np.testing.assert_allclose(ends[:, :2] * UNIT, done.hub, atol=0.51 * UNIT)
+    np.testing.assert_allclose(packed["time"], np.arange(21) / 4, atol=0.02)  # the nearest time steps
+    assert packed["commands"] == [[0] * 5, [0, 1, 0, 0, -1], [0, 1, 0, 0, -1], [0] * 5] + 2 * [[1, 0, -1, 0, 0]]
+    assert packed["waypoint"][::4] == done.waypoint_index.tolist()
+
+
+def test_recording_changes_nothing_and_draws_nothing():
+    env = RecordingEnv(path=SHORT, fidelity="fast", frames_per_stroke=3)
+    recorded = swim("a", ForthAndBack(), env, max_strokes=4)
+    plain = swim("a", ForthAndBack(), SeastarSwimEnv(path=SHORT, fidelity="fast"), max_strokes=4)
+    np.testing.assert_array_equal(recorded.hub, plain.hub)
+    assert env.render() == []
+
+
+def test_a_new_episode_is_a_new_recording():
+    env = RecordingEnv(path=SHORT, fidelity="fast", frames_per_stroke=2)
+    swim("a", ForthAndBack(), env, max_strokes=2)
+    swim("a", ForthAndBack(), env, max_strokes=1)
+    assert len(env.playback("a").frames) == 3
+
+
+# --- the page as text ------------------------------------------------------------------------------------------------
+
+
+def test_the_page_needs_nothing_beside_it_and_is_light(text):
+    assert len(text) < 6_000_000
+    own = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
+    assert not re.findall(r'\b(?:src|href)="(?!data:)', own)
+    assert "{{" not in own
+
+
+def test_names_and_sentences_are_text_not_markup(text):
+    assert STRAY not in text
+    assert "<td data-name=\"agent\">&lt;/script&gt;&lt;b&gt;&quot;stray&quot; &amp; co&lt;/b&gt;</td>" in text
+    assert "It was &lt;easy&gt;." in text
+
+
+def test_the_table_has_the_numbers_of_the_csv(evaluated, text):
+    with (evaluated[0] / "evaluation.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    lines = [line for line in text.splitlines() if line.startswith('<tr><td data-name="agent">')]
+    assert len(lines) == len(rows) == 2
+    for line, row in zip(lines, rows, strict=True):
+        shown = dict(re.findall(r'data-name="(\w+)">([^<]*)<', line))
+        assert set(shown) == set(COLUMNS)
+        for name in ("simulated_time_s", "mean_cross_track_error_mm", "limbs_heated_per_metre"):
+            assert shown[name] == f"{float(row[name]):.1f}"
+        assert shown["strokes_to_finish"] == (row["strokes_to_finish"] or "\u2013")
+        assert shown["waypoints_reached"] == f"{row['waypoints_reached']} of {row['waypoints']}"
+
+
+@pytest.mark.parametrize("value, shown", [(None, "\u2013"), (3, "3"), (2.345, "2.3"), ("1 of 5", "1 of 5")])
+def test_numbers_are_shown_to_a_tenth(value, shown):
+    assert number(value) == shown
+
+
+# --- learning curves -------------------------------------------------------------------------------------------------
+
+
+def test_a_curve_has_a_gap_where_the_pentagon_was_not_finished(tmp_path):
+    (tmp_path / "progress.csv").write_text("\n".join(",".join(map(str, row)) for row in PROGRESS) + "\n")
+    curve = Curve.of("a", read_progress(tmp_path))
+    np.testing.assert_array_equal(curve.trained, [1000, 2000, 3000])
+    np.testing.assert_array_equal(curve.pentagon, [np.nan, 200, 170])
+    (trace,) = curves_figure([curve], {}).data
+    assert list(trace.y) == [None, 200, 170]
+
+
+def test_several_curves_have_their_median_and_range():
+    finished = {"a": 170, "b": 160, "c": 180}
+    curves = [Curve.of(name, [[1, 9, 4], [2, strokes, 5]]) for name, strokes in finished.items()]
+    lowest, highest, median, *each = curves_figure(curves, {"script": 241}).data
+    assert [list(one.y) for one in (lowest, highest, median)] == [[160], [180], [170]]  # common and finished: at 2
+    assert [one.name for one in each] == ["a", "b", "c"]
+
+
+def test_names_in_pictures_are_text_not_markup():
+    page = to_html(curves_figure([Curve.of(STRAY, PROGRESS)], {STRAY: 241}), "curves")
+    assert STRAY not in page
+
+
+# --- the command line ------------------------------------------------------------------------------------------------
+
+
+def test_command_line_writes_the_report_with_the_curves_of_runs(tmp_path, capsys):
+    run = tmp_path / "run"
+    run.mkdir()
+    (run / "progress.csv").write_text("1000,200,5\n2000,190,5\n")
+    arguments = ["--agents", "learned", "straight", "--max-strokes", "2", "--no-video", "--report", "--runs", str(run)]
+    assert main([*arguments, "--fidelity", "fast", "--out", str(tmp_path / "out")]) == 0
+    assert "report.html" in capsys.readouterr().out
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert '"name":"run"' in page and '"name":"learned"' in page
+    assert "python train.py" in page and "python -m agents.evaluate --agents learned straight" in page
+
+
+def test_a_folder_without_a_run_is_answered_with_one_sentence(tmp_path, capsys):
+    assert main(["--report", "--runs", str(tmp_path), "--out", str(tmp_path / "out")]) == 2
+    printed = capsys.readouterr().err
+    assert "progress.csv" in printed and printed.count("\n") == 1
+
+
+# --- in a browser ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """Debian's chromium, or whichever is installed."""
+    playwright = pytest.importorskip("playwright.sync_api", reason='needs playwright: pip install -e ".[browser]"')
+    program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if program is None:
+        pytest.skip("no chromium is installed: apt install chromium")
+    with playwright.sync_playwright() as running:
+        browser = running.chromium.launch(executable_path=program)
+        yield browser
+        browser.close()
+
+
+class Watched:
+    """A page of the browser, offline, and what it complained about or asked for."""
+
+    def __init__(self, browser, file, width=1366, height=768):
+        context = browser.new_context(viewport={"width": width, "height": height}, offline=True)
+        self.page = context.new_page()
+        self.complaints, self.requests = [], []
+        self.page.on("console", lambda message: self.complaints.append(message.text))
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.goto(file.as_uri())
+
+    def choose(self, agent):
+        self.page.get_by_role("radio", name=agent).click()
+
+    def move_to(self, frame):
+        self.page.locator("#time").fill(str(frame))
+
+    def lines(self):
+        """Points of every line of the player's picture [mm], by the order that it draws them in; without gaps."""
+        data = self.page.evaluate("document.getElementById('playback').data.map(({x, y}) => [x, y])")
+        return [np.array([point for point in zip(*line, strict=True) if None not in point]) for line in data]
+
+    def colours(self):
+        return self.page.evaluate("document.getElementById('playback').data.map(({line}) => line && line.color)")
+
+
+@pytest.fixture(scope="module")
+def page(browser, evaluated):
+    watched = Watched(browser, evaluated[0] / "report.html")
+    yield watched
+    watched.page.context.close()
+
+
+@pytest.fixture
+def opened(page):
+    """One page for all tests, because it takes a while to load: with the first agent at the start."""
+    page.choose("straight")
+    page.move_to(0)
+    return page
+
+
+def test_it_opens_offline_without_a_complaint(opened, evaluated):
+    opened.page.wait_for_selector("#curves .main-svg")
+    assert opened.complaints == []
+    assert [url for url in opened.requests if not url.startswith("data:")] == [
+        (evaluated[0] / "report.html").as_uri()
+    ]
+
+
+def test_the_slider_moves_the_robot(opened, evaluated):
+    _, (straight, _) = evaluated
+    for stroke in (0, 1, 4):
+        opened.move_to(3 * stroke)
+        _, trail, resting, minus, plus, hub, _ = opened.lines()
+        np.testing.assert_allclose(hub[0], MM * straight.hub[stroke], atol=0.06)
+        np.testing.assert_allclose(trail[::3], MM * straight.hub[: stroke + 1], atol=0.06)
+        heated = 0 if stroke == 0 else 10  # nodes of a limb
+        assert (len(resting), len(minus), len(plus)) == (50 - 2 * heated, heated, heated)
+        assert f"stroke {stroke} of {straight.strokes}" in opened.page.inner_text("#readout")
+    assert opened.complaints == []
+
+
+def test_actuated_limbs_are_blue(opened):
+    _, _, resting, minus, plus, *_ = opened.colours()
+    for colour in (minus, plus):
+        red, green, blue = bytes.fromhex(colour[1:])
+        assert blue > 1.4 * max(red, green)
+    red, green, blue = bytes.fromhex(resting[1:])
+    assert blue < 1.4 * red
+
+
+def test_every_stroke_is_listed_and_leads_there(opened, evaluated):
+    _, (straight, stray) = evaluated
+    items = opened.page.locator("#strokes li")
+    assert items.count() == straight.strokes
+    opened.choose(STRAY)
+    assert items.count() == stray.strokes
+    listed = [" ".join(item.split()) for item in items.all_inner_texts()]
+    assert listed[:4] == [f"1 2+ 5{MINUS}", f"2 2+ 5{MINUS}", "3 rest", f"4 1+ 3{MINUS}"]
+    items.nth(3).click()
+    assert opened.page.locator("#time").input_value() == str(3 * 4)
+    assert opened.page.locator("#strokes [aria-current]").inner_text().split()[0] == "4"
+    np.testing.assert_allclose(opened.lines()[5][0], MM * stray.hub[4], atol=0.06)
+
+
+def test_it_plays_to_the_end_and_begins_again(opened, evaluated):
+    _, (straight, _) = evaluated
+    opened.move_to(3 * straight.strokes - 1)
+    play = opened.page.locator("#play")
+    play.click()
+    opened.page.wait_for_function("document.getElementById('play').textContent === 'Play'")
+    assert opened.page.locator("#time").input_value() == str(3 * straight.strokes)
+    play.click()
+    assert play.inner_text() == "Pause"
+    play.click()
+    assert int(opened.page.locator("#time").input_value()) < 3 * straight.strokes
+
+
+@pytest.mark.parametrize("size", [(1366, 768), (390, 844)], ids=["laptop", "phone"])
+def test_it_fits_the_screen_with_equal_scales(browser, evaluated, size):
+    watched = Watched(browser, evaluated[0] / "report.html", *size)
+    watched.page.wait_for_selector("#paths .main-svg")
+    assert watched.page.evaluate("document.documentElement.scrollWidth") <= size[0]
+    for name in ("playback", "paths"):
+        scales = watched.page.evaluate(
+            f"""['xaxis', 'yaxis'].map((axis) => {{
+                const {{ range, _length }} = document.getElementById("{name}")._fullLayout[axis];
+                return _length / (range[1] - range[0]);
+            }})"""
+        )
+        assert scales[0] == pytest.approx(scales[1], rel=1e-3)
+        box = watched.page.locator(f"#{name}").bounding_box()
+        assert box["height"] <= size[1] and box["width"] >= 0.6 * min(size[0], 1120)
+    figures = watched.page.locator(".js-plotly-plot").count()
+    titles = watched.page.evaluate(
+        "[...document.querySelectorAll('.xtitle, .ytitle')].map((title) => title.textContent)"
+    )
+    assert len(titles) == 2 * figures
+    assert {"x [mm]", "y [mm]", "strokes trained"} <= set(titles)
+    watched.page.context.close()
+    assert watched.complaints == []
+
+
+def test_the_recorded_swims_are_plain_json(text):
+    (recorded,) = re.findall(r"^const recorded = (.*);$", text, flags=re.MULTILINE)
+    assert [one["agent"] for one in json.loads(recorded)["swims"]] == ["straight", STRAY]
