@@ -6,6 +6,7 @@ Importing this package registers `SeastarSwim-v0`.
 from gymnasium.envs.registration import register
 
 from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
 from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water
 from seastar_gym.simulator import Simulator, SolverStatus, State, StrokeReport
 
@@ -21,6 +22,8 @@ __all__ = [
     "SolverStatus",
     "State",
     "StrokeReport",
+    "SymmetryReduction",
+    "VectorSymmetryReduction",
     "Water",
     "__version__",
 ]

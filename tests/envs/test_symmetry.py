@@ -270,6 +270,30 @@ def test_a_policy_behind_the_reduction_is_equivariant(element):
     np.testing.assert_allclose(carried_hubs, hubs @ carry.T, atol=1e-9)
 
 
+@pytest.mark.parametrize("n_limbs", [4, 5, 7])
+def test_a_random_policy_in_the_wrapper_swims_the_carried_way(n_limbs):
+    """From rest, along a carried path, for every element of the group."""
+    path = np.array([[0.01, 0.013], [-0.03, 0.02], [0.02, -0.03]])
+    weights = np.random.default_rng(6).normal(size=(186, 1 + n_limbs * (n_limbs - 1)))
+    scene = Scene(robot=Seastar(n_limbs=n_limbs, nodes_per_limb=4), numerics=Numerics.preset("fast"))
+
+    def hubs_along(path):
+        env = SymmetryReduction(gym.make("SeastarSwim-v0", path=path, actions="pairs", scene=scene))
+        observation, _ = env.reset(seed=0)
+        hubs = []
+        for _ in range(10):
+            action = np.argmax(observation @ weights[: len(observation)])
+            observation, *_, info = env.step(action)
+            hubs.append(info["hub_position"])
+        return np.array(hubs)
+
+    hubs = hubs_along(path)
+    assert np.ptp(hubs, axis=0).min() > 1e-3
+    for element in range(1, 2 * n_limbs):
+        carry = matrix(element, n_limbs)
+        np.testing.assert_allclose(hubs_along(path @ carry.T), hubs @ carry.T, atol=1e-9)
+
+
 # --- wrappers --------------------------------------------------------------------------------------------------------
 
 SQUARE_ROBOT = Scene(robot=Seastar(n_limbs=4, nodes_per_limb=4), numerics=Numerics.preset("fast"))
