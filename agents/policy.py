@@ -74,7 +74,7 @@ class Description(NamedTuple):
             symmetry=bool(facts["symmetry"]),
             scene=Scene(
                 robot=Seastar(**scene["robot"]),
-                fluid=None if scene["fluid"] is None else Water(**scene["fluid"]),
+                fluid=None if scene["fluid"] is None else Water.from_fields(scene["fluid"]),
                 actuator=SmaPulse(**scene["actuator"]),
                 numerics=Numerics(**scene["numerics"]),
             ),

@@ -7,23 +7,28 @@ from gymnasium.envs.registration import register
 
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
+from seastar_gym.fluids import GridCurrent, ShearCurrent, UniformCurrent, Vortex
 from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water
 from seastar_gym.simulator import Simulator, SolverStatus, State, StrokeReport
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "GridCurrent",
     "Numerics",
     "RewardWeights",
     "Scene",
     "Seastar",
+    "ShearCurrent",
     "Simulator",
     "SmaPulse",
     "SolverStatus",
     "State",
     "StrokeReport",
     "SymmetryReduction",
+    "UniformCurrent",
     "VectorSymmetryReduction",
+    "Vortex",
     "Water",
     "__version__",
 ]

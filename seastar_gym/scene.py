@@ -12,8 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.actuation.sma import pulse
+from seastar_gym.checks import is_finite_number
+from seastar_gym.checks import require_choice as require_choice
+from seastar_gym.checks import require_count as require_count
+from seastar_gym.checks import require_number as require_number
 from seastar_gym.der.rods import Limits, Rods
 from seastar_gym.fidelity import cheapest
+from seastar_gym.fluids import Water as Water
 from seastar_gym.morphology.seastar import make_rods, rest_positions
 
 HubHinge = Literal["opening", "turning"]
@@ -23,27 +28,6 @@ Fidelity = Literal["fast", "balanced", "accurate", "reference", "chapter"]
 
 MAX_STEPS = 10_000_000
 """Of a stroke: more take minutes even for one robot."""
-
-
-def _is_finite_number(value: object) -> bool:
-    is_number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
-    return is_number and math.isfinite(value)  # type: ignore[arg-type]
-
-
-def require_number(name: str, value: float, unit: str, *, zero_allowed: bool = False) -> None:
-    if not _is_finite_number(value) or value < 0 or (value == 0 and not zero_allowed):
-        kind = "a finite number, not negative" if zero_allowed else "a positive, finite number"
-        raise ValueError(f"{name} must be {kind} [{unit}], not {value!r}.")
-
-
-def require_count(name: str, value: int, smallest: int, largest: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not smallest <= value <= largest:
-        raise ValueError(f"{name} must be a whole number from {smallest} to {largest}, not {value!r}.")
-
-
-def require_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
-    if value not in choices:
-        raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}, not {value!r}.")
 
 
 @dataclass(frozen=True)
@@ -91,18 +75,6 @@ class Seastar:
     def nodes(self) -> NDArray[np.float64]:
         """Node positions at rest [m], shape (n_nodes, 2): hub, {1,1}..{1,N-1}, {2,1}.. ; limb 1 along +x."""
         return rest_positions(self.n_limbs, self.nodes_per_limb, self.limb_length)
-
-
-@dataclass(frozen=True)
-class Water:
-    """A fluid at rest with the quadratic drag of (13.8). density: rho_f [kg/m^3]. drag_coefficient: C_d."""
-
-    density: float = 1000.0
-    drag_coefficient: float = 1.0
-
-    def __post_init__(self) -> None:
-        require_number("density", self.density, "kg/m^3", zero_allowed=True)
-        require_number("drag_coefficient", self.drag_coefficient, "1", zero_allowed=True)
 
 
 @dataclass(frozen=True)
@@ -160,7 +132,7 @@ class Numerics:
         if self.newton_tolerance > 1e-2:
             raise ValueError(f"newton_tolerance must be at most 0.01 limb lengths, not {self.newton_tolerance!r}.")
         if self.path_tolerance is not None:
-            if not _is_finite_number(self.path_tolerance) or not 1e-3 <= self.path_tolerance <= 0.02:
+            if not is_finite_number(self.path_tolerance) or not 1e-3 <= self.path_tolerance <= 0.02:
                 raise ValueError(f"path_tolerance must be from 0.001 to 0.02, not {self.path_tolerance!r}.")
             if self.scheme != "implicit-midpoint":
                 raise ValueError(f'path_tolerance needs the scheme "implicit-midpoint", not {self.scheme!r}.')
@@ -229,7 +201,7 @@ class Scene:
         if not isinstance(self.held_nodes, tuple) or not isinstance(self.loads, tuple):
             raise ValueError(f"held_nodes and loads must be tuples, not {self.held_nodes!r} and {self.loads!r}.")
         for load in self.loads:
-            if not isinstance(load, tuple) or len(load) != 3 or not all(map(_is_finite_number, load[1:])):
+            if not isinstance(load, tuple) or len(load) != 3 or not all(map(is_finite_number, load[1:])):
                 raise ValueError(f"A load is (node, F_x, F_y) with finite forces [N], not {load!r}.")
         for node in (*self.held_nodes, *(load[0] for load in self.loads)):
             require_count("a held or loaded node", node, 0, self.robot.n_nodes - 1)
@@ -297,6 +269,8 @@ class Scene:
             hub_hinge=robot.hub_hinge,
             fluid_density=0.0 if fluid is None else fluid.density,
             drag_coefficient=0.0 if fluid is None else fluid.drag_coefficient,
+            tangential_drag_coefficient=None if fluid is None else fluid.tangential_drag_coefficient,
+            current=None if fluid is None or fluid.current is None else fluid.current.rows(),
             held_nodes=self.held_nodes,
             loads=self.loads,
         )

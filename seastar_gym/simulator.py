@@ -136,7 +136,7 @@ class Simulator:
     def _make_memory(self) -> tuple[Work, Actuation]:
         robot = self.scene.robot
         rotations = Actuation(np.zeros((robot.n_limbs, N_LANES)), np.zeros((robot.n_limbs, N_LANES)))
-        return make_work(robot.n_limbs, robot.nodes_per_limb, self._scheme.n_stages), rotations
+        return make_work(self._rods, self._scheme.n_stages), rotations
 
     def _get_pool(self) -> ThreadPoolExecutor:
         """The threads of this process: a fork inherits the pool of its parent, but not the threads in it."""

@@ -8,7 +8,7 @@ States are arrays of shape (n_nodes, 2): positions q [m] and velocities v [m/s],
 {2,1}... Gradients have that shape too; Hessians and Jacobians are (2 n_nodes, 2 n_nodes), in the order of (13.1).
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -21,7 +21,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Star:
-    """A star of limbs in a fluid, with the values of section 13.4; SI units, drag_coefficient = 0 is vacuum."""
+    """A star of limbs in a fluid, with the values of section 13.4; SI units, drag_coefficient = 0 is vacuum.
+
+    tangential_drag_coefficient: Of flow along a limb; None for that of flow across.
+    current: Velocities of the fluid [m/s] at places [m], both of shape (n, 2), or None if it is at rest.
+    """
 
     n_limbs: int = 5
     nodes_per_limb: int = 10
@@ -32,6 +36,8 @@ class Star:
     fluid_density: float = 1000.0
     drag_coefficient: float = 1.0
     hub_hinge: str = "opening"
+    tangential_drag_coefficient: float | None = None
+    current: Callable[[Array], Array] | None = None
 
     @property
     def n_nodes(self) -> int:
@@ -112,8 +118,17 @@ class Star:
 
     @cached_property
     def drag(self) -> Array:
-        """1/2 rho_f C_d D dl_i of (13.8) [kg/m], shape (n_nodes,)."""
-        return 0.5 * self.fluid_density * self.drag_coefficient * 2.0 * self.rod_radius * self.voronoi_lengths
+        """1/2 rho_f C_d D dl_i of (13.8) [kg/m], shape (n_nodes,); C_t for C_d where there is one."""
+        along = self.tangential_drag_coefficient
+        coefficient = self.drag_coefficient if along is None else along
+        return 0.5 * self.fluid_density * coefficient * 2.0 * self.rod_radius * self.voronoi_lengths
+
+    @property
+    def cross_drag(self) -> float:
+        """1/2 rho_f (C_d - C_t) D l/2 of half an edge [kg/m]: what flow across it adds to the drag of each end."""
+        along = self.tangential_drag_coefficient
+        more = 0.0 if along is None else self.drag_coefficient - along
+        return 0.5 * self.fluid_density * more * 2.0 * self.rod_radius * self.edge_length / 2.0
 
     @cached_property
     def differences(self) -> list[Array]:
@@ -229,25 +244,50 @@ def elastic_hessian(star: Star, q: Array, delta_psi: ArrayLike) -> Array:
     return hessian
 
 
-def drag_potential(star: Star, v: Array) -> float:
-    """Dissipation potential 1/6 rho_f C_d D |v|^3 dl, summed over the nodes [W]."""
-    return float(np.sum(star.drag * np.linalg.norm(v, axis=1) ** 3 / 3.0))
+def relative_velocities(star: Star, v: Array, frozen: Array | None) -> Array:
+    """v - u [m/s], shape (n_nodes, 2), with the current u at the places `frozen` [m] (of no account without one)."""
+    return v if star.current is None else v - star.current(frozen)
 
 
-def drag_force(star: Star, v: Array) -> Array:
+def half_edges(star: Star, frozen: Array | None) -> Iterator[tuple[int, Array]]:
+    """(node, unit normal) of both halves of every edge, where flow across a limb has drag of its own."""
+    if star.cross_drag > 0.0:
+        for (tail, head), e in zip(star.edges, edge_vectors(star, frozen), strict=True):
+            normal = np.array([-e[1], e[0]]) / np.linalg.norm(e)
+            yield tail, normal
+            yield head, normal
+
+
+def drag_potential(star: Star, v: Array, frozen: Array | None = None) -> float:
+    """Dissipation potential 1/6 rho_f C_d D |w|^3 dl, summed over the nodes [W], and that of flow across edges."""
+    w = relative_velocities(star, v, frozen)
+    across = sum(abs(w[node] @ normal) ** 3 for node, normal in half_edges(star, frozen))
+    return float(np.sum(star.drag * np.linalg.norm(w, axis=1) ** 3 / 3.0) + star.cross_drag * across / 3.0)
+
+
+def drag_force(star: Star, v: Array, frozen: Array | None = None) -> Array:
     """Drag force on every node [N], shape (n_nodes, 2) (13.8)."""
-    speed: Array = np.linalg.norm(v, axis=1)
-    return -(star.drag * speed)[:, None] * v
+    w = relative_velocities(star, v, frozen)
+    speed: Array = np.linalg.norm(w, axis=1)
+    force: Array = -(star.drag * speed)[:, None] * w
+    for node, normal in half_edges(star, frozen):
+        across = w[node] @ normal
+        force[node] -= star.cross_drag * abs(across) * across * normal
+    return force
 
 
-def drag_jacobian(star: Star, v: Array) -> Array:
+def drag_jacobian(star: Star, v: Array, frozen: Array | None = None) -> Array:
     """Derivative of (13.8) in the velocities [N s/m], shape (2 n_nodes, 2 n_nodes); zero for a node at rest."""
     jacobian = np.zeros((2 * star.n_nodes, 2 * star.n_nodes))
-    for i, v_i in enumerate(v):
-        speed = np.linalg.norm(v_i)
+    w = relative_velocities(star, v, frozen)
+    for i, w_i in enumerate(w):
+        speed = np.linalg.norm(w_i)
         if speed > 0.0:
-            block = -star.drag[i] * (speed * np.eye(2) + np.outer(v_i, v_i) / speed)
+            block = -star.drag[i] * (speed * np.eye(2) + np.outer(w_i, w_i) / speed)
             jacobian[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = block
+    for i, normal in half_edges(star, frozen):
+        across = 2.0 * star.cross_drag * abs(w[i] @ normal)
+        jacobian[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] -= across * np.outer(normal, normal)
     return jacobian
 
 
@@ -257,23 +297,31 @@ def kinetic_energy(star: Star, v: Array) -> float:
 
 
 def incremental_potential(
-    star: Star, q: Array, q_hat: Array, v_hat: Array, gamma: float, delta_psi: ArrayLike
+    star: Star, q: Array, q_hat: Array, v_hat: Array, gamma: float, delta_psi: ArrayLike, frozen: Array | None = None
 ) -> float:
-    """Phi(q) [J], whose stationary point solves (13.9) for v = (q - q_hat) / gamma."""
+    """Phi(q) [J], whose stationary point solves (13.9) for v = (q - q_hat) / gamma.
+
+    frozen: Places [m] where normals of edges and the current are taken, shape (n_nodes, 2), if the star has such terms.
+    """
     inertia = kinetic_energy(star, (q - q_hat) / gamma - v_hat)
-    return inertia + elastic_energy(star, q, delta_psi) + gamma * drag_potential(star, (q - q_hat) / gamma)
+    return inertia + elastic_energy(star, q, delta_psi) + gamma * drag_potential(star, (q - q_hat) / gamma, frozen)
 
 
-def incremental_gradient(star: Star, q: Array, q_hat: Array, v_hat: Array, gamma: float, delta_psi: ArrayLike) -> Array:
+def incremental_gradient(
+    star: Star, q: Array, q_hat: Array, v_hat: Array, gamma: float, delta_psi: ArrayLike, frozen: Array | None = None
+) -> Array:
     """Gradient of Phi [N], shape (n_nodes, 2): the residual f of (13.9)."""
     v = (q - q_hat) / gamma
-    return star.masses[:, None] * (v - v_hat) / gamma + elastic_gradient(star, q, delta_psi) - drag_force(star, v)
+    drag = drag_force(star, v, frozen)
+    return star.masses[:, None] * (v - v_hat) / gamma + elastic_gradient(star, q, delta_psi) - drag
 
 
-def incremental_hessian(star: Star, q: Array, q_hat: Array, gamma: float, delta_psi: ArrayLike) -> Array:
+def incremental_hessian(
+    star: Star, q: Array, q_hat: Array, gamma: float, delta_psi: ArrayLike, frozen: Array | None = None
+) -> Array:
     """Hessian of Phi [N/m], shape (2 n_nodes, 2 n_nodes): the Jacobian J of (13.12)."""
     inertia = np.diag(np.repeat(star.masses, 2)) / gamma**2
-    return inertia + elastic_hessian(star, q, delta_psi) - drag_jacobian(star, (q - q_hat) / gamma) / gamma
+    return inertia + elastic_hessian(star, q, delta_psi) - drag_jacobian(star, (q - q_hat) / gamma, frozen) / gamma
 
 
 def descent(hessian: Array, gradient: Array) -> Array:
@@ -310,11 +358,12 @@ def stage(
 
     Newton with backtracking on Phi, until a full update moves no node by more than 1e-12 limb lengths.
     """
-    q = q_hat + gamma * v_hat
+    q = frozen = q_hat + gamma * v_hat
+    data = q_hat, v_hat, gamma, delta_psi, frozen
     for _ in range(max_iterations):
-        gradient = incremental_gradient(star, q, q_hat, v_hat, gamma, delta_psi)
-        update = descent(incremental_hessian(star, q, q_hat, gamma, delta_psi), gradient)
-        fraction = backtracked(star, q, update, float(np.sum(gradient * update)), q_hat, v_hat, gamma, delta_psi)
+        gradient = incremental_gradient(star, q, *data)
+        update = descent(incremental_hessian(star, q, q_hat, gamma, delta_psi, frozen), gradient)
+        fraction = backtracked(star, q, update, float(np.sum(gradient * update)), *data)
         q = q + fraction * update
         if fraction == 1.0 and np.max(np.abs(update)) <= 1e-12 * star.limb_length:
             return q, (q - q_hat) / gamma

@@ -12,8 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from oracle import Star
-from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, Water
+from seastar_gym import GridCurrent, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 
+SAMPLED = GridCurrent((0.0, 0.0), 0.1, np.zeros((3, 2, 2)))
 FIDELITIES = ("fast", "balanced", "accurate", "reference", "chapter")
 
 
@@ -34,7 +35,7 @@ def refused(*words: str):
 def test_defaults_are_the_chapters_values():
     robot, water, actuator = Seastar(), Water(), SmaPulse()
     assert dataclasses.astuple(robot) == (5, 10, 0.1, 1.6e-3, 1e6, 1000.0, "opening")
-    assert dataclasses.astuple(water) == (1000.0, 1.0)
+    assert dataclasses.astuple(water) == (1000.0, 1.0, None, None)
     assert dataclasses.astuple(actuator) == (math.pi / 5, 0.1, 0.9)
     assert Numerics().scheme == "implicit-euler"
     assert Scene() == Scene(robot, water, actuator, Numerics())
@@ -108,7 +109,7 @@ def test_fidelities_go_from_fast_to_exact():
     assert steps == sorted(steps, reverse=True)
 
 
-@pytest.mark.parametrize("part", [Seastar(), Water(), SmaPulse(), Numerics(), Scene()])
+@pytest.mark.parametrize("part", [Seastar(), Water(), SmaPulse(), Numerics(), Scene(), SAMPLED])
 def test_parts_are_frozen_equal_by_value_hashable_and_travel(part):
     name = dataclasses.fields(part)[0].name
     with pytest.raises(dataclasses.FrozenInstanceError):

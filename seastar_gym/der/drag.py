@@ -1,15 +1,62 @@
-"""Quadratic drag (13.8): F = -c |v| v with c = 1/2 rho_f C_d D dl_i, from the dissipation potential c |v|^3 / 3."""
+"""Quadratic drag (13.8): F = -c |w| w with c = 1/2 rho_f C_d D dl_i, from the dissipation potential c |w|^3 / 3.
+
+w = v - u is a node's velocity relative to the fluid. With a coefficient C_t < C_d of its own for flow along a limb,
+c has C_t for C_d, and the flow across each edge that a node ends adds -c_n |w_n| w_n n, w_n = w n, from the potential
+c_n |w_n|^3 / 3: half the edge belongs to the node, so c_n = 1/2 rho_f (C_d - C_t) D l/2. Across a limb the two make
+C_d, along it C_t; both potentials are convex. n is the edge's normal where the stage's first guess has it, which is off
+by the square of the step: a constant of the minimisation, and schemes keep their order up to 2.
+"""
 
 from seastar_gym.der.compilation import kernel
-from seastar_gym.der.lanes import add_product, select, sqrt
+from seastar_gym.der.lanes import absolute, add_product, load, select, sqrt
 
 
 @kernel
-def drag_slopes(c, vx, vy):
-    """(potential, c |v|, c/|v|): the force is -(c |v|) v, the Hessian in v is (c |v|) 1 + (c/|v|) v v^T."""
-    squared = add_product(vx * vx, vy, vy)
+def drag_slopes(c, wx, wy):
+    """(potential, c |w|, c/|w|): the force is -(c |w|) w, the Hessian in w is (c |w|) 1 + (c/|w|) w w^T."""
+    squared = add_product(wx * wx, wy, wy)
     speed = sqrt(squared)
     c_speed = c * speed
-    # v v^T/|v| tends to zero with v.
+    # w w^T/|w| tends to zero with w.
     c_over_speed = select(speed > 0.0, c / speed, 0.0)
     return c_speed * squared * (1.0 / 3.0), c_speed, c_over_speed
+
+
+@kernel
+def edges_at(rods, node):
+    """(first, end, stride) of the edges that a node ends or begins."""
+    edges = rods.nodes_per_limb - 1
+    if node == 0:
+        return 0, rods.n_limbs * edges, edges
+    return node - 1, node if node % edges == 0 else node + 1, 1
+
+
+@kernel
+def add_cross_flow(cross_drag, rods, normals, node, wx, wy, gamma, inverse_gamma, slopes):
+    """Add the drag of flow across a node's edges to its (energy, gradient, Hessian) in q, see potential.py.
+
+    Without such drag (None) the slopes are what they were, and the kernel is gone when compiled.
+    """
+    if cross_drag is None:
+        return slopes
+    energy, (fx, fy), (xx, xy, yy) = slopes
+    begin, end, stride = edges_at(rods, node)
+    for e in range(begin, end, stride):
+        nx, ny = load(normals, 2 * e), load(normals, 2 * e + 1)
+        across = add_product(wx * nx, wy, ny)
+        c_across = load(cross_drag, e) * absolute(across)
+        force = c_across * across
+        energy = add_product(energy, gamma * (1.0 / 3.0), force * across)
+        fx, fy = add_product(fx, force, nx), add_product(fy, force, ny)
+        slope = 2.0 * c_across * inverse_gamma
+        sx, sy = slope * nx, slope * ny
+        xx, xy, yy = add_product(xx, sx, nx), add_product(xy, sx, ny), add_product(yy, sy, ny)
+    return energy, (fx, fy), (xx, xy, yy)
+
+
+@kernel
+def relative(current, node, vx, vy):
+    """Velocity of a node relative to the fluid at rest (None) or in motion."""
+    if current is None:
+        return vx, vy
+    return vx - load(current, 2 * node), vy - load(current, 2 * node + 1)

@@ -5,14 +5,8 @@ from seastar_gym.der.bending import bending_energy, moment
 from seastar_gym.der.compilation import entry_point, kernel
 from seastar_gym.der.geometry import edge_geometry, half_angle
 from seastar_gym.der.lanes import add_product, borrow, load, splat, store, subtract_product
-from seastar_gym.der.rods import n_nodes
+from seastar_gym.der.rods import n_nodes, tail_node
 from seastar_gym.der.stretching import stretching_energy, tension
-
-
-@kernel
-def tail_node(rods, e):
-    """The node where edge e starts: the hub for a root edge."""
-    return 0 if e % (rods.nodes_per_limb - 1) == 0 else e
 
 
 @kernel

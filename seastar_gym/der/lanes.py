@@ -242,6 +242,24 @@ def load_number(typing_context, rows, row):
 
 
 @intrinsic
+def load_at(typing_context, rows, row):
+    """From shared rows, for every robot the number at its own row (lanes, whole numbers)."""
+    if not (isinstance(rows, Rows) and rows.shared and row == lanes):
+        return None
+
+    def codegen(context, builder, sig, args):
+        result = ir.Constant(VECTOR, ir.Undefined)
+        indices = builder.fptosi(args[1], ir.VectorType(ir.IntType(64), N_LANES))
+        for k in range(N_LANES):
+            index = builder.extract_element(indices, ir.Constant(I32, k))
+            number = builder.load(builder.gep(args[0], [index]))
+            result = builder.insert_element(result, number, ir.Constant(I32, k))
+        return result
+
+    return lanes(rows, lanes), codegen
+
+
+@intrinsic
 def store(typing_context, rows, row, value):
     """Write `value` (lanes, or one number for all robots) to row `row` of rows that are not shared."""
     if not (isinstance(rows, Rows) and not rows.shared and isinstance(row, types.Integer)):

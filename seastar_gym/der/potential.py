@@ -1,6 +1,6 @@
 """One implicit stage as a minimisation: gradient and Hessian of the incremental potential
 
-    Phi(q) = |v - v_hat|^2_M / 2 + U(q) + gamma sum_i c_i |v_i|^3 / 3,    v = (q - q_hat)/gamma,
+    Phi(q) = |v - v_hat|^2_M / 2 + U(q) + gamma sum_i c_i |w_i|^3 / 3,    v = (q - q_hat)/gamma, w = v - u,
 
 whose stationary point satisfies (13.9) with gamma for h. The Hessian is (13.12).
 
@@ -27,7 +27,7 @@ import numpy as np
 
 from seastar_gym.der.bending import bending_energy, bending_slopes, moment
 from seastar_gym.der.compilation import kernel
-from seastar_gym.der.drag import drag_slopes
+from seastar_gym.der.drag import add_cross_flow, drag_slopes, relative
 from seastar_gym.der.geometry import EDGE_ROWS, edge_geometry, half_angle
 from seastar_gym.der.lanes import add_product, load, select, splat, store, subtract_product
 from seastar_gym.der.star_matrix import (
@@ -98,18 +98,20 @@ def node_slopes(rods, work, stage, node):
     dx, dy = vx - load(stage.v_hat, 2 * node), vy - load(stage.v_hat, 2 * node + 1)
     m = load(rods.mass, node)
     m_over_gamma = m * stage.inverse_gamma
-    potential, c_speed, c_over_speed = drag_slopes(load(rods.drag, node), vx, vy)
+    wx, wy = relative(work.current, node, vx, vy)
+    potential, c_speed, c_over_speed = drag_slopes(load(rods.drag, node), wx, wy)
     c_over_speed *= stage.inverse_gamma
-    wx, wy = c_over_speed * vx, c_over_speed * vy
+    sx, sy = c_over_speed * wx, c_over_speed * wy
     diagonal = (m_over_gamma + c_speed) * stage.inverse_gamma
     Fx, Fy = nodal_load(rods.load, node)
-    return (
+    slopes = (
         add_product(
             0.5 * m * add_product(dx * dx, dy, dy), stage.gamma, potential - load_power(rods.load, node, vx, vy)
         ),
-        (add_product(c_speed * vx, m_over_gamma, dx) - Fx, add_product(c_speed * vy, m_over_gamma, dy) - Fy),
-        (add_product(diagonal, wx, vx), wx * vy, add_product(diagonal, wy, vy)),
+        (add_product(c_speed * wx, m_over_gamma, dx) - Fx, add_product(c_speed * wy, m_over_gamma, dy) - Fy),
+        (add_product(diagonal, sx, wx), sx * wy, add_product(diagonal, sy, wy)),
     )
+    return add_cross_flow(rods.cross_drag, rods, work.normals, node, wx, wy, stage.gamma, stage.inverse_gamma, slopes)
 
 
 @kernel

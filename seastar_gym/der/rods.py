@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from seastar_gym.der.compilation import kernel
+from seastar_gym.der.current import Current
 from seastar_gym.der.geometry import EDGE_ROWS
 from seastar_gym.der.lanes import N_LANES
 from seastar_gym.der.star_matrix import NODE_ROWS, RING_ROWS, ROOT_ROWS
@@ -34,6 +35,8 @@ class Rods(NamedTuple):
     hub_angle: The angle of an unactuated hub hinge, measured that way [rad].
     mass: Lumped mass, per node [kg].
     drag: 1/2 rho_f C_d D dl_i of (13.8), per node [kg/m].
+    cross_drag: What flow across an edge adds to that, of half the edge, per edge [kg/m], or None; see drag.py.
+    current: How the fluid moves, or None; see current.py.
     load: Dead load per coordinate [N], or None.
     shortest_edge: Smallest natural length of an edge [m].
     curvature_rate: How fast Newton's foreseeable_length shrinks with the step [1/s^2], see newton.py.
@@ -53,11 +56,19 @@ class Rods(NamedTuple):
     hub_angle: float
     mass: np.ndarray
     drag: np.ndarray
+    cross_drag: np.ndarray | None
+    current: Current | None
     load: np.ndarray | None
     shortest_edge: float
     curvature_rate: float
     calm: float
     damped: float
+
+
+@kernel
+def tail_node(rods, e):
+    """The node where edge e starts: the hub for a root edge."""
+    return 0 if e % (rods.nodes_per_limb - 1) == 0 else e
 
 
 @kernel
@@ -78,6 +89,8 @@ class Work(NamedTuple):
     hub_EI_kappa_bar: Natural moment of the hub hinges, per limb [N m].
     hub_t: tan(phi/2) of the hub hinges, per limb.
     stage_v: Velocities of the stages of a time step [m/s].
+    normals: Unit normals of the edges where a stage began, or None in scenes that need none; see fluid.py.
+    current: Velocity of the fluid at every node there [m/s], or None.
     """
 
     q: np.ndarray
@@ -95,6 +108,8 @@ class Work(NamedTuple):
     hub_EI_kappa_bar: np.ndarray
     hub_t: np.ndarray
     stage_v: np.ndarray
+    normals: np.ndarray | None
+    current: np.ndarray | None
 
 
 class Stage(NamedTuple):
@@ -153,9 +168,10 @@ def aligned_rows(*shape: int) -> np.ndarray:
     return buffer[start : start + size].reshape(shape)
 
 
-def make_work(n_limbs: int, nodes_per_limb: int, n_stages: int) -> Work:
-    """Zeroed memory for one lane group and a scheme of `n_stages` stages."""
-    n_nodes = n_limbs * (nodes_per_limb - 1) + 1
+def make_work(rods: Rods, n_stages: int) -> Work:
+    """Zeroed memory for one lane group of such rods and a scheme of `n_stages` stages."""
+    n_limbs, n_edges = rods.n_limbs, rods.n_limbs * (rods.nodes_per_limb - 1)
+    n_nodes = n_edges + 1
 
     def rows(count):
         return aligned_rows(count, N_LANES)
@@ -176,4 +192,6 @@ def make_work(n_limbs: int, nodes_per_limb: int, n_stages: int) -> Work:
         hub_EI_kappa_bar=rows(n_limbs),
         hub_t=rows(n_limbs),
         stage_v=rows(2 * n_nodes * n_stages),
+        normals=None if rods.cross_drag is None else rows(2 * n_edges),
+        current=None if rods.current is None else rows(2 * n_nodes),
     )

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.der.current import Current
 from seastar_gym.der.rods import Rods
 
 Floats = NDArray[np.float64]
@@ -45,6 +46,8 @@ def make_rods(
     hub_hinge: str,
     fluid_density: float,
     drag_coefficient: float,
+    tangential_drag_coefficient: float | None = None,
+    current: Current | None = None,
     held_nodes: tuple[int, ...] = (),
     loads: tuple[tuple[int, float, float], ...] = (),
 ) -> Rods:
@@ -59,6 +62,10 @@ def make_rods(
     EI = youngs_modulus * np.pi * rod_radius**4 / 4.0
     dl = voronoi_lengths(n_limbs, nodes_per_limb, limb_length)
     drag_per_length = 0.5 * fluid_density * drag_coefficient * 2.0 * rod_radius
+    friction_per_length, cross_drag = drag_per_length, None
+    if tangential_drag_coefficient is not None:
+        friction_per_length = 0.5 * fluid_density * tangential_drag_coefficient * 2.0 * rod_radius
+        cross_drag = np.full(n_edges, (drag_per_length - friction_per_length) * 0.5 * edge_length)
     calm = CALM_STRAIN_ENERGY * EA * n_limbs * limb_length
     turning = hub_hinge == "turning"
     mass = density * area * dl
@@ -82,7 +89,9 @@ def make_rods(
         hub_side=-1.0 if turning else 1.0,
         hub_angle=2.0 * np.pi / n_limbs - (np.pi if turning else 0.0),
         mass=mass,
-        drag=drag_per_length * dl,
+        drag=friction_per_length * dl,
+        cross_drag=cross_drag,
+        current=current,
         load=forces.reshape(-1) if loads else None,
         shortest_edge=edge_length,
         curvature_rate=youngs_modulus / (density * edge_length**2) * min(1.0, (edge_length / rod_radius) ** 2 / 5000.0),

@@ -103,6 +103,10 @@ def _load(rows: Any, row: int) -> Counted:
     return Counted(rows[row] if rows.ndim == 1 else rows[row, 0])
 
 
+def _load_at(rows: Any, row: Counted) -> Counted:
+    return _load(rows, int(row.value))
+
+
 def _store(rows: Any, row: int, value: Any) -> None:
     _counts["store"] += 1
     rows[row, 0] = _value(value)
@@ -122,6 +126,7 @@ def _counting_lanes() -> ModuleType:
         N_LANES=1,
         borrow=lambda bundle: bundle,
         load=_load,
+        load_at=_load_at,
         load_number=lambda rows, row: float(rows[row]),
         store=_store,
         splat=Constant,
@@ -143,8 +148,8 @@ def _load_counting_modules() -> dict[str, ModuleType]:
     compilation = ModuleType("compilation")
     vars(compilation).update(kernel=lambda function: function, entry_point=lambda function: function)
     names = (
-        "rods", "geometry", "stretching", "bending", "drag", "star_matrix", "potential", "newton", "actuation",
-        "energy", "guard", "stages",
+        "current", "rods", "geometry", "stretching", "bending", "drag", "fluid", "star_matrix", "potential", "newton",
+        "actuation", "energy", "guard", "stages",
     )  # fmt: skip
     saved = {f"{COUNTED}.{name}": sys.modules.get(f"{COUNTED}.{name}") for name in (*names, "lanes", "compilation")}
     for name in names:
@@ -214,7 +219,7 @@ def _moving_robot(scene: Scene, modules: dict[str, ModuleType]) -> tuple[Any, ..
     command[0, 1], command[0, -1] = 1.0, -1.0
     next(simulator.stroke_in_parts(command, 20))
     scheme, rods, rows = SCHEMES[scene.numerics.scheme], scene.rods(), modules["rods"]
-    work = rows.make_work(rods.n_limbs, rods.nodes_per_limb, scheme.n_stages)
+    work = rows.make_work(rods, scheme.n_stages)
     angles = 0.5 * scene.actuator.peak_angle * command.T
     q, v = simulator.positions.reshape(-1, 1), simulator.velocities.reshape(-1, 1)
     a = np.zeros(((len(q) + 1) * scheme.n_stages, 1))

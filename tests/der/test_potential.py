@@ -1,120 +1,16 @@
 """The kernels agree with the dense oracle: potential, gradient and Hessian of a stage, whole stages and steps."""
 
-from types import SimpleNamespace
-
-import numba
 import numpy as np
 import pytest
 
 import oracle
 from oracle import Star
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, StrokeReport, Water
-from seastar_gym.der.lanes import N_LANES, any_lane, borrow, load, splat, store
-from seastar_gym.der.newton import take_step
-from seastar_gym.der.potential import factorise
-from seastar_gym.der.rods import Rods, Stage, make_work
+from seastar_gym.der.lanes import N_LANES
+from stages import RandomStages, random_shape, robot_and_star, rods_of
 
 HUBS = ("opening", "turning")
 SHAPES = [(5, 10), (5, 2), (3, 3), (4, 4), (6, 5), (12, 3)]  # n_limbs, nodes_per_limb
-
-
-@pytest.fixture(scope="module")
-def compiled_direction():
-    @numba.njit(error_model="numpy")
-    def direction(rods, work, gamma, convex, result):
-        rods_rows, memory, out = borrow(rods), borrow(work), borrow(result)
-        h, mask = splat(gamma), load(borrow(convex), 0) > 0.0
-        stage = Stage(memory.q_hat, memory.v_hat, h, 1.0 / h)
-        if any_lane(mask):
-            phi, decrement, pivot = factorise(rods_rows, memory, stage, mask)
-        else:
-            phi, decrement, pivot = factorise(rods_rows, memory, stage, None)
-        store(out, 0, phi)
-        store(out, 1, decrement)
-        store(out, 2, pivot)
-        store(out, 3, take_step(rods_rows, memory, h > 0.0, h < 0.0, splat(1.0)))
-
-    return direction
-
-
-def robot_and_star(n_limbs=5, nodes_per_limb=10, hub_hinge="opening", fluid=True):
-    """The same robot for the kernels and for the oracle."""
-    robot = Seastar(n_limbs=n_limbs, nodes_per_limb=nodes_per_limb, hub_hinge=hub_hinge)
-    star = Star(
-        n_limbs=n_limbs, nodes_per_limb=nodes_per_limb, hub_hinge=hub_hinge, drag_coefficient=1.0 if fluid else 0.0
-    )
-    return robot, star
-
-
-def rods_of(robot: Seastar, fluid: bool = True) -> Rods:
-    return Scene(robot=robot, fluid=Water() if fluid else None, actuator=SmaPulse(peak_angle=0.1)).rods()
-
-
-class RandomStages:
-    """One random stage per lane, moderate: limbs bent by some degrees, edges strained by some per mille."""
-
-    def __init__(self, star: Star, gamma: float, bend=0.15, stretch=2e-3, speed=0.1, seed=0):
-        rng = np.random.default_rng(seed)
-        self.star, self.gamma = star, gamma
-        self.q = np.array([random_shape(star, bend, stretch, rng) for _ in range(N_LANES)])
-        self.v_hat = speed * rng.standard_normal(self.q.shape)
-        self.q_hat = self.q - gamma * speed * rng.standard_normal(self.q.shape)
-        self.delta_psi = rng.uniform(-0.1, 0.1, (N_LANES, star.n_limbs))
-
-    def data(self, lane: int):
-        return self.q_hat[lane], self.v_hat[lane], self.gamma, self.delta_psi[lane]
-
-    def hessian(self, lane: int) -> np.ndarray:
-        return oracle.incremental_hessian(self.star, self.q[lane], self.q_hat[lane], self.gamma, self.delta_psi[lane])
-
-    def convex_hessian(self, lane: int) -> np.ndarray:
-        """The Hessian without what may be negative: compression, curvature of the angles, bending's second part."""
-        star, q, dl = self.star, self.q[lane], self.star.edge_length
-        hessian = np.diag(np.repeat(star.masses, 2)) / self.gamma**2
-        hessian -= oracle.drag_jacobian(star, (q - self.q_hat[lane]) / self.gamma) / self.gamma
-        D, edges = star.differences, oracle.edge_vectors(star, q)
-        for D_e, e in zip(D, edges, strict=True):
-            size = np.linalg.norm(e)
-            along = np.outer(e, e) / size**2
-            pull = max(star.EA * (size / dl - 1.0), 0.0) / size
-            hessian += D_e.T @ (star.EA / dl * along + pull * (np.eye(2) - along)) @ D_e
-        for a, b, phi, _ in oracle.hinge_terms(star, q, self.delta_psi[lane]):
-            kappa_q = D[b].T @ oracle.direction_gradient(edges[b]) - D[a].T @ oracle.direction_gradient(edges[a])
-            kappa_q *= (1.0 + np.tan(phi / 2.0) ** 2) / dl
-            hessian += star.EI * dl * np.outer(kappa_q, kappa_q)
-        return hessian
-
-    def run(self, compiled, rods: Rods, convex=0.0, q=None):
-        """Phi, decrement and pivot per lane, and the Newton direction, shape (N_LANES, n_nodes, 2)."""
-        star, q = self.star, self.q if q is None else q
-        work = make_work(star.n_limbs, star.nodes_per_limb, 1)
-        for rows, nodes in ((work.q, q), (work.q_hat, self.q_hat), (work.v_hat, self.v_hat)):
-            rows[:] = nodes.reshape(N_LANES, -1).T
-        natural = np.array([oracle.natural_angles(star, d)[-star.n_limbs :] for d in self.delta_psi])
-        work.hub_EI_kappa_bar[:] = star.EI * 2.0 * np.tan(natural.T / 2.0) / star.edge_length
-        result = np.zeros((4, N_LANES))
-        compiled(rods, work, self.gamma, np.full((1, N_LANES), convex), result)
-        return SimpleNamespace(
-            phi=result[0],
-            decrement=result[1],
-            pivot=result[2],
-            largest=result[3],
-            direction=-work.step.T.reshape(N_LANES, -1, 2),
-            moved=work.q.T.reshape(N_LANES, -1, 2) - q,
-        )
-
-
-def random_shape(star: Star, bend: float, stretch: float, rng: np.random.Generator) -> np.ndarray:
-    """Limbs whose hinges turn by about `bend` [rad] and whose edges are strained by about `stretch`."""
-    q = np.zeros((star.n_nodes, 2)) + 0.05 * rng.standard_normal(2)
-    for limb in range(star.n_limbs):
-        angle = 2.0 * np.pi * limb / star.n_limbs
-        for i in range(1, star.nodes_per_limb):
-            angle += bend * rng.standard_normal()
-            length = star.edge_length * (1.0 + stretch * rng.standard_normal())
-            step = length * np.array([np.cos(angle), np.sin(angle)])
-            q[star.node(limb, i)] = q[star.node(limb, i - 1)] + step
-    return q
 
 
 # Every shape with both hubs in water, and the chapter's shape in vacuum.
@@ -126,12 +22,10 @@ VARIANTS = [(*shape, hub, True) for shape in SHAPES for hub in HUBS] + [(5, 10, 
 
 @pytest.mark.parametrize("gamma", [1e-3, 1e-2])
 @pytest.mark.parametrize("n_limbs, nodes_per_limb, hub_hinge, fluid", VARIANTS)
-def test_potential_and_newton_direction_are_those_of_the_oracle(
-    compiled_direction, n_limbs, nodes_per_limb, hub_hinge, fluid, gamma
-):
+def test_potential_and_newton_direction_are_those_of_the_oracle(n_limbs, nodes_per_limb, hub_hinge, fluid, gamma):
     robot, star = robot_and_star(n_limbs, nodes_per_limb, hub_hinge, fluid)
     stages = RandomStages(star, gamma, bend=0.05)
-    found = stages.run(compiled_direction, rods_of(robot, fluid))
+    found = stages.run(rods_of(robot, fluid))
     for lane in range(N_LANES):
         phi = oracle.incremental_potential(star, stages.q[lane], *stages.data(lane))
         gradient = oracle.incremental_gradient(star, stages.q[lane], *stages.data(lane))
@@ -145,10 +39,10 @@ def test_potential_and_newton_direction_are_those_of_the_oracle(
 
 
 @pytest.mark.parametrize("hub_hinge", HUBS)
-def test_newton_direction_of_wildly_bent_robots_is_as_good_as_their_matrix_allows(compiled_direction, hub_hinge):
+def test_newton_direction_of_wildly_bent_robots_is_as_good_as_their_matrix_allows(hub_hinge):
     robot, star = robot_and_star(hub_hinge=hub_hinge)
     stages = RandomStages(star, 1e-3, bend=0.8, stretch=0.1, speed=1.0)
-    found = stages.run(compiled_direction, rods_of(robot))
+    found = stages.run(rods_of(robot))
     for lane in range(N_LANES):
         gradient = oracle.incremental_gradient(star, stages.q[lane], *stages.data(lane))
         hessian = stages.hessian(lane)
@@ -159,27 +53,25 @@ def test_newton_direction_of_wildly_bent_robots_is_as_good_as_their_matrix_allow
 
 @pytest.mark.parametrize("hub_hinge", HUBS)
 @pytest.mark.parametrize("convex", [0.0, 1.0])
-def test_potential_falls_along_the_newton_direction_at_the_rate_of_the_decrement(compiled_direction, hub_hinge, convex):
+def test_potential_falls_along_the_newton_direction_at_the_rate_of_the_decrement(hub_hinge, convex):
     robot, star = robot_and_star(hub_hinge=hub_hinge)
     stages, rods = RandomStages(star, 0.01), rods_of(robot)
-    found = stages.run(compiled_direction, rods, convex)
+    found = stages.run(rods, convex)
     move = 1e-3 * found.direction
-    ahead = stages.run(compiled_direction, rods, q=stages.q - move)
-    behind = stages.run(compiled_direction, rods, q=stages.q + move)
+    ahead = stages.run(rods, q=stages.q - move)
+    behind = stages.run(rods, q=stages.q + move)
     assert np.all(found.decrement > 0.0)
     np.testing.assert_allclose((ahead.phi - behind.phi) / 2e-3, -found.decrement, rtol=1e-4)
 
 
 @pytest.mark.parametrize("hub_hinge", HUBS)
 @pytest.mark.parametrize("gamma", [3e-3, 5e-3, 7e-3])
-def test_smallest_pivot_is_positive_exactly_where_the_hessian_is_positive_definite(
-    compiled_direction, hub_hinge, gamma
-):
+def test_smallest_pivot_is_positive_exactly_where_the_hessian_is_positive_definite(hub_hinge, gamma):
     robot, star = robot_and_star(nodes_per_limb=4, hub_hinge=hub_hinge)
     definite = []
     for seed in range(8):
         stages = RandomStages(star, gamma, bend=0.3, stretch=0.02, seed=seed)
-        found = stages.run(compiled_direction, rods_of(robot))
+        found = stages.run(rods_of(robot))
         smallest = [np.linalg.eigvalsh(stages.hessian(lane))[0] for lane in range(N_LANES)]
         np.testing.assert_array_equal(found.pivot > 0.0, np.array(smallest) > 0.0)
         definite += list(found.pivot > 0.0)
@@ -187,10 +79,10 @@ def test_smallest_pivot_is_positive_exactly_where_the_hessian_is_positive_defini
 
 
 @pytest.mark.parametrize("hub_hinge", HUBS)
-def test_repaired_matrix_is_the_sum_of_the_convex_parts_and_is_always_positive_definite(compiled_direction, hub_hinge):
+def test_repaired_matrix_is_the_sum_of_the_convex_parts_and_is_always_positive_definite(hub_hinge):
     robot, star = robot_and_star(nodes_per_limb=5, hub_hinge=hub_hinge)
     stages = RandomStages(star, 0.05, bend=0.8, stretch=0.2, speed=1.0)
-    found = stages.run(compiled_direction, rods_of(robot), convex=1.0)
+    found = stages.run(rods_of(robot), convex=1.0)
     assert np.all(found.pivot > 0.0)
     assert not all(np.linalg.eigvalsh(stages.hessian(lane))[0] > 0.0 for lane in range(N_LANES))
     for lane in range(N_LANES):
@@ -200,18 +92,18 @@ def test_repaired_matrix_is_the_sum_of_the_convex_parts_and_is_always_positive_d
         np.testing.assert_allclose(found.direction[lane], direction, rtol=0.0, atol=1e-9 * np.abs(direction).max())
 
 
-def test_a_matrix_that_is_not_a_number_does_not_pass_for_positive_definite(compiled_direction):
+def test_a_matrix_that_is_not_a_number_does_not_pass_for_positive_definite():
     robot, star = robot_and_star(nodes_per_limb=4)
     for node in range(star.n_nodes):
         stages = RandomStages(star, 0.01)
         stages.q[1, node] = np.nan
-        found = stages.run(compiled_direction, rods_of(robot))
+        found = stages.run(rods_of(robot))
         assert not found.pivot[1] > 0.0
         others = np.arange(N_LANES) != 1
         assert np.all(found.pivot[others] > 0.0) and np.isfinite(found.direction[others]).all()
 
 
-def test_every_robot_may_have_coefficients_of_its_own(compiled_direction):
+def test_every_robot_may_have_coefficients_of_its_own():
     robot = Seastar(nodes_per_limb=4)
     shared = Scene(robot=robot).rods()
     stiffness, weight = np.linspace(0.5, 2.0, N_LANES), np.linspace(1.0, 3.0, N_LANES)
@@ -224,7 +116,7 @@ def test_every_robot_may_have_coefficients_of_its_own(compiled_direction):
         stages.star = star
         gradient = oracle.incremental_gradient(star, stages.q[lane], *stages.data(lane))
         direction = np.linalg.solve(stages.hessian(lane), gradient.ravel()).reshape(-1, 2)
-        found = stages.run(compiled_direction, own)
+        found = stages.run(own)
         np.testing.assert_allclose(found.direction[lane], direction, rtol=0.0, atol=1e-11 * np.abs(direction).max())
 
 

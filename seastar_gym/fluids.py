@@ -1,0 +1,183 @@
+"""Fluids and their currents, as frozen dataclasses in SI units."""
+
+import dataclasses
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.checks import is_finite_number, require_finite, require_number
+from seastar_gym.der.current import GRID, LINEAR, VORTEX, Current
+
+Floats = NDArray[np.float64]
+
+LARGEST_GRID = 4_000_000
+"""Points: more than this many velocities are no longer a sample of a smooth current."""
+
+
+@dataclass(frozen=True)
+class UniformCurrent:
+    """A fluid that moves as a whole: u = (u_x, u_y) [m/s]."""
+
+    u_x: float = 0.0
+    u_y: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_finite("u_x", self.u_x, "m/s")
+        require_finite("u_y", self.u_y, "m/s")
+
+    def rows(self) -> Current:
+        """For the kernels."""
+        return Current(LINEAR, np.array([self.u_x, self.u_y, 0.0, 0.0, 0.0, 0.0]))
+
+
+@dataclass(frozen=True)
+class ShearCurrent:
+    """A simple shear: u = rate y' along x', where x', y' are x, y turned by `direction`.
+
+    rate: [1/s]. direction: Of the flow [rad]. The fluid stands still on the line through the origin.
+    """
+
+    rate: float
+    direction: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_finite("rate", self.rate, "1/s")
+        require_finite("direction", self.direction, "rad")
+
+    def rows(self) -> Current:
+        """For the kernels."""
+        c, s = math.cos(self.direction), math.sin(self.direction)
+        gradient = self.rate * np.outer([c, s], [-s, c])
+        return Current(LINEAR, np.concatenate([np.zeros(2), gradient.ravel()]))
+
+
+@dataclass(frozen=True)
+class Vortex:
+    """A steady vortex with a smooth core, after Kaufmann and Scully: u = circulation/(2 pi) r/(r_c^2 + r^2) round it.
+
+    circulation: [m^2/s], + is anti-clockwise. x, y: Its centre [m]. core_radius: r_c, where it turns fastest [m].
+    """
+
+    circulation: float
+    x: float = 0.0
+    y: float = 0.0
+    core_radius: float = 0.05
+
+    def __post_init__(self) -> None:
+        require_finite("circulation", self.circulation, "m^2/s")
+        require_finite("x", self.x, "m")
+        require_finite("y", self.y, "m")
+        require_number("core_radius", self.core_radius, "m")
+
+    def rows(self) -> Current:
+        """For the kernels."""
+        strength = self.circulation / (2.0 * math.pi)
+        return Current(VORTEX, np.array([self.x, self.y, strength, self.core_radius**2]))
+
+
+@dataclass(frozen=True)
+class GridCurrent:
+    """A current sampled on a grid, bilinear in between; beyond the grid it is that of the nearest point on its edge.
+
+    corner: The grid's first point (x, y) [m]. spacing: Of its points, both ways [m].
+    velocities: u [m/s] at the points, shape (n_x, n_y, 2); any array, kept as tuples, so that equal grids are equal.
+    """
+
+    corner: tuple[float, float]
+    spacing: float
+    velocities: tuple[tuple[tuple[float, float], ...], ...]
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.corner, tuple | list) or list(map(is_finite_number, self.corner)) != [True, True]:
+            raise ValueError(f"corner must be two finite numbers [m], not {self.corner!r}.")
+        object.__setattr__(self, "corner", tuple(self.corner))
+        require_number("spacing", self.spacing, "m")
+        try:
+            array = np.asarray(self.velocities, dtype=float)
+        except (TypeError, ValueError):
+            array = np.zeros(0)
+        if array.ndim != 3 or array.shape[2] != 2 or min(array.shape) < 2 or array.size > 2 * LARGEST_GRID:
+            raise ValueError(
+                f"velocities must have shape (n_x, n_y, 2), with two points or more each way and at most "
+                f"{LARGEST_GRID:,} points, not {array.shape}."
+            )
+        if not np.isfinite(array).all():
+            raise ValueError("velocities must be finite [m/s].")
+        object.__setattr__(self, "velocities", tuple(tuple(map(tuple, row)) for row in array.tolist()))
+
+    @classmethod
+    def from_function(
+        cls,
+        function: Callable[[Floats, Floats], tuple[Floats, Floats]],
+        x: tuple[float, float],
+        y: tuple[float, float],
+        spacing: float,
+    ) -> "GridCurrent":
+        """Sample (u_x, u_y) = function(x, y) [m/s] on the rectangle from x[0] to x[1] and from y[0] to y[1] [m].
+
+        The function takes and gives arrays of one shape, or plain numbers where the current does not depend on place.
+        """
+        require_number("spacing", spacing, "m")
+        axes = []
+        for name, ends in (("x", x), ("y", y)):
+            if len(ends) != 2 or not all(map(is_finite_number, ends)) or not ends[1] - ends[0] >= spacing:
+                raise ValueError(f"{name} must be two ends at least a spacing apart [m], not {ends!r}.")
+            axes.append(ends[0] + spacing * np.arange(int(np.ceil((ends[1] - ends[0]) / spacing - 1e-9)) + 1))
+        if len(axes[0]) * len(axes[1]) > LARGEST_GRID:
+            raise ValueError(f"The grid has more than {LARGEST_GRID:,} points: use a larger spacing.")
+        xs, ys = np.meshgrid(*axes, indexing="ij")
+        u_x, u_y = function(xs, ys)
+        velocities = np.stack([np.broadcast_to(u, xs.shape) for u in (u_x, u_y)], axis=2)
+        return cls((float(x[0]), float(y[0])), float(spacing), velocities)  # type: ignore[arg-type]
+
+    def rows(self) -> Current:
+        """For the kernels."""
+        array = np.array(self.velocities)
+        n_x, n_y, _ = array.shape
+        return Current(GRID, np.array([*self.corner, 1.0 / self.spacing]), n_x, n_y, array.reshape(-1))
+
+
+AnyCurrent = UniformCurrent | ShearCurrent | Vortex | GridCurrent
+
+
+@dataclass(frozen=True)
+class Water:
+    """A fluid with the quadratic drag of (13.8).
+
+    density: rho_f [kg/m^3]. drag_coefficient: C_d, of flow across a limb, and of all flow by default.
+    tangential_drag_coefficient: C_t, of flow along a limb; None for that of flow across. The friction C_t |w| w of all
+        flow and the pressure (C_d - C_t) |w_n| w_n of the flow across add up, w_n the normal part of w (after G. I.
+        Taylor, 1952): no less than C_t across, so C_t must not exceed C_d.
+    current: How the fluid moves, or None if it is at rest; w is the velocity relative to it.
+    """
+
+    density: float = 1000.0
+    drag_coefficient: float = 1.0
+    tangential_drag_coefficient: float | None = None
+    current: AnyCurrent | None = None
+
+    def __post_init__(self) -> None:
+        require_number("density", self.density, "kg/m^3", zero_allowed=True)
+        require_number("drag_coefficient", self.drag_coefficient, "1", zero_allowed=True)
+        if self.tangential_drag_coefficient is not None:
+            require_number("tangential_drag_coefficient", self.tangential_drag_coefficient, "1", zero_allowed=True)
+            if self.tangential_drag_coefficient > self.drag_coefficient:
+                raise ValueError(
+                    "tangential_drag_coefficient must not exceed drag_coefficient, that of flow across a limb: "
+                    f"{self.tangential_drag_coefficient!r} is more than {self.drag_coefficient!r}."
+                )
+        if not isinstance(self.current, AnyCurrent | None):
+            raise ValueError(f"current must be one of the currents of seastar_gym.fluids, not {self.current!r}.")
+
+    @classmethod
+    def from_fields(cls, fields: dict[str, Any]) -> "Water":
+        """The fluid that dataclasses.asdict has made `fields` of, maybe by way of JSON."""
+        current = fields.get("current")
+        if current is not None:
+            kinds = {frozenset(field.name for field in dataclasses.fields(kind)): kind for kind in get_args(AnyCurrent)}
+            current = kinds[frozenset(current)](**current)
+        return cls(**{**fields, "current": current})

@@ -1,0 +1,117 @@
+"""Random stages for the kernels and for the oracle."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+import oracle
+from oracle import Star
+from seastar_gym import Scene, Seastar, SmaPulse, Water
+from seastar_gym.der.compilation import entry_point
+from seastar_gym.der.fluid import freeze_fluid
+from seastar_gym.der.lanes import N_LANES, any_lane, borrow, load, splat, store
+from seastar_gym.der.newton import take_step
+from seastar_gym.der.potential import factorise
+from seastar_gym.der.rods import Rods, Stage, make_work
+
+
+@entry_point
+def direction(rods, work, q, gamma, convex, result):
+    """What the terms keep is taken at work.q; the potential and its slopes are those at q."""
+    rods_rows, memory, out = borrow(rods), borrow(work), borrow(result)
+    h, mask = splat(gamma), load(borrow(convex), 0) > 0.0
+    stage = Stage(memory.q_hat, memory.v_hat, h, 1.0 / h)
+    freeze_fluid(rods_rows, memory)
+    for row in range(q.shape[0]):
+        store(memory.q, row, load(borrow(q), row))
+    if any_lane(mask):
+        phi, decrement, pivot = factorise(rods_rows, memory, stage, mask)
+    else:
+        phi, decrement, pivot = factorise(rods_rows, memory, stage, None)
+    store(out, 0, phi)
+    store(out, 1, decrement)
+    store(out, 2, pivot)
+    store(out, 3, take_step(rods_rows, memory, h > 0.0, h < 0.0, splat(1.0)))
+
+
+def robot_and_star(n_limbs=5, nodes_per_limb=10, hub_hinge="opening", fluid=True):
+    """The same robot for the kernels and for the oracle."""
+    robot = Seastar(n_limbs=n_limbs, nodes_per_limb=nodes_per_limb, hub_hinge=hub_hinge)
+    star = Star(
+        n_limbs=n_limbs, nodes_per_limb=nodes_per_limb, hub_hinge=hub_hinge, drag_coefficient=1.0 if fluid else 0.0
+    )
+    return robot, star
+
+
+def rods_of(robot: Seastar, fluid: bool = True) -> Rods:
+    return Scene(robot=robot, fluid=Water() if fluid else None, actuator=SmaPulse(peak_angle=0.1)).rods()
+
+
+class RandomStages:
+    """One random stage per lane, moderate: limbs bent by some degrees, edges strained by some per mille."""
+
+    def __init__(self, star: Star, gamma: float, bend=0.15, stretch=2e-3, speed=0.1, seed=0):
+        rng = np.random.default_rng(seed)
+        self.star, self.gamma = star, gamma
+        self.q = np.array([random_shape(star, bend, stretch, rng) for _ in range(N_LANES)])
+        self.v_hat = speed * rng.standard_normal(self.q.shape)
+        self.frozen = self.q + 1e-4 * speed * np.random.default_rng(seed).standard_normal(self.q.shape)
+        self.q_hat = self.q - gamma * speed * rng.standard_normal(self.q.shape)
+        self.delta_psi = rng.uniform(-0.1, 0.1, (N_LANES, star.n_limbs))
+
+    def data(self, lane: int):
+        return self.q_hat[lane], self.v_hat[lane], self.gamma, self.delta_psi[lane], self.frozen[lane]
+
+    def hessian(self, lane: int) -> np.ndarray:
+        q_hat, _, gamma, delta_psi, frozen = self.data(lane)
+        return oracle.incremental_hessian(self.star, self.q[lane], q_hat, gamma, delta_psi, frozen)
+
+    def convex_hessian(self, lane: int) -> np.ndarray:
+        """The Hessian without what may be negative: compression, curvature of the angles, bending's second part."""
+        star, q, dl = self.star, self.q[lane], self.star.edge_length
+        hessian = np.diag(np.repeat(star.masses, 2)) / self.gamma**2
+        hessian -= oracle.drag_jacobian(star, (q - self.q_hat[lane]) / self.gamma) / self.gamma
+        D, edges = star.differences, oracle.edge_vectors(star, q)
+        for D_e, e in zip(D, edges, strict=True):
+            size = np.linalg.norm(e)
+            along = np.outer(e, e) / size**2
+            pull = max(star.EA * (size / dl - 1.0), 0.0) / size
+            hessian += D_e.T @ (star.EA / dl * along + pull * (np.eye(2) - along)) @ D_e
+        for a, b, phi, _ in oracle.hinge_terms(star, q, self.delta_psi[lane]):
+            kappa_q = D[b].T @ oracle.direction_gradient(edges[b]) - D[a].T @ oracle.direction_gradient(edges[a])
+            kappa_q *= (1.0 + np.tan(phi / 2.0) ** 2) / dl
+            hessian += star.EI * dl * np.outer(kappa_q, kappa_q)
+        return hessian
+
+    def run(self, rods: Rods, convex=0.0, q=None):
+        """Phi, decrement and pivot per lane, and the Newton direction, shape (N_LANES, n_nodes, 2)."""
+        star, q = self.star, self.q if q is None else q
+        work = make_work(rods, 1)
+        for rows, nodes in ((work.q, self.frozen), (work.q_hat, self.q_hat), (work.v_hat, self.v_hat)):
+            rows[:] = nodes.reshape(N_LANES, -1).T
+        natural = np.array([oracle.natural_angles(star, d)[-star.n_limbs :] for d in self.delta_psi])
+        work.hub_EI_kappa_bar[:] = star.EI * 2.0 * np.tan(natural.T / 2.0) / star.edge_length
+        result = np.zeros((4, N_LANES))
+        rows = np.ascontiguousarray(q.reshape(N_LANES, -1).T)
+        direction(rods, work, rows, self.gamma, np.full((1, N_LANES), convex), result)
+        return SimpleNamespace(
+            phi=result[0],
+            decrement=result[1],
+            pivot=result[2],
+            largest=result[3],
+            direction=-work.step.T.reshape(N_LANES, -1, 2),
+            moved=work.q.T.reshape(N_LANES, -1, 2) - q,
+        )
+
+
+def random_shape(star: Star, bend: float, stretch: float, rng: np.random.Generator) -> np.ndarray:
+    """Limbs whose hinges turn by about `bend` [rad] and whose edges are strained by about `stretch`."""
+    q = np.zeros((star.n_nodes, 2)) + 0.05 * rng.standard_normal(2)
+    for limb in range(star.n_limbs):
+        angle = 2.0 * np.pi * limb / star.n_limbs
+        for i in range(1, star.nodes_per_limb):
+            angle += bend * rng.standard_normal()
+            length = star.edge_length * (1.0 + stretch * rng.standard_normal())
+            step = length * np.array([np.cos(angle), np.sin(angle)])
+            q[star.node(limb, i)] = q[star.node(limb, i - 1)] + step
+    return q
