@@ -99,17 +99,18 @@ class Planner:
             arrived |= there.any(axis=1)
             first, passed = first[robots, best], passed[robots, best]
             rows = (robots * width * n_commands + best).reshape(-1)
-            states, width = State(*(part[rows] for part in states)), best.shape[1]
+            states, width = states.of_robots(rows), best.shape[1]
         return chosen
 
     def _swim_all(self, states: State) -> State:
         """Every state after every command, shape (states * commands, ...)."""
         n_commands = len(self._commands)
-        n = len(states.time) * n_commands
+        each = np.repeat(np.arange(len(states.time)), n_commands)
+        n = len(each)
         if n not in self._simulators:
             self._simulators[n] = Simulator(self.scene, n, self.threads)
         simulator = self._simulators[n]
-        simulator.set_state(State(*(np.repeat(part, n_commands, axis=0) for part in states)))
+        simulator.set_state(states.of_robots(each))
         simulator.stroke(np.tile(self._commands, (len(states.time), 1)))
         return simulator.get_state()
 

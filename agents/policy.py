@@ -12,7 +12,7 @@ numbers are the logits of the actions. Nothing is unpickled, and neither torch n
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
@@ -24,15 +24,22 @@ import safetensors.numpy
 from numpy.typing import NDArray
 
 import seastar_gym
+from seastar_gym.actuation.actuator import Actuator
+from seastar_gym.actuation.measured import MeasuredCurve
 from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, command_table
-from seastar_gym.envs.observation import OBSERVATION_LAYOUT, observation_size
+from seastar_gym.envs.observation import OBSERVATION_LAYOUT
 from seastar_gym.envs.symmetry import reduce_observations, restore_actions
+from seastar_gym.envs.task import scene_observation_size
+from seastar_gym.morphology.limb import Limb
 from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water
 
 FORMAT = 1
 """Version of what a description says."""
 SHIPPED = Path(__file__).parent / "policies" / "seastar.safetensors"
 """The policy in the box; `python train.py --ship` replaces it."""
+
+ACTUATORS: dict[str, Callable[..., Actuator]] = {kind.__name__: kind for kind in (SmaPulse, MeasuredCurve)}
+"""What a saved policy may have been trained with."""
 
 Weights = dict[str, NDArray[np.float32]]
 
@@ -54,9 +61,9 @@ class Description(NamedTuple):
             "format": FORMAT,
             "seastar_gym": seastar_gym.__version__,
             "observation_layout": OBSERVATION_LAYOUT,
-            "observation_size": observation_size(self.scene.robot.n_nodes),
+            "observation_size": scene_observation_size(self.scene),
             **self._asdict(),
-            "scene": asdict(self.scene),
+            "scene": asdict(self.scene) | {"actuator_kind": type(self.scene.actuator).__name__},
             **more,
         }
         return json.dumps(facts, indent=2, default=str)
@@ -68,15 +75,20 @@ class Description(NamedTuple):
         for name, ours in (("format", FORMAT), ("observation_layout", OBSERVATION_LAYOUT)):
             if facts[name] != ours:
                 raise ValueError(f"its {name} is {facts[name]!r}, this version of seastar_gym knows {ours}")
-        scene = facts["scene"]
+        scene = _as_tuples(facts["scene"])
+        kind = scene.get("actuator_kind", SmaPulse.__name__)
+        if kind not in ACTUATORS:
+            raise ValueError(f"its actuator is a {kind}, and known are {', '.join(ACTUATORS)}")
+        limbs = tuple(Limb(**limb) for limb in scene["robot"].get("limbs", ()))
         return cls(
             actions=facts["actions"],
             symmetry=bool(facts["symmetry"]),
             scene=Scene(
-                robot=Seastar(**scene["robot"]),
+                robot=Seastar(**scene["robot"] | {"limbs": limbs}),
                 fluid=None if scene["fluid"] is None else Water.from_fields(scene["fluid"]),
-                actuator=SmaPulse(**scene["actuator"]),
+                actuator=ACTUATORS[kind](**scene["actuator"]),
                 numerics=Numerics(**scene["numerics"]),
+                limb_strengths=scene.get("limb_strengths", ()),
             ),
             hidden=tuple(facts["hidden"]),
         )
@@ -92,11 +104,18 @@ class Description(NamedTuple):
     def shapes(self) -> dict[str, tuple[int, ...]]:
         """Shape of every array of weights."""
         n, choices = self.distributions
-        widths = [observation_size(self.scene.robot.n_nodes), *self.hidden, n * choices]
+        widths = [scene_observation_size(self.scene), *self.hidden, n * choices]
         shapes: dict[str, tuple[int, ...]] = {}
         for layer, (inputs, outputs) in enumerate(pairwise(widths)):
             shapes |= {f"{layer}.weight": (outputs, inputs), f"{layer}.bias": (outputs,)}
         return shapes
+
+
+def _as_tuples(facts: Any) -> Any:
+    """JSON with tuples for lists, as scenes have them."""
+    if isinstance(facts, dict):
+        return {name: _as_tuples(value) for name, value in facts.items()}
+    return tuple(map(_as_tuples, facts)) if isinstance(facts, list) else facts
 
 
 # --- the policy ------------------------------------------------------------------------------------------------------
@@ -137,7 +156,7 @@ class LearnedPolicy:
     ) -> tuple[NDArray[Any], tuple[NDArray[Any], ...] | None]:
         """Actions for observations of shape (size,) or (n, size); there is no state."""
         observation, robot = np.asarray(observation), self.scene.robot
-        size = observation_size(robot.n_nodes)
+        size = scene_observation_size(self.scene)
         if observation.ndim not in (1, 2) or observation.shape[-1] != size:
             raise ValueError(
                 f"This policy was trained on a robot of {robot.n_limbs} limbs of {robot.nodes_per_limb} nodes: "

@@ -5,9 +5,12 @@ Importing this package registers `SeastarSwim-v0`.
 
 from gymnasium.envs.registration import register
 
+from seastar_gym.actuation.limited import Limited
+from seastar_gym.actuation.measured import MeasuredCurve
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
 from seastar_gym.fluids import GridCurrent, ShearCurrent, UniformCurrent, Vortex
+from seastar_gym.morphology.limb import Limb
 from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water
 from seastar_gym.simulator import Simulator, SolverStatus, State, StrokeReport
 
@@ -15,6 +18,9 @@ __version__ = "0.1.0"
 
 __all__ = [
     "GridCurrent",
+    "Limb",
+    "Limited",
+    "MeasuredCurve",
     "Numerics",
     "RewardWeights",
     "Scene",

@@ -9,17 +9,19 @@ from dataclasses import dataclass, field
 from typing import Literal, cast, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from seastar_gym.actuation.sma import pulse
-from seastar_gym.checks import is_finite_number
+from seastar_gym.actuation.actuator import Actuator, StatefulActuator, check_actuator, is_actuator
+from seastar_gym.actuation.sma import SmaPulse as SmaPulse
+from seastar_gym.checks import is_finite_number, require_numbers
 from seastar_gym.checks import require_choice as require_choice
 from seastar_gym.checks import require_count as require_count
 from seastar_gym.checks import require_number as require_number
 from seastar_gym.der.rods import Limits, Rods
 from seastar_gym.fidelity import cheapest
 from seastar_gym.fluids import Water as Water
-from seastar_gym.morphology.seastar import make_rods, rest_positions
+from seastar_gym.morphology.limb import Limb, LimbShape, as_tuple
+from seastar_gym.morphology.seastar import make_rods, n_hub_hinges, natural_hub_angle, rest_positions, turn_per_hinge
 
 HubHinge = Literal["opening", "turning"]
 SchemeName = Literal["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
@@ -32,12 +34,17 @@ MAX_STEPS = 10_000_000
 
 @dataclass(frozen=True)
 class Seastar:
-    """A robot of straight, equal, uniform limbs around a hub (Fig. 13.4a).
+    """A robot of limbs around a hub (Fig. 13.4a): straight, equal, uniform and evenly spread, but for `limbs`.
 
-    n_limbs: Number of limbs. nodes_per_limb: N, with the hub. limb_length: L [m]. rod_radius: r_0 [m].
-    youngs_modulus: E [Pa]. density: rho_m [kg/m^3].
-    hub_hinge: "opening" measures a hub hinge by the angle psi between its two limbs; "turning" by the interior
-        turning angle pi - psi, as the published codes of the chapter's authors do.
+    n_limbs: Number of limbs. nodes_per_limb: N, with the hub. limb_length: L [m], the unit of tolerances and
+        observations, too. rod_radius: r_0 [m]. youngs_modulus: E [Pa]. density: rho_m [kg/m^3].
+    hub_hinge: "opening" measures a hub hinge by the angle psi between its two limbs, from 0 to pi, a wider gap by what
+        is missing to a full turn; "turning" by the interior turning angle pi - psi, as the published codes of the
+        chapter's authors do.
+    limbs: What limbs have of their own, one Limb each, or () for nothing.
+
+    Two limbs have one hub hinge; straight ones, with hub_hinge="turning", make a plain rod. One limb has none: it
+    swings freely about the hub, and no actuator turns it.
     """
 
     n_limbs: int = 5
@@ -47,15 +54,61 @@ class Seastar:
     youngs_modulus: float = 1e6
     density: float = 1000.0
     hub_hinge: HubHinge = "opening"
+    limbs: tuple[Limb, ...] = ()
 
     def __post_init__(self) -> None:
-        require_count("n_limbs", self.n_limbs, 3, 12)
+        require_count("n_limbs", self.n_limbs, 1, 12)
         require_count("nodes_per_limb", self.nodes_per_limb, 2, 10_000)
         require_number("limb_length", self.limb_length, "m")
         require_number("rod_radius", self.rod_radius, "m")
         require_number("youngs_modulus", self.youngs_modulus, "Pa")
         require_number("density", self.density, "kg/m^3")
         require_choice("hub_hinge", self.hub_hinge, get_args(HubHinge))
+        if self.n_limbs == 1 and self.hub_hinge != "opening":
+            raise ValueError("One limb has no hub hinge that could be measured by its turning angle.")
+        self._check_limbs()
+
+    def _check_limbs(self) -> None:
+        if not isinstance(self.limbs, tuple) or not all(isinstance(limb, Limb) for limb in self.limbs):
+            raise ValueError(f"limbs must be a tuple of Limb, not {self.limbs!r}.")
+        if len(self.limbs) not in (0, self.n_limbs):
+            raise ValueError(f"limbs must be one Limb for each of the {self.n_limbs}, or none, not {len(self.limbs)}.")
+        directions = [limb.direction for limb in self.limbs if limb.direction is not None]
+        if len(directions) not in (0, self.n_limbs):
+            raise ValueError("Either every limb has a direction or none has.")
+        if directions and (directions[0] != 0.0 or (np.diff(directions) <= 0.0).any()):
+            raise ValueError(f"Directions of limbs must begin at 0 and increase [rad], not {directions!r}.")
+        turn = max(abs(turn_per_hinge(shape, self.nodes_per_limb)) for shape in self.limb_shapes())
+        if turn >= math.pi:
+            raise ValueError(
+                f"A natural curvature that turns neighbouring edges by {turn:.4g} rad, not below pi, is too much for "
+                f"{self.nodes_per_limb} nodes per limb."
+            )
+
+    def limb_shapes(self) -> tuple[LimbShape, ...]:
+        """Every limb with nothing left open."""
+        limbs = self.limbs or (Limb(),) * self.n_limbs
+        directions = [limb.direction for limb in limbs if limb.direction is not None]
+        gaps = np.diff(directions, append=2.0 * math.pi).tolist() or [2.0 * math.pi / self.n_limbs] * self.n_limbs
+        return tuple(
+            LimbShape(
+                direction=2.0 * math.pi * j / self.n_limbs if limb.direction is None else limb.direction,
+                gap=gap,
+                length=self.limb_length if limb.length is None else limb.length,
+                radius=as_tuple(self.rod_radius if limb.radius is None else limb.radius),
+                youngs_modulus=as_tuple(self.youngs_modulus if limb.youngs_modulus is None else limb.youngs_modulus),
+                natural_curvature=limb.natural_curvature,
+            )
+            for j, (limb, gap) in enumerate(zip(limbs, gaps, strict=True))
+        )
+
+    @property
+    def is_symmetric(self) -> bool:
+        """Whether a turn by one limb and a mirror at limb 1 leave the robot as it is."""
+        shapes = self.limb_shapes()
+        alike = len({shape._replace(direction=0.0, gap=0.0) for shape in shapes}) == 1
+        gaps = np.array([shape.gap for shape in shapes])
+        return alike and shapes[0].natural_curvature == 0.0 and float(np.ptp(gaps)) < 1e-12
 
     @property
     def n_nodes(self) -> int:
@@ -64,45 +117,17 @@ class Seastar:
 
     @property
     def edge_length(self) -> float:
-        """Natural length of an edge [m]."""
+        """Natural length of an edge of a limb of length L [m]."""
         return self.limb_length / (self.nodes_per_limb - 1)
 
     @property
     def opening_angle(self) -> float:
-        """Angle between neighbouring limbs at rest [rad]."""
-        return 2.0 * math.pi / self.n_limbs
+        """Smallest angle between neighbouring limbs at rest [rad]."""
+        return min(shape.gap for shape in self.limb_shapes())
 
     def nodes(self) -> NDArray[np.float64]:
         """Node positions at rest [m], shape (n_nodes, 2): hub, {1,1}..{1,N-1}, {2,1}.. ; limb 1 along +x."""
-        return rest_positions(self.n_limbs, self.nodes_per_limb, self.limb_length)
-
-
-@dataclass(frozen=True)
-class SmaPulse:
-    """The actuator of Fig. 13.5b. peak_angle [rad], heating_time: Delta t_1 [s], cooling_time: Delta t_2 [s]."""
-
-    peak_angle: float = math.pi / 5
-    heating_time: float = 0.1
-    cooling_time: float = 0.9
-
-    def __post_init__(self) -> None:
-        require_number("peak_angle", self.peak_angle, "rad", zero_allowed=True)
-        require_number("heating_time", self.heating_time, "s")
-        require_number("cooling_time", self.cooling_time, "s")
-
-    @property
-    def period(self) -> float:
-        """Delta t_0 [s], the length of a stroke."""
-        return self.heating_time + self.cooling_time
-
-    @property
-    def corners(self) -> tuple[float, float, float]:
-        """Times within a stroke [s] that no time step may straddle."""
-        return 0.0, self.heating_time, self.period
-
-    def delta_psi(self, t: ArrayLike) -> NDArray[np.float64]:
-        """Rotation of a limb with command 1 at time t [s] of a stroke [rad]; t of any shape."""
-        return self.peak_angle * pulse(t, self.heating_time, self.cooling_time)
+        return rest_positions(self.limb_shapes(), self.nodes_per_limb)
 
 
 @dataclass(frozen=True)
@@ -175,27 +200,39 @@ class Scene:
 
     held_nodes: Indices of nodes that stay where they are; hub and root node held clamp a limb.
     loads: Dead loads on nodes, (node, F_x, F_y) [N] each.
+    limb_strengths: Share of its rotation that every limb still makes, from 0 (failed) to 1; () for all of it.
     """
 
     robot: Seastar = field(default_factory=Seastar)
     fluid: Water | None = field(default_factory=Water)
-    actuator: SmaPulse = field(default_factory=SmaPulse)
+    actuator: Actuator = field(default_factory=SmaPulse)
     numerics: Numerics = field(default_factory=Numerics)
     held_nodes: tuple[int, ...] = ()
     loads: tuple[tuple[int, float, float], ...] = ()
+    limb_strengths: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         for name, value, kinds in (
             ("robot", self.robot, Seastar),
             ("fluid", self.fluid, Water | None),
-            ("actuator", self.actuator, SmaPulse),
             ("numerics", self.numerics, Numerics),
         ):
             if not isinstance(value, kinds):
                 raise ValueError(f"Scene.{name} must be a {kinds}, not {value!r}.")
+        if not is_actuator(self.actuator):
+            raise ValueError(f"Scene.actuator must be an Actuator such as SmaPulse(), not {self.actuator!r}.")
+        check_actuator(self.actuator)
         self._check_hub_hinges()
+        self._check_strengths()
         self._check_holds_and_loads()
         self._check_coefficients()
+
+    def _check_strengths(self) -> None:
+        require_numbers("limb_strengths", self.limb_strengths, "1")
+        if len(self.limb_strengths) not in (0, self.robot.n_limbs):
+            raise ValueError(f"limb_strengths must be one number per limb, not {self.limb_strengths!r}.")
+        if not all(0.0 <= strength <= 1.0 for strength in self.limb_strengths):
+            raise ValueError(f"limb_strengths must be from 0 to 1, not {self.limb_strengths!r}.")
 
     def _check_holds_and_loads(self) -> None:
         if not isinstance(self.held_nodes, tuple) or not isinstance(self.loads, tuple):
@@ -215,8 +252,11 @@ class Scene:
             )
         try:
             with np.errstate(all="ignore"):
-                rods, squared_edge = self.rods(), np.array(self.robot.edge_length**2)
-            coefficients = (rods.EA_over_l, rods.l_over_EA, rods.EI_over_dl, rods.dl_over_EI, rods.mass, squared_edge)
+                rods = self.rods()
+                squared_edge = np.array(rods.shortest_edge**2)
+            missing = (rods.nodes_per_limb - 1) * np.arange(n_hub_hinges(rods.n_limbs), rods.n_limbs)
+            bending = (np.delete(stiffness, missing) for stiffness in (rods.EI_over_dl, rods.dl_over_EI))
+            coefficients = (rods.EA_over_l, rods.l_over_EA, *bending, rods.mass, squared_edge)
             sound = all(np.isfinite(one).all() and (one > 0.0).all() for one in coefficients)
         except (OverflowError, ZeroDivisionError):
             sound = False
@@ -227,18 +267,28 @@ class Scene:
             )
 
     def _check_hub_hinges(self) -> None:
-        """Neighbours turned apart open their hub hinge by two peak angles; at pi its curvature is infinite."""
-        rest, peak = self.robot.opening_angle, self.actuator.peak_angle
-        limit = 0.5 * (math.pi - rest)
-        if peak >= limit:
+        """Neighbours turned apart turn their hub hinge by two peak angles; at pi its curvature is infinite."""
+        robot, peak = self.robot, self.actuator.peak_angle
+        hinges = robot.limb_shapes()[: n_hub_hinges(robot.n_limbs)]
+        if not hinges:
+            if peak > 0.0:
+                raise ValueError("One limb has no hub hinge for an actuator to turn: use SmaPulse(peak_angle=0.0).")
+            return
+        widest = max(abs(natural_hub_angle(hinge.gap, robot.hub_hinge)) for hinge in hinges)
+        limit = 0.5 * (math.pi - widest)
+        if robot.hub_hinge == "turning":
+            # A stroke that remembers nothing comes to the limit for some commands only: the simulator refuses those.
+            limit *= 1.0 - 1e-12 if isinstance(self.actuator, StatefulActuator) else 1.0 + 1e-12
+            if peak > limit:
+                raise ValueError(
+                    f'With hub_hinge="turning" the natural opening angle must stay above zero: for {robot.n_limbs} '
+                    f"limbs so spread the peak angle must be at most {limit:.4g} rad, not {peak:.4g} rad."
+                )
+        elif peak >= limit:
             raise ValueError(
                 f"A peak angle of {peak:.4g} rad lets the natural angle of a hub hinge reach pi, where its curvature "
-                f"is infinite: for {self.robot.n_limbs} limbs the peak angle must stay below {limit:.4g} rad."
-            )
-        if self.robot.hub_hinge == "turning" and 2.0 * peak > rest * (1.0 + 1e-12):
-            raise ValueError(
-                f'With hub_hinge="turning" the natural opening angle must stay above zero: for {self.robot.n_limbs} '
-                f"limbs the peak angle must be at most {0.5 * rest:.4g} rad, not {peak:.4g} rad."
+                f"is infinite: for {robot.n_limbs} limbs so spread the peak angle must stay below {limit:.4g} rad"
+                + (', or use hub_hinge="turning".' if robot.n_limbs == 2 else ".")
             )
 
     def limits(self) -> Limits:
@@ -260,11 +310,8 @@ class Scene:
         """The scene's coefficients for the kernels, see der/rods.py."""
         robot, fluid = self.robot, self.fluid
         return make_rods(
-            n_limbs=robot.n_limbs,
+            limbs=robot.limb_shapes(),
             nodes_per_limb=robot.nodes_per_limb,
-            limb_length=robot.limb_length,
-            rod_radius=robot.rod_radius,
-            youngs_modulus=robot.youngs_modulus,
             density=robot.density,
             hub_hinge=robot.hub_hinge,
             fluid_density=0.0 if fluid is None else fluid.density,

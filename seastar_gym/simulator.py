@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.actuation.drive import Drive
 from seastar_gym.actuation.schedule import step_times
 from seastar_gym.der.energy import energies
 from seastar_gym.der.lanes import N_LANES
@@ -75,17 +76,23 @@ class State(NamedTuple):
     """Everything that a simulator's future depends on, besides its commands.
 
     positions, velocities: [m], [m/s], shape (n_robots, n_nodes, 2). time: [s], shape (n_robots,).
+    actuators: What actuators remember, shape (n_robots, n_limbs, n_state) with n_state = 0 for most; None: at rest.
     """
 
     positions: Floats
     velocities: Floats
     time: Floats
+    actuators: Floats | None = None
+
+    def of_robots(self, robots: NDArray[np.intp] | NDArray[np.bool_] | slice) -> "State":
+        """The state of some of the robots, in their order."""
+        return State(*(None if part is None else part[robots] for part in self))  # type: ignore[arg-type]
 
 
 PARTS_PER_THREAD = 8
 MAX_ROBOTS, MAX_THREADS = 100_000_000, 4096
-ROW_ARRAYS = ("q", "v", "_a", "_commands", "_failed", "_report")
-CLOCK = ("_start_time", "_strokes", "_since_stroke", "_delta_psi_end")
+ROW_ARRAYS = ("q", "v", "_a", "_commands", "_rotations", "_failed", "_report")
+CLOCK = ("_start_time", "_strokes", "_since_stroke")
 """What a simulator is made of besides its arguments: rows of numbers per robot, and its clock."""
 
 
@@ -116,22 +123,24 @@ class Simulator:
         self._scheme = SCHEMES[scene.numerics.scheme]
         self._limits = scene.limits()
         self._times = step_times(scene.actuator.corners, scene.numerics.step)
-        self._shape = np.asarray(scene.actuator.delta_psi(self._times))
+        self._shape = np.zeros_like(self._times)
         n_limbs, n_rows = scene.robot.n_limbs, 2 * scene.robot.n_nodes
         self.q = aligned_rows(n_groups, n_rows, N_LANES)
         self.v = aligned_rows(n_groups, n_rows, N_LANES)
         self.q[:] = scene.robot.nodes().reshape(-1, 1)
         self._a = aligned_rows(n_groups, (n_rows + 1) * self._scheme.n_stages + 2, N_LANES)
-        self._commands = np.zeros((n_groups, n_limbs, N_LANES))
+        self._drive = Drive(scene.actuator, self.n_robots, n_limbs, self._times)
+        self._commands = np.zeros((n_groups, n_limbs, N_LANES))  # share of _shape that every limb follows
+        self._rotations = np.zeros((n_groups, n_limbs, N_LANES))  # of the limbs by their actuators, now [rad]
         self._failed = np.zeros((n_groups, 1, N_LANES))
         self._report = np.zeros((n_groups, len(REPORT_ROWS), N_LANES))
         self._start_time = np.zeros(self.n_robots)
         self._strokes = np.zeros(self.n_robots, dtype=np.int64)
         self._since_stroke = np.zeros(self.n_robots)
-        self._delta_psi_end = 0.0  # per unit of command, now [rad]
         self._last_hub = self.hub_position()
         self._pool: tuple[int, ThreadPoolExecutor] | None = None
         self.memory = [self._make_memory() for _ in range(self.threads)]
+        self.set_limb_strengths(scene.limb_strengths or 1.0)
 
     def _make_memory(self) -> tuple[Work, Actuation]:
         robot = self.scene.robot
@@ -148,13 +157,16 @@ class Simulator:
         # By robot, not by lane: whoever reads it may have another lane width.
         rows = {name: self._read(getattr(self, name)) for name in ROW_ARRAYS}
         numbers = {name: getattr(self, name) for name in CLOCK}
-        return {"arguments": (self.scene, self.n_robots, self.threads), "rows": rows, "clock": numbers}
+        drive = {"state": self._drive.state, "strengths": self._drive.strengths}
+        arguments = (self.scene, self.n_robots, self.threads)
+        return {"arguments": arguments, "rows": rows, "clock": numbers, "drive": drive}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__init__(*state["arguments"])  # type: ignore[misc]
         for name, values in state["rows"].items():
             self._write(getattr(self, name), values)
         self.__dict__.update(state["clock"])
+        self._drive.__dict__.update(state["drive"])
         self._last_hub = self.hub_position()
 
     # --- state -------------------------------------------------------------------------------------------------
@@ -182,8 +194,10 @@ class Simulator:
             self.q[group, :, lane] = turned.reshape(-1)
             self.v[group, :, lane] = 0.0
             self._commands[group, :, lane] = 0.0
+            self._rotations[group, :, lane] = 0.0
             self._failed[group, 0, lane] = 0.0
             self._last_hub[robot] = 0.0
+        self._drive.rest(chosen)
         self._set_time(chosen, 0.0)
 
     def _set_time(self, chosen: NDArray[np.bool_] | slice, time: Floats | float) -> None:
@@ -193,15 +207,18 @@ class Simulator:
 
     def get_state(self) -> State:
         """A copy of the state; `set_state` continues from it to the last bit (at the ends of strokes)."""
-        return State(self.positions, self.velocities, self.time)
+        return State(self.positions, self.velocities, self.time, self._drive.state.copy())
 
     def set_state(self, state: State) -> None:
         """Put all robots into a state; robots that had failed are well again."""
-        if not isinstance(state, tuple | list) or len(state) != len(State._fields):
+        if not isinstance(state, tuple | list) or len(state) not in (3, 4):
             raise ValueError(f"A State of {', '.join(State._fields)} is needed, not {type(state).__name__}.")
+        state = State(*state)
+        at_rest = np.broadcast_to(self._drive.at_rest, self._drive.state.shape)
+        state = state._replace(actuators=at_rest if state.actuators is None else state.actuators)
         shape = (self.n_robots, self.scene.robot.n_nodes, 2)
         arrays = []
-        for name, value, wanted in zip(State._fields, state, (shape, shape, shape[:1]), strict=True):
+        for name, value, wanted in zip(State._fields, state, (shape, shape, shape[:1], at_rest.shape), strict=True):
             array = _as_floats(f"State.{name}", value)
             if array.shape != wanted:
                 raise ValueError(f"State.{name} must have shape {wanted}, not {array.shape}.")
@@ -214,6 +231,30 @@ class Simulator:
         self._failed[:] = 0.0
         self._last_hub = self.hub_position()
         self._set_time(slice(None), arrays[2])
+        self._drive.state = arrays[3]
+        self._write(self._rotations, self._drive.rotations())
+
+    @property
+    def actuators(self) -> Floats:
+        """What the actuators remember, shape (n_robots, n_limbs, n_state); see State."""
+        return self._drive.state.copy()
+
+    def observe_actuators(self) -> Floats:
+        """What the actuators remember as numbers of order one, shape (n_robots, k), limb after limb; k = 0 for most."""
+        return self._drive.observe()
+
+    @property
+    def limb_strengths(self) -> Floats:
+        """Share of its rotation that every limb still makes, shape (n_robots, n_limbs), a copy."""
+        return self._drive.strengths.copy()
+
+    def set_limb_strengths(self, strengths: ArrayLike) -> None:
+        """Weaken limbs from the next stroke on: from 0 (failed) to 1, shape (n_limbs,) or (n_robots, n_limbs)."""
+        array = _as_floats("limb_strengths", strengths)
+        wanted = self._drive.strengths.shape
+        if array.shape not in ((), wanted[1:], wanted) or not ((array >= 0.0) & (array <= 1.0)).all():
+            raise ValueError(f"limb_strengths must be numbers from 0 to 1 of shape {wanted[1:]} or {wanted}.")
+        self._drive.strengths = np.broadcast_to(array, wanted).copy()
 
     def to_rows(self, values: Floats) -> Floats:
         """Numbers of every robot, shape (n_robots, k), as rows for kernels, shape (n_groups, k, N_LANES)."""
@@ -275,7 +316,7 @@ class Simulator:
         work, actuation = self.memory[0]
         both = np.zeros((2, len(self.q), 1, N_LANES))
         for group in range(len(self.q)):
-            actuation.delta_psi_end[:] = self._delta_psi_end * self._commands[group]
+            actuation.delta_psi_end[:] = self._rotations[group]
             energies(self._rods, work, actuation, self.q[group], self.v[group], both[0, group], both[1, group])
         return self._read(both[0])[:, 0], self._read(both[1])[:, 0]
 
@@ -284,7 +325,7 @@ class Simulator:
     def stroke(self, commands: ArrayLike) -> StrokeReport:
         """Advance all robots by one actuation period.
 
-        commands: Share of the peak angle per limb, in [-1, 1], + is anti-clockwise, shape (n_robots, n_limbs).
+        commands: Share of the actuator's curve per limb, in [-1, 1], + is anti-clockwise, shape (n_robots, n_limbs).
         """
         self._begin_stroke(commands)
         self._advance(0, len(self._times) - 1)
@@ -304,17 +345,25 @@ class Simulator:
             self._advance(begin, end)
             begin = end
             self._since_stroke[:] = self._read(self._report)[:, REPORT_ROWS.index("covered")]
-            self._delta_psi_end = self._shape[end]
+            self._drive.advance(end)
+            self._rotations[:] = self._commands * (self._shape[end] if self._shape.ndim == 1 else self._shape[:, end])
             yield float(self._times[end])
         return self._end_stroke()
 
     def _begin_stroke(self, commands: ArrayLike) -> None:
-        self._write(self._commands, self._checked_commands(commands))
+        peaks, shape = self._drive.begin_stroke(self._checked_commands(commands))
+        self._write(self._commands, peaks)
+        self._shape = shape if shape.ndim == 1 else self._shape_rows(shape)
         self._start_time += self._since_stroke  # of a stroke that failed or was left half-way
         self._since_stroke[:] = 0.0
         self._a[:] = 0.0  # a stroke depends on the state at its beginning only
         self._report[:] = 0.0
         self._report[:, SMALLEST_HUB_T] = np.inf
+
+    def _shape_rows(self, shape: Floats) -> Floats:
+        """Rotations at times, per robot and limb, as rows for the kernels: (n_groups, n_times, n_limbs, N_LANES)."""
+        rows = self.to_rows(shape.transpose(1, 0, 2).reshape(self.n_robots, -1))
+        return rows.reshape(len(self.q), *shape[:, 0].shape, N_LANES)
 
     def _checked_commands(self, commands: ArrayLike) -> Floats:
         array = _as_floats("commands", commands)
@@ -332,8 +381,10 @@ class Simulator:
         return array
 
     def _check_turning_hub(self, commands: Floats) -> None:
+        commands = self.limb_strengths * commands
         turn = self.scene.actuator.peak_angle * (np.roll(commands, -1, axis=1) - commands)
-        closed = self.scene.robot.opening_angle + turn < 1e-9
+        angle = np.array([limb.gap for limb in self.scene.robot.limb_shapes()]) + turn
+        closed = np.minimum(angle, 2.0 * np.pi - angle) < 1e-9
         if closed.any():
             robot, limb = np.argwhere(closed)[0]
             raise ValueError(
@@ -342,7 +393,7 @@ class Simulator:
             )
 
     def _advance(self, begin: int, end: int) -> None:
-        times, shape = self._times[begin : end + 1], self._shape[begin : end + 1]
+        times = self._times[begin : end + 1]
 
         # More parts than threads, and whoever is ready takes the next: another process may hold up one of the threads.
         n_parts = 1 if self.threads == 1 else min(len(self.q), PARTS_PER_THREAD * self.threads)
@@ -352,6 +403,9 @@ class Simulator:
         def run(thread: int) -> None:
             work, actuation = self.memory[thread]
             for part in parts:
+                shape = self._shape[begin : end + 1]
+                if self._shape.ndim > 1:
+                    shape = np.ascontiguousarray(self._shape[part, begin : end + 1])
                 advance(
                     self._rods, work, self._scheme, SCHEMES["implicit-euler"], actuation, self.q[part], self.v[part],
                     self._a[part], self._commands[part], times, shape, self._failed[part], self._report[part],
@@ -372,7 +426,8 @@ class Simulator:
         self._last_hub = self.hub_position()
         self._strokes += ~failed
         self._since_stroke = np.where(failed, rows["covered"], 0.0)
-        self._delta_psi_end = 0.0
+        self._drive.advance(len(self._times) - 1)
+        self._write(self._rotations, self._drive.rotations())
         counts = {name: rows[name].astype(np.int64) for name in COUNTS}
         angle = 2.0 * np.arctan(rows["smallest_hub_t"])
         if self.scene.robot.hub_hinge == "turning":

@@ -59,6 +59,41 @@ class Star:
         """Bending stiffness [N m2] (13.3), with I = pi r0^4 / 4."""
         return self.youngs_modulus * np.pi * self.rod_radius**4 / 4.0
 
+    @property
+    def n_hub_hinges(self) -> int:
+        """One per gap between limbs; two limbs share one."""
+        return {1: 0, 2: 1}.get(self.n_limbs, self.n_limbs)
+
+    @cached_property
+    def edge_lengths(self) -> Array:
+        """Undeformed length of every edge [m]."""
+        return np.full(len(self.edges), self.edge_length)
+
+    @cached_property
+    def edge_EA(self) -> Array:
+        """Axial stiffness of every edge [N]."""
+        return np.full(len(self.edges), self.EA)
+
+    @cached_property
+    def hinge_EI(self) -> Array:
+        """Bending stiffness of every hinge [N m2]."""
+        return np.full(len(self.hinges), self.EI)
+
+    @cached_property
+    def hinge_dl(self) -> Array:
+        """Voronoi length of every hinge [m]."""
+        return np.full(len(self.hinges), self.edge_length)
+
+    @cached_property
+    def gaps(self) -> Array:
+        """Angle from every limb to the next at rest [rad], shape (n_limbs,)."""
+        return np.full(self.n_limbs, 2.0 * np.pi / self.n_limbs)
+
+    @cached_property
+    def inner_angles(self) -> Array:
+        """Natural angle of the hinges within the limbs [rad]."""
+        return np.zeros(len(self.hinges) - self.n_hub_hinges)
+
     def node(self, limb: int, i: int) -> int:
         """Row of node {limb, i}, limb counted from 0; i = 0 is the hub."""
         return 0 if i == 0 else limb * (self.nodes_per_limb - 1) + i
@@ -89,7 +124,7 @@ class Star:
             for i in range(self.nodes_per_limb - 2)
         ]
         sign = {"opening": 1, "turning": -1}[self.hub_hinge]
-        hub = [(self.edge(j, 0), self.edge((j + 1) % self.n_limbs, 0), sign) for j in range(self.n_limbs)]
+        hub = [(self.edge(j, 0), self.edge((j + 1) % self.n_limbs, 0), sign) for j in range(self.n_hub_hinges)]
         return inner + hub
 
     @cached_property
@@ -106,9 +141,9 @@ class Star:
     def voronoi_lengths(self) -> Array:
         """Length that belongs to each node [m], shape (n_nodes,): half of every edge it ends."""
         lengths = np.zeros(self.n_nodes)
-        for tail, head in self.edges:
-            lengths[tail] += self.edge_length / 2.0
-            lengths[head] += self.edge_length / 2.0
+        for (tail, head), length in zip(self.edges, self.edge_lengths, strict=True):
+            lengths[tail] += length / 2.0
+            lengths[head] += length / 2.0
         return lengths
 
     @cached_property
@@ -140,6 +175,95 @@ class Star:
             D[:, 2 * head : 2 * head + 2] = np.eye(2)
             matrices.append(D)
         return matrices
+
+
+@dataclass(frozen=True)
+class Shaped(Star):
+    """A star whose limbs differ; per limb its direction [rad], length [m], radius [m] and Young's modulus [Pa] at the
+    hub and at the tip, linear in between, and natural curvature [1/m]."""
+
+    directions: tuple[float, ...] = ()
+    lengths: tuple[float, ...] = ()
+    radii: tuple[tuple[float, float], ...] = ()
+    moduli: tuple[tuple[float, float], ...] = ()
+    curvatures: tuple[float, ...] = ()
+
+    def radius(self, limb: int, i: float) -> float:
+        """Radius [m] of a limb, i edges from the hub."""
+        return self._between(self.radii[limb], i)
+
+    def modulus(self, limb: int, i: float) -> float:
+        """Young's modulus [Pa] of a limb, i edges from the hub."""
+        return self._between(self.moduli[limb], i)
+
+    def _between(self, ends: tuple[float, float], i: float) -> float:
+        return ends[0] + (ends[1] - ends[0]) * i / (self.nodes_per_limb - 1)
+
+    @property
+    def _limb_edges(self) -> list[tuple[int, int]]:
+        return [(limb, i) for limb in range(self.n_limbs) for i in range(self.nodes_per_limb - 1)]
+
+    @cached_property
+    def edge_lengths(self) -> Array:
+        return np.array([self.lengths[limb] / (self.nodes_per_limb - 1) for limb, _ in self._limb_edges])
+
+    @cached_property
+    def edge_EA(self) -> Array:
+        return np.array(
+            [self.modulus(limb, i + 0.5) * np.pi * self.radius(limb, i + 0.5) ** 2 for limb, i in self._limb_edges]
+        )
+
+    def _EI(self, limb: int, i: int) -> float:
+        return self.modulus(limb, i) * np.pi * self.radius(limb, i) ** 4 / 4.0
+
+    @cached_property
+    def hinge_dl(self) -> Array:
+        return np.array([0.5 * (self.edge_lengths[a] + self.edge_lengths[b]) for a, b, _ in self.hinges])
+
+    @cached_property
+    def hinge_EI(self) -> Array:
+        """At a hub hinge the compliances of half a root edge of each limb add up."""
+        stiffness = []
+        for (a, b, _), dl in zip(self.hinges, self.hinge_dl, strict=True):
+            (limb_a, i_a), (limb_b, i_b) = self._limb_edges[a], self._limb_edges[b]
+            at_a, at_b = (limb_b, i_b) if i_b > 0 else (limb_a, i_a), (limb_b, i_b)
+            halves = 0.5 * self.edge_lengths[a] / self._EI(*at_a) + 0.5 * self.edge_lengths[b] / self._EI(*at_b)
+            stiffness.append(dl / halves)
+        return np.array(stiffness)
+
+    @cached_property
+    def gaps(self) -> Array:
+        return np.diff([*self.directions, 2.0 * np.pi])
+
+    @cached_property
+    def inner_angles(self) -> Array:
+        angles = [k * L / (self.nodes_per_limb - 1) for k, L in zip(self.curvatures, self.lengths, strict=True)]
+        return np.repeat(angles, self.nodes_per_limb - 2)
+
+    @cached_property
+    def rest(self) -> Array:
+        q = np.zeros((self.n_nodes, 2))
+        for limb, i in self._limb_edges:
+            angle = self.directions[limb] + i * self.curvatures[limb] * self.lengths[limb] / (self.nodes_per_limb - 1)
+            edge = self.edge_lengths[self.edge(limb, i)] * np.array([np.cos(angle), np.sin(angle)])
+            q[self.node(limb, i + 1)] = q[self.node(limb, i)] + edge
+        return q
+
+    def _per_node(self, value: Any) -> Array:
+        """What each half edge brings to its node, by the profile at that node."""
+        total = np.zeros(self.n_nodes)
+        for (limb, i), (tail, head), length in zip(self._limb_edges, self.edges, self.edge_lengths, strict=True):
+            total[tail] += 0.5 * length * value(self.radius(limb, i))
+            total[head] += 0.5 * length * value(self.radius(limb, i + 1))
+        return total
+
+    @cached_property
+    def masses(self) -> Array:
+        return self._per_node(lambda r: self.density * np.pi * r**2)
+
+    @cached_property
+    def drag(self) -> Array:
+        return self._per_node(lambda r: 0.5 * self.fluid_density * self.drag_coefficient * 2.0 * r)
 
 
 def stretching_energy(e: Array, EA: float, length: float) -> float:
@@ -190,9 +314,9 @@ def natural_angles(star: Star, delta_psi: ArrayLike) -> Array:
     hinge is measured by its turning angle.
     """
     delta = np.asarray(delta_psi, dtype=float)
-    psi_bar = 2.0 * np.pi / star.n_limbs + np.roll(delta, -1) - delta
+    psi_bar = (star.gaps + np.roll(delta, -1) - delta)[: star.n_hub_hinges]
     hub = psi_bar if star.hub_hinge == "opening" else psi_bar - np.pi
-    return np.concatenate([np.zeros(len(star.hinges) - star.n_limbs), hub])
+    return np.concatenate([star.inner_angles, hub])
 
 
 def edge_vectors(star: Star, q: Array) -> list[Array]:
@@ -203,44 +327,46 @@ def edge_vectors(star: Star, q: Array) -> list[Array]:
 def hinge_terms(star: Star, q: Array, delta_psi: ArrayLike) -> Iterator[tuple[int, int, float, float]]:
     """For every hinge: edge_a, edge_b, phi [rad] and kappa - kappa_bar [1/m]."""
     e = edge_vectors(star, q)
-    for (a, b, sign), phi_bar in zip(star.hinges, natural_angles(star, delta_psi), strict=True):
+    for (a, b, sign), phi_bar, dl in zip(star.hinges, natural_angles(star, delta_psi), star.hinge_dl, strict=True):
         phi = turning_angle(sign * e[a], e[b])
-        yield a, b, phi, curvature(phi, star.edge_length) - curvature(phi_bar, star.edge_length)
+        yield a, b, phi, curvature(phi, dl) - curvature(phi_bar, dl)
 
 
 def elastic_energy(star: Star, q: Array, delta_psi: ArrayLike) -> float:
     """Total elastic energy [J] (13.14), each hub hinge with the length dl that (13.13) lacks."""
-    stretching = sum(stretching_energy(e, star.EA, star.edge_length) for e in edge_vectors(star, q))
-    bending = sum(0.5 * star.EI * bent**2 * star.edge_length for _, _, _, bent in hinge_terms(star, q, delta_psi))
-    return stretching + bending
+    stretching = sum(map(stretching_energy, edge_vectors(star, q), star.edge_EA, star.edge_lengths))
+    hinges = zip(hinge_terms(star, q, delta_psi), star.hinge_EI, star.hinge_dl, strict=True)
+    return float(stretching + sum(0.5 * EI * bent**2 * dl for (*_, bent), EI, dl in hinges))
 
 
 def elastic_gradient(star: Star, q: Array, delta_psi: ArrayLike) -> Array:
     """Gradient of (13.14) [N], shape (n_nodes, 2): minus the internal force (13.6)."""
-    D, e, dl = star.differences, edge_vectors(star, q), star.edge_length
+    D, e = star.differences, edge_vectors(star, q)
     gradient = np.zeros(2 * star.n_nodes)
     for i in range(len(e)):
-        gradient += D[i].T @ stretching_gradient(e[i], star.EA, dl)
-    for a, b, phi, bent in hinge_terms(star, q, delta_psi):
+        gradient += D[i].T @ stretching_gradient(e[i], star.edge_EA[i], star.edge_lengths[i])
+    hinges = zip(hinge_terms(star, q, delta_psi), star.hinge_EI, star.hinge_dl, strict=True)
+    for (a, b, phi, bent), EI, dl in hinges:
         kappa_phi = (1.0 + np.tan(phi / 2.0) ** 2) / dl
         phi_q = D[b].T @ direction_gradient(e[b]) - D[a].T @ direction_gradient(e[a])
-        gradient += star.EI * dl * bent * kappa_phi * phi_q
+        gradient += EI * dl * bent * kappa_phi * phi_q
     return gradient.reshape(-1, 2)
 
 
 def elastic_hessian(star: Star, q: Array, delta_psi: ArrayLike) -> Array:
     """Hessian of (13.14) [N/m], shape (2 n_nodes, 2 n_nodes): the second term of (13.12)."""
-    D, e, dl = star.differences, edge_vectors(star, q), star.edge_length
+    D, e = star.differences, edge_vectors(star, q)
     hessian = np.zeros((2 * star.n_nodes, 2 * star.n_nodes))
     for i in range(len(e)):
-        hessian += D[i].T @ stretching_hessian(e[i], star.EA, dl) @ D[i]
-    for a, b, phi, bent in hinge_terms(star, q, delta_psi):
+        hessian += D[i].T @ stretching_hessian(e[i], star.edge_EA[i], star.edge_lengths[i]) @ D[i]
+    hinges = zip(hinge_terms(star, q, delta_psi), star.hinge_EI, star.hinge_dl, strict=True)
+    for (a, b, phi, bent), EI, dl in hinges:
         t = np.tan(phi / 2.0)
         kappa_phi, kappa_phi_phi = (1.0 + t**2) / dl, t * (1.0 + t**2) / dl
         phi_q = D[b].T @ direction_gradient(e[b]) - D[a].T @ direction_gradient(e[a])
         phi_qq = D[b].T @ direction_hessian(e[b]) @ D[b] - D[a].T @ direction_hessian(e[a]) @ D[a]
-        hessian += star.EI * dl * (kappa_phi**2 + bent * kappa_phi_phi) * np.outer(phi_q, phi_q)
-        hessian += star.EI * dl * bent * kappa_phi * phi_qq
+        hessian += EI * dl * (kappa_phi**2 + bent * kappa_phi_phi) * np.outer(phi_q, phi_q)
+        hessian += EI * dl * bent * kappa_phi * phi_qq
     return hessian
 
 

@@ -189,7 +189,7 @@ def test_robots_in_trouble_move_to_the_same_bits_alone_in_a_batch_and_on_two_thr
     state = batches[0].get_state()
     singles = [Simulator(scene) for _ in range(n_robots)]
     for k, single in enumerate(singles):
-        single.set_state(State(*(field[k : k + 1] for field in state)))
+        single.set_state(state.of_robots(slice(k, k + 1)))
     halvings = 0
     for command in random_commands(n_robots, 2):
         reports = [batch.stroke(command) for batch in batches]

@@ -34,7 +34,7 @@ def refused(*words: str):
 
 def test_defaults_are_the_chapters_values():
     robot, water, actuator = Seastar(), Water(), SmaPulse()
-    assert dataclasses.astuple(robot) == (5, 10, 0.1, 1.6e-3, 1e6, 1000.0, "opening")
+    assert dataclasses.astuple(robot) == (5, 10, 0.1, 1.6e-3, 1e6, 1000.0, "opening", ())
     assert dataclasses.astuple(water) == (1000.0, 1.0, None, None)
     assert dataclasses.astuple(actuator) == (math.pi / 5, 0.1, 0.9)
     assert Numerics().scheme == "implicit-euler"
@@ -151,8 +151,8 @@ def test_quantities_that_may_be_zero_are_not_negative(kind, name, value):
         kind(**{name: value})
 
 
-@pytest.mark.parametrize("value", [2, 13, 0, -5, 5.0, "5", None, True, math.nan], ids=repr)
-def test_a_seastar_has_three_to_twelve_limbs(value):
+@pytest.mark.parametrize("value", [13, 0, -5, 5.0, "5", None, True, math.nan], ids=repr)
+def test_a_seastar_has_one_to_twelve_limbs(value):
     with refused("n_limbs", "whole number", repr(value)):
         Seastar(n_limbs=value)
 

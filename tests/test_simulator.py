@@ -50,7 +50,7 @@ def assert_same_bits(one: State, other: State) -> None:
 
 
 def robots(state: State, chosen) -> State:
-    return State(*(field[chosen] for field in state))
+    return state.of_robots(chosen)
 
 
 @contextmanager

@@ -1,7 +1,12 @@
 """The shape memory alloy actuator of Fig. 13.5b: a linear ramp up while heated, a linear ramp down while cooling."""
 
+import math
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from seastar_gym.checks import require_number
 
 
 def pulse(t: ArrayLike, heating_time: float, cooling_time: float) -> NDArray[np.float64]:
@@ -13,3 +18,31 @@ def pulse(t: ArrayLike, heating_time: float, cooling_time: float) -> NDArray[np.
     rising = t / heating_time
     falling = (heating_time + cooling_time - t) / cooling_time
     return np.clip(np.minimum(rising, falling), 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class SmaPulse:
+    """The actuator of Fig. 13.5b. peak_angle [rad], heating_time: Delta t_1 [s], cooling_time: Delta t_2 [s]."""
+
+    peak_angle: float = math.pi / 5
+    heating_time: float = 0.1
+    cooling_time: float = 0.9
+
+    def __post_init__(self) -> None:
+        require_number("peak_angle", self.peak_angle, "rad", zero_allowed=True)
+        require_number("heating_time", self.heating_time, "s")
+        require_number("cooling_time", self.cooling_time, "s")
+
+    @property
+    def period(self) -> float:
+        """Delta t_0 [s], the length of a stroke."""
+        return self.heating_time + self.cooling_time
+
+    @property
+    def corners(self) -> tuple[float, float, float]:
+        """Times within a stroke [s] that no time step may straddle."""
+        return 0.0, self.heating_time, self.period
+
+    def delta_psi(self, t: ArrayLike) -> NDArray[np.float64]:
+        """Rotation of a limb with command 1 at time t [s] of a stroke [rad]; t of any shape."""
+        return self.peak_angle * pulse(t, self.heating_time, self.cooling_time)

@@ -27,6 +27,7 @@ from seastar_gym.der.compilation import kernel
 from seastar_gym.der.energy import edge_of, elastic_energy, hinge_edges, kinetic_energy, load_energy
 from seastar_gym.der.geometry import half_angle
 from seastar_gym.der.lanes import absolute, add_product, any_lane, load, select, splat, sqrt, store
+from seastar_gym.der.newton import larger
 from seastar_gym.der.rods import n_nodes
 
 ROUNDING = 1e-12  # growth below this share of the energy is taken for rounding
@@ -151,7 +152,10 @@ def energy_noise(rods, q, h, mass, potential, kinetic):
     """
     edges = rods.n_limbs * (rods.nodes_per_limb - 1)
     length = rods.shortest_edge
-    stiffness = edges * (load(rods.EA_over_l, 0) + 4.0 * load(rods.EI_over_dl, 0) / (length * length))
+    stretching, bending = load(rods.EA_over_l, 0), load(rods.EI_over_dl, 0)
+    for e in range(1, edges):
+        stretching, bending = larger(load(rods.EA_over_l, e), stretching), larger(load(rods.EI_over_dl, e), bending)
+    stiffness = edges * (stretching + 4.0 * bending / (length * length))
     limb = (rods.nodes_per_limb - 1) * length
     move = UNITS * (absolute(load(q, 0)) + absolute(load(q, 1)) + limb)
     speed = move / h

@@ -35,6 +35,7 @@ from seastar_gym.der.star_matrix import (
     eliminate_node,
     negative,
     smaller,
+    solve_lone_root,
     solve_ring,
     store_root,
 )
@@ -260,5 +261,8 @@ def factorise(rods, work, stage, convex):
         energy += limb_energy
         decrement += limb_decrement
         pivot = smaller(pivot, limb_pivot)
-    ring_decrement, ring_pivot = solve_ring(work, rods.n_limbs, D_hub, r_hub)
+    if rods.n_limbs > 1:
+        ring_decrement, ring_pivot = solve_ring(work, rods.n_limbs, D_hub, r_hub)
+    else:
+        ring_decrement, ring_pivot = solve_lone_root(work, D_hub, r_hub)
     return energy, decrement + ring_decrement, smaller(pivot, ring_pivot)

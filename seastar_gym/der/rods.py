@@ -3,7 +3,8 @@
 A star has `n_limbs` chains of nodes that share node 0, the hub. Node {j, i} (limb j from 0, i from 1) has index
 j (nodes_per_limb - 1) + i. Edge e ends at node e + 1; it starts at the hub if it is the root edge of its limb, else
 at node e. Hinge e ends with edge e: within a limb it sits at the tail of edge e, and for a root edge of limb j it is
-the hub hinge from limb j to limb j + 1, whose first edge is the root edge of limb j.
+the hub hinge from limb j to limb j + 1, whose first edge is the root edge of limb j. Two limbs have one hub hinge, one
+limb has none: hinges that are not there have no stiffness.
 
 Coefficients have shape (rows,) if all robots share them and (rows, N_LANES) if they differ from robot to robot:
 `load` reads either.
@@ -32,7 +33,7 @@ class Rods(NamedTuple):
     dl_over_EI: Its reciprocal, per hinge [1/(N m)].
     EI_kappa_bar: Natural moment, per hinge [N m]; that of hub hinges comes from the actuators instead.
     hub_side: +1 if hub hinges are measured by the opening angle, -1 if by the interior turning angle.
-    hub_angle: The angle of an unactuated hub hinge, measured that way [rad].
+    hub_angle: The angle of the unactuated hub hinges, measured that way, per limb [rad].
     mass: Lumped mass, per node [kg].
     drag: 1/2 rho_f C_d D dl_i of (13.8), per node [kg/m].
     cross_drag: What flow across an edge adds to that, of half the edge, per edge [kg/m], or None; see drag.py.
@@ -53,7 +54,7 @@ class Rods(NamedTuple):
     dl_over_EI: np.ndarray
     EI_kappa_bar: np.ndarray
     hub_side: float
-    hub_angle: float
+    hub_angle: np.ndarray
     mass: np.ndarray
     drag: np.ndarray
     cross_drag: np.ndarray | None

@@ -215,14 +215,16 @@ def add_to_report(report, row, amount):
 
 @kernel
 def note_hub_angles(rods, q, report):
-    """Keep the smallest tan(phi/2) of every robot's hub hinges."""
+    """Keep the smallest tan(phi/2) of every robot's hub hinges; those of a gap of more than pi do not count."""
     smallest = load(report, SMALLEST_HUB_T)
     edges = rods.nodes_per_limb - 1
-    first = edge_geometry(q, 0, (rods.n_limbs - 1) * edges + 1)
+    last = rods.n_limbs - 1
+    first = edge_geometry(q, 0, last * edges + 1)
     for limb in range(rods.n_limbs):
         second = edge_geometry(q, 0, limb * edges + 1)
         t = half_angle(first, second, rods.hub_side)
-        smallest = select(t < smallest, t, smallest)
+        narrow = rods.hub_side * load(rods.hub_angle, limb - 1 if limb > 0 else last) >= 0.0
+        smallest = select(narrow & (t < smallest), t, smallest)
         first = second
     store(report, SMALLEST_HUB_T, smallest)
 

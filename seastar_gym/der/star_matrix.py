@@ -317,3 +317,20 @@ def solve_ring(work, n_limbs, D_hub, r_hub):
         following = substitute_root(work, root, following, of_last, hub)
         store_pair(work.root_solution, 2 * root, following)
     return decrement, smaller(pivot, root_pivot)
+
+
+@kernel
+def solve_lone_root(work, D_hub, r_hub):
+    """What solve_ring does, for one limb: its root node couples with the hub alone."""
+    zero = splat(0.0)
+    nothing = (zero, zero, zero, zero)
+    D, H, r = load_root(work, 0)
+    D_hub, _, _, r_hub, _, decrement, pivot = eliminate_node(
+        work, 1, D, H, nothing, r, D_hub, nothing, (zero, zero, zero), r_hub, (zero, zero)
+    )
+    inverse_x, lower, inverse_y, wr, hub_pivot = pivots(D_hub, r_hub)
+    y = wr * inverse_y
+    x = subtract_product(r_hub[0] * inverse_x, lower, y)
+    store_pair(work.root_solution, 2, (x, y))
+    store_pair(work.root_solution, 0, substitute_node(work, 1, x, y, zero, zero))
+    return decrement + add_product(r_hub[0] * r_hub[0] * inverse_x, y, wr), smaller(pivot, hub_pivot)

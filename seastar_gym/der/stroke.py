@@ -1,8 +1,16 @@
 """A whole sequence of time intervals for many robots, in one compiled call."""
 
-from seastar_gym.der.compilation import entry_point
+from seastar_gym.der.compilation import entry_point, kernel
 from seastar_gym.der.lanes import borrow, load, select, splat, store
 from seastar_gym.der.stages import cover_interval
+
+
+@kernel
+def shape_of_limb(shape, group, k, limb):
+    """Rotation of a limb at time k, see `advance`; for limbs that turn alike a number, whoever the limb is."""
+    if shape.ndim == 1:
+        return shape[k]
+    return load(borrow(shape[group, k]), limb)
 
 
 @entry_point
@@ -13,8 +21,10 @@ def advance(rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shap
     q, v: Positions and velocities [m, m/s], shape (n_groups, 2 n_nodes, N_LANES).
     a: What a time step leaves for the next: accelerations of its stages [m/s^2], their shares in the next guess, length
         and size, shape (n_groups, n_stages (2 n_nodes + 1) + 2, N_LANES).
-    peaks: Rotation of every limb at full shape [rad], shape (n_groups, n_limbs, N_LANES).
-    times: Ends of the intervals [s], shape (n_intervals + 1,). shape: Share of the peak at those times, same shape.
+    peaks: Share of `shape` that every limb follows, shape (n_groups, n_limbs, N_LANES).
+    times: Ends of the intervals [s], shape (n_intervals + 1,).
+    shape: Rotation of the limbs at those times [rad], shape (n_intervals + 1,) if all limbs turn alike, else
+        (n_groups, n_intervals + 1, n_limbs, N_LANES).
     failed: 0 for robots that go on, 1 for those that have failed, shape (n_groups, 1, N_LANES).
     report: Counts and extremes, added to, shape (n_groups, len(REPORT_ROWS), N_LANES).
     limits: What the solution has to keep.
@@ -28,8 +38,8 @@ def advance(rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shap
         for k in range(times.shape[0] - 1):
             for limb in range(rods.n_limbs):
                 peak = load(peak_rows, limb)
-                store(rotation.delta_psi_start, limb, peak * shape[k])
-                store(rotation.delta_psi_end, limb, peak * shape[k + 1])
+                store(rotation.delta_psi_start, limb, peak * shape_of_limb(shape, group, k, limb))
+                store(rotation.delta_psi_end, limb, peak * shape_of_limb(shape, group, k + 1, limb))
             alive = cover_interval(
                 rods_rows, memory, tableau, fallback_tableau, rotation, q_rows, v_rows, a_rows, times[k + 1] - times[k],
                 alive, limits, report_rows,

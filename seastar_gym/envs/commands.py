@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 Actions: TypeAlias = Literal["limbs", "joint", "pairs"]
 
+MOST_LIMBS = 8
+"""With more, actions="joint" would have more than 6,561 actions."""
+
 LIMB_COMMANDS = np.array([0.0, 1.0, -1.0])
 """Command of a limb for its action 0, 1, 2: leave it alone, actuate + (anti-clockwise), actuate -."""
 
@@ -30,6 +33,11 @@ def command_table(actions: Actions, n_limbs: int) -> NDArray[np.float64]:
         raise ValueError(f"actions must be one of {', '.join(map(repr, get_args(Actions)))}, not {actions!r}.")
     if actions == "limbs":
         raise ValueError('actions="limbs" has one action per limb, not a table of commands: use LIMB_COMMANDS.')
+    if actions == "joint" and n_limbs > MOST_LIMBS:
+        raise ValueError(
+            f'actions="joint" would have 3^{n_limbs} = {3**n_limbs:,} actions for {n_limbs} limbs: use "limbs" or '
+            f'"pairs" for more than {MOST_LIMBS} limbs.'
+        )
     if actions == "joint":
         return np.array(list(itertools.product(LIMB_COMMANDS, repeat=n_limbs)))
     table = np.zeros((1 + n_limbs * (n_limbs - 1), n_limbs))

@@ -10,6 +10,9 @@ index                 what                                              unit
 4m+2, 4m+3            current waypoint relative to the hub, x and y     limb lengths
 4m+4, 4m+5            next waypoint relative to the hub, x and y        limb lengths
 
+Where actuators remember something (a `StatefulActuator`), what its `observe` says of limb 1, limb 2.. stands before the
+waypoints, which are the last four numbers always.
+
 with m = n_nodes - 1 nodes in the order {1,1}..{1,N-1}, {2,1}.. (m = 45 for the chapter's robot: 186 numbers). On the
 last leg the next waypoint is the current one. The waypoint's distance is not clipped: its full length can be read.
 """

@@ -20,7 +20,9 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.actuation.actuator import StatefulActuator
 from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, command_table
+from seastar_gym.scene import Scene
 
 Elements = NDArray[np.intp]
 
@@ -178,6 +180,21 @@ def _read_only(table: NDArray[Any]) -> NDArray[Any]:
     return table
 
 
+def require_symmetry(scene: Scene) -> None:
+    """Refuse scenes that a turn or a mirror would change."""
+    why = None
+    if not scene.robot.is_symmetric:
+        why = "its limbs are not alike, straight and evenly spread"
+    elif len(set(scene.limb_strengths)) > 1:
+        why = "its limbs are not equally strong"
+    elif isinstance(scene.actuator, StatefulActuator):
+        why = "its actuators remember what they did, and no table says how that is carried from limb to limb"
+    elif any(node != 0 for node in scene.held_nodes) or scene.loads:
+        why = "nodes are held or loaded"
+    if why is not None:
+        raise ValueError(f"The symmetry of the regular polygon is not that of this robot: {why}.")
+
+
 # --- wrappers --------------------------------------------------------------------------------------------------------
 
 
@@ -188,6 +205,7 @@ class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstru
         gym.utils.RecordConstructorArgs.__init__(self)
         gym.Wrapper.__init__(self, env)
         self._mode: Actions = env.get_wrapper_attr("actions")
+        require_symmetry(env.get_wrapper_attr("scene"))
         self._n_limbs: int = env.get_wrapper_attr("scene").robot.n_limbs
         self._element = np.zeros((), np.intp)
 
@@ -213,7 +231,9 @@ class VectorSymmetryReduction(gym.vector.VectorWrapper[Any, Any, Any, Any, Any])
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any]):
         super().__init__(env)
         self._mode: Actions = env.unwrapped.actions  # type: ignore[attr-defined]
-        self._n_limbs: int = env.unwrapped.simulator.scene.robot.n_limbs  # type: ignore[attr-defined]
+        scene: Scene = env.unwrapped.simulator.scene  # type: ignore[attr-defined]
+        require_symmetry(scene)
+        self._n_limbs: int = scene.robot.n_limbs
         self._elements = np.zeros(env.num_envs, np.intp)
 
     def _reduced(self, observations: NDArray[np.float32]) -> NDArray[np.floating[Any]]:

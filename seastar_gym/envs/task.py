@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.actuation.actuator import StatefulActuator
 from seastar_gym.envs.observation import VELOCITY_SCALE, observation_size, observe, to_float32
 from seastar_gym.envs.paths import PathName, cross_track_error, make_path, shortest_way
 from seastar_gym.envs.reward import RewardWeights, reward_terms
@@ -43,6 +44,11 @@ def promised(scene: Scene) -> dict[str, float]:
         "path_error": math.nan if known is None else known.path_error,
         "real_time_factor": math.nan if known is None else known.speed,
     }
+def scene_observation_size(scene: Scene) -> int:
+    """Length of the observation of a scene's robot."""
+    actuator, robot = scene.actuator, scene.robot
+    remembered = len(actuator.observe(actuator.rest)) if isinstance(actuator, StatefulActuator) else 0
+    return observation_size(robot.n_nodes) + remembered * robot.n_limbs
 
 
 class SwimTask:
@@ -87,7 +93,7 @@ class SwimTask:
     @property
     def observation_size(self) -> int:
         """Length of one robot's observation."""
-        return observation_size(self.simulator.scene.robot.n_nodes)
+        return scene_observation_size(self.simulator.scene)
 
     def reset(self, robots: NDArray[np.bool_], generators: list[np.random.Generator], path: Path | None = None) -> None:
         """Begin a new episode for the robots in the mask; their generators draw path, then heading."""
@@ -136,10 +142,13 @@ class SwimTask:
         simulator = self.simulator
         targets = np.concatenate([self._waypoint(self.waypoint_index), self._waypoint(self.waypoint_index + 1)], axis=1)
         target_rows = simulator.to_rows(targets)
-        out = np.empty((len(target_rows), self.observation_size, target_rows.shape[2]))
-        length = simulator.scene.robot.limb_length
-        observe(self._rest, simulator.q, simulator.v, target_rows, length, VELOCITY_SCALE, out)
-        return to_float32(out, self.n_robots)
+        robot = simulator.scene.robot
+        out = np.empty((len(target_rows), observation_size(robot.n_nodes), target_rows.shape[2]))
+        observe(self._rest, simulator.q, simulator.v, target_rows, robot.limb_length, VELOCITY_SCALE, out)
+        observations, remembered = to_float32(out, self.n_robots), simulator.observe_actuators()
+        if remembered.shape[1] == 0:
+            return observations
+        return np.hstack([observations[:, :-4], remembered.astype(np.float32), observations[:, -4:]])
 
     def step(self, commands: Floats) -> Outcome:
         """One stroke of every robot."""

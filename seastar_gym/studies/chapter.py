@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
-from seastar_gym.scene import Numerics, Scene
+from seastar_gym.scene import Numerics, Scene, SmaPulse
 from seastar_gym.simulator import Simulator, SolverStatus
 from seastar_gym.studies import chapter_pictures as pictures
 from seastar_gym.studies.chapter_pictures import MM, Cost, Swim
@@ -126,7 +126,7 @@ def stroke_motion(straight: Swim) -> tuple[float, float, float, float]:
     """Of the last stroke, on x: (way while heated, way on until it turns, way back [m], time of turning [s])."""
     start, end = straight.at_strokes()[-2:]
     x, since = straight.hub()[start : end + 1, 0], straight.time[start : end + 1] - straight.time[start]
-    heated = int(np.searchsorted(since, straight.scene.actuator.heating_time - 1e-9))
+    heated = int(np.searchsorted(since, straight.scene.actuator.corners[1] - 1e-9))
     farthest = int(np.argmax(x))
     return x[heated] - x[0], x[farthest] - x[heated], x[farthest] - x[-1], float(since[farthest])
 
@@ -233,7 +233,7 @@ def make_figures(out: Path, quick: bool = False, progress: bool = True) -> list[
     both = CHAPTER, NEARLY_CONVERGED if quick else CONVERGED
     steps, seconds = (QUICK_STEPS, 0.01) if quick else (STEPS, 0.5)
     bar = tqdm(total=4 + len(steps), unit="part", disable=not progress)
-    actuator = Scene().actuator
+    actuator = SmaPulse()
     pictures.draw_pulse(actuator, out / "fig_13_5b.png")
 
     bar.set_description("straight swim")

@@ -185,7 +185,7 @@ def draw_straight(converged: Swim, chapter: Swim, file: Path) -> None:
         axes.plot(converged.time, MM * converged_values[:, 1], color=ACTUATED, linewidth=1.3, label="y, both")
         for stroke in range(len(converged.commands)):
             begin = stroke * converged.scene.actuator.period
-            axes.axvspan(begin, begin + converged.scene.actuator.heating_time, color="#f7e3e1", linewidth=0, zorder=0.5)
+            axes.axvspan(begin, begin + converged.scene.actuator.corners[1], color="#f7e3e1", linewidth=0, zorder=0.5)
         axes.set_xticks(range(11))
     span = (0.0, converged.time[-1])
     style(panels["b"], ylabel="hub position [mm]", title="(b)  pink: limbs 2 and 5 are heated", xlim=span)

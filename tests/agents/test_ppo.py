@@ -236,7 +236,7 @@ def test_a_flipped_bit_is_found(file):
         ({"format": 99}, "its format is 99"),
         ({"actions": "waves"}, "actions must be one of"),
         ({"hidden": [16, 9]}, "does not fit"),
-        ({"scene": {"robot": {"n_limbs": 1}}}, "n_limbs must be a whole number from 3"),
+        ({"scene": {"robot": {"n_limbs": 0}}}, "n_limbs must be a whole number from 1"),
         ({"scene": {"robot": {"n_arms": 5}}}, "does not fit"),
     ],
 )

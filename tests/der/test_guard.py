@@ -72,7 +72,7 @@ def moving_robots(seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
 
 def work_at(delta_psi: np.ndarray, scheme: str = "implicit-euler"):
     """Memory with the natural hub angles of these rotations [rad], shape (N_LANES, 5)."""
-    work = make_work(5, 10, SCHEMES[scheme].n_stages)
+    work = make_work(RODS, SCHEMES[scheme].n_stages)
     natural = np.array([oracle.natural_angles(STAR, one)[-5:] for one in delta_psi])
     work.hub_EI_kappa_bar[:] = STAR.EI * 2.0 * np.tan(natural.T / 2.0) / STAR.edge_length
     return work
@@ -93,7 +93,7 @@ def test_allowed_energy_is_that_of_the_robot_standing_still_while_its_actuators_
     begin, end = np.random.default_rng(1).uniform(-0.4, 0.4, (2, N_LANES, 5))
     result = np.zeros((1, N_LANES))
     tableau, actuation = SCHEMES[scheme], Actuation(begin.T.copy(), end.T.copy())
-    allowed(RODS, make_work(5, 10, tableau.n_stages), tableau, actuation, rows_of(q), rows_of(v), result)
+    allowed(RODS, make_work(RODS, tableau.n_stages), tableau, actuation, rows_of(q), rows_of(v), result)
     for lane in range(N_LANES):
         first, last = (begin[lane] + share * (end[lane] - begin[lane]) for share in (0.25, 0.75))
         at_start, at_end = (oracle.elastic_energy(STAR, q[lane], one) for one in (first, last))
@@ -206,7 +206,7 @@ def test_a_hinge_that_turned_through_its_pole_is_seen_and_the_robot_put_back(
     everywhere, v = np.ones((N_LANES, STAR.n_nodes, 2)), np.ones((N_LANES, STAR.n_nodes, 2))
     rows, v_rows, result = rows_of(q * everywhere), rows_of(v), np.zeros((1, N_LANES))
     asked = np.arange(N_LANES) < N_LANES - 1
-    work = make_work(5, 10, tableau.n_stages)
+    work = make_work(RODS, tableau.n_stages)
     jump(rods, work, tableau, rows, v_rows, rows_of(q_1 * everywhere), 1.0 * asked[None], result)
     np.testing.assert_array_equal(result[0] > 0.0, asked & through)
     back = (asked & through)[:, None, None]

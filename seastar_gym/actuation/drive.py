@@ -1,0 +1,62 @@
+"""The actuators of a batch of robots: from commands to the rotation of every limb during a stroke."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.actuation.actuator import Actuator, StatefulActuator
+
+Floats = NDArray[np.float64]
+
+
+class Drive:
+    """One actuator per limb of `n_robots` robots.
+
+    times: Ends of a stroke's time steps [s].
+
+    strengths: Share of its rotation that every limb still makes, shape (n_robots, n_limbs).
+    state: What the actuators remember now, shape (n_robots, n_limbs, n_state); n_state is 0 for most.
+    at_rest: The same of an actuator that was left alone, shape (n_state,).
+    """
+
+    def __init__(self, actuator: Actuator, n_robots: int, n_limbs: int, times: Floats):
+        self._times = times
+        self._stateful = actuator if isinstance(actuator, StatefulActuator) else None
+        self._curve = None if self._stateful else np.asarray(actuator.delta_psi(times))
+        self.at_rest = self._stateful.rest if self._stateful else np.zeros(0)
+        self._commands = np.zeros((n_robots, n_limbs))
+        self.strengths = np.ones((n_robots, n_limbs))
+        self.state = np.tile(self.at_rest, (n_robots, n_limbs, 1))
+        self._before = self.state
+
+    def begin_stroke(self, commands: Floats) -> tuple[Floats, Floats]:
+        """(peaks, shape) of a stroke with these commands: limbs turn by their peak times the shape.
+
+        peaks: Shape (n_robots, n_limbs). shape: Shape (n_times,) where limbs turn alike, else (n_times, n_robots,
+        n_limbs) [rad].
+        """
+        if self._stateful is None:
+            assert self._curve is not None
+            return commands * self.strengths, self._curve
+        self._commands, self._before = commands, self.state
+        return self.strengths, self._stateful.respond(self._times, commands, self.state)[0]
+
+    def advance(self, end: int) -> None:
+        """Bring the state to the time step `end` of the stroke that is under way."""
+        if self._stateful is not None:
+            self.state = self._stateful.respond(self._times[: end + 1], self._commands, self._before)[1]
+
+    def observe(self) -> Floats:
+        """The state as numbers of order one, shape (n_robots, k), limb after limb; k is 0 for most actuators."""
+        seen = self.state if self._stateful is None else self._stateful.observe(self.state)
+        return seen.reshape(len(seen), -1)
+
+    def rotations(self) -> Floats:
+        """Of limbs between two strokes [rad], shape (n_robots, n_limbs)."""
+        if self._stateful is None:
+            return np.zeros_like(self.strengths)
+        return self.strengths * self._stateful.respond(np.zeros(1), np.zeros_like(self.strengths), self.state)[0][0]
+
+    def rest(self, chosen: NDArray[np.bool_] | slice) -> None:
+        """Bring the actuators of the chosen robots to rest."""
+        self.state = self.state.copy()
+        self.state[chosen] = self.at_rest

@@ -1,0 +1,253 @@
+"""Actuators other than the pulse, and weak limbs: what they do to a limb, and what is refused."""
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from seastar_gym import Limited, MeasuredCurve, Numerics, Scene, Seastar, Simulator, SmaPulse
+from seastar_gym.actuation.actuator import Actuator, StatefulActuator
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.symmetry import SymmetryReduction
+
+NUMERICS = Numerics("implicit-midpoint", 0.01)
+SAMPLED_PULSE = MeasuredCurve((0.0, 0.1, 1.0), (0.0, np.pi / 5, 0.0))
+SLOW = Limited(SmaPulse(), largest_rate=0.5)  # cannot come back within the stroke
+COMMANDS = np.random.default_rng(0).integers(-1, 2, (4, 3, 5)).astype(float)
+
+
+def swim(scene: Scene, commands=COMMANDS) -> Simulator:
+    simulator = Simulator(scene, len(commands[0]))
+    for command in commands:
+        assert not simulator.stroke(command).status.any()
+    return simulator
+
+
+# --- measured curves -------------------------------------------------------------------------------------------------
+
+
+def test_a_measured_curve_that_samples_the_pulse_reproduces_it_to_rounding():
+    times = np.linspace(0.0, 1.0, 1001)
+    np.testing.assert_allclose(SAMPLED_PULSE.delta_psi(times), SmaPulse().delta_psi(times), atol=1e-15)
+    assert SAMPLED_PULSE.corners == SmaPulse().corners and SAMPLED_PULSE.peak_angle == SmaPulse().peak_angle
+    curve, pulse = swim(Scene(actuator=SAMPLED_PULSE, numerics=NUMERICS)), swim(Scene(numerics=NUMERICS))
+    np.testing.assert_allclose(curve.positions, pulse.positions, atol=1e-11)
+
+
+def test_time_steps_end_at_every_sample():
+    curve = MeasuredCurve((0.0, 0.013, 0.5, 0.8), (0.0, 0.3, 0.2, 0.0))
+    simulator = Simulator(Scene(actuator=curve, numerics=NUMERICS))
+    times = [*simulator.stroke_in_parts(np.ones((1, 5)), 1000)]
+    assert set(curve.times[1:]) <= set(np.round(times, 12)) and simulator.time[0] == pytest.approx(0.8)
+
+
+def test_a_curve_is_read_from_csv_with_a_line_of_names_or_without(tmp_path):
+    lines = "0.0,0.0\n0.1,0.6\n\n1.0,0.0\n"
+    for text in (lines, "time,angle\n" + lines):
+        file = tmp_path / "curve.csv"
+        file.write_text(text)
+        assert MeasuredCurve.from_csv(file) == MeasuredCurve((0.0, 0.1, 1.0), (0.0, 0.6, 0.0))
+
+
+@pytest.mark.parametrize("text", ["time,angle\n0,0\n1,two\n", "0,0\n1,0,0\n", "0,0\n0.5\n"])
+def test_lines_that_are_no_samples_are_refused(tmp_path, text):
+    file = tmp_path / "curve.csv"
+    file.write_text(text)
+    with pytest.raises(ValueError, match="every line must have a time"):
+        MeasuredCurve.from_csv(file)
+
+
+@pytest.mark.parametrize(
+    "times, angles, words",
+    [
+        ((0.0, 0.5), (0.0, 0.1, 0.0), "as many angles"),
+        ((0.0,), (0.0,), "two or more"),
+        ((0.1, 0.5, 1.0), (0.0, 0.1, 0.0), "begin at 0"),
+        ((0.0, 0.5, 0.5), (0.0, 0.1, 0.0), "increase"),
+        ((0.0, 0.5, 1.0), (0.1, 0.1, 0.1), "jump"),
+        ((0.0, 0.5, 1.0), (0.0, 0.1, 0.1), "jump"),
+        ((0.0, 0.5, np.nan), (0.0, 0.1, 0.0), "finite"),
+        ([0.0, 0.5, 1.0], (0.0, 0.1, 0.0), "tuple"),
+        ((0.0, 0.5, 1.0), (0.0, "x", 0.0), "angles"),
+    ],
+)
+def test_what_is_no_curve_is_refused_with_a_sentence(times, angles, words):
+    with pytest.raises(ValueError, match=words):
+        MeasuredCurve(times, angles)
+
+
+# --- limits ----------------------------------------------------------------------------------------------------------
+
+
+def test_limits_that_bind_nowhere_change_nothing():
+    loose = Limited(SmaPulse(), largest_angle=1.0, largest_rate=100.0)
+    for name in ("positions", "velocities"):
+        free = getattr(swim(Scene(numerics=NUMERICS)), name)
+        np.testing.assert_allclose(getattr(swim(Scene(actuator=loose, numerics=NUMERICS)), name), free, atol=1e-11)
+
+
+def test_a_limited_limb_turns_as_far_and_as_fast_as_it_may():
+    actuator = Limited(SmaPulse(), largest_angle=0.4, largest_rate=2.0)
+    t = np.linspace(0.0, 1.0, 1001)
+    angle = actuator.delta_psi(t)
+    assert angle.max() == pytest.approx(0.4) and np.abs(np.diff(angle)).max() <= 2.0 * 1e-3 * (1 + 1e-9)
+    assert angle[100] == pytest.approx(0.2)  # 0.1 s at 2 rad/s
+    half, _ = actuator.respond(t, np.full((), 0.5), np.zeros(1))
+    meeting = (np.pi / 10 / 0.9) / (2.0 + np.pi / 10 / 0.9)  # [s], where 2 t meets half the falling pulse
+    assert half.max() == pytest.approx(2.0 * meeting, rel=0.01)
+
+
+def test_a_slow_limb_goes_on_from_where_the_last_stroke_left_it():
+    simulator = Simulator(Scene(actuator=SLOW, numerics=NUMERICS))
+    assert simulator.get_state().actuators.shape == (1, 5, 1)
+    turns = []
+    for command in (1.0, 0.0, 0.0):
+        simulator.stroke([[command, 0, 0, 0, 0]])
+        turns.append(simulator.actuators[0, :, 0])
+    assert turns[0][0] == pytest.approx(0.083, abs=0.002) and turns[2][0] == 0.0
+    assert not np.any([turn[1:] for turn in turns])
+
+
+def test_a_state_with_actuators_that_remember_continues_to_the_same_bits():
+    scene = Scene(actuator=SLOW, numerics=NUMERICS)
+    first, second = swim(scene), Simulator(scene, 3)
+    second.set_state(first.get_state())
+    third = pickle.loads(pickle.dumps(first))
+    assert second.elastic_energy().tobytes() == first.elastic_energy().tobytes() == third.elastic_energy().tobytes()
+    for simulator in (first, second, third):
+        simulator.stroke(COMMANDS[0])
+    assert first.positions.tobytes() == second.positions.tobytes() == third.positions.tobytes()
+    first.reset(np.array([True, False, False]))
+    assert not first.actuators[0].any() and first.actuators[1].any()
+
+
+def test_a_stroke_in_parts_gives_the_same_bits_and_the_state_in_between():
+    scene = Scene(actuator=SLOW, numerics=NUMERICS)
+    whole, parts = Simulator(scene, 3), Simulator(scene, 3)
+    for command in COMMANDS[:2]:
+        whole.stroke(command)
+        seen = [parts.actuators.copy() for _ in parts.stroke_in_parts(command, 7)]
+        assert (np.ptp(seen, axis=0)[command != 0.0] > 0.05).all()
+    assert whole.positions.tobytes() == parts.positions.tobytes()
+    assert whole.actuators.tobytes() == parts.actuators.tobytes()
+
+
+def test_what_a_robot_remembers_does_not_depend_on_its_neighbours():
+    scene = Scene(actuator=SLOW, numerics=NUMERICS)
+    commands = np.random.default_rng(1).integers(-1, 2, (3, 11, 5)).astype(float)
+    together, alone = swim(scene, commands), swim(scene, commands[:, 9:10])
+    assert together.positions[9].tobytes() == alone.positions[0].tobytes()
+
+
+@pytest.mark.parametrize("arguments", [{"largest_angle": 0.0}, {"largest_rate": -1.0}, {"largest_rate": np.inf}])
+def test_limits_are_positive_numbers(arguments):
+    with pytest.raises(ValueError, match=next(iter(arguments))):
+        Limited(SmaPulse(), **arguments)
+    with pytest.raises(ValueError, match="remembers nothing"):
+        Limited(SLOW)
+
+
+# --- weak limbs ------------------------------------------------------------------------------------------------------
+
+
+def test_a_weak_limb_turns_by_its_share_and_a_failed_one_not_at_all():
+    weak = swim(Scene(numerics=NUMERICS, limb_strengths=(1.0, 0.5, 0.0, 1.0, 1.0)))
+    less = swim(Scene(numerics=NUMERICS), COMMANDS * [1.0, 0.5, 0.0, 1.0, 1.0])
+    assert weak.positions.tobytes() == less.positions.tobytes()
+
+
+def test_every_robot_may_have_weak_limbs_of_its_own():
+    strengths = np.random.default_rng(0).uniform(0.0, 1.0, (3, 5))
+    for scene in (Scene(numerics=NUMERICS), Scene(actuator=SLOW, numerics=NUMERICS)):
+        batch = Simulator(scene, 3)
+        batch.set_limb_strengths(strengths)
+        copy = pickle.loads(pickle.dumps(batch))
+        for robot, of_robot in enumerate(strengths):
+            alone = Simulator(replace(scene, limb_strengths=tuple(of_robot)))
+            alone.stroke(COMMANDS[0][robot : robot + 1])
+            if robot == 0:
+                batch.stroke(COMMANDS[0])
+                copy.stroke(COMMANDS[0])
+            assert batch.positions[robot].tobytes() == alone.positions[0].tobytes() == copy.positions[robot].tobytes()
+
+
+@pytest.mark.parametrize(
+    "strengths", [(1.0,) * 4, (1.0, 1.0, 1.0, 1.0, 1.1), (-0.1, 1.0, 1.0, 1.0, 1.0), [1.0] * 5, "a"]
+)
+def test_strengths_are_shares_one_per_limb(strengths):
+    with pytest.raises(ValueError, match="limb_strengths"):
+        Scene(limb_strengths=strengths)
+
+
+@pytest.mark.parametrize("strengths", [np.ones(4), np.full((2, 5), 1.5), np.full(5, np.nan), np.ones((3, 5))])
+def test_strengths_of_a_batch_are_shares_too(strengths):
+    with pytest.raises(ValueError, match="limb_strengths"):
+        Simulator(Scene(), 2).set_limb_strengths(strengths)
+
+
+# --- any actuator ----------------------------------------------------------------------------------------------------
+
+
+class Triangle:
+    """One that a user might write."""
+
+    peak_angle, period, corners = 0.3, 0.6, (0.0, 0.2, 0.6)
+
+    def delta_psi(self, t):
+        return np.interp(t, self.corners, (0.0, 0.3, 0.0))
+
+
+def test_a_scene_takes_any_actuator_that_says_what_it_does():
+    assert isinstance(Triangle(), Actuator) and not isinstance(Triangle(), StatefulActuator)
+    found = swim(Scene(actuator=Triangle(), numerics=NUMERICS))
+    expected = swim(Scene(actuator=MeasuredCurve(Triangle.corners, (0.0, 0.3, 0.0)), numerics=NUMERICS))
+    assert found.positions.tobytes() == expected.positions.tobytes()
+
+
+@pytest.mark.parametrize(
+    "changes, words",
+    [
+        ({"corners": (0.0, 0.2, 0.5)}, "from 0 to its period"),
+        ({"corners": (0.0, 0.7, 0.6)}, "increasing"),
+        ({"peak_angle": 0.2}, "largest angle"),
+        ({"delta_psi": lambda self, t: 0.1 + 0.0 * t}, "jump"),
+        ({"delta_psi": lambda self, t: 0.1}, "per time"),
+    ],
+)
+def test_an_actuator_that_contradicts_itself_is_refused(changes, words):
+    with pytest.raises(ValueError, match=words):
+        Scene(actuator=type("Wrong", (Triangle,), changes)())
+
+
+def test_a_turning_hub_has_no_room_for_a_stroke_that_begins_turned():
+    robot = Seastar(hub_hinge="turning")
+    with pytest.raises(ValueError, match="above zero"):
+        Scene(robot, actuator=Limited(SmaPulse(), largest_rate=1.0))
+
+
+# --- the environment -------------------------------------------------------------------------------------------------
+
+
+def test_what_actuators_remember_is_seen_before_the_waypoints():
+    env = SeastarSwimEnv(scene=Scene(actuator=SLOW, numerics=NUMERICS))
+    plain = SeastarSwimEnv(scene=Scene(numerics=NUMERICS))
+    first, _ = env.reset(seed=0)
+    assert first.shape == env.observation_space.shape == (plain.reset(seed=0)[0].size + 5,)
+    np.testing.assert_array_equal(first[-9:-4], 0.0)
+    observation, *_ = env.step([0, 1, 0, 0, 2])
+    np.testing.assert_allclose(observation[-9:-4], env.simulator.actuators[0, :, 0] / (np.pi / 5), rtol=1e-6)
+    assert observation[-8] > 0.0 > observation[-5]
+
+
+@pytest.mark.parametrize(
+    "scene, words",
+    [
+        (Scene(actuator=SLOW), "remember"),
+        (Scene(limb_strengths=(1.0, 1.0, 0.5, 1.0, 1.0)), "equally strong"),
+        (Scene(loads=((3, 1e-5, 0.0),)), "loaded"),
+    ],
+)
+def test_symmetry_is_refused_where_the_scene_has_none(scene, words):
+    with pytest.raises(ValueError, match=words):
+        SymmetryReduction(SeastarSwimEnv(scene=scene))
