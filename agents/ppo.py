@@ -148,7 +148,7 @@ def make_model(
 def describe(env: BatchVecEnv, hidden: tuple[int, ...]) -> Description:
     """What a policy with these hidden layers expects that learns here."""
     batch: Any = env.env.unwrapped
-    return Description(batch.actions, env.env_is_wrapped(VectorSymmetryReduction)[0], batch.simulator.scene, hidden)
+    return Description(batch.actions, env.env_is_wrapped(VectorSymmetryReduction)[0], batch.scene, hidden)
 
 
 def policy_of(model: PPO) -> LearnedPolicy:

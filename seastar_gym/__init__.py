@@ -7,6 +7,7 @@ from gymnasium.envs.registration import register
 
 from seastar_gym.actuation.limited import Limited
 from seastar_gym.actuation.measured import MeasuredCurve
+from seastar_gym.envs.randomization import DomainRandomization, LogUniform, Normal, Uniform
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
 from seastar_gym.fluids import GridCurrent, ShearCurrent, UniformCurrent, Vortex
@@ -17,10 +18,13 @@ from seastar_gym.simulator import Simulator, SolverStatus, State, StrokeReport
 __version__ = "0.1.0"
 
 __all__ = [
+    "DomainRandomization",
     "GridCurrent",
     "Limb",
     "Limited",
+    "LogUniform",
     "MeasuredCurve",
+    "Normal",
     "Numerics",
     "RewardWeights",
     "Scene",
@@ -32,6 +36,7 @@ __all__ = [
     "State",
     "StrokeReport",
     "SymmetryReduction",
+    "Uniform",
     "UniformCurrent",
     "VectorSymmetryReduction",
     "Vortex",

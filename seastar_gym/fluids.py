@@ -1,16 +1,18 @@
-"""Fluids and their currents, as frozen dataclasses in SI units."""
+"""Fluids and their currents, as frozen dataclasses in SI units; for numbers of each robot see per_robot.py."""
 
 import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, get_args
+from functools import partial
+from typing import Any, ClassVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.checks import is_finite_number, require_finite, require_number
 from seastar_gym.der.current import GRID, LINEAR, VORTEX, Current
+from seastar_gym.per_robot import batch_size, require_each
 
 Floats = NDArray[np.float64]
 
@@ -22,12 +24,13 @@ LARGEST_GRID = 4_000_000
 class UniformCurrent:
     """A fluid that moves as a whole: u = (u_x, u_y) [m/s]."""
 
+    PER_ROBOT: ClassVar = ("u_x", "u_y")
     u_x: float = 0.0
     u_y: float = 0.0
 
     def __post_init__(self) -> None:
-        require_finite("u_x", self.u_x, "m/s")
-        require_finite("u_y", self.u_y, "m/s")
+        require_each(self, "u_x", partial(require_finite, unit="m/s"))
+        require_each(self, "u_y", partial(require_finite, unit="m/s"))
 
     def rows(self) -> Current:
         """For the kernels."""
@@ -41,12 +44,13 @@ class ShearCurrent:
     rate: [1/s]. direction: Of the flow [rad]. The fluid stands still on the line through the origin.
     """
 
+    PER_ROBOT: ClassVar = ("rate", "direction")
     rate: float
     direction: float = 0.0
 
     def __post_init__(self) -> None:
-        require_finite("rate", self.rate, "1/s")
-        require_finite("direction", self.direction, "rad")
+        require_each(self, "rate", partial(require_finite, unit="1/s"))
+        require_each(self, "direction", partial(require_finite, unit="rad"))
 
     def rows(self) -> Current:
         """For the kernels."""
@@ -62,16 +66,17 @@ class Vortex:
     circulation: [m^2/s], + is anti-clockwise. x, y: Its centre [m]. core_radius: r_c, where it turns fastest [m].
     """
 
+    PER_ROBOT: ClassVar = ("circulation", "x", "y", "core_radius")
     circulation: float
     x: float = 0.0
     y: float = 0.0
     core_radius: float = 0.05
 
     def __post_init__(self) -> None:
-        require_finite("circulation", self.circulation, "m^2/s")
-        require_finite("x", self.x, "m")
-        require_finite("y", self.y, "m")
-        require_number("core_radius", self.core_radius, "m")
+        require_each(self, "circulation", partial(require_finite, unit="m^2/s"))
+        require_each(self, "x", partial(require_finite, unit="m"))
+        require_each(self, "y", partial(require_finite, unit="m"))
+        require_each(self, "core_radius", partial(require_number, unit="m"))
 
     def rows(self) -> Current:
         """For the kernels."""
@@ -155,17 +160,20 @@ class Water:
     current: How the fluid moves, or None if it is at rest; w is the velocity relative to it.
     """
 
+    PER_ROBOT: ClassVar = ("density", "drag_coefficient", "tangential_drag_coefficient")
     density: float = 1000.0
     drag_coefficient: float = 1.0
     tangential_drag_coefficient: float | None = None
     current: AnyCurrent | None = None
 
     def __post_init__(self) -> None:
-        require_number("density", self.density, "kg/m^3", zero_allowed=True)
-        require_number("drag_coefficient", self.drag_coefficient, "1", zero_allowed=True)
+        not_negative = partial(require_number, zero_allowed=True)
+        require_each(self, "density", partial(not_negative, unit="kg/m^3"))
+        require_each(self, "drag_coefficient", partial(not_negative, unit="1"))
         if self.tangential_drag_coefficient is not None:
-            require_number("tangential_drag_coefficient", self.tangential_drag_coefficient, "1", zero_allowed=True)
-            if self.tangential_drag_coefficient > self.drag_coefficient:
+            require_each(self, "tangential_drag_coefficient", partial(not_negative, unit="1"))
+            batch_size(self)
+            if np.any(np.greater(self.tangential_drag_coefficient, self.drag_coefficient)):
                 raise ValueError(
                     "tangential_drag_coefficient must not exceed drag_coefficient, that of flow across a limb: "
                     f"{self.tangential_drag_coefficient!r} is more than {self.drag_coefficient!r}."

@@ -1,12 +1,16 @@
 """What is modelled: robot, fluid, actuator and numerics, as frozen dataclasses in SI units with the chapter's values.
 
 Each part checks itself, and a `Scene` checks what the parts can be together; what cannot be modelled is refused with
-a sentence that says why.
+a sentence that says why. Numbers named in a part's `PER_ROBOT` may be arrays of shape (n_robots,), one for each robot
+of a batch.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal, cast, get_args
+from functools import partial
+from operator import itemgetter
+from typing import ClassVar, Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +26,7 @@ from seastar_gym.fidelity import cheapest
 from seastar_gym.fluids import Water as Water
 from seastar_gym.morphology.limb import Limb, LimbShape, as_tuple
 from seastar_gym.morphology.seastar import make_rods, n_hub_hinges, natural_hub_angle, rest_positions, turn_per_hinge
+from seastar_gym.per_robot import batch_size, chosen, require_each
 
 HubHinge = Literal["opening", "turning"]
 SchemeName = Literal["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
@@ -47,6 +52,7 @@ class Seastar:
     swings freely about the hub, and no actuator turns it.
     """
 
+    PER_ROBOT: ClassVar = ("rod_radius", "youngs_modulus", "density")
     n_limbs: int = 5
     nodes_per_limb: int = 10
     limb_length: float = 0.1
@@ -60,9 +66,9 @@ class Seastar:
         require_count("n_limbs", self.n_limbs, 1, 12)
         require_count("nodes_per_limb", self.nodes_per_limb, 2, 10_000)
         require_number("limb_length", self.limb_length, "m")
-        require_number("rod_radius", self.rod_radius, "m")
-        require_number("youngs_modulus", self.youngs_modulus, "Pa")
-        require_number("density", self.density, "kg/m^3")
+        require_each(self, "rod_radius", partial(require_number, unit="m"))
+        require_each(self, "youngs_modulus", partial(require_number, unit="Pa"))
+        require_each(self, "density", partial(require_number, unit="kg/m^3"))
         require_choice("hub_hinge", self.hub_hinge, get_args(HubHinge))
         if self.n_limbs == 1 and self.hub_hinge != "opening":
             raise ValueError("One limb has no hub hinge that could be measured by its turning angle.")
@@ -222,6 +228,7 @@ class Scene:
         if not is_actuator(self.actuator):
             raise ValueError(f"Scene.actuator must be an Actuator such as SmaPulse(), not {self.actuator!r}.")
         check_actuator(self.actuator)
+        batch_size(self)
         self._check_hub_hinges()
         self._check_strengths()
         self._check_holds_and_loads()
@@ -252,12 +259,7 @@ class Scene:
             )
         try:
             with np.errstate(all="ignore"):
-                rods = self.rods()
-                squared_edge = np.array(rods.shortest_edge**2)
-            missing = (rods.nodes_per_limb - 1) * np.arange(n_hub_hinges(rods.n_limbs), rods.n_limbs)
-            bending = (np.delete(stiffness, missing) for stiffness in (rods.EI_over_dl, rods.dl_over_EI))
-            coefficients = (rods.EA_over_l, rods.l_over_EA, *bending, rods.mass, squared_edge)
-            sound = all(np.isfinite(one).all() and (one > 0.0).all() for one in coefficients)
+                sound = all(self._has_sound_coefficients(choose) for choose in (min, max))
         except (OverflowError, ZeroDivisionError):
             sound = False
         if not sound:
@@ -265,6 +267,13 @@ class Scene:
                 f"The stiffnesses or masses of {self.robot!r} overflow or vanish in double precision: use numbers "
                 "closer to those of a robot."
             )
+
+    def _has_sound_coefficients(self, choose: Callable[[tuple[float, ...]], float]) -> bool:
+        rods = self._rods(choose)
+        missing = (rods.nodes_per_limb - 1) * np.arange(n_hub_hinges(rods.n_limbs), rods.n_limbs)
+        bending = (np.delete(stiffness, missing) for stiffness in (rods.EI_over_dl, rods.dl_over_EI))
+        coefficients = (rods.EA_over_l, rods.l_over_EA, *bending, rods.mass, rods.shortest_edge**2)
+        return all(np.isfinite(one).all() and (one > 0.0).all() for one in coefficients)
 
     def _check_hub_hinges(self) -> None:
         """Neighbours turned apart turn their hub hinge by two peak angles; at pi its curvature is infinite."""
@@ -306,9 +315,21 @@ class Scene:
             error_rate=0.0 if tolerance is None else speed * (tolerance / ADAPTATION[0]) ** ADAPTATION[1],
         )
 
-    def rods(self) -> Rods:
-        """The scene's coefficients for the kernels, see der/rods.py."""
-        robot, fluid = self.robot, self.fluid
+    @property
+    def n_robots(self) -> int | None:
+        """Robots that the scene is for, or None if no number differs from robot to robot."""
+        return batch_size(self)
+
+    def of_robot(self, index: int) -> "Scene":
+        """The scene of one robot of a batch."""
+        return chosen(self, itemgetter(index))
+
+    def rods(self, index: int = 0) -> Rods:
+        """The coefficients of a robot for the kernels, see der/rods.py."""
+        return self._rods(itemgetter(index))
+
+    def _rods(self, choose: Callable[[tuple[float, ...]], float]) -> Rods:
+        robot, fluid = chosen(self.robot, choose), None if self.fluid is None else chosen(self.fluid, choose)
         return make_rods(
             limbs=robot.limb_shapes(),
             nodes_per_limb=robot.nodes_per_limb,

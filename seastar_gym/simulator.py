@@ -13,9 +13,20 @@ from seastar_gym.actuation.drive import Drive
 from seastar_gym.actuation.schedule import step_times
 from seastar_gym.der.energy import energies
 from seastar_gym.der.lanes import N_LANES
-from seastar_gym.der.rods import REPORT_ROWS, SMALLEST_HUB_T, Actuation, Work, aligned_rows, make_work
+from seastar_gym.der.rods import (
+    REPORT_ROWS,
+    SMALLEST_HUB_T,
+    Actuation,
+    Rods,
+    Work,
+    aligned_rows,
+    make_work,
+    put_robot,
+    side_by_side,
+)
 from seastar_gym.der.schemes import SCHEMES
 from seastar_gym.der.stroke import advance
+from seastar_gym.per_robot import frame_of
 from seastar_gym.scene import MAX_STEPS, Scene, require_count
 
 Floats = NDArray[np.float64]
@@ -119,7 +130,7 @@ class Simulator:
         n_groups = -(-self.n_robots // N_LANES)
         available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         self.threads = min(n_groups, available if threads is None else int(threads))
-        self._rods = scene.rods()
+        self._check_batch(scene)
         self._scheme = SCHEMES[scene.numerics.scheme]
         self._limits = scene.limits()
         self._times = step_times(scene.actuator.corners, scene.numerics.step)
@@ -128,6 +139,7 @@ class Simulator:
         self.q = aligned_rows(n_groups, n_rows, N_LANES)
         self.v = aligned_rows(n_groups, n_rows, N_LANES)
         self.q[:] = scene.robot.nodes().reshape(-1, 1)
+        self._rods = self._make_rods()
         self._a = aligned_rows(n_groups, (n_rows + 1) * self._scheme.n_stages + 2, N_LANES)
         self._drive = Drive(scene.actuator, self.n_robots, n_limbs, self._times)
         self._commands = np.zeros((n_groups, n_limbs, N_LANES))  # share of _shape that every limb follows
@@ -145,7 +157,42 @@ class Simulator:
     def _make_memory(self) -> tuple[Work, Actuation]:
         robot = self.scene.robot
         rotations = Actuation(np.zeros((robot.n_limbs, N_LANES)), np.zeros((robot.n_limbs, N_LANES)))
-        return make_work(self._rods, self._scheme.n_stages), rotations
+        return make_work(self._rods[0], self._scheme.n_stages), rotations
+
+    def _check_batch(self, scene: Scene) -> None:
+        if scene.n_robots not in (None, self.n_robots):
+            raise ValueError(f"The scene has numbers for {scene.n_robots} robots, the batch {self.n_robots}.")
+
+    def _make_rods(self) -> list[Rods]:
+        """One set of coefficients for all lane groups, or one for each if numbers differ from robot to robot."""
+        if self.scene.n_robots is None:
+            return [self.scene.rods()]
+        robots = [self.scene.rods(robot) for robot in range(self.n_robots)]
+        robots += robots[-1:] * (len(self.q) * N_LANES - self.n_robots)
+        return [side_by_side(robots[first : first + N_LANES]) for first in range(0, len(robots), N_LANES)]
+
+    def set_scene(self, scene: Scene, mask: ArrayLike | None = None) -> None:
+        """Go on with a scene that differs in numbers of `PER_ROBOT` alone.
+
+        mask: The robots whose numbers have changed, shape (n_robots,), all if None.
+        """
+        if not isinstance(scene, Scene) or frame_of(scene) != frame_of(self.scene):
+            raise ValueError("set_scene needs a scene of the same terms that differs in numbers of each robot alone.")
+        self._check_batch(scene)
+        chosen, whole = self._checked_mask(mask), self.scene.n_robots is None or scene.n_robots is None
+        self.scene = scene
+        if whole:
+            self._rods = self._make_rods()
+            return
+        for robot in np.flatnonzero(chosen):
+            group, lane = divmod(int(robot), N_LANES)
+            put_robot(self._rods[group], lane, scene.rods(int(robot)))
+
+    def _checked_mask(self, mask: ArrayLike | None) -> NDArray[np.bool_]:
+        chosen = np.ones(self.n_robots, bool) if mask is None else np.asarray(mask)
+        if chosen.dtype != bool or chosen.shape != (self.n_robots,):
+            raise ValueError(f"mask must be boolean of shape ({self.n_robots},), not {chosen.dtype} {chosen.shape}.")
+        return chosen
 
     def _get_pool(self) -> ThreadPoolExecutor:
         """The threads of this process: a fork inherits the pool of its parent, but not the threads in it."""
@@ -176,9 +223,7 @@ class Simulator:
 
         mask: Which robots, shape (n_robots,), all if None. heading: [rad], a number or shape (n_robots,).
         """
-        chosen = np.ones(self.n_robots, bool) if mask is None else np.asarray(mask)
-        if chosen.dtype != bool or chosen.shape != (self.n_robots,):
-            raise ValueError(f"mask must be boolean of shape ({self.n_robots},), not {chosen.dtype} {chosen.shape}.")
+        chosen = self._checked_mask(mask)
         angles = _as_floats("heading", heading)
         if angles.shape not in ((), (self.n_robots,)):
             raise ValueError(f"heading must be a number or of shape ({self.n_robots},), not {angles.shape}.")
@@ -317,7 +362,10 @@ class Simulator:
         both = np.zeros((2, len(self.q), 1, N_LANES))
         for group in range(len(self.q)):
             actuation.delta_psi_end[:] = self._rotations[group]
-            energies(self._rods, work, actuation, self.q[group], self.v[group], both[0, group], both[1, group])
+            energies(
+                self._rods[group % len(self._rods)], work, actuation, self.q[group], self.v[group], both[0, group],
+                both[1, group],
+            )  # fmt: skip
         return self._read(both[0])[:, 0], self._read(both[1])[:, 0]
 
     # --- motion ------------------------------------------------------------------------------------------------
@@ -397,6 +445,8 @@ class Simulator:
 
         # More parts than threads, and whoever is ready takes the next: another process may hold up one of the threads.
         n_parts = 1 if self.threads == 1 else min(len(self.q), PARTS_PER_THREAD * self.threads)
+        if len(self._rods) > 1:
+            n_parts = len(self.q)
         bounds = len(self.q) * np.arange(n_parts + 1) // n_parts
         parts = map(slice, bounds[:-1], bounds[1:])
 
@@ -407,9 +457,9 @@ class Simulator:
                 if self._shape.ndim > 1:
                     shape = np.ascontiguousarray(self._shape[part, begin : end + 1])
                 advance(
-                    self._rods, work, self._scheme, SCHEMES["implicit-euler"], actuation, self.q[part], self.v[part],
-                    self._a[part], self._commands[part], times, shape, self._failed[part], self._report[part],
-                    self._limits,
+                    self._rods[part.start % len(self._rods)], work, self._scheme, SCHEMES["implicit-euler"], actuation,
+                    self.q[part], self.v[part], self._a[part], self._commands[part], times, shape, self._failed[part],
+                    self._report[part], self._limits,
                 )  # fmt: skip
 
         if self.threads == 1:

@@ -151,7 +151,7 @@ def energy_noise(rods, q, h, mass, potential, kinetic):
     Velocities are differences of positions over h; stretching and bending are as stiff as `stiffness` [N/m] at most.
     """
     edges = rods.n_limbs * (rods.nodes_per_limb - 1)
-    length = rods.shortest_edge
+    length = load(rods.shortest_edge, 0)
     stretching, bending = load(rods.EA_over_l, 0), load(rods.EI_over_dl, 0)
     for e in range(1, edges):
         stretching, bending = larger(load(rods.EA_over_l, e), stretching), larger(load(rods.EI_over_dl, e), bending)

@@ -61,7 +61,7 @@ def minimise(rods, work, stage, active, tolerance, patience):
         count = select(stepping, one, zero)
         iterations += count
         backtracks += select(shortening, one, zero)
-        easy = (repairs + backtracks <= 0.0) & (iterations <= EASY) & (phi <= rods.calm)
+        easy = (repairs + backtracks <= 0.0) & (iterations <= EASY) & (phi <= load(rods.calm, 0))
         late = select(iterations < EASY, one, LATE)
         foreseen = late * move * move <= tolerance * quadratic_length
         foreseen = easy & foreseen & (largest_hub_t(rods, work) < FORESEEABLE_T)
@@ -79,7 +79,8 @@ def foreseeable_length(rods, stage):
     Measured over stiff, soft, slender and thick robots in random strokes: turning an edge stretches it, and the tension
     that this makes moves nodes the farther, the stiffer the edges are against the nodes' inertia.
     """
-    return rods.shortest_edge / (CURVATURE + rods.curvature_rate * stage.gamma * stage.gamma)
+    rate = load(rods.curvature_rate, 0)
+    return load(rods.shortest_edge, 0) / (CURVATURE + rate * stage.gamma * stage.gamma)
 
 
 @kernel

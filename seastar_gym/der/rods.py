@@ -7,9 +7,10 @@ the hub hinge from limb j to limb j + 1, whose first edge is the root edge of li
 limb has none: hinges that are not there have no stiffness.
 
 Coefficients have shape (rows,) if all robots share them and (rows, N_LANES) if they differ from robot to robot:
-`load` reads either.
+`load` reads either, and every set of rods has coefficients of one of the two shapes.
 """
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -60,10 +61,10 @@ class Rods(NamedTuple):
     cross_drag: np.ndarray | None
     current: Current | None
     load: np.ndarray | None
-    shortest_edge: float
-    curvature_rate: float
-    calm: float
-    damped: float
+    shortest_edge: np.ndarray
+    curvature_rate: np.ndarray
+    calm: np.ndarray
+    damped: np.ndarray
 
 
 @kernel
@@ -76,6 +77,31 @@ def tail_node(rods, e):
 def n_nodes(rods):
     """Number of nodes of a star, with the hub."""
     return rods.n_limbs * (rods.nodes_per_limb - 1) + 1
+
+
+def side_by_side(robots: Sequence[Any]) -> Any:
+    """Bundles of shared rows, one for each of N_LANES robots, as one bundle of rows of shape (rows, N_LANES).
+
+    Samples on a grid, which are not read by row, stay shared.
+    """
+    first = robots[0]
+    columns = {name: [getattr(robot, name) for robot in robots] for name in first._fields}
+    joined = {}
+    for name, column in columns.items():
+        if isinstance(column[0], np.ndarray) and name != "velocities":
+            joined[name] = np.stack(column, axis=1)
+        elif hasattr(column[0], "_fields"):
+            joined[name] = side_by_side(column)
+    return first._replace(**joined)
+
+
+def put_robot(bundle: Any, lane: int, robot: Any) -> None:
+    """Write a robot's shared rows into its lane of a bundle made by `side_by_side`."""
+    for rows, own in zip(bundle, robot, strict=True):
+        if isinstance(own, np.ndarray) and rows.ndim == 2:
+            rows[:, lane] = own
+        elif hasattr(own, "_fields"):
+            put_robot(rows, lane, own)
 
 
 class Work(NamedTuple):

@@ -177,7 +177,7 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, war
         good, phi, iterations, repairs, backtracks = minimise(rods, work, stage, good, limits.tolerance, patience)
         trouble = trouble | (repairs + backtracks > 0.0)
         if scheme.dissipative:
-            trouble = trouble | (phi > rods.damped)
+            trouble = trouble | (phi > load(rods.damped, 0))
         add_to_report(report, NEWTON_ITERATIONS, iterations)
         add_to_report(report, REPAIRS, repairs)
         add_to_report(report, BACKTRACKS, backtracks)

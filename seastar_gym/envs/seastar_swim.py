@@ -9,6 +9,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions, action_space, command_table, to_commands
+from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.rendering import Frame, Renderer
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.task import Outcome, Path, SwimTask, make_scene
@@ -73,6 +74,7 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     render_mode: "rgb_array" draws the end of a stroke, "rgb_array_list" collects `frames_per_stroke` frames in every
         stroke, "human" shows as many in a window.
     frames_per_stroke: See render_mode; at equal times, the last one at the end of the stroke.
+    randomization: Numbers of the scene that are drawn at the start of every episode; `info` has them by name.
     """
 
     metadata = {"render_modes": ["human", "rgb_array", "rgb_array_list"], "render_fps": FRAMES_PER_STROKE}
@@ -88,6 +90,7 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
         random_heading: bool = False,
         render_mode: Literal["human", "rgb_array", "rgb_array_list"] | None = None,
         frames_per_stroke: int = FRAMES_PER_STROKE,
+        randomization: DomainRandomization | None = None,
     ):
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise ValueError(f"render_mode must be one of {self.metadata['render_modes']}, not {render_mode!r}.")
@@ -97,7 +100,9 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
         self.frames_per_stroke = frames_per_stroke
         self.metadata = {**self.metadata, "render_fps": frames_per_stroke}
         self.actions = actions
-        self._task = SwimTask(make_scene(scene, fidelity), 1, path, reward, waypoint_radius, random_heading, threads=1)
+        self._task = SwimTask(
+            make_scene(scene, fidelity), 1, path, reward, waypoint_radius, random_heading, 1, randomization
+        )
         n_limbs = self.scene.robot.n_limbs
         self.action_space = action_space(actions, n_limbs)
         size = self._task.observation_size
@@ -111,8 +116,8 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
 
     @property
     def scene(self) -> Scene:
-        """What is modelled."""
-        return self.simulator.scene
+        """What is modelled, before anything is drawn by `randomization`."""
+        return self._task.scene
 
     @property
     def simulator(self) -> Simulator:
@@ -193,7 +198,7 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
 
     def _get_renderer(self) -> Renderer:
         if self._renderer is None:
-            robot = self.scene.robot
+            robot = self.simulator.scene.of_robot(0).robot
             limbs = 1 + np.arange(robot.n_nodes - 1).reshape(robot.n_limbs, -1)
             self._renderer = Renderer(
                 np.hstack([np.zeros((robot.n_limbs, 1), int), limbs]),

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from seastar_gym.actuation.actuator import StatefulActuator
 from seastar_gym.envs.observation import VELOCITY_SCALE, observation_size, observe, to_float32
 from seastar_gym.envs.paths import PathName, cross_track_error, make_path, shortest_way
+from seastar_gym.envs.randomization import LIMB_STRENGTH, DomainRandomization, drawn_scene
 from seastar_gym.envs.reward import RewardWeights, reward_terms
 from seastar_gym.fidelity import measured
 from seastar_gym.scene import Fidelity, Numerics, Scene, require_number
@@ -66,13 +67,18 @@ class SwimTask:
         waypoint_radius: float,
         random_heading: bool,
         threads: int | None,
+        randomization: DomainRandomization | None = None,
     ):
+        if not isinstance(randomization, DomainRandomization | None):
+            raise ValueError(f"randomization must be a DomainRandomization or None, not {randomization!r}.")
         require_number("waypoint_radius", waypoint_radius, "m")
         if not isinstance(reward, RewardWeights):
             raise ValueError(f"reward must be RewardWeights, not {reward!r}.")
         waypoints = make_path(path, np.random.default_rng(0))  # refuses a bad path now, not at the first reset
-        self.simulator = Simulator(scene, n_robots, threads)
-        self._promised = {name: np.full(n_robots, value) for name, value in promised(scene).items()}
+        self.scene, self.randomization = scene, randomization
+        self.drawn = {} if randomization is None else randomization.first_values(scene, n_robots)
+        self.simulator = Simulator(drawn_scene(scene, self.drawn), n_robots, threads)
+        self._promised = {name: np.full(n_robots, value) for name, value in promised(self.simulator.scene).items()}
         if scene.robot.hub_hinge == "turning" and 2 * scene.actuator.peak_angle >= scene.robot.opening_angle * (
             1 - 1e-9
         ):
@@ -96,12 +102,16 @@ class SwimTask:
         return scene_observation_size(self.simulator.scene)
 
     def reset(self, robots: NDArray[np.bool_], generators: list[np.random.Generator], path: Path | None = None) -> None:
-        """Begin a new episode for the robots in the mask; their generators draw path, then heading."""
+        """Begin a new episode for the robots in the mask; their generators draw path, heading, then numbers."""
         headings = np.zeros(self.n_robots)
         for robot in np.flatnonzero(robots):
             self._set_path(robot, make_path(self.path if path is None else path, generators[robot]))
             if self.random_heading:
                 headings[robot] = generators[robot].uniform(-np.pi, np.pi)
+            if self.randomization is not None:
+                self.randomization.draw(self.drawn, int(robot), generators[robot])
+        if self.drawn:
+            self.simulator.set_scene(drawn_scene(self.scene, self.drawn), robots)
         self.simulator.reset(robots, headings)
         self.waypoint_index[robots] = 0
         self._way_to_go[robots] = self._measure_way_to_go(self.simulator.hub_position())[robots]
@@ -152,11 +162,12 @@ class SwimTask:
 
     def step(self, commands: Floats) -> Outcome:
         """One stroke of every robot."""
-        return self._judge(commands, self.simulator.stroke(commands))
+        return self._judge(commands, self.simulator.stroke(commands * self.drawn.get(LIMB_STRENGTH, 1.0)))
 
     def step_in_parts(self, commands: Floats, parts: int) -> Generator[float, None, Outcome]:
         """One stroke that pauses to be looked at; yields the time in it [s]. The Outcome is its return value."""
-        report = yield from self.simulator.stroke_in_parts(commands, parts)
+        strength = self.drawn.get(LIMB_STRENGTH, 1.0)
+        report = yield from self.simulator.stroke_in_parts(commands * strength, parts)
         return self._judge(commands, report)
 
     def _judge(self, commands: Floats, report: StrokeReport) -> Outcome:
@@ -202,6 +213,7 @@ class SwimTask:
             "distance": _length(current - hub),
             "cross_track_error": cross_track_error(hub, self._waypoint(leg - 1), self._waypoint(leg)),
             **{name: values.copy() for name, values in self._promised.items()},
+            **{name: values.copy() for name, values in self.drawn.items()},
         }
 
 

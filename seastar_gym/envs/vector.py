@@ -11,6 +11,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions, action_space, command_table, to_commands
+from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.seastar_swim import checked_options
 from seastar_gym.envs.task import Path, SwimTask, make_scene
@@ -52,6 +53,7 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
         render_mode: None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
+        randomization: DomainRandomization | None = None,
     ):
         if render_mode is not None:
             raise ValueError('The batch draws nothing: use gym.make("SeastarSwim-v0", render_mode=...) for one robot.')
@@ -64,7 +66,7 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
         self.render_mode = None
         self.actions = actions
         self._task = SwimTask(
-            make_scene(scene, fidelity), num_envs, path, reward, waypoint_radius, random_heading, threads
+            make_scene(scene, fidelity), num_envs, path, reward, waypoint_radius, random_heading, threads, randomization
         )
         n_limbs = self.simulator.scene.robot.n_limbs
         self.single_action_space = action_space(actions, n_limbs)
@@ -76,6 +78,11 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
         self._elapsed = np.zeros(num_envs, np.int64)
         self._needs_reset = np.ones(num_envs, bool)
         self._has_begun = False
+
+    @property
+    def scene(self) -> Scene:
+        """What is modelled, before anything is drawn by `randomization`."""
+        return self._task.scene
 
     @property
     def simulator(self) -> Simulator:

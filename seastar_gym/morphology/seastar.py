@@ -150,10 +150,10 @@ def make_rods(
         cross_drag=cross_drag,
         current=current,
         load=forces.reshape(-1) if loads else None,
-        shortest_edge=shortest,
-        curvature_rate=max(map(max, modulus)) / (density * shortest**2) * slenderness,
-        calm=calm,
-        damped=calm * min(1.0, mean(drag_per_length) * length / (density * mean(area))),
+        shortest_edge=np.array([shortest]),
+        curvature_rate=np.array([max(map(max, modulus)) / (density * shortest**2) * slenderness]),
+        calm=np.array([calm]),
+        damped=np.array([calm * min(1.0, mean(drag_per_length) * length / (density * mean(area)))]),
     )
 
 

@@ -1,0 +1,149 @@
+"""Robots and waters that differ from episode to episode."""
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.checks import require_finite, require_number
+from seastar_gym.per_robot import numbers_of, with_numbers
+from seastar_gym.scene import Scene
+
+LIMB_STRENGTH = "limb_strength"
+"""Share of its commanded rotation that a limb makes: 0 for one that has failed; drawn for every limb."""
+WIDEST = 3.0
+"""Standard deviations: draws of `Normal` farther out are made again."""
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """Between `low` and `high`."""
+
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        require_finite("low", self.low, "of its number")
+        require_finite("high", self.high, "of its number")
+        if not self.low <= self.high:
+            raise ValueError(f"low must not exceed high: {self.low!r} is more than {self.high!r}.")
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Smallest and largest number that can be drawn."""
+        return self.low, self.high
+
+    def draw(self, rng: np.random.Generator) -> float:
+        """One number."""
+        return float(rng.uniform(self.low, self.high))
+
+
+@dataclass(frozen=True)
+class LogUniform:
+    """Between `low` and `high`, both above zero, with a uniform logarithm."""
+
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        require_number("low", self.low, "of its number")
+        Uniform(self.low, self.high)
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Smallest and largest number that can be drawn."""
+        return self.low, self.high
+
+    def draw(self, rng: np.random.Generator) -> float:
+        """One number."""
+        drawn = math.exp(rng.uniform(math.log(self.low), math.log(self.high)))
+        return min(max(drawn, self.low), self.high)
+
+
+@dataclass(frozen=True)
+class Normal:
+    """Around `mean` with the standard deviation `deviation`, never farther than three of them."""
+
+    mean: float
+    deviation: float
+
+    def __post_init__(self) -> None:
+        require_finite("mean", self.mean, "of its number")
+        require_number("deviation", self.deviation, "of its number", zero_allowed=True)
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Smallest and largest number that can be drawn."""
+        return self.mean - WIDEST * self.deviation, self.mean + WIDEST * self.deviation
+
+    def draw(self, rng: np.random.Generator) -> float:
+        """One number."""
+        while True:
+            deviations = rng.standard_normal()
+            if abs(deviations) <= WIDEST:
+                return float(self.mean + self.deviation * deviations)
+
+
+Distribution = Uniform | LogUniform | Normal
+
+
+class DomainRandomization:
+    """Distributions of a scene's numbers, drawn anew for every episode of every robot, in this order.
+
+    distributions: By name: "limb_strength", or a number that the scene has and that may differ from robot to robot, as
+        in "robot.youngs_modulus", "robot.density", "fluid.drag_coefficient", "fluid.current.u_x".
+    """
+
+    def __init__(self, distributions: Mapping[str, Distribution]):
+        if not isinstance(distributions, Mapping) or not distributions:
+            raise ValueError(f"DomainRandomization needs distributions by name, not {distributions!r}.")
+        for name, distribution in distributions.items():
+            if not isinstance(distribution, Distribution):
+                raise ValueError(f"{name} needs a Uniform, LogUniform or Normal, not {distribution!r}.")
+        strength = distributions.get(LIMB_STRENGTH)
+        if strength is not None and not (strength.bounds[0] >= 0.0 and strength.bounds[1] <= 1.0):
+            raise ValueError(f"limb_strength must be drawn from 0 to 1, not from {strength.bounds}.")
+        self.distributions = dict(distributions)
+
+    def __repr__(self) -> str:
+        return f"DomainRandomization({self.distributions!r})"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, DomainRandomization) and self.distributions == other.distributions
+
+    def __hash__(self) -> int:
+        return hash(tuple(self.distributions.items()))
+
+    def first_values(self, scene: Scene, n_robots: int) -> dict[str, NDArray[np.float64]]:
+        """The numbers before the first draw, shape (n_robots,), that of limbs (n_robots, n_limbs).
+
+        Refuses names that the scene does not have, and bounds that it does not allow.
+        """
+        numbers = [name for name in self.distributions if name != LIMB_STRENGTH]
+        known = [name for name, value in numbers_of(scene).items() if value is not None]
+        for name in numbers:
+            if name not in known:
+                raise ValueError(
+                    f"The scene has no number {name!r} to draw: it has {', '.join(known)}, {LIMB_STRENGTH}."
+                )
+        for bounds in itertools.product(*(self.distributions[name].bounds for name in numbers)):
+            with_numbers(scene, dict(zip(numbers, bounds, strict=True)))
+        values = {name: np.full(n_robots, self.distributions[name].bounds[0]) for name in numbers}
+        if LIMB_STRENGTH in self.distributions:
+            values[LIMB_STRENGTH] = np.ones((n_robots, scene.robot.n_limbs))
+        return values
+
+    def draw(self, values: dict[str, NDArray[np.float64]], robot: int, rng: np.random.Generator) -> None:
+        """Draw all numbers of a robot, in place."""
+        for name, distribution in self.distributions.items():
+            for place in np.ndindex(values[name].shape[1:]):
+                values[name][(robot, *place)] = distribution.draw(rng)
+
+
+def drawn_scene(scene: Scene, values: dict[str, Any]) -> Scene:
+    """The scene with the numbers drawn for every robot."""
+    return with_numbers(scene, {name: value for name, value in values.items() if name != LIMB_STRENGTH})

@@ -1,0 +1,78 @@
+"""Numbers that may differ from robot to robot in a batch.
+
+A part of a scene names them in `PER_ROBOT`. Each is a number, or an array of shape (n_robots,), which is kept as a
+tuple, so that parts stay equal by value, hashable and frozen.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numpy as np
+
+Part = TypeVar("Part")
+
+
+def require_each(part: Any, name: str, check: Callable[[str, float], None]) -> None:
+    """Check a number of a part, or that of each robot, and keep an array as a tuple."""
+    value = getattr(part, name)
+    if not isinstance(value, np.ndarray | tuple):
+        check(name, value)
+        return
+    numbers = value.tolist() if isinstance(value, np.ndarray) else list(value)
+    if not isinstance(numbers, list) or not numbers or isinstance(numbers[0], list):
+        raise ValueError(f"{name} must be a number, or one for every robot of shape (n_robots,), not {value!r}.")
+    for number in numbers:
+        check(name, number)
+    object.__setattr__(part, name, tuple(numbers))
+
+
+def numbers_of(part: Any) -> dict[str, Any]:
+    """The numbers that may differ from robot to robot, by their names, "fluid.density", with None for what is not
+    modelled."""
+    found = {}
+    for field in dataclasses.fields(part):
+        value = getattr(part, field.name)
+        if field.name in getattr(part, "PER_ROBOT", ()):
+            found[field.name] = value
+        elif dataclasses.is_dataclass(value):
+            found.update({f"{field.name}.{name}": number for name, number in numbers_of(value).items()})
+    return found
+
+
+def with_numbers(part: Part, numbers: dict[str, Any]) -> Part:
+    """The part with some of its numbers changed, named as `numbers_of` names them."""
+    inner: dict[str, dict[str, Any]] = {}
+    own = {}
+    for name, value in numbers.items():
+        first, _, rest = name.partition(".")
+        if rest:
+            inner.setdefault(first, {})[rest] = value
+        else:
+            own[first] = value
+    own.update({name: with_numbers(getattr(part, name), values) for name, values in inner.items()})
+    return dataclasses.replace(part, **own) if own else part  # type: ignore[type-var]
+
+
+def batch_size(part: Any) -> int | None:
+    """Robots that the numbers of a part are for, or None if they are for any number of robots."""
+    sizes = {name: len(value) for name, value in numbers_of(part).items() if isinstance(value, tuple)}
+    if len(set(sizes.values())) > 1:
+        raise ValueError(f"Numbers that differ from robot to robot must be for equally many robots, not {sizes}.")
+    return next(iter(sizes.values()), None)
+
+
+def chosen(part: Part, choose: Callable[[tuple[float, ...]], float]) -> Part:
+    """The part with one number chosen of each that differs from robot to robot."""
+    numbers = numbers_of(part)
+    return with_numbers(part, {name: choose(value) for name, value in numbers.items() if isinstance(value, tuple)})
+
+
+def frame_of(part: Any) -> Any:
+    """A part's kind and fields, nested, with only whether they are modelled for those that may differ from robot to
+    robot: equal for scenes that run the same code on memory of the same shape."""
+    if not dataclasses.is_dataclass(part):
+        return part
+    free = getattr(part, "PER_ROBOT", ())
+    values = {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}
+    return type(part), *((name, value is None if name in free else frame_of(value)) for name, value in values.items())

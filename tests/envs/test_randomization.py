@@ -1,0 +1,109 @@
+"""Numbers drawn for every episode: from their distributions, the same alone and in a batch, and told in `info`."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from seastar_gym import DomainRandomization, LogUniform, Normal, Scene, Seastar, Uniform, UniformCurrent, Water
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.scene import Numerics
+
+DRAWS = DomainRandomization(
+    {
+        "robot.youngs_modulus": LogUniform(5e5, 2e6),
+        "fluid.drag_coefficient": Normal(1.0, 0.1),
+        "limb_strength": Uniform(0.5, 1.0),
+    }
+)
+
+
+@pytest.mark.parametrize("distribution", [Uniform(-2.0, 3.0), LogUniform(0.1, 10.0), Normal(1.0, 0.5)])
+def test_draws_have_their_mean_and_stay_within_their_bounds(distribution):
+    rng = np.random.default_rng(0)
+    drawn = np.array([distribution.draw(rng) for _ in range(4000)])
+    low, high = distribution.bounds
+    assert low <= drawn.min() and drawn.max() <= high
+    if isinstance(distribution, LogUniform):
+        drawn, low, high = np.log(drawn), np.log(low), np.log(high)
+    assert drawn.mean() == pytest.approx((low + high) / 2.0, abs=0.05 * (high - low))
+    assert drawn.min() < low + 0.25 * (high - low) and drawn.max() > high - 0.25 * (high - low)
+
+
+def test_a_robot_is_drawn_alone_as_in_a_batch_and_swims_as_the_robot_that_was_drawn():
+    batch = gym.make_vec(
+        "SeastarSwim-v0", 3, "vector_entry_point", fidelity="fast", randomization=DRAWS, max_episode_steps=2
+    )
+    alone = [SeastarSwimEnv(fidelity="fast", randomization=DRAWS) for _ in range(3)]
+    observations, info = batch.reset(seed=7)
+    firsts = [env.reset(seed=7 + i) for i, env in enumerate(alone)]
+    for robot, (observation, own) in enumerate(firsts):
+        np.testing.assert_array_equal(observations[robot], observation)
+        for name in DRAWS.distributions:
+            np.testing.assert_array_equal(info[name][robot], own[name])
+    action = np.array([0, 1, 2, 0, 1])
+    observations, _, _, _, info = batch.step(np.tile(action, (3, 1)))
+    for robot, env in enumerate(alone):
+        observation, _, _, _, own = env.step(action)
+        np.testing.assert_array_equal(observations[robot], observation)
+        np.testing.assert_array_equal(info["limb_strength"][robot], own["limb_strength"])
+        modulus, drag = own["robot.youngs_modulus"], own["fluid.drag_coefficient"]
+        scene = Scene(Seastar(youngs_modulus=modulus), Water(drag_coefficient=drag), numerics=Numerics.preset("fast"))
+        env.simulator.reset()
+        plain = SeastarSwimEnv(scene=scene)
+        plain.reset()
+        command = own["limb_strength"] * np.array([0.0, 1.0, -1.0, 0.0, 1.0])
+        env.simulator.stroke(command[None])
+        plain.simulator.stroke(command[None])
+        np.testing.assert_array_equal(env.simulator.positions, plain.simulator.positions)
+
+
+def test_every_episode_is_another_robot_and_every_seed_the_same_one():
+    env = SeastarSwimEnv(fidelity="fast", randomization=DRAWS)
+    first = env.reset(seed=1)[1]["robot.youngs_modulus"]
+    second = env.reset()[1]["robot.youngs_modulus"]
+    again = env.reset(seed=1)[1]["robot.youngs_modulus"]
+    assert first == again and first != second
+    assert env.scene.robot.youngs_modulus == 1e6
+
+
+def test_a_limb_that_has_failed_does_not_move():
+    env = SeastarSwimEnv(fidelity="fast", randomization=DomainRandomization({"limb_strength": Uniform(0.0, 0.0)}))
+    _, info = env.reset(seed=0)
+    np.testing.assert_array_equal(info["limb_strength"], np.zeros(5))
+    *_, info = env.step(np.ones(5, int))
+    assert np.abs(info["hub_position"]).max() < 1e-12 and info["limbs_heated"] == 5
+
+
+@pytest.mark.parametrize(
+    "make, words",
+    [
+        (lambda: Uniform(1.0, 0.0), ("low", "high")),
+        (lambda: Uniform(0.0, np.inf), ("high", "finite")),
+        (lambda: LogUniform(0.0, 1.0), ("low", "positive")),
+        (lambda: Normal(0.0, -1.0), ("deviation",)),
+        (lambda: DomainRandomization({}), ("distributions",)),
+        (lambda: DomainRandomization({"robot.density": 3.0}), ("robot.density", "Uniform")),
+        (lambda: DomainRandomization({"limb_strength": Uniform(0.5, 1.5)}), ("limb_strength", "0 to 1")),
+        (lambda: SeastarSwimEnv(randomization="all"), ("DomainRandomization", "'all'")),
+        (lambda: env_with("robot.limb_length", 0.1, 0.2), ("robot.limb_length", "robot.density")),
+        (lambda: env_with("fluid.current.u_x", 0.1, 0.2), ("fluid.current.u_x",)),
+        (lambda: env_with("robot.density", -1.0, 0.2), ("density", "positive")),
+    ],
+)
+def test_randomization_of_what_cannot_be_is_refused_with_a_sentence(make, words):
+    with pytest.raises(ValueError, match=r"\.$") as caught:
+        make()
+    for word in words:
+        assert word in str(caught.value)
+
+
+def env_with(name: str, low: float, high: float) -> SeastarSwimEnv:
+    return SeastarSwimEnv(randomization=DomainRandomization({name: Uniform(low, high)}))
+
+
+def test_currents_can_be_drawn():
+    scene = Scene(fluid=Water(current=UniformCurrent()))
+    randomization = DomainRandomization({"fluid.current.u_x": Uniform(-0.1, 0.1)})
+    env = SeastarSwimEnv(scene=scene, randomization=randomization)
+    _, info = env.reset(seed=3)
+    assert env.simulator.scene.fluid.current.u_x == (info["fluid.current.u_x"],)
