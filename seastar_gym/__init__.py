@@ -12,7 +12,7 @@ from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
 from seastar_gym.fluids import GridCurrent, ShearCurrent, UniformCurrent, Vortex
 from seastar_gym.morphology.limb import Limb
-from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water
+from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water, relaxation_time
 from seastar_gym.simulator import Simulator, SolverStatus, State, StrokeReport
 
 __version__ = "0.1.0"
@@ -42,6 +42,7 @@ __all__ = [
     "Vortex",
     "Water",
     "__version__",
+    "relaxation_time",
 ]
 
 register(

@@ -158,13 +158,16 @@ class Water:
         flow and the pressure (C_d - C_t) |w_n| w_n of the flow across add up, w_n the normal part of w (after G. I.
         Taylor, 1952): no less than C_t across, so C_t must not exceed C_d.
     current: How the fluid moves, or None if it is at rest; w is the velocity relative to it.
+    added_mass_coefficient: C_a, mass of the fluid that a limb accelerates across itself over that which it displaces,
+        1 for a round limb; None for none, as in the chapter.
     """
 
-    PER_ROBOT: ClassVar = ("density", "drag_coefficient", "tangential_drag_coefficient")
+    PER_ROBOT: ClassVar = ("density", "drag_coefficient", "tangential_drag_coefficient", "added_mass_coefficient")
     density: float = 1000.0
     drag_coefficient: float = 1.0
     tangential_drag_coefficient: float | None = None
     current: AnyCurrent | None = None
+    added_mass_coefficient: float | None = None
 
     def __post_init__(self) -> None:
         not_negative = partial(require_number, zero_allowed=True)
@@ -178,6 +181,8 @@ class Water:
                     "tangential_drag_coefficient must not exceed drag_coefficient, that of flow across a limb: "
                     f"{self.tangential_drag_coefficient!r} is more than {self.drag_coefficient!r}."
                 )
+        if self.added_mass_coefficient is not None:
+            require_each(self, "added_mass_coefficient", partial(not_negative, unit="1"))
         if not isinstance(self.current, AnyCurrent | None):
             raise ValueError(f"current must be one of the currents of seastar_gym.fluids, not {self.current!r}.")
 

@@ -47,12 +47,14 @@ class Seastar:
         is missing to a full turn; "turning" by the interior turning angle pi - psi, as the published codes of the
         chapter's authors do.
     limbs: What limbs have of their own, one Limb each, or () for nothing.
+    relaxation_time: Of material damping after Kelvin and Voigt [s], see der/damping.py and `relaxation_time`; None for
+        none, as in the chapter.
 
     Two limbs have one hub hinge; straight ones, with hub_hinge="turning", make a plain rod. One limb has none: it
     swings freely about the hub, and no actuator turns it.
     """
 
-    PER_ROBOT: ClassVar = ("rod_radius", "youngs_modulus", "density")
+    PER_ROBOT: ClassVar = ("rod_radius", "youngs_modulus", "density", "relaxation_time")
     n_limbs: int = 5
     nodes_per_limb: int = 10
     limb_length: float = 0.1
@@ -61,6 +63,7 @@ class Seastar:
     density: float = 1000.0
     hub_hinge: HubHinge = "opening"
     limbs: tuple[Limb, ...] = ()
+    relaxation_time: float | None = None
 
     def __post_init__(self) -> None:
         require_count("n_limbs", self.n_limbs, 1, 12)
@@ -69,6 +72,8 @@ class Seastar:
         require_each(self, "rod_radius", partial(require_number, unit="m"))
         require_each(self, "youngs_modulus", partial(require_number, unit="Pa"))
         require_each(self, "density", partial(require_number, unit="kg/m^3"))
+        if self.relaxation_time is not None:
+            require_each(self, "relaxation_time", partial(require_number, unit="s", zero_allowed=True))
         require_choice("hub_hinge", self.hub_hinge, get_args(HubHinge))
         if self.n_limbs == 1 and self.hub_hinge != "opening":
             raise ValueError("One limb has no hub hinge that could be measured by its turning angle.")
@@ -134,6 +139,13 @@ class Seastar:
     def nodes(self) -> NDArray[np.float64]:
         """Node positions at rest [m], shape (n_nodes, 2): hub, {1,1}..{1,N-1}, {2,1}.. ; limb 1 along +x."""
         return rest_positions(self.limb_shapes(), self.nodes_per_limb)
+
+
+def relaxation_time(loss_factor: float, frequency: float) -> float:
+    """Relaxation time [s] of a material whose loss factor is known at a frequency [Hz]: eta = omega tau."""
+    require_number("loss_factor", loss_factor, "1", zero_allowed=True)
+    require_number("frequency", frequency, "Hz")
+    return loss_factor / (2.0 * math.pi * frequency)
 
 
 @dataclass(frozen=True)
@@ -338,6 +350,8 @@ class Scene:
             fluid_density=0.0 if fluid is None else fluid.density,
             drag_coefficient=0.0 if fluid is None else fluid.drag_coefficient,
             tangential_drag_coefficient=None if fluid is None else fluid.tangential_drag_coefficient,
+            added_mass_coefficient=None if fluid is None else fluid.added_mass_coefficient,
+            relaxation_time=robot.relaxation_time,
             current=None if fluid is None or fluid.current is None else fluid.current.rows(),
             held_nodes=self.held_nodes,
             loads=self.loads,

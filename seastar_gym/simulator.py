@@ -362,10 +362,8 @@ class Simulator:
         both = np.zeros((2, len(self.q), 1, N_LANES))
         for group in range(len(self.q)):
             actuation.delta_psi_end[:] = self._rotations[group]
-            energies(
-                self._rods[group % len(self._rods)], work, actuation, self.q[group], self.v[group], both[0, group],
-                both[1, group],
-            )  # fmt: skip
+            rods = self._rods[group % len(self._rods)]
+            energies(rods, work, actuation, self.q[group], self.v[group], both[0, group], both[1, group])
         return self._read(both[0])[:, 0], self._read(both[1])[:, 0]
 
     # --- motion ------------------------------------------------------------------------------------------------

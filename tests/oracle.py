@@ -24,6 +24,8 @@ class Star:
     """A star of limbs in a fluid, with the values of section 13.4; SI units, drag_coefficient = 0 is vacuum.
 
     tangential_drag_coefficient: Of flow along a limb; None for that of flow across.
+    added_mass_coefficient: Fluid accelerated across a limb over that displaced.
+    relaxation_time: Of Kelvin-Voigt damping [s].
     current: Velocities of the fluid [m/s] at places [m], both of shape (n, 2), or None if it is at rest.
     """
 
@@ -38,6 +40,8 @@ class Star:
     hub_hinge: str = "opening"
     tangential_drag_coefficient: float | None = None
     current: Callable[[Array], Array] | None = None
+    added_mass_coefficient: float = 0.0
+    relaxation_time: float = 0.0
 
     @property
     def n_nodes(self) -> int:
@@ -376,8 +380,8 @@ def relative_velocities(star: Star, v: Array, frozen: Array | None) -> Array:
 
 
 def half_edges(star: Star, frozen: Array | None) -> Iterator[tuple[int, Array]]:
-    """(node, unit normal) of both halves of every edge, where flow across a limb has drag of its own."""
-    if star.cross_drag > 0.0:
+    """(node, unit normal) of both halves of every edge, where flow across a limb has drag or mass of its own."""
+    if star.cross_drag > 0.0 or star.added_mass_coefficient > 0.0:
         for (tail, head), e in zip(star.edges, edge_vectors(star, frozen), strict=True):
             normal = np.array([-e[1], e[0]]) / np.linalg.norm(e)
             yield tail, normal
@@ -422,6 +426,46 @@ def kinetic_energy(star: Star, v: Array) -> float:
     return float(0.5 * np.sum(star.masses[:, None] * v**2))
 
 
+def mass_matrix(star: Star, frozen: Array | None) -> Array:
+    """Lumped masses and added mass [kg], shape (2 n_nodes, 2 n_nodes)."""
+    matrix = np.diag(np.repeat(star.masses, 2))
+    half_edge = star.fluid_density * star.added_mass_coefficient * np.pi * star.rod_radius**2 * star.edge_length / 2.0
+    for node, normal in half_edges(star, frozen):
+        matrix[2 * node : 2 * node + 2, 2 * node : 2 * node + 2] += half_edge * np.outer(normal, normal)
+    return matrix
+
+
+def strains(star: Star, q: Array) -> Iterator[tuple[float, float, Array, Array]]:
+    """Of every edge (EA l, eps, grad eps, Hess eps), of every hinge (EI dl, kappa, grad kappa, Hess kappa)."""
+    D, e, dl = star.differences, edge_vectors(star, q), star.edge_length
+    for D_e, e_i in zip(D, e, strict=True):
+        size = np.linalg.norm(e_i)
+        along = e_i / size
+        across = (np.eye(2) - np.outer(along, along)) / size
+        yield star.EA * dl, float(size / dl - 1.0), D_e.T @ along / dl, D_e.T @ across @ D_e / dl
+    for (a, b, sign), (_, _, phi, _) in zip(star.hinges, hinge_terms(star, q, np.zeros(star.n_limbs)), strict=True):
+        t = np.tan(phi / 2.0)
+        phi_q = D[b].T @ direction_gradient(e[b]) - D[a].T @ direction_gradient(sign * e[a]) * sign
+        phi_qq = D[b].T @ direction_hessian(e[b]) @ D[b] - D[a].T @ direction_hessian(e[a]) @ D[a]
+        slope = (1.0 + t**2) / dl
+        yield star.EI * dl, curvature(phi, dl), slope * phi_q, slope * phi_qq + t * slope * np.outer(phi_q, phi_q)
+
+
+def damping_potential(star: Star, q: Array, q_hat: Array, gamma: float) -> tuple[float, Array, Array]:
+    """gamma R [J] with its gradient, flat, and Hessian: 1/2 tau EA l (d eps/dt)^2 + 1/2 tau EI dl (d kappa/dt)^2."""
+    n = 2 * star.n_nodes
+    potential, gradient, hessian = 0.0, np.zeros(n), np.zeros((n, n))
+    if star.relaxation_time > 0.0:
+        for (stiffness, now, slope, bend), (_, before, _, _) in zip(
+            strains(star, q), strains(star, q_hat), strict=True
+        ):
+            rate = (now - before) / gamma
+            potential += gamma * 0.5 * star.relaxation_time * stiffness * rate**2
+            gradient += star.relaxation_time * stiffness * rate * slope
+            hessian += star.relaxation_time * stiffness * (np.outer(slope, slope) / gamma + rate * bend)
+    return potential, gradient, hessian
+
+
 def incremental_potential(
     star: Star, q: Array, q_hat: Array, v_hat: Array, gamma: float, delta_psi: ArrayLike, frozen: Array | None = None
 ) -> float:
@@ -429,7 +473,8 @@ def incremental_potential(
 
     frozen: Places [m] where normals of edges and the current are taken, shape (n_nodes, 2), if the star has such terms.
     """
-    inertia = kinetic_energy(star, (q - q_hat) / gamma - v_hat)
+    d = ((q - q_hat) / gamma - v_hat).ravel()
+    inertia = float(0.5 * d @ mass_matrix(star, frozen) @ d) + damping_potential(star, q, q_hat, gamma)[0]
     return inertia + elastic_energy(star, q, delta_psi) + gamma * drag_potential(star, (q - q_hat) / gamma, frozen)
 
 
@@ -439,14 +484,15 @@ def incremental_gradient(
     """Gradient of Phi [N], shape (n_nodes, 2): the residual f of (13.9)."""
     v = (q - q_hat) / gamma
     drag = drag_force(star, v, frozen)
-    return star.masses[:, None] * (v - v_hat) / gamma + elastic_gradient(star, q, delta_psi) - drag
+    inertia = mass_matrix(star, frozen) @ (v - v_hat).ravel() / gamma + damping_potential(star, q, q_hat, gamma)[1]
+    return inertia.reshape(-1, 2) + elastic_gradient(star, q, delta_psi) - drag
 
 
 def incremental_hessian(
     star: Star, q: Array, q_hat: Array, gamma: float, delta_psi: ArrayLike, frozen: Array | None = None
 ) -> Array:
     """Hessian of Phi [N/m], shape (2 n_nodes, 2 n_nodes): the Jacobian J of (13.12)."""
-    inertia = np.diag(np.repeat(star.masses, 2)) / gamma**2
+    inertia = mass_matrix(star, frozen) / gamma**2 + damping_potential(star, q, q_hat, gamma)[2]
     return inertia + elastic_hessian(star, q, delta_psi) - drag_jacobian(star, (q - q_hat) / gamma, frozen) / gamma
 
 

@@ -8,6 +8,7 @@ import oracle
 from oracle import Star
 from seastar_gym import Scene, Seastar, SmaPulse, Water
 from seastar_gym.der.compilation import entry_point
+from seastar_gym.der.damping import freeze_strains
 from seastar_gym.der.fluid import freeze_fluid
 from seastar_gym.der.lanes import N_LANES, any_lane, borrow, load, splat, store
 from seastar_gym.der.newton import take_step
@@ -22,6 +23,7 @@ def direction(rods, work, q, gamma, convex, result):
     h, mask = splat(gamma), load(borrow(convex), 0) > 0.0
     stage = Stage(memory.q_hat, memory.v_hat, h, 1.0 / h)
     freeze_fluid(rods_rows, memory)
+    freeze_strains(rods_rows.relaxation_time, rods_rows, memory, memory.q_hat)
     for row in range(q.shape[0]):
         store(memory.q, row, load(borrow(q), row))
     if any_lane(mask):

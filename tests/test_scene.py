@@ -34,8 +34,8 @@ def refused(*words: str):
 
 def test_defaults_are_the_chapters_values():
     robot, water, actuator = Seastar(), Water(), SmaPulse()
-    assert dataclasses.astuple(robot) == (5, 10, 0.1, 1.6e-3, 1e6, 1000.0, "opening", ())
-    assert dataclasses.astuple(water) == (1000.0, 1.0, None, None)
+    assert dataclasses.astuple(robot) == (5, 10, 0.1, 1.6e-3, 1e6, 1000.0, "opening", (), None)
+    assert dataclasses.astuple(water) == (1000.0, 1.0, None, None, None)
     assert dataclasses.astuple(actuator) == (math.pi / 5, 0.1, 0.9)
     assert Numerics().scheme == "implicit-euler"
     assert Scene() == Scene(robot, water, actuator, Numerics())

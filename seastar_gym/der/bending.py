@@ -22,12 +22,12 @@ def bending_energy(rods, hinge, moment):
 
 
 @kernel
-def bending_slopes(rods, hinge, t, moment, convex):
-    """(dE_b/dphi, d^2E_b/dphi^2) [N m].
+def bending_slopes(stiffness, t, moment, convex):
+    """(dE_b/dphi, d^2E_b/dphi^2) [N m] of a hinge of stiffness EI/dl.
 
     For the robots in the mask `convex` the second is the Gauss-Newton part alone, which is never negative.
     """
     growth = add_product(1.0, t, t)
     slope = moment * growth
-    gauss_newton = load(rods.EI_over_dl, hinge) * growth * growth
+    gauss_newton = stiffness * growth * growth
     return slope, select(convex, gauss_newton, add_product(gauss_newton, slope, t))

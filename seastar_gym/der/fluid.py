@@ -4,6 +4,7 @@ The first guess is off by the square of the step, so schemes keep their order up
 the potential stays one that is minimised, with an exact Hessian.
 """
 
+from seastar_gym.der.added_mass import freeze_added_mass
 from seastar_gym.der.compilation import kernel
 from seastar_gym.der.current import current_velocity
 from seastar_gym.der.drag import add_cross_flow, drag_slopes, relative
@@ -14,8 +15,9 @@ from seastar_gym.der.rods import n_nodes, tail_node
 
 @kernel
 def freeze_fluid(rods, work):
-    """Fill work.normals and work.current at the iterate, in scenes that have them."""
+    """Fill work.normals, work.added_mass and work.current at the iterate, in scenes that have them."""
     freeze_normals(rods, work.normals, work.q)
+    freeze_added_mass(rods.added_mass, rods, work)
     freeze_current(rods.current, rods, work)
 
 

@@ -23,6 +23,7 @@ over at no such cost.
 """
 
 from seastar_gym.der.actuation import set_natural_hub_angles
+from seastar_gym.der.added_mass import fluid_energy
 from seastar_gym.der.compilation import kernel
 from seastar_gym.der.energy import edge_of, elastic_energy, hinge_edges, kinetic_energy, load_energy
 from seastar_gym.der.geometry import half_angle
@@ -39,6 +40,12 @@ LARGEST_CUT = 0.01  # of the kinetic energy about the rigid motion; where more i
 def potential_energy(rods, work, q):
     """Of limbs, hinges and loads, at the natural hub angles in `work` [J]."""
     return elastic_energy(rods, work, q) + load_energy(rods.load, q, n_nodes(rods))
+
+
+@kernel
+def moving_energy(rods, work, v):
+    """Kinetic energy of the robot, and of fluid that moves along at the normals of the last stage [J]."""
+    return kinetic_energy(rods, v) + fluid_energy(work.added_mass, rods, v)
 
 
 @kernel
@@ -88,7 +95,7 @@ def allowed_energy(rods, work, scheme, actuation, start, end, q, v):
     else:
         set_natural_hub_angles(rods, work, actuation, end)
         allowed = potential_energy(rods, work, q)
-    return allowed + kinetic_energy(rods, v)
+    return allowed + moving_energy(rods, work, v)
 
 
 @kernel
@@ -171,7 +178,7 @@ def hold_to_energy(rods, work, q, v, h, robots, allowed, largest_cut):
 
     Returns (refused, cut): masks of the robots whose step has to be undone, and of those whose velocities were cut.
     """
-    potential, kinetic = potential_energy(rods, work, q), kinetic_energy(rods, v)
+    potential, kinetic = potential_energy(rods, work, q), moving_energy(rods, work, v)
     grown = robots & (potential + kinetic > add_product(allowed, ROUNDING, kinetic))
     cut = grown & ~grown
     if any_lane(grown):

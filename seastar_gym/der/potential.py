@@ -2,7 +2,8 @@
 
     Phi(q) = |v - v_hat|^2_M / 2 + U(q) + gamma sum_i c_i |w_i|^3 / 3,    v = (q - q_hat)/gamma, w = v - u,
 
-whose stationary point satisfies (13.9) with gamma for h. The Hessian is (13.12).
+whose stationary point satisfies (13.9) with gamma for h; scenes with more terms add theirs (damping.py, drag.py,
+added_mass.py). The Hessian is (13.12).
 
 U is a sum over edges and hinges. For an edge with net moment mu (slopes of the hinges it ends, minus slopes of the
 hinges it begins), tension T, hinge stiffness sigma (sum of second slopes), u = e/|e|^2 and theta its direction:
@@ -25,8 +26,10 @@ full one, with its quadratic convergence, is used wherever its pivots allow it.
 
 import numpy as np
 
+from seastar_gym.der.added_mass import add_fluid_inertia
 from seastar_gym.der.bending import bending_energy, bending_slopes, moment
 from seastar_gym.der.compilation import kernel
+from seastar_gym.der.damping import damped_energy, damped_stiffness, damped_stress
 from seastar_gym.der.drag import add_cross_flow, drag_slopes, relative
 from seastar_gym.der.geometry import EDGE_ROWS, edge_geometry, half_angle
 from seastar_gym.der.lanes import add_product, load, select, splat, store, subtract_product
@@ -43,23 +46,33 @@ from seastar_gym.der.stretching import stretching_energy, tension
 
 
 @kernel
-def edge_slopes(rods, e, edge, net_moment, stiffness, convex):
-    """(E_s, f, K): stretching energy, gradient and Hessian of U in edge e, whose geometry is `edge`.
+def edge_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex):
+    """(E_s, f, K): stretching energy, gradient and Hessian of U in edge e, whose geometry is `edge`, with damping.
 
     With n = (u_y, -u_x): K = across |u|^2 1 + (along - across) u u^T + mu (u n^T + n u^T), along = EA |e|^2/l.
     """
     _, _, length, squared, inverse, ux, uy = edge
     T = tension(rods, e, length)
-    pull = T * length
+    natural = splat(0.0)
+    pull = damped_stress(rods.relaxation_time, work.tension, e, stage.inverse_gamma, T, natural) * length
     across = select(convex, positive_part(pull), pull) + stiffness
     mu = select(convex, 0.0, net_moment)
     twice_mu = mu + mu
-    difference = load(rods.EA_over_l, e) * squared - across
+    difference = damped_stiffness(rods.relaxation_time, stage.inverse_gamma, load(rods.EA_over_l, e)) * squared - across
     isotropic = across * inverse
     wx = add_product(difference * ux, twice_mu, uy)
     wy = subtract_product(difference * uy, twice_mu, ux)
     return (
-        stretching_energy(rods, e, T),
+        damped_energy(
+            rods.relaxation_time,
+            work.tension,
+            e,
+            stage.inverse_gamma,
+            T,
+            natural,
+            load(rods.l_over_EA, e),
+            stretching_energy(rods, e, T),
+        ),
         (subtract_product(pull * ux, net_moment, uy), add_product(pull * uy, net_moment, ux)),
         (
             add_product(isotropic, wx, ux),
@@ -67,6 +80,21 @@ def edge_slopes(rods, e, edge, net_moment, stiffness, convex):
             add_product(isotropic, wy, uy),
         ),
     )
+
+
+@kernel
+def hinge_slopes(rods, work, stage, hinge, t, EI_kappa_bar, convex):
+    """(E_b, slope, s): energy of a hinge and its first and second slope in phi, with damping."""
+    bend = moment(rods, hinge, t, EI_kappa_bar)
+    tau, inverse_gamma = rods.relaxation_time, stage.inverse_gamma
+    energy = damped_energy(
+        tau, work.bending, hinge, inverse_gamma, bend, EI_kappa_bar, load(rods.dl_over_EI, hinge),
+        bending_energy(rods, hinge, bend),
+    )  # fmt: skip
+    stiffness = damped_stiffness(tau, inverse_gamma, load(rods.EI_over_dl, hinge))
+    damped = damped_stress(tau, work.bending, hinge, inverse_gamma, bend, EI_kappa_bar)
+    slope, s = bending_slopes(stiffness, t, damped, convex)
+    return energy, slope, s
 
 
 @kernel
@@ -112,6 +140,7 @@ def node_slopes(rods, work, stage, node):
         (add_product(c_speed * wx, m_over_gamma, dx) - Fx, add_product(c_speed * wy, m_over_gamma, dy) - Fy),
         (add_product(diagonal, sx, wx), sx * wy, add_product(diagonal, sy, wy)),
     )
+    slopes = add_fluid_inertia(work.added_mass, node, dx, dy, stage.inverse_gamma, slopes)
     return add_cross_flow(rods.cross_drag, rods, work.normals, node, wx, wy, stage.gamma, stage.inverse_gamma, slopes)
 
 
@@ -140,7 +169,7 @@ def load_root_edge(work, limb):
 
 
 @kernel
-def assemble_hub_hinges(rods, work, convex):
+def assemble_hub_hinges(rods, work, stage, convex):
     """Root edges, hub hinges and their couplings, into `work`; returns the hinges' energy [J]."""
     n_limbs, edges = rods.n_limbs, rods.nodes_per_limb - 1
     for limb in range(n_limbs):
@@ -155,9 +184,8 @@ def assemble_hub_hinges(rods, work, convex):
         hinge = a * edges
         first, second = load_root_edge(work, a), load_root_edge(work, b)
         t = half_angle(first, second, rods.hub_side)
-        bend = moment(rods, hinge, t, load(work.hub_EI_kappa_bar, a))
-        slope, s = bending_slopes(rods, hinge, t, bend, convex)
-        energy += bending_energy(rods, hinge, bend)
+        E_b, slope, s = hinge_slopes(rods, work, stage, hinge, t, load(work.hub_EI_kappa_bar, a), convex)
+        energy += E_b
         store(work.hub_t, a, t)
         store(work.hub_moment, a, load(work.hub_moment, a) - slope)
         store(work.hub_moment, b, load(work.hub_moment, b) + slope)
@@ -198,11 +226,10 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
         e = node - 1
         before = inner_edge(work, limb, first, i - 1)
         t = half_angle(before, edge, 1.0)
-        bend = moment(rods, e, t, load(rods.EI_kappa_bar, e))
-        slope_before, s_before = bending_slopes(rods, e, t, bend, convex)
-        E_s, f, K = edge_slopes(rods, e, edge, slope_before - slope, s_before + s, convex)
+        E_b, slope_before, s_before = hinge_slopes(rods, work, stage, e, t, load(rods.EI_kappa_bar, e), convex)
+        E_s, f, K = edge_slopes(rods, work, stage, e, edge, slope_before - slope, s_before + s, convex)
         E_n, g, inertia = node_slopes(rods, work, stage, node)
-        energy += (E_s + E_n) + bending_energy(rods, e, bend)
+        energy += (E_s + E_n) + E_b
         P = coupling(s_before, edge, before)
         D_1 = (D_before[0] + K[0] + 2.0 * P[0], D_before[1] + K[1] + (P[1] + P[2]), D_before[2] + K[2] + 2.0 * P[3])
         K_P = (K[0] + P[0], K[1] + P[1], K[1] + P[2], K[2] + P[3])
@@ -223,7 +250,7 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
         pivot = smaller(pivot, node_pivot)
         slope, s, edge = slope_before, s_before, before
     net_moment, stiffness = load(work.hub_moment, limb) - slope, load(work.hub_stiffness, limb) + s
-    E_s, f, K = edge_slopes(rods, first, edge, net_moment, stiffness, convex)
+    E_s, f, K = edge_slopes(rods, work, stage, first, edge, net_moment, stiffness, convex)
     E_n, g, inertia = node_slopes(rods, work, stage, first + 1)
     store_root(
         work,
@@ -250,7 +277,7 @@ def factorise(rods, work, stage, convex):
     Returns (Phi, decrement, pivot): the potential [J], gradient^T Hessian^-1 gradient [J], and the smallest pivot,
     which is not positive (or NaN) where the Hessian is not positive definite.
     """
-    energy = assemble_hub_hinges(rods, work, convex)
+    energy = assemble_hub_hinges(rods, work, stage, convex)
     E_n, r_hub, D_hub = node_slopes(rods, work, stage, 0)
     energy += E_n
     decrement, pivot = splat(0.0), splat(np.inf)

@@ -38,6 +38,8 @@ class Rods(NamedTuple):
     mass: Lumped mass, per node [kg].
     drag: 1/2 rho_f C_d D dl_i of (13.8), per node [kg/m].
     cross_drag: What flow across an edge adds to that, of half the edge, per edge [kg/m], or None; see drag.py.
+    added_mass: Mass of fluid that half the edge accelerates across itself, per edge [kg], or None; see added_mass.py.
+    relaxation_time: tau of material damping [s], one row, or None; see damping.py.
     current: How the fluid moves, or None; see current.py.
     load: Dead load per coordinate [N], or None.
     shortest_edge: Smallest natural length of an edge [m].
@@ -59,6 +61,8 @@ class Rods(NamedTuple):
     mass: np.ndarray
     drag: np.ndarray
     cross_drag: np.ndarray | None
+    added_mass: np.ndarray | None
+    relaxation_time: np.ndarray | None
     current: Current | None
     load: np.ndarray | None
     shortest_edge: np.ndarray
@@ -118,6 +122,8 @@ class Work(NamedTuple):
     stage_v: Velocities of the stages of a time step [m/s].
     normals: Unit normals of the edges where a stage began, or None in scenes that need none; see fluid.py.
     current: Velocity of the fluid at every node there [m/s], or None.
+    added_mass: Mass of fluid at every node there, xx, xy, yy [kg], or None.
+    tension, bending: EA eps [N] and EI kappa [N m] of edges and hinges where a stage began, or None without damping.
     """
 
     q: np.ndarray
@@ -137,6 +143,9 @@ class Work(NamedTuple):
     stage_v: np.ndarray
     normals: np.ndarray | None
     current: np.ndarray | None
+    added_mass: np.ndarray | None
+    tension: np.ndarray | None
+    bending: np.ndarray | None
 
 
 class Stage(NamedTuple):
@@ -219,6 +228,9 @@ def make_work(rods: Rods, n_stages: int) -> Work:
         hub_EI_kappa_bar=rows(n_limbs),
         hub_t=rows(n_limbs),
         stage_v=rows(2 * n_nodes * n_stages),
-        normals=None if rods.cross_drag is None else rows(2 * n_edges),
+        normals=None if rods.cross_drag is None and rods.added_mass is None else rows(2 * n_edges),
         current=None if rods.current is None else rows(2 * n_nodes),
+        added_mass=None if rods.added_mass is None else rows(3 * n_nodes),
+        tension=None if rods.relaxation_time is None else rows(n_edges),
+        bending=None if rods.relaxation_time is None else rows(n_edges),
     )

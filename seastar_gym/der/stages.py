@@ -2,6 +2,7 @@
 
 from seastar_gym.der.actuation import set_natural_hub_angles
 from seastar_gym.der.compilation import kernel
+from seastar_gym.der.damping import freeze_strains
 from seastar_gym.der.fluid import freeze_fluid, power_of_current
 from seastar_gym.der.geometry import edge_geometry, half_angle
 from seastar_gym.der.guard import LARGEST_CUT, allowed_energy, hold_to_energy, put_back, set_aside, through_poles
@@ -173,6 +174,7 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, war
         if any_lane(wary):
             start_standing(rods, work, stage, wary)
         freeze_fluid(rods, work)
+        freeze_strains(rods.relaxation_time, rods, work, stage.q_hat)
         set_natural_hub_angles(rods, work, actuation, start + load_number(scheme.c, k) * size)
         good, phi, iterations, repairs, backtracks = minimise(rods, work, stage, good, limits.tolerance, patience)
         trouble = trouble | (repairs + backtracks > 0.0)

@@ -67,6 +67,8 @@ def make_rods(
     fluid_density: float,
     drag_coefficient: float,
     tangential_drag_coefficient: float | None = None,
+    added_mass_coefficient: float | None = None,
+    relaxation_time: float | None = None,
     current: Current | None = None,
     held_nodes: tuple[int, ...] = (),
     loads: tuple[tuple[int, float, float], ...] = (),
@@ -125,6 +127,10 @@ def make_rods(
         friction_per_length = per_node([[drag_of(C_t, r) for r in rs] for rs in radius])
         cross = [drag_of(drag_coefficient, r) - drag_of(C_t, r) for limb in limbs for r in along(limb.radius, at_edges)]
         cross_drag = np.array(cross) * 0.5 * l
+    added_mass = None
+    if added_mass_coefficient is not None:
+        displaced = [np.pi * r**2 for limb in limbs for r in along(limb.radius, at_edges)]
+        added_mass = fluid_density * added_mass_coefficient * np.array(displaced) * 0.5 * l
     mass = density * area * dl
     mass[list(held_nodes)] *= HELD
     forces = np.zeros((len(dl), 2))
@@ -148,6 +154,8 @@ def make_rods(
         mass=mass,
         drag=friction_per_length * dl,
         cross_drag=cross_drag,
+        added_mass=added_mass,
+        relaxation_time=None if relaxation_time is None else np.array([relaxation_time]),
         current=current,
         load=forces.reshape(-1) if loads else None,
         shortest_edge=np.array([shortest]),

@@ -148,8 +148,8 @@ def _load_counting_modules() -> dict[str, ModuleType]:
     compilation = ModuleType("compilation")
     vars(compilation).update(kernel=lambda function: function, entry_point=lambda function: function)
     names = (
-        "current", "rods", "geometry", "stretching", "bending", "drag", "fluid", "star_matrix", "potential", "newton",
-        "actuation", "energy", "guard", "stages",
+        "current", "rods", "geometry", "stretching", "bending", "drag", "added_mass", "fluid", "energy", "damping",
+        "star_matrix", "potential", "newton", "actuation", "guard", "stages",
     )  # fmt: skip
     saved = {f"{COUNTED}.{name}": sys.modules.get(f"{COUNTED}.{name}") for name in (*names, "lanes", "compilation")}
     for name in names:
@@ -202,7 +202,7 @@ def count_operations(scene: Scene) -> dict[str, Counter[str]]:
 
     stage = stages.begin_stage(rods, work, scheme, 0, *state, a, h)
     stages.set_natural_hub_angles(rods, work, actuation, Counted(1.0))
-    counted("hub hinges", lambda: potential.assemble_hub_hinges(rods, work, None))
+    counted("hub hinges", lambda: potential.assemble_hub_hinges(rods, work, stage, None))
     counted("limbs", limbs)
     unit = (Counted(1.0), Counted(0.0), Counted(1.0))
     counted("ring", lambda: modules["star_matrix"].solve_ring(work, rods.n_limbs, unit, unit[:2]))

@@ -25,7 +25,7 @@ def repeat_part(rods, work, q_0, v_0, step, part, n):
     seen = zero
     for _ in range(n):
         if part == 0:
-            seen += assemble_hub_hinges(rows, memory, None)
+            seen += assemble_hub_hinges(rows, memory, stage, None)
         elif part == 1:
             for limb in range(rods.n_limbs):
                 seen += sweep_limb(rows, memory, stage, limb, None, (zero, zero, zero), (zero, zero))[2]

@@ -1,10 +1,11 @@
-"""Fluids: drag along and across limbs, and currents, against the oracle and against closed forms."""
+"""Terms that a scene may have: fluids and material damping, against the oracle and against closed forms."""
 
 import json
 from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 import oracle
 from oracle import Star
@@ -19,6 +20,7 @@ from seastar_gym import (
     UniformCurrent,
     Vortex,
     Water,
+    relaxation_time,
 )
 from seastar_gym.der.lanes import N_LANES
 from stages import RandomStages, random_shape
@@ -54,16 +56,20 @@ def velocity(name: str, places: np.ndarray) -> np.ndarray:
             return np.stack(swirl(x, y), axis=1)
 
 
-def water_and_star(current: str | None, along: float | None, **shape) -> tuple[Water, Star]:
-    water = Water(950.0, 1.3, along, current=None if current is None else CURRENTS[current])
-    of_place = None if current is None else lambda places: velocity(current, places)
-    return water, Star(
-        fluid_density=950.0, drag_coefficient=1.3, tangential_drag_coefficient=along, current=of_place, **shape
-    )
-
-
 TERMS = [("uniform", 0.0), ("shear", 0.02), ("vortex", 0.1), ("grid", 1.3)]
-# One current and one drag along in all scenes here: every other set of terms is machine code of its own.
+NONE = Water(1000.0, 1.0, 1.0, UniformCurrent(), 0.0)
+"""Water that has every term and shows none: each other set of terms would be machine code of its own to compile."""
+TAU = 4e-3
+DAMPED = Seastar(relaxation_time=1e-4)
+
+
+def robot_water_and_star(current: str, along: float, **shape) -> tuple[Seastar, Water, Star]:
+    """The same scene, with all terms, for the kernels and for the oracle."""
+    star = Star(
+        fluid_density=950.0, drag_coefficient=1.3, tangential_drag_coefficient=along, relaxation_time=TAU,
+        added_mass_coefficient=0.8, current=lambda places: velocity(current, places), **shape,
+    )  # fmt: skip
+    return Seastar(relaxation_time=TAU, **shape), Water(950.0, 1.3, along, CURRENTS[current], 0.8), star
 
 
 # Against the oracle
@@ -71,8 +77,8 @@ TERMS = [("uniform", 0.0), ("shear", 0.02), ("vortex", 0.1), ("grid", 1.3)]
 
 @pytest.mark.parametrize("current, along", TERMS)
 def test_potential_and_newton_direction_in_a_fluid_are_those_of_the_oracle(current, along):
-    water, star = water_and_star(current, along, nodes_per_limb=4)
-    scene = Scene(Seastar(nodes_per_limb=4), water)
+    robot, water, star = robot_water_and_star(current, along, nodes_per_limb=4)
+    scene = Scene(robot, water)
     stages = RandomStages(star, 1e-2, bend=0.05)
     found = stages.run(scene.rods())
     for lane in range(N_LANES):
@@ -84,9 +90,25 @@ def test_potential_and_newton_direction_in_a_fluid_are_those_of_the_oracle(curre
         np.testing.assert_allclose(found.direction[lane], direction, rtol=0.0, atol=1e-11 * np.abs(direction).max())
 
 
+@pytest.mark.parametrize("hub_hinge", ["opening", "turning"])
+def test_the_oracles_damping_has_the_slopes_of_its_potential(hub_hinge):
+    star, rng = Star(3, 3, hub_hinge=hub_hinge, relaxation_time=TAU), np.random.default_rng(4)
+    q_hat = random_shape(star, 0.3, 0.02, rng)
+    q = q_hat + 1e-3 * rng.standard_normal(q_hat.shape)
+    _, gradient, hessian = oracle.damping_potential(star, q, q_hat, 0.01)
+    for k in range(q.size):
+        step = np.zeros(q.size)
+        step[k] = 1e-8
+        moved = (q + step.reshape(q.shape), q - step.reshape(q.shape))
+        ahead, behind = (oracle.damping_potential(star, x, q_hat, 0.01) for x in moved)
+        assert gradient[k] == pytest.approx((ahead[0] - behind[0]) / 2e-8, rel=1e-5, abs=1e-6 * np.abs(gradient).max())
+        column = (ahead[1] - behind[1]) / 2e-8
+        np.testing.assert_allclose(hessian[:, k], column, rtol=1e-5, atol=1e-6 * np.abs(hessian).max())
+
+
 @pytest.mark.parametrize("current, along", TERMS)
 def test_the_oracles_drag_in_a_fluid_is_the_slope_of_its_potential(current, along):
-    _, star = water_and_star(current, along, nodes_per_limb=3)
+    _, _, star = robot_water_and_star(current, along, nodes_per_limb=3)
     rng = np.random.default_rng(2)
     frozen, v = random_shape(star, 0.3, 0.01, rng), rng.standard_normal((star.n_nodes, 2))
     force, jacobian = oracle.drag_force(star, v, frozen), oracle.drag_jacobian(star, v, frozen)
@@ -103,9 +125,9 @@ def test_the_oracles_drag_in_a_fluid_is_the_slope_of_its_potential(current, alon
 @pytest.mark.parametrize("current, along", TERMS)
 def test_a_step_in_a_fluid_is_the_oracles(current, along):
     h = 0.01
-    water, star = water_and_star(current, along, nodes_per_limb=4)
+    robot, water, star = robot_water_and_star(current, along, nodes_per_limb=4)
     numerics = Numerics("implicit-euler", h, newton_tolerance=1e-13)
-    simulator = Simulator(Scene(Seastar(nodes_per_limb=4), water, SmaPulse(0.3, 2.0 * h, 2.0 * h), numerics))
+    simulator = Simulator(Scene(robot, water, SmaPulse(0.3, 2.0 * h, 2.0 * h), numerics))
     rng = np.random.default_rng(3)
     q, v = random_shape(star, 0.05, 1e-3, rng), 0.02 * rng.standard_normal((star.n_nodes, 2))
     command = rng.uniform(-1.0, 1.0, 5)
@@ -119,9 +141,15 @@ def test_a_step_in_a_fluid_is_the_oracles(current, along):
 # Limits
 
 
-def swim(water: Water, boost=(0.0, 0.0), n_strokes=2, numerics=Numerics("implicit-midpoint", 5e-3)) -> np.ndarray:
+def swim(
+    water: Water,
+    robot: Seastar = Seastar(relaxation_time=0.0),
+    boost=(0.0, 0.0),
+    n_strokes=2,
+    numerics=Numerics("implicit-midpoint", 5e-3),
+) -> np.ndarray:
     """Node positions after strokes of a robot that is given a velocity first."""
-    simulator = Simulator(Scene(fluid=water, numerics=numerics))
+    simulator = Simulator(Scene(robot, water, numerics=numerics))
     simulator.v[0, 0::2], simulator.v[0, 1::2] = boost
     for _ in range(n_strokes):
         simulator.stroke([[0.0, 1.0, 0.0, -0.5, -1.0]])
@@ -129,13 +157,14 @@ def swim(water: Water, boost=(0.0, 0.0), n_strokes=2, numerics=Numerics("implici
 
 
 @pytest.mark.parametrize("still", [UniformCurrent(), ShearCurrent(0.0), Vortex(0.0)])
-def test_equal_drag_along_and_across_in_a_current_that_stands_still_is_the_chapters_to_the_last_bit(still):
-    np.testing.assert_array_equal(swim(Water(tangential_drag_coefficient=1.0, current=still)), swim(Water()))
+def test_terms_of_size_zero_leave_the_chapters_scene_to_the_last_bit(still):
+    """Equal drag along and across, a current that stands still, no added mass, no relaxation time."""
+    np.testing.assert_array_equal(swim(replace(NONE, current=still)), swim(Water(), Seastar()))
 
 
-@pytest.mark.parametrize("along", [1.0, 0.05])
-def test_a_uniform_current_is_a_galilean_shift_to_rounding(along):
-    water, u = Water(tangential_drag_coefficient=along, current=UniformCurrent()), (0.03, -0.05)
+@pytest.mark.parametrize("along, added_mass", [(1.0, 0.0), (0.05, 1.0)])
+def test_a_uniform_current_is_a_galilean_shift_to_rounding(along, added_mass):
+    water, u = Water(1000.0, 1.0, along, UniformCurrent(), added_mass), (0.03, -0.05)
     carried = swim(replace(water, current=UniformCurrent(*u)), boost=u)
     np.testing.assert_allclose(carried, swim(water) + 2.0 * np.array(u), rtol=0.0, atol=1e-8)
 
@@ -148,22 +177,20 @@ def test_a_linear_current_on_a_grid_is_the_current_itself():
         return 0.3 * (c * y - s * x) * c, 0.3 * (c * y - s * x) * s
 
     grid = GridCurrent.from_function(sheared, (-1.0, 1.0), (-1.0, 1.0), 0.1)
-    np.testing.assert_allclose(
-        swim(Water(1000.0, 1.0, 0.1, grid)), swim(Water(1000.0, 1.0, 0.1, shear)), rtol=0.0, atol=1e-8
-    )
+    sampled, itself = replace(NONE, current=grid), replace(NONE, current=shear)
+    np.testing.assert_allclose(swim(sampled), swim(itself), rtol=0.0, atol=1e-8)
 
 
 def test_a_current_beyond_its_grid_is_that_of_the_nearest_edge():
     grid = GridCurrent.from_function(lambda x, y: (0.02 + 0.0 * x, 0.01), (5.0, 6.0), (-8.0, -7.0), 0.5)
     uniform = UniformCurrent(0.02, 0.01)
-    np.testing.assert_allclose(
-        swim(Water(1000.0, 1.0, 0.1, grid)), swim(Water(1000.0, 1.0, 0.1, uniform)), rtol=0.0, atol=1e-12
-    )
+    sampled, itself = replace(NONE, current=grid), replace(NONE, current=uniform)
+    np.testing.assert_allclose(swim(sampled), swim(itself), rtol=0.0, atol=1e-12)
 
 
-def test_schemes_keep_their_second_order_with_lagged_currents_and_normals():
-    water = Water(tangential_drag_coefficient=0.05, current=Vortex(0.05, 0.15, 0.1))
-    robot = Seastar(nodes_per_limb=4, youngs_modulus=3e3)
+def test_schemes_keep_their_second_order_with_lagged_currents_normals_and_added_mass():
+    water = Water(1000.0, 1.0, 0.05, Vortex(0.05, 0.15, 0.1), 1.0)
+    robot = Seastar(nodes_per_limb=4, youngs_modulus=3e3, relaxation_time=0.0)
 
     def end(h):
         numerics = Numerics("implicit-midpoint", h, newton_tolerance=1e-12)
@@ -185,7 +212,7 @@ SINK = Numerics("implicit-midpoint", 0.01, newton_tolerance=1e-10)
 
 def terminal_velocity(direction: np.ndarray, water: Water) -> np.ndarray:
     """Hub velocity [m/s] of a stiff star of four limbs under a load of 1 mN per limb length along `direction`."""
-    robot = Seastar(n_limbs=4, youngs_modulus=1e9)
+    robot = Seastar(n_limbs=4, youngs_modulus=1e9, relaxation_time=0.0)
     lengths = Star(n_limbs=4).voronoi_lengths
     loads = tuple((k, *(0.01 * length * direction)) for k, length in enumerate(lengths))
     scene = Scene(robot, water, SmaPulse(0.0, 5.0, 5.0), SINK, loads=loads)
@@ -199,7 +226,7 @@ def terminal_velocity(direction: np.ndarray, water: Water) -> np.ndarray:
 @pytest.mark.parametrize("along", [0.02, 0.5, 1.0])
 def test_terminal_speed_is_where_load_and_drag_balance(along):
     """A cross of four limbs that moves along two of them: half its length has the drag along, half that across."""
-    water = Water(drag_coefficient=1.2, tangential_drag_coefficient=along, current=UniformCurrent())
+    water = Water(1000.0, 1.2, along, UniformCurrent(), 1.0)
     v_x, v_y = terminal_velocity(np.array([1.0, 0.0]), water)
     per_length = 0.5 * 1000.0 * 2.0 * 1.6e-3 * (along + 1.2) / 2.0
     assert v_x == pytest.approx(np.sqrt(0.01 / per_length), rel=1e-6)
@@ -210,8 +237,9 @@ def test_terminal_speed_is_where_load_and_drag_balance(along):
 def test_a_robot_at_rest_drifts_until_it_moves_with_the_current(along):
     """Of quadratic drag: 1 - v/u = 1/(1 + k u t). A stiff cross has half its length along the current, half across."""
     u, time = 0.1, 2.0
+    robot = Seastar(n_limbs=4, youngs_modulus=1e9, relaxation_time=0.0)
     scene = Scene(
-        Seastar(n_limbs=4, youngs_modulus=1e9), Water(1000.0, 1.2, along, UniformCurrent(u, 0.0)),
+        robot, Water(1000.0, 1.2, along, UniformCurrent(u, 0.0), 0.0),
         SmaPulse(0.0, 1.0, 1.0), Numerics("implicit-midpoint", 2e-3, newton_tolerance=1e-11),
     )  # fmt: skip
     simulator = Simulator(scene)
@@ -220,8 +248,101 @@ def test_a_robot_at_rest_drifts_until_it_moves_with_the_current(along):
     assert simulator.hub_velocity()[0, 0] == pytest.approx(u - u / (1.0 + k * u * time), rel=1e-4)
 
 
+VACUUM = Water(0.0, 1.0, 1.0, UniformCurrent(), 1.0)
+CLAMP = (0, 1)
+FIRST_ROOT = 1.8751040687119611  # of cos x cosh x = -1
+
+
+def ring(water: Water, robot: Seastar, time: float) -> tuple[np.ndarray, np.ndarray]:
+    """(times, deflections) of the tip of limb 1, clamped, after a sideways blow in its first mode, relative to L."""
+    pauses = round(time / 1e-3)
+    scene = Scene(
+        robot, water, SmaPulse(0.0, time / 2.0, time / 2.0),
+        Numerics("implicit-midpoint", 2.5e-4, newton_tolerance=1e-12), held_nodes=CLAMP,
+    )  # fmt: skip
+    simulator = Simulator(scene)
+    edges = robot.nodes_per_limb - 1
+    free = np.arange(1, edges + 1) / edges - 0.5 / edges  # the clamp is at half an edge, see docs/validation.md
+    simulator.v[0, 3 : 2 * edges + 2 : 2] = (1e-3 * free**2)[:, None]
+    simulator.v[0, 3] = 0.0
+    times, tips = [], []
+    for t in simulator.stroke_in_parts(np.zeros((1, 5)), pauses):
+        times.append(t)
+        tips.append(simulator.positions[0, edges, 1] / robot.limb_length)
+    return np.array(times), np.array(tips)
+
+
+def frequency_and_decrement(times: np.ndarray, tips: np.ndarray) -> tuple[float, float]:
+    """Of a decaying oscillation, from a fit of exp(-delta t) (a cos + b sin), and its logarithmic decrement."""
+
+    def misfit(unknowns):
+        delta, omega, *_ = unknowns
+        shapes = np.exp(-delta * times)[:, None] * np.stack([np.cos(omega * times), np.sin(omega * times)], axis=1)
+        return shapes @ np.linalg.lstsq(shapes, tips, rcond=None)[0] - tips
+
+    crossings = times[1:][np.diff(np.sign(tips)) != 0]
+    guess = np.pi / np.diff(crossings).mean()
+    delta, omega = least_squares(misfit, [1.0, guess], x_scale=[1.0, guess]).x
+    return omega / (2.0 * np.pi), 2.0 * np.pi * delta / omega
+
+
+def first_frequency(robot: Seastar) -> float:
+    """Of a clamped beam in vacuum [Hz]; the clamp is at half the first edge."""
+    length = robot.limb_length - robot.edge_length / 2.0
+    omega = (FIRST_ROOT / length) ** 2 * np.sqrt(robot.youngs_modulus / robot.density) * robot.rod_radius / 2.0
+    return float(omega / (2.0 * np.pi))
+
+
+def test_a_clamped_limb_rings_at_the_frequency_of_beam_theory_without_damping():
+    robot = Seastar(nodes_per_limb=20, relaxation_time=0.0)
+    frequency, decrement = frequency_and_decrement(*ring(VACUUM, robot, 1.0))
+    assert frequency == pytest.approx(first_frequency(robot), rel=0.01)
+    assert abs(decrement) < 1e-3
+
+
+@pytest.mark.parametrize("tau", [1e-3, 5e-3])
+def test_the_decrement_of_a_damped_limb_is_that_of_kelvin_and_voigt(tau):
+    """A mode of frequency omega has the damping ratio omega tau/2, and the decrement 2 pi z/sqrt(1 - z^2)."""
+    plain = frequency_and_decrement(*ring(VACUUM, Seastar(relaxation_time=0.0), 1.0))[0]
+    frequency, decrement = frequency_and_decrement(*ring(VACUUM, Seastar(relaxation_time=tau), 1.0))
+    ratio = np.pi * plain * tau
+    assert decrement == pytest.approx(2.0 * np.pi * ratio / np.sqrt(1.0 - ratio**2), rel=0.05)
+    assert frequency == pytest.approx(plain * np.sqrt(1.0 - ratio**2), rel=0.01)
+
+
+def test_added_mass_lowers_the_frequency_as_a_heavier_limb_would():
+    """omega falls with 1/sqrt(rho_m + C_a rho_f): no drag, so that nothing else is at work."""
+    robot = Seastar(density=1200.0, relaxation_time=0.0)
+    plain = frequency_and_decrement(*ring(VACUUM, robot, 1.0))[0]
+    loaded = frequency_and_decrement(*ring(Water(900.0, 0.0, 0.0, UniformCurrent(), 0.7), robot, 1.0))[0]
+    assert loaded / plain == pytest.approx(np.sqrt(1200.0 / (1200.0 + 0.7 * 900.0)), rel=2e-3)
+
+
+def test_a_loss_factor_is_that_of_the_relaxation_time_at_its_frequency():
+    assert relaxation_time(0.1, 10.0) == pytest.approx(0.1 / (2.0 * np.pi * 10.0))
+
+
+def test_energy_only_falls_in_a_damped_robot_that_nothing_drives():
+    scene = Scene(DAMPED, VACUUM, SmaPulse(0.0, 0.1, 0.1), Numerics(step=2e-3))
+    simulator = Simulator(scene, n_robots=4)
+    simulator.v[:] = 0.2 * np.random.default_rng(1).standard_normal(simulator.v.shape)
+    energy = [simulator.elastic_energy() + simulator.kinetic_energy()]
+    for _ in simulator.stroke_in_parts(np.zeros((4, 5)), 100):
+        energy.append(simulator.elastic_energy() + simulator.kinetic_energy())
+    assert np.all(np.diff(energy, axis=0) <= 1e-12 * energy[0]) and np.all(energy[-1] < 0.5 * energy[0])
+
+
+def test_damping_does_not_resist_a_rotation():
+    robot = Seastar(nodes_per_limb=4, relaxation_time=0.1)
+    simulator = Simulator(Scene(robot, VACUUM, SmaPulse(0.0, 0.25, 0.25), Numerics("implicit-midpoint", 1e-3)))
+    simulator.v[0, 0::2], simulator.v[0, 1::2] = -simulator.q[0, 1::2], simulator.q[0, 0::2]
+    before = simulator.kinetic_energy()[0]
+    simulator.stroke(np.zeros((1, 5)))
+    assert simulator.kinetic_energy()[0] == pytest.approx(before, rel=1e-3)
+
+
 def test_a_vortex_carries_a_robot_round_its_centre():
-    simulator = Simulator(Scene(fluid=Water(1000.0, 1.0, 1.0, Vortex(0.3, x=0.0, y=0.3))))
+    simulator = Simulator(Scene(DAMPED, replace(NONE, current=Vortex(0.3, x=0.0, y=0.3))))
     for _ in range(4):
         simulator.stroke(np.zeros((1, 5)))
     x, y = simulator.hub_position()[0]
@@ -229,8 +350,8 @@ def test_a_vortex_carries_a_robot_round_its_centre():
 
 
 def test_a_violent_robot_in_a_current_is_guarded_and_finishes():
-    water = Water(tangential_drag_coefficient=0.05, current=UniformCurrent(0.5, 0.0))
-    simulator = Simulator(Scene(fluid=water, numerics=Numerics(step=0.02)), n_robots=8)
+    water = Water(1000.0, 1.0, 0.05, UniformCurrent(0.5, 0.0), 1.0)
+    simulator = Simulator(Scene(DAMPED, water, numerics=Numerics(step=0.02)), n_robots=8)
     rng = np.random.default_rng(0)
     simulator.v[:] = rng.standard_normal(simulator.v.shape)
     report = simulator.stroke(rng.uniform(-1.0, 1.0, (8, 5)))
@@ -252,6 +373,9 @@ def test_a_fluid_comes_back_from_json(current):
         (lambda: Water(tangential_drag_coefficient=1.5), ("tangential_drag_coefficient", "must not exceed")),
         (lambda: Water(tangential_drag_coefficient=-0.1), ("tangential_drag_coefficient", "not negative")),
         (lambda: Water(current=0.1), ("current", "0.1")),
+        (lambda: Water(added_mass_coefficient=-1.0), ("added_mass_coefficient", "not negative")),
+        (lambda: Seastar(relaxation_time=-1.0), ("relaxation_time", "[s]", "not negative")),
+        (lambda: relaxation_time(0.1, 0.0), ("frequency", "positive")),
         (lambda: UniformCurrent(np.nan, 0.0), ("u_x", "[m/s]")),
         (lambda: UniformCurrent(0.0, "fast"), ("u_y", "'fast'")),
         (lambda: ShearCurrent(np.inf), ("rate", "[1/s]")),
