@@ -98,11 +98,11 @@ class Pair:
         self.shape = np.asarray(self.scene.actuator.delta_psi(self.times))
 
     def seconds(self, hardened: bool) -> float:
-        """Duration of a stroke [s]; leaves its end in q and v, and its counts in `report`."""
+        """Processor time of a stroke [s]; leaves its end in q and v, and its counts in `report`."""
         self.q[:], self.v[:] = self.start
         self.a[:], self.report[:] = 0.0, 0.0
         work, actuation = self.memory
-        begin = time.perf_counter()
+        begin = time.thread_time()
         if hardened:
             advance(
                 self.rods, work, self.scheme, SCHEMES["implicit-euler"], actuation, self.q, self.v, self.a, self.peaks,
@@ -113,14 +113,14 @@ class Pair:
                 self.rods, work, self.scheme, actuation, self.q, self.v, self.a, self.peaks, self.times, self.shape,
                 self.report, self.limits,
             )  # fmt: skip
-        return time.perf_counter() - begin
+        return time.thread_time() - begin
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Of one setting. plain: Median duration of a stroke by plain Newton, per robot and time step [s].
+    """Of one setting. plain: Median processor time of a stroke by plain Newton, per robot and time step [s].
 
-    ratio: Median, over rounds, of the hardened stroke's duration over the plain one's; quartiles: of the same.
+    ratio: Median, over rounds, of the hardened stroke's time over the plain one's; quartiles: of the same.
     """
 
     numerics: Numerics
@@ -144,8 +144,9 @@ def measure_cost(numerics: Numerics, rounds: int = 200) -> Cost:
 def cost_table(costs: list[Cost]) -> Table:
     """For a terminal."""
     table = Table(title="What hardening costs a healthy robot")
-    for name in ("scheme, step", "plain Newton, per step", "hardened over plain", "middle half of the rounds"):
-        table.add_column(name, justify="left" if name.startswith("scheme") else "right")
+    table.add_column("scheme, step", no_wrap=True)
+    for name in ("plain Newton, per step", "hardened over plain", "middle half of the rounds"):
+        table.add_column(name, justify="right")
     for cost in costs:
         table.add_row(
             f"{cost.numerics.scheme}, {1e3 * cost.numerics.step:g} ms", f"{1e6 * cost.plain:.3f} µs",
