@@ -76,7 +76,8 @@ def scenes(draw: st.DrawFn, schemes: list[str] = SCHEMES, most_limbs: int = 12, 
     fluid = draw(st.none() | powers(-2.0, 4.0).map(lambda c: Water(drag_coefficient=c)))
     heating, cooling = (step * draw(st.integers(1, most_steps // 2)) for _ in range(2))
     pulse = SmaPulse(draw(st.floats(0.0, 0.999)) * limit, heating, cooling)
-    return Scene(robot, fluid, pulse, Numerics(draw(st.sampled_from(schemes)), step))
+    most = draw(st.sampled_from([2, 5, 60]))
+    return Scene(robot, fluid, pulse, Numerics(draw(st.sampled_from(schemes)), step, max_iterations=most))
 
 
 @settings(derandomize=True, max_examples=150)
