@@ -27,7 +27,7 @@ from agents import policy as learned
 from agents.charts import Curve, read_progress
 from agents.pictures import FRAMES_PER_STROKE, draw_traces, film
 from agents.playback import Playback, RecordingEnv
-from agents.report import Remarks, ResultsTable, number, write_report
+from agents.report import Remarks, ResultsTable, number, read_trials, write_report
 from agents.scripted import scripted
 from agents.swim import Policy, Swim, swim
 from seastar_gym.envs.paths import PATH_NAMES, make_path
@@ -188,7 +188,7 @@ def _write_report(
     baselines = {agent: strokes for agent, strokes in finished.items() if agent not in curves}
     write_report(
         file,
-        [ResultsTable("Results", COLUMNS, _shown(swims))],
+        ResultsTable("Results", COLUMNS, _shown(swims)),
         swims,
         playbacks,
         waypoint_radius,
@@ -227,6 +227,8 @@ class Options:
     """Write report.html: all of it on one page, with playbacks of the swims."""
     runs: tuple[Path, ...] = ()
     """Folders of trainings whose learning curves the report shows beside those of the learned agents."""
+    trials: Path | None = None
+    """What agents.trials wrote (.csv), for the report to show too."""
 
     def __post_init__(self) -> None:
         if self.max_strokes < 1:
@@ -289,6 +291,7 @@ def _remarks(agents: Mapping[str, Policy], options: Options, arguments: Sequence
         sentences=[f'Computed at fidelity "{options.fidelity}".'],
         commands=[*commands, shlex.join(["python", "-m", "agents.evaluate", *arguments])],
         curves=curves,
+        tables=[] if options.trials is None else [read_trials(options.trials)],
     )
 
 

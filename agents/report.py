@@ -3,6 +3,7 @@
 It is `page.html` with plotly.js, the tables, the pictures of charts.py and the recorded swims written into it.
 """
 
+import csv
 import html
 import json
 from collections.abc import Mapping, Sequence
@@ -35,17 +36,18 @@ class ResultsTable:
 
 @dataclass(frozen=True, eq=False)
 class Remarks:
-    """What a report says besides the evaluation: sentences, commands that made it, learning curves."""
+    """What a report says besides the evaluation: sentences, commands that made it, learning curves, more tables."""
 
     title: str = "Evaluation"
     sentences: Sequence[str] = ()
     commands: Sequence[str] = ()
     curves: Sequence[Curve] = ()
+    tables: Sequence[ResultsTable] = ()
 
 
 def write_report(
     file: Path,
-    tables: Sequence[ResultsTable],
+    table: ResultsTable,
     swims: Sequence[Swim],
     playbacks: Sequence[Playback],
     waypoint_radius: float,
@@ -54,10 +56,11 @@ def write_report(
 ) -> None:
     """Write the page. waypoint_radius: [m]. baselines: Strokes round the pentagon, to be drawn beside the curves."""
     sections = [
-        *(_section(table.title, _table(table)) for table in tables),
+        _section(table.title, table_html(table)),
         _section("Playback", PLAYER),
         _section("Paths", _figure(to_html(paths_figure(swims, waypoint_radius), "paths"), "square")),
     ]
+    sections += [_section(more.title, table_html(more)) for more in remarks.tables]
     if remarks.curves:
         figure = to_html(curves_figure(remarks.curves, baselines), "curves")
         sections.append(_section("Learning curves", _figure(figure, "wide")))
@@ -86,16 +89,52 @@ def _figure(figure: str, shape: str) -> str:
 # --- tables ----------------------------------------------------------------------------------------------------------
 
 
-def _table(table: ResultsTable) -> str:
+def table_html(table: ResultsTable) -> str:
+    """A table as a piece of a page."""
     head = "".join(f"<th>{html.escape(' '.join(title.split()))}</th>" for title in table.columns.values())
     body = "\n".join("<tr>" + "".join(_cell(row, name) for name in table.columns) + "</tr>" for row in table.rows)
     return f'<div class="table"><table><thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody></table></div>'
 
 
+TRIALS = {
+    "path": "path",
+    "disturbance": "disturbance",
+    "agent": "agent",
+    "swims": "swims",
+    "success_rate": "success [%]",
+    "strokes_to_finish": "strokes to finish",
+    "mean_cross_track_error_mm": "mean cross-track error [mm]",
+    "limbs_heated_per_metre": "limbs heated per metre [1/m]",
+}
+"""Columns of the table of trials, as agents.trials names them."""
+MEASURED = ("success_rate", "strokes_to_finish", "mean_cross_track_error_mm", "limbs_heated_per_metre")
+"""Those with confidence intervals."""
+
+
+def read_trials(file: Path) -> ResultsTable:
+    """The CSV that agents.trials wrote. ValueError: it is none."""
+    with file.open(newline="", encoding="utf-8") as stream:
+        rows = [_trial(row) for row in csv.DictReader(stream)]
+    if not rows or not set(TRIALS) <= set(rows[0]):
+        raise ValueError(f"{file} is not what agents.trials writes.")
+    return ResultsTable("Trials, with 95 % confidence intervals", TRIALS, rows)
+
+
+def _trial(row: dict[str, str]) -> Row:
+    numbers = {name: _float_or_none(text) for name, text in row.items() if name.startswith(MEASURED)}
+    rates = {name: 100.0 * value for name, value in numbers.items() if "rate" in name and value is not None}
+    return {**row, **numbers, **rates}
+
+
+def _float_or_none(text: str) -> float | None:
+    value = float(text)
+    return None if np.isnan(value) else value
+
+
 def _cell(row: Row, name: str) -> str:
     value = row[name]
     text = html.escape(number(value))
-    if f"{name}_low" in row:
+    if value is not None and f"{name}_low" in row:
         text += f" <small>[{number(row[f'{name}_low'])}, {number(row[f'{name}_high'])}]</small>"
     return f'<td data-name="{name}">{text}</td>'
 
@@ -117,7 +156,7 @@ def _remarks(remarks: Remarks) -> str:
 
 # --- playback --------------------------------------------------------------------------------------------------------
 
-TEXT_MARGIN = 20.0
+TEXT_MARGIN = 30.0
 """[mm]: for the names of heated limbs, beyond their tips."""
 
 PLAYER = """<div id="agents" role="radiogroup" aria-label="agent"></div>

@@ -12,7 +12,7 @@ from rich.console import Console
 from agents.charts import Curve, curves_figure, read_progress, to_html
 from agents.evaluate import COLUMNS, evaluate, main
 from agents.playback import UNIT, RecordingEnv
-from agents.report import Remarks, number
+from agents.report import MEASURED, Remarks, number, read_trials, table_html
 from agents.scripted import scripted
 from agents.swim import swim
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -118,6 +118,23 @@ def test_the_table_has_the_numbers_of_the_csv(evaluated, text):
 @pytest.mark.parametrize("value, shown", [(None, "\u2013"), (3, "3"), (2.345, "2.3"), ("1 of 5", "1 of 5")])
 def test_numbers_are_shown_to_a_tenth(value, shown):
     assert number(value) == shown
+
+
+def test_trials_are_shown_with_their_confidence_intervals(tmp_path):
+    measured = [name + end for name in MEASURED for end in ("", "_low", "_high")]
+    header = ["path", "disturbance", "agent", "swims", *measured]
+    row = ["random", "none", "a", 1000, 0.9951, 0.9912, 0.9983, 160.04, 159, 161, "nan", "nan", "nan", 423, 400, 450]
+    (tmp_path / "trials.csv").write_text("\n".join(",".join(map(str, line)) for line in (header, row)) + "\n")
+    table = read_trials(tmp_path / "trials.csv")
+    cells = re.findall(r'data-name="(\w+)">(.*?)</td>', table_html(table))
+    assert {name: re.sub("<.*?>", "", cell) for name, cell in cells} == {
+        "path": "random", "disturbance": "none", "agent": "a", "swims": "1000", "success_rate": "99.5 [99.1, 99.8]",
+        "strokes_to_finish": "160.0 [159.0, 161.0]", "mean_cross_track_error_mm": "\u2013",
+        "limbs_heated_per_metre": "423.0 [400.0, 450.0]",
+    }  # fmt: skip
+    (tmp_path / "other.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(ValueError, match=r"other.csv is not what agents.trials writes"):
+        read_trials(tmp_path / "other.csv")
 
 
 # --- learning curves -------------------------------------------------------------------------------------------------
