@@ -25,13 +25,16 @@ from rich.text import Text
 
 from agents import policy as learned
 from agents.charts import Curve, read_progress
+from agents.greedy import GreedyPolicy
 from agents.pictures import FRAMES_PER_STROKE, draw_traces, film
+from agents.planner import Planner
 from agents.playback import Playback, RecordingEnv
 from agents.report import Remarks, ResultsTable, number, read_trials, write_report
 from agents.scripted import scripted
 from agents.swim import Policy, Swim, swim
 from seastar_gym.envs.paths import PATH_NAMES, make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.task import make_scene
 from seastar_gym.scene import Fidelity, Scene, require_number
 
 MM = 1000.0
@@ -205,8 +208,8 @@ class Options:
     """Compare agents on a path: a table, the same as CSV, a picture of their traces, and a video of each."""
 
     agents: tuple[str, ...] = ("learned", "pentagon")
-    """The policy in the box (learned), scripted agents (pentagon, straight, rest, random, or a pair such as 4+,1-), and
-    files of policies (.safetensors, or a training's model.zip)."""
+    """The policy in the box (learned), greedy, planner, scripted agents (pentagon, straight, rest, random, or a pair
+    such as 4+,1-), and files of policies (.safetensors, or a training's model.zip)."""
     path: str = "pentagon"
     """pentagon, square, triangle, line, figure-eight, random, or a text file with x, y [m] of one waypoint per line."""
     fidelity: Fidelity = "balanced"
@@ -236,15 +239,16 @@ class Options:
         require_number("waypoint_radius", self.waypoint_radius, "m")
 
 
-def load_agents(names: Sequence[str], seed: int = 0) -> dict[str, Policy]:
-    """Policies by name: the one in the box, scripted ones, and files under their names without the ending."""
+def load_agents(names: Sequence[str], seed: int = 0, fidelity: Fidelity = "balanced") -> dict[str, Policy]:
+    """Policies by name: the one in the box, scripted ones, those that plan with the physics of a fidelity, and files
+    under their names without the ending."""
     agents: dict[str, Policy] = {}
     for name in names:
         label = Path(name).stem if _is_file(name) else name
         label = str(Path(name).with_suffix("")) if label in agents else label
         if label in agents:
             raise ValueError(f"The agent {name!r} is named twice.")
-        agents[label] = _load_agent(name, seed)
+        agents[label] = _load_agent(name, seed, fidelity)
     return agents
 
 
@@ -252,9 +256,13 @@ def _is_file(name: str) -> bool:
     return name.endswith((".zip", ".safetensors")) or len(Path(name).parts) > 1
 
 
-def _load_agent(name: str, seed: int) -> Policy:
+def _load_agent(name: str, seed: int, fidelity: Fidelity) -> Policy:
     if name == "learned":
         return learned.load()
+    if name == "greedy":
+        return GreedyPolicy(make_scene(None, fidelity))
+    if name == "planner":
+        return Planner()
     if not _is_file(name):
         return scripted(name, rng=np.random.default_rng(seed))
     if not name.endswith(".zip"):
@@ -300,7 +308,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     options = tyro.cli(Options, args=arguments)
     try:
-        agents, path = load_agents(options.agents, options.seed), _load_path(options.path)
+        agents, path = load_agents(options.agents, options.seed, options.fidelity), _load_path(options.path)
         remarks = _remarks(agents, options, arguments) if options.report else None
     except (ValueError, OSError) as bad_input:
         print(bad_input, file=sys.stderr)

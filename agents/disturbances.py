@@ -1,0 +1,96 @@
+"""What may go wrong on a swim: a current, a weak limb, noise on what is seen, lost strokes; for a batch of robots.
+
+A uniform current is a change of frame: the robots swim in still water, towards waypoints that drift the other way, and
+everything they see and are measured by is carried back. So every robot of a batch has a direction of its own.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.greedy import headings, turned
+from seastar_gym.envs.observation import VELOCITY_SCALE
+from seastar_gym.envs.task import SwimTask
+from seastar_gym.scene import require_number
+from seastar_gym.simulator import State
+
+Floats = NDArray[np.float64]
+
+CURRENT_DIRECTIONS = 8
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """Of all robots of a batch; the zeros disturb nothing.
+
+    current: Speed [m/s]; robot i is carried along i/8 of a full turn. weakness: Share of its strength that limb i mod n
+    of robot i lacks. noise: Standard deviation of every seen node position [m]. lost: Probability that a stroke fails.
+    """
+
+    current: float = 0.0
+    weakness: float = 0.0
+    noise: float = 0.0
+    lost: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, unit in (("current", "m/s"), ("weakness", "1"), ("noise", "m"), ("lost", "1")):
+            require_number(f"Disturbance.{name}", getattr(self, name), unit, zero_allowed=True)
+        if max(self.weakness, self.lost) > 1.0:
+            raise ValueError("weakness and lost must be at most 1.")
+
+
+DISTURBANCES = {
+    "none": Disturbance(),
+    "current of 0.5 mm/s": Disturbance(current=0.5e-3),
+    "current of 1.5 mm/s": Disturbance(current=1.5e-3),
+    "a limb at half strength": Disturbance(weakness=0.5),
+    "1 mm of noise": Disturbance(noise=1e-3),
+    "every tenth stroke lost": Disturbance(lost=0.1),
+}
+
+
+class DisturbedTask:
+    """A task whose robots are disturbed; positions are those of the world, where the waypoints stand still."""
+
+    def __init__(self, task: SwimTask, disturbance: Disturbance, rng: np.random.Generator):
+        self.task, self.disturbance, self._rng = task, disturbance, rng
+        robots, n_limbs = np.arange(task.n_robots), task.simulator.scene.robot.n_limbs
+        angles = 2.0 * np.pi / CURRENT_DIRECTIONS * robots
+        self._current = disturbance.current * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        self._strength = np.where(robots[:, None] % n_limbs == np.arange(n_limbs), 1.0 - disturbance.weakness, 1.0)
+        self._carried = np.zeros((task.n_robots, 2))
+
+    def reset(self, generators: list[np.random.Generator]) -> None:
+        """Begin an episode of every robot, at rest in the world."""
+        self.task.reset(np.ones(self.task.n_robots, bool), generators)
+        positions, velocities, time = self.task.simulator.get_state()
+        self.task.simulator.set_state(State(positions, velocities - self._current[:, None], time))
+        self._carried[:] = 0.0
+
+    def hub_position(self) -> Floats:
+        """[m], shape (n_robots, 2)."""
+        return self.task.simulator.hub_position() + self._carried
+
+    def observe(self) -> NDArray[np.float32]:
+        """What the robots see of themselves and of their waypoints."""
+        seen, scene = self.task.observe(), self.task.simulator.scene
+        if self.disturbance.current > 0.0:
+            axes = headings(self.task.simulator.positions, scene.robot.nodes())
+            seen[:, -6:-4] += turned(self._current, -axes) / VELOCITY_SCALE
+        if self.disturbance.noise > 0.0:
+            error = self._rng.normal(0.0, self.disturbance.noise, (len(seen), scene.robot.n_nodes, 2))
+            error /= scene.robot.limb_length
+            seen[:, : 2 * (scene.robot.n_nodes - 1)] += (error[:, 1:] - error[:, :1]).reshape(len(seen), -1)
+            seen[:, -4:] -= np.tile(error[:, 0], 2)
+        return seen
+
+    def step(self, commands: Floats) -> Floats:
+        """One stroke of every robot; returns the commands as they were carried out, shape (n_robots, n_limbs)."""
+        lost = self._rng.random(len(commands)) < self.disturbance.lost
+        commands = np.where(lost[:, None], 0.0, self._strength * commands)
+        drift = self._current * self.task.simulator.scene.actuator.period
+        self.task.waypoints -= drift[:, None]
+        self._carried += drift
+        self.task.step(commands)
+        return commands

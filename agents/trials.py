@@ -1,0 +1,212 @@
+"""Many swims of every agent: on named paths, on random ones, and disturbed; means with their confidence intervals.
+
+    python -m agents.trials --agents learned greedy pentagon --swims 1000 --out runs/trials.csv
+
+Random paths come with random headings. The disturbed pentagon is there for the scripted gait, which knows no other
+path.
+"""
+
+import csv
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import tyro
+from numpy.typing import NDArray
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from scipy.stats import bootstrap
+
+from agents.disturbances import CURRENT_DIRECTIONS, DISTURBANCES, Disturbance, DisturbedTask
+from agents.evaluate import load_agents
+from agents.swim import Policy, Swim
+from seastar_gym.envs.commands import Actions, to_commands
+from seastar_gym.envs.paths import PathName
+from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.task import SwimTask, make_scene
+from seastar_gym.scene import Fidelity, Scene, require_count
+
+MM = 1000.0
+RESAMPLES, CONFIDENCE = 2000, 0.95
+NOMINAL: tuple[PathName, ...] = ("pentagon", "square", "triangle", "figure-eight")
+
+Interval = tuple[float, float, float]
+"""Mean, and the ends of its confidence interval."""
+
+
+def swim_many(
+    agent: str,
+    policy: Policy,
+    path: PathName,
+    n_swims: int,
+    scene: Scene,
+    disturbance: Disturbance = Disturbance(),
+    *,
+    max_strokes: int = 400,
+    waypoint_radius: float = 0.01,
+    seed: int = 0,
+    threads: int | None = None,
+) -> list[Swim]:
+    """Swims side by side, each to its last waypoint or for `max_strokes` strokes; random paths with random headings."""
+    inner = SwimTask(scene, n_swims, path, RewardWeights(), waypoint_radius, path == "random", threads)
+    task = DisturbedTask(inner, disturbance, np.random.default_rng([seed, n_swims]))
+    task.reset([np.random.default_rng([seed, swim]) for swim in range(n_swims)])
+    waypoints, counts = inner.waypoints.copy(), inner.n_waypoints
+    hubs, reached = [task.hub_position()], [inner.waypoint_index.copy()]
+    heated: list[NDArray[np.int64]] = []
+    state, begins, n_limbs = None, np.ones(n_swims, bool), scene.robot.n_limbs
+    actions: Actions = getattr(policy, "actions", "limbs")
+    while len(heated) < max_strokes and (inner.waypoint_index < counts).any():
+        chosen, state = policy.predict(task.observe(), state=state, episode_start=begins, deterministic=True)
+        commands = to_commands(actions, n_limbs, chosen, n_swims)
+        commands[inner.waypoint_index == counts] = 0.0
+        heated.append(np.count_nonzero(task.step(commands), axis=1))
+        hubs.append(task.hub_position())
+        reached.append(inner.waypoint_index.copy())
+        begins[:] = False
+    return [
+        _up_to_the_last_waypoint(
+            Swim(
+                agent=agent,
+                waypoints=waypoints[k, : counts[k]],
+                hub=np.array([hub[k] for hub in hubs]),
+                waypoint_index=np.array([index[k] for index in reached]),
+                time=scene.actuator.period * np.arange(len(hubs), dtype=np.float64),
+                limbs_heated=np.array([limbs[k] for limbs in heated]),
+                solver_message=None,
+            )
+        )
+        for k in range(n_swims)
+    ]
+
+
+def _up_to_the_last_waypoint(done: Swim) -> Swim:
+    strokes = int(np.argmax(done.waypoint_index == len(done.waypoints))) if done.finished else done.strokes
+    parts = {name: getattr(done, name)[: strokes + 1] for name in ("hub", "waypoint_index", "time")}
+    return replace(done, **parts, limbs_heated=done.limbs_heated[:strokes])
+
+
+def mean_with_interval(values: NDArray[np.float64]) -> Interval:
+    """Mean and its bootstrap confidence interval; NaN where there is nothing."""
+    if len(values) == 0:
+        return np.nan, np.nan, np.nan
+    if np.ptp(values) == 0.0:
+        return values[0], values[0], values[0]
+    found = bootstrap(
+        (values,), np.mean, confidence_level=CONFIDENCE, n_resamples=RESAMPLES, method="percentile", batch=100,
+        rng=np.random.default_rng(0),
+    ).confidence_interval  # fmt: skip
+    return float(values.mean()), float(found.low), float(found.high)
+
+
+def statistics(swims: Sequence[Swim]) -> dict[str, Interval]:
+    """What is measured of a set of swims; strokes of those that finished."""
+    finished = np.array([done.finished for done in swims], dtype=np.float64)
+    strokes = np.array([done.strokes for done in swims if done.finished], dtype=np.float64)
+    errors = MM * np.array([done.cross_track_errors.mean() for done in swims])
+    effort = np.array([done.heated_per_metre for done in swims if done.heated_per_metre is not None], dtype=np.float64)
+    measures = {
+        "success_rate": finished,
+        "strokes_to_finish": strokes,
+        "mean_cross_track_error_mm": errors,
+        "limbs_heated_per_metre": effort,
+    }
+    return {name: mean_with_interval(values) for name, values in measures.items()}
+
+
+def trials(agents: Mapping[str, Policy], options: "Options") -> list[dict[str, str | int | float]]:
+    """A row for every agent and set of swims."""
+    rows = []
+    scene = make_scene(None, options.fidelity)
+    for path, label, n_swims in _sets(options.swims):
+        for agent, policy in agents.items():
+            swims = swim_many(
+                agent, policy, path, n_swims, scene, DISTURBANCES[label], seed=options.seed, threads=options.num_threads
+            )
+            row: dict[str, str | int | float] = {
+                "path": path, "disturbance": label, "agent": agent, "fidelity": options.fidelity, "swims": n_swims
+            }  # fmt: skip
+            for name, numbers in statistics(swims).items():
+                row |= dict(zip((name, f"{name}_low", f"{name}_high"), numbers, strict=True))
+            rows.append(row)
+    return rows
+
+
+def _sets(n_random: int) -> list[tuple[PathName, str, int]]:
+    """Path, disturbance and number of swims of every set; the disturbed pentagon for all directions and limbs."""
+    nominal: list[tuple[PathName, str, int]] = [(path, "none", 1) for path in NOMINAL]
+    disturbed = [name for name in DISTURBANCES if name != "none"]
+    pentagon: list[tuple[PathName, str, int]] = [("pentagon", name, 5 * CURRENT_DIRECTIONS) for name in disturbed]
+    return [*nominal, *(("random", name, n_random) for name in DISTURBANCES), *pentagon]
+
+
+# --- the command line ------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Options:
+    """Many swims of every agent, nominal and disturbed: a table, the same as CSV."""
+
+    agents: tuple[str, ...] = ("learned", "greedy", "pentagon")
+    """As for agents.evaluate."""
+    swims: int = 1000
+    """Random paths of every set."""
+    fidelity: Fidelity = "balanced"
+    """How exactly the swims are computed."""
+    seed: int = 0
+    """Of paths, headings and disturbances; the same for every agent."""
+    num_threads: int | None = None
+    """Threads of the simulator; all processors by default."""
+    out: Path = Path("runs/trials.csv")
+    """File of the results."""
+
+    def __post_init__(self) -> None:
+        require_count("swims", self.swims, 1, 1_000_000)
+
+
+def _print(rows: Sequence[dict[str, str | int | float]]) -> None:
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    for name in (
+        "path",
+        "disturbance",
+        "agent",
+        "swims",
+        "success",
+        "strokes",
+        "cross-track\nerror [mm]",
+        "heated\n[1/m]",
+    ):
+        table.add_column(name)
+    for row in rows:
+        success = f"{row['success_rate']:.1%} [{row['success_rate_low']:.1%}, {row['success_rate_high']:.1%}]"
+        others = (
+            f"{row[name]:.1f} [{row[name + '_low']:.1f}, {row[name + '_high']:.1f}]"
+            for name in ("strokes_to_finish", "mean_cross_track_error_mm", "limbs_heated_per_metre")
+        )
+        table.add_row(*(str(row[name]) for name in ("path", "disturbance", "agent", "swims")), success, *others)
+    Console(width=160).print(table)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line; returns the exit code."""
+    options = tyro.cli(Options, args=arguments)
+    try:
+        agents = load_agents(options.agents, options.seed, options.fidelity)
+    except (ValueError, OSError) as bad_input:
+        print(bad_input, file=sys.stderr)
+        return 2
+    rows = trials(agents, options)
+    _print(rows)
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    with options.out.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, fieldnames=list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

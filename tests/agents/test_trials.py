@@ -1,0 +1,121 @@
+"""Disturbances are what they say, and many swims are measured as one is."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from agents.disturbances import Disturbance, DisturbedTask
+from agents.greedy import GreedyPolicy
+from agents.scripted import scripted
+from agents.swim import swim
+from agents.trials import main, mean_with_interval, statistics, swim_many
+from seastar_gym import Numerics, RewardWeights, Scene
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.task import SwimTask
+
+FAST = Scene(numerics=Numerics.preset("fast"))
+N = 16
+
+
+def disturbed(path="pentagon", **disturbance):
+    inner = SwimTask(FAST, N, path, RewardWeights(), 0.01, True, threads=1)
+    task = DisturbedTask(inner, Disturbance(**disturbance), np.random.default_rng(0))
+    task.reset([np.random.default_rng(swim) for swim in range(N)])
+    return task
+
+
+def test_nothing_disturbed_is_the_task_itself():
+    task, plain = disturbed(), disturbed().task
+    commands = np.tile([0.0, 1.0, 0.0, 0.0, -1.0], (N, 1))
+    for _ in range(3):
+        np.testing.assert_array_equal(task.observe(), plain.observe())
+        np.testing.assert_array_equal(task.step(commands), commands)
+        plain.step(commands)
+    np.testing.assert_array_equal(task.hub_position(), plain.simulator.hub_position())
+
+
+def test_a_current_carries_the_robots_its_own_way_and_the_waypoints_stay():
+    task, speed = disturbed(current=1e-3), 1e-3
+    first = task.observe()
+    np.testing.assert_allclose(first[:, -6:-4], 0.0, atol=1e-6)  # at rest in the world
+    np.testing.assert_array_equal(first[:, -4:], disturbed().observe()[:, -4:])
+    waypoint, hubs = np.linalg.norm(first[:, -4:-2], axis=1), []
+    for _ in range(40):
+        task.step(np.zeros((N, 5)))
+        hubs.append(task.hub_position())
+    angles = 2.0 * np.pi * np.arange(N) / 8
+    last_strokes = (hubs[-1] - hubs[-11]) / 10.0
+    np.testing.assert_allclose(
+        last_strokes, speed * np.stack([np.cos(angles), np.sin(angles)], axis=1), atol=0.2 * speed
+    )
+    seen = task.observe()
+    np.testing.assert_allclose(np.hypot(*seen[:, -6:-4].T) * 0.025, speed, rtol=0.2)
+    to_waypoint = np.linalg.norm([0.1636, 0.0] - hubs[-1], axis=1)
+    np.testing.assert_allclose(np.linalg.norm(seen[:, -4:-2], axis=1), to_waypoint / 0.1, rtol=1e-5)
+    assert waypoint == pytest.approx(1.636)
+
+
+def test_every_limb_is_the_weak_one_of_some_robot():
+    carried_out = disturbed(weakness=0.5).step(np.tile([1.0, -1.0, 1.0, -1.0, 1.0], (N, 1)))
+    for robot in range(N):
+        strength = np.ones(5)
+        strength[robot % 5] = 0.5
+        np.testing.assert_array_equal(np.abs(carried_out[robot]), strength)
+
+
+def test_noise_is_on_positions_and_has_its_size():
+    noisy, clean = disturbed(noise=1e-3).observe(), disturbed().observe()
+    error = 0.1 * (noisy - clean)
+    np.testing.assert_array_equal(error[:, 90:182], 0.0)  # velocities
+    assert error[:, :90].std() == pytest.approx(np.sqrt(2.0) * 1e-3, rel=0.15)  # a node's and the hub's
+    np.testing.assert_allclose(error[:, -4:-2], error[:, -2:], atol=1e-7)
+    assert error[:, -4:].std() == pytest.approx(1e-3, rel=0.5)
+
+
+def test_lost_strokes_are_lost_whole_and_as_often_as_said():
+    task, commands = disturbed(lost=0.25), np.tile([0.0, 1.0, 0.0, 0.0, -1.0], (N, 1))
+    carried_out = np.array([task.step(commands) for _ in range(30)])
+    lost = (carried_out == 0.0).all(axis=2)
+    assert lost.mean() == pytest.approx(0.25, abs=0.06)
+    np.testing.assert_array_equal(carried_out[~lost], np.broadcast_to(commands, carried_out.shape)[~lost])
+
+
+@pytest.mark.parametrize("arguments", [{"lost": 1.5}, {"weakness": 2.0}, {"noise": -1.0}, {"current": np.nan}])
+def test_impossible_disturbances_are_refused(arguments):
+    with pytest.raises(ValueError, match=next(iter(arguments))):
+        Disturbance(**arguments)
+
+
+def test_a_batch_of_swims_is_measured_as_one_swim():
+    agent = GreedyPolicy(FAST)
+    one = swim("greedy", agent, SeastarSwimEnv("square", actions="joint", fidelity="fast"), max_strokes=30)
+    for done in swim_many("greedy", agent, "square", 3, FAST, max_strokes=30, threads=1):
+        np.testing.assert_allclose(done.hub, one.hub, atol=1e-12)
+        np.testing.assert_array_equal(done.waypoint_index, one.waypoint_index)
+        np.testing.assert_array_equal(done.limbs_heated, one.limbs_heated)
+        np.testing.assert_allclose(done.time, one.time)
+
+
+def test_a_swim_ends_at_its_last_waypoint():
+    swims = swim_many("script", scripted("straight"), "line", 2, FAST, max_strokes=100, threads=1)
+    numbers = statistics(swims)
+    assert numbers["success_rate"][0] == 1.0
+    assert all(done.strokes < 90 and done.waypoint_index[-2] == 0 for done in swims)
+
+
+def test_a_mean_lies_in_its_interval_and_a_constant_needs_none():
+    low, high = mean_with_interval(np.random.default_rng(0).normal(size=400))[1:]
+    assert low < 0.0 < high and high - low == pytest.approx(2 * 1.96 / 20, rel=0.15)
+    assert mean_with_interval(np.full(5, 3.0)) == (3.0, 3.0, 3.0)
+    assert np.isnan(mean_with_interval(np.zeros(0))).all()
+
+
+@pytest.mark.slow
+def test_the_command_line_writes_a_row_for_every_set_and_agent(tmp_path, capsys):
+    file = tmp_path / "trials.csv"
+    assert main(["--agents", "greedy", "pentagon", "--swims", "4", "--fidelity", "fast", "--out", str(file)]) == 0
+    with file.open(newline="", encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == 2 * (4 + 6 + 5)
+    assert "success" in capsys.readouterr().out
