@@ -309,6 +309,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = tyro.cli(Options, args=arguments)
     try:
         agents, path = load_agents(options.agents, options.seed, options.fidelity), _load_path(options.path)
+        for agent in agents.values():
+            if isinstance(agent, learned.LearnedPolicy):
+                agent.require_fit(Scene(), agent.actions)
         remarks = _remarks(agents, options, arguments) if options.report else None
     except (ValueError, OSError) as bad_input:
         print(bad_input, file=sys.stderr)

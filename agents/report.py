@@ -6,6 +6,7 @@ It is `page.html` with plotly.js, the tables, the pictures of charts.py and the 
 import csv
 import html
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -72,9 +73,7 @@ def write_report(
         "sections": "\n".join(sections),
         "swims": _script_safe(_recorded(playbacks, swims[0].waypoints, waypoint_radius)),
     }
-    page = PAGE.read_text(encoding="utf-8")
-    for name, text in parts.items():
-        page = page.replace("{{" + name + "}}", text)
+    page = re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], PAGE.read_text(encoding="utf-8"))
     file.write_text(page, encoding="utf-8")
 
 

@@ -14,8 +14,10 @@ from rich.console import Console
 
 from agents.evaluate import evaluate, load_agents, main
 from agents.pictures import CLOSING_SECONDS, COLOURS, FPS, FRAMES_PER_STROKE
+from agents.policy import Description, LearnedPolicy, save
 from agents.scripted import scripted
 from agents.swim import Swim, swim
+from seastar_gym import Scene, Seastar
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -270,6 +272,13 @@ def damaged_policy(folder):
     return str(folder / "damaged.safetensors")
 
 
+def policy_of_four_limbs(folder):
+    description = Description("pairs", True, Scene(robot=Seastar(n_limbs=4)), (2,))
+    weights = {name: np.zeros(shape, np.float32) for name, shape in description.shapes().items()}
+    save(LearnedPolicy(description, weights), folder / "four.safetensors")
+    return str(folder / "four.safetensors")
+
+
 def ragged_path(folder):
     (folder / "ragged.csv").write_text("0.1, 0.0\n0.2\n")
     return str(folder / "ragged.csv")
@@ -281,6 +290,7 @@ def ragged_path(folder):
         (lambda folder: ["--agents", str(folder / "none.zip")], "There is no trained policy at"),
         (lambda folder: ["--agents", str(folder / "none.safetensors")], "There is no trained policy at"),
         (lambda folder: ["--agents", damaged_policy(folder)], "is damaged"),
+        (lambda folder: ["--agents", policy_of_four_limbs(folder)], "trained on a robot of 4 limbs of 10 nodes"),
         (lambda folder: ["--agents", damaged_model(folder)], "damaged"),
         (lambda folder: ["--agents", "pentagram"], "Unknown scripted agent 'pentagram'"),
         (lambda folder: ["--agents", "rest", "rest"], "'rest' is named twice"),
