@@ -47,6 +47,25 @@ def state_of(observations: NDArray[np.float32], scene: Scene) -> State:
     )
 
 
+class Branching:
+    """Every state after every command: what a tree search does at each of its levels."""
+
+    def __init__(self, scene: Scene, commands: Floats, threads: int | None = None):
+        self.scene, self.commands, self.threads = scene, commands, threads
+        self._simulators: dict[int, Simulator] = {}
+
+    def __call__(self, states: State) -> State:
+        """States one stroke on, those of a state side by side, shape (states * commands, ...)."""
+        n_states, n_commands = len(states.time), len(self.commands)
+        n = n_states * n_commands
+        if n not in self._simulators:
+            self._simulators[n] = Simulator(self.scene, n, self.threads)
+        simulator = self._simulators[n]
+        simulator.set_state(states.of_robots(np.repeat(np.arange(n_states), n_commands)))
+        simulator.stroke(np.tile(self.commands, (n_states, 1)))
+        return simulator.get_state()
+
+
 class Planner:
     """Beam search over pairs of limbs, anew before every stroke; in Stable-Baselines3's form.
 
@@ -65,7 +84,7 @@ class Planner:
         self.scene = Scene(numerics=Numerics.preset("fast")) if scene is None else scene
         self.waypoint_radius, self.budget, self.threads = waypoint_radius, budget, threads
         self._commands = command_table(self.actions, self.scene.robot.n_limbs)
-        self._simulators: dict[int, Simulator] = {}
+        self._swim_all = Branching(self.scene, self._commands, threads)
 
     def predict(
         self,
@@ -101,18 +120,6 @@ class Planner:
             rows = (robots * width * n_commands + best).reshape(-1)
             states, width = states.of_robots(rows), best.shape[1]
         return chosen
-
-    def _swim_all(self, states: State) -> State:
-        """Every state after every command, shape (states * commands, ...)."""
-        n_commands = len(self._commands)
-        each = np.repeat(np.arange(len(states.time)), n_commands)
-        n = len(each)
-        if n not in self._simulators:
-            self._simulators[n] = Simulator(self.scene, n, self.threads)
-        simulator = self._simulators[n]
-        simulator.set_state(states.of_robots(each))
-        simulator.stroke(np.tile(self._commands, (len(states.time), 1)))
-        return simulator.get_state()
 
     def _judge(
         self, hub: Floats, passed: NDArray[np.bool_], current: Floats, after: Floats

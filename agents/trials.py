@@ -26,6 +26,7 @@ from agents.swim import Policy, Swim
 from seastar_gym.envs.commands import Actions, to_commands
 from seastar_gym.envs.paths import PathName
 from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.task import Path as SwimPath
 from seastar_gym.envs.task import SwimTask, make_scene
 from seastar_gym.scene import Fidelity, Scene, require_count
 
@@ -40,7 +41,7 @@ Interval = tuple[float, float, float]
 def swim_many(
     agent: str,
     policy: Policy,
-    path: PathName,
+    path: SwimPath,
     n_swims: int,
     scene: Scene,
     disturbance: Disturbance = Disturbance(),
@@ -51,7 +52,8 @@ def swim_many(
     threads: int | None = None,
 ) -> list[Swim]:
     """Swims side by side, each to its last waypoint or for `max_strokes` strokes; random paths with random headings."""
-    inner = SwimTask(scene, n_swims, path, RewardWeights(), waypoint_radius, path == "random", threads)
+    with_heading = isinstance(path, str) and path == "random"
+    inner = SwimTask(scene, n_swims, path, RewardWeights(), waypoint_radius, with_heading, threads)
     task = DisturbedTask(inner, disturbance, np.random.default_rng([seed, n_swims]))
     task.reset([np.random.default_rng([seed, swim]) for swim in range(n_swims)])
     waypoints, counts = inner.waypoints.copy(), inner.n_waypoints
