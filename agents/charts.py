@@ -17,13 +17,15 @@ Floats = NDArray[np.float64]
 DASHES = ("solid", "dash", "dot")
 
 
+MARGIN = {"l": 56, "r": 12, "t": 12, "b": 48}
+
+
 def to_html(figure: go.Figure, name: str) -> str:
     """The figure as a piece of a page that has plotly.js; it fills the element around it."""
     figure.update_layout(
         template="none",
         font={"family": "system-ui, sans-serif", "size": 13, "color": INK},
-        margin={"l": 56, "r": 12, "t": 12, "b": 48},
-        legend={"orientation": "h", "y": 1.01, "yanchor": "bottom", "x": 0.0},
+        legend={"orientation": "h", "yanchor": "bottom", "x": 0.0},
         showlegend=True,
         dragmode=False,  # a finger on the picture scrolls the page
         hovermode="closest",
@@ -53,7 +55,8 @@ def paths_figure(swims: Sequence[Swim], waypoint_radius: float) -> go.Figure:
     figure.update_layout(
         xaxis={"title": "x [mm]", "range": [low[0], high[0]], "constrain": "domain"},
         yaxis={"title": "y [mm]", "range": [low[1], high[1]], "scaleanchor": "x", "constrain": "domain"},
-        legend_traceorder="reversed",
+        legend={"traceorder": "reversed", "y": 1.01},
+        margin=MARGIN,
     )
     return figure
 
@@ -127,8 +130,9 @@ def curves_figure(curves: Sequence[Curve], baselines: Mapping[str, int]) -> go.F
             y=strokes, line={"color": FAINT_INK, "dash": "dash"}, annotation_text=f"{html.escape(name)}: {strokes}"
         )
     figure.update_layout(
-        xaxis={"title": "strokes trained", "rangemode": "tozero"}, yaxis={"title": "strokes round the pentagon"}
-    )
+        xaxis={"title": "strokes trained", "rangemode": "tozero"}, yaxis={"title": "strokes round the pentagon"},
+        legend_y=1.01, margin=MARGIN,
+    )  # fmt: skip
     return figure
 
 
@@ -154,3 +158,35 @@ def _at(curve: Curve, trained: float) -> float:
 
 def _with_gaps(values: Floats) -> list[float | None]:
     return [None if np.isnan(value) else float(value) for value in values]
+
+
+# --- speeds ----------------------------------------------------------------------------------------------------------
+
+
+def speeds_figure(directions: Sequence[float], speeds: Mapping[str, Sequence[float]], n_limbs: int = 5) -> go.Figure:
+    """Straight-line speeds [mm per stroke] by direction from limb 1, 0 to 180/n_limbs degrees, turned and mirrored."""
+    figure = go.Figure()
+    there, back = list(directions), list(directions)[-2::-1]
+    sector = 360.0 / n_limbs
+    angles = [angle for limb in range(n_limbs) for angle in _round_trip(limb * sector, sector, there, back)]
+    for number, (name, values) in enumerate(speeds.items()):
+        around = [*values, *list(values)[-2::-1]][:-1] * n_limbs
+        figure.add_scatterpolar(
+            theta=[*angles, angles[0]], r=np.round([*around, around[0]], 3).tolist(), name=name, mode="lines",
+            line={"color": COLOURS[number % len(COLOURS)], "dash": DASHES[number // len(COLOURS) % len(DASHES)]},
+            hovertemplate="%{theta:.0f}\u00b0: %{r:.2f} mm",
+        )  # fmt: skip
+    figure.update_layout(
+        polar={
+            "radialaxis": {"rangemode": "tozero", "angle": sector / 4, "nticks": 5, "gridcolor": "#dfe3e8"},
+            "angularaxis": {"ticksuffix": "\u00b0", "dtick": sector / 2, "gridcolor": "#dfe3e8"},
+        },
+        margin={"l": 48, "r": 48, "t": 36, "b": 36},
+        legend_y=1.12,
+    )
+    return figure
+
+
+def _round_trip(begin: float, sector: float, there: Sequence[float], back: Sequence[float]) -> list[float]:
+    """Angles from a limb to the next, through a measured half and its mirror image; the next limb's is left out."""
+    return [*(begin + angle for angle in there), *(begin + sector - angle for angle in back)][:-1]

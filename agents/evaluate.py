@@ -7,6 +7,7 @@ From Python, `evaluate({"mine": policy, "script": scripted("pentagon")}, path)` 
 """
 
 import csv
+import json
 import re
 import shlex
 import sys
@@ -232,6 +233,8 @@ class Options:
     """Folders of trainings whose learning curves the report shows beside those of the learned agents."""
     trials: Path | None = None
     """What agents.trials wrote (.csv), for the report to show too."""
+    bound: Path = Path("docs/bound.json")
+    """What agents.bound wrote, for the report to show too, where there is such a file."""
 
     def __post_init__(self) -> None:
         if self.max_strokes < 1:
@@ -300,6 +303,7 @@ def _remarks(agents: Mapping[str, Policy], options: Options, arguments: Sequence
         commands=[*commands, shlex.join(["python", "-m", "agents.evaluate", *arguments])],
         curves=curves,
         tables=[] if options.trials is None else [read_trials(options.trials)],
+        bound=json.loads(options.bound.read_text(encoding="utf-8")) if options.bound.is_file() else None,
     )
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import plotly.offline
 
-from agents.charts import Curve, curves_figure, paths_figure, to_html
+from agents.charts import Curve, curves_figure, paths_figure, speeds_figure, to_html
 from agents.playback import UNIT, Playback
 from agents.swim import Swim
 
@@ -37,13 +37,15 @@ class ResultsTable:
 
 @dataclass(frozen=True, eq=False)
 class Remarks:
-    """What a report says besides the evaluation: sentences, commands that made it, learning curves, more tables."""
+    """What a report says besides the evaluation."""
 
     title: str = "Evaluation"
     sentences: Sequence[str] = ()
     commands: Sequence[str] = ()
     curves: Sequence[Curve] = ()
     tables: Sequence[ResultsTable] = ()
+    bound: Mapping[str, Any] | None = None
+    """What agents.bound wrote."""
 
 
 def write_report(
@@ -65,6 +67,11 @@ def write_report(
     if remarks.curves:
         figure = to_html(curves_figure(remarks.curves, baselines), "curves")
         sections.append(_section("Learning curves", _figure(figure, "wide")))
+    if remarks.bound is not None:
+        figure = to_html(speeds_figure(remarks.bound["directions_deg"], remarks.bound["mm_per_stroke"]), "speeds")
+        sections.append(
+            _section("Speed straight ahead [mm per stroke], by direction from limb 1", _figure(figure, "square"))
+        )
     if remarks.commands or remarks.sentences:
         sections.append(_section("How it was made", _remarks(remarks)))
     parts = {
@@ -90,9 +97,16 @@ def _figure(figure: str, shape: str) -> str:
 
 def table_html(table: ResultsTable) -> str:
     """A table as a piece of a page."""
-    head = "".join(f"<th>{html.escape(' '.join(title.split()))}</th>" for title in table.columns.values())
+    head = "".join(
+        f"<th{_side(name)}>{html.escape(' '.join(title.split()))}</th>" for name, title in table.columns.items()
+    )
     body = "\n".join("<tr>" + "".join(_cell(row, name) for name in table.columns) + "</tr>" for row in table.rows)
     return f'<div class="table"><table><thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody></table></div>'
+
+
+def _side(name: str) -> str:
+    """Words begin on the left, numbers end on the right."""
+    return ' class="words"' if name in ("agent", "path", "disturbance") else ""
 
 
 TRIALS = {
@@ -135,7 +149,7 @@ def _cell(row: Row, name: str) -> str:
     text = html.escape(number(value))
     if value is not None and f"{name}_low" in row:
         text += f" <small>[{number(row[f'{name}_low'])}, {number(row[f'{name}_high'])}]</small>"
-    return f'<td data-name="{name}">{text}</td>'
+    return f'<td{_side(name)} data-name="{name}">{text}</td>'
 
 
 def number(value: Any) -> str:

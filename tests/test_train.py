@@ -79,7 +79,7 @@ def test_the_report_has_the_numbers_of_the_table(finished):
         rows = list(csv.DictReader(file))
     assert [row["agent"] for row in rows] == ["learned", "script"]
     for row in rows:
-        first_cell = f'<tr><td data-name="agent">{row["agent"]}<'
+        first_cell = f'<tr><td class="words" data-name="agent">{row["agent"]}<'
         (line,) = [line for line in report.splitlines() if line.startswith(first_cell)]
         assert f">{float(row['mean_cross_track_error_mm']):.1f}<" in line
     assert int(rows[1]["strokes_to_finish"]) <= 250

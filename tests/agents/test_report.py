@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from agents.charts import Curve, curves_figure, read_progress, to_html
+from agents.charts import Curve, curves_figure, read_progress, speeds_figure, to_html
 from agents.evaluate import COLUMNS, evaluate, main
 from agents.playback import UNIT, RecordingEnv
 from agents.report import MEASURED, Remarks, number, read_trials, table_html
@@ -44,7 +44,13 @@ def evaluated(tmp_path_factory):
         fidelity="fast",
         video=False,
         out=folder,
-        report=Remarks("Test", ["It was <easy>."], ["python one", "python two"], [Curve.of("straight", PROGRESS)]),
+        report=Remarks(
+            title="Test",
+            sentences=["It was <easy>."],
+            commands=["python one", "python two"],
+            curves=[Curve.of("straight", PROGRESS)],
+            bound={"directions_deg": [0, 18, 36], "mm_per_stroke": {"straight": [3.7, 3.0, 3.5]}},
+        ),
         console=Console(quiet=True),
     )
     return folder, swims
@@ -97,14 +103,14 @@ def test_the_page_needs_nothing_beside_it_and_is_light(text):
 
 def test_names_and_sentences_are_text_not_markup(text):
     assert STRAY not in text
-    assert "<td data-name=\"agent\">&lt;/script&gt;&lt;b&gt;&quot;stray&quot; &amp; co&lt;/b&gt;</td>" in text
+    assert ">&lt;/script&gt;&lt;b&gt;&quot;stray&quot; &amp; co&lt;/b&gt;</td>" in text
     assert "It was &lt;easy&gt;." in text
 
 
 def test_the_table_has_the_numbers_of_the_csv(evaluated, text):
     with (evaluated[0] / "evaluation.csv").open(newline="") as stream:
         rows = list(csv.DictReader(stream))
-    lines = [line for line in text.splitlines() if line.startswith('<tr><td data-name="agent">')]
+    lines = [line for line in text.splitlines() if line.startswith('<tr><td class="words" data-name="agent">')]
     assert len(lines) == len(rows) == 2
     for line, row in zip(lines, rows, strict=True):
         shown = dict(re.findall(r'data-name="(\w+)">([^<]*)<', line))
@@ -155,6 +161,16 @@ def test_several_curves_have_their_median_and_range():
     lowest, highest, median, *each = curves_figure(curves, {"script": 241}).data
     assert [list(one.y) for one in (lowest, highest, median)] == [[160], [180], [170]]  # common and finished: at 2
     assert [one.name for one in each] == ["a", "b", "c"]
+
+
+def test_speeds_of_one_sector_are_turned_and_mirrored_round():
+    (trace,) = speeds_figure([0.0, 18.0, 36.0], {"a": [4.0, 5.0, 3.0]}).data
+    around = dict(zip(trace.theta, trace.r, strict=True))
+    assert list(trace.theta[:-1]) == [18.0 * k for k in range(20)]
+    for theta, speed in around.items():
+        from_limb = theta % 72.0
+        assert speed == {0.0: 4.0, 18.0: 5.0, 36.0: 3.0}[min(from_limb, 72.0 - from_limb)]
+    assert trace.theta[-1] == trace.theta[0] and trace.r[-1] == trace.r[0]
 
 
 def test_names_in_pictures_are_text_not_markup():
@@ -303,6 +319,7 @@ def test_it_fits_the_screen_with_equal_scales(browser, evaluated, size):
     watched = Watched(browser, evaluated[0] / "report.html", *size)
     watched.page.wait_for_selector("#paths .main-svg")
     assert watched.page.evaluate("document.documentElement.scrollWidth") <= size[0]
+    watched.page.wait_for_selector("#speeds .main-svg")
     for name in ("playback", "paths"):
         scales = watched.page.evaluate(
             f"""['xaxis', 'yaxis'].map((axis) => {{
@@ -313,11 +330,10 @@ def test_it_fits_the_screen_with_equal_scales(browser, evaluated, size):
         assert scales[0] == pytest.approx(scales[1], rel=1e-3)
         box = watched.page.locator(f"#{name}").bounding_box()
         assert box["height"] <= size[1] and box["width"] >= 0.6 * min(size[0], 1120)
-    figures = watched.page.locator(".js-plotly-plot").count()
     titles = watched.page.evaluate(
         "[...document.querySelectorAll('.xtitle, .ytitle')].map((title) => title.textContent)"
     )
-    assert len(titles) == 2 * figures
+    assert len(titles) == 2 * len(["playback", "paths", "curves"])
     assert {"x [mm]", "y [mm]", "strokes trained"} <= set(titles)
     watched.page.context.close()
     assert watched.complaints == []
