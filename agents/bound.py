@@ -25,6 +25,7 @@ from scipy.spatial import ConvexHull
 
 from agents.greedy import Displacements, measure_gaits, remaining_way
 from agents.planner import Branching
+from agents.roster import load_agents
 from agents.swim import Policy
 from agents.trials import swim_many
 from seastar_gym.envs.commands import Actions, command_table
@@ -197,8 +198,6 @@ def agent_speeds(agent: str, policy: Policy, scene: Scene, directions: Floats) -
 
 def study(options: Options) -> dict[str, Any]:
     """All of it; minutes."""
-    from agents.evaluate import load_agents
-
     scene = make_scene(None, options.fidelity)
     fastest, displacements = study_gaits(scene)
     directions = np.radians(np.arange(0.0, 37.0, 6.0))

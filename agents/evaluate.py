@@ -26,16 +26,13 @@ from rich.text import Text
 
 from agents import policy as learned
 from agents.charts import Curve, read_progress
-from agents.greedy import GreedyPolicy
 from agents.pictures import FRAMES_PER_STROKE, draw_traces, film
-from agents.planner import Planner
 from agents.playback import Playback, RecordingEnv
 from agents.report import Remarks, ResultsTable, number, read_trials, write_report
-from agents.scripted import scripted
+from agents.roster import load_agents
 from agents.swim import Policy, Swim, swim
 from seastar_gym.envs.paths import PATH_NAMES, make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import make_scene
 from seastar_gym.scene import Fidelity, Scene, require_number
 
 MM = 1000.0
@@ -240,41 +237,6 @@ class Options:
         if self.max_strokes < 1:
             raise ValueError(f"max_strokes must be at least 1, not {self.max_strokes}.")
         require_number("waypoint_radius", self.waypoint_radius, "m")
-
-
-def load_agents(names: Sequence[str], seed: int = 0, fidelity: Fidelity = "balanced") -> dict[str, Policy]:
-    """Policies by name: the one in the box, scripted ones, those that plan with the physics of a fidelity, and files
-    under their names without the ending."""
-    agents: dict[str, Policy] = {}
-    for name in names:
-        label = Path(name).stem if _is_file(name) else name
-        label = str(Path(name).with_suffix("")) if label in agents else label
-        if label in agents:
-            raise ValueError(f"The agent {name!r} is named twice.")
-        agents[label] = _load_agent(name, seed, fidelity)
-    return agents
-
-
-def _is_file(name: str) -> bool:
-    return name.endswith((".zip", ".safetensors")) or len(Path(name).parts) > 1
-
-
-def _load_agent(name: str, seed: int, fidelity: Fidelity) -> Policy:
-    if name == "learned":
-        return learned.load()
-    if name == "greedy":
-        return GreedyPolicy(make_scene(None, fidelity))
-    if name == "planner":
-        return Planner()
-    if not _is_file(name):
-        return scripted(name, rng=np.random.default_rng(seed))
-    if not name.endswith(".zip"):
-        return learned.load(name)
-    try:
-        from agents import ppo
-    except ModuleNotFoundError as missing:
-        raise ValueError(f'A model.zip needs {missing.name}: pip install "seastar-gym[train]".') from missing
-    return ppo.load(name)
 
 
 def _load_path(name: str) -> Any:

@@ -21,7 +21,7 @@ from rich.table import Table
 from scipy.stats import bootstrap
 
 from agents.disturbances import CURRENT_DIRECTIONS, DISTURBANCES, Disturbance, DisturbedTask
-from agents.evaluate import load_agents
+from agents.roster import load_agents
 from agents.swim import Policy, Swim
 from seastar_gym.envs.commands import Actions, to_commands
 from seastar_gym.envs.paths import PathName

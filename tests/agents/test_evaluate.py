@@ -12,9 +12,10 @@ import pytest
 from matplotlib.colors import to_rgb
 from rich.console import Console
 
-from agents.evaluate import evaluate, load_agents, main
+from agents.evaluate import evaluate, main
 from agents.pictures import CLOSING_SECONDS, COLOURS, FPS, FRAMES_PER_STROKE
 from agents.policy import Description, LearnedPolicy, save
+from agents.roster import load_agents
 from agents.scripted import scripted
 from agents.swim import Swim, swim
 from seastar_gym import Scene, Seastar

@@ -1,0 +1,49 @@
+"""Agents by the names that the command lines know."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from agents import policy as learned
+from agents.greedy import GreedyPolicy
+from agents.planner import Planner
+from agents.scripted import scripted
+from agents.swim import Policy
+from seastar_gym.envs.task import make_scene
+from seastar_gym.scene import Fidelity
+
+
+def load_agents(names: Sequence[str], seed: int = 0, fidelity: Fidelity = "balanced") -> dict[str, Policy]:
+    """Policies by name: the one in the box, scripted ones, those that plan with the physics of a fidelity, and files
+    under their names without the ending."""
+    agents: dict[str, Policy] = {}
+    for name in names:
+        label = Path(name).stem if _is_file(name) else name
+        label = str(Path(name).with_suffix("")) if label in agents else label
+        if label in agents:
+            raise ValueError(f"The agent {name!r} is named twice.")
+        agents[label] = _load_agent(name, seed, fidelity)
+    return agents
+
+
+def _is_file(name: str) -> bool:
+    return name.endswith((".zip", ".safetensors")) or len(Path(name).parts) > 1
+
+
+def _load_agent(name: str, seed: int, fidelity: Fidelity) -> Policy:
+    if name == "learned":
+        return learned.load()
+    if name == "greedy":
+        return GreedyPolicy(make_scene(None, fidelity))
+    if name == "planner":
+        return Planner()
+    if not _is_file(name):
+        return scripted(name, rng=np.random.default_rng(seed))
+    if not name.endswith(".zip"):
+        return learned.load(name)
+    try:
+        from agents import ppo
+    except ModuleNotFoundError as missing:
+        raise ValueError(f'A model.zip needs {missing.name}: pip install "seastar-gym[train]".') from missing
+    return ppo.load(name)
