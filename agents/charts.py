@@ -127,8 +127,9 @@ def curves_figure(curves: Sequence[Curve], baselines: Mapping[str, int]) -> go.F
         )  # fmt: skip
     for name, strokes in baselines.items():
         figure.add_hline(
-            y=strokes, line={"color": FAINT_INK, "dash": "dash"}, annotation_text=f"{html.escape(name)}: {strokes}"
-        )
+            y=strokes, line={"color": FAINT_INK, "dash": "dash"},
+            annotation_text=f"{html.escape(name)}: {strokes}", annotation_position="top left",
+        )  # fmt: skip
     figure.update_layout(
         xaxis={"title": "strokes trained", "rangemode": "tozero"}, yaxis={"title": "strokes round the pentagon"},
         legend_y=1.01, margin=MARGIN,

@@ -227,7 +227,8 @@ class Options:
     report: bool = False
     """Write report.html: all of it on one page, with playbacks of the swims."""
     runs: tuple[Path, ...] = ()
-    """Folders of trainings whose learning curves the report shows beside those of the learned agents."""
+    """Folders of trainings, of several seeds for instance: their learning curves, not those of the learned agents, are
+    in the report."""
     trials: Path | None = None
     """What agents.trials wrote (.csv), for the report to show too."""
     bound: Path = Path("docs/bound.json")
@@ -256,14 +257,15 @@ def _load_path(name: str) -> Any:
 def _remarks(agents: Mapping[str, Policy], options: Options, arguments: Sequence[str]) -> Remarks:
     """What the report says about the agents, and how it was made."""
     trainings = {name: one.training for name, one in agents.items() if isinstance(one, learned.LearnedPolicy)}
-    curves = [Curve.of(name, how["progress"]) for name, how in trainings.items() if "progress" in how]
-    curves += [Curve.of(folder.name, read_progress(folder)) for folder in options.runs]
+    progress = {name: how["progress"] for name, how in trainings.items() if "progress" in how}
+    if options.runs:
+        progress = {folder.name: read_progress(folder) for folder in options.runs}
     commands = dict.fromkeys(command for how in trainings.values() for command in how.get("commands", ()))
     return Remarks(
         title=f"Evaluation: {options.path}",
         sentences=[f'Computed at fidelity "{options.fidelity}".'],
         commands=[*commands, shlex.join(["python", "-m", "agents.evaluate", *arguments])],
-        curves=curves,
+        curves=[Curve.of(name, rows) for name, rows in progress.items()],
         tables=[] if options.trials is None else [read_trials(options.trials)],
         bound=json.loads(options.bound.read_text(encoding="utf-8")) if options.bound.is_file() else None,
     )

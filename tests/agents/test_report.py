@@ -189,7 +189,7 @@ def test_command_line_writes_the_report_with_the_curves_of_runs(tmp_path, capsys
     assert main([*arguments, "--fidelity", "fast", "--out", str(tmp_path / "out")]) == 0
     assert "report.html" in capsys.readouterr().out
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert '"name":"run"' in page and '"name":"learned"' in page
+    assert '"name":"run"' in page and '"name":"learned"' not in page
     assert "python train.py" in page and "python -m agents.evaluate --agents learned straight" in page
 
 
