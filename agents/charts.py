@@ -15,9 +15,9 @@ from agents.swim import Swim
 
 Floats = NDArray[np.float64]
 DASHES = ("solid", "dash", "dot")
-
-
 MARGIN = {"l": 56, "r": 12, "t": 12, "b": 48}
+"""Room for the titles of axes [px]."""
+PENTAGON_WAYPOINTS = 5
 
 
 def to_html(figure: go.Figure, name: str) -> str:
@@ -101,9 +101,6 @@ class Curve:
         """From rows of strokes trained, strokes round the pentagon, waypoints reached."""
         trained, pentagon, waypoints = np.array(progress, dtype=float).T
         return cls(name, trained, np.where(waypoints == PENTAGON_WAYPOINTS, pentagon, np.nan))
-
-
-PENTAGON_WAYPOINTS = 5
 
 
 def read_progress(folder: Path) -> list[list[int]]:
