@@ -29,7 +29,7 @@ from agents.roster import load_agents
 from agents.swim import Policy
 from agents.trials import swim_many
 from seastar_gym.envs.commands import Actions, command_table
-from seastar_gym.envs.paths import make_path
+from seastar_gym.envs.paths import LINE_LENGTH, make_path
 from seastar_gym.envs.symmetry import action_table
 from seastar_gym.envs.task import make_scene
 from seastar_gym.scene import Fidelity, Scene
@@ -190,9 +190,9 @@ def agent_speeds(agent: str, policy: Policy, scene: Scene, directions: Floats) -
     """What an agent makes per stroke [m] straight along directions [rad], once it swims steadily."""
     speeds = []
     for direction in directions:
-        waypoint = 10.0 * np.array([[np.cos(direction), np.sin(direction)]])
-        done = swim_many(agent, policy, waypoint, 1, scene, max_strokes=LINE_STROKES)[0]
-        speeds.append((done.hub[-1] - done.hub[LINE_FROM]) @ waypoint[0] / 10.0 / (LINE_STROKES - LINE_FROM))
+        along = np.array([np.cos(direction), np.sin(direction)])
+        done = swim_many(agent, policy, LINE_LENGTH * along[None], 1, scene, max_strokes=LINE_STROKES)[0]
+        speeds.append((done.hub[-1] - done.hub[LINE_FROM]) @ along / (LINE_STROKES - LINE_FROM))
     return np.array(speeds)
 
 

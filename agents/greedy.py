@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions, command_table
 from seastar_gym.envs.observation import OBSERVATION_LAYOUT
-from seastar_gym.envs.paths import shortest_way
+from seastar_gym.envs.paths import AIM, shortest_way
 from seastar_gym.scene import Scene
 from seastar_gym.simulator import Simulator
 
@@ -79,13 +79,13 @@ def displacement_map(scene: Scene, actions: Actions = "joint") -> Displacements:
 
 
 def remaining_way(hub: Floats, current: Floats, after: Floats, radius: float) -> Floats:
-    """Way [m] from hub through the circle of the current waypoint to the next one, to the circle itself if it is last.
+    """Way [m] from hub well through the circle of the current waypoint to the next one, as the reward measures it.
 
     All of shape (..., 2), in any one frame; `after` equals `current` on the last leg, as in an observation.
     """
-    to_current = np.hypot(hub[..., 0] - current[..., 0], hub[..., 1] - current[..., 1])
     last = (current == after).all(axis=-1)
-    return np.where(last, np.maximum(to_current - radius, 0.0), shortest_way(hub, current, after, radius))
+    to_current = np.hypot(hub[..., 0] - current[..., 0], hub[..., 1] - current[..., 1])
+    return np.where(last, to_current, shortest_way(hub, current, after, AIM * radius))
 
 
 def waypoints_of(observations: NDArray[np.float32], scene: Scene) -> tuple[Floats, Floats]:

@@ -22,6 +22,9 @@ LINE_LENGTH = 0.3
 FIGURE_EIGHT_WIDTH = 0.4
 FIGURE_EIGHT_WAYPOINTS = 16
 
+AIM = 0.7
+"""Share of a waypoint's radius that a way to go keeps to. A way that only touches the circle goes nowhere within it,
+and no stroke need ever end there."""
 TOUCH_BISECTIONS = 12
 """Of the arc on which a way touches a waypoint's circle: the way errs by less than 1e-6 radii."""
 

@@ -46,8 +46,8 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
 
     ## Reward
     `reward_progress` (metres by which the way to go became shorter: the shortest one that passes the current waypoint
-    within `waypoint_radius`, then from waypoint to waypoint) + `reward_waypoint` (waypoints reached) + `reward_effort`
-    (minus the limbs heated), with the weights in `RewardWeights`; the terms are in `info`.
+    well within `waypoint_radius`, then from waypoint to waypoint) + `reward_waypoint` (waypoints reached) +
+    `reward_effort` (minus the limbs heated), with the weights in `RewardWeights`; the terms are in `info`.
 
     ## Info
     `time` [s], `hub_position` [m], `waypoint_index` (waypoints reached so far), `distance` [m] from the hub to the

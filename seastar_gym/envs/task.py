@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.actuation.actuator import StatefulActuator
 from seastar_gym.envs.observation import VELOCITY_SCALE, observation_size, observe, to_float32
-from seastar_gym.envs.paths import PathName, cross_track_error, make_path, shortest_way
+from seastar_gym.envs.paths import AIM, PathName, cross_track_error, make_path, shortest_way
 from seastar_gym.envs.randomization import LIMB_STRENGTH, DomainRandomization, drawn_scene
 from seastar_gym.envs.reward import RewardWeights, reward_terms
 from seastar_gym.fidelity import measured
@@ -143,8 +143,8 @@ class SwimTask:
         k = np.minimum(self.waypoint_index, self.n_waypoints - 1)
         after = np.minimum(k + 1, self.n_waypoints - 1)
         current, robots = self._waypoint(k), np.arange(self.n_robots)
-        last = np.maximum(_length(current - hub) - self.waypoint_radius, 0.0)
-        through = shortest_way(hub, current, self._waypoint(after), self.waypoint_radius)
+        last = _length(current - hub)
+        through = shortest_way(hub, current, self._waypoint(after), AIM * self.waypoint_radius)
         return np.where(k == after, last, through + self._way_after[robots, after])
 
     def observe(self) -> NDArray[np.float32]:

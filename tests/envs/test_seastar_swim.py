@@ -12,7 +12,7 @@ from gymnasium.utils.env_checker import check_env
 
 import seastar_gym
 from seastar_gym import Numerics, RewardWeights, Scene, Seastar, SmaPulse, SolverStatus
-from seastar_gym.envs.paths import PATH_NAMES, cross_track_error, shortest_way
+from seastar_gym.envs.paths import AIM, PATH_NAMES, cross_track_error, shortest_way
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.fidelity import promise
 
@@ -236,9 +236,9 @@ def test_reward_is_the_sum_of_its_terms_and_they_are_what_their_names_say():
 
     def way_to_go(hub: np.ndarray, index: int) -> float:
         if index == 2:
-            return np.linalg.norm(path[2] - hub) - 0.004
+            return np.linalg.norm(path[2] - hub)
         after = np.linalg.norm(np.diff(path[index + 1 :], axis=0), axis=1).sum()
-        return shortest_way(hub, path[index], path[index + 1], 0.004) + after
+        return shortest_way(hub, path[index], path[index + 1], AIM * 0.004) + after
 
     indices = []
     for _ in range(15):
