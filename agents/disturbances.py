@@ -64,8 +64,8 @@ class DisturbedTask:
     def reset(self, generators: list[np.random.Generator]) -> None:
         """Begin an episode of every robot, at rest in the world."""
         self.task.reset(np.ones(self.task.n_robots, bool), generators)
-        positions, velocities, time = self.task.simulator.get_state()
-        self.task.simulator.set_state(State(positions, velocities - self._current[:, None], time))
+        state = self.task.simulator.get_state()
+        self.task.simulator.set_state(state._replace(velocities=state.velocities - self._current[:, None]))
         self._carried[:] = 0.0
 
     def hub_position(self) -> Floats:

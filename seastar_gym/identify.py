@@ -1,0 +1,302 @@
+"""Fits numbers of a scene to measured trajectories: `python -m seastar_gym.identify --help`.
+
+A trajectory is a CSV file with a line of names, `time,x0,y0,x9,y9,..`: seconds, and the coordinates [m] of any nodes
+(0 is the hub, j (N - 1) the tip of limb j). The robot begins at rest with its hub at the origin and limb 1 along +x;
+empty fields were not seen. A second file has one command per line and stroke, one number per limb.
+
+Parameters are positive numbers of the scene, by name: fluid.drag_coefficient, robot.youngs_modulus,
+actuator.peak_angle. They are fitted by their logarithms, so errors are relative to their values. With J the derivative
+of the residuals r and s^2 = |r|^2/(n - p), the covariance is s^2 (J^T J)^-1: independent errors of one size for all
+coordinates. Where a direction of parameters, a singular vector of J, has a relative error above UNTOLD, the data cannot
+tell them, and the estimate says so.
+
+`--synthetic` makes data of its own, with 1 mm of noise, and shows that the fit finds what made them.
+"""
+
+import argparse
+import csv
+import math
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import least_squares
+from scipy.stats import t as student
+
+from seastar_gym.checks import is_finite_number
+from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water
+from seastar_gym.simulator import Simulator
+
+Floats = NDArray[np.float64]
+
+DIFFERENCE = 1e-4
+"""Relative change of a parameter for a column of the Jacobian; trajectories are good to about its square."""
+UNTOLD = 0.5
+"""Relative standard error of a combination of parameters that is as good as unknown."""
+SHARE = 0.3
+"""Part in such a combination, a unit vector, from which on a parameter belongs to it."""
+LARGEST_FACTOR = 20.0
+"""Between a parameter and its first guess."""
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Where nodes of a robot were.
+
+    time: Since the first stroke began [s], shape (n,). positions: [m], shape (n, n_nodes_seen, 2), NaN: not seen.
+    nodes: Which nodes, shape (n_nodes_seen,). commands: Of every stroke, shape (n_strokes, n_limbs).
+    """
+
+    time: Floats
+    positions: Floats
+    nodes: tuple[int, ...]
+    commands: Floats
+
+    def __post_init__(self) -> None:
+        if self.positions.shape != (len(self.time), len(self.nodes), 2) or not np.isfinite(self.positions).any():
+            raise ValueError(f"{len(self.time)} times and {len(self.nodes)} nodes do not fit the positions measured.")
+        if self.commands.ndim != 2 or not len(self.commands):
+            raise ValueError("Commands must be one line per stroke with one number per limb.")
+        if not np.isfinite(self.time).all() or self.time.min() < 0.0 or (np.diff(self.time) < 0.0).any():
+            raise ValueError("Times must be finite, not negative, and in order [s].")
+
+    @classmethod
+    def from_csv(cls, trajectory: str | Path, commands: str | Path) -> "Measurement":
+        """From two files, see above."""
+        with Path(trajectory).open(newline="", encoding="utf-8") as lines:
+            names, *rows = [row for row in csv.reader(lines) if row]
+        nodes = tuple(int(name[1:]) for name in names[1::2] if name[1:].isdigit())
+        expected = ["time", *(f"{axis}{node}" for node in nodes for axis in "xy")]
+        if [name.strip() for name in names] != expected or any(len(row) != len(names) for row in rows):
+            raise ValueError(f"{trajectory}: the first line must be time,x0,y0,.. and all others as long as it.")
+        numbers = np.array([[float(field) if field.strip() else math.nan for field in row] for row in rows])
+        return cls(
+            time=numbers[:, 0],
+            positions=numbers[:, 1:].reshape(len(numbers), len(nodes), 2),
+            nodes=nodes,
+            commands=np.loadtxt(commands, delimiter=",", ndmin=2),
+        )
+
+    def to_csv(self, trajectory: str | Path, commands: str | Path) -> None:
+        """What from_csv reads."""
+        names = ["time", *(f"{axis}{node}" for node in self.nodes for axis in "xy")]
+        numbers = np.column_stack([self.time, self.positions.reshape(len(self.time), -1)])
+        np.savetxt(trajectory, numbers, "%.7g", ",", header=",".join(names), comments="")
+        np.savetxt(commands, self.commands, "%g", ",")
+
+
+class Estimate(NamedTuple):
+    """Fitted parameters; arrays over parameters.
+
+    values, lower, upper: Estimates and the ends of their confidence intervals, in the scene's units.
+    correlation: Of the estimates, shape (p, p).
+    untold: Groups of parameters that the data cannot tell, or not apart; their intervals mean nothing.
+    residuals: Measured less fitted [m], shape (n, n_nodes_seen, 2). scene: With the fitted values.
+    """
+
+    names: tuple[str, ...]
+    values: Floats
+    lower: Floats
+    upper: Floats
+    correlation: Floats
+    untold: tuple[tuple[str, ...], ...]
+    residuals: Floats
+    scene: Scene
+
+    @property
+    def root_mean_square(self) -> float:
+        """Of the residuals [m]."""
+        return float(np.sqrt(np.nanmean(self.residuals**2)))
+
+    def report(self) -> str:
+        """For people."""
+        lines = [f"residuals: {1e3 * self.root_mean_square:.3g} mm root mean square"]
+        rows = zip(self.names, self.values, self.lower, self.upper, strict=True)
+        lines += [f"{name} = {value:.5g}   [{lower:.5g}, {upper:.5g}]" for name, value, lower, upper in rows]
+        for group in self.untold:
+            what = f"{group[0]} from the data" if len(group) == 1 else f"{' and '.join(group)} apart by these data"
+            lines.append(f"Cannot tell {what}: measure something else, or fix {'it' if len(group) == 1 else 'one'}.")
+        return "\n".join(lines)
+
+
+def get_parameter(scene: Scene, name: str) -> float:
+    """A number of the scene. ValueError: it has none of that name that could be fitted."""
+    part, _, of_part = name.partition(".")
+    piece = getattr(scene, part, None) if part in ("robot", "fluid", "actuator") else None
+    value = getattr(piece, of_part, None) if piece is not None and of_part in _field_names(piece) else None
+    if not is_finite_number(value) or isinstance(value, int) or value <= 0.0:  # type: ignore[operator]
+        raise ValueError(f"{name!r} is no positive number of this scene, such as fluid.drag_coefficient.")
+    return float(value)  # type: ignore[arg-type]
+
+
+def _field_names(piece: object) -> set[str]:
+    return {field.name for field in fields(piece)}  # type: ignore[arg-type]
+
+
+def with_parameters(scene: Scene, names: Sequence[str], values: Sequence[float] | Floats) -> Scene:
+    """The scene with other numbers."""
+    for name, value in zip(names, values, strict=True):
+        part, _, of_part = name.partition(".")
+        scene = replace(scene, **{part: replace(getattr(scene, part), **{of_part: float(value)})})
+    return scene
+
+
+# --- trajectories ----------------------------------------------------------------------------------------------------
+
+
+def trajectory(time: Floats, nodes: Sequence[int], commands: Floats, scene: Scene) -> Floats:
+    """Where nodes of a scene's robot are at these times [m], shape (n, n_nodes_seen, 2).
+
+    Between time steps by cubic Hermite interpolation, of the order of the schemes. NaN where the solver gave up.
+    """
+    simulator, of_nodes = Simulator(scene, threads=1), list(nodes)
+    parts = math.ceil(scene.actuator.period / scene.numerics.step)
+    times, positions, velocities = [0.0], simulator.positions[:, of_nodes], simulator.velocities[:, of_nodes]
+    seen = [(positions[0], velocities[0])]
+    for stroke, command in enumerate(commands):
+        for since in simulator.stroke_in_parts(command[None], parts):
+            times.append(stroke * scene.actuator.period + since)
+            seen.append((simulator.positions[0, of_nodes], simulator.velocities[0, of_nodes]))
+        if simulator.failed.any():
+            return np.full((len(time), len(nodes), 2), np.nan)
+    if time[-1] > times[-1] + 1e-9:
+        raise ValueError(
+            f"The last time of {time[-1]:.4g} s is beyond the last stroke, which ends at {times[-1]:.4g} s."
+        )
+    x, v = (np.array(values) for values in zip(*seen, strict=True))
+    return np.asarray(CubicHermiteSpline(times, x, v)(time))
+
+
+def trajectories(scenes: Sequence[Scene], measurement: Measurement) -> Floats:
+    """That of every scene's robot, side by side, shape (n_scenes, n, n_nodes_seen, 2)."""
+    of_scene = partial(trajectory, measurement.time, measurement.nodes, measurement.commands)
+    with ThreadPoolExecutor() as pool:
+        return np.array(list(pool.map(of_scene, scenes)))
+
+
+# --- the fit ---------------------------------------------------------------------------------------------------------
+
+
+def identify(scene: Scene, parameters: Sequence[str], measurement: Measurement, confidence: float = 0.95) -> Estimate:
+    """Fit parameters of a scene, from the scene's own values on, to a measurement."""
+    names = tuple(parameters)
+    guess = np.array([get_parameter(scene, name) for name in names])
+    n_limbs = scene.robot.n_limbs
+    if measurement.commands.shape[1] != n_limbs or max(measurement.nodes) >= scene.robot.n_nodes:
+        raise ValueError(
+            f"Commands and nodes must be those of a robot of {n_limbs} limbs and {scene.robot.n_nodes} nodes."
+        )
+    seen = np.isfinite(measurement.positions)
+    if seen.sum() <= len(names):
+        raise ValueError(f"{seen.sum()} coordinates are too few for {len(names)} parameters.")
+
+    def scene_at(logarithms: Floats) -> Scene:
+        return with_parameters(scene, names, guess * np.exp(logarithms))
+
+    def residuals(logarithms: Floats) -> Floats:
+        try:
+            tried = scene_at(logarithms)
+        except ValueError:  # beyond what can be modelled: least_squares takes a shorter step
+            return np.full(seen.sum(), np.inf)
+        found = (trajectories([tried], measurement)[0] - measurement.positions)[seen]
+        return np.where(np.isfinite(found), found, np.inf)
+
+    def jacobian(logarithms: Floats) -> Floats:
+        changes = DIFFERENCE * np.vstack([np.zeros(len(names)), np.eye(len(names))])
+        here, *changed = trajectories([scene_at(logarithms - change) for change in changes], measurement)
+        return np.stack([(here - other)[seen] / DIFFERENCE for other in changed], axis=1)
+
+    bound = math.log(LARGEST_FACTOR)
+    fit = least_squares(residuals, np.zeros(len(names)), jacobian, (-bound, bound), xtol=1e-6, ftol=1e-8)
+    spread = math.sqrt(2.0 * fit.cost / (seen.sum() - len(names)))
+    _, singular, directions = np.linalg.svd(fit.jac, full_matrices=False)
+    errors = spread / np.maximum(singular, 1e-300)
+    covariance = (directions.T * errors**2) @ directions
+    half = student.ppf(0.5 + 0.5 * confidence, seen.sum() - len(names)) * np.sqrt(np.diag(covariance))
+    found = trajectories([scene_at(fit.x)], measurement)[0]
+    with np.errstate(over="ignore"):
+        return Estimate(
+            names=names,
+            values=guess * np.exp(fit.x),
+            lower=guess * np.exp(fit.x - half),
+            upper=guess * np.exp(fit.x + half),
+            correlation=covariance / np.sqrt(np.outer(np.diag(covariance), np.diag(covariance))),
+            untold=tuple(
+                tuple(name for name, part in zip(names, direction, strict=True) if abs(part) > SHARE)
+                for direction, error in zip(directions, errors, strict=True)
+                if error > UNTOLD
+            ),
+            residuals=measurement.positions - found,
+            scene=scene_at(fit.x),
+        )
+
+
+def draw(estimate: Estimate, measurement: Measurement, file: Path) -> None:
+    """Measured and fitted paths, and the residuals over time."""
+    import matplotlib.pyplot as plt
+
+    figure, (paths, over_time) = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained")
+    fitted = measurement.positions - estimate.residuals
+    for k, node in enumerate(measurement.nodes):
+        (line,) = paths.plot(*1e3 * fitted[:, k].T, label="hub" if node == 0 else f"node {node}")
+        paths.plot(*1e3 * measurement.positions[:, k].T, ".", color=line.get_color(), markersize=3, alpha=0.4)
+        over_time.plot(measurement.time, 1e3 * estimate.residuals[:, k], ".", color=line.get_color(), markersize=3)
+    paths.set(xlabel="x [mm]", ylabel="y [mm]", title="dots: measured, lines: fitted", aspect="equal")
+    figure.legend(loc="outside lower center", ncols=len(measurement.nodes))
+    over_time.axhline(0.0, color="black", linewidth=0.8)
+    over_time.set(xlabel="time [s]", ylabel="measured less fitted, x and y [mm]")
+    over_time.set_title(f"{1e3 * estimate.root_mean_square:.2f} mm root mean square")
+    figure.savefig(file, dpi=120)
+    plt.close(figure)
+
+
+# --- data of our own -------------------------------------------------------------------------------------------------
+
+TRUTH = {"fluid.drag_coefficient": 1.3, "robot.youngs_modulus": 1.4e6, "actuator.peak_angle": 0.55}
+
+
+def synthetic(
+    scene: Scene, truth: dict[str, float], n_strokes: int = 8, rate: float = 25.0, noise: float = 1e-3, seed: int = 0
+) -> Measurement:
+    """Hub and tips of a robot in strokes of random commands, `rate` times per second, with noise [m]."""
+    rng, robot = np.random.default_rng(seed), scene.robot
+    commands = rng.integers(-1, 2, (n_strokes, robot.n_limbs)).astype(float)
+    times = np.arange(math.floor(n_strokes * scene.actuator.period * rate)) / rate
+    nodes = (0, *((robot.nodes_per_limb - 1) * (np.arange(robot.n_limbs) + 1)).tolist())
+    exact = trajectory(times, nodes, commands, with_parameters(scene, list(truth), list(truth.values())))
+    return Measurement(times, exact + noise * rng.standard_normal(exact.shape), nodes, commands)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("trajectory", nargs="?", type=Path, help="CSV: time,x0,y0,..")
+    parser.add_argument("commands", nargs="?", type=Path, help="CSV: one command per stroke")
+    parser.add_argument("--fit", nargs="+", default=list(TRUTH), metavar="PARAMETER", help="default: %(default)s")
+    parser.add_argument("--step", type=float, default=5e-3, help="time step of the implicit midpoint rule [s]")
+    parser.add_argument("--picture", type=Path, help="where to draw the fit")
+    parser.add_argument("--synthetic", action="store_true", help="fit data of our own")
+    options = parser.parse_args()
+    scene = Scene(Seastar(), Water(), SmaPulse(), Numerics("implicit-midpoint", options.step))
+    if options.synthetic:
+        measurement = synthetic(scene, TRUTH)
+        print("truth:", ", ".join(f"{name} = {value:g}" for name, value in TRUTH.items()))
+    elif options.trajectory is None or options.commands is None:
+        parser.error("give a trajectory and its commands, or --synthetic")
+    else:
+        measurement = Measurement.from_csv(options.trajectory, options.commands)
+    begin = time.perf_counter()
+    estimate = identify(scene, options.fit, measurement)
+    print(estimate.report(), f"{time.perf_counter() - begin:.1f} s", sep="\n")
+    if options.picture is not None:
+        draw(estimate, measurement, options.picture)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,122 @@
+"""Parameters are found in data that a known robot made, and what the data cannot tell is said."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from seastar_gym import Limited, Numerics, Scene, Simulator, SmaPulse
+from seastar_gym.identify import (
+    TRUTH,
+    Measurement,
+    draw,
+    get_parameter,
+    identify,
+    main,
+    synthetic,
+    trajectory,
+    with_parameters,
+)
+
+SCENE = Scene(numerics=Numerics("implicit-midpoint", 0.01))
+
+
+@pytest.fixture(scope="module")
+def measurement():
+    return synthetic(SCENE, TRUTH, n_strokes=3)
+
+
+def test_three_parameters_are_recovered_within_their_intervals_from_data_with_1_mm_of_noise(measurement, tmp_path):
+    estimate = identify(SCENE, list(TRUTH), measurement)
+    truth = np.array(list(TRUTH.values()))
+    assert ((estimate.lower < truth) & (truth < estimate.upper)).all()
+    assert (estimate.upper / estimate.lower < 1.2).all() and not estimate.untold
+    assert estimate.root_mean_square == pytest.approx(1e-3, rel=0.05)
+    assert get_parameter(estimate.scene, "fluid.drag_coefficient") == estimate.values[0]
+    np.testing.assert_allclose(np.diag(estimate.correlation), 1.0)
+    assert all(name in estimate.report() for name in TRUTH)
+    draw(estimate, measurement, tmp_path / "fit.png")
+    assert (tmp_path / "fit.png").stat().st_size > 10_000
+
+
+def test_without_noise_the_truth_itself_is_found():
+    estimate = identify(SCENE, list(TRUTH), synthetic(SCENE, TRUTH, n_strokes=2, noise=0.0))
+    np.testing.assert_allclose(estimate.values, list(TRUTH.values()), rtol=1e-4)
+
+
+def test_parameters_that_act_as_a_product_cannot_be_told_apart(measurement):
+    names = ["fluid.drag_coefficient", "fluid.density", "actuator.peak_angle"]
+    estimate = identify(SCENE, names, measurement)
+    assert estimate.untold == (("fluid.drag_coefficient", "fluid.density"),)
+    assert "Cannot tell fluid.drag_coefficient and fluid.density apart" in estimate.report()
+
+
+def test_a_parameter_that_nothing_shows_cannot_be_told():
+    still = synthetic(SCENE, {}, n_strokes=1)
+    still = Measurement(still.time, np.zeros_like(still.positions) + 1e-9, still.nodes, 0.0 * still.commands)
+    assert identify(SCENE, ["fluid.drag_coefficient"], still).untold == (("fluid.drag_coefficient",),)
+
+
+def test_coordinates_that_were_not_seen_do_not_count(measurement):
+    positions = measurement.positions.copy()
+    positions[::2, 1:] = np.nan
+    partly = Measurement(measurement.time, positions, measurement.nodes, measurement.commands)
+    few, all_of_them = (identify(SCENE, ["actuator.peak_angle"], data) for data in (partly, measurement))
+    assert few.upper[0] - few.lower[0] > 1.2 * (all_of_them.upper[0] - all_of_them.lower[0])
+    assert few.values[0] == pytest.approx(all_of_them.values[0], rel=0.02)
+
+
+def test_a_trajectory_is_that_of_the_simulator_at_the_ends_of_strokes():
+    commands = np.random.default_rng(0).integers(-1, 2, (2, 5)).astype(float)
+    simulator = Simulator(SCENE)
+    simulator.stroke(commands[:1])
+    found = trajectory(np.array([0.0, 1.0]), (0, 9), commands, SCENE)
+    np.testing.assert_allclose(found[0], SCENE.robot.nodes()[[0, 9]], atol=1e-15)
+    np.testing.assert_allclose(found[1], simulator.positions[0, [0, 9]], atol=1e-12)
+
+
+def test_a_measurement_is_read_as_it_was_written(measurement, tmp_path):
+    files = tmp_path / "path.csv", tmp_path / "commands.csv"
+    measurement.to_csv(*files)
+    found = Measurement.from_csv(*files)
+    np.testing.assert_allclose(found.positions, measurement.positions, rtol=1e-6)
+    np.testing.assert_array_equal(found.commands, measurement.commands)
+    assert found.nodes == measurement.nodes == (0, 9, 18, 27, 36, 45)
+
+
+def test_the_command_line_fits_files(measurement, tmp_path, monkeypatch, capsys):
+    measurement.to_csv(tmp_path / "path.csv", tmp_path / "commands.csv")
+    files = [str(tmp_path / name) for name in ("path.csv", "commands.csv")]
+    monkeypatch.setattr(sys, "argv", ["identify", *files, "--fit", "actuator.peak_angle", "--step", "0.01"])
+    main()
+    assert "actuator.peak_angle = " in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("text", ["time,x0\n0,0\n", "t,x0,y0\n0,0,0\n", "time,x0,y0\n0,0\n", "time,x0,y1\n0,0,0\n"])
+def test_files_that_are_no_trajectory_are_refused(tmp_path, text):
+    (tmp_path / "path.csv").write_text(text)
+    (tmp_path / "commands.csv").write_text("0,1,0,0,-1\n")
+    with pytest.raises(ValueError, match="first line must be time,x0,y0"):
+        Measurement.from_csv(tmp_path / "path.csv", tmp_path / "commands.csv")
+
+
+@pytest.mark.parametrize("name", ["robot.n_limbs", "fluid.colour", "drag", "fluid", "numerics.step", "robot.hub_hinge"])
+def test_what_is_no_positive_number_of_the_scene_cannot_be_fitted(name):
+    with pytest.raises(ValueError, match="no positive number of this scene"):
+        get_parameter(SCENE, name)
+
+
+def test_an_actuator_of_any_kind_may_be_fitted():
+    scene = Scene(actuator=Limited(SmaPulse(), largest_rate=2.0))
+    assert get_parameter(with_parameters(scene, ["actuator.largest_rate"], [3.0]), "actuator.largest_rate") == 3.0
+
+
+def test_a_measurement_that_does_not_fit_the_robot_is_refused(measurement):
+    wrong = Measurement(measurement.time, measurement.positions, measurement.nodes, np.zeros((3, 4)))
+    with pytest.raises(ValueError, match="Commands and nodes"):
+        identify(SCENE, ["fluid.density"], wrong)
+    late = Measurement(measurement.time + 1.0, measurement.positions, measurement.nodes, measurement.commands)
+    with pytest.raises(ValueError, match="beyond the last stroke"):
+        identify(SCENE, ["fluid.density"], late)
+    with pytest.raises(ValueError, match="do not fit the positions"):
+        Measurement(measurement.time[1:], measurement.positions, measurement.nodes, measurement.commands)
