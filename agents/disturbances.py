@@ -13,7 +13,6 @@ from agents.greedy import headings, turned
 from seastar_gym.envs.observation import VELOCITY_SCALE
 from seastar_gym.envs.task import SwimTask
 from seastar_gym.scene import require_number
-from seastar_gym.simulator import State
 
 Floats = NDArray[np.float64]
 

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 import seastar_gym
 from seastar_gym.actuation.actuator import Actuator
 from seastar_gym.actuation.measured import MeasuredCurve
+from seastar_gym.actuation.thermal import ThermalSma
 from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, command_table
 from seastar_gym.envs.observation import OBSERVATION_LAYOUT
 from seastar_gym.envs.symmetry import reduce_observations, restore_actions
@@ -38,10 +39,10 @@ FORMAT = 1
 SHIPPED = Path(__file__).parent / "policies" / "seastar.safetensors"
 """The policy in the box; `python train.py --ship` replaces it."""
 
-ACTUATORS: dict[str, Callable[..., Actuator]] = {kind.__name__: kind for kind in (SmaPulse, MeasuredCurve)}
-"""What a saved policy may have been trained with."""
-
 Weights = dict[str, NDArray[np.float32]]
+
+ACTUATORS: dict[str, Callable[..., Actuator]] = {kind.__name__: kind for kind in (SmaPulse, MeasuredCurve, ThermalSma)}
+"""What a policy may have been trained with."""
 
 
 # --- what a policy expects -------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ from gymnasium.envs.registration import register
 
 from seastar_gym.actuation.limited import Limited
 from seastar_gym.actuation.measured import MeasuredCurve
+from seastar_gym.actuation.thermal import ThermalSma
 from seastar_gym.envs.randomization import DomainRandomization, LogUniform, Normal, Uniform
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
@@ -36,6 +37,7 @@ __all__ = [
     "State",
     "StrokeReport",
     "SymmetryReduction",
+    "ThermalSma",
     "Uniform",
     "UniformCurrent",
     "VectorSymmetryReduction",

@@ -242,7 +242,7 @@ class Simulator:
             self._rotations[group, :, lane] = 0.0
             self._failed[group, 0, lane] = 0.0
             self._last_hub[robot] = 0.0
-        self._drive.rest(chosen)
+        self._drive.put(chosen, self._drive.at_rest)
         self._set_time(chosen, 0.0)
 
     def _set_time(self, chosen: NDArray[np.bool_] | slice, time: Floats | float) -> None:
@@ -276,7 +276,7 @@ class Simulator:
         self._failed[:] = 0.0
         self._last_hub = self.hub_position()
         self._set_time(slice(None), arrays[2])
-        self._drive.state = arrays[3]
+        self._drive.put(slice(None), arrays[3])
         self._write(self._rotations, self._drive.rotations())
 
     @property

@@ -26,7 +26,7 @@ class Drive:
         self._commands = np.zeros((n_robots, n_limbs))
         self.strengths = np.ones((n_robots, n_limbs))
         self.state = np.tile(self.at_rest, (n_robots, n_limbs, 1))
-        self._before = self.state
+        self._before = self._after = self.state  # as the stroke that is under way begins and ends
 
     def begin_stroke(self, commands: Floats) -> tuple[Floats, Floats]:
         """(peaks, shape) of a stroke with these commands: limbs turn by their peak times the shape.
@@ -38,11 +38,14 @@ class Drive:
             assert self._curve is not None
             return commands * self.strengths, self._curve
         self._commands, self._before = commands, self.state
-        return self.strengths, self._stateful.respond(self._times, commands, self.state)[0]
+        turned, self._after = self._stateful.respond(self._times, commands, self.state)
+        return self.strengths, turned
 
     def advance(self, end: int) -> None:
         """Bring the state to the time step `end` of the stroke that is under way."""
-        if self._stateful is not None:
+        if end == len(self._times) - 1:
+            self.state = self._after
+        elif self._stateful is not None:
             self.state = self._stateful.respond(self._times[: end + 1], self._commands, self._before)[1]
 
     def observe(self) -> Floats:
@@ -56,7 +59,10 @@ class Drive:
             return np.zeros_like(self.strengths)
         return self.strengths * self._stateful.respond(np.zeros(1), np.zeros_like(self.strengths), self.state)[0][0]
 
-    def rest(self, chosen: NDArray[np.bool_] | slice) -> None:
-        """Bring the actuators of the chosen robots to rest."""
-        self.state = self.state.copy()
-        self.state[chosen] = self.at_rest
+    def put(self, chosen: NDArray[np.bool_] | slice, state: Floats) -> None:
+        """Put the actuators of the chosen robots into a state; a stroke that is under way is over for them."""
+        self._commands = np.array(self._commands)
+        self._commands[chosen] = 0.0
+        self.state, self._before, self._after = (np.array(each) for each in (self.state, self._before, self._after))
+        for each in (self.state, self._before, self._after):
+            each[chosen] = state

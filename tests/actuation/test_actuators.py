@@ -133,6 +133,17 @@ def test_a_stroke_in_parts_gives_the_same_bits_and_the_state_in_between():
     assert whole.actuators.tobytes() == parts.actuators.tobytes()
 
 
+def test_a_robot_put_at_rest_half_way_through_a_stroke_forgets_it():
+    simulator = Simulator(Scene(actuator=SLOW, numerics=NUMERICS), 2)
+    stroke = simulator.stroke_in_parts(np.ones((2, 5)), 4)
+    next(stroke)
+    simulator.reset(np.array([True, False]))
+    assert not simulator.actuators[0].any() and simulator.elastic_energy()[0] < 1e-20
+    for _ in stroke:
+        pass
+    assert not simulator.actuators[0].any() and simulator.actuators[1].all()
+
+
 def test_what_a_robot_remembers_does_not_depend_on_its_neighbours():
     scene = Scene(actuator=SLOW, numerics=NUMERICS)
     commands = np.random.default_rng(1).integers(-1, 2, (3, 11, 5)).astype(float)
