@@ -57,6 +57,8 @@ class ThermalSma:
         require_number("peak_angle", self.peak_angle, "rad", zero_allowed=True)
         for name, unit in (("heating_time", "s"), ("cooling_time", "s"), ("time_constant", "s"), ("steady_rise", "K")):
             require_number(name, getattr(self, name), unit)
+        if self.heating_time > 100.0 * self.time_constant:
+            raise ValueError("heating_time must be at most 100 time constants, after which nothing changes any more.")
         temperatures = (
             self.water_temperature, self.martensite_finish, self.austenite_start, self.martensite_start,
             self.austenite_finish,
@@ -93,18 +95,18 @@ class ThermalSma:
     def respond(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
         """See StatefulActuator; exact at all times t."""
         heated = self.heating_time * np.stack([np.maximum(commands, 0.0), np.maximum(-commands, 0.0)], axis=-1)
-        since = t.reshape(-1, *(1,) * heated.ndim)
         cold, hot = self.water_temperature, self.water_temperature + self.steady_rise
         start, before = state[..., :2], state[..., 2:]
-
-        def while_heated(time: Floats) -> Floats:
-            return hot + (start - hot) * np.exp(-time / self.time_constant)
-
-        hottest = while_heated(heated)
-        cooled = cold + (hottest - cold) * np.exp(-np.maximum(since - heated, 0.0) / self.time_constant)
-        is_heated = since < heated
-        temperature = np.where(is_heated, while_heated(np.minimum(since, heated)), cooled)
-        austenite = self.transform(temperature, np.where(is_heated, before, self.transform(hottest, before)))
+        decay = np.exp(-t / self.time_constant).reshape(-1, *(1,) * heated.ndim)
+        growth = np.exp(heated / self.time_constant)
+        hottest = hot + (start - hot) / growth
+        after = self.transform(hottest, before)
+        temperature = cold + (hottest - cold) * growth * decay
+        austenite = self.transform(temperature, after)
+        early = t < self.heating_time
+        is_heated = t[early].reshape(-1, *(1,) * heated.ndim) < heated
+        temperature[early] = np.where(is_heated, hot + (start - hot) * decay[early], temperature[early])
+        austenite[early] = self.transform(temperature[early], np.where(is_heated, before, after))
         turned = self.peak_angle * (austenite[..., 0] - austenite[..., 1])
         return turned, np.concatenate([temperature[-1], austenite[-1]], axis=-1)
 
@@ -112,7 +114,9 @@ class ThermalSma:
         """Share of austenite after the temperature [deg C] went straight to another, from a share before."""
         up = (temperature - self.austenite_start) / (self.austenite_finish - self.austenite_start)
         down = (temperature - self.martensite_finish) / (self.martensite_start - self.martensite_finish)
-        return np.clip(austenite, np.clip(up, 0.0, 1.0), np.clip(down, 0.0, 1.0))
+        np.maximum(up, austenite, out=up)
+        np.minimum(up, down, out=up)
+        return np.clip(up, 0.0, 1.0, out=up)
 
     def observe(self, state: Floats) -> Floats:
         """Temperatures above the water over A_f - T_water, and the shares of austenite."""
