@@ -44,6 +44,9 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     | 182, 183 | current waypoint relative to the hub                            | 0.1 m      | (-inf, inf) |
     | 184, 185 | next waypoint relative to the hub (on the last leg the current) | 0.1 m      | (-inf, inf) |
 
+    Where the scene's actuators remember something, such as the temperatures of `ThermalSma`, that stands before the
+    waypoints, limb after limb.
+
     ## Reward
     `reward_progress` (metres by which the way to go became shorter: the shortest one that passes the current waypoint
     well within `waypoint_radius`, then from waypoint to waypoint) + `reward_waypoint` (waypoints reached) +
