@@ -174,7 +174,7 @@ def test_a_description_that_is_none_is_said_to_be_damaged(file, text):
         ({"actions": "waves"}, "actions must be one of"),
         ({"hidden": [16, 9]}, r"its weights have the shapes .*\(16, 186\)"),
         ({"hidden": "wide"}, "is damaged"),
-        ({"scene": {"robot": {"n_limbs": 0}, "fluid": None}}, "n_limbs must be a whole number from 1"),
+        ({"scene": {"robot": {"n_limbs": 0}, "fluid": None, "actuator": {}}}, "n_limbs must be a whole number from 1"),
         ({"scene": {"robot": {"n_arms": 5}}}, "n_arms"),
     ],
 )
