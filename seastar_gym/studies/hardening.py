@@ -21,7 +21,7 @@ from seastar_gym.der.compilation import entry_point, kernel
 from seastar_gym.der.lanes import any_lane, borrow, load, load_number, select, splat, store
 from seastar_gym.der.newton import EASY, LATE, foreseeable_length, take_step
 from seastar_gym.der.potential import factorise
-from seastar_gym.der.rods import NEWTON_ITERATIONS, REPORT_ROWS
+from seastar_gym.der.rods import NEWTON_ITERATIONS, REPORT_ROWS, aligned_rows
 from seastar_gym.der.schemes import SCHEMES
 from seastar_gym.der.stages import begin_stage, end_stage, end_step
 from seastar_gym.der.stroke import advance
@@ -94,7 +94,7 @@ class Pair:
         self.q, self.v, self.memory = simulator.q, simulator.v, simulator.memory[0]
         n_groups, rows, lanes = self.q.shape
         scheme = self.scheme = SCHEMES[numerics.scheme]
-        self.a = np.zeros((n_groups, (rows + 1) * scheme.n_stages + 2, lanes))
+        self.a = aligned_rows(n_groups, (rows + 1) * scheme.n_stages + 2, lanes)
         self.failed, self.report = np.zeros((n_groups, 1, lanes)), np.zeros((n_groups, len(REPORT_ROWS), lanes))
         self.rods, self.limits = self.scene.rods(), self.scene.limits()
         self.times = step_times(self.scene.actuator.corners, numerics.step)
@@ -132,16 +132,20 @@ class Cost:
     quartiles: tuple[float, float]
 
 
-def measure_cost(numerics: Numerics, rounds: int = 200) -> Cost:
-    """Strokes in pairs, each first in every other pair."""
-    pair, durations = Pair(numerics), np.zeros((rounds, 2))
-    pair.seconds(True), pair.seconds(False)
-    for k in range(rounds):
-        for hardened in (k % 2 == 0, k % 2 == 1):
-            durations[k, int(hardened)] = pair.seconds(hardened)
-    low, middle, high = np.percentile(durations[:, 1] / durations[:, 0], [25, 50, 75])
-    steps = len(pair.times) - 1
-    return Cost(numerics, float(np.median(durations[:, 0])) / ROBOTS / steps, middle, (low, high))
+def measure_cost(numerics: Numerics, pairs: int = 12, rounds: int = 20) -> Cost:
+    """Strokes by either kernel in turn, each first in every other round.
+
+    Where the numbers lie in memory alone makes some per cent of difference, so there are several pairs, all kept.
+    """
+    durations, benches = np.zeros((pairs, rounds, 2)), [Pair(numerics) for _ in range(pairs)]
+    for bench, own in zip(benches, durations, strict=True):
+        bench.seconds(True), bench.seconds(False)
+        for k in range(rounds):
+            for hardened in (k % 2 == 0, k % 2 == 1):
+                own[k, int(hardened)] = bench.seconds(hardened)
+    low, middle, high = np.percentile(durations[..., 1] / durations[..., 0], [25, 50, 75])
+    steps = len(benches[0].times) - 1
+    return Cost(numerics, float(np.median(durations[..., 0])) / ROBOTS / steps, middle, (low, high))
 
 
 def cost_table(costs: list[Cost]) -> Table:
