@@ -6,7 +6,6 @@ current's own acceleration, would add is left out.
 """
 
 from seastar_gym.der.compilation import kernel
-from seastar_gym.der.drag import edges_at
 from seastar_gym.der.lanes import add_product, load, splat, store
 from seastar_gym.der.rods import n_nodes
 
@@ -16,16 +15,25 @@ def freeze_added_mass(added_mass, rods, work):
     """Fill work.added_mass, (xx, xy, yy) of every node [kg], from work.normals, in scenes that have it."""
     if added_mass is None:
         return
+    edges = rods.nodes_per_limb - 1
     for node in range(n_nodes(rods)):
         xx, xy, yy = splat(0.0), splat(0.0), splat(0.0)
-        begin, end, stride = edges_at(rods, node)
-        for e in range(begin, end, stride):
-            nx, ny = load(work.normals, 2 * e), load(work.normals, 2 * e + 1)
-            mx, my = load(added_mass, e) * nx, load(added_mass, e) * ny
-            xx, xy, yy = add_product(xx, mx, nx), add_product(xy, mx, ny), add_product(yy, my, ny)
+        if node == 0:
+            for e in range(0, rods.n_limbs * edges, edges):
+                xx, xy, yy = add_half_edge_mass(load(added_mass, 2 * e + 2), work.normals, e, xx, xy, yy)
+        else:
+            xx, xy, yy = add_half_edge_mass(load(added_mass, 2 * node), work.normals, node - 1, xx, xy, yy)
+            xx, xy, yy = add_half_edge_mass(load(added_mass, 2 * node + 1), work.normals, node, xx, xy, yy)
         store(work.added_mass, 3 * node, xx)
         store(work.added_mass, 3 * node + 1, xy)
         store(work.added_mass, 3 * node + 2, yy)
+
+
+@kernel
+def add_half_edge_mass(m, normals, e, xx, xy, yy):
+    nx, ny = load(normals, 2 * e), load(normals, 2 * e + 1)
+    mx, my = m * nx, m * ny
+    return add_product(xx, mx, nx), add_product(xy, mx, ny), add_product(yy, my, ny)
 
 
 @kernel

@@ -23,35 +23,38 @@ def drag_slopes(c, wx, wy):
 
 
 @kernel
-def edges_at(rods, node):
-    """(first, end, stride) of the edges that a node ends or begins."""
-    edges = rods.nodes_per_limb - 1
-    if node == 0:
-        return 0, rods.n_limbs * edges, edges
-    return node - 1, node if node % edges == 0 else node + 1, 1
+def add_half_edge(c, normals, e, wx, wy, gamma, inverse_gamma, slopes):
+    """Add the drag of flow across half of edge e to (energy, gradient, Hessian) in q, see potential.py."""
+    energy, (fx, fy), (xx, xy, yy) = slopes
+    nx, ny = load(normals, 2 * e), load(normals, 2 * e + 1)
+    across = add_product(wx * nx, wy, ny)
+    c_across = c * absolute(across)
+    force = c_across * across
+    slope = 2.0 * inverse_gamma * c_across
+    sx, sy = slope * nx, slope * ny
+    return (
+        add_product(energy, gamma * (1.0 / 3.0), force * across),
+        (add_product(fx, force, nx), add_product(fy, force, ny)),
+        (add_product(xx, sx, nx), add_product(xy, sx, ny), add_product(yy, sy, ny)),
+    )
 
 
 @kernel
 def add_cross_flow(cross_drag, rods, normals, node, wx, wy, gamma, inverse_gamma, slopes):
-    """Add the drag of flow across a node's edges to its (energy, gradient, Hessian) in q, see potential.py.
+    """Add the drag of flow across a node's edges to its slopes.
 
     Without such drag (None) the slopes are what they were, and the kernel is gone when compiled.
     """
     if cross_drag is None:
         return slopes
-    energy, (fx, fy), (xx, xy, yy) = slopes
-    begin, end, stride = edges_at(rods, node)
-    for e in range(begin, end, stride):
-        nx, ny = load(normals, 2 * e), load(normals, 2 * e + 1)
-        across = add_product(wx * nx, wy, ny)
-        c_across = load(cross_drag, e) * absolute(across)
-        force = c_across * across
-        energy = add_product(energy, gamma * (1.0 / 3.0), force * across)
-        fx, fy = add_product(fx, force, nx), add_product(fy, force, ny)
-        slope = 2.0 * c_across * inverse_gamma
-        sx, sy = slope * nx, slope * ny
-        xx, xy, yy = add_product(xx, sx, nx), add_product(xy, sx, ny), add_product(yy, sy, ny)
-    return energy, (fx, fy), (xx, xy, yy)
+    if node == 0:
+        edges = rods.nodes_per_limb - 1
+        for e in range(0, rods.n_limbs * edges, edges):
+            slopes = add_half_edge(load(cross_drag, 2 * e + 2), normals, e, wx, wy, gamma, inverse_gamma, slopes)
+        return slopes
+    inner, outer = load(cross_drag, 2 * node), load(cross_drag, 2 * node + 1)
+    slopes = add_half_edge(inner, normals, node - 1, wx, wy, gamma, inverse_gamma, slopes)
+    return add_half_edge(outer, normals, node, wx, wy, gamma, inverse_gamma, slopes)
 
 
 @kernel

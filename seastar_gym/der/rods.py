@@ -37,8 +37,9 @@ class Rods(NamedTuple):
     hub_angle: The angle of the unactuated hub hinges, measured that way, per limb [rad].
     mass: Lumped mass, per node [kg].
     drag: 1/2 rho_f C_d D dl_i of (13.8), per node [kg/m].
-    cross_drag: What flow across an edge adds to that, of half the edge, per edge [kg/m], or None; see drag.py.
-    added_mass: Mass of fluid that half the edge accelerates across itself, per edge [kg], or None; see added_mass.py.
+    cross_drag: What flow across its edges adds to that, two rows per node, for half of its inner and of its outer edge
+        (zero for hub and tips, which have none) [kg/m], or None; see drag.py.
+    added_mass: Mass of fluid that these halves accelerate across themselves, likewise [kg], or None; see added_mass.py.
     relaxation_time: tau of material damping [s], one row, or None; see damping.py.
     current: How the fluid moves, or None; see current.py.
     load: Dead load per coordinate [N], or None.
@@ -228,7 +229,7 @@ def make_work(rods: Rods, n_stages: int) -> Work:
         hub_EI_kappa_bar=rows(n_limbs),
         hub_t=rows(n_limbs),
         stage_v=rows(2 * n_nodes * n_stages),
-        normals=None if rods.cross_drag is None and rods.added_mass is None else rows(2 * n_edges),
+        normals=None if rods.cross_drag is None and rods.added_mass is None else rows(2 * n_nodes),
         current=None if rods.current is None else rows(2 * n_nodes),
         added_mass=None if rods.added_mass is None else rows(3 * n_nodes),
         tension=None if rods.relaxation_time is None else rows(n_edges),

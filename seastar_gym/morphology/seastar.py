@@ -59,6 +59,17 @@ def mean(values: ArrayLike, weights: Floats | None = None) -> float:
     return float(values[0] + np.average(values - values[0], weights=weights))
 
 
+def halves_at_nodes(halves: Floats, n_limbs: int) -> Floats:
+    """Of numbers for half of each edge, those of the inner and the outer edge of every node in turn, shape (2 n_nodes,).
+
+    Zero for the outer edge of tips, and for the hub: its halves are the inner ones of the root nodes.
+    """
+    inner = halves.reshape(n_limbs, -1)
+    outer = np.zeros_like(inner)
+    outer[:, :-1] = inner[:, 1:]
+    return np.concatenate([np.zeros(2), np.stack([inner, outer], axis=2).ravel()])
+
+
 def make_rods(
     limbs: Sequence[LimbShape],
     nodes_per_limb: int,
@@ -126,11 +137,12 @@ def make_rods(
         C_t = tangential_drag_coefficient
         friction_per_length = per_node([[drag_of(C_t, r) for r in rs] for rs in radius])
         cross = [drag_of(drag_coefficient, r) - drag_of(C_t, r) for limb in limbs for r in along(limb.radius, at_edges)]
-        cross_drag = np.array(cross) * 0.5 * l
+        cross_drag = halves_at_nodes(np.array(cross) * 0.5 * l, n_limbs)
     added_mass = None
     if added_mass_coefficient is not None:
-        displaced = [np.pi * r**2 for limb in limbs for r in along(limb.radius, at_edges)]
-        added_mass = fluid_density * added_mass_coefficient * np.array(displaced) * 0.5 * l
+        areas = [np.pi * r**2 for limb in limbs for r in along(limb.radius, at_edges)]
+        masses = fluid_density * added_mass_coefficient * np.array(areas) * 0.5 * l
+        added_mass = halves_at_nodes(masses, n_limbs)
     mass = density * area * dl
     mass[list(held_nodes)] *= HELD
     forces = np.zeros((len(dl), 2))

@@ -1,0 +1,22 @@
+"""The study of what terms cost compares scenes that all swim."""
+
+import numpy as np
+
+from seastar_gym import Scene
+from seastar_gym.studies.terms import THE_CHAPTERS, as_table, measure, scenes
+
+
+def test_costs_are_relative_to_the_first_scene():
+    costs = measure({"this": Scene(), "the same": Scene()}, rounds=3)
+    assert [cost.name for cost in costs] == ["this", "the same"]
+    assert costs[0].per_iteration == costs[0].per_stroke == 1.0
+    assert costs[1].iterations == costs[0].iterations >= 1.0
+    assert costs[1].quartiles[0] <= costs[1].per_iteration <= costs[1].quartiles[1]
+    assert as_table(costs).row_count == 2
+
+
+def test_every_scene_has_terms_of_its_own():
+    compared = scenes()
+    assert next(iter(compared)) == THE_CHAPTERS and compared[THE_CHAPTERS] == Scene()
+    assert len({hash(scene) for scene in compared.values()}) == len(compared)
+    assert np.isfinite([scene.rods().EA[0] for scene in compared.values()]).all()
