@@ -45,6 +45,8 @@ def promised(scene: Scene) -> dict[str, float]:
         "path_error": math.nan if known is None else known.path_error,
         "real_time_factor": math.nan if known is None else known.speed,
     }
+
+
 def scene_observation_size(scene: Scene) -> int:
     """Length of the observation of a scene's robot."""
     actuator, robot = scene.actuator, scene.robot

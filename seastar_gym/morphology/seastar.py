@@ -60,7 +60,7 @@ def mean(values: ArrayLike, weights: Floats | None = None) -> float:
 
 
 def halves_at_nodes(halves: Floats, n_limbs: int) -> Floats:
-    """Of numbers for half of each edge, those of the inner and the outer edge of every node in turn, shape (2 n_nodes,).
+    """Of numbers for half of each edge, those of the inner and the outer edge of every node in turn, (2 n_nodes,).
 
     Zero for the outer edge of tips, and for the hub: its halves are the inner ones of the root nodes.
     """
