@@ -260,9 +260,7 @@ def opened(page):
 def test_it_opens_offline_without_a_complaint(opened, evaluated):
     opened.page.wait_for_selector("#curves .main-svg")
     assert opened.complaints == []
-    assert [url for url in opened.requests if not url.startswith("data:")] == [
-        (evaluated[0] / "report.html").as_uri()
-    ]
+    assert [url for url in opened.requests if not url.startswith("data:")] == [(evaluated[0] / "report.html").as_uri()]
 
 
 def test_the_slider_moves_the_robot(opened, evaluated):
