@@ -4,8 +4,8 @@ Paired in one run: strokes by the simulator's kernel, and the same strokes by pl
 without line search, repair, guard, halving, status and report. Neither has anything to repair in these strokes, and
 both end in the same bits, so what differs is the time: some 100 ns per time step of a lane group, 4 % of implicit
 Euler's short steps and 2 % of longer ones. No part of it stands out: the smallest opening angle of the report (six
-roots, five divisions) is 1 % of a short step, the masks over what it writes 0.3 %, and the guard sleeps. Where a process
-has its code makes 3 % more or less, so look at several.
+roots, five divisions) is 1 % of a short step, the masks over what it writes 0.3 %, and the guard sleeps. Where the
+code comes to lie makes 3 % more or less in a process, so look at several.
 """
 
 import time
