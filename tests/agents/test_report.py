@@ -186,6 +186,7 @@ def test_command_line_writes_the_report_with_the_curves_of_runs(tmp_path, capsys
     run.mkdir()
     (run / "progress.csv").write_text("1000,200,5\n2000,190,5\n")
     arguments = ["--agents", "learned", "straight", "--max-strokes", "2", "--no-video", "--report", "--runs", str(run)]
+    arguments += ["--bound", str(tmp_path / "none.json")]  # the learned policy's speeds stand there too
     assert main([*arguments, "--fidelity", "fast", "--out", str(tmp_path / "out")]) == 0
     assert "report.html" in capsys.readouterr().out
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
