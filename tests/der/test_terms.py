@@ -207,7 +207,7 @@ def test_schemes_keep_their_second_order_with_lagged_currents_normals_and_added_
 
 # Closed forms
 
-SINK = Numerics("implicit-midpoint", 0.01, newton_tolerance=1e-10)
+SINK = Numerics("implicit-euler", 0.01, newton_tolerance=1e-10)  # it forgets the ringing, and is exact at rest
 
 
 def terminal_velocity(direction: np.ndarray, water: Water) -> np.ndarray:
