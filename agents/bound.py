@@ -187,12 +187,12 @@ def name(command: Floats) -> str:
 
 
 def agent_speeds(agent: str, policy: Policy, scene: Scene, directions: Floats) -> Floats:
-    """What an agent makes per stroke [m] straight along directions [rad], once it swims steadily."""
+    """What an agent comes nearer per stroke [m] to a waypoint LINE_LENGTH away, from rest until it is there."""
     speeds = []
     for direction in directions:
-        along = np.array([np.cos(direction), np.sin(direction)])
-        done = swim_many(agent, policy, LINE_LENGTH * along[None], 1, scene, max_strokes=LINE_STROKES)[0]
-        speeds.append((done.hub[-1] - done.hub[LINE_FROM]) @ along / (LINE_STROKES - LINE_FROM))
+        waypoint = LINE_LENGTH * np.array([np.cos(direction), np.sin(direction)])
+        done = swim_many(agent, policy, waypoint[None], 1, scene)[0]
+        speeds.append((LINE_LENGTH - np.linalg.norm(waypoint - done.hub[-1])) / done.strokes)
     return np.array(speeds)
 
 

@@ -25,7 +25,7 @@ class Budget:
     """What the search may cost: at most 21 + 21 beam (depth - 1) simulated strokes per stroke of a five-limb robot."""
 
     depth: int = 3
-    """Strokes looked ahead. One is short-sighted by a stroke per lap of the pentagon; more than three gain nothing."""
+    """Strokes looked ahead. One costs a stroke or so round the pentagon; more than three gain nothing."""
     beam: int = 8
     """States kept from one stroke to the next."""
 
