@@ -127,14 +127,20 @@ def joined(*cases: Cases) -> Cases:
 # --- swimming --------------------------------------------------------------------------------------------------------
 
 
-def scene_of(numerics: Numerics, nodes_per_limb: int = 10) -> Scene:
-    """The chapter's scene."""
-    return Scene(robot=Seastar(nodes_per_limb=nodes_per_limb), numerics=numerics)
+def scene_of(numerics: Numerics, nodes_per_limb: int = 10, relaxation_time: float | None = None) -> Scene:
+    """The chapter's scene, maybe of a material that damps."""
+    return Scene(robot=Seastar(nodes_per_limb=nodes_per_limb, relaxation_time=relaxation_time), numerics=numerics)
 
 
-def swim(cases: Cases, numerics: Numerics, nodes_per_limb: int = 10, threads: int | None = 1) -> Swim:
+def swim(
+    cases: Cases,
+    numerics: Numerics,
+    nodes_per_limb: int = 10,
+    threads: int | None = 1,
+    relaxation_time: float | None = None,
+) -> Swim:
     """All robots from rest through their commands."""
-    simulator = Simulator(scene_of(numerics, nodes_per_limb), len(cases), threads)
+    simulator = Simulator(scene_of(numerics, nodes_per_limb, relaxation_time), len(cases), threads)
     hub, heading, reports = [], [], []
     for commands in cases.commands:
         reports.append(simulator.stroke(commands))

@@ -242,9 +242,9 @@ def ringing(found: Study) -> Figure:
     return figure
 
 
-def record(numerics: Numerics) -> tuple[Floats, Floats, Floats]:
+def record(numerics: Numerics, relaxation_time: float | None = None) -> tuple[Floats, Floats, Floats]:
     """Times [s], velocity across limb 1 in its middle [m/s], r.m.s. lengthening speed of limbs [m/s]; second stroke."""
-    simulator = Simulator(scene_of(numerics), 1, threads=1)
+    simulator = Simulator(scene_of(numerics, relaxation_time=relaxation_time), 1, threads=1)
     command = PAIRS[RINGING][None]
     simulator.stroke(command)
     time, velocity, stretching = [], [], []

@@ -1,0 +1,49 @@
+"""The damping study: a damped robot rings less, and needs shorter steps less."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from seastar_gym.studies import damping
+from seastar_gym.studies.accuracy_cases import PAIRS
+from seastar_gym.studies.damping import MATERIALS, Plan, Row, Study, as_table, good_enough, of, study
+
+TINY = Plan(n_random=1, converged=(("sdirk3", 1e-3), ("implicit-midpoint", 1e-3)), shortest=10.0)
+
+
+@pytest.fixture(scope="module")
+def found() -> Study:
+    return study(TINY, progress=False)
+
+
+def row(step: float, path_error: float) -> Row:
+    return Row("silicone", "sdirk2", step, path_error, 1000.0)
+
+
+def test_a_step_is_good_enough_if_all_shorter_ones_are():
+    """An error that is small at one step by luck promises nothing."""
+    rows = [row(0.02, 0.005), row(0.01, 0.02), row(0.005, 0.009), row(0.002, 0.001)]
+    assert good_enough(rows) == rows[2]
+    assert good_enough(rows[:2]) is None
+
+
+def test_damped_swims_converge_where_undamped_ones_ring(found):
+    assert found.agreement["silicone"] < 0.1 * found.agreement["undamped"]
+    for scheme in ("sdirk2", "sdirk3", "implicit-midpoint"):
+        damped, undamped = of(found.rows, "silicone", scheme), of(found.rows, "undamped", scheme)
+        assert [each.step for each in damped] == [0.02, 0.01]
+        assert damped[-1].path_error < 0.3 * undamped[-1].path_error
+    assert all(found.pairs[material].shape == (len(PAIRS),) for material in MATERIALS)
+    assert np.all(np.abs(found.pairs["silicone"] / found.pairs["undamped"] - 1.0) < 0.2)
+
+
+def test_the_study_writes_its_table_and_picture(found, monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(damping, "study", lambda plan: found)
+    monkeypatch.setattr("sys.argv", ["damping", "--quick", "--out", str(tmp_path)])
+    damping.main()
+    with (tmp_path / "damping.csv").open() as stream:
+        assert len(list(csv.DictReader(stream))) == len(found.rows)
+    assert (tmp_path / "damping.png").stat().st_size > 10_000
+    assert "pairs of Fig. 13.8" in capsys.readouterr().out
+    assert as_table(found).row_count == 4
