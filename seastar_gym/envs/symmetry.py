@@ -14,7 +14,7 @@ Functions here take batches: observations of shape (..., size), as laid out in o
 """
 
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
@@ -198,6 +198,12 @@ def require_symmetry(scene: Scene) -> None:
 # --- wrappers --------------------------------------------------------------------------------------------------------
 
 
+if TYPE_CHECKING:
+    _VectorWrapper = gym.vector.VectorWrapper[Any, Any, Any, Any, Any]
+else:
+    _VectorWrapper = gym.vector.VectorWrapper  # not generic in gymnasium 1.2
+
+
 class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorArgs):
     """`SeastarSwim-v0` whose observations have the current waypoint in sector 0 and whose actions are carried back."""
 
@@ -225,7 +231,7 @@ class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstru
         return self._reduced(observation), reward, terminated, truncated, info
 
 
-class VectorSymmetryReduction(gym.vector.VectorWrapper[Any, Any, Any, Any, Any]):
+class VectorSymmetryReduction(_VectorWrapper):
     """The same for the native batch, with `info["final_obs"]` reduced too, each by its own element."""
 
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any]):
