@@ -1,5 +1,6 @@
 """What an action means: which limbs are heated, and which way they turn."""
 
+import functools
 import itertools
 from typing import Literal, TypeAlias, get_args
 
@@ -24,7 +25,7 @@ def action_space(actions: Actions, n_limbs: int) -> spaces.MultiDiscrete | space
 
 
 def command_table(actions: Actions, n_limbs: int) -> NDArray[np.float64]:
-    """Command of every action of a `Discrete` space, shape (n_actions, n_limbs), values -1, 0, 1.
+    """Command of every action of a `Discrete` space, shape (n_actions, n_limbs), values -1, 0, 1; read-only.
 
     "joint": every command, limb 1 varying slowest, each limb in the order 0, +, -. "pairs": no limb, then every pair
     of one + and one - limb. "limbs" has no table: it is one action per limb.
@@ -38,11 +39,18 @@ def command_table(actions: Actions, n_limbs: int) -> NDArray[np.float64]:
             f'actions="joint" would have 3^{n_limbs} = {3**n_limbs:,} actions for {n_limbs} limbs: use "limbs" or '
             f'"pairs" for more than {MOST_LIMBS} limbs.'
         )
+    return _command_table(actions, n_limbs)
+
+
+@functools.cache
+def _command_table(actions: Actions, n_limbs: int) -> NDArray[np.float64]:
     if actions == "joint":
-        return np.array(list(itertools.product(LIMB_COMMANDS, repeat=n_limbs)))
-    table = np.zeros((1 + n_limbs * (n_limbs - 1), n_limbs))
-    for row, (plus, minus) in enumerate(itertools.permutations(range(n_limbs), 2), start=1):
-        table[row, [plus, minus]] = 1.0, -1.0
+        table = np.array(list(itertools.product(LIMB_COMMANDS, repeat=n_limbs)))
+    else:
+        table = np.zeros((1 + n_limbs * (n_limbs - 1), n_limbs))
+        for row, (plus, minus) in enumerate(itertools.permutations(range(n_limbs), 2), start=1):
+            table[row, [plus, minus]] = 1.0, -1.0
+    table.setflags(write=False)  # every environment reads the same one
     return table
 
 
