@@ -151,6 +151,8 @@ class Options:
     """States kept by the searches along lines, over all commands."""
     pentagon_beam: int = 300
     """States kept by the search round the pentagon, over pairs of limbs."""
+    only_pentagon: bool = False
+    """Search the pentagon alone, print how many strokes it takes, and write nothing."""
     agents: tuple[str, ...] = ("learned",)
     """Whose speeds to measure beside."""
     out: Path = Path("docs/bound.json")
@@ -196,6 +198,12 @@ def agent_speeds(agent: str, policy: Policy, scene: Scene, directions: Floats) -
     return np.array(speeds)
 
 
+def search_pentagon(options: Options) -> Gaits:
+    """Actions, pairs of limbs, of the shortest swim found round the pentagon."""
+    waypoints = make_path("pentagon", np.random.default_rng(0))
+    return search_path(make_scene(None, options.fidelity), waypoints, "pairs", options.pentagon_beam)
+
+
 def study(options: Options) -> dict[str, Any]:
     """All of it; minutes."""
     scene = make_scene(None, options.fidelity)
@@ -207,8 +215,7 @@ def study(options: Options) -> dict[str, Any]:
         agent: MM * agent_speeds(agent, policy, scene, directions)
         for agent, policy in load_agents(options.agents, fidelity=options.fidelity).items()
     }
-    waypoints = make_path("pentagon", np.random.default_rng(0))
-    pentagon = search_path(scene, waypoints, "pairs", options.pentagon_beam)
+    pentagon = search_pentagon(options)
     return {
         "fidelity": options.fidelity,
         "fastest_gaits": fastest,
@@ -248,6 +255,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
     options = tyro.cli(Options, args=arguments)
     began = time.perf_counter()
+    if options.only_pentagon:
+        print(f"Pentagon: {len(search_pentagon(options))} strokes, in {time.perf_counter() - began:.0f} s.")
+        return 0
     results = study(options)
     given = sys.argv[1:] if arguments is None else arguments
     results |= {"command": shlex.join(["python", "-m", "agents.bound", *given])}

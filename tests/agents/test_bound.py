@@ -69,6 +69,13 @@ def test_the_path_search_visits_all_waypoints_or_says_that_it_did_not():
     assert len(search_path(FAST, corner, "pairs", beam=1, max_strokes=3)) == 0
 
 
+def test_the_pentagon_alone_can_be_searched_at_any_fidelity_and_nothing_is_written(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["--only-pentagon", "--pentagon-beam", "1"]) == 0
+    strokes = int(capsys.readouterr().out.split()[1])
+    assert 160 < strokes < 170 and not list(tmp_path.iterdir())
+
+
 @pytest.mark.slow
 def test_the_study_writes_numbers_and_a_picture(tmp_path):
     file = tmp_path / "bound.json"
