@@ -57,7 +57,8 @@ class DisturbedTask:
         robots, n_limbs = np.arange(task.n_robots), task.simulator.scene.robot.n_limbs
         angles = 2.0 * np.pi / CURRENT_DIRECTIONS * robots
         self._current = disturbance.current * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        self._strength = np.where(robots[:, None] % n_limbs == np.arange(n_limbs), 1.0 - disturbance.weakness, 1.0)
+        left = np.where(robots[:, None] % n_limbs == np.arange(n_limbs), 1.0 - disturbance.weakness, 1.0)
+        task.simulator.set_limb_strengths(task.simulator.limb_strengths * left)
         self._carried = np.zeros((task.n_robots, 2))
 
     def reset(self, generators: list[np.random.Generator]) -> None:
@@ -85,9 +86,9 @@ class DisturbedTask:
         return seen
 
     def step(self, commands: Floats) -> Floats:
-        """One stroke of every robot; returns the commands as they were carried out, shape (n_robots, n_limbs)."""
+        """One stroke of every robot; returns the commands that were not lost, shape (n_robots, n_limbs)."""
         lost = self._rng.random(len(commands)) < self.disturbance.lost
-        commands = np.where(lost[:, None], 0.0, self._strength * commands)
+        commands = np.where(lost[:, None], 0.0, commands)
         drift = self._current * self.task.simulator.scene.actuator.period
         self.task.waypoints -= drift[:, None]
         self._carried += drift

@@ -114,6 +114,8 @@ class SwimTask:
                 self.randomization.draw(self.drawn, int(robot), generators[robot])
         if self.drawn:
             self.simulator.set_scene(drawn_scene(self.scene, self.drawn), robots)
+            strengths = np.asarray(self.scene.limb_strengths or 1.0) * self.drawn.get(LIMB_STRENGTH, 1.0)
+            self.simulator.set_limb_strengths(strengths)
         self.simulator.reset(robots, headings)
         self.waypoint_index[robots] = 0
         self._way_to_go[robots] = self._measure_way_to_go(self.simulator.hub_position())[robots]
@@ -164,12 +166,11 @@ class SwimTask:
 
     def step(self, commands: Floats) -> Outcome:
         """One stroke of every robot."""
-        return self._judge(commands, self.simulator.stroke(commands * self.drawn.get(LIMB_STRENGTH, 1.0)))
+        return self._judge(commands, self.simulator.stroke(commands))
 
     def step_in_parts(self, commands: Floats, parts: int) -> Generator[float, None, Outcome]:
         """One stroke that pauses to be looked at; yields the time in it [s]. The Outcome is its return value."""
-        strength = self.drawn.get(LIMB_STRENGTH, 1.0)
-        report = yield from self.simulator.stroke_in_parts(commands * strength, parts)
+        report = yield from self.simulator.stroke_in_parts(commands, parts)
         return self._judge(commands, report)
 
     def _judge(self, commands: Floats, report: StrokeReport) -> Outcome:

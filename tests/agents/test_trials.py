@@ -57,11 +57,16 @@ def test_a_current_carries_the_robots_its_own_way_and_the_waypoints_stay():
 
 
 def test_every_limb_is_the_weak_one_of_some_robot():
-    carried_out = disturbed(weakness=0.5).step(np.tile([1.0, -1.0, 1.0, -1.0, 1.0], (N, 1)))
-    for robot in range(N):
-        strength = np.ones(5)
-        strength[robot % 5] = 0.5
-        np.testing.assert_array_equal(np.abs(carried_out[robot]), strength)
+    commands = np.tile([1.0, -1.0, 1.0, -1.0, 1.0], (N, 1))
+    weak = disturbed(weakness=0.5)
+    np.testing.assert_array_equal(weak.step(commands), commands)
+    strengths = np.ones((N, 5))
+    strengths[np.arange(N), np.arange(N) % 5] = 0.5
+    np.testing.assert_array_equal(weak.task.simulator.limb_strengths, strengths)
+    hub = weak.hub_position()
+    told = disturbed()
+    told.step(strengths * commands)
+    np.testing.assert_array_equal(hub, told.hub_position())
 
 
 def test_noise_is_on_positions_and_has_its_size():

@@ -4,7 +4,17 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from seastar_gym import DomainRandomization, LogUniform, Normal, Scene, Seastar, Uniform, UniformCurrent, Water
+from seastar_gym import (
+    DomainRandomization,
+    LogUniform,
+    Normal,
+    Scene,
+    Seastar,
+    ThermalSma,
+    Uniform,
+    UniformCurrent,
+    Water,
+)
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.scene import Numerics
 
@@ -51,9 +61,9 @@ def test_a_robot_is_drawn_alone_as_in_a_batch_and_swims_as_the_robot_that_was_dr
         env.simulator.reset()
         plain = SeastarSwimEnv(scene=scene)
         plain.reset()
-        command = own["limb_strength"] * np.array([0.0, 1.0, -1.0, 0.0, 1.0])
+        command = np.array([0.0, 1.0, -1.0, 0.0, 1.0])
         env.simulator.stroke(command[None])
-        plain.simulator.stroke(command[None])
+        plain.simulator.stroke(own["limb_strength"] * command[None])
         np.testing.assert_array_equal(env.simulator.positions, plain.simulator.positions)
 
 
@@ -107,3 +117,18 @@ def test_currents_can_be_drawn():
     env = SeastarSwimEnv(scene=scene, randomization=randomization)
     _, info = env.reset(seed=3)
     assert env.simulator.scene.fluid.current.u_x == (info["fluid.current.u_x"],)
+
+
+def test_drawn_strengths_weaken_what_limbs_turn_and_not_what_actuators_are_told():
+    """A wire with heat is as warm in a weak limb; what the scene weakens already is weakened further."""
+    weak = (1.0, 0.5, 1.0, 1.0, 1.0)
+    scene = Scene(actuator=ThermalSma(), numerics=Numerics.preset("fast"), limb_strengths=weak)
+    env = SeastarSwimEnv(scene=scene, randomization=DomainRandomization({"limb_strength": Uniform(0.2, 0.9)}))
+    _, info = env.reset(seed=3)
+    simulator = env.unwrapped.simulator
+    np.testing.assert_allclose(simulator.limb_strengths, info["limb_strength"][None] * weak, rtol=1e-15)
+    plain = SeastarSwimEnv(scene=scene)
+    plain.reset(seed=3)
+    for one in (env, plain):
+        one.step(np.array([1, 2, 0, 1, 2]))
+    np.testing.assert_array_equal(simulator.actuators, plain.unwrapped.simulator.actuators)
