@@ -69,7 +69,7 @@ class Branching:
 class Planner:
     """Beam search over pairs of limbs, anew before every stroke; in Stable-Baselines3's form.
 
-    scene: What the search swims in, the environment's own by default of whoever makes it. waypoint_radius: [m].
+    scene: What the search swims in, by default the chapter's at fidelity "fast". waypoint_radius: [m].
     """
 
     actions: Actions = "pairs"

@@ -40,6 +40,8 @@ class MeasuredCurve:
     @classmethod
     def from_csv(cls, file: str | Path) -> "MeasuredCurve":
         """From a file with a time [s] and an angle [rad] in every line, below one line of names if it has any."""
+        if not Path(file).is_file():
+            raise FileNotFoundError(f"There is no measured curve at {file}: give the path of a CSV file.")
         with Path(file).open(newline="", encoding="utf-8") as lines:
             rows = [row for row in csv.reader(lines) if row]
         if rows and not _is_number(rows[0][0]):

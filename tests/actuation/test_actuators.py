@@ -262,3 +262,8 @@ def test_what_actuators_remember_is_seen_before_the_waypoints():
 def test_symmetry_is_refused_where_the_scene_has_none(scene, words):
     with pytest.raises(ValueError, match=words):
         SymmetryReduction(SeastarSwimEnv(scene=scene))
+
+
+def test_a_missing_file_of_a_curve_is_said_in_one_sentence(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"^There is no measured curve at .*none\.csv: .*\.$"):
+        MeasuredCurve.from_csv(tmp_path / "none.csv")
