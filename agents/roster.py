@@ -15,8 +15,8 @@ from seastar_gym.scene import Fidelity
 
 
 def load_agents(names: Sequence[str], seed: int = 0, fidelity: Fidelity = "balanced") -> dict[str, Policy]:
-    """Policies by name: the one in the box, scripted ones, the greedy one by a map of a fidelity's physics, the planner,
-    which always plans with the fast ones, and files under their names without the ending."""
+    """Policies by name: the one in the box, scripted ones, the greedy one by a map of a fidelity's physics, the
+    planner, which always plans with the fast ones, and files under their names without the ending."""
     agents: dict[str, Policy] = {}
     for name in names:
         label = Path(name).stem if _is_file(name) else name
