@@ -1,13 +1,15 @@
-"""The seastar of Fig. 13.4a, limbs around a hub, and its coefficients as rods."""
+"""The seastar of Fig. 13.4a, limbs around a hub, and its coefficients as rods; those of the fluid are in fluid.py."""
 
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from seastar_gym.der.current import Current
 from seastar_gym.der.rods import Rods
+from seastar_gym.morphology import fluid
 from seastar_gym.morphology.limb import LimbShape, along
+from seastar_gym.morphology.mesh import Mesh, edges_along, make_mesh, mean, nodes_along
 
 Floats = NDArray[np.float64]
 
@@ -53,23 +55,6 @@ def n_hub_hinges(n_limbs: int) -> int:
     return n_limbs if n_limbs > 2 else n_limbs - 1
 
 
-def mean(values: ArrayLike, weights: Floats | None = None) -> float:
-    """Mean that is exact where all values are equal."""
-    values = np.asarray(values, dtype=float)
-    return float(values[0] + np.average(values - values[0], weights=weights))
-
-
-def halves_at_nodes(halves: Floats, n_limbs: int) -> Floats:
-    """Of numbers for half of each edge, those of the inner and the outer edge of every node in turn, (2 n_nodes,).
-
-    Zero for the outer edge of tips, and for the hub: its halves are the inner ones of the root nodes.
-    """
-    inner = halves.reshape(n_limbs, -1)
-    outer = np.zeros_like(inner)
-    outer[:, :-1] = inner[:, 1:]
-    return np.concatenate([np.zeros(2), np.stack([inner, outer], axis=2).ravel()])
-
-
 def make_rods(
     limbs: Sequence[LimbShape],
     nodes_per_limb: int,
@@ -91,66 +76,24 @@ def make_rods(
 
     held_nodes: Nodes that stay where they are. loads: Dead loads (node, F_x, F_y) [N].
     """
-    n_limbs, n_edges = len(limbs), nodes_per_limb - 1
-    at_edges, at_nodes = (np.arange(n_edges) + 0.5) / n_edges, np.arange(n_edges + 1) / n_edges
-    root_edges = np.array([limb.length / n_edges for limb in limbs])
-    l = np.repeat(root_edges, n_edges)  # noqa: E741
-    dl_limb = np.where(at_nodes[1:] < 1.0, 1.0, 0.5)
-    dl = np.concatenate([[0.5 * n_limbs * mean(root_edges)], l * np.tile(dl_limb, n_limbs)])
-    radius = [along(limb.radius, at_nodes) for limb in limbs]
-    modulus = [along(limb.youngs_modulus, at_nodes) for limb in limbs]
-    EA = np.array(
-        [
-            E * (np.pi * r**2)
-            for limb in limbs
-            for E, r in zip(along(limb.youngs_modulus, at_edges), along(limb.radius, at_edges), strict=True)
-        ]
-    )
-    EI = np.array(
-        [
-            E * np.pi * r**4 / 4.0
-            for Es, rs in zip(modulus, radius, strict=True)
-            for E, r in zip(Es[:-1], rs[:-1], strict=True)
-        ]
-    )
-    EI_over_dl, dl_over_EI = EI / l, l / EI
-    natural_turn = np.repeat([turn_per_hinge(limb, nodes_per_limb) for limb in limbs], n_edges)
-    EI_kappa_bar = 2.0 * EI_over_dl * np.tan(0.5 * natural_turn)
-    roots = n_edges * np.arange(n_limbs)
-    EI_kappa_bar[roots] = 0.0
-    EI_over_dl[roots], dl_over_EI[roots] = hub_stiffnesses(EI_over_dl[roots], dl_over_EI[roots])
-
-    def per_node(values: list[list[float]]) -> Floats:
-        """Values at the nodes of every limb, hub first, as one per node."""
-        hub = mean([of_limb[0] for of_limb in values], root_edges)
-        return np.array([hub, *(value for of_limb in values for value in of_limb[1:])])
-
-    area = per_node([[np.pi * r**2 for r in rs] for rs in radius])
-
-    def drag_of(coefficient: float, r: float) -> float:
-        """Per length and squared speed, of a limb of radius r (13.8) [kg/m^2]."""
-        return 0.5 * fluid_density * coefficient * 2.0 * r
-
-    drag_per_length = per_node([[drag_of(drag_coefficient, r) for r in rs] for rs in radius])
-    friction_per_length, cross_drag = drag_per_length, None
-    if tangential_drag_coefficient is not None:
-        C_t = tangential_drag_coefficient
-        friction_per_length = per_node([[drag_of(C_t, r) for r in rs] for rs in radius])
-        cross = [drag_of(drag_coefficient, r) - drag_of(C_t, r) for limb in limbs for r in along(limb.radius, at_edges)]
-        cross_drag = halves_at_nodes(np.array(cross) * 0.5 * l, n_limbs)
-    added_mass = None
-    if added_mass_coefficient is not None:
-        areas = [np.pi * r**2 for limb in limbs for r in along(limb.radius, at_edges)]
-        masses = fluid_density * added_mass_coefficient * np.array(areas) * 0.5 * l
-        added_mass = halves_at_nodes(masses, n_limbs)
-    mass = density * area * dl
+    mesh = make_mesh(limbs, nodes_per_limb)
+    n_limbs, l = len(limbs), mesh.l  # noqa: E741
+    modulus = [E for limb in limbs for E in along(limb.youngs_modulus, edges_along(nodes_per_limb))]
+    EA = np.array([E * (np.pi * r**2) for E, r in zip(modulus, mesh.radius_at_edges, strict=True)])
+    EI_over_dl, dl_over_EI, EI_kappa_bar = bending_coefficients(limbs, mesh)
+    area = mesh.per_node(lambda r: np.pi * r**2)
+    mass = density * area * mesh.dl
     mass[list(held_nodes)] *= HELD
-    forces = np.zeros((len(dl), 2))
+    forces = np.zeros((len(mass), 2))
     for node, *force in loads:
         forces[node] += force
+
+    C_d, C_t, C_a = drag_coefficient, tangential_drag_coefficient, added_mass_coefficient
+    broadside = mesh.per_node(lambda r: fluid.drag_per_length(fluid_density, C_d, r))
     length = mean([limb.length for limb in limbs])
     calm = CALM_STRAIN_ENERGY * mean(EA) * n_limbs * length
-    shortest, thinnest = float(root_edges.min()), min(map(min, radius))
+    shortest, thinnest = float(mesh.root_edges.min()), min(map(min, mesh.radius_at_nodes))
+    stiffest = max(max(along(limb.youngs_modulus, nodes_along(nodes_per_limb))) for limb in limbs)
     slenderness = min(1.0, (shortest / thinnest) ** 2 / 5000.0)
     return Rods(
         n_limbs=n_limbs,
@@ -164,17 +107,36 @@ def make_rods(
         hub_side=-1.0 if hub_hinge == "turning" else 1.0,
         hub_angle=np.array([natural_hub_angle(limb.gap, hub_hinge) for limb in limbs]),
         mass=mass,
-        drag=friction_per_length * dl,
-        cross_drag=cross_drag,
-        added_mass=added_mass,
+        drag=fluid.drag(mesh, fluid_density, C_d if C_t is None else C_t),
+        cross_drag=None if C_t is None else fluid.cross_drag(mesh, fluid_density, C_d, C_t),
+        added_mass=None if C_a is None else fluid.added_mass(mesh, fluid_density, C_a),
         relaxation_time=None if relaxation_time is None else np.array([relaxation_time]),
         current=current,
         load=forces.reshape(-1) if loads else None,
         shortest_edge=np.array([shortest]),
-        curvature_rate=np.array([max(map(max, modulus)) / (density * shortest**2) * slenderness]),
+        curvature_rate=np.array([stiffest / (density * shortest**2) * slenderness]),
         calm=np.array([calm]),
-        damped=np.array([calm * min(1.0, mean(drag_per_length) * length / (density * mean(area)))]),
+        damped=np.array([calm * min(1.0, mean(broadside) * length / (density * mean(area)))]),
     )
+
+
+def bending_coefficients(limbs: Sequence[LimbShape], mesh: Mesh) -> tuple[Floats, Floats, Floats]:
+    """(EI/dl, dl/EI, EI kappa_bar) of all hinges; see der/rods.py."""
+    n_edges = len(mesh.l) // len(limbs)
+    EI = np.array(
+        [
+            E * np.pi * r**4 / 4.0
+            for limb, radii in zip(limbs, mesh.radius_at_nodes, strict=True)
+            for E, r in zip(along(limb.youngs_modulus, nodes_along(n_edges + 1))[:-1], radii[:-1], strict=True)
+        ]
+    )
+    EI_over_dl, dl_over_EI = EI / mesh.l, mesh.l / EI
+    natural_turn = np.repeat([turn_per_hinge(limb, n_edges + 1) for limb in limbs], n_edges)
+    EI_kappa_bar = 2.0 * EI_over_dl * np.tan(0.5 * natural_turn)
+    roots = n_edges * np.arange(len(limbs))
+    EI_kappa_bar[roots] = 0.0
+    EI_over_dl[roots], dl_over_EI[roots] = hub_stiffnesses(EI_over_dl[roots], dl_over_EI[roots])
+    return EI_over_dl, dl_over_EI, EI_kappa_bar
 
 
 def hub_stiffnesses(EI_over_dl: Floats, dl_over_EI: Floats) -> tuple[Floats, Floats]:
