@@ -3,7 +3,6 @@
 import os
 from collections.abc import Generator
 from concurrent.futures import ThreadPoolExecutor
-from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,76 +10,26 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.actuation.drive import Drive
 from seastar_gym.actuation.schedule import step_times
+from seastar_gym.coefficients import Coefficients
 from seastar_gym.der.energy import energies
 from seastar_gym.der.lanes import N_LANES
 from seastar_gym.der.rods import (
     REPORT_ROWS,
     SMALLEST_HUB_T,
     Actuation,
-    Rods,
     Work,
     aligned_rows,
     make_work,
-    put_robot,
-    side_by_side,
 )
+from seastar_gym.der.rows import from_rows, to_rows, write_rows
 from seastar_gym.der.schemes import SCHEMES
 from seastar_gym.der.stroke import advance
-from seastar_gym.per_robot import frame_of
 from seastar_gym.scene import MAX_STEPS, Scene, require_count
+from seastar_gym.stroke_report import COUNTS
+from seastar_gym.stroke_report import SolverStatus as SolverStatus
+from seastar_gym.stroke_report import StrokeReport as StrokeReport
 
 Floats = NDArray[np.float64]
-
-
-class SolverStatus(IntEnum):
-    """Whether a robot's stroke was computed, and if not, why."""
-
-    CONVERGED = 0
-    NOT_CONVERGED = 1
-    NOT_FINITE = 2
-
-    @property
-    def sentence(self) -> str:
-        """What to tell the user."""
-        return {
-            SolverStatus.CONVERGED: "The stroke converged.",
-            SolverStatus.NOT_CONVERGED: (
-                "A time step did not converge even after it was halved to its floor; the robot stays at its last good "
-                "state until it is reset: use a smaller Numerics.step, a softer robot or slower initial velocities."
-            ),
-            SolverStatus.NOT_FINITE: (
-                "The robot's positions or velocities were not finite when the stroke began; it lies at rest where its "
-                "hub was before, until it is reset: write finite numbers into Simulator.q and Simulator.v only."
-            ),
-        }[self]
-
-
-COUNTS = ("newton_iterations", "repairs", "backtracks", "steps", "halvings", "rejections", "energy_cuts")
-
-
-class StrokeReport(NamedTuple):
-    """What a stroke cost and how it ended; every array has shape (n_robots,).
-
-    status: SolverStatus of every robot.
-    newton_iterations, repairs, backtracks: Counts of Newton steps, of those that needed the convex matrix, and of
-        halvings by the line search.
-    steps, halvings, rejections: Counts of time steps taken, of those that did not converge or created energy and were
-        halved, and of those whose error was too large and were halved (Numerics.path_tolerance).
-    energy_cuts: Steps after which velocities were cut, because the energy had grown a little, see der/guard.py.
-    covered: Time covered [s].
-    smallest_opening_angle: Smallest angle between neighbouring limbs at the hub [rad]; below zero, limbs crossed.
-    """
-
-    status: NDArray[np.int64]
-    newton_iterations: NDArray[np.int64]
-    repairs: NDArray[np.int64]
-    backtracks: NDArray[np.int64]
-    steps: NDArray[np.int64]
-    halvings: NDArray[np.int64]
-    rejections: NDArray[np.int64]
-    energy_cuts: NDArray[np.int64]
-    covered: Floats
-    smallest_opening_angle: Floats
 
 
 class State(NamedTuple):
@@ -115,6 +64,7 @@ class Simulator:
     threads: Lane groups are shared out over this many threads; all processors if None. A robot's trajectory is the
         same to the last bit whatever the batch, the lane and the number of threads.
 
+    coefficients: The scene's numbers for the kernels.
     memory: What every thread works in, (Work, Actuation) of der/rods.py.
     q, v: The node positions and velocities as the kernels keep them, shape (n_groups, 2 n_nodes, N_LANES), not copies.
     """
@@ -130,7 +80,7 @@ class Simulator:
         n_groups = -(-self.n_robots // N_LANES)
         available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         self.threads = min(n_groups, available if threads is None else int(threads))
-        self._check_batch(scene)
+        self.coefficients = Coefficients(scene, self.n_robots)
         self._scheme = SCHEMES[scene.numerics.scheme]
         self._limits = scene.limits()
         self._times = step_times(scene.actuator.corners, scene.numerics.step)
@@ -139,7 +89,6 @@ class Simulator:
         self.q = aligned_rows(n_groups, n_rows, N_LANES)
         self.v = aligned_rows(n_groups, n_rows, N_LANES)
         self.q[:] = scene.robot.nodes().reshape(-1, 1)
-        self._rods = self._make_rods()
         self._a = aligned_rows(n_groups, (n_rows + 1) * self._scheme.n_stages + 2, N_LANES)
         self._drive = Drive(scene.actuator, self.n_robots, n_limbs, self._times)
         self._commands = np.zeros((n_groups, n_limbs, N_LANES))  # share of _shape that every limb follows
@@ -157,36 +106,15 @@ class Simulator:
     def _make_memory(self) -> tuple[Work, Actuation]:
         robot = self.scene.robot
         rotations = Actuation(np.zeros((robot.n_limbs, N_LANES)), np.zeros((robot.n_limbs, N_LANES)))
-        return make_work(self._rods[0], self._scheme.n_stages), rotations
-
-    def _check_batch(self, scene: Scene) -> None:
-        if scene.n_robots not in (None, self.n_robots):
-            raise ValueError(f"The scene has numbers for {scene.n_robots} robots, the batch {self.n_robots}.")
-
-    def _make_rods(self) -> list[Rods]:
-        """One set of coefficients for all lane groups, or one for each if numbers differ from robot to robot."""
-        if self.scene.n_robots is None:
-            return [self.scene.rods()]
-        robots = [self.scene.rods(robot) for robot in range(self.n_robots)]
-        robots += robots[-1:] * (len(self.q) * N_LANES - self.n_robots)
-        return [side_by_side(robots[first : first + N_LANES]) for first in range(0, len(robots), N_LANES)]
+        return make_work(self.coefficients.rods(0), self._scheme.n_stages), rotations
 
     def set_scene(self, scene: Scene, mask: ArrayLike | None = None) -> None:
         """Go on with a scene that differs in numbers of `PER_ROBOT` alone.
 
         mask: The robots whose numbers have changed, shape (n_robots,), all if None.
         """
-        if not isinstance(scene, Scene) or frame_of(scene) != frame_of(self.scene):
-            raise ValueError("set_scene needs a scene of the same terms that differs in numbers of each robot alone.")
-        self._check_batch(scene)
-        chosen, whole = self._checked_mask(mask), self.scene.n_robots is None or scene.n_robots is None
+        self.coefficients = self.coefficients.changed(scene, self._checked_mask(mask))
         self.scene = scene
-        if whole:
-            self._rods = self._make_rods()
-            return
-        for robot in np.flatnonzero(chosen):
-            group, lane = divmod(int(robot), N_LANES)
-            put_robot(self._rods[group], lane, scene.rods(int(robot)))
 
     def _checked_mask(self, mask: ArrayLike | None) -> NDArray[np.bool_]:
         chosen = np.ones(self.n_robots, bool) if mask is None else np.asarray(mask)
@@ -211,7 +139,7 @@ class Simulator:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__init__(*state["arguments"])  # type: ignore[misc]
         for name, values in state["rows"].items():
-            self._write(getattr(self, name), values)
+            write_rows(getattr(self, name), values)
         self.__dict__.update(state["clock"])
         self._drive.__dict__.update(state["drive"])
         self._last_hub = self.hub_position()
@@ -270,14 +198,14 @@ class Simulator:
             if not np.isfinite(array).all():
                 raise ValueError(f"State.{name} must be finite.")
             arrays.append(array)
-        self._write(self.q, arrays[0])
-        self._write(self.v, arrays[1])
+        write_rows(self.q, arrays[0])
+        write_rows(self.v, arrays[1])
         self._commands[:] = 0.0
         self._failed[:] = 0.0
         self._last_hub = self.hub_position()
         self._set_time(slice(None), arrays[2])
         self._drive.put(slice(None), arrays[3])
-        self._write(self._rotations, self._drive.rotations())
+        write_rows(self._rotations, self._drive.rotations())
 
     @property
     def actuators(self) -> Floats:
@@ -301,20 +229,8 @@ class Simulator:
             raise ValueError(f"limb_strengths must be numbers from 0 to 1 of shape {wanted[1:]} or {wanted}.")
         self._drive.strengths = np.broadcast_to(array, wanted).copy()
 
-    def to_rows(self, values: Floats) -> Floats:
-        """Numbers of every robot, shape (n_robots, k), as rows for kernels, shape (n_groups, k, N_LANES)."""
-        padded = np.zeros((len(self.q) * N_LANES, values.shape[1]))
-        padded[: self.n_robots] = values
-        return np.ascontiguousarray(padded.reshape(len(self.q), N_LANES, -1).transpose(0, 2, 1))
-
-    def _write(self, rows: Floats, nodes: Floats) -> None:
-        """Write numbers of every robot, shape (n_robots, ...), over rows (n_groups, k, N_LANES)."""
-        groups, lanes = np.divmod(np.arange(self.n_robots), N_LANES)
-        rows[groups, :, lanes] = nodes.reshape(self.n_robots, -1)
-
     def _read(self, rows: Floats) -> Floats:
-        """Rows (n_groups, k, N_LANES) as (n_robots, k), a copy."""
-        return np.ascontiguousarray(rows.transpose(0, 2, 1)).reshape(-1, rows.shape[1])[: self.n_robots]
+        return np.asarray(from_rows(rows, self.n_robots))
 
     @property
     def positions(self) -> Floats:
@@ -362,7 +278,7 @@ class Simulator:
         both = np.zeros((2, len(self.q), 1, N_LANES))
         for group in range(len(self.q)):
             actuation.delta_psi_end[:] = self._rotations[group]
-            rods = self._rods[group % len(self._rods)]
+            rods = self.coefficients.rods(group)
             energies(rods, work, actuation, self.q[group], self.v[group], both[0, group], both[1, group])
         return self._read(both[0])[:, 0], self._read(both[1])[:, 0]
 
@@ -398,7 +314,7 @@ class Simulator:
 
     def _begin_stroke(self, commands: ArrayLike) -> None:
         peaks, shape = self._drive.begin_stroke(self._checked_commands(commands))
-        self._write(self._commands, peaks)
+        write_rows(self._commands, peaks)
         self._shape = shape if shape.ndim == 1 else self._shape_rows(shape)
         self._start_time += self._since_stroke  # of a stroke that failed or was left half-way
         self._since_stroke[:] = 0.0
@@ -408,7 +324,7 @@ class Simulator:
 
     def _shape_rows(self, shape: Floats) -> Floats:
         """Rotations at times, per robot and limb, as rows for the kernels: (n_groups, n_times, n_limbs, N_LANES)."""
-        rows = self.to_rows(shape.transpose(1, 0, 2).reshape(self.n_robots, -1))
+        rows = to_rows(shape.transpose(1, 0, 2))
         return rows.reshape(len(self.q), *shape[:, 0].shape, N_LANES)
 
     def _checked_commands(self, commands: ArrayLike) -> Floats:
@@ -443,7 +359,7 @@ class Simulator:
 
         # More parts than threads, and whoever is ready takes the next: another process may hold up one of the threads.
         n_parts = 1 if self.threads == 1 else min(len(self.q), PARTS_PER_THREAD * self.threads)
-        if len(self._rods) > 1:
+        if not self.coefficients.are_shared:
             n_parts = len(self.q)
         bounds = len(self.q) * np.arange(n_parts + 1) // n_parts
         parts = map(slice, bounds[:-1], bounds[1:])
@@ -455,7 +371,7 @@ class Simulator:
                 if self._shape.ndim > 1:
                     shape = np.ascontiguousarray(self._shape[part, begin : end + 1])
                 advance(
-                    self._rods[part.start % len(self._rods)], work, self._scheme, SCHEMES["implicit-euler"], actuation,
+                    self.coefficients.rods(part.start), work, self._scheme, SCHEMES["implicit-euler"], actuation,
                     self.q[part], self.v[part], self._a[part], self._commands[part], times, shape, self._failed[part],
                     self._report[part], self._limits,
                 )  # fmt: skip
@@ -475,7 +391,7 @@ class Simulator:
         self._strokes += ~failed
         self._since_stroke = np.where(failed, rows["covered"], 0.0)
         self._drive.advance(len(self._times) - 1)
-        self._write(self._rotations, self._drive.rotations())
+        write_rows(self._rotations, self._drive.rotations())
         counts = {name: rows[name].astype(np.int64) for name in COUNTS}
         angle = 2.0 * np.arctan(rows["smallest_hub_t"])
         if self.scene.robot.hub_hinge == "turning":

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.actuation.actuator import StatefulActuator
+from seastar_gym.der.rows import to_rows
 from seastar_gym.envs.observation import VELOCITY_SCALE, observation_size, observe, to_float32
 from seastar_gym.envs.paths import AIM, PathName, cross_track_error, make_path, shortest_way
 from seastar_gym.envs.randomization import LIMB_STRENGTH, DomainRandomization, drawn_scene
@@ -155,7 +156,7 @@ class SwimTask:
         """Observations, shape (n_robots, size), a fresh array; see observation.py."""
         simulator = self.simulator
         targets = np.concatenate([self._waypoint(self.waypoint_index), self._waypoint(self.waypoint_index + 1)], axis=1)
-        target_rows = simulator.to_rows(targets)
+        target_rows = to_rows(targets)
         robot = simulator.scene.robot
         out = np.empty((len(target_rows), observation_size(robot.n_nodes), target_rows.shape[2]))
         observe(self._rest, simulator.q, simulator.v, target_rows, robot.limb_length, VELOCITY_SCALE, out)

@@ -22,6 +22,7 @@ from seastar_gym.der.lanes import any_lane, borrow, load, load_number, select, s
 from seastar_gym.der.newton import EASY, LATE, foreseeable_length, take_step
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import NEWTON_ITERATIONS, REPORT_ROWS, aligned_rows
+from seastar_gym.der.rows import to_rows
 from seastar_gym.der.schemes import SCHEMES
 from seastar_gym.der.stages import begin_stage, end_stage, end_step
 from seastar_gym.der.stroke import advance
@@ -90,7 +91,7 @@ class Pair:
         for command in commands[:-1]:
             simulator.stroke(command)
         self.start = simulator.q.copy(), simulator.v.copy()
-        self.peaks = simulator.to_rows(commands[-1])
+        self.peaks = to_rows(commands[-1])
         self.q, self.v, self.memory = simulator.q, simulator.v, simulator.memory[0]
         n_groups, rows, lanes = self.q.shape
         scheme = self.scheme = SCHEMES[numerics.scheme]

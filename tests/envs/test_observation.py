@@ -5,6 +5,7 @@ import pytest
 
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse
 from seastar_gym.der.lanes import N_LANES
+from seastar_gym.der.rows import to_rows
 from seastar_gym.envs.observation import VELOCITY_SCALE, observation_size, observe, to_float32
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 
@@ -16,7 +17,7 @@ SCENES = [
 
 def observations_of(simulator: Simulator, targets: np.ndarray) -> np.ndarray:
     """float64 observations, shape (n_robots, size), for targets of shape (n_robots, 4) [m]."""
-    rows, robot = simulator.to_rows(targets), simulator.scene.robot
+    rows, robot = to_rows(targets), simulator.scene.robot
     out = np.full((len(rows), observation_size(robot.n_nodes), N_LANES), np.nan)
     observe(robot.nodes().reshape(-1), simulator.q, simulator.v, rows, robot.limb_length, VELOCITY_SCALE, out)
     return out.transpose(0, 2, 1).reshape(-1, out.shape[1])[: simulator.n_robots]
