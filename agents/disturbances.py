@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from agents.greedy import headings, turned
 from seastar_gym.envs.observation import VELOCITY_SCALE
 from seastar_gym.envs.task import SwimTask
+from seastar_gym.per_robot import column
 from seastar_gym.scene import require_number
 
 Floats = NDArray[np.float64]
@@ -80,7 +81,7 @@ class DisturbedTask:
             seen[:, -6:-4] += turned(self._current, -axes) / VELOCITY_SCALE
         if self.disturbance.noise > 0.0:
             error = self._rng.normal(0.0, self.disturbance.noise, (len(seen), scene.robot.n_nodes, 2))
-            error /= scene.robot.limb_length
+            error /= column(scene.robot.limb_length, 2)
             seen[:, : 2 * (scene.robot.n_nodes - 1)] += (error[:, 1:] - error[:, :1]).reshape(len(seen), -1)
             seen[:, -4:] -= np.tile(error[:, 0], 2)
         return seen

@@ -4,45 +4,70 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.der.lanes import N_LANES
-from seastar_gym.der.rods import Rods, put_robot, side_by_side
+from seastar_gym.der.rods import Limits, Rods, put_robot, side_by_side
 from seastar_gym.per_robot import frame_of
 from seastar_gym.scene import Scene
 
+Floats = NDArray[np.float64]
+
 
 class Coefficients:
-    """Of a batch of robots of one scene, shared by all lane groups where no number differs from robot to robot."""
+    """Of a batch of robots of one scene, shared by all lane groups where no number differs from robot to robot.
+
+    rest: Node positions at rest [m], shape (n_sets, 2 n_nodes, N_LANES). limb_length: [m], shape (n_sets, 1, N_LANES).
+    n_sets is 1 or the number of lane groups.
+    """
 
     def __init__(self, scene: Scene, n_robots: int):
-        if scene.n_robots not in (None, n_robots):
-            raise ValueError(f"The scene has numbers for {scene.n_robots} robots, the batch {n_robots}.")
-        self.n_robots, self._scene = n_robots, scene
-        self._rods = [scene.rods()] if scene.n_robots is None else self._rods_of_groups()
+        self.n_robots = n_robots
+        self._make(scene)
 
-    def _rods_of_groups(self) -> list[Rods]:
-        robots = [self._scene.rods(robot) for robot in range(self.n_robots)]
-        robots += robots[-1:] * (-len(robots) % N_LANES)
-        return [side_by_side(robots[first : first + N_LANES]) for first in range(0, len(robots), N_LANES)]
+    def _make(self, scene: Scene) -> None:
+        if scene.n_robots not in (None, self.n_robots):
+            raise ValueError(f"The scene has numbers for {scene.n_robots} robots, the batch {self.n_robots}.")
+        self._scene, self.are_shared = scene, scene.n_robots is None
+        n_sets = 1 if self.are_shared else -(-self.n_robots // N_LANES)
+        # Lanes that are left over do what the last robot does.
+        robots = np.minimum(np.arange(n_sets * N_LANES), (scene.n_robots or 1) - 1).reshape(n_sets, N_LANES).tolist()
+        if self.are_shared:
+            self._rods, self._limits = [scene.rods()], [scene.limits()]
+        else:
+            self._rods = [side_by_side([scene.rods(robot) for robot in group]) for group in robots]
+            self._limits = [side_by_side([scene.limits(robot) for robot in group]) for group in robots]
+        self.rest = np.zeros((n_sets, 2 * scene.robot.n_nodes, N_LANES))
+        self.limb_length = np.zeros((n_sets, 1, N_LANES))
+        for place in np.ndindex(n_sets, N_LANES):
+            self._put_lengths(place, robots[place[0]][place[1]])
 
-    @property
-    def are_shared(self) -> bool:
-        """Whether all lane groups have the same."""
-        return self._scene.n_robots is None
+    def _put_lengths(self, place: tuple[int, ...], robot: int) -> None:
+        group, lane = place
+        of_robots, length = self._scene.robot, self._scene.robot.limb_length
+        self.rest[group, :, lane] = of_robots.nodes(robot).reshape(-1)
+        self.limb_length[group, 0, lane] = length[robot] if isinstance(length, tuple) else length
+
+    def set_scene(self, scene: Scene, chosen: NDArray[np.bool_]) -> None:
+        """Go on with a scene that differs in numbers of `PER_ROBOT` alone, and those of the chosen robots only."""
+        if not isinstance(scene, Scene) or frame_of(scene) != frame_of(self._scene):
+            raise ValueError("set_scene needs a scene of the same terms that differs in numbers of each robot alone.")
+        if self.are_shared or scene.n_robots != self.n_robots:
+            self._make(scene)
+            return
+        self._scene = scene
+        for robot in np.flatnonzero(chosen).tolist():
+            group, lane = divmod(robot, N_LANES)
+            put_robot(self._rods[group], lane, scene.rods(robot))
+            put_robot(self._limits[group], lane, scene.limits(robot))
+            self._put_lengths((group, lane), robot)
 
     def rods(self, group: int) -> Rods:
         """Those of a lane group."""
         return self._rods[group % len(self._rods)]
 
-    def changed(self, scene: Scene, chosen: NDArray[np.bool_]) -> "Coefficients":
-        """Those of a scene that differs in numbers of `PER_ROBOT` alone, for the chosen robots only where it can be.
+    def limits(self, group: int) -> Limits:
+        """What the solutions of a lane group have to keep."""
+        return self._limits[group % len(self._limits)]
 
-        Robots that were not chosen keep their numbers, unless one of the scenes has the same for all.
-        """
-        if not isinstance(scene, Scene) or frame_of(scene) != frame_of(self._scene):
-            raise ValueError("set_scene needs a scene of the same terms that differs in numbers of each robot alone.")
-        if self.are_shared or scene.n_robots != self.n_robots:
-            return Coefficients(scene, self.n_robots)
-        self._scene = scene
-        for robot in np.flatnonzero(chosen):
-            group, lane = divmod(int(robot), N_LANES)
-            put_robot(self._rods[group], lane, scene.rods(int(robot)))
-        return self
+    def nodes(self, robot: int | np.intp) -> Floats:
+        """Node positions of a robot at rest [m], shape (n_nodes, 2)."""
+        group, lane = divmod(int(robot), N_LANES)
+        return self.rest[group % len(self.rest), :, lane].reshape(-1, 2)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.checks import is_finite_number, require_finite, require_number
 from seastar_gym.der.current import GRID, LINEAR, VORTEX, Current
-from seastar_gym.per_robot import batch_size, require_each
+from seastar_gym.per_robot import Numbers, batch_size, require_each
 
 Floats = NDArray[np.float64]
 
@@ -25,8 +25,8 @@ class UniformCurrent:
     """A fluid that moves as a whole: u = (u_x, u_y) [m/s]."""
 
     PER_ROBOT: ClassVar = ("u_x", "u_y")
-    u_x: float = 0.0
-    u_y: float = 0.0
+    u_x: Numbers = 0.0
+    u_y: Numbers = 0.0
 
     def __post_init__(self) -> None:
         require_each(self, "u_x", partial(require_finite, unit="m/s"))
@@ -45,8 +45,8 @@ class ShearCurrent:
     """
 
     PER_ROBOT: ClassVar = ("rate", "direction")
-    rate: float
-    direction: float = 0.0
+    rate: Numbers
+    direction: Numbers = 0.0
 
     def __post_init__(self) -> None:
         require_each(self, "rate", partial(require_finite, unit="1/s"))
@@ -67,10 +67,10 @@ class Vortex:
     """
 
     PER_ROBOT: ClassVar = ("circulation", "x", "y", "core_radius")
-    circulation: float
-    x: float = 0.0
-    y: float = 0.0
-    core_radius: float = 0.05
+    circulation: Numbers
+    x: Numbers = 0.0
+    y: Numbers = 0.0
+    core_radius: Numbers = 0.05
 
     def __post_init__(self) -> None:
         require_each(self, "circulation", partial(require_finite, unit="m^2/s"))
@@ -163,11 +163,11 @@ class Water:
     """
 
     PER_ROBOT: ClassVar = ("density", "drag_coefficient", "tangential_drag_coefficient", "added_mass_coefficient")
-    density: float = 1000.0
-    drag_coefficient: float = 1.0
-    tangential_drag_coefficient: float | None = None
+    density: Numbers = 1000.0
+    drag_coefficient: Numbers = 1.0
+    tangential_drag_coefficient: Numbers | None = None
     current: AnyCurrent | None = None
-    added_mass_coefficient: float | None = None
+    added_mass_coefficient: Numbers | None = None
 
     def __post_init__(self) -> None:
         not_negative = partial(require_number, zero_allowed=True)

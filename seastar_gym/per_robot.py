@@ -6,11 +6,17 @@ tuple, so that parts stay equal by value, hashable and frozen.
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
 Part = TypeVar("Part")
+
+Numbers: TypeAlias = float | Any
+"""A number for all robots, or an array or tuple of shape (n_robots,) with one for each.
+
+Any stands for the latter: whoever reads the scene of one robot reads a float, and need not say so.
+"""
 
 
 def require_each(part: Any, name: str, check: Callable[[str, float], None]) -> None:
@@ -25,6 +31,11 @@ def require_each(part: Any, name: str, check: Callable[[str, float], None]) -> N
     for number in numbers:
         check(name, number)
     object.__setattr__(part, name, tuple(numbers))
+
+
+def column(numbers: Numbers, n_axes: int = 1) -> Any:
+    """A number as it is, numbers of each robot as an array of shape (n_robots, 1, ..), with n_axes axes of length 1."""
+    return numbers if np.ndim(numbers) == 0 else np.asarray(numbers, dtype=float).reshape(-1, *(1,) * n_axes)
 
 
 def numbers_of(part: Any) -> dict[str, Any]:

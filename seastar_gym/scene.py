@@ -26,7 +26,7 @@ from seastar_gym.fidelity import cheapest
 from seastar_gym.fluids import Water as Water
 from seastar_gym.morphology.limb import Limb, LimbShape, as_tuple
 from seastar_gym.morphology.seastar import make_rods, n_hub_hinges, natural_hub_angle, rest_positions, turn_per_hinge
-from seastar_gym.per_robot import batch_size, chosen, require_each
+from seastar_gym.per_robot import Numbers, batch_size, chosen, require_each
 
 HubHinge = Literal["opening", "turning"]
 SchemeName = Literal["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
@@ -41,8 +41,8 @@ MAX_STEPS = 10_000_000
 class Seastar:
     """A robot of limbs around a hub (Fig. 13.4a): straight, equal, uniform and evenly spread, but for `limbs`.
 
-    n_limbs: Number of limbs. nodes_per_limb: N, with the hub. limb_length: L [m], the unit of tolerances and
-        observations, too. rod_radius: r_0 [m]. youngs_modulus: E [Pa]. density: rho_m [kg/m^3].
+    n_limbs: Number of limbs. nodes_per_limb: N, with the hub. limb_length: L [m], the unit of a robot's
+        tolerances and observations, too. rod_radius: r_0 [m]. youngs_modulus: E [Pa]. density: rho_m [kg/m^3].
     hub_hinge: "opening" measures a hub hinge by the angle psi between its two limbs, from 0 to pi, a wider gap by what
         is missing to a full turn; "turning" by the interior turning angle pi - psi, as the published codes of the
         chapter's authors do.
@@ -54,21 +54,21 @@ class Seastar:
     swings freely about the hub, and no actuator turns it.
     """
 
-    PER_ROBOT: ClassVar = ("rod_radius", "youngs_modulus", "density", "relaxation_time")
+    PER_ROBOT: ClassVar = ("limb_length", "rod_radius", "youngs_modulus", "density", "relaxation_time")
     n_limbs: int = 5
     nodes_per_limb: int = 10
-    limb_length: float = 0.1
-    rod_radius: float = 1.6e-3
-    youngs_modulus: float = 1e6
-    density: float = 1000.0
+    limb_length: Numbers = 0.1
+    rod_radius: Numbers = 1.6e-3
+    youngs_modulus: Numbers = 1e6
+    density: Numbers = 1000.0
     hub_hinge: HubHinge = "opening"
     limbs: tuple[Limb, ...] = ()
-    relaxation_time: float | None = None
+    relaxation_time: Numbers | None = None
 
     def __post_init__(self) -> None:
         require_count("n_limbs", self.n_limbs, 1, 12)
         require_count("nodes_per_limb", self.nodes_per_limb, 2, 10_000)
-        require_number("limb_length", self.limb_length, "m")
+        require_each(self, "limb_length", partial(require_number, unit="m"))
         require_each(self, "rod_radius", partial(require_number, unit="m"))
         require_each(self, "youngs_modulus", partial(require_number, unit="Pa"))
         require_each(self, "density", partial(require_number, unit="kg/m^3"))
@@ -89,15 +89,17 @@ class Seastar:
             raise ValueError("Either every limb has a direction or none has.")
         if directions and (directions[0] != 0.0 or (np.diff(directions) <= 0.0).any()):
             raise ValueError(f"Directions of limbs must begin at 0 and increase [rad], not {directions!r}.")
-        turn = max(abs(turn_per_hinge(shape, self.nodes_per_limb)) for shape in self.limb_shapes())
+        longest = chosen(self, max)
+        turn = max(abs(turn_per_hinge(shape, self.nodes_per_limb)) for shape in longest.limb_shapes())
         if turn >= math.pi:
             raise ValueError(
                 f"A natural curvature that turns neighbouring edges by {turn:.4g} rad, not below pi, is too much for "
                 f"{self.nodes_per_limb} nodes per limb."
             )
 
-    def limb_shapes(self) -> tuple[LimbShape, ...]:
-        """Every limb with nothing left open."""
+    def limb_shapes(self, index: int = 0) -> tuple[LimbShape, ...]:
+        """Every limb with nothing left open; of robot `index`, where numbers differ from robot to robot."""
+        robot = chosen(self, itemgetter(index))
         limbs = self.limbs or (Limb(),) * self.n_limbs
         directions = [limb.direction for limb in limbs if limb.direction is not None]
         gaps = np.diff(directions, append=2.0 * math.pi).tolist() or [2.0 * math.pi / self.n_limbs] * self.n_limbs
@@ -105,9 +107,9 @@ class Seastar:
             LimbShape(
                 direction=2.0 * math.pi * j / self.n_limbs if limb.direction is None else limb.direction,
                 gap=gap,
-                length=self.limb_length if limb.length is None else limb.length,
-                radius=as_tuple(self.rod_radius if limb.radius is None else limb.radius),
-                youngs_modulus=as_tuple(self.youngs_modulus if limb.youngs_modulus is None else limb.youngs_modulus),
+                length=robot.limb_length if limb.length is None else limb.length,
+                radius=as_tuple(robot.rod_radius if limb.radius is None else limb.radius),
+                youngs_modulus=as_tuple(robot.youngs_modulus if limb.youngs_modulus is None else limb.youngs_modulus),
                 natural_curvature=limb.natural_curvature,
             )
             for j, (limb, gap) in enumerate(zip(limbs, gaps, strict=True))
@@ -115,9 +117,11 @@ class Seastar:
 
     @property
     def is_symmetric(self) -> bool:
-        """Whether a turn by one limb and a mirror at limb 1 leave the robot as it is."""
-        shapes = self.limb_shapes()
-        alike = len({shape._replace(direction=0.0, gap=0.0) for shape in shapes}) == 1
+        """Whether a turn by one limb and a mirror at limb 1 leave the robot, or all of them, as it is."""
+        # A limb with a number of its own is like the others of one robot at most: not of both the least and the most.
+        robots = [chosen(self, choose).limb_shapes() for choose in (min, max)]
+        alike = all(len({shape._replace(direction=0.0, gap=0.0) for shape in shapes}) == 1 for shapes in robots)
+        shapes = robots[0]
         gaps = np.array([shape.gap for shape in shapes])
         return alike and shapes[0].natural_curvature == 0.0 and float(np.ptp(gaps)) < 1e-12
 
@@ -127,18 +131,21 @@ class Seastar:
         return self.n_limbs * (self.nodes_per_limb - 1) + 1
 
     @property
-    def edge_length(self) -> float:
+    def edge_length(self) -> Numbers:
         """Natural length of an edge of a limb of length L [m]."""
-        return self.limb_length / (self.nodes_per_limb - 1)
+        return np.divide(self.limb_length, self.nodes_per_limb - 1)
 
     @property
     def opening_angle(self) -> float:
         """Smallest angle between neighbouring limbs at rest [rad]."""
         return min(shape.gap for shape in self.limb_shapes())
 
-    def nodes(self) -> NDArray[np.float64]:
-        """Node positions at rest [m], shape (n_nodes, 2): hub, {1,1}..{1,N-1}, {2,1}.. ; limb 1 along +x."""
-        return rest_positions(self.limb_shapes(), self.nodes_per_limb)
+    def nodes(self, index: int = 0) -> NDArray[np.float64]:
+        """Node positions at rest [m], shape (n_nodes, 2): hub, {1,1}..{1,N-1}, {2,1}.. ; limb 1 along +x.
+
+        index: Of which robot, where numbers differ from robot to robot.
+        """
+        return rest_positions(self.limb_shapes(index), self.nodes_per_limb)
 
 
 def relaxation_time(loss_factor: float, frequency: float) -> float:
@@ -289,7 +296,7 @@ class Scene:
 
     def _check_hub_hinges(self) -> None:
         """Neighbours turned apart turn their hub hinge by two peak angles; at pi its curvature is infinite."""
-        robot, peak = self.robot, self.actuator.peak_angle
+        robot, peak = self.robot, float(np.max(self.actuator.peak_angle))
         hinges = robot.limb_shapes()[: n_hub_hinges(robot.n_limbs)]
         if not hinges:
             if peak > 0.0:
@@ -312,19 +319,20 @@ class Scene:
                 + (', or use hub_hinge="turning".' if robot.n_limbs == 2 else ".")
             )
 
-    def limits(self) -> Limits:
-        """What a solution has to keep, for the kernels.
+    def limits(self, index: int = 0) -> Limits:
+        """What a robot's solution has to keep, for the kernels.
 
         The error that a step may make per second is `error_rate` limb lengths per stroke; how it follows from the
         tolerance on the path was measured, see ADAPTATION.
         """
-        numerics, speed = self.numerics, self.robot.limb_length / self.actuator.period
-        tolerance = numerics.path_tolerance
+        numerics, length = self.numerics, chosen(self.robot, itemgetter(index)).limb_length
+        speed, tolerance = length / self.actuator.period, numerics.path_tolerance
+        error_rate = 0.0 if tolerance is None else speed * (tolerance / ADAPTATION[0]) ** ADAPTATION[1]
         return Limits(
-            tolerance=numerics.newton_tolerance * self.robot.limb_length,
+            tolerance=np.array([numerics.newton_tolerance * length]),
             max_iterations=numerics.max_iterations,
             adaptive=tolerance is not None,
-            error_rate=0.0 if tolerance is None else speed * (tolerance / ADAPTATION[0]) ** ADAPTATION[1],
+            error_rate=np.array([error_rate]),
         )
 
     @property

@@ -24,6 +24,7 @@ from seastar_gym.der.rods import (
 from seastar_gym.der.rows import from_rows, to_rows, write_rows
 from seastar_gym.der.schemes import SCHEMES
 from seastar_gym.der.stroke import advance
+from seastar_gym.per_robot import column
 from seastar_gym.scene import MAX_STEPS, Scene, require_count
 from seastar_gym.stroke_report import COUNTS
 from seastar_gym.stroke_report import SolverStatus as SolverStatus
@@ -82,18 +83,17 @@ class Simulator:
         self.threads = min(n_groups, available if threads is None else int(threads))
         self.coefficients = Coefficients(scene, self.n_robots)
         self._scheme = SCHEMES[scene.numerics.scheme]
-        self._limits = scene.limits()
         self._times = step_times(scene.actuator.corners, scene.numerics.step)
-        self._shape = np.zeros_like(self._times)
         n_limbs, n_rows = scene.robot.n_limbs, 2 * scene.robot.n_nodes
         self.q = aligned_rows(n_groups, n_rows, N_LANES)
         self.v = aligned_rows(n_groups, n_rows, N_LANES)
-        self.q[:] = scene.robot.nodes().reshape(-1, 1)
+        self.q[:] = self.coefficients.rest
         self._a = aligned_rows(n_groups, (n_rows + 1) * self._scheme.n_stages + 2, N_LANES)
         self._drive = Drive(scene.actuator, self.n_robots, n_limbs, self._times)
+        self._shape = self._curve = self._shape_rows(self._drive.curve)
         self._commands = np.zeros((n_groups, n_limbs, N_LANES))  # share of _shape that every limb follows
         self._rotations = np.zeros((n_groups, n_limbs, N_LANES))  # of the limbs by their actuators, now [rad]
-        self._failed = np.zeros((n_groups, 1, N_LANES))
+        self._failed = np.zeros((n_groups, 1, N_LANES))  # SolverStatus
         self._report = np.zeros((n_groups, len(REPORT_ROWS), N_LANES))
         self._start_time = np.zeros(self.n_robots)
         self._strokes = np.zeros(self.n_robots, dtype=np.int64)
@@ -113,7 +113,10 @@ class Simulator:
 
         mask: The robots whose numbers have changed, shape (n_robots,), all if None.
         """
-        self.coefficients = self.coefficients.changed(scene, self._checked_mask(mask))
+        self.coefficients.set_scene(scene, self._checked_mask(mask))
+        if scene.actuator != self.scene.actuator:
+            self._drive.set_actuator(scene.actuator)
+            self._curve = self._shape_rows(self._drive.curve)
         self.scene = scene
 
     def _checked_mask(self, mask: ArrayLike | None) -> NDArray[np.bool_]:
@@ -158,8 +161,8 @@ class Simulator:
         angles = np.broadcast_to(angles, (self.n_robots,))
         if not np.isfinite(angles[chosen]).all():
             raise ValueError("heading must be finite [rad].")
-        nodes = self.scene.robot.nodes()
         for robot in np.flatnonzero(chosen):
+            nodes = self.coefficients.nodes(robot)
             # At heading zero the nodes are exactly those of rest, so that symmetric scenes stay symmetric.
             c, s = np.cos(angles[robot]), np.sin(angles[robot])
             turned = np.stack([c * nodes[:, 0] - s * nodes[:, 1], s * nodes[:, 0] + c * nodes[:, 1]], axis=1)
@@ -170,7 +173,7 @@ class Simulator:
             self._rotations[group, :, lane] = 0.0
             self._failed[group, 0, lane] = 0.0
             self._last_hub[robot] = 0.0
-        self._drive.put(chosen, self._drive.at_rest)
+        self._drive.put(chosen, self._drive.at_rest[chosen])
         self._set_time(chosen, 0.0)
 
     def _set_time(self, chosen: NDArray[np.bool_] | slice, time: Floats | float) -> None:
@@ -187,7 +190,7 @@ class Simulator:
         if not isinstance(state, tuple | list) or len(state) not in (3, 4):
             raise ValueError(f"A State of {', '.join(State._fields)} is needed, not {type(state).__name__}.")
         state = State(*state)
-        at_rest = np.broadcast_to(self._drive.at_rest, self._drive.state.shape)
+        at_rest = self._drive.at_rest
         state = state._replace(actuators=at_rest if state.actuators is None else state.actuators)
         shape = (self.n_robots, self.scene.robot.n_nodes, 2)
         arrays = []
@@ -315,15 +318,20 @@ class Simulator:
     def _begin_stroke(self, commands: ArrayLike) -> None:
         peaks, shape = self._drive.begin_stroke(self._checked_commands(commands))
         write_rows(self._commands, peaks)
-        self._shape = shape if shape.ndim == 1 else self._shape_rows(shape)
+        self._shape = self._curve if shape is None else self._shape_rows(shape)
         self._start_time += self._since_stroke  # of a stroke that failed or was left half-way
         self._since_stroke[:] = 0.0
         self._a[:] = 0.0  # a stroke depends on the state at its beginning only
         self._report[:] = 0.0
         self._report[:, SMALLEST_HUB_T] = np.inf
 
-    def _shape_rows(self, shape: Floats) -> Floats:
-        """Rotations at times, per robot and limb, as rows for the kernels: (n_groups, n_times, n_limbs, N_LANES)."""
+    def _shape_rows(self, shape: Floats | None) -> Floats:
+        """Rotations at times, per robot and limb, as rows for the kernels: (n_groups, n_times, n_limbs, N_LANES).
+
+        One number per time, for all limbs of all robots, stays what it is.
+        """
+        if shape is None or shape.ndim == 1:
+            return np.zeros_like(self._times) if shape is None else shape
         rows = to_rows(shape.transpose(1, 0, 2))
         return rows.reshape(len(self.q), *shape[:, 0].shape, N_LANES)
 
@@ -344,7 +352,7 @@ class Simulator:
 
     def _check_turning_hub(self, commands: Floats) -> None:
         commands = self.limb_strengths * commands
-        turn = self.scene.actuator.peak_angle * (np.roll(commands, -1, axis=1) - commands)
+        turn = column(self.scene.actuator.peak_angle) * (np.roll(commands, -1, axis=1) - commands)
         angle = np.array([limb.gap for limb in self.scene.robot.limb_shapes()]) + turn
         closed = np.minimum(angle, 2.0 * np.pi - angle) < 1e-9
         if closed.any():
@@ -373,7 +381,7 @@ class Simulator:
                 advance(
                     self.coefficients.rods(part.start), work, self._scheme, SCHEMES["implicit-euler"], actuation,
                     self.q[part], self.v[part], self._a[part], self._commands[part], times, shape, self._failed[part],
-                    self._report[part], self._limits,
+                    self._report[part], self.coefficients.limits(part.start),
                 )  # fmt: skip
 
         if self.threads == 1:
@@ -384,9 +392,8 @@ class Simulator:
     def _end_stroke(self) -> StrokeReport:
         rows = dict(zip(REPORT_ROWS, self._read(self._report).T, strict=True))
         failed = self.failed
-        status = np.where(failed, SolverStatus.NOT_CONVERGED, SolverStatus.CONVERGED)
         if failed.any():
-            status[self._lay_out_lost(failed)] = SolverStatus.NOT_FINITE
+            self._lay_out_lost(failed)
         self._last_hub = self.hub_position()
         self._strokes += ~failed
         self._since_stroke = np.where(failed, rows["covered"], 0.0)
@@ -397,20 +404,20 @@ class Simulator:
         if self.scene.robot.hub_hinge == "turning":
             angle += np.pi
         return StrokeReport(
-            status=status,
+            status=self._read(self._failed)[:, 0].astype(np.int64),
             covered=rows["covered"],
             smallest_opening_angle=angle,
             **counts,
         )
 
-    def _lay_out_lost(self, failed: NDArray[np.bool_]) -> NDArray[np.intp]:
-        """Put the failed robots whose state is not finite at rest where their hub was last; returns which."""
+    def _lay_out_lost(self, failed: NDArray[np.bool_]) -> None:
+        """Put the failed robots whose state is not finite at rest where their hub was last."""
         lost = np.flatnonzero(failed & ~np.isfinite(self._read(self.q) + self._read(self.v)).all(axis=1))
         for robot in lost:
             group, lane = divmod(robot, N_LANES)
-            self.q[group, :, lane] = (self._last_hub[robot] + self.scene.robot.nodes()).reshape(-1)
+            self.q[group, :, lane] = (self._last_hub[robot] + self.coefficients.nodes(robot)).reshape(-1)
             self.v[group, :, lane] = 0.0
-        return lost
+            self._failed[group, 0, lane] = SolverStatus.NOT_FINITE
 
 
 def _as_floats(name: str, value: object) -> Floats:

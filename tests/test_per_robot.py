@@ -2,11 +2,26 @@
 
 import copy
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from seastar_gym import Numerics, Scene, Seastar, ShearCurrent, Simulator, UniformCurrent, Vortex, Water
+from seastar_gym import (
+    Limb,
+    Limited,
+    MeasuredCurve,
+    Numerics,
+    Scene,
+    Seastar,
+    ShearCurrent,
+    Simulator,
+    SmaPulse,
+    ThermalSma,
+    UniformCurrent,
+    Vortex,
+    Water,
+)
 from seastar_gym.der.lanes import N_LANES
 
 N_ROBOTS = N_LANES + 3
@@ -42,6 +57,74 @@ def test_every_robot_swims_as_it_would_alone():
     assert len({tuple(hub) for hub in positions[:, 0]}) == N_ROBOTS
 
 
+SPREAD = np.linspace(0.7, 1.2, N_ROBOTS)
+LENGTHS = Seastar(limb_length=0.1 * SPREAD)
+THERMAL = ThermalSma(0.6 * SPREAD, 0.1, 0.9, 0.4 * SPREAD, 220.0 / SPREAD, 15.0 * SPREAD, 24.0 * SPREAD, 70.0 * SPREAD,
+                     56.0 * SPREAD, 21.0 * SPREAD)  # fmt: skip
+ACTUATORS = {
+    "pulse": SmaPulse(0.5 * SPREAD),
+    "measured": MeasuredCurve((0.0, 0.1, 0.3, 1.0), (0.0, 0.5, 0.4, 0.0), 1.2 * SPREAD),
+    "limited": Limited(SmaPulse(0.5 * SPREAD), 0.5 * SPREAD[::-1], 3.0 * SPREAD**2),
+    "thermal": THERMAL,
+}
+
+
+@pytest.mark.parametrize("kind", ACTUATORS)
+def test_robots_of_different_sizes_and_actuators_swim_as_they_would_alone(kind):
+    scene = Scene(LENGTHS, actuator=ACTUATORS[kind], numerics=FAST)
+    batch = Simulator(scene, N_ROBOTS)
+    positions = strokes(batch, COMMANDS)
+    for robot in range(0, N_ROBOTS, 3):
+        alone = Simulator(scene.of_robot(robot))
+        np.testing.assert_array_equal(strokes(alone, COMMANDS[:, robot : robot + 1])[0], positions[robot])
+        np.testing.assert_array_equal(alone.actuators[0], batch.actuators[robot])
+        np.testing.assert_array_equal(alone.observe_actuators()[0], batch.observe_actuators()[robot])
+        assert alone.elastic_energy()[0] == batch.elastic_energy()[robot]
+
+
+def test_a_robot_keeps_the_tolerances_of_its_own_size():
+    scene = Scene(LENGTHS, numerics=Numerics("implicit-midpoint", 10e-3, path_tolerance=0.02))
+    batch = Simulator(scene, N_ROBOTS)
+    steps = batch.stroke(COMMANDS[0]).steps
+    for robot in (0, N_ROBOTS - 1):
+        alone = Simulator(scene.of_robot(robot))
+        assert alone.stroke(COMMANDS[0, robot : robot + 1]).steps[0] == steps[robot]
+        np.testing.assert_array_equal(alone.positions[0], batch.positions[robot])
+
+
+def test_robots_of_different_sizes_rest_in_shapes_of_their_own():
+    simulator, nodes = Simulator(Scene(LENGTHS, numerics=FAST), N_ROBOTS), Seastar().nodes()
+    np.testing.assert_allclose(simulator.positions, SPREAD[:, None, None] * nodes, rtol=0.0, atol=1e-16)
+    strokes(simulator, COMMANDS[:1])
+    simulator.reset(SPREAD > 1.0)
+    np.testing.assert_array_equal(simulator.positions[SPREAD > 1.0][0], LENGTHS.nodes(int(np.argmax(SPREAD > 1.0))))
+    np.testing.assert_allclose(LENGTHS.edge_length, SPREAD * Seastar().edge_length)
+    assert LENGTHS.is_symmetric and not replace(LENGTHS, limbs=(Limb(length=0.07), *[Limb()] * 4)).is_symmetric
+
+
+def test_set_scene_changes_sizes_and_actuators():
+    first = Scene(LENGTHS, actuator=SmaPulse(0.3 * SPREAD), numerics=FAST)
+    second = Scene(Seastar(limb_length=0.1 * SPREAD[::-1]), actuator=ACTUATORS["pulse"], numerics=FAST)
+    simulator = Simulator(first, N_ROBOTS)
+    strokes(simulator, COMMANDS[:1])
+    simulator.set_scene(second)
+    simulator.reset()
+    np.testing.assert_array_equal(strokes(simulator, COMMANDS), strokes(Simulator(second, N_ROBOTS), COMMANDS))
+    simulator.set_scene(Scene(numerics=FAST))
+    simulator.reset()
+    np.testing.assert_array_equal(
+        strokes(simulator, COMMANDS), strokes(Simulator(Scene(numerics=FAST), N_ROBOTS), COMMANDS)
+    )
+
+
+def test_wires_in_waters_of_their_own_rest_at_their_temperatures():
+    simulator = Simulator(Scene(actuator=THERMAL, numerics=FAST), N_ROBOTS)
+    strokes(simulator, COMMANDS[:1])
+    simulator.reset()
+    np.testing.assert_array_equal(simulator.actuators[:, 0, 0], 15.0 * SPREAD)
+    assert not simulator.observe_actuators().any()
+
+
 def test_a_scene_of_equal_robots_is_the_scene_of_one():
     scene = Scene(Seastar(youngs_modulus=np.full(N_ROBOTS, 1e6)), numerics=FAST)
     plain = Simulator(Scene(numerics=FAST), N_ROBOTS)
@@ -67,7 +150,15 @@ def test_a_batch_of_different_robots_travels():
 
 
 @pytest.mark.parametrize(
-    "part", [varied(), varied().robot, UniformCurrent(np.zeros(3)), ShearCurrent(np.ones(2)), Vortex(0.1, np.ones(2))]
+    "part",
+    [
+        varied(),
+        varied().robot,
+        *ACTUATORS.values(),
+        UniformCurrent(np.zeros(3)),
+        ShearCurrent(np.ones(2)),
+        Vortex(0.1, np.ones(2)),
+    ],
 )
 def test_parts_with_arrays_are_equal_by_value_hashable_and_travel(part):
     for twin in (copy.deepcopy(part), pickle.loads(pickle.dumps(part))):
@@ -88,7 +179,14 @@ def test_a_scene_knows_its_robots():
         (lambda: Seastar(youngs_modulus=np.zeros(0)), ("youngs_modulus", "(n_robots,)")),
         (lambda: Seastar(density=np.array([1.0, np.nan])), ("density", "positive", "nan")),
         (lambda: Seastar(rod_radius=("1", 2.0)), ("rod_radius", "'1'")),
-        (lambda: Seastar(limb_length=np.array([0.1, 0.2])), ("limb_length", "positive")),
+        (lambda: Seastar(limb_length=np.array([0.1, -0.2])), ("limb_length", "positive")),
+        (lambda: Seastar(limb_length=np.array([0.1, 9.0]), limbs=(Limb(natural_curvature=5.0),) * 5), ("below pi",)),
+        (lambda: Limb(length=np.array([0.1, 0.2])), ("length", "same for all robots")),
+        (lambda: SmaPulse(heating_time=np.array([0.1, 0.2])), ("heating_time", "positive")),
+        (lambda: Scene(actuator=SmaPulse(np.array([0.1, 3.0]))), ("peak angle of 3 rad",)),
+        (lambda: ThermalSma(water_temperature=np.array([20.0, 30.0])), ("T_water",)),
+        (lambda: Limited(SmaPulse(np.ones(2)), np.ones(3)), ("equally many",)),
+        (lambda: Simulator(Scene(), 2).set_scene(Scene(actuator=SmaPulse(cooling_time=2.0))), ("same terms",)),
         (lambda: Water(1000.0, np.array([1.0, 0.5]), 0.6), ("tangential", "exceed")),
         (lambda: Scene(Seastar(density=np.ones(2)), Water(density=np.ones(3))), ("equally many", "robot.density")),
         (lambda: Scene(Seastar(youngs_modulus=np.array([1e6, 1e308]))), ("overflow",)),

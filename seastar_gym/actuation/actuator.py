@@ -1,12 +1,18 @@
 """What an actuator is to a scene: how far a command turns a limb, when, and, for some, what it remembers.
 
 A rotation delta_psi [rad] is positive anti-clockwise. A command is a number in [-1, 1] per limb and stroke.
+
+Where numbers of an actuator differ from robot to robot (see per_robot.py), curves have one more axis, shape
+(*t.shape, n_robots), and commands the shape (n_robots, n_limbs). Durations are the same for all robots of a batch:
+they share the clock.
 """
 
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from seastar_gym.per_robot import Numbers
 
 Floats = NDArray[np.float64]
 
@@ -15,12 +21,12 @@ Floats = NDArray[np.float64]
 class Actuator(Protocol):
     """Turns every limb by its command times one curve that begins and ends every stroke at zero.
 
-    peak_angle: Largest rotation [rad]. period: Length of a stroke [s].
+    peak_angle: Largest rotation [rad], or that of each robot. period: Length of a stroke [s].
     corners: Times within a stroke [s], from 0 to the period, that no time step may straddle.
     """
 
     @property
-    def peak_angle(self) -> float: ...
+    def peak_angle(self) -> Numbers: ...
 
     @property
     def period(self) -> float: ...
@@ -37,7 +43,7 @@ class Actuator(Protocol):
 class StatefulActuator(Actuator, Protocol):
     """Turns every limb in a way of its own, that depends on what came before the stroke.
 
-    rest: State of an actuator that was left alone, shape (n_state,).
+    rest: State of an actuator that was left alone, shape (n_state,), or (n_robots, 1, n_state).
     """
 
     @property
@@ -74,9 +80,10 @@ def check_actuator(actuator: Actuator) -> None:
             f"An actuator's corners must go from 0 to its period ({period!r} s), not {actuator.corners!r}."
         )
     angles = np.asarray(actuator.delta_psi(corners), dtype=float)
-    if angles.shape != corners.shape or not np.isfinite(angles).all():
+    if angles.shape[:1] != corners.shape or angles.ndim > 2 or not np.isfinite(angles).all():
         raise ValueError(f"An actuator's delta_psi must be one finite angle [rad] per time, not {angles!r}.")
-    if not np.isfinite(actuator.peak_angle) or np.abs(angles).max() > actuator.peak_angle * (1.0 + 1e-12):
+    peak = np.asarray(actuator.peak_angle, dtype=float)
+    if not np.isfinite(peak).all() or (np.abs(angles).max(axis=0) > peak * (1.0 + 1e-12)).any():
         raise ValueError(f"An actuator's peak_angle must be its largest angle, not {actuator.peak_angle!r} rad.")
-    if angles[0] != 0.0 or (angles[-1] != 0.0 and not isinstance(actuator, StatefulActuator)):
+    if angles[0].any() or (angles[-1].any() and not isinstance(actuator, StatefulActuator)):
         raise ValueError("An actuator's curve must begin and end a stroke at 0 rad: otherwise limbs would jump.")

@@ -14,29 +14,36 @@ class Drive:
     times: Ends of a stroke's time steps [s].
 
     strengths: Share of its rotation that every limb still makes, shape (n_robots, n_limbs).
+    curve: Rotation by command 1 at `times`, shape (n_times,), or (n_times, n_robots, 1) where numbers differ from robot
+        to robot [rad]; None for actuators that remember something.
     state: What the actuators remember now, shape (n_robots, n_limbs, n_state); n_state is 0 for most.
-    at_rest: The same of an actuator that was left alone, shape (n_state,).
+    at_rest: The same of actuators that were left alone.
     """
 
     def __init__(self, actuator: Actuator, n_robots: int, n_limbs: int, times: Floats):
         self._times = times
-        self._stateful = actuator if isinstance(actuator, StatefulActuator) else None
-        self._curve = None if self._stateful else np.asarray(actuator.delta_psi(times))
-        self.at_rest = self._stateful.rest if self._stateful else np.zeros(0)
         self._commands = np.zeros((n_robots, n_limbs))
         self.strengths = np.ones((n_robots, n_limbs))
-        self.state = np.tile(self.at_rest, (n_robots, n_limbs, 1))
+        self.set_actuator(actuator)
+        self.state = self.at_rest.copy()
         self._before = self._after = self.state  # as the stroke that is under way begins and ends
 
-    def begin_stroke(self, commands: Floats) -> tuple[Floats, Floats]:
+    def set_actuator(self, actuator: Actuator) -> None:
+        """Go on with an actuator that differs in numbers of `PER_ROBOT` alone."""
+        self._stateful = actuator if isinstance(actuator, StatefulActuator) else None
+        self.curve = None if self._stateful else np.asarray(actuator.delta_psi(self._times))
+        if self.curve is not None and self.curve.ndim > 1:
+            self.curve = self.curve[:, :, None]
+        rest = self._stateful.rest if self._stateful else np.zeros(0)
+        self.at_rest = np.broadcast_to(rest, (*self.strengths.shape, rest.shape[-1]))
+
+    def begin_stroke(self, commands: Floats) -> tuple[Floats, Floats | None]:
         """(peaks, shape) of a stroke with these commands: limbs turn by their peak times the shape.
 
-        peaks: Shape (n_robots, n_limbs). shape: Shape (n_times,) where limbs turn alike, else (n_times, n_robots,
-        n_limbs) [rad].
+        peaks: Shape (n_robots, n_limbs). shape: Shape (n_times, n_robots, n_limbs) [rad], or None for `curve`.
         """
         if self._stateful is None:
-            assert self._curve is not None
-            return commands * self.strengths, self._curve
+            return commands * self.strengths, None
         self._commands, self._before = commands, self.state
         turned, self._after = self._stateful.respond(self._times, commands, self.state)
         return self.strengths, turned
@@ -60,7 +67,7 @@ class Drive:
         return self.strengths * self._stateful.respond(np.zeros(1), np.zeros_like(self.strengths), self.state)[0][0]
 
     def put(self, chosen: NDArray[np.bool_] | slice, state: Floats) -> None:
-        """Put the actuators of the chosen robots into a state; a stroke that is under way is over for them."""
+        """Put the actuators of the chosen robots into states; a stroke that is under way is over for them."""
         self._commands = np.array(self._commands)
         self._commands[chosen] = 0.0
         self.state, self._before, self._after = (np.array(each) for each in (self.state, self._before, self._after))

@@ -1,12 +1,15 @@
 """An actuator that can turn no farther and no faster than its drive allows."""
 
 from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.actuation.actuator import Actuator, StatefulActuator, is_actuator
 from seastar_gym.checks import require_number
+from seastar_gym.per_robot import Numbers, batch_size, column, require_each
 
 Floats = NDArray[np.float64]
 
@@ -22,23 +25,25 @@ class Limited:
     rotation [rad]. A partial command asks less of it. Between time steps the rotation is linear.
     """
 
+    PER_ROBOT: ClassVar = ("largest_angle", "largest_rate")
     actuator: Actuator
-    largest_angle: float | None = None
-    largest_rate: float | None = None
+    largest_angle: Numbers | None = None
+    largest_rate: Numbers | None = None
 
     def __post_init__(self) -> None:
         if not is_actuator(self.actuator) or isinstance(self.actuator, StatefulActuator):
             raise ValueError(f"Limited follows an actuator that remembers nothing, not {self.actuator!r}.")
         if self.largest_angle is not None:
-            require_number("largest_angle", self.largest_angle, "rad")
+            require_each(self, "largest_angle", partial(require_number, unit="rad"))
         if self.largest_rate is not None:
-            require_number("largest_rate", self.largest_rate, "rad/s")
+            require_each(self, "largest_rate", partial(require_number, unit="rad/s"))
+        batch_size(self)
 
     @property
-    def peak_angle(self) -> float:
+    def peak_angle(self) -> Numbers:
         """Largest rotation [rad]."""
         peak = self.actuator.peak_angle
-        return peak if self.largest_angle is None else min(peak, self.largest_angle)
+        return peak if self.largest_angle is None else np.minimum(peak, self.largest_angle)
 
     @property
     def period(self) -> float:
@@ -57,21 +62,26 @@ class Limited:
 
     def delta_psi(self, t: ArrayLike) -> Floats:
         """Rotation of a limb with command 1 at time t [s] of a stroke that begins at rest [rad]; t of any shape."""
-        times = np.union1d(self.corners, t)
-        turned, _ = self.respond(times, np.ones(()), self.rest)
-        return np.asarray(np.interp(np.asarray(t, float), times, turned))
+        times, n_robots = np.union1d(self.corners, t), batch_size(self)
+        if n_robots is None:
+            return np.asarray(self.respond(times, np.ones(()), self.rest)[0][np.searchsorted(times, t)])
+        turned, _ = self.respond(times, np.ones((n_robots, 1)), self.rest)
+        return np.asarray(turned[np.searchsorted(times, t), :, 0])
 
     def respond(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
         """See StatefulActuator: exact at the times t where the followed curve is linear between them."""
-        wanted = np.multiply.outer(self.actuator.delta_psi(t), commands)
-        wanted = np.clip(wanted, -self.peak_angle, self.peak_angle)
-        turned = wanted if self.largest_rate is None else np.empty_like(wanted)
-        if self.largest_rate is not None:
+        curve, peak, rate = self.actuator.delta_psi(t), column(self.peak_angle), column(self.largest_rate)
+        wanted = curve.reshape(*curve.shape, *(1,) * (1 + commands.ndim - curve.ndim)) * commands
+        wanted = np.clip(wanted, -peak, peak)
+        turned = wanted if rate is None else np.empty_like(wanted)
+        if rate is not None:
             turned[0] = state[..., 0]
-            for k, most in enumerate(self.largest_rate * np.diff(t), start=1):
+            for k, duration in enumerate(np.diff(t), start=1):
+                most = rate * duration
                 turned[k] = turned[k - 1] + np.clip(wanted[k] - turned[k - 1], -most, most)
         return turned, turned[-1][..., None].copy()
 
     def observe(self, state: Floats) -> Floats:
         """Rotation over the largest one."""
-        return state / (self.peak_angle or 1.0)
+        peak = np.asarray(column(self.peak_angle, 2))
+        return state / np.where(peak > 0.0, peak, 1.0)

@@ -2,12 +2,15 @@
 
 import csv
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.checks import require_numbers
+from seastar_gym.checks import require_number, require_numbers
+from seastar_gym.per_robot import Numbers, require_each
 
 
 @dataclass(frozen=True)
@@ -17,12 +20,16 @@ class MeasuredCurve:
     times: Increasing, the first one 0, the last one the period [s]. No time step straddles a sample, so samples closer
         than the step shorten it: leave out those that a straight line says as well.
     angles: Rotation at those times [rad], 0 at both ends, so that limbs do not jump when their command changes.
+    scale: What a robot's limbs make of these angles.
     """
 
+    PER_ROBOT: ClassVar = ("scale",)
     times: tuple[float, ...]
     angles: tuple[float, ...]
+    scale: Numbers = 1.0
 
     def __post_init__(self) -> None:
+        require_each(self, "scale", partial(require_number, unit="1", zero_allowed=True))
         require_numbers("times", self.times, "s")
         require_numbers("angles", self.angles, "rad")
         if len(self.times) != len(self.angles) or len(self.times) < 2:
@@ -52,9 +59,9 @@ class MeasuredCurve:
         return cls(times=tuple(float(row[0]) for row in rows), angles=tuple(float(row[1]) for row in rows))
 
     @property
-    def peak_angle(self) -> float:
+    def peak_angle(self) -> Numbers:
         """Largest rotation [rad], to either side."""
-        return max(map(abs, self.angles))
+        return np.multiply(self.scale, max(map(abs, self.angles)))
 
     @property
     def period(self) -> float:
@@ -68,7 +75,7 @@ class MeasuredCurve:
 
     def delta_psi(self, t: ArrayLike) -> NDArray[np.float64]:
         """Rotation of a limb with command 1 at time t [s] of a stroke [rad]; t of any shape."""
-        return np.asarray(np.interp(np.asarray(t, float), self.times, self.angles))
+        return np.multiply.outer(np.interp(np.asarray(t, float), self.times, self.angles), self.scale)
 
 
 def _is_number(text: str) -> bool:

@@ -2,11 +2,14 @@
 
 import math
 from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.checks import require_number
+from seastar_gym.per_robot import Numbers, require_each
 
 
 def pulse(t: ArrayLike, heating_time: float, cooling_time: float) -> NDArray[np.float64]:
@@ -20,18 +23,11 @@ def pulse(t: ArrayLike, heating_time: float, cooling_time: float) -> NDArray[np.
     return np.clip(np.minimum(rising, falling), 0.0, 1.0)
 
 
-@dataclass(frozen=True)
-class SmaPulse:
-    """The actuator of Fig. 13.5b. peak_angle [rad], heating_time: Delta t_1 [s], cooling_time: Delta t_2 [s]."""
+class HeatingAndCooling:
+    """A stroke of two phases. heating_time: Delta t_1 [s]. cooling_time: Delta t_2 [s]."""
 
-    peak_angle: float = math.pi / 5
-    heating_time: float = 0.1
-    cooling_time: float = 0.9
-
-    def __post_init__(self) -> None:
-        require_number("peak_angle", self.peak_angle, "rad", zero_allowed=True)
-        require_number("heating_time", self.heating_time, "s")
-        require_number("cooling_time", self.cooling_time, "s")
+    heating_time: float
+    cooling_time: float
 
     @property
     def period(self) -> float:
@@ -43,6 +39,21 @@ class SmaPulse:
         """Times within a stroke [s] that no time step may straddle."""
         return 0.0, self.heating_time, self.period
 
+
+@dataclass(frozen=True)
+class SmaPulse(HeatingAndCooling):
+    """The actuator of Fig. 13.5b. peak_angle [rad], heating_time: Delta t_1 [s], cooling_time: Delta t_2 [s]."""
+
+    PER_ROBOT: ClassVar = ("peak_angle",)
+    peak_angle: Numbers = math.pi / 5
+    heating_time: float = 0.1
+    cooling_time: float = 0.9
+
+    def __post_init__(self) -> None:
+        require_each(self, "peak_angle", partial(require_number, unit="rad", zero_allowed=True))
+        require_number("heating_time", self.heating_time, "s")
+        require_number("cooling_time", self.cooling_time, "s")
+
     def delta_psi(self, t: ArrayLike) -> NDArray[np.float64]:
         """Rotation of a limb with command 1 at time t [s] of a stroke [rad]; t of any shape."""
-        return self.peak_angle * pulse(t, self.heating_time, self.cooling_time)
+        return np.multiply.outer(pulse(t, self.heating_time, self.cooling_time), self.peak_angle)

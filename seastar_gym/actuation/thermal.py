@@ -22,83 +22,85 @@ effective numbers, not those of one alloy.
 
 import math
 from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.checks import is_finite_number, require_number
+from seastar_gym.actuation.sma import HeatingAndCooling
+from seastar_gym.checks import require_finite, require_number
+from seastar_gym.per_robot import Numbers, batch_size, column, require_each
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class ThermalSma:
+class ThermalSma(HeatingAndCooling):
     """Two wires per limb; the state of a limb is (T_+, T_-, xi_+, xi_-), temperatures [deg C] and shares of austenite.
 
     peak_angle: Rotation by austenite alone [rad]. heating_time: Pulse width of a full command [s]. cooling_time: The
-        rest of the stroke [s].
+        rest of the stroke [s]. Shorter pulses end within a time step.
     time_constant: tau = C/(h A) [s]. steady_rise: P/(h A) [K], above the water if heated for ever.
     water_temperature [deg C]. austenite_start, austenite_finish, martensite_start, martensite_finish: A_s, A_f, M_s and
         M_f [deg C], with T_water <= M_f <= A_s and M_s <= A_f.
     """
 
-    peak_angle: float = math.pi / 5
+    TEMPERATURES: ClassVar = (
+        "water_temperature", "martensite_finish", "austenite_start", "martensite_start", "austenite_finish",
+    )  # fmt: skip
+    PER_ROBOT: ClassVar = ("peak_angle", "time_constant", "steady_rise", *TEMPERATURES)
+    peak_angle: Numbers = math.pi / 5
     heating_time: float = 0.1
     cooling_time: float = 0.9
-    time_constant: float = 0.42
-    steady_rise: float = 220.0
-    water_temperature: float = 20.0
-    austenite_start: float = 23.5
-    austenite_finish: float = 70.5
-    martensite_start: float = 56.0
-    martensite_finish: float = 21.5
+    time_constant: Numbers = 0.42
+    steady_rise: Numbers = 220.0
+    water_temperature: Numbers = 20.0
+    austenite_start: Numbers = 23.5
+    austenite_finish: Numbers = 70.5
+    martensite_start: Numbers = 56.0
+    martensite_finish: Numbers = 21.5
 
     def __post_init__(self) -> None:
-        require_number("peak_angle", self.peak_angle, "rad", zero_allowed=True)
-        for name, unit in (("heating_time", "s"), ("cooling_time", "s"), ("time_constant", "s"), ("steady_rise", "K")):
+        require_each(self, "peak_angle", partial(require_number, unit="rad", zero_allowed=True))
+        for name, unit in (("heating_time", "s"), ("cooling_time", "s")):
             require_number(name, getattr(self, name), unit)
-        if self.heating_time > 100.0 * self.time_constant:
+        for name, unit in (("time_constant", "s"), ("steady_rise", "K")):
+            require_each(self, name, partial(require_number, unit=unit))
+        for name in self.TEMPERATURES:
+            require_each(self, name, partial(require_finite, unit="deg C"))
+        batch_size(self)
+        if self.heating_time > 100.0 * np.min(self.time_constant):
             raise ValueError("heating_time must be at most 100 time constants, after which nothing changes any more.")
-        temperatures = (
-            self.water_temperature, self.martensite_finish, self.austenite_start, self.martensite_start,
-            self.austenite_finish,
-        )  # fmt: skip
-        if not all(map(is_finite_number, temperatures)):
-            raise ValueError(f"Temperatures must be finite numbers [deg C], not {temperatures!r}.")
-        water, M_f, A_s, M_s, A_f = temperatures
-        if not (water <= M_f <= A_s < A_f and M_f < M_s <= A_f):
+        water, M_f, A_s, M_s, A_f = (np.asarray(getattr(self, name)) for name in self.TEMPERATURES)
+        in_order = (water <= M_f) & (M_f <= A_s) & (A_s < A_f) & (M_f < M_s) & (M_s <= A_f)
+        if not in_order.all():
             raise ValueError(
                 f"Wires come back only if T_water <= M_f <= A_s < A_f and M_f < M_s <= A_f [deg C], not with "
-                f"T_water = {water:g}, M_f = {M_f:g}, A_s = {A_s:g}, A_f = {A_f:g} and M_s = {M_s:g}."
+                f"T_water = {water}, M_f = {M_f}, A_s = {A_s}, A_f = {A_f} and M_s = {M_s}."
             )
-
-    @property
-    def period(self) -> float:
-        """Length of a stroke [s]."""
-        return self.heating_time + self.cooling_time
-
-    @property
-    def corners(self) -> tuple[float, float, float]:
-        """Times within a stroke [s] that no time step may straddle; shorter pulses end within a step."""
-        return 0.0, self.heating_time, self.period
 
     @property
     def rest(self) -> Floats:
         """Cold martensite."""
-        return np.array([self.water_temperature, self.water_temperature, 0.0, 0.0])
+        water = column(self.water_temperature)
+        return np.stack(np.broadcast_arrays(water, water, 0.0, 0.0), axis=-1)
 
     def delta_psi(self, t: ArrayLike) -> Floats:
         """Rotation of a limb with command 1 at time t [s] of a stroke that begins at rest [rad]; t of any shape."""
-        t = np.asarray(t, dtype=float)
-        return self.respond(t.ravel(), np.ones(()), self.rest)[0].reshape(t.shape)
+        t, n_robots = np.asarray(t, dtype=float), batch_size(self)
+        if n_robots is None:
+            return self.respond(t.ravel(), np.ones(()), self.rest)[0].reshape(t.shape)
+        return self.respond(t.ravel(), np.ones((n_robots, 1)), self.rest)[0].reshape(*t.shape, n_robots)
 
     def respond(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
         """See StatefulActuator; exact at all times t."""
         heated = self.heating_time * np.stack([np.maximum(commands, 0.0), np.maximum(-commands, 0.0)], axis=-1)
-        cold, hot = self.water_temperature, self.water_temperature + self.steady_rise
+        tau, cold = column(self.time_constant, 2), column(self.water_temperature, 2)
+        hot = cold + column(self.steady_rise, 2)
         start, before = state[..., :2], state[..., 2:]
-        decay = np.exp(-t / self.time_constant).reshape(-1, *(1,) * heated.ndim)
-        growth = np.exp(heated / self.time_constant)
+        decay = np.exp(-t.reshape(-1, *(1,) * heated.ndim) / tau)
+        growth = np.exp(heated / tau)
         hottest = hot + (start - hot) / growth
         after = self.transform(hottest, before)
         temperature = cold + (hottest - cold) * growth * decay
@@ -107,18 +109,20 @@ class ThermalSma:
         is_heated = t[early].reshape(-1, *(1,) * heated.ndim) < heated
         temperature[early] = np.where(is_heated, hot + (start - hot) * decay[early], temperature[early])
         austenite[early] = self.transform(temperature[early], np.where(is_heated, before, after))
-        turned = self.peak_angle * (austenite[..., 0] - austenite[..., 1])
+        turned = column(self.peak_angle) * (austenite[..., 0] - austenite[..., 1])
         return turned, np.concatenate([temperature[-1], austenite[-1]], axis=-1)
 
     def transform(self, temperature: Floats, austenite: Floats) -> Floats:
         """Share of austenite after the temperature [deg C] went straight to another, from a share before."""
-        up = (temperature - self.austenite_start) / (self.austenite_finish - self.austenite_start)
-        down = (temperature - self.martensite_finish) / (self.martensite_start - self.martensite_finish)
+        _, M_f, A_s, M_s, A_f = (column(getattr(self, name), 2) for name in self.TEMPERATURES)
+        up = (temperature - A_s) / (A_f - A_s)
+        down = (temperature - M_f) / (M_s - M_f)
         np.maximum(up, austenite, out=up)
         np.minimum(up, down, out=up)
         return np.clip(up, 0.0, 1.0, out=up)
 
     def observe(self, state: Floats) -> Floats:
         """Temperatures above the water over A_f - T_water, and the shares of austenite."""
-        warm = (state[..., :2] - self.water_temperature) / (self.austenite_finish - self.water_temperature)
+        water, A_f = column(self.water_temperature, 2), column(self.austenite_finish, 2)
+        warm = (state[..., :2] - water) / (A_f - water)
         return np.concatenate([warm, state[..., 2:]], axis=-1)

@@ -161,16 +161,16 @@ class Stage(NamedTuple):
 class Limits(NamedTuple):
     """What a solution has to keep.
 
-    tolerance: Largest node move of the last Newton update [m].
+    tolerance: Largest node move of the last Newton update [m], one row.
     max_iterations: Newton steps per stage before a time step is halved.
     adaptive: Whether time steps are adapted to their error.
-    error_rate: Largest error per time [m/s].
+    error_rate: Largest error per time [m/s], one row.
     """
 
-    tolerance: float
+    tolerance: np.ndarray
     max_iterations: int
     adaptive: bool
-    error_rate: float
+    error_rate: np.ndarray
 
 
 class Actuation(NamedTuple):

@@ -166,7 +166,7 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, war
     """
     one, zero = splat(1.0), splat(0.0)
     good = accepted = active
-    trouble = wary
+    trouble, tolerance = wary, load(limits.tolerance, 0)
     last, last_h = scheme.n_stages - 1, memory_row(rods, scheme, LAST_STEP)
     error_rate = zero
     for k in range(scheme.n_stages):
@@ -176,7 +176,7 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, war
         freeze_fluid(rods, work)
         freeze_strains(rods.relaxation_time, rods, work, stage.q_hat)
         set_natural_hub_angles(rods, work, actuation, start + load_number(scheme.c, k) * size)
-        good, phi, iterations, repairs, backtracks = minimise(rods, work, stage, good, limits.tolerance, patience)
+        good, phi, iterations, repairs, backtracks = minimise(rods, work, stage, good, tolerance, patience)
         trouble = trouble | (repairs + backtracks > 0.0)
         if scheme.dissipative:
             trouble = trouble | (phi > load(rods.damped, 0))
@@ -189,7 +189,7 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, war
             accepted = good
             if limits.adaptive and not scheme.dissipative:
                 error_rate = step_error(rods, work, stage, a, h, load(a, last_h)) / h
-                accepted = good & ((error_rate <= limits.error_rate) | (size <= SMALLEST_FRACTION))
+                accepted = good & ((error_rate <= load(limits.error_rate, 0)) | (size <= SMALLEST_FRACTION))
                 store(a, last_h, select(accepted, h, load(a, last_h)))
             guarded = accepted & trouble
             watch, allowed = any_lane(guarded), zero
@@ -277,7 +277,8 @@ def cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, a
         if limits.adaptive:
             # The error of a step of twice the length is about eight times as large, per time four times.
             pairs = start / (2.0 * size)
-            fits = accepted & ~wary & (GROWTH_MARGIN * error_rate <= limits.error_rate) & (pairs == floor(pairs))
+            small = GROWTH_MARGIN * error_rate <= load(limits.error_rate, 0)
+            fits = accepted & ~wary & small & (pairs == floor(pairs))
             size = select(fits & (size < 1.0), 2.0 * size, size)
         alive = alive & ~failed
         moving = moving & ~failed & (start < 1.0)

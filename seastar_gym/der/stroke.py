@@ -2,15 +2,16 @@
 
 from seastar_gym.der.compilation import entry_point, kernel
 from seastar_gym.der.lanes import borrow, load, select, splat, store
+from seastar_gym.der.newton import larger
 from seastar_gym.der.stages import cover_interval
 
 
 @kernel
 def shape_of_limb(shape, group, k, limb):
-    """Rotation of a limb at time k, see `advance`; for limbs that turn alike a number, whoever the limb is."""
+    """Rotation of a limb at time k, see `advance`; for robots that turn alike a number, whoever the limb is."""
     if shape.ndim == 1:
         return shape[k]
-    return load(borrow(shape[group, k]), limb)
+    return load(borrow(shape[group, k]), limb % shape.shape[2])
 
 
 @entry_point
@@ -24,17 +25,18 @@ def advance(rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shap
     peaks: Share of `shape` that every limb follows, shape (n_groups, n_limbs, N_LANES).
     times: Ends of the intervals [s], shape (n_intervals + 1,).
     shape: Rotation of the limbs at those times [rad], shape (n_intervals + 1,) if all limbs turn alike, else
-        (n_groups, n_intervals + 1, n_limbs, N_LANES).
-    failed: 0 for robots that go on, 1 for those that have failed, shape (n_groups, 1, N_LANES).
+        (n_groups, n_intervals + 1, n_limbs, N_LANES), or with 1 for n_limbs if those of a robot do.
+    failed: 0 for robots that go on, 1 or more for those that have failed, shape (n_groups, 1, N_LANES).
     report: Counts and extremes, added to, shape (n_groups, len(REPORT_ROWS), N_LANES).
     limits: What the solution has to keep.
     """
     rods_rows, memory, rotation = borrow(rods), borrow(work), borrow(actuation)
-    tableau, fallback_tableau = borrow(scheme), borrow(fallback)
+    tableau, fallback_tableau, bounds = borrow(scheme), borrow(fallback), borrow(limits)
     for group in range(q.shape[0]):
         q_rows, v_rows, a_rows, peak_rows = borrow(q[group]), borrow(v[group]), borrow(a[group]), borrow(peaks[group])
         failed_rows, report_rows = borrow(failed[group]), borrow(report[group])
-        alive = load(failed_rows, 0) < 1.0
+        status = load(failed_rows, 0)
+        alive = status < 1.0
         for k in range(times.shape[0] - 1):
             for limb in range(rods.n_limbs):
                 peak = load(peak_rows, limb)
@@ -42,6 +44,6 @@ def advance(rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shap
                 store(rotation.delta_psi_end, limb, peak * shape_of_limb(shape, group, k + 1, limb))
             alive = cover_interval(
                 rods_rows, memory, tableau, fallback_tableau, rotation, q_rows, v_rows, a_rows, times[k + 1] - times[k],
-                alive, limits, report_rows,
+                alive, bounds, report_rows,
             )  # fmt: skip
-        store(failed_rows, 0, select(alive, splat(0.0), 1.0))
+        store(failed_rows, 0, select(alive, splat(0.0), larger(status, splat(1.0))))

@@ -1,7 +1,8 @@
 """What a controller sees: node states, hub velocity and waypoints, in a frame that turns with the robot.
 
 The body frame has its origin at the hub; its x axis is the direction of limb 1 of the rest shape after the rotation
-that fits the rest shape best to the nodes (least squares over all nodes). Every number is of order one:
+that fits the rest shape best to the nodes (least squares over all nodes). Every number is of order one; the unit
+of lengths is the robot's own limb length:
 
 index                 what                                              unit
 0 .. 2m-1             node positions relative to the hub, x and y       limb lengths
@@ -57,17 +58,18 @@ def store_turned(out, row, x, y, c, s):
 
 
 @entry_point
-def observe(rest, q, v, targets, length_scale, velocity_scale, out):
+def observe(rest, limb_length, q, v, targets, velocity_scale, out):
     """Fill the observations of lane groups.
 
-    rest: Rest positions [m], shape (2 n_nodes,). q, v: [m], [m/s], shape (n_groups, 2 n_nodes, N_LANES).
+    rest: Rest positions [m], shape (n_groups, 2 n_nodes, N_LANES), or (1, ..) for all groups. limb_length: Unit of
+        lengths [m], shape (n_groups, 1, N_LANES), likewise. q, v: [m], [m/s], shape (n_groups, 2 n_nodes, N_LANES).
     targets: Current and next waypoint in the world frame [m], shape (n_groups, 4, N_LANES).
     out: Observations, shape (n_groups, observation size, N_LANES).
     """
-    n_nodes = rest.shape[0] // 2
-    per_length, per_velocity = 1.0 / length_scale, 1.0 / velocity_scale
-    rest_rows = borrow(rest)
+    n_nodes, per_velocity = rest.shape[1] // 2, 1.0 / velocity_scale
     for group in range(q.shape[0]):
+        rest_rows = borrow(rest[group % rest.shape[0]])
+        per_length = 1.0 / load(borrow(limb_length[group % limb_length.shape[0]]), 0)
         position, velocity, target, rows = (
             borrow(q[group]),
             borrow(v[group]),

@@ -95,7 +95,8 @@ class DomainRandomization:
     """Distributions of a scene's numbers, drawn anew for every episode of every robot, in this order.
 
     distributions: By name: "limb_strength", or a number that the scene has and that may differ from robot to robot, as
-        in "robot.youngs_modulus", "robot.density", "fluid.drag_coefficient", "fluid.current.u_x".
+        in "robot.youngs_modulus", "robot.limb_length", "fluid.drag_coefficient", "fluid.current.u_x",
+        "actuator.peak_angle".
     """
 
     def __init__(self, distributions: Mapping[str, Distribution]):
@@ -119,7 +120,7 @@ class DomainRandomization:
         return hash(tuple(self.distributions.items()))
 
     def first_values(self, scene: Scene, n_robots: int) -> dict[str, NDArray[np.float64]]:
-        """The numbers before the first draw, shape (n_robots,), that of limbs (n_robots, n_limbs).
+        """The numbers before the first draw, shape (n_robots,), that of limbs (n_robots, n_limbs): their upper bounds.
 
         Refuses names that the scene does not have, and bounds that it does not allow.
         """
@@ -132,7 +133,7 @@ class DomainRandomization:
                 )
         for bounds in itertools.product(*(self.distributions[name].bounds for name in numbers)):
             with_numbers(scene, dict(zip(numbers, bounds, strict=True)))
-        values = {name: np.full(n_robots, self.distributions[name].bounds[0]) for name in numbers}
+        values = {name: np.full(n_robots, self.distributions[name].bounds[1]) for name in numbers}
         if LIMB_STRENGTH in self.distributions:
             values[LIMB_STRENGTH] = np.ones((n_robots, scene.robot.n_limbs))
         return values

@@ -51,7 +51,7 @@ def promised(scene: Scene) -> dict[str, float]:
 def scene_observation_size(scene: Scene) -> int:
     """Length of the observation of a scene's robot."""
     actuator, robot = scene.actuator, scene.robot
-    remembered = len(actuator.observe(actuator.rest)) if isinstance(actuator, StatefulActuator) else 0
+    remembered = actuator.observe(actuator.rest).shape[-1] if isinstance(actuator, StatefulActuator) else 0
     return observation_size(robot.n_nodes) + remembered * robot.n_limbs
 
 
@@ -82,9 +82,8 @@ class SwimTask:
         self.drawn = {} if randomization is None else randomization.first_values(scene, n_robots)
         self.simulator = Simulator(drawn_scene(scene, self.drawn), n_robots, threads)
         self._promised = {name: np.full(n_robots, value) for name, value in promised(self.simulator.scene).items()}
-        if scene.robot.hub_hinge == "turning" and 2 * scene.actuator.peak_angle >= scene.robot.opening_angle * (
-            1 - 1e-9
-        ):
+        peak = np.max(self.simulator.scene.actuator.peak_angle)  # before the first draw the largest that may be drawn
+        if scene.robot.hub_hinge == "turning" and 2 * peak >= scene.robot.opening_angle * (1 - 1e-9):
             raise ValueError(
                 'With hub_hinge="turning" some actions would close a hub hinge, where its curvature is infinite: use '
                 'hub_hinge="opening" or a smaller peak angle.'
@@ -92,7 +91,6 @@ class SwimTask:
         self.path: Path = path if isinstance(path, str) else waypoints
         self.reward, self.waypoint_radius, self.random_heading = reward, waypoint_radius, random_heading
         self.n_robots = n_robots
-        self._rest = scene.robot.nodes().reshape(-1)
         self.waypoints = np.zeros((n_robots, 1, 2))
         self._way_after = np.zeros((n_robots, 1))  # from waypoint k to the last [m]
         self.n_waypoints = np.ones(n_robots, np.int64)
@@ -157,9 +155,9 @@ class SwimTask:
         simulator = self.simulator
         targets = np.concatenate([self._waypoint(self.waypoint_index), self._waypoint(self.waypoint_index + 1)], axis=1)
         target_rows = to_rows(targets)
-        robot = simulator.scene.robot
-        out = np.empty((len(target_rows), observation_size(robot.n_nodes), target_rows.shape[2]))
-        observe(self._rest, simulator.q, simulator.v, target_rows, robot.limb_length, VELOCITY_SCALE, out)
+        own, n_nodes = simulator.coefficients, simulator.scene.robot.n_nodes
+        out = np.empty((len(target_rows), observation_size(n_nodes), target_rows.shape[2]))
+        observe(own.rest, own.limb_length, simulator.q, simulator.v, target_rows, VELOCITY_SCALE, out)
         observations, remembered = to_float32(out, self.n_robots), simulator.observe_actuators()
         if remembered.shape[1] == 0:
             return observations

@@ -1,7 +1,7 @@
 """A limb that is not like the robot's others, and what a profile along it says."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +20,8 @@ class Limb:
     direction: Of its root edge at rest [rad], anti-clockwise from limb 1's.
     length [m]. radius [m] and youngs_modulus [Pa], along the limb: a taper is radius=(root, tip).
     natural_curvature: Of the limb at rest [1/m], + bends it anti-clockwise on the way to its tip.
+
+    They are the same for all robots of a batch: only the robot's own numbers may differ from robot to robot.
     """
 
     direction: float | None = None
@@ -29,6 +31,12 @@ class Limb:
     natural_curvature: float = 0.0
 
     def __post_init__(self) -> None:
+        for field in fields(self):
+            if isinstance(getattr(self, field.name), np.ndarray):
+                raise ValueError(
+                    f"A limb's {field.name} is the same for all robots of a batch: give one number, or a tuple along "
+                    "the limb, and let only the robot's own numbers differ from robot to robot."
+                )
         if self.direction is not None and not (is_finite_number(self.direction) and 0 <= self.direction < 2 * math.pi):
             raise ValueError(f"A limb's direction must be from 0 to below 2 pi [rad], not {self.direction!r}.")
         if self.length is not None:

@@ -59,7 +59,7 @@ def newton(rods, work, stage, tolerance, patience):
 def advance_plainly(rods, work, scheme, actuation, q, v, a, peaks, times, shape, report, limits):
     """As `advance` of der/stroke.py, with nothing in case of trouble; counts Newton iterations only."""
     rods_rows, memory, rotation, tableau = borrow(rods), borrow(work), borrow(actuation), borrow(scheme)
-    zero, last = splat(0.0), scheme.n_stages - 1
+    zero, last, tolerance = splat(0.0), scheme.n_stages - 1, load(borrow(limits).tolerance, 0)
     everyone = zero < splat(1.0)
     for group in range(q.shape[0]):
         q_rows, v_rows, a_rows, peak_rows = borrow(q[group]), borrow(v[group]), borrow(a[group]), borrow(peaks[group])
@@ -73,7 +73,7 @@ def advance_plainly(rods, work, scheme, actuation, q, v, a, peaks, times, shape,
             for i in range(scheme.n_stages):
                 stage = begin_stage(rods_rows, memory, tableau, i, q_rows, v_rows, a_rows, h)
                 set_natural_hub_angles(rods_rows, memory, rotation, zero + load_number(tableau.c, i))
-                n = newton(rods_rows, memory, stage, limits.tolerance, 1.0 * limits.max_iterations)
+                n = newton(rods_rows, memory, stage, tolerance, 1.0 * limits.max_iterations)
                 store(report_rows, NEWTON_ITERATIONS, load(report_rows, NEWTON_ITERATIONS) + n)
                 if i < last:
                     end_stage(rods_rows, memory, tableau, i, stage, a_rows, everyone)

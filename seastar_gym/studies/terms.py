@@ -55,8 +55,8 @@ def scenes() -> dict[str, Scene]:
         THE_CHAPTERS: Scene(),
         **{name: Scene(fluid=fluid) for name, fluid in fluids.items()},
         "material damping": Scene(damped),
-        "numbers of each robot": Scene(Seastar(youngs_modulus=np.full(n_robots, 1e6))),  # type: ignore[arg-type]
-        "all of these": Scene(replace(damped, youngs_modulus=np.full(n_robots, 1e6)), everything),  # type: ignore[arg-type]
+        "numbers of each robot": Scene(Seastar(youngs_modulus=np.full(n_robots, 1e6))),
+        "all of these": Scene(replace(damped, youngs_modulus=np.full(n_robots, 1e6)), everything),
     }
 
 

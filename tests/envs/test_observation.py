@@ -19,7 +19,8 @@ def observations_of(simulator: Simulator, targets: np.ndarray) -> np.ndarray:
     """float64 observations, shape (n_robots, size), for targets of shape (n_robots, 4) [m]."""
     rows, robot = to_rows(targets), simulator.scene.robot
     out = np.full((len(rows), observation_size(robot.n_nodes), N_LANES), np.nan)
-    observe(robot.nodes().reshape(-1), simulator.q, simulator.v, rows, robot.limb_length, VELOCITY_SCALE, out)
+    own = simulator.coefficients
+    observe(own.rest, own.limb_length, simulator.q, simulator.v, rows, VELOCITY_SCALE, out)
     return out.transpose(0, 2, 1).reshape(-1, out.shape[1])[: simulator.n_robots]
 
 

@@ -10,6 +10,7 @@ from seastar_gym import (
     Normal,
     Scene,
     Seastar,
+    SmaPulse,
     ThermalSma,
     Uniform,
     UniformCurrent,
@@ -21,7 +22,9 @@ from seastar_gym.scene import Numerics
 DRAWS = DomainRandomization(
     {
         "robot.youngs_modulus": LogUniform(5e5, 2e6),
+        "robot.limb_length": Uniform(0.08, 0.12),
         "fluid.drag_coefficient": Normal(1.0, 0.1),
+        "actuator.peak_angle": Uniform(0.4, 0.6),
         "limb_strength": Uniform(0.5, 1.0),
     }
 )
@@ -57,7 +60,9 @@ def test_a_robot_is_drawn_alone_as_in_a_batch_and_swims_as_the_robot_that_was_dr
         np.testing.assert_array_equal(observations[robot], observation)
         np.testing.assert_array_equal(info["limb_strength"][robot], own["limb_strength"])
         modulus, drag = own["robot.youngs_modulus"], own["fluid.drag_coefficient"]
-        scene = Scene(Seastar(youngs_modulus=modulus), Water(drag_coefficient=drag), numerics=Numerics.preset("fast"))
+        robot = Seastar(youngs_modulus=modulus, limb_length=own["robot.limb_length"])
+        pulse = SmaPulse(own["actuator.peak_angle"])
+        scene = Scene(robot, Water(drag_coefficient=drag), pulse, numerics=Numerics.preset("fast"))
         env.simulator.reset()
         plain = SeastarSwimEnv(scene=scene)
         plain.reset()
@@ -65,6 +70,22 @@ def test_a_robot_is_drawn_alone_as_in_a_batch_and_swims_as_the_robot_that_was_dr
         env.simulator.stroke(command[None])
         plain.simulator.stroke(own["limb_strength"] * command[None])
         np.testing.assert_array_equal(env.simulator.positions, plain.simulator.positions)
+
+
+def test_lengths_are_seen_in_the_robots_own_limb_length():
+    randomization = DomainRandomization({"robot.limb_length": Uniform(0.05, 0.2)})
+    env, plain = SeastarSwimEnv(fidelity="fast", randomization=randomization), SeastarSwimEnv(fidelity="fast")
+    (observation, info), (expected, _) = env.reset(seed=5), plain.reset(seed=5)
+    np.testing.assert_allclose(observation[:90], expected[:90], rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(observation[-4:] * info["robot.limb_length"], 0.1 * expected[-4:], rtol=1e-6)
+
+
+def test_peak_angles_that_would_close_a_hub_hinge_are_refused_before_they_are_drawn():
+    scene = Scene(Seastar(hub_hinge="turning"), actuator=SmaPulse(0.3), numerics=Numerics.preset("fast"))
+    with pytest.raises(ValueError, match="close a hub hinge"):
+        SeastarSwimEnv(
+            scene=scene, randomization=DomainRandomization({"actuator.peak_angle": Uniform(0.3, np.pi / 5.0)})
+        )
 
 
 def test_every_episode_is_another_robot_and_every_seed_the_same_one():
@@ -95,7 +116,9 @@ def test_a_limb_that_has_failed_does_not_move():
         (lambda: DomainRandomization({"robot.density": 3.0}), ("robot.density", "Uniform")),
         (lambda: DomainRandomization({"limb_strength": Uniform(0.5, 1.5)}), ("limb_strength", "0 to 1")),
         (lambda: SeastarSwimEnv(randomization="all"), ("DomainRandomization", "'all'")),
-        (lambda: env_with("robot.limb_length", 0.1, 0.2), ("robot.limb_length", "robot.density")),
+        (lambda: env_with("robot.n_limbs", 3, 5), ("robot.n_limbs", "robot.density")),
+        (lambda: env_with("robot.limb_length", -0.1, 0.2), ("limb_length", "positive")),
+        (lambda: env_with("actuator.peak_angle", 0.1, 2.0), ("peak angle", "2 rad")),
         (lambda: env_with("fluid.current.u_x", 0.1, 0.2), ("fluid.current.u_x",)),
         (lambda: env_with("robot.density", -1.0, 0.2), ("density", "positive")),
     ],
