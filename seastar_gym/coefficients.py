@@ -1,11 +1,13 @@
 """What a scene's numbers are to the kernels: one set for all lane groups, or one for each with a lane per robot."""
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.der.lanes import N_LANES
 from seastar_gym.der.rods import Limits, Rods, put_robot, side_by_side
-from seastar_gym.per_robot import frame_of
+from seastar_gym.per_robot import frame_of, of_robot
 from seastar_gym.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -27,23 +29,26 @@ class Coefficients:
             raise ValueError(f"The scene has numbers for {scene.n_robots} robots, the batch {self.n_robots}.")
         self._scene, self.are_shared = scene, scene.n_robots is None
         n_sets = 1 if self.are_shared else -(-self.n_robots // N_LANES)
-        # Lanes that are left over do what the last robot does.
-        robots = np.minimum(np.arange(n_sets * N_LANES), (scene.n_robots or 1) - 1).reshape(n_sets, N_LANES).tolist()
         if self.are_shared:
             self._rods, self._limits = [scene.rods()], [scene.limits()]
         else:
+            # Lanes that are left over do what the last robot does.
+            robots = np.minimum(np.arange(n_sets * N_LANES), self.n_robots - 1).reshape(n_sets, N_LANES).tolist()
             self._rods = [side_by_side([scene.rods(robot) for robot in group]) for group in robots]
             self._limits = [side_by_side([scene.limits(robot) for robot in group]) for group in robots]
         self.rest = np.zeros((n_sets, 2 * scene.robot.n_nodes, N_LANES))
         self.limb_length = np.zeros((n_sets, 1, N_LANES))
-        for place in np.ndindex(n_sets, N_LANES):
-            self._put_lengths(place, robots[place[0]][place[1]])
+        self._put_lengths(range(n_sets * N_LANES))
 
-    def _put_lengths(self, place: tuple[int, ...], robot: int) -> None:
-        group, lane = place
-        of_robots, length = self._scene.robot, self._scene.robot.limb_length
-        self.rest[group, :, lane] = of_robots.nodes(robot).reshape(-1)
-        self.limb_length[group, 0, lane] = length[robot] if isinstance(length, tuple) else length
+    def _put_lengths(self, places: Iterable[int]) -> None:
+        """Write the lengths of robots into their lanes; robots of one length have one shape."""
+        shapes: dict[float, Floats] = {}
+        for place in places:
+            (group, lane), robot = divmod(place, N_LANES), min(place, self.n_robots - 1)
+            length = of_robot(self._scene.robot.limb_length, robot)
+            if length not in shapes:
+                shapes[length] = self._scene.robot.nodes(robot).reshape(-1)
+            self.rest[group, :, lane], self.limb_length[group, 0, lane] = shapes[length], length
 
     def set_scene(self, scene: Scene, chosen: NDArray[np.bool_]) -> None:
         """Go on with a scene that differs in numbers of `PER_ROBOT` alone, and those of the chosen robots only."""
@@ -53,11 +58,12 @@ class Coefficients:
             self._make(scene)
             return
         self._scene = scene
-        for robot in np.flatnonzero(chosen).tolist():
+        robots = np.flatnonzero(chosen).tolist()
+        for robot in robots:
             group, lane = divmod(robot, N_LANES)
             put_robot(self._rods[group], lane, scene.rods(robot))
             put_robot(self._limits[group], lane, scene.limits(robot))
-            self._put_lengths((group, lane), robot)
+        self._put_lengths(robots)
 
     def rods(self, group: int) -> Rods:
         """Those of a lane group."""

@@ -38,6 +38,11 @@ def column(numbers: Numbers, n_axes: int = 1) -> Any:
     return numbers if np.ndim(numbers) == 0 else np.asarray(numbers, dtype=float).reshape(-1, *(1,) * n_axes)
 
 
+def of_robot(numbers: Numbers, index: int) -> float:
+    """The number of one robot."""
+    return float(numbers[index]) if isinstance(numbers, tuple) else float(numbers)
+
+
 def numbers_of(part: Any) -> dict[str, Any]:
     """The numbers that may differ from robot to robot, by their names, "fluid.density", with None for what is not
     modelled."""

@@ -26,7 +26,7 @@ from seastar_gym.fidelity import cheapest
 from seastar_gym.fluids import Water as Water
 from seastar_gym.morphology.limb import Limb, LimbShape, as_tuple
 from seastar_gym.morphology.seastar import make_rods, n_hub_hinges, natural_hub_angle, rest_positions, turn_per_hinge
-from seastar_gym.per_robot import Numbers, batch_size, chosen, require_each
+from seastar_gym.per_robot import Numbers, batch_size, chosen, of_robot, require_each
 
 HubHinge = Literal["opening", "turning"]
 SchemeName = Literal["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
@@ -325,7 +325,7 @@ class Scene:
         The error that a step may make per second is `error_rate` limb lengths per stroke; how it follows from the
         tolerance on the path was measured, see ADAPTATION.
         """
-        numerics, length = self.numerics, chosen(self.robot, itemgetter(index)).limb_length
+        numerics, length = self.numerics, of_robot(self.robot.limb_length, index)
         speed, tolerance = length / self.actuator.period, numerics.path_tolerance
         error_rate = 0.0 if tolerance is None else speed * (tolerance / ADAPTATION[0]) ** ADAPTATION[1]
         return Limits(

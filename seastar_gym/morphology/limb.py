@@ -69,4 +69,6 @@ def as_tuple(profile: Profile) -> tuple[float, ...]:
 
 def along(profile: tuple[float, ...], share: NDArray[np.float64]) -> list[float]:
     """A profile at shares of the way from hub to tip."""
+    if len(profile) == 1:
+        return [*profile] * len(share)
     return np.interp(share, np.linspace(0.0, 1.0, len(profile)), profile).tolist()
