@@ -4,11 +4,13 @@ A trajectory is a CSV file with a line of names, `time,x0,y0,x9,y9,..`: seconds,
 (0 is the hub, j (N - 1) the tip of limb j). The robot begins at rest with its hub at the origin and limb 1 along +x;
 empty fields were not seen. A second file has one command per line and stroke, one number per limb.
 
-Parameters are positive numbers of the scene, by name: fluid.drag_coefficient, robot.youngs_modulus,
-actuator.peak_angle. They are fitted by their logarithms, so errors are relative to their values. With J the derivative
-of the residuals r and s^2 = |r|^2/(n - p), the covariance is s^2 (J^T J)^-1: independent errors of one size for all
-coordinates. Where a direction of parameters, a singular vector of J, has a relative error above UNTOLD, the data cannot
-tell them, and the estimate says so.
+Parameters are positive numbers of the scene, by name: fluid.drag_coefficient, robot.youngs_modulus, robot.limb_length,
+actuator.peak_angle, or actuator.angles.2, a point of a measured curve. They are fitted by their logarithms, so errors
+are relative to their values. The scene and those in which one parameter has changed a little, for the columns of the
+Jacobian, are simulated side by side, as the robots of one batch. With J the derivative of the residuals r and
+s^2 = |r|^2/(n - p), the covariance is s^2 (J^T J)^-1: independent errors of one size for all coordinates. Where a
+direction of parameters, a singular vector of J, has a relative error above UNTOLD, the data cannot tell them, and the
+estimate says so.
 
 `--synthetic` makes data of its own, with 1 mm of noise, and shows that the fit finds what made them.
 """
@@ -19,18 +21,20 @@ import math
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields, replace
-from functools import partial
+from dataclasses import dataclass, fields, is_dataclass
+from functools import lru_cache
+from operator import attrgetter
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from seastar_gym.checks import is_finite_number
+from seastar_gym.per_robot import frame_of, side_by_side, with_numbers
 from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water
 from seastar_gym.simulator import Simulator
 
@@ -128,24 +132,31 @@ class Estimate(NamedTuple):
 
 def get_parameter(scene: Scene, name: str) -> float:
     """A number of the scene. ValueError: it has none of that name that could be fitted."""
-    part, _, of_part = name.partition(".")
-    piece = getattr(scene, part, None) if part in ("robot", "fluid", "actuator") else None
-    value = getattr(piece, of_part, None) if piece is not None and of_part in _field_names(piece) else None
-    if not is_finite_number(value) or isinstance(value, int) or value <= 0.0:  # type: ignore[operator]
+    first, *rest = name.split(".")
+    value: Any = getattr(scene, first) if first in ("robot", "fluid", "actuator") else None
+    for step in rest:
+        if isinstance(value, tuple) and step.isdigit() and int(step) < len(value):
+            value = value[int(step)]
+        else:
+            known = is_dataclass(value) and step in {field.name for field in fields(value)}
+            value = getattr(value, step) if known else None
+    if not is_finite_number(value) or isinstance(value, int) or value <= 0.0:
         raise ValueError(f"{name!r} is no positive number of this scene, such as fluid.drag_coefficient.")
-    return float(value)  # type: ignore[arg-type]
-
-
-def _field_names(piece: object) -> set[str]:
-    return {field.name for field in fields(piece)}  # type: ignore[arg-type]
+    return float(value)
 
 
 def with_parameters(scene: Scene, names: Sequence[str], values: Sequence[float] | Floats) -> Scene:
     """The scene with other numbers."""
+    changed: dict[str, Any] = {}
     for name, value in zip(names, values, strict=True):
-        part, _, of_part = name.partition(".")
-        scene = replace(scene, **{part: replace(getattr(scene, part), **{of_part: float(value)})})
-    return scene
+        parent, _, step = name.rpartition(".")
+        if step.isdigit():
+            points = list(changed.get(parent) or attrgetter(parent)(scene))
+            points[int(step)] = float(value)
+            changed[parent] = tuple(points)
+        else:
+            changed[name] = float(value)
+    return with_numbers(scene, changed)
 
 
 # --- trajectories ----------------------------------------------------------------------------------------------------
@@ -156,29 +167,48 @@ def trajectory(time: Floats, nodes: Sequence[int], commands: Floats, scene: Scen
 
     Between time steps by cubic Hermite interpolation, of the order of the schemes. NaN where the solver gave up.
     """
-    simulator, of_nodes = Simulator(scene, threads=1), list(nodes)
-    parts = math.ceil(scene.actuator.period / scene.numerics.step)
-    times, positions, velocities = [0.0], simulator.positions[:, of_nodes], simulator.velocities[:, of_nodes]
-    seen = [(positions[0], velocities[0])]
+    return batch_of_trajectories(time, nodes, commands, [scene])[0]
+
+
+def batch_of_trajectories(time: Floats, nodes: Sequence[int], commands: Floats, scenes: Sequence[Scene]) -> Floats:
+    """Those of scenes of one frame, whose robots are the lanes of one batch; shape (n_scenes, n, n_nodes_seen, 2)."""
+    n_robots, of_nodes = len(scenes), list(nodes)
+    simulator = Simulator(side_by_side(scenes), n_robots, threads=1)
+    period, step = scenes[0].actuator.period, scenes[0].numerics.step
+    times, seen = [0.0], [(simulator.positions[:, of_nodes], simulator.velocities[:, of_nodes])]
     for stroke, command in enumerate(commands):
-        for since in simulator.stroke_in_parts(command[None], parts):
-            times.append(stroke * scene.actuator.period + since)
-            seen.append((simulator.positions[0, of_nodes], simulator.velocities[0, of_nodes]))
-        if simulator.failed.any():
-            return np.full((len(time), len(nodes), 2), np.nan)
+        for since in simulator.stroke_in_parts(np.tile(command, (n_robots, 1)), math.ceil(period / step)):
+            times.append(stroke * period + since)
+            seen.append((simulator.positions[:, of_nodes], simulator.velocities[:, of_nodes]))
+        if simulator.failed.all():
+            return np.full((n_robots, len(time), len(nodes), 2), np.nan)
     if time[-1] > times[-1] + 1e-9:
         raise ValueError(
             f"The last time of {time[-1]:.4g} s is beyond the last stroke, which ends at {times[-1]:.4g} s."
         )
     x, v = (np.array(values) for values in zip(*seen, strict=True))
-    return np.asarray(CubicHermiteSpline(times, x, v)(time))
+    found = np.moveaxis(CubicHermiteSpline(times, x, v)(time), 1, 0)
+    found[simulator.failed] = np.nan
+    return found
 
 
 def trajectories(scenes: Sequence[Scene], measurement: Measurement) -> Floats:
-    """That of every scene's robot, side by side, shape (n_scenes, n, n_nodes_seen, 2)."""
-    of_scene = partial(trajectory, measurement.time, measurement.nodes, measurement.commands)
+    """That of every scene's robot, shape (n_scenes, n, n_nodes_seen, 2).
+
+    Scenes that differ in numbers of each robot alone are simulated side by side, in the lanes of one batch; others (of
+    other durations, or other points of a measured curve) beside them, on threads.
+    """
+    frames = [frame_of(scene) for scene in scenes]
+    batches = {frame: [k for k, other in enumerate(frames) if other == frame] for frame in frames}
+    found = np.empty((len(scenes), *measurement.positions.shape))
+
+    def simulate(batch: list[int]) -> None:
+        its_scenes = [scenes[k] for k in batch]
+        found[batch] = batch_of_trajectories(measurement.time, measurement.nodes, measurement.commands, its_scenes)
+
     with ThreadPoolExecutor() as pool:
-        return np.array(list(pool.map(of_scene, scenes)))
+        list(pool.map(simulate, batches.values()))
+    return found
 
 
 # --- the fit ---------------------------------------------------------------------------------------------------------
@@ -197,20 +227,27 @@ def identify(scene: Scene, parameters: Sequence[str], measurement: Measurement, 
     if seen.sum() <= len(names):
         raise ValueError(f"{seen.sum()} coordinates are too few for {len(names)} parameters.")
 
-    def scene_at(logarithms: Floats) -> Scene:
-        return with_parameters(scene, names, guess * np.exp(logarithms))
+    changes = DIFFERENCE * np.vstack([np.zeros(len(names)), np.eye(len(names))])
+
+    def scenes_at(logarithms: ArrayLike) -> list[Scene]:
+        """The scene with these parameters, and with each of them changed a little."""
+        return [with_parameters(scene, names, guess * np.exp(logarithms - change)) for change in changes]
+
+    @lru_cache(maxsize=1)
+    def simulate(*logarithms: float) -> Floats:
+        """Their trajectories, for residuals and Jacobian in one go."""
+        return trajectories(scenes_at(logarithms), measurement)
 
     def residuals(logarithms: Floats) -> Floats:
         try:
-            tried = scene_at(logarithms)
+            scenes_at(logarithms)
         except ValueError:  # beyond what can be modelled: least_squares takes a shorter step
             return np.full(seen.sum(), np.inf)
-        found = (trajectories([tried], measurement)[0] - measurement.positions)[seen]
+        found = (simulate(*logarithms)[0] - measurement.positions)[seen]
         return np.where(np.isfinite(found), found, np.inf)
 
     def jacobian(logarithms: Floats) -> Floats:
-        changes = DIFFERENCE * np.vstack([np.zeros(len(names)), np.eye(len(names))])
-        here, *changed = trajectories([scene_at(logarithms - change) for change in changes], measurement)
+        here, *changed = simulate(*logarithms)
         return np.stack([(here - other)[seen] / DIFFERENCE for other in changed], axis=1)
 
     bound = math.log(LARGEST_FACTOR)
@@ -220,7 +257,7 @@ def identify(scene: Scene, parameters: Sequence[str], measurement: Measurement, 
     errors = spread / np.maximum(singular, 1e-300)
     covariance = (directions.T * errors**2) @ directions
     half = student.ppf(0.5 + 0.5 * confidence, seen.sum() - len(names)) * np.sqrt(np.diag(covariance))
-    found = trajectories([scene_at(fit.x)], measurement)[0]
+    found = simulate(*fit.x)[0]
     with np.errstate(over="ignore"):
         return Estimate(
             names=names,
@@ -234,7 +271,7 @@ def identify(scene: Scene, parameters: Sequence[str], measurement: Measurement, 
                 if error > UNTOLD
             ),
             residuals=measurement.positions - found,
-            scene=scene_at(fit.x),
+            scene=scenes_at(fit.x)[0],
         )
 
 

@@ -5,7 +5,7 @@ tuple, so that parts stay equal by value, hashable and frozen.
 """
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
@@ -68,6 +68,12 @@ def with_numbers(part: Part, numbers: dict[str, Any]) -> Part:
             own[first] = value
     own.update({name: with_numbers(getattr(part, name), values) for name, values in inner.items()})
     return dataclasses.replace(part, **own) if own else part  # type: ignore[type-var]
+
+
+def side_by_side(parts: Sequence[Part]) -> Part:
+    """The part of a batch of robots, each with the numbers of one of the parts, all of one frame (see `frame_of`)."""
+    columns = {name: [numbers_of(part)[name] for part in parts] for name in numbers_of(parts[0])}
+    return with_numbers(parts[0], {name: tuple(values) for name, values in columns.items() if len(set(values)) > 1})
 
 
 def batch_size(part: Any) -> int | None:

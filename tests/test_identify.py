@@ -1,11 +1,12 @@
 """Parameters are found in data that a known robot made, and what the data cannot tell is said."""
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from seastar_gym import Limited, Numerics, Scene, Simulator, SmaPulse
+from seastar_gym import Limited, MeasuredCurve, Numerics, Scene, Simulator, SmaPulse
 from seastar_gym.identify import (
     TRUTH,
     Measurement,
@@ -14,6 +15,7 @@ from seastar_gym.identify import (
     identify,
     main,
     synthetic,
+    trajectories,
     trajectory,
     with_parameters,
 )
@@ -100,15 +102,38 @@ def test_files_that_are_no_trajectory_are_refused(tmp_path, text):
         Measurement.from_csv(tmp_path / "path.csv", tmp_path / "commands.csv")
 
 
-@pytest.mark.parametrize("name", ["robot.n_limbs", "fluid.colour", "drag", "fluid", "numerics.step", "robot.hub_hinge"])
+@pytest.mark.parametrize(
+    "name", ["robot.n_limbs", "fluid.colour", "drag", "actuator.angles.1", "fluid", "numerics.step", "robot.hub_hinge"]
+)
 def test_what_is_no_positive_number_of_the_scene_cannot_be_fitted(name):
     with pytest.raises(ValueError, match="no positive number of this scene"):
         get_parameter(SCENE, name)
 
 
+def test_a_point_of_a_measured_curve_is_found():
+    curve = MeasuredCurve((0.0, 0.1, 0.4, 1.0), (0.0, 0.5, 0.3, 0.0))
+    scene, names = replace(SCENE, actuator=curve), ["actuator.angles.1", "fluid.drag_coefficient"]
+    truth = {"actuator.angles.1": 0.55, "fluid.drag_coefficient": 1.2}
+    estimate = identify(scene, names, synthetic(scene, truth, n_strokes=2, noise=0.0))
+    np.testing.assert_allclose(estimate.values, list(truth.values()), rtol=1e-4)
+    assert estimate.scene.actuator.angles[2] == 0.3
+
+
+def test_scenes_side_by_side_move_as_each_would_alone(measurement):
+    """Whatever may differ from robot to robot makes one batch; another duration, which may not, makes another."""
+    scenes = [
+        with_parameters(SCENE, [name], [value])
+        for name, value in (("robot.limb_length", 0.09), ("actuator.cooling_time", 1.1), ("actuator.peak_angle", 0.4))
+    ]
+    for scene, found in zip(scenes, trajectories(scenes, measurement), strict=True):
+        alone = trajectory(measurement.time, measurement.nodes, measurement.commands, scene)
+        np.testing.assert_array_equal(found, alone)
+
+
 def test_an_actuator_of_any_kind_may_be_fitted():
     scene = Scene(actuator=Limited(SmaPulse(), largest_rate=2.0))
-    assert get_parameter(with_parameters(scene, ["actuator.largest_rate"], [3.0]), "actuator.largest_rate") == 3.0
+    names = ["actuator.largest_rate", "actuator.actuator.peak_angle"]
+    assert [get_parameter(with_parameters(scene, names, [3.0, 0.5]), name) for name in names] == [3.0, 0.5]
 
 
 def test_a_measurement_that_does_not_fit_the_robot_is_refused(measurement):
