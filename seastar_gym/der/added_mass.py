@@ -62,13 +62,13 @@ def add_fluid_inertia(added_mass, node, dx, dy, inverse_gamma, slopes):
 
 
 @kernel
-def fluid_energy(added_mass, rods, v):
-    """Kinetic energy of the fluid that moves along [J], at the normals of the last stage."""
-    energy = splat(0.0)
+def add_fluid_energy(added_mass, rods, v, energy):
+    """Add the kinetic energy of the fluid that moves along [J], at the normals of the last stage."""
     if added_mass is None:
         return energy
+    total = splat(0.0)
     for node in range(n_nodes(rods)):
         vx, vy = load(v, 2 * node), load(v, 2 * node + 1)
         px, py = momentum(added_mass, node, vx, vy)
-        energy = add_product(energy, 0.5, add_product(px * vx, py, vy))
-    return energy
+        total = add_product(total, 0.5, add_product(px * vx, py, vy))
+    return energy + total

@@ -55,14 +55,14 @@ def kinetic_energy(rods, v):
 
 
 @kernel
-def load_energy(loads, q, nodes):
-    """Potential of the dead loads on nodes [J]; zero, and gone when compiled, in scenes without loads (None)."""
+def add_load_energy(loads, q, nodes, energy):
+    """Add the potential of the dead loads on nodes [J]; gone when compiled in scenes without loads (None)."""
     if loads is None:
-        return splat(0.0)
+        return energy
     total = splat(0.0)
     for row in range(2 * nodes):
         total = subtract_product(total, load(loads, row), load(q, row))
-    return total
+    return energy + total
 
 
 @entry_point

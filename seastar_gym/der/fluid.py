@@ -43,11 +43,14 @@ def freeze_current(current, rods, work):
 
 
 @kernel
-def power_of_current(current, rods, work, v):
-    """What drag takes from the fluid's motion and gives to nodes of velocities v, -(drag force of w = v - u) u [W]."""
-    power, zero = splat(0.0), splat(0.0)
+def add_work_of_current(current, rods, work, v, h, energy):
+    """Add what drag takes from the fluid's motion in a step that ends with velocities v [J].
+
+    Its power is -(drag force of w = v - u) u.
+    """
     if current is None:
-        return power
+        return energy
+    power, zero = splat(0.0), splat(0.0)
     for node in range(n_nodes(rods)):
         wx, wy = relative(work.current, node, load(v, 2 * node), load(v, 2 * node + 1))
         _, c_speed, _ = drag_slopes(load(rods.drag, node), wx, wy)
@@ -55,4 +58,4 @@ def power_of_current(current, rods, work, v):
         _, (fx, fy), _ = add_cross_flow(rods.cross_drag, rods, work.normals, node, wx, wy, 1.0, 1.0, slopes)
         power = subtract_product(power, fx, load(work.current, 2 * node))
         power = subtract_product(power, fy, load(work.current, 2 * node + 1))
-    return power
+    return add_product(energy, h, power)

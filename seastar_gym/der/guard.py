@@ -23,9 +23,9 @@ over at no such cost.
 """
 
 from seastar_gym.der.actuation import set_natural_hub_angles
-from seastar_gym.der.added_mass import fluid_energy
+from seastar_gym.der.added_mass import add_fluid_energy
 from seastar_gym.der.compilation import kernel
-from seastar_gym.der.energy import edge_of, elastic_energy, hinge_edges, kinetic_energy, load_energy
+from seastar_gym.der.energy import add_load_energy, edge_of, elastic_energy, hinge_edges, kinetic_energy
 from seastar_gym.der.geometry import half_angle
 from seastar_gym.der.lanes import absolute, add_product, any_lane, load, select, splat, sqrt, store
 from seastar_gym.der.newton import larger
@@ -39,13 +39,13 @@ LARGEST_CUT = 0.01  # of the kinetic energy about the rigid motion; where more i
 @kernel
 def potential_energy(rods, work, q):
     """Of limbs, hinges and loads, at the natural hub angles in `work` [J]."""
-    return elastic_energy(rods, work, q) + load_energy(rods.load, q, n_nodes(rods))
+    return add_load_energy(rods.load, q, n_nodes(rods), elastic_energy(rods, work, q))
 
 
 @kernel
 def moving_energy(rods, work, v):
     """Kinetic energy of the robot, and of fluid that moves along at the normals of the last stage [J]."""
-    return kinetic_energy(rods, v) + fluid_energy(work.added_mass, rods, v)
+    return add_fluid_energy(work.added_mass, rods, v, kinetic_energy(rods, v))
 
 
 @kernel

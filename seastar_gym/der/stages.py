@@ -3,7 +3,7 @@
 from seastar_gym.der.actuation import set_natural_hub_angles
 from seastar_gym.der.compilation import kernel
 from seastar_gym.der.damping import freeze_strains
-from seastar_gym.der.fluid import freeze_fluid, power_of_current
+from seastar_gym.der.fluid import add_work_of_current, freeze_fluid
 from seastar_gym.der.geometry import edge_geometry, half_angle
 from seastar_gym.der.guard import LARGEST_CUT, allowed_energy, hold_to_energy, put_back, set_aside, through_poles
 from seastar_gym.der.lanes import add_product, any_lane, floor, load, load_number, select, splat, sqrt, store
@@ -199,7 +199,7 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, war
             end_step(rods, work, scheme, stage, q, v, a, h, accepted)
             if watch:
                 largest_cut = select(patience > MOST_HALVINGS * limits.max_iterations, one, LARGEST_CUT)
-                allowed = add_product(allowed, h, power_of_current(rods.current, rods, work, v))
+                allowed = add_work_of_current(rods.current, rods, work, v, h, allowed)
                 refused, cut = hold_to_energy(rods, work, q, v, h, guarded, allowed, largest_cut)
                 turnable = guarded & (patience <= TURNABLE * limits.max_iterations)
                 refused = refused | through_poles(rods, work, q, turnable)

@@ -21,6 +21,7 @@ from seastar_gym.scene import Scene
 from seastar_gym.simulator import Simulator
 
 COUNTED = "seastar_gym.der"
+KERNELS = Path(seastar_gym.der.__file__).parent
 FLOPS = {"add": 1, "multiply": 1, "fused": 2, "divide": 1, "root": 1}
 """Floating-point operations of what is counted; comparisons, selections, loads and stores are none."""
 
@@ -142,9 +143,8 @@ def _counting_lanes() -> ModuleType:
     return module
 
 
-def _load_counting_modules() -> dict[str, ModuleType]:
+def _load_counting_modules(folder: Path) -> dict[str, ModuleType]:
     """The kernels' modules, executed from their source on counting lanes; the real ones stay as they are."""
-    folder = Path(seastar_gym.der.__file__).parent
     compilation = ModuleType("compilation")
     vars(compilation).update(kernel=lambda function: function, entry_point=lambda function: function)
     names = (
@@ -171,14 +171,14 @@ def _load_counting_modules() -> dict[str, ModuleType]:
                 sys.modules[name] = module_or_none
 
 
-def count_operations(scene: Scene) -> dict[str, Counter[str]]:
-    """Operations of one robot, by part, in the middle of a heating ramp.
+def count_operations(scene: Scene, folder: Path = KERNELS) -> dict[str, Counter[str]]:
+    """Operations of one robot, by part, in the middle of a heating ramp; folder: Where the kernels' source is.
 
     Keys: "hub hinges", "limbs" (assembly and elimination), "ring" (elimination and solution of root nodes and hub),
     "substitution" (and the Newton step), together "iteration"; and "step", what a step costs besides iterations
     (schemes of one stage).
     """
-    modules = _load_counting_modules()
+    modules = _load_counting_modules(folder)
     potential, newton, stages = modules["potential"], modules["newton"], modules["stages"]
     work, rods, scheme, actuation, state, a = _moving_robot(scene, modules)
     h = Counted(scene.numerics.step)
