@@ -8,6 +8,7 @@ from gymnasium.envs.registration import register
 from seastar_gym.actuation.limited import Limited
 from seastar_gym.actuation.measured import MeasuredCurve
 from seastar_gym.actuation.thermal import ThermalSma
+from seastar_gym.contact import Contact
 from seastar_gym.envs.randomization import DomainRandomization, LogUniform, Normal, Uniform
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
@@ -19,6 +20,7 @@ from seastar_gym.simulator import Simulator, SolverStatus, State, StrokeReport
 __version__ = "0.1.0"
 
 __all__ = [
+    "Contact",
     "DomainRandomization",
     "GridCurrent",
     "Limb",

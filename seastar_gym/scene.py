@@ -21,9 +21,11 @@ from seastar_gym.checks import is_finite_number, require_numbers
 from seastar_gym.checks import require_choice as require_choice
 from seastar_gym.checks import require_count as require_count
 from seastar_gym.checks import require_number as require_number
+from seastar_gym.contact import Contact as Contact
 from seastar_gym.der.rods import Limits, Rods
 from seastar_gym.fidelity import cheapest
 from seastar_gym.fluids import Water as Water
+from seastar_gym.morphology.contact import limbs_that_may_touch
 from seastar_gym.morphology.limb import Limb, LimbShape, as_tuple
 from seastar_gym.morphology.seastar import make_rods, n_hub_hinges, natural_hub_angle, rest_positions, turn_per_hinge
 from seastar_gym.per_robot import Numbers, batch_size, chosen, of_robot, require_each
@@ -226,6 +228,7 @@ class Scene:
     held_nodes: Indices of nodes that stay where they are; hub and root node held clamp a limb.
     loads: Dead loads on nodes, (node, F_x, F_y) [N] each.
     limb_strengths: Share of its rotation that every limb still makes, from 0 (failed) to 1; () for all of it.
+    contact: What limbs do to each other where they touch; None lets them pass through each other, as in the chapter.
     """
 
     robot: Seastar = field(default_factory=Seastar)
@@ -235,12 +238,14 @@ class Scene:
     held_nodes: tuple[int, ...] = ()
     loads: tuple[tuple[int, float, float], ...] = ()
     limb_strengths: tuple[float, ...] = ()
+    contact: Contact | None = None
 
     def __post_init__(self) -> None:
         for name, value, kinds in (
             ("robot", self.robot, Seastar),
             ("fluid", self.fluid, Water | None),
             ("numerics", self.numerics, Numerics),
+            ("contact", self.contact, Contact | None),
         ):
             if not isinstance(value, kinds):
                 raise ValueError(f"Scene.{name} must be a {kinds}, not {value!r}.")
@@ -251,6 +256,7 @@ class Scene:
         self._check_hub_hinges()
         self._check_strengths()
         self._check_holds_and_loads()
+        self._check_contact()
         self._check_coefficients()
 
     def _check_strengths(self) -> None:
@@ -268,6 +274,18 @@ class Scene:
                 raise ValueError(f"A load is (node, F_x, F_y) with finite forces [N], not {load!r}.")
         for node in (*self.held_nodes, *(load[0] for load in self.loads)):
             require_count("a held or loaded node", node, 0, self.robot.n_nodes - 1)
+
+    def _check_contact(self) -> None:
+        if self.contact is None:
+            return
+        opening = self.robot.opening_angle
+        if not limbs_that_may_touch(self.robot.limb_shapes()):
+            raise ValueError("No limbs of this robot can touch: use contact=None.")
+        if self.contact.opening_angle >= opening:
+            raise ValueError(
+                f"Limbs that touch at an opening angle of {self.contact.opening_angle:.4g} rad touch at rest, where "
+                f"they are {opening:.4g} rad apart: use a smaller Contact.opening_angle."
+            )
 
     def _check_coefficients(self) -> None:
         """What is finite alone may overflow or vanish together."""
@@ -350,6 +368,7 @@ class Scene:
 
     def _rods(self, choose: Callable[[tuple[float, ...]], float]) -> Rods:
         robot, fluid = chosen(self.robot, choose), None if self.fluid is None else chosen(self.fluid, choose)
+        contact = None if self.contact is None else chosen(self.contact, choose)
         return make_rods(
             limbs=robot.limb_shapes(),
             nodes_per_limb=robot.nodes_per_limb,
@@ -363,4 +382,6 @@ class Scene:
             current=None if fluid is None or fluid.current is None else fluid.current.rows(),
             held_nodes=self.held_nodes,
             loads=self.loads,
+            contact_modulus=None if contact is None else contact.modulus,
+            contact_angle=None if contact is None else contact.opening_angle,
         )

@@ -8,6 +8,7 @@ States are arrays of shape (n_nodes, 2): positions q [m] and velocities v [m/s],
 {2,1}... Gradients have that shape too; Hessians and Jacobians are (2 n_nodes, 2 n_nodes), in the order of (13.1).
 """
 
+import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -606,3 +607,44 @@ def swim(star: Star, command: ArrayLike, n_strokes: int, h: float, scheme: str) 
             q, v = step(star, q, v, t, length, command, scheme)
         path.append(q[0])
     return np.array(path)
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A node near an edge, and the gap between them as a linear function of all coordinates."""
+
+    gradient: Array
+    thickness: float
+    stiffness: float
+
+    def depth(self, ends: Array) -> float:
+        return max(0.0, self.thickness - float(self.gradient @ ends.ravel()))
+
+
+def touches(star: Star, ends: Array, start: Array, opening_angle: float) -> list[Touch]:
+    """Nodes of a limb that meet edges of its neighbours, at `ends`, in a step that began at `start`."""
+    thickness = np.zeros(star.n_nodes)
+    for limb in range(star.n_limbs):
+        for i in range(1, star.nodes_per_limb):
+            thickness[star.node(limb, i)] = min(star.rod_radius, 0.5 * opening_angle * star.edge_length * i)
+    found = []
+    for right in range(star.n_limbs):
+        left = (right + 1) % star.n_limbs
+        for limb, other, side in ((right, left, -1.0), (left, right, 1.0)):
+            for edge, i in itertools.product(range(1, star.nodes_per_limb), range(1, star.nodes_per_limb)):
+                node, tail, head = star.node(limb, i), star.node(other, edge - 1), star.node(other, edge)
+                e, d = ends[head] - ends[tail], ends[node] - ends[tail]
+                normal = side * np.array([-e[1], e[0]]) / np.linalg.norm(e)
+                s = float(d @ e) / float(e @ e)
+                share = min(max(s, 0.0), 1.0)
+                wide = thickness[node] + (1.0 - share) * thickness[tail] + share * thickness[head]
+                o, before = start[head] - start[tail], start[node] - start[tail]
+                began = side * (o[0] * before[1] - o[1] * before[0]) / np.linalg.norm(o)
+                if -0.05 < s < 1.05 and began > -wide:
+                    gradient = np.zeros((star.n_nodes, 2))
+                    gradient[node] += normal
+                    gradient[tail] -= (1.0 - share) * normal
+                    gradient[head] -= share * normal
+                    k = np.pi / 6.0 * star.youngs_modulus * 0.5 * star.voronoi_lengths[node]
+                    found.append(Touch(gradient.ravel(), wide, k))
+    return found

@@ -8,6 +8,8 @@ import oracle
 from oracle import Star
 from seastar_gym import Scene, Seastar, SmaPulse, Water
 from seastar_gym.der.compilation import entry_point
+from seastar_gym.der.contact import freeze_contact
+from seastar_gym.der.coupled import solve_coupled
 from seastar_gym.der.damping import freeze_strains
 from seastar_gym.der.fluid import freeze_fluid
 from seastar_gym.der.lanes import N_LANES, any_lane, borrow, load, splat, store
@@ -17,12 +19,13 @@ from seastar_gym.der.rods import Rods, Stage, make_work
 
 
 @entry_point
-def direction(rods, work, q, gamma, convex, result):
-    """What the terms keep is taken at work.q; the potential and its slopes are those at q."""
+def direction(rods, work, q, q_0, gamma, ahead, convex, result):
+    """What the terms keep is taken at work.q, in a step from q_0; the potential and its slopes are those at q."""
     rods_rows, memory, out = borrow(rods), borrow(work), borrow(result)
     h, mask = splat(gamma), load(borrow(convex), 0) > 0.0
-    stage = Stage(memory.q_hat, memory.v_hat, h, 1.0 / h)
+    stage = Stage(memory.q_hat, memory.v_hat, h, 1.0 / h, ahead)
     freeze_fluid(rods_rows, memory)
+    freeze_contact(rods_rows.contact, rods_rows, memory, stage, borrow(q_0))
     freeze_strains(rods_rows.relaxation_time, rods_rows, memory, memory.q_hat)
     for row in range(q.shape[0]):
         store(memory.q, row, load(borrow(q), row))
@@ -31,9 +34,9 @@ def direction(rods, work, q, gamma, convex, result):
     else:
         phi, decrement, pivot = factorise(rods_rows, memory, stage, None)
     store(out, 0, phi)
-    store(out, 1, decrement)
+    store(out, 1, solve_coupled(rods_rows.contact, rods_rows, memory, decrement))
     store(out, 2, pivot)
-    store(out, 3, take_step(rods_rows, memory, h > 0.0, h < 0.0, splat(1.0)))
+    store(out, 3, take_step(memory.contact, rods_rows, memory, h > 0.0, h < 0.0, splat(1.0)))
 
 
 def robot_and_star(n_limbs=5, nodes_per_limb=10, hub_hinge="opening", fluid=True):
@@ -85,7 +88,7 @@ class RandomStages:
             hessian += star.EI * dl * np.outer(kappa_q, kappa_q)
         return hessian
 
-    def run(self, rods: Rods, convex=0.0, q=None):
+    def run(self, rods: Rods, convex=0.0, q=None, q_0=None, ahead=False):
         """Phi, decrement and pivot per lane, and the Newton direction, shape (N_LANES, n_nodes, 2)."""
         star, q = self.star, self.q if q is None else q
         work = make_work(rods, 1)
@@ -94,8 +97,8 @@ class RandomStages:
         natural = np.array([oracle.natural_angles(star, d)[-star.n_limbs :] for d in self.delta_psi])
         work.hub_EI_kappa_bar[:] = star.EI * 2.0 * np.tan(natural.T / 2.0) / star.edge_length
         result = np.zeros((4, N_LANES))
-        rows = np.ascontiguousarray(q.reshape(N_LANES, -1).T)
-        direction(rods, work, rows, self.gamma, np.full((1, N_LANES), convex), result)
+        rows, rows_0 = (np.ascontiguousarray(x.reshape(N_LANES, -1).T) for x in (q, self.q if q_0 is None else q_0))
+        direction(rods, work, rows, rows_0, self.gamma, ahead, np.full((1, N_LANES), convex), result)
         return SimpleNamespace(
             phi=result[0],
             decrement=result[1],

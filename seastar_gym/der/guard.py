@@ -15,7 +15,8 @@ the scheme's own error.
 
 Schemes of higher order take the energy in the middle of a step and promise no such balance. In a step that had trouble
 they are held to the larger of the energies that the robot standing still has at the step's ends, and what moving the
-natural hub angles alone can store.
+natural hub angles alone can store. What limbs store that press each other, and may get back, counts at the start of all
+steps, and at the end of implicit Euler's: where others look ahead (contact.py), limbs that part get nothing back.
 
 At phi = pi a hinge would store infinite energy, but a Newton step may jump over that pole, and the robot then stays
 folded over itself. Such steps are refused, too, while they are not very short: an edge that collapses turns its hinges
@@ -25,6 +26,7 @@ over at no such cost.
 from seastar_gym.der.actuation import set_natural_hub_angles
 from seastar_gym.der.added_mass import add_fluid_energy
 from seastar_gym.der.compilation import kernel
+from seastar_gym.der.contact import add_contact_energy
 from seastar_gym.der.energy import add_load_energy, edge_of, elastic_energy, hinge_edges, kinetic_energy
 from seastar_gym.der.geometry import half_angle
 from seastar_gym.der.lanes import absolute, add_product, any_lane, load, select, splat, sqrt, store
@@ -95,7 +97,7 @@ def allowed_energy(rods, work, scheme, actuation, start, end, q, v):
     else:
         set_natural_hub_angles(rods, work, actuation, end)
         allowed = potential_energy(rods, work, q)
-    return allowed + moving_energy(rods, work, v)
+    return add_contact_energy(rods.contact, rods, work, q, allowed + moving_energy(rods, work, v))
 
 
 @kernel
@@ -171,7 +173,7 @@ def energy_noise(rods, q, h, mass, potential, kinetic):
 
 
 @kernel
-def hold_to_energy(rods, work, q, v, h, robots, allowed, largest_cut):
+def hold_to_energy(rods, work, scheme, q, v, h, robots, allowed, largest_cut):
     """Hold the robots in the mask to the energy allowed after a step of length h.
 
     largest_cut: Share of the kinetic energy about the rigid motion that may be cut.
@@ -179,6 +181,8 @@ def hold_to_energy(rods, work, q, v, h, robots, allowed, largest_cut):
     Returns (refused, cut): masks of the robots whose step has to be undone, and of those whose velocities were cut.
     """
     potential, kinetic = potential_energy(rods, work, q), moving_energy(rods, work, v)
+    if scheme.dissipative:
+        potential = add_contact_energy(rods.contact, rods, work, q, potential)
     grown = robots & (potential + kinetic > add_product(allowed, ROUNDING, kinetic))
     cut = grown & ~grown
     if any_lane(grown):

@@ -242,6 +242,19 @@ def load_number(typing_context, rows, row):
 
 
 @intrinsic
+def store_number(typing_context, rows, row, value):
+    """Write a plain number to row `row` of shared rows."""
+    if not (isinstance(rows, Rows) and rows.shared and isinstance(row, types.Integer)):
+        return None
+
+    def codegen(context, builder, sig, args):
+        builder.store(args[2], builder.gep(args[0], [args[1]]))
+        return context.get_dummy_value()
+
+    return types.void(rows, types.intp, types.float64), codegen
+
+
+@intrinsic
 def load_at(typing_context, rows, row):
     """From shared rows, for every robot the number at its own row (lanes, whole numbers)."""
     if not (isinstance(rows, Rows) and rows.shared and row == lanes):

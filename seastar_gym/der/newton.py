@@ -5,8 +5,11 @@ is frozen by a mask, and nothing that one robot needs (a repair, a shorter step)
 """
 
 from seastar_gym.der.compilation import kernel
+from seastar_gym.der.contact import touching_robots
+from seastar_gym.der.coupled import solve_coupled
 from seastar_gym.der.lanes import absolute, add_product, any_lane, load, select, splat, sqrt
 from seastar_gym.der.potential import factorise
+from seastar_gym.der.rods import n_nodes
 from seastar_gym.der.star_matrix import load_pair, store_pair, substitute_node
 
 SUFFICIENT_DECREASE = 1e-4  # Armijo's constant
@@ -49,19 +52,21 @@ def minimise(rods, work, stage, active, tolerance, patience):
             convex = convex | indefinite
             repairs += select(indefinite, one, zero)
             continue
+        decrement = solve_coupled(rods.contact, rods, work, decrement)
         stepping = running & low_enough & (pivot > 0.0)
         shortening = running & ~low_enough & (fraction > SHORTEST_STEP) & (iterations > 0.0)
         fraction = select(stepping, one, select(shortening, 0.5 * fraction, fraction))
         if any_lane(shortening):
-            move = take_step(rods, work, stepping, shortening, fraction)
+            move = take_step(work.contact, rods, work, stepping, shortening, fraction)
         else:
-            move = take_step(rods, work, stepping, None, fraction)
+            move = take_step(work.contact, rods, work, stepping, None, fraction)
         best = select(stepping, phi, best)
         expected = select(stepping, decrement, expected)
         count = select(stepping, one, zero)
         iterations += count
         backtracks += select(shortening, one, zero)
         easy = (repairs + backtracks <= 0.0) & (iterations <= EASY) & (phi <= load(rods.calm, 0))
+        easy = easy & ~touching_robots(work.contact)
         late = select(iterations < EASY, one, LATE)
         foreseen = late * move * move <= tolerance * quadratic_length
         foreseen = easy & foreseen & (largest_hub_t(rods, work) < FORESEEABLE_T)
@@ -93,7 +98,7 @@ def largest_hub_t(rods, work):
 
 
 @kernel
-def take_step(rods, work, stepping, shortening, fraction):
+def take_step(contact, rods, work, stepping, shortening, fraction):
     """Substitute, and move q by the whole new Newton step where `stepping`, back by half the last where `shortening`.
 
     shortening: None if no robot's step is to be shortened.
@@ -102,6 +107,8 @@ def take_step(rods, work, stepping, shortening, fraction):
     """
     edges = rods.nodes_per_limb - 1
     scale = select(stepping, splat(1.0), select(shortening, -fraction, 0.0))
+    if contact is not None:
+        return take_coupled_step(contact, rods, work, shortening, scale)
     hub = load_pair(work.root_solution, 2 * rods.n_limbs)
     largest = move_node(work, 0, hub, shortening, scale)
     for limb in range(rods.n_limbs):
@@ -111,6 +118,15 @@ def take_step(rods, work, stepping, shortening, fraction):
         for i in range(2, edges + 1):
             before, here = here, substitute_node(work, first + i, here[0], here[1], before[0], before[1])
             largest = larger(largest, move_node(work, first + i, here, shortening, scale))
+    return sqrt(largest)
+
+
+@kernel
+def take_coupled_step(contact, rods, work, shortening, scale):
+    """What take_step does where the step of all nodes is known already, see coupled.py."""
+    largest = splat(0.0)
+    for node in range(n_nodes(rods)):
+        largest = larger(largest, move_node(work, node, load_pair(contact.x, 2 * node), shortening, scale))
     return sqrt(largest)
 
 

@@ -29,6 +29,7 @@ import numpy as np
 from seastar_gym.der.added_mass import add_fluid_inertia
 from seastar_gym.der.bending import bending_energy, bending_slopes, moment
 from seastar_gym.der.compilation import kernel
+from seastar_gym.der.contact import add_contact, contact_force
 from seastar_gym.der.damping import damped_energy, damped_stiffness, damped_stress
 from seastar_gym.der.drag import add_cross_flow, drag_slopes, relative
 from seastar_gym.der.geometry import EDGE_ROWS, edge_geometry, half_angle
@@ -133,11 +134,15 @@ def node_slopes(rods, work, stage, node):
     sx, sy = c_over_speed * wx, c_over_speed * wy
     diagonal = (m_over_gamma + c_speed) * stage.inverse_gamma
     Fx, Fy = nodal_load(rods.load, node)
+    push_x, push_y = contact_force(work.contact, node)
     slopes = (
         add_product(
             0.5 * m * add_product(dx * dx, dy, dy), stage.gamma, potential - load_power(rods.load, node, vx, vy)
         ),
-        (add_product(c_speed * wx, m_over_gamma, dx) - Fx, add_product(c_speed * wy, m_over_gamma, dy) - Fy),
+        (
+            add_product(c_speed * wx, m_over_gamma, dx) - Fx - push_x,
+            add_product(c_speed * wy, m_over_gamma, dy) - Fy - push_y,
+        ),
         (add_product(diagonal, sx, wx), sx * wy, add_product(diagonal, sy, wy)),
     )
     slopes = add_fluid_inertia(work.added_mass, node, dx, dy, stage.inverse_gamma, slopes)
@@ -277,7 +282,7 @@ def factorise(rods, work, stage, convex):
     Returns (Phi, decrement, pivot): the potential [J], gradient^T Hessian^-1 gradient [J], and the smallest pivot,
     which is not positive (or NaN) where the Hessian is not positive definite.
     """
-    energy = assemble_hub_hinges(rods, work, stage, convex)
+    energy = add_contact(rods.contact, rods, work, stage, assemble_hub_hinges(rods, work, stage, convex))
     E_n, r_hub, D_hub = node_slopes(rods, work, stage, 0)
     energy += E_n
     decrement, pivot = splat(0.0), splat(np.inf)

@@ -22,6 +22,55 @@ from seastar_gym.der.lanes import N_LANES
 from seastar_gym.der.star_matrix import NODE_ROWS, RING_ROWS, ROOT_ROWS
 
 CACHE_LINE = 64  # bytes
+SHARED = ("velocities", "pairs")  # by all robots
+
+
+SLOT_ROWS = 6
+N_X, N_Y, SHARE, OFFSET, THICKNESS, STIFFNESS = range(SLOT_ROWS)
+"""Rows of a listed pair of node and edge, see contact.py."""
+
+
+MOST_NEAR_EDGES = 3
+"""Of another limb that a node of a long chain can be near to, in the mean over the nodes."""
+
+
+class Contact(NamedTuple):
+    """Who may touch whom, see contact.py.
+
+    n_pairs, pairs: Limbs that may touch, (right, left) each, counted from 0, shape (2 n_pairs,), for all robots.
+    thickness: Distance from the centre line at which a node is touched [m]. widest: Twice the largest [m].
+    stiffness: Of a touched node [N/m].
+    """
+
+    n_pairs: int
+    pairs: np.ndarray
+    thickness: np.ndarray
+    widest: np.ndarray
+    stiffness: np.ndarray
+
+
+class ContactWork(NamedTuple):
+    """Memory of contact; rows per coordinate but for `listed`, `missed`, `touching` and `slots`.
+
+    capacity: Pairs of node and edge that can be listed. listed: How many are, then node and edge of each, shared.
+    slots: SLOT_ROWS of each. missed, touching: 1 for robots whose neighbours did not all fit in, and that touch.
+    ends: Positions at the end of the step [m]. force: Of contact [N].
+    x, r, z, p, Hp, w: See coupled.py.
+    """
+
+    capacity: int
+    listed: np.ndarray
+    slots: np.ndarray
+    missed: np.ndarray
+    touching: np.ndarray
+    ends: np.ndarray
+    force: np.ndarray
+    x: np.ndarray
+    r: np.ndarray
+    z: np.ndarray
+    p: np.ndarray
+    Hp: np.ndarray
+    w: np.ndarray
 
 
 class Rods(NamedTuple):
@@ -43,6 +92,7 @@ class Rods(NamedTuple):
     relaxation_time: tau of material damping [s], one row, or None; see damping.py.
     current: How the fluid moves, or None; see current.py.
     load: Dead load per coordinate [N], or None.
+    contact: Who may touch whom, or None; see contact.py.
     shortest_edge: Smallest natural length of an edge [m].
     curvature_rate: How fast Newton's foreseeable_length shrinks with the step [1/s^2], see newton.py.
     calm: Potential [J] up to which Newton steps can be foreseen, see newton.py.
@@ -66,6 +116,7 @@ class Rods(NamedTuple):
     relaxation_time: np.ndarray | None
     current: Current | None
     load: np.ndarray | None
+    contact: Contact | None
     shortest_edge: np.ndarray
     curvature_rate: np.ndarray
     calm: np.ndarray
@@ -87,13 +138,13 @@ def n_nodes(rods):
 def side_by_side(robots: Sequence[Any]) -> Any:
     """Bundles of shared rows, one for each of N_LANES robots, as one bundle of rows of shape (rows, N_LANES).
 
-    Samples on a grid, which are not read by row, stay shared.
+    What is not read by row stays shared: samples on a grid, limbs that may touch.
     """
     first = robots[0]
     columns = {name: [getattr(robot, name) for robot in robots] for name in first._fields}
     joined = {}
     for name, column in columns.items():
-        if isinstance(column[0], np.ndarray) and name != "velocities":
+        if isinstance(column[0], np.ndarray) and name not in SHARED:
             joined[name] = np.stack(column, axis=1)
         elif hasattr(column[0], "_fields"):
             joined[name] = side_by_side(column)
@@ -124,6 +175,8 @@ class Work(NamedTuple):
     normals: Unit normals of the edges where a stage began, or None in scenes that need none; see fluid.py.
     current: Velocity of the fluid at every node there [m/s], or None.
     added_mass: Mass of fluid at every node there, xx, xy, yy [kg], or None.
+    pivots, root_pivots: For solutions of other right-hand sides, see star_solution.py, or None without contact.
+    contact: Memory of contact, or None.
     tension, bending: EA eps [N] and EI kappa [N m] of edges and hinges where a stage began, or None without damping.
     """
 
@@ -145,17 +198,24 @@ class Work(NamedTuple):
     normals: np.ndarray | None
     current: np.ndarray | None
     added_mass: np.ndarray | None
+    pivots: np.ndarray | None
+    root_pivots: np.ndarray | None
+    contact: ContactWork | None
     tension: np.ndarray | None
     bending: np.ndarray | None
 
 
 class Stage(NamedTuple):
-    """An implicit stage: q_hat [m] and v_hat [m/s], rows per coordinate, gamma [s] and its reciprocal, lanes."""
+    """An implicit stage: q_hat [m] and v_hat [m/s], rows per coordinate, gamma [s] and its reciprocal, lanes.
+
+    ahead: Whether the scheme asks in the middle of a step, so that contact has to look ahead, see contact.py.
+    """
 
     q_hat: Any
     v_hat: Any
     gamma: Any
     inverse_gamma: Any
+    ahead: bool
 
 
 class Limits(NamedTuple):
@@ -232,6 +292,37 @@ def make_work(rods: Rods, n_stages: int) -> Work:
         normals=None if rods.cross_drag is None and rods.added_mass is None else rows(2 * n_nodes),
         current=None if rods.current is None else rows(2 * n_nodes),
         added_mass=None if rods.added_mass is None else rows(3 * n_nodes),
+        pivots=None if rods.contact is None else rows(2 * n_nodes),
+        root_pivots=None if rods.contact is None else rows(2 * (n_limbs + 1)),
+        contact=None if rods.contact is None else make_contact_work(rods, rods.contact),
         tension=None if rods.relaxation_time is None else rows(n_edges),
         bending=None if rods.relaxation_time is None else rows(n_edges),
+    )
+
+
+def make_contact_work(rods: Rods, contact: Contact) -> ContactWork:
+    """Zeroed memory for the contact of one lane group.
+
+    Every node of a pair of limbs may be near every edge; in long chains few are, in any of the robots of a group.
+    """
+    edges = rods.nodes_per_limb - 1
+    capacity = 2 * contact.n_pairs * edges * min(edges, MOST_NEAR_EDGES * N_LANES)
+
+    def rows(count: int = 2 * (rods.n_limbs * edges + 1)) -> np.ndarray:
+        return aligned_rows(count, N_LANES)
+
+    return ContactWork(
+        capacity=capacity,
+        listed=aligned_rows(2 * capacity + 1),
+        slots=rows(SLOT_ROWS * capacity),
+        missed=rows(1),
+        touching=rows(1),
+        ends=rows(),
+        force=rows(),
+        x=rows(),
+        r=rows(),
+        z=rows(),
+        p=rows(),
+        Hp=rows(),
+        w=rows(),
     )

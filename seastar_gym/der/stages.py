@@ -2,6 +2,7 @@
 
 from seastar_gym.der.actuation import set_natural_hub_angles
 from seastar_gym.der.compilation import kernel
+from seastar_gym.der.contact import freeze_contact, missed_robots
 from seastar_gym.der.damping import freeze_strains
 from seastar_gym.der.fluid import add_work_of_current, freeze_fluid
 from seastar_gym.der.geometry import edge_geometry, half_angle
@@ -59,8 +60,8 @@ def begin_stage(rods, work, scheme, k, q_0, v_0, a, h):
         velocity = add_product(v_hat, share, load(a, k * rows + row))
         store(work.q, row, add_product(q_hat, gamma, velocity))
     if k > 0:
-        return Stage(work.q_hat, work.v_hat, gamma, 1.0 / gamma)
-    return Stage(q_0, v_0, gamma, 1.0 / gamma)
+        return Stage(work.q_hat, work.v_hat, gamma, 1.0 / gamma, not scheme.stiffly_accurate)
+    return Stage(q_0, v_0, gamma, 1.0 / gamma, not scheme.stiffly_accurate)
 
 
 @kernel
@@ -174,9 +175,11 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, war
         if any_lane(wary):
             start_standing(rods, work, stage, wary)
         freeze_fluid(rods, work)
+        freeze_contact(rods.contact, rods, work, stage, q)
         freeze_strains(rods.relaxation_time, rods, work, stage.q_hat)
         set_natural_hub_angles(rods, work, actuation, start + load_number(scheme.c, k) * size)
         good, phi, iterations, repairs, backtracks = minimise(rods, work, stage, good, tolerance, patience)
+        good = good & ~missed_robots(work.contact)
         trouble = trouble | (repairs + backtracks > 0.0)
         if scheme.dissipative:
             trouble = trouble | (phi > load(rods.damped, 0))
@@ -200,7 +203,7 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, war
             if watch:
                 largest_cut = select(patience > MOST_HALVINGS * limits.max_iterations, one, LARGEST_CUT)
                 allowed = add_work_of_current(rods.current, rods, work, v, h, allowed)
-                refused, cut = hold_to_energy(rods, work, q, v, h, guarded, allowed, largest_cut)
+                refused, cut = hold_to_energy(rods, work, scheme, q, v, h, guarded, allowed, largest_cut)
                 turnable = guarded & (patience <= TURNABLE * limits.max_iterations)
                 refused = refused | through_poles(rods, work, q, turnable)
                 if any_lane(refused):

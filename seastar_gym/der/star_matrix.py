@@ -37,6 +37,14 @@ def pivots(D, r):
 
 
 @kernel
+def keep_pivots(kept, slot, inverse_x, inverse_y):
+    """Keep 1/d_x and 1/d_y of a node for `solve_again`, in scenes that need it (None in others)."""
+    if kept is None:
+        return
+    store_pair(kept, 2 * slot, (inverse_x, inverse_y))
+
+
+@kernel
 def less_symmetric(D, x0, y0, u0, w0, x1, y1, u1, w1):
     """D less the Schur complement of the columns 0 and 1; D is their symmetric block."""
     return (
@@ -81,6 +89,7 @@ def eliminate_node(work, node, D, B, C, r, D_1, B_1, D_2, r_1, r_2):
     xa, xb, xc, xd = B[0] * inverse_x, B[1] * inverse_x, C[0] * inverse_x, C[1] * inverse_x
     ya, yb, yc, yd = wa * inverse_y, wb * inverse_y, wc * inverse_y, wd * inverse_y
     zx, zy = r[0] * inverse_x, wr * inverse_y
+    keep_pivots(work.pivots, node, inverse_x, inverse_y)
     row = NODE_ROWS * node
     store(work.factors, row, lower)
     store(work.factors, row + 1, xa)
@@ -163,6 +172,7 @@ def eliminate_root(work, root, D, N, E, H, r, D_next, H_next, r_next, D_last, H_
         wa * inverse_y, wb * inverse_y, wc * inverse_y, wd * inverse_y, we * inverse_y, wf * inverse_y,
     )  # fmt: skip
     zx, zy = r[0] * inverse_x, wr * inverse_y
+    keep_pivots(work.root_pivots, root, inverse_x, inverse_y)
     left = (lower, xa, xb, xc, xd, xe, xf, ya, yb, yc, yd, ye, yf, zx, zy)
     for k in range(ROOT_ROWS):
         store(work.root_factors, row + k, left[k])
@@ -304,19 +314,27 @@ def solve_ring(work, n_limbs, D_hub, r_hub):
     decrement += part
     pivot = smaller(pivot, root_pivot)
     inverse_x, lower, inverse_y, wr, root_pivot = pivots(D_hub, r_hub)
+    keep_pivots(work.root_pivots, last, inverse_x, inverse_y)
+    keep_pivots(work.root_pivots, n_limbs, lower, lower)
     y = wr * inverse_y
     x = subtract_product(r_hub[0] * inverse_x, lower, y)
     decrement += add_product(r_hub[0] * r_hub[0] * inverse_x, y, wr)
-    hub = (x, y)
-    of_last = substitute_node(work, 1, x, y, zero, zero)
-    following = substitute_node(work, 0, of_last[0], of_last[1], x, y)
+    substitute_ring(work, n_limbs, (x, y))
+    return decrement, smaller(pivot, root_pivot)
+
+
+@kernel
+def substitute_ring(work, n_limbs, hub):
+    """Solution of the hub, given, and of the ring of root nodes, into work.root_solution."""
+    last, zero = n_limbs - 1, splat(0.0)
+    of_last = substitute_node(work, 1, hub[0], hub[1], zero, zero)
+    following = substitute_node(work, 0, of_last[0], of_last[1], hub[0], hub[1])
     store_pair(work.root_solution, 2 * n_limbs, hub)
     store_pair(work.root_solution, 2 * last, of_last)
     store_pair(work.root_solution, 2 * last - 2, following)
     for root in range(last - 2, -1, -1):
         following = substitute_root(work, root, following, of_last, hub)
         store_pair(work.root_solution, 2 * root, following)
-    return decrement, smaller(pivot, root_pivot)
 
 
 @kernel

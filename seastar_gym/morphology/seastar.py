@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from seastar_gym.der.current import Current
 from seastar_gym.der.rods import Rods
 from seastar_gym.morphology import fluid
+from seastar_gym.morphology.contact import contact
 from seastar_gym.morphology.limb import LimbShape, along
 from seastar_gym.morphology.mesh import Mesh, edges_along, make_mesh, mean, nodes_along
 
@@ -68,6 +69,8 @@ def make_rods(
     current: Current | None = None,
     held_nodes: tuple[int, ...] = (),
     loads: tuple[tuple[int, float, float], ...] = (),
+    contact_modulus: float | None = None,
+    contact_angle: float | None = None,
 ) -> Rods:
     """Coefficients of the seastar in a fluid (density or drag coefficient zero: vacuum); SI units.
 
@@ -75,6 +78,7 @@ def make_rods(
     every root edge, with the mean of the profiles there.
 
     held_nodes: Nodes that stay where they are. loads: Dead loads (node, F_x, F_y) [N].
+    contact_modulus, contact_angle: See seastar_gym/contact.py; without an angle (None) there is no contact.
     """
     mesh = make_mesh(limbs, nodes_per_limb)
     n_limbs, l = len(limbs), mesh.l  # noqa: E741
@@ -113,6 +117,7 @@ def make_rods(
         relaxation_time=None if relaxation_time is None else np.array([relaxation_time]),
         current=current,
         load=forces.reshape(-1) if loads else None,
+        contact=None if contact_angle is None else contact(limbs, mesh, contact_modulus, contact_angle),
         shortest_edge=np.array([shortest]),
         curvature_rate=np.array([stiffest / (density * shortest**2) * slenderness]),
         calm=np.array([calm]),

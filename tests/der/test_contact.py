@@ -1,0 +1,74 @@
+"""Contact between limbs against the dense oracle: who touches whom, energy, forces, and the step with the Hessian."""
+
+import numpy as np
+import pytest
+
+import oracle
+from oracle import Star
+from seastar_gym import Contact, Scene, SmaPulse
+from seastar_gym.der.lanes import N_LANES
+from stages import RandomStages, robot_and_star
+
+ANGLE = 0.3
+
+
+def scene(robot):
+    return Scene(robot=robot, actuator=SmaPulse(peak_angle=0.1), contact=Contact(opening_angle=ANGLE))
+
+
+def folded(star: Star, stages: RandomStages, turn: float) -> np.ndarray:
+    """The stages' positions with every limb turned about the hub by `turn`, alternating in sign: neighbours meet."""
+    q = stages.q.copy()
+    for limb in range(star.n_limbs):
+        nodes = [star.node(limb, i) for i in range(1, star.nodes_per_limb)]
+        # Of an odd number the last limb meets the first, in the order of elimination the ends of the ring.
+        angle = turn if (limb + star.n_limbs % 2) % star.n_limbs % 2 == 0 else -turn
+        rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        q[:, nodes] = q[:, :1] + (q[:, nodes] - q[:, :1]) @ rotation.T
+    return q
+
+
+def touching_stages(n_limbs: int, nodes_per_limb: int, seed: int = 0, turn_share: float = 0.9):
+    robot, star = robot_and_star(n_limbs, nodes_per_limb)
+    stages = RandomStages(star, 2e-4, bend=0.05, speed=0.05, seed=seed)
+    stages.q = folded(star, stages, turn_share * np.pi / n_limbs)
+    stages.q_hat = folded(star, stages, 0.0) - 1e-4 * np.random.default_rng(seed).standard_normal(stages.q.shape)
+    stages.frozen = stages.q + 2e-4 * np.random.default_rng(seed + 1).standard_normal(stages.q.shape)
+    return robot, star, stages
+
+
+def of_lane(star, stages, lane, ahead):
+    """(depths, gradients, stiffnesses) of the touches of a lane at its q, as the oracle has them."""
+    q_hat, v_hat = stages.q_hat[lane], stages.v_hat[lane]
+
+    def looked_at(q):
+        return q_hat + 4.0 * (q - q_hat) - stages.gamma * v_hat if ahead else q
+
+    found = oracle.touches(star, looked_at(stages.frozen[lane]), stages.q[lane], ANGLE)
+    depths = np.array([touch.depth(looked_at(stages.q[lane])) for touch in found])
+    return depths, np.array([touch.gradient for touch in found]), np.array([touch.stiffness for touch in found])
+
+
+@pytest.mark.parametrize("ahead", [False, True])
+@pytest.mark.parametrize(("n_limbs", "nodes_per_limb"), [(5, 10), (5, 4), (3, 9), (6, 6), (8, 7)])
+def test_energy_forces_and_step_are_the_oracles(n_limbs, nodes_per_limb, ahead):
+    robot, star, stages = touching_stages(n_limbs, nodes_per_limb)
+    found = stages.run(scene(robot).rods(), ahead=ahead)
+    touched, lead = 0, 4.0 if ahead else 1.0
+    for lane in range(N_LANES):
+        depths, gradients, stiffnesses = of_lane(star, stages, lane, ahead)
+        touched += int((depths > 0.0).sum())
+        q_hat, v_hat, gamma, delta_psi, frozen = stages.data(lane)
+        phi = oracle.incremental_potential(star, stages.q[lane], q_hat, v_hat, gamma, delta_psi, frozen)
+        gradient = oracle.incremental_gradient(star, stages.q[lane], q_hat, v_hat, gamma, delta_psi, frozen).ravel()
+        phi += 0.5 / lead * stiffnesses @ depths**2
+        gradient = gradient - (stiffnesses * depths) @ gradients
+        active = gradients[depths > 0.0]
+        hessian = stages.hessian(lane) + lead * (active.T * stiffnesses[depths > 0.0]) @ active
+        np.testing.assert_allclose(found.phi[lane], phi, rtol=1e-9)
+        if found.pivot[lane] > 0.0:
+            step = np.linalg.solve(hessian, gradient)
+            np.testing.assert_allclose(found.direction[lane].ravel(), step, atol=3e-4 * np.abs(step).max())
+            np.testing.assert_allclose(found.decrement[lane], gradient @ step, rtol=1e-5)
+    assert touched > 6
+    assert (found.pivot > 0.0).sum() >= N_LANES // 2

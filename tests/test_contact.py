@@ -1,0 +1,209 @@
+"""Limbs that meet: they do not cross, push each other alike, and come to rest where statics says."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from refusals import assert_refused
+from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
+
+COMMANDS = np.array(list(itertools.product([-1.0, 0.0, 1.0], repeat=5)))
+CLOSING = COMMANDS[((COMMANDS == 1.0) & (np.roll(COMMANDS, -1, axis=1) == -1.0)).any(axis=1)]
+"""Commands that turn neighbours towards each other."""
+
+
+def cross(a, b):
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def crossings(positions: np.ndarray, n_limbs: int = 5) -> np.ndarray:
+    """Pairs of edges of different limbs that cross, per robot."""
+    n_robots = len(positions)
+    limbs = positions[:, 1:].reshape(n_robots, n_limbs, -1, 2)
+    limbs = np.concatenate([np.broadcast_to(positions[:, None, :1], (n_robots, n_limbs, 1, 2)), limbs], axis=2)
+    count = np.zeros(n_robots, dtype=int)
+    for a, b in itertools.combinations(range(n_limbs), 2):
+        tail, head = limbs[:, a, :-1, None], limbs[:, a, 1:, None]
+        other_tail, other_head = limbs[:, b, None, :-1], limbs[:, b, None, 1:]
+        e, o = head - tail, other_head - other_tail
+        parted = cross(e, other_tail - tail) * cross(e, other_head - tail) < 0.0
+        other_parted = cross(o, tail - other_tail) * cross(o, head - other_tail) < 0.0
+        count += (parted & other_parted).sum(axis=(1, 2))
+    return count
+
+
+def crossed_on_the_way(simulator: Simulator, commands: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray]:
+    """(robots that crossed at some time of a stroke, status)."""
+    crossed = np.zeros(simulator.n_robots, dtype=bool)
+    stroke = simulator.stroke_in_parts(commands, parts)
+    while True:
+        try:
+            next(stroke)
+        except StopIteration as end:
+            return crossed, end.value.status
+        crossed |= crossings(simulator.positions) > 0
+
+
+def worst_commands(rng: np.random.Generator) -> np.ndarray:
+    """Every closing command, and as many drawn among them: the former are repeated, the latter follow each other."""
+    return np.concatenate([CLOSING, CLOSING[rng.integers(len(CLOSING), size=len(CLOSING))]])
+
+
+def test_limbs_cross_without_contact():
+    """What the other tests are for."""
+    simulator = Simulator(Scene(numerics=Numerics.preset("balanced")), len(CLOSING))
+    crossed, _ = crossed_on_the_way(simulator, CLOSING, 40)
+    assert crossed.sum() >= 10
+
+
+@pytest.mark.parametrize("fidelity", ["fast", "balanced", "chapter"])
+def test_no_crossing_by_the_worst_commands(fidelity):
+    rng = np.random.default_rng(0)
+    simulator = Simulator(Scene(numerics=Numerics.preset(fidelity), contact=Contact()), 2 * len(CLOSING))
+    for _ in range(4):
+        crossed, status = crossed_on_the_way(simulator, worst_commands(rng), 40)
+        assert not crossed.any()
+        assert (status == 0).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fidelity", ["fast", "balanced"])
+def test_no_crossing_in_a_thousand_strokes(fidelity):
+    rng = np.random.default_rng(1)
+    simulator = Simulator(Scene(numerics=Numerics.preset(fidelity), contact=Contact()), 2 * len(CLOSING))
+    for _ in range(1000):
+        crossed, status = crossed_on_the_way(simulator, worst_commands(rng), 10)
+        assert not crossed.any()
+        assert (status == 0).all()
+
+
+def test_limbs_that_do_not_meet_swim_as_without_contact():
+    straight = np.tile([0.0, 1.0, 0.0, 0.0, -1.0], (2, 1))
+    ends = []
+    for contact in (None, Contact()):
+        simulator = Simulator(Scene(contact=contact), 2)
+        for _ in range(3):
+            simulator.stroke(straight)
+        ends.append(simulator.positions)
+    np.testing.assert_array_equal(*ends)
+
+
+def test_a_robot_swims_alike_in_any_company():
+    """Who else is in its lane group, and what they touch, changes no bit."""
+    scene = Scene(numerics=Numerics.preset("balanced"), contact=Contact())
+    together = Simulator(scene, len(CLOSING), threads=2)
+    together.stroke(CLOSING)
+    for robot in (0, 17, 61, len(CLOSING) - 1):
+        alone = Simulator(scene, 1)
+        alone.stroke(CLOSING[robot : robot + 1])
+        np.testing.assert_array_equal(alone.positions[0], together.positions[robot])
+
+
+def test_moduli_of_each_robot():
+    scene = Scene(contact=Contact(modulus=np.array([1e4, 1e6])))
+    both = Simulator(scene, 2)
+    both.stroke(np.tile(CLOSING[5], (2, 1)))
+    for robot, modulus in enumerate((1e4, 1e6)):
+        alone = Simulator(Scene(contact=Contact(modulus=modulus)), 1)
+        alone.stroke(CLOSING[5:6])
+        np.testing.assert_array_equal(alone.positions[0], both.positions[robot])
+    assert (both.positions[0] != both.positions[1]).any()
+
+
+@pytest.mark.parametrize("scheme", ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"])
+def test_limbs_push_each_other_alike(scheme):
+    """In vacuum nothing but actuators and contact acts, so the momentum stays."""
+    scene = Scene(fluid=None, numerics=Numerics(scheme, 2e-3, newton_tolerance=1e-10), contact=Contact())
+    simulator = Simulator(scene, 1)
+    masses = scene.rods().mass
+    for _ in simulator.stroke_in_parts(np.array([[1.0, -1.0, 0.0, 0.0, 0.0]]), 100):
+        momentum = masses @ simulator.velocities[0]
+        assert np.abs(momentum).max() < 1e-11 * masses.sum()
+
+
+def test_pressed_limbs_rest_where_statics_says():
+    """All nodes are held but the tip of limb 1, and a load presses it against limb 2.
+
+    Tip and edge overlap by (F - k_b w)/k, w the way of the tip and k_b its stiffness against bending of the last hinge;
+    either tip meets the other's last edge nearly at its end.
+    """
+    gap = 0.034
+    robot = Seastar(n_limbs=2, limbs=(Limb(direction=0.0), Limb(direction=gap)))
+    tip, other_tip = robot.nodes_per_limb - 1, 2 * (robot.nodes_per_limb - 1)
+    nodes = robot.nodes()
+    push = np.array([-np.sin(gap), np.cos(gap)])
+    force = 0.02
+    scene = Scene(
+        robot=robot,
+        actuator=SmaPulse(peak_angle=0.0),
+        numerics=Numerics(step=20e-3, newton_tolerance=1e-10),
+        held_nodes=tuple(node for node in range(robot.n_nodes) if node != tip),
+        loads=((tip, *(force * push)),),
+        contact=Contact(opening_angle=0.0335),
+    )
+    simulator = Simulator(scene, 1)
+    for _ in range(3):
+        simulator.stroke(np.zeros((1, 2)))
+    rods = scene.rods()
+    way = (simulator.positions[0, tip] - nodes[tip]) @ push
+    depth = 2.0 * robot.rod_radius - (nodes[other_tip] - simulator.positions[0, tip]) @ push
+    bending = float(rods.EI_over_dl[tip - 1]) / robot.edge_length**2
+    pressure = force - bending * way
+    assert way > 1e-5
+    assert depth == pytest.approx(pressure / (2.0 * rods.contact.stiffness[tip]), rel=0.05)
+
+
+def test_schemes_agree_on_limbs_that_meet():
+    """Contact is inelastic and of first order with every scheme: with shorter steps they come together."""
+
+    def swim(scheme, step):
+        simulator = Simulator(Scene(numerics=Numerics(scheme, step), contact=Contact()), 1)
+        for _ in range(2):
+            simulator.stroke(np.array([[1.0, -1.0, 0.0, 0.0, 0.0]]))
+        return simulator.hub_position()[0]
+
+    coarse = swim("sdirk2", 5e-3) - swim("implicit-midpoint", 5e-3)
+    fine = swim("sdirk2", 5e-4) - swim("implicit-midpoint", 5e-4)
+    assert np.linalg.norm(fine) < 0.5 * np.linalg.norm(coarse)
+    assert np.linalg.norm(fine) < 0.02 * np.linalg.norm(swim("sdirk2", 5e-4))
+
+
+def test_a_long_limb_meets_one_beyond_its_neighbour():
+    """Where lengths differ, every pair may touch: limbs 1 and 3 reach over a short limb 2."""
+    limbs = (Limb(), Limb(length=0.03), Limb(), Limb(), Limb())
+    rods = Scene(robot=Seastar(limbs=limbs), contact=Contact()).rods()
+    pairs = {tuple(pair) for pair in rods.contact.pairs.reshape(-1, 2).astype(int).tolist()}
+    assert {(0, 1), (0, 2), (4, 1)} <= pairs
+    assert len(Scene(contact=Contact()).rods().contact.pairs) == 10
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda: Contact(modulus=0.0), "modulus"),
+        (lambda: Contact(modulus=np.nan), "modulus"),
+        (lambda: Contact(opening_angle=-0.1), "opening_angle"),
+        (lambda: Scene(contact=True), "contact"),
+        (lambda: Scene(contact=Contact(opening_angle=1.3)), "touch at rest"),
+        (lambda: Scene(robot=Seastar(n_limbs=1), actuator=SmaPulse(peak_angle=0.0), contact=Contact()), "touch"),
+    ],
+)
+def test_bad_contact_is_refused_in_one_sentence(make, sentence):
+    with assert_refused(sentence):
+        make()
+
+
+@pytest.mark.slow
+def test_contact_beside_other_terms():
+    """Added mass, drag along limbs, damping and a current are terms beside it; nothing fails."""
+    scene = Scene(
+        robot=Seastar(relaxation_time=1.6e-3),
+        fluid=Water(tangential_drag_coefficient=0.1, added_mass_coefficient=1.0),
+        numerics=Numerics.preset("balanced"),
+        contact=Contact(),
+    )
+    simulator = Simulator(scene, len(CLOSING))
+    crossed, status = crossed_on_the_way(simulator, CLOSING, 20)
+    assert not crossed.any()
+    assert (status == 0).all()
