@@ -95,6 +95,8 @@ class Simulator:
         self._rotations = np.zeros((n_groups, n_limbs, N_LANES))  # of the limbs by their actuators, now [rad]
         self._failed = np.zeros((n_groups, 1, N_LANES))  # SolverStatus
         self._report = np.zeros((n_groups, len(REPORT_ROWS), N_LANES))
+        self._held_rows = np.array([2 * node + axis for node in scene.held_nodes for axis in (0, 1)], dtype=int)
+        self._held = self.q[:, self._held_rows]  # coordinates of held nodes
         self._start_time = np.zeros(self.n_robots)
         self._strokes = np.zeros(self.n_robots, dtype=np.int64)
         self._since_stroke = np.zeros(self.n_robots)
@@ -321,6 +323,8 @@ class Simulator:
         self._shape = self._curve if shape is None else self._shape_rows(shape)
         self._start_time += self._since_stroke  # of a stroke that failed or was left half-way
         self._since_stroke[:] = 0.0
+        self._held = self.q[:, self._held_rows]
+        self.v[:, self._held_rows] = 0.0
         self._a[:] = 0.0  # a stroke depends on the state at its beginning only
         self._report[:] = 0.0
         self._report[:, SMALLEST_HUB_T] = np.inf
@@ -390,6 +394,8 @@ class Simulator:
             list(self._get_pool().map(run, range(self.threads)))
 
     def _end_stroke(self) -> StrokeReport:
+        self.q[:, self._held_rows] = self._held
+        self.v[:, self._held_rows] = 0.0
         rows = dict(zip(REPORT_ROWS, self._read(self._report).T, strict=True))
         failed = self.failed
         if failed.any():

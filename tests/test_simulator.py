@@ -71,6 +71,19 @@ def test_a_robot_left_alone_stays_where_it_is(scheme):
     assert simulator.elastic_energy()[0] < 1e-25
 
 
+def test_held_nodes_stay_where_they_are_to_the_last_bit():
+    held = [0, 1, 2]
+    simulator = Simulator(Scene(held_nodes=(0, 1, 2), numerics=Numerics("implicit-midpoint", 0.01)), 2)
+    state = simulator.get_state()
+    simulator.set_state(state._replace(positions=state.positions + 0.03, velocities=state.velocities + 0.01))
+    start = simulator.positions
+    for command in random_commands(2):
+        simulator.stroke(command)
+    np.testing.assert_array_equal(simulator.positions[:, held], start[:, held])
+    assert not simulator.velocities[:, held].any()
+    assert np.abs(simulator.positions - start).max() > 1e-3
+
+
 def test_what_is_read_is_a_copy():
     simulator = Simulator(scene_of(), n_robots=2)
     simulator.stroke(random_commands(2)[0])
