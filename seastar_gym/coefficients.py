@@ -41,14 +41,14 @@ class Coefficients:
         self._put_lengths(range(n_sets * N_LANES))
 
     def _put_lengths(self, places: Iterable[int]) -> None:
-        """Write the lengths of robots into their lanes; robots of one length have one shape."""
-        shapes: dict[float, Floats] = {}
+        """Write the lengths of robots into their lanes; robots of equal lengths have one shape."""
+        shapes: dict[tuple[float, ...], Floats] = {}
         for place in places:
             (group, lane), robot = divmod(place, N_LANES), min(place, self.n_robots - 1)
-            length = of_robot(self._scene.robot.limb_length, robot)
-            if length not in shapes:
-                shapes[length] = self._scene.robot.nodes(robot).reshape(-1)
-            self.rest[group, :, lane], self.limb_length[group, 0, lane] = shapes[length], length
+            lengths = tuple(of_robot(numbers, robot) for numbers in self._scene.robot.lengths)
+            if lengths not in shapes:
+                shapes[lengths] = self._scene.robot.nodes(robot).reshape(-1)
+            self.rest[group, :, lane], self.limb_length[group, 0, lane] = shapes[lengths], lengths[0]
 
     def set_scene(self, scene: Scene, chosen: NDArray[np.bool_]) -> None:
         """Go on with a scene that differs in numbers of `PER_ROBOT` alone, and those of the chosen robots only."""

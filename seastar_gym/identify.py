@@ -5,12 +5,12 @@ A trajectory is a CSV file with a line of names, `time,x0,y0,x9,y9,..`: seconds,
 empty fields were not seen. A second file has one command per line and stroke, one number per limb.
 
 Parameters are positive numbers of the scene, by name: fluid.drag_coefficient, robot.youngs_modulus, robot.limb_length,
-actuator.peak_angle, or actuator.angles.2, a point of a measured curve. They are fitted by their logarithms, so errors
-are relative to their values. The scene and those in which one parameter has changed a little, for the columns of the
-Jacobian, are simulated side by side, as the robots of one batch. With J the derivative of the residuals r and
-s^2 = |r|^2/(n - p), the covariance is s^2 (J^T J)^-1: independent errors of one size for all coordinates. Where a
-direction of parameters, a singular vector of J, has a relative error above UNTOLD, the data cannot tell them, and the
-estimate says so.
+robot.limbs.0.length, actuator.peak_angle, or actuator.angles.2, a point of a measured curve. They are fitted by their
+logarithms, so errors are relative to their values. The scene and those in which one parameter has changed a little, for
+the columns of the Jacobian, are simulated side by side, as the robots of one batch. With J the derivative of the
+residuals r and s^2 = |r|^2/(n - p), the covariance is s^2 (J^T J)^-1: independent errors of one size for all
+coordinates. Where a direction of parameters, a singular vector of J, has a relative error above UNTOLD, the data cannot
+tell them, and the estimate says so.
 
 `--synthetic` makes data of its own, with 1 mm of noise, and shows that the fit finds what made them.
 """
@@ -23,7 +23,6 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields, is_dataclass
 from functools import lru_cache
-from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -147,16 +146,7 @@ def get_parameter(scene: Scene, name: str) -> float:
 
 def with_parameters(scene: Scene, names: Sequence[str], values: Sequence[float] | Floats) -> Scene:
     """The scene with other numbers."""
-    changed: dict[str, Any] = {}
-    for name, value in zip(names, values, strict=True):
-        parent, _, step = name.rpartition(".")
-        if step.isdigit():
-            points = list(changed.get(parent) or attrgetter(parent)(scene))
-            points[int(step)] = float(value)
-            changed[parent] = tuple(points)
-        else:
-            changed[name] = float(value)
-    return with_numbers(scene, changed)
+    return with_numbers(scene, {name: float(value) for name, value in zip(names, values, strict=True)})
 
 
 # --- trajectories ----------------------------------------------------------------------------------------------------

@@ -91,8 +91,8 @@ class Seastar:
             raise ValueError("Either every limb has a direction or none has.")
         if directions and (directions[0] != 0.0 or (np.diff(directions) <= 0.0).any()):
             raise ValueError(f"Directions of limbs must begin at 0 and increase [rad], not {directions!r}.")
-        longest = chosen(self, max)
-        turn = max(abs(turn_per_hinge(shape, self.nodes_per_limb)) for shape in longest.limb_shapes())
+        most = chosen(self, partial(max, key=abs))
+        turn = max(abs(turn_per_hinge(shape, self.nodes_per_limb)) for shape in most.limb_shapes())
         if turn >= math.pi:
             raise ValueError(
                 f"A natural curvature that turns neighbouring edges by {turn:.4g} rad, not below pi, is too much for "
@@ -102,7 +102,7 @@ class Seastar:
     def limb_shapes(self, index: int = 0) -> tuple[LimbShape, ...]:
         """Every limb with nothing left open; of robot `index`, where numbers differ from robot to robot."""
         robot = chosen(self, itemgetter(index))
-        limbs = self.limbs or (Limb(),) * self.n_limbs
+        limbs = robot.limbs or (Limb(),) * self.n_limbs
         directions = [limb.direction for limb in limbs if limb.direction is not None]
         gaps = np.diff(directions, append=2.0 * math.pi).tolist() or [2.0 * math.pi / self.n_limbs] * self.n_limbs
         return tuple(
@@ -120,8 +120,7 @@ class Seastar:
     @property
     def is_symmetric(self) -> bool:
         """Whether a turn by one limb and a mirror at limb 1 leave the robot, or all of them, as it is."""
-        # A limb with a number of its own is like the others of one robot at most: not of both the least and the most.
-        robots = [chosen(self, choose).limb_shapes() for choose in (min, max)]
+        robots = [self.limb_shapes(index) for index in range(batch_size(self) or 1)]
         alike = all(len({shape._replace(direction=0.0, gap=0.0) for shape in shapes}) == 1 for shapes in robots)
         shapes = robots[0]
         gaps = np.array([shape.gap for shape in shapes])
@@ -136,6 +135,12 @@ class Seastar:
     def edge_length(self) -> Numbers:
         """Natural length of an edge of a limb of length L [m]."""
         return np.divide(self.limb_length, self.nodes_per_limb - 1)
+
+    @property
+    def lengths(self) -> tuple[Numbers, ...]:
+        """Numbers that the shape at rest depends on."""
+        of_limbs = [number for limb in self.limbs for number in (limb.length, limb.natural_curvature)]
+        return self.limb_length, *(number for number in of_limbs if number is not None)
 
     @property
     def opening_angle(self) -> float:

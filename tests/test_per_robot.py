@@ -69,14 +69,24 @@ ACTUATORS = {
 }
 
 
-@pytest.mark.parametrize("kind", ACTUATORS)
-def test_robots_of_different_sizes_and_actuators_swim_as_they_would_alone(kind):
-    scene = Scene(LENGTHS, actuator=ACTUATORS[kind], numerics=FAST)
-    batch = Simulator(scene, N_ROBOTS)
-    positions = strokes(batch, COMMANDS)
+UNEVEN = Seastar(3, limb_length=0.1 * SPREAD, limbs=(
+    Limb(length=0.12 * SPREAD[::-1], radius=1.6e-3 * SPREAD), Limb(natural_curvature=3.0 * (SPREAD - 1.0)),
+    Limb(radius=(2e-3, 1e-3), youngs_modulus=1e6 * SPREAD**2),
+))  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [*(Scene(LENGTHS, actuator=actuator, numerics=FAST) for actuator in ACTUATORS.values()),
+     Scene(UNEVEN, actuator=SmaPulse(0.3), numerics=FAST)],
+    ids=[*ACTUATORS, "limbs"],
+)  # fmt: skip
+def test_robots_of_different_sizes_and_actuators_swim_as_they_would_alone(scene):
+    batch, commands = Simulator(scene, N_ROBOTS), COMMANDS[..., : scene.robot.n_limbs]
+    positions = strokes(batch, commands)
     for robot in range(0, N_ROBOTS, 3):
         alone = Simulator(scene.of_robot(robot))
-        np.testing.assert_array_equal(strokes(alone, COMMANDS[:, robot : robot + 1])[0], positions[robot])
+        np.testing.assert_array_equal(strokes(alone, commands[:, robot : robot + 1])[0], positions[robot])
         np.testing.assert_array_equal(alone.actuators[0], batch.actuators[robot])
         np.testing.assert_array_equal(alone.observe_actuators()[0], batch.observe_actuators()[robot])
         assert alone.elastic_energy()[0] == batch.elastic_energy()[robot]
@@ -100,6 +110,23 @@ def test_robots_of_different_sizes_rest_in_shapes_of_their_own():
     np.testing.assert_array_equal(simulator.positions[SPREAD > 1.0][0], LENGTHS.nodes(int(np.argmax(SPREAD > 1.0))))
     np.testing.assert_allclose(LENGTHS.edge_length, SPREAD * Seastar().edge_length)
     assert LENGTHS.is_symmetric and not replace(LENGTHS, limbs=(Limb(length=0.07), *[Limb()] * 4)).is_symmetric
+
+
+def test_robots_whose_limbs_differ_rest_in_shapes_of_their_own_and_only_equal_limbs_are_symmetric():
+    simulator = Simulator(Scene(UNEVEN, actuator=SmaPulse(0.3), numerics=FAST), N_ROBOTS)
+    np.testing.assert_allclose(simulator.positions[:, 9, 0], 0.12 * SPREAD[::-1], rtol=1e-12)
+    for robot in (0, N_ROBOTS - 1):
+        np.testing.assert_array_equal(simulator.positions[robot], UNEVEN.nodes(robot))
+    swapped = (Limb(length=0.1 * SPREAD), Limb(length=0.1 * SPREAD[::-1]), Limb(length=0.1 * SPREAD))
+    assert not Seastar(3, limbs=swapped).is_symmetric and Seastar(3, limbs=swapped[:1] * 3).is_symmetric
+
+
+def test_a_taper_is_no_number_of_each_robot():
+    tapered = Seastar(limbs=(Limb(radius=(2e-3, 1e-3)),) * 5)
+    assert Scene(tapered).n_robots is None and len(tapered.limbs[0].radius) == 2
+    other = replace(tapered, limbs=(Limb(radius=(2e-3, 1.5e-3)),) * 5)
+    with pytest.raises(ValueError, match="same terms"):
+        Simulator(Scene(tapered), 2).set_scene(Scene(other))
 
 
 def test_set_scene_changes_sizes_and_actuators():
@@ -181,7 +208,9 @@ def test_a_scene_knows_its_robots():
         (lambda: Seastar(rod_radius=("1", 2.0)), ("rod_radius", "'1'")),
         (lambda: Seastar(limb_length=np.array([0.1, -0.2])), ("limb_length", "positive")),
         (lambda: Seastar(limb_length=np.array([0.1, 9.0]), limbs=(Limb(natural_curvature=5.0),) * 5), ("below pi",)),
-        (lambda: Limb(length=np.array([0.1, 0.2])), ("length", "same for all robots")),
+        (lambda: Limb(length=np.array([0.1, -0.2])), ("limb's length", "positive")),
+        (lambda: Limb(radius=np.array([0.1, 0.0])), ("limb's radius", "positive")),
+        (lambda: Limb(direction=np.array([0.1, 0.2])), ("direction", "for all robots")),
         (lambda: SmaPulse(heating_time=np.array([0.1, 0.2])), ("heating_time", "positive")),
         (lambda: Scene(actuator=SmaPulse(np.array([0.1, 3.0]))), ("peak angle of 3 rad",)),
         (lambda: ThermalSma(water_temperature=np.array([20.0, 30.0])), ("T_water",)),

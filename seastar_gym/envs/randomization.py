@@ -131,8 +131,13 @@ class DomainRandomization:
                 raise ValueError(
                     f"The scene has no number {name!r} to draw: it has {', '.join(known)}, {LIMB_STRENGTH}."
                 )
-        for bounds in itertools.product(*(self.distributions[name].bounds for name in numbers)):
-            with_numbers(scene, dict(zip(numbers, bounds, strict=True)))
+        bounds = {name: self.distributions[name].bounds for name in numbers}
+        lowest = {name: low for name, (low, _) in bounds.items()}
+        # What a scene forbids it forbids of one number, of two together, or of all if they are large.
+        with_numbers(scene, {name: high for name, (_, high) in bounds.items()})
+        for first, second in itertools.combinations_with_replacement(numbers, 2):
+            for pair in itertools.product(bounds[first], bounds[second]):
+                with_numbers(scene, {**lowest, first: pair[0], second: pair[1]})
         values = {name: np.full(n_robots, self.distributions[name].bounds[1]) for name in numbers}
         if LIMB_STRENGTH in self.distributions:
             values[LIMB_STRENGTH] = np.ones((n_robots, scene.robot.n_limbs))

@@ -1,13 +1,15 @@
 """A limb that is not like the robot's others, and what a profile along it says."""
 
 import math
-from dataclasses import dataclass, fields
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.checks import is_finite_number, require_number, require_numbers
+from seastar_gym.checks import is_finite_number, require_finite, require_number, require_numbers
+from seastar_gym.per_robot import Numbers, PerRobot, require_each
 
 Profile = float | tuple[float, ...]
 """A number, or numbers at equally spaced points from hub to tip (both included), linear in between."""
@@ -21,34 +23,37 @@ class Limb:
     length [m]. radius [m] and youngs_modulus [Pa], along the limb: a taper is radius=(root, tip).
     natural_curvature: Of the limb at rest [1/m], + bends it anti-clockwise on the way to its tip.
 
-    They are the same for all robots of a batch: only the robot's own numbers may differ from robot to robot.
+    Numbers that differ from robot to robot are numpy arrays of shape (n_robots,) here: a tuple is a profile.
     """
 
+    PER_ROBOT: ClassVar = ("length", "radius", "youngs_modulus", "natural_curvature")
     direction: float | None = None
-    length: float | None = None
-    radius: Profile | None = None
-    youngs_modulus: Profile | None = None
-    natural_curvature: float = 0.0
+    length: Numbers | None = None
+    radius: Profile | Numbers | None = None
+    youngs_modulus: Profile | Numbers | None = None
+    natural_curvature: Numbers = 0.0
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            if isinstance(getattr(self, field.name), np.ndarray):
-                raise ValueError(
-                    f"A limb's {field.name} is the same for all robots of a batch: give one number, or a tuple along "
-                    "the limb, and let only the robot's own numbers differ from robot to robot."
-                )
         if self.direction is not None and not (is_finite_number(self.direction) and 0 <= self.direction < 2 * math.pi):
-            raise ValueError(f"A limb's direction must be from 0 to below 2 pi [rad], not {self.direction!r}.")
+            raise ValueError(
+                f"A limb's direction must be from 0 to below 2 pi [rad], for all robots, not {self.direction!r}."
+            )
         if self.length is not None:
-            require_number("A limb's length", self.length, "m")
-        if not is_finite_number(self.natural_curvature):
-            raise ValueError(f"natural_curvature must be a finite number [1/m], not {self.natural_curvature!r}.")
+            require_each(self, "length", partial(_require_positive, unit="m"))
+        require_each(self, "natural_curvature", partial(require_finite, unit="1/m"))
         for name, profile, unit in (("radius", self.radius, "m"), ("youngs_modulus", self.youngs_modulus, "Pa")):
             if profile is None:
+                continue
+            if isinstance(profile, np.ndarray | PerRobot):
+                require_each(self, name, partial(_require_positive, unit=unit))
                 continue
             require_numbers(f"A limb's {name}", as_tuple(profile), unit)
             if not as_tuple(profile) or min(as_tuple(profile)) <= 0.0:
                 raise ValueError(f"A limb's {name} must be positive all along it [{unit}], not {profile!r}.")
+
+
+def _require_positive(name: str, value: float, unit: str) -> None:
+    require_number(f"A limb's {name}", value, unit)
 
 
 class LimbShape(NamedTuple):
