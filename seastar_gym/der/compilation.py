@@ -22,7 +22,9 @@ from seastar_gym.der.lanes import N_LANES
 PACKAGE = Path(__file__).resolve().parent.parent
 
 # error_model="numpy": divisions follow IEEE instead of raising; failure is a status, not an exception.
-kernel = numba.njit(error_model="numpy", nogil=True)
+STRICT = {"error_model": "numpy", "nogil": True}
+# Without wrappers for Python, which would be a third of the compilation.
+kernel = numba.njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **STRICT)
 
 
 def kernel_sources(package: Path = PACKAGE) -> list[Path]:
@@ -66,7 +68,7 @@ class _DigestCache(FunctionCache):
 
 def entry_point(function):
     """Compile `function` for calls from Python, with the GIL released and the machine code kept on disk."""
-    compiled = kernel(function)
+    compiled = numba.njit(**STRICT)(function)
     # RuntimeError: no folder can be written (a read-only home), so the function is compiled anew in every process.
     with contextlib.suppress(RuntimeError):
         compiled._cache = _DigestCache(function)

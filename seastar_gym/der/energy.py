@@ -25,22 +25,27 @@ def edge_of(rods, q, e):
 
 
 @kernel
-def hinge_energy(rods, work, q, e):
-    """Energy of the hinge that ends with edge e [J]."""
-    edges = rods.nodes_per_limb - 1
-    EI_kappa_bar = load(work.hub_EI_kappa_bar, e // edges) if e % edges == 0 else load(rods.EI_kappa_bar, e)
-    a, b, side = hinge_edges(rods, e)
-    t = half_angle(edge_of(rods, q, a), edge_of(rods, q, b), side)
-    return bending_energy(rods, e, moment(rods, e, t, EI_kappa_bar))
+def hinge_energy(rods, e, first, second, side, EI_kappa_bar):
+    """Energy of the hinge that ends with edge e, between two edges [J]."""
+    return bending_energy(rods, e, moment(rods, e, half_angle(first, second, side), EI_kappa_bar))
 
 
 @kernel
 def elastic_energy(rods, work, q):
     """Stretching and bending energy (13.14) at the natural hub angles in `work` [J]."""
     total = splat(0.0)
-    for e in range(rods.n_limbs * (rods.nodes_per_limb - 1)):
-        length = edge_of(rods, q, e)[2]
-        total += stretching_energy(rods, e, tension(rods, e, length)) + hinge_energy(rods, work, q, e)
+    edges = rods.nodes_per_limb - 1
+    for limb in range(rods.n_limbs):
+        root = limb * edges
+        edge = edge_of(rods, q, root)
+        next_root = edge_of(rods, q, (root + edges) % (rods.n_limbs * edges))
+        EI_kappa_bar = load(work.hub_EI_kappa_bar, limb)
+        hinge = hinge_energy(rods, root, edge, next_root, rods.hub_side, EI_kappa_bar)
+        total += stretching_energy(rods, root, tension(rods, root, edge[2])) + hinge
+        for e in range(root + 1, root + edges):
+            before, edge = edge, edge_of(rods, q, e)
+            hinge = hinge_energy(rods, e, before, edge, 1.0, load(rods.EI_kappa_bar, e))
+            total += stretching_energy(rods, e, tension(rods, e, edge[2])) + hinge
     return total
 
 

@@ -7,7 +7,8 @@ With U at the natural hub angles of the step's end, implicit Euler (13.9) over d
 U'' taken somewhere on the way: what the robot would have had, had it stood still while its actuators moved, less what
 inertia, drag and a convex U take. Where U is not convex along the step the last term may create energy, little
 (compressed edges that turn) or much (a minimum of Phi beyond the pole of tan(phi/2), edges that collapse). In water at
-moderate speeds, drag takes more than that, so only steps that had trouble, or much energy to lose, are looked at.
+moderate speeds, drag takes more than that, so only steps that had trouble, or much energy to lose, are looked at; in
+vacuum those that may have created energy by what Newton knows at their end.
 
 A step that created energy is refused, or, where little is to be taken away, its velocities about the rigid motion with
 the same momenta are cut down to the energy allowed: momentum and angular momentum stay, and the cut is of the order of
@@ -98,6 +99,27 @@ def allowed_energy(rods, work, scheme, actuation, start, end, q, v):
         set_natural_hub_angles(rods, work, actuation, end)
         allowed = potential_energy(rods, work, q)
     return add_contact_energy(rods.contact, rods, work, q, allowed + moving_energy(rods, work, v))
+
+
+@kernel
+def may_gain(current, added_mass, rods, work, stage, phi, robots):
+    """Of the robots in the mask, those whose step of implicit Euler might create energy, by what Newton knows already.
+
+    phi: Phi before Newton's last step [J], which is not less than at its end. There Phi is |v_1 - v_0|^2_M / 2 + U(q_1)
+        and what dissipation adds, so the energy ends at most Phi + v_0 M (v_1 - v_0) - U(q_0) above the one allowed.
+
+    All of them in scenes whose fluid gives energy or takes it up.
+    """
+    if current is None and added_mass is None:
+        gain = phi - elastic_energy(rods, work, stage.q_hat)
+        for node in range(n_nodes(rods)):
+            m = load(rods.mass, node)
+            for row in range(2 * node, 2 * node + 2):
+                v_0 = load(stage.v_hat, row)
+                change = (load(work.q, row) - load(stage.q_hat, row)) * stage.inverse_gamma - v_0
+                gain = add_product(gain, m * v_0, change)
+        return robots & ~(gain <= 0.0)
+    return robots
 
 
 @kernel

@@ -171,6 +171,32 @@ class _RowsModel(models.PrimitiveModel):
         super().__init__(dmm, fe_type, F64.as_pointer())
 
 
+class Absent(types.misc.Omitted):
+    """None in a borrowed bundle, known to `is None`: as an argument it takes no place, unlike numba's own None."""
+
+    def __init__(self):
+        super().__init__(None)
+
+
+absent = Absent()
+NOTHING = ir.LiteralStructType([])
+
+
+@register_model(Absent)
+class _AbsentModel(models.DataModel):
+    def get_value_type(self):
+        return NOTHING
+
+    def get_argument_type(self):
+        return ()
+
+    def as_argument(self, builder, value):
+        return ()
+
+    def from_argument(self, builder, value):
+        return ir.Constant(NOTHING, None)
+
+
 def _borrowed(field):
     """Type of a borrowed array or bundle of arrays; numbers stay what they are; None for anything else."""
     if isinstance(field, types.Array):
@@ -179,7 +205,9 @@ def _borrowed(field):
     if isinstance(field, types.BaseNamedTuple):
         fields = [_borrowed(f) for f in field]
         return None if None in fields else types.BaseTuple.from_types(fields, field.instance_class)
-    return field if isinstance(field, types.Number | types.Boolean | types.NoneType) else None
+    if isinstance(field, types.NoneType):
+        return absent
+    return field if isinstance(field, types.Number | types.Boolean) else None
 
 
 def _borrow_value(context, builder, field, value):
@@ -189,6 +217,8 @@ def _borrow_value(context, builder, field, value):
         parts = cgutils.unpack_tuple(builder, value, len(field))
         values = [_borrow_value(context, builder, f, part) for f, part in zip(field, parts, strict=True)]
         return context.make_tuple(builder, _borrowed(field), values)
+    if isinstance(field, types.NoneType):
+        return ir.Constant(NOTHING, None)
     return value
 
 

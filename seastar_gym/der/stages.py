@@ -6,7 +6,15 @@ from seastar_gym.der.contact import freeze_contact, missed_robots
 from seastar_gym.der.damping import freeze_strains
 from seastar_gym.der.fluid import add_work_of_current, freeze_fluid
 from seastar_gym.der.geometry import edge_geometry, half_angle
-from seastar_gym.der.guard import LARGEST_CUT, allowed_energy, hold_to_energy, put_back, set_aside, through_poles
+from seastar_gym.der.guard import (
+    LARGEST_CUT,
+    allowed_energy,
+    hold_to_energy,
+    may_gain,
+    put_back,
+    set_aside,
+    through_poles,
+)
 from seastar_gym.der.lanes import add_product, any_lane, floor, load, load_number, select, splat, sqrt, store
 from seastar_gym.der.newton import minimise
 from seastar_gym.der.rods import (
@@ -182,7 +190,12 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, war
         good = good & ~missed_robots(work.contact)
         trouble = trouble | (repairs + backtracks > 0.0)
         if scheme.dissipative:
-            trouble = trouble | (phi > load(rods.damped, 0))
+            lively = phi > load(rods.damped, 0)
+            calm = good & ~trouble & lively & (phi <= load(rods.calm, 0))
+            if any_lane(calm):
+                gaining = may_gain(rods.current, rods.added_mass, rods, work, stage, phi, calm)
+                lively = (lively & ~calm) | gaining
+            trouble = trouble | lively
         add_to_report(report, NEWTON_ITERATIONS, iterations)
         add_to_report(report, REPAIRS, repairs)
         add_to_report(report, BACKTRACKS, backtracks)
