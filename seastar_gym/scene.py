@@ -117,6 +117,11 @@ class Seastar:
             for j, (limb, gap) in enumerate(zip(limbs, gaps, strict=True))
         )
 
+    def limbs_that_may_touch(self) -> list[tuple[int, int]]:
+        """(right, left) limbs, counted from 0."""
+        alike = all(limb.length is None for limb in self.limbs)
+        return limbs_that_may_touch([shape.gap for shape in self.limb_shapes()], alike)
+
     @property
     def is_symmetric(self) -> bool:
         """Whether a turn by one limb and a mirror at limb 1 leave the robot, or all of them, as it is."""
@@ -284,7 +289,7 @@ class Scene:
         if self.contact is None:
             return
         opening = self.robot.opening_angle
-        if not limbs_that_may_touch(self.robot.limb_shapes()):
+        if not self.robot.limbs_that_may_touch():
             raise ValueError("No limbs of this robot can touch: use contact=None.")
         if self.contact.opening_angle >= opening:
             raise ValueError(
@@ -387,6 +392,7 @@ class Scene:
             current=None if fluid is None or fluid.current is None else fluid.current.rows(),
             held_nodes=self.held_nodes,
             loads=self.loads,
+            touching=None if contact is None else self.robot.limbs_that_may_touch(),
             contact_modulus=None if contact is None else contact.modulus,
-            contact_angle=None if contact is None else contact.opening_angle,
+            contact_angle=0.0 if contact is None else contact.opening_angle,
         )

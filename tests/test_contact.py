@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
+import oracle
 from refusals import assert_refused
 from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 
@@ -123,35 +124,33 @@ def test_limbs_push_each_other_alike(scheme):
 
 
 def test_pressed_limbs_rest_where_statics_says():
-    """All nodes are held but the tip of limb 1, and a load presses it against limb 2.
-
-    Tip and edge overlap by (F - k_b w)/k, w the way of the tip and k_b its stiffness against bending of the last hinge;
-    either tip meets the other's last edge nearly at its end.
+    """All nodes are held but the tip of limb 1, and a load F presses it against limb 2: where it comes to rest, contact
+    pushes with what bending of the last hinge leaves of F, EI/dl over the edge length squared times the way of the tip.
     """
-    gap = 0.034
+    gap, force, opening = 0.04, 0.02, 0.0385
     robot = Seastar(n_limbs=2, limbs=(Limb(direction=0.0), Limb(direction=gap)))
-    tip, other_tip = robot.nodes_per_limb - 1, 2 * (robot.nodes_per_limb - 1)
-    nodes = robot.nodes()
+    tip, nodes = robot.nodes_per_limb - 1, robot.nodes()
     push = np.array([-np.sin(gap), np.cos(gap)])
-    force = 0.02
     scene = Scene(
         robot=robot,
         actuator=SmaPulse(peak_angle=0.0),
         numerics=Numerics(step=20e-3, newton_tolerance=1e-10),
         held_nodes=tuple(node for node in range(robot.n_nodes) if node != tip),
         loads=((tip, *(force * push)),),
-        contact=Contact(opening_angle=0.0335),
+        contact=Contact(opening_angle=opening),
     )
     simulator = Simulator(scene, 1)
     for _ in range(3):
         simulator.stroke(np.zeros((1, 2)))
-    rods = scene.rods()
-    way = (simulator.positions[0, tip] - nodes[tip]) @ push
-    depth = 2.0 * robot.rod_radius - (nodes[other_tip] - simulator.positions[0, tip]) @ push
-    bending = float(rods.EI_over_dl[tip - 1]) / robot.edge_length**2
-    pressure = force - bending * way
-    assert way > 1e-5
-    assert depth == pytest.approx(pressure / (2.0 * rods.contact.stiffness[tip]), rel=0.05)
+    positions = simulator.positions[0]
+    assert np.abs(simulator.velocities).max() < 1e-9
+    contact = np.zeros(2)
+    for touch in oracle.touches(oracle.Star(n_limbs=2), positions, nodes, opening):
+        contact += touch.stiffness * touch.depth(positions) * touch.gradient.reshape(-1, 2)[tip]
+    way = (positions[tip] - nodes[tip]) @ push
+    bending = float(scene.rods().EI_over_dl[tip - 1]) / robot.edge_length**2
+    assert way > 5e-4
+    assert -contact @ push == pytest.approx(force - bending * way, rel=0.02)
 
 
 def test_schemes_agree_on_limbs_that_meet():

@@ -38,7 +38,7 @@ from seastar_gym.der.lanes import (
 from seastar_gym.der.rods import N_X, N_Y, OFFSET, SHARE, SLOT_ROWS, STIFFNESS, THICKNESS, n_nodes, tail_node
 
 OVERHANG = 0.05  # of an edge: so far beyond its ends it still meets nodes, which leaves no wedge at a bent hinge
-MARGIN = 3.0  # times the thickness: pairs nearer than that are listed, and those that approach faster
+MARGIN = 2.0  # times the thickness: pairs nearer than that are listed, and those that approach faster
 OUT_OF_TOUCH = 1e300  # [m]
 
 
@@ -63,21 +63,38 @@ def freeze_contact(contact, rods, work, stage, q_0):
     """List who may touch whom in this stage, in scenes with contact; q_0: positions where the step began."""
     if contact is None:
         return
-    for row in range(2 * n_nodes(rods)):
-        store(work.contact.ends, row, looked_at(work, stage, row))
+    moved = splat(0.0)
+    for node in range(n_nodes(rods)):
+        x, y = looked_at(work, stage, 2 * node), looked_at(work, stage, 2 * node + 1)
+        store(work.contact.ends, 2 * node, x)
+        store(work.contact.ends, 2 * node + 1, y)
+        dx, dy = x - load(q_0, 2 * node), y - load(q_0, 2 * node + 1)
+        squared = add_product(dx * dx, dy, dy)
+        moved = select(squared > moved, squared, moved)
+    # Whoever is farther apart than that could not have come near on the way.
+    reach = add_product(MARGIN * load(contact.widest, 0), 2.0, sqrt(moved))
     store_number(work.contact.listed, 0, 0.0)
     store(work.contact.missed, 0, 0.0)
     for pair in range(contact.n_pairs):
         right = int(load_number(contact.pairs, 2 * pair))
         left = int(load_number(contact.pairs, 2 * pair + 1))
-        if any_lane(may_touch(contact, rods, work, q_0, right, left)):
-            list_pairs(contact, rods, work, stage, q_0, right, left, -1.0)
-            list_pairs(contact, rods, work, stage, q_0, left, right, 1.0)
+        near, end_right, end_left = may_touch(rods, work, q_0, reach, right, left)
+        if any_lane(near):
+            list_pairs(contact, rods, work, stage, q_0, reach, right, left, -1.0, end_right)
+            list_pairs(contact, rods, work, stage, q_0, reach, left, right, 1.0, end_left)
+    if n_listed(work) == 0:
+        store(work.contact.touching, 0, 0.0)
+        for row in range(2 * n_nodes(rods)):
+            store(work.contact.force, row, 0.0)
 
 
 @kernel
-def may_touch(contact, rods, work, q_0, right, left):
-    """Mask of the robots whose two limbs no straight strip of the right width and direction keeps apart."""
+def may_touch(rods, work, q_0, reach, right, left):
+    """Look at two limbs along the gap between them, and across it, and keep what is seen in work.contact.seen.
+
+    Returns the mask of the robots whose limbs no strip of width `reach` keeps apart, and how far each of them comes
+    towards the other.
+    """
     edges = rods.nodes_per_limb - 1
     ax, ay = edge_vector(q_0, 0, right * edges + 1)
     bx, by = edge_vector(q_0, 0, left * edges + 1)
@@ -85,67 +102,87 @@ def may_touch(contact, rods, work, q_0, right, left):
     ax, ay, bx, by = a * ax, a * ay, b * bx, b * by
     # From the right limb to the left: along the difference of their directions and across their sum.
     wx, wy = bx - ax - (ay + by), by - ay + (ax + bx)
-    before, after = strip(rods, q_0, right, left, wx, wy), strip(rods, work.contact.ends, right, left, wx, wy)
-    needed = MARGIN * load(contact.widest, 0) * sqrt(add_product(wx * wx, wy, wy)) + absolute(after - before)
-    return ~(after > needed) | ~(before > needed)
-
-
-@kernel
-def strip(rods, q, right, left, wx, wy):
-    """Width of the strip across w that is free between two limbs, times |w|."""
-    edges = rods.nodes_per_limb - 1
+    scale = 1.0 / sqrt(add_product(wx * wx, wy, wy))
+    wx, wy = scale * wx, scale * wy
+    view_node(work, 0, wx, wy)
     low, high = splat(np.inf), splat(-np.inf)
     for i in range(1, edges + 1):
-        x = along(q, right * edges + i, wx, wy)
+        x = view_node(work, right * edges + i, wx, wy)
         high = select(x > high, x, high)
-        x = along(q, left * edges + i, wx, wy)
+        x = view_node(work, left * edges + i, wx, wy)
         low = select(x < low, x, low)
-    return low - high
+    return ~(low - high > reach), high, -low
 
 
 @kernel
-def along(q, node, wx, wy):
-    return add_product(load(q, 2 * node) * wx, load(q, 2 * node + 1), wy)
+def view_node(work, node, wx, wy):
+    """Keep a node's places along w and across it [m]; returns the former."""
+    x, y = load(work.contact.ends, 2 * node), load(work.contact.ends, 2 * node + 1)
+    forth = add_product(x * wx, y, wy)
+    store(work.contact.seen, 2 * node, forth)
+    store(work.contact.seen, 2 * node + 1, subtract_product(y * wx, x, wy))
+    return forth
 
 
 @kernel
-def list_pairs(contact, rods, work, stage, q_0, limb, other, side):
-    """List the nodes of a limb that are near edges of another, which has it on its left (side 1) or right (-1)."""
+def list_pairs(contact, rods, work, stage, q_0, reach, limb, other, side, end):
+    """List the nodes of a limb that are near edges of another, which has it on its left (side 1) or right (-1).
+
+    end: How far the limb comes towards the other, as may_touch saw it.
+    """
     edges = rods.nodes_per_limb - 1
-    ends, zero = work.contact.ends, splat(0.0)
+    ends, seen = work.contact.ends, work.contact.seen
     for e in range(other * edges, other * edges + edges):
         j, k = tail_node(rods, e), e + 1
+        forth_j, forth_k = -side * load(seen, 2 * j), -side * load(seen, 2 * k)
+        begin = select(forth_j < forth_k, forth_j, forth_k) - reach
+        if not any_lane(end > begin):
+            continue
+        z_j, z_k = load(seen, 2 * j + 1), load(seen, 2 * k + 1)
+        lowest, highest = select(z_j < z_k, z_j, z_k) - reach, select(z_j < z_k, z_k, z_j) + reach
         ex, ey = edge_vector(ends, j, k)
         inverse = 1.0 / add_product(ex * ex, ey, ey)
         scale = side * sqrt(inverse)
         nx, ny = -ey * scale, ex * scale
-        ox, oy = edge_vector(q_0, j, k)
-        before = side / sqrt(add_product(ox * ox, oy, oy))
         for i in range(limb * edges + 1, limb * edges + edges + 1):
-            dx, dy = edge_vector(ends, j, i)
-            s = add_product(dx * ex, dy, ey) * inverse
-            g = add_product(dx * nx, dy, ny)
-            hx, hy = edge_vector(q_0, j, i)
-            g_0 = before * subtract_product(ox * hy, oy, hx)
-            s_inside = select(s > 0.0, select(s < 1.0, s, 1.0), 0.0)
-            tail = load(contact.thickness, j)
-            d = load(contact.thickness, i) + add_product(tail, s_inside, load(contact.thickness, k) - tail)
-            near = (s > -OVERHANG) & (s < 1.0 + OVERHANG) & (g_0 > -d) & (g < MARGIN * d + absolute(g - g_0))
-            if any_lane(near):
-                slot = int(load_number(work.contact.listed, 0))
-                if slot < work.contact.capacity:
-                    store_number(work.contact.listed, 0, slot + 1.0)
-                    store_number(work.contact.listed, 2 * slot + 1, float(i))
-                    store_number(work.contact.listed, 2 * slot + 2, float(e))
-                    row = SLOT_ROWS * slot
-                    store(work.contact.slots, row + N_X, nx)
-                    store(work.contact.slots, row + N_Y, ny)
-                    store(work.contact.slots, row + SHARE, s_inside)
-                    store(work.contact.slots, row + THICKNESS, select(near, d, -OUT_OF_TOUCH))
-                    store(work.contact.slots, row + OFFSET, gap_at_rest(rods, work, stage, slot))
-                    store(work.contact.slots, row + STIFFNESS, zero)
-                else:
-                    store(work.contact.missed, 0, select(near, 1.0, load(work.contact.missed, 0)))
+            z = load(seen, 2 * i + 1)
+            facing = (-side * load(seen, 2 * i) > begin) & (z > lowest) & (z < highest)
+            if any_lane(facing):
+                dx, dy = edge_vector(ends, j, i)
+                s = add_product(dx * ex, dy, ey) * inverse
+                g = add_product(dx * nx, dy, ny)
+                facing = facing & (s > -OVERHANG) & (s < 1.0 + OVERHANG)
+                if any_lane(facing):
+                    list_pair(contact, rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing)
+
+
+@kernel
+def list_pair(contact, rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing):
+    """List node i and edge e if they are near each other in any of the robots in the mask `facing`."""
+    j, k = tail_node(rods, e), e + 1
+    ex, ey = edge_vector(q_0, j, k)
+    dx, dy = edge_vector(q_0, j, i)
+    g_0 = side * subtract_product(ex * dy, ey, dx) / sqrt(add_product(ex * ex, ey, ey))
+    s = select(s > 0.0, select(s < 1.0, s, 1.0), 0.0)
+    tail = load(contact.thickness, j)
+    d = load(contact.thickness, i) + add_product(tail, s, load(contact.thickness, k) - tail)
+    near = facing & (g_0 > -d) & (g < MARGIN * d + absolute(g - g_0))
+    if not any_lane(near):
+        return
+    slot = n_listed(work)
+    if slot == work.contact.capacity:
+        store(work.contact.missed, 0, select(near, 1.0, load(work.contact.missed, 0)))
+        return
+    store_number(work.contact.listed, 0, slot + 1.0)
+    store_number(work.contact.listed, 2 * slot + 1, float(i))
+    store_number(work.contact.listed, 2 * slot + 2, float(e))
+    row = SLOT_ROWS * slot
+    store(work.contact.slots, row + N_X, nx)
+    store(work.contact.slots, row + N_Y, ny)
+    store(work.contact.slots, row + SHARE, s)
+    store(work.contact.slots, row + THICKNESS, select(near, d, -OUT_OF_TOUCH))
+    store(work.contact.slots, row + OFFSET, gap_at_rest(rods, work, stage, slot))
+    store(work.contact.slots, row + STIFFNESS, 0.0)
 
 
 @kernel
@@ -198,6 +235,8 @@ def add_gap_gradient(rods, work, slot, amount, rows):
 def add_contact(contact, rods, work, stage, energy):
     """Add contact to the energy of a stage's Phi [J], and leave its forces in work.contact.force [N]."""
     if contact is None:
+        return energy
+    if n_listed(work) == 0:
         return energy
     lead = lead_of(stage)
     for row in range(2 * n_nodes(rods)):

@@ -38,8 +38,10 @@ def dot(rods, a, b):
 
 @kernel
 def solve_coupled(contact, rods, work, decrement):
-    """The Newton step of all nodes, into work.contact.x [m], in scenes with contact; returns its decrement [J]."""
+    """The Newton step, node by node into work.contact.x [m], where pairs are listed; returns its decrement [J]."""
     if contact is None:
+        return decrement
+    if n_listed(work) == 0:
         return decrement
     x, r, z, p, Hp, w = (
         work.contact.x, work.contact.r, work.contact.z, work.contact.p, work.contact.Hp, work.contact.w,

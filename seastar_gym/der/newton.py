@@ -5,7 +5,7 @@ is frozen by a mask, and nothing that one robot needs (a repair, a shorter step)
 """
 
 from seastar_gym.der.compilation import kernel
-from seastar_gym.der.contact import touching_robots
+from seastar_gym.der.contact import n_listed, touching_robots
 from seastar_gym.der.coupled import solve_coupled
 from seastar_gym.der.lanes import absolute, add_product, any_lane, load, select, splat, sqrt
 from seastar_gym.der.potential import factorise
@@ -107,8 +107,9 @@ def take_step(contact, rods, work, stepping, shortening, fraction):
     """
     edges = rods.nodes_per_limb - 1
     scale = select(stepping, splat(1.0), select(shortening, -fraction, 0.0))
-    if contact is not None:
-        return take_coupled_step(contact, rods, work, shortening, scale)
+    if contact is not None:  # noqa: SIM102 - numba drops a branch on None alone
+        if n_listed(work) > 0:
+            return take_coupled_step(contact, rods, work, shortening, scale)
     hub = load_pair(work.root_solution, 2 * rods.n_limbs)
     largest = move_node(work, 0, hub, shortening, scale)
     for limb in range(rods.n_limbs):

@@ -54,7 +54,8 @@ class ContactWork(NamedTuple):
 
     capacity: Pairs of node and edge that can be listed. listed: How many are, then node and edge of each, shared.
     slots: SLOT_ROWS of each. missed, touching: 1 for robots whose neighbours did not all fit in, and that touch.
-    ends: Positions at the end of the step [m]. force: Of contact [N].
+    ends: Positions where contact is asked for [m]. seen: The same along the gap between two limbs and across it.
+    force: Of contact [N].
     x, r, z, p, Hp, w: See coupled.py.
     """
 
@@ -64,6 +65,7 @@ class ContactWork(NamedTuple):
     missed: np.ndarray
     touching: np.ndarray
     ends: np.ndarray
+    seen: np.ndarray
     force: np.ndarray
     x: np.ndarray
     r: np.ndarray
@@ -318,6 +320,7 @@ def make_contact_work(rods: Rods, contact: Contact) -> ContactWork:
         missed=rows(1),
         touching=rows(1),
         ends=rows(),
+        seen=rows(),
         force=rows(),
         x=rows(),
         r=rows(),

@@ -70,8 +70,9 @@ def make_rods(
     current: Current | None = None,
     held_nodes: tuple[int, ...] = (),
     loads: tuple[tuple[int, float, float], ...] = (),
+    touching: Sequence[tuple[int, int]] | None = None,
     contact_modulus: float | None = None,
-    contact_angle: float | None = None,
+    contact_angle: float = 0.0,
 ) -> Rods:
     """Coefficients of the seastar in a fluid (density or drag coefficient zero: vacuum); SI units.
 
@@ -79,7 +80,8 @@ def make_rods(
     every root edge, with the mean of the profiles there.
 
     held_nodes: Nodes that stay where they are. loads: Dead loads (node, F_x, F_y) [N].
-    contact_modulus, contact_angle: See seastar_gym/contact.py; without an angle (None) there is no contact.
+    touching: (right, left) limbs that may touch, None without contact. contact_modulus, contact_angle: See
+    seastar_gym/contact.py.
     """
     mesh = make_mesh(limbs, nodes_per_limb)
     n_limbs, l = len(limbs), mesh.l  # noqa: E741
@@ -118,7 +120,7 @@ def make_rods(
         relaxation_time=None if relaxation_time is None else np.array([relaxation_time]),
         current=current,
         load=forces.reshape(-1) if loads else None,
-        contact=None if contact_angle is None else contact(limbs, mesh, contact_modulus, contact_angle),
+        contact=None if touching is None else contact(limbs, mesh, touching, contact_modulus, contact_angle),
         shortest_edge=np.array([shortest]),
         curvature_rate=np.array([stiffest / (density * shortest**2) * slenderness]),
         calm=np.array([calm]),

@@ -26,13 +26,14 @@ def allowed(rods, work, scheme, actuation, q, v, result):
 
 
 @numba.njit(error_model="numpy")
-def hold(rods, work, q, v, robots, limit, largest_cut, result):
-    rows, memory, out, one = borrow(rods), borrow(work), borrow(result), splat(1.0)
+def hold(rods, work, scheme, q, v, robots, limit, largest_cut, result):
+    rows, memory, tableau = borrow(rods), borrow(work), borrow(scheme)
+    out, one = borrow(result), splat(1.0)
     mask = load(borrow(robots), 0) > 0.0
     q_rows, v_rows = borrow(q), borrow(v)
     store(out, 0, rigid_motion(rows, q_rows, v_rows)[6])
     refused, cut = hold_to_energy(
-        rows, memory, q_rows, v_rows, splat(0.01), mask, load(borrow(limit), 0), splat(largest_cut)
+        rows, memory, tableau, q_rows, v_rows, splat(0.01), mask, load(borrow(limit), 0), splat(largest_cut)
     )
     store(out, 1, select(refused, one, 0.0))
     store(out, 2, select(cut, one, 0.0))
@@ -108,13 +109,15 @@ def held(share: float, largest_cut: float = 0.01, robots: np.ndarray | None = No
     q, v = moving_robots()
     rows, work, result = (rows_of(q), rows_of(v)), work_at(np.zeros((N_LANES, 5))), np.zeros((3, N_LANES))
     chosen, limit = np.ones((1, N_LANES)) if robots is None else robots[None], np.full((1, N_LANES), 1e9)
-    hold(RODS, work, *rows, chosen, limit, largest_cut, result)  # high above: says the rigid energy, changes nothing
+    hold(
+        RODS, work, SCHEMES["implicit-midpoint"], *rows, chosen, limit, largest_cut, result
+    )  # high above: says the rigid energy, changes nothing
     assert not result[1:].any()
     np.testing.assert_array_equal(nodes_of(rows[1]), v)
     rigid, kinetic = result[0].copy(), np.array([oracle.kinetic_energy(STAR, one) for one in v])
     potential = np.array([oracle.elastic_energy(STAR, one, np.zeros(5)) for one in q])
     limit[0] = potential + rigid + share * (kinetic - rigid)
-    hold(RODS, work, *rows, chosen, limit, largest_cut, result)
+    hold(RODS, work, SCHEMES["implicit-midpoint"], *rows, chosen, limit, largest_cut, result)
     np.testing.assert_array_equal(nodes_of(rows[0]), q)
     after = nodes_of(rows[1])
     return SimpleNamespace(
