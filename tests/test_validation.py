@@ -10,7 +10,7 @@ from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 from oracle import Star, elastic_hessian
 from seastar_gym import Scene, Seastar
-from seastar_gym.studies import exact, validation
+from seastar_gym.studies import exact, validation, validation_page
 
 PAGE = Path(__file__).parents[1] / "docs" / "validation.md"
 
@@ -57,7 +57,7 @@ def test_a_limb_held_by_hub_and_root_node_is_clamped_at_the_middle_of_the_held_e
     from_hub = exact.elastica_tip(load, EI, 0.1, EA)
     at_hub = [validation.loaded_tip(r, load) + [0.5 * r.edge_length, 0.0] - from_hub for r in robots]
     lengths = [robot.edge_length for robot in robots]
-    order = validation.order_row("", lengths, [np.hypot(*error) for error in at_hub], 0.0).ours
+    order = validation_page.order_row("", lengths, [np.hypot(*error) for error in at_hub], 0.0).ours
     assert order == pytest.approx(1.0, abs=0.1)
 
 
@@ -148,14 +148,14 @@ def test_the_page_in_the_repository_is_the_one_that_the_study_writes():
     for name in validation.SECTIONS:
         assert section(name).title in page
         for row in section(name).rows:
-            what, reference, *_ = validation.as_cells(row)
+            what, reference, *_ = validation_page.as_cells(row)
             assert f"| {what} | {reference} |" in page
 
 
 def test_a_row_is_written_with_its_unit_and_difference():
-    row = validation.Row("speed", 2.0, 2.001, "m/s", allowed=1e-4)
-    assert validation.as_cells(row) == ("speed [m/s]", "2.00000", "2.00100", "+1.0e-03 (+5.0e-04)")
+    row = validation_page.Row("speed", 2.0, 2.001, "m/s", allowed=1e-4)
+    assert validation_page.as_cells(row) == ("speed [m/s]", "2.00000", "2.00100", "+1.0e-03 (+5.0e-04)")
     assert not row.holds
-    shown = validation.Section("Speeds", "How.", [row])
-    assert "| speed [m/s] | 2.00000 | 2.00100 | +1.0e-03 (+5.0e-04) |" in validation.as_page([shown])
-    assert validation.as_table(shown).row_count == 1
+    shown = validation_page.Section("Speeds", "How.", [row])
+    assert "| speed [m/s] | 2.00000 | 2.00100 | +1.0e-03 (+5.0e-04) |" in validation_page.as_page([shown])
+    assert validation_page.as_table(shown).row_count == 1

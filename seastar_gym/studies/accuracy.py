@@ -9,26 +9,22 @@ are those that one thread computed, the best of several rounds, for a batch with
 """
 
 import argparse
-import csv
 import itertools
-import json
-import math
 import os
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
-from rich.table import Table
 from tqdm import tqdm
 
 from seastar_gym import fidelity
-from seastar_gym.scene import Fidelity, Numerics, SchemeName
+from seastar_gym.scene import Numerics, SchemeName
 from seastar_gym.simulator import Simulator
 from seastar_gym.studies.accuracy_cases import (
     STRAIGHT,
@@ -45,15 +41,14 @@ from seastar_gym.studies.accuracy_cases import (
     swim,
     swims,
 )
-from seastar_gym.studies.throughput import machine
+from seastar_gym.studies.accuracy_rows import Row, Space, Study, presets, promised
+from seastar_gym.studies.accuracy_tables import TABLE_WIDTH, as_markdown, as_table, facts, store, write_csv
 
 Floats = NDArray[np.float64]
 
 MS = 1e-3
 TIGHT = 1e-12
 """Newton tolerance of converged solutions."""
-AGREEMENT = {"straight": 1e-5, "pair": 1e-4, "pentagon": 1e-4, "random": 1e-4}
-"""How closely the two converged solutions have to agree before anything is stored."""
 STEPS: dict[SchemeName, tuple[float, ...]] = {
     "implicit-euler": (20, 10, 5, 3, 2, 1, 0.5, 0.25),
     "sdirk2": (50, 30, 20, 15, 10, 5, 2, 1, 0.5, 0.2),
@@ -64,9 +59,6 @@ STEPS: dict[SchemeName, tuple[float, ...]] = {
 ADAPTED = (0.02, 0.015, 0.01, 0.007, 0.005, 0.003, 0.002, 0.001)
 """path_tolerance of adapted steps."""
 LARGEST_ADAPTED = 5 * MS
-TABLE_WIDTH = 112
-NOTICEABLE = 0.03
-"""By what share an error has to be smaller to be worth any time."""
 FINE_NODES = (10, 19, 37, 73)
 """N of the extrapolation N -> infinity: each halves the edges of the one before."""
 
@@ -101,78 +93,7 @@ QUICK = Plan(
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Row:
-    """A setting, its errors and its cost.
-
-    path, straight, pair, pentagon, random, gait: Largest path errors, over all swims but gaits and by kind; worst: the
-    swim that path is of. median: Of the random sequences. heading [deg], end: The worst of all swims but gaits.
-    spatial, spatial_straight: Path errors of this N against N -> infinity, of the converged solutions.
-    iterations, steps: Newton iterations and time steps per stroke. rejections, halvings: In all swims.
-    path_promise, straight_promise, gait_promise: See `promised`.
-    speed, straight_speed: Simulated over computing seconds on one core, mixed commands and straight swim.
-    """
-
-    numerics: Numerics
-    nodes_per_limb: int
-    path: float
-    worst: str
-    straight: float
-    pair: float
-    pentagon: float
-    random: float
-    median: float
-    gait: float
-    heading: float
-    end: float
-    iterations: float
-    steps: float
-    rejections: int
-    halvings: int
-    spatial: float = math.nan
-    spatial_straight: float = math.nan
-    path_promise: float = math.nan
-    straight_promise: float = math.nan
-    gait_promise: float = math.nan
-    speed: float = math.nan
-    straight_speed: float = math.nan
-
-    @property
-    def label(self) -> str:
-        """Scheme and step, for people."""
-        adapted = self.numerics.path_tolerance
-        how = "" if adapted is None else f", adapted to {100 * adapted:g} %"
-        return f"{self.numerics.scheme} {1e3 * self.numerics.step:g} ms{how}"
-
-
-class Space(NamedTuple):
-    """Path errors of the converged solution of N nodes per limb, over all swims and of the straight swim alone."""
-
-    nodes_per_limb: int
-    path: float
-    straight: float
-
-
-@dataclass(frozen=True)
-class Study:
-    """rows: Of N = 10 first. agreement: Path difference of the two converged solutions, by kind. space: Over N.
-
-    straight: Hub x of the converged straight swim after every stroke [m]; limit: at the end for N -> infinity.
-    """
-
-    rows: list[Row]
-    agreement: dict[str, float]
-    space: list[Space]
-    straight: Floats
-    limit: float
-
-
 # --- settings --------------------------------------------------------------------------------------------------------
-
-
-def presets() -> dict[str, Numerics]:
-    """The presets of `Numerics` by name."""
-    return {name: Numerics.preset(name) for name in get_args(Fidelity)}
 
 
 def settings(plan: Plan) -> list[Numerics]:
@@ -358,52 +279,6 @@ def measure_speeds(keys: Sequence[tuple[Numerics, int]], rounds: int, bar: Any, 
     return simulated / best
 
 
-# --- what can be promised --------------------------------------------------------------------------------------------
-
-
-def no_coarser(other: Numerics, numerics: Numerics) -> bool:
-    """Whether a setting is of the same kind and no coarser in any respect."""
-    return (
-        other.scheme == numerics.scheme
-        and (other.path_tolerance is None) == (numerics.path_tolerance is None)
-        and other.step <= numerics.step
-        and other.newton_tolerance <= numerics.newton_tolerance
-        and (other.path_tolerance or 0.0) <= (numerics.path_tolerance or 0.0)
-    )
-
-
-def promised(rows: Sequence[Row]) -> list[Row]:
-    """Rows with their promises: the largest error of this setting and of all that are no coarser.
-
-    Errors of opposite sign cancel at some steps; that luck may not last, so it is not promised.
-    """
-    found = []
-    for row in rows:
-        finer = [each for each in rows if no_coarser(each.numerics, row.numerics)]
-        worst = {kind: max(getattr(each, kind) for each in finer) for kind in ("path", "straight", "gait")}
-        found.append(replace(row, **{f"{kind}_promise": error for kind, error in worst.items()}))
-    return found
-
-
-def front(rows: Iterable[Row], error: Callable[[Row], float], speed: Callable[[Row], float]) -> list[Row]:
-    """Rows that no other beats in both, fastest first; slower ones only if their error is noticeably smaller."""
-    chosen: list[Row] = []
-    for row in sorted(rows, key=lambda row: (-speed(row), error(row))):
-        if not chosen or error(row) < (1.0 - NOTICEABLE) * error(chosen[-1]):
-            chosen.append(row)
-    return [row for row in chosen if math.isfinite(error(row))]
-
-
-def fronts(rows: Sequence[Row]) -> list[Row]:
-    """Those on the front of paths, of any gait or of the straight swim, fastest first."""
-    chosen = {
-        row.numerics: row
-        for kind in ("path", "gait", "straight")
-        for row in front(rows, lambda row: getattr(row, f"{kind}_promise"), lambda row: row.speed)  # noqa: B023
-    }
-    return sorted(chosen.values(), key=lambda row: -row.speed)
-
-
 # --- the study -------------------------------------------------------------------------------------------------------
 
 
@@ -439,128 +314,6 @@ def study(plan: Plan, progress: bool = True) -> Study:
         for row, (speed, straight_speed) in zip(rows, speeds, strict=True)
     ]
     return Study(rows, agreement, space, converged[0].hub[:, 0, 0], limit)
-
-
-# --- tables ----------------------------------------------------------------------------------------------------------
-
-
-def summary(found: Study) -> list[tuple[str, Row]]:
-    """The rows worth reading, fastest first: the presets by name, and the front of the path error."""
-    own = [row for row in found.rows if row.nodes_per_limb == 10]
-    names = {numerics: name for name, numerics in presets().items()}
-    chosen = {row.numerics: row for row in front(own, lambda row: row.path_promise, lambda row: row.speed)}
-    chosen.update({row.numerics: row for row in own if row.numerics in names})
-    return [(names.get(row.numerics, ""), row) for row in sorted(chosen.values(), key=lambda row: -row.speed)]
-
-
-COLUMNS = (
-    "preset", "scheme and step", "Newton tolerance", "path error", "any gait", "straight", "heading", "x real time",
-)  # fmt: skip
-
-
-def as_cells(name: str, row: Row) -> tuple[str, ...]:
-    """A line of the summary."""
-    promises = (row.path_promise, row.gait_promise, row.straight_promise)
-    return (
-        name, row.label, f"{row.numerics.newton_tolerance:.0e}", *(f"{100 * error:.2g} %" for error in promises),
-        f"{row.heading:.2g}°", f"{two_digits(row.speed):,.0f}",
-    )  # fmt: skip
-
-
-def two_digits(value: float, up: bool = False) -> float:
-    """Rounded to two significant digits, upwards on request."""
-    unit = 10.0 ** (math.floor(math.log10(value)) - 1) if value > 0.0 and math.isfinite(value) else 1.0
-    scaled = value / unit
-    whole = math.ceil(scaled - 1e-9) if up else round(scaled)
-    return float(f"{whole * unit:.2g}")
-
-
-def facts(found: Study) -> list[str]:
-    """What the tables do not say."""
-    ten = next(each for each in found.space if each.nodes_per_limb == 10)
-    agreement = ", ".join(f"{kind} {error:.0e}" for kind, error in found.agreement.items())
-    return [
-        f"Converged straight swim, N = 10: {1e3 * found.straight[0]:.5f} mm after one stroke, "
-        f"{1e3 * found.straight[-1]:.4f} mm after {len(found.straight)}.",
-        f"Two schemes agree on the path, as a share of its length: {agreement}.",
-        f"N = 10 against N -> infinity: {100 * ten.path:.2g} % on the worst path, {100 * ten.straight:.2g} % on the "
-        f"straight swim, which then goes {1e3 * found.limit:.2f} mm.",
-    ]
-
-
-def as_markdown(found: Study) -> str:
-    """The summary for the README."""
-    lines = [f"| {' | '.join(COLUMNS)} |", "|---|---|---:|" + "---:|" * (len(COLUMNS) - 3)]
-    lines += [f"| {' | '.join(as_cells(name, row))} |" for name, row in summary(found)]
-    return "\n".join([*lines, "", *facts(found), f"Speeds: one core of {machine()}."]) + "\n"
-
-
-def as_table(found: Study) -> Table:
-    """The summary for the terminal."""
-    table = Table(title=f"Errors against h -> 0, worst cases; speed on one core ({machine()})")
-    for column in COLUMNS:
-        table.add_column(column, justify="left" if column in COLUMNS[:2] else "right")
-    for name, row in summary(found):
-        table.add_row(*as_cells(name, row), style="bold" if name else "")
-    return table
-
-
-def write_csv(rows: Sequence[Row], path: Path) -> None:
-    """All settings with all columns; errors are shares of the path's length unless the name says otherwise."""
-    units = {"heading": "heading_deg", "iterations": "iterations_per_stroke", "steps": "steps_per_stroke"}
-    names = [field.name for field in fields(Row) if field.name != "numerics"]
-    with path.open("w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(
-            ["scheme", "step_s", "newton_tolerance", "path_tolerance", *(units.get(name, name) for name in names)]
-        )
-        for row in rows:
-            n = row.numerics
-            key = [n.scheme, n.step, n.newton_tolerance, "" if n.path_tolerance is None else n.path_tolerance]
-            writer.writerow([*key, *(_cell(getattr(row, name)) for name in names)])
-
-
-def _cell(value: Any) -> Any:
-    return float(f"{value:.5g}") if isinstance(value, float) else value
-
-
-# --- the table of the package ----------------------------------------------------------------------------------------
-
-
-def as_promise(row: Row) -> dict[str, Any]:
-    """A row as `fidelity.Promise` keeps it: errors rounded upwards, speed to two digits."""
-    n = row.numerics
-    return {
-        "scheme": n.scheme,
-        "step": n.step,
-        "newton_tolerance": n.newton_tolerance,
-        "path_tolerance": n.path_tolerance,
-        "path_error": two_digits(row.path_promise, up=True),
-        "gait_error": two_digits(row.gait_promise, up=True),
-        "straight_error": two_digits(row.straight_promise, up=True),
-        "heading_error": two_digits(row.heading, up=True),
-        "end_error": two_digits(row.end, up=True),
-        "speed": two_digits(row.speed),
-    }
-
-
-def store(found: Study, path: Path = fidelity.PRESETS) -> None:
-    """Write the package's table; refuses a study whose two converged solutions do not agree."""
-    for kind, allowed in AGREEMENT.items():
-        if not found.agreement[kind] <= allowed:
-            raise ValueError(
-                f"The two converged solutions differ by {found.agreement[kind]:.1e} of the path on the {kind} swims, "
-                f"and {allowed:.0e} is allowed: nothing is stored."
-            )
-    own = [row for row in found.rows if row.nodes_per_limb == 10]
-    by_numerics = {row.numerics: row for row in own}
-    table = {
-        "about": "Written by python -m seastar_gym.studies.accuracy --store; read by seastar_gym.fidelity.",
-        "machine": machine(),
-        "presets": {name: as_promise(by_numerics[numerics]) for name, numerics in presets().items()},
-        "front": [as_promise(row) for row in fronts(own)],
-    }
-    path.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
 
 
 def main() -> None:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from seastar_gym.studies.accuracy import Row, Study
+    from seastar_gym.studies.accuracy_rows import Row, Study
 
 Floats = NDArray[np.float64]
 
@@ -114,7 +114,7 @@ def _draw_settings(axes: Axes, rows: Sequence[Row], error: RowNumber, speed: Row
 
 
 def _draw_front(axes: Axes, rows: Sequence[Row], error: RowNumber, speed: RowNumber) -> None:
-    from seastar_gym.studies.accuracy import front
+    from seastar_gym.studies.accuracy_rows import front
 
     best = front(rows, error, speed)
     x, y = np.array([(speed(row), PERCENT * error(row)) for row in best]).T
@@ -125,7 +125,7 @@ def _mark(axes: Axes, rows: Sequence[Row], error: RowNumber, speed: RowNumber) -
     """The presets, and the chapter's steps."""
     from matplotlib.patheffects import withStroke
 
-    from seastar_gym.studies.accuracy import presets
+    from seastar_gym.studies.accuracy_rows import presets
 
     by_numerics = {row.numerics: row for row in rows}
     marks = [(f'"{name}"', by_numerics[n], "s") for name, n in presets().items() if name != "chapter"]

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from seastar_gym.studies.stability import Cell
+    from seastar_gym.studies.stability_cells import Cell
 
 Floats = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ import pytest
 from seastar_gym import Numerics
 from seastar_gym.fidelity import Promise
 from seastar_gym.simulator import Simulator
-from seastar_gym.studies import accuracy
-from seastar_gym.studies.accuracy import MS, Plan, Row
+from seastar_gym.studies import accuracy, accuracy_rows, accuracy_tables
+from seastar_gym.studies.accuracy import MS, Plan
 from seastar_gym.studies.accuracy_cases import (
     PAIRS,
     STRAIGHT,
@@ -29,6 +29,7 @@ from seastar_gym.studies.accuracy_cases import (
     swims,
     symmetric_form,
 )
+from seastar_gym.studies.accuracy_rows import Row
 
 TINY = Plan(
     n_random=2, side=(1, 0), converged=(("sdirk3", 1 * MS), ("implicit-midpoint", 0.5 * MS)), shortest=10 * MS,
@@ -155,29 +156,29 @@ def test_a_promise_is_the_worst_of_all_settings_that_are_no_coarser():
         row(step=0.005, tolerance=1e-4, error=0.5),
         row("sdirk3", step=0.005, error=0.7),
     ]
-    assert [each.path_promise for each in accuracy.promised(rows)] == [0.03, 0.03, 0.01, 0.03, 0.5, 0.7]
+    assert [each.path_promise for each in accuracy_rows.promised(rows)] == [0.03, 0.03, 0.01, 0.03, 0.5, 0.7]
 
 
 def test_adapted_steps_are_promised_by_themselves():
     fixed = row("implicit-midpoint", step=0.001, error=0.5)
     tight = row("implicit-midpoint", step=0.005, path_tolerance=0.005, error=0.02)
     loose = row("implicit-midpoint", step=0.005, path_tolerance=0.02, error=0.01)
-    assert [each.path_promise for each in accuracy.promised([fixed, tight, loose])] == [0.5, 0.02, 0.02]
+    assert [each.path_promise for each in accuracy_rows.promised([fixed, tight, loose])] == [0.5, 0.02, 0.02]
 
 
 def test_front_keeps_what_no_other_setting_beats():
     rows = [row(step=s, error=e, speed=v) for s, e, v in ((1, 0.1, 9e3), (2, 0.2, 8e3), (3, 0.05, 7e3), (4, 0.05, 6e3))]
-    best = accuracy.front(rows, lambda each: each.path, lambda each: each.speed)
+    best = accuracy_rows.front(rows, lambda each: each.path, lambda each: each.speed)
     assert [each.numerics.step for each in best] == [1, 3]
-    assert accuracy.front([row(error=np.inf)], lambda each: each.path, lambda each: each.speed) == []
+    assert accuracy_rows.front([row(error=np.inf)], lambda each: each.path, lambda each: each.speed) == []
 
 
 @pytest.mark.parametrize(
     "value, rounded, up", [(0.04912, 0.049, 0.05), (17_432.0, 17_000.0, 18_000.0), (0.03, 0.03, 0.03), (0.0, 0.0, 0.0)]
 )
 def test_stored_figures_have_two_digits_and_errors_are_rounded_upwards(value, rounded, up):
-    assert accuracy.two_digits(value) == rounded
-    assert accuracy.two_digits(value, up=True) == up
+    assert accuracy_tables.two_digits(value) == rounded
+    assert accuracy_tables.two_digits(value, up=True) == up
 
 
 # The study
@@ -209,21 +210,21 @@ def test_study_finds_the_converged_straight_swim_and_that_finer_limbs_converge(f
 def test_presets_and_the_chapters_steps_are_among_the_settings():
     measured = accuracy.settings(Plan())
     chapter = (Numerics("implicit-euler", 3 * MS), Numerics("implicit-euler", 20 * MS))
-    assert {*accuracy.presets().values(), *chapter} <= set(measured)
+    assert {*accuracy_rows.presets().values(), *chapter} <= set(measured)
     assert len(measured) == len(set(measured))
 
 
 def test_tables_and_csv_are_written(found, tmp_path):
-    accuracy.write_csv(found.rows, tmp_path / "a.csv")
+    accuracy_tables.write_csv(found.rows, tmp_path / "a.csv")
     rows = list(csv.DictReader((tmp_path / "a.csv").read_text().splitlines()))
     assert len(rows) == len(found.rows)
     assert {"scheme", "step_s", "nodes_per_limb", "path", "spatial", "heading_deg", "end", "speed"} <= set(rows[0])
     assert float(rows[0]["path"]) == pytest.approx(found.rows[0].path, rel=1e-4)
-    lines = accuracy.as_markdown(found).splitlines()
-    assert all(line.count("|") == len(accuracy.COLUMNS) + 1 for line in lines if line.startswith("|"))
-    for name in accuracy.presets():
+    lines = accuracy_tables.as_markdown(found).splitlines()
+    assert all(line.count("|") == len(accuracy_tables.COLUMNS) + 1 for line in lines if line.startswith("|"))
+    for name in accuracy_rows.presets():
         assert any(line.startswith(f"| {name} |") for line in lines)
-    assert accuracy.as_table(found).row_count == len(accuracy.summary(found))
+    assert accuracy_tables.as_table(found).row_count == len(accuracy_tables.summary(found))
 
 
 def test_pictures_are_drawn(found, tmp_path):
@@ -234,10 +235,10 @@ def test_pictures_are_drawn(found, tmp_path):
 
 
 def test_what_is_stored_can_be_promised(found, tmp_path):
-    agreed = replace(found, agreement=dict.fromkeys(accuracy.AGREEMENT, 1e-6))
-    accuracy.store(agreed, tmp_path / "presets.json")
+    agreed = replace(found, agreement=dict.fromkeys(accuracy_tables.AGREEMENT, 1e-6))
+    accuracy_tables.store(agreed, tmp_path / "presets.json")
     stored = json.loads((tmp_path / "presets.json").read_text())
-    assert list(stored["presets"]) == list(accuracy.presets())
+    assert list(stored["presets"]) == list(accuracy_rows.presets())
     by_numerics = {each.numerics: each for each in found.rows if each.nodes_per_limb == 10}
     for entry in (*stored["presets"].values(), *stored["front"]):
         kept = Promise(**entry)
@@ -249,9 +250,9 @@ def test_what_is_stored_can_be_promised(found, tmp_path):
 
 
 def test_a_study_without_a_converged_solution_is_not_stored(found, tmp_path):
-    doubtful = replace(found, agreement={**dict.fromkeys(accuracy.AGREEMENT, 1e-6), "pair": 2e-4})
+    doubtful = replace(found, agreement={**dict.fromkeys(accuracy_tables.AGREEMENT, 1e-6), "pair": 2e-4})
     with pytest.raises(ValueError, match=r"2.0e-04 of the path on the pair swims.*nothing is stored"):
-        accuracy.store(doubtful, tmp_path / "presets.json")
+        accuracy_tables.store(doubtful, tmp_path / "presets.json")
     assert not (tmp_path / "presets.json").exists()
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from seastar_gym.studies import stability
+from seastar_gym.studies import stability, stability_cells
 from seastar_gym.studies.stability_cases import SWEEPS, format_step, format_value, quick_sweeps
 from seastar_gym.studies.stability_pictures import draw_atlas
 
@@ -21,7 +21,7 @@ GRID = tuple(replace(sweep, values=VALUES[sweep.name]) for sweep in SWEEPS if sw
 @pytest.fixture(scope="module")
 def cells():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(stability, "REFERENCE_STEPS", 1000)
+        patch.setattr(stability_cells, "REFERENCE_STEPS", 1000)
         return stability.atlas(GRID, STEPS, progress=False, workers=1)
 
 
@@ -121,7 +121,7 @@ def test_a_long_run_keeps_strain_and_speed_bounded():
 
 
 def test_the_study_writes_its_files_and_prints_its_table(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(stability, "REFERENCE_STEPS", 100)
+    monkeypatch.setattr(stability_cells, "REFERENCE_STEPS", 100)
     monkeypatch.setattr(stability, "quick_sweeps", lambda: GRID)
     monkeypatch.setattr(stability, "QUICK_STEPS", (2e-2, 0.3))
     monkeypatch.setattr("sys.argv", ["stability", "--quick", "--scheme", "sdirk2", "--out", str(tmp_path / "out")])
