@@ -8,6 +8,7 @@ stroke once the gait has settled. It is computed once for every scene and kept i
 
 import hashlib
 import os
+from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -95,17 +96,14 @@ def waypoints_of(observations: NDArray[np.float32], scene: Scene) -> tuple[Float
     return waypoints[:, :2], waypoints[:, 2:]
 
 
-class GreedyPolicy:
-    """The command whose mean displacement leaves the least way to go; in Stable-Baselines3's form.
+class Searcher(ABC):
+    """What chooses by the state that an observation shows, for one robot or for many; in Stable-Baselines3's form."""
 
-    scene: What the map is made of; the environment's own for a fair comparison. waypoint_radius: [m].
-    """
+    actions: Actions
 
-    actions: Actions = "joint"
-
-    def __init__(self, scene: Scene, waypoint_radius: float = 0.01):
-        self.scene, self.waypoint_radius = scene, waypoint_radius
-        self._hub = displacement_map(scene, self.actions).hub
+    @abstractmethod
+    def choose(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
+        """Actions for observations of shape (n, size)."""
 
     def predict(
         self,
@@ -115,7 +113,23 @@ class GreedyPolicy:
         deterministic: bool = False,
     ) -> tuple[NDArray[np.int64], None]:
         """Actions for observations of shape (size,) or (n, size); there is no state."""
-        current, after = waypoints_of(np.atleast_2d(observation), self.scene)
-        way = remaining_way(self._hub, current[:, None], after[:, None], self.waypoint_radius)
-        chosen = np.argmin(way, axis=1)
+        chosen = self.choose(np.atleast_2d(observation))
         return (chosen[0] if np.ndim(observation) == 1 else chosen), None
+
+
+class GreedyPolicy(Searcher):
+    """The command whose mean displacement leaves the least way to go.
+
+    scene: What the map is made of; the environment's own for a fair comparison. waypoint_radius: [m].
+    """
+
+    actions = "joint"
+
+    def __init__(self, scene: Scene, waypoint_radius: float = 0.01):
+        self.scene, self.waypoint_radius = scene, waypoint_radius
+        self._hub = displacement_map(scene, self.actions).hub
+
+    def choose(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
+        """Actions for observations of shape (n, size)."""
+        current, after = waypoints_of(observations, self.scene)
+        return np.argmin(remaining_way(self._hub, current[:, None], after[:, None], self.waypoint_radius), axis=1)

@@ -6,13 +6,12 @@ first command of the sequence that leaves the least way to go.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.greedy import remaining_way, waypoints_of
-from seastar_gym.envs.commands import Actions, command_table
+from agents.greedy import Searcher, remaining_way, waypoints_of
+from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.observation import VELOCITY_SCALE
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.simulator import Simulator, State
@@ -66,13 +65,13 @@ class Branching:
         return simulator.get_state()
 
 
-class Planner:
-    """Beam search over pairs of limbs, anew before every stroke; in Stable-Baselines3's form.
+class Planner(Searcher):
+    """Beam search over pairs of limbs, anew before every stroke.
 
     scene: What the search swims in, by default the chapter's at fidelity "fast". waypoint_radius: [m].
     """
 
-    actions: Actions = "pairs"
+    actions = "pairs"
 
     def __init__(
         self,
@@ -86,17 +85,9 @@ class Planner:
         self._commands = command_table(self.actions, self.scene.robot.n_limbs)
         self._swim_all = Branching(self.scene, self._commands, threads)
 
-    def predict(
-        self,
-        observation: NDArray[np.float32],
-        state: Any = None,
-        episode_start: Any = None,
-        deterministic: bool = False,
-    ) -> tuple[NDArray[np.int64], None]:
-        """Actions for observations of shape (size,) or (n, size); there is no state."""
-        observations = np.atleast_2d(observation)
-        chosen = self._search(state_of(observations, self.scene), *waypoints_of(observations, self.scene))
-        return (chosen[0] if np.ndim(observation) == 1 else chosen), None
+    def choose(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
+        """Actions for observations of shape (n, size)."""
+        return self._search(state_of(observations, self.scene), *waypoints_of(observations, self.scene))
 
     def _search(self, start: State, current: Floats, after: Floats) -> NDArray[np.int64]:
         """The first action of the best sequence for every robot, shape (n,)."""

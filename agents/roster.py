@@ -13,6 +13,9 @@ from agents.swim import Policy
 from seastar_gym.envs.task import make_scene
 from seastar_gym.scene import Fidelity
 
+OTHERS = ("learned", "greedy", "planner")
+"""Agents that are not scripted."""
+
 
 def load_agents(names: Sequence[str], seed: int = 0, fidelity: Fidelity = "balanced") -> dict[str, Policy]:
     """Policies by name: the one in the box, scripted ones, the greedy one by a map of a fidelity's physics, the
@@ -39,7 +42,10 @@ def _load_agent(name: str, seed: int, fidelity: Fidelity) -> Policy:
     if name == "planner":
         return Planner()
     if not _is_file(name):
-        return scripted(name, rng=np.random.default_rng(seed))
+        try:
+            return scripted(name, rng=np.random.default_rng(seed))
+        except ValueError as unknown:
+            raise ValueError(f"{unknown} Others are {', '.join(OTHERS)}, and files of policies.") from unknown
     if not name.endswith(".zip"):
         return learned.load(name)
     try:
