@@ -106,13 +106,14 @@ def table_html(table: ResultsTable) -> str:
 
 def _side(name: str) -> str:
     """Words begin on the left, numbers end on the right."""
-    return ' class="words"' if name in ("agent", "path", "disturbance") else ""
+    return ' class="words"' if name in ("agent", "path", "disturbance", "fidelity") else ""
 
 
 TRIALS = {
     "path": "path",
     "disturbance": "disturbance",
     "agent": "agent",
+    "fidelity": "fidelity",
     "swims": "swims",
     "success_rate": "success [%]",
     "strokes_to_finish": "strokes to finish",

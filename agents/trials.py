@@ -11,6 +11,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import tyro
@@ -119,17 +120,17 @@ def statistics(swims: Sequence[Swim]) -> dict[str, Interval]:
     return {name: mean_with_interval(values) for name, values in measures.items()}
 
 
-def trials(agents: Mapping[str, Policy], options: "Options") -> list[dict[str, str | int | float]]:
+def trials(agents: Mapping[str, Policy], fidelity: Fidelity, options: "Options") -> list[dict[str, str | int | float]]:
     """A row for every agent and set of swims."""
     rows = []
-    scene = make_scene(None, options.fidelity)
-    for path, label, n_swims in _sets(options.swims):
+    scene = make_scene(None, fidelity)
+    for path, label, n_swims in _sets(options):
         for agent, policy in agents.items():
             swims = swim_many(
                 agent, policy, path, n_swims, scene, DISTURBANCES[label], seed=options.seed, threads=options.num_threads
             )
             row: dict[str, str | int | float] = {
-                "path": path, "disturbance": label, "agent": agent, "fidelity": options.fidelity, "swims": n_swims
+                "path": path, "disturbance": label, "agent": agent, "fidelity": fidelity, "swims": n_swims
             }  # fmt: skip
             for name, numbers in statistics(swims).items():
                 row |= dict(zip((name, f"{name}_low", f"{name}_high"), numbers, strict=True))
@@ -137,12 +138,15 @@ def trials(agents: Mapping[str, Policy], options: "Options") -> list[dict[str, s
     return rows
 
 
-def _sets(n_random: int) -> list[tuple[PathName, str, int]]:
+def _sets(options: "Options") -> list[tuple[PathName, str, int]]:
     """Path, disturbance and number of swims of every set; the disturbed pentagon for all directions and limbs."""
     nominal: list[tuple[PathName, str, int]] = [(path, "none", 1) for path in NOMINAL]
-    disturbed = [name for name in DISTURBANCES if name != "none"]
-    pentagon: list[tuple[PathName, str, int]] = [("pentagon", name, 5 * CURRENT_DIRECTIONS) for name in disturbed]
-    return [*nominal, *(("random", name, n_random) for name in DISTURBANCES), *pentagon]
+    random: list[tuple[PathName, str, int]] = [("random", name, options.swims) for name in DISTURBANCES]
+    pentagon: list[tuple[PathName, str, int]] = [
+        ("pentagon", name, 5 * CURRENT_DIRECTIONS) for name in DISTURBANCES if name != "none"
+    ]
+    known = {"nominal": nominal, "random": random, "pentagon": pentagon}
+    return [one for name in options.sets for one in known[name]]
 
 
 # --- the command line ------------------------------------------------------------------------------------------------
@@ -154,10 +158,12 @@ class Options:
 
     agents: tuple[str, ...] = ("learned", "greedy", "pentagon")
     """As for agents.evaluate."""
+    sets: tuple[Literal["nominal", "random", "pentagon"], ...] = ("nominal", "random", "pentagon")
+    """The named paths, random paths under every disturbance, the disturbed pentagon."""
     swims: int = 1000
     """Random paths of every set."""
-    fidelity: Fidelity = "balanced"
-    """How exactly the swims are computed."""
+    fidelity: tuple[Fidelity, ...] = ("balanced",)
+    """How exactly the swims are computed; each in turn."""
     seed: int = 0
     """Of paths, headings and disturbances; the same for every agent."""
     num_threads: int | None = None
@@ -167,6 +173,8 @@ class Options:
 
     def __post_init__(self) -> None:
         require_count("swims", self.swims, 1, 1_000_000)
+        if not (self.agents and self.sets and self.fidelity):
+            raise ValueError("There is nothing to swim: name at least one agent, one set and one fidelity.")
 
 
 def _print(rows: Sequence[dict[str, str | int | float]]) -> None:
@@ -175,6 +183,7 @@ def _print(rows: Sequence[dict[str, str | int | float]]) -> None:
         "path",
         "disturbance",
         "agent",
+        "fidelity",
         "swims",
         "success",
         "strokes",
@@ -188,19 +197,22 @@ def _print(rows: Sequence[dict[str, str | int | float]]) -> None:
             f"{row[name]:.1f} [{row[name + '_low']:.1f}, {row[name + '_high']:.1f}]"
             for name in ("strokes_to_finish", "mean_cross_track_error_mm", "limbs_heated_per_metre")
         )
-        table.add_row(*(str(row[name]) for name in ("path", "disturbance", "agent", "swims")), success, *others)
+        table.add_row(
+            *(str(row[name]) for name in ("path", "disturbance", "agent", "fidelity", "swims")), success, *others
+        )
     Console(width=160).print(table)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
     options = tyro.cli(Options, args=arguments)
+    rows = []
     try:
-        agents = load_agents(options.agents, options.seed, options.fidelity)
+        for fidelity in options.fidelity:
+            rows += trials(load_agents(options.agents, options.seed, fidelity), fidelity, options)
     except (ValueError, OSError) as bad_input:
         print(bad_input, file=sys.stderr)
         return 2
-    rows = trials(agents, options)
     _print(rows)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     with options.out.open("w", newline="", encoding="utf-8") as file:

@@ -128,13 +128,15 @@ def test_numbers_are_shown_to_a_tenth(value, shown):
 
 def test_trials_are_shown_with_their_confidence_intervals(tmp_path):
     measured = [name + end for name in MEASURED for end in ("", "_low", "_high")]
-    header = ["path", "disturbance", "agent", "swims", *measured]
-    row = ["random", "none", "a", 1000, 0.9951, 0.9912, 0.9983, 160.04, 159, 161, "nan", "nan", "nan", 423, 400, 450]
+    header = ["path", "disturbance", "agent", "fidelity", "swims", *measured]
+    row = ["random", "none", "a", "fast", 1000]
+    row += [0.9951, 0.9912, 0.9983, 160.04, 159, 161, "nan", "nan", "nan", 423, 400, 450]
     (tmp_path / "trials.csv").write_text("\n".join(",".join(map(str, line)) for line in (header, row)) + "\n")
     table = read_trials(tmp_path / "trials.csv")
     cells = re.findall(r'data-name="(\w+)">(.*?)</td>', table_html(table))
     assert {name: re.sub("<.*?>", "", cell) for name, cell in cells} == {
-        "path": "random", "disturbance": "none", "agent": "a", "swims": "1000", "success_rate": "99.5 [99.1, 99.8]",
+        "path": "random", "disturbance": "none", "agent": "a", "fidelity": "fast", "swims": "1000",
+        "success_rate": "99.5 [99.1, 99.8]",
         "strokes_to_finish": "160.0 [159.0, 161.0]", "mean_cross_track_error_mm": "\u2013",
         "limbs_heated_per_metre": "423.0 [400.0, 450.0]",
     }  # fmt: skip

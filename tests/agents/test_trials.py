@@ -9,7 +9,7 @@ from agents.disturbances import Disturbance, DisturbedTask
 from agents.greedy import GreedyPolicy
 from agents.scripted import scripted
 from agents.swim import swim
-from agents.trials import main, mean_with_interval, statistics, swim_many
+from agents.trials import Options, main, mean_with_interval, statistics, swim_many
 from seastar_gym import Numerics, RewardWeights, Scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import SwimTask
@@ -124,3 +124,15 @@ def test_the_command_line_writes_a_row_for_every_set_and_agent(tmp_path, capsys)
         rows = list(csv.DictReader(stream))
     assert len(rows) == 2 * (4 + 6 + 5)
     assert "success" in capsys.readouterr().out
+
+
+def test_named_paths_on_two_fidelities(tmp_path, capsys):
+    file = tmp_path / "trials.csv"
+    command = ["--agents", "rest", "--sets", "nominal", "--fidelity", "fast", "balanced", "--out", str(file)]
+    assert main([*command, "--num-threads", "1"]) == 0
+    with file.open(newline="", encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["fidelity"] for row in rows] == ["fast"] * 4 + ["balanced"] * 4
+    assert {float(row["success_rate"]) for row in rows} == {0.0}
+    with pytest.raises(ValueError, match="nothing to swim"):
+        Options(sets=())
