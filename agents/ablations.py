@@ -1,6 +1,6 @@
 """What matters to the learning: trainings that differ in one thing each, over seeds.
 
-    python -m agents.ablations --seeds 0 1 2
+    python -m agents.ablations
 
 Every training is measured on the same held-out random paths with random headings, none of which it is trained on: mean
 strokes to the last waypoint, while it learns and at the end. Results are written after every training, and trainings
@@ -70,12 +70,9 @@ VARIANTS: dict[str, Variant] = {
     "limb by limb": _with(actions="limbs"),
     "pairs of limbs": _with(actions="pairs"),
     "discount 0.5": _with(discount=0.5),
-    "discount 0.9": _with(discount=0.9),
     "discount 0.95": _with(discount=0.95),
     "entropy 0.01": _with(entropy=0.01),
     "512 robots": _with(num_envs=512, batch_size=2048),
-    "3 epochs": _with(epochs=3),
-    "width 32": _with(hidden=(32, 32)),
     "width 256": _with(hidden=(256, 256)),
     "one waypoint first": Variant(first_path="line"),
     "aim 0.4": Variant(aim=0.4),
@@ -84,10 +81,11 @@ VARIANTS: dict[str, Variant] = {
 """By what is different."""
 
 
-def held_out_strokes(policy: Policy, n_paths: int, fidelity: Fidelity) -> float:
-    """Mean strokes on the held-out paths."""
+def mean_strokes(policy: Policy, path: PathName, n_swims: int, options: "Options") -> float:
+    """Mean strokes of swims on held-out paths, or on a path by name."""
+    scene, seed = make_scene(None, options.fidelity), HELD_OUT_SEED
     swims = swim_many(
-        "learned", policy, "random", n_paths, make_scene(None, fidelity), max_strokes=MAX_STROKES, seed=HELD_OUT_SEED
+        "learned", policy, path, n_swims, scene, max_strokes=MAX_STROKES, seed=seed, threads=options.num_threads
     )
     return float(np.mean([done.strokes for done in swims]))
 
@@ -111,7 +109,7 @@ class Measuring(BaseCallback):
         """The policy so far, measured."""
         assert isinstance(self.model, PPO)
         policy = policy_of(self.model)
-        strokes = held_out_strokes(policy, self.options.paths, self.options.fidelity)
+        strokes = mean_strokes(policy, "random", self.options.paths, self.options)
         self.curve.append((self.model.num_timesteps, strokes))
         return policy
 
@@ -135,8 +133,7 @@ def learn(variant: Variant, seed: int, options: "Options") -> dict[str, Any]:
         model.learn(rounds * n, measuring, reset_num_timesteps=variant.first_path is None)
     policy = measuring.measure()
     env.close()
-    (pentagon,) = swim_many("learned", policy, "pentagon", 1, make_scene(None, fidelity), max_strokes=MAX_STROKES)
-    return {"curve": measuring.curve, "pentagon": pentagon.strokes}
+    return {"curve": measuring.curve, "pentagon": round(mean_strokes(policy, "pentagon", 1, options))}
 
 
 # --- the study -------------------------------------------------------------------------------------------------------
@@ -146,15 +143,15 @@ def learn(variant: Variant, seed: int, options: "Options") -> dict[str, Any]:
 class Options:
     """What matters to the learning: trainings that differ in one thing each, over seeds."""
 
-    seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
+    seeds: tuple[int, ...] = (0, 1, 2)
     """Of the trainings."""
     variants: tuple[str, ...] = tuple(VARIANTS)
     """Which trainings."""
-    strokes: int = 122_880
+    strokes: int = 98_304
     """Of every training."""
     every: int = 24_576
     """Strokes between measurements."""
-    paths: int = 100
+    paths: int = 64
     """Held-out paths."""
     fidelity: Fidelity = "fast"
     """How exactly the swims are computed."""

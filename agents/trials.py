@@ -200,7 +200,7 @@ def _print(rows: Sequence[dict[str, str | int | float]]) -> None:
         table.add_row(
             *(str(row[name]) for name in ("path", "disturbance", "agent", "fidelity", "swims")), success, *others
         )
-    Console(width=160).print(table)
+    Console(width=180).print(table)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

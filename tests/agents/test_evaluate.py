@@ -325,3 +325,9 @@ def test_models_go_by_the_names_of_their_files(monkeypatch, tmp_path):
     monkeypatch.setattr("agents.ppo.load", lambda file: file)
     monkeypatch.setattr("agents.policy.load", lambda file: file)
     assert load_agents(files) == {"best": "best.zip", "last": "runs/last.safetensors", "runs/best": "runs/best.zip"}
+
+
+def test_an_unknown_agent_is_told_every_name(capsys):
+    assert main(["--agents", "nobody"]) == 2
+    error = capsys.readouterr().err
+    assert "pentagon" in error and "learned, greedy, planner, and files" in error and error.count("\n") == 1
