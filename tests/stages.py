@@ -13,7 +13,7 @@ from seastar_gym.der.coupled import solve_coupled
 from seastar_gym.der.damping import freeze_strains
 from seastar_gym.der.fluid import freeze_fluid
 from seastar_gym.der.lanes import N_LANES, any_lane, borrow, load, splat, store
-from seastar_gym.der.newton import take_step
+from seastar_gym.der.newton import move_along
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import Rods, Stage, make_work
 
@@ -36,7 +36,7 @@ def direction(rods, work, q, q_0, gamma, ahead, convex, result):
     store(out, 0, phi)
     store(out, 1, solve_coupled(rods_rows.contact, rods_rows, memory, decrement))
     store(out, 2, pivot)
-    store(out, 3, take_step(memory.contact, rods_rows, memory, h > 0.0, h < 0.0, splat(1.0)))
+    store(out, 3, move_along(memory.contact, rods_rows, memory, h > 0.0, h < 0.0, splat(1.0)))
 
 
 def robot_and_star(n_limbs=5, nodes_per_limb=10, hub_hinge="opening", fluid=True):

@@ -266,19 +266,19 @@ def contact_force(contact, node):
 
 
 @kernel
-def touching_robots(contact):
-    """Mask of the robots that touched when last asked for their slopes."""
+def those_apart(contact, robots):
+    """Of the robots in the mask, those that did not touch when last asked for their slopes."""
     if contact is None:
-        return splat(0.0) > 0.0
-    return load(contact.touching, 0) > 0.0
+        return robots
+    return robots & ~(load(contact.touching, 0) > 0.0)
 
 
 @kernel
-def missed_robots(contact):
-    """Mask of the robots for whose neighbours the list was too short."""
+def those_listed(contact, robots):
+    """Of the robots in the mask, those whose neighbours all fitted into the list."""
     if contact is None:
-        return splat(0.0) > 0.0
-    return load(contact.missed, 0) > 0.0
+        return robots
+    return robots & ~(load(contact.missed, 0) > 0.0)
 
 
 @kernel

@@ -11,7 +11,7 @@ H of the star's step.
 """
 
 from seastar_gym.der.compilation import kernel
-from seastar_gym.der.contact import add_gap_gradient, gap, n_listed, touching_robots
+from seastar_gym.der.contact import add_gap_gradient, gap, n_listed
 from seastar_gym.der.lanes import add_product, any_lane, load, select, splat, store, subtract_product
 from seastar_gym.der.rods import SLOT_ROWS, STIFFNESS, n_nodes
 from seastar_gym.der.star_solution import solve_again, substitute_star
@@ -49,7 +49,7 @@ def solve_coupled(contact, rods, work, decrement):
     rows = 2 * n_nodes(rods)
     zero = splat(0.0)
     substitute_star(rods, work, x)
-    running = touching_robots(work.contact)
+    running = load(work.contact.touching, 0) > 0.0
     if not any_lane(running):
         return decrement
     star = work.contact.ends  # no longer needed for the list

@@ -195,6 +195,16 @@ def energy_noise(rods, q, h, mass, potential, kinetic):
 
 
 @kernel
+def add_held_energy(contact, rods, work, scheme, q, energy):
+    """Add what limbs that press each other store at the end of a step, where the scheme gives it back."""
+    if contact is None:
+        return energy
+    if not scheme.dissipative:
+        return energy
+    return add_contact_energy(contact, rods, work, q, energy)
+
+
+@kernel
 def hold_to_energy(rods, work, scheme, q, v, h, robots, allowed, largest_cut):
     """Hold the robots in the mask to the energy allowed after a step of length h.
 
@@ -203,8 +213,7 @@ def hold_to_energy(rods, work, scheme, q, v, h, robots, allowed, largest_cut):
     Returns (refused, cut): masks of the robots whose step has to be undone, and of those whose velocities were cut.
     """
     potential, kinetic = potential_energy(rods, work, q), moving_energy(rods, work, v)
-    if scheme.dissipative:
-        potential = add_contact_energy(rods.contact, rods, work, q, potential)
+    potential = add_held_energy(rods.contact, rods, work, scheme, q, potential)
     grown = robots & (potential + kinetic > add_product(allowed, ROUNDING, kinetic))
     cut = grown & ~grown
     if any_lane(grown):

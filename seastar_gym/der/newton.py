@@ -5,7 +5,7 @@ is frozen by a mask, and nothing that one robot needs (a repair, a shorter step)
 """
 
 from seastar_gym.der.compilation import kernel
-from seastar_gym.der.contact import n_listed, touching_robots
+from seastar_gym.der.contact import n_listed, those_apart
 from seastar_gym.der.coupled import solve_coupled
 from seastar_gym.der.lanes import absolute, add_product, any_lane, load, select, splat, sqrt
 from seastar_gym.der.potential import factorise
@@ -57,16 +57,16 @@ def minimise(rods, work, stage, active, tolerance, patience):
         shortening = running & ~low_enough & (fraction > SHORTEST_STEP) & (iterations > 0.0)
         fraction = select(stepping, one, select(shortening, 0.5 * fraction, fraction))
         if any_lane(shortening):
-            move = take_step(work.contact, rods, work, stepping, shortening, fraction)
+            move = move_along(work.contact, rods, work, stepping, shortening, fraction)
         else:
-            move = take_step(work.contact, rods, work, stepping, None, fraction)
+            move = move_along(work.contact, rods, work, stepping, None, fraction)
         best = select(stepping, phi, best)
         expected = select(stepping, decrement, expected)
         count = select(stepping, one, zero)
         iterations += count
         backtracks += select(shortening, one, zero)
         easy = (repairs + backtracks <= 0.0) & (iterations <= EASY) & (phi <= load(rods.calm, 0))
-        easy = easy & ~touching_robots(work.contact)
+        easy = those_apart(work.contact, easy)
         late = select(iterations < EASY, one, LATE)
         foreseen = late * move * move <= tolerance * quadratic_length
         foreseen = easy & foreseen & (largest_hub_t(rods, work) < FORESEEABLE_T)
@@ -98,7 +98,7 @@ def largest_hub_t(rods, work):
 
 
 @kernel
-def take_step(contact, rods, work, stepping, shortening, fraction):
+def take_step(rods, work, stepping, shortening, fraction):
     """Substitute, and move q by the whole new Newton step where `stepping`, back by half the last where `shortening`.
 
     shortening: None if no robot's step is to be shortened.
@@ -106,10 +106,7 @@ def take_step(contact, rods, work, stepping, shortening, fraction):
     Returns the largest node move [m].
     """
     edges = rods.nodes_per_limb - 1
-    scale = select(stepping, splat(1.0), select(shortening, -fraction, 0.0))
-    if contact is not None:  # noqa: SIM102 - numba drops a branch on None alone
-        if n_listed(work) > 0:
-            return take_coupled_step(contact, rods, work, shortening, scale)
+    scale = step_scale(stepping, shortening, fraction)
     hub = load_pair(work.root_solution, 2 * rods.n_limbs)
     largest = move_node(work, 0, hub, shortening, scale)
     for limb in range(rods.n_limbs):
@@ -123,12 +120,21 @@ def take_step(contact, rods, work, stepping, shortening, fraction):
 
 
 @kernel
-def take_coupled_step(contact, rods, work, shortening, scale):
-    """What take_step does where the step of all nodes is known already, see coupled.py."""
-    largest = splat(0.0)
+def move_along(contact, rods, work, stepping, shortening, fraction):
+    """take_step, but where contact is listed along the step of all nodes that coupled.py has found."""
+    if contact is None:
+        return take_step(rods, work, stepping, shortening, fraction)
+    if n_listed(work) == 0:
+        return take_step(rods, work, stepping, shortening, fraction)
+    scale, largest = step_scale(stepping, shortening, fraction), splat(0.0)
     for node in range(n_nodes(rods)):
         largest = larger(largest, move_node(work, node, load_pair(contact.x, 2 * node), shortening, scale))
     return sqrt(largest)
+
+
+@kernel
+def step_scale(stepping, shortening, fraction):
+    return select(stepping, splat(1.0), select(shortening, -fraction, 0.0))
 
 
 @kernel

@@ -21,7 +21,7 @@ from seastar_gym.actuation.measured import MeasuredCurve
 from seastar_gym.actuation.sma import SmaPulse
 from seastar_gym.actuation.thermal import ThermalSma
 from seastar_gym.morphology.limb import Limb
-from seastar_gym.scene import Numerics, Scene, Seastar
+from seastar_gym.scene import Contact, Numerics, Scene, Seastar
 from seastar_gym.simulator import Simulator
 
 Floats = NDArray[np.float64]
@@ -92,6 +92,7 @@ def exhibits() -> list[Exhibit]:
         Exhibit("thermal", "actuator=ThermalSma()", five(actuator=ThermalSma()), straight),
         Exhibit("weak limb", "limb_strengths=(1.0, 1.0, 1.0, 1.0, 0.3)",
                 five(limb_strengths=(1.0, 1.0, 1.0, 1.0, 0.3)), straight),
+        Exhibit("contact", "contact=Contact()", five(contact=Contact()), (1.0, -1.0, 0.0, 0.0, 0.0)),
     ]  # fmt: skip
 
 

@@ -130,6 +130,7 @@ def _counting_lanes() -> ModuleType:
         load_at=_load_at,
         load_number=lambda rows, row: float(rows[row]),
         store=_store,
+        store_number=lambda rows, row, value: rows.__setitem__(row, value),
         splat=Constant,
         select=_select,
         sqrt=lambda x: _result("root", math.sqrt(x.value)),
@@ -147,9 +148,10 @@ def _load_counting_modules(folder: Path) -> dict[str, ModuleType]:
     """The kernels' modules, executed from their source on counting lanes; the real ones stay as they are."""
     compilation = ModuleType("compilation")
     vars(compilation).update(kernel=lambda function: function, entry_point=lambda function: function)
+    # Whoever is imported comes before whoever imports it: what is not there yet would come from the package itself.
     names = (
-        "current", "rods", "geometry", "stretching", "bending", "drag", "added_mass", "fluid", "energy", "damping",
-        "star_matrix", "potential", "newton", "actuation", "guard", "stages",
+        "current", "geometry", "star_matrix", "rods", "stretching", "bending", "drag", "added_mass", "fluid",
+        "actuation", "contact", "energy", "damping", "star_solution", "coupled", "potential", "newton", "guard", "stages",
     )  # fmt: skip
     saved = {f"{COUNTED}.{name}": sys.modules.get(f"{COUNTED}.{name}") for name in (*names, "lanes", "compilation")}
     for name in names:

@@ -1,8 +1,8 @@
 """What each term of a scene costs: `python -m seastar_gym.studies.terms`.
 
-Scenes that differ from the chapter's in one term swim straight in turn, in one run, and each is compared with the
-chapter's scene in the same round, so that what else the machine does falls on both. Prints a table, and writes
-`terms.csv`.
+Scenes that differ from the chapter's in one term swim straight in turn (with contact also with limbs that touch), in
+one run, and each is compared with the chapter's scene in the same round, so that what else the machine does falls on
+both. Prints a table, and writes `terms.csv`.
 """
 
 import argparse
@@ -17,10 +17,12 @@ from rich.table import Table
 
 from seastar_gym.der.lanes import N_LANES
 from seastar_gym.fluids import GridCurrent, ShearCurrent, UniformCurrent, Vortex, Water
-from seastar_gym.scene import Scene, Seastar, relaxation_time
+from seastar_gym.scene import Contact, Scene, Seastar, relaxation_time
 from seastar_gym.simulator import Simulator
 
 STRAIGHT = np.array([0.0, 1.0, 0.0, 0.0, -1.0])
+PRESSING = np.array([1.0, -1.0, 0.0, 0.0, 0.0])
+"""Two neighbours against each other."""
 GROUPS = 8
 """Lane groups of the batch; all robots do the same, so none waits for another."""
 SILICONE = relaxation_time(0.1, 10.0)
@@ -55,6 +57,7 @@ def scenes() -> dict[str, Scene]:
         THE_CHAPTERS: Scene(),
         **{name: Scene(fluid=fluid) for name, fluid in fluids.items()},
         "material damping": Scene(damped),
+        "contact, limbs apart": Scene(contact=Contact()),
         "numbers of each robot": Scene(Seastar(youngs_modulus=np.full(n_robots, 1e6))),
         "all of these": Scene(replace(damped, youngs_modulus=np.full(n_robots, 1e6)), everything),
     }
@@ -77,10 +80,10 @@ class Cost:
     per_stroke: float
 
 
-def measure(compared: dict[str, Scene], rounds: int) -> list[Cost]:
+def measure(compared: dict[str, Scene], rounds: int, command: np.ndarray = STRAIGHT) -> list[Cost]:
     """Costs of scenes, the first of which is what the others are compared with."""
     n_robots = GROUPS * N_LANES
-    commands = np.tile(STRAIGHT, (n_robots, 1))
+    commands = np.tile(command, (n_robots, 1))
     simulators = [Simulator(scene, n_robots, threads=1) for scene in compared.values()]
     for simulator in simulators:
         simulator.stroke(commands)
@@ -129,6 +132,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("runs/terms"), help="folder for terms.csv")
     arguments = parser.parse_args()
     costs = measure(scenes(), arguments.rounds)
+    touching = {THE_CHAPTERS: Scene(), "contact, a pair of limbs pressed together": Scene(contact=Contact())}
+    costs += measure(touching, arguments.rounds, PRESSING)[1:]
     Console().print(as_table(costs))
     arguments.out.mkdir(parents=True, exist_ok=True)
     rows = [{**asdict(cost), "low": cost.quartiles[0], "high": cost.quartiles[1]} for cost in costs]
