@@ -151,7 +151,8 @@ def _load_counting_modules(folder: Path) -> dict[str, ModuleType]:
     # Whoever is imported comes before whoever imports it: what is not there yet would come from the package itself.
     names = (
         "current", "geometry", "star_matrix", "rods", "stretching", "bending", "drag", "added_mass", "fluid",
-        "actuation", "contact", "energy", "damping", "star_solution", "coupled", "potential", "newton", "guard", "stages",
+        "actuation", "contact", "energy", "damping", "star_solution", "coupled", "potential", "newton", "guard",
+        "stages",
     )  # fmt: skip
     saved = {f"{COUNTED}.{name}": sys.modules.get(f"{COUNTED}.{name}") for name in (*names, "lanes", "compilation")}
     for name in names:
