@@ -1,10 +1,10 @@
 """How kernels are compiled and cached.
 
-`kernel` compiles a building block; `entry_point` compiles a function that Python calls, releases the GIL and keeps
-the machine code on disk. Numba's own cache looks at the file of the cached function only, so an edit in a called
-file would silently run the old code. Ours lives in a folder named after a digest of every file of the package that
-defines kernels, the versions of numba, llvmlite and numpy and the lane width: whatever changes, the old code cannot
-be found.
+`kernel` and `inlined_kernel` compile building blocks; `entry_point` compiles a function that Python calls, releases
+the GIL and keeps the machine code on disk. Numba's own cache looks at the file of the cached function only, so an edit
+in a called file would silently run the old code. Ours lives in a folder named after a digest of every file of the
+package that defines kernels, the versions of numba, llvmlite and numpy and the lane width: whatever changes, the old
+code cannot be found.
 """
 
 import contextlib
@@ -24,7 +24,10 @@ PACKAGE = Path(__file__).resolve().parent.parent
 # error_model="numpy": divisions follow IEEE instead of raising; failure is a status, not an exception.
 STRICT = {"error_model": "numpy", "nogil": True}
 # Without wrappers for Python, which would be a third of the compilation.
-kernel = numba.njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **STRICT)
+BLOCK = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **STRICT}
+kernel = numba.njit(**BLOCK)
+# Where calls are many, and each would pass the fifty pointers of rods and work: together a tenth of a stroke.
+inlined_kernel = numba.njit(forceinline=True, **BLOCK)
 
 
 def kernel_sources(package: Path = PACKAGE) -> list[Path]:

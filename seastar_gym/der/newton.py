@@ -4,7 +4,7 @@ Every robot of a lane group has its own state of the search: a robot that has co
 is frozen by a mask, and nothing that one robot needs (a repair, a shorter step) changes another robot's bits.
 """
 
-from seastar_gym.der.compilation import kernel
+from seastar_gym.der.compilation import inlined_kernel, kernel
 from seastar_gym.der.contact import n_listed, those_apart
 from seastar_gym.der.coupled import solve_coupled
 from seastar_gym.der.lanes import absolute, add_product, any_lane, load, select, splat, sqrt
@@ -21,7 +21,7 @@ FORESEEABLE_T = 4.0  # larger values of tan(phi/2) are too near its pole for tha
 SHORTEST_STEP = 2.0**-30  # of the Newton step: shorter ones move nothing
 
 
-@kernel
+@inlined_kernel
 def minimise(rods, work, stage, active, tolerance, patience):
     """Minimise Phi over work.q, in place, for the robots in the mask `active`.
 

@@ -28,7 +28,7 @@ import numpy as np
 
 from seastar_gym.der.added_mass import add_fluid_inertia
 from seastar_gym.der.bending import bending_energy, bending_slopes, moment
-from seastar_gym.der.compilation import kernel
+from seastar_gym.der.compilation import inlined_kernel, kernel
 from seastar_gym.der.contact import add_contact, contact_force
 from seastar_gym.der.damping import damped_energy, damped_stiffness, damped_stress
 from seastar_gym.der.drag import add_cross_flow, drag_slopes, relative
@@ -210,7 +210,7 @@ def inner_edge(work, limb, first, i):
     return edge_geometry(work.q, first + i - 1, first + i)
 
 
-@kernel
+@inlined_kernel
 def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
     """Assemble and eliminate a limb from its tip to node 2, and put its root node into the ring.
 

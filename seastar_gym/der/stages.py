@@ -1,7 +1,7 @@
 """Time steps: a scheme's implicit stages, and the halving of steps that do not converge or create energy."""
 
 from seastar_gym.der.actuation import set_natural_hub_angles
-from seastar_gym.der.compilation import kernel
+from seastar_gym.der.compilation import inlined_kernel, kernel
 from seastar_gym.der.contact import freeze_contact, those_listed
 from seastar_gym.der.damping import freeze_strains
 from seastar_gym.der.fluid import add_work_of_current, freeze_fluid
@@ -50,7 +50,7 @@ def memory_row(rods, scheme, which):
     return (2 * n_nodes(rods) + 1) * scheme.n_stages + which
 
 
-@kernel
+@inlined_kernel
 def begin_stage(rods, work, scheme, k, q_0, v_0, a, h):
     """Stage k of a step; the iterate starts at (13.10) plus a share of what the last acceleration adds."""
     gamma = load_number(scheme.a, k * scheme.n_stages + k) * h
@@ -104,7 +104,7 @@ def end_stage(rods, work, scheme, k, stage, a, robots):
     store_share(a, scheme.n_stages * rows + k, along, squared, robots)
 
 
-@kernel
+@inlined_kernel
 def end_step(rods, work, scheme, stage, q_0, v_0, a, h, accepted):
     """After the last stage: write the step's result over the state (q_0, v_0) of the robots in the mask `accepted`."""
     rows, k = 2 * n_nodes(rods), scheme.n_stages - 1

@@ -147,7 +147,7 @@ def _counting_lanes() -> ModuleType:
 def _load_counting_modules(folder: Path) -> dict[str, ModuleType]:
     """The kernels' modules, executed from their source on counting lanes; the real ones stay as they are."""
     compilation = ModuleType("compilation")
-    vars(compilation).update(kernel=lambda function: function, entry_point=lambda function: function)
+    vars(compilation).update(dict.fromkeys(("kernel", "inlined_kernel", "entry_point"), lambda function: function))
     # Whoever is imported comes before whoever imports it: what is not there yet would come from the package itself.
     names = (
         "current", "geometry", "star_matrix", "rods", "stretching", "bending", "drag", "added_mass", "fluid",

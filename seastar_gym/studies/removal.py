@@ -136,7 +136,7 @@ def drop_unused(trees: list[ast.Module], gone: set[str], uncalled: set[str]) -> 
 
 
 def _is_kernel(function: ast.FunctionDef) -> bool:
-    return [ast.unparse(decorator) for decorator in function.decorator_list] == ["kernel"]
+    return bool({"kernel", "inlined_kernel"} & set(map(ast.unparse, function.decorator_list)))
 
 
 def _drop_fields(tree: ast.Module, fields: set[tuple[str, str]]) -> set[tuple[str, str]]:
