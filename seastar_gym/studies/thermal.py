@@ -1,7 +1,8 @@
 """How near the thermal actuator comes to the pulse of Fig. 13.5b: `python -m seastar_gym.studies.thermal`.
 
 Fits its time constant, power and transformation temperatures to the pulse, over the first stroke from cold water and
-the third of three, and prints fit and defaults; `--picture` draws both strokes and the hysteresis loop.
+the third of three, and prints fit and defaults; `--picture` draws both strokes and the hysteresis loop; `--models` asks
+whether more physics would come nearer (thermal_models.py).
 """
 
 import argparse
@@ -10,10 +11,12 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.console import Console
 from scipy.optimize import least_squares
 
 from seastar_gym.actuation.sma import SmaPulse
 from seastar_gym.actuation.thermal import ThermalSma
+from seastar_gym.studies import thermal_models
 
 Floats = NDArray[np.float64]
 
@@ -90,10 +93,13 @@ def draw(actuator: ThermalSma, file: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--picture", type=Path)
+    parser.add_argument("--models", action="store_true", help="fit wires with more physics, too")
     options = parser.parse_args()
     print(describe("fitted", fit()), describe("default", ThermalSma()), sep="\n")
     if options.picture is not None:
         draw(ThermalSma(), options.picture)
+    if options.models:
+        Console(width=110).print(thermal_models.as_table())
 
 
 if __name__ == "__main__":
