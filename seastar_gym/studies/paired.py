@@ -1,11 +1,12 @@
 """What terms cost a scene without them: `python -m seastar_gym.studies.paired`.
 
 Each optional term is cut out of a copy of the package (`removal`), and the default scene swims in all copies in turn,
-one process each. Where a process has its code and numbers in memory makes 3 % more or less, so there are many
-processes, and each counts with the median of its rounds. What is exact is compared exactly: the bits that a stroke ends
-with, and the floating-point instructions of every kernel (a compiler may write a short piece of code twice, so a few
-may differ where nothing else is computed). `--against FOLDER` compares with the package in another folder instead, an
-older checkout for one.
+one process each. Where a process has its numbers in memory makes some per cent, so there are many processes, and each
+counts with the median of its rounds. How the compiler lays out the same arithmetic makes 3 % more or less, too, which
+is of a build, not of a process: the mean over all builds is nearest to what terms cost. What is exact is compared
+exactly: the bits that a stroke ends with, and the floating-point instructions of every kernel (a compiler may write a
+short piece of code twice, so a few may differ where nothing else is computed). `--against FOLDER` compares with the
+package in another folder instead, an older checkout for one.
 
 Numbers of each robot are no term that could be cut out, but a type of rows: `load` makes the code for either.
 """
@@ -160,6 +161,9 @@ def as_table(found: Sequence[Comparison]) -> Table:
                 for own in one.ratios
             ),
         )
+    if len(found) > 1:
+        medians = np.median([one.ratios for one in found], axis=2)
+        table.add_row("mean of all", "", "", "", *(f"{mean:.3f}" for mean in np.exp(np.log(medians).mean(axis=0))))
     return table
 
 

@@ -90,9 +90,9 @@ def measure(compared: dict[str, Scene], rounds: int, command: np.ndarray = STRAI
     seconds, iterations, steps = np.zeros((3, len(simulators), rounds))
     for k in range(rounds):
         for i, simulator in enumerate(simulators):
-            start = time.perf_counter()
+            start = time.thread_time()
             report = simulator.stroke(commands)
-            seconds[i, k] = (time.perf_counter() - start) / n_robots
+            seconds[i, k] = (time.thread_time() - start) / n_robots
             iterations[i, k], steps[i, k] = report.newton_iterations[0], report.steps[0]
     per_iteration = seconds / iterations
     ratios, strokes = per_iteration / per_iteration[0], seconds / seconds[0]

@@ -111,5 +111,5 @@ def test_builds_without_terms_end_strokes_with_the_same_bits(tmp_path):
     assert one.same_bits
     assert one.others < 0.02 * one.instructions
     assert one.ratios.shape == (len(paired.SETTINGS), 1) and np.isfinite(one.ratios).all()
-    assert paired.as_table([one]).row_count == 1
+    assert paired.as_table([one]).row_count == 1 and paired.as_table([one, one]).row_count == 3
     assert {field.name for field in fields(one)} >= {"name", "ratios"}
