@@ -2,10 +2,9 @@
 
 Paired in one run: strokes by the simulator's kernel, and the same strokes by plain Newton, made of the same parts but
 without line search, repair, guard, halving, status and report. Neither has anything to repair in these strokes, and
-both end in the same bits, so what differs is the time: some 100 ns per time step of a lane group, 4 % of implicit
-Euler's short steps and 2 % of longer ones. No part of it stands out: the smallest opening angle of the report (six
-roots, five divisions) is 1 % of a short step, the masks over what it writes 0.3 %, and the guard sleeps. Where the
-code comes to lie makes 3 % more or less in a process, so look at several.
+both end in the same bits, so what differs is the time. Of a short step the smallest opening angle of the report (six
+roots, five divisions) is 1 %, the masks over what it writes 0.3 %, and the guard sleeps. Where code and numbers come to
+lie makes more than that either way, so look at several processes.
 """
 
 import time
@@ -17,7 +16,7 @@ from rich.table import Table
 
 from seastar_gym.actuation.schedule import step_times
 from seastar_gym.der.actuation import set_natural_hub_angles
-from seastar_gym.der.compilation import entry_point, kernel
+from seastar_gym.der.compilation import entry_point, inlined_kernel
 from seastar_gym.der.lanes import any_lane, borrow, load, load_number, select, splat, store
 from seastar_gym.der.newton import EASY, LATE, foreseeable_length, take_step
 from seastar_gym.der.potential import factorise
@@ -39,7 +38,7 @@ SETTINGS = (
 ROBOTS = 64
 
 
-@kernel
+@inlined_kernel
 def newton(rods, work, stage, tolerance, patience):
     """(13.11) and nothing else: whole steps of the matrix as it is, until one is small; returns their number."""
     one, zero = splat(1.0), splat(0.0)
