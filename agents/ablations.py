@@ -196,11 +196,12 @@ def final_strokes(runs: Mapping[str, Any]) -> list[float]:
 
 
 def table(results: dict[str, Any]) -> str:
-    """In Markdown: for every variant the mean over seeds and the worst and best, and strokes round the pentagon."""
-    lines = ["| training | held-out random paths: strokes (seeds) | pentagon |", "|---|---:|---|"]
+    """In Markdown: for every variant the mean over seeds, with best and worst, and strokes round the pentagon."""
+    lines = ["| training | held-out paths: mean strokes | pentagon, every seed |", "|---|---:|---|"]
     for name, runs in results["runs"].items():
         ends, pentagon = final_strokes(runs), ", ".join(str(run["pentagon"]) for run in runs.values())
-        lines.append(f"| {name} | {np.mean(ends):.1f} ({min(ends):.1f} to {max(ends):.1f}) | {pentagon} |")
+        over_seeds = f" ({min(ends):.1f} to {max(ends):.1f})" if len(ends) > 1 else ""
+        lines.append(f"| {name} | {np.mean(ends):.1f}{over_seeds} | {pentagon} |")
     return "\n".join(lines)
 
 
@@ -209,9 +210,9 @@ def draw(results: dict[str, Any], file: Path) -> None:
     from matplotlib.figure import Figure
 
     others = [name for name in results["runs"] if name != DEFAULT]
-    columns = 5
+    columns = 4
     rows = -(-len(others) // columns)
-    figure = Figure(figsize=(11.0, 2.2 * rows), layout="constrained")
+    figure = Figure(figsize=(9.0, 2.1 * rows), layout="constrained")
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for axes, name in itertools.zip_longest(panels.flat, others):
         if name is None:
@@ -225,6 +226,7 @@ def draw(results: dict[str, Any], file: Path) -> None:
                 axes.plot(trained, strokes.mean(axis=0), color=colour)
         axes.set_title(name, fontsize=9)
         axes.set(ylim=(155.0, 190.0))
+        axes.tick_params(labelsize=8, labelbottom=True)
         axes.grid(alpha=0.3)
     figure.supxlabel("strokes trained [thousands]", fontsize=9)
     figure.supylabel("strokes on held-out paths", fontsize=9)
