@@ -21,7 +21,7 @@ def repeat_part(rods, work, q_0, v_0, step, part, n):
     """Run one part of an iteration n times; returns something of it, so that nothing is optimised away."""
     rows, memory = borrow(rods), borrow(work)
     zero, one, gamma = splat(0.0), splat(1.0), splat(step)
-    stage = Stage(borrow(q_0), borrow(v_0), gamma, 1.0 / gamma)
+    stage = Stage(borrow(q_0), borrow(v_0), gamma, 1.0 / gamma, False)
     seen = zero
     for _ in range(n):
         if part == 0:

@@ -7,6 +7,7 @@ import pytest
 
 from seastar_gym import Scene
 from seastar_gym.studies import throughput
+from seastar_gym.studies.parts import PARTS, part_seconds
 
 
 def test_exponent_of_a_linear_cost_is_one():
@@ -40,3 +41,9 @@ def test_table_csv_and_picture_are_written(tmp_path):
     assert len(rows) == 2 + sum(map(len, curves.values()))
     assert (tmp_path / "t.png").stat().st_size > 10_000
     assert throughput.as_table(figures).row_count == 2
+
+
+def test_every_part_of_an_iteration_is_timed():
+    durations = part_seconds(Scene(), seconds=0.0)
+    assert set(durations) == set(PARTS)
+    assert all(min(of_part) > 0.0 for of_part in durations.values())
