@@ -54,7 +54,7 @@ class Hyperparameters:
     at 168."""
     num_envs: int = 128
     """Robots side by side. Small rollouts, so frequent updates: 512 robots, with batches four times as large, are at
-    183. Fewer would keep the simulator's lanes and threads less busy."""
+    178. Fewer would keep the simulator's lanes and threads less busy."""
     rollout: int = 16
     """Strokes of every robot between updates: three times the horizon 1/(1 - discount)."""
     batch_size: int = 512
@@ -64,7 +64,7 @@ class Hyperparameters:
     learning_rate: float = 1e-3
     """At first; it falls linearly to zero, so that the last policy is a settled one."""
     discount: float = 0.8
-    """Per stroke. What a stroke does to the swimming is over after a few: 0.5 ends where 0.8 does. 0.95 stays at 167,
+    """Per stroke. What a stroke does to the swimming is over after a few: 0.5 ends where 0.8 does. 0.95 stays at 166,
     because the noise of twenty strokes hides the worth of one."""
     gae_lambda: float = 0.9
     """Little depends on it with so short a horizon."""
