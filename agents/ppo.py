@@ -41,7 +41,7 @@ class Hyperparameters:
     """What PPO learns with, and why.
 
     Numbers: mean strokes on held-out random paths after 98,304 strokes of training, `python -m agents.ablations`, which
-    come to 161 with these values. Two seeds of them differ by 2, so smaller differences say nothing; some trainings
+    come to 161 with these values. Seeds of them differ by up to 2, so smaller differences say nothing; some trainings
     have one seed only, docs/ablations.json has all.
     """
 
