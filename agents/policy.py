@@ -32,7 +32,7 @@ from seastar_gym.envs.observation import OBSERVATION_LAYOUT
 from seastar_gym.envs.symmetry import reduce_observations, restore_actions
 from seastar_gym.envs.task import scene_observation_size
 from seastar_gym.morphology.limb import Limb
-from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water
+from seastar_gym.scene import Contact, Numerics, Scene, Seastar, SmaPulse, Water
 
 FORMAT = 1
 """Version of what a description says."""
@@ -89,7 +89,10 @@ class Description(NamedTuple):
                 fluid=None if scene["fluid"] is None else Water.from_fields(scene["fluid"]),
                 actuator=ACTUATORS[kind](**scene["actuator"]),
                 numerics=Numerics(**scene["numerics"]),
+                held_nodes=scene.get("held_nodes", ()),
+                loads=scene.get("loads", ()),
                 limb_strengths=scene.get("limb_strengths", ()),
+                contact=None if scene.get("contact") is None else Contact(**scene["contact"]),
             ),
             hidden=tuple(facts["hidden"]),
         )

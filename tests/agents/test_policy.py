@@ -3,7 +3,7 @@
 import json
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import gymnasium as gym
@@ -16,7 +16,7 @@ from agents import policy as policies
 from agents.policy import SHIPPED, Description, LearnedPolicy, load, save
 from agents.ppo import Hyperparameters, make_model, make_training_env, policy_of
 from agents.swim import swim
-from seastar_gym import Numerics, Scene, Seastar, Water
+from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, SmaPulse, UniformCurrent, Water
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -115,7 +115,26 @@ def test_weights_and_description_survive_the_disk_to_the_last_bit(policy, file):
         np.testing.assert_array_equal(again.weights[name], array)
 
 
-@pytest.mark.parametrize("scene", [Scene(), FOUR_LIMBS, Scene(fluid=None), Scene(fluid=Water(drag_coefficient=1.5))])
+def unlike_the_default() -> Scene:
+    """A scene of which every field is another than the default's."""
+    scene = Scene(
+        robot=Seastar(youngs_modulus=2e6, limbs=(Limb(radius=(2e-3, 1e-3)),) * 5),
+        fluid=Water(tangential_drag_coefficient=0.1, current=UniformCurrent(0.01, 0.0)),
+        actuator=SmaPulse(peak_angle=0.5),
+        numerics=Numerics.preset("fast"),
+        held_nodes=(3,),
+        loads=((9, 0.0, 1e-3),),
+        limb_strengths=(1.0, 1.0, 0.5, 1.0, 1.0),
+        contact=Contact(opening_angle=0.2),
+    )
+    assert all(getattr(scene, field.name) != getattr(Scene(), field.name) for field in fields(Scene))
+    return scene
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [Scene(), FOUR_LIMBS, Scene(fluid=None), Scene(fluid=Water(drag_coefficient=1.5)), unlike_the_default()],
+)
 def test_a_description_survives_its_text(scene):
     description = Description("pairs", False, scene, (3, 4, 5))
     assert Description.from_json(description.to_json()) == description
