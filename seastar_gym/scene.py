@@ -25,7 +25,7 @@ from seastar_gym.contact import Contact as Contact
 from seastar_gym.der.rods import Limits, Rods
 from seastar_gym.fidelity import cheapest
 from seastar_gym.fluids import Water as Water
-from seastar_gym.morphology.contact import limbs_that_may_touch
+from seastar_gym.morphology.contact import cross_at_rest, limbs_that_may_touch
 from seastar_gym.morphology.limb import Limb, LimbShape, as_tuple
 from seastar_gym.morphology.seastar import make_rods, n_hub_hinges, natural_hub_angle, rest_positions, turn_per_hinge
 from seastar_gym.per_robot import Numbers, batch_size, chosen, of_robot, require_each
@@ -288,14 +288,20 @@ class Scene:
     def _check_contact(self) -> None:
         if self.contact is None:
             return
-        opening = self.robot.opening_angle
-        if not self.robot.limbs_that_may_touch():
-            raise ValueError("No limbs of this robot can touch: use contact=None.")
-        if self.contact.opening_angle >= opening:
+        robot, pairs = self.robot, self.robot.limbs_that_may_touch()
+        if not pairs:
+            raise ValueError("Contact is modelled between limbs less than half a turn apart, which this robot has not.")
+        if self.contact.opening_angle >= robot.opening_angle:
             raise ValueError(
                 f"Limbs that touch at an opening angle of {self.contact.opening_angle:.4g} rad touch at rest, where "
-                f"they are {opening:.4g} rad apart: use a smaller Contact.opening_angle."
+                f"they are {robot.opening_angle:.4g} rad apart: use a smaller Contact.opening_angle."
             )
+        bent = any(np.any(limb.natural_curvature) for limb in robot.limbs)
+        for index in range((batch_size(robot) or 1) if bent else 0):
+            if cross_at_rest(robot.nodes(index), robot.n_limbs, pairs):
+                raise ValueError(
+                    "Limbs of this robot cross at rest, so contact cannot keep them apart: bend them less."
+                )
 
     def _check_coefficients(self) -> None:
         """What is finite alone may overflow or vanish together."""

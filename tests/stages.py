@@ -34,7 +34,7 @@ def direction(rods, work, q, q_0, gamma, ahead, convex, result):
     else:
         phi, decrement, pivot = factorise(rods_rows, memory, stage, None)
     store(out, 0, phi)
-    store(out, 1, solve_coupled(rods_rows.contact, rods_rows, memory, decrement))
+    store(out, 1, solve_coupled(memory.contact, rods_rows, memory, h > 0.0, decrement))
     store(out, 2, pivot)
     store(out, 3, move_along(memory.contact, rods_rows, memory, h > 0.0, h < 0.0, splat(1.0)))
 

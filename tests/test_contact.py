@@ -14,6 +14,9 @@ CLOSING = COMMANDS[((COMMANDS == 1.0) & (np.roll(COMMANDS, -1, axis=1) == -1.0))
 """Commands that turn neighbours towards each other."""
 
 
+CROSSED = Seastar(limbs=tuple(Limb(natural_curvature=bend) for bend in (16.0, -16.0, 16.0, -16.0, 0.0)))
+
+
 def images(command: np.ndarray) -> list[tuple[float, ...]]:
     """A command turned by the pentagon's five rotations, and mirrored."""
     mirrored = -np.roll(command[::-1], 1)
@@ -80,6 +83,18 @@ def test_no_crossing_by_the_worst_commands(fidelity):
         crossed, status = crossed_on_the_way(simulator, worst_commands(rng), 40)
         assert not crossed.any()
         assert (status == 0).all()
+
+
+@pytest.mark.parametrize("fidelity", ["fast", "balanced", "chapter"])
+@pytest.mark.parametrize("peak_angle", [0.75, 0.85, 0.94])
+def test_limbs_driven_past_each_other_do_not_cross(peak_angle, fidelity):
+    """Up to the largest peak angle that a scene accepts; where hub hinges come near pi, robots may fail, and say so."""
+    scene = Scene(actuator=SmaPulse(peak_angle), numerics=Numerics.preset(fidelity), contact=Contact())
+    simulator = Simulator(scene, len(CLOSING))
+    for _ in range(2):
+        crossed, status = crossed_on_the_way(simulator, CLOSING, 40)
+        assert not crossed.any()
+        assert (status != 0).sum() <= (0.0 if peak_angle < 0.8 else 0.2) * len(CLOSING)
 
 
 @pytest.mark.slow
@@ -199,7 +214,8 @@ def test_a_long_limb_meets_one_beyond_its_neighbour():
         (lambda: Contact(opening_angle=-0.1), "opening_angle"),
         (lambda: Scene(contact=True), "contact"),
         (lambda: Scene(contact=Contact(opening_angle=1.3)), "touch at rest"),
-        (lambda: Scene(robot=Seastar(n_limbs=1), actuator=SmaPulse(peak_angle=0.0), contact=Contact()), "touch"),
+        (lambda: Scene(robot=Seastar(n_limbs=1), actuator=SmaPulse(peak_angle=0.0), contact=Contact()), "half a turn"),
+        (lambda: Scene(robot=CROSSED, contact=Contact()), "cross at rest"),
     ],
 )
 def test_bad_contact_is_refused_in_one_sentence(make, sentence):

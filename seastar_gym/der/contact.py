@@ -14,8 +14,8 @@ midpoint rule would keep it, and limbs that hinges press together would ring wit
 has g of half a step after the end, q_1 + h v_1/2 = q_hat + 4 (Q - q_hat) - gamma v_hat. With k to infinity, limbs that
 meet then come to rest against each other in two steps. So contact is of first order, and inelastic.
 
-A node whose limb was on its side when the step began belongs there, wherever the first guess has carried it: limbs do
-not pass through each other in long steps.
+A node whose limb was on its side when the step began belongs there, wherever the first guess has carried it, and a step
+at whose end edges have come to cross is halved: limbs do not pass through each other in long steps.
 """
 
 import numpy as np
@@ -79,6 +79,7 @@ def freeze_contact(contact, rods, work, stage, q_0):
         right = int(load_number(contact.pairs, 2 * pair))
         left = int(load_number(contact.pairs, 2 * pair + 1))
         near, end_right, end_left = may_touch(rods, work, q_0, reach, right, left)
+        store(work.contact.near, pair, select(near, splat(1.0), 0.0))
         if any_lane(near):
             list_pairs(contact, rods, work, stage, q_0, reach, right, left, -1.0, end_right)
             list_pairs(contact, rods, work, stage, q_0, reach, left, right, 1.0, end_left)
@@ -274,11 +275,60 @@ def those_apart(contact, robots):
 
 
 @kernel
-def those_listed(contact, robots):
-    """Of the robots in the mask, those whose neighbours all fitted into the list."""
+def those_uncrossed(contact, rods, work, stage, q_0, robots):
+    """Of the robots in the mask, those without edges of different limbs that cross now and did not when the step began.
+
+    Not those either whose neighbours did not all fit into the list, or whose Newton step was not found.
+    """
     if contact is None:
         return robots
-    return robots & ~(load(contact.missed, 0) > 0.0)
+    robots = robots & ~(load(work.contact.missed, 0) > 0.0)
+    ready = False
+    for pair in range(contact.n_pairs):
+        near = load(work.contact.near, pair) > 0.0
+        if any_lane(robots & near):
+            if not ready:
+                store_step_end(rods, work, stage)
+                ready = True
+            right = int(load_number(contact.pairs, 2 * pair))
+            left = int(load_number(contact.pairs, 2 * pair + 1))
+            robots = robots & ~(near & come_to_cross(rods, work.contact.ends, q_0, right, left))
+    return robots
+
+
+@kernel
+def store_step_end(rods, work, stage):
+    """Fill work.contact.ends with the positions at the end of the step [m]."""
+    for row in range(2 * n_nodes(rods)):
+        q = load(work.q, row)
+        store(work.contact.ends, row, 2.0 * q - load(stage.q_hat, row) if stage.ahead else q)
+
+
+@kernel
+def come_to_cross(rods, q_1, q_0, right, left):
+    """Mask of the robots with edges of two limbs that cross at q_1 and did not at q_0."""
+    edges = rods.nodes_per_limb - 1
+    crossed = splat(1.0) < 0.0
+    for e in range(right * edges, right * edges + edges):
+        for f in range(left * edges, left * edges + edges):
+            now = edges_cross(rods, q_1, e, f)
+            if any_lane(now):
+                crossed = crossed | (now & ~edges_cross(rods, q_0, e, f))
+    return crossed
+
+
+@kernel
+def edges_cross(rods, q, e, f):
+    """Mask of the robots whose edges e and f cross: each at a share of itself between 0 and 1, without divisions."""
+    i, j = tail_node(rods, e), tail_node(rods, f)
+    ex, ey = edge_vector(q, i, e + 1)
+    fx, fy = edge_vector(q, j, f + 1)
+    dx, dy = edge_vector(q, i, j)
+    cross = subtract_product(ex * fy, ey, fx)
+    of_e = cross * subtract_product(dx * fy, dy, fx)
+    of_f = cross * subtract_product(dx * ey, dy, ex)
+    squared = cross * cross
+    return (of_e > 0.0) & (of_e < squared) & (of_f > 0.0) & (of_f < squared)
 
 
 @kernel

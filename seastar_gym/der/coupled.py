@@ -37,8 +37,11 @@ def dot(rods, a, b):
 
 
 @kernel
-def solve_coupled(contact, rods, work, decrement):
-    """The Newton step, node by node into work.contact.x [m], where pairs are listed; returns its decrement [J]."""
+def solve_coupled(contact, rods, work, robots, decrement):
+    """The Newton step of the robots in the mask, node by node into work.contact.x [m], where pairs are listed.
+
+    Returns its decrement [J].
+    """
     if contact is None:
         return decrement
     if n_listed(work) == 0:
@@ -49,7 +52,7 @@ def solve_coupled(contact, rods, work, decrement):
     rows = 2 * n_nodes(rods)
     zero = splat(0.0)
     substitute_star(rods, work, x)
-    running = load(work.contact.touching, 0) > 0.0
+    running = robots & (load(work.contact.touching, 0) > 0.0)
     if not any_lane(running):
         return decrement
     star = work.contact.ends  # no longer needed for the list
@@ -80,4 +83,5 @@ def solve_coupled(contact, rods, work, decrement):
             store(Hp, row, add_product(load(r, row), beta, load(Hp, row)))
         running = running & (left > ACCURACY * decrement)
         iterations += 1
+    store(contact.missed, 0, select(running, 1.0, load(contact.missed, 0)))
     return decrement

@@ -52,8 +52,8 @@ def minimise(rods, work, stage, active, tolerance, patience):
             convex = convex | indefinite
             repairs += select(indefinite, one, zero)
             continue
-        decrement = solve_coupled(rods.contact, rods, work, decrement)
         stepping = running & low_enough & (pivot > 0.0)
+        decrement = solve_coupled(work.contact, rods, work, stepping, decrement)
         shortening = running & ~low_enough & (fraction > SHORTEST_STEP) & (iterations > 0.0)
         fraction = select(stepping, one, select(shortening, 0.5 * fraction, fraction))
         if any_lane(shortening):

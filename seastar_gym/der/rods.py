@@ -50,10 +50,11 @@ class Contact(NamedTuple):
 
 
 class ContactWork(NamedTuple):
-    """Memory of contact; rows per coordinate but for `listed`, `missed`, `touching` and `slots`.
+    """Memory of contact; rows per coordinate but for `listed`, `slots`, `missed`, `touching` and `near`.
 
     capacity: Pairs of node and edge that can be listed. listed: How many are, then node and edge of each, shared.
-    slots: SLOT_ROWS of each. missed, touching: 1 for robots whose neighbours did not all fit in, and that touch.
+    slots: SLOT_ROWS of each. missed: 1 for robots whose neighbours did not all fit in, or whose step was not found.
+    touching: 1 for robots that touch. near: 1 for those whose limbs may touch, per pair of limbs.
     ends: Positions where contact is asked for [m]. seen: The same along the gap between two limbs and across it.
     force: Of contact [N].
     x, r, z, p, Hp, w: See coupled.py.
@@ -64,6 +65,7 @@ class ContactWork(NamedTuple):
     slots: np.ndarray
     missed: np.ndarray
     touching: np.ndarray
+    near: np.ndarray
     ends: np.ndarray
     seen: np.ndarray
     force: np.ndarray
@@ -319,6 +321,7 @@ def make_contact_work(rods: Rods, contact: Contact) -> ContactWork:
         slots=rows(SLOT_ROWS * capacity),
         missed=rows(1),
         touching=rows(1),
+        near=rows(contact.n_pairs),
         ends=rows(),
         seen=rows(),
         force=rows(),

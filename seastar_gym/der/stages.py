@@ -2,7 +2,7 @@
 
 from seastar_gym.der.actuation import set_natural_hub_angles
 from seastar_gym.der.compilation import inlined_kernel, kernel
-from seastar_gym.der.contact import freeze_contact, those_listed
+from seastar_gym.der.contact import freeze_contact, those_uncrossed
 from seastar_gym.der.damping import freeze_strains
 from seastar_gym.der.fluid import add_work_of_current, freeze_fluid
 from seastar_gym.der.geometry import edge_geometry, half_angle
@@ -180,14 +180,14 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, war
     error_rate = zero
     for k in range(scheme.n_stages):
         stage = begin_stage(rods, work, scheme, k, q, v, a, h)
+        freeze_contact(rods.contact, rods, work, stage, q)
         if any_lane(wary):
             start_standing(rods, work, stage, wary)
         freeze_fluid(rods, work)
-        freeze_contact(rods.contact, rods, work, stage, q)
         freeze_strains(rods.relaxation_time, rods, work, stage.q_hat)
         set_natural_hub_angles(rods, work, actuation, start + load_number(scheme.c, k) * size)
         good, phi, iterations, repairs, backtracks = minimise(rods, work, stage, good, tolerance, patience)
-        good = those_listed(work.contact, good)
+        good = those_uncrossed(rods.contact, rods, work, stage, q, good)
         trouble = trouble | (repairs + backtracks > 0.0)
         if scheme.dissipative:
             lively = phi > load(rods.damped, 0)

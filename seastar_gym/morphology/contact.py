@@ -4,6 +4,7 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seastar_gym.der.rods import Contact
 from seastar_gym.morphology.limb import LimbShape, along
@@ -24,6 +25,22 @@ def limbs_that_may_touch(gaps: Sequence[float], alike: bool) -> list[tuple[int, 
         for first, steps in itertools.product(range(n_limbs), range(1, 2 if alike else n_limbs))
     }
     return [pair for pair, turn in turns.items() if pair[0] != pair[1] and turn < np.pi * (1.0 - 1e-9)]
+
+
+def cross_at_rest(nodes: NDArray[np.float64], n_limbs: int, pairs: Sequence[tuple[int, int]]) -> bool:
+    """Whether edges of limbs that may touch cross; nodes: [m], shape (n_nodes, 2)."""
+    limbs = [np.concatenate([nodes[:1], limb]) for limb in nodes[1:].reshape(n_limbs, -1, 2)]
+
+    def cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+        return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+    for right, left in pairs:
+        f, tails = np.diff(limbs[left], axis=0), limbs[left][:-1]
+        for tail, e in zip(limbs[right][:-1], np.diff(limbs[right], axis=0), strict=True):
+            of_e, of_f = cross(e, f) * cross(tails - tail, f), cross(e, f) * cross(tails - tail, e)
+            if ((of_e > 0.0) & (of_f > 0.0) & (np.maximum(of_e, of_f) < cross(e, f) ** 2)).any():
+                return True
+    return False
 
 
 def contact(
