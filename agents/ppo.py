@@ -41,17 +41,16 @@ class Hyperparameters:
     """What PPO learns with, and why.
 
     Numbers: mean strokes on held-out random paths after 98,304 strokes of training, `python -m agents.ablations`, which
-    come to 161 with these values. Seeds of them differ by up to 2, so smaller differences say nothing; some trainings
-    have one seed only, docs/ablations.json has all.
+    come to 161 with these values; means of three seeds, which differ by up to 2, so smaller differences say nothing.
     """
 
     actions: Actions = "joint"
-    """One categorical over whole commands. With one distribution per limb ("limbs") it stays at 183: the fastest swim
+    """One categorical over whole commands. With one distribution per limb ("limbs") it stays at 182: the fastest swim
     alternates between two pairs of limbs, which independent limbs do not find. "pairs" ends where "joint" does, and
     is near it sooner."""
     symmetry: bool = True
     """Waypoints turned and mirrored into one sector: every stroke teaches ten directions at once. Without, it is
-    at 168."""
+    at 167."""
     num_envs: int = 128
     """Robots side by side. Small rollouts, so frequent updates: 512 robots, with batches four times as large, are at
     178. Fewer would keep the simulator's lanes and threads less busy."""
@@ -64,7 +63,7 @@ class Hyperparameters:
     learning_rate: float = 1e-3
     """At first; it falls linearly to zero, so that the last policy is a settled one."""
     discount: float = 0.8
-    """Per stroke. What a stroke does to the swimming is over after a few: 0.5 ends where 0.8 does. 0.95 stays at 166,
+    """Per stroke. What a stroke does to the swimming is over after a few: 0.5 ends where 0.8 does. 0.95 stays at 165,
     because the noise of twenty strokes hides the worth of one."""
     gae_lambda: float = 0.9
     """Little depends on it with so short a horizon."""
