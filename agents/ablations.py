@@ -15,7 +15,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 from unittest.mock import patch
 
 import numpy as np
@@ -184,10 +184,12 @@ def read_results(options: Options, command: str) -> dict[str, Any]:
     settings = {name: getattr(options, name) for name in ("strokes", "every", "paths", "fidelity")}
     if not options.out.is_file():
         return {"command": command, "settings": settings, "runs": {}}
-    results: dict[str, Any] = json.loads(options.out.read_text(encoding="utf-8"))
-    if results["settings"] != settings:
-        raise ValueError(f"{options.out} has results of {results['settings']}, not of {settings}: give another --out.")
-    return results
+    results: Any = json.loads(options.out.read_text(encoding="utf-8"))
+    found = results.get("settings") if isinstance(results, dict) else None
+    if found != settings:
+        of = "something else" if found is None else found
+        raise ValueError(f"{options.out} has results of {of}, not of {settings}: give another --out.")
+    return cast(dict[str, Any], results)
 
 
 def final_strokes(runs: Mapping[str, Any]) -> list[float]:
@@ -206,10 +208,10 @@ def table(results: dict[str, Any]) -> str:
 
 
 def draw(results: dict[str, Any], file: Path) -> None:
-    """Learning curves, mean and range over seeds, each beside that of the default."""
+    """Learning curves, mean and range over seeds, each beside that of the default, or that alone."""
     from matplotlib.figure import Figure
 
-    others = [name for name in results["runs"] if name != DEFAULT]
+    others = [name for name in results["runs"] if name != DEFAULT] or [DEFAULT]
     columns = 4
     rows = -(-len(others) // columns)
     figure = Figure(figsize=(9.0, 2.1 * rows), layout="constrained")

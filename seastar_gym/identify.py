@@ -18,6 +18,7 @@ tell them, and the estimate says so.
 import argparse
 import csv
 import math
+import sys
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -73,18 +74,22 @@ class Measurement:
     @classmethod
     def from_csv(cls, trajectory: str | Path, commands: str | Path) -> "Measurement":
         """From two files, see above."""
-        with Path(trajectory).open(newline="", encoding="utf-8") as lines:
-            names, *rows = [row for row in csv.reader(lines) if row]
+        names, *rows = _lines(trajectory) or [[]]
         nodes = tuple(int(name[1:]) for name in names[1::2] if name[1:].isdigit())
         expected = ["time", *(f"{axis}{node}" for node in nodes for axis in "xy")]
-        if [name.strip() for name in names] != expected or any(len(row) != len(names) for row in rows):
-            raise ValueError(f"{trajectory}: the first line must be time,x0,y0,.. and all others as long as it.")
-        numbers = np.array([[float(field) if field.strip() else math.nan for field in row] for row in rows])
+        if not (nodes and rows) or names != expected or any(len(row) != len(names) for row in rows):
+            raise ValueError(
+                f"{trajectory}: the first line must be time,x0,y0,.. and below it there must be others as long as it."
+            )
+        commanded = _lines(commands)
+        if not commanded or any(len(row) != len(commanded[0]) for row in commanded):
+            raise ValueError(f"{commands}: there must be one line per stroke with one number per limb.")
+        numbers = np.array([[_number(trajectory, field or "nan") for field in row] for row in rows])
         return cls(
             time=numbers[:, 0],
             positions=numbers[:, 1:].reshape(len(numbers), len(nodes), 2),
             nodes=nodes,
-            commands=np.loadtxt(commands, delimiter=",", ndmin=2),
+            commands=np.array([[_number(commands, field) for field in row] for row in commanded]),
         )
 
     def to_csv(self, trajectory: str | Path, commands: str | Path) -> None:
@@ -93,6 +98,24 @@ class Measurement:
         numbers = np.column_stack([self.time, self.positions.reshape(len(self.time), -1)])
         np.savetxt(trajectory, numbers, "%.7g", ",", header=",".join(names), comments="")
         np.savetxt(commands, self.commands, "%g", ",")
+
+
+def _lines(file: str | Path) -> list[list[str]]:
+    """The fields of every line that has any."""
+    if not Path(file).exists():
+        raise FileNotFoundError(f"There is no file {file}.")
+    try:
+        with Path(file).open(newline="", encoding="utf-8") as lines:
+            return [[field.strip() for field in row] for row in csv.reader(lines) if row]
+    except (UnicodeDecodeError, csv.Error) as wrong:
+        raise ValueError(f"{file} is no CSV file: {wrong}.") from wrong
+
+
+def _number(file: str | Path, field: str) -> float:
+    try:
+        return float(field)
+    except ValueError:
+        raise ValueError(f"{file}: {field!r} is no number.") from None
 
 
 class Estimate(NamedTuple):
@@ -130,16 +153,17 @@ class Estimate(NamedTuple):
 
 
 def get_parameter(scene: Scene, name: str) -> float:
-    """A number of the scene. ValueError: it has none of that name that could be fitted."""
+    """A number of the scene. ValueError: it has none of that name that could be fitted; counts could not."""
     first, *rest = name.split(".")
-    value: Any = getattr(scene, first) if first in ("robot", "fluid", "actuator") else None
+    value: Any = getattr(scene, first) if first in ("robot", "fluid", "actuator", "contact") else None
     for step in rest:
         if isinstance(value, tuple) and step.isdigit() and int(step) < len(value):
             value = value[int(step)]
         else:
-            known = is_dataclass(value) and step in {field.name for field in fields(value)}
+            own = fields(value) if is_dataclass(value) else ()
+            known = step in {field.name for field in own if field.type not in (int, "int")}
             value = getattr(value, step) if known else None
-    if not is_finite_number(value) or isinstance(value, int) or value <= 0.0:
+    if not is_finite_number(value) or value <= 0.0:
         raise ValueError(f"{name!r} is no positive number of this scene, such as fluid.drag_coefficient.")
     return float(value)
 
@@ -301,7 +325,8 @@ def synthetic(
     return Measurement(times, exact + noise * rng.standard_normal(exact.shape), nodes, commands)
 
 
-def main() -> None:
+def main() -> int:
+    """The command line; returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("trajectory", nargs="?", type=Path, help="CSV: time,x0,y0,..")
     parser.add_argument("commands", nargs="?", type=Path, help="CSV: one command per stroke")
@@ -310,20 +335,25 @@ def main() -> None:
     parser.add_argument("--picture", type=Path, help="where to draw the fit")
     parser.add_argument("--synthetic", action="store_true", help="fit data of our own")
     options = parser.parse_args()
-    scene = Scene(Seastar(), Water(), SmaPulse(), Numerics("implicit-midpoint", options.step))
-    if options.synthetic:
-        measurement = synthetic(scene, TRUTH)
-        print("truth:", ", ".join(f"{name} = {value:g}" for name, value in TRUTH.items()))
-    elif options.trajectory is None or options.commands is None:
+    if not options.synthetic and options.commands is None:
         parser.error("give a trajectory and its commands, or --synthetic")
-    else:
-        measurement = Measurement.from_csv(options.trajectory, options.commands)
-    begin = time.perf_counter()
-    estimate = identify(scene, options.fit, measurement)
-    print(estimate.report(), f"{time.perf_counter() - begin:.1f} s", sep="\n")
-    if options.picture is not None:
-        draw(estimate, measurement, options.picture)
+    try:
+        scene = Scene(Seastar(), Water(), SmaPulse(), Numerics("implicit-midpoint", options.step))
+        if options.synthetic:
+            measurement = synthetic(scene, TRUTH)
+            print("truth:", ", ".join(f"{name} = {value:g}" for name, value in TRUTH.items()))
+        else:
+            measurement = Measurement.from_csv(options.trajectory, options.commands)
+        begin = time.perf_counter()
+        estimate = identify(scene, options.fit, measurement)
+        print(estimate.report(), f"{time.perf_counter() - begin:.1f} s", sep="\n")
+        if options.picture is not None:
+            draw(estimate, measurement, options.picture)
+    except (ValueError, OSError) as bad_input:
+        print(bad_input, file=sys.stderr)
+        return 2
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seastar_gym import Limited, MeasuredCurve, Numerics, Scene, Simulator, SmaPulse
+from refusals import assert_refused
+from seastar_gym import Contact, Limited, MeasuredCurve, Numerics, Scene, Seastar, Simulator, SmaPulse
 from seastar_gym.identify import (
     TRUTH,
     Measurement,
@@ -19,6 +20,7 @@ from seastar_gym.identify import (
     trajectory,
     with_parameters,
 )
+from seastar_gym.per_robot import numbers_of
 
 SCENE = Scene(numerics=Numerics("implicit-midpoint", 0.01))
 
@@ -90,24 +92,66 @@ def test_the_command_line_fits_files(measurement, tmp_path, monkeypatch, capsys)
     measurement.to_csv(tmp_path / "path.csv", tmp_path / "commands.csv")
     files = [str(tmp_path / name) for name in ("path.csv", "commands.csv")]
     monkeypatch.setattr(sys, "argv", ["identify", *files, "--fit", "actuator.peak_angle", "--step", "0.01"])
-    main()
+    assert main() == 0
     assert "actuator.peak_angle = " in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("text", ["time,x0\n0,0\n", "t,x0,y0\n0,0,0\n", "time,x0,y0\n0,0\n", "time,x0,y1\n0,0,0\n"])
+HEADER, ROW, COMMAND = "time,x0,y0\n", "0,0,0\n", "0,1,0,0,-1\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "time\n0\n", HEADER, "time,x0\n0,0\n", "t,x0,y0\n0,0,0\n", HEADER + "0,0\n", "time,x0,y1\n0,0,0\n"],
+)
 def test_files_that_are_no_trajectory_are_refused(tmp_path, text):
     (tmp_path / "path.csv").write_text(text)
-    (tmp_path / "commands.csv").write_text("0,1,0,0,-1\n")
-    with pytest.raises(ValueError, match="first line must be time,x0,y0"):
+    (tmp_path / "commands.csv").write_text(COMMAND)
+    with assert_refused("path.csv: the first line must be time,x0,y0"):
         Measurement.from_csv(tmp_path / "path.csv", tmp_path / "commands.csv")
 
 
 @pytest.mark.parametrize(
-    "name", ["robot.n_limbs", "fluid.colour", "drag", "actuator.angles.1", "fluid", "numerics.step", "robot.hub_hinge"]
+    ("path", "commands", "words"),
+    [
+        (HEADER + "0,a,0\n", COMMAND, "path.csv: 'a' is no number"),
+        (HEADER + ROW, "0,1,a\n", "commands.csv: 'a' is no number"),
+        (HEADER + ROW, "0,,1\n", "commands.csv: '' is no number"),
+        (HEADER + ROW, "", "commands.csv: there must be one line per stroke"),
+        (HEADER + ROW, COMMAND + "1\n", "commands.csv: there must be one line per stroke"),
+        ("\xff", COMMAND, "path.csv is no CSV file"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_refused_by_its_name(tmp_path, path, commands, words):
+    (tmp_path / "path.csv").write_text(path, encoding="latin-1")
+    (tmp_path / "commands.csv").write_text(commands)
+    with assert_refused(words):
+        Measurement.from_csv(tmp_path / "path.csv", tmp_path / "commands.csv")
+
+
+def test_the_command_line_says_what_is_wrong_in_a_sentence(tmp_path, monkeypatch, capsys):
+    missing = str(tmp_path / "missing.csv")
+    monkeypatch.setattr(sys, "argv", ["identify", missing, missing])
+    assert main() == 2
+    assert capsys.readouterr().err == f"There is no file {missing}.\n"
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("robot.n_limbs", "robot.nodes_per_limb", "fluid.colour", "drag", "actuator.angles.1", "fluid"),
+        *("numerics.step", "robot.hub_hinge", "contact.modulus"),
+    ],
 )
 def test_what_is_no_positive_number_of_the_scene_cannot_be_fitted(name):
     with pytest.raises(ValueError, match="no positive number of this scene"):
         get_parameter(SCENE, name)
+
+
+def test_every_positive_number_that_may_differ_from_robot_to_robot_may_be_fitted():
+    scene = Scene(Seastar(density=1000), contact=Contact(modulus=1e5))
+    positive = {name: value for name, value in numbers_of(scene).items() if value is not None and value > 0.0}
+    assert {"robot.density", "contact.modulus"} <= positive.keys()
+    assert {name: get_parameter(scene, name) for name in positive} == positive
 
 
 def test_a_point_of_a_measured_curve_is_found():

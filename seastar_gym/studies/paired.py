@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
+from seastar_gym.checks import require_count
 from seastar_gym.der.compilation import PACKAGE
 from seastar_gym.scene import Numerics
 from seastar_gym.studies import paired_worker
@@ -51,6 +52,7 @@ class Worker:
     """
 
     def __init__(self, build: Path, cache: Path, settings: Sequence[Numerics]):
+        self.build = build
         environment = {**os.environ, "PYTHONPATH": str(build), "NUMBA_CACHE_DIR": str(cache)}
         command = [sys.executable, "-P", paired_worker.__file__, json.dumps([asdict(each) for each in settings])]
         self.process = subprocess.Popen(
@@ -65,8 +67,11 @@ class Worker:
         self.process.communicate()
 
     def wait(self) -> "Worker":
-        """Until it is ready to swim."""
+        """Until it is ready to swim. ValueError: what it found is another package than the build's."""
         self.about = json.loads(self._answer())
+        found = Path(self.about["package"]).resolve().parent
+        if found.parent != self.build.resolve():
+            raise ValueError(f"There is no package {PACKAGE.name} in {self.build}: its process found that of {found}.")
         return self
 
     def seconds(self, setting: int) -> float:
@@ -115,6 +120,8 @@ def differing(ours: Counts, theirs: Counts) -> int:
 
 def compare(builds: dict[str, Path], folder: Path, processes: int, rounds: int) -> list[Comparison]:
     """This package against builds, all swimming in turn."""
+    require_count("processes", processes, 1, 10_000)
+    require_count("rounds", rounds, 1, 10_000)
     settings = list(SETTINGS.values())
     paths = [PACKAGE.parent, *builds.values()]
     caches = [folder / f"cache-{k}" for k in range(len(paths))]
@@ -182,7 +189,11 @@ def main() -> None:
             terms = optional_terms()
             for label, cut in [(LABELS.get(term, term.replace("_", " ")), (term,)) for term in terms] + [(ALL, terms)]:
                 builds[f"without {label}"] = copy_without(cut, folder / label).parent
-        Console().print(as_table(compare(builds, folder, arguments.processes, arguments.rounds)))
+        try:
+            found = compare(builds, folder, arguments.processes, arguments.rounds)
+        except (ValueError, RuntimeError) as bad_input:
+            parser.error(str(bad_input))
+    Console().print(as_table(found))
 
 
 if __name__ == "__main__":

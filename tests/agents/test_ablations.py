@@ -1,12 +1,15 @@
 """The study of trainings goes all the way, continues where it stopped, and says what it found."""
 
 import json
+from unittest.mock import patch
 
 import pytest
 
 from agents import ablations
-from agents.ablations import VARIANTS, Options, Variant, final_strokes, main, table
+from agents.ablations import VARIANTS, Options, Variant, final_strokes, learn, main, table
 from agents.ppo import Hyperparameters
+from seastar_gym.envs import task
+from seastar_gym.envs.paths import AIM
 
 TINY = {"num_envs": 8, "rollout": 8, "batch_size": 32, "epochs": 1, "hidden": (8,), "max_episode_steps": 10}
 
@@ -49,6 +52,52 @@ def test_trainings_are_measured_and_not_repeated(variants, tmp_path, capsys):
     both = json.loads(out.read_text())
     assert both["runs"][variants[0]].keys() == {"0", "1"}
     assert f"| {variants[0]} | 3.0 (3.0 to 3.0) | 3, 3 |" in table(both)
+
+
+@pytest.fixture
+def seen(monkeypatch):
+    """(path, share of a waypoint's radius that the way keeps to) in environments, in order."""
+    found, measure, shortest_way = [], task.SwimTask._measure_way_to_go, task.shortest_way
+
+    def observed(swim, hub):
+        def way(position, waypoint, after, radius):
+            found.append((swim.path, round(radius / swim.waypoint_radius, 6)))
+            return shortest_way(position, waypoint, after, radius)
+
+        with patch.object(task, "shortest_way", way):
+            return measure(swim, hub)
+
+    monkeypatch.setattr(task.SwimTask, "_measure_way_to_go", observed)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("variant", "stages"),
+    [
+        (Variant(tuple(TINY.items())), [("random", AIM)]),
+        (Variant(tuple(TINY.items()), aim=0.4, first_path="line"), [("line", 0.4), ("random", 0.4)]),
+    ],
+)
+def test_a_training_swims_the_paths_of_its_variant_and_keeps_to_its_aim(variant, stages, seen, monkeypatch):
+    monkeypatch.setattr(ablations, "mean_strokes", lambda *_: 0.0)  # those swims are no training
+    learn(variant, 0, Options(strokes=192, every=64, num_threads=1))
+    assert [stage for stage, before in zip(seen, [None, *seen], strict=False) if stage != before] == stages
+    if len(stages) == 2:
+        assert 8 < seen.count(stages[0]) < seen.count(stages[1])  # a third of the training, then the rest
+
+
+def test_the_default_training_alone_is_drawn(variants, tmp_path):
+    ablations.draw({"runs": {ablations.DEFAULT: {"0": {"curve": [[64, 170.0], [128, 165.0]]}}}}, tmp_path / "one.png")
+    assert (tmp_path / "one.png").is_file()
+
+
+@pytest.mark.parametrize("text", ["{}", "[]", '{"settings": null}'])
+def test_a_file_of_something_else_is_not_written_over(tmp_path, capsys, text):
+    out = tmp_path / "other.json"
+    out.write_text(text)
+    assert main(["--out", str(out)]) == 2
+    assert "has results of something else, not of" in capsys.readouterr().err
+    assert out.read_text() == text
 
 
 def test_results_of_other_trainings_are_not_mixed(variants, tmp_path, capsys):

@@ -1,11 +1,13 @@
 """A scene without a term runs the code of a package that never had it."""
 
 import ast
-from dataclasses import fields
+import json
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 
+from refusals import assert_refused
 from seastar_gym import Numerics, Scene
 from seastar_gym.der.rods import Rods
 from seastar_gym.studies import paired
@@ -104,6 +106,23 @@ def test_instructions_that_differ_are_counted_on_both_sides():
     assert paired.differing(ours, ours) == 0
 
 
+def test_a_folder_without_the_package_is_refused_though_another_package_is_found(tmp_path, monkeypatch):
+    build, answer, script = tmp_path / "build", tmp_path / "answer.json", tmp_path / "worker.py"
+    script.write_text(f"print(open({str(answer)!r}).read())")
+    monkeypatch.setattr(paired.paired_worker, "__file__", str(script))
+    for found, is_refused in ((build, False), (tmp_path, True), (build / "deeper", True)):
+        answer.write_text(json.dumps({"package": str(found / "seastar_gym" / "__init__.py")}))
+        expected = assert_refused("no package seastar_gym", str(build)) if is_refused else nullcontext()
+        with paired.Worker(build, tmp_path, []) as worker, expected:
+            worker.wait()
+
+
+@pytest.mark.parametrize("counts", [(0, 1), (1, 0)])
+def test_nothing_to_compare_is_refused(tmp_path, counts):
+    with assert_refused("must be a whole number from 1", "not 0"):
+        paired.compare({}, tmp_path, *counts)
+
+
 @pytest.mark.slow
 def test_builds_without_terms_end_strokes_with_the_same_bits(tmp_path):
     build = copy_without(TERMS, tmp_path / "without").parent
@@ -112,4 +131,3 @@ def test_builds_without_terms_end_strokes_with_the_same_bits(tmp_path):
     assert one.others < 0.02 * one.instructions
     assert one.ratios.shape == (len(paired.SETTINGS), 1) and np.isfinite(one.ratios).all()
     assert paired.as_table([one]).row_count == 1 and paired.as_table([one, one]).row_count == 3
-    assert {field.name for field in fields(one)} >= {"name", "ratios"}
