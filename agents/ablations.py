@@ -44,7 +44,7 @@ Curve = list[tuple[int, float]]
 
 @dataclass(frozen=True)
 class Variant:
-    """A training: hyperparameters that differ from the default ones, and how the paths are laid.
+    """A training: hyperparameters that differ from the study's, and how the paths are laid.
 
     aim: Radii of a waypoint that the reward's way keeps to. first_path: What the first third is trained on.
     """
@@ -55,15 +55,17 @@ class Variant:
 
     @property
     def hyperparameters(self) -> Hyperparameters:
-        """The default ones with the changes."""
-        return replace(Hyperparameters(), **dict(self.changes))
+        """The study's with the changes."""
+        return replace(COMMON, **dict(self.changes))
 
 
 def _with(**changes: Any) -> Variant:
     return Variant(tuple(changes.items()))
 
 
-DEFAULT = "as it is"
+COMMON = Hyperparameters(actions="joint")
+"""All 243 commands to choose from, of which the default training explores the pairs of limbs only."""
+DEFAULT = "whole commands"
 VARIANTS: dict[str, Variant] = {
     DEFAULT: Variant(),
     "no symmetry": _with(symmetry=False),

@@ -7,7 +7,6 @@ import pytest
 
 from agents import ablations
 from agents.ablations import VARIANTS, Options, Variant, final_strokes, learn, main, table
-from agents.ppo import Hyperparameters
 from seastar_gym.envs import task
 from seastar_gym.envs.paths import AIM
 
@@ -27,7 +26,7 @@ def variants(monkeypatch):
 
 
 def test_every_variant_is_a_valid_training_of_its_own():
-    default = Hyperparameters()
+    default = ablations.COMMON
     assert VARIANTS[ablations.DEFAULT].hyperparameters == default
     others = [one for name, one in VARIANTS.items() if name != ablations.DEFAULT]
     assert all(one != Variant() for one in others)
