@@ -91,7 +91,7 @@ def test_the_report_has_the_numbers_of_the_table(finished):
 def test_the_model_is_that_of_the_last_checkpoint(finished):
     model = (finished / "model.zip").read_bytes()
     assert model == (finished / "checkpoints" / "model_000000512.zip").read_bytes()
-    assert load(finished / "model.zip").actions == "joint"
+    assert load(finished / "model.zip").actions == "pairs"
 
 
 def test_the_exported_policy_is_the_model_s(finished):
@@ -162,7 +162,7 @@ def test_a_kill_leaves_the_last_checkpoint(tmp_path):
         while not (folder / "progress.csv").exists() and time.monotonic() < deadline:
             time.sleep(0.1)
         process.kill()
-    assert load(folder / "model.zip").actions == "joint"
+    assert load(folder / "model.zip").actions == "pairs"
 
 
 @pytest.mark.parametrize(

@@ -119,7 +119,7 @@ def test_a_loaded_policy_is_equivariant(learner, file):
     for element in range(10):
         elements = np.full(len(observations), element)
         carried, _ = policy.predict(symmetry.transform_observations(observations, elements, 5), deterministic=True)
-        np.testing.assert_array_equal(carried, symmetry.transform_actions(actions, elements, "joint", 5))
+        np.testing.assert_array_equal(carried, symmetry.transform_actions(actions, elements, policy.actions, 5))
 
 
 def test_without_deterministic_it_explores(learner, file):
@@ -145,7 +145,7 @@ def test_loading_unpickles_nothing(file, tmp_path):
     with zipfile.ZipFile(file) as old, zipfile.ZipFile(without, "w") as new:
         for name in (ppo.DESCRIPTION, ppo.WEIGHTS):
             new.writestr(name, old.read(name))
-    assert load(without).actions == "joint"
+    assert load(without).actions == ppo.Hyperparameters().actions
 
 
 # --- saving ----------------------------------------------------------------------------------------------------------
@@ -172,7 +172,7 @@ def test_the_description_says_what_the_policy_expects(learner, file):
     with zipfile.ZipFile(file) as archive:
         facts = json.loads(archive.read(ppo.DESCRIPTION))
     assert facts["observation_layout"] == 1
-    assert (facts["actions"], facts["symmetry"], facts["hidden"]) == ("joint", True, [16, 8])
+    assert (facts["actions"], facts["symmetry"], facts["hidden"]) == (ppo.Hyperparameters().actions, True, [16, 8])
     assert facts["scene"]["numerics"]["scheme"] == FAST.scheme
     assert facts["strokes_trained"] == learner.num_timesteps
 
@@ -291,7 +291,7 @@ def test_another_environment_is_refused(file):
     env = make_learner(scene=Scene(numerics=Numerics.preset("chapter"))).get_env()
     with pytest.raises(ValueError, match=r"was trained for .*sdirk2.* not for .*implicit-euler"):
         resume(file, env)
-    with pytest.raises(ValueError, match=r"was trained for .*joint.* not for .*limbs"):
+    with pytest.raises(ValueError, match=r"was trained for .*pairs.* not for .*limbs"):
         resume(file, make_learner(OTHER, OTHER_SCENE).get_env())
 
 
