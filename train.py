@@ -36,20 +36,20 @@ from stable_baselines3.common.logger import configure
 from tqdm import tqdm
 
 import seastar_gym
-from agents.charts import Curve, read_progress
 from agents.evaluate import evaluate
 from agents.policy import SHIPPED
 from agents.policy import load as load_policy
 from agents.policy import save as save_policy
 from agents.ppo import Hyperparameters, make_model, make_training_env, policy_of, resume, save
-from agents.report import Remarks
+from agents.report.charts import Curve, read_progress
+from agents.report.page import Remarks
 from agents.scripted import scripted
 from agents.swim import swim
 from agents.vec_env import BatchVecEnv
 from seastar_gym import RewardWeights
 from seastar_gym.envs.paths import PathName
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.scene import Fidelity
+from seastar_gym.scene.numerics import Fidelity
 
 MAX_STROKES = 400
 """Time limit of a swim round the pentagon; the scripted gait takes 250."""

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from agents.greedy import headings, turned
 from seastar_gym.envs.observation import VELOCITY_SCALE
 from seastar_gym.envs.task import SwimTask
-from seastar_gym.per_robot import column
-from seastar_gym.scene import require_number
+from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.per_robot import column
 
 Floats = NDArray[np.float64]
 

@@ -25,15 +25,17 @@ from rich.table import Table
 from rich.text import Text
 
 from agents import policy as learned
-from agents.charts import Curve, read_progress
-from agents.pictures import FRAMES_PER_STROKE, draw_traces, film
-from agents.playback import Playback, RecordingEnv
-from agents.report import Remarks, ResultsTable, number, read_trials, write_report
+from agents.report.charts import Curve, read_progress
+from agents.report.page import Remarks, ResultsTable, number, read_trials, write_report
+from agents.report.pictures import FRAMES_PER_STROKE, draw_traces, film
+from agents.report.playback import Playback, RecordingEnv
 from agents.roster import load_agents
 from agents.swim import Policy, Swim, swim
 from seastar_gym.envs.paths import PATH_NAMES, make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.scene import Fidelity, Scene, require_number
+from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.numerics import Fidelity
 
 MM = 1000.0
 
@@ -232,7 +234,7 @@ class Options:
     trials: Path | None = None
     """What agents.trials wrote (.csv), for the report to show too."""
     bound: Path = Path("docs/bound.json")
-    """What agents.bound wrote, for the report to show too, where there is such a file."""
+    """What studies.learning.bound wrote, for the report to show too, where there is such a file."""
 
     def __post_init__(self) -> None:
         if self.max_strokes < 1:

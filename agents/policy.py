@@ -24,15 +24,15 @@ import safetensors.numpy
 from numpy.typing import NDArray
 
 import seastar_gym
-from seastar_gym.actuation.actuator import Actuator
-from seastar_gym.actuation.measured import MeasuredCurve
-from seastar_gym.actuation.thermal import ThermalSma
 from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, command_table
 from seastar_gym.envs.observation import OBSERVATION_LAYOUT
 from seastar_gym.envs.symmetry import reduce_observations, restore_actions
 from seastar_gym.envs.task import scene_observation_size
-from seastar_gym.morphology.limb import Limb
 from seastar_gym.scene import Contact, Numerics, Scene, Seastar, SmaPulse, Water
+from seastar_gym.scene.actuators.actuator import Actuator
+from seastar_gym.scene.actuators.measured import MeasuredCurve
+from seastar_gym.scene.actuators.thermal import ThermalSma
+from seastar_gym.scene.limb import Limb
 
 FORMAT = 1
 """Version of what a description says."""

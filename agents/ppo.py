@@ -29,7 +29,8 @@ from seastar_gym import RewardWeights
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.symmetry import VectorSymmetryReduction
 from seastar_gym.envs.task import Path as SwimPath
-from seastar_gym.scene import Fidelity, Scene
+from seastar_gym.scene import Scene
+from seastar_gym.scene.numerics import Fidelity
 
 DESCRIPTION, WEIGHTS, RANDOM_STATES = "policy.json", "policy.pth", "random_states.npz"
 
@@ -40,8 +41,8 @@ Loaded = TypeVar("Loaded")
 class Hyperparameters:
     """What PPO learns with, and why.
 
-    Numbers: mean strokes on held-out random paths after 98,304 strokes of training, `python -m agents.ablations`, which
-    come to 161 with these values, but for the commands: they are from trainings over all 243. Means of three seeds,
+    Numbers: mean strokes on held-out random paths after 98,304 strokes of training (`python -m
+    studies.learning.ablations`), which come to 161 with these values, but for the commands: they are from trainings over all 243. Means of three seeds,
     which differ by up to 2, so smaller differences say nothing.
     """
 

@@ -11,7 +11,7 @@ from agents.planner import Planner
 from agents.scripted import scripted
 from agents.swim import Policy
 from seastar_gym.envs.task import make_scene
-from seastar_gym.scene import Fidelity
+from seastar_gym.scene.numerics import Fidelity
 
 OTHERS = ("learned", "greedy", "planner")
 """Agents that are not scripted."""

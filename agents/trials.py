@@ -29,7 +29,9 @@ from seastar_gym.envs.paths import PathName
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.task import Path as SwimPath
 from seastar_gym.envs.task import SwimTask, make_scene
-from seastar_gym.scene import Fidelity, Scene, require_count
+from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import require_count
+from seastar_gym.scene.numerics import Fidelity
 
 MM = 1000.0
 RESAMPLES, CONFIDENCE = 2000, 0.95

@@ -5,16 +5,16 @@ Importing this package registers `SeastarSwim-v0`.
 
 from gymnasium.envs.registration import register
 
-from seastar_gym.actuation.limited import Limited
-from seastar_gym.actuation.measured import MeasuredCurve
-from seastar_gym.actuation.thermal import ThermalSma
-from seastar_gym.contact import Contact
 from seastar_gym.envs.randomization import DomainRandomization, LogUniform, Normal, Uniform
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
-from seastar_gym.fluids import GridCurrent, ShearCurrent, UniformCurrent, Vortex
-from seastar_gym.morphology.limb import Limb
 from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water, relaxation_time
+from seastar_gym.scene.actuators.limited import Limited
+from seastar_gym.scene.actuators.measured import MeasuredCurve
+from seastar_gym.scene.actuators.thermal import ThermalSma
+from seastar_gym.scene.contact import Contact
+from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
+from seastar_gym.scene.limb import Limb
 from seastar_gym.simulator import Simulator, SolverStatus, State, StrokeReport
 
 __version__ = "0.1.0"

@@ -7,15 +7,16 @@ import numpy as np
 import oracle
 from oracle import Star
 from seastar_gym import Scene, Seastar, SmaPulse, Water
-from seastar_gym.der.compilation import entry_point
-from seastar_gym.der.contact import freeze_contact
-from seastar_gym.der.coupled import solve_coupled
-from seastar_gym.der.damping import freeze_strains
-from seastar_gym.der.fluid import freeze_fluid
-from seastar_gym.der.lanes import N_LANES, any_lane, borrow, load, splat, store
-from seastar_gym.der.newton import move_along
+from seastar_gym.der.linear.coupled import solve_coupled
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import Rods, Stage, make_work
+from seastar_gym.der.stepping.newton import move_along
+from seastar_gym.der.terms.contact import freeze_contact
+from seastar_gym.der.terms.damping import freeze_strains
+from seastar_gym.der.terms.fluid import freeze_fluid
+from seastar_gym.model.rods import make_rods
+from seastar_gym.simd.compilation import entry_point
+from seastar_gym.simd.lanes import N_LANES, any_lane, borrow, load, splat, store
 
 
 @entry_point
@@ -49,7 +50,7 @@ def robot_and_star(n_limbs=5, nodes_per_limb=10, hub_hinge="opening", fluid=True
 
 
 def rods_of(robot: Seastar, fluid: bool = True) -> Rods:
-    return Scene(robot=robot, fluid=Water() if fluid else None, actuator=SmaPulse(peak_angle=0.1)).rods()
+    return make_rods(Scene(robot=robot, fluid=Water() if fluid else None, actuator=SmaPulse(peak_angle=0.1)))
 
 
 class RandomStages:

@@ -8,6 +8,7 @@ import pytest
 import oracle
 from refusals import assert_refused
 from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
+from seastar_gym.model.rods import make_rods
 
 COMMANDS = np.array(list(itertools.product([-1.0, 0.0, 1.0], repeat=5)))
 CLOSING = COMMANDS[((COMMANDS == 1.0) & (np.roll(COMMANDS, -1, axis=1) == -1.0)).any(axis=1)]
@@ -146,7 +147,7 @@ def test_limbs_push_each_other_alike(scheme):
     """In vacuum nothing but actuators and contact acts, so the momentum stays."""
     scene = Scene(fluid=None, numerics=Numerics(scheme, 2e-3, newton_tolerance=1e-10), contact=Contact())
     simulator = Simulator(scene, 1)
-    masses = scene.rods().mass
+    masses = make_rods(scene).mass
     for _ in simulator.stroke_in_parts(np.array([[1.0, -1.0, 0.0, 0.0, 0.0]]), 100):
         momentum = masses @ simulator.velocities[0]
         assert np.abs(momentum).max() < 1e-11 * masses.sum()
@@ -177,7 +178,7 @@ def test_pressed_limbs_rest_where_statics_says():
     for touch in oracle.touches(oracle.Star(n_limbs=2), positions, nodes, opening):
         contact += touch.stiffness * touch.depth(positions) * touch.gradient.reshape(-1, 2)[tip]
     way = (positions[tip] - nodes[tip]) @ push
-    bending = float(scene.rods().EI_over_dl[tip - 1]) / robot.edge_length**2
+    bending = float(make_rods(scene).EI_over_dl[tip - 1]) / robot.edge_length**2
     assert way > 5e-4
     assert -contact @ push == pytest.approx(force - bending * way, rel=0.02)
 
@@ -200,10 +201,10 @@ def test_schemes_agree_on_limbs_that_meet():
 def test_a_long_limb_meets_one_beyond_its_neighbour():
     """Where lengths differ, every pair may touch: limbs 1 and 3 reach over a short limb 2."""
     limbs = (Limb(), Limb(length=0.03), Limb(), Limb(), Limb())
-    rods = Scene(robot=Seastar(limbs=limbs), contact=Contact()).rods()
+    rods = make_rods(Scene(robot=Seastar(limbs=limbs), contact=Contact()))
     pairs = {tuple(pair) for pair in rods.contact.pairs.reshape(-1, 2).astype(int).tolist()}
     assert {(0, 1), (0, 2), (4, 1)} <= pairs
-    assert len(Scene(contact=Contact()).rods().contact.pairs) == 10
+    assert len(make_rods(Scene(contact=Contact())).contact.pairs) == 10
 
 
 @pytest.mark.parametrize(

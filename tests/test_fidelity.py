@@ -9,10 +9,11 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from seastar_gym import Numerics, Scene, Simulator, fidelity
-from seastar_gym.fidelity import Promise, cheapest, promise, promises
-from seastar_gym.scene import Fidelity
-from seastar_gym.studies.accuracy_cases import errors, gaits, joined, pentagon, random_sequences, swim, swims
+from seastar_gym import Numerics, Scene, Simulator
+from seastar_gym.scene import fidelity
+from seastar_gym.scene.fidelity import Promise, cheapest, promise, promises
+from seastar_gym.scene.numerics import Fidelity
+from studies.accuracy.cases import errors, gaits, joined, pentagon, random_sequences, swim, swims
 
 NAMES = get_args(Fidelity)
 UNSEEN = random_sequences(24, np.random.default_rng(20_261_121))
@@ -33,7 +34,7 @@ def test_table_comes_with_the_package_and_is_complete():
 
 
 def test_promises_are_of_the_presets_as_they_are():
-    """If this fails, presets were changed without `python -m seastar_gym.studies.accuracy --store`."""
+    """If this fails, presets were changed without `python -m studies.accuracy --store`."""
     for name in NAMES:
         row, numerics = promise(name), Numerics.preset(name)
         assert (row.scheme, row.step) == (numerics.scheme, numerics.step)
@@ -101,7 +102,7 @@ def test_an_error_that_is_no_positive_number_is_refused(error):
 
 
 def test_reading_a_promise_compiles_and_simulates_nothing():
-    code = "import sys; from seastar_gym.fidelity import promise; print(promise('fast').path_error)"
+    code = "import sys; from seastar_gym.scene.fidelity import promise; print(promise('fast').path_error)"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
     assert float(found.stdout) == promise("fast").path_error
 

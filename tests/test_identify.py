@@ -8,7 +8,7 @@ import pytest
 
 from refusals import assert_refused
 from seastar_gym import Contact, Limited, MeasuredCurve, Numerics, Scene, Seastar, Simulator, SmaPulse
-from seastar_gym.identify import (
+from seastar_gym.identify.identify import (
     TRUTH,
     Measurement,
     draw,
@@ -20,7 +20,7 @@ from seastar_gym.identify import (
     trajectory,
     with_parameters,
 )
-from seastar_gym.per_robot import numbers_of
+from seastar_gym.scene.per_robot import numbers_of
 
 SCENE = Scene(numerics=Numerics("implicit-midpoint", 0.01))
 

@@ -22,7 +22,7 @@ from seastar_gym import (
     Vortex,
     Water,
 )
-from seastar_gym.der.lanes import N_LANES
+from seastar_gym.simd.lanes import N_LANES
 
 N_ROBOTS = N_LANES + 3
 FAST = Numerics("sdirk2", 20e-3)

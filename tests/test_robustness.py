@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 import oracle
 from oracle import Star
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State, StrokeReport, Water
-from seastar_gym.der.lanes import N_LANES
+from seastar_gym.model.rods import make_rods
+from seastar_gym.simd.lanes import N_LANES
 
 SCHEMES = ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
 EPSILON = np.finfo(float).eps
@@ -211,7 +212,7 @@ def test_robots_in_trouble_move_to_the_same_bits_alone_in_a_batch_and_on_two_thr
 
 def momenta(simulator: Simulator) -> tuple[np.ndarray, np.ndarray]:
     """Linear [kg m/s] and angular momentum about the origin [kg m^2/s] of every robot."""
-    m, q, v = simulator.scene.rods().mass, simulator.positions, simulator.velocities
+    m, q, v = make_rods(simulator.scene).mass, simulator.positions, simulator.velocities
     return np.einsum("n,rnd->rd", m, v), (q[..., 0] * v[..., 1] - q[..., 1] * v[..., 0]) @ m
 
 
@@ -226,7 +227,7 @@ def test_linear_momentum_stays_to_rounding_whatever_a_step_needs(scheme):
             report = simulator.stroke(np.zeros((8, 5)))
             after, _ = momenta(simulator)
             needed, cuts = needed + report.halvings.sum(), cuts + report.energy_cuts.sum()
-            size = simulator.scene.rods().mass.sum() * speed
+            size = make_rods(simulator.scene).mass.sum() * speed
             np.testing.assert_allclose(after, before, rtol=0.0, atol=1e-11 * size)
     assert needed > 100 and cuts > 5
 

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from oracle import Star
 from refusals import assert_refused
 from seastar_gym import GridCurrent, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
+from seastar_gym.model.rods import make_rods
 
 SAMPLED = GridCurrent((0.0, 0.0), 0.1, np.zeros((3, 2, 2)))
 FIDELITIES = ("fast", "balanced", "accurate", "reference", "chapter")
@@ -62,7 +63,7 @@ def test_nodes_are_a_fresh_array():
 )  # fmt: skip
 def test_total_mass_is_that_of_the_limbs(n_limbs, nodes_per_limb, limb_length, rod_radius, density):
     robot = Seastar(n_limbs, nodes_per_limb, limb_length, rod_radius, density=density)
-    mass = Scene(robot=robot, actuator=SmaPulse(peak_angle=0.1)).rods().mass
+    mass = make_rods(Scene(robot=robot, actuator=SmaPulse(peak_angle=0.1))).mass
     assert mass.shape == (robot.n_nodes,)
     assert mass.sum() == pytest.approx(n_limbs * limb_length * math.pi * rod_radius**2 * density, rel=1e-12)
 
@@ -72,7 +73,7 @@ def test_coefficients_are_the_oracles(hub_hinge):
     values = {"n_limbs": 4, "nodes_per_limb": 6, "limb_length": 0.2, "rod_radius": 2e-3, "youngs_modulus": 3e5}
     robot, water = Seastar(**values, density=1200.0, hub_hinge=hub_hinge), Water(density=900.0, drag_coefficient=1.3)
     star = Star(**values, density=1200.0, hub_hinge=hub_hinge, fluid_density=900.0, drag_coefficient=1.3)
-    rods = Scene(robot, water, SmaPulse(peak_angle=0.1)).rods()
+    rods = make_rods(Scene(robot, water, SmaPulse(peak_angle=0.1)))
     np.testing.assert_allclose(rods.mass, star.masses, rtol=1e-14)
     np.testing.assert_allclose(rods.drag, star.drag, rtol=1e-14)
     np.testing.assert_allclose(rods.EA, star.EA, rtol=1e-14)
@@ -87,7 +88,7 @@ def test_coefficients_are_the_oracles(hub_hinge):
 
 @pytest.mark.parametrize("fluid", [None, Water(density=0.0), Water(drag_coefficient=0.0)])
 def test_vacuum_has_no_drag(fluid):
-    assert not Scene(fluid=fluid).rods().drag.any()
+    assert not make_rods(Scene(fluid=fluid)).drag.any()
 
 
 def test_fidelities_go_from_fast_to_exact():
@@ -273,7 +274,7 @@ def test_a_turning_hub_refuses_peaks_that_close_it_and_an_opening_hub_allows_cro
 )
 def test_a_scene_refuses_what_has_no_finite_positive_coefficients(scene):
     with assert_refused():
-        Scene(robot=Seastar(**scene["robot"])).rods()
+        make_rods(Scene(robot=Seastar(**scene["robot"])))
 
 
 def test_a_step_too_short_to_count_is_refused():

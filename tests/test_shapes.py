@@ -8,8 +8,9 @@ from oracle import Shaped, Star
 from seastar_gym import Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import SymmetryReduction
-from seastar_gym.morphology.seastar import rest_positions
-from seastar_gym.studies.validation import fitted_frequency, let_pass, pause
+from seastar_gym.model.rods import make_rods
+from seastar_gym.scene.shape import rest_positions
+from studies.validation.study import fitted_frequency, let_pass, pause
 
 CLAMP = (0, 1)
 """Held nodes: the limb is then clamped in the middle of its root edge, see studies/validation.py."""
@@ -53,7 +54,7 @@ def robot_and_star(name: str, nodes_per_limb: int = 4) -> tuple[Seastar, Shaped]
 @pytest.mark.parametrize("name", DIFFERENT)
 def test_rest_shape_and_coefficients_are_those_of_the_oracle(name):
     robot, star = robot_and_star(name)
-    rods = Scene(robot, actuator=SmaPulse(0.0)).rods()
+    rods = make_rods(Scene(robot, actuator=SmaPulse(0.0)))
     np.testing.assert_allclose(robot.nodes(), star.rest, atol=1e-15)
     np.testing.assert_allclose(rods.mass, star.masses, rtol=1e-13)
     np.testing.assert_allclose(rods.drag, star.drag, rtol=1e-13)
@@ -108,11 +109,11 @@ def test_the_oracles_gradient_and_hessian_are_the_derivatives_of_its_energy(name
 
 
 def test_limbs_with_nothing_of_their_own_are_the_robots_to_the_last_bit():
-    plain, spelled_out = Scene().rods(), Scene(Seastar(limbs=(Limb(),) * 5)).rods()
+    plain, spelled_out = make_rods(Scene()), make_rods(Scene(Seastar(limbs=(Limb(),) * 5)))
     for one, other in zip(plain, spelled_out, strict=True):
         np.testing.assert_array_equal(one, other)
     evenly = tuple(Limb(2 * np.pi * j / 5, 0.1, 1.6e-3, (1e6, 1e6)) for j in range(5))
-    for one, other in zip(plain, Scene(Seastar(limbs=evenly)).rods(), strict=True):
+    for one, other in zip(plain, make_rods(Scene(Seastar(limbs=evenly))), strict=True):
         np.testing.assert_allclose(np.asarray(one, float), np.asarray(other, float), rtol=1e-15)
 
 
@@ -161,7 +162,7 @@ def test_two_limbs_in_line_ring_as_a_plain_free_rod():
     q = simulator.positions
     q[0, :, 1] = 1e-5 * np.cos(np.pi * q[0, :, 0] / 0.2)
     simulator.set_state((q, np.zeros_like(q), np.zeros(1)))
-    mass, signal, times = scene.rods().mass, [], []
+    mass, signal, times = make_rods(scene).mass, [], []
     shape = np.cos(np.pi * robot.nodes()[:, 0] / 0.2) * mass
     shape -= mass * shape.sum() / mass.sum()
     for time in simulator.stroke_in_parts(np.zeros((1, 2)), 100):
@@ -173,7 +174,7 @@ def test_two_limbs_in_line_ring_as_a_plain_free_rod():
 def test_one_limb_swings_as_a_pendulum_about_its_held_hub():
     """A stiff limb under dead loads in vacuum, small angle: the period of a rigid body on a pin."""
     robot = Seastar(1, 6, youngs_modulus=1e9)
-    mass = Scene(robot, actuator=SmaPulse(0.0)).rods().mass
+    mass = make_rods(Scene(robot, actuator=SmaPulse(0.0))).mass
     loads = tuple((node, 9.81 * float(mass[node]), 0.0) for node in range(6))  # gravity along +x, the limb hangs
     x = robot.nodes()[:, 0]
     period = 2 * np.pi * np.sqrt(np.sum(mass * x**2) / (9.81 * np.sum(mass * x)))

@@ -12,7 +12,7 @@ import pytest
 
 from refusals import assert_refused
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State, StrokeReport, Water
-from seastar_gym.der.lanes import N_LANES
+from seastar_gym.simd.lanes import N_LANES
 
 ROOT = Path(__file__).resolve().parent.parent
 SCHEMES = ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]

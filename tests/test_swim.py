@@ -6,6 +6,7 @@ import pytest
 import oracle
 from oracle import Star
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, Water
+from seastar_gym.model.rods import make_rods
 
 SCHEMES = ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
 STRAIGHT = np.array([[0.0, 1.0, 0.0, 0.0, -1.0]])
@@ -162,7 +163,7 @@ def test_ten_strokes_with_a_turning_hub_go_as_far_as_in_two_published_codes():
 
 def momentum(simulator: Simulator) -> tuple[np.ndarray, np.ndarray]:
     """Linear [kg m/s] and angular momentum about the origin [kg m^2/s] of every robot."""
-    m, q, v = simulator.scene.rods().mass, simulator.positions, simulator.velocities
+    m, q, v = make_rods(simulator.scene).mass, simulator.positions, simulator.velocities
     spin = q[..., 0] * v[..., 1] - q[..., 1] * v[..., 0]
     return np.einsum("n,rnd->rd", m, v), spin @ m
 
@@ -176,7 +177,7 @@ def test_every_scheme_keeps_linear_momentum_to_rounding_without_fluid(scheme, hu
     before, _ = momentum(simulator)
     swim(simulator, np.tile([0.0, 1.0, 0.0, 0.0, -0.5], (8, 1)), 3)
     after, _ = momentum(simulator)
-    size = np.sum(simulator.scene.rods().mass) * 0.05
+    size = np.sum(make_rods(simulator.scene).mass) * 0.05
     np.testing.assert_allclose(after, before, rtol=0.0, atol=1e-11 * size)
 
 
@@ -197,9 +198,9 @@ def test_hub_of_a_robot_without_fluid_stays_where_its_mass_allows():
     """From rest the centre of mass stays at rest, whatever the limbs do."""
     simulator = swimmer("sdirk2", 0.01, 2, None)
     swim(simulator, np.array([[1.0, -1.0, 0.0, 0.5, 0.0], [0.0, 0.0, 1.0, 1.0, 1.0]]), 3)
-    centre = np.einsum("n,rnd->rd", simulator.scene.rods().mass, simulator.positions)
+    centre = np.einsum("n,rnd->rd", make_rods(simulator.scene).mass, simulator.positions)
     assert np.abs(simulator.positions - Seastar().nodes()).max() > 1e-3
-    np.testing.assert_allclose(centre / simulator.scene.rods().mass.sum(), 0.0, atol=1e-10)
+    np.testing.assert_allclose(centre / make_rods(simulator.scene).mass.sum(), 0.0, atol=1e-10)
 
 
 # Held and loaded robots

@@ -10,7 +10,10 @@ from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
 from oracle import Star, elastic_hessian
 from seastar_gym import Scene, Seastar
-from seastar_gym.studies import exact, validation, validation_page
+from seastar_gym.model.rods import make_rods
+from studies.validation import exact
+from studies.validation import page as validation_page
+from studies.validation import study as validation
 
 PAGE = Path(__file__).parents[1] / "docs" / "validation.md"
 
@@ -107,7 +110,7 @@ def test_exact_drag_solutions_satisfy_their_equations():
 
 
 def test_drag_over_mass_is_that_of_every_node():
-    rods = Scene().rods()
+    rods = make_rods(Scene())
     k = exact.drag_over_mass(Seastar(), Scene().fluid)
     np.testing.assert_allclose(rods.drag / rods.mass, k, rtol=1e-13)
 

@@ -22,8 +22,8 @@ g, d           g, d             m       gap between a node and an edge of anothe
 h, gamma       h, gamma         s       time step; coefficient of a stage times h
 Phi            phi, energy      J       incremental potential of a stage, see potential.py
 
-Work of a Newton iteration of the chapter's robot (46 nodes), counted by seastar_gym.studies.operations; shares of the
-time are those of an AVX-512 processor, `python -m seastar_gym.studies.throughput` measures them on any:
+Work of a Newton iteration of the chapter's robot (46 nodes), counted by studies.speed.operations; shares of the
+time are those of an AVX-512 processor, `python -m studies.speed.throughput` measures them on any:
 
 part            kflop   time    what
 hub hinges       0.2     3 %    root edges, five hinges, their couplings (potential.py)

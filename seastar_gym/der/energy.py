@@ -1,12 +1,12 @@
 """Elastic and kinetic energy of a lane group."""
 
-from seastar_gym.der.actuation import set_natural_hub_angles
-from seastar_gym.der.bending import bending_energy, moment
-from seastar_gym.der.compilation import entry_point, kernel
 from seastar_gym.der.geometry import edge_geometry, half_angle
-from seastar_gym.der.lanes import add_product, borrow, load, splat, store, subtract_product
 from seastar_gym.der.rods import n_nodes, tail_node
-from seastar_gym.der.stretching import stretching_energy, tension
+from seastar_gym.der.terms.actuation import set_natural_hub_angles
+from seastar_gym.der.terms.bending import bending_energy, moment
+from seastar_gym.der.terms.stretching import stretching_energy, tension
+from seastar_gym.simd.compilation import entry_point, kernel
+from seastar_gym.simd.lanes import add_product, borrow, load, splat, store, subtract_product
 
 
 @kernel

@@ -1,7 +1,7 @@
 """Edges of a planar rod and the angles between them."""
 
-from seastar_gym.der.compilation import kernel
-from seastar_gym.der.lanes import add_product, load, sqrt, subtract_product
+from seastar_gym.simd.compilation import kernel
+from seastar_gym.simd.lanes import add_product, load, sqrt, subtract_product
 
 EDGE_ROWS = 7  # what edge_geometry returns
 

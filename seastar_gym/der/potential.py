@@ -26,15 +26,8 @@ full one, with its quadratic convergence, is used wherever its pivots allow it.
 
 import numpy as np
 
-from seastar_gym.der.added_mass import add_fluid_inertia
-from seastar_gym.der.bending import bending_energy, bending_slopes, moment
-from seastar_gym.der.compilation import inlined_kernel, kernel
-from seastar_gym.der.contact import add_contact, contact_force
-from seastar_gym.der.damping import damped_energy, damped_stiffness, damped_stress
-from seastar_gym.der.drag import add_cross_flow, drag_slopes, relative
 from seastar_gym.der.geometry import EDGE_ROWS, edge_geometry, half_angle
-from seastar_gym.der.lanes import add_product, load, select, splat, store, subtract_product
-from seastar_gym.der.star_matrix import (
+from seastar_gym.der.linear.star_matrix import (
     add_symmetric,
     eliminate_node,
     negative,
@@ -43,7 +36,14 @@ from seastar_gym.der.star_matrix import (
     solve_ring,
     store_root,
 )
-from seastar_gym.der.stretching import stretching_energy, tension
+from seastar_gym.der.terms.added_mass import add_fluid_inertia
+from seastar_gym.der.terms.bending import bending_energy, bending_slopes, moment
+from seastar_gym.der.terms.contact import add_contact, contact_force
+from seastar_gym.der.terms.damping import damped_energy, damped_stiffness, damped_stress
+from seastar_gym.der.terms.drag import add_cross_flow, drag_slopes, relative
+from seastar_gym.der.terms.stretching import stretching_energy, tension
+from seastar_gym.simd.compilation import inlined_kernel, kernel
+from seastar_gym.simd.lanes import add_product, load, select, splat, store, subtract_product
 
 
 @kernel

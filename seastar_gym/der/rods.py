@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from seastar_gym.der.compilation import kernel
-from seastar_gym.der.current import Current
 from seastar_gym.der.geometry import EDGE_ROWS
-from seastar_gym.der.lanes import N_LANES
-from seastar_gym.der.star_matrix import NODE_ROWS, RING_ROWS, ROOT_ROWS
+from seastar_gym.der.linear.star_matrix import NODE_ROWS, RING_ROWS, ROOT_ROWS
+from seastar_gym.der.terms.current import Current
+from seastar_gym.simd.compilation import kernel
+from seastar_gym.simd.lanes import N_LANES
 
 CACHE_LINE = 64  # bytes
 SHARED = ("velocities", "pairs")  # by all robots

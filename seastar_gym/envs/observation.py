@@ -21,8 +21,8 @@ last leg the next waypoint is the current one. The waypoint's distance is not cl
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.der.compilation import entry_point, kernel
-from seastar_gym.der.lanes import add_product, borrow, load, select, splat, sqrt, store
+from seastar_gym.simd.compilation import entry_point, kernel
+from seastar_gym.simd.lanes import add_product, borrow, load, select, splat, sqrt, store
 
 OBSERVATION_LAYOUT = 1
 """Number of this table. A change of order, unit or frame makes it another one: saved policies say which they know."""

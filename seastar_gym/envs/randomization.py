@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.checks import require_finite, require_number
-from seastar_gym.per_robot import numbers_of, with_numbers
 from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import require_finite, require_number
+from seastar_gym.scene.per_robot import numbers_of, with_numbers
 
 LIMB_STRENGTH = "limb_strength"
 """Share of its commanded rotation that a limb makes: 0 for one that has failed; drawn for every limb."""

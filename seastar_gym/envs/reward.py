@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene import require_number
+from seastar_gym.scene.checks import require_number
 
 
 @dataclass(frozen=True)

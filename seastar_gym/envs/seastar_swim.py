@@ -13,7 +13,8 @@ from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.rendering import Frame, Renderer
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.task import Outcome, Path, SwimTask, make_scene
-from seastar_gym.scene import Fidelity, Scene
+from seastar_gym.scene import Scene
+from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator, SolverStatus
 
 FRAMES_PER_STROKE = 10
@@ -58,7 +59,7 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     `solver_status` (0: converged), `smallest_opening_angle` [rad] between neighbouring limbs during the stroke (below
     zero: limbs crossed, which this scene allows), and the reward's terms. `solver_message` says what to do about a
     status other than 0. `path_error` (by what share of its length the hub's path may be off) and `real_time_factor` (in
-    batch, on one core) are what was measured of the fidelity, see `seastar_gym.fidelity`; NaN in other scenes.
+    batch, on one core) are what was measured of the fidelity, see `seastar_gym.scene.fidelity`; NaN in other scenes.
 
     ## Episode
     Starts at rest with the hub at the origin. `terminated` when the last waypoint is reached, or when the solver gave

@@ -20,9 +20,9 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.actuation.actuator import StatefulActuator
 from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, command_table
 from seastar_gym.scene import Scene
+from seastar_gym.scene.actuators.actuator import StatefulActuator
 
 Elements = NDArray[np.intp]
 

@@ -8,14 +8,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.actuation.actuator import StatefulActuator
-from seastar_gym.der.rows import to_rows
 from seastar_gym.envs.observation import VELOCITY_SCALE, observation_size, observe, to_float32
 from seastar_gym.envs.paths import AIM, PathName, cross_track_error, make_path, shortest_way
 from seastar_gym.envs.randomization import LIMB_STRENGTH, DomainRandomization, drawn_scene
 from seastar_gym.envs.reward import RewardWeights, reward_terms
-from seastar_gym.fidelity import measured
-from seastar_gym.scene import Fidelity, Numerics, Scene, require_number
+from seastar_gym.scene import Numerics, Scene
+from seastar_gym.scene.actuators.actuator import StatefulActuator
+from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.fidelity import measured
+from seastar_gym.scene.numerics import Fidelity
+from seastar_gym.simd.rows import to_rows
 from seastar_gym.simulator import Simulator, SolverStatus, StrokeReport
 
 Floats = NDArray[np.float64]

@@ -15,7 +15,8 @@ from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.seastar_swim import checked_options
 from seastar_gym.envs.task import Path, SwimTask, make_scene
-from seastar_gym.scene import Fidelity, Scene
+from seastar_gym.scene import Scene
+from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator, SolverStatus
 
 Observations = NDArray[np.float32]

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from seastar_gym import Limited, MeasuredCurve, Numerics, Scene, Seastar, Simulator, SmaPulse
-from seastar_gym.actuation.actuator import Actuator, StatefulActuator
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import SymmetryReduction
+from seastar_gym.scene.actuators.actuator import Actuator, StatefulActuator
 
 NUMERICS = Numerics("implicit-midpoint", 0.01)
 SAMPLED_PULSE = MeasuredCurve((0.0, 0.1, 1.0), (0.0, np.pi / 5, 0.0))

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 import oracle
 from seastar_gym import Numerics, Scene, Simulator, SmaPulse
-from seastar_gym.actuation.schedule import step_times
-from seastar_gym.actuation.sma import pulse
+from seastar_gym.scene.actuators.pulse import pulse
+from seastar_gym.simulator.schedule import step_times
 
 CHAPTER = (0.0, 0.1, 1.0)
 durations = st.floats(1e-3, 10.0)

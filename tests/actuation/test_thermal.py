@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from seastar_gym import Numerics, Scene, Simulator, SmaPulse, ThermalSma
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.studies import thermal, thermal_models
+from studies.scenes import thermal
 
 SCENE = Scene(actuator=ThermalSma(), numerics=Numerics("implicit-midpoint", 0.01))
 SLOW = ThermalSma(heating_time=5.0, cooling_time=20.0)
@@ -89,20 +89,6 @@ def test_a_full_command_comes_near_the_pulse_and_the_defaults_are_as_near_as_a_f
     assert np.sum(thermal.misfit(ThermalSma()) ** 2) < 1.01 * np.sum(thermal.misfit(thermal.fit()) ** 2)
     assert "default: tau = 0.420 s" in thermal.describe("default", ThermalSma())
     assert ThermalSma().delta_psi([[0.0, 0.1]]).shape == (1, 2)
-
-
-def test_a_wire_integrated_in_time_is_the_exact_one_and_takes_up_latent_heat():
-    box = ThermalSma()
-    wire = thermal_models.Wire(box.time_constant, box.steady_rise, 1.5, 2.0, 47.0, 14.5, box.heating_time)
-    model, latent = thermal_models.Model(), thermal_models.Model(latent=thermal_models.LATENT_HEAT)
-    np.testing.assert_allclose(thermal_models.misfit(wire, model), thermal.misfit(box), atol=2e-3)
-    assert thermal_models.strokes(wire, latent, 1).max() < 0.7 * thermal_models.strokes(wire, model, 1).max()
-
-
-def test_more_physics_is_fitted_to_the_pulse(monkeypatch):
-    monkeypatch.setattr(thermal_models, "MODELS", {"a shorter pulse": thermal_models.Model(shortest=0.04)})
-    table = thermal_models.as_table(starts=1)
-    assert table.row_count == 1 and float(next(table.columns[1].cells).split()[0]) < 20.0
 
 
 def test_the_study_draws_its_picture(tmp_path):

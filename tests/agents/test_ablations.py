@@ -5,10 +5,10 @@ from unittest.mock import patch
 
 import pytest
 
-from agents import ablations
-from agents.ablations import VARIANTS, Options, Variant, final_strokes, learn, main, table
 from seastar_gym.envs import task
 from seastar_gym.envs.paths import AIM
+from studies.learning import ablations
+from studies.learning.ablations import VARIANTS, Options, Variant, final_strokes, learn, main, table
 
 TINY = {"num_envs": 8, "rollout": 8, "batch_size": 32, "epochs": 1, "hidden": (8,), "max_episode_steps": 10}
 

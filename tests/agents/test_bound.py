@@ -6,7 +6,11 @@ import json
 import numpy as np
 import pytest
 
-from agents.bound import (
+from agents.scripted import pair_gait, to_actions
+from seastar_gym import Numerics, Scene
+from seastar_gym.envs.commands import command_table
+from seastar_gym.envs.symmetry import action_table
+from studies.learning.bound import (
     all_directions,
     distinct_gaits,
     draw,
@@ -17,10 +21,6 @@ from agents.bound import (
     search_line,
     search_path,
 )
-from agents.scripted import pair_gait, to_actions
-from seastar_gym import Numerics, Scene
-from seastar_gym.envs.commands import command_table
-from seastar_gym.envs.symmetry import action_table
 
 FAST = Scene(numerics=Numerics.preset("fast"))
 

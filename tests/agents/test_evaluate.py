@@ -13,8 +13,8 @@ from matplotlib.colors import to_rgb
 from rich.console import Console
 
 from agents.evaluate import evaluate, main
-from agents.pictures import CLOSING_SECONDS, COLOURS, FPS, FRAMES_PER_STROKE
 from agents.policy import Description, LearnedPolicy, save
+from agents.report.pictures import CLOSING_SECONDS, COLOURS, FPS, FRAMES_PER_STROKE
 from agents.roster import load_agents
 from agents.scripted import scripted
 from agents.swim import Swim, swim

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from seastar_gym import Numerics, Scene, Simulator
-from seastar_gym.der import compilation
-from seastar_gym.der.compilation import PACKAGE, kernel_sources, source_digest
+from seastar_gym.simd import compilation
+from seastar_gym.simd.compilation import PACKAGE, kernel_sources, source_digest
 
 ENERGY = """
 import numpy as np
@@ -68,9 +68,9 @@ def test_an_edited_kernel_never_runs_from_the_cache_and_an_unchanged_one_always_
     assert (hits, misses) == (0, 1)
     assert copy.run() == [energy, 1, 0]
     # stretching.py is called by energy.py, whose own file stays as it was.
-    copy.edit("seastar_gym/der/stretching.py", "return 0.5 * load", "return 3.5 * load")
+    copy.edit("seastar_gym/der/terms/stretching.py", "return 0.5 * load", "return 3.5 * load")
     assert copy.run() == [pytest.approx(7.0 * energy), 0, 1]
-    copy.edit("seastar_gym/der/stretching.py", "return 3.5 * load", "return 0.5 * load")
+    copy.edit("seastar_gym/der/terms/stretching.py", "return 3.5 * load", "return 0.5 * load")
     assert copy.run() == [energy, 1, 0]
 
 
@@ -89,7 +89,7 @@ def test_without_a_folder_to_write_to_the_kernels_are_compiled_anew(copy):
 
 def test_an_edited_entry_point_outside_the_package_does_not_run_from_the_cache_either(copy):
     module = copy.folder / "mine.py"
-    body = "from seastar_gym.der.compilation import entry_point\n\n\n@entry_point\ndef number():\n    return {}\n"
+    body = "from seastar_gym.simd.compilation import entry_point\n\n\n@entry_point\ndef number():\n    return {}\n"
     module.write_text(body.format(1.5), encoding="utf-8")
     assert copy.run("import mine; print(mine.number())") == [1.5]
     module.write_text(body.format(2.5), encoding="utf-8")

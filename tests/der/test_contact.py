@@ -6,7 +6,8 @@ import pytest
 import oracle
 from oracle import Star
 from seastar_gym import Contact, Scene, SmaPulse
-from seastar_gym.der.lanes import N_LANES
+from seastar_gym.model.rods import make_rods
+from seastar_gym.simd.lanes import N_LANES
 from stages import RandomStages, robot_and_star
 
 ANGLE = 0.3
@@ -53,7 +54,7 @@ def of_lane(star, stages, lane, ahead):
 @pytest.mark.parametrize(("n_limbs", "nodes_per_limb"), [(5, 10), (5, 4), (3, 9), (6, 6), (8, 7)])
 def test_energy_forces_and_step_are_the_oracles(n_limbs, nodes_per_limb, ahead):
     robot, star, stages = touching_stages(n_limbs, nodes_per_limb)
-    found = stages.run(scene(robot).rods(), ahead=ahead)
+    found = stages.run(make_rods(scene(robot)), ahead=ahead)
     touched, lead = 0, 4.0 if ahead else 1.0
     for lane in range(N_LANES):
         depths, gradients, stiffnesses = of_lane(star, stages, lane, ahead)

@@ -9,13 +9,21 @@ import pytest
 import oracle
 from oracle import Star
 from seastar_gym import Scene, Seastar, SmaPulse
-from seastar_gym.der.guard import allowed_energy, hold_to_energy, put_back, rigid_motion, set_aside, through_poles
-from seastar_gym.der.lanes import N_LANES, borrow, load, select, splat, store
 from seastar_gym.der.rods import Actuation, aligned_rows, make_work
-from seastar_gym.der.schemes import SCHEMES
+from seastar_gym.der.stepping.guard import (
+    allowed_energy,
+    hold_to_energy,
+    put_back,
+    rigid_motion,
+    set_aside,
+    through_poles,
+)
+from seastar_gym.der.stepping.schemes import SCHEMES
+from seastar_gym.model.rods import make_rods
+from seastar_gym.simd.lanes import N_LANES, borrow, load, select, splat, store
 
 STAR = Star()
-RODS = Scene(actuator=SmaPulse(0.5)).rods()
+RODS = make_rods(Scene(actuator=SmaPulse(0.5)))
 
 
 @numba.njit(error_model="numpy")
@@ -204,7 +212,7 @@ def test_a_hinge_that_turned_through_its_pole_is_seen_and_the_robot_put_back(
     hub_hinge, part, before, after, through, scheme
 ):
     """The last lane holds a robot that nobody asks about."""
-    rods, tableau = Scene(Seastar(hub_hinge=hub_hinge), actuator=SmaPulse(0.5)).rods(), SCHEMES[scheme]
+    rods, tableau = make_rods(Scene(Seastar(hub_hinge=hub_hinge), actuator=SmaPulse(0.5))), SCHEMES[scheme]
     q, q_1 = (turned_about(STAR.rest, *part, np.radians(angle)) for angle in (before, after))
     everywhere, v = np.ones((N_LANES, STAR.n_nodes, 2)), np.ones((N_LANES, STAR.n_nodes, 2))
     rows, v_rows, result = rows_of(q * everywhere), rows_of(v), np.zeros((1, N_LANES))

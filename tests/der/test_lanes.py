@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from seastar_gym.der import lanes
 from seastar_gym.der.geometry import tangent
-from seastar_gym.der.lanes import N_LANES, all_lanes, any_lane, borrow, load, load_number, splat, store
+from seastar_gym.simd import lanes
+from seastar_gym.simd.lanes import N_LANES, all_lanes, any_lane, borrow, load, load_number, splat, store
 
 ROOT = Path(__file__).resolve().parents[2]
 SPECIAL = [0.0, -0.0, 1.0, -1.0, np.inf, -np.inf, np.nan, 5e-324, -2.2e-308, 1.8e308, 1e-160, 1e200, 1.0 + 2**-52]

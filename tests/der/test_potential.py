@@ -6,7 +6,8 @@ import pytest
 import oracle
 from oracle import Star
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, StrokeReport, Water
-from seastar_gym.der.lanes import N_LANES
+from seastar_gym.model.rods import make_rods
+from seastar_gym.simd.lanes import N_LANES
 from stages import RandomStages, random_shape, robot_and_star, rods_of
 
 HUBS = ("opening", "turning")
@@ -105,7 +106,7 @@ def test_a_matrix_that_is_not_a_number_does_not_pass_for_positive_definite():
 
 def test_every_robot_may_have_coefficients_of_its_own():
     robot = Seastar(nodes_per_limb=4)
-    shared = Scene(robot=robot).rods()
+    shared = make_rods(Scene(robot=robot))
     stiffness, weight = np.linspace(0.5, 2.0, N_LANES), np.linspace(1.0, 3.0, N_LANES)
     scales = {"mass": weight} | dict.fromkeys(("EA", "EA_over_l", "EI_over_dl"), stiffness)
     scales |= dict.fromkeys(("l_over_EA", "dl_over_EI"), 1.0 / stiffness)

@@ -9,7 +9,7 @@ import pytest
 
 import oracle
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, State
-from seastar_gym.der.schemes import SCHEMES
+from seastar_gym.der.stepping.schemes import SCHEMES
 
 ORDERS = {"implicit-euler": 1, "sdirk2": 2, "sdirk3": 3, "implicit-midpoint": 2}
 ROBOT = Seastar(nodes_per_limb=4)

@@ -22,7 +22,8 @@ from seastar_gym import (
     Water,
     relaxation_time,
 )
-from seastar_gym.der.lanes import N_LANES
+from seastar_gym.model.rods import make_rods
+from seastar_gym.simd.lanes import N_LANES
 from stages import RandomStages, random_shape
 
 
@@ -80,7 +81,7 @@ def test_potential_and_newton_direction_in_a_fluid_are_those_of_the_oracle(curre
     robot, water, star = robot_water_and_star(current, along, nodes_per_limb=4)
     scene = Scene(robot, water)
     stages = RandomStages(star, 1e-2, bend=0.05)
-    found = stages.run(scene.rods())
+    found = stages.run(make_rods(scene))
     for lane in range(N_LANES):
         data = stages.data(lane)
         gradient = oracle.incremental_gradient(star, stages.q[lane], *data)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse
-from seastar_gym.der.lanes import N_LANES
-from seastar_gym.der.rows import to_rows
 from seastar_gym.envs.observation import VELOCITY_SCALE, observation_size, observe, to_float32
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simd.rows import to_rows
 
 SCENES = [
     Scene(numerics=Numerics.preset("fast")),

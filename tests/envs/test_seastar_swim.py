@@ -14,7 +14,7 @@ import seastar_gym
 from seastar_gym import Numerics, RewardWeights, Scene, Seastar, SmaPulse, SolverStatus
 from seastar_gym.envs.paths import AIM, PATH_NAMES, cross_track_error, shortest_way
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.fidelity import promise
+from seastar_gym.scene.fidelity import promise
 
 STRAIGHT = np.array([0, 1, 0, 0, 2])
 REST = np.zeros(5, int)

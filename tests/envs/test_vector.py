@@ -10,8 +10,8 @@ from gymnasium.utils.env_match import check_environments_match
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from seastar_gym import Numerics, RewardWeights, Scene, Seastar, SmaPulse, SolverStatus
-from seastar_gym.der.lanes import N_LANES
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.simd.lanes import N_LANES
 
 NEXT_STEP, SAME_STEP, DISABLED = AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP, AutoresetMode.DISABLED
 SHORT_PATH = [[0.004, 0.0], [0.009, 0.0]]  # some two strokes of the straight gait

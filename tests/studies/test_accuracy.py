@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from seastar_gym import Numerics
-from seastar_gym.fidelity import Promise
+from seastar_gym.scene.fidelity import Promise
 from seastar_gym.simulator import Simulator
-from seastar_gym.studies import accuracy, accuracy_rows, accuracy_tables
-from seastar_gym.studies.accuracy import MS, Plan
-from seastar_gym.studies.accuracy_cases import (
+from studies.accuracy import rows as accuracy_rows
+from studies.accuracy import study as accuracy
+from studies.accuracy import tables as accuracy_tables
+from studies.accuracy.cases import (
     PAIRS,
     STRAIGHT,
     Cases,
@@ -29,7 +30,8 @@ from seastar_gym.studies.accuracy_cases import (
     swims,
     symmetric_form,
 )
-from seastar_gym.studies.accuracy_rows import Row
+from studies.accuracy.rows import Row
+from studies.accuracy.study import MS, Plan
 
 TINY = Plan(
     n_random=2, side=(1, 0), converged=(("sdirk3", 1 * MS), ("implicit-midpoint", 0.5 * MS)), shortest=10 * MS,
@@ -228,7 +230,7 @@ def test_tables_and_csv_are_written(found, tmp_path):
 
 
 def test_pictures_are_drawn(found, tmp_path):
-    from seastar_gym.studies import accuracy_pictures
+    from studies.accuracy import pictures as accuracy_pictures
 
     for path in accuracy_pictures.draw_all(found, tmp_path):
         assert 20_000 < path.stat().st_size < 250_000

@@ -8,7 +8,8 @@ import pytest
 
 from agents.scripted import pentagon_gait
 from seastar_gym import Numerics, Scene, Simulator, SmaPulse
-from seastar_gym.studies import chapter, chapter_pictures
+from studies.chapter import pictures as chapter_pictures
+from studies.chapter import study as chapter
 
 COARSE = Numerics("implicit-euler", 10e-3)
 

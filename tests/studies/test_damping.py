@@ -5,9 +5,9 @@ import csv
 import numpy as np
 import pytest
 
-from seastar_gym.studies import damping
-from seastar_gym.studies.accuracy_cases import PAIRS
-from seastar_gym.studies.damping import MATERIALS, Plan, Row, Study, as_table, good_enough, of, study
+from studies.accuracy.cases import PAIRS
+from studies.scenes import damping
+from studies.scenes.damping import MATERIALS, Plan, Row, Study, as_table, good_enough, of, study
 
 TINY = Plan(n_random=1, converged=(("sdirk3", 1e-3), ("implicit-midpoint", 1e-3)), shortest=10.0)
 

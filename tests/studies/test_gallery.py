@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seastar_gym.studies import gallery
+from studies.scenes import gallery
 
 
 @pytest.mark.slow

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seastar_gym.studies import hardening
+from studies.speed import hardening
 
 
 @pytest.mark.parametrize("numerics", hardening.SETTINGS, ids=lambda numerics: numerics.scheme)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from seastar_gym import Numerics, Scene, Seastar
-from seastar_gym.studies.operations import count_operations, flops
+from studies.speed.operations import count_operations, flops
 
 
 def iteration_flops(**robot):

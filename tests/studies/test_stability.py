@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from seastar_gym.studies import stability, stability_cells
-from seastar_gym.studies.stability_cases import SWEEPS, format_step, format_value, quick_sweeps
-from seastar_gym.studies.stability_pictures import draw_atlas
+from studies.stability import cells as stability_cells
+from studies.stability import study as stability
+from studies.stability.cases import SWEEPS, format_step, format_value, quick_sweeps
+from studies.stability.pictures import draw_atlas
 
 STEPS = (3e-3, 2e-2, 0.3)
 VALUES = {"youngs_modulus": (1e2, 1e6, 1e11), "drag_coefficient": (None, 1.0), "speed": (0.0, 10.0),

@@ -3,7 +3,8 @@
 import numpy as np
 
 from seastar_gym import Scene
-from seastar_gym.studies.terms import THE_CHAPTERS, as_table, measure, scenes
+from seastar_gym.model.rods import make_rods
+from studies.speed.terms import THE_CHAPTERS, as_table, measure, scenes
 
 
 def test_costs_are_relative_to_the_first_scene():
@@ -19,4 +20,4 @@ def test_every_scene_has_terms_of_its_own():
     compared = scenes()
     assert next(iter(compared)) == THE_CHAPTERS and compared[THE_CHAPTERS] == Scene()
     assert len({hash(scene) for scene in compared.values()}) == len(compared)
-    assert np.isfinite([scene.rods().EA[0] for scene in compared.values()]).all()
+    assert np.isfinite([make_rods(scene).EA[0] for scene in compared.values()]).all()

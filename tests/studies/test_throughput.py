@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from seastar_gym import Scene
-from seastar_gym.studies import throughput
-from seastar_gym.studies.parts import PARTS, part_seconds
+from studies.speed import throughput
+from studies.speed.parts import PARTS, part_seconds
 
 
 def test_exponent_of_a_linear_cost_is_one():

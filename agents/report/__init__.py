@@ -1,0 +1,1 @@
+"""The page that compares agents: tables, charts and a playback of every swim."""

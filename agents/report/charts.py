@@ -1,0 +1,190 @@
+"""The report's pictures, in plotly: traced paths, learning curves, the polar picture of speeds."""
+
+import html
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import plotly.graph_objects as go
+import plotly.io
+from numpy.typing import NDArray
+
+from agents.report.pictures import COLOURS, FAINT_INK, INK, MM, PLANNED, STROKES_PER_DOT, view
+from agents.swim import Swim
+
+Floats = NDArray[np.float64]
+DASHES = ("solid", "dash", "dot")
+MARGIN = {"l": 56, "r": 12, "t": 12, "b": 48}
+"""Room for the titles of axes [px]."""
+PENTAGON_WAYPOINTS = 5
+
+
+def to_html(figure: go.Figure, name: str) -> str:
+    """The figure as a piece of a page that has plotly.js; it fills the element around it."""
+    figure.update_layout(
+        template="none",
+        font={"family": "system-ui, sans-serif", "size": 13, "color": INK},
+        legend={"orientation": "h", "yanchor": "bottom", "x": 0.0},
+        showlegend=True,
+        dragmode=False,  # a finger on the picture scrolls the page
+        hovermode="closest",
+    )
+    figure.update_xaxes(gridcolor="#eceff3", zeroline=False, linecolor=FAINT_INK, ticks="outside")
+    figure.update_yaxes(gridcolor="#eceff3", zeroline=False, linecolor=FAINT_INK, ticks="outside")
+    options = {"responsive": True, "displaylogo": False, "displayModeBar": False}
+    return str(plotly.io.to_html(figure, config=options, include_plotlyjs=False, full_html=False, div_id=name))
+
+
+# --- paths -----------------------------------------------------------------------------------------------------------
+
+
+def paths_figure(swims: Sequence[Swim], waypoint_radius: float) -> go.Figure:
+    """The hubs' ways along the path of the first swim. waypoint_radius: [m]."""
+    path = MM * np.concatenate([np.zeros((1, 2)), swims[0].waypoints])
+    figure = go.Figure()
+    figure.add_scatter(
+        x=_rounded(path[:, 0]), y=_rounded(path[:, 1]), mode="lines", name="path", hoverinfo="skip",
+        line={"color": PLANNED, "dash": "dash", "width": 1.5},
+    )  # fmt: skip
+    for x, y in path[1:]:
+        figure.add_shape(type="circle", **_circle(x, y, MM * waypoint_radius), line_color=PLANNED, layer="below")
+    for number, done in reversed(list(enumerate(swims))):  # the first swim comes on top
+        figure.add_trace(_trace(done, number))
+    low, high = view(path, MM * np.concatenate([done.hub for done in swims]))
+    figure.update_layout(
+        xaxis={"title": "x [mm]", "range": [low[0], high[0]], "constrain": "domain"},
+        yaxis={"title": "y [mm]", "range": [low[1], high[1]], "scaleanchor": "x", "constrain": "domain"},
+        legend={"traceorder": "reversed", "y": 1.01},
+        margin=MARGIN,
+    )
+    return figure
+
+
+def _trace(done: Swim, number: int) -> go.Scatter:
+    hub = MM * done.hub
+    result = f"{done.strokes} strokes" if done.finished else f"{done.waypoints_reached} of {len(done.waypoints)}"
+    dots = np.arange(len(hub)) % STROKES_PER_DOT == 0
+    return go.Scatter(
+        x=_rounded(hub[:, 0]), y=_rounded(hub[:, 1]), mode="lines+markers", name=f"{done.agent} ({result})",
+        line={"color": COLOURS[number % len(COLOURS)], "dash": DASHES[number // len(COLOURS) % len(DASHES)]},
+        marker={"size": np.where(dots, 6, 0).tolist()},
+        text=[f"stroke {stroke}" for stroke in range(len(hub))],
+        hovertemplate="%{text}: %{x:.0f}, %{y:.0f} mm",
+    )  # fmt: skip
+
+
+def _circle(x: float, y: float, radius: float) -> dict[str, float]:
+    return {"x0": x - radius, "x1": x + radius, "y0": y - radius, "y1": y + radius}
+
+
+def _rounded(values: Floats) -> list[float]:
+    """Millimetres to a tenth: a page is read by eyes."""
+    return np.round(values, 1).tolist()
+
+
+# --- learning curves -------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """What one training came to."""
+
+    name: str
+    trained: Floats
+    """Strokes trained, shape (n,)."""
+    pentagon: Floats
+    """Strokes round the pentagon, NaN where it was not finished, shape (n,)."""
+
+    @classmethod
+    def of(cls, name: str, progress: Sequence[Sequence[float]]) -> "Curve":
+        """From rows of strokes trained, strokes round the pentagon, waypoints reached."""
+        trained, pentagon, waypoints = np.array(progress, dtype=float).T
+        return cls(name, trained, np.where(waypoints == PENTAGON_WAYPOINTS, pentagon, np.nan))
+
+
+def read_progress(folder: Path) -> list[list[int]]:
+    """The rows of a training's progress.csv: strokes trained, strokes round the pentagon, waypoints reached."""
+    rows: list[list[int]] = np.loadtxt(folder / "progress.csv", dtype=int, delimiter=",", ndmin=2).tolist()
+    return rows
+
+
+def curves_figure(curves: Sequence[Curve], baselines: Mapping[str, int]) -> go.Figure:
+    """Strokes round the pentagon over the course of trainings; of several, with their median and range.
+
+    baselines: Strokes that other agents take.
+    """
+    figure = go.Figure()
+    if len(curves) > 2:
+        _add_band(figure, curves)
+    for number, curve in enumerate(curves):
+        figure.add_scatter(
+            x=curve.trained.tolist(), y=_with_gaps(curve.pentagon), name=curve.name, mode="lines+markers",
+            line={"color": COLOURS[number % len(COLOURS)], "width": 1 if len(curves) > 2 else 2}, marker={"size": 5},
+        )  # fmt: skip
+    for name, strokes in baselines.items():
+        figure.add_hline(
+            y=strokes, line={"color": FAINT_INK, "dash": "dash"},
+            annotation_text=f"{html.escape(name)}: {strokes}", annotation_position="top left",
+        )  # fmt: skip
+    figure.update_layout(
+        xaxis={"title": "strokes trained", "rangemode": "tozero"}, yaxis={"title": "strokes round the pentagon"},
+        legend_y=1.01, margin=MARGIN,
+    )  # fmt: skip
+    return figure
+
+
+def _add_band(figure: go.Figure, curves: Sequence[Curve]) -> None:
+    """Median and range of the curves at the strokes that they have in common; one that did not finish is worst."""
+    trained = sorted(set.intersection(*(set(curve.trained.tolist()) for curve in curves)))
+    worst = np.array([[_at(curve, one) for one in trained] for curve in curves])
+    known = np.isfinite(worst).all(axis=0)
+    x, values = np.array(trained)[known], worst[:, known]
+    band = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip"}
+    figure.add_scatter(x=x.tolist(), y=values.min(axis=0).tolist(), showlegend=False, **band)
+    figure.add_scatter(
+        x=x.tolist(), y=values.max(axis=0).tolist(), name="range", fill="tonexty", fillcolor="#d9e6f2", **band
+    )
+    figure.add_scatter(
+        x=x.tolist(), y=np.median(values, axis=0).tolist(), name="median", mode="lines", line={"color": INK, "width": 3}
+    )
+
+
+def _at(curve: Curve, trained: float) -> float:
+    return float(curve.pentagon[curve.trained == trained][0])
+
+
+def _with_gaps(values: Floats) -> list[float | None]:
+    return [None if np.isnan(value) else float(value) for value in values]
+
+
+# --- speeds ----------------------------------------------------------------------------------------------------------
+
+
+def speeds_figure(directions: Sequence[float], speeds: Mapping[str, Sequence[float]], n_limbs: int = 5) -> go.Figure:
+    """Straight-line speeds [mm per stroke] by direction from limb 1, 0 to 180/n_limbs degrees, turned and mirrored."""
+    figure = go.Figure()
+    there, back = list(directions), list(directions)[-2::-1]
+    sector = 360.0 / n_limbs
+    angles = [angle for limb in range(n_limbs) for angle in _round_trip(limb * sector, sector, there, back)]
+    for number, (name, values) in enumerate(speeds.items()):
+        around = [*values, *list(values)[-2::-1]][:-1] * n_limbs
+        figure.add_scatterpolar(
+            theta=[*angles, angles[0]], r=np.round([*around, around[0]], 3).tolist(), name=name, mode="lines",
+            line={"color": COLOURS[number % len(COLOURS)], "dash": DASHES[number // len(COLOURS) % len(DASHES)]},
+            hovertemplate="%{theta:.0f}\u00b0: %{r:.2f} mm",
+        )  # fmt: skip
+    figure.update_layout(
+        polar={
+            "radialaxis": {"rangemode": "tozero", "angle": sector / 4, "nticks": 5, "gridcolor": "#dfe3e8"},
+            "angularaxis": {"ticksuffix": "\u00b0", "dtick": sector / 2, "gridcolor": "#dfe3e8"},
+        },
+        margin={"l": 48, "r": 48, "t": 36, "b": 36},
+        legend_y=1.12,
+    )
+    return figure
+
+
+def _round_trip(begin: float, sector: float, there: Sequence[float], back: Sequence[float]) -> list[float]:
+    """Angles from a limb to the next, through a measured half and its mirror image; the next limb's is left out."""
+    return [*(begin + angle for angle in there), *(begin + sector - angle for angle in back)][:-1]

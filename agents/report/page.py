@@ -1,0 +1,210 @@
+"""The report of an evaluation: one HTML page that needs nothing beside it, neither files nor network.
+
+It is `page.html` with plotly.js, the tables, the pictures of charts.py and the recorded swims written into it.
+"""
+
+import csv
+import html
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import plotly.offline
+
+from agents.report.charts import Curve, curves_figure, paths_figure, speeds_figure, to_html
+from agents.report.playback import UNIT, Playback
+from agents.swim import Swim
+
+PAGE = Path(__file__).parent / "page.html"
+Row = Mapping[str, str | int | float | None]
+
+
+@dataclass(frozen=True, eq=False)
+class ResultsTable:
+    """A table of the report. rows: As in the CSV. columns: Those to show, and their titles.
+
+    Where a row has "NAME_low" and "NAME_high" too, they stand behind its number NAME, as a confidence interval.
+    """
+
+    title: str
+    columns: Mapping[str, str]
+    rows: Sequence[Row]
+
+
+@dataclass(frozen=True, eq=False)
+class Remarks:
+    """What a report says besides the evaluation."""
+
+    title: str = "Evaluation"
+    sentences: Sequence[str] = ()
+    commands: Sequence[str] = ()
+    curves: Sequence[Curve] = ()
+    tables: Sequence[ResultsTable] = ()
+    bound: Mapping[str, Any] | None = None
+    """What studies.learning.bound wrote."""
+
+
+def write_report(
+    file: Path,
+    table: ResultsTable,
+    swims: Sequence[Swim],
+    playbacks: Sequence[Playback],
+    waypoint_radius: float,
+    baselines: Mapping[str, int],
+    remarks: Remarks,
+) -> None:
+    """Write the page. waypoint_radius: [m]. baselines: Strokes round the pentagon, to be drawn beside the curves."""
+    sections = [
+        _section(table.title, table_html(table)),
+        _section("Playback", PLAYER),
+        _section("Paths", _figure(to_html(paths_figure(swims, waypoint_radius), "paths"), "square")),
+    ]
+    sections += [_section(more.title, table_html(more)) for more in remarks.tables]
+    if remarks.curves:
+        figure = to_html(curves_figure(remarks.curves, baselines), "curves")
+        sections.append(_section("Learning curves", _figure(figure, "wide")))
+    if remarks.bound is not None:
+        figure = to_html(speeds_figure(remarks.bound["directions_deg"], remarks.bound["mm_per_stroke"]), "speeds")
+        sections.append(
+            _section("Speed straight ahead [mm per stroke], by direction from limb 1", _figure(figure, "square"))
+        )
+    if remarks.commands or remarks.sentences:
+        sections.append(_section("How it was made", _remarks(remarks)))
+    parts = {
+        "title": html.escape(remarks.title),
+        "plotly": plotly.offline.get_plotlyjs(),
+        "sections": "\n".join(sections),
+        "swims": _script_safe(_recorded(playbacks, swims[0].waypoints, waypoint_radius)),
+    }
+    page = re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], PAGE.read_text(encoding="utf-8"))
+    file.write_text(page, encoding="utf-8")
+
+
+def _section(title: str, content: str) -> str:
+    return f"<section>\n<h2>{html.escape(title)}</h2>\n{content}\n</section>"
+
+
+def _figure(figure: str, shape: str) -> str:
+    return f'<div class="figure {shape}">{figure}</div>'
+
+
+# --- tables ----------------------------------------------------------------------------------------------------------
+
+
+def table_html(table: ResultsTable) -> str:
+    """A table as a piece of a page."""
+    head = "".join(
+        f"<th{_side(name)}>{html.escape(' '.join(title.split()))}</th>" for name, title in table.columns.items()
+    )
+    body = "\n".join("<tr>" + "".join(_cell(row, name) for name in table.columns) + "</tr>" for row in table.rows)
+    return f'<div class="table"><table><thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody></table></div>'
+
+
+def _side(name: str) -> str:
+    """Words begin on the left, numbers end on the right."""
+    return ' class="words"' if name in ("agent", "path", "disturbance", "fidelity") else ""
+
+
+TRIALS = {
+    "path": "path",
+    "disturbance": "disturbance",
+    "agent": "agent",
+    "fidelity": "fidelity",
+    "swims": "swims",
+    "success_rate": "success [%]",
+    "strokes_to_finish": "strokes to finish",
+    "mean_cross_track_error_mm": "mean cross-track error [mm]",
+    "limbs_heated_per_metre": "limbs heated per metre [1/m]",
+}
+"""Columns of the table of trials, as agents.trials names them."""
+MEASURED = ("success_rate", "strokes_to_finish", "mean_cross_track_error_mm", "limbs_heated_per_metre")
+"""Those with confidence intervals."""
+
+
+def read_trials(file: Path) -> ResultsTable:
+    """The CSV that agents.trials wrote. ValueError: it is none."""
+    with file.open(newline="", encoding="utf-8") as stream:
+        rows = [_trial(row) for row in csv.DictReader(stream)]
+    if not rows or not set(TRIALS) <= set(rows[0]):
+        raise ValueError(f"{file} is not what agents.trials writes.")
+    return ResultsTable("Trials, with 95 % confidence intervals", TRIALS, rows)
+
+
+def _trial(row: dict[str, str]) -> Row:
+    numbers = {name: _float_or_none(text) for name, text in row.items() if name.startswith(MEASURED)}
+    rates = {name: 100.0 * value for name, value in numbers.items() if "rate" in name and value is not None}
+    return {**row, **numbers, **rates}
+
+
+def _float_or_none(text: str) -> float | None:
+    value = float(text)
+    return None if np.isnan(value) else value
+
+
+def _cell(row: Row, name: str) -> str:
+    value = row[name]
+    text = html.escape(number(value))
+    if value is not None and f"{name}_low" in row:
+        text += f" <small>[{number(row[f'{name}_low'])}, {number(row[f'{name}_high'])}]</small>"
+    return f'<td{_side(name)} data-name="{name}">{text}</td>'
+
+
+def number(value: Any) -> str:
+    """A number of a table as it is shown; a dash for none."""
+    if value is None:
+        return "\u2013"
+    return f"{value:.1f}" if isinstance(value, float) else str(value)
+
+
+# --- remarks ---------------------------------------------------------------------------------------------------------
+
+
+def _remarks(remarks: Remarks) -> str:
+    sentences = "\n".join(f"<p>{html.escape(sentence)}</p>" for sentence in remarks.sentences)
+    return f"{sentences}\n<pre>{html.escape(chr(10).join(remarks.commands))}</pre>"
+
+
+# --- playback --------------------------------------------------------------------------------------------------------
+
+TEXT_MARGIN = 30.0
+"""[mm]: for the names of heated limbs, beyond their tips."""
+
+PLAYER = """<div id="agents" role="radiogroup" aria-label="agent"></div>
+<div class="player">
+<div>
+<div class="figure square"><div id="playback"></div></div>
+<div class="controls">
+<button id="play" type="button">Play</button>
+<input id="time" type="range" min="0" value="0" step="1" aria-label="time">
+</div>
+<p id="readout"></p>
+</div>
+<div class="strokes"><h3>Strokes</h3><ol id="strokes"></ol></div>
+</div>"""
+
+
+def _recorded(playbacks: Sequence[Playback], waypoints: Any, waypoint_radius: float) -> str:
+    """What the page's player reads, as JSON; lengths in millimetres."""
+    path = 1e3 * np.concatenate([np.zeros((1, 2)), waypoints])
+    reach = 1e3 * max(float(np.ptp(playback.frames[0].positions, axis=0).max()) for playback in playbacks) / 2
+    low, high = path.min(axis=0) - reach - TEXT_MARGIN, path.max(axis=0) + reach + TEXT_MARGIN
+    return json.dumps(
+        {
+            "unit": 1e3 * UNIT,
+            "path": np.round(path, 2).tolist(),
+            "radius": 1e3 * waypoint_radius,
+            "x": [low[0], high[0]],
+            "y": [low[1], high[1]],
+            "swims": [playback.packed() for playback in playbacks],
+        },
+        separators=(",", ":"),
+    )
+
+
+def _script_safe(text: str) -> str:
+    """JSON that may stand within a script element, whatever its strings say."""
+    return text.replace("<", "\\u003c")

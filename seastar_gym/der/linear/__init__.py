@@ -1,0 +1,1 @@
+"""The linear system of a Newton step: a star of chains, eliminated limb by limb."""

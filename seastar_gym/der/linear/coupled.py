@@ -1,0 +1,87 @@
+"""The Newton step where limbs touch: the star's matrix H plus the Hessian C K C^T of contact, which couples limbs.
+
+Conjugate gradients, with H, eliminated already, as preconditioner. Pairs in touch are few, H^-1 (H + C K C^T) differs
+from 1 in as many directions, and about as many iterations solve it exactly. Robots that do not touch keep their step to
+the last bit.
+
+    x = H^-1 g,    r = -C K C^T x,    then conjugate gradients for the rest of the way.
+
+As no gradient g is kept, the Newton decrement g x is that of the star's step, g H^-1 g, and what is added to x, times
+H of the star's step.
+"""
+
+from seastar_gym.der.linear.star_solution import solve_again, substitute_star
+from seastar_gym.der.rods import SLOT_ROWS, STIFFNESS, n_nodes
+from seastar_gym.der.terms.contact import add_gap_gradient, gap, n_listed
+from seastar_gym.simd.compilation import kernel
+from seastar_gym.simd.lanes import add_product, any_lane, load, select, splat, store, subtract_product
+
+ACCURACY = 1e-10  # of the decrement: what may be left of it
+MOST_ITERATIONS = 200
+
+
+@kernel
+def add_contact_product(rods, work, p, sign, rows):
+    """rows += sign C K C^T p."""
+    for slot in range(n_listed(work)):
+        k = load(work.contact.slots, SLOT_ROWS * slot + STIFFNESS)
+        add_gap_gradient(rods, work, slot, sign * k * gap(rods, work, slot, p), rows)
+
+
+@kernel
+def dot(rods, a, b):
+    total = splat(0.0)
+    for row in range(2 * n_nodes(rods)):
+        total = add_product(total, load(a, row), load(b, row))
+    return total
+
+
+@kernel
+def solve_coupled(contact, rods, work, robots, decrement):
+    """The Newton step of the robots in the mask, node by node into work.contact.x [m], where pairs are listed.
+
+    Returns its decrement [J].
+    """
+    if contact is None:
+        return decrement
+    if n_listed(work) == 0:
+        return decrement
+    x, r, z, p, Hp, w = (
+        work.contact.x, work.contact.r, work.contact.z, work.contact.p, work.contact.Hp, work.contact.w,
+    )  # fmt: skip
+    rows = 2 * n_nodes(rods)
+    zero = splat(0.0)
+    substitute_star(rods, work, x)
+    running = robots & (load(work.contact.touching, 0) > 0.0)
+    if not any_lane(running):
+        return decrement
+    star = work.contact.ends  # no longer needed for the list
+    for row in range(rows):
+        store(star, row, load(x, row))
+        store(r, row, zero)
+    add_contact_product(rods, work, x, -1.0, r)
+    solve_again(rods, work, r, z)
+    for row in range(rows):
+        store(p, row, load(z, row))
+        store(Hp, row, load(r, row))
+    left, iterations = dot(rods, r, z), 0
+    running = running & (left > ACCURACY * decrement)
+    while any_lane(running) and iterations < MOST_ITERATIONS:
+        for row in range(rows):
+            store(w, row, load(Hp, row))
+        add_contact_product(rods, work, p, 1.0, w)
+        alpha = select(running, left / dot(rods, p, w), zero)
+        decrement = add_product(decrement, alpha, dot(rods, star, Hp))
+        for row in range(rows):
+            store(x, row, add_product(load(x, row), alpha, load(p, row)))
+            store(r, row, subtract_product(load(r, row), alpha, load(w, row)))
+        solve_again(rods, work, r, z)
+        last, left = left, dot(rods, r, z)
+        beta = select(running, left / last, zero)
+        for row in range(rows):
+            store(p, row, add_product(load(z, row), beta, load(p, row)))
+            store(Hp, row, add_product(load(r, row), beta, load(Hp, row)))
+        running = running & (left > ACCURACY * decrement)
+        iterations += 1
+    store(contact.missed, 0, select(running, 1.0, load(contact.missed, 0)))
+    return decrement

@@ -1,0 +1,108 @@
+"""Solutions of an eliminated star of chains, see star_matrix.py: of its own right-hand side, and of another one."""
+
+from seastar_gym.der.linear.star_matrix import (
+    NODE_ROWS,
+    RING_ROWS,
+    ROOT_ROWS,
+    less_vector,
+    load_pair,
+    store_pair,
+    substitute_node,
+    substitute_ring,
+)
+from seastar_gym.simd.compilation import kernel
+from seastar_gym.simd.lanes import load, splat, subtract_product
+
+
+@kernel
+def substitute_star(rods, work, x):
+    """Write the solution of the eliminated system over rows x, node by node."""
+    edges = rods.nodes_per_limb - 1
+    hub = load_pair(work.root_solution, 2 * rods.n_limbs)
+    store_pair(x, 0, hub)
+    for limb in range(rods.n_limbs):
+        first = limb * edges
+        before, here = hub, load_pair(work.root_solution, 2 * limb)
+        store_pair(x, 2 * (first + 1), here)
+        for i in range(2, edges + 1):
+            before, here = here, substitute_node(work, first + i, here[0], here[1], before[0], before[1])
+            store_pair(x, 2 * (first + i), here)
+
+
+@kernel
+def solve_again(rods, work, r, x):
+    """Write H^-1 r over rows x, H the matrix that was eliminated last; its pivots were kept (more limbs than one)."""
+    edges, zero = rods.nodes_per_limb - 1, splat(0.0)
+    r_hub = load_pair(r, 0)
+    for limb in range(rods.n_limbs):
+        first = limb * edges
+        r_next, r_second = (zero, zero), (zero, zero)
+        for i in range(edges, 1, -1):
+            node = first + i
+            r_next, r_second = eliminate_again(work, node, add(load_pair(r, 2 * node), r_next), r_second, (zero, zero))
+        store_pair(work.ring, RING_ROWS * limb + 7, add(load_pair(r, 2 * (first + 1)), r_next))
+        r_hub = add(r_hub, r_second)
+    solve_ring_again(work, rods.n_limbs, r_hub)
+    substitute_star(rods, work, x)
+
+
+@kernel
+def add(a, b):
+    return a[0] + b[0], a[1] + b[1]
+
+
+@kernel
+def solve_ring_again(work, n_limbs, r_hub):
+    """Solve for the ring of root nodes, whose right-hand sides are in work.ring, and the hub."""
+    last, zero = n_limbs - 1, splat(0.0)
+    r, r_last = load_pair(work.ring, 7), load_pair(work.ring, RING_ROWS * last + 7)
+    for root in range(last - 1):
+        r_next = load_pair(work.ring, RING_ROWS * (root + 1) + 7)
+        r_next, r_last, r_hub = eliminate_root_again(work, root, r, r_next, r_last, r_hub)
+        r = r_next
+    r_last, r_hub = eliminate_again(work, 0, r, r_last, r_hub)
+    r_hub, _ = eliminate_again(work, 1, r_last, r_hub, (zero, zero))
+    inverse_x, inverse_y = load_pair(work.root_pivots, 2 * last)
+    lower = load(work.root_pivots, 2 * n_limbs)
+    y = subtract_product(r_hub[1], lower, r_hub[0]) * inverse_y
+    substitute_ring(work, n_limbs, (subtract_product(r_hub[0] * inverse_x, lower, y), y))
+
+
+@kernel
+def eliminate_again(work, node, r, r_1, r_2):
+    """What eliminate_node does to right-hand sides: those of the next node and the second next, updated."""
+    row = NODE_ROWS * node
+    inverse_x, inverse_y = load_pair(work.pivots, 2 * node)
+    wr = subtract_product(r[1], load(work.factors, row), r[0])
+    store_pair(work.factors, row + 9, (r[0] * inverse_x, wr * inverse_y))
+    xa, xb, xc, xd = (
+        load(work.factors, row + 1), load(work.factors, row + 2), load(work.factors, row + 3),
+        load(work.factors, row + 4),
+    )  # fmt: skip
+    ya, yb, yc, yd = (
+        load(work.factors, row + 5), load(work.factors, row + 6), load(work.factors, row + 7),
+        load(work.factors, row + 8),
+    )  # fmt: skip
+    return less_vector(r_1, xa, ya, xb, yb, r[0], wr), less_vector(r_2, xc, yc, xd, yd, r[0], wr)
+
+
+@kernel
+def eliminate_root_again(work, root, r, r_next, r_last, r_hub):
+    """What eliminate_root does to right-hand sides: those of the next root, the last one and the hub, updated."""
+    row = ROOT_ROWS * root
+    inverse_x, inverse_y = load_pair(work.root_pivots, 2 * root)
+    wr = subtract_product(r[1], load(work.root_factors, row), r[0])
+    store_pair(work.root_factors, row + 13, (r[0] * inverse_x, wr * inverse_y))
+    return (
+        less_columns(work, row + 1, r_next, r[0], wr),
+        less_columns(work, row + 3, r_last, r[0], wr),
+        less_columns(work, row + 5, r_hub, r[0], wr),
+    )
+
+
+@kernel
+def less_columns(work, row, r, rx, wr):
+    """r less what a root node takes from the two columns whose factors begin at `row`."""
+    xa, xb = load(work.root_factors, row), load(work.root_factors, row + 1)
+    ya, yb = load(work.root_factors, row + 6), load(work.root_factors, row + 7)
+    return less_vector(r, xa, ya, xb, yb, rx, wr)

@@ -1,0 +1,1 @@
+"""Time stepping: Newton's method, implicit stages, the guard of troubled steps, whole strokes."""

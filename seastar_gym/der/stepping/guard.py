@@ -1,0 +1,229 @@
+"""The guard of troubled steps: none creates energy, none turns a hinge through its pole.
+
+With U at the natural hub angles of the step's end, implicit Euler (13.9) over dq = q_1 - q_0 ends with the energy
+
+    K_1 + U(q_1) = K_0 + U(q_0) - |v_1 - v_0|^2_M / 2 - h drag(v_1) v_1 - dq U'' dq / 2,
+
+U'' taken somewhere on the way: what the robot would have had, had it stood still while its actuators moved, less what
+inertia, drag and a convex U take. Where U is not convex along the step the last term may create energy, little
+(compressed edges that turn) or much (a minimum of Phi beyond the pole of tan(phi/2), edges that collapse). In water at
+moderate speeds, drag takes more than that, so only steps that had trouble, or much energy to lose, are looked at; in
+vacuum those that may have created energy by what Newton knows at their end.
+
+A step that created energy is refused, or, where little is to be taken away, its velocities about the rigid motion with
+the same momenta are cut down to the energy allowed: momentum and angular momentum stay, and the cut is of the order of
+the scheme's own error.
+
+Schemes of higher order take the energy in the middle of a step and promise no such balance. In a step that had trouble
+they are held to the larger of the energies that the robot standing still has at the step's ends, and what moving the
+natural hub angles alone can store. What limbs store that press each other, and may get back, counts at the start of all
+steps, and at the end of implicit Euler's: where others look ahead (contact.py), limbs that part get nothing back.
+
+At phi = pi a hinge would store infinite energy, but a Newton step may jump over that pole, and the robot then stays
+folded over itself. Such steps are refused, too, while they are not very short: an edge that collapses turns its hinges
+over at no such cost.
+"""
+
+from seastar_gym.der.energy import add_load_energy, edge_of, elastic_energy, hinge_edges, kinetic_energy
+from seastar_gym.der.geometry import half_angle
+from seastar_gym.der.rods import n_nodes
+from seastar_gym.der.stepping.newton import larger
+from seastar_gym.der.terms.actuation import set_natural_hub_angles
+from seastar_gym.der.terms.added_mass import add_fluid_energy
+from seastar_gym.der.terms.contact import add_contact_energy
+from seastar_gym.simd.compilation import kernel
+from seastar_gym.simd.lanes import absolute, add_product, any_lane, load, select, splat, sqrt, store
+
+ROUNDING = 1e-12  # growth below this share of the energy is taken for rounding
+UNITS = 1e-15  # a few units in the last place: positions are exact to this share of their size
+LARGEST_CUT = 0.01  # of the kinetic energy about the rigid motion; where more is too much, a step is refused
+
+
+@kernel
+def potential_energy(rods, work, q):
+    """Of limbs, hinges and loads, at the natural hub angles in `work` [J]."""
+    return add_load_energy(rods.load, q, n_nodes(rods), elastic_energy(rods, work, q))
+
+
+@kernel
+def moving_energy(rods, work, v):
+    """Kinetic energy of the robot, and of fluid that moves along at the normals of the last stage [J]."""
+    return add_fluid_energy(work.added_mass, rods, v, kinetic_energy(rods, v))
+
+
+@kernel
+def set_aside(rods, work, scheme, q, v):
+    """Copy the state into memory that a step's last stage leaves unused."""
+    rows = 2 * n_nodes(rods)
+    unused = rows * (scheme.n_stages - 1)
+    for row in range(rows):
+        store(work.step, row, load(q, row))
+        store(work.stage_v, unused + row, load(v, row))
+
+
+@kernel
+def put_back(rods, work, scheme, q, v, robots):
+    """Undo a step of the robots in the mask."""
+    rows = 2 * n_nodes(rods)
+    unused = rows * (scheme.n_stages - 1)
+    for row in range(rows):
+        store(q, row, select(robots, load(work.step, row), load(q, row)))
+        store(v, row, select(robots, load(work.stage_v, unused + row), load(v, row)))
+
+
+@kernel
+def moved_hub_energy(rods, work, actuation, start, end):
+    """What hub hinges at their natural angles would store once those moved from `start` to `end` [J]."""
+    set_natural_hub_angles(rods, work, actuation, start)
+    for limb in range(rods.n_limbs):
+        store(work.hub_moment, limb, load(work.hub_EI_kappa_bar, limb))
+    set_natural_hub_angles(rods, work, actuation, end)
+    energy = splat(0.0)
+    for limb in range(rods.n_limbs):
+        moved = load(work.hub_EI_kappa_bar, limb) - load(work.hub_moment, limb)
+        energy = add_product(energy, 0.5 * load(rods.dl_over_EI, limb * (rods.nodes_per_limb - 1)) * moved, moved)
+    return energy
+
+
+@kernel
+def allowed_energy(rods, work, scheme, actuation, start, end, q, v):
+    """Most energy that a step from (q, v) may end with [J], at the natural hub angles of its end, left in `work`."""
+    allowed = splat(0.0)
+    if not scheme.dissipative:
+        set_natural_hub_angles(rods, work, actuation, start)
+        allowed = potential_energy(rods, work, q)
+        moved = moved_hub_energy(rods, work, actuation, start, end)
+        at_end = potential_energy(rods, work, q)
+        allowed = select(at_end > allowed, at_end, allowed) + moved
+    else:
+        set_natural_hub_angles(rods, work, actuation, end)
+        allowed = potential_energy(rods, work, q)
+    return add_contact_energy(rods.contact, rods, work, q, allowed + moving_energy(rods, work, v))
+
+
+@kernel
+def may_gain(current, added_mass, rods, work, stage, phi, robots):
+    """Of the robots in the mask, those whose step of implicit Euler might create energy, by what Newton knows already.
+
+    phi: Phi before Newton's last step [J], which is not less than at its end. There Phi is |v_1 - v_0|^2_M / 2 + U(q_1)
+        and what dissipation adds, so the energy ends at most Phi + v_0 M (v_1 - v_0) - U(q_0) above the one allowed.
+
+    All of them in scenes whose fluid gives energy or takes it up.
+    """
+    if current is None and added_mass is None:
+        gain = phi - elastic_energy(rods, work, stage.q_hat)
+        for node in range(n_nodes(rods)):
+            m = load(rods.mass, node)
+            for row in range(2 * node, 2 * node + 2):
+                v_0 = load(stage.v_hat, row)
+                change = (load(work.q, row) - load(stage.q_hat, row)) * stage.inverse_gamma - v_0
+                gain = add_product(gain, m * v_0, change)
+        return robots & ~(gain <= 0.0)
+    return robots
+
+
+@kernel
+def rigid_motion(rods, q, v):
+    """(mass, x, y, v_x, v_y, omega, energy): the motion of a rigid robot with the same momentum and angular momentum.
+
+    x, y: Centre of mass [m]. v_x, v_y: Its velocity [m/s]. omega: Angular velocity [rad/s]. energy: Its kinetic energy.
+    """
+    zero = splat(0.0)
+    mass, x, y, v_x, v_y = zero, zero, zero, zero, zero
+    for node in range(n_nodes(rods)):
+        m = load(rods.mass, node)
+        mass += m
+        x, y = add_product(x, m, load(q, 2 * node)), add_product(y, m, load(q, 2 * node + 1))
+        v_x, v_y = add_product(v_x, m, load(v, 2 * node)), add_product(v_y, m, load(v, 2 * node + 1))
+    x, y, v_x, v_y = x / mass, y / mass, v_x / mass, v_y / mass
+    spin, inertia = zero, zero
+    for node in range(n_nodes(rods)):
+        m, r_x, r_y = load(rods.mass, node), load(q, 2 * node) - x, load(q, 2 * node + 1) - y
+        spin = add_product(spin, m, r_x * (load(v, 2 * node + 1) - v_y) - r_y * (load(v, 2 * node) - v_x))
+        inertia = add_product(inertia, m, r_x * r_x + r_y * r_y)
+    omega = spin / inertia
+    return mass, x, y, v_x, v_y, omega, 0.5 * (mass * (v_x * v_x + v_y * v_y) + omega * spin)
+
+
+@kernel
+def cut_velocities(rods, q, v, motion, share):
+    """Keep `share` of the velocities about a rigid motion; a share of 1 changes no bit."""
+    _, x, y, v_x, v_y, omega, _ = motion
+    less = share - 1.0
+    for node in range(n_nodes(rods)):
+        vx, vy = load(v, 2 * node), load(v, 2 * node + 1)
+        about_x = vx - (v_x - omega * (load(q, 2 * node + 1) - y))
+        about_y = vy - (v_y + omega * (load(q, 2 * node) - x))
+        store(v, 2 * node, add_product(vx, less, about_x))
+        store(v, 2 * node + 1, add_product(vy, less, about_y))
+
+
+@kernel
+def through_poles(rods, work, q, robots):
+    """Of the robots in the mask, those with a hinge that came here through its pole from the state put aside.
+
+    Edges a and b that turned by alpha and beta (less than pi) take a hinge from phi to phi + beta - alpha. That is
+    beyond the pole where cos((phi + beta - alpha)/2) < 0; written in half-angle tangents, without their cosines.
+    """
+    through = robots & ~robots
+    for e in range(rods.n_limbs * (rods.nodes_per_limb - 1)):
+        a, b, side = hinge_edges(rods, e)
+        a_0, b_0 = edge_of(rods, work.step, a), edge_of(rods, work.step, b)
+        t = half_angle(a_0, b_0, side)
+        alpha, beta = half_angle(a_0, edge_of(rods, q, a), 1.0), half_angle(b_0, edge_of(rods, q, b), 1.0)
+        through = through | (1.0 + alpha * beta + t * (alpha - beta) < 0.0)
+    return robots & through
+
+
+@kernel
+def energy_noise(rods, q, h, mass, potential, kinetic):
+    """What rounding of positions may change an energy by [J]: its slope sqrt(2 m K) and its curvature m, times a move.
+
+    Velocities are differences of positions over h; stretching and bending are as stiff as `stiffness` [N/m] at most.
+    """
+    edges = rods.n_limbs * (rods.nodes_per_limb - 1)
+    length = load(rods.shortest_edge, 0)
+    stretching, bending = load(rods.EA_over_l, 0), load(rods.EI_over_dl, 0)
+    for e in range(1, edges):
+        stretching, bending = larger(load(rods.EA_over_l, e), stretching), larger(load(rods.EI_over_dl, e), bending)
+    stiffness = edges * (stretching + 4.0 * bending / (length * length))
+    limb = (rods.nodes_per_limb - 1) * length
+    move = UNITS * (absolute(load(q, 0)) + absolute(load(q, 1)) + limb)
+    speed = move / h
+    of_velocities = speed * sqrt(2.0 * mass * kinetic) + 0.5 * mass * speed * speed
+    return of_velocities + move * sqrt(2.0 * stiffness * absolute(potential)) + 0.5 * stiffness * move * move
+
+
+@kernel
+def add_held_energy(contact, rods, work, scheme, q, energy):
+    """Add what limbs that press each other store at the end of a step, where the scheme gives it back."""
+    if contact is None:
+        return energy
+    if not scheme.dissipative:
+        return energy
+    return add_contact_energy(contact, rods, work, q, energy)
+
+
+@kernel
+def hold_to_energy(rods, work, scheme, q, v, h, robots, allowed, largest_cut):
+    """Hold the robots in the mask to the energy allowed after a step of length h.
+
+    largest_cut: Share of the kinetic energy about the rigid motion that may be cut.
+
+    Returns (refused, cut): masks of the robots whose step has to be undone, and of those whose velocities were cut.
+    """
+    potential, kinetic = potential_energy(rods, work, q), moving_energy(rods, work, v)
+    potential = add_held_energy(rods.contact, rods, work, scheme, q, potential)
+    grown = robots & (potential + kinetic > add_product(allowed, ROUNDING, kinetic))
+    cut = grown & ~grown
+    if any_lane(grown):
+        motion = rigid_motion(rods, q, v)
+        noise = energy_noise(rods, q, h, motion[0], potential, kinetic)
+        grown = grown & (potential + kinetic > allowed + noise)
+        rigid = motion[6]
+        about = kinetic - rigid
+        left = allowed + noise - potential - rigid
+        cut = grown & (left >= 0.0) & (left >= (1.0 - largest_cut) * about)
+        if any_lane(cut):
+            cut_velocities(rods, q, v, motion, sqrt(select(cut, left / about, 1.0)))
+    return grown & ~cut, cut

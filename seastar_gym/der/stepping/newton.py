@@ -1,0 +1,153 @@
+"""Newton's method with a backtracking line search, (13.11), on the incremental potential of one implicit stage.
+
+Every robot of a lane group has its own state of the search: a robot that has converged, failed or was never active
+is frozen by a mask, and nothing that one robot needs (a repair, a shorter step) changes another robot's bits.
+"""
+
+from seastar_gym.der.linear.coupled import solve_coupled
+from seastar_gym.der.linear.star_matrix import load_pair, store_pair, substitute_node
+from seastar_gym.der.potential import factorise
+from seastar_gym.der.rods import n_nodes
+from seastar_gym.der.terms.contact import n_listed, those_apart
+from seastar_gym.simd.compilation import inlined_kernel, kernel
+from seastar_gym.simd.lanes import absolute, add_product, any_lane, load, select, splat, sqrt
+
+SUFFICIENT_DECREASE = 1e-4  # Armijo's constant
+ROUNDING = 1e-11  # an increase of Phi below this share of it is taken for rounding, not for ascent
+CURVATURE = 40.0  # for light edges, the step after one of size d is below this times d^2 over the edge length
+EASY = 3.0  # Newton steps: a stage that took more had trouble
+LATE = 10.0  # times CURVATURE for the last of the easy steps
+FORESEEABLE_T = 4.0  # larger values of tan(phi/2) are too near its pole for that
+SHORTEST_STEP = 2.0**-30  # of the Newton step: shorter ones move nothing
+
+
+@inlined_kernel
+def minimise(rods, work, stage, active, tolerance, patience):
+    """Minimise Phi over work.q, in place, for the robots in the mask `active`.
+
+    tolerance: Largest node move of the last Newton step [m], or of the one that is left out because it can be foreseen:
+    Newton's method converges quadratically, so after one of its first steps, of size d, and without trouble, the next
+    is at most d^2/(foreseeable length).
+
+    patience: Most Newton steps per robot.
+
+    Returns (converged, Phi, iterations, repairs, backtracks), per robot: a mask, the potential before the last step
+    [J], and three counts.
+    """
+    zero, one = splat(0.0), splat(1.0)
+    quadratic_length = foreseeable_length(rods, stage)
+    nobody = one < zero
+    running, converged, convex = active, nobody, nobody
+    iterations, repairs, backtracks = zero, zero, zero
+    best, expected, fraction = splat(1e300), zero, one
+    while any_lane(running):
+        if any_lane(convex):
+            phi, decrement, pivot = factorise(rods, work, stage, convex)
+        else:
+            phi, decrement, pivot = factorise(rods, work, stage, None)
+        low_enough = phi <= best - SUFFICIENT_DECREASE * fraction * expected + ROUNDING * absolute(best)
+        indefinite = running & low_enough & ~(pivot > 0.0) & ~convex
+        if any_lane(indefinite):
+            # Their matrices are made again from convex parts; the others wait and find the same numbers again.
+            convex = convex | indefinite
+            repairs += select(indefinite, one, zero)
+            continue
+        stepping = running & low_enough & (pivot > 0.0)
+        decrement = solve_coupled(work.contact, rods, work, stepping, decrement)
+        shortening = running & ~low_enough & (fraction > SHORTEST_STEP) & (iterations > 0.0)
+        fraction = select(stepping, one, select(shortening, 0.5 * fraction, fraction))
+        if any_lane(shortening):
+            move = move_along(work.contact, rods, work, stepping, shortening, fraction)
+        else:
+            move = move_along(work.contact, rods, work, stepping, None, fraction)
+        best = select(stepping, phi, best)
+        expected = select(stepping, decrement, expected)
+        count = select(stepping, one, zero)
+        iterations += count
+        backtracks += select(shortening, one, zero)
+        easy = (repairs + backtracks <= 0.0) & (iterations <= EASY) & (phi <= load(rods.calm, 0))
+        easy = those_apart(work.contact, easy)
+        late = select(iterations < EASY, one, LATE)
+        foreseen = late * move * move <= tolerance * quadratic_length
+        foreseen = easy & foreseen & (largest_hub_t(rods, work) < FORESEEABLE_T)
+        done = stepping & ((move <= tolerance) | (~convex & foreseen))
+        converged = converged | done
+        convex = convex & ~stepping
+        running = (stepping | shortening) & ~done & (iterations < patience)
+    return converged, best, iterations, repairs, backtracks
+
+
+@kernel
+def foreseeable_length(rods, stage):
+    """Length [m] that a Newton step's square is divided by to foresee the size of the next one.
+
+    Measured over stiff, soft, slender and thick robots in random strokes: turning an edge stretches it, and the tension
+    that this makes moves nodes the farther, the stiffer the edges are against the nodes' inertia.
+    """
+    rate = load(rods.curvature_rate, 0)
+    return load(rods.shortest_edge, 0) / (CURVATURE + rate * stage.gamma * stage.gamma)
+
+
+@kernel
+def largest_hub_t(rods, work):
+    """Largest tan(phi/2) of the hub hinges, as last assembled."""
+    largest = load(work.hub_t, 0)
+    for limb in range(1, rods.n_limbs):
+        largest = larger(load(work.hub_t, limb), largest)
+    return largest
+
+
+@kernel
+def take_step(rods, work, stepping, shortening, fraction):
+    """Substitute, and move q by the whole new Newton step where `stepping`, back by half the last where `shortening`.
+
+    shortening: None if no robot's step is to be shortened.
+
+    Returns the largest node move [m].
+    """
+    edges = rods.nodes_per_limb - 1
+    scale = step_scale(stepping, shortening, fraction)
+    hub = load_pair(work.root_solution, 2 * rods.n_limbs)
+    largest = move_node(work, 0, hub, shortening, scale)
+    for limb in range(rods.n_limbs):
+        first = limb * edges
+        before, here = hub, load_pair(work.root_solution, 2 * limb)
+        largest = larger(largest, move_node(work, first + 1, here, shortening, scale))
+        for i in range(2, edges + 1):
+            before, here = here, substitute_node(work, first + i, here[0], here[1], before[0], before[1])
+            largest = larger(largest, move_node(work, first + i, here, shortening, scale))
+    return sqrt(largest)
+
+
+@kernel
+def move_along(contact, rods, work, stepping, shortening, fraction):
+    """take_step, but where contact is listed along the step of all nodes that coupled.py has found."""
+    if contact is None:
+        return take_step(rods, work, stepping, shortening, fraction)
+    if n_listed(work) == 0:
+        return take_step(rods, work, stepping, shortening, fraction)
+    scale, largest = step_scale(stepping, shortening, fraction), splat(0.0)
+    for node in range(n_nodes(rods)):
+        largest = larger(largest, move_node(work, node, load_pair(contact.x, 2 * node), shortening, scale))
+    return sqrt(largest)
+
+
+@kernel
+def step_scale(stepping, shortening, fraction):
+    return select(stepping, splat(1.0), select(shortening, -fraction, 0.0))
+
+
+@kernel
+def move_node(work, node, solution, shortening, scale):
+    """Move a node by `scale` times its step: its last where `shortening`, else -solution; returns the move squared."""
+    x = select(shortening, load(work.step, 2 * node), -solution[0])
+    y = select(shortening, load(work.step, 2 * node + 1), -solution[1])
+    move_x, move_y = scale * x, scale * y
+    store_pair(work.step, 2 * node, (x, y))
+    store_pair(work.q, 2 * node, (load(work.q, 2 * node) + move_x, load(work.q, 2 * node + 1) + move_y))
+    return add_product(move_x * move_x, move_y, move_y)
+
+
+@kernel
+def larger(a, b):
+    return select(a > b, a, b)

@@ -1,0 +1,49 @@
+"""A whole sequence of time intervals for many robots, in one compiled call."""
+
+from seastar_gym.der.stepping.newton import larger
+from seastar_gym.der.stepping.stages import cover_interval
+from seastar_gym.simd.compilation import entry_point, kernel
+from seastar_gym.simd.lanes import borrow, load, select, splat, store
+
+
+@kernel
+def shape_of_limb(shape, group, k, limb):
+    """Rotation of a limb at time k, see `advance`; for robots that turn alike a number, whoever the limb is."""
+    if shape.ndim == 1:
+        return shape[k]
+    return load(borrow(shape[group, k]), limb % shape.shape[2])
+
+
+@entry_point
+def advance(rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shape, failed, report, limits):
+    """Advance lane groups through the intervals between `times`, in place.
+
+    scheme, fallback: How time steps are made, and how they are made where they give trouble (with one stage).
+    q, v: Positions and velocities [m, m/s], shape (n_groups, 2 n_nodes, N_LANES).
+    a: What a time step leaves for the next: accelerations of its stages [m/s^2], their shares in the next guess, length
+        and size, shape (n_groups, n_stages (2 n_nodes + 1) + 2, N_LANES).
+    peaks: Share of `shape` that every limb follows, shape (n_groups, n_limbs, N_LANES).
+    times: Ends of the intervals [s], shape (n_intervals + 1,).
+    shape: Rotation of the limbs at those times [rad], shape (n_intervals + 1,) if all limbs turn alike, else
+        (n_groups, n_intervals + 1, n_limbs, N_LANES), or with 1 for n_limbs if those of a robot do.
+    failed: 0 for robots that go on, 1 or more for those that have failed, shape (n_groups, 1, N_LANES).
+    report: Counts and extremes, added to, shape (n_groups, len(REPORT_ROWS), N_LANES).
+    limits: What the solution has to keep.
+    """
+    rods_rows, memory, rotation = borrow(rods), borrow(work), borrow(actuation)
+    tableau, fallback_tableau, bounds = borrow(scheme), borrow(fallback), borrow(limits)
+    for group in range(q.shape[0]):
+        q_rows, v_rows, a_rows, peak_rows = borrow(q[group]), borrow(v[group]), borrow(a[group]), borrow(peaks[group])
+        failed_rows, report_rows = borrow(failed[group]), borrow(report[group])
+        status = load(failed_rows, 0)
+        alive = status < 1.0
+        for k in range(times.shape[0] - 1):
+            for limb in range(rods.n_limbs):
+                peak = load(peak_rows, limb)
+                store(rotation.delta_psi_start, limb, peak * shape_of_limb(shape, group, k, limb))
+                store(rotation.delta_psi_end, limb, peak * shape_of_limb(shape, group, k + 1, limb))
+            alive = cover_interval(
+                rods_rows, memory, tableau, fallback_tableau, rotation, q_rows, v_rows, a_rows, times[k + 1] - times[k],
+                alive, bounds, report_rows,
+            )  # fmt: skip
+        store(failed_rows, 0, select(alive, splat(0.0), larger(status, splat(1.0))))

@@ -1,0 +1,1 @@
+"""The terms of (13.9), one file each."""

@@ -1,0 +1,74 @@
+"""Added mass, as in Morison's equation: fluid that an edge accelerates across itself weighs on its nodes.
+
+Half an edge adds m_a n n^T, m_a = rho_f C_a pi r_0^2 l/2, to the mass of each of its nodes, n its normal where the
+stage's first guess has it, off by the square of the step: a constant of the minimisation. What the turning of n, and a
+current's own acceleration, would add is left out.
+"""
+
+from seastar_gym.der.rods import n_nodes
+from seastar_gym.simd.compilation import kernel
+from seastar_gym.simd.lanes import add_product, load, splat, store
+
+
+@kernel
+def freeze_added_mass(added_mass, rods, work):
+    """Fill work.added_mass, (xx, xy, yy) of every node [kg], from work.normals, in scenes that have it."""
+    if added_mass is None:
+        return
+    edges = rods.nodes_per_limb - 1
+    for node in range(n_nodes(rods)):
+        xx, xy, yy = splat(0.0), splat(0.0), splat(0.0)
+        if node == 0:
+            for e in range(0, rods.n_limbs * edges, edges):
+                xx, xy, yy = add_half_edge_mass(load(added_mass, 2 * e + 2), work.normals, e, xx, xy, yy)
+        else:
+            xx, xy, yy = add_half_edge_mass(load(added_mass, 2 * node), work.normals, node - 1, xx, xy, yy)
+            xx, xy, yy = add_half_edge_mass(load(added_mass, 2 * node + 1), work.normals, node, xx, xy, yy)
+        store(work.added_mass, 3 * node, xx)
+        store(work.added_mass, 3 * node + 1, xy)
+        store(work.added_mass, 3 * node + 2, yy)
+
+
+@kernel
+def add_half_edge_mass(m, normals, e, xx, xy, yy):
+    nx, ny = load(normals, 2 * e), load(normals, 2 * e + 1)
+    mx, my = m * nx, m * ny
+    return add_product(xx, mx, nx), add_product(xy, mx, ny), add_product(yy, my, ny)
+
+
+@kernel
+def momentum(added_mass, node, vx, vy):
+    xx, xy, yy = load(added_mass, 3 * node), load(added_mass, 3 * node + 1), load(added_mass, 3 * node + 2)
+    return add_product(xx * vx, xy, vy), add_product(xy * vx, yy, vy)
+
+
+@kernel
+def add_fluid_inertia(added_mass, node, dx, dy, inverse_gamma, slopes):
+    """Add a node's |d|^2/2 in its added mass, d = v - v_hat, to its (energy, gradient, Hessian) in q."""
+    if added_mass is None:
+        return slopes
+    energy, (fx, fy), (xx, xy, yy) = slopes
+    px, py = momentum(added_mass, node, dx, dy)
+    squared = inverse_gamma * inverse_gamma
+    return (
+        add_product(energy, 0.5, add_product(px * dx, py, dy)),
+        (add_product(fx, px, inverse_gamma), add_product(fy, py, inverse_gamma)),
+        (
+            add_product(xx, load(added_mass, 3 * node), squared),
+            add_product(xy, load(added_mass, 3 * node + 1), squared),
+            add_product(yy, load(added_mass, 3 * node + 2), squared),
+        ),
+    )
+
+
+@kernel
+def add_fluid_energy(added_mass, rods, v, energy):
+    """Add the kinetic energy of the fluid that moves along [J], at the normals of the last stage."""
+    if added_mass is None:
+        return energy
+    total = splat(0.0)
+    for node in range(n_nodes(rods)):
+        vx, vy = load(v, 2 * node), load(v, 2 * node + 1)
+        px, py = momentum(added_mass, node, vx, vy)
+        total = add_product(total, 0.5, add_product(px * vx, py, vy))
+    return energy + total

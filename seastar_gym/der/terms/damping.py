@@ -1,0 +1,57 @@
+"""Material damping after Kelvin and Voigt: strains are answered by stress in proportion to their rate, too.
+
+Stretching has the dissipation potential R = 1/2 tau EA l (d eps/dt)^2, bending 1/2 tau EI dl (d kappa/dt)^2, with one
+relaxation time tau. The rate over a stage is (eps - eps_hat)/gamma, eps_hat the strain at q_hat, so the stage minimises
+
+    gamma R = r/2 EA l (eps - eps_hat)^2,    r = tau/gamma,
+
+which is as stiff as stretching itself times r, has its derivatives, and knows nothing of a rotation. It takes the rate
+in the middle of the way, off by gamma/2 times its change: of first order. The natural curvature of an actuator moves
+no material, so it is in U, not in R.
+"""
+
+from seastar_gym.der.energy import edge_of, hinge_edges
+from seastar_gym.der.geometry import half_angle
+from seastar_gym.der.rods import n_nodes
+from seastar_gym.der.terms.bending import moment
+from seastar_gym.der.terms.stretching import tension
+from seastar_gym.simd.compilation import kernel
+from seastar_gym.simd.lanes import add_product, load, splat, store
+
+
+@kernel
+def freeze_strains(relaxation_time, rods, work, q_hat):
+    """Fill work.tension with EA eps_hat [N] and work.bending with EI kappa_hat [N m], in scenes with damping."""
+    if relaxation_time is None:
+        return
+    for e in range(n_nodes(rods) - 1):
+        store(work.tension, e, tension(rods, e, edge_of(rods, q_hat, e)[2]))
+        a, b, side = hinge_edges(rods, e)
+        t = half_angle(edge_of(rods, q_hat, a), edge_of(rods, q_hat, b), side)
+        store(work.bending, e, moment(rods, e, t, splat(0.0)))
+
+
+@kernel
+def damped_stress(relaxation_time, hat, row, inverse_gamma, stress, natural):
+    """Tension or moment with its viscous part; stress + natural is EA eps or EI kappa."""
+    if relaxation_time is None:
+        return stress
+    ratio = load(relaxation_time, 0) * inverse_gamma
+    return add_product(stress, ratio, stress + natural - load(hat, row))
+
+
+@kernel
+def damped_energy(relaxation_time, hat, row, inverse_gamma, stress, natural, compliance, energy):
+    """Energy with gamma R; compliance: l/EA or dl/EI."""
+    if relaxation_time is None:
+        return energy
+    ratio = load(relaxation_time, 0) * inverse_gamma
+    change = stress + natural - load(hat, row)
+    return add_product(energy, 0.5 * ratio * compliance, change * change)
+
+
+@kernel
+def damped_stiffness(relaxation_time, inverse_gamma, stiffness):
+    if relaxation_time is None:
+        return stiffness
+    return add_product(stiffness, load(relaxation_time, 0) * inverse_gamma, stiffness)

@@ -1,0 +1,65 @@
+"""Quadratic drag (13.8): F = -c |w| w with c = 1/2 rho_f C_d D dl_i, from the dissipation potential c |w|^3 / 3.
+
+w = v - u is a node's velocity relative to the fluid. With a coefficient C_t < C_d of its own for flow along a limb,
+c has C_t for C_d, and the flow across each edge that a node ends adds -c_n |w_n| w_n n, w_n = w n, from the potential
+c_n |w_n|^3 / 3: half the edge belongs to the node, so c_n = 1/2 rho_f (C_d - C_t) D l/2. Across a limb the two make
+C_d, along it C_t; both potentials are convex. n is the edge's normal where the stage's first guess has it, which is off
+by the square of the step: a constant of the minimisation, and schemes keep their order up to 2.
+"""
+
+from seastar_gym.simd.compilation import kernel
+from seastar_gym.simd.lanes import absolute, add_product, load, select, sqrt
+
+
+@kernel
+def drag_slopes(c, wx, wy):
+    """(potential, c |w|, c/|w|): the force is -(c |w|) w, the Hessian in w is (c |w|) 1 + (c/|w|) w w^T."""
+    squared = add_product(wx * wx, wy, wy)
+    speed = sqrt(squared)
+    c_speed = c * speed
+    # w w^T/|w| tends to zero with w.
+    c_over_speed = select(speed > 0.0, c / speed, 0.0)
+    return c_speed * squared * (1.0 / 3.0), c_speed, c_over_speed
+
+
+@kernel
+def add_half_edge(c, normals, e, wx, wy, gamma, inverse_gamma, slopes):
+    """Add the drag of flow across half of edge e to (energy, gradient, Hessian) in q, see potential.py."""
+    energy, (fx, fy), (xx, xy, yy) = slopes
+    nx, ny = load(normals, 2 * e), load(normals, 2 * e + 1)
+    across = add_product(wx * nx, wy, ny)
+    c_across = c * absolute(across)
+    force = c_across * across
+    slope = 2.0 * inverse_gamma * c_across
+    sx, sy = slope * nx, slope * ny
+    return (
+        add_product(energy, gamma * (1.0 / 3.0), force * across),
+        (add_product(fx, force, nx), add_product(fy, force, ny)),
+        (add_product(xx, sx, nx), add_product(xy, sx, ny), add_product(yy, sy, ny)),
+    )
+
+
+@kernel
+def add_cross_flow(cross_drag, rods, normals, node, wx, wy, gamma, inverse_gamma, slopes):
+    """Add the drag of flow across a node's edges to its slopes.
+
+    Without such drag (None) the slopes are what they were, and the kernel is gone when compiled.
+    """
+    if cross_drag is None:
+        return slopes
+    if node == 0:
+        edges = rods.nodes_per_limb - 1
+        for e in range(0, rods.n_limbs * edges, edges):
+            slopes = add_half_edge(load(cross_drag, 2 * e + 2), normals, e, wx, wy, gamma, inverse_gamma, slopes)
+        return slopes
+    inner, outer = load(cross_drag, 2 * node), load(cross_drag, 2 * node + 1)
+    slopes = add_half_edge(inner, normals, node - 1, wx, wy, gamma, inverse_gamma, slopes)
+    return add_half_edge(outer, normals, node, wx, wy, gamma, inverse_gamma, slopes)
+
+
+@kernel
+def relative(current, node, vx, vy):
+    """Velocity of a node relative to the fluid at rest (None) or in motion."""
+    if current is None:
+        return vx, vy
+    return vx - load(current, 2 * node), vy - load(current, 2 * node + 1)

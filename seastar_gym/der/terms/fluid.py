@@ -1,0 +1,61 @@
+"""What a stage takes from the first guess of its iterate and keeps: normals of edges, the current at the nodes.
+
+The first guess is off by the square of the step, so schemes keep their order up to 2 (a uniform current is exact), and
+the potential stays one that is minimised, with an exact Hessian.
+"""
+
+from seastar_gym.der.geometry import edge_vector
+from seastar_gym.der.rods import n_nodes, tail_node
+from seastar_gym.der.terms.added_mass import freeze_added_mass
+from seastar_gym.der.terms.current import current_velocity
+from seastar_gym.der.terms.drag import add_cross_flow, drag_slopes, relative
+from seastar_gym.simd.compilation import kernel
+from seastar_gym.simd.lanes import add_product, load, splat, sqrt, store, subtract_product
+
+
+@kernel
+def freeze_fluid(rods, work):
+    """Fill work.normals, work.added_mass and work.current at the iterate, in scenes that have them."""
+    freeze_normals(rods, work.normals, work.q)
+    freeze_added_mass(rods.added_mass, rods, work)
+    freeze_current(rods.current, rods, work)
+
+
+@kernel
+def freeze_normals(rods, normals, q):
+    if normals is None:
+        return
+    for e in range(n_nodes(rods) - 1):
+        ex, ey = edge_vector(q, tail_node(rods, e), e + 1)
+        inverse = 1.0 / sqrt(add_product(ex * ex, ey, ey))
+        store(normals, 2 * e, -ey * inverse)
+        store(normals, 2 * e + 1, ex * inverse)
+
+
+@kernel
+def freeze_current(current, rods, work):
+    if current is None:
+        return
+    for node in range(n_nodes(rods)):
+        u_x, u_y = current_velocity(current, load(work.q, 2 * node), load(work.q, 2 * node + 1))
+        store(work.current, 2 * node, u_x)
+        store(work.current, 2 * node + 1, u_y)
+
+
+@kernel
+def add_work_of_current(current, rods, work, v, h, energy):
+    """Add what drag takes from the fluid's motion in a step that ends with velocities v [J].
+
+    Its power is -(drag force of w = v - u) u.
+    """
+    if current is None:
+        return energy
+    power, zero = splat(0.0), splat(0.0)
+    for node in range(n_nodes(rods)):
+        wx, wy = relative(work.current, node, load(v, 2 * node), load(v, 2 * node + 1))
+        _, c_speed, _ = drag_slopes(load(rods.drag, node), wx, wy)
+        slopes = (zero, (c_speed * wx, c_speed * wy), (zero, zero, zero))
+        _, (fx, fy), _ = add_cross_flow(rods.cross_drag, rods, work.normals, node, wx, wy, 1.0, 1.0, slopes)
+        power = subtract_product(power, fx, load(work.current, 2 * node))
+        power = subtract_product(power, fy, load(work.current, 2 * node + 1))
+    return add_product(energy, h, power)

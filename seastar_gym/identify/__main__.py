@@ -1,0 +1,5 @@
+import sys
+
+from seastar_gym.identify.identify import main
+
+sys.exit(main())

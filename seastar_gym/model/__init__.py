@@ -1,0 +1,1 @@
+"""From a scene to the coefficients that the kernels read."""

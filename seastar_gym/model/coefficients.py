@@ -1,0 +1,80 @@
+"""What a scene's numbers are to the kernels: one set for all lane groups, or one for each with a lane per robot."""
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.der.rods import Limits, Rods, put_robot, side_by_side
+from seastar_gym.model.rods import make_limits, make_rods
+from seastar_gym.scene import Scene
+from seastar_gym.scene.per_robot import frame_of, of_robot
+from seastar_gym.simd.lanes import N_LANES
+
+Floats = NDArray[np.float64]
+
+
+class Coefficients:
+    """Of a batch of robots of one scene, shared by all lane groups where no number differs from robot to robot.
+
+    rest: Node positions at rest [m], shape (n_sets, 2 n_nodes, N_LANES). limb_length: [m], shape (n_sets, 1, N_LANES).
+    n_sets is 1 or the number of lane groups.
+    """
+
+    def __init__(self, scene: Scene, n_robots: int):
+        self.n_robots = n_robots
+        self._make(scene)
+
+    def _make(self, scene: Scene) -> None:
+        if scene.n_robots not in (None, self.n_robots):
+            raise ValueError(f"The scene has numbers for {scene.n_robots} robots, the batch {self.n_robots}.")
+        self._scene, self.are_shared = scene, scene.n_robots is None
+        n_sets = 1 if self.are_shared else -(-self.n_robots // N_LANES)
+        if self.are_shared:
+            self._rods, self._limits = [make_rods(scene)], [make_limits(scene)]
+        else:
+            # Lanes that are left over do what the last robot does.
+            robots = np.minimum(np.arange(n_sets * N_LANES), self.n_robots - 1).reshape(n_sets, N_LANES).tolist()
+            self._rods = [side_by_side([make_rods(scene, robot) for robot in group]) for group in robots]
+            self._limits = [side_by_side([make_limits(scene, robot) for robot in group]) for group in robots]
+        self.rest = np.zeros((n_sets, 2 * scene.robot.n_nodes, N_LANES))
+        self.limb_length = np.zeros((n_sets, 1, N_LANES))
+        self._put_lengths(range(n_sets * N_LANES))
+
+    def _put_lengths(self, places: Iterable[int]) -> None:
+        """Write the lengths of robots into their lanes; robots of equal lengths have one shape."""
+        shapes: dict[tuple[float, ...], Floats] = {}
+        for place in places:
+            (group, lane), robot = divmod(place, N_LANES), min(place, self.n_robots - 1)
+            lengths = tuple(of_robot(numbers, robot) for numbers in self._scene.robot.lengths)
+            if lengths not in shapes:
+                shapes[lengths] = self._scene.robot.nodes(robot).reshape(-1)
+            self.rest[group, :, lane], self.limb_length[group, 0, lane] = shapes[lengths], lengths[0]
+
+    def set_scene(self, scene: Scene, chosen: NDArray[np.bool_]) -> None:
+        """Go on with a scene that differs in numbers of `PER_ROBOT` alone, and those of the chosen robots only."""
+        if not isinstance(scene, Scene) or frame_of(scene) != frame_of(self._scene):
+            raise ValueError("set_scene needs a scene of the same terms that differs in numbers of each robot alone.")
+        if self.are_shared or scene.n_robots != self.n_robots:
+            self._make(scene)
+            return
+        self._scene = scene
+        robots = np.flatnonzero(chosen).tolist()
+        for robot in robots:
+            group, lane = divmod(robot, N_LANES)
+            put_robot(self._rods[group], lane, make_rods(scene, robot))
+            put_robot(self._limits[group], lane, make_limits(scene, robot))
+        self._put_lengths(robots)
+
+    def rods(self, group: int) -> Rods:
+        """Those of a lane group."""
+        return self._rods[group % len(self._rods)]
+
+    def limits(self, group: int) -> Limits:
+        """What the solutions of a lane group have to keep."""
+        return self._limits[group % len(self._limits)]
+
+    def nodes(self, robot: int | np.intp) -> Floats:
+        """Node positions of a robot at rest [m], shape (n_nodes, 2)."""
+        group, lane = divmod(int(robot), N_LANES)
+        return self.rest[group % len(self.rest), :, lane].reshape(-1, 2)

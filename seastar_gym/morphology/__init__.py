@@ -1,1 +1,0 @@
-"""Robots as stars of rods: nodes, edges, hinges and their coefficients."""

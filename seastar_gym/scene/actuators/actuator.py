@@ -1,0 +1,89 @@
+"""What an actuator is to a scene: how far a command turns a limb, when, and, for some, what it remembers.
+
+A rotation delta_psi [rad] is positive anti-clockwise. A command is a number in [-1, 1] per limb and stroke.
+
+Where numbers of an actuator differ from robot to robot (see per_robot.py), curves have one more axis, shape
+(*t.shape, n_robots), and commands the shape (n_robots, n_limbs). Durations are the same for all robots of a batch:
+they share the clock.
+"""
+
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seastar_gym.scene.per_robot import Numbers
+
+Floats = NDArray[np.float64]
+
+
+@runtime_checkable
+class Actuator(Protocol):
+    """Turns every limb by its command times one curve that begins and ends every stroke at zero.
+
+    peak_angle: Largest rotation [rad], or that of each robot. period: Length of a stroke [s].
+    corners: Times within a stroke [s], from 0 to the period, that no time step may straddle.
+    """
+
+    @property
+    def peak_angle(self) -> Numbers: ...
+
+    @property
+    def period(self) -> float: ...
+
+    @property
+    def corners(self) -> tuple[float, ...]: ...
+
+    def delta_psi(self, t: ArrayLike) -> Floats:
+        """Rotation of a limb with command 1 at time t [s] of a stroke that begins at rest [rad]; t of any shape."""
+        ...
+
+
+@runtime_checkable
+class StatefulActuator(Actuator, Protocol):
+    """Turns every limb in a way of its own, that depends on what came before the stroke.
+
+    rest: State of an actuator that was left alone, shape (n_state,), or (n_robots, 1, n_state).
+    """
+
+    @property
+    def rest(self) -> Floats: ...
+
+    def respond(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
+        """Rotations during a stroke [rad], shape (len(t), *S), and the state at t[-1], shape (*S, n_state).
+
+        t: Increasing times since the stroke began [s], the first one 0. commands: Shape S, any.
+        state: At t = 0, shape (*S, n_state).
+        """
+        ...
+
+    def observe(self, state: Floats) -> Floats:
+        """The state, shape (..., n_state), as numbers of order one, zero at rest."""
+        ...
+
+
+def is_actuator(value: object) -> bool:
+    """Whether a scene can have the value for its actuator."""
+    return isinstance(value, Actuator) and not isinstance(value, type)
+
+
+def check_actuator(actuator: Actuator) -> None:
+    """Refuse a curve that does not begin and end at rest, or that its other numbers contradict.
+
+    Limbs turned at a stroke's beginning would jump when their command changes, which no rate of turning can follow.
+    """
+    corners, period = np.asarray(actuator.corners, dtype=float), actuator.period
+    if corners.ndim != 1 or len(corners) < 2 or not np.isfinite(corners).all() or (np.diff(corners) <= 0.0).any():
+        raise ValueError(f"An actuator's corners must be increasing times [s], not {actuator.corners!r}.")
+    if corners[0] != 0.0 or corners[-1] != period:
+        raise ValueError(
+            f"An actuator's corners must go from 0 to its period ({period!r} s), not {actuator.corners!r}."
+        )
+    angles = np.asarray(actuator.delta_psi(corners), dtype=float)
+    if angles.shape[:1] != corners.shape or angles.ndim > 2 or not np.isfinite(angles).all():
+        raise ValueError(f"An actuator's delta_psi must be one finite angle [rad] per time, not {angles!r}.")
+    peak = np.asarray(actuator.peak_angle, dtype=float)
+    if not np.isfinite(peak).all() or (np.abs(angles).max(axis=0) > peak * (1.0 + 1e-12)).any():
+        raise ValueError(f"An actuator's peak_angle must be its largest angle, not {actuator.peak_angle!r} rad.")
+    if angles[0].any() or (angles[-1].any() and not isinstance(actuator, StatefulActuator)):
+        raise ValueError("An actuator's curve must begin and end a stroke at 0 rad: otherwise limbs would jump.")

@@ -1,0 +1,87 @@
+"""An actuator that can turn no farther and no faster than its drive allows."""
+
+from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seastar_gym.scene.actuators.actuator import Actuator, StatefulActuator, is_actuator
+from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.per_robot import Numbers, batch_size, column, require_each
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Limited:
+    """Follows another actuator's curve as far and as fast as it can.
+
+    actuator: What is followed, one that remembers nothing.
+    largest_angle: Where the limb stops [rad], None for no stop. largest_rate: How fast it turns [rad/s], None for any.
+
+    A limb that is slow may still be turned when the next stroke begins, and goes on from there: the state is its
+    rotation [rad]. A partial command asks less of it. Between time steps the rotation is linear.
+    """
+
+    PER_ROBOT: ClassVar = ("largest_angle", "largest_rate")
+    actuator: Actuator
+    largest_angle: Numbers | None = None
+    largest_rate: Numbers | None = None
+
+    def __post_init__(self) -> None:
+        if not is_actuator(self.actuator) or isinstance(self.actuator, StatefulActuator):
+            raise ValueError(f"Limited follows an actuator that remembers nothing, not {self.actuator!r}.")
+        if self.largest_angle is not None:
+            require_each(self, "largest_angle", partial(require_number, unit="rad"))
+        if self.largest_rate is not None:
+            require_each(self, "largest_rate", partial(require_number, unit="rad/s"))
+        batch_size(self)
+
+    @property
+    def peak_angle(self) -> Numbers:
+        """Largest rotation [rad]."""
+        peak = self.actuator.peak_angle
+        return peak if self.largest_angle is None else np.minimum(peak, self.largest_angle)
+
+    @property
+    def period(self) -> float:
+        """Length of a stroke [s]."""
+        return self.actuator.period
+
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """Times within a stroke [s] that no time step may straddle."""
+        return self.actuator.corners
+
+    @property
+    def rest(self) -> Floats:
+        """Not turned."""
+        return np.zeros(1)
+
+    def delta_psi(self, t: ArrayLike) -> Floats:
+        """Rotation of a limb with command 1 at time t [s] of a stroke that begins at rest [rad]; t of any shape."""
+        times, n_robots = np.union1d(self.corners, t), batch_size(self)
+        if n_robots is None:
+            return np.asarray(self.respond(times, np.ones(()), self.rest)[0][np.searchsorted(times, t)])
+        turned, _ = self.respond(times, np.ones((n_robots, 1)), self.rest)
+        return np.asarray(turned[np.searchsorted(times, t), :, 0])
+
+    def respond(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
+        """See StatefulActuator: exact at the times t where the followed curve is linear between them."""
+        curve, peak, rate = self.actuator.delta_psi(t), column(self.peak_angle), column(self.largest_rate)
+        wanted = curve.reshape(*curve.shape, *(1,) * (1 + commands.ndim - curve.ndim)) * commands
+        wanted = np.clip(wanted, -peak, peak)
+        turned = wanted if rate is None else np.empty_like(wanted)
+        if rate is not None:
+            turned[0] = state[..., 0]
+            for k, duration in enumerate(np.diff(t), start=1):
+                most = rate * duration
+                turned[k] = turned[k - 1] + np.clip(wanted[k] - turned[k - 1], -most, most)
+        return turned, turned[-1][..., None].copy()
+
+    def observe(self, state: Floats) -> Floats:
+        """Rotation over the largest one."""
+        peak = np.asarray(column(self.peak_angle, 2))
+        return state / np.where(peak > 0.0, peak, 1.0)

@@ -1,0 +1,59 @@
+"""The shape memory alloy actuator of Fig. 13.5b: a linear ramp up while heated, a linear ramp down while cooling."""
+
+import math
+from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.per_robot import Numbers, require_each
+
+
+def pulse(t: ArrayLike, heating_time: float, cooling_time: float) -> NDArray[np.float64]:
+    """Share of the peak angle at time t [s] of the actuation period, in [0, 1]; t of any shape.
+
+    Zero at t = 0, one at t = heating_time, zero again at t = heating_time + cooling_time (Fig. 13.5b).
+    """
+    t = np.asarray(t, dtype=float)
+    rising = t / heating_time
+    falling = (heating_time + cooling_time - t) / cooling_time
+    return np.clip(np.minimum(rising, falling), 0.0, 1.0)
+
+
+class HeatingAndCooling:
+    """A stroke of two phases. heating_time: Delta t_1 [s]. cooling_time: Delta t_2 [s]."""
+
+    heating_time: float
+    cooling_time: float
+
+    @property
+    def period(self) -> float:
+        """Delta t_0 [s], the length of a stroke."""
+        return self.heating_time + self.cooling_time
+
+    @property
+    def corners(self) -> tuple[float, float, float]:
+        """Times within a stroke [s] that no time step may straddle."""
+        return 0.0, self.heating_time, self.period
+
+
+@dataclass(frozen=True)
+class SmaPulse(HeatingAndCooling):
+    """The actuator of Fig. 13.5b. peak_angle [rad], heating_time: Delta t_1 [s], cooling_time: Delta t_2 [s]."""
+
+    PER_ROBOT: ClassVar = ("peak_angle",)
+    peak_angle: Numbers = math.pi / 5
+    heating_time: float = 0.1
+    cooling_time: float = 0.9
+
+    def __post_init__(self) -> None:
+        require_each(self, "peak_angle", partial(require_number, unit="rad", zero_allowed=True))
+        require_number("heating_time", self.heating_time, "s")
+        require_number("cooling_time", self.cooling_time, "s")
+
+    def delta_psi(self, t: ArrayLike) -> NDArray[np.float64]:
+        """Rotation of a limb with command 1 at time t [s] of a stroke [rad]; t of any shape."""
+        return np.multiply.outer(pulse(t, self.heating_time, self.cooling_time), self.peak_angle)

@@ -1,0 +1,125 @@
+"""Currents: how the fluid moves, as frozen dataclasses in SI units; for numbers of each robot see per_robot.py."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.scene.checks import is_finite_number, require_finite, require_number
+from seastar_gym.scene.per_robot import Numbers, require_each
+
+Floats = NDArray[np.float64]
+
+LARGEST_GRID = 4_000_000
+"""Points: more than this many velocities are no longer a sample of a smooth current."""
+
+
+@dataclass(frozen=True)
+class UniformCurrent:
+    """A fluid that moves as a whole: u = (u_x, u_y) [m/s]."""
+
+    PER_ROBOT: ClassVar = ("u_x", "u_y")
+    u_x: Numbers = 0.0
+    u_y: Numbers = 0.0
+
+    def __post_init__(self) -> None:
+        require_each(self, "u_x", partial(require_finite, unit="m/s"))
+        require_each(self, "u_y", partial(require_finite, unit="m/s"))
+
+
+@dataclass(frozen=True)
+class ShearCurrent:
+    """A simple shear: u = rate y' along x', where x', y' are x, y turned by `direction`.
+
+    rate: [1/s]. direction: Of the flow [rad]. The fluid stands still on the line through the origin.
+    """
+
+    PER_ROBOT: ClassVar = ("rate", "direction")
+    rate: Numbers
+    direction: Numbers = 0.0
+
+    def __post_init__(self) -> None:
+        require_each(self, "rate", partial(require_finite, unit="1/s"))
+        require_each(self, "direction", partial(require_finite, unit="rad"))
+
+
+@dataclass(frozen=True)
+class Vortex:
+    """A steady vortex with a smooth core, after Kaufmann and Scully: u = circulation/(2 pi) r/(r_c^2 + r^2) round it.
+
+    circulation: [m^2/s], + is anti-clockwise. x, y: Its centre [m]. core_radius: r_c, where it turns fastest [m].
+    """
+
+    PER_ROBOT: ClassVar = ("circulation", "x", "y", "core_radius")
+    circulation: Numbers
+    x: Numbers = 0.0
+    y: Numbers = 0.0
+    core_radius: Numbers = 0.05
+
+    def __post_init__(self) -> None:
+        require_each(self, "circulation", partial(require_finite, unit="m^2/s"))
+        require_each(self, "x", partial(require_finite, unit="m"))
+        require_each(self, "y", partial(require_finite, unit="m"))
+        require_each(self, "core_radius", partial(require_number, unit="m"))
+
+
+@dataclass(frozen=True)
+class GridCurrent:
+    """A current sampled on a grid, bilinear in between; beyond the grid it is that of the nearest point on its edge.
+
+    corner: The grid's first point (x, y) [m]. spacing: Of its points, both ways [m].
+    velocities: u [m/s] at the points, shape (n_x, n_y, 2); any array, kept as tuples, so that equal grids are equal.
+    """
+
+    corner: tuple[float, float]
+    spacing: float
+    velocities: tuple[tuple[tuple[float, float], ...], ...]
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.corner, tuple | list) or list(map(is_finite_number, self.corner)) != [True, True]:
+            raise ValueError(f"corner must be two finite numbers [m], not {self.corner!r}.")
+        object.__setattr__(self, "corner", tuple(self.corner))
+        require_number("spacing", self.spacing, "m")
+        try:
+            array = np.asarray(self.velocities, dtype=float)
+        except (TypeError, ValueError):
+            array = np.zeros(0)
+        if array.ndim != 3 or array.shape[2] != 2 or min(array.shape) < 2 or array.size > 2 * LARGEST_GRID:
+            raise ValueError(
+                f"velocities must have shape (n_x, n_y, 2), with two points or more each way and at most "
+                f"{LARGEST_GRID:,} points, not {array.shape}."
+            )
+        if not np.isfinite(array).all():
+            raise ValueError("velocities must be finite [m/s].")
+        object.__setattr__(self, "velocities", tuple(tuple(map(tuple, row)) for row in array.tolist()))
+
+    @classmethod
+    def from_function(
+        cls,
+        function: Callable[[Floats, Floats], tuple[Floats, Floats]],
+        x: tuple[float, float],
+        y: tuple[float, float],
+        spacing: float,
+    ) -> "GridCurrent":
+        """Sample (u_x, u_y) = function(x, y) [m/s] on the rectangle from x[0] to x[1] and from y[0] to y[1] [m].
+
+        The function takes and gives arrays of one shape, or plain numbers where the current does not depend on place.
+        """
+        require_number("spacing", spacing, "m")
+        axes = []
+        for name, ends in (("x", x), ("y", y)):
+            if len(ends) != 2 or not all(map(is_finite_number, ends)) or not ends[1] - ends[0] >= spacing:
+                raise ValueError(f"{name} must be two ends at least a spacing apart [m], not {ends!r}.")
+            axes.append(ends[0] + spacing * np.arange(int(np.ceil((ends[1] - ends[0]) / spacing - 1e-9)) + 1))
+        if len(axes[0]) * len(axes[1]) > LARGEST_GRID:
+            raise ValueError(f"The grid has more than {LARGEST_GRID:,} points: use a larger spacing.")
+        xs, ys = np.meshgrid(*axes, indexing="ij")
+        u_x, u_y = function(xs, ys)
+        velocities = np.stack([np.broadcast_to(u, xs.shape) for u in (u_x, u_y)], axis=2)
+        return cls((float(x[0]), float(y[0])), float(spacing), velocities)  # type: ignore[arg-type]
+
+
+AnyCurrent = UniformCurrent | ShearCurrent | Vortex | GridCurrent

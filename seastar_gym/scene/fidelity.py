@@ -1,0 +1,120 @@
+"""What the settings of `Numerics` keep, as measured: errors and speeds of `presets.json`, which comes with the package.
+
+`python -m studies.accuracy --store` measures and writes them, for the chapter's robot in the chapter's
+water, over ten strokes from rest:
+
+    promise("fast").path_error  ->  0.05: the hub's path is off by 5 % of its length at most
+"""
+
+import json
+import math
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, Protocol
+
+PRESETS = Path(__file__).with_name("presets.json")
+
+
+@dataclass(frozen=True)
+class Promise:
+    """A setting of `Numerics` and what it keeps. Errors are against the solution that no time step errs in (h -> 0).
+
+    scheme, step [s], newton_tolerance, path_tolerance: The setting.
+    path_error: Largest distance of the hub from its converged path, at the ends of strokes, over the length of that
+        path: the worst of the straight swim, the four pairs of Fig. 13.8, the pentagon and random commands.
+    gait_error: The same for whatever command of -, 0, + is repeated, the hardest that a robot can be asked.
+    straight_error: The same for the straight swim alone.
+    heading_error: Largest error of the heading [deg], over what path_error looks at.
+    end_error: Distance from the converged end over the length of the path, the worst likewise.
+    speed: Simulated over computing seconds, in batch on one core of the machine named in presets.json.
+    """
+
+    scheme: str
+    step: float
+    newton_tolerance: float
+    path_tolerance: float | None
+    path_error: float
+    gait_error: float
+    straight_error: float
+    heading_error: float
+    end_error: float
+    speed: float
+
+    def __str__(self) -> str:
+        adapted = "" if self.path_tolerance is None else f" adapted to {100 * self.path_tolerance:g} %"
+        return f'"{self.scheme}" at {1e3 * self.step:g} ms{adapted}'
+
+
+class Setting(Protocol):
+    """A `Numerics`, as far as a promise depends on it."""
+
+    @property
+    def scheme(self) -> str: ...
+    @property
+    def step(self) -> float: ...
+    @property
+    def newton_tolerance(self) -> float: ...
+    @property
+    def path_tolerance(self) -> float | None: ...
+
+
+@cache
+def _stored() -> dict[str, Any]:
+    stored: dict[str, Any] = json.loads(PRESETS.read_text(encoding="utf-8"))
+    return stored
+
+
+def machine() -> str:
+    """Where the speeds were measured."""
+    return str(_stored()["machine"])
+
+
+def promises() -> tuple[Promise, ...]:
+    """The stored settings, fastest first: those that no other measured setting beats in both error and speed."""
+    return tuple(Promise(**row) for row in _stored()["front"])
+
+
+def promise(setting: str | Setting) -> Promise:
+    """What a preset, by its name, or a `Numerics` keeps; ValueError for settings that were not measured."""
+    presets = {name: Promise(**row) for name, row in _stored()["presets"].items()}
+    if isinstance(setting, str):
+        if setting not in presets:
+            raise ValueError(f"A preset is one of {', '.join(map(repr, presets))}, not {setting!r}.")
+        return presets[setting]
+    known = measured(setting)
+    if known is None:
+        raise ValueError(f"Nothing was measured, so nothing can be promised, for {setting!r}.")
+    return known
+
+
+def measured(setting: Setting) -> Promise | None:
+    """What a `Numerics` keeps, or None if it was not measured."""
+    known = (*(Promise(**row) for row in _stored()["presets"].values()), *promises())
+    return next((row for row in known if _identity(row) == _identity(setting)), None)
+
+
+def _identity(setting: Setting) -> tuple[str, float, float, float | None]:
+    return setting.scheme, setting.step, setting.newton_tolerance, setting.path_tolerance
+
+
+def cheapest(error: float, any_gait: bool = False) -> Promise:
+    """The fastest stored setting whose path error is at most `error`; ValueError if none can promise it.
+
+    any_gait: Ask it of gait_error, too.
+    """
+    if not isinstance(error, int | float) or isinstance(error, bool) or not (0.0 < error < math.inf):
+        raise ValueError(f"error must be a positive, finite share of the path's length, not {error!r}.")
+    known = sorted(promises(), key=lambda row: -row.speed)
+
+    def kept(row: Promise) -> float:
+        return max(row.path_error, row.gait_error) if any_gait else row.path_error
+
+    for row in known:
+        if kept(row) <= error:
+            return row
+    best = min(known, key=kept)
+    raise ValueError(
+        f"No measured setting keeps the path error below {100 * error:g} %: "
+        f"the best, {best}, keeps {100 * kept(best):g} %."
+    )

@@ -1,0 +1,89 @@
+"""A limb that is not like the robot's others, and what a profile along it says."""
+
+import math
+from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.scene.checks import is_finite_number, require_finite, require_number, require_numbers
+from seastar_gym.scene.per_robot import Numbers, PerRobot, require_each
+
+Profile = float | tuple[float, ...]
+"""A number, or numbers at equally spaced points from hub to tip (both included), linear in between."""
+
+
+@dataclass(frozen=True)
+class Limb:
+    """What one limb has of its own; None: what the robot says for all.
+
+    direction: Of its root edge at rest [rad], anti-clockwise from limb 1's.
+    length [m]. radius [m] and youngs_modulus [Pa], along the limb: a taper is radius=(root, tip).
+    natural_curvature: Of the limb at rest [1/m], + bends it anti-clockwise on the way to its tip.
+
+    Numbers that differ from robot to robot are numpy arrays of shape (n_robots,) here: a tuple is a profile.
+    """
+
+    PER_ROBOT: ClassVar = ("length", "radius", "youngs_modulus", "natural_curvature")
+    direction: float | None = None
+    length: Numbers | None = None
+    radius: Profile | Numbers | None = None
+    youngs_modulus: Profile | Numbers | None = None
+    natural_curvature: Numbers = 0.0
+
+    def __post_init__(self) -> None:
+        if self.direction is not None and not (is_finite_number(self.direction) and 0 <= self.direction < 2 * math.pi):
+            raise ValueError(
+                f"A limb's direction must be from 0 to below 2 pi [rad], for all robots, not {self.direction!r}."
+            )
+        if self.length is not None:
+            require_each(self, "length", partial(_require_positive, unit="m"))
+        require_each(self, "natural_curvature", partial(require_finite, unit="1/m"))
+        for name, profile, unit in (("radius", self.radius, "m"), ("youngs_modulus", self.youngs_modulus, "Pa")):
+            if profile is None:
+                continue
+            if isinstance(profile, np.ndarray | PerRobot):
+                require_each(self, name, partial(_require_positive, unit=unit))
+                continue
+            require_numbers(f"A limb's {name}", as_tuple(profile), unit)
+            if not as_tuple(profile) or min(as_tuple(profile)) <= 0.0:
+                raise ValueError(f"A limb's {name} must be positive all along it [{unit}], not {profile!r}.")
+
+
+def _require_positive(name: str, value: float, unit: str) -> None:
+    require_number(f"A limb's {name}", value, unit)
+
+
+class LimbShape(NamedTuple):
+    """A limb with nothing left open; see Limb. gap: Angle to the next limb's root edge, anti-clockwise [rad]."""
+
+    direction: float
+    gap: float
+    length: float
+    radius: tuple[float, ...]
+    youngs_modulus: tuple[float, ...]
+    natural_curvature: float
+
+    def extreme_edges(self, nodes_per_limb: int) -> list[tuple[float, float, float, float]]:
+        """(l^2 [m^2], EA/l [N/m], EI/l [N m], volume [m^3]) of the smallest and the largest edge there may be."""
+        l = self.length / (nodes_per_limb - 1)  # noqa: E741
+        found = []
+        for choose in (min, max):
+            r, E = choose(self.radius), choose(self.youngs_modulus)
+            area = math.pi * r**2
+            found.append((l**2, E * area / l, E * math.pi * r**4 / 4.0 / l, area * l))
+        return found
+
+
+def as_tuple(profile: Profile) -> tuple[float, ...]:
+    """The numbers of a profile."""
+    return profile if isinstance(profile, tuple) else (profile,)
+
+
+def along(profile: tuple[float, ...], share: NDArray[np.float64]) -> list[float]:
+    """A profile at shares of the way from hub to tip."""
+    if len(profile) == 1:
+        return [*profile] * len(share)
+    return np.interp(share, np.linspace(0.0, 1.0, len(profile)), profile).tolist()

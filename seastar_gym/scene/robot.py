@@ -1,0 +1,145 @@
+"""The robot: limbs around a hub."""
+
+import math
+from dataclasses import dataclass
+from functools import partial
+from operator import itemgetter
+from typing import ClassVar, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.scene.checks import require_choice, require_count, require_number
+from seastar_gym.scene.limb import Limb, LimbShape, as_tuple
+from seastar_gym.scene.per_robot import Numbers, batch_size, chosen, require_each
+from seastar_gym.scene.shape import limbs_that_may_touch, rest_positions, turn_per_hinge
+
+HubHinge = Literal["opening", "turning"]
+
+
+@dataclass(frozen=True)
+class Seastar:
+    """A robot of limbs around a hub (Fig. 13.4a): straight, equal, uniform and evenly spread, but for `limbs`.
+
+    n_limbs: Number of limbs. nodes_per_limb: N, with the hub. limb_length: L [m], the unit of a robot's
+        tolerances and observations, too. rod_radius: r_0 [m]. youngs_modulus: E [Pa]. density: rho_m [kg/m^3].
+    hub_hinge: "opening" measures a hub hinge by the angle psi between its two limbs, from 0 to pi, a wider gap by what
+        is missing to a full turn; "turning" by the interior turning angle pi - psi, as the published codes of the
+        chapter's authors do.
+    limbs: What limbs have of their own, one Limb each, or () for nothing.
+    relaxation_time: Of material damping after Kelvin and Voigt [s], see der/damping.py and `relaxation_time`; None for
+        none, as in the chapter.
+
+    Two limbs have one hub hinge; straight ones, with hub_hinge="turning", make a plain rod. One limb has none: it
+    swings freely about the hub, and no actuator turns it.
+    """
+
+    PER_ROBOT: ClassVar = ("limb_length", "rod_radius", "youngs_modulus", "density", "relaxation_time")
+    n_limbs: int = 5
+    nodes_per_limb: int = 10
+    limb_length: Numbers = 0.1
+    rod_radius: Numbers = 1.6e-3
+    youngs_modulus: Numbers = 1e6
+    density: Numbers = 1000.0
+    hub_hinge: HubHinge = "opening"
+    limbs: tuple[Limb, ...] = ()
+    relaxation_time: Numbers | None = None
+
+    def __post_init__(self) -> None:
+        require_count("n_limbs", self.n_limbs, 1, 12)
+        require_count("nodes_per_limb", self.nodes_per_limb, 2, 10_000)
+        require_each(self, "limb_length", partial(require_number, unit="m"))
+        require_each(self, "rod_radius", partial(require_number, unit="m"))
+        require_each(self, "youngs_modulus", partial(require_number, unit="Pa"))
+        require_each(self, "density", partial(require_number, unit="kg/m^3"))
+        if self.relaxation_time is not None:
+            require_each(self, "relaxation_time", partial(require_number, unit="s", zero_allowed=True))
+        require_choice("hub_hinge", self.hub_hinge, get_args(HubHinge))
+        if self.n_limbs == 1 and self.hub_hinge != "opening":
+            raise ValueError("One limb has no hub hinge that could be measured by its turning angle.")
+        self._check_limbs()
+
+    def _check_limbs(self) -> None:
+        if not isinstance(self.limbs, tuple) or not all(isinstance(limb, Limb) for limb in self.limbs):
+            raise ValueError(f"limbs must be a tuple of Limb, not {self.limbs!r}.")
+        if len(self.limbs) not in (0, self.n_limbs):
+            raise ValueError(f"limbs must be one Limb for each of the {self.n_limbs}, or none, not {len(self.limbs)}.")
+        directions = [limb.direction for limb in self.limbs if limb.direction is not None]
+        if len(directions) not in (0, self.n_limbs):
+            raise ValueError("Either every limb has a direction or none has.")
+        if directions and (directions[0] != 0.0 or (np.diff(directions) <= 0.0).any()):
+            raise ValueError(f"Directions of limbs must begin at 0 and increase [rad], not {directions!r}.")
+        most = chosen(self, partial(max, key=abs))
+        turn = max(abs(turn_per_hinge(shape, self.nodes_per_limb)) for shape in most.limb_shapes())
+        if turn >= math.pi:
+            raise ValueError(
+                f"A natural curvature that turns neighbouring edges by {turn:.4g} rad, not below pi, is too much for "
+                f"{self.nodes_per_limb} nodes per limb."
+            )
+
+    def limb_shapes(self, index: int = 0) -> tuple[LimbShape, ...]:
+        """Every limb with nothing left open; of robot `index`, where numbers differ from robot to robot."""
+        robot = chosen(self, itemgetter(index))
+        limbs = robot.limbs or (Limb(),) * self.n_limbs
+        directions = [limb.direction for limb in limbs if limb.direction is not None]
+        gaps = np.diff(directions, append=2.0 * math.pi).tolist() or [2.0 * math.pi / self.n_limbs] * self.n_limbs
+        return tuple(
+            LimbShape(
+                direction=2.0 * math.pi * j / self.n_limbs if limb.direction is None else limb.direction,
+                gap=gap,
+                length=robot.limb_length if limb.length is None else limb.length,
+                radius=as_tuple(robot.rod_radius if limb.radius is None else limb.radius),
+                youngs_modulus=as_tuple(robot.youngs_modulus if limb.youngs_modulus is None else limb.youngs_modulus),
+                natural_curvature=limb.natural_curvature,
+            )
+            for j, (limb, gap) in enumerate(zip(limbs, gaps, strict=True))
+        )
+
+    def limbs_that_may_touch(self) -> list[tuple[int, int]]:
+        """(right, left) limbs, counted from 0."""
+        alike = all(limb.length is None for limb in self.limbs)
+        return limbs_that_may_touch([shape.gap for shape in self.limb_shapes()], alike)
+
+    @property
+    def is_symmetric(self) -> bool:
+        """Whether a turn by one limb and a mirror at limb 1 leave the robot, or all of them, as it is."""
+        robots = [self.limb_shapes(index) for index in range(batch_size(self) or 1)]
+        alike = all(len({shape._replace(direction=0.0, gap=0.0) for shape in shapes}) == 1 for shapes in robots)
+        shapes = robots[0]
+        gaps = np.array([shape.gap for shape in shapes])
+        return alike and shapes[0].natural_curvature == 0.0 and float(np.ptp(gaps)) < 1e-12
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes, n_limbs (N - 1) + 1."""
+        return self.n_limbs * (self.nodes_per_limb - 1) + 1
+
+    @property
+    def edge_length(self) -> Numbers:
+        """Natural length of an edge of a limb of length L [m]."""
+        return np.divide(self.limb_length, self.nodes_per_limb - 1)
+
+    @property
+    def lengths(self) -> tuple[Numbers, ...]:
+        """Numbers that the shape at rest depends on."""
+        of_limbs = [number for limb in self.limbs for number in (limb.length, limb.natural_curvature)]
+        return self.limb_length, *(number for number in of_limbs if number is not None)
+
+    @property
+    def opening_angle(self) -> float:
+        """Smallest angle between neighbouring limbs at rest [rad]."""
+        return min(shape.gap for shape in self.limb_shapes())
+
+    def nodes(self, index: int = 0) -> NDArray[np.float64]:
+        """Node positions at rest [m], shape (n_nodes, 2): hub, {1,1}..{1,N-1}, {2,1}.. ; limb 1 along +x.
+
+        index: Of which robot, where numbers differ from robot to robot.
+        """
+        return rest_positions(self.limb_shapes(index), self.nodes_per_limb)
+
+
+def relaxation_time(loss_factor: float, frequency: float) -> float:
+    """Relaxation time [s] of a material whose loss factor is known at a frequency [Hz]: eta = omega tau."""
+    require_number("loss_factor", loss_factor, "1", zero_allowed=True)
+    require_number("frequency", frequency, "Hz")
+    return loss_factor / (2.0 * math.pi * frequency)

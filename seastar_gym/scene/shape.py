@@ -1,0 +1,74 @@
+"""The shape of a robot at rest: where its nodes are, how limbs bend, which hub hinges exist, who may touch whom."""
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.scene.limb import LimbShape
+
+Floats = NDArray[np.float64]
+
+
+def rest_positions(limbs: Sequence[LimbShape], nodes_per_limb: int) -> Floats:
+    """Nodes of the undeformed robot [m], shape (n_nodes, 2): hub at the origin, limb after limb.
+
+    Edges of a limb have equal lengths and turn by its natural curvature times that length, so its nodes lie on an arc.
+    """
+    i = np.arange(1, nodes_per_limb)
+    nodes = [np.zeros((1, 2))]
+    for limb in limbs:
+        half_turn = 0.5 * turn_per_hinge(limb, nodes_per_limb)
+        # The sum of i unit vectors, each turned from the last by twice half_turn.
+        chord = np.sin(i * half_turn) / (i * np.sin(half_turn)) if half_turn else 1.0
+        distance = limb.length * i / (nodes_per_limb - 1) * chord
+        angle = limb.direction + (i - 1) * half_turn
+        nodes.append(np.stack([distance * np.cos(angle), distance * np.sin(angle)], axis=1))
+    return np.concatenate(nodes)
+
+
+def turn_per_hinge(limb: LimbShape, nodes_per_limb: int) -> float:
+    """Natural angle of the hinges within a limb [rad]."""
+    return limb.natural_curvature * limb.length / (nodes_per_limb - 1)
+
+
+def natural_hub_angle(gap: float, hub_hinge: str) -> float:
+    """Angle of an unactuated hub hinge over a gap [rad], as its hinge measures it: from -pi to pi."""
+    if hub_hinge == "turning":
+        return gap - np.pi
+    return gap if gap <= np.pi else gap - 2.0 * np.pi
+
+
+def n_hub_hinges(n_limbs: int) -> int:
+    """One per gap; two limbs have one, not the same one twice, so that straight ones make a plain rod."""
+    return n_limbs if n_limbs > 2 else n_limbs - 1
+
+
+def limbs_that_may_touch(gaps: Sequence[float], alike: bool) -> list[tuple[int, int]]:
+    """(right, left) limbs with less than a half turn in between: neighbours, or all such pairs, if limbs are not alike.
+
+    gaps: Angle from every limb to the next [rad]. alike: Whether none is longer, and could reach over another.
+    """
+    n_limbs = len(gaps)
+    turns = {
+        (first, (first + steps) % n_limbs): sum(gaps[(first + k) % n_limbs] for k in range(steps))
+        for first, steps in itertools.product(range(n_limbs), range(1, 2 if alike else n_limbs))
+    }
+    return [pair for pair, turn in turns.items() if pair[0] != pair[1] and turn < np.pi * (1.0 - 1e-9)]
+
+
+def cross_at_rest(nodes: NDArray[np.float64], n_limbs: int, pairs: Sequence[tuple[int, int]]) -> bool:
+    """Whether edges of limbs that may touch cross; nodes: [m], shape (n_nodes, 2)."""
+    limbs = [np.concatenate([nodes[:1], limb]) for limb in nodes[1:].reshape(n_limbs, -1, 2)]
+
+    def cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+        return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+    for right, left in pairs:
+        f, tails = np.diff(limbs[left], axis=0), limbs[left][:-1]
+        for tail, e in zip(limbs[right][:-1], np.diff(limbs[right], axis=0), strict=True):
+            of_e, of_f = cross(e, f) * cross(tails - tail, f), cross(e, f) * cross(tails - tail, e)
+            if ((of_e > 0.0) & (of_f > 0.0) & (np.maximum(of_e, of_f) < cross(e, f) ** 2)).any():
+                return True
+    return False

@@ -1,0 +1,79 @@
+"""How kernels are compiled and cached.
+
+`kernel` and `inlined_kernel` compile building blocks; `entry_point` compiles a function that Python calls, releases
+the GIL and keeps the machine code on disk. Numba's own cache looks at the file of the cached function only, so an edit
+in a called file would silently run the old code. Ours lives in a folder named after a digest of every file of the
+package that defines kernels, the versions of numba, llvmlite and numpy and the lane width: whatever changes, the old
+code cannot be found.
+"""
+
+import contextlib
+import functools
+import hashlib
+from pathlib import Path
+
+import llvmlite
+import numba
+import numpy as np
+from numba.core.caching import FunctionCache, UserWideCacheLocator
+
+from seastar_gym.simd.lanes import N_LANES
+
+PACKAGE = Path(__file__).resolve().parent.parent
+
+# error_model="numpy": divisions follow IEEE instead of raising; failure is a status, not an exception.
+STRICT = {"error_model": "numpy", "nogil": True}
+# Without wrappers for Python, which would be a third of the compilation.
+BLOCK = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **STRICT}
+kernel = numba.njit(**BLOCK)
+# Where calls are many, and each would pass the fifty pointers of rods and work: together a tenth of a stroke.
+inlined_kernel = numba.njit(forceinline=True, **BLOCK)
+
+
+def kernel_sources(package: Path = PACKAGE) -> list[Path]:
+    """The files that machine code may come from: those of `der` and `simd`, and any other that names this module."""
+    rooms = {package / "der", package / "simd"}
+    return [
+        path
+        for path in sorted(package.rglob("*.py"))
+        if rooms & set(path.parents) or "simd.compilation" in path.read_text(encoding="utf-8")
+    ]
+
+
+def source_digest(package: Path = PACKAGE) -> str:
+    """Hexadecimal digest of everything that the machine code depends on."""
+    versions = f"numba {numba.__version__} llvmlite {llvmlite.__version__} numpy {np.__version__} lanes {N_LANES}"
+    digest = hashlib.sha256(versions.encode())
+    for source in kernel_sources(package):
+        digest.update(str(source.relative_to(package)).encode() + b"\0" + source.read_bytes())
+    return digest.hexdigest()[:32]
+
+
+_digest_of_this_process = functools.cache(source_digest)
+
+
+class _DigestLocator(UserWideCacheLocator):
+    """Numba's user-wide cache folder, with our digest as the folder's name and as the source stamp."""
+
+    def __init__(self, py_func, py_file):
+        super().__init__(py_func, py_file)
+        root = Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else Path(self._cache_path).parent
+        self._cache_path = str(root / f"seastar_gym-{_digest_of_this_process()}")
+
+    def get_source_stamp(self):
+        # An entry point may stand outside the package.
+        return _digest_of_this_process(), hashlib.sha256(Path(self._py_file).read_bytes()).hexdigest()
+
+
+class _DigestCache(FunctionCache):
+    class _impl_class(FunctionCache._impl_class):  # noqa: N801 - numba's own name
+        _locator_classes = (_DigestLocator,)
+
+
+def entry_point(function):
+    """Compile `function` for calls from Python, with the GIL released and the machine code kept on disk."""
+    compiled = numba.njit(**STRICT)(function)
+    # RuntimeError: no folder can be written (a read-only home), so the function is compiled anew in every process.
+    with contextlib.suppress(RuntimeError):
+        compiled._cache = _DigestCache(function)
+    return compiled

@@ -1,0 +1,3 @@
+from studies.accuracy.study import main
+
+main()

@@ -1,0 +1,3 @@
+from studies.chapter.study import main
+
+main()

@@ -1,0 +1,1 @@
+"""What matters to the learning, and the best that a search finds."""

@@ -1,0 +1,257 @@
+"""What matters to the learning: trainings that differ in one thing each, over seeds.
+
+    python -m studies.learning.ablations
+
+Every training is measured on the same held-out random paths with random headings, none of which it is trained on: mean
+strokes to the last waypoint, while it learns and at the end. Results are written after every training, and trainings
+whose results are there already are not repeated.
+"""
+
+import itertools
+import json
+import shlex
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, cast
+from unittest.mock import patch
+
+import numpy as np
+import torch
+import tyro
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
+
+from agents.policy import LearnedPolicy
+from agents.ppo import Hyperparameters, make_model, make_training_env, policy_of
+from agents.report.pictures import COLOURS, FAINT_INK
+from agents.swim import Policy
+from agents.trials import swim_many
+from seastar_gym.envs.paths import AIM, PathName
+from seastar_gym.envs.task import make_scene
+from seastar_gym.scene.numerics import Fidelity
+
+HELD_OUT_SEED = 1_000
+"""Of the paths that are measured on; a training draws its own from small seeds."""
+MAX_STROKES = 400
+"""Of a measured swim; who does not arrive counts as this many."""
+
+Curve = list[tuple[int, float]]
+"""Strokes trained, and mean strokes on the held-out paths."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A training: hyperparameters that differ from the study's, and how the paths are laid.
+
+    aim: Radii of a waypoint that the reward's way keeps to. first_path: What the first third is trained on.
+    """
+
+    changes: tuple[tuple[str, Any], ...] = ()
+    aim: float = AIM
+    first_path: PathName | None = None
+
+    @property
+    def hyperparameters(self) -> Hyperparameters:
+        """The study's with the changes."""
+        return replace(COMMON, **dict(self.changes))
+
+
+def _with(**changes: Any) -> Variant:
+    return Variant(tuple(changes.items()))
+
+
+COMMON = Hyperparameters(actions="joint")
+"""All 243 commands to choose from, of which the default training explores the pairs of limbs only."""
+DEFAULT = "whole commands"
+VARIANTS: dict[str, Variant] = {
+    DEFAULT: Variant(),
+    "no symmetry": _with(symmetry=False),
+    "limb by limb": _with(actions="limbs"),
+    "pairs of limbs": _with(actions="pairs"),
+    "discount 0.5": _with(discount=0.5),
+    "discount 0.95": _with(discount=0.95),
+    "entropy 0.01": _with(entropy=0.01),
+    "512 robots": _with(num_envs=512, batch_size=2048),
+    "width 256": _with(hidden=(256, 256)),
+    "one waypoint first": Variant(first_path="line"),
+    "aim 0.4": Variant(aim=0.4),
+    "aim 0.9": Variant(aim=0.9),
+}
+"""By what is different."""
+
+
+def mean_strokes(policy: Policy, path: PathName, n_swims: int, options: "Options") -> float:
+    """Mean strokes of swims on held-out paths, or on a path by name."""
+    scene, seed = make_scene(None, options.fidelity), HELD_OUT_SEED
+    swims = swim_many(
+        "learned", policy, path, n_swims, scene, max_strokes=MAX_STROKES, seed=seed, threads=options.num_threads
+    )
+    return float(np.mean([done.strokes for done in swims]))
+
+
+class Measuring(BaseCallback):
+    """Measures the policy every `every` strokes of the training."""
+
+    def __init__(self, options: "Options"):
+        super().__init__()
+        self.options, self.curve, self._next = options, Curve(), options.every
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_start(self) -> None:
+        if self.num_timesteps >= self._next:
+            self._next += self.options.every
+            self.measure()
+
+    def measure(self) -> LearnedPolicy:
+        """The policy so far, measured."""
+        assert isinstance(self.model, PPO)
+        policy = policy_of(self.model)
+        strokes = mean_strokes(policy, "random", self.options.paths, self.options)
+        self.curve.append((self.model.num_timesteps, strokes))
+        return policy
+
+
+def learn(variant: Variant, seed: int, options: "Options") -> dict[str, Any]:
+    """One training: its learning curve, and the strokes that its policy takes round the pentagon."""
+    hyperparameters, fidelity = variant.hyperparameters, options.fidelity
+    measuring, n = Measuring(options), hyperparameters.num_envs * hyperparameters.rollout
+    rounds = max(1, options.strokes // n)
+
+    with patch("seastar_gym.envs.task.AIM", variant.aim):
+        first = variant.first_path or "random"
+        env = make_training_env(hyperparameters, first, True, fidelity, threads=options.num_threads)
+        model = make_model(env, hyperparameters, seed)
+        if variant.first_path is not None:
+            model.learn(rounds // 3 * n, measuring)
+            rounds -= rounds // 3
+            env.close()
+            env = make_training_env(hyperparameters, "random", True, fidelity, threads=options.num_threads)
+            model.set_env(env)
+        model.learn(rounds * n, measuring, reset_num_timesteps=variant.first_path is None)
+    policy = measuring.measure()
+    env.close()
+    return {"curve": measuring.curve, "pentagon": round(mean_strokes(policy, "pentagon", 1, options))}
+
+
+# --- the study -------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Options:
+    """What matters to the learning: trainings that differ in one thing each, over seeds."""
+
+    seeds: tuple[int, ...] = (0, 1, 2)
+    """Of the trainings."""
+    variants: tuple[str, ...] = tuple(VARIANTS)
+    """Which trainings."""
+    strokes: int = 98_304
+    """Of every training."""
+    every: int = 24_576
+    """Strokes between measurements."""
+    paths: int = 64
+    """Held-out paths."""
+    fidelity: Fidelity = "fast"
+    """How exactly the swims are computed."""
+    num_threads: int | None = None
+    """Threads of the simulator; all processors by default."""
+    out: Path = Path("docs/ablations.json")
+    """File of the results; the picture has its name."""
+
+    def __post_init__(self) -> None:
+        if unknown := set(self.variants) - set(VARIANTS):
+            raise ValueError(f"Unknown variant {min(unknown)!r}: choose of {', '.join(VARIANTS)}.")
+
+
+def study(options: Options, results: dict[str, Any]) -> None:
+    """Fill in what is missing in the results, and write them after every training."""
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    for seed, name in itertools.product(options.seeds, options.variants):
+        runs = results["runs"].setdefault(name, {})
+        if str(seed) in runs:
+            continue
+        began = time.perf_counter()
+        runs[str(seed)] = learn(VARIANTS[name], seed, options)
+        options.out.write_text(json.dumps(results) + "\n", encoding="utf-8")
+        strokes, seconds = runs[str(seed)]["curve"][-1][1], time.perf_counter() - began
+        print(f"{name}, seed {seed}: {strokes:.1f} strokes on held-out paths ({seconds:.0f} s)", flush=True)
+
+
+def read_results(options: Options, command: str) -> dict[str, Any]:
+    """Those of the file, or none yet. ValueError where they are of other trainings."""
+    settings = {name: getattr(options, name) for name in ("strokes", "every", "paths", "fidelity")}
+    if not options.out.is_file():
+        return {"command": command, "settings": settings, "runs": {}}
+    results: Any = json.loads(options.out.read_text(encoding="utf-8"))
+    found = results.get("settings") if isinstance(results, dict) else None
+    if found != settings:
+        of = "something else" if found is None else found
+        raise ValueError(f"{options.out} has results of {of}, not of {settings}: give another --out.")
+    return cast(dict[str, Any], results)
+
+
+def final_strokes(runs: Mapping[str, Any]) -> list[float]:
+    """Mean strokes on the held-out paths at the end, of every seed."""
+    return [run["curve"][-1][1] for run in runs.values()]
+
+
+def table(results: dict[str, Any]) -> str:
+    """In Markdown: for every variant the mean over seeds, with best and worst, and strokes round the pentagon."""
+    lines = ["| training | held-out paths: mean strokes | pentagon, every seed |", "|---|---:|---|"]
+    for name, runs in results["runs"].items():
+        ends, pentagon = final_strokes(runs), ", ".join(str(run["pentagon"]) for run in runs.values())
+        over_seeds = f" ({min(ends):.1f} to {max(ends):.1f})" if len(ends) > 1 else ""
+        lines.append(f"| {name} | {np.mean(ends):.1f}{over_seeds} | {pentagon} |")
+    return "\n".join(lines)
+
+
+def draw(results: dict[str, Any], file: Path) -> None:
+    """Learning curves, mean and range over seeds, each beside that of the default, or that alone."""
+    from matplotlib.figure import Figure
+
+    others = [name for name in results["runs"] if name != DEFAULT] or [DEFAULT]
+    columns = 4
+    rows = -(-len(others) // columns)
+    figure = Figure(figsize=(9.0, 2.1 * rows), layout="constrained")
+    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    for axes, name in itertools.zip_longest(panels.flat, others):
+        if name is None:
+            axes.set_axis_off()
+            continue
+        for label, colour in ((DEFAULT, FAINT_INK), (name, COLOURS[0])):
+            curves = np.array([run["curve"] for run in results["runs"].get(label, {}).values()])
+            if curves.size:
+                trained, strokes = 1e-3 * curves[0, :, 0], curves[:, :, 1]
+                axes.fill_between(trained, strokes.min(axis=0), strokes.max(axis=0), color=colour, alpha=0.25, lw=0)
+                axes.plot(trained, strokes.mean(axis=0), color=colour)
+        axes.set_title(name, fontsize=9)
+        axes.set(ylim=(155.0, 190.0))
+        axes.tick_params(labelsize=8, labelbottom=True)
+        axes.grid(alpha=0.3)
+    figure.supxlabel("strokes trained [thousands]", fontsize=9)
+    figure.supylabel("strokes on held-out paths", fontsize=9)
+    figure.savefig(file, dpi=130)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line; returns the exit code."""
+    torch.set_num_threads(1)
+    given = sys.argv[1:] if arguments is None else arguments
+    try:
+        options = tyro.cli(Options, args=given)
+        results = read_results(options, shlex.join(["python", "-m", "studies.learning.ablations", *given]))
+    except ValueError as wrong:
+        print(wrong, file=sys.stderr)
+        return 2
+    study(options, results)
+    draw(results, options.out.with_suffix(".png"))
+    print(table(results))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

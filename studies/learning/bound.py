@@ -1,0 +1,274 @@
+"""How fast can it swim at all: the best gaits found offline, the best speed in every direction, the fastest pentagon.
+
+    python -m studies.learning.bound
+
+Periodic gaits: all of one and two strokes over all commands, all of three and four strokes over pairs of limbs, once
+for every class under the symmetry of the robot. Gaits swum in turns make every speed of their convex hull. Longer
+sequences: a wide beam search along straight lines, and one round the pentagon. None of this proves that nothing faster
+exists; it says what searches without a time limit find.
+"""
+
+import itertools
+import json
+import shlex
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tyro
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
+
+from agents.greedy import Displacements, measure_gaits, remaining_way
+from agents.planner import Branching
+from agents.roster import load_agents
+from agents.swim import Policy
+from agents.trials import swim_many
+from seastar_gym.envs.commands import Actions, command_table
+from seastar_gym.envs.paths import LINE_LENGTH, make_path
+from seastar_gym.envs.symmetry import action_table
+from seastar_gym.envs.task import make_scene
+from seastar_gym.scene import Scene
+from seastar_gym.scene.numerics import Fidelity
+from seastar_gym.simulator import Simulator, State
+
+Floats = NDArray[np.float64]
+Gaits = NDArray[np.intp]
+
+MM = 1000.0
+SETTLING, MEASURED = 12, 12
+"""Strokes of a periodic gait; 12 is whole periods of all of one to four strokes."""
+CHUNK = 4096
+STRAIGHT = np.radians(0.3)
+"""A gait that turns by less per stroke [rad] can be kept straight by its mirror image or by a rare other stroke."""
+LINE_STROKES, LINE_FROM = 36, 12
+"""A searched straight swim, and the stroke from which its speed counts."""
+WAYPOINT_RADIUS = 0.01
+
+
+# --- periodic gaits --------------------------------------------------------------------------------------------------
+
+
+def distinct_gaits(period: int, actions: Actions, n_limbs: int = 5) -> Gaits:
+    """One gait of every class under turning, mirroring and beginning later; actions of shape (n, period)."""
+    carried, n_actions = action_table(actions, n_limbs), len(command_table(actions, n_limbs))
+    place = n_actions ** np.arange(period)[::-1]
+    numbers = np.arange(n_actions**period)
+    gaits = numbers[:, None] // place % n_actions
+    least = numbers
+    for element, shift in itertools.product(range(2 * n_limbs), range(period)):
+        least = np.minimum(least, np.roll(carried[element][gaits], shift, axis=1) @ place)
+    return gaits[least == numbers]
+
+
+def measure(scene: Scene, gaits: Gaits, actions: Actions) -> Displacements:
+    """What they do per stroke, in the body frame."""
+    table = command_table(actions, scene.robot.n_limbs)
+    parts = [measure_gaits(scene, table[part], SETTLING, MEASURED) for part in _chunks(gaits)]
+    return Displacements(np.concatenate([part.hub for part in parts]), np.concatenate([part.turn for part in parts]))
+
+
+def _chunks(gaits: Gaits) -> list[Gaits]:
+    return [gaits[begin : begin + CHUNK] for begin in range(0, len(gaits), CHUNK)]
+
+
+def all_directions(hub: Floats, n_limbs: int = 5) -> Floats:
+    """Displacements of the turned and mirrored gaits too, shape (2 n_limbs n, 2)."""
+    way = hub @ [1.0, 1.0j]
+    turns = np.exp(2j * np.pi / n_limbs * np.arange(n_limbs))[:, None]
+    every = (turns * np.stack([way, way.conj()])[:, None]).reshape(-1)
+    return np.stack([every.real, every.imag], axis=1)
+
+
+def mixed_speed(displacements: Floats, directions: Floats) -> Floats:
+    """Fastest way per stroke [m] straight along directions [rad] by gaits swum in turns: their convex hull's edge."""
+    normals = ConvexHull(displacements).equations  # n.x + b <= 0
+    along = np.stack([np.cos(directions), np.sin(directions)], axis=1)
+    return np.asarray(1.0 / (along @ (normals[:, :2] / -normals[:, 2:]).T).max(axis=1))
+
+
+# --- beam searches ---------------------------------------------------------------------------------------------------
+
+
+def search_line(scene: Scene, direction: float, actions: Actions, beam: int) -> tuple[float, Gaits]:
+    """Speed [m per stroke] of the best found swim from rest along a direction [rad], and its actions."""
+    along, aside = np.array([[np.cos(direction), np.sin(direction)], [-np.sin(direction), np.cos(direction)]])
+    swim_all = Branching(scene, command_table(actions, scene.robot.n_limbs))
+    states, actions_so_far = _at_rest(scene), np.zeros((1, 0), np.intp)
+    way = [0.0]
+    for _ in range(LINE_STROKES):
+        states = swim_all(states)
+        hub = states.positions[:, 0]
+        best = np.argsort(np.abs(hub @ aside) - hub @ along)[:beam]  # who is off the line has that far to come back
+        states, actions_so_far = _keep(states, actions_so_far, best, len(swim_all.commands))
+        way.append(float(hub[best[0]] @ along))
+    return (way[-1] - way[LINE_FROM]) / (LINE_STROKES - LINE_FROM), actions_so_far[0]
+
+
+def search_path(scene: Scene, waypoints: Floats, actions: Actions, beam: int, max_strokes: int = 400) -> Gaits:
+    """Actions of the shortest found swim from rest through all waypoints [m]; empty if none ends in time."""
+    swim_all = Branching(scene, command_table(actions, scene.robot.n_limbs))
+    states, actions_so_far, reached = _at_rest(scene), np.zeros((1, 0), np.intp), np.zeros(1, np.intp)
+    legs = np.linalg.norm(np.diff(waypoints, axis=0), axis=1)
+    way_after = np.append(np.cumsum(legs[::-1])[::-1], 0.0)
+    last = len(waypoints) - 1
+    for _ in range(max_strokes):
+        states, reached = swim_all(states), np.repeat(reached, len(swim_all.commands))
+        hub = states.positions[:, 0]
+        reached = reached + (np.linalg.norm(waypoints[np.minimum(reached, last)] - hub, axis=1) <= WAYPOINT_RADIUS)
+        current, after = np.minimum(reached, last), np.minimum(reached + 1, last)
+        way = remaining_way(hub, waypoints[current], waypoints[after], WAYPOINT_RADIUS) + way_after[after]
+        best = np.argsort(way)[:beam]
+        states, actions_so_far = _keep(states, actions_so_far, best, len(swim_all.commands))
+        reached = reached[best]
+        if (reached > last).any():
+            return actions_so_far[np.argmax(reached > last)]
+    return np.zeros(0, np.intp)
+
+
+def _at_rest(scene: Scene) -> State:
+    return Simulator(scene).get_state()
+
+
+def _keep(states: State, so_far: Gaits, chosen: NDArray[np.intp], n_actions: int) -> tuple[State, Gaits]:
+    longer = np.concatenate([so_far[chosen // n_actions], (chosen % n_actions)[:, None]], axis=1)
+    return states.of_robots(chosen), longer
+
+
+# --- the study -------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Options:
+    """The best gaits, the best speed in every direction and the fastest pentagon that searches find offline."""
+
+    fidelity: Fidelity = "fast"
+    """How exactly the swims are computed."""
+    line_beam: int = 12
+    """States kept by the searches along lines, over all commands."""
+    pentagon_beam: int = 300
+    """States kept by the search round the pentagon, over pairs of limbs."""
+    only_pentagon: bool = False
+    """Search the pentagon alone, print how many strokes it takes, and write nothing."""
+    agents: tuple[str, ...] = ("learned",)
+    """Whose speeds to measure beside."""
+    out: Path = Path("docs/bound.json")
+    """File of the results; the picture has its name."""
+
+
+def study_gaits(scene: Scene) -> tuple[list[dict[str, Any]], Floats]:
+    """The fastest gaits of every period, and the displacements of all that swim straight."""
+    kinds: tuple[tuple[int, Actions], ...] = ((1, "joint"), (2, "joint"), (3, "pairs"), (4, "pairs"))
+    fastest, straight = [], []
+    for period, actions in kinds:
+        gaits = distinct_gaits(period, actions)
+        done = measure(scene, gaits, actions)
+        keeps = np.abs(done.turn) < STRAIGHT
+        straight.append(all_directions(done.hub[keeps]))
+        speed = np.where(keeps, np.linalg.norm(done.hub, axis=1), 0.0)
+        fastest += [
+            {
+                "period": period,
+                "gait": [name(command) for command in command_table(actions, scene.robot.n_limbs)[gaits[k]]],
+                "mm_per_stroke": MM * float(speed[k]),
+                "direction_deg": float(np.degrees(np.arctan2(done.hub[k, 1], done.hub[k, 0]))),
+                "searched": len(gaits),
+            }
+            for k in np.argsort(-speed)[:5]
+        ]
+    return fastest, np.concatenate(straight)
+
+
+def name(command: Floats) -> str:
+    """{2+,5-} and the like."""
+    limbs = [f"{limb}{'+' if share > 0 else '-'}" for limb, share in enumerate(command, start=1) if share]
+    return "{" + ",".join(limbs) + "}"
+
+
+def agent_speeds(agent: str, policy: Policy, scene: Scene, directions: Floats) -> Floats:
+    """What an agent comes nearer per stroke [m] to a waypoint LINE_LENGTH away, from rest until it is there."""
+    speeds = []
+    for direction in directions:
+        waypoint = LINE_LENGTH * np.array([np.cos(direction), np.sin(direction)])
+        done = swim_many(agent, policy, waypoint[None], 1, scene)[0]
+        speeds.append((LINE_LENGTH - np.linalg.norm(waypoint - done.hub[-1])) / done.strokes)
+    return np.array(speeds)
+
+
+def search_pentagon(options: Options) -> Gaits:
+    """Actions, pairs of limbs, of the shortest swim found round the pentagon."""
+    waypoints = make_path("pentagon", np.random.default_rng(0))
+    return search_path(make_scene(None, options.fidelity), waypoints, "pairs", options.pentagon_beam)
+
+
+def study(options: Options) -> dict[str, Any]:
+    """All of it; minutes."""
+    scene = make_scene(None, options.fidelity)
+    fastest, displacements = study_gaits(scene)
+    directions = np.radians(np.arange(0.0, 37.0, 6.0))
+    mixed = mixed_speed(displacements, directions)
+    lines = [search_line(scene, direction, "joint", options.line_beam)[0] for direction in directions]
+    agents = {
+        agent: MM * agent_speeds(agent, policy, scene, directions)
+        for agent, policy in load_agents(options.agents, fidelity=options.fidelity).items()
+    }
+    pentagon = search_pentagon(options)
+    return {
+        "fidelity": options.fidelity,
+        "fastest_gaits": fastest,
+        "directions_deg": np.degrees(directions).tolist(),
+        "mm_per_stroke": {
+            "gaits in turns": (MM * mixed).tolist(),
+            "beam search": (MM * np.array(lines)).tolist(),
+            **{agent: speeds.tolist() for agent, speeds in agents.items()},
+        },
+        "pentagon": {
+            "strokes": len(pentagon),
+            "beam": options.pentagon_beam,
+            "gait": [name(command) for command in command_table("pairs", scene.robot.n_limbs)[pentagon]],
+        },
+    }
+
+
+def draw(results: dict[str, Any], file: Path) -> None:
+    """The best speeds as a polar picture; the measured sector of 36 degrees is turned and mirrored round."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(5.2, 4.8), layout="constrained")
+    axes = figure.add_subplot(projection="polar")
+    sector = np.radians(results["directions_deg"])
+    for (label, speeds), style in zip(results["mm_per_stroke"].items(), itertools.cycle("-x.+"), strict=False):
+        angles = np.concatenate([k * 0.4 * np.pi + sign * sector for k in range(5) for sign in (1, -1)])
+        order = np.argsort(angles % (2.0 * np.pi))
+        closed = np.append(order, order[0])
+        axes.plot(angles[closed], np.tile(speeds, 10)[closed], style, label=label)
+    axes.set(rlim=(0.0, 5.2))
+    axes.set_title("straight-line speed [mm per stroke] by direction from limb 1", fontsize=10)
+    axes.legend(loc="lower left", bbox_to_anchor=(-0.15, -0.1), frameon=False, fontsize=8)
+    figure.savefig(file, dpi=160)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line; returns the exit code."""
+    options = tyro.cli(Options, args=arguments)
+    began = time.perf_counter()
+    if options.only_pentagon:
+        print(f"Pentagon: {len(search_pentagon(options))} strokes, in {time.perf_counter() - began:.0f} s.")
+        return 0
+    results = study(options)
+    given = sys.argv[1:] if arguments is None else arguments
+    results |= {"command": shlex.join(["python", "-m", "studies.learning.bound", *given])}
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    options.out.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+    draw(results, options.out.with_suffix(".png"))
+    print(json.dumps({key: value for key, value in results.items() if key != "pentagon"}, indent=1))
+    print(f"Pentagon: {results['pentagon']['strokes']} strokes. All in {time.perf_counter() - began:.0f} s.")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Scenes beyond the chapter's: gallery, damping, the thermal actuator."""

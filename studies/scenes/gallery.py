@@ -1,0 +1,200 @@
+"""What a scene may hold, one picture and one price each: `python -m studies.scenes.gallery`.
+
+Writes `gallery.md` and a picture per scene. A picture shows the robot at rest (grey), at the end of heating (blue) and
+its hub's path. A price is the processor time of a stroke of random commands over that of the default scene, median of
+strokes in turn, so that whatever else the machine does is in both.
+"""
+
+import argparse
+import os
+import platform
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.scene import Contact, Numerics, Scene, Seastar
+from seastar_gym.scene.actuators.limited import Limited
+from seastar_gym.scene.actuators.measured import MeasuredCurve
+from seastar_gym.scene.actuators.pulse import SmaPulse
+from seastar_gym.scene.actuators.thermal import ThermalSma
+from seastar_gym.scene.limb import Limb
+from seastar_gym.simulator import Simulator
+
+Floats = NDArray[np.float64]
+
+NUMERICS = Numerics.preset("balanced")
+ROBOTS, ROUNDS, STROKES = 64, 9, 5
+REST, HEATED, PATH = "#c8c8c8", "#2b6cb0", "#c53030"
+
+
+@dataclass(frozen=True)
+class Exhibit:
+    """A scene of the gallery. code: What a user would write. commands: Of the strokes in the picture."""
+
+    name: str
+    code: str
+    scene: Scene
+    command: tuple[float, ...]
+
+
+def exhibits() -> list[Exhibit]:
+    """All scenes, the default first."""
+    curve = MeasuredCurve((0.0, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0), (0.0, 0.35, 0.6, 0.5, 0.25, 0.08, 0.0))
+    tapered = (Limb(radius=(2e-3, 1e-3)),) * 5
+    curved = (Limb(natural_curvature=10.0),) * 5
+    lengths = zip((0.0, 1.0, 2.2, 4.1, 5.3), (0.12, 0.08, 0.06, 0.06, 0.08), strict=True)
+    uneven = tuple(Limb(direction=angle, length=length) for angle, length in lengths)
+    straight = (0.0, 1.0, 0.0, 0.0, -1.0)
+
+    def five(**pieces: object) -> Scene:
+        return Scene(numerics=NUMERICS, **pieces)  # type: ignore[arg-type]
+
+    return [
+        Exhibit("default", "Scene()", five(), straight),
+        Exhibit(
+            "one limb",
+            "Seastar(1), actuator=SmaPulse(0.0), held_nodes=(0,), loads=((9, 0.0, -1e-3),)",
+            five(robot=Seastar(1), actuator=SmaPulse(0.0), held_nodes=(0,), loads=((9, 0.0, -1e-3),)),
+            (0.0,),
+        ),
+        Exhibit(
+            "two limbs",
+            'Seastar(2, hub_hinge="turning")',
+            five(robot=Seastar(2, hub_hinge="turning")),
+            (1.0, -1.0),
+        ),
+        Exhibit(
+            "three limbs",
+            "Seastar(3), actuator=SmaPulse(0.4)",
+            five(robot=Seastar(3), actuator=SmaPulse(0.4)),
+            (0.0, 1.0, -1.0),
+        ),
+        Exhibit("eight limbs", "Seastar(8)", five(robot=Seastar(8)), (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0, 0.0)),
+        Exhibit(
+            "twelve limbs",
+            "Seastar(12), actuator=SmaPulse(0.25)",
+            five(robot=Seastar(12), actuator=SmaPulse(0.25)),
+            (0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, -1.0, 0.0),
+        ),
+        Exhibit("tapered limbs", "Seastar(limbs=(Limb(radius=(2e-3, 1e-3)),) * 5)",
+                five(robot=Seastar(limbs=tapered)), straight),
+        Exhibit("curved limbs", "Seastar(limbs=(Limb(natural_curvature=10.0),) * 5)",
+                five(robot=Seastar(limbs=curved)), straight),
+        Exhibit("uneven limbs", "Seastar(limbs=(Limb(0.0, 0.12), Limb(1.0, 0.08), ..)), actuator=SmaPulse(0.4)",
+                five(robot=Seastar(limbs=uneven), actuator=SmaPulse(0.4)), straight),
+        Exhibit("measured curve", 'actuator=MeasuredCurve.from_csv("curve.csv")', five(actuator=curve), straight),
+        Exhibit("limited rate", "actuator=Limited(SmaPulse(), largest_rate=2.0)",
+                five(actuator=Limited(SmaPulse(), largest_rate=2.0)), straight),
+        Exhibit("thermal", "actuator=ThermalSma()", five(actuator=ThermalSma()), straight),
+        Exhibit("weak limb", "limb_strengths=(1.0, 1.0, 1.0, 1.0, 0.3)",
+                five(limb_strengths=(1.0, 1.0, 1.0, 1.0, 0.3)), straight),
+        Exhibit("contact", "contact=Contact()", five(contact=Contact()), (1.0, -1.0, 0.0, 0.0, 0.0)),
+    ]  # fmt: skip
+
+
+# --- prices ----------------------------------------------------------------------------------------------------------
+
+
+def prices(shown: Sequence[Exhibit], rounds: int = ROUNDS, n_robots: int = ROBOTS) -> tuple[Floats, Floats]:
+    """(processor time of a stroke over that of the first scene, Newton iterations per step), per scene."""
+    simulators = [Simulator(exhibit.scene, n_robots, threads=1) for exhibit in shown]
+    seconds, per_step = np.zeros((rounds, len(shown))), np.zeros((rounds, len(shown)))
+    for k in range(-1, rounds):  # the first round compiles
+        for i, simulator in enumerate(simulators):
+            commands = np.random.default_rng(k + 1).integers(-1, 2, (n_robots, simulator.scene.robot.n_limbs))
+            begin = time.process_time()
+            report = simulator.stroke(commands)
+            if k >= 0:
+                seconds[k, i] = time.process_time() - begin
+                per_step[k, i] = report.newton_iterations.sum() / report.steps.sum()
+    return np.median(seconds / seconds[:, :1], axis=0), per_step.mean(axis=0)
+
+
+# --- pictures --------------------------------------------------------------------------------------------------------
+
+
+def outline(centre: Floats, radius: Floats) -> Floats:
+    """A limb's contour, shape (2 n, 2), from its nodes and its radius there [m]."""
+    tangent = np.gradient(centre, axis=0)
+    normal = tangent[:, ::-1] * [-1.0, 1.0] / np.linalg.norm(tangent, axis=1, keepdims=True)
+    return np.concatenate([centre + radius[:, None] * normal, (centre - radius[:, None] * normal)[::-1]])
+
+
+def draw(exhibit: Exhibit, file: Path, strokes: int = STROKES) -> None:
+    """The robot at rest and at the end of heating, and its hub's path over some strokes."""
+    import matplotlib.pyplot as plt
+
+    simulator, robot = Simulator(exhibit.scene, threads=1), exhibit.scene.robot
+    shapes, hub = [simulator.positions[0]], [np.zeros(2)]
+    for _ in range(strokes):
+        for since in simulator.stroke_in_parts([exhibit.command], 20):
+            hub.append(simulator.hub_position()[0])
+            if len(shapes) == 1 and since >= exhibit.scene.actuator.corners[1] - 1e-9:
+                shapes.append(simulator.positions[0])
+    figure, axes = plt.subplots(figsize=(2.6, 2.6))
+    share = np.linspace(0.0, 1.0, robot.nodes_per_limb)
+    for nodes, colour in zip(shapes, (REST, HEATED), strict=True):
+        limbs = nodes[1:].reshape(robot.n_limbs, -1, 2)
+        for limb, shape in zip(limbs, robot.limb_shapes(), strict=True):
+            radius = np.interp(share, np.linspace(0.0, 1.0, len(shape.radius)), shape.radius)
+            axes.fill(*1e3 * outline(np.concatenate([nodes[:1], limb]), radius).T, color=colour, linewidth=0.5)
+    axes.plot(*1e3 * np.array(hub).T, color=PATH, linewidth=1.2)
+    axes.set_aspect("equal")
+    axes.set_xlim(-128, 128)
+    axes.set_ylim(-128, 128)
+    axes.axis("off")
+    figure.savefig(file, dpi=80, bbox_inches="tight", pad_inches=0.02)
+    plt.close(figure)
+
+
+# --- the page --------------------------------------------------------------------------------------------------------
+
+
+def page(shown: Sequence[Exhibit], costs: Floats, per_step: Floats, machine: str) -> str:
+    """The gallery in Markdown."""
+    lines = [
+        "# Gallery",
+        "",
+        "What a scene may hold besides the defaults. Grey: at rest; blue: at the end of the first heating; red: the",
+        f"hub's path over {STROKES} strokes. Pictures are 256 mm wide. Cost: processor time of a stroke of random",
+        "commands over that of the default scene in the same run, good to a few per cent (`python -m",
+        f"studies.scenes.gallery`; {machine}; {ROBOTS} robots, one thread, fidelity `balanced`). Limbs that open",
+        "nearly to pi and thin tips take more Newton iterations, and some of them a repaired matrix.",
+        "",
+        "| | scene | cost | Newton iterations per step |",
+        "|---|---|---:|---:|",
+    ]
+    for exhibit, cost, iterations in zip(shown, costs, per_step, strict=True):
+        picture = f"![{exhibit.name}](gallery/{_file_name(exhibit)})"
+        lines.append(f"| {picture} | **{exhibit.name}**<br>`{exhibit.code}` | {cost:.2f} | {iterations:.2f} |")
+    return "\n".join(lines) + "\n"
+
+
+def _file_name(exhibit: Exhibit) -> str:
+    return exhibit.name.replace(" ", "_") + ".png"
+
+
+def make_gallery(out: Path, machine: str, rounds: int = ROUNDS, n_robots: int = ROBOTS, strokes: int = STROKES) -> None:
+    """Write the page and its pictures into a folder."""
+    (out / "gallery").mkdir(parents=True, exist_ok=True)
+    shown = exhibits()
+    for exhibit in shown:
+        draw(exhibit, out / "gallery" / _file_name(exhibit), strokes)
+    (out / "gallery.md").write_text(page(shown, *prices(shown, rounds, n_robots), machine), encoding="utf-8")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, default=Path("docs"))
+    parser.add_argument("--machine", default=f"{os.cpu_count()} cores, {platform.machine()}", help="to be named")
+    options = parser.parse_args()
+    make_gallery(options.out, options.machine)
+    print((options.out / "gallery.md").read_text(encoding="utf-8"))
+
+
+if __name__ == "__main__":
+    main()

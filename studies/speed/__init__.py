@@ -1,0 +1,1 @@
+"""Speed: real-time factors, shares of time, operation counts, costs of terms."""

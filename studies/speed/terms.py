@@ -1,0 +1,149 @@
+"""What each term of a scene costs: `python -m studies.speed.terms`.
+
+Scenes that differ from the chapter's in one term swim straight in turn (with contact also with limbs that touch), in
+one run, and each is compared with the chapter's scene in the same round, so that what else the machine does falls on
+both. Prints a table, and writes `terms.csv`.
+"""
+
+import argparse
+import csv
+import time
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from seastar_gym.scene import Contact, Scene, Seastar, relaxation_time
+from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
+from seastar_gym.scene.fluid import Water
+from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simulator import Simulator
+
+STRAIGHT = np.array([0.0, 1.0, 0.0, 0.0, -1.0])
+PRESSING = np.array([1.0, -1.0, 0.0, 0.0, 0.0])
+"""Two neighbours against each other."""
+GROUPS = 8
+"""Lane groups of the batch; all robots do the same, so none waits for another."""
+SILICONE = relaxation_time(0.1, 10.0)
+"""Relaxation time [s] of a soft silicone, loss factor 0.1 at 10 Hz."""
+THE_CHAPTERS = "the chapter's scene"
+
+
+def swirl(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A cellular current [m/s]."""
+    return 0.02 * np.sin(10.0 * x) * np.cos(10.0 * y), -0.02 * np.cos(10.0 * x) * np.sin(10.0 * y)
+
+
+def scenes() -> dict[str, Scene]:
+    """The chapter's scene, and with one term more each."""
+    n_robots = GROUPS * N_LANES
+    damped = Seastar(relaxation_time=SILICONE)
+    everything = Water(
+        tangential_drag_coefficient=0.02, added_mass_coefficient=1.0, current=GridCurrent.from_function(
+            swirl, (-1.0, 1.0), (-1.0, 1.0), 0.02
+        ),
+    )  # fmt: skip
+    fluids = {
+        "no fluid": None,
+        "drag along limbs": Water(tangential_drag_coefficient=0.02),
+        "uniform current": Water(current=UniformCurrent(0.01, 0.0)),
+        "shear": Water(current=ShearCurrent(0.1)),
+        "vortex": Water(current=Vortex(0.01, 0.2, 0.2)),
+        "current on a grid": Water(current=everything.current),
+        "added mass": Water(added_mass_coefficient=1.0),
+    }
+    return {
+        THE_CHAPTERS: Scene(),
+        **{name: Scene(fluid=fluid) for name, fluid in fluids.items()},
+        "material damping": Scene(damped),
+        "contact, limbs apart": Scene(contact=Contact()),
+        "numbers of each robot": Scene(Seastar(youngs_modulus=np.full(n_robots, 1e6))),
+        "all of these": Scene(replace(damped, youngs_modulus=np.full(n_robots, 1e6)), everything),
+    }
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a scene costs beside the chapter's.
+
+    iterations: Newton iterations per time step. seconds: Per robot and iteration.
+    per_iteration, per_stroke: Medians over the rounds of the time over that of the chapter's scene. quartiles: Of the
+        first.
+    """
+
+    name: str
+    iterations: float
+    seconds: float
+    per_iteration: float
+    quartiles: tuple[float, float]
+    per_stroke: float
+
+
+def measure(compared: dict[str, Scene], rounds: int, command: np.ndarray = STRAIGHT) -> list[Cost]:
+    """Costs of scenes, the first of which is what the others are compared with."""
+    n_robots = GROUPS * N_LANES
+    commands = np.tile(command, (n_robots, 1))
+    simulators = [Simulator(scene, n_robots, threads=1) for scene in compared.values()]
+    for simulator in simulators:
+        simulator.stroke(commands)
+    seconds, iterations, steps = np.zeros((3, len(simulators), rounds))
+    for k in range(rounds):
+        for i, simulator in enumerate(simulators):
+            start = time.thread_time()
+            report = simulator.stroke(commands)
+            seconds[i, k] = (time.thread_time() - start) / n_robots
+            iterations[i, k], steps[i, k] = report.newton_iterations[0], report.steps[0]
+    per_iteration = seconds / iterations
+    ratios, strokes = per_iteration / per_iteration[0], seconds / seconds[0]
+    costs = []
+    for i, name in enumerate(compared):
+        low, middle, high = np.percentile(ratios[i], [25, 50, 75])
+        costs.append(
+            Cost(
+                name=name,
+                iterations=float(iterations[i].sum() / steps[i].sum()),
+                seconds=float(np.median(per_iteration[i])),
+                per_iteration=float(middle),
+                quartiles=(float(low), float(high)),
+                per_stroke=float(np.median(strokes[i])),
+            )
+        )
+    return costs
+
+
+def as_table(costs: list[Cost]) -> Table:
+    """For people."""
+    table = Table(title="Cost of terms, implicit Euler at 3 ms, one core")
+    for header in ("scene", "iterations per step", "µs per robot and iteration", "time per iteration", "per stroke"):
+        table.add_column(header, justify="left" if header == "scene" else "right")
+    for cost in costs:
+        low, high = cost.quartiles
+        table.add_row(
+            cost.name, f"{cost.iterations:.2f}", f"{1e6 * cost.seconds:.3f}",
+            f"x {cost.per_iteration:.2f} ({low:.2f} to {high:.2f})", f"x {cost.per_stroke:.2f}",
+        )  # fmt: skip
+    return table
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--rounds", type=int, default=40, help="strokes of every scene")
+    parser.add_argument("--out", type=Path, default=Path("runs/terms"), help="folder for terms.csv")
+    arguments = parser.parse_args()
+    costs = measure(scenes(), arguments.rounds)
+    touching = {THE_CHAPTERS: Scene(), "contact, a pair of limbs pressed together": Scene(contact=Contact())}
+    costs += measure(touching, arguments.rounds, PRESSING)[1:]
+    Console().print(as_table(costs))
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    rows = [{**asdict(cost), "low": cost.quartiles[0], "high": cost.quartiles[1]} for cost in costs]
+    names = ["name", "iterations", "seconds", "per_iteration", "low", "high", "per_stroke"]
+    with (arguments.out / "terms.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, names, extrasaction="ignore")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+if __name__ == "__main__":
+    main()

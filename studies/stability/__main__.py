@@ -1,0 +1,3 @@
+from studies.stability.study import main
+
+main()

@@ -1,0 +1,193 @@
+"""Draws the atlas of stability. matplotlib is imported where something is drawn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studies.stability.cases import CHAPTER_TROUBLE, Sweep, format_step, format_value
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from studies.stability.cells import Cell
+
+Floats = NDArray[np.float64]
+
+INK, FAINT_INK, MARK, EMPTY = "#3a404a", "#80868f", "#d62728", "#eceff3"
+NEEDS = ("Newton alone", "repaired matrices or line search", "halved time steps", "failed")
+NEED_COLOURS = ("#c7e0f4", "#5aa2d6", "#1b4f8f", "#d62728")
+NAMES = {
+    "implicit-euler": "Implicit Euler",
+    "implicit-midpoint": "Implicit midpoint rule",
+    "sdirk2": "SDIRK2",
+    "sdirk3": "SDIRK3",
+}
+FRAME: dict[str, Any] = {"fill": False, "edgecolor": INK, "linewidth": 1.4}
+DASHES: dict[str, Any] = {"color": MARK, "linewidth": 1.6, "linestyle": (0, (4, 2))}
+DPI = 120
+
+
+def draw_atlas(
+    cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], scheme: str, folder: Path
+) -> list[Path]:
+    """Writes three pictures, with one map per sweep each: what a cell needed, iterations, error."""
+    name = NAMES[scheme]
+    return [
+        _draw_needs(cells, sweeps, steps, f"{name}: what it took to converge", folder / "stability_needs.png"),
+        _draw_numbers(
+            cells, sweeps, steps, f"{name}: Newton iterations per time step", folder / "stability_iterations.png",
+            lambda cell: cell.iterations, "viridis_r", (1.0, 300.0), "{:g}", "Newton iterations per time step",
+        ),
+        _draw_numbers(
+            cells, sweeps, steps, f"{name}: error of the hub's path against the converged run",
+            folder / "stability_error.png", lambda cell: 100.0 * cell.error, "magma_r", (0.01, 100.0), "{:g} %",
+            "error of the hub's path", "no converged run",
+        ),
+    ]  # fmt: skip
+
+
+def _draw_needs(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], title: str, file: Path) -> Path:
+    from matplotlib.colors import ListedColormap
+    from matplotlib.patches import Patch
+
+    figure, panels, foot = _panels(sweeps, title)
+    for axes, sweep in zip(panels, sweeps, strict=True):
+        grid = _grid(cells, sweep, steps, _need)
+        axes.pcolormesh(grid, cmap=ListedColormap(NEED_COLOURS), vmin=-0.5, vmax=3.5, edgecolors="white", linewidth=0.5)
+        _finish(axes, cells, sweep, steps)
+    patches = [Patch(color=colour, label=need) for colour, need in zip(NEED_COLOURS, NEEDS, strict=True)]
+    _legend(foot, [*patches, _refused_patch()])
+    return _save(figure, file)
+
+
+def _need(cell: Cell) -> float:
+    """Index into NEEDS."""
+    if cell.failed:
+        return 3.0
+    return 2.0 if cell.halvings else float(cell.repairs + cell.backtracks > 0)
+
+
+def _draw_numbers(
+    cells: Sequence[Cell],
+    sweeps: Sequence[Sweep],
+    steps: Sequence[float],
+    title: str,
+    file: Path,
+    number: Callable[[Cell], float],
+    colours: str,
+    limits: tuple[float, float],
+    tick: str,
+    label: str,
+    missing: str = "",
+) -> Path:
+    """Maps of a positive number on a logarithmic scale; missing: What an empty cell means that was not refused."""
+    from matplotlib.colors import LogNorm
+    from matplotlib.patches import Patch
+
+    figure, panels, foot = _panels(sweeps, title)
+    for axes, sweep in zip(panels, sweeps, strict=True):
+        grid = np.clip(_grid(cells, sweep, steps, number), *limits)
+        image = axes.pcolormesh(grid, cmap=colours, norm=LogNorm(*limits), edgecolors="white", linewidth=0.5)
+        _finish(axes, cells, sweep, steps)
+    bar = figure.colorbar(image, cax=foot.inset_axes((0.0, 0.55, 0.5, 0.3)), orientation="horizontal", extend="both")
+    ticks = [10.0**k for k in range(round(math.log10(limits[0])), math.floor(math.log10(limits[1])) + 1)]
+    bar.set_ticks(ticks, labels=[tick.format(value) for value in ticks])
+    bar.set_label(label, color=INK)
+    bar.ax.minorticks_off()
+    patches = [Patch(facecolor=EMPTY, label=missing)] if missing else []
+    _legend(foot, [*patches, _refused_patch()], 0.56)
+    return _save(figure, file)
+
+
+# --- parts of a picture ----------------------------------------------------------------------------------------------
+
+
+def _panels(sweeps: Sequence[Sweep], title: str) -> tuple[Figure, list[Axes], Axes]:
+    """A figure, one pair of axes per sweep, and a strip below for legends."""
+    from matplotlib.figure import Figure
+
+    columns = min(4, len(sweeps))
+    rows = math.ceil(len(sweeps) / columns)
+    figure = Figure(figsize=(3.1 * columns + 0.3, 2.75 * rows + 1.2), layout="constrained")
+    figure.suptitle(title, x=0.01, ha="left", color=INK, fontsize=13)
+    note = "Strokes with steps below 1 ms are cut short after 2000 steps."
+    figure.text(0.99, 0.975, note, ha="right", fontsize=8.5, color=FAINT_INK)
+    grid = figure.add_gridspec(rows + 1, columns, height_ratios=[*[1.0] * rows, 0.16])
+    panels = [figure.add_subplot(grid[k // columns, k % columns]) for k in range(len(sweeps))]
+    for axes in panels[-columns:]:
+        axes.set_xlabel("time step h", fontsize=8.5, color=INK)
+    foot = figure.add_subplot(grid[rows, :])
+    foot.axis("off")
+    return figure, panels, foot
+
+
+def _grid(
+    cells: Sequence[Cell], sweep: Sweep, steps: Sequence[float], number: Callable[[Cell], float]
+) -> np.ma.MaskedArray[Any, Any]:
+    """A number of every cell of a sweep, shape (values, steps); masked where there is none."""
+    found = {(cell.value, cell.step): number(cell) for cell in cells if cell.sweep == sweep.name and not cell.refused}
+    return np.ma.masked_invalid([[found.get((value, step), math.nan) for step in steps] for value in sweep.values])
+
+
+def _finish(axes: Axes, cells: Sequence[Cell], sweep: Sweep, steps: Sequence[float]) -> None:
+    """Ticks, titles, the chapter's marks, and hatching over refused cells."""
+    from matplotlib.patches import Rectangle
+
+    axes.set_facecolor(EMPTY)
+    for cell in cells:
+        if cell.sweep == sweep.name and cell.refused:
+            corner = (steps.index(cell.step), sweep.values.index(cell.value))
+            axes.add_patch(Rectangle(corner, 1, 1, facecolor="white", edgecolor=FAINT_INK, hatch="////", linewidth=0.0))
+    axes.set_xticks(np.arange(len(steps)) + 0.5, [format_step(step) for step in steps], rotation=90)
+    axes.set_yticks(np.arange(len(sweep.values)) + 0.5, [format_value(sweep, value) for value in sweep.values])
+    axes.tick_params(length=0, labelsize=8, labelcolor=INK)
+    axes.set_title(f"{sweep.label} [{sweep.unit}]" if sweep.unit else sweep.label, fontsize=10, color=INK, loc="left")
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+    if sweep.chapter in sweep.values:
+        row = sweep.values.index(sweep.chapter)
+        axes.add_patch(Rectangle((0, row), len(steps), 1, clip_on=False, path_effects=_halo(), **FRAME))
+        axes.get_yticklabels()[row].set_fontweight("bold")
+    if CHAPTER_TROUBLE in steps:
+        column = steps.index(CHAPTER_TROUBLE)
+        axes.axvline(column, path_effects=_halo(), **DASHES)
+        axes.get_xticklabels()[column].set_color(MARK)
+
+
+def _halo() -> list[Any]:
+    """A white seam around lines, so that they show on any colour."""
+    from matplotlib.patheffects import withStroke
+
+    return [withStroke(linewidth=3.2, foreground="white")]
+
+
+def _refused_patch() -> Any:
+    from matplotlib.patches import Patch
+
+    return Patch(facecolor="white", edgecolor=FAINT_INK, hatch="////", label="refused when built")
+
+
+def _legend(foot: Axes, patches: list[Any], left: float = 0.0) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    marks = [
+        Patch(label="the chapter's value", **FRAME),
+        Line2D([], [], label="the chapter's trouble begins: 20 ms", **DASHES),
+    ]
+    foot.legend(
+        handles=[*patches, *marks], loc="upper left", bbox_to_anchor=(left, 1.0), ncols=4 if left == 0.0 else 2,
+        frameon=False, fontsize=9, labelcolor=INK, borderaxespad=0.0,
+    )  # fmt: skip
+
+
+def _save(figure: Figure, file: Path) -> Path:
+    figure.savefig(file, dpi=DPI)
+    return file

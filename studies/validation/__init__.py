@@ -1,0 +1,1 @@
+"""Comparison with beam theory, exact solutions and published codes."""

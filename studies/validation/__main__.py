@@ -1,0 +1,3 @@
+from studies.validation.study import main
+
+main()

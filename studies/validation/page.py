@@ -1,0 +1,79 @@
+"""What a comparison with something known is, and the page and the tables that show it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from rich.table import Table
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the page. allowed: The largest |ours - reference| that the tests accept, in the row's unit."""
+
+    quantity: str
+    reference: float
+    ours: float
+    unit: str
+    allowed: float
+    digits: int = 6
+
+    @property
+    def difference(self) -> float:
+        """ours - reference, in the row's unit."""
+        return self.ours - self.reference
+
+    @property
+    def holds(self) -> bool:
+        """Whether the difference is allowed."""
+        return abs(self.difference) <= self.allowed
+
+
+@dataclass(frozen=True)
+class Section:
+    """Rows with one kind of reference. method: What was computed and how, for the reader."""
+
+    title: str
+    method: str
+    rows: list[Row]
+
+
+def order_row(of: str, edge_lengths: ArrayLike, errors: ArrayLike, allowed: float) -> Row:
+    """The slope of log error over log edge length, beside the order 2 of the discrete rods."""
+    order = np.polyfit(np.log(np.asarray(edge_lengths)), np.log(np.abs(np.asarray(errors))), 1)[0]
+    return Row(f"order in l, {of}", 2.0, float(order), "", allowed, digits=3)
+
+
+def as_cells(row: Row) -> tuple[str, str, str, str]:
+    """Quantity with unit, reference, ours, and the difference: absolute, and relative to the reference."""
+    unit = f" [{row.unit}]" if row.unit else ""
+    relative = f" ({row.difference / row.reference:+.1e})" if row.unit else ""
+    reference, ours = (f"{value:#.{row.digits}g}" for value in (row.reference, row.ours))
+    return row.quantity + unit, reference, ours, f"{row.difference:+.1e}{relative}"
+
+
+def as_page(sections: Sequence[Section]) -> str:
+    """The page of results in Markdown."""
+    lines = [
+        "# Validation against what is known",
+        "",
+        "Written by `python -m studies.validation`; `tests/test_validation.py` holds each line to a bound.",
+        "Robot and fluid are the chapter's unless a section says otherwise; l is the length of an edge. The difference",
+        "is ours minus the reference, and in brackets relative to the reference.",
+    ]
+    for section in sections:
+        lines += ["", f"## {section.title}", "", section.method, ""]
+        lines += ["| quantity | reference | ours | difference |", "|---|---:|---:|---:|"]
+        lines += [f"| {' | '.join(as_cells(row))} |" for row in section.rows]
+    return "\n".join(lines) + "\n"
+
+
+def as_table(section: Section) -> Table:
+    """For the terminal; a line outside its bound is red."""
+    table = Table("quantity", title=section.title, title_justify="left")
+    for column in ("reference", "ours", "difference"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for row in section.rows:
+        table.add_row(*as_cells(row), style="" if row.holds else "red")
+    return table
