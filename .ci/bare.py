@@ -9,7 +9,7 @@ from importlib.util import find_spec
 import gymnasium as gym
 import numpy as np
 
-for absent in ("agents", "train", "torch", "stable_baselines3", "matplotlib", "pygame"):
+for absent in ("agents", "studies", "train", "torch", "stable_baselines3", "matplotlib", "pygame"):
     assert find_spec(absent) is None, f"a bare environment holds {absent}"
 
 files = distribution("seastar-gym").files or []

@@ -42,8 +42,8 @@ class Hyperparameters:
     """What PPO learns with, and why.
 
     Numbers: mean strokes on held-out random paths after 98,304 strokes of training (`python -m
-    studies.learning.ablations`), which come to 161 with these values, but for the commands: they are from trainings over all 243. Means of three seeds,
-    which differ by up to 2, so smaller differences say nothing.
+    studies.learning.ablations`), 161 with these values; all trainings there choose among all 243 commands. They are
+    means of three seeds that differ by up to 2 strokes, so smaller differences say nothing.
     """
 
     actions: Actions = "pairs"
