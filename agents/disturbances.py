@@ -9,11 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.greedy import headings, turned
+from agents.greedy import turned
 from seastar_gym.envs.observation import VELOCITY_SCALE
 from seastar_gym.envs.task import SwimTask
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.per_robot import column
+from seastar_gym.simulator.body_frame import best_fit_heading
 
 Floats = NDArray[np.float64]
 
@@ -77,7 +78,7 @@ class DisturbedTask:
         """What the robots see of themselves and of their waypoints."""
         seen, scene = self.task.observe(), self.task.simulator.scene
         if self.disturbance.current > 0.0:
-            axes = headings(self.task.simulator.positions, scene.robot.nodes())
+            axes = best_fit_heading(self.task.simulator.positions, scene.robot.nodes())
             seen[:, -6:-4] += turned(self._current, -axes) / VELOCITY_SCALE
         if self.disturbance.noise > 0.0:
             error = self._rng.normal(0.0, self.disturbance.noise, (len(seen), scene.robot.n_nodes, 2))

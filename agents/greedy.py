@@ -20,6 +20,7 @@ from seastar_gym.envs.observation import OBSERVATION_LAYOUT
 from seastar_gym.envs.paths import AIM, shortest_way
 from seastar_gym.scene import Scene
 from seastar_gym.simulator import Simulator
+from seastar_gym.simulator.body_frame import best_fit_heading
 
 Floats = NDArray[np.float64]
 
@@ -32,12 +33,6 @@ class Displacements(NamedTuple):
 
     hub: Floats
     turn: Floats
-
-
-def headings(positions: Floats, rest: Floats) -> Floats:
-    """Turn [rad] of the rest shape that fits best to the nodes; positions: [m], shape (n, n_nodes, 2)."""
-    x, y = np.moveaxis(positions - positions[:, :1], -1, 0)
-    return np.asarray(np.arctan2(y @ rest[:, 0] - x @ rest[:, 1], x @ rest[:, 0] + y @ rest[:, 1]))
 
 
 def turned(vectors: Floats, angles: Floats) -> Floats:
@@ -55,9 +50,9 @@ def measure_gaits(scene: Scene, commands: Floats, settling: int, measured: int) 
     simulator, rest = Simulator(scene, len(commands)), scene.robot.nodes()
     for stroke in range(settling + measured):
         if stroke == settling:
-            hub, heading = simulator.hub_position(), headings(simulator.positions, rest)
+            hub, heading = simulator.hub_position(), best_fit_heading(simulator.positions, rest)
         simulator.stroke(commands[:, stroke % commands.shape[1]])
-    turn = headings(simulator.positions, rest) - heading
+    turn = best_fit_heading(simulator.positions, rest) - heading
     turn -= 2.0 * np.pi * np.rint(turn / (2.0 * np.pi))
     return Displacements(turned(simulator.hub_position() - hub, -heading) / measured, turn / measured)
 

@@ -13,48 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, command_table
+from seastar_gym.gaits import pair_gait, pentagon_gait, straight_gait
 
 Floats = NDArray[np.float64]
 PolicyState = tuple[NDArray[np.int64], ...] | None
 
-SWIMMING_STROKES, RESTING_STROKES = 45, 5
-"""Strokes of a side of the pentagon: of swimming, then of rest "to bring the robot to a complete stop"."""
 SCRIPTED_NAMES = ("pentagon", "straight", "rest", "random")
 
 _PAIR = re.compile(r"\{?(\d+)([+-]),(\d+)([+-])\}?")
-
-
-# --- gaits: commands per stroke, shape (n_strokes, n_limbs) ----------------------------------------------------------
-
-
-def pair_gait(plus: int, minus: int, n_limbs: int = 5) -> Floats:
-    """One stroke of the pair {plus+, minus-}: two limbs, numbered from 1, turned against each other (Fig. 13.8)."""
-    if plus == minus or not {plus, minus} <= set(range(1, n_limbs + 1)):
-        raise ValueError(f"A pair needs two different limbs from 1 to {n_limbs}, not {plus} and {minus}.")
-    command = np.zeros((1, n_limbs))
-    command[0, [plus - 1, minus - 1]] = 1.0, -1.0
-    return command
-
-
-def straight_gait(n_limbs: int = 5) -> Floats:
-    """One stroke of {2+, 5-}, the neighbours of limb 1: the robot moves along +x."""
-    return pair_gait(2, n_limbs, n_limbs)
-
-
-def pentagon_gait() -> Floats:
-    """The 250 strokes of (13.15): {2,5}; {1,3}; {2,4}; {3,5}; {1,4}, with a rest after each.
-
-    The chapter leaves the signs open. The straight gait fixes the first pair, {2+, 5-}; every further side is turned by
-    72 degrees, which moves both limbs on by one: {3+, 1-}, {4+, 2-}, {5+, 3-}, {1+, 4-}.
-    """
-    sides = []
-    for side in range(5):
-        command = np.roll(straight_gait(), side, axis=1)
-        sides += [np.repeat(command, SWIMMING_STROKES, axis=0), np.zeros((RESTING_STROKES, 5))]
-    return np.concatenate(sides)
-
-
-# --- policies --------------------------------------------------------------------------------------------------------
 
 
 def to_actions(commands: ArrayLike, actions: Actions, n_limbs: int) -> NDArray[np.int64]:

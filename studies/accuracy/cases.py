@@ -7,21 +7,15 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.envs.paths import path_length
+from seastar_gym.gaits import PAIRS, STRAIGHT, pentagon_gait
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.simulator import Simulator, SolverStatus
+from seastar_gym.simulator.body_frame import best_fit_heading
 
 Floats = NDArray[np.float64]
 Kind = Literal["straight", "pair", "pentagon", "random", "gait"]
 
-STRAIGHT = np.array([0.0, 1.0, 0.0, 0.0, -1.0])
-"""{2+, 5-}, the straight swim along limb 1."""
-PAIRS = {
-    "{1-,2+}": np.array([-1.0, 1.0, 0.0, 0.0, 0.0]),
-    "{1-,3+}": np.array([-1.0, 0.0, 1.0, 0.0, 0.0]),
-    "{1-,4+}": np.array([-1.0, 0.0, 0.0, 1.0, 0.0]),
-    "{1-,5+}": np.array([-1.0, 0.0, 0.0, 0.0, 1.0]),
-}
-"""The pairs of Fig. 13.8."""
 STROKES = 10
 
 
@@ -111,10 +105,7 @@ def symmetric_form(command: Floats) -> tuple[int, ...]:
 
 def pentagon(swimming: int, resting: int) -> Cases:
     """The sides of (13.15), with so many strokes of swimming and of rest each."""
-    sides = [
-        [np.roll(STRAIGHT, side)] * swimming + [np.zeros(5)] * resting for side in range(5)
-    ]  # {2+,5-}; {3+,1-}; {4+,2-}; ...
-    return Cases(("pentagon",), ("pentagon",), np.array(sides).reshape(-1, 1, 5))
+    return Cases(("pentagon",), ("pentagon",), pentagon_gait(swimming, resting)[:, None])
 
 
 def joined(*cases: Cases) -> Cases:
@@ -145,7 +136,7 @@ def swim(
     for commands in cases.commands:
         reports.append(simulator.stroke(commands))
         hub.append(simulator.hub_position())
-        heading.append(headings(simulator))
+        heading.append(best_fit_heading(simulator.positions, simulator.scene.robot.nodes()))
     return Swim(
         np.array(hub),
         np.array(heading),
@@ -157,19 +148,12 @@ def swim(
     )
 
 
-def headings(simulator: Simulator) -> Floats:
-    """Direction of the body's x axis [rad]: the rotation that fits the rest shape best to the nodes around the hub."""
-    rest, nodes = simulator.scene.robot.nodes(), simulator.positions
-    x, y = np.moveaxis(nodes - nodes[:, :1], -1, 0)
-    return np.arctan2(y @ rest[:, 0] - x @ rest[:, 1], x @ rest[:, 0] + y @ rest[:, 1])
-
-
 # --- errors ----------------------------------------------------------------------------------------------------------
 
 
-def path_lengths(hub: Floats) -> Floats:
+def hub_path_lengths(hub: Floats) -> Floats:
     """Lengths of the hubs' paths from the origin, stroke end to stroke end [m], shape (n_robots,)."""
-    return np.asarray(np.linalg.norm(np.diff(hub, axis=0, prepend=0.0), axis=-1).sum(axis=0))
+    return path_length(np.zeros(2), np.moveaxis(hub, 0, 1))
 
 
 def errors(swum: Swim, converged: Swim) -> Errors:
@@ -178,5 +162,5 @@ def errors(swum: Swim, converged: Swim) -> Errors:
         return Errors(*np.full((3, swum.hub.shape[1]), np.inf))
     distance = np.linalg.norm(swum.hub - converged.hub, axis=-1)
     turn = np.angle(np.exp(1j * (swum.heading - converged.heading)))
-    length = path_lengths(converged.hub)
+    length = hub_path_lengths(converged.hub)
     return Errors(distance.max(axis=0) / length, np.abs(turn).max(axis=0), distance[-1] / length)

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.gaits import PAIRS
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene import Numerics
 from seastar_gym.simulator import Simulator
-from studies.accuracy.cases import PAIRS, STROKES, scene_of
+from studies.accuracy.cases import STROKES, scene_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -23,18 +23,18 @@ from numpy.typing import NDArray
 from rich.console import Console
 from tqdm import tqdm
 
+from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Numerics, fidelity
 from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.simulator import Simulator
 from studies.accuracy.cases import (
-    STRAIGHT,
     Cases,
     Errors,
     Swim,
     errors,
     gaits,
+    hub_path_lengths,
     joined,
-    path_lengths,
     pentagon,
     random_sequences,
     scene_of,
@@ -240,7 +240,7 @@ def measure_space(cases: Cases, plan: Plan, bar: Any) -> tuple[dict[int, Swim], 
 
     swum = dict(zip(nodes, swim_all([(cases, numerics(n), n) for n in nodes], bar), strict=True))
     limit = extrapolated([swum[n].hub for n in FINE_NODES[: plan.n_fine]])
-    lengths = path_lengths(limit)
+    lengths = hub_path_lengths(limit)
     space = []
     for n in nodes:
         error = np.linalg.norm(swum[n].hub - limit, axis=-1).max(axis=0) / lengths

@@ -17,6 +17,8 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
+from seastar_gym import gaits
+from seastar_gym.gaits import STRAIGHT, pentagon_gait
 from seastar_gym.scene import Numerics, Scene, SmaPulse
 from seastar_gym.simulator import Simulator, SolverStatus
 from studies.chapter import pictures
@@ -26,18 +28,13 @@ Floats = NDArray[np.float64]
 
 CHAPTER = Numerics("implicit-euler", 3e-3)
 CONVERGED, NEARLY_CONVERGED = Numerics("implicit-midpoint", 0.25e-3), Numerics("implicit-midpoint", 1e-3)
-STRAIGHT = np.array([0.0, 1.0, 0.0, 0.0, -1.0])
-"""{2+,5-}."""
 PAIRS = {
-    "{1⁻, 2⁺}": (-1.0, 1.0, 0.0, 0.0, 0.0),
-    "{1⁻, 3⁺}": (-1.0, 0.0, 1.0, 0.0, 0.0),
-    "{1⁻, 4⁺}": (-1.0, 0.0, 0.0, 1.0, 0.0),
-    "{1⁻, 5⁺}": (-1.0, 0.0, 0.0, 0.0, 1.0),
+    name.replace(",", ", ").replace("-", "⁻").replace("+", "⁺"): command for name, command in gaits.PAIRS.items()
 }
+SIDE = gaits.SWIMMING_STROKES + gaits.RESTING_STROKES
+"""Strokes of a side of the pentagon."""
 BISECTORS = (36.0, 72.0, 108.0, 144.0)
 """Of the pairs at rest, on the side they swim to [degrees]."""
-SWIMMING, RESTING = 45, 5
-"""Strokes of a side of the pentagon."""
 STEPS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0, 40.0]) * 1e-3
 QUICK_STEPS = np.array([0.3, 1.0, 3.0, 10.0, 20.0, 40.0]) * 1e-3
 BATCH = 64
@@ -51,12 +48,6 @@ def label(numerics: Numerics) -> str:
     name = {CHAPTER: "the chapter's setting", CONVERGED: "converged"}.get(numerics, "nearly converged")
     scheme = numerics.scheme.replace("-", " ").replace("euler", "Euler")
     return f"{name} ({scheme}, {1e3 * numerics.step:g} ms)"
-
-
-def pentagon_commands() -> Floats:
-    """The 250 strokes of (13.15) for one robot, shape (250, 1, 5): each side turned by one limb, then a rest."""
-    sides = [np.repeat([np.roll(STRAIGHT, k), np.zeros(5)], [SWIMMING, RESTING], axis=0) for k in range(5)]
-    return np.concatenate(sides)[:, None]
 
 
 def swim(numerics: Numerics, commands: ArrayLike, samples_per_stroke: int) -> Swim:
@@ -150,10 +141,10 @@ def straight_statements(swims: Sequence[Swim]) -> list[Statement]:
 
 def pentagon_statements(swims: Sequence[Swim]) -> list[Statement]:
     """About Figs. 13.2 and 13.7."""
-    corners = [s.hub()[s.at_strokes()[:: SWIMMING + RESTING]] for s in swims]
+    corners = [s.hub()[s.at_strokes()[:: SIDE]] for s in swims]
     sides = [np.hypot(*np.diff(c, axis=0).T) for c in corners]
-    stops = [s.at_strokes()[SWIMMING :: SWIMMING + RESTING] for s in swims]
-    rests = [s.at_strokes()[SWIMMING + RESTING :: SWIMMING + RESTING] for s in swims]
+    stops = [s.at_strokes()[gaits.SWIMMING_STROKES :: SIDE] for s in swims]
+    rests = [s.at_strokes()[SIDE :: SIDE] for s in swims]
     coasts = [np.hypot(*(s.hub()[r] - s.hub()[b]).T) for s, r, b in zip(swims, rests, stops, strict=True)]
     rest = "left unactuated for 5 s to bring the robot to a complete stop"
     same = "the same initial conditions for each straight component"
@@ -243,7 +234,7 @@ def make_figures(out: Path, quick: bool = False, progress: bool = True) -> list[
     bar.update()
 
     bar.set_description("pentagon")
-    pentagon = [swim(numerics, pentagon_commands(), 20) for numerics in both]
+    pentagon = [swim(numerics, pentagon_gait()[:, None], 20) for numerics in both]
     pictures.draw_pentagon_snapshots(pentagon[1], pentagon[0], out / "fig_13_2.png")
     bar.update()
     pictures.draw_pentagon(pentagon[1], pentagon[0], out / "fig_13_7a.png")

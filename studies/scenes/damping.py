@@ -24,9 +24,10 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
+from seastar_gym.gaits import PAIRS
 from seastar_gym.scene import Numerics
 from seastar_gym.scene.numerics import SchemeName
-from studies.accuracy.cases import PAIRS, Cases, Swim, errors, joined, random_sequences, swim, swims
+from studies.accuracy.cases import Cases, Swim, errors, joined, random_sequences, swim, swims
 from studies.speed.terms import SILICONE
 
 Floats = NDArray[np.float64]

@@ -15,13 +15,13 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Contact, Scene, Seastar, relaxation_time
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
 from seastar_gym.scene.fluid import Water
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator import Simulator
 
-STRAIGHT = np.array([0.0, 1.0, 0.0, 0.0, -1.0])
 PRESSING = np.array([1.0, -1.0, 0.0, 0.0, 0.0])
 """Two neighbours against each other."""
 GROUPS = 8

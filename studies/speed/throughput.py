@@ -28,6 +28,7 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
+from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.simd.compilation import entry_point
 from seastar_gym.simd.lanes import N_LANES, add_product, borrow, load, store
@@ -37,7 +38,6 @@ from studies.speed.parts import part_seconds
 
 CHAPTER = 1.0
 """The chapter's real-time factor at h = 3 ms: one robot, one thread of an AMD Ryzen 1950X (Fig. 13.9)."""
-STRAIGHT = np.array([0.0, 1.0, 0.0, 0.0, -1.0])
 NODES_PER_LIMB = (5, 10, 20, 40, 80, 160, 320, 640)
 BATCHES = (1, 2, 4, 8, 16, 32, 64, 128, 512, 2048)
 

@@ -14,6 +14,7 @@ from rich.console import Console
 from scipy.optimize import minimize_scalar
 from tqdm import tqdm
 
+from seastar_gym.gaits import straight_gait
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water
 from seastar_gym.simulator import Simulator, SolverStatus, State
@@ -23,7 +24,6 @@ from studies.validation.page import Row, Section, as_page, as_table, order_row
 Floats = NDArray[np.float64]
 
 PUBLISHED_SWIM = Path(__file__).resolve().parents[2] / "tests" / "data" / "straight_turning_hub_10ms.csv"
-STRAIGHT = np.array([[0.0, 1.0, 0.0, 0.0, -1.0]])
 MM = 1e3
 
 
@@ -299,7 +299,7 @@ def straight_swim(step: float, parts: int = 10) -> Floats:
     numerics = Numerics("implicit-euler", step, newton_tolerance=1e-12)
     simulator = Simulator(Scene(Seastar(hub_hinge="turning"), numerics=numerics))
     return np.array(
-        [simulator.hub_position()[0, 0] for _ in range(10) for _ in simulator.stroke_in_parts(STRAIGHT, parts)]
+        [simulator.hub_position()[0, 0] for _ in range(10) for _ in simulator.stroke_in_parts(straight_gait(), parts)]
     )
 
 

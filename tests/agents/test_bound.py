@@ -6,10 +6,11 @@ import json
 import numpy as np
 import pytest
 
-from agents.scripted import pair_gait, to_actions
+from agents.scripted import to_actions
 from seastar_gym import Numerics, Scene
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.symmetry import action_table
+from seastar_gym.gaits import pair_gait
 from studies.learning.bound import (
     all_directions,
     distinct_gaits,

@@ -6,17 +6,10 @@ import pytest
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 
-from agents.scripted import (
-    SCRIPTED_NAMES,
-    OpenLoopPolicy,
-    pair_gait,
-    pentagon_gait,
-    scripted,
-    straight_gait,
-    to_actions,
-)
+from agents.scripted import SCRIPTED_NAMES, OpenLoopPolicy, scripted, to_actions
 from seastar_gym import Numerics, Scene, Simulator
 from seastar_gym.envs.commands import action_space, to_commands
+from seastar_gym.gaits import pair_gait, pentagon_gait, straight_gait
 
 MODES = ["limbs", "joint", "pairs"]
 OBSERVATION = np.zeros(186, np.float32)

@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 
 from seastar_gym import Numerics
+from seastar_gym.gaits import PAIRS, STRAIGHT
 from seastar_gym.scene.fidelity import Promise
 from seastar_gym.simulator import Simulator
 from studies.accuracy import rows as accuracy_rows
 from studies.accuracy import study as accuracy
 from studies.accuracy import tables as accuracy_tables
 from studies.accuracy.cases import (
-    PAIRS,
-    STRAIGHT,
     Cases,
     Swim,
     errors,

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents.scripted import pentagon_gait
 from seastar_gym import Numerics, Scene, Simulator, SmaPulse
+from seastar_gym.gaits import pentagon_gait
 from studies.chapter import pictures as chapter_pictures
 from studies.chapter import study as chapter
 

@@ -5,7 +5,7 @@ import csv
 import numpy as np
 import pytest
 
-from studies.accuracy.cases import PAIRS
+from seastar_gym.gaits import PAIRS
 from studies.scenes import damping
 from studies.scenes.damping import MATERIALS, Plan, Row, Study, as_table, good_enough, of, study
 
