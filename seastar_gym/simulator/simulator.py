@@ -26,6 +26,7 @@ from seastar_gym.scene.numerics import MAX_STEPS
 from seastar_gym.scene.per_robot import column
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import from_rows, to_rows, write_rows
+from seastar_gym.simulator.body_frame import best_fit_heading
 from seastar_gym.simulator.drive import Drive
 from seastar_gym.simulator.report import COUNTS
 from seastar_gym.simulator.report import SolverStatus as SolverStatus
@@ -271,6 +272,10 @@ class Simulator:
     def hub_velocity(self) -> Floats:
         """Velocity of the hub [m/s], world frame, shape (n_robots, 2)."""
         return self._read(self.v[:, :2])
+
+    def heading(self) -> Floats:
+        """Turn of the rest shape that fits the nodes best [rad], shape (n_robots,); robots of one batch share it."""
+        return best_fit_heading(self.positions, self.scene.robot.nodes())
 
     def elastic_energy(self) -> Floats:
         """Stretching and bending energy (13.14) at the present actuation [J], shape (n_robots,)."""

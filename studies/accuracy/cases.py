@@ -11,7 +11,6 @@ from seastar_gym.envs.paths import path_length
 from seastar_gym.gaits import PAIRS, STRAIGHT, pentagon_gait
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.simulator import Simulator, SolverStatus
-from seastar_gym.simulator.body_frame import best_fit_heading
 
 Floats = NDArray[np.float64]
 Kind = Literal["straight", "pair", "pentagon", "random", "gait"]
@@ -136,7 +135,7 @@ def swim(
     for commands in cases.commands:
         reports.append(simulator.stroke(commands))
         hub.append(simulator.hub_position())
-        heading.append(best_fit_heading(simulator.positions, simulator.scene.robot.nodes()))
+        heading.append(simulator.heading())
     return Swim(
         np.array(hub),
         np.array(heading),

@@ -19,9 +19,8 @@ from studies.accuracy.cases import (
     Swim,
     errors,
     gaits,
-    headings,
+    hub_path_lengths,
     joined,
-    path_lengths,
     pentagon,
     random_sequences,
     scene_of,
@@ -95,7 +94,7 @@ def swum(hub, heading=None) -> Swim:
 
 def test_path_error_is_the_largest_distance_over_the_length_of_the_converged_path():
     exact = swum([[[3.0, 4.0]], [[3.0, 9.0]]])
-    assert path_lengths(exact.hub) == pytest.approx([10.0])
+    assert hub_path_lengths(exact.hub) == pytest.approx([10.0])
     off = errors(swum([[[3.0, 4.5]], [[3.0, 9.1]]]), exact)
     assert off.path == pytest.approx([0.05]) and off.end == pytest.approx([0.01])
 
@@ -113,7 +112,7 @@ def test_a_failed_robot_makes_every_error_infinite():
 def test_heading_is_what_a_robot_was_turned_by():
     simulator = Simulator(scene_of(Numerics()), 3)
     simulator.reset(heading=[0.0, 0.4, -2.5])
-    np.testing.assert_allclose(headings(simulator), [0.0, 0.4, -2.5], atol=1e-12)
+    np.testing.assert_allclose(simulator.heading(), [0.0, 0.4, -2.5], atol=1e-12)
 
 
 def test_groups_swim_as_the_whole_batch_does():
