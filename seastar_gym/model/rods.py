@@ -10,6 +10,7 @@ from seastar_gym.der.rods import Limits, Rods
 from seastar_gym.model import fluid
 from seastar_gym.model.contact import contact
 from seastar_gym.model.currents import current_rows
+from seastar_gym.model.forces import constant_forces
 from seastar_gym.model.mesh import Mesh, edges_along, make_mesh, mean, nodes_along
 from seastar_gym.scene.limb import LimbShape, along
 from seastar_gym.scene.numerics import ADAPTATION
@@ -63,9 +64,6 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
     area = mesh.per_node(lambda r: np.pi * r**2)
     mass = density * area * mesh.dl
     mass[list(scene.held_nodes)] *= HELD
-    forces = np.zeros((len(mass), 2))
-    for node, *force in scene.loads:
-        forces[node] += force
 
     fluid_density, C_d = (0.0, 0.0) if water is None else (water.density, water.drag_coefficient)
     C_t, C_a = (None, None) if water is None else (water.tangential_drag_coefficient, water.added_mass_coefficient)
@@ -93,7 +91,7 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         added_mass=None if C_a is None else fluid.added_mass(mesh, fluid_density, C_a),
         relaxation_time=None if robot.relaxation_time is None else np.array([robot.relaxation_time]),
         current=None if current is None else current_rows(current),
-        load=forces.reshape(-1) if scene.loads else None,
+        load=constant_forces(scene, mesh, density, fluid_density),
         contact=None if touch is None else contact(limbs, mesh, scene.robot.limbs_that_may_touch(), touch),
         shortest_edge=np.array([shortest]),
         curvature_rate=np.array([stiffest / (density * shortest**2) * slenderness]),

@@ -31,6 +31,8 @@ class Scene:
     loads: Dead loads on nodes, (node, F_x, F_y) [N] each.
     limb_strengths: Share of its rotation that every limb still makes, from 0 (failed) to 1; () for all of it.
     contact: What limbs do to each other where they touch; None lets them pass through each other, as in the chapter.
+    gravity: Acceleration of free fall in the plane (g_x, g_y) [m/s^2]; limbs feel their weight less the buoyancy of the
+        fluid that they displace. None for none: limbs as dense as the fluid, or a plane that lies level.
     """
 
     robot: Seastar = field(default_factory=Seastar)
@@ -41,6 +43,7 @@ class Scene:
     loads: tuple[tuple[int, float, float], ...] = ()
     limb_strengths: tuple[float, ...] = ()
     contact: Contact | None = None
+    gravity: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         for name, value, kinds in (
@@ -74,6 +77,10 @@ class Scene:
         for load in self.loads:
             if not isinstance(load, tuple) or len(load) != 3 or not all(map(is_finite_number, load[1:])):
                 raise ValueError(f"A load is (node, F_x, F_y) with finite forces [N], not {load!r}.")
+        if self.gravity is not None:
+            require_numbers("gravity", self.gravity, "m/s^2")
+            if len(self.gravity) != 2:
+                raise ValueError(f"gravity must be two numbers (g_x, g_y) [m/s^2], not {self.gravity!r}.")
         for node in (*self.held_nodes, *(load[0] for load in self.loads)):
             require_count("a held or loaded node", node, 0, self.robot.n_nodes - 1)
 
