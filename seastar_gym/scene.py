@@ -39,6 +39,13 @@ MAX_STEPS = 10_000_000
 """Of a stroke: more take minutes even for one robot."""
 
 
+MOST_ITERATIONS, MOST_ITERATIONS_PER_STEP = 200_000, 100
+"""Newton iterations that a robot has for a stroke, and for each of its steps besides: seconds of computing.
+
+Four times what any stroke of the atlas of stability needs; strokes of adapted steps in vacuum may need half of it.
+"""
+
+
 @dataclass(frozen=True)
 class Seastar:
     """A robot of limbs around a hub (Fig. 13.4a): straight, equal, uniform and evenly spread, but for `limbs`.
@@ -175,7 +182,9 @@ class Numerics:
         shortened.
     newton_tolerance: Largest node move of the last Newton update, or of the one that is left out because it can be
         foreseen, over the limb length.
-    max_iterations: Newton iterations per stage before the robot's step is halved.
+    max_iterations: Newton iterations per stage before the robot's step is halved, down to 1/4096. For a whole stroke a
+        robot has 200,000 and 100 for every step besides; if it needs more, it fails with
+        SolverStatus.ITERATION_LIMIT.
     path_tolerance: Adapt the steps, up to `step`, so that the hub's path errs by about this share of its length at
         most, from 0.001 to 0.02; for scheme "implicit-midpoint". None for steps of one length.
     """
@@ -362,9 +371,11 @@ class Scene:
         numerics, length = self.numerics, of_robot(self.robot.limb_length, index)
         speed, tolerance = length / self.actuator.period, numerics.path_tolerance
         error_rate = 0.0 if tolerance is None else speed * (tolerance / ADAPTATION[0]) ** ADAPTATION[1]
+        n_steps = math.ceil(self.actuator.period / numerics.step)
         return Limits(
             tolerance=np.array([numerics.newton_tolerance * length]),
             max_iterations=numerics.max_iterations,
+            most_iterations=MOST_ITERATIONS + MOST_ITERATIONS_PER_STEP * n_steps,
             adaptive=tolerance is not None,
             error_rate=np.array([error_rate]),
         )

@@ -31,11 +31,12 @@ from seastar_gym.der.rods import (
     n_nodes,
 )
 
-MOST_HALVINGS = 12.0  # in an interval: a robot that is stuck once more has failed
+MOST_HALVINGS = 12.0  # a robot that is stuck once more has failed
 TURNABLE = 8.0  # after so many halvings, hinges may go through their poles, see guard.py
-CAUTIOUS = 4.0  # from so many halvings in an interval on, its steps are implicit Euler's
+CAUTIOUS = 4.0  # from so many halvings on, a robot's steps are implicit Euler's
 
-SMALLEST_FRACTION = 2.0**-12  # of an interval: a shorter step is not made for the sake of its error
+SMALLEST_FRACTION = 2.0**-12  # of an interval: there is no shorter step
+SOONEST_GROWTH = 4.0  # steps after trouble before a step is doubled; the next doubling waits twice as long
 FIRST_FRACTION = 2.0**-3  # of an interval: an adapted stroke begins with this step
 GROWTH_MARGIN = 5.0  # a step is doubled when its error rate is this many times below the limit
 
@@ -186,7 +187,9 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, war
         freeze_fluid(rods, work)
         freeze_strains(rods.relaxation_time, rods, work, stage.q_hat)
         set_natural_hub_angles(rods, work, actuation, start + load_number(scheme.c, k) * size)
-        good, phi, iterations, repairs, backtracks = minimise(rods, work, stage, good, tolerance, patience)
+        left = limits.most_iterations - load(report, NEWTON_ITERATIONS)
+        most, good = select(left < patience, left, patience), good & (left > 0.0)
+        good, phi, iterations, repairs, backtracks = minimise(rods, work, stage, good, tolerance, most)
         good = those_uncrossed(rods.contact, rods, work, stage, q, good)
         trouble = trouble | (repairs + backtracks > 0.0)
         if scheme.dissipative:
@@ -254,14 +257,19 @@ def cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, a
     A robot whose step does not converge in `limits.max_iterations`, or creates energy, halves it, alone, as often as it
     takes, and still covers the whole interval. After each halving it has as many more iterations and starts them where
     it stands; after CAUTIOUS halvings it goes on with the scheme `fallback` (implicit Euler); after MOST_HALVINGS it
-    has failed and keeps its last good state. If steps are adapted, a robot also halves a step whose error is too large
-    (not below SMALLEST_FRACTION), doubles it when the error allows, and goes on with it in the next interval. Steps are
-    dyadic fractions of the interval, on the grid of their own size, so their sums are exact.
+    has failed and keeps its last good state. Every doubling takes a halving back: the first after SOONEST_GROWTH steps
+    without trouble, the next after twice as many, so that a robot that cannot do with longer steps rarely tries them.
+
+    If steps are adapted, a robot also halves a step whose error is too large, doubles it when the error allows, and
+    goes on with it in the next interval. No step is below SMALLEST_FRACTION: a robot that is stuck there tries again,
+    and the halving counts. Steps are dyadic fractions of the interval, on the grid of their own size, so their sums are
+    exact. A robot that has made `limits.most_iterations` in the stroke and needs more has failed, too.
 
     Returns the mask of the robots that arrived.
     """
     zero, one = splat(0.0), splat(1.0)
     start, size, halvings = zero, one, zero
+    streak, growth = zero, splat(SOONEST_GROWTH)  # accepted steps since the last trouble, and needed for a doubling
     if limits.adaptive:
         last_size = load(a, memory_row(rods, scheme, SIZE))
         size = select(last_size > 0.0, last_size, FIRST_FRACTION)
@@ -287,15 +295,20 @@ def cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, a
         add_to_report(report, REJECTIONS, select(good & rejected, one, zero))
         add_to_report(report, COVERED, select(accepted, h, zero))
         start = select(accepted, start + size, start)
-        size = select(rejected, 0.5 * size, size)
-        failed = stuck & (halvings >= MOST_HALVINGS)
+        size = select(rejected & (size > SMALLEST_FRACTION), 0.5 * size, size)
+        spent = load(report, NEWTON_ITERATIONS) >= limits.most_iterations
+        failed = stuck & ((halvings >= MOST_HALVINGS) | spent)
         halvings += select(stuck, one, zero)
-        if limits.adaptive:
+        if limits.adaptive or any_lane(wary):
             # The error of a step of twice the length is about eight times as large, per time four times.
-            pairs = start / (2.0 * size)
             small = GROWTH_MARGIN * error_rate <= load(limits.error_rate, 0)
-            fits = accepted & ~wary & small & (pairs == floor(pairs))
-            size = select(fits & (size < 1.0), 2.0 * size, size)
+            pairs = start / (2.0 * size)
+            fits = accepted & small & (pairs == floor(pairs)) & (size < 1.0)
+            streak = select(accepted & wary, streak + 1.0, zero)
+            relieved = fits & (streak >= growth)
+            halvings -= select(relieved, one, zero)
+            streak, growth = select(relieved, zero, streak), select(relieved, 2.0 * growth, growth)
+            size = select((fits & ~wary) | relieved, 2.0 * size, size)
         alive = alive & ~failed
         moving = moving & ~failed & (start < 1.0)
     if limits.adaptive:

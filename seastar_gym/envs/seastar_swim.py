@@ -1,6 +1,7 @@
 """`SeastarSwim-v0`: one robot."""
 
-from collections.abc import Generator
+import contextlib
+from collections.abc import Generator, Iterator
 from typing import Any, Literal
 
 import gymnasium as gym
@@ -137,7 +138,8 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin an episode. options: {"path": name or waypoints [m]} for this episode."""
         super().reset(seed=seed)
-        self._task.reset(np.ones(1, bool), [self.np_random], checked_options(options, {"path"}).get("path"))
+        with self._until_whole():
+            self._task.reset(np.ones(1, bool), [self.np_random], checked_options(options, {"path"}).get("path"))
         self._running = True
         self._command = np.zeros_like(self._command)
         self._trail = self.simulator.hub_position()
@@ -150,10 +152,13 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """One stroke."""
         if not self._running:
-            raise gym.error.ResetNeeded("The episode has not begun or is over: call reset() before step().")
+            raise gym.error.ResetNeeded(
+                "The episode has not begun, is over or was interrupted: call reset() before step()."
+            )
         command = to_commands(self.actions, self.scene.robot.n_limbs, np.asarray(action)[None], 1)
         self._command = command[0]
-        outcome = self._swim(command)
+        with self._until_whole():
+            outcome = self._swim(command)
         terminated = bool(outcome.terminated[0])
         self._running = not terminated
         info = _of_one_robot(outcome.info)
@@ -162,12 +167,23 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
             info["solver_message"] = status.sentence
         return self._task.observe()[0], float(outcome.reward[0]), terminated, False, info
 
+    @contextlib.contextmanager
+    def _until_whole(self) -> Iterator[None]:
+        """Around a step or reset: if it is interrupted, robot and task may have come differently far."""
+        was_running, self._running = self._running, False
+        try:
+            yield
+        except ValueError:  # refused before anything changed
+            self._running = was_running
+            raise
+
     def _swim(self, command: NDArray[np.float64]) -> Outcome:
         if self.render_mode in (None, "rgb_array"):
             outcome = self._task.step(command)
             self._extend_trail()
             return outcome
-        return self._draw_while_swimming(self._task.step_in_parts(command, self.frames_per_stroke))
+        with contextlib.closing(self._task.step_in_parts(command, self.frames_per_stroke)) as parts:
+            return self._draw_while_swimming(parts)
 
     def _draw_while_swimming(self, parts: Generator[float, None, Outcome]) -> Outcome:
         while True:
@@ -223,7 +239,8 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
         return frames if self.render_mode == "rgb_array_list" else None
 
     def close(self) -> None:
-        """Close the window, if there is one."""
+        """Close the window, if there is one, and end the simulator's threads."""
+        self.simulator.close()
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None

@@ -1,5 +1,7 @@
 """`SeastarSwim-v0` as a native batch: all robots of one simulator, the same numbers as one environment each."""
 
+import contextlib
+from collections.abc import Iterator
 from typing import Any
 
 import gymnasium as gym
@@ -103,8 +105,8 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
         for robot in np.flatnonzero(mask):
             if seeds[robot] is not None:
                 self._generators[robot] = seeding.np_random(seeds[robot])[0]
-        self._begin_episodes(mask, chosen.get("path"))
-        self._has_begun = True
+        with self._until_whole():
+            self._begin_episodes(mask, chosen.get("path"))
         facts = self._task.facts()
         return self._task.observe(), {**facts, **{f"_{name}": mask.copy() for name in facts}}
 
@@ -126,7 +128,7 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
     def step(self, actions: Any) -> tuple[Observations, NDArray[np.float64], Flags, Flags, Info]:
         """One stroke of every robot."""
         if not self._has_begun:
-            raise gym.error.ResetNeeded("The episodes have not begun: call reset() before step().")
+            raise gym.error.ResetNeeded("The episodes have not begun or were interrupted: call reset() before step().")
         if self.autoreset_mode is AutoresetMode.DISABLED and self._needs_reset.any():
             raise gym.error.ResetNeeded(
                 'Some episodes are over: call reset(options={"reset_mask": ...}) before step().'
@@ -134,6 +136,24 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
         resting = self._needs_reset.copy()  # NEXT_STEP: these begin anew instead of swimming
         commands = to_commands(self.actions, self.simulator.scene.robot.n_limbs, actions, self.num_envs)
         commands[resting] = 0.0
+        self.closed = False
+        with self._until_whole():
+            return self._step(commands, resting)
+
+    @contextlib.contextmanager
+    def _until_whole(self) -> Iterator[None]:
+        """Around a step or reset: if it is interrupted, robots and task may have come differently far."""
+        had_begun, self._has_begun = self._has_begun, False
+        try:
+            yield
+        except ValueError:  # refused before anything changed
+            self._has_begun = had_begun
+            raise
+        self._has_begun = True
+
+    def _step(
+        self, commands: NDArray[np.float64], resting: Flags
+    ) -> tuple[Observations, NDArray[np.float64], Flags, Flags, Info]:
         outcome = self._task.step(commands)
         self._elapsed += 1
         terminated = outcome.terminated & ~resting
@@ -147,6 +167,10 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._needs_reset.any():
             observations, info = self._begin_next_episodes(observations, outcome.info)
         return observations, reward, terminated, truncated, info
+
+    def close_extras(self) -> None:
+        """End the simulator's threads; a step after that starts them again."""
+        self.simulator.close()
 
     def _begin_next_episodes(
         self, observations: Observations, strokes: dict[str, NDArray[Any]]

@@ -220,7 +220,8 @@ def _moving_robot(scene: Scene, modules: dict[str, ModuleType]) -> tuple[Any, ..
     simulator = Simulator(scene, threads=1)
     command = np.zeros((1, scene.robot.n_limbs))
     command[0, 1], command[0, -1] = 1.0, -1.0
-    next(simulator.stroke_in_parts(command, 20))
+    stroke = simulator.stroke_in_parts(command, 20)
+    next(stroke)
     scheme, rods, rows = SCHEMES[scene.numerics.scheme], scene.rods(), modules["rods"]
     work = rows.make_work(rods, scheme.n_stages)
     angles = 0.5 * scene.actuator.peak_angle * command.T
