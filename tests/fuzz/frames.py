@@ -161,6 +161,7 @@ def mirror() -> Frame:
     return Frame("mirrored", carried, carried, carried, mirrored_current, mirrored=True)
 
 
+REST = Frame("at rest")
 TURN, SHIFT, MIRROR = turn(1.1), shift(np.array([0.3, -0.2])), mirror()
 FRAMES = (TURN, SHIFT, MIRROR)
 

@@ -117,8 +117,8 @@ class Tally:
             self.cases.add((trial.terms, trial.seed))
         if failure is not None:
             self.failed[f"{trial.promise}: {type(failure).__name__}"] += 1
-            text = " ".join(str(failure).split())
-            print(f'FAILED pytest tests/fuzz --fuzz-case "{trial}"  # {type(failure).__name__}: {text:.300}', flush=True)
+            text = f"{type(failure).__name__}: {' '.join(str(failure).split()):.300}"
+            print(f'FAILED pytest tests/fuzz --fuzz-case "{trial}"  # {text}', flush=True)
 
     def __str__(self) -> str:
         strokes = sum(self.tried[name] for name in (*PROMISES, *TAME_PROMISES)) * N_ROBOTS * N_STROKES

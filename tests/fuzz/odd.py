@@ -1,5 +1,6 @@
 """Arguments that nobody should give, for everything that takes arguments."""
 
+# ruff: noqa: C408 - what is given reads as a call
 import fractions
 import math
 from collections.abc import Callable

@@ -3,10 +3,11 @@
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from fuzz.frames import FRAMES, MOVING, Frame, can_be_seen_from
+from fuzz.frames import FRAMES, MOVING, REST, Frame, can_be_seen_from
 from fuzz.scenes import IN_WATER, Case, Terms
 from seastar_gym import Numerics, Scene, Simulator, SolverStatus, State, StrokeReport, UniformCurrent
 from seastar_gym.actuation.schedule import step_times
@@ -25,7 +26,7 @@ EPSILON = float(np.finfo(float).eps)
 MOMENTUM_ROUNDING = 1e-11
 """Of a robot's mass times the largest speed of its nodes, and that at which they pass edges in a step."""
 
-MOMENTUM_PER_TOLERANCE = 1e-3
+MOMENTUM_PER_TOLERANCE = 1e-5
 """Of a robot's mass times the speed that a Newton tolerance over a step is."""
 
 ENERGY_ROUNDING = 1e-11
@@ -33,6 +34,9 @@ ENERGY_ROUNDING = 1e-11
 
 FRAME_TOLERANCE = 100.0
 """Newton tolerances by which a robot may differ where it is seen from another frame."""
+
+NUDGE, STEADY = 1e-13, 1e-8
+"""Limb lengths by which nodes are nudged, and what a stroke that does not depend on rounding makes of it at most."""
 
 
 def make(case: Case, robots: Iterable[int] | None = None, threads: int = 1) -> Simulator:
@@ -220,17 +224,45 @@ def check_energy(case: Case) -> None:
 # --- frames ----------------------------------------------------------------------------------------------------------
 
 
-def assert_alike(case: Case, frame: Frame) -> None:
-    """The case seen from another frame swims as the case does, seen from there."""
-    own, other = make(case), make(frame.case(case))
-    tolerance = FRAME_TOLERANCE * case.scene.numerics.newton_tolerance
+class Swim(NamedTuple):
+    """Positions over limb lengths after every stroke, shape (n_strokes, n_robots, n_nodes, 2), and every status."""
+
+    positions: np.ndarray
+    status: np.ndarray
+
+
+def seen_from(frame: Frame, case: Case) -> Swim:
+    """How the case swims, seen from the frame."""
+    simulator, positions, status = make(case), [], []
+    for commands in case.commands:
+        status.append(simulator.stroke(commands).status)
+        positions.append(frame.state(simulator.get_state(), case.scene).positions)
     lengths = np.broadcast_to(np.asarray(case.scene.robot.limb_length, float), (case.n_robots,))[:, None, None]
-    for k in range(len(case.commands)):
-        reports = own.stroke(case.commands[k]), other.stroke(frame.case(case).commands[k])
-        np.testing.assert_array_equal(*(report.status for report in reports), err_msg=frame.name)
-        seen = frame.state(own.get_state(), case.scene)
-        off = np.abs(other.positions - seen.positions) / lengths
-        assert off.max() <= tolerance, f"{frame.name}: off by {off.max():.3g} limb lengths after stroke {k + 1}"
+    return Swim(np.array(positions) / lengths, np.array(status))
+
+
+def nudged(case: Case, seed: int) -> Case:
+    """The same with rounding errors on its nodes, as other frames make."""
+    noise = NUDGE * np.random.default_rng(seed).uniform(-1.0, 1.0, case.state.positions.shape)
+    lengths = np.broadcast_to(np.asarray(case.scene.robot.limb_length, float), (case.n_robots,))[:, None, None]
+    return case._replace(state=case.state._replace(positions=case.state.positions + lengths * noise))
+
+
+def assert_alike(case: Case, frame: Frame) -> None:
+    """The case as it would be in another frame swims as it does, seen from there, as far as rounding is not amplified.
+
+    Robots whose stroke depends on rounding, as that of a compressed edge does that may give way to either side, are
+    looked at until they do.
+    """
+    own, other = seen_from(frame, case), seen_from(REST, frame.case(case))
+    twins = [seen_from(frame, nudged(case, seed)) for seed in range(2)]
+    amplified = np.max([np.abs(twin.positions - own.positions) for twin in twins], axis=(0, 3, 4))
+    is_steady = (amplified < STEADY) & np.all([twin.status == own.status for twin in twins], axis=0)
+    is_steady = np.logical_and.accumulate(is_steady, axis=0)
+    off = np.abs(other.positions - own.positions).max(axis=(2, 3))
+    allowed = FRAME_TOLERANCE * case.scene.numerics.newton_tolerance + 1000.0 * amplified
+    assert np.all((other.status == own.status) | ~is_steady), f"{frame.name}: {other.status} instead of {own.status}"
+    assert np.all((off <= allowed) | ~is_steady), f"{frame.name}: off by {off} limb lengths, allowed are {allowed}"
 
 
 def check_frames(case: Case) -> None:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from random import Random
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 from hypothesis import Phase, given, settings
@@ -37,6 +37,7 @@ from seastar_gym import (
 from seastar_gym.actuation.actuator import Actuator
 from seastar_gym.fluids import AnyCurrent
 from seastar_gym.morphology.seastar import n_hub_hinges, natural_hub_angle
+from seastar_gym.scene import Fidelity
 
 Terms = frozenset[str]
 
@@ -97,6 +98,10 @@ class Draw:
         decades = decades if self.wild else decades / 6.0
         return value * self.power(-decades, decades)
 
+    def or_zero(self, value: float) -> float:
+        """A term that is there, and shows or not."""
+        return 0.0 if self.maybe(0.4) else value
+
     def each(self, draw: Callable[[], float], always: bool = False) -> Any:
         """A number, or those of each robot."""
         if self.n_robots is None or not (always or self.maybe(0.5)):
@@ -109,6 +114,8 @@ class Draw:
 
 def draw_robot(draw: Draw, terms: Terms) -> Seastar:
     rng = draw.rng
+    if not draw.wild and draw.n_robots is None and draw.maybe(0.3):
+        return Seastar(relaxation_time=0.0 if "damping" in terms else None)
     n_limbs = rng.choice([1, 2, 3, 5, 5, 8, 12]) if draw.wild else rng.choice([3, 4, 5, 6])
     if "contact" in terms:
         n_limbs = max(n_limbs, 3)
@@ -122,7 +129,7 @@ def draw_robot(draw: Draw, terms: Terms) -> Seastar:
         density=draw.each(lambda: draw.around(1e3, 1.5)),
         hub_hinge=hub_hinge,
         limbs=draw_limbs(draw, n_limbs) if draw.maybe(0.4) else (),
-        relaxation_time=draw.each(lambda: draw.power(-6.0, -1.0)) if "damping" in terms else None,
+        relaxation_time=draw.each(lambda: draw.or_zero(draw.power(-6.0, -1.0))) if "damping" in terms else None,
     )
 
 
@@ -176,7 +183,7 @@ def draw_fluid(draw: Draw, terms: Terms) -> Water | None:
         drag_coefficient=coefficient,
         tangential_drag_coefficient=share * float(np.min(coefficient)) if "drag along limbs" in terms else None,
         current=draw_current(draw) if "current" in terms else None,
-        added_mass_coefficient=draw.each(lambda: draw.around(1.0, 1.0)) if "added mass" in terms else None,
+        added_mass_coefficient=draw.each(lambda: draw.or_zero(draw.around(1, 1))) if "added mass" in terms else None,
     )
 
 
@@ -214,6 +221,8 @@ def draw_actuator(draw: Draw, terms: Terms, robot: Seastar, step: float) -> Actu
 
 
 def draw_numerics(draw: Draw) -> Numerics:
+    if not draw.wild and draw.maybe(0.5):
+        return Numerics.preset(draw.rng.choice(get_args(Fidelity)))
     scheme = draw.rng.choice(["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint", "implicit-midpoint"])
     adapted = scheme == "implicit-midpoint" and draw.maybe(0.4)
     tolerance = draw.power(-14.0, -2.0) if draw.wild else draw.power(-9.0, -6.0)
