@@ -8,7 +8,9 @@ from seastar_gym.der.fluid import add_work_of_current, freeze_fluid
 from seastar_gym.der.geometry import edge_geometry, half_angle
 from seastar_gym.der.guard import (
     LARGEST_CUT,
+    add_work_of_loads,
     allowed_energy,
+    frame_velocity,
     hold_to_energy,
     may_gain,
     put_back,
@@ -16,6 +18,7 @@ from seastar_gym.der.guard import (
     through_poles,
 )
 from seastar_gym.der.lanes import add_product, any_lane, floor, load, load_number, select, splat, sqrt, store
+from seastar_gym.der.momentum import settle_momentum
 from seastar_gym.der.newton import minimise
 from seastar_gym.der.rods import (
     BACKTRACKS,
@@ -157,10 +160,15 @@ def step_error(rods, work, stage, a, h, last_h):
 
 
 @kernel
-def start_standing(rods, work, stage, robots):
-    """Start the iterate of the robots in the mask at q_hat: Phi is finite there, and no velocity leads it astray."""
-    for row in range(2 * n_nodes(rods)):
-        store(work.q, row, select(robots, load(stage.q_hat, row), load(work.q, row)))
+def start_standing(rods, work, stage, frame, robots):
+    """Start the iterate of the robots in the mask at q_hat, carried on by the frame: Phi is finite there, and no
+    velocity about it leads it astray.
+    """
+    for node in range(n_nodes(rods)):
+        x = add_product(load(stage.q_hat, 2 * node), stage.gamma, frame[0])
+        y = add_product(load(stage.q_hat, 2 * node + 1), stage.gamma, frame[1])
+        store(work.q, 2 * node, select(robots, x, load(work.q, 2 * node)))
+        store(work.q, 2 * node + 1, select(robots, y, load(work.q, 2 * node + 1)))
 
 
 @kernel
@@ -183,13 +191,14 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, war
         stage = begin_stage(rods, work, scheme, k, q, v, a, h)
         freeze_contact(rods.contact, rods, work, stage, q)
         if any_lane(wary):
-            start_standing(rods, work, stage, wary)
+            start_standing(rods, work, stage, frame_velocity(rods.current, rods, q, v), wary)
         freeze_fluid(rods, work)
         freeze_strains(rods.relaxation_time, rods, work, stage.q_hat)
         set_natural_hub_angles(rods, work, actuation, start + load_number(scheme.c, k) * size)
         left = limits.most_iterations - load(report, NEWTON_ITERATIONS)
         most, good = select(left < patience, left, patience), good & (left > 0.0)
         good, phi, iterations, repairs, backtracks = minimise(rods, work, stage, good, tolerance, most)
+        settle_momentum(rods, work, stage, good)
         good = those_uncrossed(rods.contact, rods, work, stage, q, good)
         trouble = trouble | (repairs + backtracks > 0.0)
         if scheme.dissipative:
@@ -211,15 +220,17 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, war
                 accepted = good & ((error_rate <= load(limits.error_rate, 0)) | (size <= SMALLEST_FRACTION))
                 store(a, last_h, select(accepted, h, load(a, last_h)))
             guarded = accepted & trouble
-            watch, allowed = any_lane(guarded), zero
+            watch, allowed, frame = any_lane(guarded), zero, (zero, zero)
             if watch:
                 set_aside(rods, work, scheme, q, v)
-                allowed = allowed_energy(rods, work, scheme, actuation, start, start + size, q, v)
+                frame = frame_velocity(rods.current, rods, q, v)
+                allowed = allowed_energy(rods, work, scheme, actuation, start, start + size, q, v, frame)
             end_step(rods, work, scheme, stage, q, v, a, h, accepted)
             if watch:
                 largest_cut = select(patience > MOST_HALVINGS * limits.max_iterations, one, LARGEST_CUT)
-                allowed = add_work_of_current(rods.current, rods, work, v, h, allowed)
-                refused, cut = hold_to_energy(rods, work, scheme, q, v, h, guarded, allowed, largest_cut)
+                allowed = add_work_of_current(rods.current, rods, work, v, h, frame, allowed)
+                allowed = add_work_of_loads(rods.load, rods, work, q, h, frame, allowed)
+                refused, cut = hold_to_energy(rods, work, scheme, q, v, h, frame, guarded, allowed, largest_cut)
                 turnable = guarded & (patience <= TURNABLE * limits.max_iterations)
                 refused = refused | through_poles(rods, work, q, turnable)
                 if any_lane(refused):
@@ -235,8 +246,8 @@ def add_to_report(report, row, amount):
 
 
 @kernel
-def note_hub_angles(rods, q, report):
-    """Keep the smallest tan(phi/2) of every robot's hub hinges; those of a gap of more than pi do not count."""
+def note_hub_angles(rods, q, robots, report):
+    """Keep the smallest tan(phi/2) of the hub hinges of the robots in the mask, but for gaps of more than pi."""
     smallest = load(report, SMALLEST_HUB_T)
     edges = rods.nodes_per_limb - 1
     last = rods.n_limbs - 1
@@ -245,7 +256,7 @@ def note_hub_angles(rods, q, report):
         second = edge_geometry(q, 0, limb * edges + 1)
         t = half_angle(first, second, rods.hub_side)
         narrow = rods.hub_side * load(rods.hub_angle, limb - 1 if limb > 0 else last) >= 0.0
-        smallest = select(narrow & (t < smallest), t, smallest)
+        smallest = select(robots & narrow & (t < smallest), t, smallest)
         first = second
     store(report, SMALLEST_HUB_T, smallest)
 
@@ -284,7 +295,7 @@ def cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, a
         good, accepted, error_rate = try_step(
             rods, work, tableau, actuation, q, v, a, start, size, h, going, wary, limits, patience, report
         )
-        note_hub_angles(rods, q, report)
+        note_hub_angles(rods, q, going, report)
         stuck = going & ~good
         rejected = going & ~accepted
         cautious = going & ~steady

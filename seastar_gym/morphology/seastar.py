@@ -102,6 +102,8 @@ def make_rods(
     shortest, thinnest = float(mesh.root_edges.min()), min(map(min, mesh.radius_at_nodes))
     stiffest = max(max(along(limb.youngs_modulus, nodes_along(nodes_per_limb))) for limb in limbs)
     slenderness = min(1.0, (shortest / thinnest) ** 2 / 5000.0)
+    dragged = mean(broadside) > 0.0
+    stiffness_over_mass = float((EA / l / (density * area * mesh.dl)[1:]).max())
     return Rods(
         n_limbs=n_limbs,
         nodes_per_limb=nodes_per_limb,
@@ -125,6 +127,8 @@ def make_rods(
         curvature_rate=np.array([stiffest / (density * shortest**2) * slenderness]),
         calm=np.array([calm]),
         damped=np.array([calm * min(1.0, mean(broadside) * length / (density * mean(area)))]),
+        unsettled_rate=np.array([stiffness_over_mass * (nodes_per_limb - 1) ** 2 if dragged else np.inf]),
+        held=bool(held_nodes),
     )
 
 
