@@ -16,6 +16,7 @@ import llvmlite
 import numba
 import numpy as np
 from numba.core.caching import FunctionCache, UserWideCacheLocator
+from numba.core.registry import CPUDispatcher
 
 from seastar_gym.der.lanes import N_LANES
 
@@ -25,9 +26,28 @@ PACKAGE = Path(__file__).resolve().parent.parent
 STRICT = {"error_model": "numpy", "nogil": True}
 # Without wrappers for Python, which would be a third of the compilation.
 BLOCK = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **STRICT}
-kernel = numba.njit(**BLOCK)
+
+
+class Kernel(CPUDispatcher):
+    """A building block of compiled code, without the wrapper that a call from Python would need."""
+
+    def __call__(self, *args, **kwargs):
+        raise TypeError(
+            f"{self.py_func.__name__} is a kernel, which only compiled code can call: call it from an @entry_point, "
+            "or as plain Python from plain_kernels() in seastar_gym.der.plain."
+        )
+
+
+def kernel(function, **options):
+    """Compile `function` as a building block; with NUMBA_DISABLE_JIT=1 it stays the Python function that it is."""
+    compiled = numba.njit(**BLOCK, **options)(function)
+    if isinstance(compiled, CPUDispatcher):
+        compiled.__class__ = Kernel  # numba offers no other way to say how its dispatchers are called
+    return compiled
+
+
 # Where calls are many, and each would pass the fifty pointers of rods and work: together a tenth of a stroke.
-inlined_kernel = numba.njit(forceinline=True, **BLOCK)
+inlined_kernel = functools.partial(kernel, forceinline=True)
 
 
 def kernel_sources(package: Path = PACKAGE) -> list[Path]:
@@ -71,6 +91,8 @@ class _DigestCache(FunctionCache):
 
 def entry_point(function):
     """Compile `function` for calls from Python, with the GIL released and the machine code kept on disk."""
+    if numba.config.DISABLE_JIT:
+        return np.errstate(all="ignore")(function)
     compiled = numba.njit(**STRICT)(function)
     # RuntimeError: no folder can be written (a read-only home), so the function is compiled anew in every process.
     with contextlib.suppress(RuntimeError):
