@@ -19,6 +19,7 @@ from numba.core.caching import FunctionCache, UserWideCacheLocator
 from numba.core.registry import CPUDispatcher
 
 from seastar_gym.der.lanes import N_LANES
+from seastar_gym.der.plain import plain_kernels
 
 PACKAGE = Path(__file__).resolve().parent.parent
 
@@ -32,10 +33,16 @@ class Kernel(CPUDispatcher):
     """A building block of compiled code, without the wrapper that a call from Python would need."""
 
     def __call__(self, *args, **kwargs):
+        name = self.py_func.__name__
         raise TypeError(
-            f"{self.py_func.__name__} is a kernel, which only compiled code can call: call it from an @entry_point, "
-            "or as plain Python from plain_kernels() in seastar_gym.der.plain."
+            f"{name} is a kernel, which only compiled code can call: call it from an @entry_point, "
+            f"or {name}.plain in Python."
         )
+
+    @property
+    def plain(self):
+        """The same in plain Python, on the lanes of numpy_lanes.py."""
+        return plain_kernels()(self)
 
 
 def kernel(function, **options):
@@ -43,6 +50,8 @@ def kernel(function, **options):
     compiled = numba.njit(**BLOCK, **options)(function)
     if isinstance(compiled, CPUDispatcher):
         compiled.__class__ = Kernel  # numba offers no other way to say how its dispatchers are called
+    else:
+        compiled.plain = compiled
     return compiled
 
 

@@ -1,6 +1,6 @@
 """The plain twin of lanes.py on numpy: kernels run on it as the Python that they are, slowly, step by step.
 
-With `NUMBA_DISABLE_JIT=1` the whole package does; plain.py loads the kernels beside the compiled ones. What kernels may
+With `NUMBA_DISABLE_JIT=1` the whole package does; plain.py loads them beside the compiled ones. What kernels may
 ask of lanes is this and no more, and another processor would need no more either:
 
 Lanes           one float64 per robot, a value: + - * / with lanes and plain numbers, -x, and += -= *= /=, which make a

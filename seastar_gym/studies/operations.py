@@ -12,9 +12,15 @@ from typing import Any
 import numpy as np
 
 from seastar_gym.der import numpy_lanes
+from seastar_gym.der.actuation import set_natural_hub_angles
+from seastar_gym.der.newton import take_step
 from seastar_gym.der.numpy_lanes import Lanes, Mask
-from seastar_gym.der.plain import FOLDER, plain_kernels
+from seastar_gym.der.plain import FOLDER, PlainKernels
+from seastar_gym.der.potential import assemble_hub_hinges, sweep_limb
+from seastar_gym.der.rods import Actuation, make_work
 from seastar_gym.der.schemes import SCHEMES
+from seastar_gym.der.stages import begin_stage, end_step
+from seastar_gym.der.star_matrix import solve_ring
 from seastar_gym.scene import Scene
 from seastar_gym.simulator import Simulator
 
@@ -45,9 +51,9 @@ class Constant(Counted):
     __slots__ = ()
 
 
-def _counting_kernels(folder: Path) -> Any:
+def _counting_kernels(folder: Path) -> PlainKernels:
     """The kernels on one lane that counts."""
-    return plain_kernels(
+    return PlainKernels(
         n_lanes=1,
         folder=folder,
         load=lambda rows, row: Counted(numpy_lanes.load(rows, row).numbers),
@@ -56,6 +62,7 @@ def _counting_kernels(folder: Path) -> Any:
     )
 
 
+@np.errstate(all="ignore")
 def count_operations(scene: Scene, folder: Path = FOLDER) -> dict[str, Counter[str]]:
     """Operations of one robot, by part, in the middle of a heating ramp; folder: Where the kernels' source is.
 
@@ -63,9 +70,8 @@ def count_operations(scene: Scene, folder: Path = FOLDER) -> dict[str, Counter[s
     "substitution" (and the Newton step), together "iteration"; and "step", what a step costs besides iterations
     (schemes of one stage).
     """
-    der = _counting_kernels(folder)
-    potential, newton, stages = der.potential, der.newton, der.stages
-    work, rods, scheme, actuation, state, a = _moving_robot(scene, der)
+    counting = _counting_kernels(folder)
+    work, rods, scheme, actuation, state, a = _moving_robot(scene, counting)
     h = Counted(scene.numerics.step)
     parts: dict[str, Counter[str]] = {}
 
@@ -78,37 +84,37 @@ def count_operations(scene: Scene, folder: Path = FOLDER) -> dict[str, Counter[s
     def limbs() -> None:
         D, r = (Counted(1.0), Counted(0.0), Counted(1.0)), (Counted(0.0), Counted(0.0))
         for limb in range(rods.n_limbs):
-            D, r, *_ = potential.sweep_limb(rods, work, stage, limb, None, D, r)
+            D, r, *_ = counting(sweep_limb)(rods, work, stage, limb, None, D, r)
 
     def step() -> None:
-        begun = stages.begin_stage(rods, work, scheme, 0, *state, a, h)
-        stages.set_natural_hub_angles(rods, work, actuation, Counted(1.0))
-        stages.end_step(rods, work, scheme, begun, *state, a, h, Mask(True))
+        begun = counting(begin_stage)(rods, work, scheme, 0, *state, a, h)
+        counting(set_natural_hub_angles)(rods, work, actuation, Counted(1.0))
+        counting(end_step)(rods, work, scheme, begun, *state, a, h, Mask(True))
 
-    stage = stages.begin_stage(rods, work, scheme, 0, *state, a, h)
-    stages.set_natural_hub_angles(rods, work, actuation, Counted(1.0))
-    counted("hub hinges", lambda: potential.assemble_hub_hinges(rods, work, stage, None))
+    stage = counting(begin_stage)(rods, work, scheme, 0, *state, a, h)
+    counting(set_natural_hub_angles)(rods, work, actuation, Counted(1.0))
+    counted("hub hinges", lambda: counting(assemble_hub_hinges)(rods, work, stage, None))
     counted("limbs", limbs)
     unit = (Counted(1.0), Counted(0.0), Counted(1.0))
-    counted("ring", lambda: der.star_matrix.solve_ring(work, rods.n_limbs, unit, unit[:2]))
-    counted("substitution", lambda: newton.take_step(rods, work, Mask(True), Mask(False), Counted(1.0)))
+    counted("ring", lambda: counting(solve_ring)(work, rods.n_limbs, unit, unit[:2]))
+    counted("substitution", lambda: counting(take_step)(rods, work, Mask(True), Mask(False), Counted(1.0)))
     parts["iteration"] = sum(parts.values(), Counter())
     counted("step", step)
     return parts
 
 
-def _moving_robot(scene: Scene, der: Any) -> tuple[Any, ...]:
+def _moving_robot(scene: Scene, counting: PlainKernels) -> tuple[Any, ...]:
     """Memory, coefficients, scheme, actuation, state rows and accelerations of a robot whose limbs are bending."""
     simulator = Simulator(scene, threads=1)
     command = np.zeros((1, scene.robot.n_limbs))
     command[0, 1], command[0, -1] = 1.0, -1.0
     next(simulator.stroke_in_parts(command, 20))
-    scheme, rods, rows = SCHEMES[scene.numerics.scheme], scene.rods(), der.rods
-    work = rows.make_work(rods, scheme.n_stages)
+    scheme, rods = SCHEMES[scene.numerics.scheme], scene.rods()
+    work = counting(make_work)(rods, scheme.n_stages)
     angles = 0.5 * scene.actuator.peak_angle * command.T
     q, v = simulator.positions.reshape(-1, 1), simulator.velocities.reshape(-1, 1)
     a = np.zeros(((len(q) + 1) * scheme.n_stages, 1))
-    return work, rods, scheme, rows.Actuation(angles, angles), (q, v), a
+    return work, rods, scheme, Actuation(angles, angles), (q, v), a
 
 
 def flops(counts: Counter[str]) -> int:
