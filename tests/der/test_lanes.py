@@ -14,7 +14,6 @@ import pytest
 from numba.core.errors import TypingError
 
 from seastar_gym.der import lanes
-from seastar_gym.der.geometry import tangent
 from seastar_gym.der.lanes import N_LANES, all_lanes, any_lane, borrow, load, load_number, splat, store
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -352,44 +351,6 @@ def test_shared_rows_cannot_be_written():
 
     with pytest.raises(TypingError):
         function(np.zeros(3))
-
-
-# The tangent
-
-
-def tangents(x: np.ndarray) -> np.ndarray:
-    @numba.njit(error_model="numpy")
-    def function(rows_in, rows_out):
-        source, target = borrow(rows_in), borrow(rows_out)
-        for r in range(rows_in.shape[0]):
-            store(target, r, tangent(load(source, r)))
-
-    rows = rows_of(x)
-    out = np.zeros_like(rows)
-    function(rows, out)
-    return out.reshape(-1)[: x.size]
-
-
-def test_tangent_is_that_of_numpy_to_a_few_units_in_the_last_place():
-    """Up to 1.3 rad: the chapter's hub hinges, opened by two peaks, need pi/5 + pi/5 = 1.26 rad."""
-    x = np.concatenate([np.linspace(-1.3, 1.3, 200_001), [0.0, -0.0, 1e-300, -1e-9]])
-    exact = np.tan(x.astype(np.longdouble))
-    found = tangents(x)
-    assert np.max(np.abs(found - exact) / np.spacing(np.abs(exact.astype(float)))) < 5.0
-    assert not np.signbit(found[-4])
-
-
-def test_tangent_is_that_of_an_angle_a_few_units_in_the_last_place_away_up_to_the_pole():
-    x = 0.5 * np.pi - np.geomspace(1e-6, 0.4, 10_000)
-    exact = np.tan(x.astype(np.longdouble))
-    # d tan x = (1 + tan^2 x) dx: the pole magnifies what rounding does to the angle.
-    error_in_angle = (tangents(x) - exact) / (1.0 + exact**2)
-    assert np.max(np.abs(error_in_angle)) < 4.0 * np.spacing(1.5)
-
-
-def test_tangent_is_odd():
-    x = np.linspace(0.0, 1.5, 1001)
-    np.testing.assert_array_equal(tangents(-x), -tangents(x))
 
 
 # The width
