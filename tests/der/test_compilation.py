@@ -8,12 +8,15 @@ import threading
 import time
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 
 from seastar_gym import Numerics, Scene, Simulator
 from seastar_gym.der import compilation
 from seastar_gym.der.compilation import PACKAGE, kernel_sources, source_digest
+
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 
 ENERGY = """
 import numpy as np

@@ -37,7 +37,7 @@ def test_the_step_solves_the_star_and_contact_together():
 
 def test_contact_makes_the_matrix_stiffer_so_its_decrement_is_smaller():
     _, _, alone, together = steps(touching_limbs())
-    assert np.all((0.0 < together) & (together < alone))
+    assert np.all((together > 0.0) & (together < alone))
 
 
 def test_robots_that_do_not_touch_or_are_not_asked_keep_the_stars_step_to_the_last_bit():

@@ -1,5 +1,7 @@
 """Elimination of a star of chains solves what a dense matrix of the same blocks solves."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -20,7 +22,7 @@ def neighbours(n_limbs: int, nodes_per_limb: int) -> np.ndarray:
     coupled = np.eye(n_limbs * edges + 1, dtype=bool)
     for limb in range(n_limbs):
         chain = [0, *range(limb * edges + 1, limb * edges + edges + 1)]
-        for i, j in [*zip(chain, chain[1:], strict=False), *zip(chain, chain[2:], strict=False)]:
+        for i, j in [*pairwise(chain), *zip(chain, chain[2:], strict=False)]:
             coupled[i, j] = coupled[j, i] = True
     return coupled
 
