@@ -19,8 +19,10 @@ import llvmlite
 import numba
 import numpy as np
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache, UserWideCacheLocator
+from numba.core.registry import CPUDispatcher
 
 from seastar_gym.der.lanes import N_LANES
+from seastar_gym.der.plain import plain_kernels
 
 PACKAGE = Path(__file__).resolve().parent.parent
 DIGEST_SIZE = hashlib.sha256().digest_size  # bytes
@@ -29,9 +31,36 @@ DIGEST_SIZE = hashlib.sha256().digest_size  # bytes
 STRICT = {"error_model": "numpy", "nogil": True}
 # Without wrappers for Python, which would be a third of the compilation.
 BLOCK = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **STRICT}
-kernel = numba.njit(**BLOCK)
+
+
+class Kernel(CPUDispatcher):
+    """A building block of compiled code, without the wrapper that a call from Python would need."""
+
+    def __call__(self, *args, **kwargs):
+        name = self.py_func.__name__
+        raise TypeError(
+            f"{name} is a kernel, which only compiled code can call: call it from an @entry_point, "
+            f"or {name}.plain in Python."
+        )
+
+    @property
+    def plain(self):
+        """The same in plain Python, on the lanes of numpy_lanes.py."""
+        return plain_kernels()(self)
+
+
+def kernel(function, **options):
+    """Compile `function` as a building block; with NUMBA_DISABLE_JIT=1 it stays the Python function that it is."""
+    compiled = numba.njit(**BLOCK, **options)(function)
+    if isinstance(compiled, CPUDispatcher):
+        compiled.__class__ = Kernel  # numba offers no other way to say how its dispatchers are called
+    else:
+        compiled.plain = compiled
+    return compiled
+
+
 # Where calls are many, and each would pass the fifty pointers of rods and work: together a tenth of a stroke.
-inlined_kernel = numba.njit(forceinline=True, **BLOCK)
+inlined_kernel = functools.partial(kernel, forceinline=True)
 
 
 def kernel_sources(package: Path = PACKAGE) -> list[Path]:
@@ -140,6 +169,8 @@ def _say_that_it_compiles():
 
 def entry_point(function):
     """Compile `function` for calls from Python, with the GIL released and the machine code kept on disk."""
+    if numba.config.DISABLE_JIT:
+        return np.errstate(all="ignore")(function)
     compiled = numba.njit(**STRICT)(function)
     try:
         compiled._cache = _DigestCache(function)

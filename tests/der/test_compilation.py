@@ -22,6 +22,8 @@ from seastar_gym import Numerics, Scene, Simulator
 from seastar_gym.der import compilation
 from seastar_gym.der.compilation import PACKAGE, entry_point, kernel_sources, source_digest
 
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+
 ENERGY = """
 import numpy as np
 from seastar_gym import Scene, Simulator
