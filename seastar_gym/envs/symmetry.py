@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.actuation.actuator import StatefulActuator
 from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, command_table
+from seastar_gym.envs.observation import layout_of_size
 from seastar_gym.scene import Scene
 
 Elements = NDArray[np.intp]
@@ -29,9 +30,6 @@ Elements = NDArray[np.intp]
 BOUNDARY_WIDTH = 1e-6
 """[rad]: a waypoint this close to a boundary between two sectors lies on it. Far above the rounding of observations, so
 that rounding never chooses the sector of a robot that is aimed along a limb; the next waypoint's side does."""
-
-CURRENT, NEXT = slice(-4, -2), slice(-2, None)
-"""Where the waypoints stand in an observation."""
 
 
 # --- the group -------------------------------------------------------------------------------------------------------
@@ -78,8 +76,9 @@ def sectors(observations: NDArray[np.floating[Any]], n_limbs: int) -> Elements:
     On a boundary it is the sector on the side of the next waypoint, and where that lies on the same line (or there is
     none) the sector anti-clockwise of the boundary. A waypoint at the hub lies in sector 0.
     """
-    current = np.asarray(observations[..., CURRENT], np.float64)
-    towards_next = np.asarray(observations[..., NEXT], np.float64)
+    at = layout_of_size(observations.shape[-1])
+    current = np.asarray(observations[..., at.current_waypoint], np.float64)
+    towards_next = np.asarray(observations[..., at.next_waypoint], np.float64)
     width = np.pi / n_limbs
     angle = np.arctan2(current[..., 1], current[..., 0])
     boundary = np.rint(angle / width)  # the nearest one
@@ -94,10 +93,10 @@ def sectors(observations: NDArray[np.floating[Any]], n_limbs: int) -> Elements:
 @cache
 def _vector_order(n_limbs: int, n_vectors: int) -> NDArray[np.intp]:
     """Vector i of an observation carried by element g was vector order[g, i]; shape (2 n_limbs, n_vectors)."""
-    nodes_per_limb = (n_vectors - 3) // (2 * n_limbs)
-    n_nodes = n_limbs * nodes_per_limb
-    nodes = np.arange(n_nodes).reshape(n_limbs, nodes_per_limb)[limb_order(n_limbs)].reshape(-1, n_nodes)
-    others = np.broadcast_to(np.arange(2 * n_nodes, n_vectors), (2 * n_limbs, 3))
+    at = layout_of_size(2 * n_vectors)
+    n_nodes = at.velocities.start // 2
+    nodes = np.arange(n_nodes).reshape(n_limbs, -1)[limb_order(n_limbs)].reshape(-1, n_nodes)
+    others = np.tile(np.arange(at.hub_velocity.start // 2, n_vectors), (2 * n_limbs, 1))
     return _read_only(np.concatenate([nodes, n_nodes + nodes, others], axis=1))
 
 
@@ -107,7 +106,8 @@ def transform_observations(
     """What the robots carried by the elements see: a fresh array of the same shape and type."""
     observations, elements = np.asarray(observations), np.asarray(elements, dtype=np.intp)
     size = observations.shape[-1]
-    if size % 2 or (size // 2 - 3) % (2 * n_limbs) or size // 2 <= 3:
+    at = layout_of_size(size)
+    if at.size != size or at.velocities.start % (2 * n_limbs) or at.velocities.start <= 0:
         raise ValueError(f"An observation of {size} numbers is not that of a robot of {n_limbs} limbs.")
     as_vectors = np.result_type(observations, np.complex64)  # pairs of numbers as x + iy
     vectors = np.ascontiguousarray(observations).view(as_vectors)

@@ -8,9 +8,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.actuation.actuator import StatefulActuator
 from seastar_gym.der.rows import to_rows
-from seastar_gym.envs.observation import VELOCITY_SCALE, observation_size, observe, to_float32
+from seastar_gym.envs.observation import (
+    VELOCITY_SCALE,
+    observation_size,
+    observe,
+    scene_layout,
+    to_float32,
+    with_memory,
+)
 from seastar_gym.envs.paths import AIM, PathName, cross_track_error, make_path, shortest_way
 from seastar_gym.envs.randomization import LIMB_STRENGTH, DomainRandomization, drawn_scene
 from seastar_gym.envs.reward import RewardWeights, reward_terms
@@ -50,9 +56,7 @@ def promised(scene: Scene) -> dict[str, float]:
 
 def scene_observation_size(scene: Scene) -> int:
     """Length of the observation of a scene's robot."""
-    actuator, robot = scene.actuator, scene.robot
-    remembered = actuator.observe(actuator.rest).shape[-1] if isinstance(actuator, StatefulActuator) else 0
-    return observation_size(robot.n_nodes) + remembered * robot.n_limbs
+    return scene_layout(scene).size
 
 
 class SwimTask:
@@ -158,10 +162,7 @@ class SwimTask:
         own, n_nodes = simulator.coefficients, simulator.scene.robot.n_nodes
         out = np.empty((len(target_rows), observation_size(n_nodes), target_rows.shape[2]))
         observe(own.rest, own.limb_length, simulator.q, simulator.v, target_rows, VELOCITY_SCALE, out)
-        observations, remembered = to_float32(out, self.n_robots), simulator.observe_actuators()
-        if remembered.shape[1] == 0:
-            return observations
-        return np.hstack([observations[:, :-4], remembered.astype(np.float32), observations[:, -4:]])
+        return with_memory(to_float32(out, self.n_robots), simulator.observe_actuators())
 
     def step(self, commands: Floats) -> Outcome:
         """One stroke of every robot."""
