@@ -127,9 +127,8 @@ class Seastar:
         """Whether a turn by one limb and a mirror at limb 1 leave the robot, or all of them, as it is."""
         robots = [self.limb_shapes(index) for index in range(batch_size(self) or 1)]
         alike = all(len({shape._replace(direction=0.0, gap=0.0) for shape in shapes}) == 1 for shapes in robots)
-        shapes = robots[0]
-        gaps = np.array([shape.gap for shape in shapes])
-        return alike and shapes[0].natural_curvature == 0.0 and float(np.ptp(gaps)) < 1e-12
+        straight = not any(shape.natural_curvature for shapes in robots for shape in shapes)
+        return alike and straight and float(np.ptp([shape.gap for shape in robots[0]])) < 1e-12
 
     @property
     def n_nodes(self) -> int:

@@ -123,6 +123,11 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
         return self._task.scene
 
     @property
+    def randomization(self) -> DomainRandomization | None:
+        """Numbers of the scene that are drawn for every episode."""
+        return self._task.randomization
+
+    @property
     def simulator(self) -> Simulator:
         """The simulator, with one robot."""
         return self._task.simulator

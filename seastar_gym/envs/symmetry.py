@@ -13,6 +13,7 @@ equivariant: in a turned or mirrored world it swims the turned or mirrored way.
 Functions here take batches: observations of shape (..., size), as laid out in observation.py, and elements (...).
 """
 
+from collections.abc import Iterable, Iterator
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,9 @@ from numpy.typing import ArrayLike, NDArray
 from seastar_gym.actuation.actuator import StatefulActuator
 from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, command_table
 from seastar_gym.envs.observation import layout_of_size
+from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene import Scene
 
 Elements = NDArray[np.intp]
@@ -180,19 +184,30 @@ def _read_only(table: NDArray[Any]) -> NDArray[Any]:
     return table
 
 
-def require_symmetry(scene: Scene) -> None:
-    """Refuse scenes that a turn or a mirror would change."""
-    why = None
-    if not scene.robot.is_symmetric:
-        why = "its limbs are not alike, straight and evenly spread"
-    elif len(set(scene.limb_strengths)) > 1:
-        why = "its limbs are not equally strong"
-    elif isinstance(scene.actuator, StatefulActuator):
-        why = "its actuators remember what they did, and no table says how that is carried from limb to limb"
-    elif any(node != 0 for node in scene.held_nodes) or scene.loads:
-        why = "nodes are held or loaded"
+def require_symmetry(scene: Scene, randomization: DomainRandomization | None = None) -> None:
+    """Refuse scenes, and draws of their numbers, that a turn or a mirror would change."""
+    why = next(_asymmetries(scene, () if randomization is None else randomization.distributions), None)
     if why is not None:
-        raise ValueError(f"The symmetry of the regular polygon is not that of this robot: {why}.")
+        raise ValueError(f"This scene has not the symmetry of the regular polygon: {why}.")
+
+
+def _asymmetries(scene: Scene, drawn: Iterable[str]) -> Iterator[str]:
+    """Reasons why a scene, some of whose numbers are drawn, is not symmetric."""
+    if not scene.robot.is_symmetric:
+        yield "its limbs are not alike, straight and evenly spread"
+    if len(set(scene.limb_strengths)) > 1:
+        yield "its limbs are not equally strong"
+    if isinstance(scene.actuator, StatefulActuator):
+        yield "its actuators remember what they did, and no table says how that is carried from limb to limb"
+    if any(node != 0 for node in scene.held_nodes):
+        yield "nodes of limbs are held"
+    if scene.loads:
+        yield "its nodes are loaded"
+    if scene.fluid is not None and scene.fluid.current is not None:
+        yield "its water has a current"
+    for name in drawn:
+        if name == LIMB_STRENGTHS or name.startswith("robot.limbs."):
+            yield f"{name} is drawn for every limb by itself"
 
 
 # --- wrappers --------------------------------------------------------------------------------------------------------
@@ -204,15 +219,22 @@ else:
     _VectorWrapper = gym.vector.VectorWrapper  # not generic in gymnasium 1.2
 
 
+def _of_symmetric(env: Any) -> tuple[Actions, int]:
+    """Action mode and number of limbs of an environment, or of a batch of them; ValueError if it is not symmetric."""
+    inner = getattr(env, "unwrapped", env)
+    if not isinstance(inner, SeastarSwimEnv | SeastarSwimVectorEnv):
+        raise ValueError(f"Symmetry is known of SeastarSwim-v0 alone, not of {inner!r}.")
+    require_symmetry(inner.scene, inner.randomization)
+    return inner.actions, inner.scene.robot.n_limbs
+
+
 class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorArgs):
     """`SeastarSwim-v0` whose observations have the current waypoint in sector 0 and whose actions are carried back."""
 
     def __init__(self, env: gym.Env[Any, Any]):
         gym.utils.RecordConstructorArgs.__init__(self)
         gym.Wrapper.__init__(self, env)
-        self._mode: Actions = env.get_wrapper_attr("actions")
-        require_symmetry(env.get_wrapper_attr("scene"))
-        self._n_limbs: int = env.get_wrapper_attr("scene").robot.n_limbs
+        self._mode, self._n_limbs = _of_symmetric(env)
         self._element = np.zeros((), np.intp)
 
     def _reduced(self, observation: NDArray[np.float32]) -> NDArray[np.floating[Any]]:
@@ -236,10 +258,7 @@ class VectorSymmetryReduction(_VectorWrapper):
 
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any]):
         super().__init__(env)
-        self._mode: Actions = env.unwrapped.actions  # type: ignore[attr-defined]
-        scene: Scene = env.unwrapped.simulator.scene  # type: ignore[attr-defined]
-        require_symmetry(scene)
-        self._n_limbs: int = scene.robot.n_limbs
+        self._mode, self._n_limbs = _of_symmetric(env)
         self._elements = np.zeros(env.num_envs, np.intp)
 
     def _reduced(self, observations: NDArray[np.float32]) -> NDArray[np.floating[Any]]:

@@ -18,7 +18,7 @@ from seastar_gym.envs.observation import (
     with_memory,
 )
 from seastar_gym.envs.paths import AIM, PathName, cross_track_error, make_path, shortest_way
-from seastar_gym.envs.randomization import LIMB_STRENGTH, DomainRandomization, drawn_scene
+from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, drawn_scene
 from seastar_gym.envs.reward import RewardWeights, reward_terms
 from seastar_gym.fidelity import measured
 from seastar_gym.scene import Fidelity, Numerics, Scene, require_number
@@ -117,7 +117,7 @@ class SwimTask:
                 self.randomization.draw(self.drawn, int(robot), generators[robot])
         if self.drawn:
             self.simulator.set_scene(drawn_scene(self.scene, self.drawn), robots)
-            strengths = np.asarray(self.scene.limb_strengths or 1.0) * self.drawn.get(LIMB_STRENGTH, 1.0)
+            strengths = np.asarray(self.scene.limb_strengths or 1.0) * self.drawn.get(LIMB_STRENGTHS, 1.0)
             self.simulator.set_limb_strengths(strengths)
         self.simulator.reset(robots, headings)
         self.waypoint_index[robots] = 0

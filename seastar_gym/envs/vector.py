@@ -85,6 +85,11 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
         return self._task.scene
 
     @property
+    def randomization(self) -> DomainRandomization | None:
+        """Numbers of the scene that are drawn for every episode."""
+        return self._task.randomization
+
+    @property
     def simulator(self) -> Simulator:
         """The simulator of all robots."""
         return self._task.simulator
