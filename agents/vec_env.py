@@ -37,7 +37,6 @@ class BatchVecEnv(VecEnv):
         self._started = time.time()
         self._returns = np.zeros(self.num_envs)
         self._lengths = np.zeros(self.num_envs, np.int64)
-        self._first_info_names: list[str] = []
 
     def reset(self) -> VecEnvObs:
         """Begin episodes of all robots, with the seeds and options set for this reset."""
@@ -50,7 +49,6 @@ class BatchVecEnv(VecEnv):
         self._reset_options()
         self._returns[:] = 0.0
         self._lengths[:] = 0
-        self._first_info_names = _names(info)
         self.reset_infos = _one_per_robot(info, self.num_envs)
         return observations
 
@@ -70,7 +68,7 @@ class BatchVecEnv(VecEnv):
         if dones.any():
             final_infos = _one_per_robot(info["final_info"], self.num_envs)
             for robot in np.flatnonzero(dones).tolist():
-                self.reset_infos[robot] = {name: infos[robot][name] for name in self._first_info_names}
+                self.reset_infos[robot] = infos[robot]
                 infos[robot] = {
                     **final_infos[robot],
                     "terminal_observation": info["final_obs"][robot],

@@ -14,7 +14,7 @@ from seastar_gym.envs.rendering import Frame, Renderer
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.task import Outcome, Path, SwimTask, make_scene
 from seastar_gym.scene import Fidelity, Scene
-from seastar_gym.simulator import Simulator, SolverStatus
+from seastar_gym.simulator import Simulator
 
 FRAMES_PER_STROKE = 10
 Observation = NDArray[np.float32]
@@ -57,8 +57,9 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     current waypoint, `cross_track_error` [m] from the leg it is on, `is_success`, `limbs_heated`, `newton_iterations`,
     `solver_status` (0: converged), `smallest_opening_angle` [rad] between neighbouring limbs during the stroke (below
     zero: limbs crossed, which this scene allows), and the reward's terms. `solver_message` says what to do about a
-    status other than 0. `path_error` (by what share of its length the hub's path may be off) and `real_time_factor` (in
-    batch, on one core) are what was measured of the fidelity, see `seastar_gym.fidelity`; NaN in other scenes.
+    status other than 0, and is empty for 0. `path_error` (by what share of its length the hub's path may be off) and
+    `real_time_factor` (in batch, on one core) are what was measured of the fidelity, see `seastar_gym.fidelity`; NaN
+    for other robots and scenes. A reset gives the same names as a step, with zeros for what only a stroke can tell.
 
     ## Episode
     Starts at rest with the hub at the origin. `terminated` when the last waypoint is reached, or when the solver gave
@@ -150,7 +151,7 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
         if self._renderer is not None:
             self._renderer.reset(self.waypoints)
         self._draw_frame()
-        return self._task.observe()[0], _of_one_robot(self._task.facts())
+        return self._task.observe()[0], _of_one_robot(self._task.first_info())
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """One stroke."""
@@ -161,11 +162,7 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
         outcome = self._swim(command)
         terminated = bool(outcome.terminated[0])
         self._running = not terminated
-        info = _of_one_robot(outcome.info)
-        status = SolverStatus(info["solver_status"])
-        if status is not SolverStatus.CONVERGED:
-            info["solver_message"] = status.sentence
-        return self._task.observe()[0], float(outcome.reward[0]), terminated, False, info
+        return self._task.observe()[0], float(outcome.reward[0]), terminated, False, _of_one_robot(outcome.info)
 
     def _swim(self, command: NDArray[np.float64]) -> Outcome:
         if self.render_mode in (None, "rgb_array"):
@@ -247,4 +244,4 @@ def checked_options(options: dict[str, Any] | None, known: set[str]) -> dict[str
 
 def _of_one_robot(info: dict[str, NDArray[Any]]) -> dict[str, Any]:
     """Info of robot 0 as plain numbers, its vectors as arrays."""
-    return {name: values[0].item() if values.ndim == 1 else values[0] for name, values in info.items()}
+    return {name: values[0] if values.ndim > 1 else values.tolist()[0] for name, values in info.items()}

@@ -85,7 +85,7 @@ class SwimTask:
         self.scene, self.randomization = scene, randomization
         self.drawn = {} if randomization is None else randomization.first_values(scene, n_robots)
         self.simulator = Simulator(drawn_scene(scene, self.drawn), n_robots, threads)
-        self._promised = {name: np.full(n_robots, value) for name, value in promised(self.simulator.scene).items()}
+        self._promise = self.simulator.scene, promised(self.simulator.scene)
         peak = np.max(self.simulator.scene.actuator.peak_angle)  # before the first draw the largest that may be drawn
         if scene.robot.hub_hinge == "turning" and 2 * peak >= scene.robot.opening_angle * (1 - 1e-9):
             raise ValueError(
@@ -188,10 +188,25 @@ class SwimTask:
             "limbs_heated": limbs_heated,
             "newton_iterations": report.newton_iterations,
             "solver_status": report.status,
+            "solver_message": _messages(report.status),
             "smallest_opening_angle": report.smallest_opening_angle,
             **terms,
         }
         return Outcome(reward, success | (report.status != SolverStatus.CONVERGED), info)
+
+    def first_info(self) -> dict[str, NDArray[Any]]:
+        """What there is to tell before the first stroke, by the names and in the types of a stroke's info."""
+        counts = np.zeros(self.n_robots, np.int64)
+        return {
+            **self.facts(),
+            "is_success": np.zeros(self.n_robots, bool),
+            "limbs_heated": counts,
+            "newton_iterations": counts.copy(),
+            "solver_status": counts.copy(),
+            "solver_message": _messages(counts),
+            "smallest_opening_angle": np.full(self.n_robots, min(self.scene.robot.opening_angle, np.pi)),
+            **reward_terms(self.reward, np.zeros(self.n_robots), counts, counts),
+        }
 
     def _pass_waypoints(self, hub: Floats) -> NDArray[np.int64]:
         """Move on to the next waypoint as often as the current one is within reach; returns how often."""
@@ -215,9 +230,25 @@ class SwimTask:
             "waypoint_index": self.waypoint_index.copy(),
             "distance": _length(current - hub),
             "cross_track_error": cross_track_error(hub, self._waypoint(leg - 1), self._waypoint(leg)),
-            **{name: values.copy() for name, values in self._promised.items()},
+            **self._promised(),
             **{name: values.copy() for name, values in self.drawn.items()},
         }
+
+    def _promised(self) -> dict[str, Floats]:
+        """What was measured of the scene that the simulator has now; NaN for robots with weak limbs."""
+        simulator = self.simulator
+        if simulator.scene is not self._promise[0]:
+            self._promise = simulator.scene, promised(simulator.scene)
+        strong = (simulator.limb_strengths == 1.0).all(axis=1)
+        return {name: np.where(strong, value, np.nan) for name, value in self._promise[1].items()}
+
+
+def _messages(status: NDArray[np.int64]) -> NDArray[Any]:
+    """What to do about a status, shape (n_robots,); empty where the solver converged."""
+    messages = np.full(len(status), "", dtype=object)
+    for robot in np.flatnonzero(status != SolverStatus.CONVERGED):
+        messages[robot] = SolverStatus(status[robot]).sentence
+    return messages
 
 
 def _length(vectors: Floats) -> Floats:

@@ -16,7 +16,7 @@ from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.seastar_swim import checked_options
 from seastar_gym.envs.task import Path, SwimTask, make_scene
 from seastar_gym.scene import Fidelity, Scene
-from seastar_gym.simulator import Simulator, SolverStatus
+from seastar_gym.simulator import Simulator
 
 Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]
@@ -110,8 +110,7 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
                 self._generators[robot] = seeding.np_random(seeds[robot])[0]
         self._begin_episodes(mask, chosen.get("path"))
         self._has_begun = True
-        facts = self._task.facts()
-        return self._task.observe(), {**facts, **{f"_{name}": mask.copy() for name in facts}}
+        return self._task.observe(), _with_masks(self._task.first_info(), mask)
 
     def _checked_mask(self, mask: Any) -> Flags:
         if mask is None:
@@ -148,7 +147,7 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
         if resting.any():
             self._begin_episodes(resting)
         self._needs_reset = terminated | truncated
-        observations, info = self._task.observe(), self._with_masks(outcome.info, resting)
+        observations, info = self._task.observe(), self._info(outcome.info, resting)
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._needs_reset.any():
             observations, info = self._begin_next_episodes(observations, outcome.info)
         return observations, reward, terminated, truncated, info
@@ -161,32 +160,32 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
         final_obs = np.full(self.num_envs, None, dtype=object)
         for robot in np.flatnonzero(over):
             final_obs[robot] = observations[robot]
-        final_info = self._with_masks(strokes, ~over, begun_anew=False)
+        final_info = _with_masks({name: _of_some(values, over) for name, values in strokes.items()}, over)
         self._begin_episodes(over)
         return self._task.observe(), {
-            **self._with_masks(strokes, over),
+            **self._info(strokes, over),
             "final_obs": final_obs,
             "_final_obs": over,
             "final_info": final_info,
             "_final_info": over,
         }
 
-    def _with_masks(self, strokes: dict[str, NDArray[Any]], others: Flags, begun_anew: bool = True) -> Info:
-        """Gymnasium's form of a batch's info: beside every array a mask of the robots that it tells about.
+    def _info(self, strokes: dict[str, NDArray[Any]], begun: Flags) -> Info:
+        """What a stroke says of the robots, and a reset of those that have begun anew."""
+        info = {name: values.copy() for name, values in strokes.items()}
+        if begun.any():
+            for name, values in self._task.first_info().items():
+                info[name][begun] = values[begun]
+        return _with_masks(info, np.ones_like(begun))
 
-        strokes: What a stroke says of all robots; of `others` only what a reset says counts, if they have begun anew.
-        """
-        facts = self._task.facts() if begun_anew and others.any() else {}
-        info: Info = {}
-        for name, values in strokes.items():
-            values = values.copy()
-            if others.any():
-                values[others] = facts[name][others] if name in facts else 0
-            info[name], info[f"_{name}"] = values, np.ones_like(others) if name in facts else ~others
-        failed = (strokes["solver_status"] != SolverStatus.CONVERGED) & ~others
-        if failed.any():
-            messages = np.full(self.num_envs, None, dtype=object)
-            for robot in np.flatnonzero(failed):
-                messages[robot] = SolverStatus(strokes["solver_status"][robot]).sentence
-            info["solver_message"], info["_solver_message"] = messages, failed
-        return info
+
+def _of_some(values: NDArray[Any], mask: Flags) -> NDArray[Any]:
+    """The values of the robots in the mask; nothing, as Gymnasium writes it, for the others."""
+    values = values.copy()
+    values[~mask] = None if values.dtype == object else 0
+    return values
+
+
+def _with_masks(values: dict[str, NDArray[Any]], mask: Flags) -> Info:
+    """Gymnasium's form of a batch's info: beside every array a mask of the robots that it tells about."""
+    return values | {f"_{name}": mask.copy() for name in values}

@@ -4,6 +4,7 @@ import copy
 import math
 import pickle
 import warnings
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import seastar_gym
-from seastar_gym import Numerics, RewardWeights, Scene, Seastar, SmaPulse, SolverStatus
+from seastar_gym import DomainRandomization, Numerics, RewardWeights, Scene, Seastar, SmaPulse, SolverStatus, Uniform
 from seastar_gym.envs.paths import AIM, PATH_NAMES, cross_track_error, shortest_way
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.fidelity import promise
@@ -22,8 +23,8 @@ FACTS = {
     "time", "hub_position", "waypoint_index", "distance", "cross_track_error", "path_error", "real_time_factor",
 }  # fmt: skip
 OF_A_STROKE = {
-    "is_success", "limbs_heated", "newton_iterations", "solver_status", "smallest_opening_angle", "reward_progress",
-    "reward_waypoint", "reward_effort",
+    "is_success", "limbs_heated", "newton_iterations", "solver_status", "solver_message", "smallest_opening_angle",
+    "reward_progress", "reward_waypoint", "reward_effort",
 }  # fmt: skip
 
 
@@ -101,6 +102,25 @@ def test_info_promises_nothing_for_scenes_that_were_not_measured(scene):
     assert np.isnan([info["path_error"], info["real_time_factor"]]).all()
 
 
+def test_info_promises_nothing_for_robots_that_were_drawn():
+    draws = DomainRandomization({"limb_strengths": Uniform(0.5, 0.9)})
+    env = fast(randomization=draws)
+    for info in (env.reset(seed=0)[1], env.step(STRAIGHT)[4]):
+        assert np.isnan([info["path_error"], info["real_time_factor"]]).all()
+
+
+def test_info_promises_nothing_once_the_scene_or_a_strength_was_changed():
+    env = fast()
+    known = env.reset(seed=0)[1]["path_error"]
+    chapters = env.simulator.scene
+    env.simulator.set_scene(replace(chapters, robot=Seastar(youngs_modulus=1.5e6)))
+    assert np.isnan(env.step(STRAIGHT)[4]["path_error"])
+    env.simulator.set_scene(chapters)
+    assert env.step(STRAIGHT)[4]["path_error"] == known
+    env.simulator.set_limb_strengths([1.0, 1.0, 0.5, 1.0, 1.0])
+    assert np.isnan(env.step(STRAIGHT)[4]["real_time_factor"])
+
+
 def test_fidelity_replaces_the_numerics_of_a_scene_and_nothing_else():
     scene = Scene(Seastar(density=1100.0), numerics=Numerics("sdirk3", 0.05))
     assert SeastarSwimEnv(scene=scene).scene == scene
@@ -120,8 +140,42 @@ def test_types_of_a_step_are_plain():
         if name == "hub_position":
             assert value.shape == (2,) and value.dtype == np.float64
         else:
-            assert type(value) in (int, float, bool), name
-    assert env.reset()[1].keys() == FACTS
+            assert type(value) in (int, float, bool, str), name
+
+
+@pytest.mark.parametrize("draws", [None, DomainRandomization({"limb_strengths": Uniform(0.5, 1.0)})])
+def test_info_has_the_same_names_types_and_shapes_on_a_reset_on_a_step_and_on_a_failure(draws):
+    env = fast(randomization=draws)
+    infos = [env.reset(seed=0)[1], env.step(STRAIGHT)[4]]
+    break_robot(env, SolverStatus.NOT_CONVERGED)
+    infos += [env.step(STRAIGHT)[4], env.reset()[1]]
+    for info in infos[1:]:
+        assert list(info) == list(infos[0])
+        for name, value in info.items():
+            assert type(value) is type(infos[0][name]), name
+            assert np.shape(value) == np.shape(infos[0][name]), name
+
+
+def test_a_reset_tells_of_a_stroke_that_has_not_happened():
+    info = fast().reset(seed=0)[1]
+    assert info["smallest_opening_angle"] == pytest.approx(2 * np.pi / 5)
+    assert info["is_success"] is False and info["solver_message"] == ""
+    assert not any(info[name] for name in OF_A_STROKE - {"smallest_opening_angle"})
+
+
+@pytest.mark.filterwarnings("ignore")  # about a dataset without a description, and a folder left to the collector
+def test_a_dataset_recorder_takes_the_infos(tmp_path, monkeypatch):
+    minari = pytest.importorskip("minari")
+    pytest.importorskip("jax")
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    env = gym.make("SeastarSwim-v0", fidelity="fast", max_episode_steps=2)
+    collector = minari.DataCollector(env, record_infos=True)
+    for seed in range(2):
+        collector.reset(seed=seed)
+        for _ in range(2):
+            collector.step(STRAIGHT)
+    dataset = collector.create_dataset("seastar/swim-v0")
+    assert [len(episode.infos["time"]) for episode in dataset] == [3, 3]
 
 
 # Physics behind the step
@@ -422,7 +476,7 @@ def test_a_converged_stroke_has_no_message():
     env = fast()
     env.reset(seed=0)
     info = env.step(STRAIGHT)[4]
-    assert info["solver_status"] == SolverStatus.CONVERGED and "solver_message" not in info
+    assert info["solver_status"] == SolverStatus.CONVERGED and info["solver_message"] == ""
 
 
 # Refusals
