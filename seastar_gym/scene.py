@@ -20,6 +20,7 @@ from seastar_gym.actuation.sma import SmaPulse as SmaPulse
 from seastar_gym.checks import is_finite_number, require_numbers
 from seastar_gym.checks import require_choice as require_choice
 from seastar_gym.checks import require_count as require_count
+from seastar_gym.checks import require_flag as require_flag
 from seastar_gym.checks import require_number as require_number
 from seastar_gym.contact import Contact as Contact
 from seastar_gym.der.rods import Limits, Rods
@@ -177,6 +178,8 @@ class Numerics:
     max_iterations: Newton iterations per stage before the robot's step is halved.
     path_tolerance: Adapt the steps, up to `step`, so that the hub's path errs by about this share of its length at
         most, from 0.001 to 0.02; for scheme "implicit-midpoint". None for steps of one length.
+    named: Whether somebody chose these numerics. False for those of a `Scene` that was given none: a `Simulator` steps
+        by them, an environment by its fidelity. Equal numerics may differ in it; changed ones are named.
     """
 
     scheme: SchemeName = "implicit-euler"
@@ -184,8 +187,10 @@ class Numerics:
     newton_tolerance: float = 1e-8
     max_iterations: int = 60
     path_tolerance: float | None = None
+    named: bool = field(default=True, kw_only=True, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        require_flag("named", self.named)
         require_choice("scheme", self.scheme, get_args(SchemeName))
         require_number("step", self.step, "s")
         require_number("newton_tolerance", self.newton_tolerance, "limb lengths")
@@ -197,6 +202,8 @@ class Numerics:
                 raise ValueError(f"path_tolerance must be from 0.001 to 0.02, not {self.path_tolerance!r}.")
             if self.scheme != "implicit-midpoint":
                 raise ValueError(f'path_tolerance needs the scheme "implicit-midpoint", not {self.scheme!r}.')
+        if not self.named and self != Numerics():
+            object.__setattr__(self, "named", True)
 
     @classmethod
     def preset(cls, fidelity: Fidelity) -> "Numerics":
@@ -234,6 +241,7 @@ _PRESETS: dict[Fidelity, Numerics] = {
 class Scene:
     """A robot, the fluid around it (None: vacuum), its actuator and the numerics.
 
+    numerics: The chapter's where none are named; environments then take those of their fidelity.
     held_nodes: Indices of nodes that stay where they are; hub and root node held clamp a limb.
     loads: Dead loads on nodes, (node, F_x, F_y) [N] each.
     limb_strengths: Share of its rotation that every limb still makes, from 0 (failed) to 1; () for all of it.
@@ -243,7 +251,7 @@ class Scene:
     robot: Seastar = field(default_factory=Seastar)
     fluid: Water | None = field(default_factory=Water)
     actuator: Actuator = field(default_factory=SmaPulse)
-    numerics: Numerics = field(default_factory=Numerics)
+    numerics: Numerics = field(default_factory=partial(Numerics, named=False))
     held_nodes: tuple[int, ...] = ()
     loads: tuple[tuple[int, float, float], ...] = ()
     limb_strengths: tuple[float, ...] = ()

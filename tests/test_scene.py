@@ -30,6 +30,19 @@ def test_defaults_are_the_chapters_values():
     assert Scene() == Scene(robot, water, actuator, Numerics())
 
 
+def test_a_scene_knows_whether_its_numerics_were_named_and_is_otherwise_the_same():
+    plain, named = Scene(), Scene(numerics=Numerics())
+    assert not plain.numerics.named and named.numerics.named
+    assert plain == named and hash(plain) == hash(named) and repr(plain) == repr(named)
+    for same in (dataclasses.replace(plain, robot=Seastar()), copy.deepcopy(plain), plain.of_robot(0)):
+        assert not same.numerics.named
+    assert dataclasses.replace(plain.numerics, step=1e-3).named
+    assert Numerics(**dataclasses.asdict(plain.numerics)).named is False
+    Simulator(plain).set_scene(named)  # one frame
+    with assert_refused("named", "True or False"):
+        Numerics(named="no")
+
+
 def test_chapter_robot_has_46_nodes_in_the_documented_order():
     robot = Seastar()
     nodes = robot.nodes()

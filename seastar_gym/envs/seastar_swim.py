@@ -69,8 +69,8 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     path: "pentagon", "square", "triangle", "line", "figure-eight", "random", or waypoints [m] of shape (n, 2); also
         through `reset(options={"path": ...})`, for that episode.
     actions: see above.
-    fidelity: "fast", "balanced", "accurate", "reference" or "chapter"; replaces the numerics of `scene`. By default
-        "balanced", or the numerics of `scene` where one is given.
+    fidelity: "fast", "balanced" (default), "accurate", "reference" or "chapter". Where `scene` names its numerics,
+        those hold, and another fidelity is refused.
     scene: What is modelled; the chapter's robot in water by default.
     reward: Weights of the reward's terms.
     waypoint_radius: A waypoint is reached within this distance [m].

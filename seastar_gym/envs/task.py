@@ -27,6 +27,8 @@ from seastar_gym.simulator import Simulator, SolverStatus, StrokeReport
 Floats = NDArray[np.float64]
 Path = PathName | ArrayLike
 
+DEFAULT_FIDELITY: Fidelity = "balanced"
+
 
 class Outcome(NamedTuple):
     """What a stroke did for the task; arrays over robots."""
@@ -37,12 +39,22 @@ class Outcome(NamedTuple):
 
 
 def make_scene(scene: Scene | None, fidelity: Fidelity | None) -> Scene:
-    """The scene with the numerics of `fidelity`; "balanced" if neither is given."""
-    if scene is None:
-        return Scene(numerics=Numerics.preset("balanced" if fidelity is None else fidelity))
+    """The scene with the numerics that it names, else with those of `fidelity`, which is "balanced" by default.
+
+    ValueError where scene and fidelity name different ones.
+    """
+    scene = Scene() if scene is None else scene
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a Scene, not {scene!r}.")
-    return scene if fidelity is None else replace(scene, numerics=Numerics.preset(fidelity))
+    if fidelity is None and scene.numerics.named:
+        return scene
+    numerics = Numerics.preset(DEFAULT_FIDELITY if fidelity is None else fidelity)
+    if scene.numerics.named and scene.numerics != numerics:
+        raise ValueError(
+            f'fidelity="{fidelity}" contradicts the numerics that the scene names, {scene.numerics!r}: '
+            "give one of them."
+        )
+    return replace(scene, numerics=numerics)
 
 
 def promised(scene: Scene) -> dict[str, float]:

@@ -12,9 +12,11 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import seastar_gym
+from refusals import assert_refused
 from seastar_gym import DomainRandomization, Numerics, RewardWeights, Scene, Seastar, SmaPulse, SolverStatus, Uniform
 from seastar_gym.envs.paths import AIM, PATH_NAMES, cross_track_error, shortest_way
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.fidelity import promise
 
 STRAIGHT = np.array([0, 1, 0, 0, 2])
@@ -121,12 +123,25 @@ def test_info_promises_nothing_once_the_scene_or_a_strength_was_changed():
     assert np.isnan(env.step(STRAIGHT)[4]["real_time_factor"])
 
 
-def test_fidelity_replaces_the_numerics_of_a_scene_and_nothing_else():
-    scene = Scene(Seastar(density=1100.0), numerics=Numerics("sdirk3", 0.05))
-    assert SeastarSwimEnv(scene=scene).scene == scene
-    assert SeastarSwimEnv(scene=scene, fidelity="chapter").scene == Scene(
-        scene.robot, numerics=Numerics.preset("chapter")
-    )
+@pytest.mark.parametrize("fidelity", [None, "fast", "chapter"])
+def test_a_scene_that_names_no_numerics_swims_at_the_fidelity(fidelity):
+    scene = Scene(Seastar(density=1100.0))
+    for given in (scene, pickle.loads(pickle.dumps(scene)), replace(scene, contact=None)):
+        env = SeastarSwimEnv(scene=given, fidelity=fidelity)
+        assert env.scene == replace(scene, numerics=Numerics.preset(fidelity or "balanced"))
+
+
+def test_numerics_that_a_scene_names_are_kept():
+    for numerics in (Numerics("sdirk3", 0.05), Numerics(), replace(Scene().numerics, step=2e-3)):
+        assert SeastarSwimEnv(scene=Scene(numerics=numerics)).scene.numerics == numerics
+    chapters = Scene(numerics=Numerics.preset("chapter"))
+    assert SeastarSwimEnv(scene=chapters, fidelity="chapter").scene == chapters
+
+
+def test_a_fidelity_that_contradicts_the_numerics_of_a_scene_is_refused():
+    for make in (SeastarSwimEnv, SeastarSwimVectorEnv):
+        with assert_refused('fidelity="fast"', "implicit-euler", "give one of them"):
+            make(scene=Scene(numerics=Numerics()), fidelity="fast")
 
 
 def test_types_of_a_step_are_plain():
