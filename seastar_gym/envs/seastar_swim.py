@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions, action_space, command_table, to_commands
 from seastar_gym.envs.randomization import DomainRandomization
-from seastar_gym.envs.rendering import Frame, Renderer
+from seastar_gym.envs.rendering import Frame, Renderer, limb_nodes
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.task import Outcome, Path, SwimTask, make_scene
 from seastar_gym.scene import Fidelity, Scene
@@ -136,7 +136,7 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     @property
     def waypoints(self) -> NDArray[np.float64]:
         """Waypoints of the current episode [m], shape (n, 2)."""
-        return self._task.waypoints[0, : self._task.n_waypoints[0]].copy()
+        return self._task.waypoints_of(0)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -149,7 +149,8 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
         self._trail = self.simulator.hub_position()
         self._frames = []
         if self._renderer is not None:
-            self._renderer.reset(self.waypoints)
+            robot = self.simulator.scene.of_robot(0).robot
+            self._renderer.reset(self.waypoints, robot.limb_length, robot.rod_radius)
         self._draw_frame()
         return self._task.observe()[0], _of_one_robot(self._task.first_info())
 
@@ -204,9 +205,8 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     def _get_renderer(self) -> Renderer:
         if self._renderer is None:
             robot = self.simulator.scene.of_robot(0).robot
-            limbs = 1 + np.arange(robot.n_nodes - 1).reshape(robot.n_limbs, -1)
             self._renderer = Renderer(
-                np.hstack([np.zeros((robot.n_limbs, 1), int), limbs]),
+                limb_nodes(robot.n_limbs, robot.nodes_per_limb),
                 self.waypoints,
                 limb_length=robot.limb_length,
                 rod_radius=robot.rod_radius,

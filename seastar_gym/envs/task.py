@@ -148,6 +148,10 @@ class SwimTask:
         self._way_after[robot, : n - 1] = np.cumsum(legs[::-1])[::-1]
         self.n_waypoints[robot] = n
 
+    def waypoints_of(self, robot: int) -> Floats:
+        """Waypoints of a robot's present episode [m], shape (n, 2), a copy."""
+        return self.waypoints[robot, : self.n_waypoints[robot]].copy()
+
     def _waypoint(self, k: NDArray[np.int64]) -> Floats:
         """Waypoint k of every robot [m], the last one beyond the end, the origin at -1; shape (n_robots, 2)."""
         robots = np.arange(self.n_robots)

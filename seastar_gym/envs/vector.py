@@ -1,6 +1,7 @@
 """`SeastarSwim-v0` as a native batch: all robots of one simulator, the same numbers as one environment each."""
 
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, Literal
 
 import gymnasium as gym
 import numpy as np
@@ -10,10 +11,11 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from seastar_gym.envs.batch_pictures import BatchPictures, Picture
 from seastar_gym.envs.commands import Actions, action_space, command_table, to_commands
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.reward import RewardWeights
-from seastar_gym.envs.seastar_swim import checked_options
+from seastar_gym.envs.seastar_swim import FRAMES_PER_STROKE, checked_options
 from seastar_gym.envs.task import Path, SwimTask, make_scene
 from seastar_gym.scene import Fidelity, Scene
 from seastar_gym.simulator import Simulator
@@ -35,9 +37,17 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
         observation, and its own last one in `info["final_obs"]`, `info["final_info"]`. DISABLED: `reset` with
         `options={"reset_mask": ...}` before the next step.
     threads: Threads of the simulator; all processors if None.
+    render_mode: "rgb_array": `render` draws every robot after its stroke, the smaller the more there are;
+        `render_robots` draws some of them.
+
+    `call`, `get_attr` and `set_attr` are those of Gymnasium's `SyncVectorEnv`. What a robot has of its own
+    (`waypoints`, `scene`, `np_random`, `render`..) they give robot by robot; everything else is one and the same for
+    all robots.
     """
 
-    metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
+    metadata = {
+        "render_modes": ["rgb_array"], "render_fps": FRAMES_PER_STROKE, "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }  # fmt: skip
 
     def __init__(
         self,
@@ -50,20 +60,22 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
         reward: RewardWeights = RewardWeights(),
         waypoint_radius: float = 0.01,
         random_heading: bool = False,
-        render_mode: None = None,
+        render_mode: Literal["rgb_array"] | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
         randomization: DomainRandomization | None = None,
     ):
-        if render_mode is not None:
-            raise ValueError('The batch draws nothing: use gym.make("SeastarSwim-v0", render_mode=...) for one robot.')
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(
+                f'The batch draws with render_mode="rgb_array" only, not {render_mode!r}: use gym.make for one robot.'
+            )
         if max_episode_steps is not None and max_episode_steps < 1:
             raise ValueError(f"max_episode_steps must be at least 1 or None, not {max_episode_steps!r}.")
         self.num_envs = num_envs
         self.max_episode_steps = max_episode_steps
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
-        self.render_mode = None
+        self.render_mode = render_mode
         self.actions = actions
         self._task = SwimTask(
             make_scene(scene, fidelity), num_envs, path, reward, waypoint_radius, random_heading, threads, randomization
@@ -74,7 +86,10 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
         self.single_observation_space = spaces.Box(-np.inf, np.inf, (self._task.observation_size,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.command_table = None if actions == "limbs" else command_table(actions, n_limbs)
-        self._generators = [seeding.np_random(None)[0] for _ in range(num_envs)]
+        self._generators, self._seeds = map(list, zip(*(seeding.np_random(None) for _ in range(num_envs)), strict=True))
+        self._commands = np.zeros((num_envs, n_limbs))
+        self._pictures = BatchPictures(self._task)
+        self._attributes: dict[str, tuple[Any, ...]] = {}
         self._elapsed = np.zeros(num_envs, np.int64)
         self._needs_reset = np.ones(num_envs, bool)
         self._has_begun = False
@@ -94,6 +109,25 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
         """The simulator of all robots."""
         return self._task.simulator
 
+    @property
+    def waypoints(self) -> tuple[NDArray[np.float64], ...]:
+        """Waypoints of every robot's present episode [m], shape (n, 2) each."""
+        return tuple(map(self._task.waypoints_of, range(self.num_envs)))
+
+    @property  # type: ignore[override]
+    def np_random(self) -> tuple[np.random.Generator, ...]:
+        """What every robot's paths, headings and numbers are drawn from."""
+        return tuple(self._generators)
+
+    @np_random.setter  # type: ignore[override]
+    def np_random(self, generators: Iterable[np.random.Generator]) -> None:
+        self._generators = list(generators)
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """The seed of every robot's generator."""
+        return tuple(self._seeds)
+
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, Info]:
@@ -107,7 +141,7 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
             raise ValueError(f"seed must be one number or {self.num_envs} of them, not {len(seeds)}.")
         for robot in np.flatnonzero(mask):
             if seeds[robot] is not None:
-                self._generators[robot] = seeding.np_random(seeds[robot])[0]
+                self._generators[robot], self._seeds[robot] = seeding.np_random(seeds[robot])
         self._begin_episodes(mask, chosen.get("path"))
         self._has_begun = True
         return self._task.observe(), _with_masks(self._task.first_info(), mask)
@@ -126,6 +160,9 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
         self._task.reset(mask, self._generators, path)
         self._elapsed[mask] = 0
         self._needs_reset[mask] = False
+        self._commands[mask] = 0.0
+        if self.render_mode is not None:
+            self._pictures.begin(mask)
 
     def step(self, actions: Any) -> tuple[Observations, NDArray[np.float64], Flags, Flags, Info]:
         """One stroke of every robot."""
@@ -139,6 +176,9 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
         commands = to_commands(self.actions, self.simulator.scene.robot.n_limbs, actions, self.num_envs)
         commands[resting] = 0.0
         outcome = self._task.step(commands)
+        self._commands = commands
+        if self.render_mode is not None:
+            self._pictures.follow()
         self._elapsed += 1
         terminated = outcome.terminated & ~resting
         out_of_time = self.max_episode_steps is not None and self._elapsed >= self.max_episode_steps
@@ -151,6 +191,51 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._needs_reset.any():
             observations, info = self._begin_next_episodes(observations, outcome.info)
         return observations, reward, terminated, truncated, info
+
+    def render(self) -> tuple[Picture, ...] | None:
+        """A picture of every robot, shape (height, width, 3) each; None without a render_mode."""
+        return self.render_robots(range(self.num_envs))
+
+    def render_robots(self, robots: Iterable[int]) -> tuple[Picture, ...] | None:
+        """Pictures of some robots; None without a render_mode."""
+        if self.render_mode is None:
+            gym.logger.warn('render() without a render_mode draws nothing: make the batch with "rgb_array".')
+            return None
+        return self._pictures.draw(robots, self._commands)
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """An attribute, or the result of a method, once for every robot."""
+        if name in ("reset", "step", "close"):
+            raise ValueError(f"The robots share one simulator: use {name}() of the batch, not call({name!r}).")
+        if name in ("action_space", "observation_space"):
+            name = f"single_{name}"
+        if name == "scene":
+            return tuple(map(self.scene.of_robot, range(self.num_envs)))
+        value = self._attributes[name] if name in self._attributes else getattr(self, name)
+        value = value(*args, **kwargs) if callable(value) else value
+        of_each = name in self._attributes or name in ("np_random", "np_random_seed", "render", "waypoints")
+        return value if of_each and value is not None else (value,) * self.num_envs
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """An attribute, once for every robot."""
+        return self.call(name)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Set an attribute: a list or tuple has a value for every robot, anything else is the value for all.
+
+        Robots may have different values of new attributes and of `np_random`; what the batch has already, all share.
+        """
+        values = tuple(values) if isinstance(values, list | tuple) else (values,) * self.num_envs
+        if len(values) != self.num_envs:
+            raise ValueError(f"{name} must be one value or {self.num_envs} of them, not {len(values)}.")
+        if name == "np_random":
+            self.np_random = values
+        elif not hasattr(self, name):
+            self._attributes[name] = values
+        elif all(value is values[0] or np.all(value == values[0]) for value in values):
+            setattr(self, name, values[0])
+        else:
+            raise ValueError(f"The robots share one batch, so {name} must be the same for all of them.")
 
     def _begin_next_episodes(
         self, observations: Observations, strokes: dict[str, NDArray[Any]]

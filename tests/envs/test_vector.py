@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_match import check_environments_match
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.wrappers.vector import RecordVideo
 
+from refusals import assert_refused
 from seastar_gym import DomainRandomization, Numerics, RewardWeights, Scene, Seastar, SmaPulse, SolverStatus, Uniform
 from seastar_gym.der.lanes import N_LANES
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -342,6 +344,110 @@ def test_a_robots_smallest_opening_angle_does_not_depend_on_its_neighbours():
     assert_same_infos(batch.step(actions)[4], singles.step(actions)[4], apart_from=None)
 
 
+# What a vector environment of Gymnasium offers
+
+
+@pytest.mark.parametrize(
+    "name", ["waypoints", "action_space", "observation_space", "actions", "scene", "np_random_seed", "render_mode"]
+)
+def test_attributes_are_those_of_single_environments(name):
+    batch, singles = both(3, path="random")
+    for env in (batch, singles):
+        env.reset(seed=4)
+    found, expected = batch.get_attr(name), singles.get_attr(name)
+    assert type(found) is type(expected) is tuple and len(found) == len(expected) == 3
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_equal(one, other)
+    np.testing.assert_equal(batch.call(name), found)
+
+
+def test_every_robot_has_its_own_scene_and_generator():
+    scene = Scene(Seastar(youngs_modulus=np.array([1e6, 2e6, 3e6])), numerics=Numerics.preset("fast"))
+    batch = SeastarSwimVectorEnv(3, scene=scene, path="random", random_heading=True)
+    assert [one.robot.youngs_modulus for one in batch.get_attr("scene")] == [1e6, 2e6, 3e6]
+    batch.reset(seed=[5, 6, 7])
+    assert batch.np_random_seed == batch.get_attr("np_random_seed") == (5, 6, 7)
+    generators = batch.get_attr("np_random")
+    first = batch.reset(seed=[5, 6, 7])[0]
+    batch.set_attr("np_random", generators)  # as they are after one draw
+    assert np.abs(batch.reset()[0] - first).max() > 1e-3
+    batch.set_attr("np_random", [np.random.default_rng(seed) for seed in (6, 5, 7)])
+    np.testing.assert_array_equal(batch.reset()[0][[1, 0, 2]], batch.reset(seed=[5, 6, 7])[0])
+
+
+def test_methods_are_called_and_what_has_to_be_done_together_is_refused():
+    batch = native(2)
+    batch.reset(seed=0)
+    assert batch.call("get_attr", "actions") == (("limbs", "limbs"),) * 2
+    for name in ("reset", "step", "close"):
+        with assert_refused(f"use {name}()"):
+            batch.call(name)
+    with pytest.raises(AttributeError, match="no_such_thing"):
+        batch.get_attr("no_such_thing")
+
+
+def test_attributes_are_set_as_in_single_environments():
+    batch, singles = both(3)
+    for env in (batch, singles):
+        env.set_attr("mark", ["a", "b", "c"])
+        assert env.get_attr("mark") == ("a", "b", "c")
+        env.set_attr("mark", 7)
+        assert env.get_attr("mark") == (7, 7, 7)
+        with pytest.raises(ValueError, match="2"):
+            env.set_attr("mark", [1, 2])
+    batch.set_attr("max_episode_steps", [3, 3, 3])
+    assert batch.max_episode_steps == 3
+    with assert_refused("max_episode_steps", "the same for all"):
+        batch.set_attr("max_episode_steps", [3, 4, 3])
+
+
+def test_robots_are_drawn_as_alone():
+    """Over the end of an episode, in motion, with paths and sizes of their own."""
+    pytest.importorskip("pygame")
+    draws = DomainRandomization({"robot.limb_length": Uniform(0.08, 0.12)})
+    batch, singles = both(2, path="random", max_episode_steps=3, randomization=draws, render_mode="rgb_array")
+    for env in (batch, singles):
+        env.reset(seed=1)
+    for _ in range(5):
+        actions = np.tile([0, 1, 0, 0, 2], (2, 1))
+        batch.step(actions)
+        singles.step(actions)
+        pictures, expected = batch.render(), singles.render()
+        assert len(pictures) == 2 and pictures[0].shape == (720, 960, 3) and pictures[0].dtype == np.uint8
+        for one, other in zip(pictures, expected, strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+def test_pictures_of_many_robots_are_small_and_some_can_be_drawn_alone():
+    pytest.importorskip("pygame")
+    batch = native(40, render_mode="rgb_array", path="random")
+    batch.reset(seed=0)
+    all_of_them = batch.render()
+    assert len(all_of_them) == 40 and {picture.shape for picture in all_of_them} == {(240, 320, 3)}
+    np.testing.assert_array_equal(batch.render_robots([7])[0], all_of_them[7])
+    again = pickle.loads(pickle.dumps(batch))
+    np.testing.assert_array_equal(again.render_robots([7])[0], all_of_them[7])
+
+
+def test_a_batch_without_a_render_mode_warns_and_draws_nothing():
+    with pytest.warns(UserWarning, match="draws nothing"):
+        assert native().render() is None
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_gymnasium_records_a_video(tmp_path):
+    pytest.importorskip("pygame")
+    pytest.importorskip("moviepy")
+    batch = native(4, render_mode="rgb_array", max_episode_steps=3)
+    recorder = RecordVideo(batch, str(tmp_path), episode_trigger=lambda episode: episode == 0)
+    recorder.reset(seed=0)
+    for _ in range(5):
+        recorder.step(np.ones((4, 5), int))
+    recorder.close()
+    (video,) = tmp_path.glob("*.mp4")
+    assert video.stat().st_size > 1000 and recorder.frames_per_sec == 10
+
+
 # Failure
 
 
@@ -449,7 +555,7 @@ def test_a_list_of_seeds_has_one_for_every_robot():
         ({"num_envs": 0}, "whole number"),
         ({"num_envs": 2.5}, "whole number"),
         ({"max_episode_steps": 0}, "max_episode_steps"),
-        ({"render_mode": "rgb_array"}, "draws nothing"),
+        ({"render_mode": "human"}, "rgb_array"),
         ({"autoreset_mode": "sometimes"}, "sometimes"),
         ({"path": "hexagon"}, "hexagon"),
         ({"actions": "binary"}, "actions"),
