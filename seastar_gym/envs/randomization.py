@@ -31,6 +31,8 @@ class Uniform:
         require_finite("high", self.high, "of its number")
         if not self.low <= self.high:
             raise ValueError(f"low must not exceed high: {self.low!r} is more than {self.high!r}.")
+        if not math.isfinite(self.high - self.low):
+            raise ValueError(f"high - low must be finite: {self.low!r} and {self.high!r} are too far apart.")
 
     @property
     def bounds(self) -> tuple[float, float]:

@@ -158,7 +158,7 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
         """One stroke."""
         if not self._running:
             raise gym.error.ResetNeeded("The episode has not begun or is over: call reset() before step().")
-        command = to_commands(self.actions, self.scene.robot.n_limbs, np.asarray(action)[None], 1)
+        command = to_commands(self.actions, self.scene.robot.n_limbs, [action], 1)
         self._command = command[0]
         outcome = self._swim(command)
         terminated = bool(outcome.terminated[0])

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.actuation.actuator import StatefulActuator
-from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, command_table
+from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, as_array, command_table
 from seastar_gym.envs.observation import layout_of_size
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -162,14 +162,27 @@ def transform_actions(
     actions: NDArray[np.integer[Any]], elements: ArrayLike, mode: Actions, n_limbs: int
 ) -> NDArray[np.integer[Any]]:
     """Actions of the robots carried by the elements: shape (..., n_limbs) for mode "limbs", else (...)."""
-    actions, elements = np.asarray(actions), np.asarray(elements, dtype=np.intp)
+    actions, elements = as_array(actions), np.asarray(elements, dtype=np.intp)
     n_choices = 3 if mode == "limbs" else action_table(mode, n_limbs).shape[1]
+    _check_shape(actions, elements, mode, n_limbs)
     if actions.dtype.kind not in "iu" or (actions.size and (actions.min() < 0 or actions.max() >= n_choices)):
         raise ValueError(f'With actions="{mode}" an action is a whole number from 0 to {n_choices - 1}.')
     if mode != "limbs":
         return action_table(mode, n_limbs)[elements, actions]
     moved = _move_limbs(actions, elements)
     return np.where(_is_mirror(elements)[..., None], _SWAPPED_LIMB_ACTIONS[moved], moved)
+
+
+def _check_shape(actions: NDArray[Any], elements: Elements, mode: Actions, n_limbs: int) -> None:
+    """Refuse actions that are not one for every element, or one for all."""
+    of_one = (n_limbs,) if mode == "limbs" else ()
+    robots = actions.shape[: actions.ndim - len(of_one)]
+    if actions.shape != (*robots, *of_one) or (robots != elements.shape and () not in (robots, elements.shape)):
+        one = f"{n_limbs} numbers" if mode == "limbs" else "a number"
+        raise ValueError(
+            f'With actions="{mode}" an action is {one}, for each of {elements.size} robot(s), not an array of shape '
+            f"{actions.shape}."
+        )
 
 
 def restore_actions(
@@ -248,7 +261,7 @@ class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstru
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """One stroke, by an action chosen on the last reduced observation."""
-        action = restore_actions(np.asarray(action), self._element, self._mode, self._n_limbs)
+        action = restore_actions(action, self._element, self._mode, self._n_limbs)
         observation, reward, terminated, truncated, info = self.env.step(action)
         return self._reduced(observation), reward, terminated, truncated, info
 
@@ -274,7 +287,7 @@ class VectorSymmetryReduction(_VectorWrapper):
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """One stroke of every robot, by actions chosen on the last reduced observations."""
-        actions = restore_actions(np.asarray(actions), self._elements, self._mode, self._n_limbs)
+        actions = restore_actions(actions, self._elements, self._mode, self._n_limbs)
         observations, rewards, terminated, truncated, info = self.env.step(actions)
         if "final_obs" in info:
             final = info["final_obs"].copy()

@@ -17,11 +17,11 @@ from seastar_gym.envs.observation import (
     to_float32,
     with_memory,
 )
-from seastar_gym.envs.paths import AIM, PathName, cross_track_error, make_path, shortest_way
+from seastar_gym.envs.paths import AIM, FARTHEST, PathName, cross_track_error, make_path, shortest_way
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, drawn_scene
 from seastar_gym.envs.reward import RewardWeights, reward_terms
 from seastar_gym.fidelity import measured
-from seastar_gym.scene import Fidelity, Numerics, Scene, require_number
+from seastar_gym.scene import Fidelity, Numerics, Scene, require_flag, require_number
 from seastar_gym.simulator import Simulator, SolverStatus, StrokeReport
 
 Floats = NDArray[np.float64]
@@ -91,6 +91,9 @@ class SwimTask:
         if not isinstance(randomization, DomainRandomization | None):
             raise ValueError(f"randomization must be a DomainRandomization or None, not {randomization!r}.")
         require_number("waypoint_radius", waypoint_radius, "m")
+        if waypoint_radius > FARTHEST:
+            raise ValueError(f"waypoint_radius must be at most {FARTHEST:g} m, not {waypoint_radius!r}.")
+        require_flag("random_heading", random_heading)
         if not isinstance(reward, RewardWeights):
             raise ValueError(f"reward must be RewardWeights, not {reward!r}.")
         waypoints = make_path(path, np.random.default_rng(0))  # refuses a bad path now, not at the first reset

@@ -12,12 +12,12 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from seastar_gym.envs.batch_pictures import BatchPictures, Picture
-from seastar_gym.envs.commands import Actions, action_space, command_table, to_commands
+from seastar_gym.envs.commands import Actions, action_space, as_array, command_table, to_commands
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.seastar_swim import FRAMES_PER_STROKE, checked_options
 from seastar_gym.envs.task import Path, SwimTask, make_scene
-from seastar_gym.scene import Fidelity, Scene
+from seastar_gym.scene import Fidelity, Scene, require_count
 from seastar_gym.simulator import Simulator
 
 Observations = NDArray[np.float32]
@@ -69,8 +69,8 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
             raise ValueError(
                 f'The batch draws with render_mode="rgb_array" only, not {render_mode!r}: use gym.make for one robot.'
             )
-        if max_episode_steps is not None and max_episode_steps < 1:
-            raise ValueError(f"max_episode_steps must be at least 1 or None, not {max_episode_steps!r}.")
+        if max_episode_steps is not None:
+            require_count("max_episode_steps", max_episode_steps, 1, 2**63 - 1)
         self.num_envs = num_envs
         self.max_episode_steps = max_episode_steps
         self.autoreset_mode = AutoresetMode(autoreset_mode)
@@ -149,7 +149,7 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
     def _checked_mask(self, mask: Any) -> Flags:
         if mask is None:
             return np.ones(self.num_envs, bool)
-        mask = np.asarray(mask)
+        mask = as_array(mask)
         if mask.dtype != bool or mask.shape != (self.num_envs,) or not mask.any():
             raise ValueError(f"reset_mask must be boolean of shape ({self.num_envs},) with at least one True.")
         if not self._has_begun and not mask.all():

@@ -120,6 +120,17 @@ def test_a_swim_ends_at_its_last_waypoint():
     assert all(done.strokes < 90 and done.waypoint_index[-2] == 0 for done in swims)
 
 
+@pytest.mark.parametrize("draw", ["normal", "exponential"])
+def test_an_interval_covers_the_mean_as_often_as_it_says(draw):
+    """The mean of 40 draws, 500 times: 95 % of the intervals, 93 % for skewed draws; one too narrow by 40 %: 76 %."""
+    draws = getattr(np.random.default_rng(0), draw)(size=(500, 40))
+    _, low, high = np.array([mean_with_interval(values) for values in draws]).T
+    mean = {"normal": 0.0, "exponential": 1.0}[draw]
+    covered = np.mean((low <= mean) & (mean <= high))
+    assert 0.90 < covered < 0.97
+    assert np.mean(high - low) == pytest.approx(2.0 * 1.96 / np.sqrt(40), rel=0.08)
+
+
 def test_a_mean_lies_in_its_interval_and_a_constant_needs_none():
     low, high = mean_with_interval(np.random.default_rng(0).normal(size=400))[1:]
     assert low < 0.0 < high and high - low == pytest.approx(2 * 1.96 / 20, rel=0.15)

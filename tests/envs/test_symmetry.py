@@ -389,6 +389,18 @@ def test_the_wrapper_refuses_an_action_that_is_none():
     env.reset(seed=0)
     with pytest.raises(ValueError, match="an action is a whole number from 0 to 2"):
         env.step(np.array([0, 1, 2, 3]))
+    for action in ([0, 1, 2], 1, [[0, 1], [0]], None, np.zeros((2, 4), int)):
+        with pytest.raises(ValueError, match=r'^With actions="limbs" .*\.$'):
+            env.step(action)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_the_wrapper_of_a_batch_refuses_actions_of_another_number_of_robots(mode):
+    batch = VectorSymmetryReduction(SeastarSwimVectorEnv(3, actions=mode, **SETTINGS))
+    batch.reset(seed=0)
+    for actions in (random_actions(mode, 4, 2), random_actions(mode, 4, 3)[:, None], [[0, 1], [0]]):
+        with pytest.raises(ValueError, match=rf'^With actions="{mode}" .*\.$'):
+            batch.step(actions)
 
 
 # --- which scenes are symmetric --------------------------------------------------------------------------------------

@@ -510,7 +510,10 @@ def test_the_first_reset_is_of_all_robots():
 
 @pytest.mark.parametrize(
     "actions",
-    [np.zeros((3, 5)), np.full((3, 5), np.nan), np.zeros((2, 5), int), np.zeros(5, int), np.full((3, 5), 3), None],
+    [
+        np.zeros((3, 5)), np.full((3, 5), np.nan), np.zeros((2, 5), int), np.zeros(5, int), np.full((3, 5), 3), None,
+        [[0, 1], [0]], [[10**400] * 5] * 3, np.zeros((3, 5), bool), "up",
+    ],
     ids=str,
 )
 def test_what_is_no_action_is_refused_and_changes_nothing(actions):
@@ -531,6 +534,8 @@ def test_what_is_no_action_is_refused_and_changes_nothing(actions):
         ({"path": "hexagon"}, "hexagon"),
         ({"path": [[0.0, np.inf]]}, "finite"),
         ({"reset_mask": [1, 0, 0]}, "reset_mask"),
+        ({"reset_mask": [[True], [True, False]]}, "reset_mask"),
+        ({"reset_mask": "True"}, "reset_mask"),
         ({"reset_mask": np.array([True])}, "reset_mask"),
         ({"reset_mask": np.zeros(3, bool)}, "reset_mask"),
     ],
@@ -554,7 +559,10 @@ def test_a_list_of_seeds_has_one_for_every_robot():
     [
         ({"num_envs": 0}, "whole number"),
         ({"num_envs": 2.5}, "whole number"),
-        ({"max_episode_steps": 0}, "max_episode_steps"),
+        *(({"max_episode_steps": value}, "max_episode_steps") for value in (0, -1, np.nan, np.inf, 2.5, True, "4")),
+        ({"random_heading": "False"}, "random_heading"),
+        ({"path": [[0.1, 0.0], [0.1, 0.0]]}, "the same point"),
+        ({"threads": 0}, "threads"),
         ({"render_mode": "human"}, "rgb_array"),
         ({"autoreset_mode": "sometimes"}, "sometimes"),
         ({"path": "hexagon"}, "hexagon"),
