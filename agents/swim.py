@@ -122,5 +122,5 @@ def swim(
         waypoint_index=np.array([info["waypoint_index"] for info in infos]),
         time=np.array([info["time"] for info in infos]),
         limbs_heated=np.array([info["limbs_heated"] for info in infos[1:]], dtype=np.int64),
-        solver_message=infos[-1].get("solver_message"),
+        solver_message=infos[-1]["solver_message"] or None,
     )

@@ -30,6 +30,12 @@ def require_count(name: str, value: int, smallest: int, largest: int) -> None:
         raise ValueError(f"{name} must be a whole number from {smallest} to {largest}, not {value!r}.")
 
 
+def require_flag(name: str, value: object) -> None:
+    """True or False, and nothing that Python takes for one of them."""
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError(f"{name} must be True or False, not {value!r}.")
+
+
 def require_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
     """One of the choices."""
     if value not in choices:

@@ -22,13 +22,21 @@ LARGEST_GRID = 4_000_000
 
 @dataclass(frozen=True)
 class UniformCurrent:
-    """A fluid that moves as a whole: u = (u_x, u_y) [m/s]."""
+    """A fluid that moves as a whole with the velocity u_x, u_y [m/s].
+
+    Numbers that differ from robot to robot are numpy arrays of shape (n_robots,) here: a tuple would be a vector.
+    """
 
     PER_ROBOT: ClassVar = ("u_x", "u_y")
     u_x: Numbers = 0.0
     u_y: Numbers = 0.0
 
     def __post_init__(self) -> None:
+        if type(self.u_x) in (tuple, list):
+            raise ValueError(
+                "UniformCurrent takes u_x and u_y [m/s], or a numpy array of each with a number for every robot, not "
+                f"the vector {self.u_x!r}."
+            )
         require_each(self, "u_x", partial(require_finite, unit="m/s"))
         require_each(self, "u_y", partial(require_finite, unit="m/s"))
 

@@ -65,7 +65,7 @@ def numbers_of(part: Any) -> dict[str, Any]:
 def _contents(part: Any) -> dict[str, Any]:
     """What a part is made of, by name; nothing for what is no part."""
     if dataclasses.is_dataclass(part):
-        return {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}
+        return {field.name: getattr(part, field.name) for field in dataclasses.fields(part) if field.compare}
     is_tuple_of_parts = isinstance(part, tuple) and part and all(map(dataclasses.is_dataclass, part))
     return {str(k): one for k, one in enumerate(part)} if is_tuple_of_parts else {}
 

@@ -20,6 +20,7 @@ from seastar_gym.actuation.sma import SmaPulse as SmaPulse
 from seastar_gym.checks import is_finite_number, require_numbers
 from seastar_gym.checks import require_choice as require_choice
 from seastar_gym.checks import require_count as require_count
+from seastar_gym.checks import require_flag as require_flag
 from seastar_gym.checks import require_number as require_number
 from seastar_gym.contact import Contact as Contact
 from seastar_gym.der.rods import Limits, Rods
@@ -134,9 +135,8 @@ class Seastar:
         """Whether a turn by one limb and a mirror at limb 1 leave the robot, or all of them, as it is."""
         robots = [self.limb_shapes(index) for index in range(batch_size(self) or 1)]
         alike = all(len({shape._replace(direction=0.0, gap=0.0) for shape in shapes}) == 1 for shapes in robots)
-        shapes = robots[0]
-        gaps = np.array([shape.gap for shape in shapes])
-        return alike and shapes[0].natural_curvature == 0.0 and float(np.ptp(gaps)) < 1e-12
+        straight = not any(shape.natural_curvature for shapes in robots for shape in shapes)
+        return alike and straight and float(np.ptp([shape.gap for shape in robots[0]])) < 1e-12
 
     @property
     def n_nodes(self) -> int:
@@ -187,6 +187,8 @@ class Numerics:
         SolverStatus.ITERATION_LIMIT.
     path_tolerance: Adapt the steps, up to `step`, so that the hub's path errs by about this share of its length at
         most, from 0.001 to 0.02; for scheme "implicit-midpoint". None for steps of one length.
+    named: Whether somebody chose these numerics. False for those of a `Scene` that was given none: a `Simulator` steps
+        by them, an environment by its fidelity. Equal numerics may differ in it; changed ones are named.
     """
 
     scheme: SchemeName = "implicit-euler"
@@ -194,8 +196,10 @@ class Numerics:
     newton_tolerance: float = 1e-8
     max_iterations: int = 60
     path_tolerance: float | None = None
+    named: bool = field(default=True, kw_only=True, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        require_flag("named", self.named)
         require_choice("scheme", self.scheme, get_args(SchemeName))
         require_number("step", self.step, "s")
         require_number("newton_tolerance", self.newton_tolerance, "limb lengths")
@@ -207,6 +211,8 @@ class Numerics:
                 raise ValueError(f"path_tolerance must be from 0.001 to 0.02, not {self.path_tolerance!r}.")
             if self.scheme != "implicit-midpoint":
                 raise ValueError(f'path_tolerance needs the scheme "implicit-midpoint", not {self.scheme!r}.')
+        if not self.named and self != Numerics():
+            object.__setattr__(self, "named", True)
 
     @classmethod
     def preset(cls, fidelity: Fidelity) -> "Numerics":
@@ -244,6 +250,7 @@ _PRESETS: dict[Fidelity, Numerics] = {
 class Scene:
     """A robot, the fluid around it (None: vacuum), its actuator and the numerics.
 
+    numerics: The chapter's where none are named; environments then take those of their fidelity.
     held_nodes: Indices of nodes that stay where they are; hub and root node held clamp a limb.
     loads: Dead loads on nodes, (node, F_x, F_y) [N] each.
     limb_strengths: Share of its rotation that every limb still makes, from 0 (failed) to 1; () for all of it.
@@ -253,7 +260,7 @@ class Scene:
     robot: Seastar = field(default_factory=Seastar)
     fluid: Water | None = field(default_factory=Water)
     actuator: Actuator = field(default_factory=SmaPulse)
-    numerics: Numerics = field(default_factory=Numerics)
+    numerics: Numerics = field(default_factory=partial(Numerics, named=False))
     held_nodes: tuple[int, ...] = ()
     loads: tuple[tuple[int, float, float], ...] = ()
     limb_strengths: tuple[float, ...] = ()

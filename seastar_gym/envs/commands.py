@@ -2,7 +2,7 @@
 
 import functools
 import itertools
-from typing import Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from gymnasium import spaces
@@ -54,9 +54,17 @@ def _command_table(actions: Actions, n_limbs: int) -> NDArray[np.float64]:
     return table
 
 
+def as_array(value: object) -> NDArray[Any]:
+    """The value as an array; rows of different lengths as one of objects, so that they can be refused in a sentence."""
+    try:
+        return np.asarray(value)
+    except ValueError:
+        return np.array(None)
+
+
 def to_commands(actions: Actions, n_limbs: int, action: object, n_robots: int) -> NDArray[np.float64]:
     """Commands of `n_robots` robots, shape (n_robots, n_limbs), or ValueError for what is not an action of theirs."""
-    array = np.asarray(action)
+    array = as_array(action)
     shape = (n_robots, n_limbs) if actions == "limbs" else (n_robots,)
     n_choices = 3 if actions == "limbs" else len(command_table(actions, n_limbs))
     if array.dtype.kind not in "iu" or array.shape != shape:

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions, action_space, command_table, to_commands
 from seastar_gym.envs.randomization import DomainRandomization
-from seastar_gym.envs.rendering import Frame, Renderer
+from seastar_gym.envs.rendering import Frame, Renderer, limb_nodes
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.task import Outcome, Path, SwimTask, make_scene
 from seastar_gym.scene import Fidelity, Scene
-from seastar_gym.simulator import Simulator, SolverStatus
+from seastar_gym.simulator import Simulator
 
 FRAMES_PER_STROKE = 10
 Observation = NDArray[np.float32]
@@ -58,8 +58,9 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     current waypoint, `cross_track_error` [m] from the leg it is on, `is_success`, `limbs_heated`, `newton_iterations`,
     `solver_status` (0: converged), `smallest_opening_angle` [rad] between neighbouring limbs during the stroke (below
     zero: limbs crossed, which this scene allows), and the reward's terms. `solver_message` says what to do about a
-    status other than 0. `path_error` (by what share of its length the hub's path may be off) and `real_time_factor` (in
-    batch, on one core) are what was measured of the fidelity, see `seastar_gym.fidelity`; NaN in other scenes.
+    status other than 0, and is empty for 0. `path_error` (by what share of its length the hub's path may be off) and
+    `real_time_factor` (in batch, on one core) are what was measured of the fidelity, see `seastar_gym.fidelity`; NaN
+    for other robots and scenes. A reset gives the same names as a step, with zeros for what only a stroke can tell.
 
     ## Episode
     Starts at rest with the hub at the origin. `terminated` when the last waypoint is reached, or when the solver gave
@@ -69,8 +70,8 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     path: "pentagon", "square", "triangle", "line", "figure-eight", "random", or waypoints [m] of shape (n, 2); also
         through `reset(options={"path": ...})`, for that episode.
     actions: see above.
-    fidelity: "fast", "balanced", "accurate", "reference" or "chapter"; replaces the numerics of `scene`. By default
-        "balanced", or the numerics of `scene` where one is given.
+    fidelity: "fast", "balanced" (default), "accurate", "reference" or "chapter". Where `scene` names its numerics,
+        those hold, and another fidelity is refused.
     scene: What is modelled; the chapter's robot in water by default.
     reward: Weights of the reward's terms.
     waypoint_radius: A waypoint is reached within this distance [m].
@@ -124,6 +125,11 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
         return self._task.scene
 
     @property
+    def randomization(self) -> DomainRandomization | None:
+        """Numbers of the scene that are drawn for every episode."""
+        return self._task.randomization
+
+    @property
     def simulator(self) -> Simulator:
         """The simulator, with one robot."""
         return self._task.simulator
@@ -131,7 +137,7 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     @property
     def waypoints(self) -> NDArray[np.float64]:
         """Waypoints of the current episode [m], shape (n, 2)."""
-        return self._task.waypoints[0, : self._task.n_waypoints[0]].copy()
+        return self._task.waypoints_of(0)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -145,9 +151,10 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
         self._trail = self.simulator.hub_position()
         self._frames = []
         if self._renderer is not None:
-            self._renderer.reset(self.waypoints)
+            robot = self.simulator.scene.of_robot(0).robot
+            self._renderer.reset(self.waypoints, robot.limb_length, robot.rod_radius)
         self._draw_frame()
-        return self._task.observe()[0], _of_one_robot(self._task.facts())
+        return self._task.observe()[0], _of_one_robot(self._task.first_info())
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """One stroke."""
@@ -155,17 +162,13 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
             raise gym.error.ResetNeeded(
                 "The episode has not begun, is over or was interrupted: call reset() before step()."
             )
-        command = to_commands(self.actions, self.scene.robot.n_limbs, np.asarray(action)[None], 1)
+        command = to_commands(self.actions, self.scene.robot.n_limbs, [action], 1)
         self._command = command[0]
         with self._until_whole():
             outcome = self._swim(command)
         terminated = bool(outcome.terminated[0])
         self._running = not terminated
-        info = _of_one_robot(outcome.info)
-        status = SolverStatus(info["solver_status"])
-        if status is not SolverStatus.CONVERGED:
-            info["solver_message"] = status.sentence
-        return self._task.observe()[0], float(outcome.reward[0]), terminated, False, info
+        return self._task.observe()[0], float(outcome.reward[0]), terminated, False, _of_one_robot(outcome.info)
 
     @contextlib.contextmanager
     def _until_whole(self) -> Iterator[None]:
@@ -218,9 +221,8 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     def _get_renderer(self) -> Renderer:
         if self._renderer is None:
             robot = self.simulator.scene.of_robot(0).robot
-            limbs = 1 + np.arange(robot.n_nodes - 1).reshape(robot.n_limbs, -1)
             self._renderer = Renderer(
-                np.hstack([np.zeros((robot.n_limbs, 1), int), limbs]),
+                limb_nodes(robot.n_limbs, robot.nodes_per_limb),
                 self.waypoints,
                 limb_length=robot.limb_length,
                 rod_radius=robot.rod_radius,
@@ -259,4 +261,4 @@ def checked_options(options: dict[str, Any] | None, known: set[str]) -> dict[str
 
 def _of_one_robot(info: dict[str, NDArray[Any]]) -> dict[str, Any]:
     """Info of robot 0 as plain numbers, its vectors as arrays."""
-    return {name: values[0].item() if values.ndim == 1 else values[0] for name, values in info.items()}
+    return {name: values[0] if values.ndim > 1 else values.tolist()[0] for name, values in info.items()}
