@@ -240,8 +240,13 @@ def load(path: str | os.PathLike[str] = SHIPPED) -> LearnedPolicy:
         description, weights = Description.from_facts(facts), safetensors.numpy.load(data)
         return LearnedPolicy(description, weights, checked_training(facts["training"]))
     except (KeyError, TypeError, ValueError, safetensors.SafetensorError) as unfit:
-        reason = f"it does not say {unfit}" if isinstance(unfit, KeyError) else " ".join(str(unfit).split())
-        raise ValueError(f"{path} is damaged, or no policy of this version: {reason.rstrip('.')}.") from unfit
+        raise ValueError(f"{path} is damaged, or no policy of this version: {reason_of(unfit)}.") from unfit
+
+
+def reason_of(unfit: Exception) -> str:
+    """What an exception says first, to end a sentence with."""
+    said = f"it does not say {unfit}" if isinstance(unfit, KeyError) else " ".join(str(unfit).split())
+    return said.split(". ")[0].rstrip(".")
 
 
 def read_facts(text: bytes) -> dict[str, Any]:
