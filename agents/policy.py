@@ -68,8 +68,8 @@ class Description(NamedTuple):
         return json.dumps(facts, indent=2, default=str, allow_nan=False)
 
     @classmethod
-    def from_json(cls, text: bytes) -> "Description":
-        """From `to_json`, encoded; see from_facts."""
+    def from_json(cls, text: str | bytes) -> "Description":
+        """From `to_json`, see from_facts."""
         return cls.from_facts(read_facts(text))
 
     @classmethod
@@ -249,10 +249,10 @@ def reason_of(unfit: Exception) -> str:
     return said.split(". ")[0].rstrip(".")
 
 
-def read_facts(text: bytes) -> dict[str, Any]:
+def read_facts(text: str | bytes) -> dict[str, Any]:
     """What a description in JSON says. ValueError for anything but an object of finite numbers."""
     try:
-        facts = json.loads(text.decode(), parse_constant=_finite, parse_float=_finite)
+        facts = json.loads(text if isinstance(text, str) else text.decode(), parse_constant=_finite, parse_float=_finite)
     except RecursionError:
         raise ValueError("its description is nested too deeply") from None
     if not isinstance(facts, dict):

@@ -24,7 +24,7 @@ from gymnasium.vector import AutoresetMode
 from stable_baselines3 import PPO
 from stable_baselines3.common.utils import LinearSchedule
 
-from agents.policy import Description, LearnedPolicy, Weights
+from agents.policy import Description, LearnedPolicy, Weights, reason_of
 from agents.vec_env import BatchVecEnv
 from seastar_gym import RewardWeights
 from seastar_gym.envs.commands import Actions
@@ -267,5 +267,4 @@ def _read(path: str | os.PathLike[str], read: Callable[[zipfile.ZipFile], Loaded
         reason = str(damaged.args[0]).rstrip(".")
         raise ValueError(f"{os.fspath(path)} is damaged, or no policy saved by this project: {reason}.") from damaged
     except (ValueError, TypeError, RuntimeError, pickle.UnpicklingError) as mismatch:
-        reason = " ".join(str(mismatch).split()).rstrip(".")
-        raise ValueError(f"{os.fspath(path)} does not fit: {reason}.") from mismatch
+        raise ValueError(f"{os.fspath(path)} does not fit: {reason_of(mismatch)}.") from mismatch

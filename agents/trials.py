@@ -158,8 +158,8 @@ class Options:
     """Many swims of every agent, nominal and disturbed: a table, the same as CSV."""
 
     agents: tuple[str, ...] = ("learned", "greedy", "pentagon")
-    """As for agents.evaluate; a model.zip of plain Stable-Baselines3 and module:function execute the code of whoever made
-    them: load only files that you trust."""
+    """As for agents.evaluate. A model.zip of plain Stable-Baselines3 and module:function execute the code of whoever
+    made them: load only files that you trust."""
     sets: tuple[Literal["nominal", "random", "pentagon"], ...] = ("nominal", "random", "pentagon")
     """The named paths, random paths under every disturbance, the disturbed pentagon."""
     swims: int = 1000

@@ -1,4 +1,4 @@
-"""A model of plain Stable-Baselines3 and a function of one's own swim in every evaluation; what is neither is refused."""
+"""A model of plain Stable-Baselines3 and a function of one's own swim in every evaluation; others are refused."""
 
 import csv
 import pickle
@@ -163,8 +163,8 @@ class Bomb:
 
 def test_a_model_of_this_project_is_not_unpickled(tmp_path):
     """It says what it is in policy.json: pickles instead of its weights are not run."""
-    description = Description("pairs", False, FAST, (4,)).to_json()
-    file = zipped(tmp_path / "model.zip", data=b"{}", policy_pth=pickle.dumps(Bomb(), protocol=2), policy_json=description)
+    description, bomb = Description("pairs", False, FAST, (4,)).to_json(), pickle.dumps(Bomb(), protocol=2)
+    file = zipped(tmp_path / "model.zip", data=b"{}", policy_pth=bomb, policy_json=description)
     with assert_refused("model.zip"):
         load_agents([file])
 

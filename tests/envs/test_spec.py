@@ -36,7 +36,7 @@ ARGUMENTS = {
     "actions": {"actions": "pairs", "path": "random", "random_heading": np.bool_(True), "scene": SCENE},
     "reward": {"reward": RewardWeights(100 / 3, 2, 0.0), "waypoint_radius": np.float64(0.1 / 3), "scene": SCENE},
     "randomization": {
-        "randomization": DomainRandomization({"robot.density": Normal(1000.0, 10 / 3), "limb_strength": Uniform(0, 1)}),
+        "randomization": DomainRandomization({"robot.density": Normal(1e3, 10 / 3), "fluid.density": Uniform(9, 99)}),
         "scene": SCENE,
     },
     "plain": {
