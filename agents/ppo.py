@@ -8,6 +8,7 @@ their learner stands in policy.py.
 
 import io
 import os
+import pickle
 import random
 import zipfile
 import zlib
@@ -23,7 +24,7 @@ from gymnasium.vector import AutoresetMode
 from stable_baselines3 import PPO
 from stable_baselines3.common.utils import LinearSchedule
 
-from agents.policy import Description, LearnedPolicy, Weights
+from agents.policy import Description, LearnedPolicy, Weights, reason_of
 from agents.vec_env import BatchVecEnv
 from seastar_gym import RewardWeights
 from seastar_gym.envs.commands import Actions
@@ -228,7 +229,7 @@ def load(path: str | os.PathLike[str]) -> LearnedPolicy:
     """The policy in a file that `save` wrote. FileNotFoundError or ValueError, with one sentence, if there is none."""
 
     def read(archive: zipfile.ZipFile) -> LearnedPolicy:
-        description = Description.from_json(archive.read(DESCRIPTION).decode())
+        description = Description.from_json(archive.read(DESCRIPTION))
         weights = torch.load(io.BytesIO(archive.read(WEIGHTS)), map_location="cpu", weights_only=True)
         return LearnedPolicy(description, _actor(weights))
 
@@ -243,7 +244,7 @@ def resume(path: str | os.PathLike[str], env: BatchVecEnv, device: str = "cpu") 
     """
 
     def read(archive: zipfile.ZipFile) -> tuple[Description, bytes]:
-        return Description.from_json(archive.read(DESCRIPTION).decode()), archive.read(RANDOM_STATES)
+        return Description.from_json(archive.read(DESCRIPTION)), archive.read(RANDOM_STATES)
 
     description, random_states = _read(path, read)
     ours = describe(env, description.hidden)
@@ -265,6 +266,5 @@ def _read(path: str | os.PathLike[str], read: Callable[[zipfile.ZipFile], Loaded
     except (zipfile.BadZipFile, EOFError, zlib.error, KeyError) as damaged:
         reason = str(damaged.args[0]).rstrip(".")
         raise ValueError(f"{os.fspath(path)} is damaged, or no policy saved by this project: {reason}.") from damaged
-    except (ValueError, TypeError, RuntimeError) as mismatch:
-        reason = " ".join(str(mismatch).split()).rstrip(".")
-        raise ValueError(f"{os.fspath(path)} does not fit: {reason}.") from mismatch
+    except (ValueError, TypeError, RuntimeError, pickle.UnpicklingError) as mismatch:
+        raise ValueError(f"{os.fspath(path)} does not fit: {reason_of(mismatch)}.") from mismatch

@@ -15,6 +15,7 @@ from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
 from seastar_gym.fluids import GridCurrent, ShearCurrent, UniformCurrent, Vortex
 from seastar_gym.morphology.limb import Limb
 from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water, relaxation_time
+from seastar_gym.serial import register_part
 from seastar_gym.simulator import Simulator, SolverStatus, State, StrokeReport
 
 __version__ = "0.1.0"
@@ -46,6 +47,7 @@ __all__ = [
     "Vortex",
     "Water",
     "__version__",
+    "register_part",
     "relaxation_time",
 ]
 

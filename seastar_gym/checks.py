@@ -1,14 +1,16 @@
 """Checks of what a scene is made of; what is no such number or choice is refused with a sentence that names it."""
 
 import math
+import sys
 
 import numpy as np
 
 
 def is_finite_number(value: object) -> bool:
-    """Whether the value is a number, not a flag, and finite."""
-    is_number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
-    return is_number and math.isfinite(value)  # type: ignore[arg-type]
+    """Whether the value is a number, not a flag, finite, and no larger than a float can be."""
+    if isinstance(value, int):
+        return not isinstance(value, bool) and abs(value) <= sys.float_info.max
+    return isinstance(value, float | np.integer | np.floating) and math.isfinite(value)
 
 
 def require_number(name: str, value: float, unit: str, *, zero_allowed: bool = False) -> None:

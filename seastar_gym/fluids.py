@@ -1,11 +1,10 @@
 """Fluids and their currents, as frozen dataclasses in SI units; for numbers of each robot see per_robot.py."""
 
-import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, ClassVar, get_args
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from seastar_gym.checks import is_finite_number, require_finite, require_number
 from seastar_gym.der.current import GRID, LINEAR, VORTEX, Current
 from seastar_gym.per_robot import Numbers, batch_size, require_each
+from seastar_gym.serial import register_part
 
 Floats = NDArray[np.float64]
 
@@ -20,6 +20,7 @@ LARGEST_GRID = 4_000_000
 """Points: more than this many velocities are no longer a sample of a smooth current."""
 
 
+@register_part
 @dataclass(frozen=True)
 class UniformCurrent:
     """A fluid that moves as a whole with the velocity u_x, u_y [m/s].
@@ -45,6 +46,7 @@ class UniformCurrent:
         return Current(LINEAR, np.array([self.u_x, self.u_y, 0.0, 0.0, 0.0, 0.0]))
 
 
+@register_part
 @dataclass(frozen=True)
 class ShearCurrent:
     """A simple shear: u = rate y' along x', where x', y' are x, y turned by `direction`.
@@ -67,6 +69,7 @@ class ShearCurrent:
         return Current(LINEAR, np.concatenate([np.zeros(2), gradient.ravel()]))
 
 
+@register_part
 @dataclass(frozen=True)
 class Vortex:
     """A steady vortex with a smooth core, after Kaufmann and Scully: u = circulation/(2 pi) r/(r_c^2 + r^2) round it.
@@ -92,6 +95,7 @@ class Vortex:
         return Current(VORTEX, np.array([self.x, self.y, strength, self.core_radius**2]))
 
 
+@register_part
 @dataclass(frozen=True)
 class GridCurrent:
     """A current sampled on a grid, bilinear in between; beyond the grid it is that of the nearest point on its edge.
@@ -107,10 +111,12 @@ class GridCurrent:
     def __post_init__(self) -> None:
         if not isinstance(self.corner, tuple | list) or list(map(is_finite_number, self.corner)) != [True, True]:
             raise ValueError(f"corner must be two finite numbers [m], not {self.corner!r}.")
-        object.__setattr__(self, "corner", tuple(self.corner))
+        object.__setattr__(self, "corner", tuple(float(x) for x in self.corner))
         require_number("spacing", self.spacing, "m")
+        object.__setattr__(self, "spacing", float(self.spacing))
         try:
-            array = np.asarray(self.velocities, dtype=float)
+            array = np.asarray(self.velocities)
+            array = array.astype(float) if array.dtype.kind in "iuf" else np.zeros(0)
         except (TypeError, ValueError):
             array = np.zeros(0)
         if array.ndim != 3 or array.shape[2] != 2 or min(array.shape) < 2 or array.size > 2 * LARGEST_GRID:
@@ -120,7 +126,8 @@ class GridCurrent:
             )
         if not np.isfinite(array).all():
             raise ValueError("velocities must be finite [m/s].")
-        object.__setattr__(self, "velocities", tuple(tuple(map(tuple, row)) for row in array.tolist()))
+        rows: Any = array.tolist()
+        object.__setattr__(self, "velocities", tuple(tuple(map(tuple, row)) for row in rows))
 
     @classmethod
     def from_function(
@@ -157,6 +164,7 @@ class GridCurrent:
 AnyCurrent = UniformCurrent | ShearCurrent | Vortex | GridCurrent
 
 
+@register_part
 @dataclass(frozen=True)
 class Water:
     """A fluid with the quadratic drag of (13.8).
@@ -193,12 +201,3 @@ class Water:
             require_each(self, "added_mass_coefficient", partial(not_negative, unit="1"))
         if not isinstance(self.current, AnyCurrent | None):
             raise ValueError(f"current must be one of the currents of seastar_gym.fluids, not {self.current!r}.")
-
-    @classmethod
-    def from_fields(cls, fields: dict[str, Any]) -> "Water":
-        """The fluid that dataclasses.asdict has made `fields` of, maybe by way of JSON."""
-        current = fields.get("current")
-        if current is not None:
-            kinds = {frozenset(field.name for field in dataclasses.fields(kind)): kind for kind in get_args(AnyCurrent)}
-            current = kinds[frozenset(current)](**current)
-        return cls(**{**fields, "current": current})

@@ -26,17 +26,23 @@ class PerRobot(tuple[float, ...]):
 
 
 def require_each(part: Any, name: str, check: Callable[[str, float], None]) -> None:
-    """Check a number of a part, or that of each robot, and keep an array as a tuple."""
+    """Check a number of a part, or that of each robot, and keep an array as a tuple, numbers of numpy as Python's."""
     value = getattr(part, name)
     if not isinstance(value, np.ndarray | tuple):
         check(name, value)
+        object.__setattr__(part, name, _plain(value))
         return
-    numbers = value.tolist() if isinstance(value, np.ndarray) else list(value)
+    numbers = value.tolist() if isinstance(value, np.ndarray) else list(map(_plain, value))
     if not isinstance(numbers, list) or not numbers or isinstance(numbers[0], list):
         raise ValueError(f"{name} must be a number, or one for every robot of shape (n_robots,), not {value!r}.")
     for number in numbers:
         check(name, number)
     object.__setattr__(part, name, PerRobot(numbers))
+
+
+def _plain(number: Any) -> Any:
+    """A number of numpy as Python's: one of single precision would go on computing to single precision."""
+    return number.item() if isinstance(number, np.generic) else number
 
 
 def column(numbers: Numbers, n_axes: int = 1) -> Any:

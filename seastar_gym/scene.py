@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from operator import itemgetter
-from typing import ClassVar, Literal, cast, get_args
+from typing import Any, ClassVar, Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ from seastar_gym.morphology.contact import cross_at_rest, limbs_that_may_touch
 from seastar_gym.morphology.limb import Limb, LimbShape, as_tuple
 from seastar_gym.morphology.seastar import make_rods, n_hub_hinges, natural_hub_angle, rest_positions, turn_per_hinge
 from seastar_gym.per_robot import Numbers, batch_size, chosen, of_robot, require_each
+from seastar_gym.serial import from_dict, register_part, to_dict
 
 HubHinge = Literal["opening", "turning"]
 SchemeName = Literal["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
@@ -47,6 +48,7 @@ Four times what any stroke of the atlas of stability needs; strokes of adapted s
 """
 
 
+@register_part
 @dataclass(frozen=True)
 class Seastar:
     """A robot of limbs around a hub (Fig. 13.4a): straight, equal, uniform and evenly spread, but for `limbs`.
@@ -174,6 +176,7 @@ def relaxation_time(loss_factor: float, frequency: float) -> float:
     return loss_factor / (2.0 * math.pi * frequency)
 
 
+@register_part
 @dataclass(frozen=True)
 class Numerics:
     """Time stepping.
@@ -246,6 +249,7 @@ _PRESETS: dict[Fidelity, Numerics] = {
 }
 
 
+@register_part
 @dataclass(frozen=True)
 class Scene:
     """A robot, the fluid around it (None: vacuum), its actuator and the numerics.
@@ -386,6 +390,15 @@ class Scene:
             adaptive=tolerance is not None,
             error_rate=np.array([error_rate]),
         )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The scene as plain data for JSON, see serial.py. ValueError: an actuator that could not be read back."""
+        return to_dict(self)
+
+    @classmethod
+    def from_dict(cls, data: object) -> "Scene":
+        """The scene that `to_dict` wrote. ValueError, with one sentence, for everything else."""
+        return from_dict(data, cls)
 
     @property
     def n_robots(self) -> int | None:

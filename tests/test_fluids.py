@@ -1,7 +1,6 @@
 """Whole scenes with fluids and material damping, in their limits and against closed forms."""
 
-import json
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -246,12 +245,6 @@ def test_a_violent_robot_in_a_current_is_guarded_and_finishes():
     simulator.v[:] = rng.standard_normal(simulator.v.shape)
     report = simulator.stroke(rng.uniform(-1.0, 1.0, (8, 5)))
     assert not report.status.any() and report.halvings.sum() > 0
-
-
-@pytest.mark.parametrize("current", [None, *CURRENTS.values()])
-def test_a_fluid_comes_back_from_json(current):
-    water = Water(900.0, 1.1, 0.2, current)
-    assert Water.from_fields(json.loads(json.dumps(asdict(water)))) == water
 
 
 # Refusals

@@ -11,8 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.checks import require_number, require_numbers
 from seastar_gym.per_robot import Numbers, require_each
+from seastar_gym.serial import register_part
 
 
+@register_part
 @dataclass(frozen=True)
 class MeasuredCurve:
     """Rotation of a limb with command 1 over one stroke, linear between samples, the same in every stroke.

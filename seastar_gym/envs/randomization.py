@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from seastar_gym.checks import require_finite, require_number
 from seastar_gym.per_robot import numbers_of, with_numbers
 from seastar_gym.scene import Scene
+from seastar_gym.serial import register_part
 
 LIMB_STRENGTHS = "limb_strengths"
 """Share of its commanded rotation that a limb makes: 0 for one that has failed; drawn for every limb."""
@@ -19,6 +20,7 @@ WIDEST = 3.0
 """Standard deviations: draws of `Normal` farther out are made again."""
 
 
+@register_part
 @dataclass(frozen=True)
 class Uniform:
     """Between `low` and `high`."""
@@ -44,6 +46,7 @@ class Uniform:
         return float(rng.uniform(self.low, self.high))
 
 
+@register_part
 @dataclass(frozen=True)
 class LogUniform:
     """Between `low` and `high`, both above zero, with a uniform logarithm."""
@@ -66,6 +69,7 @@ class LogUniform:
         return min(max(drawn, self.low), self.high)
 
 
+@register_part
 @dataclass(frozen=True)
 class Normal:
     """Around `mean` with the standard deviation `deviation`, never farther than three of them."""
@@ -93,6 +97,7 @@ class Normal:
 Distribution = Uniform | LogUniform | Normal
 
 
+@register_part
 class DomainRandomization:
     """Distributions of a scene's numbers, drawn anew for every episode of every robot, in this order.
 

@@ -13,7 +13,8 @@ from seastar_gym.envs.commands import Actions, action_space, command_table, to_c
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.rendering import Frame, Renderer, limb_nodes
 from seastar_gym.envs.reward import RewardWeights
-from seastar_gym.envs.task import Outcome, Path, SwimTask, make_scene
+from seastar_gym.envs.spec import PlainSpec
+from seastar_gym.envs.task import Outcome, Path, Plain, SwimTask, make_scene
 from seastar_gym.scene import Fidelity, Scene
 from seastar_gym.simulator import Simulator
 
@@ -21,7 +22,7 @@ FRAMES_PER_STROKE = 10
 Observation = NDArray[np.float32]
 
 
-class SeastarSwimEnv(gym.Env[Observation, Any]):
+class SeastarSwimEnv(PlainSpec, gym.Env[Observation, Any]):
     """A five-limb soft robot, driven by shape memory alloy actuators, swims along waypoints.
 
     ## Action
@@ -80,6 +81,9 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
         stroke, "human" shows as many in a window.
     frames_per_stroke: See render_mode; at equal times, the last one at the end of the stroke.
     randomization: Numbers of the scene that are drawn at the start of every episode; `info` has them by name.
+
+    scene, reward and randomization may be in plain form, as `Scene.to_dict` and `seastar_gym.serial.to_dict` write
+    them. `spec` has them so: `gym.make(EnvSpec.from_json(env.spec.to_json()))` is the same environment.
     """
 
     metadata = {"render_modes": ["human", "rgb_array", "rgb_array_list"], "render_fps": FRAMES_PER_STROKE}
@@ -89,13 +93,13 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
         path: Path = "pentagon",
         actions: Actions = "limbs",
         fidelity: Fidelity | None = None,
-        scene: Scene | None = None,
-        reward: RewardWeights = RewardWeights(),
+        scene: Scene | Plain | None = None,
+        reward: RewardWeights | Plain = RewardWeights(),
         waypoint_radius: float = 0.01,
         random_heading: bool = False,
         render_mode: Literal["human", "rgb_array", "rgb_array_list"] | None = None,
         frames_per_stroke: int = FRAMES_PER_STROKE,
-        randomization: DomainRandomization | None = None,
+        randomization: DomainRandomization | Plain | None = None,
     ):
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise ValueError(f"render_mode must be one of {self.metadata['render_modes']}, not {render_mode!r}.")

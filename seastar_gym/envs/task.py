@@ -22,10 +22,13 @@ from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, 
 from seastar_gym.envs.reward import RewardWeights, reward_terms
 from seastar_gym.fidelity import measured
 from seastar_gym.scene import Fidelity, Numerics, Scene, require_flag, require_number
+from seastar_gym.serial import Part, from_dict
 from seastar_gym.simulator import Simulator, SolverStatus, StrokeReport
 
 Floats = NDArray[np.float64]
 Path = PathName | ArrayLike
+Plain = dict[str, Any]
+"""A part of a scene, or of the task, as plain data, see `seastar_gym.serial`."""
 
 DEFAULT_FIDELITY: Fidelity = "balanced"
 
@@ -38,12 +41,12 @@ class Outcome(NamedTuple):
     info: dict[str, NDArray[Any]]
 
 
-def make_scene(scene: Scene | None, fidelity: Fidelity | None) -> Scene:
+def make_scene(scene: Scene | Plain | None, fidelity: Fidelity | None) -> Scene:
     """The scene with the numerics that it names, else with those of `fidelity`, which is "balanced" by default.
 
     ValueError where scene and fidelity name different ones.
     """
-    scene = Scene() if scene is None else scene
+    scene = Scene() if scene is None else read(scene, Scene)
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a Scene, not {scene!r}.")
     if fidelity is None and scene.numerics.named:
@@ -55,6 +58,11 @@ def make_scene(scene: Scene | None, fidelity: Fidelity | None) -> Scene:
             "give one of them."
         )
     return replace(scene, numerics=numerics)
+
+
+def read(part: Part | Plain, kind: type[Any]) -> Part:
+    """The part, whether it comes as it is or in plain form."""
+    return from_dict(part, kind) if isinstance(part, dict) else part
 
 
 def promised(scene: Scene) -> dict[str, float]:
@@ -82,12 +90,13 @@ class SwimTask:
         scene: Scene,
         n_robots: int,
         path: Path,
-        reward: RewardWeights,
+        reward: RewardWeights | Plain,
         waypoint_radius: float,
         random_heading: bool,
         threads: int | None,
-        randomization: DomainRandomization | None = None,
+        randomization: DomainRandomization | Plain | None = None,
     ):
+        randomization, reward = read(randomization, DomainRandomization), read(reward, RewardWeights)
         if not isinstance(randomization, DomainRandomization | None):
             raise ValueError(f"randomization must be a DomainRandomization or None, not {randomization!r}.")
         require_number("waypoint_radius", waypoint_radius, "m")

@@ -17,7 +17,8 @@ from seastar_gym.envs.commands import Actions, action_space, as_array, command_t
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.seastar_swim import FRAMES_PER_STROKE, checked_options
-from seastar_gym.envs.task import Path, SwimTask, make_scene
+from seastar_gym.envs.spec import PlainSpec
+from seastar_gym.envs.task import Path, Plain, SwimTask, make_scene
 from seastar_gym.scene import Fidelity, Scene, require_count
 from seastar_gym.simulator import Simulator
 
@@ -26,7 +27,7 @@ Flags = NDArray[np.bool_]
 Info = dict[str, Any]
 
 
-class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
+class SeastarSwimVectorEnv(PlainSpec, gym.vector.VectorEnv[Observations, Any, Any]):
     """`num_envs` robots side by side; spaces, rewards, info and arguments are those of `SeastarSwimEnv`.
 
     Robot i has the seed `seed + i` and then does to the last bit what `SeastarSwimEnv` does with that seed and the same
@@ -57,14 +58,14 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
         path: Path = "pentagon",
         actions: Actions = "limbs",
         fidelity: Fidelity | None = None,
-        scene: Scene | None = None,
-        reward: RewardWeights = RewardWeights(),
+        scene: Scene | Plain | None = None,
+        reward: RewardWeights | Plain = RewardWeights(),
         waypoint_radius: float = 0.01,
         random_heading: bool = False,
         render_mode: Literal["rgb_array"] | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
-        randomization: DomainRandomization | None = None,
+        randomization: DomainRandomization | Plain | None = None,
     ):
         if render_mode not in (None, "rgb_array"):
             raise ValueError(
