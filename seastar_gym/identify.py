@@ -16,8 +16,8 @@ tell them, and the estimate says so.
 """
 
 import argparse
-import csv
 import math
+import re
 import sys
 import time
 from collections.abc import Sequence
@@ -34,12 +34,15 @@ from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from seastar_gym.checks import is_finite_number
+from seastar_gym.csv_rows import Row, read_numbers, read_rows
 from seastar_gym.per_robot import frame_of, side_by_side, with_numbers
 from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water
 from seastar_gym.simulator import Simulator
 
 Floats = NDArray[np.float64]
 
+NODE = re.compile("[0-9]{1,5}")
+"""The number of a node, as a column's name says it."""
 DIFFERENCE = 1e-4
 """Relative change of a parameter for a column of the Jacobian; trajectories are good to about its square."""
 UNTOLD = 0.5
@@ -74,48 +77,30 @@ class Measurement:
     @classmethod
     def from_csv(cls, trajectory: str | Path, commands: str | Path) -> "Measurement":
         """From two files, see above."""
-        names, *rows = _lines(trajectory) or [[]]
-        nodes = tuple(int(name[1:]) for name in names[1::2] if name[1:].isdigit())
-        expected = ["time", *(f"{axis}{node}" for node in nodes for axis in "xy")]
-        if not (nodes and rows) or names != expected or any(len(row) != len(names) for row in rows):
-            raise ValueError(
-                f"{trajectory}: the first line must be time,x0,y0,.. and below it there must be others as long as it."
-            )
-        commanded = _lines(commands)
-        if not commanded or any(len(row) != len(commanded[0]) for row in commanded):
-            raise ValueError(f"{commands}: there must be one line per stroke with one number per limb.")
-        numbers = np.array([[_number(trajectory, field or "nan") for field in row] for row in rows])
-        return cls(
-            time=numbers[:, 0],
-            positions=numbers[:, 1:].reshape(len(numbers), len(nodes), 2),
-            nodes=nodes,
-            commands=np.array([[_number(commands, field) for field in row] for row in commanded]),
-        )
+        names, *rows = read_rows(trajectory) or [Row(str(trajectory), ())]
+        nodes = tuple(int(name[1:]) for name in names.fields[1::2] if NODE.fullmatch(name[1:]))
+        expected = ("time", *(f"{axis}{node}" for node in nodes for axis in "xy"))
+        if not (nodes and rows) or names.fields != expected:
+            raise ValueError(f"{trajectory}: the first line must be time,x0,y0,.. and there must be others below it.")
+        for row in rows:
+            if len(row.fields) != len(expected):
+                raise row.refused(f"the line must have {len(expected)} fields, as the first one, not {len(row.fields)}")
+            if not row.fields[0]:
+                raise row.refused("there is no time")
+        numbers = np.array([row.numbers(empty_allowed=True) for row in rows])
+        commanded = np.array(read_numbers(commands, "one number per limb, every line as many"))
+        try:
+            return cls(numbers[:, 0], numbers[:, 1:].reshape(len(numbers), len(nodes), 2), nodes, commanded)
+        except ValueError as unfit:
+            raise ValueError(f"{trajectory}: {unfit}") from None
 
     def to_csv(self, trajectory: str | Path, commands: str | Path) -> None:
         """What from_csv reads."""
         names = ["time", *(f"{axis}{node}" for node in self.nodes for axis in "xy")]
         numbers = np.column_stack([self.time, self.positions.reshape(len(self.time), -1)])
-        np.savetxt(trajectory, numbers, "%.7g", ",", header=",".join(names), comments="")
+        lines = [names, *(["" if math.isnan(x) else f"{x:.7g}" for x in row] for row in numbers.tolist())]
+        Path(trajectory).write_text("".join(",".join(line) + "\n" for line in lines), encoding="utf-8")
         np.savetxt(commands, self.commands, "%g", ",")
-
-
-def _lines(file: str | Path) -> list[list[str]]:
-    """The fields of every line that has any."""
-    if not Path(file).exists():
-        raise FileNotFoundError(f"There is no file {file}.")
-    try:
-        with Path(file).open(newline="", encoding="utf-8") as lines:
-            return [[field.strip() for field in row] for row in csv.reader(lines) if row]
-    except (UnicodeDecodeError, csv.Error) as wrong:
-        raise ValueError(f"{file} is no CSV file: {wrong}.") from wrong
-
-
-def _number(file: str | Path, field: str) -> float:
-    try:
-        return float(field)
-    except ValueError:
-        raise ValueError(f"{file}: {field!r} is no number.") from None
 
 
 class Estimate(NamedTuple):
