@@ -1,8 +1,8 @@
 """CSV files as users have them: what cannot be read is refused in one sentence with the file and the line.
 
 Fields are separated by commas, numbers have a decimal point, the text is UTF-8, with a byte order mark or without.
-Empty lines are skipped, nothing else is. A line of names is one in which no field has a digit and none is a number, so
-that a mistyped first line of numbers is an error and not a header.
+Empty lines are skipped, and a first line of names, in which every field begins with a letter and has no digit: a mistyped
+line of numbers is an error and not a header.
 """
 
 import csv
@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+NAME = re.compile(r"[^\W\d_]\D*")
 NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", re.IGNORECASE)
 LONGEST_SHOWN = 40
 """Characters of a field that a sentence shows."""
@@ -30,11 +31,8 @@ class Row(NamedTuple):
         return ValueError(f"{self.where}: {reason}.")
 
     def has_names(self) -> bool:
-        """Whether every field is a name: some text without a digit that is not nan or inf."""
-        return all(
-            field and not re.search(r"\d", field) and not NOT_FINITE.fullmatch(field) and field not in "+-.;"
-            for field in self.fields
-        )
+        """Whether every field is a name: a letter first, no digit, and not nan or inf."""
+        return all(NAME.fullmatch(field) and not NOT_FINITE.fullmatch(field) for field in self.fields)
 
     def numbers(self, *, empty_allowed: bool = False) -> list[float]:
         """Its finite numbers; NaN for an empty field where those are allowed."""
@@ -69,16 +67,16 @@ def read_numbers(file: str | Path, columns: str, n_columns: int | None = None) -
     columns: What a line must have, for sentences: "a time [s] and an angle [rad]". n_columns: How many, or None for
         as many as there are in the first line.
     """
-    first, *others = read_rows(file) or [Row(str(file), ())]
-    rows = others if first.fields and first.has_names() else [first, *others]
-    if not rows or not rows[0].fields:
-        raise ValueError(f"{file} has no line with {columns}.")
+    rows = read_rows(file)
     for row in rows:
         if ";" in "".join(row.fields):
             raise row.refused("fields must be separated by commas, not by semicolons")
         if len(row.fields) != (n_columns or len(rows[0].fields)):
             raise row.refused(f"every line must have {columns}, not {_shown(','.join(row.fields))}")
-    return [row.numbers() for row in rows]
+    numbers = [row.numbers() for row in (rows[1:] if rows and rows[0].has_names() else rows)]
+    if not numbers:
+        raise ValueError(f"{file} has no line with {columns}.")
+    return numbers
 
 
 def _text(file: str | Path) -> str:

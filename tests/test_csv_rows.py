@@ -44,6 +44,7 @@ def test_a_file_of_numbers_is_read_to_the_last_line(tmp_path, data):
         (b"0.0,0.l\n" + GOOD, "line 1: '0.l' is no number"),
         (b"O.0,0.0\n" + GOOD, "line 1: 'O.0' is no number"),
         (b"\xef\xbb\xbfO.0,O.0\n" + GOOD, "line 1: 'O.0' is no number"),
+        (b"time\n" + GOOD, "line 1: every line must have a time and an angle, not 'time'"),
         (b"time,angle\ntime,angle\n" + GOOD, "line 2: 'time' is no number"),
         (b"nan,nan\n" + GOOD, "line 1: 'nan' is no finite number"),
         (b"-,-\n" + GOOD, "line 1: '-' is no number"),
