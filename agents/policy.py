@@ -24,6 +24,7 @@ import safetensors.numpy
 from numpy.typing import NDArray
 
 import seastar_gym
+from agents.files import write_atomically
 from seastar_gym.actuation.actuator import Actuator
 from seastar_gym.actuation.measured import MeasuredCurve
 from seastar_gym.actuation.thermal import ThermalSma
@@ -233,9 +234,8 @@ def save(policy: LearnedPolicy, path: str | os.PathLike[str], **training: Any) -
     path = _checked_suffix(path)
     data = safetensors.numpy.save({name: np.ascontiguousarray(array) for name, array in policy.weights.items()})
     text = policy.description.to_json(sha256=hashlib.sha256(data).hexdigest(), training={**policy.training, **training})
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(data)
-    path.with_suffix(".json").write_text(text + "\n", encoding="utf-8")
+    write_atomically(path, data)
+    write_atomically(path.with_suffix(".json"), f"{text}\n".encode())
 
 
 def load(path: str | os.PathLike[str] = SHIPPED) -> LearnedPolicy:
