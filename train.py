@@ -27,36 +27,40 @@ from pathlib import Path
 from types import FrameType
 from typing import Annotated, Literal
 
-import gymnasium
-import numba
-import numpy as np
-import stable_baselines3
-import torch
-import tyro
-from stable_baselines3 import PPO
-from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import configure
-from tqdm import tqdm
+try:
+    import gymnasium
+    import numba
+    import numpy as np
+    import stable_baselines3
+    import tensorboard  # noqa: F401, Stable-Baselines3 asserts that it is there when the training begins
+    import torch
+    import tyro
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.callbacks import BaseCallback
+    from stable_baselines3.common.logger import configure
+    from tqdm import tqdm
 
-import seastar_gym
-from agents.ablations import HELD_OUT_SEED
-from agents.charts import Curve, read_progress
-from agents.evaluate import evaluate
-from agents.files import write_atomically
-from agents.policy import SHIPPED, LearnedPolicy
-from agents.policy import load as load_policy
-from agents.policy import save as save_policy
-from agents.ppo import Hyperparameters, make_model, make_training_env, policy_of, require_device, resume, save
-from agents.report import Remarks
-from agents.scripted import scripted
-from agents.swim import Swim, swim
-from agents.trials import swim_many
-from agents.vec_env import BatchVecEnv
-from seastar_gym import RewardWeights
-from seastar_gym.envs.paths import PathName
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import make_scene
-from seastar_gym.scene import Fidelity
+    import seastar_gym
+    from agents.ablations import HELD_OUT_SEED
+    from agents.charts import Curve, read_progress
+    from agents.evaluate import evaluate
+    from agents.files import write_atomically
+    from agents.policy import SHIPPED, LearnedPolicy
+    from agents.policy import load as load_policy
+    from agents.policy import save as save_policy
+    from agents.ppo import Hyperparameters, make_model, make_training_env, policy_of, require_device, resume, save
+    from agents.report import Remarks
+    from agents.scripted import scripted
+    from agents.swim import Swim, swim
+    from agents.trials import swim_many
+    from agents.vec_env import BatchVecEnv
+    from seastar_gym import RewardWeights
+    from seastar_gym.envs.paths import PathName
+    from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+    from seastar_gym.envs.task import make_scene
+    from seastar_gym.scene import Fidelity
+except ModuleNotFoundError as missing:
+    sys.exit(f'train.py needs {missing.name}: pip install "seastar-gym[train]".')
 
 MAX_STROKES = 400
 """Time limit of a swim round the pentagon; the scripted gait takes 250."""
@@ -104,10 +108,6 @@ class Options:
     def __post_init__(self) -> None:
         if self.strokes < 1 or self.save_freq < 1:
             raise ValueError("strokes and save_freq must be at least 1.")
-        if self.ship_anyway and not self.ship:
-            raise ValueError("--ship-anyway confirms --ship: give both.")
-        if self.ship and self.quick and not self.ship_anyway:
-            raise ValueError("A --quick run replaces the policy in the box only with --ship-anyway beside --ship.")
 
 
 CHANGEABLE = {"strokes", "num_threads", "device", "save_freq", "video", "ship", "ship_anyway", "out", "resume", "quick"}
@@ -159,8 +159,20 @@ def write_config(options: Options, arguments: Sequence[str], folder: Path) -> No
     write_atomically(file, (json.dumps(config, indent=2, default=str) + "\n").encode())
 
 
+def require_consent(options: Options) -> None:
+    """ValueError where the policy in the box would be replaced by that of a short run, asked for only once."""
+    if options.ship_anyway and not options.ship:
+        raise ValueError("--ship-anyway confirms --ship: give both.")
+    if options.ship and options.quick and not options.ship_anyway:
+        raise ValueError("A --quick run replaces the policy in the box only with --ship-anyway beside --ship.")
+
+
 def claim(folder: Path) -> None:
     """Make the folder of a new run; one that is there may only be empty, or hold what a kill left of its beginning."""
+    if "\0" in str(folder):
+        raise ValueError(f"{str(folder)!r} is no name of a folder.")
+    if folder.exists() and not folder.is_dir():
+        raise ValueError(f"{folder} is no folder: give another --out.")
     folder.mkdir(parents=True, exist_ok=True)
     if any(file.name != "config.json.part" for file in folder.iterdir()):
         raise ValueError(f"{folder} exists already: give another --out, or continue the run in it with --resume.")
@@ -404,6 +416,7 @@ def run(options: Options, arguments: Sequence[str]) -> int:
     """Train, compare, report; returns the exit code."""
     torch.set_num_threads(1)  # two threads are slower on so small a network, and the simulator has the processors
     require_device(options.device)
+    require_consent(options)
     folder = options.out or Path("runs") / time.strftime("%Y-%m-%d_%H-%M-%S")
     if options.resume is None:
         claim(folder)

@@ -1,8 +1,8 @@
 """CSV files as users have them: what cannot be read is refused in one sentence with the file and the line.
 
 Fields are separated by commas, numbers have a decimal point, the text is UTF-8, with a byte order mark or without.
-Empty lines are skipped, and a first line of names, in which every field begins with a letter and has no digit: a mistyped
-line of numbers is an error and not a header.
+Empty lines are skipped, and a first line of names, in which every field begins with a letter and has no digit: a
+mistyped line of numbers is an error and not a header.
 """
 
 import csv

@@ -35,6 +35,7 @@ from scipy.stats import t as student
 
 from seastar_gym.checks import is_finite_number
 from seastar_gym.csv_rows import Row, read_numbers, read_rows
+from seastar_gym.extras import require_extra
 from seastar_gym.per_robot import frame_of, side_by_side, with_numbers
 from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water
 from seastar_gym.simulator import Simulator
@@ -323,6 +324,8 @@ def main() -> int:
     if not options.synthetic and options.commands is None:
         parser.error("give a trajectory and its commands, or --synthetic")
     try:
+        if options.picture is not None:
+            require_extra("Pictures", "studies", "matplotlib")
         scene = Scene(Seastar(), Water(), SmaPulse(), Numerics("implicit-midpoint", options.step))
         if options.synthetic:
             measurement = synthetic(scene, TRUTH)
@@ -334,7 +337,7 @@ def main() -> int:
         print(estimate.report(), f"{time.perf_counter() - begin:.1f} s", sep="\n")
         if options.picture is not None:
             draw(estimate, measurement, options.picture)
-    except (ValueError, OSError) as bad_input:
+    except (ValueError, OSError, ModuleNotFoundError) as bad_input:
         print(bad_input, file=sys.stderr)
         return 2
     return 0
