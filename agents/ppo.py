@@ -17,7 +17,7 @@ from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, get_args
 
 import gymnasium as gym
 import numpy as np
@@ -31,7 +31,7 @@ from agents.files import write_atomically
 from agents.policy import Description, LearnedPolicy, Weights
 from agents.vec_env import BatchVecEnv
 from seastar_gym import RewardWeights
-from seastar_gym.checks import require_count
+from seastar_gym.checks import require_choice, require_count, require_finite, shown
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.symmetry import VectorSymmetryReduction
 from seastar_gym.envs.task import Path as SwimPath
@@ -86,20 +86,26 @@ class Hyperparameters:
     """Progress dominates: a stroke of the best gaits earns about 1, and a heated limb costs 0.01."""
 
     def __post_init__(self) -> None:
+        require_choice("actions", self.actions, get_args(Actions))
         for name in ("num_envs", "rollout", "batch_size", "epochs", "max_episode_steps"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}.")
-        if self.num_envs * self.rollout % self.batch_size:
+            require_count(name, getattr(self, name), 1, 2**31)
+        for name in ("learning_rate", "discount", "gae_lambda", "clip_range", "entropy"):
+            require_finite(name, getattr(self, name), "1")
+        if not isinstance(self.symmetry, bool) or not isinstance(self.reward, RewardWeights):
+            raise ValueError(f"symmetry must be True or False, and reward RewardWeights, not {self.symmetry!r}.")
+        strokes = int(self.num_envs) * int(self.rollout)
+        if strokes % int(self.batch_size):
             raise ValueError(
-                f"batch_size must divide the {self.num_envs * self.rollout} strokes of a rollout of all robots, "
-                f"{self.batch_size} does not."
+                f"batch_size must divide the {strokes} strokes of a rollout of all robots, {self.batch_size} does not."
             )
         if not (0.0 <= self.discount < 1.0 and 0.0 <= self.gae_lambda <= 1.0):
             raise ValueError("discount must be in [0, 1) and gae_lambda in [0, 1].")
         if not (self.learning_rate > 0.0 and self.clip_range > 0.0 and self.entropy >= 0.0):
             raise ValueError("learning_rate and clip_range must be positive, entropy not negative.")
-        if not self.hidden or min(self.hidden) < 1:
-            raise ValueError(f"hidden must be widths of at least 1, not {self.hidden}.")
+        if not isinstance(self.hidden, tuple) or not self.hidden:
+            raise ValueError(f"hidden must be widths of at least 1, not {shown(self.hidden)}.")
+        for width in self.hidden:
+            require_count("a width in hidden", width, 1, 2**20)
 
 
 def make_training_env(

@@ -33,7 +33,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
-from seastar_gym.checks import is_finite_number
+from seastar_gym.checks import is_finite_number, is_whole_number, shown
 from seastar_gym.csv_rows import Row, read_numbers, read_rows
 from seastar_gym.extras import require_extra
 from seastar_gym.per_robot import frame_of, side_by_side, with_numbers
@@ -68,6 +68,12 @@ class Measurement:
     commands: Floats
 
     def __post_init__(self) -> None:
+        for name in ("time", "positions", "commands"):
+            array = getattr(self, name)
+            if not isinstance(array, np.ndarray) or array.dtype.kind not in "iuf":
+                raise ValueError(f"{name} must be an array of numbers, not {shown(array)}.")
+        if not isinstance(self.nodes, tuple) or not all(map(is_whole_number, self.nodes)) or self.time.ndim != 1:
+            raise ValueError(f"nodes must be a tuple of whole numbers, not {shown(self.nodes)}, and times in a row.")
         if self.positions.shape != (len(self.time), len(self.nodes), 2) or not np.isfinite(self.positions).any():
             raise ValueError(f"{len(self.time)} times and {len(self.nodes)} nodes do not fit the positions measured.")
         if self.commands.ndim != 2 or not len(self.commands):
@@ -140,6 +146,8 @@ class Estimate(NamedTuple):
 
 def get_parameter(scene: Scene, name: str) -> float:
     """A number of the scene. ValueError: it has none of that name that could be fitted; counts could not."""
+    if not isinstance(scene, Scene) or not isinstance(name, str):
+        raise ValueError(f"A Scene and a parameter's name are needed, not {shown(scene)} and {shown(name)}.")
     first, *rest = name.split(".")
     value: Any = getattr(scene, first) if first in ("robot", "fluid", "actuator", "contact") else None
     for step in rest:
@@ -216,6 +224,10 @@ def trajectories(scenes: Sequence[Scene], measurement: Measurement) -> Floats:
 
 def identify(scene: Scene, parameters: Sequence[str], measurement: Measurement, confidence: float = 0.95) -> Estimate:
     """Fit parameters of a scene, from the scene's own values on, to a measurement."""
+    if isinstance(parameters, str) or not isinstance(parameters, Sequence) or not parameters:
+        raise ValueError(f"parameters must be names of numbers, such as fluid.density, not {shown(parameters)}.")
+    if not is_finite_number(confidence) or not 0.0 < confidence < 1.0:
+        raise ValueError(f"confidence must be between 0 and 1, not {shown(confidence)}.")
     names = tuple(parameters)
     guess = np.array([get_parameter(scene, name) for name in names])
     n_limbs = scene.robot.n_limbs

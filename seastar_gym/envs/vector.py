@@ -10,13 +10,14 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from seastar_gym.checks import require_choice, require_count, require_seed
 from seastar_gym.envs.commands import Actions, action_space, command_table, to_commands
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.seastar_swim import checked_options
 from seastar_gym.envs.task import Path, SwimTask, make_scene
 from seastar_gym.scene import Fidelity, Scene
-from seastar_gym.simulator import Simulator, SolverStatus
+from seastar_gym.simulator import MAX_ROBOTS, Simulator, SolverStatus
 
 Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]
@@ -57,11 +58,12 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
     ):
         if render_mode is not None:
             raise ValueError('The batch draws nothing: use gym.make("SeastarSwim-v0", render_mode=...) for one robot.')
-        if max_episode_steps is not None and max_episode_steps < 1:
-            raise ValueError(f"max_episode_steps must be at least 1 or None, not {max_episode_steps!r}.")
+        require_count("num_envs", num_envs, 1, MAX_ROBOTS)
+        if max_episode_steps is not None:
+            require_count("max_episode_steps", max_episode_steps, 1, 2**63 - 1)
         self.num_envs = num_envs
         self.max_episode_steps = max_episode_steps
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.autoreset_mode = _checked_mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = None
         self.actions = actions
@@ -95,11 +97,7 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
         """Begin episodes. options: "path" (name or waypoints [m]), "reset_mask" (which robots, shape (num_envs,))."""
         chosen = checked_options(options, {"path", "reset_mask"})
         mask = self._checked_mask(chosen.get("reset_mask"))
-        seeds = (
-            [None if seed is None else seed + i for i in range(self.num_envs)] if not isinstance(seed, list) else seed
-        )
-        if len(seeds) != self.num_envs:
-            raise ValueError(f"seed must be one number or {self.num_envs} of them, not {len(seeds)}.")
+        seeds = checked_seeds(seed, self.num_envs)
         for robot in np.flatnonzero(mask):
             if seeds[robot] is not None:
                 self._generators[robot] = seeding.np_random(seeds[robot])[0]
@@ -185,3 +183,21 @@ class SeastarSwimVectorEnv(gym.vector.VectorEnv[Observations, Any, Any]):
                 messages[robot] = SolverStatus(strokes["solver_status"][robot]).sentence
             info["solver_message"], info["_solver_message"] = messages, failed
         return info
+
+
+def checked_seeds(seed: object, n_robots: int) -> list[int | None]:
+    """The seed of every robot: one number and those that follow it, or a list with one for each."""
+    if isinstance(seed, list):
+        if len(seed) != n_robots:
+            raise ValueError(f"seed must be one number or {n_robots} of them, not {len(seed)}.")
+        for one in seed:
+            require_seed(one)
+        return [None if one is None else int(one) for one in seed]
+    require_seed(seed)
+    return [None if seed is None else int(seed) + robot for robot in range(n_robots)]  # type: ignore[call-overload]
+
+
+def _checked_mode(mode: AutoresetMode | str) -> AutoresetMode:
+    if not isinstance(mode, AutoresetMode):
+        require_choice("autoreset_mode", mode, tuple(one.value for one in AutoresetMode))
+    return AutoresetMode(mode)

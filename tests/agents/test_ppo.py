@@ -62,10 +62,11 @@ def file(learner, tmp_path):
 @pytest.mark.parametrize(
     "change, sentence",
     [
-        ({"num_envs": 0}, "num_envs must be at least 1, not 0"),
+        ({"num_envs": 0}, "num_envs must be a whole number from 1"),
         ({"batch_size": 7}, "batch_size must divide the 64 strokes"),
         ({"discount": 1.0}, r"discount must be in \[0, 1\)"),
-        ({"learning_rate": float("nan")}, "learning_rate and clip_range must be positive"),
+        ({"learning_rate": float("nan")}, "learning_rate must be a finite number"),
+        ({"clip_range": 0.0}, "learning_rate and clip_range must be positive"),
         ({"entropy": -0.1}, "entropy not negative"),
         ({"hidden": ()}, "hidden must be widths"),
     ],
