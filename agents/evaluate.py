@@ -31,6 +31,7 @@ from agents.playback import Playback, RecordingEnv
 from agents.report import Remarks, ResultsTable, number, read_trials, write_report
 from agents.roster import load_agents
 from agents.swim import Policy, Swim, actions_of, require_fit, swim
+from seastar_gym.csv_rows import read_numbers
 from seastar_gym.envs.paths import PATH_NAMES, make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
@@ -249,11 +250,9 @@ def _load_path(name: str) -> Any:
     if name in PATH_NAMES or not Path(name).is_file():
         make_path(name, np.random.default_rng(0))
         return name
-    lines = Path(name).read_text(encoding="utf-8").splitlines()
+    waypoints = read_numbers(name, "x and y [m] of a waypoint", 2)
     try:
-        return make_path(
-            [[float(x) for x in line.split(",")] for line in lines if line.strip()], np.random.default_rng(0)
-        )
+        return make_path(waypoints, np.random.default_rng(0))
     except ValueError as bad:
         raise ValueError(f"{name}: {bad}") from bad
 

@@ -25,6 +25,7 @@ import safetensors.numpy
 from numpy.typing import NDArray
 
 import seastar_gym
+from agents.files import write_atomically
 from seastar_gym.checks import is_finite_number
 from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, command_table
 from seastar_gym.envs.observation import OBSERVATION_LAYOUT
@@ -221,9 +222,8 @@ def save(policy: LearnedPolicy, path: str | os.PathLike[str], **training: Any) -
     path = _checked_suffix(path)
     data = safetensors.numpy.save({name: np.ascontiguousarray(array) for name, array in policy.weights.items()})
     text = policy.description.to_json(sha256=hashlib.sha256(data).hexdigest(), training={**policy.training, **training})
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(data)
-    path.with_suffix(".json").write_text(text + "\n", encoding="utf-8")
+    write_atomically(path, data)
+    write_atomically(path.with_suffix(".json"), f"{text}\n".encode())
 
 
 def load(path: str | os.PathLike[str] = SHIPPED) -> LearnedPolicy:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.checks import is_finite_number, require_finite, require_number
+from seastar_gym.checks import is_finite_number, require_finite, require_number, shown
 from seastar_gym.der.current import GRID, LINEAR, VORTEX, Current
 from seastar_gym.per_robot import Numbers, batch_size, require_each
 from seastar_gym.serial import register_part
@@ -117,7 +117,7 @@ class GridCurrent:
         try:
             array = np.asarray(self.velocities)
             array = array.astype(float) if array.dtype.kind in "iuf" else np.zeros(0)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             array = np.zeros(0)
         if array.ndim != 3 or array.shape[2] != 2 or min(array.shape) < 2 or array.size > 2 * LARGEST_GRID:
             raise ValueError(
@@ -142,16 +142,24 @@ class GridCurrent:
         The function takes and gives arrays of one shape, or plain numbers where the current does not depend on place.
         """
         require_number("spacing", spacing, "m")
+        if not callable(function):
+            raise ValueError(f"function must be a function of x and y [m], not {shown(function)}.")
         axes = []
         for name, ends in (("x", x), ("y", y)):
-            if len(ends) != 2 or not all(map(is_finite_number, ends)) or not ends[1] - ends[0] >= spacing:
-                raise ValueError(f"{name} must be two ends at least a spacing apart [m], not {ends!r}.")
+            two = isinstance(ends, tuple | list | np.ndarray) and np.shape(ends) == (2,)
+            if not two or not all(map(is_finite_number, ends)) or not ends[1] - ends[0] >= spacing:
+                raise ValueError(f"{name} must be two ends at least a spacing apart [m], not {shown(ends)}.")
+            if (ends[1] - ends[0]) / spacing > LARGEST_GRID:
+                raise ValueError(f"The grid has more than {LARGEST_GRID:,} points: use a larger spacing.")
             axes.append(ends[0] + spacing * np.arange(int(np.ceil((ends[1] - ends[0]) / spacing - 1e-9)) + 1))
         if len(axes[0]) * len(axes[1]) > LARGEST_GRID:
             raise ValueError(f"The grid has more than {LARGEST_GRID:,} points: use a larger spacing.")
         xs, ys = np.meshgrid(*axes, indexing="ij")
-        u_x, u_y = function(xs, ys)
-        velocities = np.stack([np.broadcast_to(u, xs.shape) for u in (u_x, u_y)], axis=2)
+        velocities = np.zeros((*xs.shape, 2))
+        try:
+            velocities[..., 0], velocities[..., 1] = function(xs, ys)
+        except (TypeError, ValueError, OverflowError) as wrong:
+            raise ValueError(f"function must make (u_x, u_y) [m/s] of arrays x and y: {shown(str(wrong))}.") from wrong
         return cls((float(x[0]), float(y[0])), float(spacing), velocities)  # type: ignore[arg-type]
 
     def rows(self) -> Current:

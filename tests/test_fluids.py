@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from currents import CURRENTS, swirl
+from currents import swirl
 from oracle import Star
 from seastar_gym import (
     GridCurrent,

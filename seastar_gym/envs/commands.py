@@ -8,6 +8,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from seastar_gym.checks import require_choice
+
 Actions: TypeAlias = Literal["limbs", "joint", "pairs"]
 
 MOST_LIMBS = 8
@@ -19,6 +21,7 @@ LIMB_COMMANDS = np.array([0.0, 1.0, -1.0])
 
 def action_space(actions: Actions, n_limbs: int) -> spaces.MultiDiscrete | spaces.Discrete:
     """The space of one robot's actions."""
+    require_choice("actions", actions, get_args(Actions))
     if actions == "limbs":
         return spaces.MultiDiscrete([3] * n_limbs)
     return spaces.Discrete(len(command_table(actions, n_limbs)))
@@ -30,8 +33,7 @@ def command_table(actions: Actions, n_limbs: int) -> NDArray[np.float64]:
     "joint": every command, limb 1 varying slowest, each limb in the order 0, +, -. "pairs": no limb, then every pair
     of one + and one - limb. "limbs" has no table: it is one action per limb.
     """
-    if actions not in get_args(Actions):
-        raise ValueError(f"actions must be one of {', '.join(map(repr, get_args(Actions)))}, not {actions!r}.")
+    require_choice("actions", actions, get_args(Actions))
     if actions == "limbs":
         raise ValueError('actions="limbs" has one action per limb, not a table of commands: use LIMB_COMMANDS.')
     if actions == "joint" and n_limbs > MOST_LIMBS:

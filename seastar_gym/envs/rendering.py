@@ -420,5 +420,5 @@ def _import_pygame() -> Any:
     try:
         import pygame
     except ImportError as missing:
-        raise ImportError('Rendering needs pygame-ce: pip install "seastar-gym[render]"') from missing
+        raise ImportError('Rendering needs pygame-ce: pip install "seastar-gym[render]".') from missing
     return pygame

@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from seastar_gym.checks import require_choice, require_count, require_seed, shown
 from seastar_gym.envs.commands import Actions, action_space, command_table, to_commands
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.rendering import Frame, Renderer, limb_nodes
@@ -101,10 +102,9 @@ class SeastarSwimEnv(PlainSpec, gym.Env[Observation, Any]):
         frames_per_stroke: int = FRAMES_PER_STROKE,
         randomization: DomainRandomization | Plain | None = None,
     ):
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(f"render_mode must be one of {self.metadata['render_modes']}, not {render_mode!r}.")
-        if isinstance(frames_per_stroke, bool) or not isinstance(frames_per_stroke, int) or frames_per_stroke < 1:
-            raise ValueError(f"frames_per_stroke must be a whole number of at least 1, not {frames_per_stroke!r}.")
+        if render_mode is not None:
+            require_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
+        require_count("frames_per_stroke", frames_per_stroke, 1, 1_000_000)
         self.render_mode = render_mode
         self.frames_per_stroke = frames_per_stroke
         self.metadata = {**self.metadata, "render_fps": frames_per_stroke}
@@ -147,7 +147,8 @@ class SeastarSwimEnv(PlainSpec, gym.Env[Observation, Any]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin an episode. options: {"path": name or waypoints [m]} for this episode."""
-        super().reset(seed=seed)
+        require_seed(seed)
+        super().reset(seed=None if seed is None else int(seed))
         with self._until_whole():
             self._task.reset(np.ones(1, bool), [self.np_random], checked_options(options, {"path"}).get("path"))
         self._running = True
@@ -257,9 +258,11 @@ class SeastarSwimEnv(PlainSpec, gym.Env[Observation, Any]):
 
 def checked_options(options: dict[str, Any] | None, known: set[str]) -> dict[str, Any]:
     """Options of a reset; a name that means nothing is refused, not ignored."""
+    if options is not None and not isinstance(options, dict):
+        raise ValueError(f"options must be a dictionary with any of {sorted(known)}, or None, not {shown(options)}.")
     unknown = set(options or {}) - known
     if unknown:
-        raise ValueError(f"Unknown reset option(s) {sorted(unknown)}: known are {sorted(known)}.")
+        raise ValueError(f"Unknown reset option(s) {shown(sorted(unknown, key=str))}: known are {sorted(known)}.")
     return options or {}
 
 

@@ -12,6 +12,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from seastar_gym.checks import require_choice, require_count, require_seed
 from seastar_gym.envs.batch_pictures import BatchPictures, Picture
 from seastar_gym.envs.commands import Actions, action_space, as_array, command_table, to_commands
 from seastar_gym.envs.randomization import DomainRandomization
@@ -19,8 +20,8 @@ from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.seastar_swim import FRAMES_PER_STROKE, checked_options
 from seastar_gym.envs.spec import PlainSpec
 from seastar_gym.envs.task import Path, Plain, SwimTask, make_scene
-from seastar_gym.scene import Fidelity, Scene, require_count
-from seastar_gym.simulator import Simulator
+from seastar_gym.scene import Fidelity, Scene
+from seastar_gym.simulator import MAX_ROBOTS, Simulator
 
 Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]
@@ -71,11 +72,12 @@ class SeastarSwimVectorEnv(PlainSpec, gym.vector.VectorEnv[Observations, Any, An
             raise ValueError(
                 f'The batch draws with render_mode="rgb_array" only, not {render_mode!r}: use gym.make for one robot.'
             )
+        require_count("num_envs", num_envs, 1, MAX_ROBOTS)
         if max_episode_steps is not None:
             require_count("max_episode_steps", max_episode_steps, 1, 2**63 - 1)
         self.num_envs = num_envs
         self.max_episode_steps = max_episode_steps
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.autoreset_mode = _checked_mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
         self.actions = actions
@@ -136,11 +138,7 @@ class SeastarSwimVectorEnv(PlainSpec, gym.vector.VectorEnv[Observations, Any, An
         """Begin episodes. options: "path" (name or waypoints [m]), "reset_mask" (which robots, shape (num_envs,))."""
         chosen = checked_options(options, {"path", "reset_mask"})
         mask = self._checked_mask(chosen.get("reset_mask"))
-        seeds = (
-            [None if seed is None else seed + i for i in range(self.num_envs)] if not isinstance(seed, list) else seed
-        )
-        if len(seeds) != self.num_envs:
-            raise ValueError(f"seed must be one number or {self.num_envs} of them, not {len(seeds)}.")
+        seeds = checked_seeds(seed, self.num_envs)
         for robot in np.flatnonzero(mask):
             if seeds[robot] is not None:
                 self._generators[robot], self._seeds[robot] = seeding.np_random(seeds[robot])
@@ -286,6 +284,24 @@ class SeastarSwimVectorEnv(PlainSpec, gym.vector.VectorEnv[Observations, Any, An
             for name, values in self._task.first_info().items():
                 info[name][begun] = values[begun]
         return _with_masks(info, np.ones_like(begun))
+
+
+def checked_seeds(seed: object, n_robots: int) -> list[int | None]:
+    """The seed of every robot: one number and those that follow it, or a list with one for each."""
+    if isinstance(seed, list):
+        if len(seed) != n_robots:
+            raise ValueError(f"seed must be one number or {n_robots} of them, not {len(seed)}.")
+        for one in seed:
+            require_seed(one)
+        return [None if one is None else int(one) for one in seed]
+    require_seed(seed)
+    return [None if seed is None else int(seed) + robot for robot in range(n_robots)]  # type: ignore[call-overload]
+
+
+def _checked_mode(mode: AutoresetMode | str) -> AutoresetMode:
+    if not isinstance(mode, AutoresetMode):
+        require_choice("autoreset_mode", mode, tuple(one.value for one in AutoresetMode))
+    return AutoresetMode(mode)
 
 
 def _of_some(values: NDArray[Any], mask: Flags) -> NDArray[Any]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from refusals import assert_refused
 from seastar_gym import Limited, MeasuredCurve, Numerics, Scene, Seastar, Simulator, SmaPulse
 from seastar_gym.actuation.actuator import Actuator, StatefulActuator
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -50,11 +51,18 @@ def test_a_curve_is_read_from_csv_with_a_line_of_names_or_without(tmp_path):
         assert MeasuredCurve.from_csv(file) == MeasuredCurve((0.0, 0.1, 1.0), (0.0, 0.6, 0.0))
 
 
-@pytest.mark.parametrize("text", ["time,angle\n0,0\n1,two\n", "0,0\n1,0,0\n", "0,0\n0.5\n"])
+@pytest.mark.parametrize("text", ["0,0\n1,0,0\n", "0,0\n0.5\n", "time,angle\n", "0,O\n", ""])
 def test_lines_that_are_no_samples_are_refused(tmp_path, text):
     file = tmp_path / "curve.csv"
     file.write_text(text)
-    with pytest.raises(ValueError, match="every line must have a time"):
+    with assert_refused(str(file)):
+        MeasuredCurve.from_csv(file)
+
+
+def test_a_curve_that_jumps_is_refused_by_the_name_of_its_file(tmp_path):
+    file = tmp_path / "curve.csv"
+    file.write_text("0,0\n1,1\n")
+    with assert_refused("curve.csv: A measured curve must begin and end at 0"):
         MeasuredCurve.from_csv(file)
 
 

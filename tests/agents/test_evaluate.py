@@ -296,7 +296,7 @@ def ragged_path(folder):
         (lambda folder: ["--agents", "pentagram"], "Unknown scripted agent 'pentagram'"),
         (lambda folder: ["--agents", "rest", "rest"], "'rest' is named twice"),
         (lambda folder: ["--path", "hexagon"], "Unknown path 'hexagon'"),
-        (lambda folder: ["--path", ragged_path(folder)], "ragged.csv: A path must have shape"),
+        (lambda folder: ["--path", ragged_path(folder)], "ragged.csv, line 2: every line must have x and y"),
     ],
 )
 def test_bad_input_is_answered_with_one_sentence(tmp_path, capsys, arguments, complaint):
