@@ -2,57 +2,69 @@
 
     python train.py                        a minute or two on two cores
     python train.py --quick                the whole way in short, in under a minute
-    python train.py --resume runs/FOLDER   continues a run that was stopped (Ctrl-C), or trains it for more --strokes
+    python train.py --resume runs/FOLDER   continues a run that was stopped (Ctrl-C, or killed), or trains it for more
+                                           --strokes
 
 Everything is written to a folder of its own: the policy, the learner and its checkpoints, the options and the command,
 TensorBoard logs, and the comparison with its table, pictures, videos and report.html. With --ship the policy becomes
-the one in the box.
+the one in the box, if it is no worse.
+
+Exit status: 0 done; 1 a file could not be written, or the policy was not put in the box; 2 wrong options; 130 stopped.
 """
 
-import csv
 import json
 import os
 import platform
 import shlex
-import shutil
 import signal
 import sys
+import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import FrameType
 from typing import Annotated, Literal
 
-import gymnasium
-import numba
-import numpy as np
-import stable_baselines3
-import torch
-import tyro
-from stable_baselines3 import PPO
-from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import configure
-from tqdm import tqdm
+try:
+    import gymnasium
+    import numba
+    import numpy as np
+    import stable_baselines3
+    import tensorboard  # noqa: F401, Stable-Baselines3 asserts that it is there when the training begins
+    import torch
+    import tyro
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.callbacks import BaseCallback
+    from stable_baselines3.common.logger import configure
+    from tqdm import tqdm
 
-import seastar_gym
-from agents.evaluate import evaluate
-from agents.policy import SHIPPED
-from agents.policy import load as load_policy
-from agents.policy import save as save_policy
-from agents.ppo import Hyperparameters, make_model, make_training_env, policy_of, resume, save
-from agents.report.charts import Curve, read_progress
-from agents.report.page import Remarks
-from agents.scripted import scripted
-from agents.swim import swim
-from agents.vec_env import BatchVecEnv
-from seastar_gym import RewardWeights
-from seastar_gym.envs.paths import PathName
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.scene.numerics import Fidelity
+    import seastar_gym
+    from agents.evaluate import evaluate
+    from agents.files import write_atomically
+    from agents.policy import SHIPPED, LearnedPolicy
+    from agents.policy import load as load_policy
+    from agents.policy import save as save_policy
+    from agents.ppo import Hyperparameters, make_model, make_training_env, policy_of, require_device, resume, save
+    from agents.report.charts import Curve, read_progress
+    from agents.report.page import Remarks
+    from agents.scripted import scripted
+    from agents.swim import Swim, swim
+    from agents.trials import HELD_OUT_SEED, swim_many
+    from agents.vec_env import BatchVecEnv
+    from seastar_gym import RewardWeights
+    from seastar_gym.envs.paths import PathName
+    from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+    from seastar_gym.envs.task import make_scene
+    from seastar_gym.scene.numerics import Fidelity
+except ModuleNotFoundError as missing:
+    sys.exit(f'train.py needs {missing.name}: pip install "seastar-gym[train]".')
 
 MAX_STROKES = 400
 """Time limit of a swim round the pentagon; the scripted gait takes 250."""
+HELD_OUT_PATHS = 64
+"""Random paths on which a policy is compared with the one in the box; no training draws them."""
 
 
 @dataclass(frozen=True)
@@ -80,10 +92,14 @@ class Options:
     out: Path | None = None
     """Folder of the run; runs/ and the time by default."""
     ship: bool = False
-    """Make the policy the one in the box, which agents.evaluate takes by default."""
+    """Make the policy the one in the box, which agents.evaluate takes by default; if it takes more strokes than that
+    one on held-out random paths, or the run is --quick, only with --ship-anyway."""
+    ship_anyway: bool = False
+    """With --ship: replace the policy in the box even by that of a short run, or by a worse one."""
     resume: Path | None = None
     """Continue the run in this folder, with its options; only strokes, num_threads, device, save_freq, video and ship
-    may be given anew."""
+    may be given anew. Somebody else's run is safe to continue: what is read of it is JSON and tensors, and nothing is
+    unpickled. Loading its model.zip with Stable-Baselines3's own PPO.load can execute their code."""
     quick: bool = False
     """A short form that goes all the way in under a minute, at fidelity "fast"."""
     ppo: Annotated[Hyperparameters, tyro.conf.arg(name="")] = Hyperparameters()
@@ -93,7 +109,7 @@ class Options:
             raise ValueError("strokes and save_freq must be at least 1.")
 
 
-CHANGEABLE = {"strokes", "num_threads", "device", "save_freq", "video", "ship", "out", "resume", "quick"}
+CHANGEABLE = {"strokes", "num_threads", "device", "save_freq", "video", "ship", "ship_anyway", "out", "resume", "quick"}
 """Options that may change when a run is continued."""
 
 
@@ -114,7 +130,7 @@ def read_options(arguments: Sequence[str]) -> Options:
 
 
 def saved_options(folder: Path) -> Options:
-    """The options of the run in a folder."""
+    """The options of the run in a folder; its policy goes to the box only if that is asked for anew."""
     file = folder / "config.json"
     if not file.is_file():
         raise FileNotFoundError(f"There is no run to continue in {folder}: it has no config.json.")
@@ -122,9 +138,10 @@ def saved_options(folder: Path) -> Options:
         options = json.loads(file.read_text(encoding="utf-8"))["options"]
         ppo = options.pop("ppo")
         ppo |= {"hidden": tuple(ppo["hidden"]), "reward": RewardWeights(**ppo["reward"])}
-        return Options(**{**options, "out": folder, "resume": None, "ppo": Hyperparameters(**ppo)})
-    except (json.JSONDecodeError, KeyError, TypeError) as damaged:
-        raise ValueError(f"{file} is damaged or from another version: {damaged}.") from damaged
+        here = {"out": folder, "resume": None, "ppo": Hyperparameters(**ppo), "ship": False, "ship_anyway": False}
+        return Options(**{**options, **here})
+    except (AttributeError, KeyError, RecursionError, TypeError, ValueError) as damaged:
+        raise ValueError(f"{file} is damaged or from another version: {str(damaged).rstrip('.')}.") from damaged
 
 
 def write_config(options: Options, arguments: Sequence[str], folder: Path) -> None:
@@ -138,22 +155,78 @@ def write_config(options: Options, arguments: Sequence[str], folder: Path) -> No
         "versions": {"python": platform.python_version(), **{one.__name__: one.__version__ for one in modules}},
         "machine": {"system": platform.platform(), "processors": os.cpu_count()},
     }
-    file.write_text(json.dumps(config, indent=2, default=str) + "\n", encoding="utf-8")
+    write_atomically(file, (json.dumps(config, indent=2, default=str) + "\n").encode())
 
 
-def export(model: PPO, folder: Path, ship: bool) -> None:
-    """policy.safetensors and policy.json: what was learned and how, without the learner; `ship` puts it in the box."""
+def require_consent(options: Options) -> None:
+    """ValueError where the policy in the box would be replaced by that of a short run, asked for only once."""
+    if options.ship_anyway and not options.ship:
+        raise ValueError("--ship-anyway confirms --ship: give both.")
+    if options.ship and options.quick and not options.ship_anyway:
+        raise ValueError("A --quick run replaces the policy in the box only with --ship-anyway beside --ship.")
+
+
+def claim(folder: Path) -> None:
+    """Make the folder of a new run; one that is there may only be empty, or hold what a kill left of its beginning."""
+    if "\0" in str(folder):
+        raise ValueError(f"{str(folder)!r} is no name of a folder.")
+    if folder.exists() and not folder.is_dir():
+        raise ValueError(f"{folder} is no folder: give another --out.")
+    folder.mkdir(parents=True, exist_ok=True)
+    if any(file.name != "config.json.part" for file in folder.iterdir()):
+        raise ValueError(f"{folder} exists already: give another --out, or continue the run in it with --resume.")
+
+
+def export(model: PPO, folder: Path) -> None:
+    """policy.safetensors and policy.json: what was learned and how, without the learner."""
     config = json.loads((folder / "config.json").read_text(encoding="utf-8"))
-    learned = policy_of(model)
-    for file in (folder / "policy.safetensors", *([SHIPPED] if ship else [])):
-        save_policy(
-            learned,
-            file,
-            strokes=model.num_timesteps,
-            seed=model.seed,
-            progress=read_progress(folder),
-            **{name: config[name] for name in ("commands", "options", "versions")},
-        )
+    save_policy(
+        policy_of(model),
+        folder / "policy.safetensors",
+        strokes=model.num_timesteps,
+        seed=model.seed,
+        progress=read_progress(folder),
+        **{name: config[name] for name in ("commands", "options", "versions")},
+    )
+
+
+# --- the policy in the box -------------------------------------------------------------------------------------------
+
+
+def put_in_the_box(options: Options, folder: Path) -> int:
+    """Make the run's policy the one in the box, unless that one is better and nobody insists; returns the exit code."""
+    policy = load_policy(folder / "policy.safetensors")
+    if not options.ship_anyway and (objection := why_not(policy, options)):
+        command = f"{resume_command(folder)} --ship --ship-anyway"
+        print(f"The policy in the box stays: {objection}. Replace it all the same with\n    {command}", file=sys.stderr)
+        return 1
+    save_policy(policy, SHIPPED)
+    print(f"In the box: {SHIPPED}")
+    return 0
+
+
+def why_not(policy: LearnedPolicy, options: Options) -> str | None:
+    """What is to be said against replacing the policy in the box by this one, if anything."""
+    if not SHIPPED.exists():
+        return None
+    try:
+        box = load_policy(SHIPPED)
+    except (ValueError, FileNotFoundError) as unreadable:
+        return f"there is nothing to compare with, {str(unreadable).rstrip('.')}"
+    ours, theirs = (held_out_strokes(one, options) for one in (policy, box))
+    if ours <= theirs:
+        return None
+    return f"it takes {theirs:.1f} strokes on {HELD_OUT_PATHS} held-out random paths, the new one {ours:.1f}"
+
+
+def held_out_strokes(policy: LearnedPolicy, options: Options) -> float:
+    """Mean strokes to the last waypoint of random paths; who does not arrive counts as the time limit."""
+    scene, limit = make_scene(None, options.fidelity), MAX_STROKES
+    swims = swim_many(
+        "learned", policy, "random", HELD_OUT_PATHS, scene,
+        max_strokes=limit, seed=HELD_OUT_SEED, threads=options.num_threads,
+    )  # fmt: skip
+    return float(np.mean([done.strokes for done in swims]))
 
 
 # --- training --------------------------------------------------------------------------------------------------------
@@ -233,19 +306,37 @@ class Watch(BaseCallback):
 
     def checkpoint(self) -> None:
         """Save the model, and see how it swims round the pentagon."""
-        strokes = self.learner.num_timesteps
         save(self.learner, self.folder / "model.zip")
-        (self.folder / "checkpoints").mkdir(exist_ok=True)
-        shutil.copyfile(self.folder / "model.zip", self.folder / "checkpoints" / f"model_{strokes:09d}.zip")
-        done = swim("learned", policy_of(self.learner), self.pentagon, max_strokes=MAX_STROKES)
-        self.logger.record("eval/pentagon_strokes", done.strokes)
-        self.logger.record("eval/pentagon_waypoints", done.waypoints_reached)
-        with (self.folder / "progress.csv").open("a", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerow([strokes, done.strokes, done.waypoints_reached])
+        done = self.keep()
+        strokes = self.learner.num_timesteps
         reached = "" if done.finished else f" (only {done.waypoints_reached} waypoints)"
         self.bar.set_postfix_str(f"pentagon in {done.strokes}{reached}")
         if self.bar.disable:
             print(f"{strokes} strokes trained: the pentagon takes {done.strokes}{reached}.", flush=True)
+
+
+    def keep(self) -> Swim:
+        """What comes after a save of the model: a copy, and how it swims round the pentagon, which is logged."""
+        strokes = self.learner.num_timesteps
+        copy = self.folder / "checkpoints" / f"model_{strokes:09d}.zip"
+        write_atomically(copy, (self.folder / "model.zip").read_bytes())
+        done = swim("learned", policy_of(self.learner), self.pentagon, max_strokes=MAX_STROKES)
+        self.learner.logger.record("eval/pentagon_strokes", done.strokes)
+        self.learner.logger.record("eval/pentagon_waypoints", done.waypoints_reached)
+        rows = [*recorded(self.folder), [strokes, done.strokes, done.waypoints_reached]]
+        text = "".join(",".join(map(str, row)) + "\n" for row in rows)
+        write_atomically(self.folder / "progress.csv", text.encode())
+        return done
+
+
+def recorded(folder: Path) -> list[list[int]]:
+    """The rows of the run's progress.csv; none before the first checkpoint."""
+    return read_progress(folder) if (folder / "progress.csv").exists() else []
+
+
+def is_unbegun(folder: Path) -> bool:
+    """Whether a run was stopped before its first checkpoint, so that it begins anew where it is continued."""
+    return not any((folder / name).exists() for name in ("model.zip", "checkpoints", "progress.csv"))
 
 
 def train(options: Options, folder: Path, stop: Callable[[], bool]) -> tuple[PPO, Watch]:
@@ -253,15 +344,18 @@ def train(options: Options, folder: Path, stop: Callable[[], bool]) -> tuple[PPO
     env = make_training_env(
         options.ppo, options.path, options.random_heading, fidelity=options.fidelity, threads=options.num_threads
     )
-    if options.resume is None:
+    new = options.resume is None or is_unbegun(folder)
+    if new:
         model = make_model(env, options.ppo, options.seed, options.device)
     else:
         model = resume(folder / "model.zip", env, options.device)
     model.set_logger(configure(str(folder / "tensorboard"), ["tensorboard"]))
     watch = Watch(options, folder, model, env, stop)
+    if not new and model.num_timesteps not in (strokes for strokes, *_ in recorded(folder)):
+        watch.keep()  # a kill came between the two
     left = options.strokes - model.num_timesteps
     if left > 0:
-        model.learn(left, watch, log_interval=1, reset_num_timesteps=options.resume is None)
+        model.learn(left, watch, log_interval=1, reset_num_timesteps=new)
         watch.checkpoint()
     env.close()
     return model, watch
@@ -320,32 +414,60 @@ def resume_command(folder: Path) -> str:
 def run(options: Options, arguments: Sequence[str]) -> int:
     """Train, compare, report; returns the exit code."""
     torch.set_num_threads(1)  # two threads are slower on so small a network, and the simulator has the processors
+    require_device(options.device)
+    require_consent(options)
     folder = options.out or Path("runs") / time.strftime("%Y-%m-%d_%H-%M-%S")
-    if folder.exists() and options.resume is None:
-        raise ValueError(f"{folder} exists already: give another --out, or continue the run in it with --resume.")
-    folder.mkdir(parents=True, exist_ok=True)
+    if options.resume is None:
+        claim(folder)
     write_config(options, arguments, folder)
     print(f"The run is in {folder}.", flush=True)
     with Interruption() as interruption:
         model, watch = train(options, folder, lambda: interruption.requested)
-    export(model, folder, options.ship and not interruption.requested)
+    export(model, folder)
     if interruption.requested:
         print(
             f"Stopped after {model.num_timesteps} strokes; {folder / 'model.zip'} is the policy so far. Continue with"
         )
-        print(f"    {resume_command(folder)}")
+        asked = ["--ship"] * options.ship + ["--ship-anyway"] * options.ship_anyway
+        print(" ".join(["   ", resume_command(folder), *asked]))
         return 130
     compare(options, folder, describe(options, folder, model.num_timesteps, watch))
     print(f"Report:  {folder / 'evaluation' / 'report.html'}\nPolicy:  {folder / 'policy.safetensors'}")
     print(f"Logs:    tensorboard --logdir {folder}")
-    return 0
+    return put_in_the_box(options, folder) if options.ship else 0
+
+
+@contextmanager
+def quiet_writers() -> Iterator[None]:
+    """Within it, a thread that cannot write says nothing: the next who writes through it raises the same error."""
+    before = threading.excepthook
+
+    def hook(failure: threading.ExceptHookArgs) -> None:
+        if not isinstance(failure.exc_value, OSError):
+            before(failure)
+
+    threading.excepthook = hook
+    try:
+        yield
+    finally:
+        threading.excepthook = before
+
+
+def cannot(failure: OSError) -> str:
+    """What the disk refused, in a sentence."""
+    where = "a file of the run" if failure.filename is None else failure.filename
+    return f"Cannot write or read {where}: {(failure.strerror or str(failure)).lower()}."
 
 
 def main(arguments: Sequence[str]) -> int:
     """The command line; returns the exit code."""
     try:
-        return run(read_options(arguments), arguments)
-    except (ValueError, FileNotFoundError) as wrong:
+        with quiet_writers():
+            return run(read_options(arguments), arguments)
+    except OSError as failure:
+        print(failure if failure.errno is None else cannot(failure), file=sys.stderr)
+        return 2 if failure.errno is None else 1
+    except ValueError as wrong:
         print(wrong, file=sys.stderr)
         return 2
     except KeyboardInterrupt:

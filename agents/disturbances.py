@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.greedy import turned
-from seastar_gym.envs.observation import VELOCITY_SCALE
+from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout
 from seastar_gym.envs.task import SwimTask
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.per_robot import column
@@ -77,14 +77,15 @@ class DisturbedTask:
     def observe(self) -> NDArray[np.float32]:
         """What the robots see of themselves and of their waypoints."""
         seen, scene = self.task.observe(), self.task.simulator.scene
+        at = scene_layout(scene)
         if self.disturbance.current > 0.0:
             axes = best_fit_heading(self.task.simulator.positions, scene.robot.nodes())
-            seen[:, -6:-4] += turned(self._current, -axes) / VELOCITY_SCALE
+            seen[:, at.hub_velocity] += turned(self._current, -axes) / VELOCITY_SCALE
         if self.disturbance.noise > 0.0:
             error = self._rng.normal(0.0, self.disturbance.noise, (len(seen), scene.robot.n_nodes, 2))
             error /= column(scene.robot.limb_length, 2)
-            seen[:, : 2 * (scene.robot.n_nodes - 1)] += (error[:, 1:] - error[:, :1]).reshape(len(seen), -1)
-            seen[:, -4:] -= np.tile(error[:, 0], 2)
+            seen[:, at.positions] += (error[:, 1:] - error[:, :1]).reshape(len(seen), -1)
+            seen[:, at.waypoints] -= np.tile(error[:, 0], 2)
         return seen
 
     def step(self, commands: Floats) -> Floats:

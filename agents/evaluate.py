@@ -30,11 +30,13 @@ from agents.report.page import Remarks, ResultsTable, number, read_trials, write
 from agents.report.pictures import FRAMES_PER_STROKE, draw_traces, film
 from agents.report.playback import Playback, RecordingEnv
 from agents.roster import load_agents
-from agents.swim import Policy, Swim, swim
+from agents.swim import Policy, Swim, actions_of, require_fit, swim
 from seastar_gym.envs.paths import PATH_NAMES, make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.task import make_scene
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.csv_rows import read_numbers
 from seastar_gym.scene.numerics import Fidelity
 
 MM = 1000.0
@@ -105,7 +107,8 @@ def _swim_once(
     name: str, policy: Policy, environment: dict[str, Any], episode: dict[str, Any], video: Path | None, record: bool
 ) -> tuple[Swim, Playback | None]:
     """The swim; filmed if there is a file for the video, with a playback if it is to be recorded."""
-    environment = {"actions": getattr(policy, "actions", "limbs"), **environment}
+    scene = make_scene(environment["scene"], None)
+    environment = {"actions": actions_of(policy, scene.robot.n_limbs), **environment}
     if video is None and not record:
         return swim(name, policy, SeastarSwimEnv(**environment), **episode), None
     env = RecordingEnv(film=video is not None, frames_per_stroke=FRAMES_PER_STROKE, **environment)
@@ -209,7 +212,9 @@ class Options:
 
     agents: tuple[str, ...] = ("learned", "pentagon")
     """The policy in the box (learned), greedy, planner, scripted agents (pentagon, straight, rest, random, or a pair
-    such as 4+,1-), and files of policies (.safetensors, or a training's model.zip)."""
+    such as 4+,1-), files of policies (.safetensors, or a training's model.zip), a model.zip of plain
+    Stable-Baselines3, and module:function, which gets an environment and returns anything with predict. The last two
+    execute the code of whoever made them, because Stable-Baselines3 unpickles: load only files that you trust."""
     path: str = "pentagon"
     """pentagon, square, triangle, line, figure-eight, random, or a text file with x, y [m] of one waypoint per line."""
     fidelity: Fidelity = "balanced"
@@ -247,11 +252,9 @@ def _load_path(name: str) -> Any:
     if name in PATH_NAMES or not Path(name).is_file():
         make_path(name, np.random.default_rng(0))
         return name
-    lines = Path(name).read_text(encoding="utf-8").splitlines()
+    waypoints = read_numbers(name, "x and y [m] of a waypoint", 2)
     try:
-        return make_path(
-            [[float(x) for x in line.split(",")] for line in lines if line.strip()], np.random.default_rng(0)
-        )
+        return make_path(waypoints, np.random.default_rng(0))
     except ValueError as bad:
         raise ValueError(f"{name}: {bad}") from bad
 
@@ -280,8 +283,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         agents, path = load_agents(options.agents, options.seed, options.fidelity), _load_path(options.path)
         for agent in agents.values():
-            if isinstance(agent, learned.LearnedPolicy):
-                agent.require_fit(Scene(), agent.actions)
+            require_fit(agent, Scene(), actions_of(agent, Scene().robot.n_limbs))
         remarks = _remarks(agents, options, arguments) if options.report else None
     except (ValueError, OSError) as bad_input:
         print(bad_input, file=sys.stderr)

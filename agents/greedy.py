@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions, command_table
-from seastar_gym.envs.observation import OBSERVATION_LAYOUT
+from seastar_gym.envs.observation import scene_layout
 from seastar_gym.envs.paths import AIM, shortest_way
 from seastar_gym.scene import Scene
 from seastar_gym.simulator import Simulator
@@ -85,10 +85,10 @@ def remaining_way(hub: Floats, current: Floats, after: Floats, radius: float) ->
 
 
 def waypoints_of(observations: NDArray[np.float32], scene: Scene) -> tuple[Floats, Floats]:
-    """Current and next waypoint [m] relative to the hub in the body frame, (n, 2) each, by observation layout 1."""
-    assert OBSERVATION_LAYOUT == 1
-    waypoints = scene.robot.limb_length * observations[:, -4:].astype(np.float64)
-    return waypoints[:, :2], waypoints[:, 2:]
+    """Current and next waypoint [m] relative to the hub in the body frame, (n, 2) each."""
+    at, length = scene_layout(scene), scene.robot.limb_length
+    current, after = observations[:, at.current_waypoint], observations[:, at.next_waypoint]
+    return length * current.astype(np.float64), length * after.astype(np.float64)
 
 
 class Searcher(ABC):

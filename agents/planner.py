@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from agents.greedy import Searcher, remaining_way, waypoints_of
 from seastar_gym.envs.commands import command_table
-from seastar_gym.envs.observation import VELOCITY_SCALE
+from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.simulator import Simulator, State
 
@@ -34,11 +34,16 @@ class Budget:
 
 
 def state_of(observations: NDArray[np.float32], scene: Scene) -> State:
-    """The state that observations, shape (n, size), were made from: in the body frame, the hub at its origin."""
-    n, robot = len(observations), scene.robot
-    vectors = observations[:, :-4].astype(np.float64).reshape(n, -1, 2)
-    nodes, velocities = np.split(vectors[:, :-1], 2, axis=1)
-    hub_velocity, zero = vectors[:, -1:], np.zeros((n, 1, 2))
+    """The state that observations, shape (n, size), were made from: in the body frame, the hub at its origin.
+
+    Actuators that remember something are taken to be at rest: what is seen of them is not all of their state.
+    """
+    n, robot, at = len(observations), scene.robot, scene_layout(scene)
+    nodes, velocities, hub_velocity = (
+        observations[:, place].astype(np.float64).reshape(n, -1, 2)
+        for place in (at.positions, at.velocities, at.hub_velocity)
+    )
+    zero = np.zeros((n, 1, 2))
     return State(
         positions=robot.limb_length * np.concatenate([zero, nodes], axis=1),
         velocities=VELOCITY_SCALE * (hub_velocity + np.concatenate([zero, velocities], axis=1)),

@@ -11,12 +11,13 @@ numbers are the logits of the actions. Nothing is unpickled, and neither torch n
 
 import hashlib
 import json
+import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 import safetensors
@@ -24,25 +25,23 @@ import safetensors.numpy
 from numpy.typing import NDArray
 
 import seastar_gym
+from agents.files import write_atomically
 from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, command_table
 from seastar_gym.envs.observation import OBSERVATION_LAYOUT
 from seastar_gym.envs.symmetry import reduce_observations, restore_actions
 from seastar_gym.envs.task import scene_observation_size
-from seastar_gym.scene import Contact, Numerics, Scene, Seastar, SmaPulse, Water
-from seastar_gym.scene.actuators.actuator import Actuator
-from seastar_gym.scene.actuators.measured import MeasuredCurve
-from seastar_gym.scene.actuators.thermal import ThermalSma
-from seastar_gym.scene.limb import Limb
+from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import is_finite_number, require_count
+from seastar_gym.scene.serial import shown
 
-FORMAT = 1
+FORMAT = 2
 """Version of what a description says."""
+WIDEST = 1_000_000
+"""Neurons of a layer that a description may claim."""
 SHIPPED = Path(__file__).parent / "policies" / "seastar.safetensors"
 """The policy in the box; `python train.py --ship` replaces it."""
 
 Weights = dict[str, NDArray[np.float32]]
-
-ACTUATORS: dict[str, Callable[..., Actuator]] = {kind.__name__: kind for kind in (SmaPulse, MeasuredCurve, ThermalSma)}
-"""What a policy may have been trained with."""
 
 
 # --- what a policy expects -------------------------------------------------------------------------------------------
@@ -64,38 +63,33 @@ class Description(NamedTuple):
             "observation_layout": OBSERVATION_LAYOUT,
             "observation_size": scene_observation_size(self.scene),
             **self._asdict(),
-            "scene": asdict(self.scene) | {"actuator_kind": type(self.scene.actuator).__name__},
+            "scene": self.scene.to_dict(),
             **more,
         }
-        return json.dumps(facts, indent=2, default=str)
+        return json.dumps(facts, indent=2, default=str, allow_nan=False)
 
     @classmethod
-    def from_json(cls, text: str) -> "Description":
-        """From `to_json`. ValueError: another format or observation layout, or a scene that is none."""
-        facts = json.loads(text)
+    def from_json(cls, text: str | bytes) -> "Description":
+        """From `to_json`, see from_facts."""
+        return cls.from_facts(read_facts(text))
+
+    @classmethod
+    def from_facts(cls, facts: Mapping[str, Any]) -> "Description":
+        """From the names and values of `to_json`. KeyError: one is missing. ValueError: one cannot be."""
         for name, ours in (("format", FORMAT), ("observation_layout", OBSERVATION_LAYOUT)):
-            if facts[name] != ours:
-                raise ValueError(f"its {name} is {facts[name]!r}, this version of seastar_gym knows {ours}")
-        scene = _as_tuples(facts["scene"])
-        kind = scene.get("actuator_kind", SmaPulse.__name__)
-        if kind not in ACTUATORS:
-            raise ValueError(f"its actuator is a {kind}, and known are {', '.join(ACTUATORS)}")
-        limbs = tuple(Limb(**limb) for limb in scene["robot"].get("limbs", ()))
-        return cls(
-            actions=facts["actions"],
-            symmetry=bool(facts["symmetry"]),
-            scene=Scene(
-                robot=Seastar(**scene["robot"] | {"limbs": limbs}),
-                fluid=None if scene["fluid"] is None else Water.from_fields(scene["fluid"]),
-                actuator=ACTUATORS[kind](**scene["actuator"]),
-                numerics=Numerics(**scene["numerics"]),
-                held_nodes=scene.get("held_nodes", ()),
-                loads=scene.get("loads", ()),
-                limb_strengths=scene.get("limb_strengths", ()),
-                contact=None if scene.get("contact") is None else Contact(**scene["contact"]),
-            ),
-            hidden=tuple(facts["hidden"]),
-        )
+            if facts[name] != ours or isinstance(facts[name], bool):
+                raise ValueError(f"its {name} is {shown(facts[name])}, this version of seastar_gym knows {ours}")
+        actions, symmetry, hidden = facts["actions"], facts["symmetry"], facts["hidden"]
+        if actions not in get_args(Actions):
+            known = ", ".join(map(repr, get_args(Actions)))
+            raise ValueError(f"its actions must be one of {known}, not {shown(actions)}")
+        if not isinstance(symmetry, bool):
+            raise ValueError(f"its symmetry must be true or false, not {shown(symmetry)}")
+        if not isinstance(hidden, list):
+            raise ValueError(f"its hidden must be a list of widths, not {shown(hidden)}")
+        for width in hidden:
+            require_count("a width of its hidden layers", width, 1, WIDEST)
+        return cls(actions, symmetry, Scene.from_dict(facts["scene"]), tuple(hidden))
 
     @property
     def distributions(self) -> tuple[int, int]:
@@ -113,13 +107,6 @@ class Description(NamedTuple):
         for layer, (inputs, outputs) in enumerate(pairwise(widths)):
             shapes |= {f"{layer}.weight": (outputs, inputs), f"{layer}.bias": (outputs,)}
         return shapes
-
-
-def _as_tuples(facts: Any) -> Any:
-    """JSON with tuples for lists, as scenes have them."""
-    if isinstance(facts, dict):
-        return {name: _as_tuples(value) for name, value in facts.items()}
-    return tuple(map(_as_tuples, facts)) if isinstance(facts, list) else facts
 
 
 # --- the policy ------------------------------------------------------------------------------------------------------
@@ -144,6 +131,8 @@ class LearnedPolicy:
         shapes = {name: array.shape for name, array in weights.items()}
         if shapes != description.shapes():
             raise ValueError(f"its weights have the shapes {shapes}, not {description.shapes()}")
+        if not all(array.dtype == np.float32 and np.isfinite(array).all() for array in weights.values()):
+            raise ValueError("its weights are not all finite numbers of single precision")
         self.description = description
         self.weights = weights
         self.actions = description.actions
@@ -209,7 +198,7 @@ class LearnedPolicy:
         parts = [
             f"{name} {ours.get(name)} (here {theirs.get(name)})"
             for name in sorted(ours | theirs)
-            if ours.get(name) != theirs.get(name) and not name.startswith("numerics.")
+            if ours.get(name) != theirs.get(name) and name.split(".")[0] != "numerics"
         ]
         return f"trained in another scene, with {', '.join(parts)}." if parts else ""
 
@@ -233,9 +222,8 @@ def save(policy: LearnedPolicy, path: str | os.PathLike[str], **training: Any) -
     path = _checked_suffix(path)
     data = safetensors.numpy.save({name: np.ascontiguousarray(array) for name, array in policy.weights.items()})
     text = policy.description.to_json(sha256=hashlib.sha256(data).hexdigest(), training={**policy.training, **training})
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(data)
-    path.with_suffix(".json").write_text(text + "\n", encoding="utf-8")
+    write_atomically(path, data)
+    write_atomically(path.with_suffix(".json"), f"{text}\n".encode())
 
 
 def load(path: str | os.PathLike[str] = SHIPPED) -> LearnedPolicy:
@@ -246,14 +234,50 @@ def load(path: str | os.PathLike[str] = SHIPPED) -> LearnedPolicy:
             raise FileNotFoundError(f"There is no trained policy at {path}: {file.name} is missing.")
     data = path.read_bytes()
     try:
-        text = path.with_suffix(".json").read_text(encoding="utf-8")
-        facts = json.loads(text)
+        facts = read_facts(path.with_suffix(".json").read_bytes())
         if hashlib.sha256(data).hexdigest() != facts["sha256"]:
             raise ValueError("the weights are not those that its .json file describes")
-        return LearnedPolicy(Description.from_json(text), safetensors.numpy.load(data), facts["training"])
+        description, weights = Description.from_facts(facts), safetensors.numpy.load(data)
+        return LearnedPolicy(description, weights, checked_training(facts["training"]))
     except (KeyError, TypeError, ValueError, safetensors.SafetensorError) as unfit:
-        reason = f"it does not say {unfit}" if isinstance(unfit, KeyError) else " ".join(str(unfit).split())
-        raise ValueError(f"{path} is damaged, or no policy of this version: {reason.rstrip('.')}.") from unfit
+        raise ValueError(f"{path} is damaged, or no policy of this version: {reason_of(unfit)}.") from unfit
+
+
+def reason_of(unfit: Exception) -> str:
+    """What an exception says first, to end a sentence with."""
+    said = f"it does not say {unfit}" if isinstance(unfit, KeyError) else " ".join(str(unfit).split())
+    return said.split(". ")[0].rstrip(".")
+
+
+def read_facts(text: str | bytes) -> dict[str, Any]:
+    """What a description in JSON says. ValueError for anything but an object of finite numbers."""
+    try:
+        text = text if isinstance(text, str) else text.decode()
+        facts = json.loads(text, parse_constant=_finite, parse_float=_finite)
+    except RecursionError:
+        raise ValueError("its description is nested too deeply") from None
+    if not isinstance(facts, dict):
+        raise ValueError(f"its description is a {type(facts).__name__}, not an object with names")
+    return facts
+
+
+def _finite(text: str) -> float:
+    if not math.isfinite(float(text)):
+        raise ValueError(f"its description says {text}, which is no finite number")
+    return float(text)
+
+
+def checked_training(training: object) -> dict[str, Any]:
+    """How a policy came to be, as far as the reports read it."""
+    if not isinstance(training, dict):
+        raise ValueError(f"its training is a {type(training).__name__}, not an object with names")
+    progress, commands = training.get("progress", []), training.get("commands", [])
+    rows = progress if isinstance(progress, list) else [progress]
+    if not all(isinstance(row, list) and len(row) == 3 and all(map(is_finite_number, row)) for row in rows):
+        raise ValueError("the progress of its training must be rows of three numbers")
+    if not isinstance(commands, list) or not all(isinstance(command, str) for command in commands):
+        raise ValueError("the commands of its training must be texts")
+    return training
 
 
 def _checked_suffix(path: str | os.PathLike[str]) -> Path:

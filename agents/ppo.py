@@ -1,40 +1,46 @@
 """PPO on the native batch: its hyperparameters, its training environment, and learners on disk.
 
-A saved learner is Stable-Baselines3's own zip file with two more entries: `policy.json` says what the policy expects
-(observation layout, scene, action mode, symmetry), `random_states.npz` holds what `resume` continues from. `load` reads
-only `policy.json` and the network's weights, and unpickles nothing. What policies are and how they are kept without
-their learner stands in policy.py.
+A saved learner is Stable-Baselines3's own zip file with three more entries, which hold no pickles: `policy.json` says
+what the policy expects (observation layout, scene, action mode, symmetry), `learner.safetensors` has the network, the
+optimiser and the random generators, `learner.json` the settings and counters. `load` and `resume` read these three, and
+unpickle nothing. `PPO.load` of Stable-Baselines3 reads the file, too, and unpickles its own part: only from people you
+trust. Policies without their learner stand in policy.py.
 """
 
 import io
+import json
 import os
 import random
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, TypeVar
+from collections import deque
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from typing import Any, get_args
 
 import gymnasium as gym
 import numpy as np
+import safetensors.torch
 import torch
 from gymnasium.vector import AutoresetMode
 from stable_baselines3 import PPO
 from stable_baselines3.common.utils import LinearSchedule
 
-from agents.policy import Description, LearnedPolicy, Weights
+from agents.files import write_atomically
+from agents.policy import Description, LearnedPolicy, Weights, reason_of
 from agents.vec_env import BatchVecEnv
 from seastar_gym import RewardWeights
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.symmetry import VectorSymmetryReduction
 from seastar_gym.envs.task import Path as SwimPath
 from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import require_choice, require_count, require_finite, shown
 from seastar_gym.scene.numerics import Fidelity
 
-DESCRIPTION, WEIGHTS, RANDOM_STATES = "policy.json", "policy.pth", "random_states.npz"
-
-Loaded = TypeVar("Loaded")
+DESCRIPTION, LEARNER, FACTS = "policy.json", "learner.safetensors", "learner.json"
+FORMAT = 1
+"""Version of what a saved learner goes on from."""
 
 
 @dataclass(frozen=True)
@@ -81,20 +87,26 @@ class Hyperparameters:
     """Progress dominates: a stroke of the best gaits earns about 1, and a heated limb costs 0.01."""
 
     def __post_init__(self) -> None:
+        require_choice("actions", self.actions, get_args(Actions))
         for name in ("num_envs", "rollout", "batch_size", "epochs", "max_episode_steps"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}.")
-        if self.num_envs * self.rollout % self.batch_size:
+            require_count(name, getattr(self, name), 1, 2**31)
+        for name in ("learning_rate", "discount", "gae_lambda", "clip_range", "entropy"):
+            require_finite(name, getattr(self, name), "1")
+        if not isinstance(self.symmetry, bool) or not isinstance(self.reward, RewardWeights):
+            raise ValueError(f"symmetry must be True or False, and reward RewardWeights, not {self.symmetry!r}.")
+        strokes = int(self.num_envs) * int(self.rollout)
+        if strokes % int(self.batch_size):
             raise ValueError(
-                f"batch_size must divide the {self.num_envs * self.rollout} strokes of a rollout of all robots, "
-                f"{self.batch_size} does not."
+                f"batch_size must divide the {strokes} strokes of a rollout of all robots, {self.batch_size} does not."
             )
         if not (0.0 <= self.discount < 1.0 and 0.0 <= self.gae_lambda <= 1.0):
             raise ValueError("discount must be in [0, 1) and gae_lambda in [0, 1].")
         if not (self.learning_rate > 0.0 and self.clip_range > 0.0 and self.entropy >= 0.0):
             raise ValueError("learning_rate and clip_range must be positive, entropy not negative.")
-        if not self.hidden or min(self.hidden) < 1:
-            raise ValueError(f"hidden must be widths of at least 1, not {self.hidden}.")
+        if not isinstance(self.hidden, tuple) or not self.hidden:
+            raise ValueError(f"hidden must be widths of at least 1, not {shown(self.hidden)}.")
+        for width in self.hidden:
+            require_count("a width in hidden", width, 1, 2**20)
 
 
 def make_training_env(
@@ -131,6 +143,7 @@ def make_model(
     tensorboard_log: str | os.PathLike[str] | None = None,
 ) -> PPO:
     """A new learner on this environment."""
+    require_device(device)
     return PPO(
         "MlpPolicy",
         env,
@@ -147,6 +160,14 @@ def make_model(
         seed=seed,
         device=device,
     )
+
+
+def require_device(device: str) -> None:
+    """ValueError for a device that is not there, where Stable-Baselines3 would quietly take the processor."""
+    if device not in ("cpu", "cuda", "auto"):
+        raise ValueError(f"device must be 'cpu', 'cuda' or 'auto', not {device!r}.")
+    if device == "cuda" and not torch.cuda.is_available():
+        raise ValueError("There is no CUDA device that torch can use: take device cpu or auto.")
 
 
 # --- what is learned -------------------------------------------------------------------------------------------------
@@ -188,38 +209,66 @@ def save(model: PPO, path: str | os.PathLike[str]) -> None:
     with zipfile.ZipFile(buffer, "a") as archive:
         description = policy_of(model).description
         archive.writestr(DESCRIPTION, description.to_json(strokes_trained=model.num_timesteps))
-        archive.writestr(RANDOM_STATES, _random_states())
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(path.name + ".part")
-    part.write_bytes(buffer.getvalue())
-    os.replace(part, path)
+        archive.writestr(LEARNER, safetensors.torch.save({**_tensors(model), **_generators(model)}))
+        archive.writestr(FACTS, json.dumps(_facts(model)))
+    write_atomically(path, buffer.getvalue())
 
 
-def _random_states() -> bytes:
-    """The global generators of torch, numpy and Python, as an .npz file."""
-    _, keys, position, has_gauss, cached_gaussian = np.random.get_state(legacy=True)  # noqa: NPY002
-    version, internal, gauss_next = random.getstate()
-    buffer = io.BytesIO()
-    np.savez(
-        buffer,
-        torch=torch.get_rng_state().numpy(),
-        numpy_keys=keys,
-        numpy_rest=np.array([position, has_gauss, cached_gaussian]),
-        python=np.array(internal, dtype=np.uint64),
-        python_rest=np.array([version, np.nan if gauss_next is None else gauss_next]),
+def _tensors(model: PPO) -> dict[str, torch.Tensor]:
+    """Every number that is learned: the network's, and the optimiser's moments of each."""
+    network = {f"network.{name}": tensor for name, tensor in model.policy.state_dict().items()}
+    moments = {
+        f"optimiser.{index}.{name}": tensor
+        for index, state in model.policy.optimizer.state_dict()["state"].items()
+        for name, tensor in state.items()
+    }
+    return {name: tensor.detach().cpu().contiguous() for name, tensor in (network | moments).items()}
+
+
+def _generators(model: PPO) -> dict[str, torch.Tensor]:
+    """The global generators of torch, numpy and Python; what is no word of theirs is among the facts."""
+    _, numpy_words, *_ = np.random.get_state(legacy=True)  # noqa: NPY002
+    words = {
+        "torch": torch.get_rng_state(),
+        "numpy": torch.from_numpy(np.asarray(numpy_words, np.int64)),
+        "python": torch.tensor(random.getstate()[1]),
+    }
+    if model.device.type == "cuda":
+        words["cuda"] = torch.cuda.get_rng_state(model.device)
+    return {f"generator.{name}": tensor for name, tensor in words.items()}
+
+
+def _facts(model: PPO) -> dict[str, Any]:
+    """What a learner goes on from besides its tensors, as JSON has it."""
+    _, _, *numpy_rest = np.random.get_state(legacy=True)  # noqa: NPY002
+    return {
+        "format": FORMAT,
+        "settings": asdict(_hyperparameters(model)),
+        "seed": model.seed,
+        "strokes": model.num_timesteps,
+        "updates": model._n_updates,
+        "episodes": list(model.ep_info_buffer or ()),
+        "successes": list(model.ep_success_buffer or ()),
+        "numpy": numpy_rest,
+        "python": random.getstate()[2],
+    }
+
+
+def _hyperparameters(model: PPO) -> Hyperparameters:
+    """Those that a learner learns with; what its environment is made with keeps its defaults."""
+    assert callable(model.clip_range)
+    return Hyperparameters(
+        num_envs=model.n_envs,
+        rollout=model.n_steps,
+        batch_size=model.batch_size,
+        epochs=model.n_epochs,
+        learning_rate=model.lr_schedule(1.0),
+        discount=model.gamma,
+        gae_lambda=model.gae_lambda,
+        clip_range=model.clip_range(1.0),
+        entropy=model.ent_coef,
+        hidden=tuple(model.policy_kwargs["net_arch"]),
     )
-    return buffer.getvalue()
-
-
-def _restore_random_states(data: bytes) -> None:
-    with np.load(io.BytesIO(data), allow_pickle=False) as states:
-        torch.set_rng_state(torch.from_numpy(states["torch"]))
-        position, has_gauss, cached_gaussian = states["numpy_rest"].tolist()
-        numpy_state = ("MT19937", states["numpy_keys"], int(position), int(has_gauss), cached_gaussian)
-        np.random.set_state(numpy_state)  # noqa: NPY002
-        version, gauss_next = states["python_rest"].tolist()
-        random.setstate((int(version), tuple(states["python"].tolist()), None if np.isnan(gauss_next) else gauss_next))
 
 
 # --- loading ---------------------------------------------------------------------------------------------------------
@@ -227,45 +276,94 @@ def _restore_random_states(data: bytes) -> None:
 
 def load(path: str | os.PathLike[str]) -> LearnedPolicy:
     """The policy in a file that `save` wrote. FileNotFoundError or ValueError, with one sentence, if there is none."""
-
-    def read(archive: zipfile.ZipFile) -> LearnedPolicy:
+    with _opened(path) as archive:
         description = Description.from_json(archive.read(DESCRIPTION).decode())
-        weights = torch.load(io.BytesIO(archive.read(WEIGHTS)), map_location="cpu", weights_only=True)
-        return LearnedPolicy(description, _actor(weights))
-
-    return _read(path, read)
+        network = _part(safetensors.torch.load(archive.read(LEARNER)), "network")
+        return LearnedPolicy(description, _actor(network))
 
 
 def resume(path: str | os.PathLike[str], env: BatchVecEnv, device: str = "cpu") -> PPO:
     """The learner in a file that `save` wrote, as it was: weights, optimiser, stroke count and random states.
 
-    The environment's episodes begin anew, with seeds that were not used before. Unpickles Stable-Baselines3's own
-    data: resume only from files you trust.
+    The environment's episodes begin anew, with seeds that were not used before. Nothing is unpickled.
     """
-
-    def read(archive: zipfile.ZipFile) -> tuple[Description, bytes]:
-        return Description.from_json(archive.read(DESCRIPTION).decode()), archive.read(RANDOM_STATES)
-
-    description, random_states = _read(path, read)
+    with _opened(path) as archive:
+        description = Description.from_json(archive.read(DESCRIPTION).decode())
+        tensors = safetensors.torch.load(archive.read(LEARNER))
+        facts = json.loads(archive.read(FACTS))
+        network = _part(tensors, "network")
+        LearnedPolicy(description, _actor(network))  # its widths are those of tensors that are there
     ours = describe(env, description.hidden)
     if description != ours:
         raise ValueError(f"{os.fspath(path)} was trained for {description}, not for {ours}.")
-    model = PPO.load(Path(path), env=env, device=device)
-    assert model.seed is not None
-    env.seed(model.seed + model.num_timesteps)
-    _restore_random_states(random_states)
+    require_device(device)
+    with _one_sentence(path):
+        require_count("seed", facts["seed"], 0, 2**32 - 1)
+        settings = facts["settings"] | {"hidden": description.hidden, "reward": RewardWeights()}
+        model = make_model(env, Hyperparameters(**settings), facts["seed"], device)
+        model.policy.load_state_dict(network)
+        _restore_optimiser(model, _part(tensors, "optimiser"))
+        _restore_counters(model, facts)
+        env.seed(facts["seed"] + model.num_timesteps)
+        _restore_generators(model, _part(tensors, "generator"), facts)
     return model
 
 
-def _read(path: str | os.PathLike[str], read: Callable[[zipfile.ZipFile], Loaded]) -> Loaded:
+def _part(tensors: Mapping[str, torch.Tensor], kind: str) -> dict[str, torch.Tensor]:
+    """The tensors of one kind, without it in their names."""
+    return {name.removeprefix(f"{kind}."): one for name, one in tensors.items() if name.startswith(f"{kind}.")}
+
+
+def _restore_optimiser(model: PPO, moments: Mapping[str, torch.Tensor]) -> None:
+    parameters = list(model.policy.parameters())
+    state: dict[int, dict[str, torch.Tensor]] = {}
+    for name, tensor in moments.items():
+        index, _, moment = name.partition(".")
+        if tensor.shape not in ((), parameters[int(index)].shape):
+            raise ValueError(f"its optimiser has {name} of shape {tuple(tensor.shape)}")
+        state.setdefault(int(index), {})[moment] = tensor
+    groups = model.policy.optimizer.state_dict()["param_groups"]
+    model.policy.optimizer.load_state_dict({"state": state, "param_groups": groups})
+
+
+def _restore_counters(model: PPO, facts: Mapping[str, Any]) -> None:
+    if facts["format"] != FORMAT:
+        raise ValueError(f"the learner's format is {facts['format']}, this version knows {FORMAT}")
+    for name in ("strokes", "updates"):
+        require_count(name, facts[name], 0, 2**53)
+    model.num_timesteps, model._n_updates = facts["strokes"], facts["updates"]
+    size = model._stats_window_size
+    model.ep_info_buffer = deque(({name: float(one[name]) for name in "rlt"} for one in facts["episodes"]), size)
+    model.ep_success_buffer = deque(map(float, facts["successes"]), size)
+
+
+def _restore_generators(model: PPO, words: Mapping[str, torch.Tensor], facts: Mapping[str, Any]) -> None:
+    """Set the global generators; a place beyond numpy's words would be read from foreign memory, unchecked."""
+    position, has_gauss, cached_gaussian = facts["numpy"]
+    require_count("the position in numpy's generator", position, 0, 624)
+    numpy_words = words["numpy"].numpy().astype(np.uint32)
+    np.random.set_state(("MT19937", numpy_words, position, has_gauss, cached_gaussian))  # noqa: NPY002
+    random.setstate((3, tuple(words["python"].tolist()), facts["python"]))
+    torch.set_rng_state(words["torch"])
+    if model.device.type == "cuda" and "cuda" in words:
+        torch.cuda.set_rng_state(words["cuda"], model.device)
+
+
+@contextmanager
+def _opened(path: str | os.PathLike[str]) -> Iterator[zipfile.ZipFile]:
     if not os.path.isfile(path):
         raise FileNotFoundError(f"There is no trained policy at {os.fspath(path)}.")
+    with _one_sentence(path), zipfile.ZipFile(path) as archive:
+        yield archive
+
+
+@contextmanager
+def _one_sentence(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Within it, whatever is wrong with the file's contents becomes a ValueError with one sentence."""
     try:
-        with zipfile.ZipFile(path) as archive:
-            return read(archive)
-    except (zipfile.BadZipFile, EOFError, zlib.error, KeyError) as damaged:
+        yield
+    except (zipfile.BadZipFile, EOFError, zlib.error, KeyError, safetensors.SafetensorError) as damaged:
         reason = str(damaged.args[0]).rstrip(".")
         raise ValueError(f"{os.fspath(path)} is damaged, or no policy saved by this project: {reason}.") from damaged
-    except (ValueError, TypeError, RuntimeError) as mismatch:
-        reason = " ".join(str(mismatch).split()).rstrip(".")
-        raise ValueError(f"{os.fspath(path)} does not fit: {reason}.") from mismatch
+    except (AttributeError, IndexError, OverflowError, RuntimeError, TypeError, ValueError) as mismatch:
+        raise ValueError(f"{os.fspath(path)} does not fit: {reason_of(mismatch)}.") from mismatch

@@ -5,11 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
+from agents import foreign
 from agents import policy as learned
 from agents.greedy import GreedyPolicy
 from agents.planner import Planner
 from agents.scripted import scripted
 from agents.swim import Policy
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
 from seastar_gym.scene.numerics import Fidelity
 
@@ -19,7 +21,8 @@ OTHERS = ("learned", "greedy", "planner")
 
 def load_agents(names: Sequence[str], seed: int = 0, fidelity: Fidelity = "balanced") -> dict[str, Policy]:
     """Policies by name: the one in the box, scripted ones, the greedy one by a map of a fidelity's physics, the
-    planner, which always plans with the fast ones, and files under their names without the ending."""
+    planner, which always plans with the fast ones, files under their names without the ending, and "module:function"
+    for what a function returns that gets an environment; see foreign.py for what the last two may execute."""
     agents: dict[str, Policy] = {}
     for name in names:
         label = Path(name).stem if _is_file(name) else name
@@ -31,7 +34,7 @@ def load_agents(names: Sequence[str], seed: int = 0, fidelity: Fidelity = "balan
 
 
 def _is_file(name: str) -> bool:
-    return name.endswith((".zip", ".safetensors")) or len(Path(name).parts) > 1
+    return name.endswith((".zip", ".safetensors", ".pth", ".pt", ".pkl")) or len(Path(name).parts) > 1
 
 
 def _load_agent(name: str, seed: int, fidelity: Fidelity) -> Policy:
@@ -41,14 +44,19 @@ def _load_agent(name: str, seed: int, fidelity: Fidelity) -> Policy:
         return GreedyPolicy(make_scene(None, fidelity))
     if name == "planner":
         return Planner()
+    if foreign.is_function(name):
+        return foreign.call_function(name, SeastarSwimEnv(fidelity=fidelity))
     if not _is_file(name):
         try:
             return scripted(name, rng=np.random.default_rng(seed))
         except ValueError as unknown:
-            raise ValueError(f"{unknown} Others are {', '.join(OTHERS)}, and files of policies.") from unknown
+            others = ", ".join(OTHERS)
+            raise ValueError(f"{unknown} Others are {others}, files of policies, and module:function.") from unknown
     if not name.endswith(".zip"):
         return learned.load(name)
     try:
+        if foreign.is_model(name):
+            return foreign.load_model(name)
         from agents import ppo
     except ModuleNotFoundError as missing:
         raise ValueError(f'A model.zip needs {missing.name}: pip install "seastar-gym[train]".') from missing

@@ -3,26 +3,53 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from agents.policy import LearnedPolicy
+from seastar_gym.envs.commands import MOST_LIMBS, Actions, action_space
 from seastar_gym.envs.paths import cross_track_error, path_length
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.task import scene_observation_size
+from seastar_gym.scene import Scene
 
 Floats = NDArray[np.float64]
 
 
 class Policy(Protocol):
-    """Anything with Stable-Baselines3's `predict`. An attribute `actions` names the environment's action mode that it
-    is made for; without one it is "limbs"."""
+    """Anything with Stable-Baselines3's `predict`; see `actions_of` for the action mode that it is made for."""
 
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
     ) -> tuple[Any, Any]:
         """Action for an observation, and the recurrent state for the next call."""
+
+
+def actions_of(policy: Policy, n_limbs: int) -> Actions:
+    """The action mode that a policy is for: its attribute `actions`, or the mode that has its `action_space`, as models
+    of Stable-Baselines3 say it; "limbs" if it says neither."""
+    space: Any = getattr(policy, "action_space", None)
+    if space is None or hasattr(policy, "actions"):
+        return getattr(policy, "actions", "limbs")
+    for mode in get_args(Actions):
+        if (mode != "joint" or n_limbs <= MOST_LIMBS) and action_space(mode, n_limbs) == space:
+            return mode
+    raise ValueError(f"The policy acts in {space}, which is no action mode of a robot of {n_limbs} limbs.")
+
+
+def require_fit(policy: Policy, scene: Scene, actions: Actions) -> None:
+    """ValueError, with one sentence, where a policy cannot drive the robot of an environment, as far as it tells."""
+    if isinstance(policy, LearnedPolicy):
+        policy.require_fit(scene, actions)
+    sees: Any = getattr(policy, "observation_space", None)
+    seen = (scene_observation_size(scene),)
+    if sees is not None and sees.shape != seen:
+        raise ValueError(f"The policy sees observations of shape {sees.shape}, the environment's have {seen}.")
+    acts = getattr(policy, "action_space", None)
+    if acts is not None and acts != action_space(actions, scene.robot.n_limbs):
+        raise ValueError(f'The policy acts in {acts}, which is not that of an environment with actions="{actions}".')
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,11 +125,10 @@ def swim(
 ) -> Swim:
     """One episode, with deterministic actions, to the last waypoint or for `max_strokes` strokes.
 
-    ValueError, before it begins, where a learned policy was made for another robot.
+    ValueError, before it begins, where the policy was made for another robot.
     watch: Called with `env` after its reset and after every stroke, to film it for instance.
     """
-    if isinstance(policy, LearnedPolicy):
-        policy.require_fit(env.scene, env.actions)
+    require_fit(policy, env.scene, env.actions)
     observation, info = env.reset(seed=seed, options=reset_options)
     infos = [info]
     state, over = None, False
@@ -122,5 +148,5 @@ def swim(
         waypoint_index=np.array([info["waypoint_index"] for info in infos]),
         time=np.array([info["time"] for info in infos]),
         limbs_heated=np.array([info["limbs_heated"] for info in infos[1:]], dtype=np.int64),
-        solver_message=infos[-1].get("solver_message"),
+        solver_message=infos[-1]["solver_message"] or None,
     )

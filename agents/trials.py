@@ -23,8 +23,8 @@ from scipy.stats import bootstrap
 
 from agents.disturbances import CURRENT_DIRECTIONS, DISTURBANCES, Disturbance, DisturbedTask
 from agents.roster import load_agents
-from agents.swim import Policy, Swim
-from seastar_gym.envs.commands import Actions, to_commands
+from agents.swim import Policy, Swim, actions_of, require_fit
+from seastar_gym.envs.commands import to_commands
 from seastar_gym.envs.paths import PathName
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.task import Path as SwimPath
@@ -33,6 +33,8 @@ from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
 
+HELD_OUT_SEED = 1_000
+"""Seed of the paths that policies are measured on; trainings draw theirs from small seeds."""
 MM = 1000.0
 RESAMPLES, CONFIDENCE = 2000, 0.95
 NOMINAL: tuple[PathName, ...] = ("pentagon", "square", "triangle", "figure-eight")
@@ -55,6 +57,8 @@ def swim_many(
     threads: int | None = None,
 ) -> list[Swim]:
     """Swims side by side, each to its last waypoint or for `max_strokes` strokes; random paths with random headings."""
+    actions = actions_of(policy, scene.robot.n_limbs)
+    require_fit(policy, scene, actions)
     with_heading = isinstance(path, str) and path == "random"
     inner = SwimTask(scene, n_swims, path, RewardWeights(), waypoint_radius, with_heading, threads)
     task = DisturbedTask(inner, disturbance, np.random.default_rng([seed, n_swims]))
@@ -63,7 +67,6 @@ def swim_many(
     hubs, reached = [task.hub_position()], [inner.waypoint_index.copy()]
     heated: list[NDArray[np.int64]] = []
     state, begins, n_limbs = None, np.ones(n_swims, bool), scene.robot.n_limbs
-    actions: Actions = getattr(policy, "actions", "limbs")
     while len(heated) < max_strokes and (inner.waypoint_index < counts).any():
         chosen, state = policy.predict(task.observe(), state=state, episode_start=begins, deterministic=True)
         commands = to_commands(actions, n_limbs, chosen, n_swims)
@@ -159,7 +162,8 @@ class Options:
     """Many swims of every agent, nominal and disturbed: a table, the same as CSV."""
 
     agents: tuple[str, ...] = ("learned", "greedy", "pentagon")
-    """As for agents.evaluate."""
+    """As for agents.evaluate. A model.zip of plain Stable-Baselines3 and module:function execute the code of whoever
+    made them: load only files that you trust."""
     sets: tuple[Literal["nominal", "random", "pentagon"], ...] = ("nominal", "random", "pentagon")
     """The named paths, random paths under every disturbance, the disturbed pentagon."""
     swims: int = 1000

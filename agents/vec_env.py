@@ -11,7 +11,12 @@ from numpy.typing import NDArray
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv, VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
+
 Info = dict[str, Any]
+
+DRAWN = 16
+"""Robots in a picture of the batch: of more, none could be recognised."""
 
 
 class BatchVecEnv(VecEnv):
@@ -19,8 +24,8 @@ class BatchVecEnv(VecEnv):
 
     Gives what its `DummyVecEnv` of single environments behind a `Monitor` gives: fresh arrays every step, and at the
     end of an episode `terminal_observation`, `TimeLimit.truncated` and `episode` (return `r`, length `l`, seconds `t`)
-    in that robot's info. The robots share one environment, so attributes and methods are the batch's own: the same
-    for every robot, and settable for all of them only.
+    in that robot's info. The robots share one environment, so methods are the batch's own, and attributes can be set
+    for all of them only. With render_mode "rgb_array" the first DRAWN robots are drawn, side by side.
 
     seconds_in_steps: Time spent in the steps so far [s], the simulator's share of a training.
     """
@@ -33,11 +38,11 @@ class BatchVecEnv(VecEnv):
             raise ValueError(f"Stable-Baselines3 needs autoreset_mode=AutoresetMode.SAME_STEP, not {mode}.")
         self.env = env
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
+        self.metadata = {**env.metadata, **self.metadata}
         self.seconds_in_steps = 0.0
         self._started = time.time()
         self._returns = np.zeros(self.num_envs)
         self._lengths = np.zeros(self.num_envs, np.int64)
-        self._first_info_names: list[str] = []
 
     def reset(self) -> VecEnvObs:
         """Begin episodes of all robots, with the seeds and options set for this reset."""
@@ -50,7 +55,6 @@ class BatchVecEnv(VecEnv):
         self._reset_options()
         self._returns[:] = 0.0
         self._lengths[:] = 0
-        self._first_info_names = _names(info)
         self.reset_infos = _one_per_robot(info, self.num_envs)
         return observations
 
@@ -70,7 +74,7 @@ class BatchVecEnv(VecEnv):
         if dones.any():
             final_infos = _one_per_robot(info["final_info"], self.num_envs)
             for robot in np.flatnonzero(dones).tolist():
-                self.reset_infos[robot] = {name: infos[robot][name] for name in self._first_info_names}
+                self.reset_infos[robot] = infos[robot]
                 infos[robot] = {
                     **final_infos[robot],
                     "terminal_observation": info["final_obs"][robot],
@@ -109,8 +113,13 @@ class BatchVecEnv(VecEnv):
         raise AttributeError(f"{self.env} has no attribute {name!r}.")
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """The batch's attribute, once for every robot asked for."""
-        return [getattr(self._owner(attr_name), attr_name)] * len(list(self._get_indices(indices)))
+        """The attribute of every robot asked for."""
+        owner = self._owner(attr_name)
+        value = getattr(owner, attr_name)
+        values: Sequence[Any] = [value] * self.num_envs
+        if isinstance(owner, SeastarSwimVectorEnv) and not callable(value):
+            values = owner.get_attr(attr_name)
+        return [values[robot] for robot in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
         """Set an attribute of the batch, on the layer that has it."""
@@ -132,8 +141,11 @@ class BatchVecEnv(VecEnv):
         return [wrapped] * len(list(self._get_indices(indices)))
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
-        """The batch draws nothing."""
-        return [None] * self.num_envs
+        """Pictures of the first DRAWN robots."""
+        batch = self.env.unwrapped
+        if self.render_mode is None or not isinstance(batch, SeastarSwimVectorEnv):
+            return [None] * self.num_envs
+        return batch.render_robots(range(min(DRAWN, self.num_envs))) or ()
 
 
 def _names(info: Info) -> list[str]:

@@ -15,6 +15,7 @@ from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
 from seastar_gym.scene.limb import Limb
+from seastar_gym.scene.serial import register_part
 from seastar_gym.simulator import Simulator, SolverStatus, State, StrokeReport
 
 __version__ = "0.1.0"
@@ -46,6 +47,7 @@ __all__ = [
     "Vortex",
     "Water",
     "__version__",
+    "register_part",
     "relaxation_time",
 ]
 

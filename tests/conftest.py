@@ -15,6 +15,9 @@ settings.load_profile("seastar")
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="also run the tests marked slow")
+    parser.addoption("--fuzz-minutes", type=float, default=0.0, help="how long tests/fuzz tries what it draws")
+    parser.addoption("--fuzz-seed", type=int, default=0, help="what that long run draws")
+    parser.addoption("--fuzz-case", help="one trial of that long run, as it prints it")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

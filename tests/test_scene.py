@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from oracle import Star
 from refusals import assert_refused
-from seastar_gym import GridCurrent, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
+from seastar_gym import GridCurrent, Numerics, Scene, Seastar, Simulator, SmaPulse, UniformCurrent, Water
 from seastar_gym.model.rods import make_rods
 
 SAMPLED = GridCurrent((0.0, 0.0), 0.1, np.zeros((3, 2, 2)))
@@ -29,6 +29,27 @@ def test_defaults_are_the_chapters_values():
     assert dataclasses.astuple(actuator) == (math.pi / 5, 0.1, 0.9)
     assert Numerics().scheme == "implicit-euler"
     assert Scene() == Scene(robot, water, actuator, Numerics())
+
+
+@pytest.mark.parametrize("vector", [(0.001, 0.0), [0.001, 0.0]])
+def test_a_uniform_current_given_as_a_vector_is_told_how_to_be_given(vector):
+    with assert_refused("UniformCurrent takes u_x and u_y", "vector"):
+        UniformCurrent(vector)
+    each = UniformCurrent(np.array([0.001, 0.002]))
+    assert dataclasses.replace(each, u_y=0.1).u_x == each.u_x == (0.001, 0.002)
+
+
+def test_a_scene_knows_whether_its_numerics_were_named_and_is_otherwise_the_same():
+    plain, named = Scene(), Scene(numerics=Numerics())
+    assert not plain.numerics.named and named.numerics.named
+    assert plain == named and hash(plain) == hash(named) and repr(plain) == repr(named)
+    for same in (dataclasses.replace(plain, robot=Seastar()), copy.deepcopy(plain), plain.of_robot(0)):
+        assert not same.numerics.named
+    assert dataclasses.replace(plain.numerics, step=1e-3).named
+    assert Numerics(**dataclasses.asdict(plain.numerics)).named is False
+    Simulator(plain).set_scene(named)  # one frame
+    with assert_refused("named", "True or False"):
+        Numerics(named="no")
 
 
 def test_chapter_robot_has_46_nodes_in_the_documented_order():

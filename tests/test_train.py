@@ -1,9 +1,12 @@
 """train.py goes all the way, stops in good order, and continues where it stopped."""
 
 import csv
+import errno
 import html
+import itertools
 import json
 import os
+import re
 import shlex
 import shutil
 import signal
@@ -181,9 +184,138 @@ def test_a_folder_without_a_run_cannot_be_resumed(tmp_path, capsys, make, senten
 
 
 def test_a_run_without_its_model_cannot_be_resumed(finished, tmp_path, capsys):
-    (tmp_path / "config.json").write_bytes((finished / "config.json").read_bytes())
+    for name in ("config.json", "progress.csv"):
+        (tmp_path / name).write_bytes((finished / name).read_bytes())
     assert train.main(["--resume", str(tmp_path), "--strokes", "1024"]) == 2
     assert "There is no trained policy at" in capsys.readouterr().err
+
+
+def test_a_run_killed_before_its_first_checkpoint_is_continued_from_its_beginning(finished, tmp_path):
+    (tmp_path / "config.json").write_bytes((finished / "config.json").read_bytes())
+    assert train.main(["--resume", str(tmp_path)]) == 0
+    first, again = (policies.load(folder / "policy.safetensors") for folder in (finished, tmp_path))
+    for name, array in first.weights.items():
+        np.testing.assert_array_equal(again.weights[name], array)
+    assert len(again.training["commands"]) == 2
+
+
+def test_an_empty_folder_is_taken(tmp_path):
+    (tmp_path / "config.json.part").write_text("{")
+    train.claim(tmp_path)
+    (tmp_path / "somebody's").write_text("work")
+    with pytest.raises(ValueError, match="exists already"):
+        train.claim(tmp_path)
+
+
+def test_a_checkpoint_that_a_kill_cut_short_is_completed(finished, tmp_path):
+    folder = tmp_path / "tiny"
+    shutil.copytree(finished, folder)
+    (folder / "progress.csv").write_text((finished / "progress.csv").read_text().splitlines()[0] + "\n")
+    (folder / "checkpoints" / "model_000000512.zip").unlink()
+    assert train.main(["--resume", str(folder)]) == 0
+    assert (folder / "progress.csv").read_text() == (finished / "progress.csv").read_text()
+    assert (folder / "checkpoints" / "model_000000512.zip").is_file()
+
+
+# --- what cannot be --------------------------------------------------------------------------------------------------
+
+
+def assert_one_sentence(capsys, *words):
+    printed = capsys.readouterr().err
+    assert printed.count("\n") == 1 and printed.endswith(".\n"), printed
+    for word in words:
+        assert word in printed, printed
+
+
+@pytest.mark.parametrize("out", ["taken/run", "taken", "\0", "x" * 300, "/proc/none/run", "/dev/full/run", ""])
+def test_a_folder_that_cannot_be_is_refused_in_a_sentence(out, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "taken").write_text("a file")
+    assert train.main([*TINY, "--strokes", "128", "--out", out]) in (1, 2)
+    assert_one_sentence(capsys)
+
+
+@pytest.mark.parametrize(
+    "call, at, code",
+    [
+        *(("mkdir", 1, code) for code in (errno.ENOSPC, errno.EROFS, errno.EACCES, errno.EIO, errno.EDQUOT)),
+        *(("fsync", at, errno.ENOSPC) for at in (1, 2, 6)),
+        ("replace", 3, errno.ENOSPC),
+    ],
+)
+def test_a_disk_that_refuses_is_said_in_a_sentence(call, at, code, tmp_path, capsys, monkeypatch):
+    calls, done = itertools.count(1), getattr(os, call)
+
+    def refuse(*arguments, **options):
+        if ("run" in str(arguments[0]) or call == "fsync") and next(calls) >= at:
+            raise OSError(code, os.strerror(code), str(arguments[0]))
+        return done(*arguments, **options)
+
+    with monkeypatch.context() as broken:
+        broken.setattr(os, call, refuse)
+        assert train.main([*TINY, "--strokes", "256", "--out", str(tmp_path / "run")]) == 1
+    assert_one_sentence(capsys, "Cannot write", os.strerror(code).lower())
+    assert not list(tmp_path.rglob("*.part"))
+    again = ["--resume", str(tmp_path / "run")]
+    if not (tmp_path / "run" / "config.json").exists():
+        again = [*TINY, "--strokes", "256", "--out", str(tmp_path / "run")]
+    if code == errno.ENOSPC:
+        assert train.main(again) == 0
+
+
+def test_a_device_that_is_not_there_is_refused_before_anything_is_written(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(train.torch.cuda, "is_available", lambda: False)
+    assert train.main([*TINY, "--device", "cuda", "--out", str(tmp_path / "run")]) == 2
+    assert_one_sentence(capsys, "There is no CUDA device")
+    assert not (tmp_path / "run").exists()
+    with pytest.raises(SystemExit) as refused:
+        train.main([*TINY, "--device", "toaster", "--out", str(tmp_path / "run")])
+    assert refused.value.code == 2
+
+
+# --- the policy in the box -------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def box(tmp_path, monkeypatch):
+    """The box with the policy that swims best, to be overwritten without regret."""
+    file = tmp_path / "box" / "seastar.safetensors"
+    shutil.copytree(policies.SHIPPED.parent, file.parent)
+    monkeypatch.setattr(train, "SHIPPED", file)
+    return file
+
+
+def test_a_worse_policy_goes_into_the_box_only_when_asked_twice(finished, tmp_path, box, capsys):
+    folder = tmp_path / "tiny"
+    shutil.copytree(finished, folder)
+    before = box.read_bytes()
+    assert train.main(["--resume", str(folder), "--ship"]) == 1
+    printed = capsys.readouterr().err
+    assert re.search(r"stays: it takes 1[0-9.]+ strokes on 64 held-out random paths, the new one [0-9.]+", printed)
+    assert f"--resume {folder} --ship --ship-anyway" in printed
+    assert box.read_bytes() == before
+    assert train.main(["--resume", str(folder)]) == 0 and box.read_bytes() == before
+    assert train.main(["--resume", str(folder), "--ship", "--ship-anyway"]) == 0
+    assert policies.load(box).training["seed"] == 4
+
+
+def test_a_policy_no_worse_than_that_in_the_box_needs_no_second_word(finished, box):
+    policies.save(policies.load(finished / "policy.safetensors"), box)
+    assert train.why_not(policies.load(finished / "policy.safetensors"), train.saved_options(finished)) is None
+
+
+def test_a_box_that_cannot_be_read_is_not_overwritten_at_once(finished, box):
+    box.write_bytes(b"")
+    policy, options = policies.load(finished / "policy.safetensors"), train.saved_options(finished)
+    assert "nothing to compare with" in train.why_not(policy, options)
+
+
+def test_a_quick_run_is_asked_twice_before_it_begins(tmp_path, capsys):
+    assert train.main(["--quick", "--ship", "--out", str(tmp_path / "run")]) == 2
+    assert_one_sentence(capsys, "only with --ship-anyway")
+    assert train.main(["--ship-anyway", "--out", str(tmp_path / "run")]) == 2
+    assert_one_sentence(capsys, "give both")
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_folder_in_use_is_not_written_over(finished, capsys):

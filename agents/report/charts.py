@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from agents.report.pictures import COLOURS, FAINT_INK, INK, MM, PLANNED, STROKES_PER_DOT, view
 from agents.swim import Swim
+from seastar_gym.scene.csv_rows import read_rows
 
 Floats = NDArray[np.float64]
 DASHES = ("solid", "dash", "dot")
@@ -105,8 +106,11 @@ class Curve:
 
 def read_progress(folder: Path) -> list[list[int]]:
     """The rows of a training's progress.csv: strokes trained, strokes round the pentagon, waypoints reached."""
-    rows: list[list[int]] = np.loadtxt(folder / "progress.csv", dtype=int, delimiter=",", ndmin=2).tolist()
-    return rows
+    rows = read_rows(folder / "progress.csv")
+    for row in rows:
+        if len(row.fields) != 3:
+            raise row.refused("every line must have strokes trained, strokes round the pentagon, waypoints reached")
+    return [row.integers() for row in rows]
 
 
 def curves_figure(curves: Sequence[Curve], baselines: Mapping[str, int]) -> go.Figure:

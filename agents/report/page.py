@@ -3,7 +3,6 @@
 It is `page.html` with plotly.js, the tables, the pictures of charts.py and the recorded swims written into it.
 """
 
-import csv
 import html
 import json
 import re
@@ -18,6 +17,8 @@ import plotly.offline
 from agents.report.charts import Curve, curves_figure, paths_figure, speeds_figure, to_html
 from agents.report.playback import UNIT, Playback
 from agents.swim import Swim
+from seastar_gym.scene.csv_rows import Row as CsvRow
+from seastar_gym.scene.csv_rows import read_rows
 
 PAGE = Path(__file__).parent / "page.html"
 Row = Mapping[str, str | int | float | None]
@@ -127,21 +128,28 @@ MEASURED = ("success_rate", "strokes_to_finish", "mean_cross_track_error_mm", "l
 
 def read_trials(file: Path) -> ResultsTable:
     """The CSV that agents.trials wrote. ValueError: it is none."""
-    with file.open(newline="", encoding="utf-8") as stream:
-        rows = [_trial(row) for row in csv.DictReader(stream)]
-    if not rows or not set(TRIALS) <= set(rows[0]):
+    names, *lines = read_rows(file) or [CsvRow(str(file), ())]
+    if not lines or not set(TRIALS) <= set(names.fields):
         raise ValueError(f"{file} is not what agents.trials writes.")
+    rows = [_trial(names, line) for line in lines]
     return ResultsTable("Trials, with 95 % confidence intervals", TRIALS, rows)
 
 
-def _trial(row: dict[str, str]) -> Row:
-    numbers = {name: _float_or_none(text) for name, text in row.items() if name.startswith(MEASURED)}
+def _trial(names: CsvRow, line: CsvRow) -> Row:
+    if len(line.fields) != len(names.fields):
+        raise line.refused(f"the line must have {len(names.fields)} fields, as the first one, not {len(line.fields)}")
+    row = dict(zip(names.fields, line.fields, strict=True))
+    numbers = {name: _float_or_none(text, line) for name, text in row.items() if name.startswith(MEASURED)}
     rates = {name: 100.0 * value for name, value in numbers.items() if "rate" in name and value is not None}
     return {**row, **numbers, **rates}
 
 
-def _float_or_none(text: str) -> float | None:
-    value = float(text)
+def _float_or_none(text: str, line: CsvRow) -> float | None:
+    """A measured number, None for "nan": no swim arrived."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise line.refused(f"{text!r} is no number") from None
     return None if np.isnan(value) else value
 
 

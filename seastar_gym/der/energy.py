@@ -6,7 +6,7 @@ from seastar_gym.der.terms.actuation import set_natural_hub_angles
 from seastar_gym.der.terms.bending import bending_energy, moment
 from seastar_gym.der.terms.stretching import stretching_energy, tension
 from seastar_gym.simd.compilation import entry_point, kernel
-from seastar_gym.simd.lanes import add_product, borrow, load, splat, store, subtract_product
+from seastar_gym.simd.lanes import add_product, borrow, load, splat, store
 
 
 @kernel
@@ -50,24 +50,13 @@ def elastic_energy(rods, work, q):
 
 
 @kernel
-def kinetic_energy(rods, v):
-    """[J]."""
+def kinetic_energy(rods, v, frame):
+    """Kinetic energy [J] as seen from a frame that moves with the velocity `frame` [m/s]."""
     total = splat(0.0)
     for node in range(n_nodes(rods)):
-        vx, vy = load(v, 2 * node), load(v, 2 * node + 1)
+        vx, vy = load(v, 2 * node) - frame[0], load(v, 2 * node + 1) - frame[1]
         total = add_product(total, 0.5 * load(rods.mass, node), vx * vx + vy * vy)
     return total
-
-
-@kernel
-def add_load_energy(loads, q, nodes, energy):
-    """Add the potential of the dead loads on nodes [J]; gone when compiled in scenes without loads (None)."""
-    if loads is None:
-        return energy
-    total = splat(0.0)
-    for row in range(2 * nodes):
-        total = subtract_product(total, load(loads, row), load(q, row))
-    return energy + total
 
 
 @entry_point
@@ -76,4 +65,4 @@ def energies(rods, work, actuation, q, v, elastic, kinetic):
     rods, work, actuation = borrow(rods), borrow(work), borrow(actuation)
     set_natural_hub_angles(rods, work, actuation, splat(1.0))
     store(borrow(elastic), 0, elastic_energy(rods, work, borrow(q)))
-    store(borrow(kinetic), 0, kinetic_energy(rods, borrow(v)))
+    store(borrow(kinetic), 0, kinetic_energy(rods, borrow(v), (splat(0.0), splat(0.0))))

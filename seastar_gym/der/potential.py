@@ -3,7 +3,8 @@
     Phi(q) = |v - v_hat|^2_M / 2 + U(q) + gamma sum_i c_i |w_i|^3 / 3,    v = (q - q_hat)/gamma, w = v - u,
 
 whose stationary point satisfies (13.9) with gamma for h; scenes with more terms add theirs (damping.py, drag.py,
-added_mass.py). The Hessian is (13.12).
+added_mass.py). That of a dead load F is -gamma F (v - v_hat): what differs from -F q is constant, and like the rest of
+Phi it is the same for every observer who moves uniformly. The Hessian is (13.12).
 
 U is a sum over edges and hinges. For an edge with net moment mu (slopes of the hinges it ends, minus slopes of the
 hinges it begins), tension T, hinge stiffness sigma (sum of second slopes), u = e/|e|^2 and theta its direction:
@@ -113,7 +114,7 @@ def nodal_load(loads, node):
 
 @kernel
 def load_power(loads, node, vx, vy):
-    """Power of a node's dead load at the velocity (vx, vy) [W]."""
+    """Power of a node's dead load at a velocity (vx, vy) [W]."""
     if loads is None:
         return splat(0.0)
     return add_product(load(loads, 2 * node) * vx, load(loads, 2 * node + 1), vy)
@@ -137,7 +138,7 @@ def node_slopes(rods, work, stage, node):
     push_x, push_y = contact_force(work.contact, node)
     slopes = (
         add_product(
-            0.5 * m * add_product(dx * dx, dy, dy), stage.gamma, potential - load_power(rods.load, node, vx, vy)
+            0.5 * m * add_product(dx * dx, dy, dy), stage.gamma, potential - load_power(rods.load, node, dx, dy)
         ),
         (
             add_product(c_speed * wx, m_over_gamma, dx) - Fx - push_x,

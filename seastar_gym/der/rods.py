@@ -30,8 +30,9 @@ N_X, N_Y, SHARE, OFFSET, THICKNESS, STIFFNESS = range(SLOT_ROWS)
 """Rows of a listed pair of node and edge, see contact.py."""
 
 
-MOST_NEAR_EDGES = 3
-"""Of another limb that a node of a long chain can be near to, in the mean over the nodes."""
+MOST_NEAR_EDGES, SHORT_CHAIN = 3, 24
+"""Edges of another limb that a node can be near to, in the mean over the nodes: all, in chains of SHORT_CHAIN edges or
+fewer. In longer ones a node that is not crumpled is near to one or two."""
 
 
 class Contact(NamedTuple):
@@ -50,22 +51,23 @@ class Contact(NamedTuple):
 
 
 class ContactWork(NamedTuple):
-    """Memory of contact; rows per coordinate but for `listed`, `slots`, `missed`, `touching` and `near`.
+    """Memory of contact; rows per coordinate but for `listed`, `slots`, `own`, `missed` and `touching`.
 
-    capacity: Pairs of node and edge that can be listed. listed: How many are, then node and edge of each, shared.
-    slots: SLOT_ROWS of each. missed: 1 for robots whose neighbours did not all fit in, or whose step was not found.
-    touching: 1 for robots that touch. near: 1 for those whose limbs may touch, per pair of limbs.
+    share: Most pairs of node and edge of one robot that can be listed. own: How many are.
+    listed: How many are of all robots together, then node and edge of each, shared. slots: SLOT_ROWS of each.
+    missed: 1 for robots whose pairs did not all fit into their share, or whose step was not found.
+    touching: 1 for robots that touch.
     ends: Positions where contact is asked for [m]. seen: The same along the gap between two limbs and across it.
     force: Of contact [N].
     x, r, z, p, Hp, w: See coupled.py.
     """
 
-    capacity: int
+    share: float
     listed: np.ndarray
     slots: np.ndarray
+    own: np.ndarray
     missed: np.ndarray
     touching: np.ndarray
-    near: np.ndarray
     ends: np.ndarray
     seen: np.ndarray
     force: np.ndarray
@@ -100,7 +102,10 @@ class Rods(NamedTuple):
     shortest_edge: Smallest natural length of an edge [m].
     curvature_rate: How fast Newton's foreseeable_length shrinks with the step [1/s^2], see newton.py.
     calm: Potential [J] up to which Newton steps can be foreseen, see newton.py.
-    damped: Potential [J] up to which drag takes more energy than a step without trouble may create, see guard.py.
+    damped: Potential [J] up to which drag takes more energy than a step without trouble may create, see guard.py; zero
+        without drag.
+    unsettled_rate: How much stiffer edges are than inertia, the more the longer the step [1/s^2], see momentum.py.
+    held: Whether nodes are held, so that no frame but the laboratory's will do.
     """
 
     n_limbs: int
@@ -125,6 +130,8 @@ class Rods(NamedTuple):
     curvature_rate: np.ndarray
     calm: np.ndarray
     damped: np.ndarray
+    unsettled_rate: np.ndarray
+    held: bool
 
 
 @kernel
@@ -227,12 +234,14 @@ class Limits(NamedTuple):
 
     tolerance: Largest node move of the last Newton update [m], one row.
     max_iterations: Newton steps per stage before a time step is halved.
+    most_iterations: Newton steps per stroke before the robot has failed.
     adaptive: Whether time steps are adapted to their error.
     error_rate: Largest error per time [m/s], one row.
     """
 
     tolerance: np.ndarray
     max_iterations: int
+    most_iterations: int
     adaptive: bool
     error_rate: np.ndarray
 
@@ -305,23 +314,21 @@ def make_work(rods: Rods, n_stages: int) -> Work:
 
 
 def make_contact_work(rods: Rods, contact: Contact) -> ContactWork:
-    """Zeroed memory for the contact of one lane group.
-
-    Every node of a pair of limbs may be near every edge; in long chains few are, in any of the robots of a group.
-    """
+    """Zeroed memory for the contact of one lane group, where robots list the pairs they have in common once."""
     edges = rods.nodes_per_limb - 1
-    capacity = 2 * contact.n_pairs * edges * min(edges, MOST_NEAR_EDGES * N_LANES)
+    near_edges = edges if edges <= SHORT_CHAIN else MOST_NEAR_EDGES
+    capacity = 2 * contact.n_pairs * edges * min(edges, near_edges * N_LANES)
 
     def rows(count: int = 2 * (rods.n_limbs * edges + 1)) -> np.ndarray:
         return aligned_rows(count, N_LANES)
 
     return ContactWork(
-        capacity=capacity,
+        share=float(2 * contact.n_pairs * edges * near_edges),
         listed=aligned_rows(2 * capacity + 1),
         slots=rows(SLOT_ROWS * capacity),
+        own=rows(1),
         missed=rows(1),
         touching=rows(1),
-        near=rows(contact.n_pairs),
         ends=rows(),
         seen=rows(),
         force=rows(),

@@ -2,11 +2,13 @@
 
 import functools
 import itertools
-from typing import Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
+
+from seastar_gym.scene.checks import require_choice
 
 Actions: TypeAlias = Literal["limbs", "joint", "pairs"]
 
@@ -19,6 +21,7 @@ LIMB_COMMANDS = np.array([0.0, 1.0, -1.0])
 
 def action_space(actions: Actions, n_limbs: int) -> spaces.MultiDiscrete | spaces.Discrete:
     """The space of one robot's actions."""
+    require_choice("actions", actions, get_args(Actions))
     if actions == "limbs":
         return spaces.MultiDiscrete([3] * n_limbs)
     return spaces.Discrete(len(command_table(actions, n_limbs)))
@@ -30,8 +33,7 @@ def command_table(actions: Actions, n_limbs: int) -> NDArray[np.float64]:
     "joint": every command, limb 1 varying slowest, each limb in the order 0, +, -. "pairs": no limb, then every pair
     of one + and one - limb. "limbs" has no table: it is one action per limb.
     """
-    if actions not in get_args(Actions):
-        raise ValueError(f"actions must be one of {', '.join(map(repr, get_args(Actions)))}, not {actions!r}.")
+    require_choice("actions", actions, get_args(Actions))
     if actions == "limbs":
         raise ValueError('actions="limbs" has one action per limb, not a table of commands: use LIMB_COMMANDS.')
     if actions == "joint" and n_limbs > MOST_LIMBS:
@@ -54,9 +56,17 @@ def _command_table(actions: Actions, n_limbs: int) -> NDArray[np.float64]:
     return table
 
 
+def as_array(value: object) -> NDArray[Any]:
+    """The value as an array; rows of different lengths as one of objects, so that they can be refused in a sentence."""
+    try:
+        return np.asarray(value)
+    except ValueError:
+        return np.array(None)
+
+
 def to_commands(actions: Actions, n_limbs: int, action: object, n_robots: int) -> NDArray[np.float64]:
     """Commands of `n_robots` robots, shape (n_robots, n_limbs), or ValueError for what is not an action of theirs."""
-    array = np.asarray(action)
+    array = as_array(action)
     shape = (n_robots, n_limbs) if actions == "limbs" else (n_robots,)
     n_choices = 3 if actions == "limbs" else len(command_table(actions, n_limbs))
     if array.dtype.kind not in "iu" or array.shape != shape:

@@ -12,15 +12,20 @@ index                 what                                              unit
 4m+4, 4m+5            next waypoint relative to the hub, x and y        limb lengths
 
 Where actuators remember something (a `StatefulActuator`), what its `observe` says of limb 1, limb 2.. stands before the
-waypoints, which are the last four numbers always.
+waypoints, which are the last four numbers always. `Layout` names all these places.
 
 with m = n_nodes - 1 nodes in the order {1,1}..{1,N-1}, {2,1}.. (m = 45 for the chapter's robot: 186 numbers). On the
 last leg the next waypoint is the current one. The waypoint's distance is not clipped: its full length can be read.
 """
 
+from functools import cache
+from typing import Any, NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.scene import Scene
+from seastar_gym.scene.actuators.actuator import StatefulActuator
 from seastar_gym.simd.compilation import entry_point, kernel
 from seastar_gym.simd.lanes import add_product, borrow, load, select, splat, sqrt, store
 
@@ -30,9 +35,64 @@ VELOCITY_SCALE = 0.025
 """[m/s]: nodes and hub move at 12 to 24 mm/s root mean square after strokes of random commands."""
 
 
+class Layout(NamedTuple):
+    """Places in an observation, as slices of its last axis; the table above says what stands there."""
+
+    positions: slice
+    velocities: slice
+    hub_velocity: slice
+    actuators: slice
+    current_waypoint: slice
+    next_waypoint: slice
+
+    @property
+    def nodes_and_hub(self) -> slice:
+        """Positions, velocities and the hub's velocity: all that the rods are doing."""
+        return slice(0, self.hub_velocity.stop)
+
+    @property
+    def waypoints(self) -> slice:
+        """The current waypoint and the next."""
+        return slice(self.current_waypoint.start, self.next_waypoint.stop)
+
+    @property
+    def size(self) -> int:
+        """Length of the observation."""
+        return int(self.next_waypoint.stop)
+
+
+@cache
+def layout(n_nodes: int, n_remembered: int = 0) -> Layout:
+    """Layout for a robot of n_nodes nodes whose actuators remember n_remembered numbers in all."""
+    nodes = 2 * (n_nodes - 1)
+    ends = np.cumsum([nodes, nodes, 2, n_remembered, 2, 2]).tolist()
+    return Layout(*map(slice, [0, *ends[:-1]], ends))
+
+
+def layout_of_size(size: int) -> Layout:
+    """Layout of an observation of `size` numbers, for actuators that remember nothing."""
+    return layout((size - 6) // 4 + 1)
+
+
+def scene_layout(scene: Scene) -> Layout:
+    """Layout for the robot of a scene."""
+    actuator, robot = scene.actuator, scene.robot
+    remembered = actuator.observe(actuator.rest).shape[-1] if isinstance(actuator, StatefulActuator) else 0
+    return layout(robot.n_nodes, remembered * robot.n_limbs)
+
+
 def observation_size(n_nodes: int) -> int:
-    """Length of the observation of a robot of n_nodes nodes."""
-    return 4 * (n_nodes - 1) + 6
+    """Length of the observation of a robot of n_nodes nodes whose actuators remember nothing."""
+    return layout(n_nodes).size
+
+
+def with_memory(observations: NDArray[Any], remembered: NDArray[Any]) -> NDArray[Any]:
+    """Observations (n, size) with what actuators remember, (n, k), put in its place; the same array where k = 0."""
+    if remembered.shape[1] == 0:
+        return observations
+    bare = layout_of_size(observations.shape[1])
+    parts = observations[:, bare.nodes_and_hub], remembered.astype(observations.dtype), observations[:, bare.waypoints]
+    return np.hstack(parts)
 
 
 @kernel

@@ -22,6 +22,9 @@ LINE_LENGTH = 0.3
 FIGURE_EIGHT_WIDTH = 0.4
 FIGURE_EIGHT_WAYPOINTS = 16
 
+FARTHEST = 1e6
+"""Largest coordinate of a waypoint [m], and largest radius: beyond it a stroke's progress is lost in rounding."""
+
 AIM = 0.7
 """Share of a waypoint's radius that a way to go keeps to. A way that only touches the circle goes nowhere within it,
 and no stroke need ever end there."""
@@ -125,7 +128,14 @@ def _checked_waypoints(path: ArrayLike) -> NDArray[np.float64]:
         raise ValueError(f"A path must have shape (n, 2), x and y [m] of every waypoint, not {waypoints.shape}.")
     if not np.isfinite(waypoints).all():
         raise ValueError("Every waypoint of a path must be finite: this one has NaN or infinite coordinates.")
-    return waypoints.astype(np.float64)
+    waypoints = waypoints.astype(np.float64)
+    if np.abs(waypoints).max() > FARTHEST:
+        raise ValueError(f"Every waypoint of a path must be within {FARTHEST:g} m of the start.")
+    if not waypoints.any():
+        raise ValueError("A path must lead away from the origin, where the robot starts: this one stays there.")
+    if len(waypoints) > 1 and (waypoints == waypoints[0]).all():
+        raise ValueError(f"All {len(waypoints)} waypoints of this path are the same point: give it once, or others.")
+    return waypoints
 
 
 def _regular_polygon(n_sides: int, side: float) -> NDArray[np.float64]:

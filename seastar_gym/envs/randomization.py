@@ -12,13 +12,15 @@ from numpy.typing import NDArray
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_finite, require_number
 from seastar_gym.scene.per_robot import numbers_of, with_numbers
+from seastar_gym.scene.serial import register_part
 
-LIMB_STRENGTH = "limb_strength"
+LIMB_STRENGTHS = "limb_strengths"
 """Share of its commanded rotation that a limb makes: 0 for one that has failed; drawn for every limb."""
 WIDEST = 3.0
 """Standard deviations: draws of `Normal` farther out are made again."""
 
 
+@register_part
 @dataclass(frozen=True)
 class Uniform:
     """Between `low` and `high`."""
@@ -31,6 +33,8 @@ class Uniform:
         require_finite("high", self.high, "of its number")
         if not self.low <= self.high:
             raise ValueError(f"low must not exceed high: {self.low!r} is more than {self.high!r}.")
+        if not math.isfinite(self.high - self.low):
+            raise ValueError(f"high - low must be finite: {self.low!r} and {self.high!r} are too far apart.")
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -42,6 +46,7 @@ class Uniform:
         return float(rng.uniform(self.low, self.high))
 
 
+@register_part
 @dataclass(frozen=True)
 class LogUniform:
     """Between `low` and `high`, both above zero, with a uniform logarithm."""
@@ -64,6 +69,7 @@ class LogUniform:
         return min(max(drawn, self.low), self.high)
 
 
+@register_part
 @dataclass(frozen=True)
 class Normal:
     """Around `mean` with the standard deviation `deviation`, never farther than three of them."""
@@ -91,10 +97,11 @@ class Normal:
 Distribution = Uniform | LogUniform | Normal
 
 
+@register_part
 class DomainRandomization:
     """Distributions of a scene's numbers, drawn anew for every episode of every robot, in this order.
 
-    distributions: By name: "limb_strength", or a number that the scene has and that may differ from robot to robot, as
+    distributions: By name: "limb_strengths", or a number that the scene has and that may differ from robot to robot, as
         in "robot.youngs_modulus", "robot.limb_length", "fluid.drag_coefficient", "fluid.current.u_x",
         "actuator.peak_angle".
     """
@@ -105,9 +112,9 @@ class DomainRandomization:
         for name, distribution in distributions.items():
             if not isinstance(distribution, Distribution):
                 raise ValueError(f"{name} needs a Uniform, LogUniform or Normal, not {distribution!r}.")
-        strength = distributions.get(LIMB_STRENGTH)
+        strength = distributions.get(LIMB_STRENGTHS)
         if strength is not None and not (strength.bounds[0] >= 0.0 and strength.bounds[1] <= 1.0):
-            raise ValueError(f"limb_strength must be drawn from 0 to 1, not from {strength.bounds}.")
+            raise ValueError(f"limb_strengths must be drawn from 0 to 1, not from {strength.bounds}.")
         self.distributions = dict(distributions)
 
     def __repr__(self) -> str:
@@ -124,12 +131,12 @@ class DomainRandomization:
 
         Refuses names that the scene does not have, and bounds that it does not allow.
         """
-        numbers = [name for name in self.distributions if name != LIMB_STRENGTH]
+        numbers = [name for name in self.distributions if name != LIMB_STRENGTHS]
         known = [name for name, value in numbers_of(scene).items() if value is not None]
         for name in numbers:
             if name not in known:
                 raise ValueError(
-                    f"The scene has no number {name!r} to draw: it has {', '.join(known)}, {LIMB_STRENGTH}."
+                    f"The scene has no number {name!r} to draw: it has {', '.join(known)}, {LIMB_STRENGTHS}."
                 )
         bounds = {name: self.distributions[name].bounds for name in numbers}
         lowest = {name: low for name, (low, _) in bounds.items()}
@@ -139,8 +146,8 @@ class DomainRandomization:
             for pair in itertools.product(bounds[first], bounds[second]):
                 with_numbers(scene, {**lowest, first: pair[0], second: pair[1]})
         values = {name: np.full(n_robots, self.distributions[name].bounds[1]) for name in numbers}
-        if LIMB_STRENGTH in self.distributions:
-            values[LIMB_STRENGTH] = np.ones((n_robots, scene.robot.n_limbs))
+        if LIMB_STRENGTHS in self.distributions:
+            values[LIMB_STRENGTHS] = np.ones((n_robots, scene.robot.n_limbs))
         return values
 
     def draw(self, values: dict[str, NDArray[np.float64]], robot: int, rng: np.random.Generator) -> None:
@@ -152,4 +159,4 @@ class DomainRandomization:
 
 def drawn_scene(scene: Scene, values: dict[str, Any]) -> Scene:
     """The scene with the numbers drawn for every robot."""
-    return with_numbers(scene, {name: value for name, value in values.items() if name != LIMB_STRENGTH})
+    return with_numbers(scene, {name: value for name, value in values.items() if name != LIMB_STRENGTHS})

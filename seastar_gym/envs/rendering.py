@@ -56,6 +56,12 @@ class Frame:
     """Simulated time [s]."""
 
 
+def limb_nodes(n_limbs: int, nodes_per_limb: int) -> NDArray[np.int_]:
+    """Node numbers of every limb from the hub to the tip, shape (n_limbs, nodes_per_limb)."""
+    beyond_the_hub = 1 + np.arange(n_limbs * (nodes_per_limb - 1)).reshape(n_limbs, -1)
+    return np.hstack([np.zeros((n_limbs, 1), int), beyond_the_hub])
+
+
 class Camera:
     """Maps metres to pixels of a viewport: one scale for x and y, the box [m] that was fitted in the middle."""
 
@@ -121,8 +127,12 @@ class Renderer:
         self._clock = self._pygame.time.Clock()
         self.reset(waypoints)
 
-    def reset(self, waypoints: ArrayLike) -> None:
-        """Takes a new path [m], shape (n, 2), and fits the view to it."""
+    def reset(
+        self, waypoints: ArrayLike, limb_length: float | None = None, rod_radius: float | None = None
+    ) -> None:
+        """Takes a new path [m], shape (n, 2), and fits the view to it; and new sizes of the robot [m], where given."""
+        self._limb_length = self._limb_length if limb_length is None else limb_length
+        self._rod_radius = self._rod_radius if rod_radius is None else rod_radius
         self._waypoints = np.array(waypoints, dtype=np.float64)
         self._path = np.concatenate([np.zeros((1, 2)), self._waypoints])
         self._labels = _waypoint_labels(self._path)
@@ -410,5 +420,5 @@ def _import_pygame() -> Any:
     try:
         import pygame
     except ImportError as missing:
-        raise ImportError('Rendering needs pygame-ce: pip install "seastar-gym[render]"') from missing
+        raise ImportError('Rendering needs pygame-ce: pip install "seastar-gym[render]".') from missing
     return pygame

@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.serial import register_part
 
 
+@register_part
 @dataclass(frozen=True)
 class RewardWeights:
     """Weights of the reward's terms, none negative.

@@ -1,6 +1,7 @@
 """`SeastarSwim-v0`: one robot."""
 
-from collections.abc import Generator
+import contextlib
+from collections.abc import Generator, Iterator
 from typing import Any, Literal
 
 import gymnasium as gym
@@ -10,18 +11,20 @@ from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions, action_space, command_table, to_commands
 from seastar_gym.envs.randomization import DomainRandomization
-from seastar_gym.envs.rendering import Frame, Renderer
+from seastar_gym.envs.rendering import Frame, Renderer, limb_nodes
 from seastar_gym.envs.reward import RewardWeights
-from seastar_gym.envs.task import Outcome, Path, SwimTask, make_scene
+from seastar_gym.envs.spec import PlainSpec
+from seastar_gym.envs.task import Outcome, Path, Plain, SwimTask, make_scene
 from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import require_choice, require_count, require_seed, shown
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.simulator import Simulator, SolverStatus
+from seastar_gym.simulator import Simulator
 
 FRAMES_PER_STROKE = 10
 Observation = NDArray[np.float32]
 
 
-class SeastarSwimEnv(gym.Env[Observation, Any]):
+class SeastarSwimEnv(PlainSpec, gym.Env[Observation, Any]):
     """A five-limb soft robot, driven by shape memory alloy actuators, swims along waypoints.
 
     ## Action
@@ -58,8 +61,10 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     current waypoint, `cross_track_error` [m] from the leg it is on, `is_success`, `limbs_heated`, `newton_iterations`,
     `solver_status` (0: converged), `smallest_opening_angle` [rad] between neighbouring limbs during the stroke (below
     zero: limbs crossed, which this scene allows), and the reward's terms. `solver_message` says what to do about a
-    status other than 0. `path_error` (by what share of its length the hub's path may be off) and `real_time_factor` (in
-    batch, on one core) are what was measured of the fidelity, see `seastar_gym.scene.fidelity`; NaN in other scenes.
+    status other than 0, and is empty for 0. `path_error` (by what share of its length the hub's path may be off) and
+    `real_time_factor` (in batch, on one core) are what was measured of the fidelity, see
+    `seastar_gym.scene.fidelity`; NaN for other robots and scenes. A reset gives the same names as a step, with zeros
+    for what only a stroke can tell.
 
     ## Episode
     Starts at rest with the hub at the origin. `terminated` when the last waypoint is reached, or when the solver gave
@@ -69,8 +74,8 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     path: "pentagon", "square", "triangle", "line", "figure-eight", "random", or waypoints [m] of shape (n, 2); also
         through `reset(options={"path": ...})`, for that episode.
     actions: see above.
-    fidelity: "fast", "balanced", "accurate", "reference" or "chapter"; replaces the numerics of `scene`. By default
-        "balanced", or the numerics of `scene` where one is given.
+    fidelity: "fast", "balanced" (default), "accurate", "reference" or "chapter". Where `scene` names its numerics,
+        those hold, and another fidelity is refused.
     scene: What is modelled; the chapter's robot in water by default.
     reward: Weights of the reward's terms.
     waypoint_radius: A waypoint is reached within this distance [m].
@@ -79,6 +84,10 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
         stroke, "human" shows as many in a window.
     frames_per_stroke: See render_mode; at equal times, the last one at the end of the stroke.
     randomization: Numbers of the scene that are drawn at the start of every episode; `info` has them by name.
+
+    scene, reward and randomization may be in plain form, as `Scene.to_dict` and
+    `seastar_gym.scene.serial.to_dict` write them. `spec` has them so:
+    `gym.make(EnvSpec.from_json(env.spec.to_json()))` is the same environment.
     """
 
     metadata = {"render_modes": ["human", "rgb_array", "rgb_array_list"], "render_fps": FRAMES_PER_STROKE}
@@ -88,18 +97,17 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
         path: Path = "pentagon",
         actions: Actions = "limbs",
         fidelity: Fidelity | None = None,
-        scene: Scene | None = None,
-        reward: RewardWeights = RewardWeights(),
+        scene: Scene | Plain | None = None,
+        reward: RewardWeights | Plain = RewardWeights(),
         waypoint_radius: float = 0.01,
         random_heading: bool = False,
         render_mode: Literal["human", "rgb_array", "rgb_array_list"] | None = None,
         frames_per_stroke: int = FRAMES_PER_STROKE,
-        randomization: DomainRandomization | None = None,
+        randomization: DomainRandomization | Plain | None = None,
     ):
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(f"render_mode must be one of {self.metadata['render_modes']}, not {render_mode!r}.")
-        if isinstance(frames_per_stroke, bool) or not isinstance(frames_per_stroke, int) or frames_per_stroke < 1:
-            raise ValueError(f"frames_per_stroke must be a whole number of at least 1, not {frames_per_stroke!r}.")
+        if render_mode is not None:
+            require_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
+        require_count("frames_per_stroke", frames_per_stroke, 1, 1_000_000)
         self.render_mode = render_mode
         self.frames_per_stroke = frames_per_stroke
         self.metadata = {**self.metadata, "render_fps": frames_per_stroke}
@@ -124,6 +132,11 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
         return self._task.scene
 
     @property
+    def randomization(self) -> DomainRandomization | None:
+        """Numbers of the scene that are drawn for every episode."""
+        return self._task.randomization
+
+    @property
     def simulator(self) -> Simulator:
         """The simulator, with one robot."""
         return self._task.simulator
@@ -131,44 +144,57 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     @property
     def waypoints(self) -> NDArray[np.float64]:
         """Waypoints of the current episode [m], shape (n, 2)."""
-        return self._task.waypoints[0, : self._task.n_waypoints[0]].copy()
+        return self._task.waypoints_of(0)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin an episode. options: {"path": name or waypoints [m]} for this episode."""
-        super().reset(seed=seed)
-        self._task.reset(np.ones(1, bool), [self.np_random], checked_options(options, {"path"}).get("path"))
+        require_seed(seed)
+        super().reset(seed=None if seed is None else int(seed))
+        with self._until_whole():
+            self._task.reset(np.ones(1, bool), [self.np_random], checked_options(options, {"path"}).get("path"))
         self._running = True
         self._command = np.zeros_like(self._command)
         self._trail = self.simulator.hub_position()
         self._frames = []
         if self._renderer is not None:
-            self._renderer.reset(self.waypoints)
+            robot = self.simulator.scene.of_robot(0).robot
+            self._renderer.reset(self.waypoints, robot.limb_length, robot.rod_radius)
         self._draw_frame()
-        return self._task.observe()[0], _of_one_robot(self._task.facts())
+        return self._task.observe()[0], _of_one_robot(self._task.first_info())
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """One stroke."""
         if not self._running:
-            raise gym.error.ResetNeeded("The episode has not begun or is over: call reset() before step().")
-        command = to_commands(self.actions, self.scene.robot.n_limbs, np.asarray(action)[None], 1)
+            raise gym.error.ResetNeeded(
+                "The episode has not begun, is over or was interrupted: call reset() before step()."
+            )
+        command = to_commands(self.actions, self.scene.robot.n_limbs, [action], 1)
         self._command = command[0]
-        outcome = self._swim(command)
+        with self._until_whole():
+            outcome = self._swim(command)
         terminated = bool(outcome.terminated[0])
         self._running = not terminated
-        info = _of_one_robot(outcome.info)
-        status = SolverStatus(info["solver_status"])
-        if status is not SolverStatus.CONVERGED:
-            info["solver_message"] = status.sentence
-        return self._task.observe()[0], float(outcome.reward[0]), terminated, False, info
+        return self._task.observe()[0], float(outcome.reward[0]), terminated, False, _of_one_robot(outcome.info)
+
+    @contextlib.contextmanager
+    def _until_whole(self) -> Iterator[None]:
+        """Around a step or reset: if it is interrupted, robot and task may have come differently far."""
+        was_running, self._running = self._running, False
+        try:
+            yield
+        except ValueError:  # refused before anything changed
+            self._running = was_running
+            raise
 
     def _swim(self, command: NDArray[np.float64]) -> Outcome:
         if self.render_mode in (None, "rgb_array"):
             outcome = self._task.step(command)
             self._extend_trail()
             return outcome
-        return self._draw_while_swimming(self._task.step_in_parts(command, self.frames_per_stroke))
+        with contextlib.closing(self._task.step_in_parts(command, self.frames_per_stroke)) as parts:
+            return self._draw_while_swimming(parts)
 
     def _draw_while_swimming(self, parts: Generator[float, None, Outcome]) -> Outcome:
         while True:
@@ -203,9 +229,8 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
     def _get_renderer(self) -> Renderer:
         if self._renderer is None:
             robot = self.simulator.scene.of_robot(0).robot
-            limbs = 1 + np.arange(robot.n_nodes - 1).reshape(robot.n_limbs, -1)
             self._renderer = Renderer(
-                np.hstack([np.zeros((robot.n_limbs, 1), int), limbs]),
+                limb_nodes(robot.n_limbs, robot.nodes_per_limb),
                 self.waypoints,
                 limb_length=robot.limb_length,
                 rod_radius=robot.rod_radius,
@@ -224,7 +249,8 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
         return frames if self.render_mode == "rgb_array_list" else None
 
     def close(self) -> None:
-        """Close the window, if there is one."""
+        """Close the window, if there is one, and end the simulator's threads."""
+        self.simulator.close()
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None
@@ -235,12 +261,14 @@ class SeastarSwimEnv(gym.Env[Observation, Any]):
 
 def checked_options(options: dict[str, Any] | None, known: set[str]) -> dict[str, Any]:
     """Options of a reset; a name that means nothing is refused, not ignored."""
+    if options is not None and not isinstance(options, dict):
+        raise ValueError(f"options must be a dictionary with any of {sorted(known)}, or None, not {shown(options)}.")
     unknown = set(options or {}) - known
     if unknown:
-        raise ValueError(f"Unknown reset option(s) {sorted(unknown)}: known are {sorted(known)}.")
+        raise ValueError(f"Unknown reset option(s) {shown(sorted(unknown, key=str))}: known are {sorted(known)}.")
     return options or {}
 
 
 def _of_one_robot(info: dict[str, NDArray[Any]]) -> dict[str, Any]:
     """Info of robot 0 as plain numbers, its vectors as arrays."""
-    return {name: values[0].item() if values.ndim == 1 else values[0] for name, values in info.items()}
+    return {name: values[0] if values.ndim > 1 else values.tolist()[0] for name, values in info.items()}

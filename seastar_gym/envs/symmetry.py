@@ -13,6 +13,7 @@ equivariant: in a turned or mirrored world it swims the turned or mirrored way.
 Functions here take batches: observations of shape (..., size), as laid out in observation.py, and elements (...).
 """
 
+from collections.abc import Iterable, Iterator
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,11 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, command_table
+from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, as_array, command_table
+from seastar_gym.envs.observation import layout_of_size
+from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import StatefulActuator
 
@@ -29,9 +34,6 @@ Elements = NDArray[np.intp]
 BOUNDARY_WIDTH = 1e-6
 """[rad]: a waypoint this close to a boundary between two sectors lies on it. Far above the rounding of observations, so
 that rounding never chooses the sector of a robot that is aimed along a limb; the next waypoint's side does."""
-
-CURRENT, NEXT = slice(-4, -2), slice(-2, None)
-"""Where the waypoints stand in an observation."""
 
 
 # --- the group -------------------------------------------------------------------------------------------------------
@@ -78,8 +80,9 @@ def sectors(observations: NDArray[np.floating[Any]], n_limbs: int) -> Elements:
     On a boundary it is the sector on the side of the next waypoint, and where that lies on the same line (or there is
     none) the sector anti-clockwise of the boundary. A waypoint at the hub lies in sector 0.
     """
-    current = np.asarray(observations[..., CURRENT], np.float64)
-    towards_next = np.asarray(observations[..., NEXT], np.float64)
+    at = layout_of_size(observations.shape[-1])
+    current = np.asarray(observations[..., at.current_waypoint], np.float64)
+    towards_next = np.asarray(observations[..., at.next_waypoint], np.float64)
     width = np.pi / n_limbs
     angle = np.arctan2(current[..., 1], current[..., 0])
     boundary = np.rint(angle / width)  # the nearest one
@@ -94,10 +97,10 @@ def sectors(observations: NDArray[np.floating[Any]], n_limbs: int) -> Elements:
 @cache
 def _vector_order(n_limbs: int, n_vectors: int) -> NDArray[np.intp]:
     """Vector i of an observation carried by element g was vector order[g, i]; shape (2 n_limbs, n_vectors)."""
-    nodes_per_limb = (n_vectors - 3) // (2 * n_limbs)
-    n_nodes = n_limbs * nodes_per_limb
-    nodes = np.arange(n_nodes).reshape(n_limbs, nodes_per_limb)[limb_order(n_limbs)].reshape(-1, n_nodes)
-    others = np.broadcast_to(np.arange(2 * n_nodes, n_vectors), (2 * n_limbs, 3))
+    at = layout_of_size(2 * n_vectors)
+    n_nodes = at.velocities.start // 2
+    nodes = np.arange(n_nodes).reshape(n_limbs, -1)[limb_order(n_limbs)].reshape(-1, n_nodes)
+    others = np.tile(np.arange(at.hub_velocity.start // 2, n_vectors), (2 * n_limbs, 1))
     return _read_only(np.concatenate([nodes, n_nodes + nodes, others], axis=1))
 
 
@@ -107,7 +110,8 @@ def transform_observations(
     """What the robots carried by the elements see: a fresh array of the same shape and type."""
     observations, elements = np.asarray(observations), np.asarray(elements, dtype=np.intp)
     size = observations.shape[-1]
-    if size % 2 or (size // 2 - 3) % (2 * n_limbs) or size // 2 <= 3:
+    at = layout_of_size(size)
+    if at.size != size or at.velocities.start % (2 * n_limbs) or at.velocities.start <= 0:
         raise ValueError(f"An observation of {size} numbers is not that of a robot of {n_limbs} limbs.")
     as_vectors = np.result_type(observations, np.complex64)  # pairs of numbers as x + iy
     vectors = np.ascontiguousarray(observations).view(as_vectors)
@@ -158,14 +162,27 @@ def transform_actions(
     actions: NDArray[np.integer[Any]], elements: ArrayLike, mode: Actions, n_limbs: int
 ) -> NDArray[np.integer[Any]]:
     """Actions of the robots carried by the elements: shape (..., n_limbs) for mode "limbs", else (...)."""
-    actions, elements = np.asarray(actions), np.asarray(elements, dtype=np.intp)
+    actions, elements = as_array(actions), np.asarray(elements, dtype=np.intp)
     n_choices = 3 if mode == "limbs" else action_table(mode, n_limbs).shape[1]
+    _check_shape(actions, elements, mode, n_limbs)
     if actions.dtype.kind not in "iu" or (actions.size and (actions.min() < 0 or actions.max() >= n_choices)):
         raise ValueError(f'With actions="{mode}" an action is a whole number from 0 to {n_choices - 1}.')
     if mode != "limbs":
         return action_table(mode, n_limbs)[elements, actions]
     moved = _move_limbs(actions, elements)
     return np.where(_is_mirror(elements)[..., None], _SWAPPED_LIMB_ACTIONS[moved], moved)
+
+
+def _check_shape(actions: NDArray[Any], elements: Elements, mode: Actions, n_limbs: int) -> None:
+    """Refuse actions that are not one for every element, or one for all."""
+    of_one = (n_limbs,) if mode == "limbs" else ()
+    robots = actions.shape[: actions.ndim - len(of_one)]
+    if actions.shape != (*robots, *of_one) or (robots != elements.shape and () not in (robots, elements.shape)):
+        one = f"{n_limbs} numbers" if mode == "limbs" else "a number"
+        raise ValueError(
+            f'With actions="{mode}" an action is {one}, for each of {elements.size} robot(s), not an array of shape '
+            f"{actions.shape}."
+        )
 
 
 def restore_actions(
@@ -180,19 +197,30 @@ def _read_only(table: NDArray[Any]) -> NDArray[Any]:
     return table
 
 
-def require_symmetry(scene: Scene) -> None:
-    """Refuse scenes that a turn or a mirror would change."""
-    why = None
-    if not scene.robot.is_symmetric:
-        why = "its limbs are not alike, straight and evenly spread"
-    elif len(set(scene.limb_strengths)) > 1:
-        why = "its limbs are not equally strong"
-    elif isinstance(scene.actuator, StatefulActuator):
-        why = "its actuators remember what they did, and no table says how that is carried from limb to limb"
-    elif any(node != 0 for node in scene.held_nodes) or scene.loads:
-        why = "nodes are held or loaded"
+def require_symmetry(scene: Scene, randomization: DomainRandomization | None = None) -> None:
+    """Refuse scenes, and draws of their numbers, that a turn or a mirror would change."""
+    why = next(_asymmetries(scene, () if randomization is None else randomization.distributions), None)
     if why is not None:
-        raise ValueError(f"The symmetry of the regular polygon is not that of this robot: {why}.")
+        raise ValueError(f"This scene has not the symmetry of the regular polygon: {why}.")
+
+
+def _asymmetries(scene: Scene, drawn: Iterable[str]) -> Iterator[str]:
+    """Reasons why a scene, some of whose numbers are drawn, is not symmetric."""
+    if not scene.robot.is_symmetric:
+        yield "its limbs are not alike, straight and evenly spread"
+    if len(set(scene.limb_strengths)) > 1:
+        yield "its limbs are not equally strong"
+    if isinstance(scene.actuator, StatefulActuator):
+        yield "its actuators remember what they did, and no table says how that is carried from limb to limb"
+    if any(node != 0 for node in scene.held_nodes):
+        yield "nodes of limbs are held"
+    if scene.loads:
+        yield "its nodes are loaded"
+    if scene.fluid is not None and scene.fluid.current is not None:
+        yield "its water has a current"
+    for name in drawn:
+        if name == LIMB_STRENGTHS or name.startswith("robot.limbs."):
+            yield f"{name} is drawn for every limb by itself"
 
 
 # --- wrappers --------------------------------------------------------------------------------------------------------
@@ -204,15 +232,22 @@ else:
     _VectorWrapper = gym.vector.VectorWrapper  # not generic in gymnasium 1.2
 
 
+def _of_symmetric(env: Any) -> tuple[Actions, int]:
+    """Action mode and number of limbs of an environment, or of a batch of them; ValueError if it is not symmetric."""
+    inner = getattr(env, "unwrapped", env)
+    if not isinstance(inner, SeastarSwimEnv | SeastarSwimVectorEnv):
+        raise ValueError(f"Symmetry is known of SeastarSwim-v0 alone, not of {inner!r}.")
+    require_symmetry(inner.scene, inner.randomization)
+    return inner.actions, inner.scene.robot.n_limbs
+
+
 class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorArgs):
     """`SeastarSwim-v0` whose observations have the current waypoint in sector 0 and whose actions are carried back."""
 
     def __init__(self, env: gym.Env[Any, Any]):
         gym.utils.RecordConstructorArgs.__init__(self)
         gym.Wrapper.__init__(self, env)
-        self._mode: Actions = env.get_wrapper_attr("actions")
-        require_symmetry(env.get_wrapper_attr("scene"))
-        self._n_limbs: int = env.get_wrapper_attr("scene").robot.n_limbs
+        self._mode, self._n_limbs = _of_symmetric(env)
         self._element = np.zeros((), np.intp)
 
     def _reduced(self, observation: NDArray[np.float32]) -> NDArray[np.floating[Any]]:
@@ -226,7 +261,7 @@ class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstru
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """One stroke, by an action chosen on the last reduced observation."""
-        action = restore_actions(np.asarray(action), self._element, self._mode, self._n_limbs)
+        action = restore_actions(action, self._element, self._mode, self._n_limbs)
         observation, reward, terminated, truncated, info = self.env.step(action)
         return self._reduced(observation), reward, terminated, truncated, info
 
@@ -236,10 +271,7 @@ class VectorSymmetryReduction(_VectorWrapper):
 
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any]):
         super().__init__(env)
-        self._mode: Actions = env.unwrapped.actions  # type: ignore[attr-defined]
-        scene: Scene = env.unwrapped.simulator.scene  # type: ignore[attr-defined]
-        require_symmetry(scene)
-        self._n_limbs: int = scene.robot.n_limbs
+        self._mode, self._n_limbs = _of_symmetric(env)
         self._elements = np.zeros(env.num_envs, np.intp)
 
     def _reduced(self, observations: NDArray[np.float32]) -> NDArray[np.floating[Any]]:
@@ -255,7 +287,7 @@ class VectorSymmetryReduction(_VectorWrapper):
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """One stroke of every robot, by actions chosen on the last reduced observations."""
-        actions = restore_actions(np.asarray(actions), self._elements, self._mode, self._n_limbs)
+        actions = restore_actions(actions, self._elements, self._mode, self._n_limbs)
         observations, rewards, terminated, truncated, info = self.env.step(actions)
         if "final_obs" in info:
             final = info["final_obs"].copy()

@@ -8,20 +8,31 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.envs.observation import VELOCITY_SCALE, observation_size, observe, to_float32
-from seastar_gym.envs.paths import AIM, PathName, cross_track_error, make_path, shortest_way
-from seastar_gym.envs.randomization import LIMB_STRENGTH, DomainRandomization, drawn_scene
+from seastar_gym.envs.observation import (
+    VELOCITY_SCALE,
+    observation_size,
+    observe,
+    scene_layout,
+    to_float32,
+    with_memory,
+)
+from seastar_gym.envs.paths import AIM, FARTHEST, PathName, cross_track_error, make_path, shortest_way
+from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, drawn_scene
 from seastar_gym.envs.reward import RewardWeights, reward_terms
 from seastar_gym.scene import Numerics, Scene
-from seastar_gym.scene.actuators.actuator import StatefulActuator
-from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.checks import require_flag, require_number
 from seastar_gym.scene.fidelity import measured
 from seastar_gym.scene.numerics import Fidelity
+from seastar_gym.scene.serial import Part, from_dict
 from seastar_gym.simd.rows import to_rows
 from seastar_gym.simulator import Simulator, SolverStatus, StrokeReport
 
 Floats = NDArray[np.float64]
 Path = PathName | ArrayLike
+Plain = dict[str, Any]
+"""A part of a scene, or of the task, as plain data, see `seastar_gym.scene.serial`."""
+
+DEFAULT_FIDELITY: Fidelity = "balanced"
 
 
 class Outcome(NamedTuple):
@@ -32,13 +43,28 @@ class Outcome(NamedTuple):
     info: dict[str, NDArray[Any]]
 
 
-def make_scene(scene: Scene | None, fidelity: Fidelity | None) -> Scene:
-    """The scene with the numerics of `fidelity`; "balanced" if neither is given."""
-    if scene is None:
-        return Scene(numerics=Numerics.preset("balanced" if fidelity is None else fidelity))
+def make_scene(scene: Scene | Plain | None, fidelity: Fidelity | None) -> Scene:
+    """The scene with the numerics that it names, else with those of `fidelity`, which is "balanced" by default.
+
+    ValueError where scene and fidelity name different ones.
+    """
+    scene = Scene() if scene is None else read(scene, Scene)
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a Scene, not {scene!r}.")
-    return scene if fidelity is None else replace(scene, numerics=Numerics.preset(fidelity))
+    if fidelity is None and scene.numerics.named:
+        return scene
+    numerics = Numerics.preset(DEFAULT_FIDELITY if fidelity is None else fidelity)
+    if scene.numerics.named and scene.numerics != numerics:
+        raise ValueError(
+            f'fidelity="{fidelity}" contradicts the numerics that the scene names, {scene.numerics!r}: '
+            "give one of them."
+        )
+    return replace(scene, numerics=numerics)
+
+
+def read(part: Part | Plain, kind: type[Any]) -> Part:
+    """The part, whether it comes as it is or in plain form."""
+    return from_dict(part, kind) if isinstance(part, dict) else part
 
 
 def promised(scene: Scene) -> dict[str, float]:
@@ -52,9 +78,7 @@ def promised(scene: Scene) -> dict[str, float]:
 
 def scene_observation_size(scene: Scene) -> int:
     """Length of the observation of a scene's robot."""
-    actuator, robot = scene.actuator, scene.robot
-    remembered = actuator.observe(actuator.rest).shape[-1] if isinstance(actuator, StatefulActuator) else 0
-    return observation_size(robot.n_nodes) + remembered * robot.n_limbs
+    return scene_layout(scene).size
 
 
 class SwimTask:
@@ -68,22 +92,26 @@ class SwimTask:
         scene: Scene,
         n_robots: int,
         path: Path,
-        reward: RewardWeights,
+        reward: RewardWeights | Plain,
         waypoint_radius: float,
         random_heading: bool,
         threads: int | None,
-        randomization: DomainRandomization | None = None,
+        randomization: DomainRandomization | Plain | None = None,
     ):
+        randomization, reward = read(randomization, DomainRandomization), read(reward, RewardWeights)
         if not isinstance(randomization, DomainRandomization | None):
             raise ValueError(f"randomization must be a DomainRandomization or None, not {randomization!r}.")
         require_number("waypoint_radius", waypoint_radius, "m")
+        if waypoint_radius > FARTHEST:
+            raise ValueError(f"waypoint_radius must be at most {FARTHEST:g} m, not {waypoint_radius!r}.")
+        require_flag("random_heading", random_heading)
         if not isinstance(reward, RewardWeights):
             raise ValueError(f"reward must be RewardWeights, not {reward!r}.")
         waypoints = make_path(path, np.random.default_rng(0))  # refuses a bad path now, not at the first reset
         self.scene, self.randomization = scene, randomization
         self.drawn = {} if randomization is None else randomization.first_values(scene, n_robots)
         self.simulator = Simulator(drawn_scene(scene, self.drawn), n_robots, threads)
-        self._promised = {name: np.full(n_robots, value) for name, value in promised(self.simulator.scene).items()}
+        self._promise = self.simulator.scene, promised(self.simulator.scene)
         peak = np.max(self.simulator.scene.actuator.peak_angle)  # before the first draw the largest that may be drawn
         if scene.robot.hub_hinge == "turning" and 2 * peak >= scene.robot.opening_angle * (1 - 1e-9):
             raise ValueError(
@@ -115,7 +143,7 @@ class SwimTask:
                 self.randomization.draw(self.drawn, int(robot), generators[robot])
         if self.drawn:
             self.simulator.set_scene(drawn_scene(self.scene, self.drawn), robots)
-            strengths = np.asarray(self.scene.limb_strengths or 1.0) * self.drawn.get(LIMB_STRENGTH, 1.0)
+            strengths = np.asarray(self.scene.limb_strengths or 1.0) * self.drawn.get(LIMB_STRENGTHS, 1.0)
             self.simulator.set_limb_strengths(strengths)
         self.simulator.reset(robots, headings)
         self.waypoint_index[robots] = 0
@@ -133,6 +161,10 @@ class SwimTask:
         self._way_after[robot] = 0.0
         self._way_after[robot, : n - 1] = np.cumsum(legs[::-1])[::-1]
         self.n_waypoints[robot] = n
+
+    def waypoints_of(self, robot: int) -> Floats:
+        """Waypoints of a robot's present episode [m], shape (n, 2), a copy."""
+        return self.waypoints[robot, : self.n_waypoints[robot]].copy()
 
     def _waypoint(self, k: NDArray[np.int64]) -> Floats:
         """Waypoint k of every robot [m], the last one beyond the end, the origin at -1; shape (n_robots, 2)."""
@@ -160,10 +192,7 @@ class SwimTask:
         own, n_nodes = simulator.coefficients, simulator.scene.robot.n_nodes
         out = np.empty((len(target_rows), observation_size(n_nodes), target_rows.shape[2]))
         observe(own.rest, own.limb_length, simulator.q, simulator.v, target_rows, VELOCITY_SCALE, out)
-        observations, remembered = to_float32(out, self.n_robots), simulator.observe_actuators()
-        if remembered.shape[1] == 0:
-            return observations
-        return np.hstack([observations[:, :-4], remembered.astype(np.float32), observations[:, -4:]])
+        return with_memory(to_float32(out, self.n_robots), simulator.observe_actuators())
 
     def step(self, commands: Floats) -> Outcome:
         """One stroke of every robot."""
@@ -189,10 +218,25 @@ class SwimTask:
             "limbs_heated": limbs_heated,
             "newton_iterations": report.newton_iterations,
             "solver_status": report.status,
+            "solver_message": _messages(report.status),
             "smallest_opening_angle": report.smallest_opening_angle,
             **terms,
         }
         return Outcome(reward, success | (report.status != SolverStatus.CONVERGED), info)
+
+    def first_info(self) -> dict[str, NDArray[Any]]:
+        """What there is to tell before the first stroke, by the names and in the types of a stroke's info."""
+        counts = np.zeros(self.n_robots, np.int64)
+        return {
+            **self.facts(),
+            "is_success": np.zeros(self.n_robots, bool),
+            "limbs_heated": counts,
+            "newton_iterations": counts.copy(),
+            "solver_status": counts.copy(),
+            "solver_message": _messages(counts),
+            "smallest_opening_angle": np.full(self.n_robots, min(self.scene.robot.opening_angle, np.pi)),
+            **reward_terms(self.reward, np.zeros(self.n_robots), counts, counts),
+        }
 
     def _pass_waypoints(self, hub: Floats) -> NDArray[np.int64]:
         """Move on to the next waypoint as often as the current one is within reach; returns how often."""
@@ -216,9 +260,25 @@ class SwimTask:
             "waypoint_index": self.waypoint_index.copy(),
             "distance": _length(current - hub),
             "cross_track_error": cross_track_error(hub, self._waypoint(leg - 1), self._waypoint(leg)),
-            **{name: values.copy() for name, values in self._promised.items()},
+            **self._promised(),
             **{name: values.copy() for name, values in self.drawn.items()},
         }
+
+    def _promised(self) -> dict[str, Floats]:
+        """What was measured of the scene that the simulator has now; NaN for robots with weak limbs."""
+        simulator = self.simulator
+        if simulator.scene is not self._promise[0]:
+            self._promise = simulator.scene, promised(simulator.scene)
+        strong = (simulator.limb_strengths == 1.0).all(axis=1)
+        return {name: np.where(strong, value, np.nan) for name, value in self._promise[1].items()}
+
+
+def _messages(status: NDArray[np.int64]) -> NDArray[Any]:
+    """What to do about a status, shape (n_robots,); empty where the solver converged."""
+    messages = np.full(len(status), "", dtype=object)
+    for robot in np.flatnonzero(status != SolverStatus.CONVERGED):
+        messages[robot] = SolverStatus(status[robot]).sentence
+    return messages
 
 
 def _length(vectors: Floats) -> Floats:

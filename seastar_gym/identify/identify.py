@@ -16,8 +16,8 @@ tell them, and the estimate says so.
 """
 
 import argparse
-import csv
 import math
+import re
 import sys
 import time
 from collections.abc import Sequence
@@ -33,13 +33,17 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
+from seastar_gym.extras import require_extra
 from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water
-from seastar_gym.scene.checks import is_finite_number
+from seastar_gym.scene.checks import is_finite_number, is_whole_number, shown
+from seastar_gym.scene.csv_rows import Row, read_numbers, read_rows
 from seastar_gym.scene.per_robot import frame_of, side_by_side, with_numbers
 from seastar_gym.simulator import Simulator
 
 Floats = NDArray[np.float64]
 
+NODE = re.compile("[0-9]{1,5}")
+"""The number of a node, as a column's name says it."""
 DIFFERENCE = 1e-4
 """Relative change of a parameter for a column of the Jacobian; trajectories are good to about its square."""
 UNTOLD = 0.5
@@ -64,6 +68,12 @@ class Measurement:
     commands: Floats
 
     def __post_init__(self) -> None:
+        for name in ("time", "positions", "commands"):
+            array = getattr(self, name)
+            if not isinstance(array, np.ndarray) or array.dtype.kind not in "iuf":
+                raise ValueError(f"{name} must be an array of numbers, not {shown(array)}.")
+        if not isinstance(self.nodes, tuple) or not all(map(is_whole_number, self.nodes)) or self.time.ndim != 1:
+            raise ValueError(f"nodes must be a tuple of whole numbers, not {shown(self.nodes)}, and times in a row.")
         if self.positions.shape != (len(self.time), len(self.nodes), 2) or not np.isfinite(self.positions).any():
             raise ValueError(f"{len(self.time)} times and {len(self.nodes)} nodes do not fit the positions measured.")
         if self.commands.ndim != 2 or not len(self.commands):
@@ -74,48 +84,30 @@ class Measurement:
     @classmethod
     def from_csv(cls, trajectory: str | Path, commands: str | Path) -> "Measurement":
         """From two files, see above."""
-        names, *rows = _lines(trajectory) or [[]]
-        nodes = tuple(int(name[1:]) for name in names[1::2] if name[1:].isdigit())
-        expected = ["time", *(f"{axis}{node}" for node in nodes for axis in "xy")]
-        if not (nodes and rows) or names != expected or any(len(row) != len(names) for row in rows):
-            raise ValueError(
-                f"{trajectory}: the first line must be time,x0,y0,.. and below it there must be others as long as it."
-            )
-        commanded = _lines(commands)
-        if not commanded or any(len(row) != len(commanded[0]) for row in commanded):
-            raise ValueError(f"{commands}: there must be one line per stroke with one number per limb.")
-        numbers = np.array([[_number(trajectory, field or "nan") for field in row] for row in rows])
-        return cls(
-            time=numbers[:, 0],
-            positions=numbers[:, 1:].reshape(len(numbers), len(nodes), 2),
-            nodes=nodes,
-            commands=np.array([[_number(commands, field) for field in row] for row in commanded]),
-        )
+        names, *rows = read_rows(trajectory) or [Row(str(trajectory), ())]
+        nodes = tuple(int(name[1:]) for name in names.fields[1::2] if NODE.fullmatch(name[1:]))
+        expected = ("time", *(f"{axis}{node}" for node in nodes for axis in "xy"))
+        if not (nodes and rows) or names.fields != expected:
+            raise ValueError(f"{trajectory}: the first line must be time,x0,y0,.. and there must be others below it.")
+        for row in rows:
+            if len(row.fields) != len(expected):
+                raise row.refused(f"the line must have {len(expected)} fields, as the first one, not {len(row.fields)}")
+            if not row.fields[0]:
+                raise row.refused("there is no time")
+        numbers = np.array([row.numbers(empty_allowed=True) for row in rows])
+        commanded = np.array(read_numbers(commands, "one number per limb, every line as many"))
+        try:
+            return cls(numbers[:, 0], numbers[:, 1:].reshape(len(numbers), len(nodes), 2), nodes, commanded)
+        except ValueError as unfit:
+            raise ValueError(f"{trajectory}: {unfit}") from None
 
     def to_csv(self, trajectory: str | Path, commands: str | Path) -> None:
         """What from_csv reads."""
         names = ["time", *(f"{axis}{node}" for node in self.nodes for axis in "xy")]
         numbers = np.column_stack([self.time, self.positions.reshape(len(self.time), -1)])
-        np.savetxt(trajectory, numbers, "%.7g", ",", header=",".join(names), comments="")
+        lines = [names, *(["" if math.isnan(x) else f"{x:.7g}" for x in row] for row in numbers.tolist())]
+        Path(trajectory).write_text("".join(",".join(line) + "\n" for line in lines), encoding="utf-8")
         np.savetxt(commands, self.commands, "%g", ",")
-
-
-def _lines(file: str | Path) -> list[list[str]]:
-    """The fields of every line that has any."""
-    if not Path(file).exists():
-        raise FileNotFoundError(f"There is no file {file}.")
-    try:
-        with Path(file).open(newline="", encoding="utf-8") as lines:
-            return [[field.strip() for field in row] for row in csv.reader(lines) if row]
-    except (UnicodeDecodeError, csv.Error) as wrong:
-        raise ValueError(f"{file} is no CSV file: {wrong}.") from wrong
-
-
-def _number(file: str | Path, field: str) -> float:
-    try:
-        return float(field)
-    except ValueError:
-        raise ValueError(f"{file}: {field!r} is no number.") from None
 
 
 class Estimate(NamedTuple):
@@ -154,6 +146,8 @@ class Estimate(NamedTuple):
 
 def get_parameter(scene: Scene, name: str) -> float:
     """A number of the scene. ValueError: it has none of that name that could be fitted; counts could not."""
+    if not isinstance(scene, Scene) or not isinstance(name, str):
+        raise ValueError(f"A Scene and a parameter's name are needed, not {shown(scene)} and {shown(name)}.")
     first, *rest = name.split(".")
     value: Any = getattr(scene, first) if first in ("robot", "fluid", "actuator", "contact") else None
     for step in rest:
@@ -230,6 +224,10 @@ def trajectories(scenes: Sequence[Scene], measurement: Measurement) -> Floats:
 
 def identify(scene: Scene, parameters: Sequence[str], measurement: Measurement, confidence: float = 0.95) -> Estimate:
     """Fit parameters of a scene, from the scene's own values on, to a measurement."""
+    if isinstance(parameters, str) or not isinstance(parameters, Sequence) or not parameters:
+        raise ValueError(f"parameters must be names of numbers, such as fluid.density, not {shown(parameters)}.")
+    if not is_finite_number(confidence) or not 0.0 < confidence < 1.0:
+        raise ValueError(f"confidence must be between 0 and 1, not {shown(confidence)}.")
     names = tuple(parameters)
     guess = np.array([get_parameter(scene, name) for name in names])
     n_limbs = scene.robot.n_limbs
@@ -338,6 +336,8 @@ def main() -> int:
     if not options.synthetic and options.commands is None:
         parser.error("give a trajectory and its commands, or --synthetic")
     try:
+        if options.picture is not None:
+            require_extra("Pictures", "studies", "matplotlib")
         scene = Scene(Seastar(), Water(), SmaPulse(), Numerics("implicit-midpoint", options.step))
         if options.synthetic:
             measurement = synthetic(scene, TRUTH)
@@ -349,7 +349,7 @@ def main() -> int:
         print(estimate.report(), f"{time.perf_counter() - begin:.1f} s", sep="\n")
         if options.picture is not None:
             draw(estimate, measurement, options.picture)
-    except (ValueError, OSError) as bad_input:
+    except (ValueError, OSError, ModuleNotFoundError) as bad_input:
         print(bad_input, file=sys.stderr)
         return 2
     return 0

@@ -1,5 +1,6 @@
 """From a scene to the coefficients of its rods, one robot at a time; those of the fluid's terms are in fluid.py."""
 
+import math
 from collections.abc import Sequence
 from operator import itemgetter
 
@@ -13,7 +14,7 @@ from seastar_gym.model.currents import current_rows
 from seastar_gym.model.forces import constant_forces
 from seastar_gym.model.mesh import Mesh, edges_along, make_mesh, mean, nodes_along
 from seastar_gym.scene.limb import LimbShape, along
-from seastar_gym.scene.numerics import ADAPTATION
+from seastar_gym.scene.numerics import ADAPTATION, MOST_ITERATIONS, MOST_ITERATIONS_PER_STEP
 from seastar_gym.scene.per_robot import chosen, of_robot
 from seastar_gym.scene.scene import Scene
 from seastar_gym.scene.shape import n_hub_hinges, natural_hub_angle, turn_per_hinge
@@ -38,9 +39,11 @@ def make_limits(scene: Scene, index: int = 0) -> Limits:
     numerics, length = scene.numerics, of_robot(scene.robot.limb_length, index)
     speed, tolerance = length / scene.actuator.period, numerics.path_tolerance
     error_rate = 0.0 if tolerance is None else speed * (tolerance / ADAPTATION[0]) ** ADAPTATION[1]
+    n_steps = math.ceil(scene.actuator.period / numerics.step)
     return Limits(
         tolerance=np.array([numerics.newton_tolerance * length]),
         max_iterations=numerics.max_iterations,
+        most_iterations=MOST_ITERATIONS + MOST_ITERATIONS_PER_STEP * n_steps,
         adaptive=tolerance is not None,
         error_rate=np.array([error_rate]),
     )
@@ -74,6 +77,8 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
     shortest, thinnest = float(mesh.root_edges.min()), min(map(min, mesh.radius_at_nodes))
     stiffest = max(max(along(limb.youngs_modulus, nodes_along(nodes_per_limb))) for limb in limbs)
     slenderness = min(1.0, (shortest / thinnest) ** 2 / 5000.0)
+    dragged = mean(broadside) > 0.0
+    stiffness_over_mass = float((EA / l / (density * area * mesh.dl)[1:]).max())
     return Rods(
         n_limbs=n_limbs,
         nodes_per_limb=nodes_per_limb,
@@ -97,6 +102,8 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         curvature_rate=np.array([stiffest / (density * shortest**2) * slenderness]),
         calm=np.array([calm]),
         damped=np.array([calm * min(1.0, mean(broadside) * length / (density * mean(area)))]),
+        unsettled_rate=np.array([stiffness_over_mass * (nodes_per_limb - 1) ** 2 if dragged else np.inf]),
+        held=bool(scene.held_nodes),
     )
 
 

@@ -4,39 +4,72 @@ import math
 
 import numpy as np
 
+LONGEST_SHOWN = 200
+"""Characters of a value that a sentence shows."""
+
+
+def shown(value: object) -> str:
+    """The value as a sentence shows it: on one line, and cut where it is long."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:  # Python writes out no integers of thousands of digits
+        text = f"a number of {type(value).__name__}"
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
+
+
+def is_whole_number(value: object) -> bool:
+    """Whether the value is a whole number, not a flag and not a time."""
+    return isinstance(value, int | np.integer) and not isinstance(value, bool | np.timedelta64)
+
 
 def is_finite_number(value: object) -> bool:
-    """Whether the value is a number, not a flag, and finite."""
-    is_number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
-    return is_number and math.isfinite(value)  # type: ignore[arg-type]
+    """Whether the value is a number, not a flag, and finite in double precision."""
+    if not (is_whole_number(value) or isinstance(value, float | np.floating)):
+        return False
+    try:
+        return math.isfinite(float(value))  # type: ignore[arg-type]
+    except OverflowError:
+        return False
 
 
 def require_number(name: str, value: float, unit: str, *, zero_allowed: bool = False) -> None:
     """A positive, finite number, or zero where that is allowed."""
     if not is_finite_number(value) or value < 0 or (value == 0 and not zero_allowed):
         kind = "a finite number, not negative" if zero_allowed else "a positive, finite number"
-        raise ValueError(f"{name} must be {kind} [{unit}], not {value!r}.")
+        raise ValueError(f"{name} must be {kind} [{unit}], not {shown(value)}.")
 
 
 def require_finite(name: str, value: float, unit: str) -> None:
     """A finite number."""
     if not is_finite_number(value):
-        raise ValueError(f"{name} must be a finite number [{unit}], not {value!r}.")
+        raise ValueError(f"{name} must be a finite number [{unit}], not {shown(value)}.")
 
 
 def require_count(name: str, value: int, smallest: int, largest: int) -> None:
     """A whole number within bounds."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not smallest <= value <= largest:
-        raise ValueError(f"{name} must be a whole number from {smallest} to {largest}, not {value!r}.")
+    if not is_whole_number(value) or not smallest <= value <= largest:
+        raise ValueError(f"{name} must be a whole number from {smallest} to {largest}, not {shown(value)}.")
+
+
+def require_seed(seed: object) -> None:
+    """A whole number that is not negative, or None."""
+    if seed is not None and (not is_whole_number(seed) or seed < 0):  # type: ignore[operator]
+        raise ValueError(f"A seed is a whole number that is not negative, or None, not {shown(seed)}.")
+
+
+def require_flag(name: str, value: object) -> None:
+    """True or False, and nothing that Python takes for one of them."""
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError(f"{name} must be True or False, not {value!r}.")
 
 
 def require_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
     """One of the choices."""
-    if value not in choices:
-        raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}, not {value!r}.")
+    if not isinstance(value, str) or value not in choices:
+        raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}, not {shown(value)}.")
 
 
 def require_numbers(name: str, values: object, unit: str) -> None:
     """A tuple of finite numbers."""
     if not isinstance(values, tuple) or not all(map(is_finite_number, values)):
-        raise ValueError(f"{name} must be a tuple of finite numbers [{unit}], not {values!r}.")
+        raise ValueError(f"{name} must be a tuple of finite numbers [{unit}], not {shown(values)}.")

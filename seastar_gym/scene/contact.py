@@ -6,8 +6,10 @@ from typing import ClassVar
 
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.per_robot import Numbers, require_each
+from seastar_gym.scene.serial import register_part
 
 
+@register_part
 @dataclass(frozen=True)
 class Contact:
     """Limbs do not pass through each other: they push each other apart, without friction, see der/contact.py.

@@ -3,13 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.checks import is_finite_number, require_finite, require_number
+from seastar_gym.scene.checks import is_finite_number, require_finite, require_number, shown
 from seastar_gym.scene.per_robot import Numbers, require_each
+from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
 
@@ -17,19 +18,29 @@ LARGEST_GRID = 4_000_000
 """Points: more than this many velocities are no longer a sample of a smooth current."""
 
 
+@register_part
 @dataclass(frozen=True)
 class UniformCurrent:
-    """A fluid that moves as a whole: u = (u_x, u_y) [m/s]."""
+    """A fluid that moves as a whole with the velocity u_x, u_y [m/s].
+
+    Numbers that differ from robot to robot are numpy arrays of shape (n_robots,) here: a tuple would be a vector.
+    """
 
     PER_ROBOT: ClassVar = ("u_x", "u_y")
     u_x: Numbers = 0.0
     u_y: Numbers = 0.0
 
     def __post_init__(self) -> None:
+        if type(self.u_x) in (tuple, list):
+            raise ValueError(
+                "UniformCurrent takes u_x and u_y [m/s], or a numpy array of each with a number for every robot, not "
+                f"the vector {self.u_x!r}."
+            )
         require_each(self, "u_x", partial(require_finite, unit="m/s"))
         require_each(self, "u_y", partial(require_finite, unit="m/s"))
 
 
+@register_part
 @dataclass(frozen=True)
 class ShearCurrent:
     """A simple shear: u = rate y' along x', where x', y' are x, y turned by `direction`.
@@ -46,6 +57,7 @@ class ShearCurrent:
         require_each(self, "direction", partial(require_finite, unit="rad"))
 
 
+@register_part
 @dataclass(frozen=True)
 class Vortex:
     """A steady vortex with a smooth core, after Kaufmann and Scully: u = circulation/(2 pi) r/(r_c^2 + r^2) round it.
@@ -66,6 +78,7 @@ class Vortex:
         require_each(self, "core_radius", partial(require_number, unit="m"))
 
 
+@register_part
 @dataclass(frozen=True)
 class GridCurrent:
     """A current sampled on a grid, bilinear in between; beyond the grid it is that of the nearest point on its edge.
@@ -81,11 +94,13 @@ class GridCurrent:
     def __post_init__(self) -> None:
         if not isinstance(self.corner, tuple | list) or list(map(is_finite_number, self.corner)) != [True, True]:
             raise ValueError(f"corner must be two finite numbers [m], not {self.corner!r}.")
-        object.__setattr__(self, "corner", tuple(self.corner))
+        object.__setattr__(self, "corner", tuple(float(x) for x in self.corner))
         require_number("spacing", self.spacing, "m")
+        object.__setattr__(self, "spacing", float(self.spacing))
         try:
-            array = np.asarray(self.velocities, dtype=float)
-        except (TypeError, ValueError):
+            array = np.asarray(self.velocities)
+            array = array.astype(float) if array.dtype.kind in "iuf" else np.zeros(0)
+        except (TypeError, ValueError, OverflowError):
             array = np.zeros(0)
         if array.ndim != 3 or array.shape[2] != 2 or min(array.shape) < 2 or array.size > 2 * LARGEST_GRID:
             raise ValueError(
@@ -94,7 +109,8 @@ class GridCurrent:
             )
         if not np.isfinite(array).all():
             raise ValueError("velocities must be finite [m/s].")
-        object.__setattr__(self, "velocities", tuple(tuple(map(tuple, row)) for row in array.tolist()))
+        rows: Any = array.tolist()
+        object.__setattr__(self, "velocities", tuple(tuple(map(tuple, row)) for row in rows))
 
     @classmethod
     def from_function(
@@ -109,16 +125,24 @@ class GridCurrent:
         The function takes and gives arrays of one shape, or plain numbers where the current does not depend on place.
         """
         require_number("spacing", spacing, "m")
+        if not callable(function):
+            raise ValueError(f"function must be a function of x and y [m], not {shown(function)}.")
         axes = []
         for name, ends in (("x", x), ("y", y)):
-            if len(ends) != 2 or not all(map(is_finite_number, ends)) or not ends[1] - ends[0] >= spacing:
-                raise ValueError(f"{name} must be two ends at least a spacing apart [m], not {ends!r}.")
+            two = isinstance(ends, tuple | list | np.ndarray) and np.shape(ends) == (2,)
+            if not two or not all(map(is_finite_number, ends)) or not ends[1] - ends[0] >= spacing:
+                raise ValueError(f"{name} must be two ends at least a spacing apart [m], not {shown(ends)}.")
+            if (ends[1] - ends[0]) / spacing > LARGEST_GRID:
+                raise ValueError(f"The grid has more than {LARGEST_GRID:,} points: use a larger spacing.")
             axes.append(ends[0] + spacing * np.arange(int(np.ceil((ends[1] - ends[0]) / spacing - 1e-9)) + 1))
         if len(axes[0]) * len(axes[1]) > LARGEST_GRID:
             raise ValueError(f"The grid has more than {LARGEST_GRID:,} points: use a larger spacing.")
         xs, ys = np.meshgrid(*axes, indexing="ij")
-        u_x, u_y = function(xs, ys)
-        velocities = np.stack([np.broadcast_to(u, xs.shape) for u in (u_x, u_y)], axis=2)
+        velocities = np.zeros((*xs.shape, 2))
+        try:
+            velocities[..., 0], velocities[..., 1] = function(xs, ys)
+        except (TypeError, ValueError, OverflowError) as wrong:
+            raise ValueError(f"function must make (u_x, u_y) [m/s] of arrays x and y: {shown(str(wrong))}.") from wrong
         return cls((float(x[0]), float(y[0])), float(spacing), velocities)  # type: ignore[arg-type]
 
 

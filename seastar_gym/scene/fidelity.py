@@ -7,13 +7,17 @@ water, over ten strokes from rest:
 """
 
 import json
-import math
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, Protocol
 
+import numpy as np
+
+from seastar_gym.scene.checks import is_finite_number, shown
+
 PRESETS = Path(__file__).with_name("presets.json")
+SETTING = ("scheme", "step", "newton_tolerance", "path_tolerance")
 
 
 @dataclass(frozen=True)
@@ -78,6 +82,8 @@ def promises() -> tuple[Promise, ...]:
 def promise(setting: str | Setting) -> Promise:
     """What a preset, by its name, or a `Numerics` keeps; ValueError for settings that were not measured."""
     presets = {name: Promise(**row) for name, row in _stored()["presets"].items()}
+    if not isinstance(setting, str) and not all(hasattr(setting, name) for name in SETTING):
+        raise ValueError(f"A promise is asked of a preset's name or a Numerics, not of {shown(setting)}.")
     if isinstance(setting, str):
         if setting not in presets:
             raise ValueError(f"A preset is one of {', '.join(map(repr, presets))}, not {setting!r}.")
@@ -103,8 +109,10 @@ def cheapest(error: float, any_gait: bool = False) -> Promise:
 
     any_gait: Ask it of gait_error, too.
     """
-    if not isinstance(error, int | float) or isinstance(error, bool) or not (0.0 < error < math.inf):
-        raise ValueError(f"error must be a positive, finite share of the path's length, not {error!r}.")
+    if not is_finite_number(error) or error <= 0.0:
+        raise ValueError(f"error must be a positive, finite share of the path's length, not {shown(error)}.")
+    if not isinstance(any_gait, bool | np.bool_):
+        raise ValueError(f"any_gait must be True or False, not {shown(any_gait)}.")
     known = sorted(promises(), key=lambda row: -row.speed)
 
     def kept(row: Promise) -> float:

@@ -1,17 +1,18 @@
 """The fluid around the robot, as a frozen dataclass in SI units; for numbers of each robot see per_robot.py."""
 
-import dataclasses
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, ClassVar, get_args
+from typing import ClassVar
 
 import numpy as np
 
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.currents import AnyCurrent
 from seastar_gym.scene.per_robot import Numbers, batch_size, require_each
+from seastar_gym.scene.serial import register_part
 
 
+@register_part
 @dataclass(frozen=True)
 class Water:
     """A fluid with the quadratic drag of (13.8).
@@ -48,12 +49,3 @@ class Water:
             require_each(self, "added_mass_coefficient", partial(not_negative, unit="1"))
         if not isinstance(self.current, AnyCurrent | None):
             raise ValueError(f"current must be a current such as UniformCurrent(u_x=0.001), not {self.current!r}.")
-
-    @classmethod
-    def from_fields(cls, fields: dict[str, Any]) -> "Water":
-        """The fluid that dataclasses.asdict has made `fields` of, maybe by way of JSON."""
-        current = fields.get("current")
-        if current is not None:
-            kinds = {frozenset(field.name for field in dataclasses.fields(kind)): kind for kind in get_args(AnyCurrent)}
-            current = kinds[frozenset(current)](**current)
-        return cls(**{**fields, "current": current})

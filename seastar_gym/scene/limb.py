@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from seastar_gym.scene.checks import is_finite_number, require_finite, require_number, require_numbers
 from seastar_gym.scene.per_robot import Numbers, PerRobot, require_each
+from seastar_gym.scene.serial import register_part
 
 Profile = float | tuple[float, ...]
 """A number, or numbers at equally spaced points from hub to tip (both included), linear in between."""
 
 
+@register_part
 @dataclass(frozen=True)
 class Limb:
     """What one limb has of its own; None: what the robot says for all.
@@ -44,11 +46,11 @@ class Limb:
         for name, profile, unit in (("radius", self.radius, "m"), ("youngs_modulus", self.youngs_modulus, "Pa")):
             if profile is None:
                 continue
-            if isinstance(profile, np.ndarray | PerRobot):
+            if isinstance(profile, PerRobot) or not isinstance(profile, tuple):
                 require_each(self, name, partial(_require_positive, unit=unit))
                 continue
-            require_numbers(f"A limb's {name}", as_tuple(profile), unit)
-            if not as_tuple(profile) or min(as_tuple(profile)) <= 0.0:
+            require_numbers(f"A limb's {name}", profile, unit)
+            if not profile or min(profile) <= 0.0:
                 raise ValueError(f"A limb's {name} must be positive all along it [{unit}], not {profile!r}.")
 
 

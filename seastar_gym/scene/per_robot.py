@@ -26,17 +26,23 @@ class PerRobot(tuple[float, ...]):
 
 
 def require_each(part: Any, name: str, check: Callable[[str, float], None]) -> None:
-    """Check a number of a part, or that of each robot, and keep an array as a tuple."""
+    """Check a number of a part, or that of each robot, and keep an array as a tuple, numbers of numpy as Python's."""
     value = getattr(part, name)
     if not isinstance(value, np.ndarray | tuple):
         check(name, value)
+        object.__setattr__(part, name, _plain(value))
         return
-    numbers = value.tolist() if isinstance(value, np.ndarray) else list(value)
+    numbers = value.tolist() if isinstance(value, np.ndarray) else list(map(_plain, value))
     if not isinstance(numbers, list) or not numbers or isinstance(numbers[0], list):
         raise ValueError(f"{name} must be a number, or one for every robot of shape (n_robots,), not {value!r}.")
     for number in numbers:
         check(name, number)
     object.__setattr__(part, name, PerRobot(numbers))
+
+
+def _plain(number: Any) -> Any:
+    """A number of numpy as Python's: one of single precision would go on computing to single precision."""
+    return number.item() if isinstance(number, np.generic) else number
 
 
 def column(numbers: Numbers, n_axes: int = 1) -> Any:
@@ -65,7 +71,7 @@ def numbers_of(part: Any) -> dict[str, Any]:
 def _contents(part: Any) -> dict[str, Any]:
     """What a part is made of, by name; nothing for what is no part."""
     if dataclasses.is_dataclass(part):
-        return {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}
+        return {field.name: getattr(part, field.name) for field in dataclasses.fields(part) if field.compare}
     is_tuple_of_parts = isinstance(part, tuple) and part and all(map(dataclasses.is_dataclass, part))
     return {str(k): one for k, one in enumerate(part)} if is_tuple_of_parts else {}
 

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from seastar_gym.scene.checks import require_choice, require_count, require_number
 from seastar_gym.scene.limb import Limb, LimbShape, as_tuple
 from seastar_gym.scene.per_robot import Numbers, batch_size, chosen, require_each
+from seastar_gym.scene.serial import register_part
 from seastar_gym.scene.shape import limbs_that_may_touch, rest_positions, turn_per_hinge
 
 HubHinge = Literal["opening", "turning"]
 
 
+@register_part
 @dataclass(frozen=True)
 class Seastar:
     """A robot of limbs around a hub (Fig. 13.4a): straight, equal, uniform and evenly spread, but for `limbs`.
@@ -105,9 +107,8 @@ class Seastar:
         """Whether a turn by one limb and a mirror at limb 1 leave the robot, or all of them, as it is."""
         robots = [self.limb_shapes(index) for index in range(batch_size(self) or 1)]
         alike = all(len({shape._replace(direction=0.0, gap=0.0) for shape in shapes}) == 1 for shapes in robots)
-        shapes = robots[0]
-        gaps = np.array([shape.gap for shape in shapes])
-        return alike and shapes[0].natural_curvature == 0.0 and float(np.ptp(gaps)) < 1e-12
+        straight = not any(shape.natural_curvature for shapes in robots for shape in shapes)
+        return alike and straight and float(np.ptp([shape.gap for shape in robots[0]])) < 1e-12
 
     @property
     def n_nodes(self) -> int:

@@ -8,7 +8,9 @@ of a batch.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from operator import itemgetter
+from typing import Any
 
 import numpy as np
 
@@ -20,13 +22,16 @@ from seastar_gym.scene.fluid import Water
 from seastar_gym.scene.numerics import MAX_STEPS, Numerics
 from seastar_gym.scene.per_robot import batch_size, chosen
 from seastar_gym.scene.robot import Seastar
+from seastar_gym.scene.serial import from_dict, register_part, to_dict
 from seastar_gym.scene.shape import cross_at_rest, n_hub_hinges, natural_hub_angle
 
 
+@register_part
 @dataclass(frozen=True)
 class Scene:
     """A robot, the fluid around it (None: vacuum), its actuator and the numerics.
 
+    numerics: The chapter's where none are named; environments then take those of their fidelity.
     held_nodes: Indices of nodes that stay where they are; hub and root node held clamp a limb.
     loads: Dead loads on nodes, (node, F_x, F_y) [N] each.
     limb_strengths: Share of its rotation that every limb still makes, from 0 (failed) to 1; () for all of it.
@@ -38,7 +43,7 @@ class Scene:
     robot: Seastar = field(default_factory=Seastar)
     fluid: Water | None = field(default_factory=Water)
     actuator: Actuator = field(default_factory=SmaPulse)
-    numerics: Numerics = field(default_factory=Numerics)
+    numerics: Numerics = field(default_factory=partial(Numerics, named=False))
     held_nodes: tuple[int, ...] = ()
     loads: tuple[tuple[int, float, float], ...] = ()
     limb_strengths: tuple[float, ...] = ()
@@ -155,6 +160,15 @@ class Scene:
                 f"is infinite: for {robot.n_limbs} limbs so spread the peak angle must stay below {limit:.4g} rad"
                 + (', or use hub_hinge="turning".' if robot.n_limbs == 2 else ".")
             )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The scene as plain data for JSON, see serial.py. ValueError: an actuator that could not be read back."""
+        return to_dict(self)
+
+    @classmethod
+    def from_dict(cls, data: object) -> "Scene":
+        """The scene that `to_dict` wrote. ValueError, with one sentence, for everything else."""
+        return from_dict(data, cls)
 
     @property
     def n_robots(self) -> int | None:

@@ -4,30 +4,63 @@
 the GIL and keeps the machine code on disk. Numba's own cache looks at the file of the cached function only, so an edit
 in a called file would silently run the old code. Ours lives in a folder named after a digest of every file of the
 package that defines kernels, the versions of numba, llvmlite and numpy and the lane width: whatever changes, the old
-code cannot be found.
+code cannot be found. Every file begins with a digest of the rest: what was cut off or written over is not there, and is
+compiled and written anew. What cannot be written is compiled in every process.
 """
 
 import contextlib
 import functools
 import hashlib
+import pickle
+import sys
 from pathlib import Path
 
 import llvmlite
 import numba
 import numpy as np
-from numba.core.caching import FunctionCache, UserWideCacheLocator
+from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache, UserWideCacheLocator
+from numba.core.registry import CPUDispatcher
 
 from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simd.plain import plain_kernels
 
 PACKAGE = Path(__file__).resolve().parent.parent
+DIGEST_SIZE = hashlib.sha256().digest_size  # bytes
 
 # error_model="numpy": divisions follow IEEE instead of raising; failure is a status, not an exception.
 STRICT = {"error_model": "numpy", "nogil": True}
 # Without wrappers for Python, which would be a third of the compilation.
 BLOCK = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **STRICT}
-kernel = numba.njit(**BLOCK)
+
+
+class Kernel(CPUDispatcher):
+    """A building block of compiled code, without the wrapper that a call from Python would need."""
+
+    def __call__(self, *args, **kwargs):
+        name = self.py_func.__name__
+        raise TypeError(
+            f"{name} is a kernel, which only compiled code can call: call it from an @entry_point, "
+            f"or {name}.plain in Python."
+        )
+
+    @property
+    def plain(self):
+        """The same in plain Python, on the lanes of numpy_lanes.py."""
+        return plain_kernels()(self)
+
+
+def kernel(function, **options):
+    """Compile `function` as a building block; with NUMBA_DISABLE_JIT=1 it stays the Python function that it is."""
+    compiled = numba.njit(**BLOCK, **options)(function)
+    if isinstance(compiled, CPUDispatcher):
+        compiled.__class__ = Kernel  # numba offers no other way to say how its dispatchers are called
+    else:
+        compiled.plain = compiled
+    return compiled
+
+
 # Where calls are many, and each would pass the fifty pointers of rods and work: together a tenth of a stroke.
-inlined_kernel = numba.njit(forceinline=True, **BLOCK)
+inlined_kernel = functools.partial(kernel, forceinline=True)
 
 
 def kernel_sources(package: Path = PACKAGE) -> list[Path]:
@@ -65,15 +98,83 @@ class _DigestLocator(UserWideCacheLocator):
         return _digest_of_this_process(), hashlib.sha256(Path(self._py_file).read_bytes()).hexdigest()
 
 
+class _SoundFile(IndexDataCacheFile):
+    """Numba's index and data files, each behind a digest of its content: damaged ones count as missing.
+
+    Data are kept with their key: an index made anew may have given their file to another signature meanwhile.
+    """
+
+    def load(self, key):
+        found, data = super().load(key) or (None, None)
+        return data if found == key else None
+
+    def save(self, key, data):
+        super().save(key, (key, data))
+
+    def _load_index(self):
+        stamp, overloads = self._load(self._index_path) or (None, {})
+        return overloads if stamp == self._source_stamp else {}
+
+    def _save_index(self, overloads):
+        self._save(self._index_path, (self._source_stamp, overloads))
+
+    def _load_data(self, name):
+        return self._load(self._data_path(name))
+
+    def _save_data(self, name, data):
+        self._save(self._data_path(name), data)
+
+    def _load(self, path):
+        try:
+            file = Path(path).read_bytes()
+        except OSError:
+            return None
+        digest, content = file[:DIGEST_SIZE], file[DIGEST_SIZE:]
+        return pickle.loads(content) if digest == hashlib.sha256(content).digest() else None
+
+    def _save(self, path, value):
+        content = self._dump(value)
+        with self._open_for_write(path) as file:
+            file.write(hashlib.sha256(content).digest() + content)
+
+
 class _DigestCache(FunctionCache):
     class _impl_class(FunctionCache._impl_class):  # noqa: N801 - numba's own name
         _locator_classes = (_DigestLocator,)
 
+    def __init__(self, py_func):
+        super().__init__(py_func)
+        stamp = self._impl.locator.get_source_stamp()
+        self._cache_file = _SoundFile(self._cache_path, self._impl.filename_base, stamp)
+
+    def load_overload(self, sig, target_context):
+        return super().load_overload(sig, target_context) or _say_that_it_compiles()
+
+    def save_overload(self, sig, data):
+        # OSError: the disk is full, or the folder is gone or no longer ours.
+        with contextlib.suppress(OSError):
+            super().save_overload(sig, data)
+
+
+class _NoCache(NullCache):
+    def load_overload(self, sig, target_context):
+        return _say_that_it_compiles()
+
+
+@functools.cache
+def _say_that_it_compiles():
+    """One sentence per process, to whoever sits at a terminal and would wonder why nothing happens."""
+    if sys.stderr is not None and sys.stderr.isatty():
+        print("seastar_gym: compiling the kernels for this kind of scene, about 15 s ...", file=sys.stderr, flush=True)
+
 
 def entry_point(function):
     """Compile `function` for calls from Python, with the GIL released and the machine code kept on disk."""
+    if numba.config.DISABLE_JIT:
+        return np.errstate(all="ignore")(function)
     compiled = numba.njit(**STRICT)(function)
-    # RuntimeError: no folder can be written (a read-only home), so the function is compiled anew in every process.
-    with contextlib.suppress(RuntimeError):
+    try:
         compiled._cache = _DigestCache(function)
+    except RuntimeError:  # no folder can be written (a read-only home)
+        compiled._cache = _NoCache()
     return compiled

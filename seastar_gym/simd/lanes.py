@@ -15,6 +15,9 @@ robot to robot without a change in the kernel.
 Arithmetic is strict IEEE (no fastmath; a fused multiply-add only where `add_product` or `subtract_product` says
 so), so a robot's bits depend neither on its lane nor on its neighbours. Comparisons give a `Mask`; `select` picks
 by mask. Loads and stores are unaligned on purpose: numpy does not align to 64 bytes.
+
+numpy_lanes.py lists all that kernels may ask of lanes, and does the same on numpy; with NUMBA_DISABLE_JIT=1 the names
+here are those there.
 """
 
 import operator
@@ -23,10 +26,12 @@ from collections.abc import Callable
 
 import llvmlite.binding
 from llvmlite import ir
-from numba.core import cgutils, types
+from numba.core import cgutils, config, types
 from numba.core.datamodel import models
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, register_model
+
+from seastar_gym.simd import numpy_lanes
 
 
 def _lanes_for_this_processor() -> int:
@@ -433,3 +438,7 @@ def all_lanes(typing_context, condition):
         return None
     full = 2**N_LANES - 1
     return types.boolean(mask), _mask_reduction(lambda b, bits, i: b.icmp_unsigned("==", bits, ir.Constant(i, full)))
+
+
+if config.DISABLE_JIT:
+    globals().update({name: getattr(numpy_lanes, name) for name in numpy_lanes.FUNCTIONS})

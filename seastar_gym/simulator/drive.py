@@ -67,9 +67,6 @@ class Drive:
         return self.strengths * self._stateful.respond(np.zeros(1), np.zeros_like(self.strengths), self.state)[0][0]
 
     def put(self, chosen: NDArray[np.bool_] | slice, state: Floats) -> None:
-        """Put the actuators of the chosen robots into states; a stroke that is under way is over for them."""
-        self._commands = np.array(self._commands)
-        self._commands[chosen] = 0.0
-        self.state, self._before, self._after = (np.array(each) for each in (self.state, self._before, self._after))
-        for each in (self.state, self._before, self._after):
-            each[chosen] = state
+        """Put the actuators of the chosen robots into states, between two strokes."""
+        self.state = np.array(self.state)
+        self.state[chosen] = state

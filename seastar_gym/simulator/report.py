@@ -15,6 +15,7 @@ class SolverStatus(IntEnum):
     CONVERGED = 0
     NOT_CONVERGED = 1
     NOT_FINITE = 2
+    ITERATION_LIMIT = 3
 
     @property
     def sentence(self) -> str:
@@ -29,6 +30,11 @@ class SolverStatus(IntEnum):
                 "The robot's positions or velocities were not finite when the stroke began; it lies at rest where its "
                 "hub was before, until it is reset: write finite numbers into Simulator.q and Simulator.v only."
             ),
+            SolverStatus.ITERATION_LIMIT: (
+                "The stroke took all Newton iterations that a robot has for one (see Numerics); the robot stays at its "
+                "last good state until it is reset: use a smaller Numerics.step or peak angle, or slower initial "
+                "velocities."
+            ),
         }[self]
 
 
@@ -42,7 +48,8 @@ class StrokeReport(NamedTuple):
     newton_iterations, repairs, backtracks: Counts of Newton steps, of those that needed the convex matrix, and of
         halvings by the line search.
     steps, halvings, rejections: Counts of time steps taken, of those that did not converge or created energy and were
-        halved, and of those whose error was too large and were halved (Numerics.path_tolerance).
+        halved (or, at the shortest, tried again), and of those whose error was too large and were halved
+        (Numerics.path_tolerance).
     energy_cuts: Steps after which velocities were cut, because the energy had grown a little, see der/guard.py.
     covered: Time covered [s].
     smallest_opening_angle: Smallest angle between neighbouring limbs at the hub [rad]; below zero, limbs crossed.

@@ -1,8 +1,8 @@
 """`Simulator`: a batch of robots of one scene, advanced by whole strokes."""
 
 import os
-from collections.abc import Generator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,6 +32,8 @@ from seastar_gym.simulator.report import COUNTS
 from seastar_gym.simulator.report import SolverStatus as SolverStatus
 from seastar_gym.simulator.report import StrokeReport as StrokeReport
 from seastar_gym.simulator.schedule import step_times
+from seastar_gym.simulator.threads import Threads
+from seastar_gym.simulator.turn import BROKEN_OFF, Turn
 
 Floats = NDArray[np.float64]
 
@@ -54,10 +56,14 @@ class State(NamedTuple):
 
 
 PARTS_PER_THREAD = 8
+LARGEST_PART = 64  # lane groups: an interrupt waits for the part that is under way
 MAX_ROBOTS, MAX_THREADS = 100_000_000, 4096
 ROW_ARRAYS = ("q", "v", "_a", "_commands", "_rotations", "_failed", "_report")
 CLOCK = ("_start_time", "_strokes", "_since_stroke")
 """What a simulator is made of besides its arguments: rows of numbers per robot, and its clock."""
+
+MOVED = ("q", "v", "_commands", "_rotations", "_failed", "_last_hub", *CLOCK)
+"""What a stroke changes, besides what the actuators remember and what the next stroke makes anew."""
 
 
 class Simulator:
@@ -67,6 +73,9 @@ class Simulator:
     n_robots: Size of the batch.
     threads: Lane groups are shared out over this many threads; all processors if None. A robot's trajectory is the
         same to the last bit whatever the batch, the lane and the number of threads.
+
+    A stroke that does not come to its end (Ctrl-C, an exception, a generator that was closed or dropped) has not begun.
+    One stroke at a time: what comes in the middle of one is refused with a RuntimeError.
 
     coefficients: The scene's numbers for the kernels.
     memory: What every thread works in, (Work, Actuation) of der/rods.py.
@@ -104,7 +113,7 @@ class Simulator:
         self._strokes = np.zeros(self.n_robots, dtype=np.int64)
         self._since_stroke = np.zeros(self.n_robots)
         self._last_hub = self.hub_position()
-        self._pool: tuple[int, ThreadPoolExecutor] | None = None
+        self._threads, self._turn = Threads(self.threads), Turn()
         self.memory = [self._make_memory() for _ in range(self.threads)]
         self.set_limb_strengths(scene.limb_strengths or 1.0)
 
@@ -118,11 +127,27 @@ class Simulator:
 
         mask: The robots whose numbers have changed, shape (n_robots,), all if None.
         """
-        self.coefficients.set_scene(scene, self._checked_mask(mask))
-        if scene.actuator != self.scene.actuator:
-            self._drive.set_actuator(scene.actuator)
-            self._curve = self._shape_rows(self._drive.curve)
-        self.scene = scene
+        chosen = self._checked_mask(mask)
+        with self._turn.change():
+            self.coefficients.set_scene(scene, chosen)
+            if scene.actuator != self.scene.actuator:
+                self._set_actuator(scene)
+            self.scene = scene
+
+    def _set_actuator(self, scene: Scene) -> None:
+        self._drive.set_actuator(scene.actuator)
+        self._curve = self._shape_rows(self._drive.curve)
+
+    @contextmanager
+    def _new_state(self, of_all: bool) -> Iterator[None]:
+        """Around whatever puts robots into a state; that `of_all` mends what was broken off before."""
+        with self._turn.change(cures=of_all):
+            if self._turn.broken and of_all:
+                self.coefficients = Coefficients(self.scene, self.n_robots)
+                self._set_actuator(self.scene)
+            elif self._turn.broken:
+                raise RuntimeError(BROKEN_OFF)
+            yield
 
     def _checked_mask(self, mask: ArrayLike | None) -> NDArray[np.bool_]:
         chosen = np.ones(self.n_robots, bool) if mask is None else np.asarray(mask)
@@ -130,13 +155,12 @@ class Simulator:
             raise ValueError(f"mask must be boolean of shape ({self.n_robots},), not {chosen.dtype} {chosen.shape}.")
         return chosen
 
-    def _get_pool(self) -> ThreadPoolExecutor:
-        """The threads of this process: a fork inherits the pool of its parent, but not the threads in it."""
-        if self._pool is None or self._pool[0] != os.getpid():
-            self._pool = os.getpid(), ThreadPoolExecutor(self.threads)
-        return self._pool[1]
+    def close(self) -> None:
+        """End the threads; a stroke after that starts them again."""
+        self._threads.close()
 
     def __getstate__(self) -> dict[str, Any]:
+        self._turn.require_whole()
         # By robot, not by lane: whoever reads it may have another lane width.
         rows = {name: self._read(getattr(self, name)) for name in ROW_ARRAYS}
         numbers = {name: getattr(self, name) for name in CLOCK}
@@ -166,6 +190,10 @@ class Simulator:
         angles = np.broadcast_to(angles, (self.n_robots,))
         if not np.isfinite(angles[chosen]).all():
             raise ValueError("heading must be finite [rad].")
+        with self._new_state(bool(chosen.all())):
+            self._put_at_rest(chosen, angles)
+
+    def _put_at_rest(self, chosen: NDArray[np.bool_], angles: Floats) -> None:
         for robot in np.flatnonzero(chosen):
             nodes = self.coefficients.nodes(robot)
             # At heading zero the nodes are exactly those of rest, so that symmetric scenes stay symmetric.
@@ -188,6 +216,7 @@ class Simulator:
 
     def get_state(self) -> State:
         """A copy of the state; `set_state` continues from it to the last bit (at the ends of strokes)."""
+        self._turn.require_whole()
         return State(self.positions, self.velocities, self.time, self._drive.state.copy())
 
     def set_state(self, state: State) -> None:
@@ -206,6 +235,10 @@ class Simulator:
             if not np.isfinite(array).all():
                 raise ValueError(f"State.{name} must be finite.")
             arrays.append(array)
+        with self._new_state(of_all=True):
+            self._put_state(arrays)
+
+    def _put_state(self, arrays: list[Floats]) -> None:
         write_rows(self.q, arrays[0])
         write_rows(self.v, arrays[1])
         self._commands[:] = 0.0
@@ -235,7 +268,8 @@ class Simulator:
         wanted = self._drive.strengths.shape
         if array.shape not in ((), wanted[1:], wanted) or not ((array >= 0.0) & (array <= 1.0)).all():
             raise ValueError(f"limb_strengths must be numbers from 0 to 1 of shape {wanted[1:]} or {wanted}.")
-        self._drive.strengths = np.broadcast_to(array, wanted).copy()
+        with self._turn.change():
+            self._drive.strengths = np.broadcast_to(array, wanted).copy()
 
     def _read(self, rows: Floats) -> Floats:
         return np.asarray(from_rows(rows, self.n_robots))
@@ -301,34 +335,68 @@ class Simulator:
 
         commands: Share of the actuator's curve per limb, in [-1, 1], + is anti-clockwise, shape (n_robots, n_limbs).
         """
-        self._begin_stroke(commands)
-        self._advance(0, len(self._times) - 1)
-        return self._end_stroke()
+        with self._whole_stroke(commands):
+            self._advance(0, len(self._times) - 1)
+            return self._end_stroke()
 
     def stroke_in_parts(self, commands: ArrayLike, parts: int) -> Generator[float, None, StrokeReport]:
         """A stroke that pauses `parts` times, after about equal times, to be looked at; the same bits as `stroke`.
 
-        Yields the time since the stroke began [s]. Its StrokeReport is the generator's return value.
+        Yields the time since the stroke began [s]. Its StrokeReport is the generator's return value. A generator that
+        is closed or dropped before its end puts the robots back to where the stroke began.
         """
         require_count("parts", parts, 1, MAX_STEPS)
-        self._begin_stroke(commands)
-        wanted = self._times[-1] * np.arange(1, parts + 1) / parts
-        ends = np.unique(np.clip(np.searchsorted(self._times, wanted - 1e-12), 1, len(self._times) - 1))
-        begin = 0
-        for end in ends:
-            self._advance(begin, end)
-            begin = end
-            self._since_stroke[:] = self._read(self._report)[:, REPORT_ROWS.index("covered")]
-            self._drive.advance(end)
-            self._rotations[:] = self._commands * (self._shape[end] if self._shape.ndim == 1 else self._shape[:, end])
-            yield float(self._times[end])
-        return self._end_stroke()
+        with self._whole_stroke(commands) as stroke:
+            wanted = self._times[-1] * np.arange(1, parts + 1) / parts
+            ends = np.unique(np.clip(np.searchsorted(self._times, wanted - 1e-12), 1, len(self._times) - 1))
+            begin = 0
+            for end in ends:
+                self._advance(begin, end)
+                begin = end
+                self._show(end)
+                self._turn.pause()
+                yield float(self._times[end])
+                self._turn.resume(stroke)
+            return self._end_stroke()
 
-    def _begin_stroke(self, commands: ArrayLike) -> None:
-        peaks, shape = self._drive.begin_stroke(self._checked_commands(commands))
+    @contextmanager
+    def _whole_stroke(self, commands: ArrayLike) -> Iterator[object]:
+        """Around a stroke: if it does not come to its end, it has not begun."""
+        checked = self._checked_commands(commands)
+        self._turn.require_whole()
+        stroke = self._turn.take()
+        before = {name: getattr(self, name).copy() for name in MOVED}, dict(vars(self._drive))
+        try:
+            self._begin_stroke(checked)
+            yield stroke
+            self._turn.give_back()
+        except BaseException:
+            self._put_back(stroke, *before)
+            raise
+
+    def _put_back(self, stroke: object, moved: dict[str, Any], drive: dict[str, Any]) -> None:
+        """Undo a stroke, unless robots were put into another state since."""
+        try:
+            if self._turn.resume(stroke):
+                for name, values in moved.items():
+                    getattr(self, name)[:] = values
+                vars(self._drive).update(drive)
+                self._turn.give_back()
+        except BaseException:  # interrupted once more: the robots are put back all the same
+            self._put_back(stroke, moved, drive)
+            raise
+
+    def _show(self, end: int) -> None:
+        """Let clock and actuators tell how far the stroke has come: to the time step `end`."""
+        self._since_stroke[:] = self._read(self._report)[:, REPORT_ROWS.index("covered")]
+        self._drive.advance(end)
+        self._rotations[:] = self._commands * (self._shape[end] if self._shape.ndim == 1 else self._shape[:, end])
+
+    def _begin_stroke(self, commands: Floats) -> None:
+        peaks, shape = self._drive.begin_stroke(commands)
         write_rows(self._commands, peaks)
         self._shape = self._curve if shape is None else self._shape_rows(shape)
-        self._start_time += self._since_stroke  # of a stroke that failed or was left half-way
+        self._start_time += self._since_stroke  # of a stroke that failed, or in which the simulator was copied
         self._since_stroke[:] = 0.0
         self._held = self.q[:, self._held_rows]
         self.v[:, self._held_rows] = 0.0
@@ -378,27 +446,23 @@ class Simulator:
 
         # More parts than threads, and whoever is ready takes the next: another process may hold up one of the threads.
         n_parts = 1 if self.threads == 1 else min(len(self.q), PARTS_PER_THREAD * self.threads)
+        n_parts = max(n_parts, -(-len(self.q) // LARGEST_PART))
         if not self.coefficients.are_shared:
             n_parts = len(self.q)
         bounds = len(self.q) * np.arange(n_parts + 1) // n_parts
-        parts = map(slice, bounds[:-1], bounds[1:])
 
-        def run(thread: int) -> None:
+        def swim(thread: int, part: slice) -> None:
             work, actuation = self.memory[thread]
-            for part in parts:
-                shape = self._shape[begin : end + 1]
-                if self._shape.ndim > 1:
-                    shape = np.ascontiguousarray(self._shape[part, begin : end + 1])
-                advance(
-                    self.coefficients.rods(part.start), work, self._scheme, SCHEMES["implicit-euler"], actuation,
-                    self.q[part], self.v[part], self._a[part], self._commands[part], times, shape, self._failed[part],
-                    self._report[part], self.coefficients.limits(part.start),
-                )  # fmt: skip
+            shape = self._shape[begin : end + 1]
+            if self._shape.ndim > 1:
+                shape = np.ascontiguousarray(self._shape[part, begin : end + 1])
+            advance(
+                self.coefficients.rods(part.start), work, self._scheme, SCHEMES["implicit-euler"], actuation,
+                self.q[part], self.v[part], self._a[part], self._commands[part], times, shape, self._failed[part],
+                self._report[part], self.coefficients.limits(part.start),
+            )  # fmt: skip
 
-        if self.threads == 1:
-            run(0)
-        else:
-            list(self._get_pool().map(run, range(self.threads)))
+        self._threads.run(swim, map(slice, bounds[:-1], bounds[1:]))
 
     def _end_stroke(self) -> StrokeReport:
         self.q[:, self._held_rows] = self._held

@@ -28,13 +28,11 @@ from agents.policy import LearnedPolicy
 from agents.ppo import Hyperparameters, make_model, make_training_env, policy_of
 from agents.report.pictures import COLOURS, FAINT_INK
 from agents.swim import Policy
-from agents.trials import swim_many
+from agents.trials import HELD_OUT_SEED, swim_many
 from seastar_gym.envs.paths import AIM, PathName
 from seastar_gym.envs.task import make_scene
 from seastar_gym.scene.numerics import Fidelity
 
-HELD_OUT_SEED = 1_000
-"""Of the paths that are measured on; a training draws its own from small seeds."""
 MAX_STROKES = 400
 """Of a measured swim; who does not arrive counts as this many."""
 

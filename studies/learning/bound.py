@@ -155,7 +155,7 @@ class Options:
     only_pentagon: bool = False
     """Search the pentagon alone, print how many strokes it takes, and write nothing."""
     agents: tuple[str, ...] = ("learned",)
-    """Whose speeds to measure beside."""
+    """Whose speeds to measure beside; agents as for agents.evaluate."""
     out: Path = Path("docs/bound.json")
     """File of the results; the picture has its name."""
 

@@ -42,7 +42,8 @@ def part_seconds(scene: Scene, seconds: float) -> dict[str, list[float]]:
     simulator = Simulator(scene, N_LANES, threads=1)
     commands = np.zeros((N_LANES, scene.robot.n_limbs))
     commands[:, 1], commands[:, -1] = 1.0, -1.0
-    next(simulator.stroke_in_parts(commands, 20))
+    stroke = simulator.stroke_in_parts(commands, 20)
+    next(stroke)
     rods, (work, _) = make_rods(scene), simulator.memory[0]
     work.q[:] = simulator.q[0]
     durations: dict[str, list[float]] = {}

@@ -296,7 +296,7 @@ def ragged_path(folder):
         (lambda folder: ["--agents", "pentagram"], "Unknown scripted agent 'pentagram'"),
         (lambda folder: ["--agents", "rest", "rest"], "'rest' is named twice"),
         (lambda folder: ["--path", "hexagon"], "Unknown path 'hexagon'"),
-        (lambda folder: ["--path", ragged_path(folder)], "ragged.csv: A path must have shape"),
+        (lambda folder: ["--path", ragged_path(folder)], "ragged.csv, line 2: every line must have x and y"),
     ],
 )
 def test_bad_input_is_answered_with_one_sentence(tmp_path, capsys, arguments, complaint):
@@ -330,4 +330,5 @@ def test_models_go_by_the_names_of_their_files(monkeypatch, tmp_path):
 def test_an_unknown_agent_is_told_every_name(capsys):
     assert main(["--agents", "nobody"]) == 2
     error = capsys.readouterr().err
-    assert "pentagon" in error and "learned, greedy, planner, and files" in error and error.count("\n") == 1
+    assert "pentagon" in error and "learned, greedy, planner, files" in error and "module:function" in error
+    assert error.count("\n") == 1

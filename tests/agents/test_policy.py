@@ -1,6 +1,7 @@
 """A policy in its two files swims as its learner did; what does not fit is refused with a sentence."""
 
 import json
+import pickle
 import subprocess
 import sys
 from dataclasses import fields, replace
@@ -16,6 +17,7 @@ from agents import policy as policies
 from agents.policy import SHIPPED, Description, LearnedPolicy, load, save
 from agents.ppo import Hyperparameters, make_model, make_training_env, policy_of
 from agents.swim import swim
+from every_part import ACTUATORS, PARTS
 from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, SmaPulse, UniformCurrent, Water
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.commands import command_table
@@ -137,7 +139,26 @@ def unlike_the_default() -> Scene:
 )
 def test_a_description_survives_its_text(scene):
     description = Description("pairs", False, scene, (3, 4, 5))
-    assert Description.from_json(description.to_json()) == description
+    assert Description.from_json(description.to_json().encode()) == description
+
+
+@pytest.mark.parametrize(
+    "scene", [{"actuator": one} for one in ACTUATORS.values()] + [*PARTS.values()], ids=[*ACTUATORS, *PARTS]
+)
+def test_a_policy_of_any_scene_can_be_loaded_again(scene, tmp_path):
+    policy = random_policy(Description("pairs", False, Scene(**scene), (3,)))
+    save(policy, tmp_path / "policy.safetensors")
+    assert load(tmp_path / "policy.safetensors").description == policy.description
+
+
+def test_a_policy_that_could_not_be_loaded_again_is_refused_when_it_is_saved(tmp_path):
+    class Own(SmaPulse):
+        """Not the package's."""
+
+    policy = random_policy(Description("pairs", False, Scene(actuator=Own()), (3,)))
+    with pytest.raises(ValueError, match=r"Scene\.actuator is a Own, .*register_part"):
+        save(policy, tmp_path / "policy.safetensors")
+    assert not [*tmp_path.iterdir()]
 
 
 def test_the_weights_can_be_read_by_anyone(policy, file):
@@ -185,6 +206,9 @@ def test_a_description_that_is_none_is_said_to_be_damaged(file, text):
     assert_refused(file, "is damaged, or no policy of this version")
 
 
+NO_LIMBS = Scene().to_dict() | {"robot": Scene().to_dict()["robot"] | {"n_limbs": 0}}
+
+
 @pytest.mark.parametrize(
     "change, sentence",
     [
@@ -193,8 +217,27 @@ def test_a_description_that_is_none_is_said_to_be_damaged(file, text):
         ({"actions": "waves"}, "actions must be one of"),
         ({"hidden": [16, 9]}, r"its weights have the shapes .*\(16, 186\)"),
         ({"hidden": "wide"}, "is damaged"),
-        ({"scene": {"robot": {"n_limbs": 0}, "fluid": None, "actuator": {}}}, "n_limbs must be a whole number from 1"),
-        ({"scene": {"robot": {"n_arms": 5}}}, "n_arms"),
+        ({"scene": NO_LIMBS}, "n_limbs must be a whole number from 1"),
+        ({"scene": {"robot": {"n_arms": 5}}}, "a dict with a version"),
+        ({"symmetry": "False"}, "symmetry must be true or false, not 'False'"),
+        ({"symmetry": None}, "symmetry must be true or false, not None"),
+        ({"actions": None}, "actions must be one of"),
+        ({"actions": ["joint"]}, "actions must be one of .*, not a list"),
+        ({"format": True}, "its format is True"),
+        ({"format": 2.5}, "its format is 2.5"),
+        ({"observation_layout": [1]}, "its observation_layout is a list"),
+        ({"hidden": None}, "hidden must be a list of widths, not None"),
+        ({"hidden": [16, "8"]}, "a width of its hidden layers must be a whole number"),
+        ({"hidden": [0]}, "a width of its hidden layers must be a whole number"),
+        ({"hidden": [10**300]}, "a width of its hidden layers must be a whole number"),
+        ({"hidden": []}, "its weights have the shapes"),
+        ({"scene": None}, "a dict with a version.*, not None"),
+        ({"training": None}, "its training is a NoneType"),
+        ({"training": {"progress": [[1, 2]]}}, "the progress of its training must be rows of three numbers"),
+        ({"training": {"progress": [[1, 2, 10**400]]}}, "the progress of its training must be rows of three numbers"),
+        ({"training": {"progress": {"a": 1}}}, "the progress of its training must be rows of three numbers"),
+        ({"training": {"commands": [3]}}, "the commands of its training must be texts"),
+        ({"sha256": 3}, "the weights are not those"),
     ],
 )
 def test_what_does_not_fit_is_said_in_one_sentence(file, change, sentence):
@@ -209,6 +252,106 @@ def test_bytes_that_are_no_safetensors_are_refused_even_if_described(file):
     facts["sha256"] = policies.hashlib.sha256(file.read_bytes()).hexdigest()
     file.with_suffix(".json").write_text(json.dumps(facts))
     assert_refused(file, "is damaged")
+
+
+@pytest.mark.parametrize("weight", [np.nan, np.inf, -np.inf])
+def test_weights_that_are_not_finite_are_refused(policy, file, weight):
+    policy.weights["1.bias"][3] = weight
+    save(policy, file)
+    assert_refused(file, "its weights are not all finite numbers of single precision")
+
+
+def test_weights_of_another_precision_are_refused(policy, file):
+    weights = {name: array.astype(np.float64) for name, array in policy.weights.items()}
+    rewrite(file, safetensors.numpy.save(weights))
+    assert_refused(file, "its weights are not all finite numbers of single precision")
+
+
+def rewrite(file, data: bytes) -> None:
+    """Other weights, and a description that says that they are the ones."""
+    file.write_bytes(data)
+    facts = json.loads(file.with_suffix(".json").read_text())
+    file.with_suffix(".json").write_text(json.dumps(facts | {"sha256": policies.hashlib.sha256(data).hexdigest()}))
+
+
+@pytest.mark.parametrize(
+    "text, sentence",
+    [
+        (b"null", "its description is a NoneType"),
+        (b"\xff\xfe{}", "'utf-8' codec can't decode"),
+        ("{}".encode("utf-16"), "'utf-8' codec can't decode"),
+        (b"[" * 100_000, "is damaged"),
+        (b'{"a":' * 100_000, "nested too deeply"),
+        (b'{"format": 1e999}', "says 1e999, which is no finite number"),
+        (b'{"format": NaN}', "says NaN, which is no finite number"),
+        (b'{"format": ' + b"9" * 5000 + b"}", "is damaged"),
+        (b'{"format": 2, "format": 1}', "does not say 'sha256'"),
+    ],
+)
+def test_json_that_no_description_can_be_is_refused(file, text, sentence):
+    file.with_suffix(".json").write_bytes(text)
+    assert_refused(file, sentence)
+
+
+def test_a_pickle_or_a_zip_that_is_named_like_a_policy_is_refused_unread(policy, file, tmp_path):
+    class Bomb:
+        def __reduce__(self):
+            return print, ("boom",)
+
+    torch.save({"0.weight": Bomb()}, tmp_path / "policy.pth")
+    with pytest.raises(ValueError, match=r"is in a file named \.safetensors, not in .*policy\.pth\.$"):
+        load(tmp_path / "policy.pth")
+    rewrite(file, (tmp_path / "policy.pth").read_bytes())  # a zip of pickles
+    assert_refused(file, "is damaged")
+    rewrite(file, pickle.dumps(Bomb()))
+    assert_refused(file, "is damaged")
+
+
+N_DAMAGED = 200
+
+
+@pytest.mark.parametrize("suffix", [".json", ".safetensors", "the weights of the description"])
+def test_damaged_files_of_the_policy_in_the_box_load_or_are_refused_in_a_sentence(suffix, tmp_path):
+    """Bytes flipped, cut out, doubled or cut off, with a fixed seed."""
+    rng, file = np.random.default_rng(0), tmp_path / "policy.safetensors"
+    shipped = {one: SHIPPED.with_suffix(one).read_bytes() for one in (".json", ".safetensors")}
+    refused = 0
+    for _ in range(N_DAMAGED):
+        for one, data in shipped.items():
+            file.with_suffix(one).write_bytes(data)
+        if suffix in shipped:
+            file.with_suffix(suffix).write_bytes(damaged(shipped[suffix], rng))
+        else:
+            rewrite(file, damaged(shipped[".safetensors"], rng, n_first=1000))  # its header, too
+        try:
+            loaded = load(file)
+        except ValueError as refusal:
+            text = str(refusal)
+            assert text.startswith(str(file)) and text.endswith(".") and "\n" not in text, text
+            refused += 1
+        else:
+            assert loaded.predict(np.zeros(186, np.float32), deterministic=True)[0] in range(21)
+    assert refused > N_DAMAGED // 4
+
+
+def damaged(data: bytes, rng: np.random.Generator, n_first: int | None = None) -> bytes:
+    """The bytes with a few changes, half of them among the first ones."""
+    out = bytearray(data)
+    for _ in range(rng.integers(1, 4)):
+        end = len(out) if n_first is None or rng.random() < 0.5 else n_first
+        place = int(rng.integers(max(1, min(end, len(out)))))
+        match rng.integers(5):
+            case 0:
+                out[place] ^= 1 << int(rng.integers(8))
+            case 1:
+                out[place] = int(rng.integers(256))
+            case 2:
+                del out[place : place + int(rng.integers(1, 20))]
+            case 3:
+                out[place:place] = out[place : place + int(rng.integers(1, 20))]
+            case 4 if rng.random() < 0.3:
+                del out[place:]
+    return bytes(out) or b"\0"
 
 
 # --- in an environment -----------------------------------------------------------------------------------------------

@@ -1,6 +1,8 @@
 """A saved policy is all it takes to swim on, or to learn on; what is no such policy is refused with a sentence."""
 
 import json
+import os
+import pickle
 import random
 import zipfile
 from dataclasses import replace
@@ -8,7 +10,9 @@ from dataclasses import replace
 import gymnasium as gym
 import numpy as np
 import pytest
+import safetensors.torch
 import torch
+from stable_baselines3 import PPO
 from stable_baselines3.common.evaluation import evaluate_policy
 
 from agents import ppo
@@ -58,10 +62,11 @@ def file(learner, tmp_path):
 @pytest.mark.parametrize(
     "change, sentence",
     [
-        ({"num_envs": 0}, "num_envs must be at least 1, not 0"),
+        ({"num_envs": 0}, "num_envs must be a whole number from 1"),
         ({"batch_size": 7}, "batch_size must divide the 64 strokes"),
         ({"discount": 1.0}, r"discount must be in \[0, 1\)"),
-        ({"learning_rate": float("nan")}, "learning_rate and clip_range must be positive"),
+        ({"learning_rate": float("nan")}, "learning_rate must be a finite number"),
+        ({"clip_range": 0.0}, "learning_rate and clip_range must be positive"),
         ({"entropy": -0.1}, "entropy not negative"),
         ({"hidden": ()}, "hidden must be widths"),
     ],
@@ -140,12 +145,35 @@ def test_the_learner_and_its_policy_score_the_same(learner):
 
 
 def test_loading_unpickles_nothing(file, tmp_path):
-    """Stable-Baselines3's pickles are not even looked at."""
+    """Stable-Baselines3's pickles are not even looked at, neither to swim nor to learn on."""
     without = tmp_path / "without.zip"
     with zipfile.ZipFile(file) as old, zipfile.ZipFile(without, "w") as new:
-        for name in (ppo.DESCRIPTION, ppo.WEIGHTS):
+        for name in (ppo.DESCRIPTION, ppo.LEARNER, ppo.FACTS):
             new.writestr(name, old.read(name))
+        for name in set(old.namelist()) - set(new.namelist()):
+            new.writestr(name, pickle.dumps(Bomb(tmp_path / "exploded")))
     assert load(without).actions == ppo.Hyperparameters().actions
+    assert resume(without, make_learner().get_env()).num_timesteps == 3 * 64
+    assert not (tmp_path / "exploded").exists()
+    with zipfile.ZipFile(without) as archive:
+        pickle.loads(archive.read("data"))
+    assert (tmp_path / "exploded").exists()
+
+
+class Bomb:
+    """Whoever unpickles it makes a folder."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def __reduce__(self):
+        return os.mkdir, (self.folder,)
+
+
+def test_stable_baselines_reads_the_file_as_its_own(learner, file):
+    theirs = PPO.load(file)
+    for name, tensor in learner.policy.state_dict().items():
+        assert torch.equal(tensor, theirs.policy.state_dict()[name])
 
 
 # --- saving ----------------------------------------------------------------------------------------------------------
@@ -160,7 +188,7 @@ def test_saving_replaces_the_file_in_one_go(learner, file, monkeypatch):
         raise OSError("the disk is gone")
 
     with monkeypatch.context() as broken:
-        broken.setattr(ppo.os, "replace", fail)
+        broken.setattr(os, "replace", fail)
         with pytest.raises(OSError, match="the disk is gone"):
             save(learner, file)
     assert file.read_bytes() == before
@@ -221,22 +249,25 @@ def test_a_cut_file_is_said_to_be_damaged(file, keep):
 def test_a_flipped_bit_is_found(file):
     data = bytearray(file.read_bytes())
     with zipfile.ZipFile(file) as archive:
-        data[archive.getinfo(ppo.WEIGHTS).header_offset + 5000] ^= 1
+        data[archive.getinfo(ppo.LEARNER).header_offset + 5000] ^= 1
     file.write_bytes(bytes(data))
     with pytest.raises(ValueError, match=r"is damaged.*Bad CRC-32"):
         load(file)
+
+
+NO_LIMBS = Scene().to_dict() | {"robot": Scene().to_dict()["robot"] | {"n_limbs": 0}}
 
 
 @pytest.mark.parametrize(
     "change, sentence",
     [
         ({"policy__json": None}, "no policy saved by this project: There is no item"),
-        ({"policy__pth": None}, "no policy saved by this project: There is no item"),
+        ({"learner__safetensors": None}, "no policy saved by this project: There is no item"),
         ({"observation_layout": 0}, "its observation_layout is 0, this version of seastar_gym knows 1"),
         ({"format": 99}, "its format is 99"),
         ({"actions": "waves"}, "actions must be one of"),
         ({"hidden": [16, 9]}, "does not fit"),
-        ({"scene": {"robot": {"n_limbs": 0}}}, "n_limbs must be a whole number from 1"),
+        ({"scene": NO_LIMBS}, "n_limbs must be a whole number from 1"),
         ({"scene": {"robot": {"n_arms": 5}}}, "does not fit"),
     ],
 )
@@ -247,13 +278,58 @@ def test_what_does_not_fit_is_said_in_one_sentence(file, change, sentence):
     assert_one_sentence(error, file)
 
 
+def with_learner(file, change):
+    """The file after a change of its learner's facts and tensors, in place."""
+    with zipfile.ZipFile(file) as archive:
+        entries = {name: archive.read(name) for name in archive.namelist()}
+    facts, tensors = json.loads(entries[ppo.FACTS]), safetensors.torch.load(entries[ppo.LEARNER])
+    change(facts, tensors)
+    entries |= {ppo.FACTS: json.dumps(facts).encode(), ppo.LEARNER: safetensors.torch.save(tensors)}
+    with zipfile.ZipFile(file, "w") as archive:
+        for name, data in entries.items():
+            archive.writestr(name, data)
+
+
+@pytest.mark.parametrize(
+    "change, sentence",
+    [
+        (lambda facts, tensors: facts.pop("seed"), "damaged.*: seed"),
+        (lambda facts, tensors: facts.update(format=2), "the learner's format is 2, this version knows 1"),
+        (lambda facts, tensors: facts.update(seed="x"), "seed must be a whole number"),
+        (lambda facts, tensors: facts.update(strokes=-1), "strokes must be a whole number"),
+        (lambda facts, tensors: facts.update(numpy=[10**6, 0, 0.0]), "position in numpy's generator must be a whole"),
+        (lambda facts, tensors: facts.update(episodes=[1]), "does not fit"),
+        (lambda facts, tensors: facts["settings"].update(rollout="many"), "does not fit"),
+        (lambda facts, tensors: facts["settings"].update(patience=3), "does not fit"),
+        (lambda facts, tensors: tensors.pop("network.value_net.bias"), "Missing key"),
+        (lambda facts, tensors: tensors.pop("generator.torch"), "damaged.*: torch"),
+        (lambda facts, tensors: tensors.update({"optimiser.0.exp_avg": torch.zeros(3)}), "its optimiser has 0.exp_avg"),
+        (lambda facts, tensors: tensors.update({"optimiser.99.exp_avg": torch.zeros(3)}), "does not fit"),
+        (lambda facts, tensors: tensors.update({"generator.numpy": torch.zeros(3)}), "does not fit"),
+        (lambda facts, tensors: tensors.update({"generator.torch": torch.zeros(3)}), "does not fit"),
+    ],
+)
+def test_a_learner_that_does_not_fit_is_refused_in_one_sentence(file, change, sentence):
+    with_learner(file, change)
+    with pytest.raises(ValueError, match=sentence) as error:
+        resume(file, make_learner().get_env())
+    assert_one_sentence(error, file)
+
+
+@pytest.mark.parametrize("device, sentence", [("cuda", "no CUDA device"), ("tpu", "device must be"), (3, "not 3")])
+def test_a_device_that_is_not_there_is_refused(device, sentence, monkeypatch):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    with pytest.raises(ValueError, match=sentence):
+        make_model(make_learner().get_env(), SMALL, seed=0, device=device)
+
+
 # --- learning on -----------------------------------------------------------------------------------------------------
 
 
 def numbers_of(learner):
     """Every number that the learner's future depends on, besides the environment's."""
     optimiser = learner.policy.optimizer.state_dict()["state"]
-    moments = [moment for state in optimiser.values() for moment in state.values()]
+    moments = [optimiser[index][name] for index in sorted(optimiser) for name in sorted(optimiser[index])]
     return [number.detach().numpy() for number in [*learner.policy.state_dict().values(), *moments]]
 
 
@@ -273,9 +349,17 @@ def test_a_resumed_learner_is_where_it_was(tmp_path):
         np.testing.assert_array_equal(number, its_number)
     for name in ("n_steps", "batch_size", "n_epochs", "gamma", "gae_lambda", "ent_coef"):
         assert getattr(resumed, name) == getattr(learner, name)
+    assert resumed._n_updates == learner._n_updates > 0
+    assert list(resumed.ep_info_buffer) == list(learner.ep_info_buffer) != []
     resumed.learn(64, reset_num_timesteps=False)
     assert resumed.num_timesteps == 192
     assert resumed.lr_schedule(1.0) == SMALL.learning_rate
+
+
+def test_learning_on_from_one_file_ends_at_the_same_numbers(file):
+    first, second = (resume(file, make_learner().get_env()).learn(64, reset_num_timesteps=False) for _ in range(2))
+    for number, same in zip(numbers_of(first), numbers_of(second), strict=True):
+        np.testing.assert_array_equal(number, same)
 
 
 def test_a_resumed_learner_meets_new_paths(file):

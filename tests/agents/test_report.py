@@ -15,6 +15,7 @@ from agents.report.page import MEASURED, Remarks, number, read_trials, table_htm
 from agents.report.playback import UNIT, RecordingEnv
 from agents.scripted import scripted
 from agents.swim import swim
+from refusals import assert_refused
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 
 MM = 1000.0
@@ -143,6 +144,11 @@ def test_trials_are_shown_with_their_confidence_intervals(tmp_path):
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")
     with pytest.raises(ValueError, match=r"other.csv is not what agents.trials writes"):
         read_trials(tmp_path / "other.csv")
+    for place, field, words in ((9, "x", "line 2: 'x' is no number"), (8, "9,9", "line 2: the line must have 17")):
+        wrong = [*row[:place], field, *row[place + 1 :]]
+        (tmp_path / "other.csv").write_text("\n".join(",".join(map(str, line)) for line in (header, wrong)) + "\n")
+        with assert_refused(words):
+            read_trials(tmp_path / "other.csv")
 
 
 # --- learning curves -------------------------------------------------------------------------------------------------
@@ -155,6 +161,16 @@ def test_a_curve_has_a_gap_where_the_pentagon_was_not_finished(tmp_path):
     np.testing.assert_array_equal(curve.pentagon, [np.nan, 200, 170])
     (trace,) = curves_figure([curve], {}).data
     assert list(trace.y) == [None, 200, 170]
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [("1000,400,3\n2000,2", "line 2: every line must have"), ("1,2,x\n", "'x' is no number"), ("1,2,.5\n", "be whole")],
+)
+def test_a_damaged_curve_is_refused_with_its_line(tmp_path, text, words):
+    (tmp_path / "progress.csv").write_text(text)
+    with assert_refused(str(tmp_path / "progress.csv"), words):
+        read_progress(tmp_path)
 
 
 def test_several_curves_have_their_median_and_range():

@@ -6,7 +6,7 @@ import pytest
 from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize, VecVideoRecorder
 
 from agents.scripted import scripted
 from agents.vec_env import BatchVecEnv
@@ -168,6 +168,44 @@ def test_normalisation_goes_on_top():
     for info, raw_info in zip(infos, raw_infos, strict=True):
         last, raw_last = info["terminal_observation"], raw_info["terminal_observation"]
         np.testing.assert_allclose(last, raw_last - 1.0, rtol=1e-5, atol=1e-6)
+
+
+def test_a_robots_own_attributes_are_its_own():
+    batch = make_batch(path="random")
+    batch.reset()
+    own = batch.env.unwrapped.waypoints
+    for found, expected in zip(batch.get_attr("waypoints", indices=[2, 0]), (own[2], own[0]), strict=True):
+        np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("symmetry", [False, True])
+def test_a_picture_of_the_batch_has_its_first_robots_side_by_side(symmetry):
+    pytest.importorskip("pygame")
+    batch = make_batch(symmetry, render_mode="rgb_array", num_envs=20)
+    batch.reset()
+    batch.step(np.zeros(20, int))
+    picture, tiles = batch.render(), batch.get_images()
+    assert len(tiles) == 16 and tiles[0].shape == (288, 384, 3)
+    assert picture.shape == (4 * 288, 4 * 384, 3)
+    np.testing.assert_array_equal(picture[:288, :384], tiles[0])
+
+
+def test_a_batch_that_draws_nothing_has_no_pictures():
+    assert make_batch().get_images() == [None] * N
+
+
+def test_stable_baselines_records_a_video(tmp_path):
+    pytest.importorskip("pygame")
+    pytest.importorskip("moviepy")
+    recorder = VecVideoRecorder(
+        make_batch(render_mode="rgb_array", num_envs=2), str(tmp_path), lambda step: step == 0, video_length=3
+    )
+    recorder.reset()
+    for _ in range(4):
+        recorder.step(np.ones(2, int))
+    recorder.close()
+    (video,) = tmp_path.glob("*.mp4")
+    assert video.stat().st_size > 1000 and recorder.frames_per_sec == 10
 
 
 def test_closing_closes_the_batch():

@@ -1,19 +1,28 @@
 """Machine code kept on disk is found again as long as nothing changed, and never once something did."""
 
+import contextlib
+import errno
+import io
 import os
+import pickle
 import shutil
 import subprocess
 import sys
 import threading
 import time
 from pathlib import Path
+from types import ModuleType
 
+import numba
 import numpy as np
 import pytest
+from numba.core import caching
 
 from seastar_gym import Numerics, Scene, Simulator
 from seastar_gym.simd import compilation
-from seastar_gym.simd.compilation import PACKAGE, kernel_sources, source_digest
+from seastar_gym.simd.compilation import PACKAGE, entry_point, kernel_sources, source_digest
+
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 
 ENERGY = """
 import numpy as np
@@ -94,6 +103,196 @@ def test_an_edited_entry_point_outside_the_package_does_not_run_from_the_cache_e
     assert copy.run("import mine; print(mine.number())") == [1.5]
     module.write_text(body.format(2.5), encoding="utf-8")
     assert copy.run("import mine; print(mine.number())") == [2.5]
+
+
+NUMBER = """
+from seastar_gym.simd.compilation import entry_point
+
+
+@entry_point
+def number(x):
+    return x + 1.5
+"""
+
+
+class Cached:
+    """A tiny entry point outside the package, with a cache of its own; every call as if in a new process."""
+
+    def __init__(self, folder: Path):
+        self.cache, self.module = folder / "cache", ModuleType("mine")
+        file = folder / "mine.py"
+        file.write_text(NUMBER, encoding="utf-8")
+        exec(compile(NUMBER, str(file), "exec"), self.module.__dict__)
+
+    def call(self, x: complex = 1.0) -> tuple[complex, int, int]:
+        """(result, cache hits, cache misses)."""
+        number = entry_point(self.module.number.py_func)
+        result = number(x)
+        return result, sum(number.stats.cache_hits.values()), sum(number.stats.cache_misses.values())
+
+    def file(self, suffix: str) -> Path:
+        """The only one."""
+        (found,) = self.cache.rglob(f"*{suffix}")
+        return found
+
+
+FOUND, COMPILED = (2.5, 1, 0), (2.5, 0, 1)
+
+
+@pytest.fixture
+def fresh(tmp_path, monkeypatch):
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "cache"))
+    return Cached(tmp_path)
+
+
+@pytest.fixture
+def cached(fresh):
+    assert [fresh.call(), fresh.call()] == [COMPILED, FOUND]
+    return fresh
+
+
+def flip(file: Path) -> None:
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 0x10
+    file.write_bytes(content)
+
+
+DAMAGE = {
+    "empty": lambda file: file.write_bytes(b""),
+    "cut off": lambda file: file.write_bytes(file.read_bytes()[: file.stat().st_size // 2]),
+    "one byte short": lambda file: file.write_bytes(file.read_bytes()[:-1]),
+    "one bit": flip,
+    "zeros": lambda file: file.write_bytes(bytes(file.stat().st_size)),
+    "garbage": lambda file: file.write_bytes(np.random.default_rng(0).bytes(5000)),
+    "text": lambda file: file.write_text("No space left on device\n", encoding="utf-8"),
+    "another pickle": lambda file: file.write_bytes(pickle.dumps(["something", "else"])),
+    "missing": Path.unlink,
+}
+
+
+@pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
+@pytest.mark.parametrize("damage", DAMAGE.values(), ids=DAMAGE)
+def test_a_damaged_file_is_compiled_anew_and_then_found_again(cached, suffix, damage):
+    damage(cached.file(suffix))
+    assert [cached.call(), cached.call()] == [COMPILED, FOUND]
+
+
+@pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
+def test_a_folder_in_the_place_of_a_file_does_no_harm(cached, suffix):
+    file = cached.file(suffix)
+    file.unlink()
+    file.mkdir()
+    assert cached.call() == COMPILED
+
+
+def test_code_in_the_file_of_another_signature_never_runs(cached):
+    """As where an index was lost, and made anew with the same file for another signature."""
+    of_floats = cached.file(".nbc").read_bytes()
+    cached.file(".nbi").unlink()
+    assert cached.call(3) == (4.5, 0, 1)
+    cached.file(".nbc").write_bytes(of_floats)
+    assert cached.call(3) == (4.5, 0, 1)
+
+
+class FullDisk(io.FileIO):
+    """Takes a hundred bytes."""
+
+    def write(self, data):
+        super().write(bytes(data)[:100])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_on_a_full_disk_kernels_are_compiled_and_what_is_there_is_found(fresh, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(caching, "open", lambda file, mode: FullDisk(file, "w"), raising=False)
+        assert [fresh.call(), fresh.call()] == [COMPILED, COMPILED]
+        assert not [file for file in fresh.cache.rglob("*") if file.is_file()]
+    assert fresh.call() == COMPILED
+    monkeypatch.setattr(caching, "open", lambda file, mode: FullDisk(file, "w"), raising=False)
+    assert fresh.call() == FOUND
+    assert fresh.call(3) == (4.5, 0, 1)
+
+
+@pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
+def test_files_that_may_not_be_read_or_written_do_no_harm(cached, monkeypatch, suffix):
+    """A folder that has become read-only, or another user's; to root nothing is, so it is only said to be."""
+
+    whole = Path.read_bytes
+
+    def forbidden(file: Path, *_):
+        if str(file).endswith(suffix) or ".tmp." in str(file):
+            raise PermissionError(errno.EACCES, "Permission denied")
+        return whole(file)
+
+    monkeypatch.setattr(Path, "read_bytes", forbidden)
+    monkeypatch.setattr(caching, "open", forbidden, raising=False)
+    assert [cached.call(), cached.call()] == [COMPILED, COMPILED]
+
+
+def test_a_folder_that_is_lost_within_a_process_does_no_harm(fresh):
+    number = entry_point(fresh.module.number.py_func)
+    shutil.rmtree(fresh.cache)
+    fresh.cache.write_text("a file where the folder was", encoding="utf-8")
+    assert number(1.0) == 2.5
+
+
+def test_a_real_kernel_whose_files_are_damaged_gives_the_same_bits(copy):
+    energy, *_ = copy.run()
+    for damage in ("cut off", "garbage"):
+        for file in copy.cache.rglob("*energies*"):
+            DAMAGE[damage](file)
+        assert copy.run() == [energy, 0, 1]
+        assert copy.run() == [energy, 1, 0]
+
+
+# Whoever waits is told
+
+NUMBERS = """
+import sys
+import numba
+numba.config.CACHE_DIR = sys.argv[1]
+sys.path.insert(0, sys.argv[2])
+from mine import number
+number(1.0), number(3), number(1j)
+"""
+
+
+def said_at_a_terminal(arguments: list[str], environment: dict[str, str]) -> str:
+    """Everything that a process writes to its standard error, which is a terminal."""
+    import pty
+
+    parent, child = pty.openpty()
+    subprocess.run([sys.executable, *arguments], env=environment, stderr=child, check=True)
+    os.close(child)
+    said = b""
+    with contextlib.suppress(OSError):  # all is read
+        while chunk := os.read(parent, 1000):
+            said += chunk
+    os.close(parent)
+    return said.decode()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs a pseudo-terminal")
+def test_the_first_compilation_says_so_once_and_at_a_terminal_only(tmp_path):
+    (tmp_path / "mine.py").write_text(NUMBER, encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(PACKAGE.parent)}
+    arguments = ["-c", NUMBERS, str(tmp_path / "cache"), str(tmp_path)]
+    said = said_at_a_terminal(arguments, environment)
+    assert said.count("\n") == 1 and "compiling" in said and "15 s" in said
+    assert said_at_a_terminal(arguments, environment) == ""
+    elsewhere = ["-c", NUMBERS, str(tmp_path / "other"), str(tmp_path)]
+    answer = subprocess.run([sys.executable, *elsewhere], env=environment, capture_output=True, check=True)
+    assert answer.stderr == b""
+
+
+def test_the_sentence_needs_no_standard_error(fresh, monkeypatch):
+    """As under pythonw."""
+    compilation._say_that_it_compiles.cache_clear()
+    monkeypatch.setattr(sys, "stderr", None)
+    assert fresh.call() == COMPILED
+
+
+# The digest
 
 
 def test_digest_covers_every_file_that_defines_kernels():

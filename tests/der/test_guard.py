@@ -1,4 +1,5 @@
-"""The guard's parts: energies are the oracle's, cuts keep the momenta, hinges that go through their poles are seen."""
+"""The guard's parts: energies and work are the oracle's, seen from any frame; cuts keep the momenta; hinges that go
+through their poles are seen."""
 
 from types import SimpleNamespace
 
@@ -8,9 +9,10 @@ import pytest
 
 import oracle
 from oracle import Star
-from seastar_gym import Scene, Seastar, SmaPulse
-from seastar_gym.der.rods import Actuation, aligned_rows, make_work
+from seastar_gym import Scene, Seastar, SmaPulse, Vortex, Water
+from seastar_gym.der.rods import Actuation, Rods, aligned_rows, make_work
 from seastar_gym.der.stepping.guard import (
+    add_work_of_loads,
     allowed_energy,
     hold_to_energy,
     put_back,
@@ -19,6 +21,7 @@ from seastar_gym.der.stepping.guard import (
     through_poles,
 )
 from seastar_gym.der.stepping.schemes import SCHEMES
+from seastar_gym.der.terms.fluid import add_work_of_current, freeze_fluid
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES, borrow, load, select, splat, store
 
@@ -26,25 +29,55 @@ STAR = Star()
 RODS = make_rods(Scene(actuator=SmaPulse(0.5)))
 
 
+def circling(places: np.ndarray) -> np.ndarray:
+    """A vortex of 0.4 m^2/s about (0.1, 0.2) m with a core of 60 mm, from its definition."""
+    x, y = (places - [0.1, 0.2]).T
+    return 0.4 / (2.0 * np.pi) * np.stack([-y, x], axis=1) / (x**2 + y**2 + 0.06**2)[:, None]
+
+
+STREAM = Star(tangential_drag_coefficient=0.2, added_mass_coefficient=0.7, current=circling)
+PULL = np.random.default_rng(5).standard_normal((STAR.n_nodes, 2))
+STREAM_RODS = make_rods(Scene(
+    fluid=Water(tangential_drag_coefficient=0.2, added_mass_coefficient=0.7, current=Vortex(0.4, 0.1, 0.2, 0.06)),
+    actuator=SmaPulse(0.5),
+    loads=tuple((node, *force) for node, force in enumerate(PULL.tolist())),
+))
+FRAME = np.random.default_rng(6).uniform(-1.0, 1.0, (2, N_LANES))
+"""Velocity that every lane is seen from [m/s]."""
+
+
 @numba.njit(error_model="numpy")
-def allowed(rods, work, scheme, actuation, q, v, result):
+def allowed(rods, work, scheme, actuation, q, v, frame, result):
     rows, memory, tableau, rotation = borrow(rods), borrow(work), borrow(scheme), borrow(actuation)
     start, end = splat(0.25), splat(0.75)
-    store(borrow(result), 0, allowed_energy(rows, memory, tableau, rotation, start, end, borrow(q), borrow(v)))
+    seen_from = (load(borrow(frame), 0), load(borrow(frame), 1))
+    q_rows, v_rows = borrow(q), borrow(v)
+    store(borrow(result), 0, allowed_energy(rows, memory, tableau, rotation, start, end, q_rows, v_rows, seen_from))
 
 
 @numba.njit(error_model="numpy")
-def hold(rods, work, scheme, q, v, robots, limit, largest_cut, result):
+def hold(rods, work, scheme, q, v, frame, robots, limit, largest_cut, result):
     rows, memory, tableau = borrow(rods), borrow(work), borrow(scheme)
     out, one = borrow(result), splat(1.0)
     mask = load(borrow(robots), 0) > 0.0
     q_rows, v_rows = borrow(q), borrow(v)
-    store(out, 0, rigid_motion(rows, q_rows, v_rows)[6])
+    seen_from, h = (load(borrow(frame), 0), load(borrow(frame), 1)), splat(0.01)
+    store(out, 0, rigid_motion(rows, memory, q_rows, v_rows, seen_from)[6])
     refused, cut = hold_to_energy(
-        rows, memory, tableau, q_rows, v_rows, splat(0.01), mask, load(borrow(limit), 0), splat(largest_cut)
+        rows, memory, tableau, q_rows, v_rows, h, seen_from, mask, load(borrow(limit), 0), splat(largest_cut)
     )
     store(out, 1, select(refused, one, 0.0))
     store(out, 2, select(cut, one, 0.0))
+
+
+@numba.njit(error_model="numpy")
+def worked(rods, work, q, v, frame, result):
+    """Work of the current, then of loads, in a step of 10 ms to (q, v); the fluid is frozen at work.q."""
+    rows, memory, out, h = borrow(rods), borrow(work), borrow(result), splat(0.01)
+    seen_from = (load(borrow(frame), 0), load(borrow(frame), 1))
+    freeze_fluid(rows, memory)
+    store(out, 0, add_work_of_current(rows.current, rows, memory, borrow(v), h, seen_from, splat(0.0)))
+    store(out, 1, add_work_of_loads(rows.load, rows, memory, borrow(q), h, seen_from, splat(0.0)))
 
 
 @numba.njit(error_model="numpy")
@@ -79,9 +112,9 @@ def moving_robots(seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     return q, 0.2 * rng.standard_normal(shape) + [0.5, -0.2] + 2.0 * (q - 0.3) @ [[0.0, 1.0], [-1.0, 0.0]]
 
 
-def work_at(delta_psi: np.ndarray, scheme: str = "implicit-euler"):
+def work_at(delta_psi: np.ndarray, scheme: str = "implicit-euler", rods: Rods = RODS):
     """Memory with the natural hub angles of these rotations [rad], shape (N_LANES, 5)."""
-    work = make_work(RODS, SCHEMES[scheme].n_stages)
+    work = make_work(rods, SCHEMES[scheme].n_stages)
     natural = np.array([oracle.natural_angles(STAR, one)[-5:] for one in delta_psi])
     work.hub_EI_kappa_bar[:] = STAR.EI * 2.0 * np.tan(natural.T / 2.0) / STAR.edge_length
     return work
@@ -102,59 +135,104 @@ def test_allowed_energy_is_that_of_the_robot_standing_still_while_its_actuators_
     begin, end = np.random.default_rng(1).uniform(-0.4, 0.4, (2, N_LANES, 5))
     result = np.zeros((1, N_LANES))
     tableau, actuation = SCHEMES[scheme], Actuation(begin.T.copy(), end.T.copy())
-    allowed(RODS, make_work(RODS, tableau.n_stages), tableau, actuation, rows_of(q), rows_of(v), result)
+    allowed(RODS, make_work(RODS, tableau.n_stages), tableau, actuation, rows_of(q), rows_of(v), FRAME, result)
     for lane in range(N_LANES):
         first, last = (begin[lane] + share * (end[lane] - begin[lane]) for share in (0.25, 0.75))
         at_start, at_end = (oracle.elastic_energy(STAR, q[lane], one) for one in (first, last))
         kappa = [2.0 * np.tan(oracle.natural_angles(STAR, one)[-5:] / 2.0) / STAR.edge_length for one in (first, last)]
         moved = 0.5 * STAR.EI * STAR.edge_length * np.sum((kappa[1] - kappa[0]) ** 2)
         expected = at_end if tableau.dissipative else max(at_start, at_end) + moved
-        assert result[0, lane] == pytest.approx(expected + oracle.kinetic_energy(STAR, v[lane]), rel=1e-12)
+        seen = v[lane] - FRAME[:, lane]
+        assert result[0, lane] == pytest.approx(expected + oracle.kinetic_energy(STAR, seen), rel=1e-12)
 
 
-def held(share: float, largest_cut: float = 0.01, robots: np.ndarray | None = None) -> SimpleNamespace:
-    """Robots held to their potential energy, that of their rigid motion, and `share` of the rest."""
+def test_work_of_currents_and_loads_is_force_times_way_as_the_frame_sees_it():
+    """Drag and the current are those where the stage began; the load's way is that of its node."""
+    h, (q, v), (begin, _) = 0.01, moving_robots(), moving_robots(seed=2)
+    work, result = make_work(STREAM_RODS, 1), np.zeros((2, N_LANES))
+    work.q[:], work.step[:] = rows_of(begin), rows_of(begin)
+    worked(STREAM_RODS, work, rows_of(q), rows_of(v), FRAME, result)
+    for lane in range(N_LANES):
+        drag, fluid = oracle.drag_force(STREAM, v[lane], begin[lane]), circling(begin[lane]) - FRAME[:, lane]
+        assert result[0, lane] == pytest.approx(h * np.sum(drag * fluid), rel=1e-12)
+        way = q[lane] - begin[lane] - h * FRAME[:, lane]
+        assert result[1, lane] == pytest.approx(np.sum(PULL * way), rel=1e-12)
+
+
+def inertia(star: Star, lane_q: np.ndarray) -> np.ndarray:
+    """Mass matrix of robot and fluid carried along, shape (n_nodes, 2, n_nodes, 2)."""
+    return oracle.mass_matrix(star, lane_q).reshape(star.n_nodes, 2, star.n_nodes, 2)
+
+
+def held(
+    share: float, largest_cut: float = 0.01, robots: np.ndarray | None = None, star: Star = STAR
+) -> SimpleNamespace:
+    """Robots held to their potential energy, that of their rigid motion, and `share` of the rest, all seen from FRAME."""
     q, v = moving_robots()
-    rows, work, result = (rows_of(q), rows_of(v)), work_at(np.zeros((N_LANES, 5))), np.zeros((3, N_LANES))
+    rods = RODS if star is STAR else STREAM_RODS
+    rows, work, result = (rows_of(q), rows_of(v)), work_at(np.zeros((N_LANES, 5)), rods=rods), np.zeros((3, N_LANES))
+    work.q[:] = rows[0]
+    if star is not STAR:
+        worked(rods, work, *rows, FRAME, np.zeros((2, N_LANES)))
     chosen, limit = np.ones((1, N_LANES)) if robots is None else robots[None], np.full((1, N_LANES), 1e9)
     hold(
-        RODS, work, SCHEMES["implicit-midpoint"], *rows, chosen, limit, largest_cut, result
+        rods, work, SCHEMES["implicit-midpoint"], *rows, FRAME, chosen, limit, largest_cut, result
     )  # high above: says the rigid energy, changes nothing
     assert not result[1:].any()
     np.testing.assert_array_equal(nodes_of(rows[1]), v)
-    rigid, kinetic = result[0].copy(), np.array([oracle.kinetic_energy(STAR, one) for one in v])
+
+    def kinetic_energies(velocities: np.ndarray) -> np.ndarray:
+        seen = velocities - FRAME.T[:, None]
+        return np.array(
+            [0.5 * np.einsum("nd,ndme,me", one, inertia(star, at), one) for at, one in zip(q, seen, strict=True)]
+        )
+
+    rigid, kinetic = result[0].copy(), kinetic_energies(v)
     potential = np.array([oracle.elastic_energy(STAR, one, np.zeros(5)) for one in q])
     limit[0] = potential + rigid + share * (kinetic - rigid)
-    hold(RODS, work, SCHEMES["implicit-midpoint"], *rows, chosen, limit, largest_cut, result)
+    hold(rods, work, SCHEMES["implicit-midpoint"], *rows, FRAME, chosen, limit, largest_cut, result)
     np.testing.assert_array_equal(nodes_of(rows[0]), q)
     after = nodes_of(rows[1])
     return SimpleNamespace(
         q=q, v=v, after=after, rigid=rigid, refused=result[1] > 0.0, cut=result[2] > 0.0,
-        allowed=limit[0] - potential, kinetic=np.array([oracle.kinetic_energy(STAR, one) for one in after]),
+        allowed=limit[0] - potential, kinetic=kinetic_energies(after),
     )  # fmt: skip
 
 
-def test_rigid_motion_has_the_least_energy_with_the_same_momenta():
-    found = held(0.995)
+def rigid_motions(q: np.ndarray) -> np.ndarray:
+    """Along x, along y, and about the centre of mass, shape (3, n_nodes, 2)."""
+    r = q - STAR.masses @ q / STAR.masses.sum()
+    motions = np.zeros((3, *q.shape))
+    motions[0, :, 0], motions[1, :, 1], motions[2] = 1.0, 1.0, np.stack([-r[:, 1], r[:, 0]], axis=1)
+    return motions
+
+
+STARS = pytest.mark.parametrize("star", [STAR, STREAM], ids=["alone", "with added mass"])
+
+
+@STARS
+def test_rigid_motion_has_the_least_energy_with_the_same_momenta(star):
+    found = held(0.995, star=star)
     for lane in range(N_LANES):
-        q, v = found.q[lane], found.v[lane]
-        r = q - STAR.masses @ q / STAR.masses.sum()
-        motions = np.zeros((3, *q.shape))
-        motions[0, :, 0], motions[1, :, 1], motions[2] = 1.0, 1.0, np.stack([-r[:, 1], r[:, 0]], axis=1)
-        inner = np.einsum("and,n,bnd->ab", motions, STAR.masses, motions)
-        projected = np.linalg.solve(inner, np.einsum("and,n,nd->a", motions, STAR.masses, v))
+        q, v = found.q[lane], found.v[lane] - FRAME[:, lane]
+        motions, masses = rigid_motions(q), inertia(star, q)
+        inner = np.einsum("and,ndme,bme->ab", motions, masses, motions)
+        projected = np.linalg.solve(inner, np.einsum("and,ndme,me->a", motions, masses, v))
         assert found.rigid[lane] == pytest.approx(0.5 * projected @ inner @ projected, rel=1e-12)
 
 
 # Cuts and refusals
 
 
-def test_a_small_excess_of_energy_is_cut_and_the_momenta_stay():
-    found = held(0.995)
+@STARS
+def test_a_small_excess_of_energy_is_cut_and_the_momenta_stay(star):
+    """Those of the robot and of fluid that moves along."""
+    found = held(0.995, star=star)
     assert found.cut.all() and not found.refused.any()
     np.testing.assert_allclose(found.kinetic, found.allowed, rtol=1e-9)
-    before, after = momenta(found.q, found.v), momenta(found.q, found.after)
-    np.testing.assert_allclose(after, before, rtol=1e-13)
+    for q, v, cut in zip(found.q, found.v, found.after, strict=True):
+        carried = np.einsum("and,ndme->ame", rigid_motions(q), inertia(star, q)).reshape(3, -1)
+        np.testing.assert_allclose(carried @ cut.ravel(), carried @ v.ravel(), rtol=1e-12)
     assert np.abs(found.after - found.v).max() > 1e-4
 
 

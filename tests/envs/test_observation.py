@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse
-from seastar_gym.envs.observation import VELOCITY_SCALE, observation_size, observe, to_float32
+from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, ThermalSma
+from seastar_gym.envs.observation import VELOCITY_SCALE, layout, observation_size, observe, scene_layout, to_float32
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import to_rows
@@ -41,6 +41,28 @@ def expected_observation(robot: Seastar, q: np.ndarray, v: np.ndarray, waypoint,
 def test_scale_and_size_are_the_documented_ones():
     assert VELOCITY_SCALE == 0.025
     assert observation_size(46) == 186
+
+
+@pytest.mark.parametrize("n_nodes, n_remembered", [(46, 0), (46, 20), (10, 3)])
+def test_a_layout_names_every_place_once_and_in_the_order_of_the_table(n_nodes, n_remembered):
+    at = layout(n_nodes, n_remembered)
+    places = np.arange(at.size)
+    np.testing.assert_array_equal(np.concatenate([places[place] for place in at]), places)
+    assert [len(places[place]) for place in at] == [2 * (n_nodes - 1)] * 2 + [2, n_remembered, 2, 2]
+    np.testing.assert_array_equal(places[at.waypoints], places[-4:])
+    np.testing.assert_array_equal(places[at.nodes_and_hub], places[: 4 * (n_nodes - 1) + 2])
+
+
+def test_the_layout_of_a_scene_finds_what_its_actuators_remember():
+    scene = Scene(actuator=ThermalSma(), numerics=Numerics.preset("fast"))
+    env, plain = SeastarSwimEnv(scene=scene), SeastarSwimEnv(fidelity="fast")
+    env.reset(seed=0)
+    seen, at = env.step([0, 1, 0, 0, 2])[0], scene_layout(scene)
+    np.testing.assert_allclose(seen[at.actuators], env.simulator.observe_actuators()[0], rtol=1e-6)
+    assert np.any(seen[at.actuators])
+    first, bare = plain.reset(seed=0)[0], scene_layout(plain.scene)
+    np.testing.assert_array_equal(env.reset(seed=0)[0][at.waypoints], first[bare.waypoints])
+    assert env.observation_space.shape == (at.size,) and plain.observation_space.shape == (bare.size,)
 
 
 @pytest.mark.parametrize("scene", SCENES)

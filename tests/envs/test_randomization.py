@@ -25,7 +25,7 @@ DRAWS = DomainRandomization(
         "robot.limb_length": Uniform(0.08, 0.12),
         "fluid.drag_coefficient": Normal(1.0, 0.1),
         "actuator.peak_angle": Uniform(0.4, 0.6),
-        "limb_strength": Uniform(0.5, 1.0),
+        "limb_strengths": Uniform(0.5, 1.0),
     }
 )
 
@@ -58,7 +58,7 @@ def test_a_robot_is_drawn_alone_as_in_a_batch_and_swims_as_the_robot_that_was_dr
     for robot, env in enumerate(alone):
         observation, _, _, _, own = env.step(action)
         np.testing.assert_array_equal(observations[robot], observation)
-        np.testing.assert_array_equal(info["limb_strength"][robot], own["limb_strength"])
+        np.testing.assert_array_equal(info["limb_strengths"][robot], own["limb_strengths"])
         modulus, drag = own["robot.youngs_modulus"], own["fluid.drag_coefficient"]
         robot = Seastar(youngs_modulus=modulus, limb_length=own["robot.limb_length"])
         pulse = SmaPulse(own["actuator.peak_angle"])
@@ -68,7 +68,7 @@ def test_a_robot_is_drawn_alone_as_in_a_batch_and_swims_as_the_robot_that_was_dr
         plain.reset()
         command = np.array([0.0, 1.0, -1.0, 0.0, 1.0])
         env.simulator.stroke(command[None])
-        plain.simulator.stroke(own["limb_strength"] * command[None])
+        plain.simulator.stroke(own["limb_strengths"] * command[None])
         np.testing.assert_array_equal(env.simulator.positions, plain.simulator.positions)
 
 
@@ -98,9 +98,9 @@ def test_every_episode_is_another_robot_and_every_seed_the_same_one():
 
 
 def test_a_limb_that_has_failed_does_not_move():
-    env = SeastarSwimEnv(fidelity="fast", randomization=DomainRandomization({"limb_strength": Uniform(0.0, 0.0)}))
+    env = SeastarSwimEnv(fidelity="fast", randomization=DomainRandomization({"limb_strengths": Uniform(0.0, 0.0)}))
     _, info = env.reset(seed=0)
-    np.testing.assert_array_equal(info["limb_strength"], np.zeros(5))
+    np.testing.assert_array_equal(info["limb_strengths"], np.zeros(5))
     *_, info = env.step(np.ones(5, int))
     assert np.abs(info["hub_position"]).max() < 1e-12 and info["limbs_heated"] == 5
 
@@ -110,11 +110,18 @@ def test_a_limb_that_has_failed_does_not_move():
     [
         (lambda: Uniform(1.0, 0.0), ("low", "high")),
         (lambda: Uniform(0.0, np.inf), ("high", "finite")),
+        (lambda: Uniform(-1.7e308, 1.7e308), ("high - low", "finite")),
+        (lambda: Uniform("0", 1.0), ("low", "finite number")),
+        (lambda: Uniform(np.array([0.0, 1.0]), 1.0), ("low", "finite number")),
+        (lambda: Normal(np.nan, 1.0), ("mean", "finite")),
+        (lambda: Normal(1.0, True), ("deviation",)),
         (lambda: LogUniform(0.0, 1.0), ("low", "positive")),
         (lambda: Normal(0.0, -1.0), ("deviation",)),
         (lambda: DomainRandomization({}), ("distributions",)),
         (lambda: DomainRandomization({"robot.density": 3.0}), ("robot.density", "Uniform")),
-        (lambda: DomainRandomization({"limb_strength": Uniform(0.5, 1.5)}), ("limb_strength", "0 to 1")),
+        (lambda: env_with("limb_strength", 0.5, 1.0), ("'limb_strength'", "limb_strengths")),
+        (lambda: env_with(3, 0.5, 1.0), ("3", "limb_strengths")),
+        (lambda: DomainRandomization({"limb_strengths": Uniform(0.5, 1.5)}), ("limb_strengths", "0 to 1")),
         (lambda: SeastarSwimEnv(randomization="all"), ("DomainRandomization", "'all'")),
         (lambda: env_with("robot.n_limbs", 3, 5), ("robot.n_limbs", "robot.density")),
         (lambda: env_with("robot.limb_length", -0.1, 0.2), ("limb_length", "positive")),
@@ -146,10 +153,10 @@ def test_drawn_strengths_weaken_what_limbs_turn_and_not_what_actuators_are_told(
     """A wire with heat is as warm in a weak limb; what the scene weakens already is weakened further."""
     weak = (1.0, 0.5, 1.0, 1.0, 1.0)
     scene = Scene(actuator=ThermalSma(), numerics=Numerics.preset("fast"), limb_strengths=weak)
-    env = SeastarSwimEnv(scene=scene, randomization=DomainRandomization({"limb_strength": Uniform(0.2, 0.9)}))
+    env = SeastarSwimEnv(scene=scene, randomization=DomainRandomization({"limb_strengths": Uniform(0.2, 0.9)}))
     _, info = env.reset(seed=3)
     simulator = env.unwrapped.simulator
-    np.testing.assert_allclose(simulator.limb_strengths, info["limb_strength"][None] * weak, rtol=1e-15)
+    np.testing.assert_allclose(simulator.limb_strengths, info["limb_strengths"][None] * weak, rtol=1e-15)
     plain = SeastarSwimEnv(scene=scene)
     plain.reset(seed=3)
     for one in (env, plain):

@@ -36,7 +36,7 @@ def frame_of(hub=(0.0, 0.0), command=(0, 0, 0, 0, 0), trail=((0.0, 0.0),), waypo
 
 
 def renderer_of(path="pentagon", size=(480, 360)):
-    waypoints = make_path(path, np.random.default_rng(0))
+    waypoints = make_path(path, np.random.default_rng(0)) if isinstance(path, str) else np.array(path)
     return Renderer(LIMB_NODES, waypoints, limb_length=0.1, rod_radius=1.6e-3, waypoint_radius=0.01, size=size)
 
 

@@ -4,6 +4,7 @@ import copy
 import math
 import pickle
 import warnings
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
@@ -11,9 +12,11 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import seastar_gym
-from seastar_gym import Numerics, RewardWeights, Scene, Seastar, SmaPulse, SolverStatus
+from refusals import assert_refused
+from seastar_gym import DomainRandomization, Numerics, RewardWeights, Scene, Seastar, SmaPulse, SolverStatus, Uniform
 from seastar_gym.envs.paths import AIM, PATH_NAMES, cross_track_error, shortest_way
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.fidelity import promise
 
 STRAIGHT = np.array([0, 1, 0, 0, 2])
@@ -22,8 +25,8 @@ FACTS = {
     "time", "hub_position", "waypoint_index", "distance", "cross_track_error", "path_error", "real_time_factor",
 }  # fmt: skip
 OF_A_STROKE = {
-    "is_success", "limbs_heated", "newton_iterations", "solver_status", "smallest_opening_angle", "reward_progress",
-    "reward_waypoint", "reward_effort",
+    "is_success", "limbs_heated", "newton_iterations", "solver_status", "solver_message", "smallest_opening_angle",
+    "reward_progress", "reward_waypoint", "reward_effort",
 }  # fmt: skip
 
 
@@ -101,12 +104,44 @@ def test_info_promises_nothing_for_scenes_that_were_not_measured(scene):
     assert np.isnan([info["path_error"], info["real_time_factor"]]).all()
 
 
-def test_fidelity_replaces_the_numerics_of_a_scene_and_nothing_else():
-    scene = Scene(Seastar(density=1100.0), numerics=Numerics("sdirk3", 0.05))
-    assert SeastarSwimEnv(scene=scene).scene == scene
-    assert SeastarSwimEnv(scene=scene, fidelity="chapter").scene == Scene(
-        scene.robot, numerics=Numerics.preset("chapter")
-    )
+def test_info_promises_nothing_for_robots_that_were_drawn():
+    draws = DomainRandomization({"limb_strengths": Uniform(0.5, 0.9)})
+    env = fast(randomization=draws)
+    for info in (env.reset(seed=0)[1], env.step(STRAIGHT)[4]):
+        assert np.isnan([info["path_error"], info["real_time_factor"]]).all()
+
+
+def test_info_promises_nothing_once_the_scene_or_a_strength_was_changed():
+    env = fast()
+    known = env.reset(seed=0)[1]["path_error"]
+    chapters = env.simulator.scene
+    env.simulator.set_scene(replace(chapters, robot=Seastar(youngs_modulus=1.5e6)))
+    assert np.isnan(env.step(STRAIGHT)[4]["path_error"])
+    env.simulator.set_scene(chapters)
+    assert env.step(STRAIGHT)[4]["path_error"] == known
+    env.simulator.set_limb_strengths([1.0, 1.0, 0.5, 1.0, 1.0])
+    assert np.isnan(env.step(STRAIGHT)[4]["real_time_factor"])
+
+
+@pytest.mark.parametrize("fidelity", [None, "fast", "chapter"])
+def test_a_scene_that_names_no_numerics_swims_at_the_fidelity(fidelity):
+    scene = Scene(Seastar(density=1100.0))
+    for given in (scene, pickle.loads(pickle.dumps(scene)), replace(scene, contact=None)):
+        env = SeastarSwimEnv(scene=given, fidelity=fidelity)
+        assert env.scene == replace(scene, numerics=Numerics.preset(fidelity or "balanced"))
+
+
+def test_numerics_that_a_scene_names_are_kept():
+    for numerics in (Numerics("sdirk3", 0.05), Numerics(), replace(Scene().numerics, step=2e-3)):
+        assert SeastarSwimEnv(scene=Scene(numerics=numerics)).scene.numerics == numerics
+    chapters = Scene(numerics=Numerics.preset("chapter"))
+    assert SeastarSwimEnv(scene=chapters, fidelity="chapter").scene == chapters
+
+
+def test_a_fidelity_that_contradicts_the_numerics_of_a_scene_is_refused():
+    for make in (SeastarSwimEnv, SeastarSwimVectorEnv):
+        with assert_refused('fidelity="fast"', "implicit-euler", "give one of them"):
+            make(scene=Scene(numerics=Numerics()), fidelity="fast")
 
 
 def test_types_of_a_step_are_plain():
@@ -120,8 +155,42 @@ def test_types_of_a_step_are_plain():
         if name == "hub_position":
             assert value.shape == (2,) and value.dtype == np.float64
         else:
-            assert type(value) in (int, float, bool), name
-    assert env.reset()[1].keys() == FACTS
+            assert type(value) in (int, float, bool, str), name
+
+
+@pytest.mark.parametrize("draws", [None, DomainRandomization({"limb_strengths": Uniform(0.5, 1.0)})])
+def test_info_has_the_same_names_types_and_shapes_on_a_reset_on_a_step_and_on_a_failure(draws):
+    env = fast(randomization=draws)
+    infos = [env.reset(seed=0)[1], env.step(STRAIGHT)[4]]
+    break_robot(env, SolverStatus.NOT_CONVERGED)
+    infos += [env.step(STRAIGHT)[4], env.reset()[1]]
+    for info in infos[1:]:
+        assert list(info) == list(infos[0])
+        for name, value in info.items():
+            assert type(value) is type(infos[0][name]), name
+            assert np.shape(value) == np.shape(infos[0][name]), name
+
+
+def test_a_reset_tells_of_a_stroke_that_has_not_happened():
+    info = fast().reset(seed=0)[1]
+    assert info["smallest_opening_angle"] == pytest.approx(2 * np.pi / 5)
+    assert info["is_success"] is False and info["solver_message"] == ""
+    assert not any(info[name] for name in OF_A_STROKE - {"smallest_opening_angle"})
+
+
+@pytest.mark.filterwarnings("ignore")  # about a dataset without a description, and a folder left to the collector
+def test_a_dataset_recorder_takes_the_infos(tmp_path, monkeypatch):
+    minari = pytest.importorskip("minari")
+    pytest.importorskip("jax")
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    env = gym.make("SeastarSwim-v0", fidelity="fast", max_episode_steps=2)
+    collector = minari.DataCollector(env, record_infos=True)
+    for seed in range(2):
+        collector.reset(seed=seed)
+        for _ in range(2):
+            collector.step(STRAIGHT)
+    dataset = collector.create_dataset("seastar/swim-v0")
+    assert [len(episode.infos["time"]) for episode in dataset] == [3, 3]
 
 
 # Physics behind the step
@@ -422,7 +491,7 @@ def test_a_converged_stroke_has_no_message():
     env = fast()
     env.reset(seed=0)
     info = env.step(STRAIGHT)[4]
-    assert info["solver_status"] == SolverStatus.CONVERGED and "solver_message" not in info
+    assert info["solver_status"] == SolverStatus.CONVERGED and info["solver_message"] == ""
 
 
 # Refusals
@@ -463,6 +532,19 @@ def test_what_is_no_action_is_refused_and_changes_nothing(action):
         ({"waypoint_radius": 0.0}, "waypoint_radius"),
         ({"waypoint_radius": np.nan}, "waypoint_radius"),
         ({"waypoint_radius": "10 mm"}, "waypoint_radius"),
+        ({"waypoint_radius": 1e300}, "waypoint_radius"),
+        ({"waypoint_radius": np.array([0.01])}, "waypoint_radius"),
+        ({"waypoint_radius": True}, "waypoint_radius"),
+        ({"path": [[0.1, 0.0], [0.1, 0.0]]}, "the same point"),
+        ({"path": [[0.0, 0.0]]}, "origin"),
+        ({"path": [[1e300, 0.0]]}, "within"),
+        ({"path": [[True, False]]}, "numbers"),
+        ({"path": [[10**400, 0]]}, "numbers"),
+        ({"path": b"pentagon"}, "name"),
+        ({"random_heading": "False"}, "random_heading"),
+        ({"random_heading": np.nan}, "random_heading"),
+        ({"random_heading": np.array([True])}, "random_heading"),
+        ({"randomization": {}}, "DomainRandomization"),
         ({"render_mode": "ansi"}, "render_mode"),
         ({"frames_per_stroke": 0}, "frames_per_stroke"),
         ({"scene": Scene(Seastar(hub_hinge="turning"))}, "turning"),

@@ -1,6 +1,7 @@
 """A robot turned by a sector or mirrored is the same robot: observations, commands and actions say so."""
 
 import pickle
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
@@ -9,11 +10,29 @@ from gymnasium.vector import AutoresetMode
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seastar_gym import Numerics, Scene, Seastar
+from refusals import assert_refused
+from seastar_gym import (
+    Contact,
+    DomainRandomization,
+    Limb,
+    MeasuredCurve,
+    Numerics,
+    Scene,
+    Seastar,
+    ShearCurrent,
+    SmaPulse,
+    ThermalSma,
+    Uniform,
+    UniformCurrent,
+    Vortex,
+    Water,
+)
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.commands import command_table, to_commands
 from seastar_gym.envs.observation import observation_size
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
 
 N_LIMBS = (3, 4, 5, 7, 8)
 MODES = ("limbs", "joint", "pairs")
@@ -370,3 +389,125 @@ def test_the_wrapper_refuses_an_action_that_is_none():
     env.reset(seed=0)
     with pytest.raises(ValueError, match="an action is a whole number from 0 to 2"):
         env.step(np.array([0, 1, 2, 3]))
+    for action in ([0, 1, 2], 1, [[0, 1], [0]], None, np.zeros((2, 4), int)):
+        with pytest.raises(ValueError, match=r'^With actions="limbs" .*\.$'):
+            env.step(action)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_the_wrapper_of_a_batch_refuses_actions_of_another_number_of_robots(mode):
+    batch = VectorSymmetryReduction(SeastarSwimVectorEnv(3, actions=mode, **SETTINGS))
+    batch.reset(seed=0)
+    for actions in (random_actions(mode, 4, 2), random_actions(mode, 4, 3)[:, None], [[0, 1], [0]]):
+        with pytest.raises(ValueError, match=rf'^With actions="{mode}" .*\.$'):
+            batch.step(actions)
+
+
+# --- which scenes are symmetric --------------------------------------------------------------------------------------
+
+FAST = Numerics.preset("fast")
+STAR = Seastar(4, 4)
+TAPERED = replace(STAR, limbs=(Limb(length=0.09, radius=(2e-3, 1e-3)),) * 4)
+EVERYTHING = Scene(
+    replace(STAR, relaxation_time=1e-3),
+    Water(tangential_drag_coefficient=0.1, added_mass_coefficient=1.0),
+    contact=Contact(),
+    limb_strengths=(0.9,) * 4,
+)
+SYMMETRIC = {
+    "three limbs": Scene(Seastar(3, 4), actuator=SmaPulse(0.3)),
+    "five limbs": Scene(Seastar(5, 4)),
+    "turning hub": Scene(Seastar(4, 4, hub_hinge="turning"), actuator=SmaPulse(0.4)),
+    "rod": Scene(Seastar(2, 4, hub_hinge="turning"), actuator=SmaPulse(0.4)),
+    "profiles": Scene(TAPERED),
+    "curve": Scene(STAR, actuator=MeasuredCurve((0.0, 0.2, 1.0), (0.0, 0.5, 0.0))),
+    "every term": EVERYTHING,
+    "held hub": Scene(STAR, held_nodes=(0,)),
+}
+DRAWS = DomainRandomization({"robot.youngs_modulus": Uniform(5e5, 2e6), "fluid.density": Uniform(900.0, 1100.0)})
+WEAK_LIMBS = DomainRandomization({"limb_strengths": Uniform(0.2, 1.0)})
+OWN_LENGTHS = DomainRandomization({"robot.limbs.1.length": Uniform(0.05, 0.06)})
+ASYMMETRIC = {
+    "lengths": (Scene(replace(STAR, limbs=(Limb(), Limb(length=0.07), Limb(), Limb()))), None, "not alike"),
+    "spread": (Scene(replace(STAR, limbs=tuple(Limb(direction=d) for d in (0.0, 1.5, 3.1, 4.7)))), None, "not alike"),
+    "bent": (Scene(replace(STAR, limbs=(Limb(natural_curvature=9.0),) * 4)), None, "straight"),
+    "strengths": (Scene(STAR, limb_strengths=(1.0, 0.5, 1.0, 1.0)), None, "equally strong"),
+    "held": (Scene(STAR, held_nodes=(6,)), None, "held"),
+    "loads": (Scene(STAR, loads=((0, 1e-4, 0.0),)), None, "loaded"),
+    "uniform current": (Scene(STAR, Water(current=UniformCurrent(2e-3))), None, "current"),
+    "shear": (Scene(STAR, Water(current=ShearCurrent(0.05))), None, "current"),
+    "vortex": (Scene(STAR, Water(current=Vortex(1e-3))), None, "current"),
+    "drawn strengths": (Scene(STAR), WEAK_LIMBS, "limb_strengths is drawn"),
+    "drawn lengths": (Scene(TAPERED), OWN_LENGTHS, "robot.limbs.1.length is drawn"),
+}
+"""Scene, draws, and words of the refusal."""
+
+
+def reduced_swim(scene, randomization, element, actions):
+    """Rewards and reduced observations of the same reduced actions, in a world carried by the element."""
+    n_limbs = scene.robot.n_limbs
+    path = np.array([[0.02, 0.013], [-0.03, 0.02], [0.02, -0.03]]) @ matrix(element, n_limbs).T
+    scene = replace(scene, numerics=FAST)
+    env = SymmetryReduction(SeastarSwimEnv(path, "pairs", scene=scene, randomization=randomization))
+    seen, rewards = [env.reset(seed=0)[0]], []
+    for action in actions:
+        observation, reward, *_ = env.step(action)
+        seen.append(observation)
+        rewards.append(reward)
+    return np.array(rewards), np.array(seen)
+
+
+def pairs_for(scene, n):
+    return random_actions("pairs", scene.robot.n_limbs, n)
+
+
+@pytest.mark.parametrize("name, draws", [*((name, None) for name in SYMMETRIC), ("five limbs", DRAWS)])
+def test_in_every_accepted_scene_the_world_may_be_turned_and_mirrored(name, draws):
+    """The same reduced actions then earn the same rewards."""
+    scene, actions = SYMMETRIC[name], pairs_for(SYMMETRIC[name], 5)
+    rewards, seen = reduced_swim(scene, draws, 0, actions)
+    assert name == "held hub" or np.ptp(rewards) > 0.01
+    for element in range(1, 2 * scene.robot.n_limbs):
+        its_rewards, its_seen = reduced_swim(scene, draws, element, actions)
+        np.testing.assert_allclose(its_rewards, rewards, rtol=0.0, atol=1e-6)
+        np.testing.assert_allclose(its_seen, seen, rtol=0.0, atol=2e-5)
+
+
+@pytest.mark.parametrize("name", ASYMMETRIC)
+def test_a_scene_that_is_not_symmetric_is_refused_with_its_reason(name):
+    scene, randomization, words = ASYMMETRIC[name]
+    arguments = {"scene": replace(scene, numerics=FAST), "randomization": randomization}
+    with assert_refused("symmetry of the regular polygon", words):
+        SymmetryReduction(SeastarSwimEnv(**arguments))
+    with assert_refused("symmetry of the regular polygon", words):
+        VectorSymmetryReduction(SeastarSwimVectorEnv(2, **arguments))
+
+
+@pytest.mark.parametrize("name", ASYMMETRIC)
+def test_a_refusal_has_its_reason_in_the_swim(name, monkeypatch):
+    """Were the scene accepted, the same reduced actions would not earn the same in a world that is turned."""
+    scene, randomization, _ = ASYMMETRIC[name]
+    actions = pairs_for(scene, 5)
+    monkeypatch.setattr(symmetry, "require_symmetry", lambda *_: None)
+    swims = [reduced_swim(scene, randomization, element, actions)[0] for element in range(8)]
+    assert np.ptp(swims, axis=0).max() > 1e-3
+
+
+def test_actuators_that_remember_are_refused():
+    with assert_refused("symmetry of the regular polygon", "remember"):
+        SymmetryReduction(SeastarSwimEnv(scene=Scene(actuator=ThermalSma())))
+
+
+def test_every_robot_of_a_batch_has_to_be_symmetric():
+    bent = Limb(natural_curvature=np.array([0.0, 0.0, 9.0]))
+    with assert_refused("symmetry of the regular polygon", "straight"):
+        VectorSymmetryReduction(SeastarSwimVectorEnv(3, scene=Scene(replace(STAR, limbs=(bent,) * 4))))
+    alike = Seastar(4, 4, limb_length=np.array([0.1, 0.11, 0.12]))
+    VectorSymmetryReduction(SeastarSwimVectorEnv(3, scene=Scene(alike)))
+
+
+def test_another_environment_is_refused():
+    with assert_refused("SeastarSwim-v0", "CartPole"):
+        SymmetryReduction(gym.make("CartPole-v1").unwrapped)
+    with assert_refused("SeastarSwim-v0", "SyncVectorEnv"):
+        VectorSymmetryReduction(gym.make_vec("CartPole-v1", 2, "sync"))

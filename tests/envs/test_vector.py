@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_match import check_environments_match
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.wrappers.vector import RecordVideo
 
-from seastar_gym import Numerics, RewardWeights, Scene, Seastar, SmaPulse, SolverStatus
+from refusals import assert_refused
+from seastar_gym import DomainRandomization, Numerics, RewardWeights, Scene, Seastar, SmaPulse, SolverStatus, Uniform
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.simd.lanes import N_LANES
 
@@ -304,12 +306,146 @@ def test_masks_say_which_infos_count_as_those_of_single_environments_do(autorese
                 np.testing.assert_array_equal(found[name], mask, err_msg=name)
 
 
+@pytest.mark.parametrize("autoreset_mode", [NEXT_STEP, SAME_STEP, DISABLED])
+def test_infos_have_the_same_names_types_and_shapes_always(autoreset_mode):
+    """On a reset of all robots and of some, on steps, over the ends of episodes, and where the solver gives up."""
+    draws = DomainRandomization({"limb_strengths": Uniform(0.5, 1.0)})
+    batch = native(3, autoreset_mode=autoreset_mode, max_episode_steps=2, randomization=draws)
+    infos, over = [batch.reset(seed=0)[1]], np.zeros(3, bool)
+    for stroke in range(6):
+        if autoreset_mode is DISABLED and over.any():
+            infos.append(batch.reset(options={"reset_mask": over})[1])
+        if stroke == 3:
+            break_robot(batch, 1)
+        *_, terminated, truncated, info = batch.step(np.ones((3, 5), int))
+        over = terminated | truncated
+        infos.append(info)
+        infos += [info["final_info"]] if "final_info" in info else []
+    for info in infos:
+        names = [name for name in info if "final" not in name]
+        assert names == list(infos[0])
+        for name in names:
+            assert (info[name].dtype, info[name].shape) == (infos[0][name].dtype, infos[0][name].shape), name
+
+
+def test_every_robot_has_its_own_promise():
+    batch = native(3)
+    batch.reset(seed=0)
+    batch.simulator.set_limb_strengths([[1.0] * 5, [0.5] * 5, [1.0] * 5])
+    info = batch.step(np.ones((3, 5), int))[4]
+    assert np.isnan(info["path_error"]).tolist() == [False, True, False]
+
+
 def test_a_robots_smallest_opening_angle_does_not_depend_on_its_neighbours():
     batch, singles = both(N_LANES)
     batch.reset(seed=0)
     singles.reset(seed=0)
     actions = np.random.default_rng(0).integers(0, 3, (N_LANES, 5))
     assert_same_infos(batch.step(actions)[4], singles.step(actions)[4], apart_from=None)
+
+
+# What a vector environment of Gymnasium offers
+
+
+@pytest.mark.parametrize(
+    "name", ["waypoints", "action_space", "observation_space", "actions", "scene", "np_random_seed", "render_mode"]
+)
+def test_attributes_are_those_of_single_environments(name):
+    batch, singles = both(3, path="random")
+    for env in (batch, singles):
+        env.reset(seed=4)
+    found, expected = batch.get_attr(name), singles.get_attr(name)
+    assert type(found) is type(expected) is tuple and len(found) == len(expected) == 3
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_equal(one, other)
+    np.testing.assert_equal(batch.call(name), found)
+
+
+def test_every_robot_has_its_own_scene_and_generator():
+    scene = Scene(Seastar(youngs_modulus=np.array([1e6, 2e6, 3e6])), numerics=Numerics.preset("fast"))
+    batch = SeastarSwimVectorEnv(3, scene=scene, path="random", random_heading=True)
+    assert [one.robot.youngs_modulus for one in batch.get_attr("scene")] == [1e6, 2e6, 3e6]
+    batch.reset(seed=[5, 6, 7])
+    assert batch.np_random_seed == batch.get_attr("np_random_seed") == (5, 6, 7)
+    generators = batch.get_attr("np_random")
+    first = batch.reset(seed=[5, 6, 7])[0]
+    batch.set_attr("np_random", generators)  # as they are after one draw
+    assert np.abs(batch.reset()[0] - first).max() > 1e-3
+    batch.set_attr("np_random", [np.random.default_rng(seed) for seed in (6, 5, 7)])
+    np.testing.assert_array_equal(batch.reset()[0][[1, 0, 2]], batch.reset(seed=[5, 6, 7])[0])
+
+
+def test_methods_are_called_and_what_has_to_be_done_together_is_refused():
+    batch = native(2)
+    batch.reset(seed=0)
+    assert batch.call("get_attr", "actions") == (("limbs", "limbs"),) * 2
+    for name in ("reset", "step", "close"):
+        with assert_refused(f"use {name}()"):
+            batch.call(name)
+    with pytest.raises(AttributeError, match="no_such_thing"):
+        batch.get_attr("no_such_thing")
+
+
+def test_attributes_are_set_as_in_single_environments():
+    batch, singles = both(3)
+    for env in (batch, singles):
+        env.set_attr("mark", ["a", "b", "c"])
+        assert env.get_attr("mark") == ("a", "b", "c")
+        env.set_attr("mark", 7)
+        assert env.get_attr("mark") == (7, 7, 7)
+        with pytest.raises(ValueError, match="2"):
+            env.set_attr("mark", [1, 2])
+    batch.set_attr("max_episode_steps", [3, 3, 3])
+    assert batch.max_episode_steps == 3
+    with assert_refused("max_episode_steps", "the same for all"):
+        batch.set_attr("max_episode_steps", [3, 4, 3])
+
+
+def test_robots_are_drawn_as_alone():
+    """Over the end of an episode, in motion, with paths and sizes of their own."""
+    pytest.importorskip("pygame")
+    draws = DomainRandomization({"robot.limb_length": Uniform(0.08, 0.12)})
+    batch, singles = both(2, path="random", max_episode_steps=3, randomization=draws, render_mode="rgb_array")
+    for env in (batch, singles):
+        env.reset(seed=1)
+    for _ in range(5):
+        actions = np.tile([0, 1, 0, 0, 2], (2, 1))
+        batch.step(actions)
+        singles.step(actions)
+        pictures, expected = batch.render(), singles.render()
+        assert len(pictures) == 2 and pictures[0].shape == (720, 960, 3) and pictures[0].dtype == np.uint8
+        for one, other in zip(pictures, expected, strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+def test_pictures_of_many_robots_are_small_and_some_can_be_drawn_alone():
+    pytest.importorskip("pygame")
+    batch = native(40, render_mode="rgb_array", path="random")
+    batch.reset(seed=0)
+    all_of_them = batch.render()
+    assert len(all_of_them) == 40 and {picture.shape for picture in all_of_them} == {(240, 320, 3)}
+    np.testing.assert_array_equal(batch.render_robots([7])[0], all_of_them[7])
+    again = pickle.loads(pickle.dumps(batch))
+    np.testing.assert_array_equal(again.render_robots([7])[0], all_of_them[7])
+
+
+def test_a_batch_without_a_render_mode_warns_and_draws_nothing():
+    with pytest.warns(UserWarning, match="draws nothing"):
+        assert native().render() is None
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_gymnasium_records_a_video(tmp_path):
+    pytest.importorskip("pygame")
+    pytest.importorskip("moviepy")
+    batch = native(4, render_mode="rgb_array", max_episode_steps=3)
+    recorder = RecordVideo(batch, str(tmp_path), episode_trigger=lambda episode: episode == 0)
+    recorder.reset(seed=0)
+    for _ in range(5):
+        recorder.step(np.ones((4, 5), int))
+    recorder.close()
+    (video,) = tmp_path.glob("*.mp4")
+    assert video.stat().st_size > 1000 and recorder.frames_per_sec == 10
 
 
 # Failure
@@ -356,7 +492,7 @@ def test_the_message_of_a_failed_robot_is_that_of_a_single_environment():
     break_robot(batch, 1)
     info = batch.step(np.zeros((2, 5), int))[4]
     assert info["solver_message"][1] == SolverStatus.NOT_CONVERGED.sentence
-    assert info["_solver_message"].tolist() == [False, True]
+    assert info["solver_message"][0] == "" and info["_solver_message"].all()
 
 
 # Refusals
@@ -374,7 +510,10 @@ def test_the_first_reset_is_of_all_robots():
 
 @pytest.mark.parametrize(
     "actions",
-    [np.zeros((3, 5)), np.full((3, 5), np.nan), np.zeros((2, 5), int), np.zeros(5, int), np.full((3, 5), 3), None],
+    [
+        np.zeros((3, 5)), np.full((3, 5), np.nan), np.zeros((2, 5), int), np.zeros(5, int), np.full((3, 5), 3), None,
+        [[0, 1], [0]], [[10**400] * 5] * 3, np.zeros((3, 5), bool), "up",
+    ],
     ids=str,
 )
 def test_what_is_no_action_is_refused_and_changes_nothing(actions):
@@ -395,6 +534,8 @@ def test_what_is_no_action_is_refused_and_changes_nothing(actions):
         ({"path": "hexagon"}, "hexagon"),
         ({"path": [[0.0, np.inf]]}, "finite"),
         ({"reset_mask": [1, 0, 0]}, "reset_mask"),
+        ({"reset_mask": [[True], [True, False]]}, "reset_mask"),
+        ({"reset_mask": "True"}, "reset_mask"),
         ({"reset_mask": np.array([True])}, "reset_mask"),
         ({"reset_mask": np.zeros(3, bool)}, "reset_mask"),
     ],
@@ -418,8 +559,11 @@ def test_a_list_of_seeds_has_one_for_every_robot():
     [
         ({"num_envs": 0}, "whole number"),
         ({"num_envs": 2.5}, "whole number"),
-        ({"max_episode_steps": 0}, "max_episode_steps"),
-        ({"render_mode": "rgb_array"}, "draws nothing"),
+        *(({"max_episode_steps": value}, "max_episode_steps") for value in (0, -1, np.nan, np.inf, 2.5, True, "4")),
+        ({"random_heading": "False"}, "random_heading"),
+        ({"path": [[0.1, 0.0], [0.1, 0.0]]}, "the same point"),
+        ({"threads": 0}, "threads"),
+        ({"render_mode": "human"}, "rgb_array"),
         ({"autoreset_mode": "sometimes"}, "sometimes"),
         ({"path": "hexagon"}, "hexagon"),
         ({"actions": "binary"}, "actions"),

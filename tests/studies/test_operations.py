@@ -1,9 +1,11 @@
 """The work of a Newton iteration, counted: it grows with the number of nodes and not without our knowing."""
 
+import re
+
 import numpy as np
 import pytest
 
-from seastar_gym import Numerics, Scene, Seastar
+from seastar_gym import Numerics, Scene, Seastar, der
 from studies.speed.operations import count_operations, flops
 
 
@@ -50,3 +52,17 @@ def test_counting_leaves_the_real_kernels_as_they_are(fluid_scene):
 
     assert again.factorise is before
     assert np.isfinite(flops(count_operations(fluid_scene)["iteration"]))
+
+
+def test_the_table_of_the_rods_says_what_is_counted():
+    parts = count_operations(Scene(numerics=Numerics.preset("chapter")))
+    for part in ("hub hinges", "limbs", "ring", "substitution"):
+        (kflop,) = re.findall(rf"^{part} +([\d.]+) ", der.__doc__, flags=re.MULTILINE)
+        assert float(kflop) == round(flops(parts[part]) / 1e3, 1)
+    nodes = 45
+    per_node = [round(parts["limbs"][kind] / nodes) for kind in ("multiply", "fused", "add")]
+    per_node += [round(parts["limbs"][kind] / nodes, 1) for kind in ("divide", "root")]
+    kinds = ("products", "fused products", "sums", "divisions", "roots")
+    said = [re.search(rf"([\d.]+) {kind}", der.__doc__.partition("A node of a limb")[2]) for kind in kinds]
+    assert [float(number[1]) for number in said] == per_node
+    assert f"{flops(parts['limbs']) / nodes:.0f} flop per node" in der.__doc__

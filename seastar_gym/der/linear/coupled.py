@@ -71,9 +71,9 @@ def solve_coupled(contact, rods, work, robots, decrement):
             store(w, row, load(Hp, row))
         add_contact_product(rods, work, p, 1.0, w)
         alpha = select(running, left / dot(rods, p, w), zero)
-        decrement = add_product(decrement, alpha, dot(rods, star, Hp))
+        decrement = select(running, add_product(decrement, alpha, dot(rods, star, Hp)), decrement)
         for row in range(rows):
-            store(x, row, add_product(load(x, row), alpha, load(p, row)))
+            store(x, row, select(running, add_product(load(x, row), alpha, load(p, row)), load(x, row)))
             store(r, row, subtract_product(load(r, row), alpha, load(w, row)))
         solve_again(rods, work, r, z)
         last, left = left, dot(rods, r, z)

@@ -24,15 +24,17 @@ folded over itself. Such steps are refused, too, while they are not very short: 
 over at no such cost.
 """
 
-from seastar_gym.der.energy import add_load_energy, edge_of, elastic_energy, hinge_edges, kinetic_energy
+from seastar_gym.der.energy import edge_of, elastic_energy, hinge_edges, kinetic_energy
 from seastar_gym.der.geometry import half_angle
+from seastar_gym.der.potential import load_power
 from seastar_gym.der.rods import n_nodes
 from seastar_gym.der.stepping.newton import larger
 from seastar_gym.der.terms.actuation import set_natural_hub_angles
-from seastar_gym.der.terms.added_mass import add_fluid_energy
+from seastar_gym.der.terms.added_mass import add_fluid_energy, add_fluid_momentum
 from seastar_gym.der.terms.contact import add_contact_energy
+from seastar_gym.der.terms.fluid import fluid_velocity
 from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.lanes import absolute, add_product, any_lane, load, select, splat, sqrt, store
+from seastar_gym.simd.lanes import absolute, add_product, any_lane, load, select, splat, sqrt, store, subtract_product
 
 ROUNDING = 1e-12  # growth below this share of the energy is taken for rounding
 UNITS = 1e-15  # a few units in the last place: positions are exact to this share of their size
@@ -40,15 +42,39 @@ LARGEST_CUT = 0.01  # of the kinetic energy about the rigid motion; where more i
 
 
 @kernel
-def potential_energy(rods, work, q):
-    """Of limbs, hinges and loads, at the natural hub angles in `work` [J]."""
-    return add_load_energy(rods.load, q, n_nodes(rods), elastic_energy(rods, work, q))
+def frame_velocity(current, rods, q, v):
+    """(c_x, c_y): velocity of the frame that a step from (q, v) is judged in [m/s].
+
+    That of the fluid at the hub; in vacuum that of the centre of mass; zero where nodes are held in the laboratory.
+    """
+    mass, v_x, v_y = splat(0.0), splat(0.0), splat(0.0)
+    if rods.held:
+        return v_x, v_y
+    for node in range(n_nodes(rods)):
+        m = load(rods.mass, node)
+        mass += m
+        v_x, v_y = add_product(v_x, m, load(v, 2 * node)), add_product(v_y, m, load(v, 2 * node + 1))
+    dragged = load(rods.damped, 0) > 0.0
+    u_x, u_y = fluid_velocity(current, load(q, 0), load(q, 1))
+    return select(dragged, u_x, v_x / mass), select(dragged, u_y, v_y / mass)
 
 
 @kernel
-def moving_energy(rods, work, v):
+def moving_energy(rods, work, v, frame):
     """Kinetic energy of the robot, and of fluid that moves along at the normals of the last stage [J]."""
-    return add_fluid_energy(work.added_mass, rods, v, kinetic_energy(rods, v))
+    return add_fluid_energy(work.added_mass, rods, v, frame, kinetic_energy(rods, v, frame))
+
+
+@kernel
+def add_work_of_loads(loads, rods, work, q, h, frame, energy):
+    """Add the work of dead loads in a step of length h from the state put aside to q [J], as seen from the frame."""
+    if loads is None:
+        return energy
+    for node in range(n_nodes(rods)):
+        dx = subtract_product(load(q, 2 * node) - load(work.step, 2 * node), h, frame[0])
+        dy = subtract_product(load(q, 2 * node + 1) - load(work.step, 2 * node + 1), h, frame[1])
+        energy += load_power(loads, node, dx, dy)
+    return energy
 
 
 @kernel
@@ -86,19 +112,22 @@ def moved_hub_energy(rods, work, actuation, start, end):
 
 
 @kernel
-def allowed_energy(rods, work, scheme, actuation, start, end, q, v):
-    """Most energy that a step from (q, v) may end with [J], at the natural hub angles of its end, left in `work`."""
+def allowed_energy(rods, work, scheme, actuation, start, end, q, v, frame):
+    """Most energy that a step from (q, v) may end with [J], at the natural hub angles of its end, left in `work`.
+
+    But for the work of currents and loads, which is known when the step is.
+    """
     allowed = splat(0.0)
     if not scheme.dissipative:
         set_natural_hub_angles(rods, work, actuation, start)
-        allowed = potential_energy(rods, work, q)
+        allowed = elastic_energy(rods, work, q)
         moved = moved_hub_energy(rods, work, actuation, start, end)
-        at_end = potential_energy(rods, work, q)
+        at_end = elastic_energy(rods, work, q)
         allowed = select(at_end > allowed, at_end, allowed) + moved
     else:
         set_natural_hub_angles(rods, work, actuation, end)
-        allowed = potential_energy(rods, work, q)
-    return add_contact_energy(rods.contact, rods, work, q, allowed + moving_energy(rods, work, v))
+        allowed = elastic_energy(rods, work, q)
+    return add_contact_energy(rods.contact, rods, work, q, allowed + moving_energy(rods, work, v, frame))
 
 
 @kernel
@@ -106,7 +135,8 @@ def may_gain(current, added_mass, rods, work, stage, phi, robots):
     """Of the robots in the mask, those whose step of implicit Euler might create energy, by what Newton knows already.
 
     phi: Phi before Newton's last step [J], which is not less than at its end. There Phi is |v_1 - v_0|^2_M / 2 + U(q_1)
-        and what dissipation adds, so the energy ends at most Phi + v_0 M (v_1 - v_0) - U(q_0) above the one allowed.
+        and what dissipation adds, less h F (v_1 - v_0) of loads F, so the energy ends at most
+        Phi + v_0 M (v_1 - v_0) - h F v_0 - U(q_0) above the one allowed.
 
     All of them in scenes whose fluid gives energy or takes it up.
     """
@@ -118,44 +148,67 @@ def may_gain(current, added_mass, rods, work, stage, phi, robots):
                 v_0 = load(stage.v_hat, row)
                 change = (load(work.q, row) - load(stage.q_hat, row)) * stage.inverse_gamma - v_0
                 gain = add_product(gain, m * v_0, change)
+            power = load_power(rods.load, node, load(stage.v_hat, 2 * node), load(stage.v_hat, 2 * node + 1))
+            gain = subtract_product(gain, stage.gamma, power)
         return robots & ~(gain <= 0.0)
     return robots
 
 
 @kernel
-def rigid_motion(rods, q, v):
+def momentum_of(added_mass, rods, node, vx, vy):
+    """Momentum of a node at the velocity (vx, vy) [kg m/s], with that of the fluid it carries along."""
+    m = load(rods.mass, node)
+    return add_fluid_momentum(added_mass, node, vx, vy, (m * vx, m * vy))
+
+
+@kernel
+def rigid_motion(rods, work, q, v, frame):
     """(mass, x, y, v_x, v_y, omega, energy): the motion of a rigid robot with the same momentum and angular momentum.
 
-    x, y: Centre of mass [m]. v_x, v_y: Its velocity [m/s]. omega: Angular velocity [rad/s]. energy: Its kinetic energy.
+    x, y: Centre of mass [m]. v_x, v_y: Its velocity, as seen from the frame [m/s]. omega: Angular velocity [rad/s].
+    energy: Its kinetic energy there. Momenta and energy are those of robot and fluid that moves along.
     """
-    zero = splat(0.0)
-    mass, x, y, v_x, v_y = zero, zero, zero, zero, zero
+    zero, one = splat(0.0), splat(1.0)
+    mass, x, y = zero, zero, zero
     for node in range(n_nodes(rods)):
         m = load(rods.mass, node)
         mass += m
         x, y = add_product(x, m, load(q, 2 * node)), add_product(y, m, load(q, 2 * node + 1))
-        v_x, v_y = add_product(v_x, m, load(v, 2 * node)), add_product(v_y, m, load(v, 2 * node + 1))
-    x, y, v_x, v_y = x / mass, y / mass, v_x / mass, v_y / mass
-    spin, inertia = zero, zero
+    x, y = x / mass, y / mass
+    p_x, p_y, spin = zero, zero, zero
+    # What the motions along x, along y and about the centre of mass have in common: the inertia of a rigid robot.
+    xx, xy, yy, x_turn, y_turn, turn = zero, zero, zero, zero, zero, zero
     for node in range(n_nodes(rods)):
-        m, r_x, r_y = load(rods.mass, node), load(q, 2 * node) - x, load(q, 2 * node + 1) - y
-        spin = add_product(spin, m, r_x * (load(v, 2 * node + 1) - v_y) - r_y * (load(v, 2 * node) - v_x))
-        inertia = add_product(inertia, m, r_x * r_x + r_y * r_y)
-    omega = spin / inertia
-    return mass, x, y, v_x, v_y, omega, 0.5 * (mass * (v_x * v_x + v_y * v_y) + omega * spin)
+        r_x, r_y = load(q, 2 * node) - x, load(q, 2 * node + 1) - y
+        p = momentum_of(work.added_mass, rods, node, load(v, 2 * node) - frame[0], load(v, 2 * node + 1) - frame[1])
+        along_x = momentum_of(work.added_mass, rods, node, one, zero)
+        along_y = momentum_of(work.added_mass, rods, node, zero, one)
+        about = momentum_of(work.added_mass, rods, node, -r_y, r_x)
+        p_x, p_y, spin = p_x + p[0], p_y + p[1], spin + (r_x * p[1] - r_y * p[0])
+        xx, xy, yy = xx + along_x[0], xy + along_x[1], yy + along_y[1]
+        x_turn, y_turn, turn = x_turn + about[0], y_turn + about[1], turn + (r_x * about[1] - r_y * about[0])
+    # Elimination of x, then y.
+    lower, turn_lower = xy / xx, x_turn / xx
+    yy, y_turn, turn = yy - lower * xy, y_turn - lower * x_turn, turn - turn_lower * x_turn
+    y_left, spin_left = p_y - lower * p_x, spin - turn_lower * p_x
+    turn_lower = y_turn / yy
+    omega = (spin_left - turn_lower * y_left) / (turn - turn_lower * y_turn)
+    v_y = (y_left - y_turn * omega) / yy
+    v_x = (p_x - xy * v_y - x_turn * omega) / xx
+    return mass, x, y, v_x, v_y, omega, 0.5 * (p_x * v_x + p_y * v_y + spin * omega)
 
 
 @kernel
-def cut_velocities(rods, q, v, motion, share):
-    """Keep `share` of the velocities about a rigid motion; a share of 1 changes no bit."""
+def cut_velocities(rods, q, v, frame, motion, share, robots):
+    """Keep `share` of the velocities of the robots in the mask about a rigid motion that is seen from the frame."""
     _, x, y, v_x, v_y, omega, _ = motion
     less = share - 1.0
     for node in range(n_nodes(rods)):
         vx, vy = load(v, 2 * node), load(v, 2 * node + 1)
-        about_x = vx - (v_x - omega * (load(q, 2 * node + 1) - y))
-        about_y = vy - (v_y + omega * (load(q, 2 * node) - x))
-        store(v, 2 * node, add_product(vx, less, about_x))
-        store(v, 2 * node + 1, add_product(vy, less, about_y))
+        about_x = vx - frame[0] - (v_x - omega * (load(q, 2 * node + 1) - y))
+        about_y = vy - frame[1] - (v_y + omega * (load(q, 2 * node) - x))
+        store(v, 2 * node, select(robots, add_product(vx, less, about_x), vx))
+        store(v, 2 * node + 1, select(robots, add_product(vy, less, about_y), vy))
 
 
 @kernel
@@ -190,8 +243,18 @@ def energy_noise(rods, q, h, mass, potential, kinetic):
     limb = (rods.nodes_per_limb - 1) * length
     move = UNITS * (absolute(load(q, 0)) + absolute(load(q, 1)) + limb)
     speed = move / h
+    of_positions = move * sqrt(2.0 * stiffness * absolute(potential))
     of_velocities = speed * sqrt(2.0 * mass * kinetic) + 0.5 * mass * speed * speed
-    return of_velocities + move * sqrt(2.0 * stiffness * absolute(potential)) + 0.5 * stiffness * move * move
+    return add_load_noise(rods.load, rods, move, of_velocities + of_positions + 0.5 * stiffness * move * move)
+
+
+@kernel
+def add_load_noise(loads, rods, move, noise):
+    if loads is None:
+        return noise
+    for row in range(2 * n_nodes(rods)):
+        noise = add_product(noise, move, absolute(load(loads, row)))
+    return noise
 
 
 @kernel
@@ -205,19 +268,19 @@ def add_held_energy(contact, rods, work, scheme, q, energy):
 
 
 @kernel
-def hold_to_energy(rods, work, scheme, q, v, h, robots, allowed, largest_cut):
+def hold_to_energy(rods, work, scheme, q, v, h, frame, robots, allowed, largest_cut):
     """Hold the robots in the mask to the energy allowed after a step of length h.
 
     largest_cut: Share of the kinetic energy about the rigid motion that may be cut.
 
     Returns (refused, cut): masks of the robots whose step has to be undone, and of those whose velocities were cut.
     """
-    potential, kinetic = potential_energy(rods, work, q), moving_energy(rods, work, v)
+    potential, kinetic = elastic_energy(rods, work, q), moving_energy(rods, work, v, frame)
     potential = add_held_energy(rods.contact, rods, work, scheme, q, potential)
     grown = robots & (potential + kinetic > add_product(allowed, ROUNDING, kinetic))
     cut = grown & ~grown
     if any_lane(grown):
-        motion = rigid_motion(rods, q, v)
+        motion = rigid_motion(rods, work, q, v, frame)
         noise = energy_noise(rods, q, h, motion[0], potential, kinetic)
         grown = grown & (potential + kinetic > allowed + noise)
         rigid = motion[6]
@@ -225,5 +288,5 @@ def hold_to_energy(rods, work, scheme, q, v, h, robots, allowed, largest_cut):
         left = allowed + noise - potential - rigid
         cut = grown & (left >= 0.0) & (left >= (1.0 - largest_cut) * about)
         if any_lane(cut):
-            cut_velocities(rods, q, v, motion, sqrt(select(cut, left / about, 1.0)))
+            cut_velocities(rods, q, v, frame, motion, sqrt(left / about), cut)
     return grown & ~cut, cut

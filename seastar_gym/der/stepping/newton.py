@@ -139,12 +139,17 @@ def step_scale(stepping, shortening, fraction):
 
 @kernel
 def move_node(work, node, solution, shortening, scale):
-    """Move a node by `scale` times its step: its last where `shortening`, else -solution; returns the move squared."""
+    """Move a node by `scale` times its step: its last where `shortening`, else -solution; returns the move squared.
+
+    Where the scale is zero the node stays, whatever the solution is: that of a robot at rest may be no number.
+    """
     x = select(shortening, load(work.step, 2 * node), -solution[0])
     y = select(shortening, load(work.step, 2 * node + 1), -solution[1])
     move_x, move_y = scale * x, scale * y
     store_pair(work.step, 2 * node, (x, y))
-    store_pair(work.q, 2 * node, (load(work.q, 2 * node) + move_x, load(work.q, 2 * node + 1) + move_y))
+    stays = scale == 0.0
+    qx, qy = load_pair(work.q, 2 * node)
+    store_pair(work.q, 2 * node, (select(stays, qx, qx + move_x), select(stays, qy, qy + move_y)))
     return add_product(move_x * move_x, move_y, move_y)
 
 

@@ -16,13 +16,16 @@ from seastar_gym.der.rods import (
 )
 from seastar_gym.der.stepping.guard import (
     LARGEST_CUT,
+    add_work_of_loads,
     allowed_energy,
+    frame_velocity,
     hold_to_energy,
     may_gain,
     put_back,
     set_aside,
     through_poles,
 )
+from seastar_gym.der.stepping.momentum import settle_momentum
 from seastar_gym.der.stepping.newton import minimise
 from seastar_gym.der.terms.actuation import set_natural_hub_angles
 from seastar_gym.der.terms.contact import freeze_contact, those_uncrossed
@@ -31,11 +34,12 @@ from seastar_gym.der.terms.fluid import add_work_of_current, freeze_fluid
 from seastar_gym.simd.compilation import inlined_kernel, kernel
 from seastar_gym.simd.lanes import add_product, any_lane, floor, load, load_number, select, splat, sqrt, store
 
-MOST_HALVINGS = 12.0  # in an interval: a robot that is stuck once more has failed
+MOST_HALVINGS = 12.0  # a robot that is stuck once more has failed
 TURNABLE = 8.0  # after so many halvings, hinges may go through their poles, see guard.py
-CAUTIOUS = 4.0  # from so many halvings in an interval on, its steps are implicit Euler's
+CAUTIOUS = 4.0  # from so many halvings on, a robot's steps are implicit Euler's
 
-SMALLEST_FRACTION = 2.0**-12  # of an interval: a shorter step is not made for the sake of its error
+SMALLEST_FRACTION = 2.0**-12  # of an interval: there is no shorter step
+SOONEST_GROWTH = 4.0  # steps after trouble before a step is doubled; the next doubling waits twice as long
 FIRST_FRACTION = 2.0**-3  # of an interval: an adapted stroke begins with this step
 GROWTH_MARGIN = 5.0  # a step is doubled when its error rate is this many times below the limit
 
@@ -156,10 +160,15 @@ def step_error(rods, work, stage, a, h, last_h):
 
 
 @kernel
-def start_standing(rods, work, stage, robots):
-    """Start the iterate of the robots in the mask at q_hat: Phi is finite there, and no velocity leads it astray."""
-    for row in range(2 * n_nodes(rods)):
-        store(work.q, row, select(robots, load(stage.q_hat, row), load(work.q, row)))
+def start_standing(rods, work, stage, frame, robots):
+    """Start the iterate of the robots in the mask at q_hat, carried on by the frame: Phi is finite there, and no
+    velocity about it leads it astray.
+    """
+    for node in range(n_nodes(rods)):
+        x = add_product(load(stage.q_hat, 2 * node), stage.gamma, frame[0])
+        y = add_product(load(stage.q_hat, 2 * node + 1), stage.gamma, frame[1])
+        store(work.q, 2 * node, select(robots, x, load(work.q, 2 * node)))
+        store(work.q, 2 * node + 1, select(robots, y, load(work.q, 2 * node + 1)))
 
 
 @kernel
@@ -182,11 +191,14 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, war
         stage = begin_stage(rods, work, scheme, k, q, v, a, h)
         freeze_contact(rods.contact, rods, work, stage, q)
         if any_lane(wary):
-            start_standing(rods, work, stage, wary)
+            start_standing(rods, work, stage, frame_velocity(rods.current, rods, q, v), wary)
         freeze_fluid(rods, work)
         freeze_strains(rods.relaxation_time, rods, work, stage.q_hat)
         set_natural_hub_angles(rods, work, actuation, start + load_number(scheme.c, k) * size)
-        good, phi, iterations, repairs, backtracks = minimise(rods, work, stage, good, tolerance, patience)
+        left = limits.most_iterations - load(report, NEWTON_ITERATIONS)
+        most, good = select(left < patience, left, patience), good & (left > 0.0)
+        good, phi, iterations, repairs, backtracks = minimise(rods, work, stage, good, tolerance, most)
+        settle_momentum(rods, work, stage, good)
         good = those_uncrossed(rods.contact, rods, work, stage, q, good)
         trouble = trouble | (repairs + backtracks > 0.0)
         if scheme.dissipative:
@@ -208,15 +220,17 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, war
                 accepted = good & ((error_rate <= load(limits.error_rate, 0)) | (size <= SMALLEST_FRACTION))
                 store(a, last_h, select(accepted, h, load(a, last_h)))
             guarded = accepted & trouble
-            watch, allowed = any_lane(guarded), zero
+            watch, allowed, frame = any_lane(guarded), zero, (zero, zero)
             if watch:
                 set_aside(rods, work, scheme, q, v)
-                allowed = allowed_energy(rods, work, scheme, actuation, start, start + size, q, v)
+                frame = frame_velocity(rods.current, rods, q, v)
+                allowed = allowed_energy(rods, work, scheme, actuation, start, start + size, q, v, frame)
             end_step(rods, work, scheme, stage, q, v, a, h, accepted)
             if watch:
                 largest_cut = select(patience > MOST_HALVINGS * limits.max_iterations, one, LARGEST_CUT)
-                allowed = add_work_of_current(rods.current, rods, work, v, h, allowed)
-                refused, cut = hold_to_energy(rods, work, scheme, q, v, h, guarded, allowed, largest_cut)
+                allowed = add_work_of_current(rods.current, rods, work, v, h, frame, allowed)
+                allowed = add_work_of_loads(rods.load, rods, work, q, h, frame, allowed)
+                refused, cut = hold_to_energy(rods, work, scheme, q, v, h, frame, guarded, allowed, largest_cut)
                 turnable = guarded & (patience <= TURNABLE * limits.max_iterations)
                 refused = refused | through_poles(rods, work, q, turnable)
                 if any_lane(refused):
@@ -232,8 +246,8 @@ def add_to_report(report, row, amount):
 
 
 @kernel
-def note_hub_angles(rods, q, report):
-    """Keep the smallest tan(phi/2) of every robot's hub hinges; those of a gap of more than pi do not count."""
+def note_hub_angles(rods, q, robots, report):
+    """Keep the smallest tan(phi/2) of the hub hinges of the robots in the mask, but for gaps of more than pi."""
     smallest = load(report, SMALLEST_HUB_T)
     edges = rods.nodes_per_limb - 1
     last = rods.n_limbs - 1
@@ -242,7 +256,7 @@ def note_hub_angles(rods, q, report):
         second = edge_geometry(q, 0, limb * edges + 1)
         t = half_angle(first, second, rods.hub_side)
         narrow = rods.hub_side * load(rods.hub_angle, limb - 1 if limb > 0 else last) >= 0.0
-        smallest = select(narrow & (t < smallest), t, smallest)
+        smallest = select(robots & narrow & (t < smallest), t, smallest)
         first = second
     store(report, SMALLEST_HUB_T, smallest)
 
@@ -254,14 +268,19 @@ def cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, a
     A robot whose step does not converge in `limits.max_iterations`, or creates energy, halves it, alone, as often as it
     takes, and still covers the whole interval. After each halving it has as many more iterations and starts them where
     it stands; after CAUTIOUS halvings it goes on with the scheme `fallback` (implicit Euler); after MOST_HALVINGS it
-    has failed and keeps its last good state. If steps are adapted, a robot also halves a step whose error is too large
-    (not below SMALLEST_FRACTION), doubles it when the error allows, and goes on with it in the next interval. Steps are
-    dyadic fractions of the interval, on the grid of their own size, so their sums are exact.
+    has failed and keeps its last good state. Every doubling takes a halving back: the first after SOONEST_GROWTH steps
+    without trouble, the next after twice as many, so that a robot that cannot do with longer steps rarely tries them.
+
+    If steps are adapted, a robot also halves a step whose error is too large, doubles it when the error allows, and
+    goes on with it in the next interval. No step is below SMALLEST_FRACTION: a robot that is stuck there tries again,
+    and the halving counts. Steps are dyadic fractions of the interval, on the grid of their own size, so their sums are
+    exact. A robot that has made `limits.most_iterations` in the stroke and needs more has failed, too.
 
     Returns the mask of the robots that arrived.
     """
     zero, one = splat(0.0), splat(1.0)
     start, size, halvings = zero, one, zero
+    streak, growth = zero, splat(SOONEST_GROWTH)  # accepted steps since the last trouble, and needed for a doubling
     if limits.adaptive:
         last_size = load(a, memory_row(rods, scheme, SIZE))
         size = select(last_size > 0.0, last_size, FIRST_FRACTION)
@@ -276,7 +295,7 @@ def cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, a
         good, accepted, error_rate = try_step(
             rods, work, tableau, actuation, q, v, a, start, size, h, going, wary, limits, patience, report
         )
-        note_hub_angles(rods, q, report)
+        note_hub_angles(rods, q, going, report)
         stuck = going & ~good
         rejected = going & ~accepted
         cautious = going & ~steady
@@ -287,15 +306,20 @@ def cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, a
         add_to_report(report, REJECTIONS, select(good & rejected, one, zero))
         add_to_report(report, COVERED, select(accepted, h, zero))
         start = select(accepted, start + size, start)
-        size = select(rejected, 0.5 * size, size)
-        failed = stuck & (halvings >= MOST_HALVINGS)
+        size = select(rejected & (size > SMALLEST_FRACTION), 0.5 * size, size)
+        spent = load(report, NEWTON_ITERATIONS) >= limits.most_iterations
+        failed = stuck & ((halvings >= MOST_HALVINGS) | spent)
         halvings += select(stuck, one, zero)
-        if limits.adaptive:
+        if limits.adaptive or any_lane(wary):
             # The error of a step of twice the length is about eight times as large, per time four times.
-            pairs = start / (2.0 * size)
             small = GROWTH_MARGIN * error_rate <= load(limits.error_rate, 0)
-            fits = accepted & ~wary & small & (pairs == floor(pairs))
-            size = select(fits & (size < 1.0), 2.0 * size, size)
+            pairs = start / (2.0 * size)
+            fits = accepted & small & (pairs == floor(pairs)) & (size < 1.0)
+            streak = select(accepted & wary, streak + 1.0, zero)
+            relieved = fits & (streak >= growth)
+            halvings -= select(relieved, one, zero)
+            streak, growth = select(relieved, zero, streak), select(relieved, 2.0 * growth, growth)
+            size = select((fits & ~wary) | relieved, 2.0 * size, size)
         alive = alive & ~failed
         moving = moving & ~failed & (start < 1.0)
     if limits.adaptive:

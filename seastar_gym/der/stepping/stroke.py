@@ -1,9 +1,12 @@
 """A whole sequence of time intervals for many robots, in one compiled call."""
 
+from seastar_gym.der.rods import NEWTON_ITERATIONS
 from seastar_gym.der.stepping.newton import larger
 from seastar_gym.der.stepping.stages import cover_interval
 from seastar_gym.simd.compilation import entry_point, kernel
 from seastar_gym.simd.lanes import borrow, load, select, splat, store
+
+STUCK, SPENT = 1.0, 3.0  # SolverStatus.NOT_CONVERGED and ITERATION_LIMIT
 
 
 @kernel
@@ -26,7 +29,7 @@ def advance(rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shap
     times: Ends of the intervals [s], shape (n_intervals + 1,).
     shape: Rotation of the limbs at those times [rad], shape (n_intervals + 1,) if all limbs turn alike, else
         (n_groups, n_intervals + 1, n_limbs, N_LANES), or with 1 for n_limbs if those of a robot do.
-    failed: 0 for robots that go on, 1 or more for those that have failed, shape (n_groups, 1, N_LANES).
+    failed: 0 for robots that go on, else their SolverStatus, shape (n_groups, 1, N_LANES).
     report: Counts and extremes, added to, shape (n_groups, len(REPORT_ROWS), N_LANES).
     limits: What the solution has to keep.
     """
@@ -46,4 +49,6 @@ def advance(rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shap
                 rods_rows, memory, tableau, fallback_tableau, rotation, q_rows, v_rows, a_rows, times[k + 1] - times[k],
                 alive, bounds, report_rows,
             )  # fmt: skip
-        store(failed_rows, 0, select(alive, splat(0.0), larger(status, splat(1.0))))
+        spent = load(report_rows, NEWTON_ITERATIONS) >= bounds.most_iterations
+        reason = select(spent, splat(SPENT), splat(STUCK))
+        store(failed_rows, 0, select(alive, splat(0.0), larger(status, reason)))

@@ -43,6 +43,15 @@ def momentum(added_mass, node, vx, vy):
 
 
 @kernel
+def add_fluid_momentum(added_mass, node, vx, vy, p):
+    """Add the momentum of the fluid that a node of velocity (vx, vy) carries along to its own [kg m/s]."""
+    if added_mass is None:
+        return p
+    px, py = momentum(added_mass, node, vx, vy)
+    return p[0] + px, p[1] + py
+
+
+@kernel
 def add_fluid_inertia(added_mass, node, dx, dy, inverse_gamma, slopes):
     """Add a node's |d|^2/2 in its added mass, d = v - v_hat, to its (energy, gradient, Hessian) in q."""
     if added_mass is None:
@@ -62,13 +71,16 @@ def add_fluid_inertia(added_mass, node, dx, dy, inverse_gamma, slopes):
 
 
 @kernel
-def add_fluid_energy(added_mass, rods, v, energy):
-    """Add the kinetic energy of the fluid that moves along [J], at the normals of the last stage."""
+def add_fluid_energy(added_mass, rods, v, frame, energy):
+    """Add the kinetic energy of the fluid that moves along [J], at the normals of the last stage.
+
+    frame: Velocity of the frame that it is seen from [m/s].
+    """
     if added_mass is None:
         return energy
     total = splat(0.0)
     for node in range(n_nodes(rods)):
-        vx, vy = load(v, 2 * node), load(v, 2 * node + 1)
+        vx, vy = load(v, 2 * node) - frame[0], load(v, 2 * node + 1) - frame[1]
         px, py = momentum(added_mass, node, vx, vy)
         total = add_product(total, 0.5, add_product(px * vx, py, vy))
     return energy + total

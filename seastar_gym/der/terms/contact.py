@@ -64,25 +64,32 @@ def freeze_contact(contact, rods, work, stage, q_0):
     if contact is None:
         return
     moved = splat(0.0)
+    carried_x, carried_y = moved, moved  # with the hub
     for node in range(n_nodes(rods)):
         x, y = looked_at(work, stage, 2 * node), looked_at(work, stage, 2 * node + 1)
         store(work.contact.ends, 2 * node, x)
         store(work.contact.ends, 2 * node + 1, y)
         dx, dy = x - load(q_0, 2 * node), y - load(q_0, 2 * node + 1)
+        if node == 0:
+            carried_x, carried_y = dx, dy
+        dx, dy = dx - carried_x, dy - carried_y
         squared = add_product(dx * dx, dy, dy)
         moved = select(squared > moved, squared, moved)
     # Whoever is farther apart than that could not have come near on the way.
     reach = add_product(MARGIN * load(contact.widest, 0), 2.0, sqrt(moved))
     store_number(work.contact.listed, 0, 0.0)
     store(work.contact.missed, 0, 0.0)
+    store(work.contact.own, 0, 0.0)
     for pair in range(contact.n_pairs):
         right = int(load_number(contact.pairs, 2 * pair))
         left = int(load_number(contact.pairs, 2 * pair + 1))
-        near, end_right, end_left = may_touch(rods, work, q_0, reach, right, left)
-        store(work.contact.near, pair, select(near, splat(1.0), 0.0))
+        view_limbs(rods, work, q_0, right, left)
+        near, end = may_touch(rods, work, reach, right, left, -1.0)
         if any_lane(near):
-            list_pairs(contact, rods, work, stage, q_0, reach, right, left, -1.0, end_right)
-            list_pairs(contact, rods, work, stage, q_0, reach, left, right, 1.0, end_left)
+            list_pairs(contact, rods, work, stage, q_0, reach, right, left, -1.0, end, near)
+        near, end = may_touch(rods, work, reach, left, right, 1.0)
+        if any_lane(near):
+            list_pairs(contact, rods, work, stage, q_0, reach, left, right, 1.0, end, near)
     if n_listed(work) == 0:
         store(work.contact.touching, 0, 0.0)
         for row in range(2 * n_nodes(rods)):
@@ -90,46 +97,58 @@ def freeze_contact(contact, rods, work, stage, q_0):
 
 
 @kernel
-def may_touch(rods, work, q_0, reach, right, left):
-    """Look at two limbs along the gap between them, and across it, and keep what is seen in work.contact.seen.
-
-    Returns the mask of the robots whose limbs no strip of width `reach` keeps apart, and how far each of them comes
-    towards the other.
-    """
+def view_limbs(rods, work, q_0, right, left):
+    """Look at two limbs and the hub along the gap between them, and across it; keep it in work.contact.seen."""
     edges = rods.nodes_per_limb - 1
-    ax, ay = edge_vector(q_0, 0, right * edges + 1)
-    bx, by = edge_vector(q_0, 0, left * edges + 1)
+    wx, wy = across_gap(rods, q_0, right, left)
+    view_node(work, 0, wx, wy)
+    for limb in (right, left):
+        for node in range(limb * edges + 1, limb * edges + edges + 1):
+            view_node(work, node, wx, wy)
+
+
+@kernel
+def across_gap(rods, q, right, left):
+    """Unit vector from the right limb to the left one: along the difference of their directions and across their sum."""
+    edges = rods.nodes_per_limb - 1
+    ax, ay = edge_vector(q, 0, right * edges + 1)
+    bx, by = edge_vector(q, 0, left * edges + 1)
     a, b = 1.0 / sqrt(add_product(ax * ax, ay, ay)), 1.0 / sqrt(add_product(bx * bx, by, by))
     ax, ay, bx, by = a * ax, a * ay, b * bx, b * by
-    # From the right limb to the left: along the difference of their directions and across their sum.
     wx, wy = bx - ax - (ay + by), by - ay + (ax + bx)
     scale = 1.0 / sqrt(add_product(wx * wx, wy, wy))
-    wx, wy = scale * wx, scale * wy
-    view_node(work, 0, wx, wy)
-    low, high = splat(np.inf), splat(-np.inf)
+    return scale * wx, scale * wy
+
+
+@kernel
+def may_touch(rods, work, reach, limb, other, side):
+    """(near, end): the mask of the robots with no strip of width `reach` between the nodes of a limb and the edges of
+    another, which begin at the hub, and how far the limb comes towards the other.
+    """
+    edges = rods.nodes_per_limb - 1
+    end, begin = splat(-np.inf), -side * load(work.contact.seen, 0)
     for i in range(1, edges + 1):
-        x = view_node(work, right * edges + i, wx, wy)
-        high = select(x > high, x, high)
-        x = view_node(work, left * edges + i, wx, wy)
-        low = select(x < low, x, low)
-    return ~(low - high > reach), high, -low
+        x, y = -side * load(work.contact.seen, 2 * (limb * edges + i)), -side * load(
+            work.contact.seen, 2 * (other * edges + i)
+        )
+        end = select(x > end, x, end)
+        begin = select(y < begin, y, begin)
+    return ~(begin - end > reach), end
 
 
 @kernel
 def view_node(work, node, wx, wy):
-    """Keep a node's places along w and across it [m]; returns the former."""
+    """Keep a node's places along w and across it [m]."""
     x, y = load(work.contact.ends, 2 * node), load(work.contact.ends, 2 * node + 1)
-    forth = add_product(x * wx, y, wy)
-    store(work.contact.seen, 2 * node, forth)
+    store(work.contact.seen, 2 * node, add_product(x * wx, y, wy))
     store(work.contact.seen, 2 * node + 1, subtract_product(y * wx, x, wy))
-    return forth
 
 
 @kernel
-def list_pairs(contact, rods, work, stage, q_0, reach, limb, other, side, end):
+def list_pairs(contact, rods, work, stage, q_0, reach, limb, other, side, end, robots):
     """List the nodes of a limb that are near edges of another, which has it on its left (side 1) or right (-1).
 
-    end: How far the limb comes towards the other, as may_touch saw it.
+    end, robots: How far the limb comes towards the other, and in whom it may touch it, as may_touch saw it.
     """
     edges = rods.nodes_per_limb - 1
     ends, seen = work.contact.ends, work.contact.seen
@@ -137,7 +156,8 @@ def list_pairs(contact, rods, work, stage, q_0, reach, limb, other, side, end):
         j, k = tail_node(rods, e), e + 1
         forth_j, forth_k = -side * load(seen, 2 * j), -side * load(seen, 2 * k)
         begin = select(forth_j < forth_k, forth_j, forth_k) - reach
-        if not any_lane(end > begin):
+        reached = robots & (end > begin)
+        if not any_lane(reached):
             continue
         z_j, z_k = load(seen, 2 * j + 1), load(seen, 2 * k + 1)
         lowest, highest = select(z_j < z_k, z_j, z_k) - reach, select(z_j < z_k, z_k, z_j) + reach
@@ -147,7 +167,7 @@ def list_pairs(contact, rods, work, stage, q_0, reach, limb, other, side, end):
         nx, ny = -ey * scale, ex * scale
         for i in range(limb * edges + 1, limb * edges + edges + 1):
             z = load(seen, 2 * i + 1)
-            facing = (-side * load(seen, 2 * i) > begin) & (z > lowest) & (z < highest)
+            facing = reached & (-side * load(seen, 2 * i) > begin) & (z > lowest) & (z < highest)
             if any_lane(facing):
                 dx, dy = edge_vector(ends, j, i)
                 s = add_product(dx * ex, dy, ey) * inverse
@@ -170,19 +190,25 @@ def list_pair(contact, rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing)
     near = facing & (g_0 > -d) & (g < MARGIN * d + absolute(g - g_0))
     if not any_lane(near):
         return
-    slot = n_listed(work)
-    if slot == work.contact.capacity:
-        store(work.contact.missed, 0, select(near, 1.0, load(work.contact.missed, 0)))
+    # Every robot has a share of the list of its own, so that nobody takes another's place.
+    own = load(work.contact.own, 0)
+    full = near & (own >= work.contact.share)
+    store(work.contact.missed, 0, select(full, 1.0, load(work.contact.missed, 0)))
+    near = near & ~full
+    if not any_lane(near):
         return
+    store(work.contact.own, 0, select(near, own + 1.0, own))
+    slot = n_listed(work)
     store_number(work.contact.listed, 0, slot + 1.0)
     store_number(work.contact.listed, 2 * slot + 1, float(i))
     store_number(work.contact.listed, 2 * slot + 2, float(e))
     row = SLOT_ROWS * slot
-    store(work.contact.slots, row + N_X, nx)
-    store(work.contact.slots, row + N_Y, ny)
-    store(work.contact.slots, row + SHARE, s)
+    # Others, whose edge may have no direction, meet nothing here that is not zero.
+    store(work.contact.slots, row + N_X, select(near, nx, 0.0))
+    store(work.contact.slots, row + N_Y, select(near, ny, 0.0))
+    store(work.contact.slots, row + SHARE, select(near, s, 0.0))
     store(work.contact.slots, row + THICKNESS, select(near, d, -OUT_OF_TOUCH))
-    store(work.contact.slots, row + OFFSET, gap_at_rest(rods, work, stage, slot))
+    store(work.contact.slots, row + OFFSET, select(near, gap_at_rest(rods, work, stage, slot), 0.0))
     store(work.contact.slots, row + STIFFNESS, 0.0)
 
 
@@ -283,17 +309,30 @@ def those_uncrossed(contact, rods, work, stage, q_0, robots):
     if contact is None:
         return robots
     robots = robots & ~(load(work.contact.missed, 0) > 0.0)
-    ready = False
+    store_step_end(rods, work, stage)
     for pair in range(contact.n_pairs):
-        near = load(work.contact.near, pair) > 0.0
-        if any_lane(robots & near):
-            if not ready:
-                store_step_end(rods, work, stage)
-                ready = True
-            right = int(load_number(contact.pairs, 2 * pair))
-            left = int(load_number(contact.pairs, 2 * pair + 1))
-            robots = robots & ~(near & come_to_cross(rods, work.contact.ends, q_0, right, left))
+        right = int(load_number(contact.pairs, 2 * pair))
+        left = int(load_number(contact.pairs, 2 * pair + 1))
+        doubtful = robots & ~on_their_sides(rods, work.contact.ends, q_0, right, left)
+        if any_lane(doubtful):
+            robots = robots & ~(doubtful & come_to_cross(rods, work.contact.ends, q_0, right, left))
     return robots
+
+
+@kernel
+def on_their_sides(rods, q_1, q_0, right, left):
+    """Mask of the robots whose limbs lie on either side of a line through the hub at q_1, so that they cannot cross."""
+    edges = rods.nodes_per_limb - 1
+    wx, wy = across_gap(rods, q_0, right, left)
+    high, low = splat(-np.inf), splat(np.inf)
+    for i in range(1, edges + 1):
+        dx, dy = edge_vector(q_1, 0, right * edges + i)
+        x = add_product(dx * wx, dy, wy)
+        dx, dy = edge_vector(q_1, 0, left * edges + i)
+        y = add_product(dx * wx, dy, wy)
+        high = select(high > x, high, x)
+        low = select(low < y, low, y)
+    return (high < 0.0) & (low > 0.0)
 
 
 @kernel

@@ -43,10 +43,18 @@ def freeze_current(current, rods, work):
 
 
 @kernel
-def add_work_of_current(current, rods, work, v, h, energy):
+def fluid_velocity(current, x, y):
+    """(u_x, u_y) [m/s] of the fluid, in motion or at rest (None), at (x, y) [m]."""
+    if current is None:
+        return splat(0.0), splat(0.0)
+    return current_velocity(current, x, y)
+
+
+@kernel
+def add_work_of_current(current, rods, work, v, h, frame, energy):
     """Add what drag takes from the fluid's motion in a step that ends with velocities v [J].
 
-    Its power is -(drag force of w = v - u) u.
+    Its power, as seen from a frame that moves with the velocity c, is (drag on the robot at w = v - u) (u - c).
     """
     if current is None:
         return energy
@@ -56,6 +64,6 @@ def add_work_of_current(current, rods, work, v, h, energy):
         _, c_speed, _ = drag_slopes(load(rods.drag, node), wx, wy)
         slopes = (zero, (c_speed * wx, c_speed * wy), (zero, zero, zero))
         _, (fx, fy), _ = add_cross_flow(rods.cross_drag, rods, work.normals, node, wx, wy, 1.0, 1.0, slopes)
-        power = subtract_product(power, fx, load(work.current, 2 * node))
-        power = subtract_product(power, fy, load(work.current, 2 * node + 1))
+        power = subtract_product(power, fx, load(work.current, 2 * node) - frame[0])
+        power = subtract_product(power, fy, load(work.current, 2 * node + 1) - frame[1])
     return add_product(energy, h, power)

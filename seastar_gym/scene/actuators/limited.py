@@ -10,10 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from seastar_gym.scene.actuators.actuator import Actuator, StatefulActuator, is_actuator
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.per_robot import Numbers, batch_size, column, require_each
+from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
 
 
+@register_part
 @dataclass(frozen=True)
 class Limited:
     """Follows another actuator's curve as far and as fast as it can.

@@ -1,6 +1,5 @@
 """An actuator that was measured: angles at times, for instance filmed on the bench."""
 
-import csv
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -10,9 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.scene.checks import require_number, require_numbers
+from seastar_gym.scene.csv_rows import read_numbers
 from seastar_gym.scene.per_robot import Numbers, require_each
+from seastar_gym.scene.serial import register_part
 
 
+@register_part
 @dataclass(frozen=True)
 class MeasuredCurve:
     """Rotation of a limb with command 1 over one stroke, linear between samples, the same in every stroke.
@@ -46,17 +48,17 @@ class MeasuredCurve:
 
     @classmethod
     def from_csv(cls, file: str | Path) -> "MeasuredCurve":
-        """From a file with a time [s] and an angle [rad] in every line, below one line of names if it has any."""
+        """From a file with a time [s] and an angle [rad] in every line, below one line of names if it has any.
+
+        Names have no digits: a mistyped first line is an error, see `seastar_gym.scene.csv_rows`.
+        """
         if not Path(file).is_file():
             raise FileNotFoundError(f"There is no measured curve at {file}: give the path of a CSV file.")
-        with Path(file).open(newline="", encoding="utf-8") as lines:
-            rows = [row for row in csv.reader(lines) if row]
-        if rows and not _is_number(rows[0][0]):
-            rows = rows[1:]
-        for row in rows:
-            if len(row) != 2 or not all(map(_is_number, row)):
-                raise ValueError(f"{file}: every line must have a time [s] and an angle [rad], not {','.join(row)!r}.")
-        return cls(times=tuple(float(row[0]) for row in rows), angles=tuple(float(row[1]) for row in rows))
+        times, angles = zip(*read_numbers(file, "a time [s] and an angle [rad]", 2), strict=True)
+        try:
+            return cls(times=times, angles=angles)
+        except ValueError as no_curve:
+            raise ValueError(f"{file}: {no_curve}") from None
 
     @property
     def peak_angle(self) -> Numbers:
@@ -76,11 +78,3 @@ class MeasuredCurve:
     def delta_psi(self, t: ArrayLike) -> NDArray[np.float64]:
         """Rotation of a limb with command 1 at time t [s] of a stroke [rad]; t of any shape."""
         return np.multiply.outer(np.interp(np.asarray(t, float), self.times, self.angles), self.scale)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

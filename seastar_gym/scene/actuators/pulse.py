@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.per_robot import Numbers, require_each
+from seastar_gym.scene.serial import register_part
 
 
 def pulse(t: ArrayLike, heating_time: float, cooling_time: float) -> NDArray[np.float64]:
@@ -40,6 +41,7 @@ class HeatingAndCooling:
         return 0.0, self.heating_time, self.period
 
 
+@register_part
 @dataclass(frozen=True)
 class SmaPulse(HeatingAndCooling):
     """The actuator of Fig. 13.5b. peak_angle [rad], heating_time: Delta t_1 [s], cooling_time: Delta t_2 [s]."""

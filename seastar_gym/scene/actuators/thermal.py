@@ -32,10 +32,12 @@ from numpy.typing import ArrayLike, NDArray
 from seastar_gym.scene.actuators.pulse import HeatingAndCooling
 from seastar_gym.scene.checks import require_finite, require_number
 from seastar_gym.scene.per_robot import Numbers, batch_size, column, require_each
+from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
 
 
+@register_part
 @dataclass(frozen=True)
 class ThermalSma(HeatingAndCooling):
     """Two wires per limb; the state of a limb is (T_+, T_-, xi_+, xi_-), temperatures [deg C] and shares of austenite.

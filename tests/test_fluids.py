@@ -1,13 +1,12 @@
-"""Terms that a scene may have: fluids and material damping, against the oracle and against closed forms."""
+"""Whole scenes with fluids and material damping, in their limits and against closed forms."""
 
-import json
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-import oracle
+from currents import swirl
 from oracle import Star
 from seastar_gym import (
     GridCurrent,
@@ -22,121 +21,10 @@ from seastar_gym import (
     Water,
     relaxation_time,
 )
-from seastar_gym.model.rods import make_rods
-from seastar_gym.simd.lanes import N_LANES
-from stages import RandomStages, random_shape
 
-
-def swirl(x, y):
-    """A current that is linear in x, in y and in x y, as bilinear interpolation is."""
-    return 0.1 + 0.3 * x - 0.5 * y + 2.0 * x * y, 0.2 * x + 0.05 * y
-
-
-CURRENTS = {
-    "uniform": UniformCurrent(0.03, -0.02),
-    "shear": ShearCurrent(0.4, direction=0.7),
-    "vortex": Vortex(0.02, x=0.1, y=-0.05, core_radius=0.06),
-    "grid": GridCurrent.from_function(swirl, (-0.4, 0.4), (-0.5, 0.4), 0.05),
-}
-
-
-def velocity(name: str, places: np.ndarray) -> np.ndarray:
-    """The currents once more, from their definitions."""
-    x, y = places.T
-    match name:
-        case "uniform":
-            return np.tile([0.03, -0.02], (len(x), 1))
-        case "shear":
-            along, across = np.array([np.cos(0.7), np.sin(0.7)]), np.array([-np.sin(0.7), np.cos(0.7)])
-            return 0.4 * (places @ across)[:, None] * along
-        case "vortex":
-            r, angle = np.hypot(x - 0.1, y + 0.05), np.arctan2(y + 0.05, x - 0.1)
-            speed = 0.02 / (2.0 * np.pi) * r / (0.06**2 + r**2)
-            return speed[:, None] * np.stack([-np.sin(angle), np.cos(angle)], axis=1)
-        case _:
-            return np.stack(swirl(x, y), axis=1)
-
-
-TERMS = [("uniform", 0.0), ("shear", 0.02), ("vortex", 0.1), ("grid", 1.3)]
 NONE = Water(1000.0, 1.0, 1.0, UniformCurrent(), 0.0)
 """Water that has every term and shows none: each other set of terms would be machine code of its own to compile."""
-TAU = 4e-3
 DAMPED = Seastar(relaxation_time=1e-4)
-
-
-def robot_water_and_star(current: str, along: float, **shape) -> tuple[Seastar, Water, Star]:
-    """The same scene, with all terms, for the kernels and for the oracle."""
-    star = Star(
-        fluid_density=950.0, drag_coefficient=1.3, tangential_drag_coefficient=along, relaxation_time=TAU,
-        added_mass_coefficient=0.8, current=lambda places: velocity(current, places), **shape,
-    )  # fmt: skip
-    return Seastar(relaxation_time=TAU, **shape), Water(950.0, 1.3, along, CURRENTS[current], 0.8), star
-
-
-# Against the oracle
-
-
-@pytest.mark.parametrize("current, along", TERMS)
-def test_potential_and_newton_direction_in_a_fluid_are_those_of_the_oracle(current, along):
-    robot, water, star = robot_water_and_star(current, along, nodes_per_limb=4)
-    scene = Scene(robot, water)
-    stages = RandomStages(star, 1e-2, bend=0.05)
-    found = stages.run(make_rods(scene))
-    for lane in range(N_LANES):
-        data = stages.data(lane)
-        gradient = oracle.incremental_gradient(star, stages.q[lane], *data)
-        direction = np.linalg.solve(stages.hessian(lane), gradient.ravel()).reshape(-1, 2)
-        assert found.phi[lane] == pytest.approx(oracle.incremental_potential(star, stages.q[lane], *data), rel=1e-12)
-        assert found.decrement[lane] == pytest.approx(np.sum(gradient * direction), rel=1e-11)
-        np.testing.assert_allclose(found.direction[lane], direction, rtol=0.0, atol=1e-11 * np.abs(direction).max())
-
-
-@pytest.mark.parametrize("hub_hinge", ["opening", "turning"])
-def test_the_oracles_damping_has_the_slopes_of_its_potential(hub_hinge):
-    star, rng = Star(3, 3, hub_hinge=hub_hinge, relaxation_time=TAU), np.random.default_rng(4)
-    q_hat = random_shape(star, 0.3, 0.02, rng)
-    q = q_hat + 1e-3 * rng.standard_normal(q_hat.shape)
-    _, gradient, hessian = oracle.damping_potential(star, q, q_hat, 0.01)
-    for k in range(q.size):
-        step = np.zeros(q.size)
-        step[k] = 1e-8
-        moved = (q + step.reshape(q.shape), q - step.reshape(q.shape))
-        ahead, behind = (oracle.damping_potential(star, x, q_hat, 0.01) for x in moved)
-        assert gradient[k] == pytest.approx((ahead[0] - behind[0]) / 2e-8, rel=1e-5, abs=1e-6 * np.abs(gradient).max())
-        column = (ahead[1] - behind[1]) / 2e-8
-        np.testing.assert_allclose(hessian[:, k], column, rtol=1e-5, atol=1e-6 * np.abs(hessian).max())
-
-
-@pytest.mark.parametrize("current, along", TERMS)
-def test_the_oracles_drag_in_a_fluid_is_the_slope_of_its_potential(current, along):
-    _, _, star = robot_water_and_star(current, along, nodes_per_limb=3)
-    rng = np.random.default_rng(2)
-    frozen, v = random_shape(star, 0.3, 0.01, rng), rng.standard_normal((star.n_nodes, 2))
-    force, jacobian = oracle.drag_force(star, v, frozen), oracle.drag_jacobian(star, v, frozen)
-    for k in range(v.size):
-        step = np.zeros(v.size)
-        step[k] = 1e-6
-        ahead, behind = v + step.reshape(v.shape), v - step.reshape(v.shape)
-        slope = (oracle.drag_potential(star, ahead, frozen) - oracle.drag_potential(star, behind, frozen)) / 2e-6
-        assert -force.ravel()[k] == pytest.approx(slope, rel=1e-7, abs=1e-9)
-        column = (oracle.drag_force(star, ahead, frozen) - oracle.drag_force(star, behind, frozen)).ravel() / 2e-6
-        np.testing.assert_allclose(jacobian[:, k], column, rtol=1e-6, atol=1e-9)
-
-
-@pytest.mark.parametrize("current, along", TERMS)
-def test_a_step_in_a_fluid_is_the_oracles(current, along):
-    h = 0.01
-    robot, water, star = robot_water_and_star(current, along, nodes_per_limb=4)
-    numerics = Numerics("implicit-euler", h, newton_tolerance=1e-13)
-    simulator = Simulator(Scene(robot, water, SmaPulse(0.3, 2.0 * h, 2.0 * h), numerics))
-    rng = np.random.default_rng(3)
-    q, v = random_shape(star, 0.05, 1e-3, rng), 0.02 * rng.standard_normal((star.n_nodes, 2))
-    command = rng.uniform(-1.0, 1.0, 5)
-    simulator.set_state((q[None], v[None], np.zeros(1)))
-    next(simulator.stroke_in_parts(command[None], 4))
-    q, v = oracle.step(star, q, v, 0.0, h, command, "implicit-euler", peak_angle=0.3, heating_time=0.02)
-    np.testing.assert_allclose(simulator.positions[0], q, rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(simulator.velocities[0], v, rtol=0.0, atol=1e-10)
 
 
 # Limits
@@ -357,12 +245,6 @@ def test_a_violent_robot_in_a_current_is_guarded_and_finishes():
     simulator.v[:] = rng.standard_normal(simulator.v.shape)
     report = simulator.stroke(rng.uniform(-1.0, 1.0, (8, 5)))
     assert not report.status.any() and report.halvings.sum() > 0
-
-
-@pytest.mark.parametrize("current", [None, *CURRENTS.values()])
-def test_a_fluid_comes_back_from_json(current):
-    water = Water(900.0, 1.1, 0.2, current)
-    assert Water.from_fields(json.loads(json.dumps(asdict(water)))) == water
 
 
 # Refusals

@@ -1,0 +1,42 @@
+"""Linear momentum, which no internal force changes, whatever the rounding of a linear solution.
+
+Summed over all nodes, internal forces and contact cancel, so a full Newton step balances the momentum exactly, however
+rough its other parts are. Its rounding does not: elimination subtracts stiffnesses EA/l from each other until the inertia
+m/gamma^2 is left, and loses the share EA/l over m/gamma^2, times the edges squared, of what a double holds. The move of
+the whole robot is then off by that share of the last Newton step.
+
+So where that can be seen, at any step in vacuum and in a fluid at very long ones, the whole robot takes one Newton step
+of its own after the others: from the residual summed over the nodes, and its slope. In vacuum it is exact.
+"""
+
+from seastar_gym.der.potential import node_slopes
+from seastar_gym.der.rods import n_nodes
+from seastar_gym.simd.compilation import kernel
+from seastar_gym.simd.lanes import any_lane, load, select, splat, store
+
+LOST = 1e8  # of stiffness over inertia: from there on a step's rounding is worth a correction in a fluid, too
+
+
+@kernel
+def settle_momentum(rods, work, stage, robots):
+    """Move the robots in the mask whose momentum may be unbalanced to where it is balanced."""
+    unsettled = robots & (load(rods.unsettled_rate, 0) * stage.gamma * stage.gamma > LOST)
+    if any_lane(unsettled):
+        move_as_a_whole(rods, work, stage, unsettled)
+
+
+@kernel
+def move_as_a_whole(rods, work, stage, robots):
+    """Newton step of a stage in which all nodes of a robot move alike."""
+    zero = splat(0.0)
+    fx, fy, xx, xy, yy = zero, zero, zero, zero, zero
+    for node in range(n_nodes(rods)):
+        _, gradient, hessian = node_slopes(rods, work, stage, node)
+        fx, fy = fx + gradient[0], fy + gradient[1]
+        xx, xy, yy = xx + hessian[0], xy + hessian[1], yy + hessian[2]
+    determinant = xx * yy - xy * xy
+    dx, dy = (yy * fx - xy * fy) / determinant, (xx * fy - xy * fx) / determinant
+    for node in range(n_nodes(rods)):
+        x, y = load(work.q, 2 * node), load(work.q, 2 * node + 1)
+        store(work.q, 2 * node, select(robots, x - dx, x))
+        store(work.q, 2 * node + 1, select(robots, y - dy, y))

@@ -1,0 +1,108 @@
+"""CSV files as users have them: what cannot be read is refused in one sentence with the file and the line.
+
+Fields are separated by commas, numbers have a decimal point, the text is UTF-8, with a byte order mark or without.
+Empty lines are skipped, and a first line of names, in which every field begins with a letter and has no digit: a
+mistyped line of numbers is an error and not a header.
+"""
+
+import csv
+import io
+import math
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+NAME = re.compile(r"[^\W\d_]\D*")
+NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", re.IGNORECASE)
+LONGEST_SHOWN = 40
+"""Characters of a field that a sentence shows."""
+
+
+class Row(NamedTuple):
+    """The fields of one line, and where it stands: "curve.csv, line 3"."""
+
+    where: str
+    fields: tuple[str, ...]
+
+    def refused(self, reason: str) -> ValueError:
+        """The error that names the line."""
+        return ValueError(f"{self.where}: {reason}.")
+
+    def has_names(self) -> bool:
+        """Whether every field is a name: a letter first, no digit, and not nan or inf."""
+        return all(NAME.fullmatch(field) and not NOT_FINITE.fullmatch(field) for field in self.fields)
+
+    def numbers(self, *, empty_allowed: bool = False) -> list[float]:
+        """Its finite numbers; NaN for an empty field where those are allowed."""
+        return [math.nan if empty_allowed and not field else self._number(field) for field in self.fields]
+
+    def integers(self) -> list[int]:
+        """Its whole numbers."""
+        numbers = self.numbers()
+        if not all(map(float.is_integer, numbers)):
+            raise self.refused("its numbers must be whole")
+        return [int(number) for number in numbers]
+
+    def _number(self, field: str) -> float:
+        if NOT_FINITE.fullmatch(field) or (NUMBER.fullmatch(field) and math.isinf(float(field))):
+            raise self.refused(f"{_shown(field)} is no finite number")
+        if not NUMBER.fullmatch(field):
+            hint = ", decimals follow a point" if "," in field else ""
+            raise self.refused(f"{_shown(field)} is no number{hint}")
+        return float(field)
+
+
+def read_rows(file: str | Path) -> list[Row]:
+    """Every line that is not empty. FileNotFoundError or ValueError, with one sentence, where it cannot be read."""
+    if not Path(file).is_file():
+        raise FileNotFoundError(f"There is no file {file}.")
+    return [row for row in _rows(file) if row.fields not in ((), ("",))]
+
+
+def read_numbers(file: str | Path, columns: str, n_columns: int | None = None) -> list[list[float]]:
+    """Equally many numbers of every line, below one line of names if there is any.
+
+    columns: What a line must have, for sentences: "a time [s] and an angle [rad]". n_columns: How many, or None for
+        as many as there are in the first line.
+    """
+    rows = read_rows(file)
+    for row in rows:
+        if ";" in "".join(row.fields):
+            raise row.refused("fields must be separated by commas, not by semicolons")
+        if len(row.fields) != (n_columns or len(rows[0].fields)):
+            raise row.refused(f"every line must have {columns}, not {_shown(','.join(row.fields))}")
+    numbers = [row.numbers() for row in (rows[1:] if rows and rows[0].has_names() else rows)]
+    if not numbers:
+        raise ValueError(f"{file} has no line with {columns}.")
+    return numbers
+
+
+def _text(file: str | Path) -> str:
+    data = Path(file).read_bytes()
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as undecodable:
+        line = data.count(b"\n", 0, undecodable.start) + 1
+        raise ValueError(f"{file}, line {line}: this is no UTF-8 text: save the file in that encoding.") from None
+    if "\0" in text:
+        line = text.count("\n", 0, text.index("\0")) + 1
+        raise ValueError(f"{file}, line {line}: there is a NUL byte, which no CSV file has.")
+    return text
+
+
+def _rows(file: str | Path) -> Iterator[Row]:
+    """Every row, with the number of the line on which it begins."""
+    reader = csv.reader(io.StringIO(_text(file), newline=""), strict=True, skipinitialspace=True)
+    begin = 1
+    try:
+        for fields in reader:
+            yield Row(f"{file}, line {begin}", tuple(field.strip() for field in fields))
+            begin = reader.line_num + 1
+    except csv.Error as wrong:
+        raise ValueError(f"{file}, line {begin}: this is no CSV: {wrong}.") from None
+
+
+def _shown(field: str) -> str:
+    return repr(field if len(field) <= LONGEST_SHOWN else field[:LONGEST_SHOWN] + "...")

@@ -1,0 +1,162 @@
+"""Scenes as plain data: numbers, texts, lists and dicts that any JSON library writes and reads.
+
+    data = json.loads(json.dumps(scene.to_dict()))
+    assert Scene.from_dict(data) == scene  # to the last bit
+
+A part of a scene is a dict of its `kind` and its constructor's arguments; arguments that are left out have their
+defaults, so that scenes written before a new term can be read. A tuple is a list, and numbers of each robot
+are a kind of their own. The outermost dict has the `version` of this form, too. What could not be read back is refused
+when it is written. Reading makes parts of registered classes and nothing else: no text is evaluated, nothing imported.
+"""
+
+import inspect
+import sys
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+import numpy as np
+
+from seastar_gym.scene.per_robot import PerRobot
+
+VERSION = 1
+"""Version of the plain form."""
+DEEPEST = 32
+"""Lists and dicts within each other that are read."""
+
+Part = TypeVar("Part")
+
+KINDS: dict[str, type] = {}
+"""Classes that are written by the arguments of their constructors, by name."""
+COLLECTIONS: dict[str, type] = {"per robot": PerRobot, "mapping": dict}
+"""Classes that are written by their items; those of a dict are pairs, because JSON libraries may sort its names."""
+
+
+def register_part(kind: type[Part]) -> type[Part]:
+    """Class decorator: scenes with parts of this class, such as an actuator of your own, can be written and read.
+
+    The class keeps its constructor's arguments as attributes of the same names and compares by value, as a dataclass
+    does; the arguments are numbers, texts, None, tuples, dicts and parts of registered classes. Whoever reads such a
+    scene has registered the class before.
+    """
+    known = KINDS.setdefault(kind.__name__, kind)
+    if (known.__module__, known.__qualname__) != (kind.__module__, kind.__qualname__):
+        raise ValueError(f"There is a part of the name {kind.__name__} already: give this class another one.")
+    KINDS[kind.__name__] = kind
+    return kind
+
+
+def _arguments(kind: type) -> list[str]:
+    return list(inspect.signature(kind).parameters)
+
+
+# --- writing ---------------------------------------------------------------------------------------------------------
+
+
+def to_dict(part: Any) -> dict[str, Any]:
+    """The plain form of a part. ValueError, with one sentence, where it could not be read back as it is."""
+    name = type(part).__name__
+    data = {"version": VERSION, **_written(part, name)}
+    if from_dict(data, type(part)) != part:
+        raise ValueError(f"{name} could not be read back as it is: its parts have to compare by value.")
+    return data
+
+
+def _written(value: Any, where: str) -> Any:
+    kind = type(value).__name__
+    if KINDS.get(kind) is type(value):
+        missing = [name for name in _arguments(type(value)) if not hasattr(value, name)]
+        if missing:
+            raise ValueError(f"{where} could not be read back: a {kind} keeps no {', '.join(missing)}.")
+        fields = {name: getattr(value, name) for name in _arguments(type(value))}
+        return {"kind": kind, **{name: _written(one, f"{where}.{name}") for name, one in fields.items()}}
+    match value:
+        case None | bool() | str():
+            return value
+        case np.bool_():
+            return bool(value)
+        case int() | np.integer():
+            return int(value)
+        case float():
+            return float(value)
+        case PerRobot():
+            return {"kind": "per robot", "items": _written_items(value, where)}
+        case Mapping():
+            return {"kind": "mapping", "items": _written_items(tuple(value.items()), where)}
+        case tuple():
+            return _written_items(value, where)
+        case np.floating():
+            raise ValueError(f"{where} is a {kind}, which computes to another precision: make it a float.")
+    raise ValueError(
+        f"{where} is a {kind}, which could not be read back: use a part of seastar_gym, or register the class of yours "
+        "with the decorator seastar_gym.register_part."
+    )
+
+
+def _written_items(values: tuple[Any, ...], where: str) -> list[Any]:
+    return [_written(value, f"{where}[{k}]") for k, value in enumerate(values)]
+
+
+# --- reading ---------------------------------------------------------------------------------------------------------
+
+
+def from_dict(data: object, kind: type[Part]) -> Part:
+    """The part that `to_dict` wrote. ValueError, with one sentence, for everything else."""
+    if not isinstance(data, dict) or "version" not in data:
+        raise ValueError(f"A plain {kind.__name__} is a dict with a version, as to_dict writes it, not {shown(data)}.")
+    version = data["version"]
+    if type(version) is not int or version != VERSION:
+        raise ValueError(f"A plain {kind.__name__} of version {shown(version)} cannot be read here, only of {VERSION}.")
+    part = _read({name: value for name, value in data.items() if name != "version"}, kind.__name__)
+    if not isinstance(part, kind):
+        raise ValueError(f"This is a plain {type(part).__name__}, not a {kind.__name__}.")
+    return part
+
+
+def _read(value: object, where: str, depth: int = 0) -> Any:
+    if depth > DEEPEST:
+        raise ValueError(f"{where.split('.')[0]} is nested too deeply: more than {DEEPEST} levels.")
+    match value:
+        case None | bool() | str():
+            return value
+        case int() | float() if abs(value) <= sys.float_info.max:
+            return value
+        case list():
+            return tuple(_read(one, f"{where}[{k}]", depth + 1) for k, one in enumerate(value))
+        case {"kind": str(kind), **fields} if kind in KINDS:
+            return _read_part(kind, fields, where, depth)
+        case {"kind": str(kind), "items": list(items), **others} if kind in COLLECTIONS and not others:
+            return _made(COLLECTIONS[kind], where, _read(items, where, depth + 1))
+        case {"kind": kind}:
+            raise ValueError(
+                f"{where} is of the kind {shown(kind)}, which is not known: a class of your own has to be registered "
+                "with seastar_gym.register_part before it is read."
+            )
+    raise ValueError(f"{where} must be a finite number, a text, a list or a part with its kind, not {shown(value)}.")
+
+
+def _read_part(kind: str, fields: dict[Any, object], where: str, depth: int) -> Any:
+    parameters = inspect.signature(KINDS[kind]).parameters
+    names = list(parameters)
+    unknown = [name for name in fields if name not in names]
+    missing = [name for name in names if name not in fields and parameters[name].default is inspect.Parameter.empty]
+    if unknown or missing:
+        problem = f"says {shown(unknown[0])}, which no {kind} has" if unknown else f"does not say {missing[0]!r}"
+        raise ValueError(f"{where} {problem}: a {kind} is written with {', '.join(names) or 'nothing'}.")
+    values = {name: _read(fields[name], f"{where}.{name}", depth + 1) for name in names if name in fields}
+    return _made(KINDS[kind], where, **values)
+
+
+def _made(kind: type, where: str, *arguments: Any, **fields: Any) -> Any:
+    try:
+        return kind(*arguments, **fields)
+    except (TypeError, ArithmeticError) as unfit:
+        raise ValueError(f"{where} is no {kind.__name__}: {' '.join(str(unfit).split()).rstrip('.')}.") from unfit
+
+
+def shown(value: object) -> str:
+    """A value in a sentence, however large it is."""
+    if isinstance(value, int) and abs(value) > sys.float_info.max:
+        return "a number beyond all floats"
+    if value is None or isinstance(value, bool | int | float):
+        return repr(value)
+    return repr(value) if isinstance(value, str) and len(value) < 40 else f"a {type(value).__name__}"

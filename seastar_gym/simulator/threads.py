@@ -1,0 +1,66 @@
+"""`Threads`: parts of a batch, shared out over threads."""
+
+import os
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+
+
+class Threads:
+    """`n` threads, started when they are first needed, and again after `close`; one is the caller's own."""
+
+    def __init__(self, n: int):
+        self.n = n
+        self._pool: ThreadPoolExecutor | None = None
+        self._at_work: list[threading.Lock] = []
+        self._process = os.getpid()
+
+    def run(self, work: Callable[[int, slice], None], parts: Iterable[slice]) -> None:
+        """Do work(thread, part) for all parts; whoever is ready takes the next.
+
+        If a part fails or the caller is interrupted, no thread is at work any more when the exception leaves.
+        """
+        waiting = iter(list(parts))
+        if self.n == 1:
+            for part in waiting:
+                work(0, part)
+            return
+        pool, at_work = self._get_pool(), self._at_work
+
+        def take_parts(thread: int) -> None:
+            with at_work[thread]:
+                for part in waiting:
+                    work(thread, part)
+
+        try:
+            list(pool.map(take_parts, range(self.n)))
+        except BaseException:
+            _stop(waiting, at_work)
+            raise
+
+    def _get_pool(self) -> ThreadPoolExecutor:
+        """The threads of this process: a fork inherits the pool of its parent, but not the threads in it."""
+        if self._pool is None or self._process != os.getpid():
+            self._process = os.getpid()
+            self._at_work = [threading.Lock() for _ in range(self.n)]
+            self._pool = ThreadPoolExecutor(self.n)
+        return self._pool
+
+    def close(self) -> None:
+        """End the threads."""
+        pool, self._pool = self._pool, None
+        if pool is not None and self._process == os.getpid():
+            pool.shutdown()
+
+
+def _stop(waiting: Iterator[slice], at_work: Iterable[threading.Lock]) -> None:
+    """Leave nothing to take, and wait until nobody is at work; a thread that is late finds nothing."""
+    try:
+        for _ in waiting:
+            pass
+        for busy in at_work:
+            with busy:
+                pass
+    except BaseException:  # interrupted once more: the threads are waited for all the same
+        _stop(waiting, at_work)
+        raise

@@ -1,0 +1,72 @@
+"""Elastic and kinetic energy of a robot: at rest, in motion, turned, mirrored, loaded."""
+
+import numpy as np
+import pytest
+
+import oracle
+from seastar_gym import Scene, Seastar, SmaPulse
+from seastar_gym.der.energy import add_load_energy, elastic_energy, kinetic_energy
+from seastar_gym.der.rods import Actuation, make_work
+from seastar_gym.der.terms.actuation import set_natural_hub_angles
+from seastar_gym.model.rods import make_rods
+from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simd.numpy_lanes import Lanes
+from slopes import gradient, plain, rotated, rows
+from stages import random_shape
+
+STAR = oracle.Star(5, 4)
+RNG = np.random.default_rng(0)
+SHAPE = random_shape(STAR, 0.3, 0.05, RNG)
+TURNS = RNG.uniform(-0.2, 0.2, 5)
+
+
+def energy(q: np.ndarray, delta_psi=TURNS, hub_hinge: str = "opening") -> float:
+    """Elastic energy [J] with limbs turned by their actuators."""
+    rods = make_rods(Scene(Seastar(5, 4, hub_hinge=hub_hinge), actuator=SmaPulse(0.2)))
+    turns = np.tile(np.asarray(delta_psi)[:, None], N_LANES)
+    work = make_work(rods, 1)
+    set_natural_hub_angles.plain(rods, work, Actuation(turns, turns), Lanes(1.0))
+    return float(plain(elastic_energy.plain(rods, work, rows(q)))[0])
+
+
+@pytest.mark.parametrize("hub_hinge", ["opening", "turning"])
+def test_elastic_energy_is_that_of_the_oracle(hub_hinge):
+    star = oracle.Star(5, 4, hub_hinge=hub_hinge)
+    assert energy(SHAPE, hub_hinge=hub_hinge) == pytest.approx(oracle.elastic_energy(star, SHAPE, TURNS), rel=1e-12)
+
+
+def test_a_robot_at_rest_stores_nothing():
+    assert energy(STAR.rest, np.zeros(5)) < 1e-25
+
+
+def test_where_a_robot_lies_and_how_it_is_turned_stores_nothing():
+    assert energy(rotated(SHAPE, 1.3) + [0.2, -0.5]) == pytest.approx(energy(SHAPE), rel=1e-10)
+
+
+def test_a_mirrored_robot_stores_the_same():
+    """Limbs 2 and 5, 3 and 4 change places, and turn the other way."""
+    limbs = np.array([0, 4, 3, 2, 1])
+    nodes = np.concatenate([[0], *(3 * limb + np.arange(1, 4) for limb in limbs)])
+    assert energy(SHAPE[nodes] * [1.0, -1.0], -TURNS[limbs]) == pytest.approx(energy(SHAPE), rel=1e-10)
+
+
+def test_internal_forces_neither_push_nor_turn_the_robot():
+    force = gradient(lambda q: energy(q.reshape(-1, 2)), SHAPE.ravel(), 1e-6).reshape(-1, 2)
+    spin = SHAPE[:, 0] * force[:, 1] - SHAPE[:, 1] * force[:, 0]
+    size = np.abs(force).max()
+    np.testing.assert_allclose(force.sum(axis=0), 0.0, atol=1e-6 * size)
+    assert abs(spin.sum()) < 1e-6 * size * 0.1
+
+
+def test_kinetic_energy_is_half_the_masses_times_the_speeds_squared():
+    v = RNG.standard_normal(SHAPE.shape)
+    rods = make_rods(Scene(Seastar(5, 4)))
+    assert plain(kinetic_energy.plain(rods, rows(v)))[0] == pytest.approx(oracle.kinetic_energy(STAR, v), rel=1e-13)
+
+
+def test_a_load_gives_its_node_the_energy_that_it_loses_on_the_way():
+    loads = np.zeros(2 * STAR.n_nodes)
+    loads[4], loads[7] = 0.3, -0.2
+    found = plain(add_load_energy.plain(loads, rows(SHAPE), STAR.n_nodes, Lanes(1.0)))[0]
+    assert found == pytest.approx(1.0 - 0.3 * SHAPE[2, 0] + 0.2 * SHAPE[3, 1], rel=1e-13)
+    assert add_load_energy.plain(None, None, None, 1.0) == 1.0

@@ -1,0 +1,150 @@
+"""Kernels in plain Python: beside the compiled ones, in place of them, and never by accident."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+from seastar_gym import Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, Vortex, Water
+from seastar_gym.der.terms import drag
+from seastar_gym.der.terms.drag import drag_slopes
+from seastar_gym.envs.observation import body_axis
+from seastar_gym.simd import lanes, numpy_lanes
+from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simd.numpy_lanes import Lanes, Mask
+from seastar_gym.simd.plain import PlainKernels
+from slopes import plain
+
+ROOT = Path(__file__).resolve().parents[2]
+COMPILED = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+
+
+SCRIPT = """
+import sys, numpy, test_plain
+numpy.savez(sys.argv[1], **test_plain.ends())
+"""
+MEETING = SmaPulse(0.62, 0.1, 0.1)
+
+
+# Whole strokes
+
+
+def scenes():
+    """Few nodes and a short stroke: every scheme, adapted steps, a fluid with all terms, limbs that meet."""
+    pulse = SmaPulse(0.6, 0.05, 0.05)
+    for scheme, nodes in (("implicit-euler", 4), ("sdirk2", 3), ("sdirk3", 3), ("implicit-midpoint", 3)):
+        yield scheme, Scene(Seastar(nodes_per_limb=nodes), actuator=pulse, numerics=Numerics(scheme, 0.02))
+    adapted = Numerics("implicit-midpoint", 0.02, path_tolerance=0.02)
+    yield "adapted", Scene(Seastar(nodes_per_limb=3), actuator=pulse, numerics=adapted)
+    water = Water(950.0, 1.3, 0.1, Vortex(0.02, 0.1, -0.05, 0.06), 0.8)
+    robot = Seastar(nodes_per_limb=3, relaxation_time=4e-3)
+    yield "fluid", Scene(robot, water, pulse, Numerics("implicit-midpoint", 0.01))
+    for name, contact in (("contact", Contact()), ("no contact", None)):
+        yield name, Scene(Seastar(nodes_per_limb=4), None, MEETING, Numerics(step=0.02), contact=contact)
+
+
+def ends() -> dict[str, np.ndarray]:
+    """Where the nodes are after a stroke; some robots begin with blows that need repairs and halved steps."""
+    found = {}
+    for name, scene in scenes():
+        n_robots = N_LANES + (name == "implicit-euler")  # two threads once
+        simulator, rng = Simulator(scene, n_robots, threads=2), np.random.default_rng(0)
+        simulator.v[:, :, -2:] = 1.0 * rng.standard_normal(simulator.v[:, :, -2:].shape)
+        report = simulator.stroke(rng.integers(-1, 2, (n_robots, 5)).astype(float))
+        found[name], found[f"{name} counts"] = simulator.positions, np.array([report.steps, report.halvings])
+    return found
+
+
+@COMPILED
+def test_strokes_in_plain_python_are_those_of_the_machine_code(tmp_path):
+    path = os.pathsep.join(map(str, (ROOT, ROOT / "tests", ROOT / "tests" / "der")))
+    answer = subprocess.run(
+        [sys.executable, "-W", "error", "-c", SCRIPT, str(tmp_path / "plain.npz")],
+        cwd=ROOT, env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": path},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert answer.returncode == 0, answer.stderr
+    expected = ends()
+    with np.load(tmp_path / "plain.npz") as found:
+        assert set(found) == set(expected)
+        for name in expected:
+            np.testing.assert_allclose(found[name], expected[name], rtol=0.0, atol=1e-13, err_msg=name)
+    assert expected["implicit-euler counts"][1].sum() > 0  # steps were halved
+    assert np.abs(expected["contact"] - expected["no contact"]).max() > 1e-5  # limbs have met
+
+
+# One kernel
+
+
+@COMPILED
+def test_a_compiled_kernel_called_from_python_says_so_in_one_sentence():
+    with pytest.raises(TypeError, match=r"drag_slopes is a kernel.*@entry_point.*drag_slopes\.plain.*\.$") as caught:
+        drag_slopes(0.3, 1.0, 2.0)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_kernel_runs_in_plain_python_beside_itself():
+    _, c_speed, _ = drag_slopes.plain(Lanes(0.5), Lanes([3.0, 0.0]), Lanes([4.0, 0.0]))
+    np.testing.assert_array_equal(plain(c_speed), [2.5, 0.0])
+
+
+def test_a_kernel_outside_the_rods_has_its_plain_twin_too():
+    square = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 1.0])[:, None]
+    turned = np.array([0.0, 0.0, 0.0, 1.0, -1.0, 0.0])[:, None]
+    np.testing.assert_allclose(plain(body_axis.plain(square, turned, 3)), [[0.0], [1.0]], atol=1e-15)
+
+
+def test_loading_plain_kernels_leaves_every_module_as_it_was():
+    before = dict(sys.modules), dict(vars(drag)), dict(vars(sys.modules["seastar_gym.der"]))
+    kernels = PlainKernels()
+    assert kernels(drag_slopes) is not drag_slopes
+    assert (sys.modules, vars(drag), vars(sys.modules["seastar_gym.der"])) == before
+
+
+def test_functions_of_the_interface_can_be_replaced():
+    loaded = []
+    kernels = PlainKernels(load=lambda rows, row: loaded.append(row) or numpy_lanes.load(rows, row))
+    kernels(drag.relative)(np.zeros((4, 1)), 1, Lanes(1.0), Lanes(2.0))
+    assert loaded == [2, 3]
+
+
+# The twin
+
+
+def test_the_twin_has_every_function_of_lanes_and_says_so():
+    assert all(callable(getattr(numpy_lanes, name)) and hasattr(lanes, name) for name in numpy_lanes.FUNCTIONS)
+    used = {
+        name
+        for file in (ROOT / "seastar_gym").rglob("*.py")
+        for block in file.read_text(encoding="utf-8").split("seastar_gym.simd.lanes import ")[1:]
+        for name in block.lstrip("(").split(")" if block.startswith("(") else "\n")[0].replace(",", " ").split()
+    }
+    assert used <= {*numpy_lanes.FUNCTIONS, "N_LANES"}
+    for name in (*numpy_lanes.FUNCTIONS, "N_LANES", "Lanes", "Mask"):
+        assert f"\n{name} " in numpy_lanes.__doc__
+
+
+def test_what_is_loaded_does_not_change_with_what_is_stored():
+    rows = np.ones((2, 3))
+    value = numpy_lanes.load(rows, 1)
+    numpy_lanes.store(rows, 1, 5.0)
+    np.testing.assert_array_equal(value.numbers, 1.0)
+
+
+def test_a_row_that_is_not_there_is_an_index_error():
+    with pytest.raises(IndexError):
+        numpy_lanes.load(np.ones((2, 3)), 2)
+
+
+def test_a_mask_is_neither_true_nor_false():
+    with pytest.raises(TypeError, match="any_lane or all_lanes"):
+        bool(Mask([True, False]))
+
+
+def test_numbers_of_numpy_leave_operators_to_lanes():
+    for result in (np.float64(2.0) * Lanes([1.0, 2.0]), np.float64(4.0) - Lanes([2.0, 0.0])):
+        np.testing.assert_array_equal(plain(result), [2.0, 4.0])

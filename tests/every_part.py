@@ -1,0 +1,58 @@
+"""Every actuator, and every part that a scene may have, for tests that have to hold for all of them."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from seastar_gym import (
+    Contact,
+    GridCurrent,
+    Limb,
+    Limited,
+    MeasuredCurve,
+    Numerics,
+    Seastar,
+    ShearCurrent,
+    SmaPulse,
+    ThermalSma,
+    UniformCurrent,
+    Vortex,
+    Water,
+)
+
+EACH = np.array([1.0, 0.1 + 0.2, math.nextafter(1.0, 2.0)])
+"""Numbers of three robots, none of which survives rounding."""
+CURVE = MeasuredCurve((0.0, 0.1, 1 / 3, 1.0), (0.0, math.pi / 5, 0.2, 0.0))
+WAVES = GridCurrent.from_function(lambda x, y: (1e-3 * np.sin(7 * x), 1e-3 * np.cos(3 * y)), (-0.3, 0.3), (0, 1), 0.1)
+
+ACTUATORS = {
+    "pulse": SmaPulse(0.3 + 1e-16, 1 / 7, 6 / 7),
+    "pulse of each robot": SmaPulse(0.5 * EACH),
+    "curve": CURVE,
+    "curve of each robot": replace(CURVE, scale=EACH),
+    "limited pulse": Limited(SmaPulse(), 0.5, 2.0),
+    "limited curve": Limited(CURVE, None, 3.0),
+    "limits of each robot": Limited(SmaPulse(0.4), 0.3 * EACH, None),
+    "thermal": ThermalSma(austenite_finish=70.1),
+    "thermal of each robot": ThermalSma(water_temperature=20.0 + EACH),
+}
+PARTS = {
+    "nothing": {},
+    "vacuum": {"fluid": None},
+    "currents": {"fluid": Water(current=UniformCurrent(1e-3, -1 / 3e3))},
+    "currents of each robot": {"fluid": Water(current=UniformCurrent(1e-3 * EACH, 0.0))},
+    "shear": {"fluid": Water(1000.0, 1.1, 0.1, ShearCurrent(0.01, 1 / 3), 1.0)},
+    "vortex": {"fluid": Water(current=Vortex(1e-3, 0.1, -0.2, 0.07))},
+    "grid": {"fluid": Water(current=WAVES)},
+    "contact": {"contact": Contact(1e5 / 3, 0.2)},
+    "contact of each robot": {"contact": Contact(1e5 * EACH)},
+    "loads": {"loads": ((9, 0.0, 1e-3 / 3), (18, -1e-4, 0.0))},
+    "held nodes": {"held_nodes": (3, 0)},
+    "strengths": {"limb_strengths": (1.0, 0.0, 1 / 3, 1.0, 0.5)},
+    "limbs": {"robot": Seastar(limbs=(Limb(radius=(2e-3, 1e-3 / 3)), *(Limb(length=0.1 / 3),) * 4))},
+    "limbs of each robot": {"robot": Seastar(limbs=(Limb(radius=1e-3 * EACH, natural_curvature=EACH),) * 5)},
+    "directions": {"robot": Seastar(limbs=tuple(Limb(1.25 * k, youngs_modulus=(1e6, 2e6)) for k in range(5)))},
+    "robots": {"robot": Seastar(n_limbs=4, nodes_per_limb=6, density=1000.0 * EACH, relaxation_time=1e-3)},
+    "numerics": {"numerics": Numerics("implicit-midpoint", 5e-3 / 3, 1e-7 / 3, 30, 0.015)},
+}  # fmt: skip

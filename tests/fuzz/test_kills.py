@@ -1,0 +1,173 @@
+"""However a training ends, what is on the disk can be read, and the training can be continued to its end.
+
+Runs are killed when they touch a file for the nth time, or at a moment, and meet full disks, made up and real. `--slow`
+takes 60 ends, otherwise there are a few. Continued runs begin new episodes, so they need not end at the weights of a
+run that was left alone; but those that continue from the same checkpoint, or from none, all end at the same weights.
+"""
+
+import json
+import os
+import random
+import shlex
+import subprocess
+import sys
+import time
+import zipfile
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import train
+from agents import policy as policies
+from agents.ppo import load
+from agents.report.charts import read_progress
+
+DRIVER = Path(__file__).with_name("killed_training.py")
+STROKES, BETWEEN = 512, 128
+TINY = shlex.split(
+    f"--strokes {STROKES} --save-freq {BETWEEN} --seed 4 --fidelity fast --num-envs 16 --rollout 8 --batch-size 64 "
+    "--epochs 2 --hidden 16 16 --max-episode-steps 20 --no-video --num-threads 1"
+)
+SENTENCE_ENDS = {"kill": -9, "full": 1}
+
+
+def start(fate, at, folder):
+    command = [sys.executable, str(DRIVER), fate, str(at), str(folder), *TINY, "--out", str(folder)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def weights_in(folder):
+    return policies.load(folder / "policy.safetensors").weights
+
+
+@pytest.fixture(scope="module")
+def ends(tmp_path_factory):
+    """Weights at the end of a training by the strokes it was continued from, at first of one that was left alone."""
+    folder = tmp_path_factory.mktemp("alone") / "run"
+    assert train.main([*TINY, "--out", str(folder)]) == 0
+    return {0: weights_in(folder), STROKES: weights_in(folder)}
+
+
+@pytest.fixture(scope="module")
+def touches(tmp_path_factory):
+    """How often a training touches a file, by what may come of it, and the seconds that it takes."""
+    found = {}
+    for fate in ("kill", "full"):
+        began = time.monotonic()
+        output, _ = start(fate, 0, tmp_path_factory.mktemp(fate) / "run").communicate()
+        found[fate] = int(output.rsplit("touches: ", 1)[1])
+        found["seconds"] = time.monotonic() - began
+    return found
+
+
+def assert_readable(folder):
+    """Every checkpoint is whole, and so is every other file that is there, but for a policy that lacks its half."""
+    for file in folder.rglob("*.zip"):
+        with zipfile.ZipFile(file) as archive:
+            assert archive.testzip() is None
+        assert load(file).actions == "pairs"
+    if (folder / "config.json").exists():
+        assert len(json.loads((folder / "config.json").read_text())["commands"]) == 1
+    if (folder / "progress.csv").exists():
+        assert all(len(row) == 3 for row in read_progress(folder))
+    with suppress(ValueError, FileNotFoundError):
+        weights_in(folder)
+
+
+def trained_in(folder):
+    """Strokes that the model in the folder is trained for; 0 where there is none."""
+    if not (folder / "model.zip").exists():
+        return 0
+    with zipfile.ZipFile(folder / "model.zip") as archive:
+        return int(json.loads(archive.read("learner.json"))["strokes"])
+
+
+def assert_continues(folder, ends):
+    """The run goes on to its end, and ends where others do that go on from the same checkpoint."""
+    before = trained_in(folder)
+    begun = (folder / "config.json").exists()
+    assert train.main(["--resume", str(folder)] if begun else [*TINY, "--out", str(folder)]) == 0
+    assert [strokes for strokes, *_ in read_progress(folder)] == list(range(BETWEEN, STROKES + 1, BETWEEN))
+    assert (folder / "evaluation" / "report.html").is_file()
+    assert not list(folder.rglob("*.part"))
+    assert_readable_after_all(folder)
+    weights = weights_in(folder)
+    for name, expected in ends.setdefault(before, weights).items():
+        np.testing.assert_array_equal(weights[name], expected, err_msg=f"continued from {before} strokes")
+
+
+def assert_readable_after_all(folder):
+    for strokes in range(BETWEEN, STROKES + 1, BETWEEN):
+        assert load(folder / "checkpoints" / f"model_{strokes:09d}.zip").actions == "pairs"
+
+
+def some(few, many):
+    """Seeds: few of them, the others only with --slow."""
+    return [*range(few), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(few, many))]
+
+
+@pytest.mark.parametrize("seed", some(1, 30))
+def test_a_run_killed_at_any_touch_of_a_file_continues(seed, tmp_path, touches, ends):
+    at = random.Random(seed).randint(1, touches["kill"])
+    process = start("kill", at, tmp_path / "run")
+    process.communicate()
+    assert process.returncode == -9
+    assert_readable(tmp_path / "run")
+    assert_continues(tmp_path / "run", ends)
+
+
+@pytest.mark.parametrize("seed", some(1, 24))
+def test_a_run_killed_at_any_moment_continues(seed, tmp_path, touches, ends):
+    process = start("kill", 0, tmp_path / "run")
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(random.Random(seed).uniform(0.3, 1.0) * touches["seconds"])
+    process.kill()
+    process.communicate()
+    assert_readable(tmp_path / "run")
+    assert_continues(tmp_path / "run", ends)
+
+
+def assert_one_sentence(process):
+    _, errors = process.communicate()
+    assert process.returncode == 1
+    assert errors.count("\n") == 1 and errors.endswith("no space left on device.\n"), errors
+
+
+@pytest.mark.parametrize("seed", some(1, 12))
+def test_a_run_on_a_full_disk_ends_in_a_sentence_and_continues(seed, tmp_path, touches, ends):
+    process = start("full", random.Random(seed).randint(1, touches["full"]), tmp_path / "run")
+    assert_one_sentence(process)
+    assert_readable(tmp_path / "run")
+    assert_continues(tmp_path / "run", ends)
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """Mounts a disk of so many bytes; a second call changes its size."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+
+    def mount(size, *options):
+        done = subprocess.run(
+            ["mount", "-t", "tmpfs", *options, "-o", f"{'remount,' if options else ''}size={size}", "tmpfs", folder],
+            capture_output=True, check=False,
+        )  # fmt: skip
+        if done.returncode:
+            pytest.skip("needs the right to mount a small disk")
+        return folder
+
+    yield mount
+    subprocess.run(["umount", folder], check=False, capture_output=True)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="mounts a small disk")
+@pytest.mark.parametrize("kilobytes", [4, 8, 16, 64, 128, 200, 300, 400, 500, 600, 800, 1200])
+def test_a_run_on_a_disk_that_fills_up_ends_in_a_sentence_and_continues(kilobytes, small_disk, ends):
+    folder = small_disk(kilobytes << 10) / "run"
+    assert_one_sentence(start("kill", 0, folder))
+    assert_readable(folder)
+    small_disk(256 << 20, "-o", "remount")
+    assert_continues(folder, ends)

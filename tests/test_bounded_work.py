@@ -1,0 +1,106 @@
+"""A stroke's work is bounded: no step below 1/4096 of an interval, and no robot beyond its Newton iterations."""
+
+import numpy as np
+import pytest
+
+from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State, StrokeReport, Water
+from seastar_gym import scene as module
+from seastar_gym.der.rods import STEPS
+from seastar_gym.model.rods import make_limits
+
+SCHEMES = ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint", "adaptive"]
+SHORTEST = 4096  # of an interval
+
+
+def numerics(scheme: str, step: float) -> Numerics:
+    return Numerics("implicit-midpoint", step, path_tolerance=0.01) if scheme == "adaptive" else Numerics(scheme, step)
+
+
+def swimmers(scene: Scene, n_robots: int = 11, speed: float = 0.0) -> tuple[Simulator, np.ndarray]:
+    """Robots whose nodes have random velocities [m/s], the more the later they come, and commands for them."""
+    simulator, rng = Simulator(scene, n_robots), np.random.default_rng(0)
+    state = simulator.get_state()
+    velocities = speed * np.linspace(0.0, 1.0, n_robots)[:, None, None] * rng.standard_normal(state.positions.shape)
+    simulator.set_state(State(state.positions, velocities, state.time))
+    return simulator, rng.integers(-1, 2, (n_robots, scene.robot.n_limbs)).astype(float)
+
+
+def in_parts(simulator: Simulator, commands: np.ndarray, parts: int) -> tuple[np.ndarray, StrokeReport]:
+    """(time steps of the robots in every part, report)."""
+    stroke, steps = simulator.stroke_in_parts(commands, parts), [np.zeros(simulator.n_robots)]
+    while True:
+        try:
+            next(stroke)
+        except StopIteration as finished:
+            return np.diff(steps, axis=0), finished.value
+        steps.append(simulator._report[:, STEPS].reshape(-1)[: simulator.n_robots].copy())
+
+
+def test_error_control_and_halvings_together_keep_the_shortest_step_and_the_bound():
+    """Error control goes down to 1/4096 here, and then Newton is stuck; on top of each other they took for ever."""
+    scene = Scene(Seastar(12), None, SmaPulse(1.3), Numerics.preset("accurate"))
+    simulator, command = Simulator(scene), np.array([[1.0, -1.0] * 6])
+    for sign in (1.0, -1.0, 1.0):
+        steps, report = in_parts(simulator, sign * command, 200)
+        assert steps.max() <= SHORTEST
+        assert report.newton_iterations[0] <= make_limits(scene).most_iterations
+        assert report.status[0] in (SolverStatus.CONVERGED, SolverStatus.ITERATION_LIMIT)
+        assert (report.covered[0] == pytest.approx(1.0)) == (report.status[0] == SolverStatus.CONVERGED)
+
+
+@pytest.mark.parametrize("speed", [0.0, 3.0], ids="{:g} m/s".format)
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_robots_that_need_more_iterations_than_they_have_fail_and_the_others_keep_every_bit(monkeypatch, scheme, speed):
+    scene = Scene(numerics=numerics(scheme, 0.05))
+    free, commands = swimmers(scene, speed=speed)
+    needed = free.stroke(commands).newton_iterations
+    most = int(np.median(needed))
+    monkeypatch.setattr(module, "MOST_ITERATIONS_PER_STEP", 0)
+    monkeypatch.setattr(module, "MOST_ITERATIONS", most)
+    for n_parts in (1, 7):
+        bound, _ = swimmers(scene, speed=speed)
+        _, report = in_parts(bound, commands, n_parts)
+        failed = report.status > 0
+        assert 0 < failed.sum() < len(failed)
+        np.testing.assert_array_equal(failed, needed > most)
+        np.testing.assert_array_equal(report.status[failed], SolverStatus.ITERATION_LIMIT)
+        np.testing.assert_array_equal(report.newton_iterations, np.minimum(needed, most))
+        np.testing.assert_array_equal(bound.positions[~failed], free.positions[~failed])
+        np.testing.assert_array_equal(bound.velocities[~failed], free.velocities[~failed])
+        assert np.isfinite(bound.positions).all() and (report.covered[failed] < 1.0).all()
+        np.testing.assert_array_equal(bound.time, np.where(failed, report.covered, 1.0))
+        later = bound.stroke(commands)
+        np.testing.assert_array_equal(later.status[failed], SolverStatus.ITERATION_LIMIT)
+        assert not later.newton_iterations[failed].any()
+
+
+def test_a_robot_that_had_too_few_iterations_swims_again_after_a_reset(monkeypatch):
+    scene = Scene(numerics=numerics("implicit-euler", 0.05))
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "MOST_ITERATIONS", -1950)  # and 100 for each of 20 steps
+        simulator, commands = swimmers(scene, 3)
+        assert (simulator.stroke(commands).status == SolverStatus.ITERATION_LIMIT).all()
+    simulator.set_scene(Scene(Seastar(density=1001.0), numerics=scene.numerics))
+    assert simulator.failed.all()
+    simulator.reset()
+    assert not simulator.stroke(commands).status.any()
+
+
+@pytest.mark.parametrize("scheme", SCHEMES[:4])
+@pytest.mark.parametrize("fluid", [None, Water()], ids=["vacuum", "water"])
+def test_steps_that_were_halved_grow_again_within_their_interval(scheme, fluid):
+    """From velocities that need steps of 1/256 at first: without growth, those would take all of the interval."""
+    scene = Scene(fluid=fluid, actuator=SmaPulse(0.3, 0.1, 0.1), numerics=Numerics(scheme, 0.1))
+    simulator, commands = swimmers(scene, 8, speed=200.0)
+    report = simulator.stroke(commands)
+    assert not report.status.any()
+    assert report.halvings.max() >= 8
+    assert 10 < report.steps.max() < 200
+    np.testing.assert_allclose(report.covered, 0.2, rtol=1e-12)
+
+
+def test_the_bound_leaves_room_for_the_strokes_of_every_fidelity():
+    for fidelity in ("fast", "balanced", "accurate", "reference", "chapter"):
+        scene = Scene(numerics=Numerics.preset(fidelity))
+        report = Simulator(scene).stroke([[1.0, -1.0, 1.0, -1.0, 1.0]])
+        assert report.newton_iterations[0] < 0.05 * make_limits(scene).most_iterations

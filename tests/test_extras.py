@@ -1,0 +1,87 @@
+"""Without an optional dependency there is one sentence with the command that installs it, and no traceback."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+OF_STUDIES = ("matplotlib", "rich", "tqdm")
+OF_TRAIN = ("imageio", "plotly", "safetensors", "stable_baselines3", "tensorboard", "torch", "tyro")
+STUDIES = sorted(
+    f"seastar_gym.studies.{file.stem}"
+    for file in (ROOT / "seastar_gym" / "studies").glob("*.py")
+    if '__name__ == "__main__"' in file.read_text(encoding="utf-8")
+)
+AGENTS = sorted(
+    f"agents.{file.stem}"
+    for file in (ROOT / "agents").glob("*.py")
+    if '__name__ == "__main__"' in file.read_text(encoding="utf-8")
+)
+
+
+def python(tmp_path, missing, *arguments):
+    """The command's result on a machine that lacks these modules."""
+    (tmp_path / "sitecustomize.py").write_text(f"import sys; sys.modules.update(dict.fromkeys({missing!r}))")
+    path = os.pathsep.join([str(tmp_path), str(ROOT)])
+    return subprocess.run(
+        [sys.executable, *arguments], cwd=ROOT, env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+
+
+def assert_says(done, extra, missing):
+    assert done.returncode in (1, 2) and done.stdout == ""
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert done.stderr.endswith(f': pip install "seastar-gym[{extra}]".\n'), done.stderr
+    assert any(name in done.stderr for name in missing)
+
+
+def test_there_are_commands_to_test():
+    assert len(STUDIES) > 8 and len(AGENTS) > 3
+
+
+@pytest.mark.parametrize("command", STUDIES)
+def test_a_study_without_its_extra_says_how_to_get_it(command, tmp_path):
+    assert_says(python(tmp_path, OF_STUDIES, "-m", command, "--help"), "studies", OF_STUDIES)
+
+
+@pytest.mark.parametrize("command", AGENTS)
+def test_an_agent_s_command_without_its_extra_says_how_to_get_it(command, tmp_path):
+    assert_says(python(tmp_path, OF_TRAIN, "-m", command, "--help"), "train", OF_TRAIN)
+
+
+@pytest.mark.parametrize(
+    "missing", [("tyro",), ("rich",), ("tensorboard",), ("torch", "stable_baselines3"), ("plotly", "safetensors")]
+)
+def test_train_without_a_part_of_its_extra_says_how_to_get_it(missing, tmp_path):
+    assert_says(python(tmp_path, missing, "train.py", "--help"), "train", missing)
+
+
+def test_ablations_need_torch(tmp_path):
+    missing = ("torch", "stable_baselines3")
+    assert_says(python(tmp_path, missing, "-m", "studies.learning.ablations", "--help"), "train", missing)
+
+
+def test_a_picture_of_a_fit_says_what_it_needs_before_it_fits(tmp_path):
+    command = "-m", "seastar_gym.identify", "--synthetic", "--picture", "fit.png"
+    assert_says(python(tmp_path, ("matplotlib",), *command), "studies", ("matplotlib",))
+
+
+def test_rendering_without_pygame_says_how_to_get_it(tmp_path):
+    code = (
+        "import gymnasium, seastar_gym\n"
+        "try: env = gymnasium.make('SeastarSwim-v0', render_mode='rgb_array'); env.reset(seed=0); env.render()\n"
+        "except ImportError as missing: raise SystemExit(str(missing))"
+    )
+    assert_says(python(tmp_path, ("pygame",), "-c", code), "render", ("pygame",))
+
+
+def test_importing_a_study_without_its_extra_is_a_missing_module(tmp_path):
+    code = "import studies.speed.terms"
+    done = python(tmp_path, ("rich",), "-c", code)
+    assert done.stderr.splitlines()[-1] == (
+        'ModuleNotFoundError: The studies need rich: pip install "seastar-gym[studies]".'
+    )

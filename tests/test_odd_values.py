@@ -1,0 +1,146 @@
+"""Whatever is given as an argument is accepted, or refused with a ValueError of one sentence."""
+
+import inspect
+from decimal import Decimal
+from fractions import Fraction
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from agents.ppo import Hyperparameters
+from seastar_gym import (
+    Contact,
+    DomainRandomization,
+    GridCurrent,
+    Limb,
+    Limited,
+    LogUniform,
+    MeasuredCurve,
+    Normal,
+    Numerics,
+    RewardWeights,
+    Scene,
+    Seastar,
+    ShearCurrent,
+    Simulator,
+    SmaPulse,
+    ThermalSma,
+    Uniform,
+    UniformCurrent,
+    Vortex,
+    Water,
+    relaxation_time,
+)  # fmt: skip
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.identify import Measurement, get_parameter, identify
+from seastar_gym.scene.fidelity import cheapest, promise
+
+HUGE = 10**400
+NUMBERS = {
+    "10**400": HUGE, "-10**400": -HUGE, "nan": np.nan, "inf": np.inf, "-inf": -np.inf, "1e308": 1e308, "1e-320": 1e-320,
+    "-1": -1, "0": 0, "-0.0": -0.0, "1.5": 1.5, "True": True, "np.True_": np.True_, "1+2j": 1 + 2j,
+    "Decimal": Decimal("0.5"), "Decimal(sNaN)": Decimal("sNaN"), "Fraction": Fraction(1, 2),
+    "huge Fraction": Fraction(HUGE), "float32": np.float32(0.5), "int8": np.int8(1), "uint64": np.uint64(2**64 - 1),
+    "longdouble": np.longdouble("1e4000"), "complex64": np.complex64(1j), "timedelta": np.timedelta64(1, "s"),
+}  # fmt: skip
+THINGS = {
+    "None": None, "'1'": "1", "''": "", "b'1'": b"1", "object": object(), "class": float, "function": abs, "{}": {},
+    "set": {1}, "range": range(3), "...": ..., "Scene": Scene(),
+    "0-d array": np.array(0.5), "generator": (x for x in "ab"),
+}  # fmt: skip
+ARRAYS = {
+    "()": (), "[]": [], "array([])": np.array([]), "[1]": [1], "array([1, 2])": np.array([1, 2]),
+    "array([[1]])": np.array([[1.0]]), "array of objects": np.array([None, 1], object),
+    "array of strings": np.array(["a"]), "array of complex": np.array([1j]), "array with nan": np.array([np.nan, 1.0]),
+    "ragged": [[1], [1, 2]], "(10**400,)": (HUGE,), "[10**400]": [HUGE], "(None,)": (None,), "('a',)": ("a",),
+    "(1, None)": (1, None), "((10**400,),)": ((HUGE, HUGE, HUGE),), "((0, nan),)": ((0, np.nan),),
+    "records": np.zeros(2, "i,f"),
+}  # fmt: skip
+ODD = {**NUMBERS, **THINGS, **ARRAYS}
+
+CURVE = {"times": (0.0, 0.5, 1.0), "angles": (0.0, 0.5, 0.0)}
+FAST = Scene(numerics=Numerics.preset("fast"))
+AT_REST = Simulator(FAST, 2)
+
+
+def state(**changes):
+    return AT_REST.set_state(AT_REST.get_state()._replace(**changes))
+
+
+def measurement(time, positions, nodes, commands):
+    return Measurement(time, positions, nodes, commands)
+
+
+def fit(parameters, confidence=0.95):
+    """Only what is refused before the fit begins."""
+    return identify(FAST, parameters, Measurement(np.zeros(1), np.zeros((1, 1, 2)), (0,), np.zeros((1, 4))), confidence)
+
+
+def step(action):
+    env = SeastarSwimEnv(scene=FAST)
+    env.reset(seed=0)
+    return env.step(action)
+
+
+def swirl(x, y):
+    return -y, x
+
+
+def swim_path(path="pentagon"):
+    return SeastarSwimEnv(scene=FAST).reset(options={"path": path})
+
+
+def reset(seed, options):
+    return SeastarSwimEnv(scene=FAST).reset(seed=seed, options=options)
+
+
+def reset_batch(seed, options):
+    return SeastarSwimVectorEnv(num_envs=2, scene=FAST).reset(seed=seed, options=options)
+
+
+TARGETS = [
+    (Seastar, {}), (Limb, {}), (Water, {}), (Contact, {}), (SmaPulse, {}), (MeasuredCurve, CURVE), (ThermalSma, {}),
+    (Limited, {"actuator": SmaPulse()}), (Numerics, {}), (Numerics.preset, {"fidelity": "fast"}),
+    (Numerics.for_error, {"error": 0.05}), (Scene, {}), (UniformCurrent, {}), (ShearCurrent, {"rate": 1.0}),
+    (Vortex, {"circulation": 1.0}), (Uniform, {"low": 1.0, "high": 2.0}), (LogUniform, {"low": 1.0, "high": 2.0}),
+    (Normal, {"mean": 1.0, "deviation": 1.0}), (DomainRandomization, {"distributions": {}}), (RewardWeights, {}),
+    (relaxation_time, {"loss_factor": 0.1, "frequency": 10.0}), (promise, {"setting": "fast"}),
+    (cheapest, {"error": 0.05}), (Simulator, {"scene": FAST, "n_robots": 2}), (AT_REST.reset, {}),
+    (AT_REST.set_limb_strengths, {"strengths": 1.0}), (AT_REST.set_scene, {"scene": FAST}),
+    (AT_REST.set_state, {"state": AT_REST.get_state()}), (state, AT_REST.get_state()._asdict()),
+    (AT_REST.stroke, {"commands": np.zeros((2, 5))}), (step, {"action": np.zeros(5, int)}),
+    (fit, {"parameters": ["x"]}),
+    (GridCurrent, {"corner": (0.0, 0.0), "spacing": 0.1, "velocities": np.zeros((2, 2, 2))}), (swim_path, {}),
+    (GridCurrent.from_function, {"function": swirl, "x": (0.0, 0.5), "y": (0.0, 0.5), "spacing": 0.1}),
+    (SeastarSwimEnv, {"scene": FAST}), (SeastarSwimVectorEnv, {"num_envs": 2, "scene": FAST}),
+    (reset, {"seed": 0, "options": None}), (reset_batch, {"seed": 0, "options": None}),
+    (measurement, {"time": np.zeros(1), "positions": np.zeros((1, 1, 2)), "nodes": (0,), "commands": np.zeros((1, 5))}),
+    (get_parameter, {"scene": FAST, "name": "fluid.density"}), (Hyperparameters, {}),
+]  # fmt: skip
+
+
+def outcome(call, arguments):
+    """None where the arguments are accepted or refused as they should be, else what was raised."""
+    try:
+        call(**arguments)
+    except (ValueError, gym.error.Error) as refused:
+        text = str(refused)
+        return None if text.endswith(".") and "\n" not in text else f"no sentence: {text!r}"
+    except Exception as other:
+        return f"{type(other).__name__}: {other}"
+    return None
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("call, arguments", TARGETS, ids=lambda one: getattr(one, "__qualname__", ""))
+def test_odd_values_are_accepted_or_refused_in_a_sentence(call, arguments):
+    parameters = [p for p in inspect.signature(call).parameters.values() if p.kind is not p.VAR_KEYWORD]
+    wrong = [
+        f"{parameter.name}={name}: {found}"
+        for parameter in parameters
+        for name, value in ODD.items()
+        if (found := outcome(call, {**arguments, parameter.name: value})) is not None
+    ]
+    assert not wrong, "\n".join([f"{len(wrong)} of {len(parameters) * len(ODD)}", *wrong])

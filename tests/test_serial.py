@@ -1,0 +1,400 @@
+"""A scene comes back from its plain form to the last bit; what could not is refused when it is written."""
+
+import copy
+import dataclasses
+import inspect
+import json
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+
+import seastar_gym
+from every_part import ACTUATORS, CURVE, EACH, PARTS, WAVES
+from refusals import assert_refused
+from seastar_gym import (
+    Contact,
+    DomainRandomization,
+    GridCurrent,
+    Limb,
+    Limited,
+    LogUniform,
+    Normal,
+    Numerics,
+    RewardWeights,
+    Scene,
+    Seastar,
+    ShearCurrent,
+    Simulator,
+    SmaPulse,
+    ThermalSma,
+    Uniform,
+    UniformCurrent,
+    Vortex,
+    Water,
+    register_part,
+)
+from seastar_gym.model.rods import make_rods
+from seastar_gym.scene.actuators.actuator import Actuator
+from seastar_gym.scene.actuators.pulse import HeatingAndCooling
+from seastar_gym.scene.serial import KINDS, VERSION, from_dict, to_dict
+
+
+def again(scene: Scene) -> Scene:
+    """The scene by way of JSON."""
+    return Scene.from_dict(json.loads(json.dumps(scene.to_dict(), allow_nan=False)))
+
+
+def swum(scene: Scene) -> np.ndarray:
+    simulator = Simulator(scene, scene.n_robots or 1)
+    simulator.stroke(np.tile([1.0, -1.0, 0.5, 0.0, -1.0][: scene.robot.n_limbs], (simulator.n_robots, 1)))
+    return simulator.positions
+
+
+# Coming back
+
+
+@pytest.mark.parametrize("part", PARTS)
+@pytest.mark.parametrize("actuator", ACTUATORS)
+def test_every_actuator_comes_back_with_every_part(actuator, part):
+    scene = Scene(**{"actuator": ACTUATORS[actuator], **PARTS[part]})
+    assert again(scene) == scene
+    assert repr(again(scene)) == repr(scene)  # the types of its numbers, too
+
+
+@pytest.mark.parametrize(
+    "actuator, part",
+    [
+        ("pulse of each robot", "nothing"),
+        ("limited curve", "robots"),
+        ("thermal of each robot", "limbs"),
+        pytest.param("limits of each robot", "contact of each robot", marks=pytest.mark.slow),
+        pytest.param("curve", "shear", marks=pytest.mark.slow),
+        pytest.param("pulse", "grid", marks=pytest.mark.slow),
+    ],
+)
+def test_a_scene_that_came_back_swims_to_the_same_bits(actuator, part):
+    scene = Scene(**{"actuator": ACTUATORS[actuator], "numerics": Numerics.preset("fast"), **PARTS[part]})
+    assert swum(again(scene)).tobytes() == swum(scene).tobytes()
+
+
+def test_every_part_of_the_package_is_in_the_table():
+    """A new part is not forgotten: of every registered kind some scene of the tables has one."""
+    scenes = [Scene(actuator=actuator) for actuator in ACTUATORS.values()] + [Scene(**part) for part in PARTS.values()]
+    seen = {kind for scene in scenes for kind in KINDS if f'"kind": "{kind}"' in json.dumps(scene.to_dict())}
+    of_environments = {"RewardWeights", "DomainRandomization", "Uniform", "LogUniform", "Normal"}
+    assert {name for name, kind in KINDS.items() if kind.__module__.startswith("seastar_gym")} == seen | of_environments
+
+
+def test_every_actuator_of_the_package_is_registered():
+    public = (getattr(seastar_gym, name) for name in seastar_gym.__all__)
+    parts = [kind for kind in public if inspect.isclass(kind) and dataclasses.is_dataclass(kind)]
+    assert len(parts) > 15
+    reports = {seastar_gym.StrokeReport}
+    assert {kind for kind in parts if kind not in reports} <= set(KINDS.values())
+
+
+def numbers(low: float, high: float):
+    """A number in one of the forms that a user may give it, or one for each of three robots."""
+    one = st.floats(low, high)
+    each = st.lists(one, min_size=3, max_size=3).map(np.array)
+    return st.one_of(one, one.map(np.float64), one.map(np.float32), each)
+
+
+CURRENTS = st.one_of(
+    st.none(),
+    st.builds(UniformCurrent, numbers(-0.01, 0.01), numbers(-0.01, 0.01)),
+    st.builds(ShearCurrent, numbers(-0.1, 0.1), numbers(-9.0, 9.0)),
+    st.builds(Vortex, numbers(-0.01, 0.01), numbers(-1, 1), numbers(-1, 1), numbers(0.01, 1.0)),
+    st.lists(st.floats(-0.01, 0.01), min_size=12, max_size=12).map(
+        lambda u: GridCurrent((0.0, u[0]), 0.1, np.reshape(u, (3, 2, 2)))
+    ),
+)
+FLUIDS = st.one_of(
+    st.none(),
+    st.builds(
+        Water,
+        density=numbers(0.0, 2000.0),
+        drag_coefficient=numbers(0.5, 2.0),
+        tangential_drag_coefficient=st.one_of(st.none(), numbers(0.0, 0.5)),
+        current=CURRENTS,
+        added_mass_coefficient=st.one_of(st.none(), numbers(0.0, 1.0)),
+    ),
+)
+PULSES = st.builds(SmaPulse, numbers(0.0, 0.6), st.floats(0.05, 0.5), st.floats(0.1, 1.0))
+CURVES = st.builds(replace, st.just(CURVE), scale=numbers(0.0, 0.9))
+ANY_ACTUATOR = st.one_of(
+    PULSES,
+    CURVES,
+    st.builds(Limited, st.one_of(PULSES, CURVES), st.one_of(st.none(), numbers(0.1, 0.9)), numbers(0.1, 9.0)),
+    st.builds(ThermalSma, numbers(0.0, 0.6), time_constant=numbers(0.3, 0.9), steady_rise=numbers(100.0, 300.0)),
+)
+LIMBS = st.builds(
+    Limb,
+    length=st.one_of(st.none(), numbers(0.05, 0.2)),
+    radius=st.one_of(st.none(), numbers(1e-3, 2e-3), st.tuples(st.floats(1e-3, 2e-3), st.floats(1e-3, 2e-3))),
+    youngs_modulus=st.one_of(st.none(), numbers(1e5, 1e7)),
+    natural_curvature=numbers(-2.0, 2.0),
+)
+
+
+@st.composite
+def scenes(draw) -> Scene:
+    """Any scene that is accepted."""
+    n_limbs = draw(st.sampled_from([3, 4, 5, 7]))
+    try:
+        robot = Seastar(
+            n_limbs=draw(st.sampled_from([n_limbs, np.int64(n_limbs)])),
+            nodes_per_limb=draw(st.integers(3, 6)),
+            limb_length=draw(numbers(0.05, 0.2)),
+            density=draw(numbers(500.0, 2000.0)),
+            limbs=draw(st.one_of(st.just(()), st.lists(LIMBS, min_size=n_limbs, max_size=n_limbs).map(tuple))),
+            relaxation_time=draw(st.one_of(st.none(), numbers(0.0, 1e-2))),
+        )
+        return Scene(
+            robot,
+            draw(FLUIDS),
+            draw(ANY_ACTUATOR),
+            draw(st.sampled_from([Numerics.preset("fast"), Numerics(), Numerics("sdirk3", 1 / 30)])),
+            held_nodes=draw(st.one_of(st.just(()), st.just((1,)))),
+            loads=draw(st.one_of(st.just(()), st.tuples(st.tuples(st.integers(0, 5), st.floats(-1, 1), st.just(0.0))))),
+            limb_strengths=draw(st.one_of(st.just(()), st.tuples(*[st.floats(0.0, 1.0)] * n_limbs))),
+            contact=draw(st.one_of(st.none(), st.just(Contact()), st.builds(Contact, numbers(1e4, 1e6)))),
+        )  # fmt: skip
+    except ValueError:
+        assume(False)
+        raise
+
+
+@given(scenes())
+@settings(max_examples=60, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow])
+def test_any_scene_comes_back_from_json(scene):
+    assert again(scene) == scene
+    assert repr(again(scene)) == repr(again(again(scene)))
+    for index in range(scene.n_robots or 1):
+        for ours, theirs in zip(make_rods(scene, index), make_rods(again(scene), index), strict=True):
+            assert_same_bits(ours, theirs)
+
+
+def assert_same_bits(one, other):
+    if isinstance(one, tuple):
+        for ours, theirs in zip(one, other, strict=True):
+            assert_same_bits(ours, theirs)
+    else:
+        assert type(one) is type(other) and np.asarray(one).tobytes() == np.asarray(other).tobytes()
+
+
+def test_numbers_of_numpy_become_pythons_and_do_not_compute_to_their_own_precision():
+    robot = Seastar(density=np.float32(1000.1), n_limbs=np.int64(5), limbs=(Limb(radius=np.float32(1e-3)),) * 5)
+    scene = Scene(robot, Water(density=np.array([1.0, 2.0], np.float32)))
+    assert type(scene.robot.density) is float and {type(one) for one in scene.fluid.density} == {float}
+    assert again(scene) == scene
+    with assert_refused("Scene.actuator.heating_time is a float32"):
+        Scene(actuator=SmaPulse(heating_time=np.float32(0.1), cooling_time=np.float32(0.9))).to_dict()
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        RewardWeights(199.9, 0.0, 1 / 3),
+        DomainRandomization({"robot.density": Uniform(900, 1100.1), "actuator.peak_angle": Uniform(0, 0.5)}),
+        DomainRandomization({"fluid.density": LogUniform(1.0, 1 / 0.3), "actuator.peak_angle": Normal(0.5, 0.01)}),
+    ],
+)
+def test_what_an_environment_is_told_comes_back_in_its_order(part):
+    read = from_dict(json.loads(json.dumps(to_dict(part), sort_keys=True)), type(part))
+    assert read == part and repr(read) == repr(part)
+
+
+# Parts of one's own
+
+
+@dataclass(frozen=True)
+class Sawtooth(HeatingAndCooling):
+    """An actuator that is not the package's."""
+
+    peak_angle: float = 0.3
+    heating_time: float = 0.2
+    cooling_time: float = 0.8
+
+    def delta_psi(self, t):
+        return np.interp(t, self.corners, (0.0, self.peak_angle, 0.0))
+
+
+def test_an_actuator_of_ones_own_is_refused_when_it_is_written(monkeypatch):
+    with assert_refused("Scene.actuator is a Sawtooth", "seastar_gym.register_part"):
+        Scene(actuator=Sawtooth()).to_dict()
+    with assert_refused("Scene.actuator.actuator is a Sawtooth"):
+        Scene(actuator=Limited(Sawtooth())).to_dict()
+
+
+def test_a_registered_actuator_of_ones_own_comes_back(monkeypatch):
+    monkeypatch.setitem(KINDS, "Sawtooth", Sawtooth)
+    assert register_part(Sawtooth) is Sawtooth
+    scene = Scene(actuator=Limited(Sawtooth(0.2), largest_rate=3.0))
+    data = scene.to_dict()
+    assert Scene.from_dict(data) == scene
+    monkeypatch.delitem(KINDS, "Sawtooth")
+    with assert_refused("Scene.actuator.actuator", "'Sawtooth'", "registered"):
+        Scene.from_dict(data)
+
+
+def test_two_parts_of_one_name_are_refused():
+    other = type("SmaPulse", (SmaPulse,), {"__module__": "elsewhere"})
+    with assert_refused("SmaPulse"):
+        register_part(other)
+    assert KINDS["SmaPulse"] is SmaPulse
+    with assert_refused("Scene.actuator is a SmaPulse"):
+        Scene(actuator=other()).to_dict()
+
+
+class Forgetful(Sawtooth):
+    def __init__(self, peak, memory=0):
+        super().__init__(peak)
+
+
+class Incomparable(HeatingAndCooling):
+    peak_angle, heating_time, cooling_time = 0.3, 0.2, 0.8
+    delta_psi = Sawtooth.delta_psi
+
+
+@pytest.mark.parametrize(
+    "kind, actuator, words",
+    [(Forgetful, Forgetful(0.3), "keeps no peak, memory"), (Incomparable, Incomparable(), "compare by value")],
+)
+def test_a_registered_class_that_would_not_come_back_is_refused_when_it_is_written(kind, actuator, words, monkeypatch):
+    assert isinstance(actuator, Actuator)
+    monkeypatch.setitem(KINDS, kind.__name__, kind)
+    with assert_refused(words):
+        Scene(actuator=actuator).to_dict()
+
+
+# What is no scene
+
+HUGE = 10**400
+PLAIN = Scene(actuator=Limited(SmaPulse()), fluid=Water(current=WAVES)).to_dict()
+
+
+@pytest.mark.parametrize("data", [None, [], 3, "Scene", {}, {"kind": "Scene"}, PLAIN["robot"], Scene()])
+def test_what_has_no_version_is_refused(data):
+    with assert_refused("is a dict with a version"):
+        Scene.from_dict(data)
+
+
+@pytest.mark.parametrize("version", [0, VERSION + 1, HUGE, True, 1.0, None, "1", [1], {}])
+def test_other_versions_are_refused(version):
+    with assert_refused("of version", f"only of {VERSION}"):
+        Scene.from_dict({**PLAIN, "version": version})
+
+
+def test_another_part_is_refused():
+    with assert_refused("plain Seastar, not a Scene"):
+        Scene.from_dict(to_dict(Seastar()))
+    with assert_refused("Scene.robot must be"):
+        Scene.from_dict({**PLAIN, "robot": PLAIN["numerics"]})
+
+
+@pytest.mark.parametrize(
+    "name, change, words",
+    [
+        ("robot", {"n_arms": 5}, ("Scene.robot says 'n_arms', which no Seastar has",)),
+        ("robot", {1: 5}, ("Scene.robot says 1",)),
+        ("robot", {"density": math.nan}, ("Scene.robot.density must be a finite number", "nan")),
+        ("robot", {"density": -math.inf}, ("Scene.robot.density",)),
+        ("robot", {"density": HUGE}, ("Scene.robot.density", "a number beyond all floats")),
+        ("robot", {"density": 10**5000}, ("Scene.robot.density", "a number beyond all floats")),
+        ("robot", {"n_limbs": HUGE}, ("Scene.robot.n_limbs",)),
+        ("robot", {"n_limbs": 5.0}, ("n_limbs must be a whole number",)),
+        ("robot", {"n_limbs": True}, ("n_limbs must be a whole number",)),
+        ("robot", {"density": "1000"}, ("density must be",)),
+        ("robot", {"density": {"value": 3}}, ("Scene.robot.density", "a dict")),
+        ("robot", {"density": {"kind": []}}, ("Scene.robot.density is of the kind a list",)),
+        ("robot", {"density": {"kind": "os.system", "items": ["true"]}}, ("'os.system'", "not known")),
+        ("robot", {"density": {"kind": "per robot", "items": []}}, ("density",)),
+        ("robot", {"density": {"kind": "per robot", "items": [[1.0]]}}, ("density",)),
+        ("robot", {"density": {"kind": "per robot"}}, ("Scene.robot.density",)),
+        ("robot", {"density": {"kind": "mapping", "items": 3}}, ("Scene.robot.density",)),
+        ("robot", {"density": {"kind": "mapping", "items": [3]}}, ("Scene.robot.density is no dict",)),
+        ("robot", {"density": {"kind": "mapping", "items": [[{"kind": "mapping", "items": []}, 1]]}}, ("no dict",)),
+        ("robot", {"density": (1.0, 2.0)}, ("Scene.robot.density", "a tuple")),
+        ("robot", {"density": b"1"}, ("Scene.robot.density", "a bytes")),
+        ("robot", {"limbs": [{"kind": "SmaPulse"}]}, ("Scene.robot.limbs[0] does not say 'peak_angle'",)),
+        ("fluid", {"current": {**PLAIN["fluid"]["current"], "velocities": [[["1", "2"]] * 2] * 2}}, ("velocities",)),
+        ("fluid", {"current": {**PLAIN["fluid"]["current"], "corner": "ab"}}, ("corner",)),
+        ("actuator", {"actuator": PLAIN["actuator"]}, ("Limited follows an actuator that remembers nothing",)),
+        ("numerics", {"scheme": ["euler"]}, ("scheme must be one of",)),
+    ],
+)  # fmt: skip
+def test_wrong_words_and_numbers_are_refused_in_one_sentence(name, change, words):
+    data = copy.deepcopy(PLAIN)
+    data[name] |= change
+    with assert_refused(*words):
+        Scene.from_dict(data)
+
+
+def nested(depth: int) -> list:
+    lists: list = []
+    for _ in range(depth):
+        lists = [lists]
+    return lists
+
+
+@pytest.mark.parametrize("depth", [100, 100_000])
+def test_what_is_nested_without_end_is_refused(depth):
+    with assert_refused("nested too deeply"):
+        Scene.from_dict({**PLAIN, "loads": nested(depth)})
+
+
+def places(data, path=()):
+    """Where every value of nested data stands."""
+    inner = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    for key, value in inner:
+        yield (*path, key)
+        yield from places(value, (*path, key))
+
+
+SMALL = Scene(
+    robot=Seastar(3, 3, limbs=(Limb(radius=1e-3 * EACH), *(Limb(radius=(1e-3, 2e-3)),) * 2)),
+    fluid=Water(current=GridCurrent((0.0, 0.0), 0.1, np.zeros((2, 2, 2)))),
+    actuator=Limited(CURVE, 0.5, 3.0),
+    loads=((1, 0.0, 1e-4),),
+    limb_strengths=(1.0, 0.5, 1.0),
+    contact=Contact(),
+).to_dict()
+JUNK = st.one_of(
+    st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=5), st.just(HUGE), st.just(10**5000),
+    st.lists(st.one_of(st.integers(), st.floats(), st.lists(st.integers()))), st.just(SMALL["actuator"]),
+    st.dictionaries(st.text(max_size=3), st.integers()), st.builds(lambda k: {"kind": k}, st.sampled_from([*KINDS, 3])),
+    st.builds(lambda x: {"kind": "per robot", "items": x}, st.lists(st.one_of(st.floats(), st.integers(), st.text()))),
+)  # fmt: skip
+
+
+@given(st.sampled_from(list(places(SMALL))), JUNK)
+@settings(max_examples=400)
+def test_junk_anywhere_is_refused_in_a_sentence_or_is_a_scene(place, junk):
+    data = copy.deepcopy(SMALL)
+    inner = data
+    for key in place[:-1]:
+        inner = inner[key]
+    inner[place[-1]] = junk
+    sentence, scene = "", None
+    try:
+        scene = Scene.from_dict(data)
+    except ValueError as refusal:
+        sentence = str(refusal)
+    assert again(scene) == scene if scene is not None else sentence.endswith(".") and "\n" not in sentence
+
+
+@pytest.mark.parametrize("place", list(places(SMALL)), ids=str)
+def test_nothing_may_be_missing(place):
+    data = copy.deepcopy(SMALL)
+    inner = data
+    for key in place[:-1]:
+        inner = inner[key]
+    del inner[place[-1]]
+    if isinstance(inner, dict):
+        with assert_refused():
+            Scene.from_dict(data)
