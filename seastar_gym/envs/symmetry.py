@@ -216,6 +216,8 @@ def _asymmetries(scene: Scene, drawn: Iterable[str]) -> Iterator[str]:
         yield "nodes of limbs are held"
     if scene.loads:
         yield "its nodes are loaded"
+    if scene.gravity is not None:
+        yield "gravity has a direction"
     if scene.fluid is not None and scene.fluid.current is not None:
         yield "its water has a current"
     for name in drawn:

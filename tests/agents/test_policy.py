@@ -128,6 +128,7 @@ def unlike_the_default() -> Scene:
         loads=((9, 0.0, 1e-3),),
         limb_strengths=(1.0, 1.0, 0.5, 1.0, 1.0),
         contact=Contact(opening_angle=0.2),
+        gravity=(0.1, 0.0),
     )
     assert all(getattr(scene, field.name) != getattr(Scene(), field.name) for field in fields(Scene))
     return scene
