@@ -5,7 +5,7 @@ import dataclasses
 import inspect
 import json
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -239,6 +239,19 @@ def test_a_registered_actuator_of_ones_own_comes_back(monkeypatch):
     monkeypatch.delitem(KINDS, "Sawtooth")
     with assert_refused("Scene.actuator.actuator", "'Sawtooth'", "registered"):
         Scene.from_dict(data)
+
+
+@dataclass(frozen=True)
+class Labelled(Sawtooth):
+    label: str = field(default="none", kw_only=True, compare=False, repr=False)
+    table: dict = field(default_factory=dict)
+
+
+def test_what_does_not_count_in_comparisons_comes_back_too(monkeypatch):
+    monkeypatch.setitem(KINDS, "Labelled", Labelled)
+    actuator = Labelled(0.25, label="the left one", table={"b": (1, 2.0), "a": None})
+    read = again(Scene(actuator=actuator)).actuator
+    assert read == actuator and read.label == "the left one" and [*read.table] == ["b", "a"]
 
 
 def test_two_parts_of_one_name_are_refused():
