@@ -39,6 +39,7 @@ from seastar_gym import (
 )
 from seastar_gym.actuation.actuator import Actuator
 from seastar_gym.actuation.sma import HeatingAndCooling
+from seastar_gym.per_robot import numbers_of
 from seastar_gym.serial import KINDS, VERSION, from_dict, to_dict
 
 
@@ -62,13 +63,14 @@ def test_every_actuator_comes_back_with_every_part(actuator, part):
     scene = Scene(**{"actuator": ACTUATORS[actuator], **PARTS[part]})
     assert again(scene) == scene
     assert repr(again(scene)) == repr(scene)  # the types of its numbers, too
+    assert numbers_of(again(scene)) == numbers_of(scene)  # and which of them are those of each robot
 
 
 @pytest.mark.parametrize(
     "actuator, part",
     [
         ("pulse of each robot", "nothing"),
-        ("limited curve", "robots"),
+        ("limited curve", "strengths"),
         ("thermal of each robot", "limbs"),
         pytest.param("limits of each robot", "contact of each robot", marks=pytest.mark.slow),
         pytest.param("curve", "shear", marks=pytest.mark.slow),
