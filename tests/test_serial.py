@@ -82,6 +82,11 @@ def test_a_scene_that_came_back_swims_to_the_same_bits(actuator, part):
     assert swum(again(scene)).tobytes() == swum(scene).tobytes()
 
 
+def test_numerics_that_nobody_named_come_back_unnamed():
+    assert not again(Scene()).numerics.named
+    assert again(Scene(numerics=Numerics())).numerics.named
+
+
 def test_every_part_of_the_package_is_in_the_table():
     """A new part is not forgotten: of every registered kind some scene of the tables has one."""
     scenes = [Scene(actuator=actuator) for actuator in ACTUATORS.values()] + [Scene(**part) for part in PARTS.values()]
