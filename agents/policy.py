@@ -251,8 +251,8 @@ def reason_of(unfit: Exception) -> str:
 
 def read_facts(text: str | bytes) -> dict[str, Any]:
     """What a description in JSON says. ValueError for anything but an object of finite numbers."""
+    text = text if isinstance(text, str) else text.decode()
     try:
-        text = text if isinstance(text, str) else text.decode()
         facts = json.loads(text, parse_constant=_finite, parse_float=_finite)
     except RecursionError:
         raise ValueError("its description is nested too deeply") from None

@@ -50,8 +50,8 @@ def _load_agent(name: str, seed: int, fidelity: Fidelity) -> Policy:
         try:
             return scripted(name, rng=np.random.default_rng(seed))
         except ValueError as unknown:
-            others = ", ".join(OTHERS)
-            raise ValueError(f"{unknown} Others are {others}, files of policies, and module:function.") from unknown
+            others = f"{', '.join(OTHERS)}, files of policies, and module:function"
+            raise ValueError(f"{unknown} Others are {others}.") from unknown
     if not name.endswith(".zip"):
         return learned.load(name)
     try:

@@ -5,7 +5,7 @@ import dataclasses
 import inspect
 import json
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -40,6 +40,7 @@ from seastar_gym import (
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene.actuators.actuator import Actuator
 from seastar_gym.scene.actuators.pulse import HeatingAndCooling
+from seastar_gym.scene.per_robot import numbers_of
 from seastar_gym.scene.serial import KINDS, VERSION, from_dict, to_dict
 
 
@@ -63,13 +64,14 @@ def test_every_actuator_comes_back_with_every_part(actuator, part):
     scene = Scene(**{"actuator": ACTUATORS[actuator], **PARTS[part]})
     assert again(scene) == scene
     assert repr(again(scene)) == repr(scene)  # the types of its numbers, too
+    assert numbers_of(again(scene)) == numbers_of(scene)  # and which of them are those of each robot
 
 
 @pytest.mark.parametrize(
     "actuator, part",
     [
         ("pulse of each robot", "nothing"),
-        ("limited curve", "robots"),
+        ("limited curve", "strengths"),
         ("thermal of each robot", "limbs"),
         pytest.param("limits of each robot", "contact of each robot", marks=pytest.mark.slow),
         pytest.param("curve", "shear", marks=pytest.mark.slow),
@@ -79,6 +81,11 @@ def test_every_actuator_comes_back_with_every_part(actuator, part):
 def test_a_scene_that_came_back_swims_to_the_same_bits(actuator, part):
     scene = Scene(**{"actuator": ACTUATORS[actuator], "numerics": Numerics.preset("fast"), **PARTS[part]})
     assert swum(again(scene)).tobytes() == swum(scene).tobytes()
+
+
+def test_numerics_that_nobody_named_come_back_unnamed():
+    assert not again(Scene()).numerics.named
+    assert again(Scene(numerics=Numerics())).numerics.named
 
 
 def test_every_part_of_the_package_is_in_the_table():
@@ -240,6 +247,19 @@ def test_a_registered_actuator_of_ones_own_comes_back(monkeypatch):
     monkeypatch.delitem(KINDS, "Sawtooth")
     with assert_refused("Scene.actuator.actuator", "'Sawtooth'", "registered"):
         Scene.from_dict(data)
+
+
+@dataclass(frozen=True)
+class Labelled(Sawtooth):
+    label: str = field(default="none", kw_only=True, compare=False, repr=False)
+    table: dict = field(default_factory=dict)
+
+
+def test_what_does_not_count_in_comparisons_comes_back_too(monkeypatch):
+    monkeypatch.setitem(KINDS, "Labelled", Labelled)
+    actuator = Labelled(0.25, label="the left one", table={"b": (1, 2.0), "a": None})
+    read = again(Scene(actuator=actuator)).actuator
+    assert read == actuator and read.label == "the left one" and [*read.table] == ["b", "a"]
 
 
 def test_two_parts_of_one_name_are_refused():
