@@ -31,6 +31,7 @@ from agents.playback import Playback, RecordingEnv
 from agents.report import Remarks, ResultsTable, number, read_trials, write_report
 from agents.roster import load_agents
 from agents.swim import Policy, Swim, actions_of, require_fit, swim
+from seastar_gym.command import run_command
 from seastar_gym.csv_rows import read_numbers
 from seastar_gym.envs.paths import PATH_NAMES, make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -302,4 +303,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_command(main)

@@ -34,6 +34,7 @@ from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from seastar_gym.checks import is_finite_number, is_whole_number, shown
+from seastar_gym.command import run_command
 from seastar_gym.csv_rows import Row, read_numbers, read_rows
 from seastar_gym.extras import require_extra
 from seastar_gym.per_robot import frame_of, side_by_side, with_numbers
@@ -356,4 +357,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_command(main)

@@ -24,6 +24,7 @@ from rich.console import Console
 from tqdm import tqdm
 
 from seastar_gym import fidelity
+from seastar_gym.command import run_command
 from seastar_gym.scene import Numerics, SchemeName
 from seastar_gym.simulator import Simulator
 from seastar_gym.studies.accuracy_cases import (
@@ -344,4 +345,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_command(main)

@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
+from seastar_gym.command import run_command
 from seastar_gym.scene import Numerics, Scene, SmaPulse
 from seastar_gym.simulator import Simulator, SolverStatus
 from seastar_gym.studies import chapter_pictures as pictures
@@ -280,4 +281,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_command(main)

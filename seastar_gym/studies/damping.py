@@ -24,6 +24,7 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
+from seastar_gym.command import run_command
 from seastar_gym.scene import Numerics, SchemeName
 from seastar_gym.studies.accuracy_cases import PAIRS, Cases, Swim, errors, joined, random_sequences, swim, swims
 from seastar_gym.studies.terms import SILICONE
@@ -220,4 +221,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_command(main)

@@ -20,6 +20,7 @@ from seastar_gym.actuation.limited import Limited
 from seastar_gym.actuation.measured import MeasuredCurve
 from seastar_gym.actuation.sma import SmaPulse
 from seastar_gym.actuation.thermal import ThermalSma
+from seastar_gym.command import run_command
 from seastar_gym.morphology.limb import Limb
 from seastar_gym.scene import Contact, Numerics, Scene, Seastar
 from seastar_gym.simulator import Simulator
@@ -197,4 +198,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_command(main)

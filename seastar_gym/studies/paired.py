@@ -29,6 +29,7 @@ from rich.console import Console
 from rich.table import Table
 
 from seastar_gym.checks import require_count
+from seastar_gym.command import run_command
 from seastar_gym.der.compilation import PACKAGE
 from seastar_gym.scene import Numerics
 from seastar_gym.studies import paired_worker
@@ -197,4 +198,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_command(main)

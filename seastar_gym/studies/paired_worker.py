@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 import seastar_gym
+from seastar_gym.command import run_command
 from seastar_gym.der.stroke import advance
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.simulator import Simulator
@@ -80,4 +81,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_command(main)

@@ -29,6 +29,7 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
+from seastar_gym.command import run_command
 from seastar_gym.scene import Fidelity, Numerics, Scene, SchemeName
 from seastar_gym.simulator import Simulator
 from seastar_gym.studies.hardening import SETTINGS, cost_table, measure_cost
@@ -260,4 +261,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_command(main)

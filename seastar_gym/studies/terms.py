@@ -15,6 +15,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from seastar_gym.command import run_command
 from seastar_gym.der.lanes import N_LANES
 from seastar_gym.fluids import GridCurrent, ShearCurrent, UniformCurrent, Vortex, Water
 from seastar_gym.scene import Contact, Scene, Seastar, relaxation_time
@@ -145,4 +146,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_command(main)

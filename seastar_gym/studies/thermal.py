@@ -16,6 +16,7 @@ from scipy.optimize import least_squares
 
 from seastar_gym.actuation.sma import SmaPulse
 from seastar_gym.actuation.thermal import ThermalSma
+from seastar_gym.command import run_command
 from seastar_gym.studies import thermal_models
 
 Floats = NDArray[np.float64]
@@ -103,4 +104,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_command(main)

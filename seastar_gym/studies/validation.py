@@ -14,6 +14,7 @@ from rich.console import Console
 from scipy.optimize import minimize_scalar
 from tqdm import tqdm
 
+from seastar_gym.command import run_command
 from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water
 from seastar_gym.simulator import Simulator, SolverStatus, State
 from seastar_gym.studies import exact
@@ -361,4 +362,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_command(main)
