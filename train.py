@@ -54,6 +54,7 @@ try:
     from agents.trials import HELD_OUT_SEED, swim_many
     from agents.vec_env import BatchVecEnv
     from seastar_gym import RewardWeights
+    from seastar_gym.command import refused_by_disk
     from seastar_gym.envs.paths import PathName
     from seastar_gym.envs.seastar_swim import SeastarSwimEnv
     from seastar_gym.envs.task import make_scene
@@ -453,19 +454,13 @@ def quiet_writers() -> Iterator[None]:
         threading.excepthook = before
 
 
-def cannot(failure: OSError) -> str:
-    """What the disk refused, in a sentence."""
-    where = "a file of the run" if failure.filename is None else failure.filename
-    return f"Cannot write or read {where}: {(failure.strerror or str(failure)).lower()}."
-
-
 def main(arguments: Sequence[str]) -> int:
     """The command line; returns the exit code."""
     try:
         with quiet_writers():
             return run(read_options(arguments), arguments)
     except OSError as failure:
-        print(failure if failure.errno is None else cannot(failure), file=sys.stderr)
+        print(refused_by_disk(failure), file=sys.stderr)
         return 2 if failure.errno is None else 1
     except ValueError as wrong:
         print(wrong, file=sys.stderr)

@@ -31,6 +31,7 @@ from agents.report.pictures import FRAMES_PER_STROKE, draw_traces, film
 from agents.report.playback import Playback, RecordingEnv
 from agents.roster import load_agents
 from agents.swim import Policy, Swim, actions_of, require_fit, swim
+from seastar_gym.command import run_command
 from seastar_gym.envs.paths import PATH_NAMES, make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
@@ -304,4 +305,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_command(main)

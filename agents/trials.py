@@ -24,6 +24,7 @@ from scipy.stats import bootstrap
 from agents.disturbances import CURRENT_DIRECTIONS, DISTURBANCES, Disturbance, DisturbedTask
 from agents.roster import load_agents
 from agents.swim import Policy, Swim, actions_of, require_fit
+from seastar_gym.command import run_command
 from seastar_gym.envs.commands import to_commands
 from seastar_gym.envs.paths import PathName
 from seastar_gym.envs.reward import RewardWeights
@@ -229,4 +230,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_command(main)

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from seastar_gym.command import run_command
+
 ROOT = Path(__file__).resolve().parent.parent
 OF_STUDIES = ("matplotlib", "rich", "tqdm")
 OF_TRAIN = ("imageio", "plotly", "safetensors", "stable_baselines3", "tensorboard", "torch", "tyro")
@@ -41,6 +43,36 @@ def assert_says(done, extra, missing):
 
 def test_there_are_commands_to_test():
     assert len(STUDIES) > 8 and len(AGENTS) > 3
+
+
+@pytest.mark.parametrize("command", [*STUDIES, *AGENTS, "seastar_gym.identify"])
+def test_every_command_says_in_a_sentence_what_the_disk_refuses(command):
+    text = ROOT.joinpath(*command.split(".")).with_suffix(".py").read_text(encoding="utf-8")
+    assert text.endswith('if __name__ == "__main__":\n    run_command(main)\n')
+
+
+@pytest.mark.parametrize(
+    "failure, sentence",
+    [
+        (OSError(28, "No space left on device", "out.csv"), "Cannot write or read out.csv: no space left on device."),
+        (OSError(28, "No space left on device"), "Cannot write or read a file: no space left on device."),
+        (FileNotFoundError("There is no file out.csv."), "There is no file out.csv."),
+    ],
+)
+def test_what_the_disk_refuses_is_said_in_a_sentence(failure, sentence):
+    def main():
+        raise failure
+
+    with pytest.raises(SystemExit) as ended:
+        run_command(main)
+    assert ended.value.code == sentence
+
+
+def test_a_command_keeps_its_exit_code():
+    for code in (None, 0, 2):
+        with pytest.raises(SystemExit) as ended:
+            run_command(lambda code=code: code)
+        assert ended.value.code == code
 
 
 @pytest.mark.parametrize("command", STUDIES)

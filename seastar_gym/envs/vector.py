@@ -70,7 +70,7 @@ class SeastarSwimVectorEnv(PlainSpec, gym.vector.VectorEnv[Observations, Any, An
         threads: int | None = None,
         randomization: DomainRandomization | Plain | None = None,
     ):
-        if render_mode not in (None, "rgb_array"):
+        if render_mode is not None and not (isinstance(render_mode, str) and render_mode == "rgb_array"):
             raise ValueError(
                 f'The batch draws with render_mode="rgb_array" only, not {render_mode!r}: use gym.make for one robot.'
             )

@@ -1,5 +1,4 @@
-import sys
-
+from seastar_gym.command import run_command
 from seastar_gym.identify.identify import main
 
-sys.exit(main())
+run_command(main)

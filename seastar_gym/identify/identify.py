@@ -353,7 +353,3 @@ def main() -> int:
         print(bad_input, file=sys.stderr)
         return 2
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,3 +1,4 @@
+from seastar_gym.command import run_command
 from studies.accuracy.study import main
 
-main()
+run_command(main)

@@ -341,7 +341,3 @@ def main() -> None:
         store(found)
         console.print(f"Stored: {fidelity.PRESETS}")
     console.print(f"Written: {', '.join(str(path) for path in (options.out / 'accuracy.csv', *pictures))}")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,3 +1,4 @@
+from seastar_gym.command import run_command
 from studies.chapter.study import main
 
-main()
+run_command(main)

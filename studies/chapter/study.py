@@ -268,7 +268,3 @@ def main() -> None:
     console = Console()
     console.print(as_table(statements))
     console.print(f"Written: {', '.join(str(file) for file in sorted(options.out.glob('*.png')))}")
-
-
-if __name__ == "__main__":
-    main()

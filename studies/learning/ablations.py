@@ -24,11 +24,13 @@ import tyro
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
+from agents.files import write_atomically
 from agents.policy import LearnedPolicy
 from agents.ppo import Hyperparameters, make_model, make_training_env, policy_of
 from agents.report.pictures import COLOURS, FAINT_INK
 from agents.swim import Policy
 from agents.trials import HELD_OUT_SEED, swim_many
+from seastar_gym.command import run_command
 from seastar_gym.envs.paths import AIM, PathName
 from seastar_gym.envs.task import make_scene
 from seastar_gym.scene.numerics import Fidelity
@@ -174,7 +176,7 @@ def study(options: Options, results: dict[str, Any]) -> None:
             continue
         began = time.perf_counter()
         runs[str(seed)] = learn(VARIANTS[name], seed, options)
-        options.out.write_text(json.dumps(results) + "\n", encoding="utf-8")
+        write_atomically(options.out, (json.dumps(results) + "\n").encode())
         strokes, seconds = runs[str(seed)]["curve"][-1][1], time.perf_counter() - began
         print(f"{name}, seed {seed}: {strokes:.1f} strokes on held-out paths ({seconds:.0f} s)", flush=True)
 
@@ -252,4 +254,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_command(main)

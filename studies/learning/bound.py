@@ -23,11 +23,13 @@ import tyro
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
+from agents.files import write_atomically
 from agents.greedy import Displacements, measure_gaits, remaining_way
 from agents.planner import Branching
 from agents.roster import load_agents
 from agents.swim import Policy
 from agents.trials import swim_many
+from seastar_gym.command import run_command
 from seastar_gym.envs.commands import Actions, command_table
 from seastar_gym.envs.paths import LINE_LENGTH, make_path
 from seastar_gym.envs.symmetry import action_table
@@ -262,8 +264,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     results = study(options)
     given = sys.argv[1:] if arguments is None else arguments
     results |= {"command": shlex.join(["python", "-m", "studies.learning.bound", *given])}
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    options.out.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+    write_atomically(options.out, (json.dumps(results, indent=1) + "\n").encode())
     draw(results, options.out.with_suffix(".png"))
     print(json.dumps({key: value for key, value in results.items() if key != "pentagon"}, indent=1))
     print(f"Pentagon: {results['pentagon']['strokes']} strokes. All in {time.perf_counter() - began:.0f} s.")
@@ -271,4 +272,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_command(main)

@@ -24,6 +24,7 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
+from seastar_gym.command import run_command
 from seastar_gym.gaits import PAIRS
 from seastar_gym.scene import Numerics
 from seastar_gym.scene.numerics import SchemeName
@@ -222,4 +223,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_command(main)

@@ -28,6 +28,7 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
+from seastar_gym.command import run_command
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.simd.compilation import entry_point
@@ -368,4 +369,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_command(main)

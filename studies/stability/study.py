@@ -258,7 +258,3 @@ def main() -> None:
     files += draw_atlas(cells, sweeps, steps, options.scheme, options.out)
     console.print(as_table(rows))
     console.print(f"{time.perf_counter() - start:.0f} s. In {options.out}: {', '.join(one.name for one in files)}")
-
-
-if __name__ == "__main__":
-    main()

@@ -359,7 +359,3 @@ def main() -> None:
     for section in sections:
         console.print(as_table(section))
     console.print(f"Written: {options.out}")
-
-
-if __name__ == "__main__":
-    main()

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from agents.greedy import waypoints_of
 from agents.planner import Budget, Planner, state_of
 from agents.swim import swim
-from seastar_gym import Numerics, Scene, Seastar, Simulator
+from seastar_gym import Numerics, Scene, Seastar, Simulator, ThermalSma
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 
@@ -39,6 +40,18 @@ def test_an_observation_is_the_whole_state(scene):
     env.simulator.stroke(commands)
     moved = np.linalg.norm(env.simulator.hub_position() - before, axis=1)
     np.testing.assert_allclose(np.linalg.norm(twin.hub_position(), axis=1), moved, rtol=1e-4)
+
+
+def test_the_state_of_the_rods_is_seen_beside_what_actuators_remember():
+    scene = Scene(actuator=ThermalSma(), numerics=FAST.numerics)
+    env, observations = swum(scene=scene)
+    twin = Simulator(scene, 3, threads=1)
+    twin.set_state(state_of(observations, scene))
+    np.testing.assert_allclose(twin.kinetic_energy(), env.simulator.kinetic_energy(), rtol=1e-4)
+    for found, waypoints, hub in zip(
+        waypoints_of(observations, scene)[0], env.waypoints, env.simulator.hub_position(), strict=True
+    ):
+        assert np.hypot(*found) == pytest.approx(np.hypot(*(waypoints[0] - hub)), rel=1e-5)
 
 
 def test_a_batch_gets_the_actions_of_single_robots():
