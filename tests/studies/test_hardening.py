@@ -1,4 +1,4 @@
-"""What is compared is the same stroke: plain Newton and the simulator's kernel end in the same bits."""
+"""The cost of safeguards compares the same stroke: plain Newton and the simulator's kernel end in the same bits."""
 
 import numpy as np
 import pytest
