@@ -103,13 +103,13 @@ class Pair:
         self.times = step_times(self.scene.actuator.corners, numerics.step)
         self.shape = np.asarray(self.scene.actuator.delta_psi(self.times))
 
-    def seconds(self, hardened: bool) -> float:
+    def seconds(self, safeguarded: bool) -> float:
         """Processor time of the stroke [s]; leaves the final state in `q` and `v` and the counts in `report`."""
         self.q[:], self.v[:] = self.start
         self.a[:], self.report[:] = 0.0, 0.0
         work, actuation = self.memory
         begin = time.thread_time()
-        if hardened:
+        if safeguarded:
             advance(
                 self.rods, work, self.scheme, SCHEMES["implicit-euler"], actuation, self.q, self.v, self.a, self.peaks,
                 self.times, self.shape, self.failed, self.report, self.limits,
@@ -146,8 +146,8 @@ def measure_cost(numerics: Numerics, pairs: int = 12, rounds: int = 20) -> Cost:
     for bench, own in zip(benches, durations, strict=True):
         bench.seconds(True), bench.seconds(False)
         for k in range(rounds):
-            for hardened in (k % 2 == 0, k % 2 == 1):
-                own[k, int(hardened)] = bench.seconds(hardened)
+            for safeguarded in (k % 2 == 0, k % 2 == 1):
+                own[k, int(safeguarded)] = bench.seconds(safeguarded)
     low, middle, high = np.percentile(durations[..., 1] / durations[..., 0], [25, 50, 75])
     steps = len(benches[0].times) - 1
     return Cost(numerics, float(np.median(durations[..., 0])) / ROBOTS / steps, middle, (low, high))

@@ -28,7 +28,7 @@ ENERGY_STEPS = 100
 """Number of time steps of a run without commands."""
 ROBOTS = 8
 """Number of robots in a cell. Cells of peak angles have one for every command instead."""
-RATTLED = 0.1
+ENERGY_RUN_SPEED = 0.1
 """Standard deviation of the initial velocities [m/s] in the energy runs of cases without initial motion."""
 REFERENCE_STEPS = 10_000
 """Number of steps of the converged stroke, which the implicit midpoint rule computes."""
@@ -102,7 +102,7 @@ def commands_of(case: Case) -> Floats:
     return commands
 
 
-def rattle(simulator: Simulator, speed: float, shift: float) -> None:
+def disturb(simulator: Simulator, speed: float, shift: float) -> None:
     """Add random velocities [m/s] and shifts [edge lengths] to all nodes, from the same random numbers in all cells."""
     rng, state = np.random.default_rng(2), simulator.get_state()
     shifts = rng.uniform(-1.0, 1.0, state.positions.shape) * shift * simulator.scene.robot.edge_length
@@ -117,7 +117,7 @@ def swim(case: Case, numerics: Numerics, duration: float) -> tuple[Simulator, Fl
     """
     commands = commands_of(case)
     simulator = Simulator(make_scene(case, numerics, duration), len(commands), threads=1)
-    rattle(simulator, case.speed, case.shift)
+    disturb(simulator, case.speed, case.shift)
     begin, hubs = simulator.hub_position(), {}
     stroke = simulator.stroke_in_parts(commands, 10)
     while True:
@@ -127,21 +127,21 @@ def swim(case: Case, numerics: Numerics, duration: float) -> tuple[Simulator, Fl
             return simulator, np.array([hubs[0.1], hubs[1.0]]) - begin, finished.value
 
 
-def converged_way(case: Case, duration: float) -> Floats | None:
+def converged_displacements(case: Case, duration: float) -> Floats | None:
     """Converged hub displacements of a case [m], see `swim`, or None if two fine time steps do not agree on them."""
-    ways = []
+    found = []
     for steps in (REFERENCE_STEPS, REFERENCE_STEPS // 2):
-        _, way, report = swim(case, Numerics("implicit-midpoint", duration / steps), duration)
+        _, displacements, report = swim(case, Numerics("implicit-midpoint", duration / steps), duration)
         if report.status.any():
             return None
-        ways.append(way)
-    return ways[0] if way_error(ways[1], ways[0]) <= AGREEMENT else None
+        found.append(displacements)
+    return found[0] if displacement_error(found[1], found[0]) <= AGREEMENT else None
 
 
-def way_error(way: Floats, converged: Floats) -> float:
+def displacement_error(displacements: Floats, converged: Floats) -> float:
     """Relative error of hub displacements, see `Cell.error`; NaN if the converged hub does not move."""
     size = float(np.sqrt(np.mean(converged**2)))
-    return float(np.sqrt(np.mean((way - converged) ** 2))) / size if size > 0.0 else math.nan
+    return float(np.sqrt(np.mean((displacements - converged) ** 2))) / size if size > 0.0 else math.nan
 
 
 def largest_strain(simulator: Simulator) -> float:
@@ -165,7 +165,7 @@ def energy_growth(case: Case, numerics: Numerics, fluid: Water | None) -> tuple[
     """(growth, gain, number of failed robots) of randomly moving robots without commands, see `Cell`."""
     half = 0.5 * ENERGY_STEPS * numerics.step
     simulator = Simulator(Scene(case.robot, fluid, SmaPulse(0.0, half, half), numerics), ROBOTS, threads=1)
-    rattle(simulator, case.speed if case.speed or case.shift else RATTLED, case.shift)
+    disturb(simulator, case.speed if case.speed or case.shift else ENERGY_RUN_SPEED, case.shift)
     energies = [simulator.elastic_energy() + simulator.kinetic_energy()]
     for _ in simulator.stroke_in_parts(np.zeros((ROBOTS, case.robot.n_limbs)), ENERGY_STEPS):
         energies.append(simulator.elastic_energy() + simulator.kinetic_energy())
@@ -176,10 +176,10 @@ def energy_growth(case: Case, numerics: Numerics, fluid: Water | None) -> tuple[
 
 
 def run_cell(sweep: Sweep, value: float | None, step: float, scheme: SchemeName, converged: Floats | None) -> Cell:
-    """Measure one cell; converged: the result of `converged_way` for its case and duration."""
+    """Measure one cell; converged: the result of `converged_displacements` for its case and duration."""
     start, case, numerics = time.perf_counter(), sweep.case(value), Numerics(scheme, step)
     try:
-        simulator, way, report = swim(case, numerics, stroke_duration(step))
+        simulator, displacements, report = swim(case, numerics, stroke_duration(step))
     except ValueError as refusal:
         return Cell(sweep.name, value, step, refused=str(refusal))
     finite = np.isfinite(simulator.positions).all(axis=(1, 2)) & np.isfinite(simulator.velocities).all(axis=(1, 2))
@@ -194,7 +194,8 @@ def run_cell(sweep: Sweep, value: float | None, step: float, scheme: SchemeName,
         opening_angle=float(report.smallest_opening_angle.min()), strain=largest_strain(simulator),
         speed=float(np.linalg.norm(simulator.velocities, axis=-1).max()),
         growth=in_fluid[0], growth_in_vacuum=in_vacuum[0], gain=in_fluid[1], gain_in_vacuum=in_vacuum[1],
-        error=math.nan if converged is None else way_error(way, converged), seconds=time.perf_counter() - start,
+        error=math.nan if converged is None else displacement_error(displacements, converged),
+        seconds=time.perf_counter() - start,
     )  # fmt: skip
 
 

@@ -32,7 +32,7 @@ from studies.chapter import ISSUES_FROM, REAL_TIME_FROM
 from studies.parser import study_parser
 from studies.speed.hardening import SETTINGS, cost_table, measure_cost
 from studies.stability.cases import QUICK_STEPS, STEPS, SWEEPS, Sweep, format_value, quick_sweeps
-from studies.stability.cells import Cell, commands_of, converged_way, run_cell, stroke_duration
+from studies.stability.cells import Cell, commands_of, converged_displacements, run_cell, stroke_duration
 from studies.stability.long_run import long_run, long_table
 
 Floats = NDArray[np.float64]
@@ -57,7 +57,7 @@ def atlas(
         cells = []
         for duration, members in itertools.groupby(steps, stroke_duration):
             try:
-                converged = converged_way(sweep.case(value), duration)
+                converged = converged_displacements(sweep.case(value), duration)
             except ValueError:
                 converged = None  # run_cell records why the scene is refused
             for step in members:
@@ -81,7 +81,7 @@ def _weight(sweep: Sweep, value: float | None) -> float:
 
 
 SUMMARY = (
-    "against", "cells", "refused", "strokes", "failed", "Newton iterations per step (most)", "steps halved",
+    "against", "cells", "refused", "strokes", "failed", "Newton iterations per step (most)", "substeps",
     "energy grew", "error at 3, 20 ms",
 )  # fmt: skip
 
@@ -150,8 +150,8 @@ def main() -> None:
     """Command line: run the atlas, the long run or the measurement of cost, and print its table."""
     parser = study_parser("studies.stability", __doc__)
     parser.add_argument("--quick", action="store_true", help="run a coarser grid, in a fraction of the time")
-    parser.add_argument("--scheme", choices=get_args(SchemeName), default="implicit-euler",
-                        help="scheme of the atlas (default: %(default)s)")  # fmt: skip
+    parser.add_argument("--scheme", choices=get_args(SchemeName), default="implicit-euler", metavar="SCHEME",
+                        help="scheme of the atlas: %(choices)s (default: %(default)s)")  # fmt: skip
     parser.add_argument("--long", action="store_true", help="simulate a long run of random commands instead")
     parser.add_argument("--cost", action="store_true", help="measure the cost of the safeguards instead")
     parser.add_argument(

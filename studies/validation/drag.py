@@ -42,7 +42,7 @@ def quadratic_drag() -> Section:
         rows.append(Row(f"{name}, a = 1 m/s²", reference, ours, "mm/s", 1e-6 * reference))
     for time in (0.1, 1.0, 10.0):
         pairs = zip(MM * exact.coasting(k, 0.1, time), MM * coasted(0.1, time), strict=True)
-        for (name, unit), (reference, ours) in zip((("speed", "mm/s"), ("way", "mm")), pairs, strict=True):
+        for (name, unit), (reference, ours) in zip((("speed", "mm/s"), ("distance", "mm")), pairs, strict=True):
             rows.append(Row(f"{name} after coasting {time:g} s", reference, ours, unit, 5e-6 * reference))
     return Section(
         "Quadratic drag",

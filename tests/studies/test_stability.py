@@ -80,7 +80,7 @@ def test_the_csv_has_every_cell_and_the_summary_counts_it(cells, folder):
         assert figures["cells"] == str(len(own)) and figures["refused"] == str(len(own) - len(ran))
         assert figures["strokes"] == str(sum(int(line["robots"]) for line in ran))
         assert figures["failed"] == str(sum(int(line["failed"]) for line in ran)) == "0"
-        assert figures["steps halved"] == f"{sum(int(line['halvings']) > 0 for line in ran)} cells"
+        assert figures["substeps"] == f"{sum(int(line['halvings']) > 0 for line in ran)} cells"
         iterations = [float(line["iterations"]) for line in ran]
         wanted = f"{np.median(iterations):.2g} ({max(iterations):.0f})"
         assert figures["Newton iterations per step (most)"] == wanted
