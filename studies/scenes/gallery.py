@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 
 NUMERICS = Numerics.preset("balanced")
 ROBOTS, ROUNDS, STROKES = 64, 9, 5
-"""Robots and strokes of the measured cost, and strokes in a picture."""
+"""Robots and rounds of the measured cost, and strokes in a picture."""
 REST, HEATED, PATH = "#c8c8c8", "#2b6cb0", "#c53030"
 
 
