@@ -1,4 +1,7 @@
-"""Studies: measurements of the simulator and of learning, each run as `python -m studies.NAME` (extra `studies`)."""
+"""Measurements of the simulator and of learning, each run as `python -m studies.ROOM` or `python -m studies.ROOM.NAME`.
+
+They need the extra `studies`, those of `learning` also the extra `train`.
+"""
 
 from seastar_gym.extras import require_extra
 

@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parent.parent
 OF_STUDIES = ("matplotlib", "rich", "tqdm")
 OF_TRAIN = ("imageio", "plotly", "safetensors", "stable_baselines3", "tensorboard", "torch", "tyro")
 STUDIES = sorted(
-    f"seastar_gym.studies.{file.stem}"
+    f"studies.{file.stem}"
     for file in (ROOT / "seastar_gym" / "studies").glob("*.py")
     if '__name__ == "__main__"' in file.read_text(encoding="utf-8")
 )

@@ -11,7 +11,7 @@ from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 from oracle import Star, elastic_hessian
 from seastar_gym import Scene, Seastar
 from seastar_gym.model.rods import make_rods
-from studies.validation import exact
+from studies.validation import elastica, exact, frequencies, published, waves
 from studies.validation import page as validation_page
 from studies.validation import study as validation
 
@@ -58,7 +58,7 @@ def test_a_limb_held_by_hub_and_root_node_is_clamped_at_the_middle_of_the_held_e
     EI, EA = exact.bending_stiffness(robots[0]), exact.stretching_stiffness(robots[0])
     load = EI / 0.1**2
     from_hub = exact.elastica_tip(load, EI, 0.1, EA)
-    at_hub = [validation.loaded_tip(r, load) + [0.5 * r.edge_length, 0.0] - from_hub for r in robots]
+    at_hub = [elastica.loaded_tip(r, load) + [0.5 * r.edge_length, 0.0] - from_hub for r in robots]
     lengths = [robot.edge_length for robot in robots]
     order = validation_page.order_row("", lengths, [np.hypot(*error) for error in at_hub], 0.0).ours
     assert order == pytest.approx(1.0, abs=0.1)
@@ -87,14 +87,14 @@ def test_the_limb_rings_with_the_eigenvalues_of_its_stiffness(nodes_per_limb):
     root_mass = np.sqrt(star.masses[2:nodes_per_limb])
     eigenvalues = np.linalg.eigvalsh(stiffness / np.outer(root_mass, root_mass))
     robot = Seastar(nodes_per_limb=nodes_per_limb)
-    ours = [validation.ringing_frequency(robot, mode) for mode in range(3)]
+    ours = [frequencies.ringing_frequency(robot, mode) for mode in range(3)]
     np.testing.assert_allclose(ours, np.sqrt(eigenvalues[:3]) / (2.0 * np.pi), rtol=5e-5)
 
 
 def test_a_fitted_frequency_is_that_of_the_signal():
     time = np.linspace(0.0, 12.0, 301)
     signal = 0.3 * np.sin(2.0 * np.pi * 1.037 * time + 0.4) + 1e-4 * np.sin(2.0 * np.pi * 6.2 * time)
-    assert validation.fitted_frequency(time, signal, 1.0) == pytest.approx(1.037, rel=1e-6)
+    assert frequencies.fitted_frequency(time, signal, 1.0) == pytest.approx(1.037, rel=1e-6)
 
 
 # Drag
@@ -121,35 +121,36 @@ def test_drag_over_mass_is_that_of_every_node():
 def test_a_pulse_has_the_dispersion_of_the_discrete_rod():
     """omega = 4/l^2 sin^2(k l / 2) sqrt(EI / (rho_m A)): what the continuous k^2 becomes on nodes a length l apart."""
     robot = Seastar(n_limbs=3, nodes_per_limb=201, limb_length=1.0)
-    pulse, h = validation.bending_pulse(robot), 1e-4
+    pulse, h = waves.bending_pulse(robot), 1e-4
     for k in (70.0, 80.0, 90.0):
         omega = (2.0 / robot.edge_length * np.sin(0.5 * k * robot.edge_length)) ** 2 * exact.beam_constant(robot)
         omega = 2.0 / h * np.arctan(0.5 * omega * h)  # as slow as the implicit midpoint rule makes it
-        assert validation.pulse_frequency(robot, k, *pulse) == pytest.approx(omega, rel=5e-4)
+        assert waves.pulse_frequency(robot, k, *pulse) == pytest.approx(omega, rel=5e-4)
 
 
 # Published codes
 
 
 def test_published_swims_have_a_hundred_times_and_agree_with_each_other():
-    time, x_a, x_b = validation.published_swim()
+    time, x_a, x_b = published.published_swim()
     np.testing.assert_allclose(time, 0.1 * np.arange(1, 101))
     np.testing.assert_allclose(x_a, x_b, rtol=1e-6)
 
 
 def test_a_missing_file_of_published_figures_is_named(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"nothing\.csv is missing"):
-        validation.published_swim(tmp_path / "nothing.csv")
+        published.published_swim(tmp_path / "nothing.csv")
 
 
 # The page
 
 
 def test_the_page_in_the_repository_is_the_one_that_the_study_writes():
-    """But for the last digits of ours, which belong to the machine."""
+    """Except for the last digits of ours, which depend on the machine."""
     page = PAGE.read_text(encoding="utf-8")
+    assert page.startswith(validation_page.as_page([]))
     for name in validation.SECTIONS:
-        assert section(name).title in page
+        assert f"## {section(name).title}\n\n{section(name).method}\n" in page
         for row in section(name).rows:
             what, reference, *_ = validation_page.as_cells(row)
             assert f"| {what} | {reference} |" in page

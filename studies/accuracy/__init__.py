@@ -1,1 +1,1 @@
-"""What speed costs in accuracy: errors of every scheme and step against converged paths."""
+"""Accuracy and its cost: errors of every scheme and step against converged paths."""

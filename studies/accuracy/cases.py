@@ -1,4 +1,4 @@
-"""What the accuracy study swims: command sequences, how robots swim them, and how far off a swim is."""
+"""Swims of the accuracy study: command sequences, the simulated swim, and its error against a converged swim."""
 
 import itertools
 from dataclasses import dataclass
@@ -16,13 +16,15 @@ Floats = NDArray[np.float64]
 Kind = Literal["straight", "pair", "pentagon", "random", "gait"]
 
 STROKES = 10
+"""Strokes of a swim, except round the pentagon."""
 
 
 @dataclass(frozen=True)
 class Cases:
     """Command sequences of equal length, one per robot.
 
-    names, kinds: Of every robot. commands: In [-1, 1], shape (n_strokes, n_robots, n_limbs).
+    names, kinds: Name and kind of every robot's sequence.
+    commands: Commands in [-1, 1], shape (n_strokes, n_robots, n_limbs).
     """
 
     names: tuple[str, ...]
@@ -33,17 +35,19 @@ class Cases:
         return len(self.names)
 
     def first(self, n: int) -> "Cases":
-        """The first n of them."""
+        """The sequences of the first n robots."""
         return Cases(self.names[:n], self.kinds[:n], self.commands[:, :n])
 
 
 class Swim(NamedTuple):
-    """What robots did and what it cost.
+    """Paths of robots, and the solver's work on them.
 
-    hub: Positions after every stroke [m], shape (n_strokes, n_robots, 2). heading: After every stroke [rad], shape
-    (n_strokes, n_robots). iterations, steps: Newton iterations and time steps per stroke, means over all. rejections,
-    halvings: Steps taken back because of their error and because Newton did not converge, in all. failed: Robots whose
-    solver gave up.
+    hub: Hub positions after every stroke [m], shape (n_strokes, n_robots, 2).
+    heading: Headings after every stroke [rad], shape (n_strokes, n_robots).
+    iterations, steps: Newton iterations and time steps per stroke, averaged over strokes and robots.
+    rejections: Number of time steps rejected because of their estimated error, over all strokes and robots.
+    halvings: Number of time steps halved because Newton did not converge, over all strokes and robots.
+    failed: Number of robots that the solver failed on.
     """
 
     hub: Floats
@@ -56,18 +60,19 @@ class Swim(NamedTuple):
 
 
 class Errors(NamedTuple):
-    """Of every robot, shape (n_robots,): path and end error over the length of the path, heading error [rad]."""
+    """Errors of every robot against its converged swim, shape (n_robots,).
+
+    path, end: Largest and last distance of the hub from the converged path, as fractions of that path's length.
+    heading: Largest difference of the heading [rad].
+    """
 
     path: Floats
     heading: Floats
     end: Floats
 
 
-# --- command sequences -----------------------------------------------------------------------------------------------
-
-
 def repeated(names: list[str], kinds: list[Kind], commands: Floats) -> Cases:
-    """Every robot repeats its command, commands of shape (n_robots, n_limbs)."""
+    """Sequences in which every robot repeats one command; commands: shape (n_robots, n_limbs)."""
     return Cases(tuple(names), tuple(kinds), np.repeat(commands[None], STROKES, axis=0))
 
 
@@ -78,7 +83,7 @@ def swims() -> Cases:
 
 
 def random_sequences(n: int, rng: np.random.Generator) -> Cases:
-    """Half of them of commands -1, 0, 1, which an environment's actions mean; half of any in [-1, 1]."""
+    """Random sequences of n robots: half draw from -1, 0 and 1, as an environment's actions do, half from [-1, 1]."""
     commands = rng.uniform(-1.0, 1.0, (STROKES, n, 5))
     commands[:, ::2] = rng.integers(-1, 2, commands[:, ::2].shape)
     kinds: list[Kind] = ["random"] * n
@@ -86,9 +91,10 @@ def random_sequences(n: int, rng: np.random.Generator) -> Cases:
 
 
 def gaits() -> Cases:
-    """Every command of -, 0 and + over and over, but for those of `swims`, those that others mirror, and those at rest.
+    """Repetitions of every command of -1, 0 and +1 that is not in `swims`, once per class under the robot's symmetry.
 
-    Turning the robot moves a command on by limbs; mirroring it exchanges limbs and signs. All limbs alike only twist.
+    A turn of the robot rolls a command over the limbs; a mirror image exchanges limbs and signs. Rest and the same
+    command for all limbs are left out, because the hub then stays where it is.
     """
     known = {symmetric_form(command) for command in (*PAIRS.values(), np.zeros(5), np.ones(5))}
     forms = sorted({symmetric_form(np.array(command)) for command in itertools.product((-1, 0, 1), repeat=5)} - known)
@@ -97,13 +103,13 @@ def gaits() -> Cases:
 
 
 def symmetric_form(command: Floats) -> tuple[int, ...]:
-    """The first of all commands that are this one, turned or mirrored."""
+    """Smallest of all commands that are this one turned or mirrored: equal for commands that swim alike."""
     mirrored = -command[[0, 4, 3, 2, 1]]
     return min(tuple(int(c) for c in np.roll(form, turn)) for form in (command, mirrored) for turn in range(5))
 
 
 def pentagon(swimming: int, resting: int) -> Cases:
-    """The sides of (13.15), with so many strokes of swimming and of rest each."""
+    """The pentagon of (13.15), with these numbers of strokes of swimming and of rest per side."""
     return Cases(("pentagon",), ("pentagon",), pentagon_gait(swimming, resting)[:, None])
 
 
@@ -114,11 +120,8 @@ def joined(*cases: Cases) -> Cases:
     return Cases(names, kinds, np.concatenate([each.commands for each in cases], axis=1))
 
 
-# --- swimming --------------------------------------------------------------------------------------------------------
-
-
 def scene_of(numerics: Numerics, nodes_per_limb: int = 10, relaxation_time: float | None = None) -> Scene:
-    """The chapter's scene, maybe of a material that damps."""
+    """The chapter's scene with these numerics; relaxation_time: That of a damped material [s], or None."""
     return Scene(robot=Seastar(nodes_per_limb=nodes_per_limb, relaxation_time=relaxation_time), numerics=numerics)
 
 
@@ -129,7 +132,7 @@ def swim(
     threads: int | None = 1,
     relaxation_time: float | None = None,
 ) -> Swim:
-    """All robots from rest through their commands."""
+    """Simulate all robots from rest through their commands."""
     simulator = Simulator(scene_of(numerics, nodes_per_limb, relaxation_time), len(cases), threads)
     hub, heading, reports = [], [], []
     for commands in cases.commands:
@@ -147,16 +150,13 @@ def swim(
     )
 
 
-# --- errors ----------------------------------------------------------------------------------------------------------
-
-
 def hub_path_lengths(hub: Floats) -> Floats:
-    """Lengths of the hubs' paths from the origin, stroke end to stroke end [m], shape (n_robots,)."""
+    """Lengths of the hubs' paths from the origin, measured at the ends of strokes [m], shape (n_robots,)."""
     return path_length(np.zeros(2), np.moveaxis(hub, 0, 1))
 
 
 def errors(swum: Swim, converged: Swim) -> Errors:
-    """How far off a swim is; infinite for all if a robot failed."""
+    """Errors of a swim against the converged one; infinite for all robots if one failed."""
     if swum.failed:
         return Errors(*np.full((3, swum.hub.shape[1]), np.inf))
     distance = np.linalg.norm(swum.hub - converged.hub, axis=-1)

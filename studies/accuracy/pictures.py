@@ -1,20 +1,17 @@
-"""Pictures of the accuracy study: work against precision, convergence, and why damped ringing costs accuracy."""
+"""Pictures of the accuracy study: work against precision, and convergence in time and space."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.gaits import PAIRS
-from seastar_gym.model.rods import make_rods
 from seastar_gym.scene import Numerics
-from seastar_gym.simulator import Simulator
-from studies.accuracy.cases import STROKES, scene_of
+from studies.accuracy.ringing import ringing
+from studies.accuracy.style import COLOURS, DPI, FAINT, INK, MS, PERCENT, as_numbers, as_percent, subplots
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,25 +21,14 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-COLOURS = {
-    "implicit-euler": "#cc7a00",
-    "sdirk2": "#cc3355",
-    "sdirk3": "#8844aa",
-    "implicit-midpoint": "#3366aa",
-    "adapted": "#118855",
-}
-INK, FAINT = "#1b1f26", "#80868f"
-MM, MS, PERCENT = 1e3, 1e3, 100.0
-DPI = 130
-
 
 def kind_of(numerics: Numerics) -> str:
-    """Key of COLOURS."""
+    """Key of COLOURS for a setting: its scheme, or "adapted"."""
     return numerics.scheme if numerics.path_tolerance is None else "adapted"
 
 
 def draw_all(found: Study, folder: Path) -> list[Path]:
-    """Write all pictures; returns where."""
+    """Write all pictures into a folder and return their paths."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -57,33 +43,8 @@ def draw_all(found: Study, folder: Path) -> list[Path]:
     return paths
 
 
-def subplots(*shape: int, **keywords: Any) -> tuple[Figure, Any]:
-    """Empty axes in the study's style."""
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(*shape, layout="constrained", **keywords)
-    for each in np.ravel(axes):
-        each.grid(True, which="major", color="0.92", lw=0.8)
-        each.set_axisbelow(True)
-        each.spines[["top", "right"]].set_visible(False)
-    return figure, axes
-
-
-def as_percent(axis: Any) -> None:
-    """Tick labels such as 0.1 %."""
-    axis.set_major_formatter(lambda value, _: f"{value:g} %")
-
-
-def as_numbers(axis: Any) -> None:
-    """Tick labels such as 0.1 and 10,000."""
-    axis.set_major_formatter(lambda value, _: f"{value:,.0f}" if value >= 1.0 else f"{value:g}")
-
-
-# --- work against precision ------------------------------------------------------------------------------------------
-
-
 def work_precision(found: Study) -> Figure:
-    """Error over speed of all settings, the front, the presets and the chapter's two steps."""
+    """Error over speed: all settings, the front, the presets and the chapter's two time steps."""
     figure, axes = subplots(1, 2, figsize=(12.5, 5.6), sharey=True)
     rows = [row for row in found.rows if row.nodes_per_limb == 10]
     panels: tuple[tuple[str, str, str, str], ...] = (
@@ -124,7 +85,7 @@ def _draw_front(axes: Axes, rows: Sequence[Row], error: RowNumber, speed: RowNum
 
 
 def _mark(axes: Axes, rows: Sequence[Row], error: RowNumber, speed: RowNumber) -> None:
-    """The presets, and the chapter's steps."""
+    """Mark the presets and the chapter's two time steps."""
     from matplotlib.patheffects import withStroke
 
     from studies.accuracy.rows import presets
@@ -145,11 +106,8 @@ def _mark(axes: Axes, rows: Sequence[Row], error: RowNumber, speed: RowNumber) -
         )  # fmt: skip
 
 
-# --- convergence -----------------------------------------------------------------------------------------------------
-
-
 def convergence(found: Study) -> Figure:
-    """Error over h for the straight swim and the worst case, and over N."""
+    """Error over the time step for the straight swim and the worst swim, and error over the nodes per limb."""
     figure, (straight, worst, space) = subplots(1, 3, figsize=(13.5, 4.6))
     fixed = [row for row in found.rows if row.nodes_per_limb == 10 and row.numerics.path_tolerance is None]
     tightest_last = sorted(fixed, key=lambda row: -row.numerics.newton_tolerance)
@@ -191,113 +149,9 @@ def convergence(found: Study) -> Figure:
 
 
 def _slopes(axes: Axes, ends: tuple[float, float], orders: dict[int, float]) -> None:
-    """Dashed lines error = c h^order."""
+    """Draw dashed lines error = c h^order; ends: first and last h [ms], orders: c of every order."""
     for order, c in orders.items():
         h = np.array(ends)
         axes.loglog(h, c * h**order, "--", lw=0.9, color=FAINT)
         axes.annotate(f"order {order}", (h[1], c * h[1] ** order), (4, 0), textcoords="offset points", fontsize=8,
                       color=FAINT, va="center", annotation_clip=False)  # fmt: skip
-
-
-# --- ringing ---------------------------------------------------------------------------------------------------------
-
-RINGING = "{1-,2+}"
-EXACT = Numerics("implicit-midpoint", 0.05e-3, 1e-11)
-SHOWN: tuple[tuple[str, Numerics, str, float], ...] = (
-    ("converged", EXACT, INK, 1.4),
-    ("implicit-midpoint 0.5 ms: keeps it", Numerics("implicit-midpoint", 0.5e-3), COLOURS["implicit-midpoint"], 1.2),
-    ("sdirk2 0.5 ms: damps it", Numerics("sdirk2", 0.5e-3), "#ee9922", 1.4),
-    ("sdirk2 20 ms", Numerics("sdirk2", 20e-3), COLOURS["sdirk2"], 1.4),
-)
-SAMPLES = 4000
-"""Of a stroke, where the steps are short enough."""
-
-
-def ringing(found: Study) -> Figure:
-    """What a limb does within a stroke, how much it rings, and how far robots then swim."""
-    figure, (close, strength, path) = subplots(1, 3, figsize=(13.5, 4.7))
-    begin, end = 0.42, 0.45
-    for name, numerics, colour, width in SHOWN:
-        time, velocity, stretching = record(numerics)
-        some = (time >= begin - 0.02) & (time <= end + 0.02)
-        close.plot(MS * time[some], MM * velocity[some], lw=width, color=colour)
-        strength.semilogy(time, MM * smoothed(stretching, time), color=colour, lw=width, label=name)
-        path.plot(*excess(swum(numerics)), "o-", ms=3.5, lw=width, color=colour)
-    strokes, frozen = excess(swum(EXACT, freeze_lengths=True))
-    path.plot(strokes, frozen, "o--", ms=3.5, mfc="white", lw=1.4, color=INK)
-    path.annotate(
-        "converged, but every 2 ms the\nlengthwise ringing is taken out", (9, frozen[8]),
-        (-12, 14), textcoords="offset points", ha="right", fontsize=8.5, color=INK,
-    )  # fmt: skip
-    close.set(xlim=(MS * begin, MS * end), ylim=(2, 18), xlabel="time in the stroke [ms]")
-    close.set_ylabel("speed of a node in the middle of limb 1 [mm/s]")
-    close.set_title("1. Limbs ring lengthwise, at hundreds of hertz", fontsize=10.5, loc="left")
-    strength.set(
-        xlabel="time in the stroke [s]", ylabel="lengthening speed of limbs, r.m.s. [mm/s]", ylim=(0.03, 100.0)
-    )
-    strength.set_title("2. SDIRK2 damps the ringing, the midpoint rule keeps it", fontsize=10.5, loc="left")
-    strength.legend(frameon=False, fontsize=8.5, loc="upper right")
-    path.set(xlabel="strokes", ylabel="farther from the start than the converged robot", xticks=range(0, 11, 2))
-    path.set_title("3. Robots that do not ring swim too far", fontsize=10.5, loc="left")
-    as_percent(path.yaxis)
-    figure.suptitle(f"Why damped ringing costs accuracy: the pair {RINGING} of Fig. 13.8", x=0.01, ha="left")
-    return figure
-
-
-def record(numerics: Numerics, relaxation_time: float | None = None) -> tuple[Floats, Floats, Floats]:
-    """Times [s], velocity across limb 1 in its middle [m/s], r.m.s. lengthening speed of limbs [m/s]; second stroke."""
-    simulator = Simulator(scene_of(numerics, relaxation_time=relaxation_time), 1, threads=1)
-    command = PAIRS[RINGING][None]
-    simulator.stroke(command)
-    time, velocity, stretching = [], [], []
-    for t in simulator.stroke_in_parts(command, min(SAMPLES, round(1.0 / numerics.step))):
-        time.append(t)
-        velocity.append(simulator.velocities[0, 5, 1])
-        limbs = (lengthening(simulator) @ simulator.velocities.ravel()).reshape(5, -1).sum(axis=1)
-        stretching.append(np.sqrt(np.mean(limbs**2)))
-    return np.array(time), np.array(velocity), np.array(stretching)
-
-
-def lengthening(simulator: Simulator) -> Floats:
-    """Matrix from node velocities to the lengthening speeds of the edges of one robot, limb by limb."""
-    nodes = simulator.positions[0]
-    heads = np.arange(1, len(nodes))
-    tails = np.where((heads - 1) % ((len(nodes) - 1) // 5) == 0, 0, heads - 1)
-    directions = nodes[heads] - nodes[tails]
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    matrix = np.zeros((len(heads), len(nodes), 2))
-    edges = np.arange(len(heads))
-    matrix[edges, heads], matrix[edges, tails] = directions, -directions
-    return matrix.reshape(len(heads), -1)
-
-
-@cache
-def swum(numerics: Numerics, freeze_lengths: bool = False) -> Floats:
-    """Distances of the hub from the start at the ends of strokes [m].
-
-    freeze_lengths: Every 2 ms take out what lengthens edges, by impulses between the ends of the edges.
-    """
-    simulator = Simulator(scene_of(numerics), 1, threads=1)
-    masses = np.repeat(make_rods(simulator.scene).mass, 2)
-    distances = []
-    for _ in range(STROKES):
-        for _ in simulator.stroke_in_parts(PAIRS[RINGING][None], 500 if freeze_lengths else 1):
-            if freeze_lengths:
-                rates = lengthening(simulator)
-                v = simulator.v[0, :, 0]
-                v -= np.linalg.solve((rates / masses) @ rates.T, rates @ v) @ (rates / masses)
-        distances.append(np.hypot(*simulator.hub_position()[0]))
-    return np.array(distances)
-
-
-def excess(distances: Floats) -> tuple[Floats, Floats]:
-    """Strokes, and by how many per cent of its path a robot is farther from the start than the converged one."""
-    exact = swum(EXACT)
-    return np.arange(1.0, STROKES + 1.0), PERCENT * (distances / exact - 1.0)
-
-
-def smoothed(values: Floats, time: Floats, window: float = 0.03) -> Floats:
-    """Root mean square over a window of time [s]."""
-    n = max(1, round(window / (time[-1] - time[-2])))
-    ones = np.convolve(np.ones(len(values)), np.ones(n), mode="same")
-    return np.sqrt(np.convolve(values**2, np.ones(n), mode="same") / ones)

@@ -1,4 +1,4 @@
-"""What the accuracy study finds: a row for every setting, and which rows are worth anything."""
+"""Results of the accuracy study: a row per setting, and the selection of rows that no other row beats."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -14,19 +14,23 @@ from seastar_gym.scene.numerics import Fidelity
 Floats = NDArray[np.float64]
 
 NOTICEABLE = 0.03
-"""By what share an error has to be smaller to be worth any time."""
+"""A slower setting joins the front if it reduces the error by at least this fraction."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """A setting, its errors and its cost.
+    """A setting, its errors and its cost. Path and end errors are fractions of the converged path's length.
 
-    path, straight, pair, pentagon, random, gait: Largest path errors, over all swims but gaits and by kind; worst: the
-    swim that path is of. median: Of the random sequences. heading [deg], end: The worst of all swims but gaits.
-    spatial, spatial_straight: Path errors of this N against N -> infinity, of the converged solutions.
-    iterations, steps: Newton iterations and time steps per stroke. rejections, halvings: In all swims.
-    path_promise, straight_promise, gait_promise: See `promised`.
-    speed, straight_speed: Simulated over computing seconds on one core, mixed commands and straight swim.
+    path: Largest path error of all swims except gaits. worst: Name of the swim with that error.
+    straight, pair, pentagon, random, gait: Largest path error of the swims of one kind.
+    median: Median path error of the random sequences.
+    heading, end: Largest heading error [deg] and end error of all swims except gaits.
+    iterations, steps: Newton iterations and time steps per stroke.
+    rejections, halvings: Numbers of rejected and of halved time steps, in all swims.
+    spatial, spatial_straight: Path errors of the converged solution with N nodes per limb against N -> infinity, the
+        largest and that of the straight swim.
+    path_promise, straight_promise, gait_promise: Largest error of this setting and of all finer ones, see `promised`.
+    speed, straight_speed: Real-time factors on one core, for mixed commands and for the straight swim.
     """
 
     numerics: Numerics
@@ -55,14 +59,14 @@ class Row:
 
     @property
     def label(self) -> str:
-        """Scheme and step, for people."""
+        """Scheme and step as a reader sees them, such as "sdirk2 20 ms"."""
         adapted = self.numerics.path_tolerance
         how = "" if adapted is None else f", adapted to {100 * adapted:g} %"
         return f"{self.numerics.scheme} {1e3 * self.numerics.step:g} ms{how}"
 
 
 class Space(NamedTuple):
-    """Path errors of the converged solution of N nodes per limb, over all swims and of the straight swim alone."""
+    """Path errors of the converged solution with N nodes per limb: largest of all swims, and of the straight swim."""
 
     nodes_per_limb: int
     path: float
@@ -71,9 +75,13 @@ class Space(NamedTuple):
 
 @dataclass(frozen=True)
 class Study:
-    """rows: Of N = 10 first. agreement: Path difference of the two converged solutions, by kind. space: Over N.
+    """Results of the study.
 
-    straight: Hub x of the converged straight swim after every stroke [m]; limit: at the end for N -> infinity.
+    rows: One row per setting, those with N = 10 first.
+    agreement: Largest path difference of the two converged solutions, by kind of swim.
+    space: Errors of the converged solutions over N.
+    straight: Hub x of the converged straight swim after every stroke [m].
+    limit: Hub x of the converged straight swim after the last stroke for N -> infinity [m].
     """
 
     rows: list[Row]
@@ -89,7 +97,7 @@ def presets() -> dict[str, Numerics]:
 
 
 def no_coarser(other: Numerics, numerics: Numerics) -> bool:
-    """Whether a setting is of the same kind and no coarser in any respect."""
+    """Whether `other` has the scheme of `numerics` and no larger step or tolerance."""
     return (
         other.scheme == numerics.scheme
         and (other.path_tolerance is None) == (numerics.path_tolerance is None)
@@ -100,9 +108,9 @@ def no_coarser(other: Numerics, numerics: Numerics) -> bool:
 
 
 def promised(rows: Sequence[Row]) -> list[Row]:
-    """Rows with their promises: the largest error of this setting and of all that are no coarser.
+    """Rows with their promises: the largest error of a setting and of all settings that are no coarser.
 
-    Errors of opposite sign cancel at some steps; that luck may not last, so it is not promised.
+    At some steps errors of opposite sign cancel. A promise does not rely on that.
     """
     found = []
     for row in rows:
@@ -113,7 +121,7 @@ def promised(rows: Sequence[Row]) -> list[Row]:
 
 
 def front(rows: Iterable[Row], error: Callable[[Row], float], speed: Callable[[Row], float]) -> list[Row]:
-    """Rows that no other beats in both, fastest first; slower ones only if their error is noticeably smaller."""
+    """Pareto front of error and speed, fastest first; a slower row needs a noticeably smaller error."""
     chosen: list[Row] = []
     for row in sorted(rows, key=lambda row: (-speed(row), error(row))):
         if not chosen or error(row) < (1.0 - NOTICEABLE) * error(chosen[-1]):
@@ -122,7 +130,7 @@ def front(rows: Iterable[Row], error: Callable[[Row], float], speed: Callable[[R
 
 
 def fronts(rows: Sequence[Row]) -> list[Row]:
-    """Those on the front of paths, of any gait or of the straight swim, fastest first."""
+    """Rows on the front of the path error, of the gait error or of the straight swim's, fastest first."""
     chosen = {
         row.numerics: row
         for kind in ("path", "gait", "straight")

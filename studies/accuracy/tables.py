@@ -1,4 +1,4 @@
-"""Tables of the accuracy study, and the one that comes with the package."""
+"""Tables of the accuracy study, among them the one that comes with the package."""
 
 import csv
 import json
@@ -12,17 +12,16 @@ from rich.table import Table
 
 from seastar_gym.scene import fidelity
 from studies.accuracy.rows import Row, Study, front, fronts, presets
-from studies.speed.throughput import machine
+from studies.speed.timing import machine
 
 AGREEMENT = {"straight": 1e-5, "pair": 1e-4, "pentagon": 1e-4, "random": 1e-4}
-"""How closely the two converged solutions have to agree before anything is stored."""
-
-
+"""Largest path difference of the two converged solutions, by kind of swim, with which results are stored."""
 TABLE_WIDTH = 112
+"""Width of the printed table [characters]."""
 
 
 def summary(found: Study) -> list[tuple[str, Row]]:
-    """The rows worth reading, fastest first: the presets by name, and the front of the path error."""
+    """Presets, by name, and the front of the path error, fastest first."""
     own = [row for row in found.rows if row.nodes_per_limb == 10]
     names = {numerics: name for name, numerics in presets().items()}
     chosen = {row.numerics: row for row in front(own, lambda row: row.path_promise, lambda row: row.speed)}
@@ -36,7 +35,7 @@ COLUMNS = (
 
 
 def as_cells(name: str, row: Row) -> tuple[str, ...]:
-    """A line of the summary."""
+    """Cells of one line of the summary; errors in per cent, speed as real-time factor."""
     promises = (row.path_promise, row.gait_promise, row.straight_promise)
     return (
         name, row.label, f"{row.numerics.newton_tolerance:.0e}", *(f"{100 * error:.2g} %" for error in promises),
@@ -45,7 +44,7 @@ def as_cells(name: str, row: Row) -> tuple[str, ...]:
 
 
 def two_digits(value: float, up: bool = False) -> float:
-    """Rounded to two significant digits, upwards on request."""
+    """Value rounded to two significant digits; up: round upwards."""
     unit = 10.0 ** (math.floor(math.log10(value)) - 1) if value > 0.0 and math.isfinite(value) else 1.0
     scaled = value / unit
     whole = math.ceil(scaled - 1e-9) if up else round(scaled)
@@ -53,7 +52,7 @@ def two_digits(value: float, up: bool = False) -> float:
 
 
 def facts(found: Study) -> list[str]:
-    """What the tables do not say."""
+    """Sentences about convergence that go below the table."""
     ten = next(each for each in found.space if each.nodes_per_limb == 10)
     agreement = ", ".join(f"{kind} {error:.0e}" for kind, error in found.agreement.items())
     return [
@@ -66,14 +65,14 @@ def facts(found: Study) -> list[str]:
 
 
 def as_markdown(found: Study) -> str:
-    """The summary for the README."""
+    """Summary in Markdown."""
     lines = [f"| {' | '.join(COLUMNS)} |", "|---|---|---:|" + "---:|" * (len(COLUMNS) - 3)]
     lines += [f"| {' | '.join(as_cells(name, row))} |" for name, row in summary(found)]
     return "\n".join([*lines, "", *facts(found), f"Speeds: one core of {machine()}."]) + "\n"
 
 
 def as_table(found: Study) -> Table:
-    """The summary for the terminal."""
+    """Summary for the terminal."""
     table = Table(title=f"Errors against h -> 0, worst cases; speed on one core ({machine()})")
     for column in COLUMNS:
         table.add_column(column, justify="left" if column in COLUMNS[:2] else "right")
@@ -83,7 +82,7 @@ def as_table(found: Study) -> Table:
 
 
 def write_csv(rows: Sequence[Row], path: Path) -> None:
-    """All settings with all columns; errors are shares of the path's length unless the name says otherwise."""
+    """Write all columns of all settings; errors are fractions of the path's length unless the name has a unit."""
     units = {"heading": "heading_deg", "iterations": "iterations_per_stroke", "steps": "steps_per_stroke"}
     names = [field.name for field in fields(Row) if field.name != "numerics"]
     with path.open("w", newline="") as file:
@@ -102,7 +101,7 @@ def _cell(value: Any) -> Any:
 
 
 def as_promise(row: Row) -> dict[str, Any]:
-    """A row as `fidelity.Promise` keeps it: errors rounded upwards, speed to two digits."""
+    """Fields of a `fidelity.Promise` from a row: errors rounded upwards to two digits, speed rounded to two digits."""
     n = row.numerics
     return {
         "scheme": n.scheme,
@@ -119,7 +118,7 @@ def as_promise(row: Row) -> dict[str, Any]:
 
 
 def store(found: Study, path: Path = fidelity.PRESETS) -> None:
-    """Write the package's table; refuses a study whose two converged solutions do not agree."""
+    """Write the package's table; ValueError if the two converged solutions of the study do not agree."""
     for kind, allowed in AGREEMENT.items():
         if not found.agreement[kind] <= allowed:
             raise ValueError(

@@ -1,23 +1,26 @@
-"""Draws the chapter's figures from recorded swims. matplotlib is imported where something is drawn.
+"""Pictures of the chapter's figures from recorded swims. matplotlib is imported only where something is drawn.
 
-Wherever a figure depends on the numerics, the converged swim (dark) stands beside the chapter's setting (orange).
+A figure that depends on the numerics shows the converged swim (dark) beside the chapter's setting (orange).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene import Scene, SmaPulse
+from seastar_gym.scene import SmaPulse
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+from studies.chapter import ISSUES_FROM, REAL_TIME_FROM
+from studies.chapter.cost import Cost
+from studies.chapter.swims import MM, MS, Swim
 
 Floats = NDArray[np.float64]
 
@@ -29,82 +32,20 @@ CONVERGED: dict[str, Any] = {"color": DARK, "linestyle": "-", "linewidth": 1.3, 
 CHAPTER: dict[str, Any] = {"color": ORANGE, "linestyle": (0, (4, 2)), "linewidth": 1.3, "zorder": 2.4}
 CONVERGED_PATH: dict[str, Any] = {"color": INK, "linewidth": 2.4, "zorder": 3.5}
 CHAPTER_PATH: dict[str, Any] = {"color": ORANGE, "linewidth": 1.1, "zorder": 3.6}
-"""Of paths, which a robot swims to and fro: dashes would fill up."""
+"""Line of the chapter's paths. It is solid, because a robot swims back and forth and dashes would overlap."""
 PAIR_COLOURS = ("#0072b2", "#009e73", "#cc3d7a", "#8c6d1f")
 DPI = 150
-MM, MS = 1e3, 1e3
-CHAPTER_REAL_TIME, CHAPTER_TROUBLE = 3e-3, 20e-3
-"""The time steps [s] from which the chapter's code runs faster than real time, and meets numerical issues."""
-
-
-@dataclass(frozen=True)
-class Swim:
-    """Robots of one scene, followed over strokes.
-
-    label: What solved it, for legends. scene: What was modelled. commands: Of every stroke, shape (n_strokes, n_robots,
-    n_limbs). time: Of the samples [s], shape (n,), the first one before the first stroke. positions, velocities: Of
-    all nodes [m], [m/s], shape (n, n_robots, n_nodes, 2).
-    """
-
-    label: str
-    scene: Scene
-    commands: Floats
-    time: Floats
-    positions: Floats
-    velocities: Floats
-
-    def hub(self, robot: int = 0) -> Floats:
-        """Hub positions [m], shape (n, 2)."""
-        return self.positions[:, robot, 0]
-
-    def hub_velocity(self, robot: int = 0) -> Floats:
-        """Hub velocities [m/s], shape (n, 2)."""
-        return self.velocities[:, robot, 0]
-
-    def at(self, time: float) -> int:
-        """The first sample that is not before a time [s]."""
-        return int(np.searchsorted(self.time, time - 1e-9))
-
-    def at_strokes(self) -> NDArray[np.intp]:
-        """The samples at rest and at the end of every stroke, shape (n_strokes + 1,)."""
-        ends = np.arange(len(self.commands) + 1) * self.scene.actuator.period
-        return np.searchsorted(self.time, ends - 1e-9)
-
-    def actuated(self, time: float, robot: int = 0) -> NDArray[np.bool_]:
-        """Limbs that are turned at a time [s], shape (n_limbs,)."""
-        stroke, since = divmod(time + 1e-9, self.scene.actuator.period)
-        turned = stroke < len(self.commands) and self.scene.actuator.delta_psi(since) > 1e-6
-        active: NDArray[np.bool_] = turned & (self.commands[int(stroke) if turned else 0, robot] != 0.0)
-        return active
-
-
-@dataclass(frozen=True)
-class Cost:
-    """Computing time over simulated time, against the time step.
-
-    steps: h [s], shape (n,). alone: Of one robot. in_batch: Of one of n_robots, shape (n,) each. n_robots: Size of
-    the batch. repaired: Where Newton's matrix was not positive definite in some steps, shape (n,).
-    """
-
-    steps: Floats
-    alone: Floats
-    in_batch: Floats
-    n_robots: int
-    repaired: NDArray[np.bool_]
-
-
-# --- axes ------------------------------------------------------------------------------------------------------------
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure, sizes in inches."""
+    """Empty figure; width, height: Size [inches]."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
 
 
 def style(axes: Axes, **labels: Any) -> None:
-    """Axes in the manner of this project; labels go to `axes.set`."""
+    """Apply the study's style to axes; labels: Arguments of `axes.set`."""
     axes.set(**labels)
     axes.tick_params(labelcolor=INK, color=FAINT_INK)
     axes.grid(color=GRID, linewidth=0.8)
@@ -118,12 +59,12 @@ def style(axes: Axes, **labels: Any) -> None:
 
 
 def save(figure: Figure, file: Path) -> None:
-    """Writes a PNG."""
+    """Write a figure as PNG."""
     figure.savefig(file, dpi=DPI)
 
 
 def draw_robot(axes: Axes, swim: Swim, time: float, size: float = 1.0) -> None:
-    """The robot at a time [s] on axes in millimetres, actuated limbs bold and blue. size: Of its lines."""
+    """Draw the robot at a time [s] on axes in mm, with actuated limbs bold and blue; size: Scale of the lines."""
     n = swim.scene.robot.nodes_per_limb
     nodes, active = MM * swim.positions[swim.at(time), 0], swim.actuated(time)
     for limb in range(swim.scene.robot.n_limbs):
@@ -131,9 +72,6 @@ def draw_robot(axes: Axes, swim: Swim, time: float, size: float = 1.0) -> None:
         colour, width, level = (ACTUATED, 3.2, 4.0) if active[limb] else (LIMB, 1.8, 3.0)
         axes.plot(*line.T, color=colour, linewidth=size * width, solid_capstyle="round", zorder=level)
     axes.plot(*nodes[0], marker="o", markersize=size * 4.5, color=INK, zorder=5.0)
-
-
-# --- Fig. 13.5b: the actuation signal --------------------------------------------------------------------------------
 
 
 def draw_pulse(actuator: SmaPulse, file: Path) -> None:
@@ -158,10 +96,8 @@ def draw_pulse(actuator: SmaPulse, file: Path) -> None:
     save(figure, file)
 
 
-# --- Fig. 13.6: the straight swim ------------------------------------------------------------------------------------
-
 STRAIGHT_TIMES = (0.0, 2.2, 5.5, 10.0)
-"""Of the snapshots of Fig. 13.6 [s]."""
+"""Times of the snapshots in Fig. 13.6 [s]."""
 
 
 def draw_straight(converged: Swim, chapter: Swim, file: Path) -> None:
@@ -195,10 +131,8 @@ def draw_straight(converged: Swim, chapter: Swim, file: Path) -> None:
     save(figure, file)
 
 
-# --- Figs. 13.2 and 13.7: the pentagon -------------------------------------------------------------------------------
-
 PENTAGON_TIMES = (22.1, 72.1, 122.1, 172.1, 222.1)
-"""Of the snapshots of Fig. 13.2 [s]: limbs at their farthest, in the middle of every side."""
+"""Times of the snapshots in Fig. 13.2 [s]: in the middle of every side, when limbs are rotated farthest."""
 
 
 def draw_pentagon_snapshots(converged: Swim, chapter: Swim, file: Path) -> None:
@@ -254,7 +188,7 @@ def draw_pentagon(converged: Swim, chapter: Swim, file: Path) -> None:
 
 
 def signal_curves(swim: Swim, limb: int) -> tuple[Floats, Floats, Floats]:
-    """(time [s], positive rotation, negative rotation [rad]) of a limb with all corners of its pulses."""
+    """(time [s], positive rotation [rad], negative rotation [rad]) of a limb at all corners of its pulses."""
     actuator = swim.scene.actuator
     corners = np.array(actuator.corners)
     time = (np.arange(len(swim.commands))[:, None] * actuator.period + corners).ravel()
@@ -263,7 +197,7 @@ def signal_curves(swim: Swim, limb: int) -> tuple[Floats, Floats, Floats]:
 
 
 def draw_pentagon_signals(swim: Swim, file: Path, zoom: tuple[float, float] = (43.0, 53.0)) -> None:
-    """Fig. 13.7b: the actuation signals of the pentagon. zoom: The time [s] that is shown in detail."""
+    """Fig. 13.7b: the actuation signals of the pentagon. zoom: Interval [s] that is shown in detail."""
     n_limbs, peak = swim.scene.robot.n_limbs, swim.scene.actuator.peak_angle
     figure = new_figure(9.6, 5.8)
     panels = figure.subplots(n_limbs, 2, sharex="col", sharey=True, width_ratios=[2.0, 1.0])
@@ -287,15 +221,12 @@ def draw_pentagon_signals(swim: Swim, file: Path, zoom: tuple[float, float] = (4
     save(figure, file)
 
 
-# --- Fig. 13.8: pairs ------------------------------------------------------------------------------------------------
-
-
 PAIR_LABELS = ((42.0, 22.0), (26.0, 50.0), (-18.0, 60.0), (-46.0, 12.0))
-"""Where the names of the pairs stand [mm]."""
+"""Positions of the pairs' names [mm]."""
 
 
 def draw_pairs(converged: Swim, chapter: Swim, names: Sequence[str], file: Path) -> None:
-    """Fig. 13.8: where the pairs of limbs take the robot in ten strokes. names: Of the pairs, one per robot."""
+    """Fig. 13.8: paths of ten strokes by each pair of limbs; names: Names of the pairs, one per robot."""
     robot = converged.scene.robot
     figure = new_figure(9.0, 4.6)
     left, right = figure.subplots(1, 2, width_ratios=[1.05, 1.0])
@@ -322,16 +253,13 @@ def draw_pairs(converged: Swim, chapter: Swim, names: Sequence[str], file: Path)
     save(figure, file)
 
 
-# --- Fig. 13.9: cost -------------------------------------------------------------------------------------------------
-
-
 def draw_cost(cost: Cost, file: Path) -> None:
-    """Fig. 13.9: computing time over wall-clock time against the time step."""
+    """Fig. 13.9: computing time over simulated time, against the time step."""
     figure = new_figure(7.2, 5.0)
     axes = figure.subplots()
-    steps, trouble, real_time = MS * cost.steps, MS * CHAPTER_TROUBLE, MS * CHAPTER_REAL_TIME
-    line = np.array([steps.min(), trouble])
-    axes.axvspan(trouble, 1.3 * steps.max(), color="#fbeedd", linewidth=0, zorder=0.5)
+    steps, issues, real_time = MS * cost.steps, MS * ISSUES_FROM, MS * REAL_TIME_FROM
+    line = np.array([steps.min(), issues])
+    axes.axvspan(issues, 1.3 * steps.max(), color="#fbeedd", linewidth=0, zorder=0.5)
     axes.axhline(1.0, color=FAINT_INK, linewidth=0.8)
     axes.loglog(line, real_time / line, **CHAPTER, label="the chapter: proportional to 1/h, real time at 3 ms")
     axes.plot(real_time, 1.0, marker="D", color=ORANGE, zorder=3.0)
@@ -340,12 +268,12 @@ def draw_cost(cost: Cost, file: Path) -> None:
         (cost.in_batch, "s", "#009e73", f"ours, per robot of a batch of {cost.n_robots}"),
     ):
         axes.loglog(steps, values, color=colour, marker=marker, label=name)
-        axes.loglog(steps[cost.repaired], values[cost.repaired], color=colour, marker=marker, linestyle="",
+        axes.loglog(steps[cost.regularised], values[cost.regularised], color=colour, marker=marker, linestyle="",
                     markerfacecolor="w", zorder=3.0)  # fmt: skip
     axes.plot([], [], color=INK, marker="o", linestyle="", markerfacecolor="w",
-              label="open: Newton's matrix indefinite in some steps, repaired")  # fmt: skip
+              label="open: Newton's matrix regularised in some steps")  # fmt: skip
     axes.text(steps.min(), 1.15, "real time", va="bottom", color=INK, fontsize=9)
-    axes.text(1.06 * trouble, 2.0, "the chapter:\nnumerical\nissues", va="bottom", color="#9a5a00", fontsize=9)
+    axes.text(1.06 * issues, 2.0, "the chapter:\nnumerical\nissues", va="bottom", color="#9a5a00", fontsize=9)
     style(axes, xlabel="time step h [ms]", ylabel="computing time over simulated time",
           xlim=(0.8 * steps.min(), 1.3 * steps.max()), ylim=(0.02 * cost.in_batch.min(), 60.0))  # fmt: skip
     ticks = [tick for tick in (0.1, 0.3, 1.0, 3.0, 10.0, 20.0, 40.0) if steps.min() <= tick <= steps.max()]

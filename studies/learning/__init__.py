@@ -1,4 +1,4 @@
-"""What matters to the learning, and the best that a search finds."""
+"""Ablations of the training, and the fastest swims that offline searches find."""
 
 import sys
 

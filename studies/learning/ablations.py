@@ -1,10 +1,10 @@
-"""What matters to the learning: trainings that differ in one thing each, over seeds.
+"""Ablations of the training: trainings that differ from the default one in a single choice, over several seeds.
 
     python -m studies.learning.ablations
 
-Every training is measured on the same held-out random paths with random headings, none of which it is trained on: mean
-strokes to the last waypoint, while it learns and at the end. Results are written after every training, and trainings
-whose results are there already are not repeated.
+Every policy is evaluated on the same held-out random paths with random headings, none of which it is trained on. The
+score is the mean number of strokes to the last waypoint, during the training and at its end. Results are written after
+every training, and a training whose result is already in the file is not repeated.
 """
 
 import itertools
@@ -36,17 +36,19 @@ from seastar_gym.envs.task import make_scene
 from seastar_gym.scene.numerics import Fidelity
 
 MAX_STROKES = 400
-"""Of a measured swim; who does not arrive counts as this many."""
+"""Largest number of strokes of an evaluated swim, which is also the score of a robot that does not arrive."""
 
 Curve = list[tuple[int, float]]
-"""Strokes trained, and mean strokes on the held-out paths."""
+"""Learning curve: pairs of strokes trained and mean strokes on the held-out paths."""
 
 
 @dataclass(frozen=True)
 class Variant:
-    """A training: hyperparameters that differ from the study's, and how the paths are laid.
+    """A training that differs from the default of the study.
 
-    aim: Radii of a waypoint that the reward's way keeps to. first_path: What the first third is trained on.
+    changes: Hyperparameters that differ from `COMMON`, as pairs of name and value.
+    aim: Distance from a waypoint's centre, as a fraction of its radius, at which the rewarded route passes it.
+    first_path: Path of the first third of the training, or None for random paths throughout.
     """
 
     changes: tuple[tuple[str, Any], ...] = ()
@@ -55,7 +57,7 @@ class Variant:
 
     @property
     def hyperparameters(self) -> Hyperparameters:
-        """The study's with the changes."""
+        """Hyperparameters of the study with the changes of this variant."""
         return replace(COMMON, **dict(self.changes))
 
 
@@ -64,8 +66,9 @@ def _with(**changes: Any) -> Variant:
 
 
 COMMON = Hyperparameters(actions="joint")
-"""All 243 commands to choose from, of which the default training explores the pairs of limbs only."""
+"""Hyperparameters of the study: policies choose from all 243 commands, not only from the pairs of limbs."""
 DEFAULT = "whole commands"
+"""Name of the variant without changes."""
 VARIANTS: dict[str, Variant] = {
     DEFAULT: Variant(),
     "no symmetry": _with(symmetry=False),
@@ -80,11 +83,11 @@ VARIANTS: dict[str, Variant] = {
     "aim 0.4": Variant(aim=0.4),
     "aim 0.9": Variant(aim=0.9),
 }
-"""By what is different."""
+"""Trainings by the choice in which they differ."""
 
 
 def mean_strokes(policy: Policy, path: PathName, n_swims: int, options: "Options") -> float:
-    """Mean strokes of swims on held-out paths, or on a path by name."""
+    """Mean number of strokes of swims by a policy; path: "random" means the held-out paths."""
     scene, seed = make_scene(None, options.fidelity), HELD_OUT_SEED
     swims = swim_many(
         "learned", policy, path, n_swims, scene, max_strokes=MAX_STROKES, seed=seed, threads=options.num_threads
@@ -93,7 +96,7 @@ def mean_strokes(policy: Policy, path: PathName, n_swims: int, options: "Options
 
 
 class Measuring(BaseCallback):
-    """Measures the policy every `every` strokes of the training."""
+    """Callback that evaluates the policy after every `options.every` strokes of the training."""
 
     def __init__(self, options: "Options"):
         super().__init__()
@@ -108,7 +111,7 @@ class Measuring(BaseCallback):
             self.measure()
 
     def measure(self) -> LearnedPolicy:
-        """The policy so far, measured."""
+        """Evaluate the present policy, add the score to the curve, and return the policy."""
         assert isinstance(self.model, PPO)
         policy = policy_of(self.model)
         strokes = mean_strokes(policy, "random", self.options.paths, self.options)
@@ -117,7 +120,7 @@ class Measuring(BaseCallback):
 
 
 def learn(variant: Variant, seed: int, options: "Options") -> dict[str, Any]:
-    """One training: its learning curve, and the strokes that its policy takes round the pentagon."""
+    """Run one training; returns its learning curve and the strokes of the final policy round the pentagon."""
     hyperparameters, fidelity = variant.hyperparameters, options.fidelity
     measuring, n = Measuring(options), hyperparameters.num_envs * hyperparameters.rollout
     rounds = max(1, options.strokes // n)
@@ -138,29 +141,26 @@ def learn(variant: Variant, seed: int, options: "Options") -> dict[str, Any]:
     return {"curve": measuring.curve, "pentagon": round(mean_strokes(policy, "pentagon", 1, options))}
 
 
-# --- the study -------------------------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Options:
-    """What matters to the learning: trainings that differ in one thing each, over seeds."""
+    """Ablations of the training: trainings that differ from the default one in a single choice, over several seeds."""
 
     seeds: tuple[int, ...] = (0, 1, 2)
-    """Of the trainings."""
+    """Seeds of the trainings."""
     variants: tuple[str, ...] = tuple(VARIANTS)
-    """Which trainings."""
+    """Names of the trainings to run."""
     strokes: int = 98_304
-    """Of every training."""
+    """Length of every training [strokes]."""
     every: int = 24_576
-    """Strokes between measurements."""
+    """Strokes of training between evaluations."""
     paths: int = 64
-    """Held-out paths."""
+    """Number of held-out paths."""
     fidelity: Fidelity = "fast"
-    """How exactly the swims are computed."""
+    """Fidelity of the simulated swims."""
     num_threads: int | None = None
     """Threads of the simulator; all processors by default."""
     out: Path = Path("docs/ablations.json")
-    """File of the results; the picture has its name."""
+    """File of the results. The picture has the same name with the suffix .png."""
 
     def __post_init__(self) -> None:
         if unknown := set(self.variants) - set(VARIANTS):
@@ -168,7 +168,7 @@ class Options:
 
 
 def study(options: Options, results: dict[str, Any]) -> None:
-    """Fill in what is missing in the results, and write them after every training."""
+    """Run the trainings that are missing in the results, and write the results after each."""
     options.out.parent.mkdir(parents=True, exist_ok=True)
     for seed, name in itertools.product(options.seeds, options.variants):
         runs = results["runs"].setdefault(name, {})
@@ -182,7 +182,7 @@ def study(options: Options, results: dict[str, Any]) -> None:
 
 
 def read_results(options: Options, command: str) -> dict[str, Any]:
-    """Those of the file, or none yet. ValueError where they are of other trainings."""
+    """Results in the output file, or empty ones if there is none; ValueError if the file has other settings."""
     settings = {name: getattr(options, name) for name in ("strokes", "every", "paths", "fidelity")}
     if not options.out.is_file():
         return {"command": command, "settings": settings, "runs": {}}
@@ -195,12 +195,12 @@ def read_results(options: Options, command: str) -> dict[str, Any]:
 
 
 def final_strokes(runs: Mapping[str, Any]) -> list[float]:
-    """Mean strokes on the held-out paths at the end, of every seed."""
+    """Mean strokes on the held-out paths at the end of the training, for every seed."""
     return [run["curve"][-1][1] for run in runs.values()]
 
 
 def table(results: dict[str, Any]) -> str:
-    """In Markdown: for every variant the mean over seeds, with best and worst, and strokes round the pentagon."""
+    """Table in Markdown: mean, best and worst strokes over seeds of every variant, and strokes round the pentagon."""
     lines = ["| training | held-out paths: mean strokes | pentagon, every seed |", "|---|---:|---|"]
     for name, runs in results["runs"].items():
         ends, pentagon = final_strokes(runs), ", ".join(str(run["pentagon"]) for run in runs.values())
@@ -210,7 +210,7 @@ def table(results: dict[str, Any]) -> str:
 
 
 def draw(results: dict[str, Any], file: Path) -> None:
-    """Learning curves, mean and range over seeds, each beside that of the default, or that alone."""
+    """Draw the learning curve of every variant beside the default one: mean and range over seeds."""
     from matplotlib.figure import Figure
 
     others = [name for name in results["runs"] if name != DEFAULT] or [DEFAULT]
@@ -238,11 +238,11 @@ def draw(results: dict[str, Any], file: Path) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line; returns the exit code."""
+    """Command line of the study; returns the exit code."""
     torch.set_num_threads(1)
     given = sys.argv[1:] if arguments is None else arguments
     try:
-        options = tyro.cli(Options, args=given)
+        options = tyro.cli(Options, prog="python -m studies.learning.ablations", args=given)
         results = read_results(options, shlex.join(["python", "-m", "studies.learning.ablations", *given]))
     except ValueError as wrong:
         print(wrong, file=sys.stderr)

@@ -1,11 +1,11 @@
-"""How fast can it swim at all: the best gaits found offline, the best speed in every direction, the fastest pentagon.
+"""Fastest swims found offline: the best gaits, the best speed in every direction, and the fastest pentagon.
 
     python -m studies.learning.bound
 
-Periodic gaits: all of one and two strokes over all commands, all of three and four strokes over pairs of limbs, once
-for every class under the symmetry of the robot. Gaits swum in turns make every speed of their convex hull. Longer
-sequences: a wide beam search along straight lines, and one round the pentagon. None of this proves that nothing faster
-exists; it says what searches without a time limit find.
+The study simulates all periodic gaits of one and two strokes over all commands, and of three and four strokes over
+pairs of limbs, once for every class under the symmetry of the robot. Swimming several gaits in turn reaches every
+velocity in their convex hull. Longer sequences are found by a wide beam search along straight lines, and by one round
+the pentagon. The results are what searches without a time limit find; they do not prove that nothing is faster.
 """
 
 import itertools
@@ -43,20 +43,19 @@ Gaits = NDArray[np.intp]
 
 MM = 1000.0
 SETTLING, MEASURED = 12, 12
-"""Strokes of a periodic gait; 12 is whole periods of all of one to four strokes."""
+"""Strokes before and during the measurement of a gait; 12 strokes are whole periods of gaits of one to four strokes."""
 CHUNK = 4096
+"""Gaits that are simulated in one batch."""
 STRAIGHT = np.radians(0.3)
-"""A gait that turns by less per stroke [rad] can be kept straight by its mirror image or by a rare other stroke."""
+"""Largest turn per stroke [rad] of a straight gait, which its mirror image or a rare other stroke can correct."""
 LINE_STROKES, LINE_FROM = 36, 12
-"""A searched straight swim, and the stroke from which its speed counts."""
+"""Strokes of a searched straight swim, and the stroke from which its speed is measured."""
 WAYPOINT_RADIUS = 0.01
-
-
-# --- periodic gaits --------------------------------------------------------------------------------------------------
+"""Distance of the hub from a waypoint at which it is reached [m]."""
 
 
 def distinct_gaits(period: int, actions: Actions, n_limbs: int = 5) -> Gaits:
-    """One gait of every class under turning, mirroring and beginning later; actions of shape (n, period)."""
+    """One gait of every class under turns, mirror images and cyclic shifts, as actions of shape (n_gaits, period)."""
     carried, n_actions = action_table(actions, n_limbs), len(command_table(actions, n_limbs))
     place = n_actions ** np.arange(period)[::-1]
     numbers = np.arange(n_actions**period)
@@ -68,7 +67,7 @@ def distinct_gaits(period: int, actions: Actions, n_limbs: int = 5) -> Gaits:
 
 
 def measure(scene: Scene, gaits: Gaits, actions: Actions) -> Displacements:
-    """What they do per stroke, in the body frame."""
+    """Displacements of gaits per stroke, in the body frame."""
     table = command_table(actions, scene.robot.n_limbs)
     parts = [measure_gaits(scene, table[part], SETTLING, MEASURED) for part in _chunks(gaits)]
     return Displacements(np.concatenate([part.hub for part in parts]), np.concatenate([part.turn for part in parts]))
@@ -79,7 +78,7 @@ def _chunks(gaits: Gaits) -> list[Gaits]:
 
 
 def all_directions(hub: Floats, n_limbs: int = 5) -> Floats:
-    """Displacements of the turned and mirrored gaits too, shape (2 n_limbs n, 2)."""
+    """Displacements [m] of all turned and mirrored gaits, shape (2 n_limbs n_gaits, 2)."""
     way = hub @ [1.0, 1.0j]
     turns = np.exp(2j * np.pi / n_limbs * np.arange(n_limbs))[:, None]
     every = (turns * np.stack([way, way.conj()])[:, None]).reshape(-1)
@@ -87,17 +86,14 @@ def all_directions(hub: Floats, n_limbs: int = 5) -> Floats:
 
 
 def mixed_speed(displacements: Floats, directions: Floats) -> Floats:
-    """Fastest way per stroke [m] straight along directions [rad] by gaits swum in turns: their convex hull's edge."""
+    """Largest speed [m per stroke] along directions [rad] by gaits swum in turn: the edge of their convex hull."""
     normals = ConvexHull(displacements).equations  # n.x + b <= 0
     along = np.stack([np.cos(directions), np.sin(directions)], axis=1)
     return np.asarray(1.0 / (along @ (normals[:, :2] / -normals[:, 2:]).T).max(axis=1))
 
 
-# --- beam searches ---------------------------------------------------------------------------------------------------
-
-
 def search_line(scene: Scene, direction: float, actions: Actions, beam: int) -> tuple[float, Gaits]:
-    """Speed [m per stroke] of the best found swim from rest along a direction [rad], and its actions."""
+    """Speed [m per stroke] and actions of the best swim found from rest along a direction [rad]."""
     along, aside = np.array([[np.cos(direction), np.sin(direction)], [-np.sin(direction), np.cos(direction)]])
     swim_all = Branching(scene, command_table(actions, scene.robot.n_limbs))
     states, actions_so_far = _at_rest(scene), np.zeros((1, 0), np.intp)
@@ -105,14 +101,14 @@ def search_line(scene: Scene, direction: float, actions: Actions, beam: int) -> 
     for _ in range(LINE_STROKES):
         states = swim_all(states)
         hub = states.positions[:, 0]
-        best = np.argsort(np.abs(hub @ aside) - hub @ along)[:beam]  # who is off the line has that far to come back
+        best = np.argsort(np.abs(hub @ aside) - hub @ along)[:beam]  # a robot beside the line still has to return to it
         states, actions_so_far = _keep(states, actions_so_far, best, len(swim_all.commands))
         way.append(float(hub[best[0]] @ along))
     return (way[-1] - way[LINE_FROM]) / (LINE_STROKES - LINE_FROM), actions_so_far[0]
 
 
 def search_path(scene: Scene, waypoints: Floats, actions: Actions, beam: int, max_strokes: int = 400) -> Gaits:
-    """Actions of the shortest found swim from rest through all waypoints [m]; empty if none ends in time."""
+    """Actions of the shortest swim found from rest through all waypoints [m]; empty if none ends within max_strokes."""
     swim_all = Branching(scene, command_table(actions, scene.robot.n_limbs))
     states, actions_so_far, reached = _at_rest(scene), np.zeros((1, 0), np.intp), np.zeros(1, np.intp)
     legs = np.linalg.norm(np.diff(waypoints, axis=0), axis=1)
@@ -141,29 +137,26 @@ def _keep(states: State, so_far: Gaits, chosen: NDArray[np.intp], n_actions: int
     return states.of_robots(chosen), longer
 
 
-# --- the study -------------------------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Options:
-    """The best gaits, the best speed in every direction and the fastest pentagon that searches find offline."""
+    """Fastest swims found offline: the best gaits, the best speed in every direction, and the fastest pentagon."""
 
     fidelity: Fidelity = "fast"
-    """How exactly the swims are computed."""
+    """Fidelity of the simulated swims."""
     line_beam: int = 12
-    """States kept by the searches along lines, over all commands."""
+    """Width of the beam searches along lines, over all commands [states]."""
     pentagon_beam: int = 300
-    """States kept by the search round the pentagon, over pairs of limbs."""
+    """Width of the beam search round the pentagon, over pairs of limbs [states]."""
     only_pentagon: bool = False
-    """Search the pentagon alone, print how many strokes it takes, and write nothing."""
+    """Search only the pentagon, print the number of strokes found, and write nothing."""
     agents: tuple[str, ...] = ("learned",)
-    """Whose speeds to measure beside; agents as for agents.evaluate."""
+    """Agents whose speeds are measured for comparison, named as for agents.evaluate."""
     out: Path = Path("docs/bound.json")
-    """File of the results; the picture has its name."""
+    """File of the results. The picture has the same name with the suffix .png."""
 
 
 def study_gaits(scene: Scene) -> tuple[list[dict[str, Any]], Floats]:
-    """The fastest gaits of every period, and the displacements of all that swim straight."""
+    """Fastest straight gaits of every period, and the displacements per stroke [m] of all straight gaits."""
     kinds: tuple[tuple[int, Actions], ...] = ((1, "joint"), (2, "joint"), (3, "pairs"), (4, "pairs"))
     fastest, straight = [], []
     for period, actions in kinds:
@@ -186,13 +179,13 @@ def study_gaits(scene: Scene) -> tuple[list[dict[str, Any]], Floats]:
 
 
 def name(command: Floats) -> str:
-    """{2+,5-} and the like."""
+    """Name of a command such as {2+,5-}."""
     limbs = [f"{limb}{'+' if share > 0 else '-'}" for limb, share in enumerate(command, start=1) if share]
     return "{" + ",".join(limbs) + "}"
 
 
 def agent_speeds(agent: str, policy: Policy, scene: Scene, directions: Floats) -> Floats:
-    """What an agent comes nearer per stroke [m] to a waypoint LINE_LENGTH away, from rest until it is there."""
+    """Speeds [m per stroke] of an agent from rest to waypoints at distance LINE_LENGTH in directions [rad]."""
     speeds = []
     for direction in directions:
         waypoint = LINE_LENGTH * np.array([np.cos(direction), np.sin(direction)])
@@ -202,13 +195,13 @@ def agent_speeds(agent: str, policy: Policy, scene: Scene, directions: Floats) -
 
 
 def search_pentagon(options: Options) -> Gaits:
-    """Actions, pairs of limbs, of the shortest swim found round the pentagon."""
+    """Actions (pairs of limbs) of the shortest swim found round the pentagon."""
     waypoints = make_path("pentagon", np.random.default_rng(0))
     return search_path(make_scene(None, options.fidelity), waypoints, "pairs", options.pentagon_beam)
 
 
 def study(options: Options) -> dict[str, Any]:
-    """All of it; minutes."""
+    """Run the whole study, which takes minutes, and return its results as plain data."""
     scene = make_scene(None, options.fidelity)
     fastest, displacements = study_gaits(scene)
     directions = np.radians(np.arange(0.0, 37.0, 6.0))
@@ -237,7 +230,7 @@ def study(options: Options) -> dict[str, Any]:
 
 
 def draw(results: dict[str, Any], file: Path) -> None:
-    """The best speeds as a polar picture; the measured sector of 36 degrees is turned and mirrored round."""
+    """Draw the speeds in polar axes; the measured sector of 36 degrees is repeated by turns and mirror images."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(5.2, 4.8), layout="constrained")
@@ -255,8 +248,8 @@ def draw(results: dict[str, Any], file: Path) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line; returns the exit code."""
-    options = tyro.cli(Options, args=arguments)
+    """Command line of the study; returns the exit code."""
+    options = tyro.cli(Options, prog="python -m studies.learning.bound", args=arguments)
     began = time.perf_counter()
     if options.only_pentagon:
         print(f"Pentagon: {len(search_pentagon(options))} strokes, in {time.perf_counter() - began:.0f} s.")

@@ -1,1 +1,1 @@
-"""Scenes beyond the chapter's: gallery, damping, the thermal actuator."""
+"""Scenes beyond the chapter's: the gallery, material damping, and the thermal actuator."""

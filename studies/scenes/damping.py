@@ -1,16 +1,15 @@
-"""What the damping of a soft silicone changes: `python -m studies.scenes.damping`.
+"""Effect of the damping of a soft silicone on ringing, distances and errors.
 
-The chapter's rods are not damped: they ring until the water has taken it, and ringing limbs feel more drag, so only
-steps that follow the ringing swim right, see `accuracy`. This study gives the rods the Kelvin-Voigt damping of a
-typical silicone, and looks at the ringing, at how far the pairs of Fig. 13.8 swim, and at the time step and speed that
-1 % of error then needs. Errors are of the hub's path as in `accuracy`, each material against its own converged paths.
+The chapter's rods are undamped and ring until the drag has taken up the energy. Ringing limbs feel more drag, so a swim
+is accurate only with time steps that resolve the ringing. This study gives the rods the Kelvin-Voigt damping of a soft
+silicone. It measures the ringing, the distances that the pairs of Fig. 13.8 swim, and the time step and speed at an
+error of 1 %. Errors are those of the accuracy study, each material against its own converged paths.
 
 Prints a table, and writes `damping.csv` and one picture.
 """
 
 from __future__ import annotations
 
-import argparse
 import csv
 import time
 from collections.abc import Sequence
@@ -29,6 +28,7 @@ from seastar_gym.gaits import PAIRS
 from seastar_gym.scene import Numerics
 from seastar_gym.scene.numerics import SchemeName
 from studies.accuracy.cases import Cases, Swim, errors, joined, random_sequences, swim, swims
+from studies.parser import study_parser
 from studies.speed.terms import SILICONE
 
 Floats = NDArray[np.float64]
@@ -40,16 +40,21 @@ STEPS: dict[SchemeName, tuple[float, ...]] = {
     "sdirk3": (20, 10, 5, 2, 1, 0.5),
     "implicit-midpoint": (20, 10, 5, 2, 1, 0.5, 0.25),
 }
-"""h [ms]."""
+"""Time steps of every scheme [ms]."""
 TOLERANCE = 1e-7
 """Newton tolerance of the settings."""
 WANTED = 0.01
-"""Path error."""
+"""Path error that a setting has to keep, as a fraction of the path's length."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """How much is computed. converged: Schemes and steps [s] that have to agree. shortest: Step of a setting [ms]."""
+    """Size of the study.
+
+    n_random: Number of random sequences.
+    converged: Schemes and time steps [s] whose solutions have to agree.
+    shortest: Shortest time step of a setting [ms].
+    """
 
     n_random: int = 16
     converged: tuple[tuple[SchemeName, float], ...] = (("sdirk3", 2e-5), ("implicit-midpoint", 2e-5))
@@ -61,7 +66,7 @@ QUICK = Plan(n_random=3, converged=(("sdirk3", 2e-4), ("implicit-midpoint", 2e-4
 
 @dataclass(frozen=True)
 class Row:
-    """A material at a setting: largest path error, and simulated over computing seconds on one core."""
+    """A material with a scheme and a time step [s]: its largest path error, and its real-time factor on one core."""
 
     material: str
     scheme: SchemeName
@@ -72,9 +77,11 @@ class Row:
 
 @dataclass(frozen=True)
 class Study:
-    """rows: All settings. agreement: Path difference of the converged solutions, by material.
+    """Results of the study.
 
-    pairs: Distance that the pairs of Fig. 13.8 swim in ten strokes, converged, by material [m].
+    rows: One row per material and setting.
+    agreement: Largest path difference of the converged solutions, by material.
+    pairs: Distances that the pairs of Fig. 13.8 swim in ten strokes, converged, by material [m].
     """
 
     rows: list[Row]
@@ -83,15 +90,15 @@ class Study:
 
 
 def timed(cases: Cases, numerics: Numerics, tau: float | None) -> tuple[Swim, float]:
-    """A swim, and simulated over computing seconds."""
-    swim(cases.first(1), numerics, relaxation_time=tau)  # compiles, if it has to
+    """Swim with a relaxation time tau [s], and its real-time factor."""
+    swim(cases.first(1), numerics, relaxation_time=tau)  # compiles the kernels for this scene outside the timing
     start = time.thread_time()
     swum = swim(cases, numerics, relaxation_time=tau)
     return swum, len(cases) * len(cases.commands) / (time.thread_time() - start)
 
 
 def study(plan: Plan, progress: bool = True) -> Study:
-    """Everything but the picture."""
+    """Run the whole study; drawing is left to the caller."""
     cases = joined(swims(), random_sequences(plan.n_random, np.random.default_rng(0)))
     settings = [(scheme, h) for scheme, steps in STEPS.items() for h in steps if h >= plan.shortest]
     rows: list[Row] = []
@@ -103,7 +110,7 @@ def study(plan: Plan, progress: bool = True) -> Study:
             for scheme, step in plan.converged:
                 found.append(swim(cases, Numerics(scheme, step, 1e-11), threads=None, relaxation_time=tau))
                 bar.update()
-            # The midpoint rule is the better one where nothing is damped.
+            # The midpoint rule is the more accurate reference for undamped rods.
             exact = found[-1]
             agreement[material] = float(errors(found[0], exact).path.max())
             pairs[material] = np.linalg.norm(exact.hub[-1, 1 : 1 + len(PAIRS)], axis=-1)
@@ -114,20 +121,23 @@ def study(plan: Plan, progress: bool = True) -> Study:
     return Study(rows, agreement, pairs)
 
 
-def of(rows: Sequence[Row], material: str, scheme: SchemeName) -> list[Row]:
-    """Rows of a material and a scheme, the longest step first."""
+def rows_of(rows: Sequence[Row], material: str, scheme: SchemeName) -> list[Row]:
+    """Rows of one material and scheme, the longest time step first."""
     mine = [row for row in rows if (row.material, row.scheme) == (material, scheme)]
     return sorted(mine, key=lambda row: -row.step)
 
 
 def good_enough(rows: Sequence[Row]) -> Row | None:
-    """The longest step from which on all shorter ones keep the wanted error, too; rows longest first."""
+    """Row with the longest step that keeps the wanted error and whose shorter steps all keep it; None if there is none.
+
+    rows: Rows of one material and scheme, the longest step first.
+    """
     kept = [all(shorter.path_error <= WANTED for shorter in rows[k:]) for k in range(len(rows))]
     return rows[kept.index(True)] if any(kept) else None
 
 
 def as_table(found: Study) -> Table:
-    """What 1 % of error needs."""
+    """Table of the time steps and speeds that keep the wanted error."""
     table = Table(title=f"The longest step whose path error is below {100 * WANTED:g} %, and its speed on one core")
     table.add_column("scheme")
     for material in MATERIALS:
@@ -136,39 +146,38 @@ def as_table(found: Study) -> Table:
     for scheme in STEPS:
         cells = []
         for material in MATERIALS:
-            row = good_enough(of(found.rows, material, scheme))
+            row = good_enough(rows_of(found.rows, material, scheme))
             cells += ["none tried", "-"] if row is None else [f"{1e3 * row.step:g}", f"{row.speed:,.0f}"]
         table.add_row(scheme, *cells)
     return table
 
 
 def facts(found: Study) -> list[str]:
-    """What the table does not say."""
+    """Sentences about agreement and distances that go below the table."""
     lines = [
         f"{material}: the converged solutions agree to {error:.0e} of the path."
         for material, error in found.agreement.items()
     ]
     change = found.pairs["silicone"] / found.pairs["undamped"] - 1.0
     pairs = ", ".join(f"{name} {100 * part:+.2g} %" for name, part in zip(PAIRS, change, strict=True))
-    return [*lines, f"Damped, the pairs of Fig. 13.8 swim farther or less far by {pairs}."]
+    return [*lines, f"Damping changes the distances that the pairs of Fig. 13.8 swim by {pairs}."]
 
 
 def draw(found: Study, file: Path) -> None:
-    """Ringing, pairs, and errors over the step."""
+    """Draw the ringing, the distances of the pairs, and errors over the time step."""
     import matplotlib
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    from studies.accuracy.pictures import (
+    from studies.accuracy.ringing import record, smoothed
+    from studies.accuracy.style import (
         COLOURS,
         DPI,
         FAINT,
         INK,
         as_numbers,
         as_percent,
-        record,
-        smoothed,
         subplots,
     )
 
@@ -187,7 +196,7 @@ def draw(found: Study, file: Path) -> None:
     pairs.set_title("2. How far the pairs of Fig. 13.8 swim", fontsize=10.5, loc="left")
     for scheme in STEPS:
         for material, line in (("undamped", ":"), ("silicone", "-")):
-            mine = of(found.rows, material, scheme)
+            mine = rows_of(found.rows, material, scheme)
             front.loglog(
                 [1e3 * row.step for row in mine], [100.0 * row.path_error for row in mine], f"o{line}", ms=3.5, lw=1.3,
                 color=COLOURS[scheme], label=scheme if material == "silicone" else None,
@@ -203,10 +212,12 @@ def draw(found: Study, file: Path) -> None:
 
 
 def main() -> None:
-    """Compute, print, write."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--quick", action="store_true", help="fewer swims and longer steps, in a fraction of the time")
-    parser.add_argument("--out", type=Path, default=Path("runs/damping"), help="folder for CSV and picture")
+    """Command line: run the study, write its files and print its table."""
+    parser = study_parser("studies.scenes.damping", __doc__)
+    parser.add_argument("--quick", action="store_true", help="run fewer swims with longer steps")
+    parser.add_argument(
+        "--out", type=Path, default=Path("runs/damping"), help="folder for CSV and picture (default: %(default)s)"
+    )
     options = parser.parse_args()
     found = study(QUICK if options.quick else Plan())
     options.out.mkdir(parents=True, exist_ok=True)

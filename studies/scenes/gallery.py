@@ -1,11 +1,10 @@
-"""What a scene may hold, one picture and one price each: `python -m studies.scenes.gallery`.
+"""Pictures and costs of scenes that differ from the default; writes `gallery.md`.
 
-Writes `gallery.md` and a picture per scene. A picture shows the robot at rest (grey), at the end of heating (blue) and
-its hub's path. A price is the processor time of a stroke of random commands over that of the default scene, median of
-strokes in turn, so that whatever else the machine does is in both.
+A picture shows the robot at rest (grey), at the end of heating (blue) and its hub's path. The cost is the processor
+time of a stroke of random commands relative to that of the default scene. Scenes take turns, stroke by stroke, so that
+other work of the machine affects all of them alike, and the median over strokes counts.
 """
 
-import argparse
 import os
 import platform
 import time
@@ -24,17 +23,23 @@ from seastar_gym.scene.actuators.pulse import SmaPulse
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.limb import Limb
 from seastar_gym.simulator import Simulator
+from studies.parser import study_parser
 
 Floats = NDArray[np.float64]
 
 NUMERICS = Numerics.preset("balanced")
 ROBOTS, ROUNDS, STROKES = 64, 9, 5
+"""Robots and rounds of the measured cost, and strokes in a picture."""
 REST, HEATED, PATH = "#c8c8c8", "#2b6cb0", "#c53030"
 
 
 @dataclass(frozen=True)
 class Exhibit:
-    """A scene of the gallery. code: What a user would write. commands: Of the strokes in the picture."""
+    """A scene of the gallery.
+
+    code: Arguments that make the scene.
+    command: Command of every limb in every stroke of the picture.
+    """
 
     name: str
     code: str
@@ -43,7 +48,7 @@ class Exhibit:
 
 
 def exhibits() -> list[Exhibit]:
-    """All scenes, the default first."""
+    """Scenes of the gallery, the default first."""
     curve = MeasuredCurve((0.0, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0), (0.0, 0.35, 0.6, 0.5, 0.25, 0.08, 0.0))
     tapered = (Limb(radius=(2e-3, 1e-3)),) * 5
     curved = (Limb(natural_curvature=10.0),) * 5
@@ -97,11 +102,8 @@ def exhibits() -> list[Exhibit]:
     ]  # fmt: skip
 
 
-# --- prices ----------------------------------------------------------------------------------------------------------
-
-
-def prices(shown: Sequence[Exhibit], rounds: int = ROUNDS, n_robots: int = ROBOTS) -> tuple[Floats, Floats]:
-    """(processor time of a stroke over that of the first scene, Newton iterations per step), per scene."""
+def measure_costs(shown: Sequence[Exhibit], rounds: int = ROUNDS, n_robots: int = ROBOTS) -> tuple[Floats, Floats]:
+    """Processor time of a stroke relative to the first scene, and Newton iterations per step, shape (n_scenes,)."""
     simulators = [Simulator(exhibit.scene, n_robots, threads=1) for exhibit in shown]
     seconds, per_step = np.zeros((rounds, len(shown))), np.zeros((rounds, len(shown)))
     for k in range(-1, rounds):  # the first round compiles
@@ -115,18 +117,15 @@ def prices(shown: Sequence[Exhibit], rounds: int = ROUNDS, n_robots: int = ROBOT
     return np.median(seconds / seconds[:, :1], axis=0), per_step.mean(axis=0)
 
 
-# --- pictures --------------------------------------------------------------------------------------------------------
-
-
 def outline(centre: Floats, radius: Floats) -> Floats:
-    """A limb's contour, shape (2 n, 2), from its nodes and its radius there [m]."""
+    """Contour of a limb [m], shape (2 n, 2), from its nodes [m], shape (n, 2), and its radii there [m], shape (n,)."""
     tangent = np.gradient(centre, axis=0)
     normal = tangent[:, ::-1] * [-1.0, 1.0] / np.linalg.norm(tangent, axis=1, keepdims=True)
     return np.concatenate([centre + radius[:, None] * normal, (centre - radius[:, None] * normal)[::-1]])
 
 
 def draw(exhibit: Exhibit, file: Path, strokes: int = STROKES) -> None:
-    """The robot at rest and at the end of heating, and its hub's path over some strokes."""
+    """Draw the robot at rest and at the end of the first heating, and its hub's path over some strokes."""
     import matplotlib.pyplot as plt
 
     simulator, robot = Simulator(exhibit.scene, threads=1), exhibit.scene.robot
@@ -152,19 +151,16 @@ def draw(exhibit: Exhibit, file: Path, strokes: int = STROKES) -> None:
     plt.close(figure)
 
 
-# --- the page --------------------------------------------------------------------------------------------------------
-
-
 def page(shown: Sequence[Exhibit], costs: Floats, per_step: Floats, machine: str) -> str:
-    """The gallery in Markdown."""
+    """Page of the gallery in Markdown."""
     lines = [
         "# Gallery",
         "",
-        "What a scene may hold besides the defaults. Grey: at rest; blue: at the end of the first heating; red: the",
-        f"hub's path over {STROKES} strokes. Pictures are 256 mm wide. Cost: processor time of a stroke of random",
-        "commands over that of the default scene in the same run, good to a few per cent (`python -m",
-        f"studies.scenes.gallery`; {machine}; {ROBOTS} robots, one thread, fidelity `balanced`). Limbs that open",
-        "nearly to pi and thin tips take more Newton iterations, and some of them a repaired matrix.",
+        "Scenes that differ from the default. The robot is grey at rest and blue at the end of the first heating, and",
+        f"its hub's path over {STROKES} strokes is red. Pictures are 256 mm wide. The cost is the processor time of a",
+        "stroke of random commands relative to the default scene in the same run, to within a few per cent",
+        f"(`python -m studies.scenes.gallery`; {machine}; {ROBOTS} robots, one thread, fidelity `balanced`). Thin tips",
+        "and limbs that open nearly to pi take more Newton iterations, and some of these a regularised matrix.",
         "",
         "| | scene | cost | Newton iterations per step |",
         "|---|---|---:|---:|",
@@ -180,18 +176,20 @@ def _file_name(exhibit: Exhibit) -> str:
 
 
 def make_gallery(out: Path, machine: str, rounds: int = ROUNDS, n_robots: int = ROBOTS, strokes: int = STROKES) -> None:
-    """Write the page and its pictures into a folder."""
+    """Write the page and its pictures into a folder; machine: Text about the machine for the page."""
     (out / "gallery").mkdir(parents=True, exist_ok=True)
     shown = exhibits()
     for exhibit in shown:
         draw(exhibit, out / "gallery" / _file_name(exhibit), strokes)
-    (out / "gallery.md").write_text(page(shown, *prices(shown, rounds, n_robots), machine), encoding="utf-8")
+    (out / "gallery.md").write_text(page(shown, *measure_costs(shown, rounds, n_robots), machine), encoding="utf-8")
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=Path("docs"))
-    parser.add_argument("--machine", default=f"{os.cpu_count()} cores, {platform.machine()}", help="to be named")
+    """Command line: write the gallery and print its page."""
+    parser = study_parser("studies.scenes.gallery", __doc__)
+    parser.add_argument("--out", type=Path, default=Path("docs"), help="folder of the page (default: %(default)s)")
+    named = f"{os.cpu_count()} cores, {platform.machine()}"
+    parser.add_argument("--machine", default=named, help="name of the machine on the page (default: %(default)s)")
     options = parser.parse_args()
     make_gallery(options.out, options.machine)
     print((options.out / "gallery.md").read_text(encoding="utf-8"))

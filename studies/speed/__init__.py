@@ -1,1 +1,1 @@
-"""Speed: real-time factors, shares of time, operation counts, costs of terms."""
+"""Measurements of speed: real-time factors, shares of time, operation counts, and the cost of terms and safeguards."""

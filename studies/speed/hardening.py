@@ -1,10 +1,11 @@
-"""What it costs a healthy robot that the solver never breaks: `python -m studies.stability --cost`.
+"""Cost of the solver's safeguards for a robot that does not need them: `python -m studies.stability --cost`.
 
-Paired in one run: strokes by the simulator's kernel, and the same strokes by plain Newton, made of the same parts but
-without line search, repair, guard, halving, status and report. Neither has anything to repair in these strokes, and
-both end in the same bits, so what differs is the time. Of a short step the smallest opening angle of the report (six
-roots, five divisions) is 1 %, the masks over what it writes 0.3 %, and the guard sleeps. Where code and numbers come to
-lie makes more than that either way, so look at several processes.
+Compares strokes by the simulator's kernel with the same strokes by plain Newton in one run. Plain Newton is made of the
+same parts, but without line search, regularised matrix, energy guard, substeps, status and report. These strokes need
+none of them and end in the same bits either way, so only the time differs. The report's smallest opening angle (six
+roots, five divisions) takes 1 % of a short step, and the masks over its writes 0.3 %; the guard does not run. The
+layout of code and numbers in memory changes the time by more than that in either direction, so compare several
+processes.
 """
 
 import time
@@ -37,11 +38,12 @@ SETTINGS = (
     Numerics("implicit-midpoint", 5e-3),
 )
 ROBOTS = 64
+"""Robots of the compared strokes."""
 
 
 @inlined_kernel
-def newton(rods, work, stage, tolerance, patience):
-    """(13.11) and nothing else: whole steps of the matrix as it is, until one is small; returns their number."""
+def newton(rods, work, stage, tolerance, iteration_limit):
+    """Plain Newton (13.11): full steps without safeguards until one is below the tolerance; returns the iterations."""
     one, zero = splat(1.0), splat(0.0)
     iterations, running = zero, zero < one
     quadratic_length = foreseeable_length(rods, stage)
@@ -51,13 +53,13 @@ def newton(rods, work, stage, tolerance, patience):
         iterations += select(running, one, zero)
         late = select(iterations < EASY, one, LATE)
         foreseen = (iterations <= EASY) & (late * move * move <= tolerance * quadratic_length)
-        running = running & ~((move <= tolerance) | foreseen) & (iterations < patience)
+        running = running & ~((move <= tolerance) | foreseen) & (iterations < iteration_limit)
     return iterations
 
 
 @entry_point
 def advance_plainly(rods, work, scheme, actuation, q, v, a, peaks, times, shape, report, limits):
-    """As `advance` of der/stroke.py, with nothing in case of trouble; counts Newton iterations only."""
+    """Stroke of `seastar_gym.der.stepping.stroke.advance` without safeguards; reports Newton iterations only."""
     rods_rows, memory, rotation, tableau = borrow(rods), borrow(work), borrow(actuation), borrow(scheme)
     zero, last, tolerance = splat(0.0), scheme.n_stages - 1, load(borrow(limits).tolerance, 0)
     everyone = zero < splat(1.0)
@@ -82,7 +84,7 @@ def advance_plainly(rods, work, scheme, actuation, q, v, a, peaks, times, shape,
 
 
 class Pair:
-    """The same stroke, again and again, by either kernel. numerics: The scene's; all else is the chapter's."""
+    """One stroke that either kernel repeats, in the chapter's scene with these numerics."""
 
     def __init__(self, numerics: Numerics):
         self.scene = Scene(numerics=numerics)
@@ -101,13 +103,13 @@ class Pair:
         self.times = step_times(self.scene.actuator.corners, numerics.step)
         self.shape = np.asarray(self.scene.actuator.delta_psi(self.times))
 
-    def seconds(self, hardened: bool) -> float:
-        """Processor time of a stroke [s]; leaves its end in q and v, and its counts in `report`."""
+    def seconds(self, safeguarded: bool) -> float:
+        """Processor time of the stroke [s]; leaves the final state in `q` and `v` and the counts in `report`."""
         self.q[:], self.v[:] = self.start
         self.a[:], self.report[:] = 0.0, 0.0
         work, actuation = self.memory
         begin = time.thread_time()
-        if hardened:
+        if safeguarded:
             advance(
                 self.rods, work, self.scheme, SCHEMES["implicit-euler"], actuation, self.q, self.v, self.a, self.peaks,
                 self.times, self.shape, self.failed, self.report, self.limits,
@@ -122,9 +124,11 @@ class Pair:
 
 @dataclass(frozen=True)
 class Cost:
-    """Of one setting. plain: Median processor time of a stroke by plain Newton, per robot and time step [s].
+    """Cost of the safeguards with one setting.
 
-    ratio: Median, over rounds, of the hardened stroke's time over the plain one's; quartiles: of the same.
+    plain: Median processor time of a stroke by plain Newton, per robot and time step [s].
+    ratio: Median over rounds of the time with safeguards over the time of plain Newton.
+    quartiles: Lower and upper quartile of that ratio.
     """
 
     numerics: Numerics
@@ -134,26 +138,26 @@ class Cost:
 
 
 def measure_cost(numerics: Numerics, pairs: int = 12, rounds: int = 20) -> Cost:
-    """Strokes by either kernel in turn, each first in every other round.
+    """Measure the cost from strokes by either kernel in turn; each kernel comes first in every other round.
 
-    Where the numbers lie in memory alone makes some per cent of difference, so there are several pairs, all kept.
+    The place of the numbers in memory changes times by some per cent, so several pairs are measured side by side.
     """
     durations, benches = np.zeros((pairs, rounds, 2)), [Pair(numerics) for _ in range(pairs)]
     for bench, own in zip(benches, durations, strict=True):
         bench.seconds(True), bench.seconds(False)
         for k in range(rounds):
-            for hardened in (k % 2 == 0, k % 2 == 1):
-                own[k, int(hardened)] = bench.seconds(hardened)
+            for safeguarded in (k % 2 == 0, k % 2 == 1):
+                own[k, int(safeguarded)] = bench.seconds(safeguarded)
     low, middle, high = np.percentile(durations[..., 1] / durations[..., 0], [25, 50, 75])
     steps = len(benches[0].times) - 1
     return Cost(numerics, float(np.median(durations[..., 0])) / ROBOTS / steps, middle, (low, high))
 
 
 def cost_table(costs: list[Cost]) -> Table:
-    """For a terminal."""
-    table = Table(title="What hardening costs a healthy robot")
+    """Costs as a table for the terminal."""
+    table = Table(title="Cost of the safeguards for robots that do not need them")
     table.add_column("scheme, step", no_wrap=True)
-    for name in ("plain Newton, per step", "hardened over plain", "middle half of the rounds"):
+    for name in ("plain Newton, per step", "with safeguards", "middle half of the rounds"):
         table.add_column(name, justify="right")
     for cost in costs:
         table.add_row(

@@ -1,8 +1,7 @@
-"""Counts the floating-point operations of the kernels by running their own source on numbers that count.
+"""Number of floating-point operations of the kernels, counted by running their source on lanes that count.
 
-The kernels are loaded as plain Python, see der/plain.py, on lanes that count what is done with them, so the count is
-that of the code that runs, robot by robot, in whatever scene it is asked for. It does not depend on the machine, which
-makes it the measure that tests hold the kernels to.
+The kernels are loaded as plain Python, see seastar_gym/simd/plain.py, so the count is that of the code that runs, for
+one robot of any scene. It does not depend on the machine, and tests bound it.
 """
 
 from collections import Counter
@@ -26,13 +25,13 @@ from seastar_gym.simd.plain import FOLDER, PlainKernels
 from seastar_gym.simulator import Simulator
 
 FLOPS = {"add": 1, "multiply": 1, "fused": 2, "divide": 1, "root": 1}
-"""Floating-point operations of what is counted; comparisons, selections, loads and stores are none."""
+"""Floating-point operations per counted operation; comparisons, selections, loads and stores do not count."""
 
 _counts: Counter[str] = Counter()
 
 
 class Counted(Lanes):
-    """Lanes that count what is done with them."""
+    """Lanes that count the operations on them."""
 
     __slots__ = ()
 
@@ -42,18 +41,18 @@ class Counted(Lanes):
 
     def __sub__(self, other: Any) -> Any:
         if isinstance(other, Constant) and other.numbers == 0.0:
-            return self  # the compiler leaves it out, too
+            return self  # the compiler omits this subtraction
         return super().__sub__(other)
 
 
 class Constant(Counted):
-    """A number that the compiler knows."""
+    """Lanes whose value is known when kernels are compiled."""
 
     __slots__ = ()
 
 
 def _counting_kernels(folder: Path) -> PlainKernels:
-    """The kernels on one lane that counts."""
+    """Kernels in plain Python on one counting lane; folder: Folder of their source."""
     return PlainKernels(
         n_lanes=1,
         folder=folder,
@@ -65,11 +64,11 @@ def _counting_kernels(folder: Path) -> PlainKernels:
 
 @np.errstate(all="ignore")
 def count_operations(scene: Scene, folder: Path = FOLDER) -> dict[str, Counter[str]]:
-    """Operations of one robot, by part, in the middle of a heating ramp; folder: Where the kernels' source is.
+    """Operations of one robot in the middle of a heating ramp, by part; folder: Folder of the kernels' source.
 
-    Keys: "hub hinges", "limbs" (assembly and elimination), "ring" (elimination and solution of root nodes and hub),
-    "substitution" (and the Newton step), together "iteration"; and "step", what a step costs besides iterations
-    (schemes of one stage).
+    The parts of an iteration are "hub hinges", "limbs" (assembly and elimination), "ring" (elimination and solution for
+    the root nodes and the hub) and "substitution" (with the Newton step); "iteration" is their sum. "step" counts the
+    operations of a time step outside iterations, for schemes with one stage.
     """
     counting = _counting_kernels(folder)
     work, rods, scheme, actuation, state, a = _moving_robot(scene, counting)
@@ -105,7 +104,7 @@ def count_operations(scene: Scene, folder: Path = FOLDER) -> dict[str, Counter[s
 
 
 def _moving_robot(scene: Scene, counting: PlainKernels) -> tuple[Any, ...]:
-    """Memory, coefficients, scheme, actuation, state rows and accelerations of a robot whose limbs are bending."""
+    """Memory, coefficients, scheme, actuation, state rows and accelerations of a robot with bending limbs."""
     simulator = Simulator(scene, threads=1)
     command = np.zeros((1, scene.robot.n_limbs))
     command[0, 1], command[0, -1] = 1.0, -1.0
@@ -120,5 +119,5 @@ def _moving_robot(scene: Scene, counting: PlainKernels) -> tuple[Any, ...]:
 
 
 def flops(counts: Counter[str]) -> int:
-    """Floating-point operations of a count; a fused product counts as two."""
+    """Number of floating-point operations in a count; a fused product counts as two."""
     return sum(FLOPS.get(kind, 0) * n for kind, n in counts.items())

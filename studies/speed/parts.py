@@ -1,4 +1,4 @@
-"""Where the time of a Newton iteration goes: its parts, each repeated alone in one compiled loop."""
+"""Time of the parts of a Newton iteration, each repeated alone in a compiled loop."""
 
 import time
 
@@ -19,7 +19,7 @@ PARTS = ("hub hinges", "limbs", "ring", "substitution")
 
 @entry_point
 def repeat_part(rods, work, q_0, v_0, step, part, n):
-    """Run one part of an iteration n times; returns something of it, so that nothing is optimised away."""
+    """Run one part of an iteration n times; returns a value that depends on it, so that it is not optimised away."""
     rows, memory = borrow(rods), borrow(work)
     zero, one, gamma = splat(0.0), splat(1.0), splat(step)
     stage = Stage(borrow(q_0), borrow(v_0), gamma, 1.0 / gamma, False)
@@ -38,7 +38,7 @@ def repeat_part(rods, work, q_0, v_0, step, part, n):
 
 
 def part_seconds(scene: Scene, seconds: float) -> dict[str, list[float]]:
-    """Durations [s] of every part per robot, several repeats each, in the middle of a heating ramp."""
+    """Durations of every part per robot [s], repeated for about `seconds` each, in the middle of a heating ramp."""
     simulator = Simulator(scene, N_LANES, threads=1)
     commands = np.zeros((N_LANES, scene.robot.n_limbs))
     commands[:, 1], commands[:, -1] = 1.0, -1.0

@@ -1,11 +1,10 @@
-"""What each term of a scene costs: `python -m studies.speed.terms`.
+"""Cost of each term of a scene.
 
-Scenes that differ from the chapter's in one term swim straight in turn (with contact also with limbs that touch), in
-one run, and each is compared with the chapter's scene in the same round, so that what else the machine does falls on
-both. Prints a table, and writes `terms.csv`.
+Scenes that differ from the chapter's in one term take turns to swim straight, and the scene with contact also presses
+two limbs together. Each stroke is compared with the chapter's scene in the same round, so that other work of the
+machine affects both alike. Prints a table, and writes `terms.csv`.
 """
 
-import argparse
 import csv
 import time
 from dataclasses import asdict, dataclass, replace
@@ -22,23 +21,24 @@ from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent
 from seastar_gym.scene.fluid import Water
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator import Simulator
+from studies.parser import study_parser
 
 PRESSING = np.array([1.0, -1.0, 0.0, 0.0, 0.0])
-"""Two neighbours against each other."""
+"""Command that presses limbs 1 and 2 together."""
 GROUPS = 8
-"""Lane groups of the batch; all robots do the same, so none waits for another."""
+"""Lane groups in the batch. All robots do the same, so no lane waits for another."""
 SILICONE = relaxation_time(0.1, 10.0)
 """Relaxation time [s] of a soft silicone, loss factor 0.1 at 10 Hz."""
 THE_CHAPTERS = "the chapter's scene"
 
 
 def swirl(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A cellular current [m/s]."""
+    """Velocity of a cellular current [m/s] at positions x, y [m]."""
     return 0.02 * np.sin(10.0 * x) * np.cos(10.0 * y), -0.02 * np.cos(10.0 * x) * np.sin(10.0 * y)
 
 
 def scenes() -> dict[str, Scene]:
-    """The chapter's scene, and with one term more each."""
+    """Compared scenes by name: the chapter's first, then each with one more term, then all terms together."""
     n_robots = GROUPS * N_LANES
     damped = Seastar(relaxation_time=SILICONE)
     everything = Water(
@@ -67,11 +67,13 @@ def scenes() -> dict[str, Scene]:
 
 @dataclass(frozen=True)
 class Cost:
-    """What a scene costs beside the chapter's.
+    """Cost of a scene relative to the chapter's.
 
-    iterations: Newton iterations per time step. seconds: Per robot and iteration.
-    per_iteration, per_stroke: Medians over the rounds of the time over that of the chapter's scene. quartiles: Of the
-        first.
+    iterations: Newton iterations per time step.
+    seconds: Median processor time per robot and Newton iteration [s].
+    per_iteration: Median over rounds of the time per iteration, relative to the chapter's scene.
+    quartiles: Lower and upper quartile of that ratio.
+    per_stroke: Median over rounds of the time per stroke, relative to the chapter's scene.
     """
 
     name: str
@@ -83,7 +85,7 @@ class Cost:
 
 
 def measure(compared: dict[str, Scene], rounds: int, command: np.ndarray = STRAIGHT) -> list[Cost]:
-    """Costs of scenes, the first of which is what the others are compared with."""
+    """Measure the costs of scenes relative to the first one; command: Command of all robots in all strokes."""
     n_robots = GROUPS * N_LANES
     commands = np.tile(command, (n_robots, 1))
     simulators = [Simulator(scene, n_robots, threads=1) for scene in compared.values()]
@@ -115,7 +117,7 @@ def measure(compared: dict[str, Scene], rounds: int, command: np.ndarray = STRAI
 
 
 def as_table(costs: list[Cost]) -> Table:
-    """For people."""
+    """Costs as a table for the terminal."""
     table = Table(title="Cost of terms, implicit Euler at 3 ms, one core")
     for header in ("scene", "iterations per step", "µs per robot and iteration", "time per iteration", "per stroke"):
         table.add_column(header, justify="left" if header == "scene" else "right")
@@ -129,9 +131,10 @@ def as_table(costs: list[Cost]) -> Table:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--rounds", type=int, default=40, help="strokes of every scene")
-    parser.add_argument("--out", type=Path, default=Path("runs/terms"), help="folder for terms.csv")
+    """Command line: measure the costs, print them and write them as CSV."""
+    parser = study_parser("studies.speed.terms", __doc__)
+    parser.add_argument("--rounds", type=int, default=40, help="strokes of every scene (default: %(default)s)")
+    parser.add_argument("--out", type=Path, default=Path("runs/terms"), help="folder for CSV (default: %(default)s)")
     arguments = parser.parse_args()
     costs = measure(scenes(), arguments.rounds)
     touching = {THE_CHAPTERS: Scene(), "contact, a pair of limbs pressed together": Scene(contact=Contact())}

@@ -1,27 +1,15 @@
-"""How fast the simulator is on this machine: `python -m studies.speed.throughput`.
+"""Speed of the simulator on this machine.
 
-Measures what the README states about speed, prints it beside the chapter's figure, and writes `throughput.csv` and
-`throughput.png`. Real-time factor: simulated seconds of all robots over seconds of computing. Figures are medians
-of several repeats after a warm-up; the spread beside them is the range of the middle half of the repeats.
+Measures the numbers that the README states about speed, prints them beside the chapter's, and writes `throughput.csv`
+and `throughput.png`. The real-time factor is the simulated time of all robots over the computing time. Numbers are
+medians of several repeats after a warm-up; beside them stands the range of the middle half of the repeats.
 """
 
-import argparse
 import csv
-import gc
-import os
-import platform
-import subprocess
-import sys
 import tempfile
-import time
-import tracemalloc
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 from pathlib import Path
 
-import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
@@ -29,23 +17,24 @@ from rich.table import Table
 from tqdm import tqdm
 
 from seastar_gym.command import run_command
-from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Numerics, Scene
-from seastar_gym.simd.compilation import entry_point
-from seastar_gym.simd.lanes import N_LANES, add_product, borrow, load, store
-from seastar_gym.simulator import Simulator
+from studies.parser import study_parser
 from studies.speed.operations import count_operations, flops
 from studies.speed.parts import part_seconds
+from studies.speed.peak import peak_gigaflops, peak_speedup
+from studies.speed.process import FIRST_STROKE, TIMED, environment_share, memory_per_robot, process_seconds
+from studies.speed.strokes import cost_over_nodes, exponent, iteration_seconds, real_time_factors, threads_speedup
+from studies.speed.timing import machine
 
 CHAPTER = 1.0
 """The chapter's real-time factor at h = 3 ms: one robot, one thread of an AMD Ryzen 1950X (Fig. 13.9)."""
-NODES_PER_LIMB = (5, 10, 20, 40, 80, 160, 320, 640)
 BATCHES = (1, 2, 4, 8, 16, 32, 64, 128, 512, 2048)
+"""Numbers of robots on the curves of the real-time factor."""
 
 
 @dataclass(frozen=True)
 class Figure:
-    """One row of the table. quartiles: of the repeats, or None where only one value makes sense."""
+    """A measured number, one row of the table; quartiles: Those of the repeats, or None for a single measurement."""
 
     what: str
     value: float
@@ -54,165 +43,13 @@ class Figure:
 
 
 def median(what: str, unit: str, values: list[float]) -> Figure:
-    """The median of repeats, with its quartiles."""
+    """Figure from the median and the quartiles of repeats."""
     low, middle, high = np.percentile(values, [25, 50, 75])
     return Figure(what, float(middle), unit, (float(low), float(high)))
 
 
-# --- the simulator ---------------------------------------------------------------------------------------------------
-
-
-def repeat(run: Callable[[], object], seconds: float, at_least: int = 5) -> list[float]:
-    """Durations [s] of repeated runs, after one that does not count, for about `seconds`."""
-    run()
-    durations: list[float] = []
-    while len(durations) < at_least or sum(durations) < seconds:
-        start = time.perf_counter()
-        run()
-        durations.append(time.perf_counter() - start)
-    return durations
-
-
-def stroke_durations(scene: Scene, n_robots: int, threads: int, seconds: float) -> list[float]:
-    """Durations [s] of strokes of the straight swim."""
-    simulator = Simulator(scene, n_robots, threads)
-    commands = np.tile(STRAIGHT, (n_robots, 1))
-    return repeat(lambda: simulator.stroke(commands), seconds)
-
-
-def real_time_factors(scene: Scene, n_robots: int, threads: int, seconds: float) -> list[float]:
-    """Simulated seconds per second of computing."""
-    return [n_robots * scene.actuator.period / d for d in stroke_durations(scene, n_robots, threads, seconds)]
-
-
-def threads_speedup(scene: Scene, n_robots: int, seconds: float) -> list[float]:
-    """Ratios of the duration on one thread to that on two, measured in turn."""
-    commands = np.tile(STRAIGHT, (n_robots, 1))
-    one, two = Simulator(scene, n_robots, threads=1), Simulator(scene, n_robots, threads=2)
-    ratios = []
-    for _ in range(max(5, int(seconds * 4))):
-        ratios.append(repeat(lambda: one.stroke(commands), 0.0, 1)[0] / repeat(lambda: two.stroke(commands), 0.0, 1)[0])
-    return ratios
-
-
-def cost_over_nodes(scene: Scene, seconds: float) -> list[tuple[int, float]]:
-    """(N, microseconds per robot and step) of a fixed motion, for N nodes per limb."""
-    rows = []
-    for n in NODES_PER_LIMB:
-        finer = replace(scene, robot=replace(scene.robot, nodes_per_limb=n))
-        simulator = Simulator(finer, N_LANES, threads=1)
-        commands = np.zeros((N_LANES, 5))  # one Newton iteration per step for any N: what is compared is its cost
-        duration = float(np.median(repeat(partial(simulator.stroke, commands), seconds)))
-        iterations = int(simulator.stroke(commands).newton_iterations.max())
-        rows.append((n, duration / N_LANES / iterations * 1e6))
-    return rows
-
-
-def exponent(rows: list[tuple[int, float]]) -> float:
-    """Slope of log cost over the logarithm of the number of nodes, 5 N - 4."""
-    nodes, cost = np.array(rows).T
-    slope: float = np.polyfit(np.log(5 * nodes - 4), np.log(cost), 1)[0]
-    return slope
-
-
-@entry_point
-def fused_products(values, n):
-    """Sixteen independent chains of fused products: nothing else can be faster. values: shape (18, N_LANES)."""
-    rows = borrow(values)
-    c, d = load(rows, 16), load(rows, 17)
-    x0, x1, x2, x3 = load(rows, 0), load(rows, 1), load(rows, 2), load(rows, 3)
-    x4, x5, x6, x7 = load(rows, 4), load(rows, 5), load(rows, 6), load(rows, 7)
-    for _ in range(n):
-        x0, x1, x2, x3 = add_product(c, x0, d), add_product(c, x1, d), add_product(c, x2, d), add_product(c, x3, d)
-        x4, x5, x6, x7 = add_product(c, x4, d), add_product(c, x5, d), add_product(c, x6, d), add_product(c, x7, d)
-    store(rows, 0, x0 + x1 + x2 + x3 + x4 + x5 + x6 + x7)
-
-
-def peak_gigaflops(seconds: float) -> list[float]:
-    """What one core reaches on fused products alone."""
-    values = np.full((18, N_LANES), 0.5)
-    n = 200_000
-    return [8 * 2 * N_LANES * n / d / 1e9 for d in repeat(lambda: fused_products(values, n), seconds)]
-
-
-def peak_speedup(seconds: float) -> list[float]:
-    """What the second core is worth to fused products alone, in turn: no batch can gain more."""
-    chains, n = [np.full((18, N_LANES), 0.5) for _ in range(2)], 2_000_000
-    ratios = []
-    with ThreadPoolExecutor(2) as pool:
-        for _ in range(max(5, int(seconds * 4))):
-            one = repeat(lambda: [fused_products(chain, n) for chain in chains], 0.0, 1)[0]
-            two = repeat(lambda: list(pool.map(fused_products, chains, [n, n])), 0.0, 1)[0]
-            ratios.append(one / two)
-    return ratios
-
-
-def iteration_seconds(scene: Scene, seconds: float) -> list[float]:
-    """Seconds per robot and Newton iteration, everything else that a stroke does included."""
-    simulator = Simulator(scene, 8 * N_LANES, threads=1)
-    commands = np.tile(STRAIGHT, (simulator.n_robots, 1))
-    iterations = int(simulator.stroke(commands).newton_iterations.sum())
-    return [d / iterations for d in repeat(lambda: simulator.stroke(commands), seconds)]
-
-
-# --- the environment and the process ---------------------------------------------------------------------------------
-
-
-def environment_share(n_robots: int, seconds: float) -> list[float]:
-    """Share of a vector environment's step that is not the simulator's stroke, at the fastest preset, in turn."""
-    env = gym.make_vec(
-        "seastar_gym:SeastarSwim-v0", num_envs=n_robots, vectorization_mode="vector_entry_point", fidelity="fast",
-        actions="joint", max_episode_steps=10**9, threads=1, path=[[10.0, 0.0]],
-    )  # fmt: skip
-    env.reset(seed=0)
-    rng = np.random.default_rng(0)
-    shares = []
-    for _ in range(max(5, int(20 * seconds))):
-        actions = rng.integers(3**5, size=n_robots)
-        batch = env.unwrapped
-        commands = batch.command_table[actions]  # type: ignore[attr-defined]
-        simulator = batch.simulator  # type: ignore[attr-defined]
-        state = simulator.get_state()
-        start = time.perf_counter()
-        simulator.stroke(commands)
-        stroke = time.perf_counter() - start
-        simulator.set_state(state)
-        start = time.perf_counter()
-        env.step(actions)
-        shares.append(1.0 - stroke / (time.perf_counter() - start))
-    return shares[1:]
-
-
-def memory_per_robot(scene: Scene, n_robots: int = 512) -> tuple[float, float]:
-    """(KiB that a robot of a batch holds, bytes that a stroke leaves behind per robot)."""
-    commands = np.tile(STRAIGHT, (n_robots, 1))
-    tracemalloc.start()
-    simulator = Simulator(scene, n_robots, threads=1)
-    held = tracemalloc.get_traced_memory()[0]
-    simulator.stroke(commands)
-    gc.collect()
-    before = tracemalloc.get_traced_memory()[0]
-    for _ in range(20):
-        simulator.stroke(commands)
-    gc.collect()
-    left = tracemalloc.get_traced_memory()[0] - before
-    tracemalloc.stop()
-    return held / n_robots / 1024, max(0, left) / 20 / n_robots
-
-
-def process_seconds(code: str, cache: str) -> float:
-    """Seconds that a fresh interpreter takes for `code`, which prints them, with numba's cache in a folder."""
-    environment = {**os.environ, "NUMBA_CACHE_DIR": cache}
-    output = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
-    return float(output.stdout)
-
-
-TIMED = "import time; start = time.perf_counter(); {}; print(time.perf_counter() - start)"
-FIRST_STROKE = "import seastar_gym as s; s.Simulator(s.Scene()).stroke([[0, 1, 0, 0, -1]])"
-
-
 def start_up_figures() -> list[Figure]:
-    """Import, first stroke ever and first stroke of a later process."""
+    """Durations of the import, of the first stroke ever, and of the first stroke of a later process."""
     with tempfile.TemporaryDirectory() as cache:
         imports = [process_seconds(TIMED.format("import seastar_gym"), cache) for _ in range(5)]
         first = process_seconds(TIMED.format(FIRST_STROKE), cache)
@@ -224,11 +61,8 @@ def start_up_figures() -> list[Figure]:
     ]
 
 
-# --- the study -------------------------------------------------------------------------------------------------------
-
-
 def measure(seconds: float, progress: bool = True) -> tuple[list[Figure], dict[str, list[tuple[int, float]]]]:
-    """All rows of the table, and the curves of the picture (real-time factor over batch size and over N)."""
+    """Rows of the table, and the curves of the picture: real-time factor over batch size, and cost over N."""
     chapter = Scene(numerics=Numerics.preset("chapter"))
     steps = {
         "batch": lambda: [median("batch, one core", "x real time", real_time_factors(chapter, 512, 1, 4 * seconds))],
@@ -270,7 +104,7 @@ def measure(seconds: float, progress: bool = True) -> tuple[list[Figure], dict[s
 
 
 def peak_figures(scene: Scene, seconds: float) -> list[Figure]:
-    """Operations of an iteration, the processor's peak, and the share of it that whole strokes reach."""
+    """Operations of a Newton iteration, the peak rate of one core, and the share of it that strokes reach."""
     operations = flops(count_operations(scene)["iteration"])
     peak, duration = peak_gigaflops(seconds), iteration_seconds(scene, 4 * seconds)
     reached = operations / float(np.median(duration)) / 1e9
@@ -285,7 +119,7 @@ def peak_figures(scene: Scene, seconds: float) -> list[Figure]:
 
 
 def memory_figures(scene: Scene) -> list[Figure]:
-    """What a robot holds, and what a stroke leaves behind."""
+    """Memory of a robot, and memory that a stroke leaves allocated."""
     held, left = memory_per_robot(scene)
     return [
         Figure("memory per robot, batch of 512", held, "KiB"),
@@ -293,13 +127,8 @@ def memory_figures(scene: Scene) -> list[Figure]:
     ]
 
 
-def machine() -> str:
-    """A line about the machine."""
-    return f"{os.cpu_count()} cores, {platform.machine()}, {N_LANES} lanes, Python {platform.python_version()}"
-
-
 def as_table(figures: list[Figure]) -> Table:
-    """For the terminal."""
+    """Figures as a table for the terminal."""
     table = Table(title=f"Implicit Euler, h = 3 ms, N = 10 ({machine()}); the chapter: {CHAPTER:g} x real time")
     for column, justify in (("what", "left"), ("median", "right"), ("unit", "left"), ("middle half", "right")):
         table.add_column(column, justify=justify)  # type: ignore[arg-type]
@@ -310,7 +139,7 @@ def as_table(figures: list[Figure]) -> Table:
 
 
 def write_csv(figures: list[Figure], curves: dict[str, list[tuple[int, float]]], path: Path) -> None:
-    """Table and curves."""
+    """Write figures and curves as CSV."""
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(["what", "x", "value", "unit", "quartile_1", "quartile_3"])
@@ -322,7 +151,7 @@ def write_csv(figures: list[Figure], curves: dict[str, list[tuple[int, float]]],
 
 
 def draw(curves: dict[str, list[tuple[int, float]]], path: Path) -> None:
-    """Real-time factor over batch size, and cost over nodes per limb."""
+    """Draw the real-time factor over the batch size, and the cost over the nodes per limb."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -354,10 +183,12 @@ def draw(curves: dict[str, list[tuple[int, float]]], path: Path) -> None:
 
 
 def main() -> None:
-    """Measure, print, write."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--quick", action="store_true", help="shorter measurements, noisier")
-    parser.add_argument("--out", type=Path, default=Path("runs/throughput"), help="folder for CSV and picture")
+    """Command line: measure, write the files and print the table."""
+    parser = study_parser("studies.speed.throughput", __doc__)
+    parser.add_argument("--quick", action="store_true", help="measure for a fifth of the time, with more noise")
+    parser.add_argument(
+        "--out", type=Path, default=Path("runs/throughput"), help="folder for CSV and picture (default: %(default)s)"
+    )
     options = parser.parse_args()
     figures, curves = measure(0.2 if options.quick else 1.0)
     options.out.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""What the atlas of stability tries: eight quantities against the time step, and how a reader sees their values."""
+"""Cases of the atlas of stability: eight quantities against the time step, and the text of their values."""
 
 import math
 from collections.abc import Callable
@@ -7,19 +7,18 @@ from dataclasses import dataclass, field, replace
 from seastar_gym.scene import Seastar, Water
 
 STEPS = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 2e-2, 5e-2, 1e-1, 3e-1, 1.0)
-"""Time steps [s]."""
+"""Time steps of the atlas [s]."""
 QUICK_STEPS = (1e-4, 1e-3, 2e-2, 3e-1)
-CHAPTER_TROUBLE = 2e-2
-"""The chapter reports numerical issues from this time step on [s]."""
+"""Time steps of the quick atlas [s]."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """A scene but for its time step, and how its robots begin.
+    """A scene without its time step, and the initial state of its robots.
 
     speed: Standard deviation of the random initial velocities, per component and node [m/s].
-    shift: Largest random initial displacement of nodes, per component, over the length of an edge.
-    all_commands: One robot for every command of -1, 0, +1 per limb.
+    shift: Largest random initial displacement of a node, per component, as a fraction of the edge length.
+    all_commands: Simulate one robot for every command of -1, 0 and +1 per limb.
     """
 
     robot: Seastar = field(default_factory=Seastar)
@@ -32,7 +31,12 @@ class Case:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A quantity that is varied. values: In `unit`; None is vacuum. chapter: Its value in the chapter."""
+    """A quantity that the atlas varies.
+
+    values: Values of the quantity in `unit`; None is vacuum.
+    case: Case of a value.
+    chapter: Value in the chapter, in `unit`.
+    """
 
     name: str
     label: str
@@ -89,7 +93,7 @@ SWEEPS = (
 
 
 def quick_sweeps() -> tuple[Sweep, ...]:
-    """Every third value, the ends and the chapter's."""
+    """Sweeps reduced to every third value, the ends and the chapter's value."""
     return tuple(
         replace(sweep, values=tuple(v for k, v in enumerate(sweep.values) if _stays(sweep, k, v))) for sweep in SWEEPS
     )
@@ -100,7 +104,7 @@ def _stays(sweep: Sweep, k: int, value: float | None) -> bool:
 
 
 def format_value(sweep: Sweep, value: float | None) -> str:
-    """As a reader expects it: 10⁶ Pa, 1.6 mm, vacuum."""
+    """Text of a value of a sweep without its unit, such as 10⁶, 1.6 or vacuum."""
     if value is None:
         return "vacuum"
     if value >= 1e4:
@@ -109,7 +113,7 @@ def format_value(sweep: Sweep, value: float | None) -> str:
 
 
 def format_step(step: float) -> str:
-    """With the unit that makes it a number from 1 to 999."""
+    """Text of a time step [s] in the unit that makes it a number from 1 to 999."""
     if step < 1e-3:
         return f"{1e6 * step:g} µs"
     return f"{1e3 * step:g} ms" if step < 1.0 else f"{step:g} s"

@@ -1,4 +1,4 @@
-"""Draws the atlas of stability. matplotlib is imported where something is drawn."""
+"""Pictures of the atlas of stability. matplotlib is imported only where something is drawn."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.stability.cases import CHAPTER_TROUBLE, Sweep, format_step, format_value
+from studies.chapter import ISSUES_FROM
+from studies.stability.cases import Sweep, format_step, format_value
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +22,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 INK, FAINT_INK, MARK, EMPTY = "#3a404a", "#80868f", "#d62728", "#eceff3"
-NEEDS = ("Newton alone", "repaired matrices or line search", "halved time steps", "failed")
+NEEDS = ("plain Newton", "regularised matrix or line search", "substeps", "failed")
+"""What the solver needed, from least to most."""
 NEED_COLOURS = ("#c7e0f4", "#5aa2d6", "#1b4f8f", "#d62728")
 NAMES = {
     "implicit-euler": "Implicit Euler",
@@ -37,10 +39,10 @@ DPI = 120
 def draw_atlas(
     cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], scheme: str, folder: Path
 ) -> list[Path]:
-    """Writes three pictures, with one map per sweep each: what a cell needed, iterations, error."""
+    """Write three pictures with one map per sweep each: what the solver needed, Newton iterations, and error."""
     name = NAMES[scheme]
     return [
-        _draw_needs(cells, sweeps, steps, f"{name}: what it took to converge", folder / "stability_needs.png"),
+        _draw_needs(cells, sweeps, steps, f"{name}: needs of the solver", folder / "stability_needs.png"),
         _draw_numbers(
             cells, sweeps, steps, f"{name}: Newton iterations per time step", folder / "stability_iterations.png",
             lambda cell: cell.iterations, "viridis_r", (1.0, 300.0), "{:g}", "Newton iterations per time step",
@@ -68,7 +70,7 @@ def _draw_needs(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[
 
 
 def _need(cell: Cell) -> float:
-    """Index into NEEDS."""
+    """Index into NEEDS of what the solver needed in a cell."""
     if cell.failed:
         return 3.0
     return 2.0 if cell.halvings else float(cell.repairs + cell.backtracks > 0)
@@ -87,7 +89,7 @@ def _draw_numbers(
     label: str,
     missing: str = "",
 ) -> Path:
-    """Maps of a positive number on a logarithmic scale; missing: What an empty cell means that was not refused."""
+    """Draw maps of a positive number on a logarithmic scale; missing: legend of empty cells that were not refused."""
     from matplotlib.colors import LogNorm
     from matplotlib.patches import Patch
 
@@ -106,11 +108,8 @@ def _draw_numbers(
     return _save(figure, file)
 
 
-# --- parts of a picture ----------------------------------------------------------------------------------------------
-
-
 def _panels(sweeps: Sequence[Sweep], title: str) -> tuple[Figure, list[Axes], Axes]:
-    """A figure, one pair of axes per sweep, and a strip below for legends."""
+    """Figure, axes of every sweep, and axes below them for legends."""
     from matplotlib.figure import Figure
 
     columns = min(4, len(sweeps))
@@ -131,13 +130,13 @@ def _panels(sweeps: Sequence[Sweep], title: str) -> tuple[Figure, list[Axes], Ax
 def _grid(
     cells: Sequence[Cell], sweep: Sweep, steps: Sequence[float], number: Callable[[Cell], float]
 ) -> np.ma.MaskedArray[Any, Any]:
-    """A number of every cell of a sweep, shape (values, steps); masked where there is none."""
+    """Number of every cell of a sweep, shape (n_values, n_steps); masked where there is none."""
     found = {(cell.value, cell.step): number(cell) for cell in cells if cell.sweep == sweep.name and not cell.refused}
     return np.ma.masked_invalid([[found.get((value, step), math.nan) for step in steps] for value in sweep.values])
 
 
 def _finish(axes: Axes, cells: Sequence[Cell], sweep: Sweep, steps: Sequence[float]) -> None:
-    """Ticks, titles, the chapter's marks, and hatching over refused cells."""
+    """Add ticks, a title, the marks of the chapter, and hatching over refused cells."""
     from matplotlib.patches import Rectangle
 
     axes.set_facecolor(EMPTY)
@@ -155,14 +154,14 @@ def _finish(axes: Axes, cells: Sequence[Cell], sweep: Sweep, steps: Sequence[flo
         row = sweep.values.index(sweep.chapter)
         axes.add_patch(Rectangle((0, row), len(steps), 1, clip_on=False, path_effects=_halo(), **FRAME))
         axes.get_yticklabels()[row].set_fontweight("bold")
-    if CHAPTER_TROUBLE in steps:
-        column = steps.index(CHAPTER_TROUBLE)
+    if ISSUES_FROM in steps:
+        column = steps.index(ISSUES_FROM)
         axes.axvline(column, path_effects=_halo(), **DASHES)
         axes.get_xticklabels()[column].set_color(MARK)
 
 
 def _halo() -> list[Any]:
-    """A white seam around lines, so that they show on any colour."""
+    """White outline of lines, which then show on any colour."""
     from matplotlib.patheffects import withStroke
 
     return [withStroke(linewidth=3.2, foreground="white")]
@@ -171,7 +170,7 @@ def _halo() -> list[Any]:
 def _refused_patch() -> Any:
     from matplotlib.patches import Patch
 
-    return Patch(facecolor="white", edgecolor=FAINT_INK, hatch="////", label="refused when built")
+    return Patch(facecolor="white", edgecolor=FAINT_INK, hatch="////", label="scene refused")
 
 
 def _legend(foot: Axes, patches: list[Any], left: float = 0.0) -> None:
@@ -180,7 +179,7 @@ def _legend(foot: Axes, patches: list[Any], left: float = 0.0) -> None:
 
     marks = [
         Patch(label="the chapter's value", **FRAME),
-        Line2D([], [], label="the chapter's trouble begins: 20 ms", **DASHES),
+        Line2D([], [], label="the chapter's numerical issues begin: 20 ms", **DASHES),
     ]
     foot.legend(
         handles=[*patches, *marks], loc="upper left", bbox_to_anchor=(left, 1.0), ncols=4 if left == 0.0 else 2,

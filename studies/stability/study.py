@@ -1,16 +1,14 @@
-"""The atlas of stability: `python -m studies.stability`.
+"""Robustness and accuracy of the solver with time steps from 10 microseconds to 1 s.
 
-How the solver fares from 10 microseconds to 1 s of time step, against stiffness, thickness, resolution, drag, density,
-rattled robots and commands up to the largest peak angle. Prints a summary and writes every cell as CSV, the summary as
-Markdown, and three pictures: what every cell needed, Newton iterations per step, and the error of the hub's path.
+The atlas varies eight quantities against the time step: Young's modulus, rod radius, resolution, drag, density, random
+initial velocities and shifts, and the peak angle. Each of its cells is a scene at a time step. Prints a summary, and
+writes all cells as CSV, the summary as Markdown, and three pictures: what the solver needed to converge, Newton
+iterations per step, and the error of the hub's path.
 
-A cell is a scene at a time step, see stability_cells.py.
-
-`--long` instead makes 10,000 strokes of random commands with 256 robots; `--cost` measures what never breaking costs a
-healthy robot, see hardening.py.
+`--long` simulates 10,000 strokes of random commands by 256 robots instead. `--cost` measures what the solver's
+safeguards cost a robot that does not need them.
 """
 
-import argparse
 import csv
 import itertools
 import math
@@ -18,7 +16,7 @@ import os
 import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import get_args
 
@@ -29,35 +27,18 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
-from seastar_gym.scene import Numerics, Scene
-from seastar_gym.scene.numerics import Fidelity, SchemeName
-from seastar_gym.simulator import Simulator
+from seastar_gym.scene.numerics import SchemeName
+from studies.chapter import ISSUES_FROM, REAL_TIME_FROM
+from studies.parser import study_parser
 from studies.speed.hardening import SETTINGS, cost_table, measure_cost
-from studies.stability.cases import (
-    CHAPTER_TROUBLE,
-    QUICK_STEPS,
-    STEPS,
-    SWEEPS,
-    Sweep,
-    format_value,
-    quick_sweeps,
-)
-from studies.stability.cells import (
-    Cell,
-    commands_of,
-    converged_way,
-    largest_strain,
-    run_cell,
-    stroke_duration,
-)
+from studies.stability.cases import QUICK_STEPS, STEPS, SWEEPS, Sweep, format_value, quick_sweeps
+from studies.stability.cells import Cell, commands_of, converged_displacements, run_cell, stroke_duration
+from studies.stability.long_run import long_run, long_table
 
 Floats = NDArray[np.float64]
 
 GROWTH_ROUNDING = 1e-11
-"""Growth of energy in a step, over the energy, that is rounding."""
-
-
-# --- the atlas -------------------------------------------------------------------------------------------------------
+"""Relative growth of the energy in a step that is attributed to rounding."""
 
 
 def atlas(
@@ -67,25 +48,25 @@ def atlas(
     progress: bool = True,
     workers: int | None = None,
 ) -> list[Cell]:
-    """All cells, in the order of sweeps, values and steps."""
+    """Measure all cells of the atlas; returns them in the order of sweeps, values and steps."""
     columns = [(sweep, value) for sweep in sweeps for value in sweep.values]
     bar = tqdm(total=len(columns) * len(steps), unit="cell", smoothing=0.02, disable=not progress)
 
     def column(sweep: Sweep, value: float | None) -> list[Cell]:
-        """All steps of one value; steps with strokes of the same duration share their converged run."""
+        """Cells of one value at all steps; steps with strokes of the same duration share their converged run."""
         cells = []
         for duration, members in itertools.groupby(steps, stroke_duration):
             try:
-                converged = converged_way(sweep.case(value), duration)
+                converged = converged_displacements(sweep.case(value), duration)
             except ValueError:
-                converged = None  # refused: the cells say why
+                converged = None  # run_cell records why the scene is refused
             for step in members:
                 cells.append(run_cell(sweep, value, step, scheme, converged))
                 bar.update()
         return cells
 
     with bar, ThreadPoolExecutor(workers or os.cpu_count() or 1) as pool:
-        # The longest columns first, so that no thread ends with one of them alone.
+        # The longest columns go first, so that no thread is left with one of them at the end.
         order = sorted(range(len(columns)), key=lambda k: -_weight(*columns[k]))
         found = dict(zip(order, pool.map(lambda k: column(*columns[k]), order), strict=True))
     return [cell for k in range(len(columns)) for cell in found[k]]
@@ -100,13 +81,13 @@ def _weight(sweep: Sweep, value: float | None) -> float:
 
 
 SUMMARY = (
-    "against", "cells", "refused", "strokes", "failed", "Newton iterations per step (most)", "steps halved",
+    "against", "cells", "refused", "strokes", "failed", "Newton iterations per step (most)", "substeps",
     "energy grew", "error at 3, 20 ms",
 )  # fmt: skip
 
 
 def summarise(cells: Iterable[Cell], sweeps: Sequence[Sweep]) -> list[list[str]]:
-    """Rows of the summary, one per sweep and one for all; columns as in SUMMARY."""
+    """Rows of the summary, one per sweep and one for all cells; columns as in SUMMARY."""
     everything = list(cells)
     rows = []
     for sweep in sweeps:
@@ -117,7 +98,7 @@ def summarise(cells: Iterable[Cell], sweeps: Sequence[Sweep]) -> list[list[str]]
 
 
 def _figures(cells: list[Cell]) -> list[str]:
-    """From "cells" to "energy grew"."""
+    """Columns "cells" to "energy grew" of the summary."""
     ran = [cell for cell in cells if not cell.refused]
     iterations = [cell.iterations for cell in ran]
     grew = sum(max(cell.growth, cell.growth_in_vacuum) > GROWTH_ROUNDING for cell in ran)
@@ -129,15 +110,15 @@ def _figures(cells: list[Cell]) -> list[str]:
 
 
 def _errors(cells: list[Cell], sweep: Sweep) -> str:
-    """At the chapter's value."""
+    """Errors [%] at the chapter's value with time steps of 3 and 20 ms."""
     found = {cell.step: cell.error for cell in cells if cell.value == sweep.chapter}
-    errors = [found.get(step, math.nan) for step in (3e-3, CHAPTER_TROUBLE)]
+    errors = [found.get(step, math.nan) for step in (REAL_TIME_FROM, ISSUES_FROM)]
     return ", ".join(f"{100 * error:.2g}" if math.isfinite(error) else "-" for error in errors) + " %"
 
 
 def as_table(rows: Sequence[Sequence[str]]) -> Table:
-    """The summary for a terminal of 100 columns or more."""
-    title = "Stability: one stroke per robot, from 10 µs to 1 s of time step"
+    """Summary for a terminal of 100 columns or more."""
+    title = "Stability: one stroke per robot, time steps from 10 µs to 1 s"
     table = Table(title=title, box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column(SUMMARY[0])
     for name, column in zip(SUMMARY[1:], list(zip(*rows, strict=True))[1:], strict=True):
@@ -150,13 +131,13 @@ def as_table(rows: Sequence[Sequence[str]]) -> Table:
 
 
 def write_markdown(rows: Sequence[Sequence[str]], file: Path) -> None:
-    """The summary for a page."""
+    """Write the summary as a table in Markdown."""
     lines = [SUMMARY, ["---", *["---:"] * (len(SUMMARY) - 1)], *rows]
     file.write_text("".join(f"| {' | '.join(line)} |\n" for line in lines), encoding="utf-8")
 
 
 def write_csv(cells: Iterable[Cell], file: Path) -> None:
-    """One line per cell; columns as in Cell, in SI units but for the values of sweeps."""
+    """Write one line per cell; columns as in `Cell`, in SI units except for the values of sweeps."""
     names = [one.name for one in fields(Cell)]
     with file.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
@@ -165,78 +146,17 @@ def write_csv(cells: Iterable[Cell], file: Path) -> None:
             writer.writerow(["vacuum" if n == "value" and cell.value is None else getattr(cell, n) for n in names])
 
 
-# --- long runs -------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class LongRun:
-    """Random commands, stroke after stroke.
-
-    failed: Robots that failed. repairs, halvings, energy_cuts: See StrokeReport, all strokes together.
-    strain, speed [m/s]: Largest at the end of a stroke. strain_late, speed_late: The same in the last tenth.
-    farthest: Largest distance of a hub from where it began [m].
-    """
-
-    strokes: int
-    robots: int
-    failed: int
-    iterations_per_stroke: float
-    repairs: int
-    halvings: int
-    energy_cuts: int
-    strain: float
-    strain_late: float
-    speed: float
-    speed_late: float
-    farthest: float
-    seconds: float
-
-
-def long_run(
-    strokes: int = 10_000,
-    robots: int = 256,
-    fidelity: Fidelity = "fast",
-    threads: int | None = None,
-    progress: bool = True,
-) -> LongRun:
-    """Make strokes of random commands; every robot draws its own in every stroke."""
-    simulator = Simulator(Scene(numerics=Numerics.preset(fidelity)), robots, threads)
-    rng, start = np.random.default_rng(0), time.perf_counter()
-    iterations, repairs, halvings, cuts, strain, speed = np.zeros((6, strokes))
-    for k in tqdm(range(strokes), unit="stroke", disable=not progress):
-        report = simulator.stroke(rng.integers(-1, 2, (robots, simulator.scene.robot.n_limbs)))
-        iterations[k], repairs[k] = report.newton_iterations.mean(), report.repairs.sum()
-        halvings[k], cuts[k] = report.halvings.sum(), report.energy_cuts.sum()
-        strain[k], speed[k] = largest_strain(simulator), np.linalg.norm(simulator.velocities, axis=-1).max()
-    late = -max(1, strokes // 10)
-    return LongRun(
-        strokes=strokes, robots=robots, failed=int(simulator.failed.sum()),
-        iterations_per_stroke=float(iterations.mean()), repairs=int(repairs.sum()), halvings=int(halvings.sum()),
-        energy_cuts=int(cuts.sum()), strain=float(strain.max()), strain_late=float(strain[late:].max()),
-        speed=float(speed.max()), speed_late=float(speed[late:].max()),
-        farthest=float(np.linalg.norm(simulator.hub_position(), axis=-1).max()), seconds=time.perf_counter() - start,
-    )  # fmt: skip
-
-
-def long_table(run: LongRun) -> Table:
-    """For a terminal."""
-    table = Table("quantity", "value", title="Long run of random commands")
-    for one in fields(LongRun):
-        table.add_row(one.name.replace("_", " "), f"{getattr(run, one.name):.5g}")
-    return table
-
-
-# --- the study -------------------------------------------------------------------------------------------------------
-
-
 def main() -> None:
-    """Measure, write, print."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--quick", action="store_true", help="a coarser grid, in a fraction of the time")
-    parser.add_argument("--scheme", choices=get_args(SchemeName), default="implicit-euler")
-    parser.add_argument("--long", action="store_true", help="10,000 strokes of 256 robots instead of the atlas")
-    parser.add_argument("--cost", action="store_true", help="what hardening costs, instead of the atlas")
-    parser.add_argument("--out", type=Path, default=Path("runs/stability"), help="folder for CSV and pictures")
+    """Command line: run the atlas, the long run or the measurement of cost, and print its table."""
+    parser = study_parser("studies.stability", __doc__)
+    parser.add_argument("--quick", action="store_true", help="run a coarser grid, in a fraction of the time")
+    parser.add_argument("--scheme", choices=get_args(SchemeName), default="implicit-euler", metavar="SCHEME",
+                        help="scheme of the atlas: %(choices)s (default: %(default)s)")  # fmt: skip
+    parser.add_argument("--long", action="store_true", help="simulate a long run of random commands instead")
+    parser.add_argument("--cost", action="store_true", help="measure the cost of the safeguards instead")
+    parser.add_argument(
+        "--out", type=Path, default=Path("runs/stability"), help="folder for tables and pictures (default: %(default)s)"
+    )
     options = parser.parse_args()
     console = Console()
     if options.long:
@@ -257,4 +177,5 @@ def main() -> None:
     write_markdown(rows, files[1])
     files += draw_atlas(cells, sweeps, steps, options.scheme, options.out)
     console.print(as_table(rows))
-    console.print(f"{time.perf_counter() - start:.0f} s. In {options.out}: {', '.join(one.name for one in files)}")
+    names = ", ".join(one.name for one in files)
+    console.print(f"{time.perf_counter() - start:.0f} s. Written to {options.out}: {names}")

@@ -1,4 +1,4 @@
-"""What a comparison with something known is, and the page and the tables that show it."""
+"""Comparisons with references, and the page and tables that show them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,11 @@ from rich.table import Table
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the page. allowed: The largest |ours - reference| that the tests accept, in the row's unit."""
+    """A compared quantity, one line of the page.
+
+    allowed: Largest |ours - reference| that the tests accept, in `unit`.
+    digits: Significant digits on the page.
+    """
 
     quantity: str
     reference: float
@@ -21,18 +25,18 @@ class Row:
 
     @property
     def difference(self) -> float:
-        """ours - reference, in the row's unit."""
+        """Difference ours - reference, in the row's unit."""
         return self.ours - self.reference
 
     @property
     def holds(self) -> bool:
-        """Whether the difference is allowed."""
+        """Whether the difference is within the row's bound."""
         return abs(self.difference) <= self.allowed
 
 
 @dataclass(frozen=True)
 class Section:
-    """Rows with one kind of reference. method: What was computed and how, for the reader."""
+    """Rows with one kind of reference; method: Text that says what is computed and how."""
 
     title: str
     method: str
@@ -40,13 +44,13 @@ class Section:
 
 
 def order_row(of: str, edge_lengths: ArrayLike, errors: ArrayLike, allowed: float) -> Row:
-    """The slope of log error over log edge length, beside the order 2 of the discrete rods."""
+    """Row that compares the order of convergence over edge lengths [m] with the order 2 of the discrete rods."""
     order = np.polyfit(np.log(np.asarray(edge_lengths)), np.log(np.abs(np.asarray(errors))), 1)[0]
     return Row(f"order in l, {of}", 2.0, float(order), "", allowed, digits=3)
 
 
 def as_cells(row: Row) -> tuple[str, str, str, str]:
-    """Quantity with unit, reference, ours, and the difference: absolute, and relative to the reference."""
+    """Cells of a row: quantity with unit, reference, ours, and the absolute and relative difference."""
     unit = f" [{row.unit}]" if row.unit else ""
     relative = f" ({row.difference / row.reference:+.1e})" if row.unit else ""
     reference, ours = (f"{value:#.{row.digits}g}" for value in (row.reference, row.ours))
@@ -54,13 +58,13 @@ def as_cells(row: Row) -> tuple[str, str, str, str]:
 
 
 def as_page(sections: Sequence[Section]) -> str:
-    """The page of results in Markdown."""
+    """Page of all sections in Markdown."""
     lines = [
-        "# Validation against what is known",
+        "# Validation against exact solutions and published codes",
         "",
-        "Written by `python -m studies.validation`; `tests/test_validation.py` holds each line to a bound.",
-        "Robot and fluid are the chapter's unless a section says otherwise; l is the length of an edge. The difference",
-        "is ours minus the reference, and in brackets relative to the reference.",
+        "Written by `python -m studies.validation`. `tests/test_validation.py` checks each line against a bound.",
+        "Robot and fluid are the chapter's unless a section says otherwise, and l is the length of an edge. The",
+        "difference is ours minus the reference; in brackets it is relative to the reference.",
     ]
     for section in sections:
         lines += ["", f"## {section.title}", "", section.method, ""]
@@ -70,7 +74,7 @@ def as_page(sections: Sequence[Section]) -> str:
 
 
 def as_table(section: Section) -> Table:
-    """For the terminal; a line outside its bound is red."""
+    """Section as a table for the terminal; rows outside their bound are red."""
     table = Table("quantity", title=section.title, title_justify="left")
     for column in ("reference", "ours", "difference"):
         table.add_column(column, justify="right", no_wrap=True)

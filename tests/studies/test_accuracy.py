@@ -1,4 +1,4 @@
-"""The accuracy study measures what it says, promises no luck, and writes what it found."""
+"""The accuracy study: its errors against closed forms, its promises against errors that cancel, and its files."""
 
 import csv
 import json
@@ -11,6 +11,7 @@ from seastar_gym import Numerics
 from seastar_gym.gaits import PAIRS, STRAIGHT
 from seastar_gym.scene.fidelity import Promise
 from seastar_gym.simulator import Simulator
+from studies.accuracy import convergence
 from studies.accuracy import rows as accuracy_rows
 from studies.accuracy import study as accuracy
 from studies.accuracy import tables as accuracy_tables
@@ -29,7 +30,7 @@ from studies.accuracy.cases import (
     symmetric_form,
 )
 from studies.accuracy.rows import Row
-from studies.accuracy.study import MS, Plan
+from studies.accuracy.settings import MS, Plan
 
 TINY = Plan(
     n_random=2, side=(1, 0), converged=(("sdirk3", 1 * MS), ("implicit-midpoint", 0.5 * MS)), shortest=10 * MS,
@@ -118,9 +119,9 @@ def test_heading_is_what_a_robot_was_turned_by():
 def test_groups_swim_as_the_whole_batch_does():
     cases = joined(swims(), random_sequences(7, np.random.default_rng(5)))
     numerics = Numerics("sdirk2", 20 * MS)
-    whole, groups = swim(cases, numerics), accuracy.in_groups(cases)
+    whole, groups = swim(cases, numerics), convergence.in_groups(cases)
     assert [len(group) for group in groups] == [8, 4]
-    parts = accuracy.together([swim(group, numerics) for group in groups])
+    parts = convergence.together([swim(group, numerics) for group in groups])
     np.testing.assert_array_equal(parts.hub, whole.hub)
     assert parts.iterations == pytest.approx(whole.iterations)
     assert parts.steps == pytest.approx(whole.steps) == 50.0
@@ -129,15 +130,15 @@ def test_groups_swim_as_the_whole_batch_does():
 def test_extrapolation_is_exact_for_errors_of_first_and_second_order():
     limit = np.array([[1.0, -2.0]])
     paths = [limit + 0.3 / edges + 5.0 / edges**2 for edges in (9, 18, 36, 72)]
-    np.testing.assert_allclose(accuracy.extrapolated(paths), limit, rtol=1e-13)
+    np.testing.assert_allclose(convergence.extrapolated(paths), limit, rtol=1e-13)
 
 
 @pytest.mark.slow
 def test_two_schemes_of_different_kind_agree_on_the_converged_straight_swim():
     """38.4133 mm after ten strokes and 4.91276 mm after one, to 1e-5."""
     straight = swims().first(1)
-    sdirk3 = swim(straight, Numerics("sdirk3", 0.02 * MS, accuracy.TIGHT))
-    midpoint = swim(straight, Numerics("implicit-midpoint", 0.01 * MS, accuracy.TIGHT))
+    sdirk3 = swim(straight, Numerics("sdirk3", 0.02 * MS, convergence.TIGHT))
+    midpoint = swim(straight, Numerics("implicit-midpoint", 0.01 * MS, convergence.TIGHT))
     assert errors(midpoint, sdirk3).path[0] < 1e-5
     for found in (sdirk3, midpoint):
         assert found.hub[0, 0, 0] == pytest.approx(4.91276e-3, rel=1e-5)

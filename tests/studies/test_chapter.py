@@ -1,4 +1,4 @@
-"""The chapter's figures show the swims that they name, and the statements beside them are what was computed."""
+"""The chapter's figures show the swims that they name, and its statements stand beside the computed numbers."""
 
 import csv
 from dataclasses import replace
@@ -7,26 +7,26 @@ import numpy as np
 import pytest
 
 from seastar_gym import Numerics, Scene, Simulator, SmaPulse
-from seastar_gym.gaits import pentagon_gait
-from studies.chapter import pictures as chapter_pictures
-from studies.chapter import study as chapter
+from seastar_gym.gaits import STRAIGHT, pentagon_gait
+from studies.chapter import cost, pictures, statements, swims
+from studies.chapter.study import make_figures
 
 COARSE = Numerics("implicit-euler", 10e-3)
 
 
 @pytest.fixture(scope="module")
 def straight():
-    """Two strokes of the straight swim, ten samples each."""
-    return chapter.swim(COARSE, np.tile(chapter.STRAIGHT, (2, 1, 1)), 10)
+    """Swim of two strokes of the straight swim, with ten samples each."""
+    return swims.swim(COARSE, np.tile(STRAIGHT, (2, 1, 1)), 10)
 
 
 @pytest.fixture(scope="module")
 def pentagon():
-    return chapter.swim(COARSE, pentagon_gait()[:, None], 10)
+    return swims.swim(COARSE, pentagon_gait()[:, None], 10)
 
 
-def values(statements, quantity):
-    (found,) = [row.values for row in statements if row.quantity == quantity]
+def values(rows, quantity):
+    (found,) = [row.values for row in rows if row.quantity == quantity]
     return found
 
 
@@ -44,20 +44,20 @@ def test_a_swim_is_sampled_at_its_times_and_begins_at_rest(straight):
 def test_a_swim_followed_is_the_swim_of_the_simulator(straight):
     simulator = Simulator(Scene(numerics=COARSE))
     for stroke in range(2):
-        simulator.stroke(chapter.STRAIGHT[None])
+        simulator.stroke(STRAIGHT[None])
         np.testing.assert_array_equal(straight.hub()[straight.at_strokes()[stroke + 1]], simulator.hub_position()[0])
     np.testing.assert_array_equal(straight.hub_velocity()[-1], simulator.hub_velocity()[0])
 
 
 def test_limbs_are_blue_while_they_are_turned(straight, pentagon):
     assert straight.actuated(1.1).tolist() == [False, True, False, False, True]
-    assert not any(straight.actuated(time).any() for time in (0.0, 1.0, 2.0))  # turned by nothing at these times
+    assert not any(straight.actuated(time).any() for time in (0.0, 1.0, 2.0))  # all rotations are zero at these times
     assert pentagon.actuated(72.1).tolist() == [True, False, True, False, False]
     assert not pentagon.actuated(47.5).any()
 
 
 def test_settings_are_named_for_what_they_are():
-    names = [chapter.label(numerics) for numerics in (chapter.CHAPTER, chapter.CONVERGED, chapter.NEARLY_CONVERGED)]
+    names = [swims.label(numerics) for numerics in (swims.CHAPTER, swims.CONVERGED, swims.NEARLY_CONVERGED)]
     assert names == [
         "the chapter's setting (implicit Euler, 3 ms)",
         "converged (implicit midpoint, 0.25 ms)",
@@ -66,7 +66,7 @@ def test_settings_are_named_for_what_they_are():
 
 
 def test_signals_of_the_pentagon_are_pulses_with_sharp_corners(pentagon):
-    time, plus, minus = chapter_pictures.signal_curves(pentagon, 0)
+    time, plus, minus = pictures.signal_curves(pentagon, 0)
     assert time[0] == 0.0 and time[-1] == pytest.approx(250.0)
     assert np.all(np.diff(time) >= -1e-9)
     for rotation, begin in ((-minus, 50.0), (plus, 200.0)):
@@ -78,9 +78,9 @@ def test_signals_of_the_pentagon_are_pulses_with_sharp_corners(pentagon):
 
 
 def test_the_straight_swim_goes_forward_long_after_the_heating_and_then_far_back():
-    """The chapter: forward during the actuating phase, slightly backward while cooling. It is otherwise."""
-    swims = [chapter.swim(Numerics("implicit-midpoint", 5e-3), np.tile(chapter.STRAIGHT, (10, 1, 1)), 100)]
-    rows = chapter.straight_statements(swims)
+    """The chapter states: forward during the actuating phase, slightly backward while cooling. The swim differs."""
+    straight = [swims.swim(Numerics("implicit-midpoint", 5e-3), np.tile(STRAIGHT, (10, 1, 1)), 100)]
+    rows = statements.straight_statements(straight)
     (heated,), (after,), (back,) = (
         values(rows, name) for name in ("forward while heated, 10th stroke", "forward after that", "backward")
     )
@@ -91,7 +91,7 @@ def test_the_straight_swim_goes_forward_long_after_the_heating_and_then_far_back
 
 
 def test_a_pentagon_closes_and_its_rests_are_almost_rests(pentagon):
-    rows = chapter.pentagon_statements([pentagon])
+    rows = statements.pentagon_statements([pentagon])
     hub = pentagon.hub()
     (side,) = values(rows, "mean side")
     assert side == pytest.approx(1e3 * np.hypot(*hub[pentagon.at(50.0)]), rel=1e-3)
@@ -103,36 +103,37 @@ def test_a_pentagon_closes_and_its_rests_are_almost_rests(pentagon):
 
 
 def test_pairs_go_along_their_bisectors_and_1_4_farthest():
-    swims = [chapter.swim(COARSE, np.tile(list(chapter.PAIRS.values()), (10, 1, 1)), 1)]
-    rows = chapter.pair_statements(swims)
-    distances = {name: values(rows, f"distance of {name}")[0] for name in chapter.PAIRS}
+    pairs = [swims.swim(COARSE, np.tile(list(statements.PAIRS.values()), (10, 1, 1)), 1)]
+    rows = statements.pair_statements(pairs)
+    distances = {name: values(rows, f"distance of {name}")[0] for name in statements.PAIRS}
     assert min(distances, key=distances.get) == "{1⁻, 2⁺}"
     assert values(rows, "largest angle off it")[0] < 1e-6
     assert distances["{1⁻, 3⁺}"] == pytest.approx(36.025, rel=1e-3)  # the straight swim, mirrored
 
 
 def test_newtons_matrix_becomes_indefinite_where_the_chapter_meets_numerical_issues():
-    assert not chapter.needs_repair(Scene(numerics=Numerics("implicit-euler", 10e-3)))
-    assert chapter.needs_repair(Scene(numerics=Numerics("implicit-euler", 20e-3)))
+    assert not cost.needs_regularisation(Scene(numerics=Numerics("implicit-euler", 10e-3)))
+    assert cost.needs_regularisation(Scene(numerics=Numerics("implicit-euler", 20e-3)))
 
 
 def test_cost_is_measured_for_every_step():
     calls = []
-    cost = chapter.cost(np.array([3e-3, 40e-3]), 0.0, lambda: calls.append(1))
+    found = cost.measure_cost(np.array([3e-3, 40e-3]), 0.0, lambda: calls.append(1))
     assert len(calls) == 2
-    assert cost.repaired.tolist() == [False, True]
-    assert np.all(cost.alone > cost.in_batch) and np.all(cost.in_batch > 0.0)
-    rows = chapter.cost_statements(cost)
-    assert values(rows, "real-time factor at 3 ms, one robot alone")[0] == pytest.approx(1.0 / cost.alone[0])
+    assert found.regularised.tolist() == [False, True]
+    assert np.all(found.alone > found.in_batch) and np.all(found.in_batch > 0.0)
+    rows = statements.cost_statements(found)
+    assert values(rows, "real-time factor at 3 ms, one robot alone")[0] == pytest.approx(1.0 / found.alone[0])
     assert values(rows, "smallest h at which Newton's matrix is indefinite")[0] == pytest.approx(40.0)
-    never = chapter.cost_statements(replace(cost, repaired=np.array([False, False])))
+    never = statements.cost_statements(replace(found, regularised=np.array([False, False])))
     assert values(never, "smallest h at which Newton's matrix is indefinite") == ()
 
 
 def test_statements_become_a_table_and_a_file(tmp_path):
-    rows = [chapter.Statement("It moves.", "x", "mm", (1.0, 2.0)), chapter.Statement("It moves.", "y", "mm", (3.0,))]
-    assert chapter.as_table(rows).row_count == 2
-    chapter.write_csv(rows, tmp_path / "s.csv")
+    Statement = statements.Statement
+    rows = [Statement("It moves.", "x", "mm", (1.0, 2.0)), Statement("It moves.", "y", "mm", (3.0,))]
+    assert statements.as_table(rows).row_count == 2
+    statements.write_csv(rows, tmp_path / "s.csv")
     written = list(csv.reader((tmp_path / "s.csv").read_text(encoding="utf-8").splitlines()))
     assert written[1:] == [["It moves.", "x", "mm", "1.0", "2.0"], ["It moves.", "y", "mm", "3.0"]]
 
@@ -153,24 +154,24 @@ def pixels_like(image, colour):
 
 
 def test_the_pulse_is_drawn_red_and_blue(tmp_path):
-    chapter_pictures.draw_pulse(SmaPulse(), tmp_path / "b.png")
+    pictures.draw_pulse(SmaPulse(), tmp_path / "b.png")
     image = picture(tmp_path / "b.png")
-    assert pixels_like(image, chapter_pictures.PLUS) > 500 and pixels_like(image, chapter_pictures.MINUS) > 300
+    assert pixels_like(image, pictures.PLUS) > 500 and pixels_like(image, pictures.MINUS) > 300
 
 
 def test_snapshots_show_actuated_limbs_in_blue(pentagon, tmp_path):
-    chapter_pictures.draw_pentagon_snapshots(pentagon, pentagon, tmp_path / "blue.png")
+    pictures.draw_pentagon_snapshots(pentagon, pentagon, tmp_path / "blue.png")
     at_rest = replace(pentagon, commands=np.zeros_like(pentagon.commands))
-    chapter_pictures.draw_pentagon_snapshots(at_rest, at_rest, tmp_path / "grey.png")
+    pictures.draw_pentagon_snapshots(at_rest, at_rest, tmp_path / "grey.png")
     blue, grey = (
-        pixels_like(picture(tmp_path / f"{name}.png"), chapter_pictures.ACTUATED) for name in ("blue", "grey")
+        pixels_like(picture(tmp_path / f"{name}.png"), pictures.ACTUATED) for name in ("blue", "grey")
     )
     assert blue > 10 * grey > 0  # the legend's line stays
 
 
 @pytest.mark.slow
 def test_the_study_writes_every_figure(tmp_path):
-    statements = chapter.make_figures(tmp_path, quick=True, progress=False)
+    rows = make_figures(tmp_path, quick=True, progress=False)
     names = {"13_2", "13_5b", "13_6", "13_7a", "13_7b", "13_8", "13_9"}
     assert {file.name for file in tmp_path.glob("*.png")} == {f"fig_{name}.png" for name in names}
     for file in tmp_path.glob("*.png"):
@@ -178,6 +179,6 @@ def test_the_study_writes_every_figure(tmp_path):
         assert image.shape[0] > 500 and image.shape[1] > 700
         assert 0.01 < np.mean(np.any(image < 0.9, axis=-1)) < 0.4
     for name in ("13_2", "13_6", "13_7a", "13_9"):  # the chapter's setting is orange wherever it is shown
-        assert pixels_like(picture(tmp_path / f"fig_{name}.png"), chapter_pictures.ORANGE) > 200
-    distances = {row.quantity: row.values for row in statements if row.quantity.startswith("distance of")}
+        assert pixels_like(picture(tmp_path / f"fig_{name}.png"), pictures.ORANGE) > 200
+    distances = {row.quantity: row.values for row in rows if row.quantity.startswith("distance of")}
     assert max(distances, key=lambda name: distances[name][1]) == "distance of {1⁻, 4⁺}"

@@ -1,4 +1,4 @@
-"""The damping study: a damped robot rings less, and needs shorter steps less."""
+"""The damping study: a damped robot rings less and converges with longer steps."""
 
 import csv
 
@@ -7,7 +7,7 @@ import pytest
 
 from seastar_gym.gaits import PAIRS
 from studies.scenes import damping
-from studies.scenes.damping import MATERIALS, Plan, Row, Study, as_table, good_enough, of, study
+from studies.scenes.damping import MATERIALS, Plan, Row, Study, as_table, good_enough, rows_of, study
 
 TINY = Plan(n_random=1, converged=(("sdirk3", 1e-3), ("implicit-midpoint", 1e-3)), shortest=10.0)
 
@@ -22,7 +22,7 @@ def row(step: float, path_error: float) -> Row:
 
 
 def test_a_step_is_good_enough_if_all_shorter_ones_are():
-    """An error that is small at one step by luck promises nothing."""
+    """Errors of opposite sign may cancel at one step, so a small error at one step alone does not count."""
     rows = [row(0.02, 0.005), row(0.01, 0.02), row(0.005, 0.009), row(0.002, 0.001)]
     assert good_enough(rows) == rows[2]
     assert good_enough(rows[:2]) is None
@@ -31,7 +31,7 @@ def test_a_step_is_good_enough_if_all_shorter_ones_are():
 def test_damped_swims_converge_where_undamped_ones_ring(found):
     assert found.agreement["silicone"] < 0.1 * found.agreement["undamped"]
     for scheme in ("sdirk2", "sdirk3", "implicit-midpoint"):
-        damped, undamped = of(found.rows, "silicone", scheme), of(found.rows, "undamped", scheme)
+        damped, undamped = (rows_of(found.rows, material, scheme) for material in ("silicone", "undamped"))
         assert [each.step for each in damped] == [0.02, 0.01]
         assert damped[-1].path_error < 0.3 * undamped[-1].path_error
     assert all(found.pairs[material].shape == (len(PAIRS),) for material in MATERIALS)
@@ -45,5 +45,5 @@ def test_the_study_writes_its_table_and_picture(found, monkeypatch, tmp_path, ca
     with (tmp_path / "damping.csv").open() as stream:
         assert len(list(csv.DictReader(stream))) == len(found.rows)
     assert (tmp_path / "damping.png").stat().st_size > 10_000
-    assert "pairs of Fig. 13.8" in capsys.readouterr().out
+    assert "Damping changes the distances that the pairs of Fig. 13.8 swim by" in capsys.readouterr().out
     assert as_table(found).row_count == 4

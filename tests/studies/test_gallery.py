@@ -1,4 +1,6 @@
-"""The gallery shows every scene, and what it costs."""
+"""The gallery shows every scene with its cost."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -7,7 +9,7 @@ from studies.scenes import gallery
 
 
 @pytest.mark.slow
-def test_the_gallery_has_a_picture_and_a_price_of_every_scene(tmp_path):
+def test_the_gallery_has_a_picture_and_a_cost_of_every_scene(tmp_path):
     gallery.make_gallery(tmp_path, "a machine", rounds=1, n_robots=8, strokes=1)
     text = (tmp_path / "gallery.md").read_text(encoding="utf-8")
     for exhibit in gallery.exhibits():
@@ -17,9 +19,18 @@ def test_the_gallery_has_a_picture_and_a_price_of_every_scene(tmp_path):
     assert "a machine" in text
 
 
-def test_prices_are_over_that_of_the_first_scene():
+def test_the_page_in_the_repository_is_the_one_that_the_study_writes():
+    """Except for the measured numbers, which depend on the machine."""
+    page = (Path(__file__).parents[2] / "docs" / "gallery.md").read_text(encoding="utf-8").splitlines()
+    shown = gallery.exhibits()
+    zeros = np.zeros(len(shown))
+    written = gallery.page(shown, zeros, zeros, "2-core AMD EPYC").splitlines()
+    assert [line.split(" | ")[:2] for line in page] == [line.split(" | ")[:2] for line in written]
+
+
+def test_costs_are_relative_to_the_first_scene():
     shown = gallery.exhibits()[:1] * 2
-    costs, per_step = gallery.prices(shown, rounds=1, n_robots=1)
+    costs, per_step = gallery.measure_costs(shown, rounds=1, n_robots=1)
     assert costs[0] == 1.0 and costs[1] > 0.0
     np.testing.assert_array_equal(per_step[0], per_step[1])
 

@@ -1,4 +1,4 @@
-"""What is compared is the same stroke: plain Newton and the simulator's kernel end in the same bits."""
+"""The cost of safeguards compares the same stroke: plain Newton and the simulator's kernel end in the same bits."""
 
 import numpy as np
 import pytest
@@ -9,8 +9,8 @@ from studies.speed import hardening
 @pytest.mark.parametrize("numerics", hardening.SETTINGS, ids=lambda numerics: numerics.scheme)
 def test_both_kernels_make_the_same_stroke_in_as_many_iterations(numerics):
     pair, ends = hardening.Pair(numerics), []
-    for hardened in (True, False):
-        assert pair.seconds(hardened) > 0.0
+    for safeguarded in (True, False):
+        assert pair.seconds(safeguarded) > 0.0
         ends.append((pair.q.copy(), pair.v.copy(), pair.report[:, hardening.NEWTON_ITERATIONS].copy()))
     for one, other in zip(*ends, strict=True):
         np.testing.assert_array_equal(one, other)

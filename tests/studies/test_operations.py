@@ -1,4 +1,4 @@
-"""The work of a Newton iteration, counted: it grows with the number of nodes and not without our knowing."""
+"""The operations of a Newton iteration grow in proportion to the nodes and stay below a bound."""
 
 import re
 
@@ -14,7 +14,7 @@ def iteration_flops(**robot):
 
 
 def test_an_iteration_of_the_chapter_scene_costs_no_more_than_when_it_was_tuned():
-    # The one number that says the kernels became slower on every machine. Lower it when they become faster.
+    # These bounds show on any machine when kernels become slower. Lower them when kernels become faster.
     parts = count_operations(Scene(numerics=Numerics.preset("chapter")))
     assert flops(parts["iteration"]) <= 11_600
     assert parts["iteration"]["divide"] <= 227

@@ -1,4 +1,4 @@
-"""The study of what terms cost compares scenes that all swim."""
+"""The study of the cost of terms compares scenes with one more term each, in the same round."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The speed study measures what it says and writes it; how fast this machine is, it reports and no test asserts."""
+"""The speed study counts all robots and writes its results. No test asserts a speed, which depends on the machine."""
 
 import csv
 
@@ -6,23 +6,23 @@ import numpy as np
 import pytest
 
 from seastar_gym import Scene
-from studies.speed import throughput
+from studies.speed import process, strokes, throughput
 from studies.speed.parts import PARTS, part_seconds
 
 
 def test_exponent_of_a_linear_cost_is_one():
     nodes = np.array([5, 10, 20, 40])
-    assert throughput.exponent([(n, 3.0 * (5 * n - 4)) for n in nodes]) == pytest.approx(1.0)
+    assert strokes.exponent([(n, 3.0 * (5 * n - 4)) for n in nodes]) == pytest.approx(1.0)
 
 
 def test_real_time_factor_counts_all_robots():
-    one = throughput.real_time_factors(Scene(), 1, 1, 0.02)
+    one = strokes.real_time_factors(Scene(), 1, 1, 0.02)
     assert all(factor > 0 for factor in one)
     assert len(one) >= 5
 
 
 def test_a_robot_is_small_and_a_stroke_leaves_nothing_behind():
-    held, left = throughput.memory_per_robot(Scene())
+    held, left = process.memory_per_robot(Scene())
     assert held < 64.0  # KiB
     assert left < 8.0  # B: less than one number per robot
 
@@ -32,7 +32,7 @@ def test_table_csv_and_picture_are_written(tmp_path):
     curves = {
         "batch, 1 thread": [(n, 1000.0) for n in throughput.BATCHES],
         "batch, 2 threads": [(n, 1900.0) for n in throughput.BATCHES],
-        "us per step over N": [(n, 0.03 * n) for n in throughput.NODES_PER_LIMB],
+        "us per step over N": [(n, 0.03 * n) for n in strokes.NODES_PER_LIMB],
     }
     throughput.write_csv(figures, curves, tmp_path / "t.csv")
     throughput.draw(curves, tmp_path / "t.png")

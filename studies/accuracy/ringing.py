@@ -1,0 +1,125 @@
+"""Ringing of the limbs, and the error of schemes that damp it."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.gaits import PAIRS
+from seastar_gym.model.rods import make_rods
+from seastar_gym.scene import Numerics
+from seastar_gym.simulator import Simulator
+from studies.accuracy.cases import STROKES, scene_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from studies.accuracy.rows import Study
+
+from studies.accuracy.style import COLOURS, INK, MM, MS, PERCENT, as_percent, subplots
+
+Floats = NDArray[np.float64]
+
+RINGING = "{1-,2+}"
+EXACT = Numerics("implicit-midpoint", 0.05e-3, 1e-11)
+SHOWN: tuple[tuple[str, Numerics, str, float], ...] = (
+    ("converged", EXACT, INK, 1.4),
+    ("implicit-midpoint 0.5 ms: keeps it", Numerics("implicit-midpoint", 0.5e-3), COLOURS["implicit-midpoint"], 1.2),
+    ("sdirk2 0.5 ms: damps it", Numerics("sdirk2", 0.5e-3), "#ee9922", 1.4),
+    ("sdirk2 20 ms", Numerics("sdirk2", 20e-3), COLOURS["sdirk2"], 1.4),
+)
+SAMPLES = 4000
+"""Samples of a stroke, where the time steps are short enough."""
+
+
+def ringing(found: Study) -> Figure:
+    """Speed of a limb within a stroke, strength of its ringing, and the excess distance swum, for several schemes."""
+    figure, (close, strength, path) = subplots(1, 3, figsize=(13.5, 4.7))
+    begin, end = 0.42, 0.45
+    for name, numerics, colour, width in SHOWN:
+        time, velocity, stretching = record(numerics)
+        some = (time >= begin - 0.02) & (time <= end + 0.02)
+        close.plot(MS * time[some], MM * velocity[some], lw=width, color=colour)
+        strength.semilogy(time, MM * smoothed(stretching, time), color=colour, lw=width, label=name)
+        path.plot(*excess(swum(numerics)), "o-", ms=3.5, lw=width, color=colour)
+    strokes, frozen = excess(swum(EXACT, freeze_lengths=True))
+    path.plot(strokes, frozen, "o--", ms=3.5, mfc="white", lw=1.4, color=INK)
+    path.annotate(
+        "converged, but every 2 ms the\nlengthwise ringing is taken out", (9, frozen[8]),
+        (-12, 14), textcoords="offset points", ha="right", fontsize=8.5, color=INK,
+    )  # fmt: skip
+    close.set(xlim=(MS * begin, MS * end), ylim=(2, 18), xlabel="time in the stroke [ms]")
+    close.set_ylabel("speed of a node in the middle of limb 1 [mm/s]")
+    close.set_title("1. Limbs ring lengthwise, at hundreds of hertz", fontsize=10.5, loc="left")
+    strength.set(
+        xlabel="time in the stroke [s]", ylabel="lengthening speed of limbs, r.m.s. [mm/s]", ylim=(0.03, 100.0)
+    )
+    strength.set_title("2. SDIRK2 damps the ringing, the midpoint rule keeps it", fontsize=10.5, loc="left")
+    strength.legend(frameon=False, fontsize=8.5, loc="upper right")
+    path.set(xlabel="strokes", ylabel="farther from the start than the converged robot", xticks=range(0, 11, 2))
+    path.set_title("3. Robots that do not ring swim too far", fontsize=10.5, loc="left")
+    as_percent(path.yaxis)
+    figure.suptitle(f"Why damped ringing costs accuracy: the pair {RINGING} of Fig. 13.8", x=0.01, ha="left")
+    return figure
+
+
+def record(numerics: Numerics, relaxation_time: float | None = None) -> tuple[Floats, Floats, Floats]:
+    """Second stroke: times [s], velocity across limb 1 at its middle [m/s], r.m.s. lengthening speed of limbs [m/s]."""
+    simulator = Simulator(scene_of(numerics, relaxation_time=relaxation_time), 1, threads=1)
+    command = PAIRS[RINGING][None]
+    simulator.stroke(command)
+    time, velocity, stretching = [], [], []
+    for t in simulator.stroke_in_parts(command, min(SAMPLES, round(1.0 / numerics.step))):
+        time.append(t)
+        velocity.append(simulator.velocities[0, 5, 1])
+        limbs = (lengthening(simulator) @ simulator.velocities.ravel()).reshape(5, -1).sum(axis=1)
+        stretching.append(np.sqrt(np.mean(limbs**2)))
+    return np.array(time), np.array(velocity), np.array(stretching)
+
+
+def lengthening(simulator: Simulator) -> Floats:
+    """Matrix from node velocities to the lengthening speeds of edges, limb by limb, shape (n_edges, 2 n_nodes)."""
+    nodes = simulator.positions[0]
+    heads = np.arange(1, len(nodes))
+    tails = np.where((heads - 1) % ((len(nodes) - 1) // 5) == 0, 0, heads - 1)
+    directions = nodes[heads] - nodes[tails]
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    matrix = np.zeros((len(heads), len(nodes), 2))
+    edges = np.arange(len(heads))
+    matrix[edges, heads], matrix[edges, tails] = directions, -directions
+    return matrix.reshape(len(heads), -1)
+
+
+@cache
+def swum(numerics: Numerics, freeze_lengths: bool = False) -> Floats:
+    """Distances of the hub from the start at the ends of strokes [m], shape (STROKES,).
+
+    freeze_lengths: Every 2 ms, remove the lengthening speed of all edges by impulses between their ends.
+    """
+    simulator = Simulator(scene_of(numerics), 1, threads=1)
+    masses = np.repeat(make_rods(simulator.scene).mass, 2)
+    distances = []
+    for _ in range(STROKES):
+        for _ in simulator.stroke_in_parts(PAIRS[RINGING][None], 500 if freeze_lengths else 1):
+            if freeze_lengths:
+                rates = lengthening(simulator)
+                v = simulator.v[0, :, 0]
+                v -= np.linalg.solve((rates / masses) @ rates.T, rates @ v) @ (rates / masses)
+        distances.append(np.hypot(*simulator.hub_position()[0]))
+    return np.array(distances)
+
+
+def excess(distances: Floats) -> tuple[Floats, Floats]:
+    """Numbers of strokes, and relative excess of the distance from the start over the converged robot's [%]."""
+    exact = swum(EXACT)
+    return np.arange(1.0, STROKES + 1.0), PERCENT * (distances / exact - 1.0)
+
+
+def smoothed(values: Floats, time: Floats, window: float = 0.03) -> Floats:
+    """Root mean square of values over a moving window of time [s]."""
+    n = max(1, round(window / (time[-1] - time[-2])))
+    ones = np.convolve(np.ones(len(values)), np.ones(n), mode="same")
+    return np.sqrt(np.convolve(values**2, np.ones(n), mode="same") / ones)

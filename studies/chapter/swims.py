@@ -1,0 +1,82 @@
+"""Recorded swims, with the chapter's numerics and converged."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seastar_gym.scene import Numerics, Scene
+from seastar_gym.simulator import Simulator, SolverStatus
+
+Floats = NDArray[np.float64]
+MM, MS = 1e3, 1e3
+
+CHAPTER = Numerics("implicit-euler", 3e-3)
+"""Numerics of the chapter."""
+CONVERGED, NEARLY_CONVERGED = Numerics("implicit-midpoint", 0.25e-3), Numerics("implicit-midpoint", 1e-3)
+
+
+@dataclass(frozen=True)
+class Swim:
+    """Recorded motion of the robots of one scene.
+
+    label: Name of the numerics in legends.
+    scene: Simulated scene.
+    commands: Commands of every stroke, shape (n_strokes, n_robots, n_limbs).
+    time: Times of the samples [s], shape (n,). The first sample is at rest, before the first stroke.
+    positions, velocities: Node positions [m] and velocities [m/s], shape (n, n_robots, n_nodes, 2).
+    """
+
+    label: str
+    scene: Scene
+    commands: Floats
+    time: Floats
+    positions: Floats
+    velocities: Floats
+
+    def hub(self, robot: int = 0) -> Floats:
+        """Hub positions of a robot [m], shape (n, 2)."""
+        return self.positions[:, robot, 0]
+
+    def hub_velocity(self, robot: int = 0) -> Floats:
+        """Hub velocities of a robot [m/s], shape (n, 2)."""
+        return self.velocities[:, robot, 0]
+
+    def at(self, time: float) -> int:
+        """Index of the first sample that is not before a time [s]."""
+        return int(np.searchsorted(self.time, time - 1e-9))
+
+    def at_strokes(self) -> NDArray[np.intp]:
+        """Indices of the samples at rest and at the end of every stroke, shape (n_strokes + 1,)."""
+        ends = np.arange(len(self.commands) + 1) * self.scene.actuator.period
+        return np.searchsorted(self.time, ends - 1e-9)
+
+    def actuated(self, time: float, robot: int = 0) -> NDArray[np.bool_]:
+        """Mask of a robot's limbs that are rotated at a time [s], shape (n_limbs,)."""
+        stroke, since = divmod(time + 1e-9, self.scene.actuator.period)
+        turned = stroke < len(self.commands) and self.scene.actuator.delta_psi(since) > 1e-6
+        active: NDArray[np.bool_] = turned & (self.commands[int(stroke) if turned else 0, robot] != 0.0)
+        return active
+
+
+def label(numerics: Numerics) -> str:
+    """Name of numerics in legends."""
+    name = {CHAPTER: "the chapter's setting", CONVERGED: "converged"}.get(numerics, "nearly converged")
+    scheme = numerics.scheme.replace("-", " ").replace("euler", "Euler")
+    return f"{name} ({scheme}, {1e3 * numerics.step:g} ms)"
+
+
+def swim(numerics: Numerics, commands: ArrayLike, samples_per_stroke: int) -> Swim:
+    """Simulate and record robots from rest; commands: shape (n_strokes, n_robots, n_limbs)."""
+    commands = np.asarray(commands, float)
+    scene = Scene(numerics=numerics)
+    simulator = Simulator(scene, commands.shape[1])
+    samples = [(0.0, simulator.positions, simulator.velocities)]
+    for stroke, command in enumerate(commands):
+        for since in simulator.stroke_in_parts(command, samples_per_stroke):
+            now = stroke * scene.actuator.period + since
+            samples.append((now, simulator.positions, simulator.velocities))
+        if simulator.failed.any():
+            raise RuntimeError(SolverStatus.NOT_CONVERGED.sentence)
+    times, positions, velocities = (np.array(values) for values in zip(*samples, strict=True))
+    return Swim(label(numerics), scene, commands, times, positions, velocities)

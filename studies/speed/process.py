@@ -1,0 +1,68 @@
+"""Costs around the strokes: the vector environment, memory, and the start of a process."""
+
+import gc
+import os
+import subprocess
+import sys
+import time
+import tracemalloc
+
+import gymnasium as gym
+import numpy as np
+
+from seastar_gym.gaits import STRAIGHT
+from seastar_gym.scene import Scene
+from seastar_gym.simulator import Simulator
+
+
+def environment_share(n_robots: int, seconds: float) -> list[float]:
+    """Shares of a vector environment's step that are not the simulator's stroke, with fidelity `fast`."""
+    env = gym.make_vec(
+        "seastar_gym:SeastarSwim-v0", num_envs=n_robots, vectorization_mode="vector_entry_point", fidelity="fast",
+        actions="joint", max_episode_steps=10**9, threads=1, path=[[10.0, 0.0]],
+    )  # fmt: skip
+    env.reset(seed=0)
+    rng = np.random.default_rng(0)
+    shares = []
+    for _ in range(max(5, int(20 * seconds))):
+        actions = rng.integers(3**5, size=n_robots)
+        batch = env.unwrapped
+        commands = batch.command_table[actions]  # type: ignore[attr-defined]
+        simulator = batch.simulator  # type: ignore[attr-defined]
+        state = simulator.get_state()
+        start = time.perf_counter()
+        simulator.stroke(commands)
+        stroke = time.perf_counter() - start
+        simulator.set_state(state)
+        start = time.perf_counter()
+        env.step(actions)
+        shares.append(1.0 - stroke / (time.perf_counter() - start))
+    return shares[1:]
+
+
+def memory_per_robot(scene: Scene, n_robots: int = 512) -> tuple[float, float]:
+    """Memory of a robot in a batch [KiB], and memory that a stroke leaves allocated per robot [B]."""
+    commands = np.tile(STRAIGHT, (n_robots, 1))
+    tracemalloc.start()
+    simulator = Simulator(scene, n_robots, threads=1)
+    held = tracemalloc.get_traced_memory()[0]
+    simulator.stroke(commands)
+    gc.collect()
+    before = tracemalloc.get_traced_memory()[0]
+    for _ in range(20):
+        simulator.stroke(commands)
+    gc.collect()
+    left = tracemalloc.get_traced_memory()[0] - before
+    tracemalloc.stop()
+    return held / n_robots / 1024, max(0, left) / 20 / n_robots
+
+
+def process_seconds(code: str, cache: str) -> float:
+    """Time [s] that `code` prints in a fresh interpreter; cache: Folder of numba's cache."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": cache}
+    output = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    return float(output.stdout)
+
+
+TIMED = "import time; start = time.perf_counter(); {}; print(time.perf_counter() - start)"
+FIRST_STROKE = "import seastar_gym as s; s.Simulator(s.Scene()).stroke([[0, 1, 0, 0, -1]])"
