@@ -1,6 +1,7 @@
 """Kernels in plain Python: beside the compiled ones, in place of them, and never by accident."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -124,7 +125,7 @@ def test_the_twin_has_every_function_of_lanes_and_says_so():
     }
     assert used <= {*numpy_lanes.FUNCTIONS, "N_LANES"}
     for name in (*numpy_lanes.FUNCTIONS, "N_LANES", "Lanes", "Mask"):
-        assert f"\n{name} " in numpy_lanes.__doc__
+        assert re.search(rf"^{name}\s", numpy_lanes.__doc__, flags=re.MULTILINE)
 
 
 def test_what_is_loaded_does_not_change_with_what_is_stored():
