@@ -27,7 +27,9 @@ SCRIPT = """
 import sys, numpy, test_plain
 numpy.savez(sys.argv[1], **test_plain.ends())
 """
-MEETING = SmaPulse(0.62, 0.08, 0.02)
+MEETING = SmaPulse(0.62, 0.06, 0.02)
+BLOWS = {"implicit-euler": 3.0, "contact": 1.0, "no contact": 1.0}
+"""Velocities of some robots when a stroke begins [m/s], 0.3 in other scenes: steps are halved, limbs meet."""
 
 
 # Whole strokes
@@ -51,7 +53,7 @@ def ends() -> dict[str, np.ndarray]:
     """Where the nodes are after a stroke; some robots begin with blows that need repairs and halved steps."""
     found = {}
     for name, scene in scenes():
-        n_robots, blow = (N_LANES + 1, 3.0) if name == "implicit-euler" else (N_LANES, 0.3)  # two threads once
+        n_robots, blow = N_LANES + (name == "implicit-euler"), BLOWS.get(name, 0.3)  # two threads once
         simulator, rng = Simulator(scene, n_robots, threads=2), np.random.default_rng(0)
         simulator.v[:, :, -2:] = blow * rng.standard_normal(simulator.v[:, :, -2:].shape)
         report = simulator.stroke(rng.integers(-1, 2, (n_robots, 5)).astype(float))
