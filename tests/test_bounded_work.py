@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State, StrokeReport, Water
+from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State, StrokeReport
 from seastar_gym import scene as module
 from seastar_gym.der.rods import STEPS
 from seastar_gym.model.rods import make_limits
@@ -40,11 +40,11 @@ def test_error_control_and_halvings_together_keep_the_shortest_step_and_the_boun
     """Error control goes down to 1/4096 here, and then Newton is stuck; on top of each other they took for ever."""
     scene = Scene(Seastar(12), None, SmaPulse(1.3), Numerics.preset("accurate"))
     simulator, command = Simulator(scene), np.array([[1.0, -1.0] * 6])
-    for sign in (1.0, -1.0, 1.0):
-        steps, report = in_parts(simulator, sign * command, 200)
+    for _ in range(3):
+        steps, report = in_parts(simulator, command, 200)
         assert steps.max() <= SHORTEST
         assert report.newton_iterations[0] <= make_limits(scene).most_iterations
-        assert report.status[0] in (SolverStatus.CONVERGED, SolverStatus.ITERATION_LIMIT)
+        assert report.status[0] != SolverStatus.NOT_FINITE
         assert (report.covered[0] == pytest.approx(1.0)) == (report.status[0] == SolverStatus.CONVERGED)
 
 
@@ -86,16 +86,16 @@ def test_a_robot_that_had_too_few_iterations_swims_again_after_a_reset(monkeypat
     assert not simulator.stroke(commands).status.any()
 
 
-@pytest.mark.parametrize("scheme", SCHEMES[:4])
-@pytest.mark.parametrize("fluid", [None, Water()], ids=["vacuum", "water"])
-def test_steps_that_were_halved_grow_again_within_their_interval(scheme, fluid):
-    """From velocities that need steps of 1/256 at first: without growth, those would take all of the interval."""
-    scene = Scene(fluid=fluid, actuator=SmaPulse(0.3, 0.1, 0.1), numerics=Numerics(scheme, 0.1))
-    simulator, commands = swimmers(scene, 8, speed=200.0)
-    report = simulator.stroke(commands)
+def test_adapted_steps_that_were_halved_grow_again_within_their_interval():
+    """From velocities that need short steps at first: without growth, they took 65,533 for the two intervals."""
+    scene = Scene(actuator=SmaPulse(0.3, 0.1, 0.1), numerics=Numerics("implicit-midpoint", 0.1, path_tolerance=0.02))
+    simulator, rng = Simulator(scene, 8), np.random.default_rng(0)
+    state = simulator.get_state()
+    simulator.set_state(State(state.positions, 300.0 * rng.standard_normal(state.positions.shape), state.time))
+    report = simulator.stroke(rng.integers(-1, 2, (8, 5)))
     assert not report.status.any()
-    assert report.halvings.max() >= 8
-    assert 10 < report.steps.max() < 200
+    assert report.halvings.max() > 4
+    assert report.steps.max() < SHORTEST
     np.testing.assert_allclose(report.covered, 0.2, rtol=1e-12)
 
 

@@ -12,16 +12,20 @@ from seastar_gym.command import run_command
 ROOT = Path(__file__).resolve().parent.parent
 OF_STUDIES = ("matplotlib", "rich", "tqdm")
 OF_TRAIN = ("imageio", "plotly", "safetensors", "stable_baselines3", "tensorboard", "torch", "tyro")
-STUDIES = sorted(
-    f"studies.{file.stem}"
-    for file in (ROOT / "seastar_gym" / "studies").glob("*.py")
-    if '__name__ == "__main__"' in file.read_text(encoding="utf-8")
-)
-AGENTS = sorted(
-    f"agents.{file.stem}"
-    for file in (ROOT / "agents").glob("*.py")
-    if '__name__ == "__main__"' in file.read_text(encoding="utf-8")
-)
+
+
+def commands(folder: str) -> list[str]:
+    """Every module of a folder that `python -m` runs, a room by the name of its folder."""
+    files = [
+        file
+        for file in sorted((ROOT / folder).rglob("*.py"))
+        if file.stem == "__main__" or '__name__ == "__main__"' in file.read_text(encoding="utf-8")
+    ]
+    names = [".".join(file.relative_to(ROOT).with_suffix("").parts) for file in files]
+    return [name.removesuffix(".__main__") for name in names]
+
+
+STUDIES, AGENTS = commands("studies"), commands("agents")
 
 
 def python(tmp_path, missing, *arguments):
@@ -47,8 +51,10 @@ def test_there_are_commands_to_test():
 
 @pytest.mark.parametrize("command", [*STUDIES, *AGENTS, "seastar_gym.identify"])
 def test_every_command_says_in_a_sentence_what_the_disk_refuses(command):
-    text = ROOT.joinpath(*command.split(".")).with_suffix(".py").read_text(encoding="utf-8")
-    assert text.endswith('if __name__ == "__main__":\n    run_command(main)\n')
+    place = ROOT.joinpath(*command.split("."))
+    file = place / "__main__.py" if place.is_dir() else place.with_suffix(".py")
+    last_line = file.read_text(encoding="utf-8").splitlines()[-1]
+    assert last_line.strip() == "run_command(main)"
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
 """The plain twin of lanes.py on numpy: kernels run on it as the Python that they are, slowly, step by step.
 
-With `NUMBA_DISABLE_JIT=1` the whole package does; plain.py loads them beside the compiled ones. What kernels may
-ask of lanes is this and no more, and another processor would need no more either:
+With NUMBA_DISABLE_JIT=1 the whole package does; plain.py loads them beside the compiled ones. What kernels may ask of
+lanes is this and no more, and another processor would need no more either:
 
 Lanes           one float64 per robot, a value: + - * / with lanes and plain numbers, -x, and += -= *= /=, which make a
                 new value; < <= > >= == give a mask, in which NaN is false
@@ -19,7 +19,8 @@ sqrt            sqrt(lanes) -> Lanes, correctly rounded
 floor           floor(lanes) -> Lanes
 absolute        absolute(lanes) -> Lanes
 add_product     add_product(c, a, b) -> Lanes: c + a b, rounded once; two of the three may be numbers
-subtract_product  subtract_product(c, a, b) -> Lanes: c - a b, likewise
+subtract_product
+                subtract_product(c, a, b) -> Lanes: c - a b, likewise
 any_lane        any_lane(mask) -> bool
 all_lanes       all_lanes(mask) -> bool
 

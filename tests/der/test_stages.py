@@ -85,9 +85,9 @@ def test_the_error_of_a_step_is_that_of_the_midpoint_rule_on_a_cubic():
 def test_the_smallest_hub_angle_is_kept():
     report = np.zeros((len(REPORT_ROWS), N_LANES))
     report[SMALLEST_HUB_T] = np.inf
-    note_hub_angles.plain(RODS, rows(ROBOT.nodes()), report)
+    note_hub_angles.plain(RODS, rows(ROBOT.nodes()), EVERYONE, report)
     np.testing.assert_allclose(report[SMALLEST_HUB_T], np.tan(np.pi / 5.0), rtol=1e-12)
-    note_hub_angles.plain(RODS, 2.0 * rows(ROBOT.nodes()), report)
+    note_hub_angles.plain(RODS, 2.0 * rows(ROBOT.nodes()), EVERYONE, report)
     np.testing.assert_allclose(report[SMALLEST_HUB_T], np.tan(np.pi / 5.0), rtol=1e-12)
 
 

@@ -61,7 +61,7 @@ def draw_arguments(rng: Random) -> dict[str, Any]:
     actuator = rng.choice([SmaPulse(), SmaPulse(0.3), Limited(SmaPulse(), largest_rate=3.0), ThermalSma()])
     names = rng.sample(["robot.youngs_modulus", "robot.density", "fluid.density"], rng.randint(1, 3))
     spread = DomainRandomization(
-        {"limb_strength": Uniform(0.3, 1.0)}
+        {"limb_strengths": Uniform(0.3, 1.0)}
         | {name: Uniform(8e5, 2e6) if "modulus" in name else Uniform(800.0, 1200.0) for name in names}
     )
     return {

@@ -268,13 +268,15 @@ def cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, a
     A robot whose step does not converge in `limits.max_iterations`, or creates energy, halves it, alone, as often as it
     takes, and still covers the whole interval. After each halving it has as many more iterations and starts them where
     it stands; after CAUTIOUS halvings it goes on with the scheme `fallback` (implicit Euler); after MOST_HALVINGS it
-    has failed and keeps its last good state. Every doubling takes a halving back: the first after SOONEST_GROWTH steps
-    without trouble, the next after twice as many, so that a robot that cannot do with longer steps rarely tries them.
+    has failed and keeps its last good state. So has one that needs more than `limits.most_iterations` in the stroke.
 
     If steps are adapted, a robot also halves a step whose error is too large, doubles it when the error allows, and
-    goes on with it in the next interval. No step is below SMALLEST_FRACTION: a robot that is stuck there tries again,
-    and the halving counts. Steps are dyadic fractions of the interval, on the grid of their own size, so their sums are
-    exact. A robot that has made `limits.most_iterations` in the stroke and needs more has failed, too.
+    goes on with it in the next interval. After halvings for other reasons, a doubling takes one back: the first after
+    SOONEST_GROWTH steps without trouble, the next after twice as many, so that a robot that cannot do with longer steps
+    rarely tries them; none leads back from `fallback` to `scheme`, whose ringing may have been the trouble.
+
+    No step is below SMALLEST_FRACTION: a robot that is stuck there tries again, and the halving counts. Steps are
+    dyadic fractions of the interval, on the grid of their own size, so their sums are exact.
 
     Returns the mask of the robots that arrived.
     """
@@ -310,13 +312,13 @@ def cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, a
         spent = load(report, NEWTON_ITERATIONS) >= limits.most_iterations
         failed = stuck & ((halvings >= MOST_HALVINGS) | spent)
         halvings += select(stuck, one, zero)
-        if limits.adaptive or any_lane(wary):
+        if limits.adaptive:
             # The error of a step of twice the length is about eight times as large, per time four times.
             small = GROWTH_MARGIN * error_rate <= load(limits.error_rate, 0)
             pairs = start / (2.0 * size)
             fits = accepted & small & (pairs == floor(pairs)) & (size < 1.0)
             streak = select(accepted & wary, streak + 1.0, zero)
-            relieved = fits & (streak >= growth)
+            relieved = fits & (streak >= growth) & ~(halvings == CAUTIOUS)
             halvings -= select(relieved, one, zero)
             streak, growth = select(relieved, zero, streak), select(relieved, 2.0 * growth, growth)
             size = select((fits & ~wary) | relieved, 2.0 * size, size)

@@ -1,0 +1,61 @@
+"""The guard in plain Python: the frame that a step is judged in, rigid motions, cuts, hinges beyond their poles."""
+
+import numpy as np
+import pytest
+
+from seastar_gym import Scene, Seastar, UniformCurrent, Water
+from seastar_gym.der.rods import make_work
+from seastar_gym.der.stepping.guard import cut_velocities, frame_velocity, rigid_motion, through_poles
+from seastar_gym.model.rods import make_rods
+from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simd.numpy_lanes import Lanes, Mask
+from slopes import nodes, plain, rotated, rows
+
+ROBOT = Seastar(5, 4)
+RODS = make_rods(Scene(ROBOT, None))
+STILL, EVERYONE = (Lanes(0.0), Lanes(0.0)), Mask(np.ones(N_LANES, bool))
+RNG = np.random.default_rng(0)
+Q, V = ROBOT.nodes() + 1e-3 * RNG.standard_normal((ROBOT.n_nodes, 2)), RNG.standard_normal((ROBOT.n_nodes, 2))
+
+
+def motion_of(v: np.ndarray):
+    return rigid_motion.plain(RODS, make_work(RODS, 1), rows(Q), rows(v), STILL)
+
+
+def test_a_robot_is_judged_as_its_water_sees_it_and_in_vacuum_as_its_own_centre_of_mass_does():
+    stream = make_rods(Scene(ROBOT, Water(current=UniformCurrent(0.3, -0.2))))
+    found = plain(frame_velocity.plain(stream.current, stream, rows(Q), rows(V)))
+    np.testing.assert_allclose([found[0][0], found[1][0]], [0.3, -0.2])
+    alone = plain(frame_velocity.plain(None, RODS, rows(Q), rows(V)))
+    np.testing.assert_allclose([alone[0][0], alone[1][0]], RODS.mass @ V / RODS.mass.sum(), rtol=1e-12)
+
+
+def test_a_rigid_motion_is_found_again_with_its_energy():
+    c = RODS.mass @ Q / RODS.mass.sum()
+    rigid = np.array([0.2, -0.1]) + 1.5 * (Q - c) @ np.array([[0.0, 1.0], [-1.0, 0.0]])
+    _, x, y, v_x, v_y, omega, energy = (float(np.ravel(part)[0]) for part in plain(motion_of(rigid)))
+    np.testing.assert_allclose([x, y, v_x, v_y, omega], [*c, 0.2, -0.1, 1.5], rtol=1e-12)
+    assert energy == pytest.approx(0.5 * np.sum(RODS.mass[:, None] * rigid**2), rel=1e-12)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.5, 0.0])
+def test_a_cut_keeps_that_share_of_what_is_not_rigid_and_all_that_is(share):
+    v, motion = rows(V), motion_of(V)
+    cut_velocities.plain(RODS, rows(Q), v, STILL, motion, Lanes(share), EVERYONE)
+    after = plain(motion_of(nodes(v)[0]))
+    np.testing.assert_allclose([part[0] for part in after[3:]], [part[0] for part in plain(motion)[3:]], rtol=1e-11)
+    kinetic, before = (0.5 * np.sum(RODS.mass[:, None] * each**2) for each in (nodes(v)[0], V))
+    rigid = float(after[-1][0])
+    assert kinetic - rigid == pytest.approx(share**2 * (before - rigid), rel=1e-9, abs=1e-15)
+
+
+@pytest.mark.parametrize("degrees, through", [(100.0, False), (-170.0, False), (190.0, True), (-200.0, True)])
+def test_a_limb_that_is_folded_over_its_hinge_has_gone_through_its_pole(degrees, through):
+    """From 60 degrees towards where it goes, the end of limb 1 beyond its node 2."""
+    work, folded = make_work(RODS, 1), []
+    for angle in (np.copysign(60.0, degrees), degrees):
+        q = ROBOT.nodes()
+        q[3] = q[2] + rotated(q[3] - q[2], np.radians(angle))
+        folded.append(rows(q))
+    work.step[:] = folded[0]
+    assert np.all(plain(through_poles.plain(RODS, work, folded[1], EVERYONE)) == through)
