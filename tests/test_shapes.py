@@ -67,7 +67,7 @@ ACROSS = {"drag_coefficient": 1.3, "tangential_drag_coefficient": 0.2, "added_ma
 
 @pytest.mark.parametrize("name", DIFFERENT)
 def test_drag_and_mass_across_tapered_limbs_are_those_of_the_oracle(name):
-    """Of half an edge, by the radius in its middle: for every node that of its inner edge, then that of its outer one."""
+    """Of half an edge, by the radius in its middle: for every node of its inner edge, then of its outer one."""
     robot, star = robot_and_star(name, **ACROSS)
     rods = Scene(robot, Water(**ACROSS), SmaPulse(0.0)).rods()
     for found, of_edges in ((rods.cross_drag, star.cross_drag), (rods.added_mass, star.added_mass)):
