@@ -17,6 +17,8 @@ RODS = Scene(ROBOT, WATER).rods()
 OF_AN_EDGE = 1000.0 * 0.7 * np.pi * ROBOT.rod_radius**2 * ROBOT.edge_length
 NOTHING = (Lanes(0.0), (Lanes(0.0), Lanes(0.0)), (Lanes(0.0), Lanes(0.0), Lanes(0.0)))
 
+AT_HOME = Lanes(0.0), Lanes(0.0)
+
 
 def frozen(angle: float = 0.0):
     """Memory of the robot at rest, turned."""
@@ -29,7 +31,7 @@ def frozen(angle: float = 0.0):
 def energy(work, velocity: np.ndarray) -> float:
     """Kinetic energy of the fluid [J] where all nodes move alike."""
     v = rows(np.tile(velocity, (ROBOT.n_nodes, 1)))
-    return float(plain(add_fluid_energy.plain(work.added_mass, RODS, v, Lanes(0.0)))[0])
+    return float(plain(add_fluid_energy.plain(work.added_mass, RODS, v, AT_HOME, Lanes(0.0)))[0])
 
 
 def test_all_edges_together_weigh_on_their_nodes_what_they_drag_along():
@@ -51,7 +53,7 @@ def test_a_star_of_five_limbs_moves_the_same_fluid_in_every_direction():
 def test_robot_and_motion_turned_together_have_the_same_energy():
     v = np.random.default_rng(0).standard_normal((ROBOT.n_nodes, 2))
     energies = [
-        plain(add_fluid_energy.plain(frozen(angle).added_mass, RODS, rows(rotated(v, angle)), Lanes(0.0)))[0]
+        plain(add_fluid_energy.plain(frozen(angle).added_mass, RODS, rows(rotated(v, angle)), AT_HOME, Lanes(0.0)))[0]
         for angle in (0.0, 1.1)
     ]
     assert energies[1] == pytest.approx(energies[0], rel=1e-12)
@@ -76,4 +78,9 @@ def test_inertia_has_the_derivatives_of_its_energy_and_a_mass_that_is_never_nega
 
 def test_without_added_mass_slopes_and_energy_stay_what_they_are():
     assert add_fluid_inertia.plain(None, 1, None, None, None, NOTHING) is NOTHING
-    assert add_fluid_energy.plain(None, None, None, 3.0) == 3.0
+    assert add_fluid_energy.plain(None, None, None, None, 3.0) == 3.0
+
+
+def test_a_frame_that_moves_with_all_nodes_sees_no_energy():
+    v, frame = rows(np.tile([0.3, -0.2], (ROBOT.n_nodes, 1))), (Lanes(0.3), Lanes(-0.2))
+    assert plain(add_fluid_energy.plain(frozen().added_mass, RODS, v, frame, Lanes(0.0)))[0] == 0.0

@@ -6,7 +6,7 @@ import pytest
 import oracle
 from seastar_gym import Scene, Seastar, SmaPulse
 from seastar_gym.der.actuation import set_natural_hub_angles
-from seastar_gym.der.energy import add_load_energy, elastic_energy, kinetic_energy
+from seastar_gym.der.energy import elastic_energy, kinetic_energy
 from seastar_gym.der.lanes import N_LANES
 from seastar_gym.der.numpy_lanes import Lanes
 from seastar_gym.der.rods import Actuation, make_work
@@ -57,15 +57,7 @@ def test_internal_forces_neither_push_nor_turn_the_robot():
     assert abs(spin.sum()) < 1e-6 * size * 0.1
 
 
-def test_kinetic_energy_is_half_the_masses_times_the_speeds_squared():
-    v = RNG.standard_normal(SHAPE.shape)
-    rods = Scene(Seastar(5, 4)).rods()
-    assert plain(kinetic_energy.plain(rods, rows(v)))[0] == pytest.approx(oracle.kinetic_energy(STAR, v), rel=1e-13)
-
-
-def test_a_load_gives_its_node_the_energy_that_it_loses_on_the_way():
-    loads = np.zeros(2 * STAR.n_nodes)
-    loads[4], loads[7] = 0.3, -0.2
-    found = plain(add_load_energy.plain(loads, rows(SHAPE), STAR.n_nodes, Lanes(1.0)))[0]
-    assert found == pytest.approx(1.0 - 0.3 * SHAPE[2, 0] + 0.2 * SHAPE[3, 1], rel=1e-13)
-    assert add_load_energy.plain(None, None, None, 1.0) == 1.0
+def test_kinetic_energy_is_half_the_masses_times_the_speeds_squared_as_the_frame_sees_them():
+    v, frame = RNG.standard_normal(SHAPE.shape), np.array([0.4, -1.1])
+    found = plain(kinetic_energy.plain(Scene(Seastar(5, 4)).rods(), rows(v), tuple(map(Lanes, frame))))[0]
+    assert found == pytest.approx(oracle.kinetic_energy(STAR, v - frame), rel=1e-13)

@@ -84,9 +84,12 @@ def test_the_error_of_a_step_is_that_of_the_midpoint_rule_on_a_cubic():
 def test_the_smallest_hub_angle_is_kept():
     report = np.zeros((len(REPORT_ROWS), N_LANES))
     report[SMALLEST_HUB_T] = np.inf
-    note_hub_angles.plain(RODS, rows(ROBOT.nodes()), report)
+    asked = np.arange(N_LANES) > 0
+    note_hub_angles.plain(RODS, rows(ROBOT.nodes()), Mask(asked), report)
+    assert np.isinf(report[SMALLEST_HUB_T, 0])
+    note_hub_angles.plain(RODS, rows(ROBOT.nodes()), Mask(~asked), report)
     np.testing.assert_allclose(report[SMALLEST_HUB_T], np.tan(np.pi / 5.0), rtol=1e-12)
-    note_hub_angles.plain(RODS, 2.0 * rows(ROBOT.nodes()), report)
+    note_hub_angles.plain(RODS, 2.0 * rows(ROBOT.nodes()), Mask(asked), report)
     np.testing.assert_allclose(report[SMALLEST_HUB_T], np.tan(np.pi / 5.0), rtol=1e-12)
 
 
