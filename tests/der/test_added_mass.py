@@ -17,6 +17,8 @@ RODS = Scene(ROBOT, WATER).rods()
 OF_AN_EDGE = 1000.0 * 0.7 * np.pi * ROBOT.rod_radius**2 * ROBOT.edge_length
 NOTHING = (Lanes(0.0), (Lanes(0.0), Lanes(0.0)), (Lanes(0.0), Lanes(0.0), Lanes(0.0)))
 
+AT_HOME = Lanes(0.0), Lanes(0.0)
+
 
 def frozen(angle: float = 0.0):
     """Memory of the robot at rest, turned."""
