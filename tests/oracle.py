@@ -163,12 +163,23 @@ class Star:
         coefficient = self.drag_coefficient if along is None else along
         return 0.5 * self.fluid_density * coefficient * 2.0 * self.rod_radius * self.voronoi_lengths
 
-    @property
-    def cross_drag(self) -> float:
+    @cached_property
+    def edge_radii(self) -> Array:
+        """Radius in the middle of every edge [m]."""
+        return np.full(len(self.edges), self.rod_radius)
+
+    @cached_property
+    def cross_drag(self) -> Array:
         """1/2 rho_f (C_d - C_t) D l/2 of half an edge [kg/m]: what flow across it adds to the drag of each end."""
         along = self.tangential_drag_coefficient
         more = 0.0 if along is None else self.drag_coefficient - along
-        return 0.5 * self.fluid_density * more * 2.0 * self.rod_radius * self.edge_length / 2.0
+        return 0.5 * self.fluid_density * more * 2.0 * self.edge_radii * self.edge_lengths / 2.0
+
+    @cached_property
+    def added_mass(self) -> Array:
+        """rho_f C_a pi r^2 l/2 of half an edge [kg]: fluid that each end carries along across the edge."""
+        volumes = np.pi * self.edge_radii**2 * self.edge_lengths
+        return self.fluid_density * self.added_mass_coefficient * volumes / 2.0
 
     @cached_property
     def differences(self) -> list[Array]:
@@ -211,6 +222,10 @@ class Shaped(Star):
     @cached_property
     def edge_lengths(self) -> Array:
         return np.array([self.lengths[limb] / (self.nodes_per_limb - 1) for limb, _ in self._limb_edges])
+
+    @cached_property
+    def edge_radii(self) -> Array:
+        return np.array([self.radius(limb, i + 0.5) for limb, i in self._limb_edges])
 
     @cached_property
     def edge_EA(self) -> Array:
@@ -268,7 +283,9 @@ class Shaped(Star):
 
     @cached_property
     def drag(self) -> Array:
-        return self._per_node(lambda r: 0.5 * self.fluid_density * self.drag_coefficient * 2.0 * r)
+        along = self.tangential_drag_coefficient
+        coefficient = self.drag_coefficient if along is None else along
+        return self._per_node(lambda r: 0.5 * self.fluid_density * coefficient * 2.0 * r)
 
 
 def stretching_energy(e: Array, EA: float, length: float) -> float:
@@ -380,20 +397,20 @@ def relative_velocities(star: Star, v: Array, frozen: Array | None) -> Array:
     return v if star.current is None else v - star.current(frozen)
 
 
-def half_edges(star: Star, frozen: Array | None) -> Iterator[tuple[int, Array]]:
-    """(node, unit normal) of both halves of every edge, where flow across a limb has drag or mass of its own."""
-    if star.cross_drag > 0.0 or star.added_mass_coefficient > 0.0:
-        for (tail, head), e in zip(star.edges, edge_vectors(star, frozen), strict=True):
+def half_edges(star: Star, frozen: Array | None) -> Iterator[tuple[int, int, Array]]:
+    """(edge, node, unit normal) of both halves of every edge, where flow across a limb has drag or mass of its own."""
+    if star.cross_drag.any() or star.added_mass.any():
+        for i, e in enumerate(edge_vectors(star, frozen)):
             normal = np.array([-e[1], e[0]]) / np.linalg.norm(e)
-            yield tail, normal
-            yield head, normal
+            for node in star.edges[i]:
+                yield i, node, normal
 
 
 def drag_potential(star: Star, v: Array, frozen: Array | None = None) -> float:
     """Dissipation potential 1/6 rho_f C_d D |w|^3 dl, summed over the nodes [W], and that of flow across edges."""
     w = relative_velocities(star, v, frozen)
-    across = sum(abs(w[node] @ normal) ** 3 for node, normal in half_edges(star, frozen))
-    return float(np.sum(star.drag * np.linalg.norm(w, axis=1) ** 3 / 3.0) + star.cross_drag * across / 3.0)
+    across = sum(star.cross_drag[i] * abs(w[node] @ normal) ** 3 for i, node, normal in half_edges(star, frozen))
+    return float(np.sum(star.drag * np.linalg.norm(w, axis=1) ** 3 / 3.0) + across / 3.0)
 
 
 def drag_force(star: Star, v: Array, frozen: Array | None = None) -> Array:
@@ -401,9 +418,9 @@ def drag_force(star: Star, v: Array, frozen: Array | None = None) -> Array:
     w = relative_velocities(star, v, frozen)
     speed: Array = np.linalg.norm(w, axis=1)
     force: Array = -(star.drag * speed)[:, None] * w
-    for node, normal in half_edges(star, frozen):
+    for i, node, normal in half_edges(star, frozen):
         across = w[node] @ normal
-        force[node] -= star.cross_drag * abs(across) * across * normal
+        force[node] -= star.cross_drag[i] * abs(across) * across * normal
     return force
 
 
@@ -416,9 +433,9 @@ def drag_jacobian(star: Star, v: Array, frozen: Array | None = None) -> Array:
         if speed > 0.0:
             block = -star.drag[i] * (speed * np.eye(2) + np.outer(w_i, w_i) / speed)
             jacobian[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = block
-    for i, normal in half_edges(star, frozen):
-        across = 2.0 * star.cross_drag * abs(w[i] @ normal)
-        jacobian[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] -= across * np.outer(normal, normal)
+    for i, node, normal in half_edges(star, frozen):
+        across = 2.0 * star.cross_drag[i] * abs(w[node] @ normal)
+        jacobian[2 * node : 2 * node + 2, 2 * node : 2 * node + 2] -= across * np.outer(normal, normal)
     return jacobian
 
 
@@ -430,9 +447,8 @@ def kinetic_energy(star: Star, v: Array) -> float:
 def mass_matrix(star: Star, frozen: Array | None) -> Array:
     """Lumped masses and added mass [kg], shape (2 n_nodes, 2 n_nodes)."""
     matrix = np.diag(np.repeat(star.masses, 2))
-    half_edge = star.fluid_density * star.added_mass_coefficient * np.pi * star.rod_radius**2 * star.edge_length / 2.0
-    for node, normal in half_edges(star, frozen):
-        matrix[2 * node : 2 * node + 2, 2 * node : 2 * node + 2] += half_edge * np.outer(normal, normal)
+    for i, node, normal in half_edges(star, frozen):
+        matrix[2 * node : 2 * node + 2, 2 * node : 2 * node + 2] += star.added_mass[i] * np.outer(normal, normal)
     return matrix
 
 

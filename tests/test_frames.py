@@ -20,8 +20,8 @@ PARTS, FORESEEABLE = 100, 10
 
 
 def seen_from(boost: np.ndarray, scene: Scene, noise: float, shake: float = 0.0) -> tuple[np.ndarray, int]:
-    """Positions [m] in the frame, shape (PARTS, n_robots, n_nodes, 2), on the way of a stroke from some noise [m] on the
-    nodes, with `boost` added to all motion and `shake` [m] to the nodes; and how many steps were halved or cut.
+    """Positions [m] in the frame, shape (PARTS, n_robots, n_nodes, 2), on the way of a stroke from some noise [m] on
+    the nodes, with `boost` added to all motion and `shake` [m] to the nodes; and how many steps were halved or cut.
     """
     if scene.fluid is not None:
         scene = replace(scene, fluid=replace(scene.fluid, current=UniformCurrent(*boost)))
@@ -35,13 +35,15 @@ def seen_from(boost: np.ndarray, scene: Scene, noise: float, shake: float = 0.0)
         try:
             way.append(-boost * next(stroke) + simulator.positions)
         except StopIteration as end:
-            assert np.median(end.value.status) == 0
-            return np.array(way), int(end.value.halvings.sum() + end.value.energy_cuts.sum())
+            report = end.value
+            break
+    assert np.median(report.status) == 0
+    return np.array(way), int(report.halvings.sum() + report.energy_cuts.sum())
 
 
 def assert_seen_alike(scene: Scene, noise: float = 1e-3) -> int:
-    """In another frame robots part no farther than from ones that are shaken by rounding, in the median: those that ring
-    wildly are chaotic. Returns how much trouble they had.
+    """In another frame robots part no farther than from ones that are shaken by rounding, in the median: those that
+    ring wildly are chaotic. Returns how much trouble they had.
     """
     home, needed = seen_from(np.zeros(2), scene, noise)
     moving, _ = seen_from(np.array([0.31, -0.17]), scene, noise)

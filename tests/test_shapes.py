@@ -5,7 +5,7 @@ import pytest
 
 import oracle
 from oracle import Shaped, Star
-from seastar_gym import Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
+from seastar_gym import Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, UniformCurrent, Water
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import SymmetryReduction
 from seastar_gym.model.rods import make_rods
@@ -41,13 +41,15 @@ DIFFERENT = {
 }
 
 
-def robot_and_star(name: str, nodes_per_limb: int = 4) -> tuple[Seastar, Shaped]:
+def robot_and_star(name: str, nodes_per_limb: int = 4, **fluid: float) -> tuple[Seastar, Shaped]:
     limbs, hub = DIFFERENT[name]
-    robot = Seastar(len(limbs), nodes_per_limb, hub_hinge=hub, limbs=tuple(Limb(*limb) for limb in limbs))
+    robot = Seastar(
+        len(limbs), nodes_per_limb, hub_hinge=hub, limbs=tuple(Limb(*limb) for limb in limbs)
+    )
     directions, lengths, radii, moduli, curvatures = zip(*limbs, strict=True)
     star = Shaped(
         len(limbs), nodes_per_limb, hub_hinge=hub, directions=directions, lengths=lengths, radii=radii, moduli=moduli,
-        curvatures=curvatures,
+        curvatures=curvatures, **fluid,
     )  # fmt: skip
     return robot, star
 
@@ -59,6 +61,39 @@ def test_rest_shape_and_coefficients_are_those_of_the_oracle(name):
     np.testing.assert_allclose(robot.nodes(), star.rest, atol=1e-15)
     np.testing.assert_allclose(rods.mass, star.masses, rtol=1e-13)
     np.testing.assert_allclose(rods.drag, star.drag, rtol=1e-13)
+
+
+ACROSS = {"drag_coefficient": 1.3, "tangential_drag_coefficient": 0.2, "added_mass_coefficient": 0.8}
+"""Coefficients of the fluid where flow across a limb has drag and mass of its own."""
+
+
+@pytest.mark.parametrize("name", DIFFERENT)
+def test_drag_and_mass_across_tapered_limbs_are_those_of_the_oracle(name):
+    """Of half an edge, by the radius in its middle: for every node of its inner edge, then of its outer one."""
+    robot, star = robot_and_star(name, **ACROSS)
+    rods = make_rods(Scene(robot, Water(**ACROSS), SmaPulse(0.0)))
+    for found, of_edges in ((rods.cross_drag, star.cross_drag), (rods.added_mass, star.added_mass)):
+        expected = np.zeros((star.n_nodes, 2))
+        for (tail, head), of_edge in zip(star.edges, of_edges, strict=True):
+            expected[head, 0] = of_edge
+            if tail > 0:
+                expected[tail, 1] = of_edge
+        np.testing.assert_allclose(found.reshape(-1, 2), expected, rtol=1e-13)
+
+
+@pytest.mark.parametrize("name", ["one limb", "four limbs, turning", "five unlike limbs"])
+def test_a_step_of_a_tapered_robot_in_such_a_fluid_is_the_oracles(name):
+    h = 0.01
+    robot, star = robot_and_star(name, **ACROSS)
+    numerics = Numerics("implicit-euler", h, newton_tolerance=1e-13)
+    water = Water(**ACROSS, current=UniformCurrent())
+    simulator, rng = Simulator(Scene(robot, water, SmaPulse(0.0, 2.0 * h, 2.0 * h), numerics)), np.random.default_rng(3)
+    q, v = star.rest + 1e-4 * rng.standard_normal(star.rest.shape), 0.1 * rng.standard_normal(star.rest.shape)
+    simulator.set_state((q[None], v[None], np.zeros(1)))
+    next(simulator.stroke_in_parts(np.zeros((1, star.n_limbs)), 4))
+    q, v = oracle.step(star, q, v, 0.0, h, np.zeros(star.n_limbs), "implicit-euler", peak_angle=0.0)
+    np.testing.assert_allclose(simulator.positions[0], q, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(simulator.velocities[0], v, rtol=0.0, atol=1e-10)
 
 
 @pytest.mark.parametrize("name", DIFFERENT)

@@ -73,3 +73,25 @@ def test_energy_forces_and_step_are_the_oracles(n_limbs, nodes_per_limb, ahead):
             np.testing.assert_allclose(found.decrement[lane], gradient @ step, rtol=1e-5)
     assert touched > 6
     assert (found.pivot > 0.0).sum() >= N_LANES // 2
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("nodes_per_limb", [3, 4])
+def test_a_tip_at_a_root_edge_of_its_neighbour_is_met(nodes_per_limb, side):
+    """However far from it the nodes of either limb are that end the root edges."""
+    robot, star = robot_and_star(5, nodes_per_limb)
+    stages = RandomStages(star, 2e-4, bend=0.01, speed=0.01)
+    limb, other = (1, 2) if side < 0.0 else (2, 1)
+    hub, root = stages.q[:, 0], stages.q[:, star.node(other, 1)] - stages.q[:, 0]
+    normal = side * np.stack([-root[:, 1], root[:, 0]], axis=1) / star.edge_length
+    tip = star.node(limb, nodes_per_limb - 1)
+    stages.q[:, tip] = hub + 0.3 * root + 1.2e-3 * normal
+    stages.q_hat, stages.frozen = stages.q - 1e-5, stages.q.copy()
+    found = stages.run(make_rods(scene(robot)))
+    for lane in range(N_LANES):
+        depths, gradients, stiffnesses = of_lane(star, stages, lane, False)
+        at_tip = gradients.reshape(len(gradients), -1, 2)[:, tip].any(axis=1)
+        assert (depths[at_tip] > 1e-4).any()
+        q_hat, v_hat, gamma, delta_psi, frozen = stages.data(lane)
+        phi = oracle.incremental_potential(star, stages.q[lane], q_hat, v_hat, gamma, delta_psi, frozen)
+        np.testing.assert_allclose(found.phi[lane], phi + 0.5 * stiffnesses @ depths**2, rtol=1e-9)

@@ -167,7 +167,7 @@ def inertia(star: Star, lane_q: np.ndarray) -> np.ndarray:
 def held(
     share: float, largest_cut: float = 0.01, robots: np.ndarray | None = None, star: Star = STAR
 ) -> SimpleNamespace:
-    """Robots held to their potential energy, that of their rigid motion, and `share` of the rest, all seen from FRAME."""
+    """Robots held to their potential energy, that of their rigid motion, and `share` of the rest, seen from FRAME."""
     q, v = moving_robots()
     rods = RODS if star is STAR else STREAM_RODS
     rows, work, result = (rows_of(q), rows_of(v)), work_at(np.zeros((N_LANES, 5)), rods=rods), np.zeros((3, N_LANES))

@@ -24,7 +24,6 @@ from slopes import plain, rows
 ROBOT = Seastar(5, 3)
 SCENE = Scene(ROBOT, actuator=SmaPulse(0.3))
 RODS, SIZE = make_rods(SCENE), 2 * ROBOT.n_nodes
-EVERYONE = Mask(np.ones(N_LANES, bool))
 RNG = np.random.default_rng(0)
 H = 0.01
 
@@ -85,9 +84,12 @@ def test_the_error_of_a_step_is_that_of_the_midpoint_rule_on_a_cubic():
 def test_the_smallest_hub_angle_is_kept():
     report = np.zeros((len(REPORT_ROWS), N_LANES))
     report[SMALLEST_HUB_T] = np.inf
-    note_hub_angles.plain(RODS, rows(ROBOT.nodes()), EVERYONE, report)
+    asked = np.arange(N_LANES) > 0
+    note_hub_angles.plain(RODS, rows(ROBOT.nodes()), Mask(asked), report)
+    assert np.isinf(report[SMALLEST_HUB_T, 0])
+    note_hub_angles.plain(RODS, rows(ROBOT.nodes()), Mask(~asked), report)
     np.testing.assert_allclose(report[SMALLEST_HUB_T], np.tan(np.pi / 5.0), rtol=1e-12)
-    note_hub_angles.plain(RODS, 2.0 * rows(ROBOT.nodes()), EVERYONE, report)
+    note_hub_angles.plain(RODS, 2.0 * rows(ROBOT.nodes()), Mask(asked), report)
     np.testing.assert_allclose(report[SMALLEST_HUB_T], np.tan(np.pi / 5.0), rtol=1e-12)
 
 

@@ -10,9 +10,17 @@ inertia, drag and a convex U take. Where U is not convex along the step the last
 moderate speeds, drag takes more than that, so only steps that had trouble, or much energy to lose, are looked at; in
 vacuum those that may have created energy by what Newton knows at their end.
 
+All that is measured in a frame that moves with the velocity c of the fluid at the hub, in vacuum with that of the
+centre of mass. Seen from there, the kinetic energy is that of v - c, a current u does the work h drag (u - c), and a
+dead load F does F (dq - h c). With the balance of momentum, P_1 - P_0 = h (drag + F), any c says the same: another one
+changes the energy's growth by -c (P_1 - P_0) and the work by -c h (drag + F). But only implicit Euler has the drag of
+the step's end throughout the step. With a c fixed in the laboratory, the other schemes would be held to one thing
+there and to another where everything moves uniformly. In still water c is zero, and a uniform current changes nothing.
+It is zero, too, where nodes are held in the laboratory.
+
 A step that created energy is refused, or, where little is to be taken away, its velocities about the rigid motion with
-the same momenta are cut down to the energy allowed: momentum and angular momentum stay, and the cut is of the order of
-the scheme's own error.
+the same momenta are cut down to the energy allowed: momentum and angular momentum, with those of added mass, stay, and
+the cut is of the order of the scheme's own error.
 
 Schemes of higher order take the energy in the middle of a step and promise no such balance. In a step that had trouble
 they are held to the larger of the energies that the robot standing still has at the step's ends, and what moving the

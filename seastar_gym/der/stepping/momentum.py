@@ -1,9 +1,9 @@
 """Linear momentum, which no internal force changes, whatever the rounding of a linear solution.
 
 Summed over all nodes, internal forces and contact cancel, so a full Newton step balances the momentum exactly, however
-rough its other parts are. Its rounding does not: elimination subtracts stiffnesses EA/l from each other until the inertia
-m/gamma^2 is left, and loses the share EA/l over m/gamma^2, times the edges squared, of what a double holds. The move of
-the whole robot is then off by that share of the last Newton step.
+rough its other parts are. Its rounding does not: elimination subtracts stiffnesses EA/l from each other until the
+inertia m/gamma^2 is left, and loses as many digits as EA/l over m/gamma^2, times the edges of a limb squared, has. The
+move of the whole robot is then off by that share of the last Newton step, which is as long as the tolerance lets it be.
 
 So where that can be seen, at any step in vacuum and in a fluid at very long ones, the whole robot takes one Newton step
 of its own after the others: from the residual summed over the nodes, and its slope. In vacuum it is exact.

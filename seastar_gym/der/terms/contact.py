@@ -109,7 +109,7 @@ def view_limbs(rods, work, q_0, right, left):
 
 @kernel
 def across_gap(rods, q, right, left):
-    """Unit vector from the right limb to the left one: along the difference of their directions and across their sum."""
+    """Unit vector from the right limb to the left: along the difference of their directions and across their sum."""
     edges = rods.nodes_per_limb - 1
     ax, ay = edge_vector(q, 0, right * edges + 1)
     bx, by = edge_vector(q, 0, left * edges + 1)
@@ -128,11 +128,10 @@ def may_touch(rods, work, reach, limb, other, side):
     edges = rods.nodes_per_limb - 1
     end, begin = splat(-np.inf), -side * load(work.contact.seen, 0)
     for i in range(1, edges + 1):
-        x, y = -side * load(work.contact.seen, 2 * (limb * edges + i)), -side * load(
-            work.contact.seen, 2 * (other * edges + i)
-        )
-        end = select(x > end, x, end)
-        begin = select(y < begin, y, begin)
+        own = -side * load(work.contact.seen, 2 * (limb * edges + i))
+        others = -side * load(work.contact.seen, 2 * (other * edges + i))
+        end = select(own > end, own, end)
+        begin = select(others < begin, others, begin)
     return ~(begin - end > reach), end
 
 
