@@ -26,6 +26,7 @@ SCENE = Scene(ROBOT, actuator=SmaPulse(0.3))
 RODS, SIZE = make_rods(SCENE), 2 * ROBOT.n_nodes
 RNG = np.random.default_rng(0)
 H = 0.01
+EVERYONE = Mask(np.ones(N_LANES, bool))
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
