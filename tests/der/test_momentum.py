@@ -7,9 +7,8 @@ import oracle
 from seastar_gym import Scene, Seastar, SmaPulse
 from seastar_gym.der.potential import node_slopes
 from seastar_gym.der.rods import Stage, make_work
-from seastar_gym.der.stepping.momentum import move_as_a_whole
-from seastar_gym.model.rods import make_rods
 from seastar_gym.der.stepping.momentum import LOST, move_as_a_whole, settle_momentum
+from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
 from slopes import nodes, plain, rows
