@@ -5,7 +5,7 @@ import pytest
 
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State, StrokeReport
 from seastar_gym import scene as module
-from seastar_gym.der.rods import STEPS
+from seastar_gym.der.stepping.report import STEPS
 from seastar_gym.model.rods import make_limits
 
 SCHEMES = ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint", "adaptive"]

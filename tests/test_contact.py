@@ -178,7 +178,7 @@ def test_pressed_limbs_rest_where_statics_says():
     for touch in oracle.touches(oracle.Star(n_limbs=2), positions, nodes, opening):
         contact += touch.stiffness * touch.depth(positions) * touch.gradient.reshape(-1, 2)[tip]
     way = (positions[tip] - nodes[tip]) @ push
-    bending = float(make_rods(scene).EI_over_dl[tip - 1]) / robot.edge_length**2
+    bending = float(make_rods(scene).bending.EI_over_dl[tip - 1]) / robot.edge_length**2
     assert way > 5e-4
     assert -contact @ push == pytest.approx(force - bending * way, rel=0.02)
 

@@ -97,14 +97,14 @@ def test_coefficients_are_the_oracles(hub_hinge):
     rods = make_rods(Scene(robot, water, SmaPulse(peak_angle=0.1)))
     np.testing.assert_allclose(rods.mass, star.masses, rtol=1e-14)
     np.testing.assert_allclose(rods.drag, star.drag, rtol=1e-14)
-    np.testing.assert_allclose(rods.EA, star.EA, rtol=1e-14)
-    np.testing.assert_allclose(rods.EA_over_l * rods.l_over_EA, 1.0, rtol=1e-14)
-    np.testing.assert_allclose(rods.EA_over_l, star.EA / star.edge_length, rtol=1e-14)
-    np.testing.assert_allclose(rods.EI_over_dl, star.EI / star.edge_length, rtol=1e-14)
-    np.testing.assert_allclose(rods.EI_over_dl * rods.dl_over_EI, 1.0, rtol=1e-14)
-    assert rods.hub_side == {"opening": 1.0, "turning": -1.0}[hub_hinge]
-    assert rods.hub_angle == pytest.approx(math.pi / 2 if hub_hinge == "opening" else -math.pi / 2)
-    assert len(rods.EA) == len(star.edges) and len(rods.EI_over_dl) == len(star.hinges)
+    np.testing.assert_allclose(rods.stretching.EA, star.EA, rtol=1e-14)
+    np.testing.assert_allclose(rods.stretching.EA_over_l * rods.stretching.l_over_EA, 1.0, rtol=1e-14)
+    np.testing.assert_allclose(rods.stretching.EA_over_l, star.EA / star.edge_length, rtol=1e-14)
+    np.testing.assert_allclose(rods.bending.EI_over_dl, star.EI / star.edge_length, rtol=1e-14)
+    np.testing.assert_allclose(rods.bending.EI_over_dl * rods.bending.dl_over_EI, 1.0, rtol=1e-14)
+    assert rods.hub.side == {"opening": 1.0, "turning": -1.0}[hub_hinge]
+    assert rods.hub.angle == pytest.approx(math.pi / 2 if hub_hinge == "opening" else -math.pi / 2)
+    assert len(rods.stretching.EA) == len(star.edges) and len(rods.bending.EI_over_dl) == len(star.hinges)
 
 
 @pytest.mark.parametrize("fluid", [None, Water(density=0.0), Water(drag_coefficient=0.0)])

@@ -7,8 +7,9 @@ import numpy as np
 import oracle
 from oracle import Star
 from seastar_gym import Contact, Scene, Seastar, SmaPulse
-from seastar_gym.der.rods import Stage, make_work
-from seastar_gym.der.terms.contact import freeze_contact
+from seastar_gym.der.rods import make_work
+from seastar_gym.der.stepping.stages import Stage
+from seastar_gym.der.terms.near_pairs import freeze_contact
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes

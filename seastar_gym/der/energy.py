@@ -1,27 +1,13 @@
 """Elastic and kinetic energy of a lane group."""
 
-from seastar_gym.der.geometry import edge_geometry, half_angle
-from seastar_gym.der.rods import n_nodes, tail_node
-from seastar_gym.der.terms.actuation import set_natural_hub_angles
+from seastar_gym.der.geometry import half_angle
+from seastar_gym.der.star import edge_of
 from seastar_gym.der.terms.bending import bending_energy, moment
+from seastar_gym.der.terms.hub import set_natural_hub_angles
+from seastar_gym.der.terms.inertia import kinetic_energy
 from seastar_gym.der.terms.stretching import stretching_energy, tension
 from seastar_gym.simd.compilation import entry_point, kernel
-from seastar_gym.simd.lanes import add_product, borrow, load, splat, store
-
-
-@kernel
-def hinge_edges(rods, e):
-    """(a, b, side): the edges of the hinge that ends with edge e, and how its angle is measured, see geometry.py."""
-    edges = rods.nodes_per_limb - 1
-    if e % edges == 0:
-        return e, (e + edges) % (rods.n_limbs * edges), rods.hub_side
-    return e - 1, e, 1.0
-
-
-@kernel
-def edge_of(rods, q, e):
-    """Geometry of edge e."""
-    return edge_geometry(q, tail_node(rods, e), e + 1)
+from seastar_gym.simd.lanes import borrow, load, splat, store
 
 
 @kernel
@@ -40,22 +26,12 @@ def elastic_energy(rods, work, q):
         edge = edge_of(rods, q, root)
         next_root = edge_of(rods, q, (root + edges) % (rods.n_limbs * edges))
         EI_kappa_bar = load(work.hub_EI_kappa_bar, limb)
-        hinge = hinge_energy(rods, root, edge, next_root, rods.hub_side, EI_kappa_bar)
+        hinge = hinge_energy(rods, root, edge, next_root, rods.hub.side, EI_kappa_bar)
         total += stretching_energy(rods, root, tension(rods, root, edge[2])) + hinge
         for e in range(root + 1, root + edges):
             before, edge = edge, edge_of(rods, q, e)
-            hinge = hinge_energy(rods, e, before, edge, 1.0, load(rods.EI_kappa_bar, e))
+            hinge = hinge_energy(rods, e, before, edge, 1.0, load(rods.bending.EI_kappa_bar, e))
             total += stretching_energy(rods, e, tension(rods, e, edge[2])) + hinge
-    return total
-
-
-@kernel
-def kinetic_energy(rods, v, frame):
-    """Kinetic energy [J] as seen from a frame that moves with the velocity `frame` [m/s]."""
-    total = splat(0.0)
-    for node in range(n_nodes(rods)):
-        vx, vy = load(v, 2 * node) - frame[0], load(v, 2 * node + 1) - frame[1]
-        total = add_product(total, 0.5 * load(rods.mass, node), vx * vx + vy * vy)
     return total
 
 

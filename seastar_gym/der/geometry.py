@@ -1,9 +1,14 @@
 """Edges of a planar rod and the angles between them."""
 
 from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.lanes import add_product, load, sqrt, subtract_product
+from seastar_gym.simd.lanes import add_product, load, select, sqrt, subtract_product
 
 EDGE_ROWS = 7  # what edge_geometry returns
+
+
+@kernel
+def larger(a, b):
+    return select(a > b, a, b)
 
 
 @kernel

@@ -42,6 +42,7 @@ from seastar_gym.der.terms.bending import bending_energy, bending_slopes, moment
 from seastar_gym.der.terms.contact import add_contact, contact_force
 from seastar_gym.der.terms.damping import damped_energy, damped_stiffness, damped_stress
 from seastar_gym.der.terms.drag import add_cross_flow, drag_slopes, relative
+from seastar_gym.der.terms.load import load_power, nodal_load
 from seastar_gym.der.terms.stretching import stretching_energy, tension
 from seastar_gym.simd.compilation import inlined_kernel, kernel
 from seastar_gym.simd.lanes import add_product, load, select, splat, store, subtract_product
@@ -56,23 +57,24 @@ def edge_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex):
     _, _, length, squared, inverse, ux, uy = edge
     T = tension(rods, e, length)
     natural = splat(0.0)
-    pull = damped_stress(rods.relaxation_time, work.tension, e, stage.inverse_gamma, T, natural) * length
+    pull = damped_stress(rods.damping, work.tension, e, stage.inverse_gamma, T, natural) * length
     across = select(convex, positive_part(pull), pull) + stiffness
     mu = select(convex, 0.0, net_moment)
     twice_mu = mu + mu
-    difference = damped_stiffness(rods.relaxation_time, stage.inverse_gamma, load(rods.EA_over_l, e)) * squared - across
+    stretching = damped_stiffness(rods.damping, stage.inverse_gamma, load(rods.stretching.EA_over_l, e))
+    difference = stretching * squared - across
     isotropic = across * inverse
     wx = add_product(difference * ux, twice_mu, uy)
     wy = subtract_product(difference * uy, twice_mu, ux)
     return (
         damped_energy(
-            rods.relaxation_time,
+            rods.damping,
             work.tension,
             e,
             stage.inverse_gamma,
             T,
             natural,
-            load(rods.l_over_EA, e),
+            load(rods.stretching.l_over_EA, e),
             stretching_energy(rods, e, T),
         ),
         (subtract_product(pull * ux, net_moment, uy), add_product(pull * uy, net_moment, ux)),
@@ -88,12 +90,12 @@ def edge_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex):
 def hinge_slopes(rods, work, stage, hinge, t, EI_kappa_bar, convex):
     """(E_b, slope, s): energy of a hinge and its first and second slope in phi, with damping."""
     bend = moment(rods, hinge, t, EI_kappa_bar)
-    tau, inverse_gamma = rods.relaxation_time, stage.inverse_gamma
+    tau, inverse_gamma = rods.damping, stage.inverse_gamma
     energy = damped_energy(
-        tau, work.bending, hinge, inverse_gamma, bend, EI_kappa_bar, load(rods.dl_over_EI, hinge),
+        tau, work.bending, hinge, inverse_gamma, bend, EI_kappa_bar, load(rods.bending.dl_over_EI, hinge),
         bending_energy(rods, hinge, bend),
     )  # fmt: skip
-    stiffness = damped_stiffness(tau, inverse_gamma, load(rods.EI_over_dl, hinge))
+    stiffness = damped_stiffness(tau, inverse_gamma, load(rods.bending.EI_over_dl, hinge))
     damped = damped_stress(tau, work.bending, hinge, inverse_gamma, bend, EI_kappa_bar)
     slope, s = bending_slopes(stiffness, t, damped, convex)
     return energy, slope, s
@@ -102,22 +104,6 @@ def hinge_slopes(rods, work, stage, hinge, t, EI_kappa_bar, convex):
 @kernel
 def positive_part(x):
     return select(x > 0.0, x, 0.0)
-
-
-@kernel
-def nodal_load(loads, node):
-    """Dead load on a node [N]; zero, and gone when compiled, in scenes without loads (None)."""
-    if loads is None:
-        return splat(0.0), splat(0.0)
-    return load(loads, 2 * node), load(loads, 2 * node + 1)
-
-
-@kernel
-def load_power(loads, node, vx, vy):
-    """Power of a node's dead load at a velocity (vx, vy) [W]."""
-    if loads is None:
-        return splat(0.0)
-    return add_product(load(loads, 2 * node) * vx, load(loads, 2 * node + 1), vy)
 
 
 @kernel
@@ -189,7 +175,7 @@ def assemble_hub_hinges(rods, work, stage, convex):
         b = a + 1 if a + 1 < n_limbs else 0
         hinge = a * edges
         first, second = load_root_edge(work, a), load_root_edge(work, b)
-        t = half_angle(first, second, rods.hub_side)
+        t = half_angle(first, second, rods.hub.side)
         E_b, slope, s = hinge_slopes(rods, work, stage, hinge, t, load(work.hub_EI_kappa_bar, a), convex)
         energy += E_b
         store(work.hub_t, a, t)
@@ -232,7 +218,7 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
         e = node - 1
         before = inner_edge(work, limb, first, i - 1)
         t = half_angle(before, edge, 1.0)
-        E_b, slope_before, s_before = hinge_slopes(rods, work, stage, e, t, load(rods.EI_kappa_bar, e), convex)
+        E_b, slope_before, s_before = hinge_slopes(rods, work, stage, e, t, load(rods.bending.EI_kappa_bar, e), convex)
         E_s, f, K = edge_slopes(rods, work, stage, e, edge, slope_before - slope, s_before + s, convex)
         E_n, g, inertia = node_slopes(rods, work, stage, node)
         energy += (E_s + E_n) + E_b

@@ -5,11 +5,13 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.der.rods import Limits, Rods, put_robot, side_by_side
+from seastar_gym.der.rods import Rods
+from seastar_gym.der.stepping.limits import Limits
 from seastar_gym.model.rods import make_limits, make_rods
 from seastar_gym.scene import Scene
 from seastar_gym.scene.per_robot import frame_of, of_robot
 from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simd.rows import put_robot, side_by_side
 
 Floats = NDArray[np.float64]
 

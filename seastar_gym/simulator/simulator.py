@@ -9,23 +9,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.der.energy import energies
-from seastar_gym.der.rods import (
-    REPORT_ROWS,
-    SMALLEST_HUB_T,
-    Actuation,
-    Work,
-    aligned_rows,
-    make_work,
-)
+from seastar_gym.der.rods import Work, make_work
+from seastar_gym.der.stepping.report import REPORT_ROWS, SMALLEST_HUB_T
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stroke import advance
+from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.coefficients import Coefficients
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import MAX_STEPS
 from seastar_gym.scene.per_robot import column
 from seastar_gym.simd.lanes import N_LANES
-from seastar_gym.simd.rows import from_rows, to_rows, write_rows
+from seastar_gym.simd.rows import aligned_rows, from_rows, to_rows, write_rows
 from seastar_gym.simulator.body_frame import best_fit_heading
 from seastar_gym.simulator.drive import Drive
 from seastar_gym.simulator.report import COUNTS

@@ -16,17 +16,18 @@ from numpy.typing import NDArray
 from rich.table import Table
 
 from seastar_gym.der.potential import factorise
-from seastar_gym.der.rods import NEWTON_ITERATIONS, REPORT_ROWS, aligned_rows
-from seastar_gym.der.stepping.newton import EASY, LATE, foreseeable_length, take_step
+from seastar_gym.der.stepping.foresight import EASY, LATE, foreseeable_length
+from seastar_gym.der.stepping.newton import take_step
+from seastar_gym.der.stepping.report import NEWTON_ITERATIONS, REPORT_ROWS
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stages import begin_stage, end_stage, end_step
 from seastar_gym.der.stepping.stroke import advance
-from seastar_gym.der.terms.actuation import set_natural_hub_angles
+from seastar_gym.der.terms.hub import set_natural_hub_angles
 from seastar_gym.model.rods import make_limits, make_rods
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.simd.compilation import entry_point, inlined_kernel
 from seastar_gym.simd.lanes import any_lane, borrow, load, load_number, select, splat, store
-from seastar_gym.simd.rows import to_rows
+from seastar_gym.simd.rows import aligned_rows, to_rows
 from seastar_gym.simulator import Simulator
 from seastar_gym.simulator.schedule import step_times
 

@@ -12,11 +12,11 @@ import numpy as np
 
 from seastar_gym.der.linear.star_matrix import solve_ring
 from seastar_gym.der.potential import assemble_hub_hinges, sweep_limb
-from seastar_gym.der.rods import Actuation, make_work
+from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.newton import take_step
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stages import begin_stage, end_step
-from seastar_gym.der.terms.actuation import set_natural_hub_angles
+from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene import Scene
 from seastar_gym.simd import numpy_lanes

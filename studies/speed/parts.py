@@ -6,8 +6,8 @@ import numpy as np
 
 from seastar_gym.der.linear.star_matrix import solve_ring
 from seastar_gym.der.potential import assemble_hub_hinges, sweep_limb
-from seastar_gym.der.rods import Stage
 from seastar_gym.der.stepping.newton import take_step
+from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene import Scene
 from seastar_gym.simd.compilation import entry_point

@@ -19,7 +19,7 @@ def parts(phi, kappa_bar: float, convex=None):
     """(energy, slope, second slope) of a hinge."""
     t = Lanes(np.tan(0.5 * phi))
     bent = moment.plain(RODS, HINGE, t, Lanes(EI * kappa_bar))
-    slopes = bending_slopes.plain(Lanes(RODS.EI_over_dl[HINGE]), t, bent, convex)
+    slopes = bending_slopes.plain(Lanes(RODS.bending.EI_over_dl[HINGE]), t, bent, convex)
     return plain((bending_energy.plain(RODS, HINGE, bent), *slopes))
 
 

@@ -5,17 +5,17 @@ import pytest
 
 from seastar_gym import Scene
 from seastar_gym.der.terms.contact import (
-    OVERHANG,
     add_contact,
     add_contact_energy,
     add_gap_gradient,
     contact_force,
-    edges_cross,
     gap,
     members,
     n_listed,
     those_apart,
 )
+from seastar_gym.der.terms.crossing import edges_cross
+from seastar_gym.der.terms.near_pairs import OVERHANG
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask

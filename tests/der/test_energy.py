@@ -5,9 +5,10 @@ import pytest
 
 import oracle
 from seastar_gym import Scene, Seastar, SmaPulse
-from seastar_gym.der.energy import elastic_energy, kinetic_energy
-from seastar_gym.der.rods import Actuation, make_work
-from seastar_gym.der.terms.actuation import set_natural_hub_angles
+from seastar_gym.der.energy import elastic_energy
+from seastar_gym.der.rods import make_work
+from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
+from seastar_gym.der.terms.inertia import kinetic_energy
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes

@@ -10,7 +10,7 @@ import pytest
 import oracle
 from oracle import Star
 from seastar_gym import Scene, Seastar, SmaPulse, Vortex, Water
-from seastar_gym.der.rods import Actuation, Rods, aligned_rows, make_work
+from seastar_gym.der.rods import Rods, make_work
 from seastar_gym.der.stepping.guard import (
     add_work_of_loads,
     allowed_energy,
@@ -22,8 +22,10 @@ from seastar_gym.der.stepping.guard import (
 )
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.terms.fluid import add_work_of_current, freeze_fluid
+from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES, borrow, load, select, splat, store
+from seastar_gym.simd.rows import aligned_rows
 
 STAR = Star()
 RODS = make_rods(Scene(actuator=SmaPulse(0.5)))

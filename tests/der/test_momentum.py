@@ -6,8 +6,9 @@ import pytest
 import oracle
 from seastar_gym import Scene, Seastar, SmaPulse
 from seastar_gym.der.potential import node_slopes
-from seastar_gym.der.rods import Stage, make_work
+from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.momentum import LOST, move_as_a_whole, settle_momentum
+from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
@@ -82,11 +83,11 @@ def test_in_vacuum_one_step_balances_the_momentum_and_bends_no_limb():
 
 
 def test_in_a_fluid_steps_that_leave_digits_enough_stay_what_they_are():
-    rate = float(make_rods(Scene()).unsettled_rate[0])
+    rate = float(make_rods(Scene()).scales.unsettled_rate[0])
     assert rate * GAMMA**2 < LOST
     _, stages, q = settled(fluid=True)
     np.testing.assert_array_equal(q, stages.q)
-    gamma = 1.1 * np.sqrt(LOST / float(make_rods(Scene(robot_and_star(5, 4)[0])).unsettled_rate[0]))
+    gamma = 1.1 * np.sqrt(LOST / float(make_rods(Scene(robot_and_star(5, 4)[0])).scales.unsettled_rate[0]))
     star, stages, q = settled(fluid=True, gamma=gamma)
     for lane in range(N_LANES - 1):
         before, after = (

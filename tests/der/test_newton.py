@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 import oracle
-from seastar_gym.der.rods import Stage, make_work
-from seastar_gym.der.stepping.newton import foreseeable_length, larger, minimise, move_node, step_scale
+from seastar_gym.der.geometry import larger
+from seastar_gym.der.rods import make_work
+from seastar_gym.der.stepping.foresight import foreseeable_length
+from seastar_gym.der.stepping.newton import minimise, move_node, step_scale
+from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
 from slopes import nodes, plain, rows

@@ -5,8 +5,10 @@ import pytest
 
 from seastar_gym import Numerics, Scene, Seastar, UniformCurrent, Water
 from seastar_gym.der.geometry import edge_geometry
-from seastar_gym.der.potential import coupling, edge_slopes, load_power, nodal_load, node_slopes, positive_part
-from seastar_gym.der.rods import Stage, make_work
+from seastar_gym.der.potential import coupling, edge_slopes, node_slopes, positive_part
+from seastar_gym.der.rods import make_work
+from seastar_gym.der.stepping.stages import Stage
+from seastar_gym.der.terms.load import load_power, nodal_load
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from seastar_gym import Numerics, Scene, Seastar, SmaPulse
-from seastar_gym.der.rods import COVERED, HALVINGS, REPORT_ROWS, SMALLEST_HUB_T, STEPS, Actuation, Stage, make_work
+from seastar_gym.der.rods import make_work
+from seastar_gym.der.stepping.report import COVERED, HALVINGS, REPORT_ROWS, SMALLEST_HUB_T, STEPS
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stages import (
+    Stage,
     begin_stage,
     cover_interval,
     end_stage,
@@ -16,6 +18,7 @@ from seastar_gym.der.stepping.stages import (
     step_error,
     store_share,
 )
+from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.rods import make_limits, make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask

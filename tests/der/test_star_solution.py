@@ -6,7 +6,8 @@ import pytest
 from seastar_gym import Contact, Scene, SmaPulse
 from seastar_gym.der.linear.star_solution import solve_again, substitute_star
 from seastar_gym.der.potential import factorise
-from seastar_gym.der.rods import Stage, make_work
+from seastar_gym.der.rods import make_work
+from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes

@@ -30,7 +30,7 @@ def test_energy_is_that_of_the_chapter():
 
 def test_tension_is_the_slope_of_the_energy_and_stiffness_that_of_the_tension():
     np.testing.assert_allclose(pull(LENGTHS), slope(energy, LENGTHS, 1e-3), rtol=1e-9, atol=1e-10)
-    np.testing.assert_allclose(RODS.EA_over_l[1], slope(pull, LENGTHS, 1e-3), rtol=1e-9)
+    np.testing.assert_allclose(RODS.stretching.EA_over_l[1], slope(pull, LENGTHS, 1e-3), rtol=1e-9)
 
 
 def test_an_edge_of_its_natural_length_neither_pulls_nor_stores():

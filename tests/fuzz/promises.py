@@ -188,8 +188,9 @@ def energy_noise(simulator: Simulator, robot: int, energy: float, h: float) -> f
     h: Of the shortest step [s]; velocities are differences of positions over it.
     """
     rods = make_rods(simulator.scene, robot if simulator.scene.n_robots else 0)
-    length, mass = float(rods.shortest_edge[0]), float(rods.mass[rods.mass < 1e9 * rods.mass.min()].sum())
-    stiffness = len(rods.EA) * float(rods.EA_over_l.max() + 4.0 * rods.EI_over_dl.max() / length**2)
+    length, mass = float(rods.foresight.shortest_edge[0]), float(rods.mass[rods.mass < 1e9 * rods.mass.min()].sum())
+    stretching, bending = rods.stretching.EA_over_l.max(), rods.bending.EI_over_dl.max()
+    stiffness = (len(rods.mass) - 1) * float(stretching + 4.0 * bending / length**2)
     move = 10.0 * EPSILON * (float(np.abs(simulator.positions[robot]).max()) + rods.nodes_per_limb * length)
     curvature = max(stiffness, mass / h**2)
     return move * math.sqrt(2.0 * curvature * energy) + 0.5 * curvature * move**2

@@ -11,8 +11,8 @@ H of the star's step.
 """
 
 from seastar_gym.der.linear.star_solution import solve_again, substitute_star
-from seastar_gym.der.rods import SLOT_ROWS, STIFFNESS, n_nodes
-from seastar_gym.der.terms.contact import add_gap_gradient, gap, n_listed
+from seastar_gym.der.star import n_nodes
+from seastar_gym.der.terms.contact import SLOT_ROWS, STIFFNESS, add_gap_gradient, gap, n_listed
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, any_lane, load, select, splat, store, subtract_product
 

@@ -32,15 +32,15 @@ folded over itself. Such steps are refused, too, while they are not very short: 
 over at no such cost.
 """
 
-from seastar_gym.der.energy import edge_of, elastic_energy, hinge_edges, kinetic_energy
-from seastar_gym.der.geometry import half_angle
-from seastar_gym.der.potential import load_power
-from seastar_gym.der.rods import n_nodes
-from seastar_gym.der.stepping.newton import larger
-from seastar_gym.der.terms.actuation import set_natural_hub_angles
+from seastar_gym.der.energy import elastic_energy
+from seastar_gym.der.geometry import half_angle, larger
+from seastar_gym.der.star import edge_of, hinge_edges, n_nodes
 from seastar_gym.der.terms.added_mass import add_fluid_energy, add_fluid_momentum
 from seastar_gym.der.terms.contact import add_contact_energy
 from seastar_gym.der.terms.fluid import fluid_velocity
+from seastar_gym.der.terms.hub import set_natural_hub_angles
+from seastar_gym.der.terms.inertia import kinetic_energy
+from seastar_gym.der.terms.load import load_power
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import absolute, add_product, any_lane, load, select, splat, sqrt, store, subtract_product
 
@@ -56,13 +56,13 @@ def frame_velocity(current, rods, q, v):
     That of the fluid at the hub; in vacuum that of the centre of mass; zero where nodes are held in the laboratory.
     """
     mass, v_x, v_y = splat(0.0), splat(0.0), splat(0.0)
-    if rods.held:
+    if rods.scales.held:
         return v_x, v_y
     for node in range(n_nodes(rods)):
         m = load(rods.mass, node)
         mass += m
         v_x, v_y = add_product(v_x, m, load(v, 2 * node)), add_product(v_y, m, load(v, 2 * node + 1))
-    dragged = load(rods.damped, 0) > 0.0
+    dragged = load(rods.scales.damped, 0) > 0.0
     u_x, u_y = fluid_velocity(current, load(q, 0), load(q, 1))
     return select(dragged, u_x, v_x / mass), select(dragged, u_y, v_y / mass)
 
@@ -115,7 +115,8 @@ def moved_hub_energy(rods, work, actuation, start, end):
     energy = splat(0.0)
     for limb in range(rods.n_limbs):
         moved = load(work.hub_EI_kappa_bar, limb) - load(work.hub_moment, limb)
-        energy = add_product(energy, 0.5 * load(rods.dl_over_EI, limb * (rods.nodes_per_limb - 1)) * moved, moved)
+        dl_over_EI = load(rods.bending.dl_over_EI, limb * (rods.nodes_per_limb - 1))
+        energy = add_product(energy, 0.5 * dl_over_EI * moved, moved)
     return energy
 
 
@@ -243,10 +244,11 @@ def energy_noise(rods, q, h, mass, potential, kinetic):
     Velocities are differences of positions over h; stretching and bending are as stiff as `stiffness` [N/m] at most.
     """
     edges = rods.n_limbs * (rods.nodes_per_limb - 1)
-    length = load(rods.shortest_edge, 0)
-    stretching, bending = load(rods.EA_over_l, 0), load(rods.EI_over_dl, 0)
+    length = load(rods.foresight.shortest_edge, 0)
+    stretching, bending = load(rods.stretching.EA_over_l, 0), load(rods.bending.EI_over_dl, 0)
     for e in range(1, edges):
-        stretching, bending = larger(load(rods.EA_over_l, e), stretching), larger(load(rods.EI_over_dl, e), bending)
+        stretching = larger(load(rods.stretching.EA_over_l, e), stretching)
+        bending = larger(load(rods.bending.EI_over_dl, e), bending)
     stiffness = edges * (stretching + 4.0 * bending / (length * length))
     limb = (rods.nodes_per_limb - 1) * length
     move = UNITS * (absolute(load(q, 0)) + absolute(load(q, 1)) + limb)

@@ -10,7 +10,7 @@ of its own after the others: from the residual summed over the nodes, and its sl
 """
 
 from seastar_gym.der.potential import node_slopes
-from seastar_gym.der.rods import n_nodes
+from seastar_gym.der.star import n_nodes
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import any_lane, load, select, splat, store
 
@@ -20,7 +20,7 @@ LOST = 1e8  # of stiffness over inertia: from there on a step's rounding is wort
 @kernel
 def settle_momentum(rods, work, stage, robots):
     """Move the robots in the mask whose momentum may be unbalanced to where it is balanced."""
-    unsettled = robots & (load(rods.unsettled_rate, 0) * stage.gamma * stage.gamma > LOST)
+    unsettled = robots & (load(rods.scales.unsettled_rate, 0) * stage.gamma * stage.gamma > LOST)
     if any_lane(unsettled):
         move_as_a_whole(rods, work, stage, unsettled)
 

@@ -4,20 +4,18 @@ Every robot of a lane group has its own state of the search: a robot that has co
 is frozen by a mask, and nothing that one robot needs (a repair, a shorter step) changes another robot's bits.
 """
 
+from seastar_gym.der.geometry import larger
 from seastar_gym.der.linear.coupled import solve_coupled
 from seastar_gym.der.linear.star_matrix import load_pair, store_pair, substitute_node
 from seastar_gym.der.potential import factorise
-from seastar_gym.der.rods import n_nodes
-from seastar_gym.der.terms.contact import n_listed, those_apart
+from seastar_gym.der.star import n_nodes
+from seastar_gym.der.stepping.foresight import foreseeable_length, predictable
+from seastar_gym.der.terms.contact import n_listed
 from seastar_gym.simd.compilation import inlined_kernel, kernel
 from seastar_gym.simd.lanes import absolute, add_product, any_lane, load, select, splat, sqrt
 
 SUFFICIENT_DECREASE = 1e-4  # Armijo's constant
 ROUNDING = 1e-11  # an increase of Phi below this share of it is taken for rounding, not for ascent
-CURVATURE = 40.0  # for light edges, the step after one of size d is below this times d^2 over the edge length
-EASY = 3.0  # Newton steps: a stage that took more had trouble
-LATE = 10.0  # times CURVATURE for the last of the easy steps
-FORESEEABLE_T = 4.0  # larger values of tan(phi/2) are too near its pole for that
 SHORTEST_STEP = 2.0**-30  # of the Newton step: shorter ones move nothing
 
 
@@ -65,36 +63,12 @@ def minimise(rods, work, stage, active, tolerance, patience):
         count = select(stepping, one, zero)
         iterations += count
         backtracks += select(shortening, one, zero)
-        easy = (repairs + backtracks <= 0.0) & (iterations <= EASY) & (phi <= load(rods.calm, 0))
-        easy = those_apart(work.contact, easy)
-        late = select(iterations < EASY, one, LATE)
-        foreseen = late * move * move <= tolerance * quadratic_length
-        foreseen = easy & foreseen & (largest_hub_t(rods, work) < FORESEEABLE_T)
+        foreseen = predictable(rods, work, iterations, repairs + backtracks, phi, move, tolerance * quadratic_length)
         done = stepping & ((move <= tolerance) | (~convex & foreseen))
         converged = converged | done
         convex = convex & ~stepping
         running = (stepping | shortening) & ~done & (iterations < patience)
     return converged, best, iterations, repairs, backtracks
-
-
-@kernel
-def foreseeable_length(rods, stage):
-    """Length [m] that a Newton step's square is divided by to foresee the size of the next one.
-
-    Measured over stiff, soft, slender and thick robots in random strokes: turning an edge stretches it, and the tension
-    that this makes moves nodes the farther, the stiffer the edges are against the nodes' inertia.
-    """
-    rate = load(rods.curvature_rate, 0)
-    return load(rods.shortest_edge, 0) / (CURVATURE + rate * stage.gamma * stage.gamma)
-
-
-@kernel
-def largest_hub_t(rods, work):
-    """Largest tan(phi/2) of the hub hinges, as last assembled."""
-    largest = load(work.hub_t, 0)
-    for limb in range(1, rods.n_limbs):
-        largest = larger(load(work.hub_t, limb), largest)
-    return largest
 
 
 @kernel
@@ -151,8 +125,3 @@ def move_node(work, node, solution, shortening, scale):
     qx, qy = load_pair(work.q, 2 * node)
     store_pair(work.q, 2 * node, (select(stays, qx, qx + move_x), select(stays, qy, qy + move_y)))
     return add_product(move_x * move_x, move_y, move_y)
-
-
-@kernel
-def larger(a, b):
-    return select(a > b, a, b)

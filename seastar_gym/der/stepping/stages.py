@@ -1,19 +1,9 @@
 """Time steps: a scheme's implicit stages, and the halving of steps that do not converge or create energy."""
 
+from typing import Any, NamedTuple
+
 from seastar_gym.der.geometry import edge_geometry, half_angle
-from seastar_gym.der.rods import (
-    BACKTRACKS,
-    COVERED,
-    ENERGY_CUTS,
-    HALVINGS,
-    NEWTON_ITERATIONS,
-    REJECTIONS,
-    REPAIRS,
-    SMALLEST_HUB_T,
-    STEPS,
-    Stage,
-    n_nodes,
-)
+from seastar_gym.der.star import n_nodes
 from seastar_gym.der.stepping.guard import (
     LARGEST_CUT,
     add_work_of_loads,
@@ -27,12 +17,38 @@ from seastar_gym.der.stepping.guard import (
 )
 from seastar_gym.der.stepping.momentum import settle_momentum
 from seastar_gym.der.stepping.newton import minimise
-from seastar_gym.der.terms.actuation import set_natural_hub_angles
-from seastar_gym.der.terms.contact import freeze_contact, those_uncrossed
+from seastar_gym.der.stepping.report import (
+    BACKTRACKS,
+    COVERED,
+    ENERGY_CUTS,
+    HALVINGS,
+    NEWTON_ITERATIONS,
+    REJECTIONS,
+    REPAIRS,
+    SMALLEST_HUB_T,
+    STEPS,
+)
+from seastar_gym.der.terms.crossing import those_uncrossed
 from seastar_gym.der.terms.damping import freeze_strains
 from seastar_gym.der.terms.fluid import add_work_of_current, freeze_fluid
+from seastar_gym.der.terms.hub import set_natural_hub_angles
+from seastar_gym.der.terms.near_pairs import freeze_contact
 from seastar_gym.simd.compilation import inlined_kernel, kernel
 from seastar_gym.simd.lanes import add_product, any_lane, floor, load, load_number, select, splat, sqrt, store
+
+
+class Stage(NamedTuple):
+    """An implicit stage: q_hat [m] and v_hat [m/s], rows per coordinate, gamma [s] and its reciprocal, lanes.
+
+    ahead: Whether the scheme asks in the middle of a step, so that contact has to look ahead, see contact.py.
+    """
+
+    q_hat: Any
+    v_hat: Any
+    gamma: Any
+    inverse_gamma: Any
+    ahead: bool
+
 
 MOST_HALVINGS = 12.0  # a robot that is stuck once more has failed
 TURNABLE = 8.0  # after so many halvings, hinges may go through their poles, see guard.py
@@ -193,7 +209,7 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, war
         if any_lane(wary):
             start_standing(rods, work, stage, frame_velocity(rods.current, rods, q, v), wary)
         freeze_fluid(rods, work)
-        freeze_strains(rods.relaxation_time, rods, work, stage.q_hat)
+        freeze_strains(rods.damping, rods, work, stage.q_hat)
         set_natural_hub_angles(rods, work, actuation, start + load_number(scheme.c, k) * size)
         left = limits.most_iterations - load(report, NEWTON_ITERATIONS)
         most, good = select(left < patience, left, patience), good & (left > 0.0)
@@ -202,8 +218,8 @@ def try_step(rods, work, scheme, actuation, q, v, a, start, size, h, active, war
         good = those_uncrossed(rods.contact, rods, work, stage, q, good)
         trouble = trouble | (repairs + backtracks > 0.0)
         if scheme.dissipative:
-            lively = phi > load(rods.damped, 0)
-            calm = good & ~trouble & lively & (phi <= load(rods.calm, 0))
+            lively = phi > load(rods.scales.damped, 0)
+            calm = good & ~trouble & lively & (phi <= load(rods.foresight.calm, 0))
             if any_lane(calm):
                 gaining = may_gain(rods.current, rods.added_mass, rods, work, stage, phi, calm)
                 lively = (lively & ~calm) | gaining
@@ -254,8 +270,8 @@ def note_hub_angles(rods, q, robots, report):
     first = edge_geometry(q, 0, last * edges + 1)
     for limb in range(rods.n_limbs):
         second = edge_geometry(q, 0, limb * edges + 1)
-        t = half_angle(first, second, rods.hub_side)
-        narrow = rods.hub_side * load(rods.hub_angle, limb - 1 if limb > 0 else last) >= 0.0
+        t = half_angle(first, second, rods.hub.side)
+        narrow = rods.hub.side * load(rods.hub.angle, limb - 1 if limb > 0 else last) >= 0.0
         smallest = select(robots & narrow & (t < smallest), t, smallest)
         first = second
     store(report, SMALLEST_HUB_T, smallest)

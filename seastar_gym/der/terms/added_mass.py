@@ -5,9 +5,21 @@ stage's first guess has it, off by the square of the step: a constant of the min
 current's own acceleration, would add is left out.
 """
 
-from seastar_gym.der.rods import n_nodes
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.der.mesh import Mesh
+from seastar_gym.der.star import n_nodes
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, splat, store
+
+
+def coefficients(mesh: Mesh, density: float, C_a: float | None) -> NDArray[np.float64] | None:
+    """m_a = rho_f C_a pi r_0^2 l/2, per half edge as in drag.py [kg]; None for none."""
+    if C_a is None:
+        return None
+    area = np.array([np.pi * r**2 for r in mesh.radius_at_edges])
+    return mesh.per_half_edge(density * C_a * area * 0.5 * mesh.l)
 
 
 @kernel

@@ -5,20 +5,71 @@ With t = tan(phi/2): d kappa/d phi = (1 + t^2)/dl and d^2 kappa/d phi^2 = t (1 +
 (13.13) lacks the length of (13.3), so its units do not close: a hub hinge has the energy of (13.3) too.
 """
 
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.der.mesh import Mesh
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, select
+
+Floats = NDArray[np.float64]
+
+
+class Bending(NamedTuple):
+    """Coefficients per hinge: EI over Voronoi length [N m], its reciprocal [1/(N m)], and the natural moment [N m].
+
+    The natural moments of hub hinges come from the actuators instead, see hub.py.
+    """
+
+    EI_over_dl: np.ndarray
+    dl_over_EI: np.ndarray
+    EI_kappa_bar: np.ndarray
+
+
+def coefficients(mesh: Mesh) -> Bending:
+    """Bending stiffnesses and natural moments, with modulus and radius at the nodes."""
+    n_edges = mesh.nodes_per_limb - 1
+    EI = np.array(
+        [
+            E * np.pi * r**4 / 4.0
+            for moduli, radii in zip(mesh.modulus_at_nodes, mesh.radius_at_nodes, strict=True)
+            for E, r in zip(moduli[:-1], radii[:-1], strict=True)
+        ]
+    )
+    EI_over_dl, dl_over_EI = EI / mesh.l, mesh.l / EI
+    EI_kappa_bar = 2.0 * EI_over_dl * np.tan(0.5 * np.repeat(mesh.natural_turn, n_edges))
+    roots = n_edges * np.arange(mesh.n_limbs)
+    EI_kappa_bar[roots] = 0.0
+    EI_over_dl[roots], dl_over_EI[roots] = hub_stiffnesses(EI_over_dl[roots], dl_over_EI[roots])
+    return Bending(EI_over_dl, dl_over_EI, EI_kappa_bar)
+
+
+def hub_stiffnesses(EI_over_dl: Floats, dl_over_EI: Floats) -> tuple[Floats, Floats]:
+    """(EI/dl, dl/EI) of the hub hinges, from those at the limbs' roots: half of each root edge, one after the other."""
+    next_stiffness, next_compliance = np.roll(EI_over_dl, -1), np.roll(dl_over_EI, -1)
+    stiffness = EI_over_dl + (next_stiffness - EI_over_dl) * (EI_over_dl / (EI_over_dl + next_stiffness))
+    compliance = dl_over_EI + 0.5 * (next_compliance - dl_over_EI)
+    exists = np.arange(len(EI_over_dl)) < n_hub_hinges(len(EI_over_dl))
+    return np.where(exists, stiffness, 0.0), np.where(exists, compliance, 0.0)
+
+
+def n_hub_hinges(n_limbs: int) -> int:
+    """Number of hub hinges: one per gap; two limbs have one, so that straight ones make a plain rod."""
+    return n_limbs if n_limbs > 2 else n_limbs - 1
 
 
 @kernel
 def moment(rods, hinge, t, EI_kappa_bar):
     """EI (kappa - kappa_bar) [N m]."""
-    return add_product(-EI_kappa_bar, 2.0 * load(rods.EI_over_dl, hinge), t)
+    return add_product(-EI_kappa_bar, 2.0 * load(rods.bending.EI_over_dl, hinge), t)
 
 
 @kernel
 def bending_energy(rods, hinge, moment):
     """E_b [J]."""
-    return 0.5 * load(rods.dl_over_EI, hinge) * moment * moment
+    return 0.5 * load(rods.bending.dl_over_EI, hinge) * moment * moment
 
 
 @kernel

@@ -18,28 +18,126 @@ A node whose limb was on its side when the step began belongs there, wherever th
 at whose end edges have come to cross is halved: limbs do not pass through each other in long steps.
 """
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 
 from seastar_gym.der.geometry import edge_vector
-from seastar_gym.der.rods import N_X, N_Y, OFFSET, SHARE, SLOT_ROWS, STIFFNESS, THICKNESS, n_nodes, tail_node
+from seastar_gym.der.mesh import Mesh
+from seastar_gym.der.star import n_nodes, tail_node
 from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.lanes import (
-    absolute,
-    add_product,
-    any_lane,
-    load,
-    load_number,
-    select,
-    splat,
-    sqrt,
-    store,
-    store_number,
-    subtract_product,
-)
+from seastar_gym.simd.lanes import N_LANES, add_product, load, load_number, select, splat, store, subtract_product
+from seastar_gym.simd.rows import aligned_rows
 
-OVERHANG = 0.05  # of an edge: so far beyond its ends it still meets nodes, which leaves no wedge at a bent hinge
-MARGIN = 2.0  # times the thickness: pairs nearer than that are listed, and those that approach faster
-OUT_OF_TOUCH = 1e300  # [m]
+SLOT_ROWS = 6
+N_X, N_Y, SHARE, OFFSET, THICKNESS, STIFFNESS = range(SLOT_ROWS)
+"""Rows of a listed pair of node and edge, see contact.py."""
+
+
+MOST_NEAR_EDGES, SHORT_CHAIN = 3, 24
+"""Edges of another limb that a node can be near to, in the mean over the nodes: all, in chains of SHORT_CHAIN edges or
+fewer. In longer ones a node that is not crumpled is near to one or two."""
+
+
+class Contact(NamedTuple):
+    """Who may touch whom, see contact.py.
+
+    n_pairs, pairs: Limbs that may touch, (right, left) each, counted from 0, shape (2 n_pairs,), for all robots.
+    thickness: Distance from the centre line at which a node is touched [m]. widest: Twice the largest [m].
+    stiffness: Of a touched node [N/m].
+    """
+
+    n_pairs: int
+    pairs: np.ndarray
+    thickness: np.ndarray
+    widest: np.ndarray
+    stiffness: np.ndarray
+
+
+class ContactWork(NamedTuple):
+    """Memory of contact; rows per coordinate but for `listed`, `slots`, `own`, `missed` and `touching`.
+
+    share: Most pairs of node and edge of one robot that can be listed. own: How many are.
+    listed: How many are of all robots together, then node and edge of each, shared. slots: SLOT_ROWS of each.
+    missed: 1 for robots whose pairs did not all fit into their share, or whose step was not found.
+    touching: 1 for robots that touch.
+    ends: Positions where contact is asked for [m]. seen: The same along the gap between two limbs and across it.
+    force: Of contact [N].
+    x, r, z, p, Hp, w: See coupled.py.
+    """
+
+    share: float
+    listed: np.ndarray
+    slots: np.ndarray
+    own: np.ndarray
+    missed: np.ndarray
+    touching: np.ndarray
+    ends: np.ndarray
+    seen: np.ndarray
+    force: np.ndarray
+    x: np.ndarray
+    r: np.ndarray
+    z: np.ndarray
+    p: np.ndarray
+    Hp: np.ndarray
+    w: np.ndarray
+
+
+OF_CYLINDERS = np.pi / 6.0
+"""Force per length and depth over Young's modulus, see seastar_gym/scene/contact.py."""
+
+
+def coefficients(
+    mesh: Mesh, pairs: Sequence[tuple[int, int]], modulus: float | None, opening_angle: float
+) -> Contact:
+    """Thickness and stiffness of every node; half of the latter, because nodes of both limbs push.
+
+    pairs: (right, left) limbs that may touch, counted from 0. modulus: Force per length and depth [Pa]; None for that
+    of elastic cylinders. opening_angle: Angle at which the cones near the hub touch [rad].
+    """
+    share = np.arange(mesh.nodes_per_limb) / (mesh.nodes_per_limb - 1)
+    thickness, stiffness = [0.0], [0.0]
+    for length, radii, moduli in zip(mesh.limb_lengths, mesh.radius_at_nodes, mesh.modulus_at_nodes, strict=True):
+        thickness += [min(r, 0.5 * opening_angle * length * s) for r, s in zip(radii, share, strict=True)][1:]
+        stiffness += [OF_CYLINDERS * E if modulus is None else modulus for E in moduli][1:]
+    return Contact(
+        n_pairs=len(pairs),
+        pairs=np.array(pairs, dtype=float).ravel(),
+        thickness=np.array(thickness),
+        widest=np.array([2.0 * max(thickness)]),
+        stiffness=0.5 * np.array(stiffness) * mesh.dl,
+    )
+
+
+def memory(contact: Contact | None, n_limbs: int, nodes_per_limb: int) -> ContactWork | None:
+    """Zeroed memory for the contact of one lane group, where robots list the pairs they have in common once."""
+    if contact is None:
+        return None
+    edges = nodes_per_limb - 1
+    near_edges = edges if edges <= SHORT_CHAIN else MOST_NEAR_EDGES
+    capacity = 2 * contact.n_pairs * edges * min(edges, near_edges * N_LANES)
+
+    def rows(count: int = 2 * (n_limbs * edges + 1)) -> np.ndarray:
+        return aligned_rows(count, N_LANES)
+
+    return ContactWork(
+        share=float(2 * contact.n_pairs * edges * near_edges),
+        listed=aligned_rows(2 * capacity + 1),
+        slots=rows(SLOT_ROWS * capacity),
+        own=rows(1),
+        missed=rows(1),
+        touching=rows(1),
+        ends=rows(),
+        seen=rows(),
+        force=rows(),
+        x=rows(),
+        r=rows(),
+        z=rows(),
+        p=rows(),
+        Hp=rows(),
+        w=rows(),
+    )
 
 
 @kernel
@@ -56,159 +154,6 @@ def looked_at(work, stage, row):
         q_hat = subtract_product(q_hat, stage.gamma, load(stage.v_hat, row))
         return add_product(q_hat, 4.0, load(work.q, row) - load(stage.q_hat, row))
     return load(work.q, row)
-
-
-@kernel
-def freeze_contact(contact, rods, work, stage, q_0):
-    """List who may touch whom in this stage, in scenes with contact; q_0: positions where the step began."""
-    if contact is None:
-        return
-    moved = splat(0.0)
-    carried_x, carried_y = moved, moved  # with the hub
-    for node in range(n_nodes(rods)):
-        x, y = looked_at(work, stage, 2 * node), looked_at(work, stage, 2 * node + 1)
-        store(work.contact.ends, 2 * node, x)
-        store(work.contact.ends, 2 * node + 1, y)
-        dx, dy = x - load(q_0, 2 * node), y - load(q_0, 2 * node + 1)
-        if node == 0:
-            carried_x, carried_y = dx, dy
-        dx, dy = dx - carried_x, dy - carried_y
-        squared = add_product(dx * dx, dy, dy)
-        moved = select(squared > moved, squared, moved)
-    # Whoever is farther apart than that could not have come near on the way.
-    reach = add_product(MARGIN * load(contact.widest, 0), 2.0, sqrt(moved))
-    store_number(work.contact.listed, 0, 0.0)
-    store(work.contact.missed, 0, 0.0)
-    store(work.contact.own, 0, 0.0)
-    for pair in range(contact.n_pairs):
-        right = int(load_number(contact.pairs, 2 * pair))
-        left = int(load_number(contact.pairs, 2 * pair + 1))
-        view_limbs(rods, work, q_0, right, left)
-        near, end = may_touch(rods, work, reach, right, left, -1.0)
-        if any_lane(near):
-            list_pairs(contact, rods, work, stage, q_0, reach, right, left, -1.0, end, near)
-        near, end = may_touch(rods, work, reach, left, right, 1.0)
-        if any_lane(near):
-            list_pairs(contact, rods, work, stage, q_0, reach, left, right, 1.0, end, near)
-    if n_listed(work) == 0:
-        store(work.contact.touching, 0, 0.0)
-        for row in range(2 * n_nodes(rods)):
-            store(work.contact.force, row, 0.0)
-
-
-@kernel
-def view_limbs(rods, work, q_0, right, left):
-    """Look at two limbs and the hub along the gap between them, and across it; keep it in work.contact.seen."""
-    edges = rods.nodes_per_limb - 1
-    wx, wy = across_gap(rods, q_0, right, left)
-    view_node(work, 0, wx, wy)
-    for limb in (right, left):
-        for node in range(limb * edges + 1, limb * edges + edges + 1):
-            view_node(work, node, wx, wy)
-
-
-@kernel
-def across_gap(rods, q, right, left):
-    """Unit vector from the right limb to the left: along the difference of their directions and across their sum."""
-    edges = rods.nodes_per_limb - 1
-    ax, ay = edge_vector(q, 0, right * edges + 1)
-    bx, by = edge_vector(q, 0, left * edges + 1)
-    a, b = 1.0 / sqrt(add_product(ax * ax, ay, ay)), 1.0 / sqrt(add_product(bx * bx, by, by))
-    ax, ay, bx, by = a * ax, a * ay, b * bx, b * by
-    wx, wy = bx - ax - (ay + by), by - ay + (ax + bx)
-    scale = 1.0 / sqrt(add_product(wx * wx, wy, wy))
-    return scale * wx, scale * wy
-
-
-@kernel
-def may_touch(rods, work, reach, limb, other, side):
-    """(near, end): the mask of the robots with no strip of width `reach` between the nodes of a limb and the edges of
-    another, which begin at the hub, and how far the limb comes towards the other.
-    """
-    edges = rods.nodes_per_limb - 1
-    end, begin = splat(-np.inf), -side * load(work.contact.seen, 0)
-    for i in range(1, edges + 1):
-        own = -side * load(work.contact.seen, 2 * (limb * edges + i))
-        others = -side * load(work.contact.seen, 2 * (other * edges + i))
-        end = select(own > end, own, end)
-        begin = select(others < begin, others, begin)
-    return ~(begin - end > reach), end
-
-
-@kernel
-def view_node(work, node, wx, wy):
-    """Keep a node's places along w and across it [m]."""
-    x, y = load(work.contact.ends, 2 * node), load(work.contact.ends, 2 * node + 1)
-    store(work.contact.seen, 2 * node, add_product(x * wx, y, wy))
-    store(work.contact.seen, 2 * node + 1, subtract_product(y * wx, x, wy))
-
-
-@kernel
-def list_pairs(contact, rods, work, stage, q_0, reach, limb, other, side, end, robots):
-    """List the nodes of a limb that are near edges of another, which has it on its left (side 1) or right (-1).
-
-    end, robots: How far the limb comes towards the other, and in whom it may touch it, as may_touch saw it.
-    """
-    edges = rods.nodes_per_limb - 1
-    ends, seen = work.contact.ends, work.contact.seen
-    for e in range(other * edges, other * edges + edges):
-        j, k = tail_node(rods, e), e + 1
-        forth_j, forth_k = -side * load(seen, 2 * j), -side * load(seen, 2 * k)
-        begin = select(forth_j < forth_k, forth_j, forth_k) - reach
-        reached = robots & (end > begin)
-        if not any_lane(reached):
-            continue
-        z_j, z_k = load(seen, 2 * j + 1), load(seen, 2 * k + 1)
-        lowest, highest = select(z_j < z_k, z_j, z_k) - reach, select(z_j < z_k, z_k, z_j) + reach
-        ex, ey = edge_vector(ends, j, k)
-        inverse = 1.0 / add_product(ex * ex, ey, ey)
-        scale = side * sqrt(inverse)
-        nx, ny = -ey * scale, ex * scale
-        for i in range(limb * edges + 1, limb * edges + edges + 1):
-            z = load(seen, 2 * i + 1)
-            facing = reached & (-side * load(seen, 2 * i) > begin) & (z > lowest) & (z < highest)
-            if any_lane(facing):
-                dx, dy = edge_vector(ends, j, i)
-                s = add_product(dx * ex, dy, ey) * inverse
-                g = add_product(dx * nx, dy, ny)
-                facing = facing & (s > -OVERHANG) & (s < 1.0 + OVERHANG)
-                if any_lane(facing):
-                    list_pair(contact, rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing)
-
-
-@kernel
-def list_pair(contact, rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing):
-    """List node i and edge e if they are near each other in any of the robots in the mask `facing`."""
-    j, k = tail_node(rods, e), e + 1
-    ex, ey = edge_vector(q_0, j, k)
-    dx, dy = edge_vector(q_0, j, i)
-    g_0 = side * subtract_product(ex * dy, ey, dx) / sqrt(add_product(ex * ex, ey, ey))
-    s = select(s > 0.0, select(s < 1.0, s, 1.0), 0.0)
-    tail = load(contact.thickness, j)
-    d = load(contact.thickness, i) + add_product(tail, s, load(contact.thickness, k) - tail)
-    near = facing & (g_0 > -d) & (g < MARGIN * d + absolute(g - g_0))
-    if not any_lane(near):
-        return
-    # Every robot has a share of the list of its own, so that nobody takes another's place.
-    own = load(work.contact.own, 0)
-    full = near & (own >= work.contact.share)
-    store(work.contact.missed, 0, select(full, 1.0, load(work.contact.missed, 0)))
-    near = near & ~full
-    if not any_lane(near):
-        return
-    store(work.contact.own, 0, select(near, own + 1.0, own))
-    slot = n_listed(work)
-    store_number(work.contact.listed, 0, slot + 1.0)
-    store_number(work.contact.listed, 2 * slot + 1, float(i))
-    store_number(work.contact.listed, 2 * slot + 2, float(e))
-    row = SLOT_ROWS * slot
-    # Others, whose edge may have no direction, meet nothing here that is not zero.
-    store(work.contact.slots, row + N_X, select(near, nx, 0.0))
-    store(work.contact.slots, row + N_Y, select(near, ny, 0.0))
-    store(work.contact.slots, row + SHARE, select(near, s, 0.0))
-    store(work.contact.slots, row + THICKNESS, select(near, d, -OUT_OF_TOUCH))
-    store(work.contact.slots, row + OFFSET, select(near, gap_at_rest(rods, work, stage, slot), 0.0))
-    store(work.contact.slots, row + STIFFNESS, 0.0)
 
 
 @kernel
@@ -297,76 +242,6 @@ def those_apart(contact, robots):
     if contact is None:
         return robots
     return robots & ~(load(contact.touching, 0) > 0.0)
-
-
-@kernel
-def those_uncrossed(contact, rods, work, stage, q_0, robots):
-    """Of the robots in the mask, those without edges of different limbs that cross now and did not when the step began.
-
-    Not those either whose neighbours did not all fit into the list, or whose Newton step was not found.
-    """
-    if contact is None:
-        return robots
-    robots = robots & ~(load(work.contact.missed, 0) > 0.0)
-    store_step_end(rods, work, stage)
-    for pair in range(contact.n_pairs):
-        right = int(load_number(contact.pairs, 2 * pair))
-        left = int(load_number(contact.pairs, 2 * pair + 1))
-        doubtful = robots & ~on_their_sides(rods, work.contact.ends, q_0, right, left)
-        if any_lane(doubtful):
-            robots = robots & ~(doubtful & come_to_cross(rods, work.contact.ends, q_0, right, left))
-    return robots
-
-
-@kernel
-def on_their_sides(rods, q_1, q_0, right, left):
-    """Mask of the robots whose limbs lie on either side of a line through the hub at q_1, so that they cannot cross."""
-    edges = rods.nodes_per_limb - 1
-    wx, wy = across_gap(rods, q_0, right, left)
-    high, low = splat(-np.inf), splat(np.inf)
-    for i in range(1, edges + 1):
-        dx, dy = edge_vector(q_1, 0, right * edges + i)
-        x = add_product(dx * wx, dy, wy)
-        dx, dy = edge_vector(q_1, 0, left * edges + i)
-        y = add_product(dx * wx, dy, wy)
-        high = select(high > x, high, x)
-        low = select(low < y, low, y)
-    return (high < 0.0) & (low > 0.0)
-
-
-@kernel
-def store_step_end(rods, work, stage):
-    """Fill work.contact.ends with the positions at the end of the step [m]."""
-    for row in range(2 * n_nodes(rods)):
-        q = load(work.q, row)
-        store(work.contact.ends, row, 2.0 * q - load(stage.q_hat, row) if stage.ahead else q)
-
-
-@kernel
-def come_to_cross(rods, q_1, q_0, right, left):
-    """Mask of the robots with edges of two limbs that cross at q_1 and did not at q_0."""
-    edges = rods.nodes_per_limb - 1
-    crossed = splat(1.0) < 0.0
-    for e in range(right * edges, right * edges + edges):
-        for f in range(left * edges, left * edges + edges):
-            now = edges_cross(rods, q_1, e, f)
-            if any_lane(now):
-                crossed = crossed | (now & ~edges_cross(rods, q_0, e, f))
-    return crossed
-
-
-@kernel
-def edges_cross(rods, q, e, f):
-    """Mask of the robots whose edges e and f cross: each at a share of itself between 0 and 1, without divisions."""
-    i, j = tail_node(rods, e), tail_node(rods, f)
-    ex, ey = edge_vector(q, i, e + 1)
-    fx, fy = edge_vector(q, j, f + 1)
-    dx, dy = edge_vector(q, i, j)
-    cross = subtract_product(ex * fy, ey, fx)
-    of_e = cross * subtract_product(dx * fy, dy, fx)
-    of_f = cross * subtract_product(dx * ey, dy, ex)
-    squared = cross * cross
-    return (of_e > 0.0) & (of_e < squared) & (of_f > 0.0) & (of_f < squared)
 
 
 @kernel

@@ -10,13 +10,20 @@ in the middle of the way, off by gamma/2 times its change: of first order. The n
 no material, so it is in U, not in R.
 """
 
-from seastar_gym.der.energy import edge_of, hinge_edges
+import numpy as np
+from numpy.typing import NDArray
+
 from seastar_gym.der.geometry import half_angle
-from seastar_gym.der.rods import n_nodes
+from seastar_gym.der.star import edge_of, hinge_edges, n_nodes
 from seastar_gym.der.terms.bending import moment
 from seastar_gym.der.terms.stretching import tension
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, splat, store
+
+
+def coefficients(relaxation_time: float | None) -> NDArray[np.float64] | None:
+    """tau of material damping [s], one row; None for none."""
+    return None if relaxation_time is None else np.array([relaxation_time])
 
 
 @kernel

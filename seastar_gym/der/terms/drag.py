@@ -7,8 +7,35 @@ C_d, along it C_t; both potentials are convex. n is the edge's normal where the 
 by the square of the step: a constant of the minimisation, and schemes keep their order up to 2.
 """
 
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.der.mesh import Mesh
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import absolute, add_product, load, select, sqrt
+
+Floats = NDArray[np.float64]
+
+
+def drag_per_length(density: float, coefficient: float, radius: float) -> float:
+    """1/2 rho_f C_d D of (13.8), per length and squared speed, of a limb of that radius [kg/m^2]."""
+    return 0.5 * density * coefficient * 2.0 * radius
+
+
+def coefficients(mesh: Mesh, density: float, C: float) -> Floats:
+    """c = 1/2 rho_f C D dl of flow in any direction, per node [kg/m]."""
+    return mesh.per_node(lambda r: drag_per_length(density, C, r)) * mesh.dl
+
+
+def cross_coefficients(mesh: Mesh, density: float, C_d: float, C_t: float | None) -> Floats | None:
+    """c_n = 1/2 rho_f (C_d - C_t) D l/2 of flow across an edge, per half edge [kg/m]; None for isotropic drag.
+
+    Two rows per node, for half of its inner and of its outer edge; zero for hub and tips, which have none.
+    """
+    if C_t is None:
+        return None
+    added = [drag_per_length(density, C_d, r) - drag_per_length(density, C_t, r) for r in mesh.radius_at_edges]
+    return mesh.per_half_edge(np.array(added) * 0.5 * mesh.l)
 
 
 @kernel

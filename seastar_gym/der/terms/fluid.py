@@ -5,7 +5,7 @@ the potential stays one that is minimised, with an exact Hessian.
 """
 
 from seastar_gym.der.geometry import edge_vector
-from seastar_gym.der.rods import n_nodes, tail_node
+from seastar_gym.der.star import n_nodes, tail_node
 from seastar_gym.der.terms.added_mass import freeze_added_mass
 from seastar_gym.der.terms.current import current_velocity
 from seastar_gym.der.terms.drag import add_cross_flow, drag_slopes, relative

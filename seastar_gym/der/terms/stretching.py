@@ -1,16 +1,35 @@
 """Stretching (13.2): E_s = 1/2 EA (|e|/l - 1)^2 l."""
 
+from typing import NamedTuple
+
+import numpy as np
+
+from seastar_gym.der.mesh import Mesh
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load
+
+
+class Stretching(NamedTuple):
+    """Coefficients per edge: EA [N], the same over the edge's natural length [N/m], and its reciprocal [m/N]."""
+
+    EA: np.ndarray
+    EA_over_l: np.ndarray
+    l_over_EA: np.ndarray
+
+
+def coefficients(mesh: Mesh) -> Stretching:
+    """Stretching stiffnesses, with modulus and radius in the middle of the edges."""
+    EA = np.array([E * (np.pi * r**2) for E, r in zip(mesh.modulus_at_edges, mesh.radius_at_edges, strict=True)])
+    return Stretching(EA, EA / mesh.l, mesh.l / EA)
 
 
 @kernel
 def tension(rods, e, length):
     """T = EA (|e|/l - 1) [N] of edge e, whose length is `length` [m]."""
-    return add_product(-load(rods.EA, e), load(rods.EA_over_l, e), length)
+    return add_product(-load(rods.stretching.EA, e), load(rods.stretching.EA_over_l, e), length)
 
 
 @kernel
 def stretching_energy(rods, e, tension):
     """E_s [J]."""
-    return 0.5 * load(rods.l_over_EA, e) * tension * tension
+    return 0.5 * load(rods.stretching.l_over_EA, e) * tension * tension

@@ -1,0 +1,38 @@
+"""Nodes, edges and hinges of a star of rods.
+
+A star has `n_limbs` chains of nodes that share node 0, the hub. Node {j, i} (limb j from 0, i from 1) has index
+j (nodes_per_limb - 1) + i. Edge e ends at node e + 1; it starts at the hub if it is the root edge of its limb, else
+at node e. Hinge e ends with edge e: within a limb it sits at the tail of edge e, and for a root edge of limb j it is
+the hub hinge from limb j to limb j + 1, whose first edge is the root edge of limb j. Two limbs have one hub hinge, one
+limb has none: hinges that are not there have no stiffness.
+"""
+
+from seastar_gym.der.geometry import edge_geometry
+from seastar_gym.simd.compilation import kernel
+
+
+@kernel
+def n_nodes(rods):
+    """Number of nodes of a star, with the hub."""
+    return rods.n_limbs * (rods.nodes_per_limb - 1) + 1
+
+
+@kernel
+def tail_node(rods, e):
+    """The node where edge e starts: the hub for a root edge."""
+    return 0 if e % (rods.nodes_per_limb - 1) == 0 else e
+
+
+@kernel
+def hinge_edges(rods, e):
+    """(a, b, side): the edges of the hinge that ends with edge e, and how its angle is measured, see geometry.py."""
+    edges = rods.nodes_per_limb - 1
+    if e % edges == 0:
+        return e, (e + edges) % (rods.n_limbs * edges), rods.hub.side
+    return e - 1, e, 1.0
+
+
+@kernel
+def edge_of(rods, q, e):
+    """Geometry of edge e."""
+    return edge_geometry(q, tail_node(rods, e), e + 1)

@@ -1,0 +1,80 @@
+"""When Newton's last step may be left out, because quadratic convergence guarantees that it would be small enough.
+
+After one of its first steps, of size d, the next is at most d^2/(foreseeable length). The numbers below were measured
+over stiff, soft, slender and thick robots in random strokes, see `python -m studies.speed.foresight`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from seastar_gym.der.geometry import larger
+from seastar_gym.der.mesh import Mesh, mean
+from seastar_gym.der.terms.contact import those_apart
+from seastar_gym.der.terms.stretching import Stretching
+from seastar_gym.simd.compilation import kernel
+from seastar_gym.simd.lanes import load, select, splat
+
+CURVATURE = 40.0  # for light edges, the step after one of size d is below this times d^2 over the edge length
+EASY = 3.0  # Newton steps: a stage that took more is not predictable
+LATE = 10.0  # times CURVATURE for the last of the easy steps
+FORESEEABLE_T = 4.0  # larger values of tan(phi/2) are too near its pole for that
+SLENDER = 5000.0  # square of an edge's length over its radius: slenderer edges do not curve the potential more
+CALM_STRAIN_ENERGY = 1e-3  # over EA times the length of all limbs: more energy strains or moves a robot violently
+
+
+class Foresight(NamedTuple):
+    """Scales of a robot that decide what is predictable, one row each.
+
+    shortest_edge: Smallest natural length of an edge [m].
+    curvature_rate: How fast the foreseeable length shrinks with the step [1/s^2].
+    calm: Potential [J] up to which Newton steps can be foreseen.
+    """
+
+    shortest_edge: np.ndarray
+    curvature_rate: np.ndarray
+    calm: np.ndarray
+
+
+def coefficients(mesh: Mesh, stretching: Stretching, density: float) -> Foresight:
+    """Scales of a robot, from its shortest, thinnest and stiffest edges."""
+    shortest, thinnest = float(mesh.root_edges.min()), min(map(min, mesh.radius_at_nodes))
+    slenderness = min(1.0, (shortest / thinnest) ** 2 / SLENDER)
+    rate = max(map(max, mesh.modulus_at_nodes)) / (density * shortest**2) * slenderness
+    calm = CALM_STRAIN_ENERGY * mean(stretching.EA) * mesh.n_limbs * mean(mesh.limb_lengths)
+    return Foresight(np.array([shortest]), np.array([rate]), np.array([calm]))
+
+
+@kernel
+def predictable(rods, work, iterations, setbacks, phi, move, tolerated):
+    """Mask of the robots whose next Newton step is sure to be small enough.
+
+    iterations, setbacks: Newton steps so far, and how many of them were shortened or needed a convex matrix. phi:
+    Potential before the step [J]. move: Largest node move of the step [m]. tolerated: Tolerance times the foreseeable
+    length [m^2].
+    """
+    easy = (setbacks <= 0.0) & (iterations <= EASY) & (phi <= load(rods.foresight.calm, 0))
+    easy = those_apart(work.contact, easy)
+    late = select(iterations < EASY, splat(1.0), LATE)
+    foreseen = late * move * move <= tolerated
+    return easy & foreseen & (largest_hub_t(rods, work) < FORESEEABLE_T)
+
+
+@kernel
+def foreseeable_length(rods, stage):
+    """Length [m] that a Newton step's square is divided by to foresee the size of the next one.
+
+    Measured over stiff, soft, slender and thick robots in random strokes: turning an edge stretches it, and the tension
+    that this makes moves nodes the farther, the stiffer the edges are against the nodes' inertia.
+    """
+    rate = load(rods.foresight.curvature_rate, 0)
+    return load(rods.foresight.shortest_edge, 0) / (CURVATURE + rate * stage.gamma * stage.gamma)
+
+
+@kernel
+def largest_hub_t(rods, work):
+    """Largest tan(phi/2) of the hub hinges, as last assembled."""
+    largest = load(work.hub_t, 0)
+    for limb in range(1, rods.n_limbs):
+        largest = larger(load(work.hub_t, limb), largest)
+    return largest

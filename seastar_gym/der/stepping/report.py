@@ -1,0 +1,17 @@
+"""What a stroke reports of every robot: counts and extremes."""
+
+# Rows of a lane group's report, shape (len(REPORT_ROWS), N_LANES): what happened to its robots.
+REPORT_ROWS = (
+    "newton_iterations",
+    "repairs",  # Newton steps that needed the convex matrix
+    "backtracks",  # halvings of a Newton step by the line search
+    "steps",  # time steps taken
+    "halvings",  # halvings of a time step that did not converge
+    "rejections",  # halvings of a time step whose error was too large
+    "energy_cuts",  # steps after which velocities were cut, see guard.py
+    "covered",  # time [s]
+    "smallest_hub_t",  # smallest tan(phi/2) of a hub hinge
+)
+NEWTON_ITERATIONS, REPAIRS, BACKTRACKS, STEPS, HALVINGS, REJECTIONS, ENERGY_CUTS, COVERED, SMALLEST_HUB_T = range(
+    len(REPORT_ROWS)
+)

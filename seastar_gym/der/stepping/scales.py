@@ -1,0 +1,46 @@
+"""Scales of a robot that decide which steps the guard and the balance of momentum look at."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from seastar_gym.der.mesh import Mesh, mean
+from seastar_gym.der.stepping.foresight import Foresight
+from seastar_gym.der.terms.drag import drag_per_length
+from seastar_gym.der.terms.stretching import Stretching
+
+
+class Scales(NamedTuple):
+    """One row each, but for `held`.
+
+    damped: Potential [J] up to which drag takes more energy than an unregularised step may create, see guard.py; zero
+        without drag.
+    unsettled_rate: How much stiffer edges are than inertia, the more the longer the step [1/s^2], see momentum.py.
+    held: Whether nodes are held, so that no frame but the laboratory's will do.
+    """
+
+    damped: np.ndarray
+    unsettled_rate: np.ndarray
+    held: bool
+
+
+def coefficients(
+    mesh: Mesh,
+    stretching: Stretching,
+    foresight: Foresight,
+    density: float,
+    fluid_density: float,
+    C_d: float,
+    held: bool,
+) -> Scales:
+    """Scales of a robot in a fluid (density or drag coefficient zero: vacuum)."""
+    area = mesh.per_node(lambda r: np.pi * r**2)
+    broadside = mean(mesh.per_node(lambda r: drag_per_length(fluid_density, C_d, r)))
+    length, calm = mean(mesh.limb_lengths), float(foresight.calm[0])
+    stiffness_over_mass = float((stretching.EA_over_l / (density * area * mesh.dl)[1:]).max())
+    edges = mesh.nodes_per_limb - 1
+    return Scales(
+        damped=np.array([calm * min(1.0, broadside * length / (density * mean(area)))]),
+        unsettled_rate=np.array([stiffness_over_mass * edges**2 if broadside > 0.0 else np.inf]),
+        held=held,
+    )

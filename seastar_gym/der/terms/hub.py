@@ -1,0 +1,48 @@
+"""The hinges at the hub: how they are measured, and their natural angles (13.13), which actuators change with time."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from seastar_gym.der.geometry import tangent
+from seastar_gym.simd.compilation import kernel
+from seastar_gym.simd.lanes import add_product, load, store
+
+
+class Hub(NamedTuple):
+    """Measure of the hub hinges.
+
+    side: +1 if hub hinges are measured by the opening angle, -1 if by the interior turning angle.
+    angle: The angle of the unactuated hub hinges, measured that way, per limb [rad].
+    """
+
+    side: float
+    angle: np.ndarray
+
+
+class Actuation(NamedTuple):
+    """Rotation of every limb at the ends of an interval [rad], shape (n_limbs, N_LANES), linear in between."""
+
+    delta_psi_start: np.ndarray
+    delta_psi_end: np.ndarray
+
+
+def coefficients(angles: Sequence[float], turning: bool) -> Hub:
+    """Measure of the hub hinges with these natural angles [rad]; turning: by the interior turning angle."""
+    return Hub(side=-1.0 if turning else 1.0, angle=np.array(angles))
+
+
+@kernel
+def set_natural_hub_angles(rods, work, actuation, fraction):
+    """Natural moments of the hub hinges at `fraction` (lanes) of an interval, (13.13).
+
+    The hinge from limb j to limb j + 1 has the natural angle hub_angle_j + delta_psi_{j+1} - delta_psi_j.
+    """
+    for a in range(rods.n_limbs):
+        b = (a + 1) % rods.n_limbs
+        start = load(actuation.delta_psi_start, b) - load(actuation.delta_psi_start, a)
+        end = load(actuation.delta_psi_end, b) - load(actuation.delta_psi_end, a)
+        angle = load(rods.hub.angle, a) + add_product(start, fraction, end - start)
+        natural_moment = 2.0 * load(rods.bending.EI_over_dl, a * (rods.nodes_per_limb - 1)) * tangent(0.5 * angle)
+        store(work.hub_EI_kappa_bar, a, natural_moment)

@@ -1,0 +1,189 @@
+"""Which nodes and edges of different limbs may touch in a stage: listed from its first guess, robot by robot."""
+
+import numpy as np
+
+from seastar_gym.der.geometry import edge_vector
+from seastar_gym.der.star import n_nodes, tail_node
+from seastar_gym.der.terms.contact import (
+    N_X,
+    N_Y,
+    OFFSET,
+    SHARE,
+    SLOT_ROWS,
+    STIFFNESS,
+    THICKNESS,
+    gap_at_rest,
+    looked_at,
+    n_listed,
+)
+from seastar_gym.simd.compilation import kernel
+from seastar_gym.simd.lanes import (
+    absolute,
+    add_product,
+    any_lane,
+    load,
+    load_number,
+    select,
+    splat,
+    sqrt,
+    store,
+    store_number,
+    subtract_product,
+)
+
+OVERHANG = 0.05  # of an edge: so far beyond its ends it still meets nodes, which leaves no wedge at a bent hinge
+MARGIN = 2.0  # times the thickness: pairs nearer than that are listed, and those that approach faster
+OUT_OF_TOUCH = 1e300  # [m]
+
+
+@kernel
+def freeze_contact(contact, rods, work, stage, q_0):
+    """List who may touch whom in this stage, in scenes with contact; q_0: positions where the step began."""
+    if contact is None:
+        return
+    moved = splat(0.0)
+    carried_x, carried_y = moved, moved  # with the hub
+    for node in range(n_nodes(rods)):
+        x, y = looked_at(work, stage, 2 * node), looked_at(work, stage, 2 * node + 1)
+        store(work.contact.ends, 2 * node, x)
+        store(work.contact.ends, 2 * node + 1, y)
+        dx, dy = x - load(q_0, 2 * node), y - load(q_0, 2 * node + 1)
+        if node == 0:
+            carried_x, carried_y = dx, dy
+        dx, dy = dx - carried_x, dy - carried_y
+        squared = add_product(dx * dx, dy, dy)
+        moved = select(squared > moved, squared, moved)
+    # Whoever is farther apart than that could not have come near on the way.
+    reach = add_product(MARGIN * load(contact.widest, 0), 2.0, sqrt(moved))
+    store_number(work.contact.listed, 0, 0.0)
+    store(work.contact.missed, 0, 0.0)
+    store(work.contact.own, 0, 0.0)
+    for pair in range(contact.n_pairs):
+        right = int(load_number(contact.pairs, 2 * pair))
+        left = int(load_number(contact.pairs, 2 * pair + 1))
+        view_limbs(rods, work, q_0, right, left)
+        near, end = may_touch(rods, work, reach, right, left, -1.0)
+        if any_lane(near):
+            list_pairs(contact, rods, work, stage, q_0, reach, right, left, -1.0, end, near)
+        near, end = may_touch(rods, work, reach, left, right, 1.0)
+        if any_lane(near):
+            list_pairs(contact, rods, work, stage, q_0, reach, left, right, 1.0, end, near)
+    if n_listed(work) == 0:
+        store(work.contact.touching, 0, 0.0)
+        for row in range(2 * n_nodes(rods)):
+            store(work.contact.force, row, 0.0)
+
+
+@kernel
+def view_limbs(rods, work, q_0, right, left):
+    """Look at two limbs and the hub along the gap between them, and across it; keep it in work.contact.seen."""
+    edges = rods.nodes_per_limb - 1
+    wx, wy = across_gap(rods, q_0, right, left)
+    view_node(work, 0, wx, wy)
+    for limb in (right, left):
+        for node in range(limb * edges + 1, limb * edges + edges + 1):
+            view_node(work, node, wx, wy)
+
+
+@kernel
+def across_gap(rods, q, right, left):
+    """Unit vector from the right limb to the left: along the difference of their directions and across their sum."""
+    edges = rods.nodes_per_limb - 1
+    ax, ay = edge_vector(q, 0, right * edges + 1)
+    bx, by = edge_vector(q, 0, left * edges + 1)
+    a, b = 1.0 / sqrt(add_product(ax * ax, ay, ay)), 1.0 / sqrt(add_product(bx * bx, by, by))
+    ax, ay, bx, by = a * ax, a * ay, b * bx, b * by
+    wx, wy = bx - ax - (ay + by), by - ay + (ax + bx)
+    scale = 1.0 / sqrt(add_product(wx * wx, wy, wy))
+    return scale * wx, scale * wy
+
+
+@kernel
+def may_touch(rods, work, reach, limb, other, side):
+    """(near, end): the mask of the robots with no strip of width `reach` between the nodes of a limb and the edges of
+    another, which begin at the hub, and how far the limb comes towards the other.
+    """
+    edges = rods.nodes_per_limb - 1
+    end, begin = splat(-np.inf), -side * load(work.contact.seen, 0)
+    for i in range(1, edges + 1):
+        own = -side * load(work.contact.seen, 2 * (limb * edges + i))
+        others = -side * load(work.contact.seen, 2 * (other * edges + i))
+        end = select(own > end, own, end)
+        begin = select(others < begin, others, begin)
+    return ~(begin - end > reach), end
+
+
+@kernel
+def view_node(work, node, wx, wy):
+    """Keep a node's places along w and across it [m]."""
+    x, y = load(work.contact.ends, 2 * node), load(work.contact.ends, 2 * node + 1)
+    store(work.contact.seen, 2 * node, add_product(x * wx, y, wy))
+    store(work.contact.seen, 2 * node + 1, subtract_product(y * wx, x, wy))
+
+
+@kernel
+def list_pairs(contact, rods, work, stage, q_0, reach, limb, other, side, end, robots):
+    """List the nodes of a limb that are near edges of another, which has it on its left (side 1) or right (-1).
+
+    end, robots: How far the limb comes towards the other, and in whom it may touch it, as may_touch saw it.
+    """
+    edges = rods.nodes_per_limb - 1
+    ends, seen = work.contact.ends, work.contact.seen
+    for e in range(other * edges, other * edges + edges):
+        j, k = tail_node(rods, e), e + 1
+        forth_j, forth_k = -side * load(seen, 2 * j), -side * load(seen, 2 * k)
+        begin = select(forth_j < forth_k, forth_j, forth_k) - reach
+        reached = robots & (end > begin)
+        if not any_lane(reached):
+            continue
+        z_j, z_k = load(seen, 2 * j + 1), load(seen, 2 * k + 1)
+        lowest, highest = select(z_j < z_k, z_j, z_k) - reach, select(z_j < z_k, z_k, z_j) + reach
+        ex, ey = edge_vector(ends, j, k)
+        inverse = 1.0 / add_product(ex * ex, ey, ey)
+        scale = side * sqrt(inverse)
+        nx, ny = -ey * scale, ex * scale
+        for i in range(limb * edges + 1, limb * edges + edges + 1):
+            z = load(seen, 2 * i + 1)
+            facing = reached & (-side * load(seen, 2 * i) > begin) & (z > lowest) & (z < highest)
+            if any_lane(facing):
+                dx, dy = edge_vector(ends, j, i)
+                s = add_product(dx * ex, dy, ey) * inverse
+                g = add_product(dx * nx, dy, ny)
+                facing = facing & (s > -OVERHANG) & (s < 1.0 + OVERHANG)
+                if any_lane(facing):
+                    list_pair(contact, rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing)
+
+
+@kernel
+def list_pair(contact, rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing):
+    """List node i and edge e if they are near each other in any of the robots in the mask `facing`."""
+    j, k = tail_node(rods, e), e + 1
+    ex, ey = edge_vector(q_0, j, k)
+    dx, dy = edge_vector(q_0, j, i)
+    g_0 = side * subtract_product(ex * dy, ey, dx) / sqrt(add_product(ex * ex, ey, ey))
+    s = select(s > 0.0, select(s < 1.0, s, 1.0), 0.0)
+    tail = load(contact.thickness, j)
+    d = load(contact.thickness, i) + add_product(tail, s, load(contact.thickness, k) - tail)
+    near = facing & (g_0 > -d) & (g < MARGIN * d + absolute(g - g_0))
+    if not any_lane(near):
+        return
+    # Every robot has a share of the list of its own, so that nobody takes another's place.
+    own = load(work.contact.own, 0)
+    full = near & (own >= work.contact.share)
+    store(work.contact.missed, 0, select(full, 1.0, load(work.contact.missed, 0)))
+    near = near & ~full
+    if not any_lane(near):
+        return
+    store(work.contact.own, 0, select(near, own + 1.0, own))
+    slot = n_listed(work)
+    store_number(work.contact.listed, 0, slot + 1.0)
+    store_number(work.contact.listed, 2 * slot + 1, float(i))
+    store_number(work.contact.listed, 2 * slot + 2, float(e))
+    row = SLOT_ROWS * slot
+    # Others, whose edge may have no direction, meet nothing here that is not zero.
+    store(work.contact.slots, row + N_X, select(near, nx, 0.0))
+    store(work.contact.slots, row + N_Y, select(near, ny, 0.0))
+    store(work.contact.slots, row + SHARE, select(near, s, 0.0))
+    store(work.contact.slots, row + THICKNESS, select(near, d, -OUT_OF_TOUCH))
+    store(work.contact.slots, row + OFFSET, select(near, gap_at_rest(rods, work, stage, slot), 0.0))
+    store(work.contact.slots, row + STIFFNESS, 0.0)
