@@ -27,11 +27,11 @@ def elastic_energy(rods, work, q):
         next_root = edge_of(rods, q, (root + edges) % (rods.n_limbs * edges))
         EI_kappa_bar = load(work.hub_EI_kappa_bar, limb)
         hinge = hinge_energy(rods, root, edge, next_root, rods.hub.side, EI_kappa_bar)
-        total += stretching_energy(rods, root, tension(rods, root, edge[2])) + hinge
+        total += stretching_energy(rods, root, tension(rods, root, edge.length)) + hinge
         for e in range(root + 1, root + edges):
             before, edge = edge, edge_of(rods, q, e)
             hinge = hinge_energy(rods, e, before, edge, 1.0, load(rods.bending.EI_kappa_bar, e))
-            total += stretching_energy(rods, e, tension(rods, e, edge[2])) + hinge
+            total += stretching_energy(rods, e, tension(rods, e, edge.length)) + hinge
     return total
 
 

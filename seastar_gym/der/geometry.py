@@ -1,9 +1,28 @@
 """Edges of a planar rod and the angles between them."""
 
+from typing import Any, NamedTuple
+
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, select, sqrt, subtract_product
 
-EDGE_ROWS = 7  # what edge_geometry returns
+
+class Edge(NamedTuple):
+    """Geometry of an edge e: its components and length |e| [m], |e|^2 [m^2], 1/|e|^2, and u = e/|e|^2 [1/m].
+
+    The gradient of the edge's direction angle theta is (-u_y, u_x), its Hessian
+    [[2 u_x u_y, u_y^2 - u_x^2], [u_y^2 - u_x^2, -2 u_x u_y]].
+    """
+
+    x: Any
+    y: Any
+    length: Any
+    squared: Any
+    inverse: Any
+    ux: Any
+    uy: Any
+
+
+EDGE_ROWS = 7  # numbers of an Edge
 
 
 @kernel
@@ -19,26 +38,22 @@ def edge_vector(q, tail, head):
 
 @kernel
 def edge_geometry(q, tail, head):
-    """(e_x, e_y, |e|, |e|^2, |u|^2, u_x, u_y) with u = e/|e|^2 [1/m], so that |u|^2 = 1/|e|^2.
-
-    The gradient of the edge's direction angle theta is (-u_y, u_x), its Hessian
-    [[2 u_x u_y, u_y^2 - u_x^2], [u_y^2 - u_x^2, -2 u_x u_y]].
-    """
+    """The Edge from node `tail` to node `head`."""
     ex, ey = edge_vector(q, tail, head)
     squared = add_product(ex * ex, ey, ey)
     inverse = 1.0 / squared
-    return ex, ey, sqrt(squared), squared, inverse, ex * inverse, ey * inverse
+    return Edge(ex, ey, sqrt(squared), squared, inverse, ex * inverse, ey * inverse)
 
 
 @kernel
 def half_angle(a, b, side):
-    """t = tan(phi/2) of the angle phi from edge a to edge b (geometries), from (13.4) without trigonometry.
+    """t = tan(phi/2) of the angle phi from edge a to edge b, from (13.4) without trigonometry.
 
     side = -1 turns edge a round: the angle is then the interior turning angle at a hub whose edges both point out.
     """
-    cross = subtract_product(a[0] * b[1], a[1], b[0])
-    dot = add_product(a[0] * b[0], a[1], b[1])
-    return side * cross / add_product(side * dot, a[2], b[2])
+    cross = subtract_product(a.x * b.y, a.y, b.x)
+    dot = add_product(a.x * b.x, a.y, b.y)
+    return side * cross / add_product(side * dot, a.length, b.length)
 
 
 @kernel

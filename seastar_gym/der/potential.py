@@ -27,7 +27,7 @@ full one, with its quadratic convergence, is used wherever its pivots allow it.
 
 import numpy as np
 
-from seastar_gym.der.geometry import EDGE_ROWS, edge_geometry, half_angle
+from seastar_gym.der.geometry import EDGE_ROWS, Edge, edge_geometry, half_angle
 from seastar_gym.der.linear.star_matrix import (
     add_symmetric,
     eliminate_node,
@@ -54,16 +54,16 @@ def edge_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex):
 
     With n = (u_y, -u_x): K = across |u|^2 1 + (along - across) u u^T + mu (u n^T + n u^T), along = EA |e|^2/l.
     """
-    _, _, length, squared, inverse, ux, uy = edge
-    T = tension(rods, e, length)
+    ux, uy = edge.ux, edge.uy
+    T = tension(rods, e, edge.length)
     natural = splat(0.0)
-    pull = damped_stress(rods.damping, work.tension, e, stage.inverse_gamma, T, natural) * length
+    pull = damped_stress(rods.damping, work.tension, e, stage.inverse_gamma, T, natural) * edge.length
     across = select(convex, positive_part(pull), pull) + stiffness
     mu = select(convex, 0.0, net_moment)
     twice_mu = mu + mu
     stretching = damped_stiffness(rods.damping, stage.inverse_gamma, load(rods.stretching.EA_over_l, e))
-    difference = stretching * squared - across
-    isotropic = across * inverse
+    difference = stretching * edge.squared - across
+    isotropic = across * edge.inverse
     wx = add_product(difference * ux, twice_mu, uy)
     wy = subtract_product(difference * uy, twice_mu, ux)
     return (
@@ -80,7 +80,7 @@ def edge_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex):
         (subtract_product(pull * ux, net_moment, uy), add_product(pull * uy, net_moment, ux)),
         (
             add_product(isotropic, wx, ux),
-            subtract_product(wx * uy, mu, inverse),
+            subtract_product(wx * uy, mu, edge.inverse),
             add_product(isotropic, wy, uy),
         ),
     )
@@ -139,17 +139,15 @@ def node_slopes(rods, work, stage, node):
 @kernel
 def coupling(s, outer, inner):
     """P = s grad theta(outer) grad theta(inner)^T, row by row, with grad theta = (-u_y, u_x)."""
-    _, _, _, _, _, outer_x, outer_y = outer
-    _, _, _, _, _, inner_x, inner_y = inner
-    sx, sy = s * outer_x, s * outer_y
-    return sy * inner_y, -sy * inner_x, -sx * inner_y, sx * inner_x
+    sx, sy = s * outer.ux, s * outer.uy
+    return sy * inner.uy, -sy * inner.ux, -sx * inner.uy, sx * inner.ux
 
 
 @kernel
 def load_root_edge(work, limb):
-    """Geometry of a limb's root edge, as edge_geometry gave it."""
+    """The root Edge of a limb, as it was put away."""
     row = EDGE_ROWS * limb
-    return (
+    return Edge(
         load(work.root_edges, row),
         load(work.root_edges, row + 1),
         load(work.root_edges, row + 2),

@@ -32,7 +32,7 @@ def freeze_strains(relaxation_time, rods, work, q_hat):
     if relaxation_time is None:
         return
     for e in range(n_nodes(rods) - 1):
-        store(work.tension, e, tension(rods, e, edge_of(rods, q_hat, e)[2]))
+        store(work.tension, e, tension(rods, e, edge_of(rods, q_hat, e).length))
         a, b, side = hinge_edges(rods, e)
         t = half_angle(edge_of(rods, q_hat, a), edge_of(rods, q_hat, b), side)
         store(work.bending, e, moment(rods, e, t, splat(0.0)))
