@@ -182,7 +182,7 @@ def frames_of(video):
 
 
 def test_a_path_that_ends_where_it_starts_can_be_drawn(tmp_path):
-    (done,) = evaluate({"a": scripted("rest")}, [[0.0, 0.0]], out=tmp_path, video=False, **EASY)
+    (done,) = evaluate({"a": scripted("rest")}, [[4e-3, 0.0], [0.0, 0.0]], out=tmp_path, video=False, **EASY)
     assert done.finished
     assert (tmp_path / "traces.png").is_file()
 

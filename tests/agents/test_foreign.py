@@ -102,8 +102,8 @@ def test_help_says_what_may_be_executed(command, capsys):
     assert "module:function" in text and "load only files that you trust" in text
 
 
-def test_the_readme_says_what_may_be_executed():
-    text = " ".join((Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8").split())
+def test_the_documentation_says_what_may_be_executed():
+    text = " ".join((Path(__file__).parents[2] / "docs" / "results.md").read_text(encoding="utf-8").split())
     assert "module:function" in text and "load only files that you trust" in text
 
 

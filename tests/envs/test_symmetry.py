@@ -434,7 +434,7 @@ ASYMMETRIC = {
     "strengths": (Scene(STAR, limb_strengths=(1.0, 0.5, 1.0, 1.0)), None, "equally strong"),
     "held": (Scene(STAR, held_nodes=(6,)), None, "held"),
     "loads": (Scene(STAR, loads=((0, 1e-4, 0.0),)), None, "loaded"),
-    "gravity": (Scene(STAR, gravity=(0.0, -9.81)), None, "gravity"),
+    "gravity": (Scene(replace(STAR, density=1050.0), gravity=(0.0, -9.81)), None, "gravity"),
     "uniform current": (Scene(STAR, Water(current=UniformCurrent(2e-3))), None, "current"),
     "shear": (Scene(STAR, Water(current=ShearCurrent(0.05))), None, "current"),
     "vortex": (Scene(STAR, Water(current=Vortex(1e-3))), None, "current"),
