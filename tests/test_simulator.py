@@ -222,7 +222,7 @@ def wild_swim() -> list[np.ndarray]:
     set_motion(simulator, velocities)
     for command in random_commands(9, 2):
         report = simulator.stroke(command)
-    counts = [report.status, report.newton_iterations, report.repairs, report.backtracks, report.halvings]
+    counts = [report.status, report.newton_iterations, report.regularised, report.backtracks, report.halvings]
     return [simulator.positions, simulator.velocities, np.array(counts)]
 
 

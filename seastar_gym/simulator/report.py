@@ -38,15 +38,15 @@ class SolverStatus(IntEnum):
         }[self]
 
 
-COUNTS = ("newton_iterations", "repairs", "backtracks", "steps", "halvings", "rejections", "energy_cuts")
+COUNTS = ("newton_iterations", "regularised", "backtracks", "steps", "halvings", "rejections", "energy_cuts")
 
 
 class StrokeReport(NamedTuple):
     """What a stroke cost and how it ended; every array has shape (n_robots,).
 
     status: SolverStatus of every robot.
-    newton_iterations, repairs, backtracks: Counts of Newton steps, of those that needed the convex matrix, and of
-        halvings by the line search.
+    newton_iterations, regularised, backtracks: Counts of Newton steps, of those that needed the convex matrix, and of
+        those that the line search halved.
     steps, halvings, rejections: Counts of time steps taken, of those that did not converge or created energy and were
         halved (or, at the shortest, tried again), and of those whose error was too large and were halved
         (Numerics.path_tolerance).
@@ -57,7 +57,7 @@ class StrokeReport(NamedTuple):
 
     status: NDArray[np.int64]
     newton_iterations: NDArray[np.int64]
-    repairs: NDArray[np.int64]
+    regularised: NDArray[np.int64]
     backtracks: NDArray[np.int64]
     steps: NDArray[np.int64]
     halvings: NDArray[np.int64]

@@ -46,7 +46,7 @@ def computing_seconds(simulator: Simulator, seconds: float) -> float:
 def needs_regularisation(scene: Scene) -> bool:
     """Whether Newton's matrix is indefinite in some step of ten strokes of the straight swim."""
     simulator = Simulator(scene)
-    return any(simulator.stroke(STRAIGHT[None]).repairs[0] > 0 for _ in range(10))
+    return any(simulator.stroke(STRAIGHT[None]).regularised[0] > 0 for _ in range(10))
 
 
 def measure_cost(steps: Floats, seconds: float, progress: Callable[[], object] = lambda: None) -> Cost:

@@ -44,7 +44,7 @@ class Cell:
     robots, steps: Number of robots, and of nominal time steps in the stroke.
     failed: Number of robots whose status was not CONVERGED, or whose state was not finite, in any of the runs.
     iterations: Newton iterations per nominal time step, averaged over the stroke and its robots.
-    repairs, backtracks, halvings, energy_cuts: Counts of StrokeReport, summed over robots.
+    regularised, backtracks, halvings, energy_cuts: Counts of StrokeReport, summed over robots.
     folded: Number of robots whose opening angles do not add up to a full turn after the stroke, because a hub hinge
         passed through pi.
     opening_angle: Smallest opening angle of a hub hinge [rad], see StrokeReport.
@@ -65,7 +65,7 @@ class Cell:
     steps: int = 0
     failed: int = 0
     iterations: float = math.nan
-    repairs: int = 0
+    regularised: int = 0
     backtracks: int = 0
     halvings: int = 0
     energy_cuts: int = 0
@@ -189,7 +189,7 @@ def run_cell(sweep: Sweep, value: float | None, step: float, scheme: SchemeName,
         sweep.name, value, step, "", simulator.n_robots, steps,
         failed=int((report.status.astype(bool) | ~finite).sum()) + in_fluid[2] + in_vacuum[2],
         iterations=float(report.newton_iterations.mean()) / steps,
-        repairs=int(report.repairs.sum()), backtracks=int(report.backtracks.sum()),
+        regularised=int(report.regularised.sum()), backtracks=int(report.backtracks.sum()),
         halvings=int(report.halvings.sum()), energy_cuts=int(report.energy_cuts.sum()), folded=count_folded(simulator),
         opening_angle=float(report.smallest_opening_angle.min()), strain=largest_strain(simulator),
         speed=float(np.linalg.norm(simulator.velocities, axis=-1).max()),

@@ -18,7 +18,7 @@ class LongRun:
     """Results of many strokes of random commands.
 
     failed: Number of failed robots.
-    repairs, halvings, energy_cuts: Counts of StrokeReport, summed over strokes and robots.
+    regularised, halvings, energy_cuts: Counts of StrokeReport, summed over strokes and robots.
     strain, speed: Largest strain of an edge and largest speed of a node [m/s] at the end of a stroke.
     strain_late, speed_late: Largest strain and speed [m/s] in the last tenth of the strokes.
     farthest: Largest distance of a hub from its start at the end of the run [m].
@@ -29,7 +29,7 @@ class LongRun:
     robots: int
     failed: int
     iterations_per_stroke: float
-    repairs: int
+    regularised: int
     halvings: int
     energy_cuts: int
     strain: float
@@ -50,16 +50,17 @@ def long_run(
     """Simulate strokes of random commands, drawn for every robot and stroke."""
     simulator = Simulator(Scene(numerics=Numerics.preset(fidelity)), robots, threads)
     rng, start = np.random.default_rng(0), time.perf_counter()
-    iterations, repairs, halvings, cuts, strain, speed = np.zeros((6, strokes))
+    iterations, regularised, halvings, cuts, strain, speed = np.zeros((6, strokes))
     for k in tqdm(range(strokes), unit="stroke", disable=not progress):
         report = simulator.stroke(rng.integers(-1, 2, (robots, simulator.scene.robot.n_limbs)))
-        iterations[k], repairs[k] = report.newton_iterations.mean(), report.repairs.sum()
+        iterations[k], regularised[k] = report.newton_iterations.mean(), report.regularised.sum()
         halvings[k], cuts[k] = report.halvings.sum(), report.energy_cuts.sum()
         strain[k], speed[k] = largest_strain(simulator), np.linalg.norm(simulator.velocities, axis=-1).max()
     late = -max(1, strokes // 10)
     return LongRun(
         strokes=strokes, robots=robots, failed=int(simulator.failed.sum()),
-        iterations_per_stroke=float(iterations.mean()), repairs=int(repairs.sum()), halvings=int(halvings.sum()),
+        iterations_per_stroke=float(iterations.mean()), regularised=int(regularised.sum()),
+        halvings=int(halvings.sum()),
         energy_cuts=int(cuts.sum()), strain=float(strain.max()), strain_late=float(strain[late:].max()),
         speed=float(speed.max()), speed_late=float(speed[late:].max()),
         farthest=float(np.linalg.norm(simulator.hub_position(), axis=-1).max()), seconds=time.perf_counter() - start,

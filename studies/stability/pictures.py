@@ -73,7 +73,7 @@ def _need(cell: Cell) -> float:
     """Index into NEEDS of what the solver needed in a cell."""
     if cell.failed:
         return 3.0
-    return 2.0 if cell.halvings else float(cell.repairs + cell.backtracks > 0)
+    return 2.0 if cell.halvings else float(cell.regularised + cell.backtracks > 0)
 
 
 def _draw_numbers(

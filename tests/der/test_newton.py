@@ -21,16 +21,16 @@ RODS, GAMMA = rods_of(ROBOT), 5e-3
 EVERYONE = np.ones(N_LANES, bool)
 
 
-def minimised(active=EVERYONE, tolerance=1e-13, patience=60.0, speed=0.05, bend=0.05, gamma=GAMMA):
+def minimised(active=EVERYONE, tolerance=1e-13, limit=60.0, speed=0.05, bend=0.05, gamma=GAMMA):
     stages, work = RandomStages(STAR, gamma, bend=bend, speed=speed), make_work(RODS, 1)
     work.q[:], work.q_hat[:], work.v_hat[:] = rows(stages.q), rows(stages.q_hat), rows(stages.v_hat)
     natural = np.array([oracle.natural_angles(STAR, d)[-5:] for d in stages.delta_psi])
     work.hub_EI_kappa_bar[:] = STAR.EI * 2.0 * np.tan(natural.T / 2.0) / STAR.edge_length
     stage = Stage(work.q_hat, work.v_hat, Lanes(gamma), Lanes(1.0 / gamma), False)
-    found = minimise.plain(RODS, work, stage, Mask(active), Lanes(tolerance), Lanes(patience))
-    converged, phi, iterations, repairs, backtracks = plain(found)
+    found = minimise.plain(RODS, work, stage, Mask(active), Lanes(tolerance), Lanes(limit))
+    converged, phi, iterations, regularised, backtracks = plain(found)
     return SimpleNamespace(
-        stages=stages, q=nodes(work.q), converged=converged, phi=phi, iterations=iterations, repairs=repairs,
+        stages=stages, q=nodes(work.q), converged=converged, phi=phi, iterations=iterations, regularised=regularised,
         backtracks=backtracks, length=plain(foreseeable_length.plain(RODS, stage)),
     )  # fmt: skip
 
@@ -63,13 +63,13 @@ def test_robots_that_are_not_active_keep_their_bits_and_cost_no_iteration():
 
 
 def test_nobody_takes_more_iterations_than_allowed():
-    found = minimised(patience=2.0, speed=1.0, bend=0.5)
+    found = minimised(limit=2.0, speed=1.0, bend=0.5)
     assert found.iterations.max() == 2.0 and not found.converged.all()
 
 
-def test_wild_robots_are_helped_by_repairs_or_shorter_steps_and_arrive():
-    found = minimised(speed=1.0, bend=0.5, patience=500.0, gamma=0.05)
-    assert found.converged.all() and np.all(found.repairs + found.backtracks > 0.0)
+def test_wild_robots_are_helped_by_convex_matrices_or_shorter_steps_and_arrive():
+    found = minimised(speed=1.0, bend=0.5, limit=500.0, gamma=0.05)
+    assert found.converged.all() and np.all(found.regularised + found.backtracks > 0.0)
 
 
 def test_a_node_moves_by_its_new_step_or_back_along_its_last():

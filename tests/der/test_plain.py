@@ -51,7 +51,7 @@ def scenes():
 
 
 def ends() -> dict[str, np.ndarray]:
-    """Where the nodes are after a stroke; some robots begin with blows that need repairs and halved steps."""
+    """Where the nodes are after a stroke; some robots begin with blows that need convex matrices and halved steps."""
     found = {}
     for name, scene in scenes():
         n_robots, blow = N_LANES + (name == "implicit-euler"), BLOWS.get(name, 0.3)  # two threads once

@@ -196,7 +196,7 @@ def the_rest(stroke) -> StrokeReport:
 
 @pytest.mark.parametrize("hub_hinge", HUBS)
 def test_stages_where_plain_newton_diverges_end_at_a_minimum_of_the_oracles_potential(hub_hinge):
-    """Velocities of 1 m/s at h = 10 ms, as in tests/test_oracle.py: line search and repairs do the work."""
+    """Velocities of 1 m/s at h = 10 ms, as in tests/test_oracle.py: line search and convex matrix do the work."""
     h, n_robots = 0.01, 12
     robot, star = robot_and_star(hub_hinge=hub_hinge)
     actuator = SmaPulse(peak_angle=0.0, heating_time=h, cooling_time=h)
@@ -210,7 +210,7 @@ def test_stages_where_plain_newton_diverges_end_at_a_minimum_of_the_oracles_pote
     report = the_rest(stroke)
     whole = report.halvings == 0
     assert whole.sum() >= n_robots // 6
-    assert report.repairs[whole].min() > 0 and report.backtracks.sum() > 0
+    assert report.regularised[whole].min() > 0 and report.backtracks.sum() > 0
     for k in np.flatnonzero(whole):
         phi = oracle.incremental_potential(star, star.rest + h * v_hat[k], star.rest, v_hat[k], h, np.zeros(5))
         assert oracle.incremental_potential(star, q[k], star.rest, v_hat[k], h, np.zeros(5)) < phi

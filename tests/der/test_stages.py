@@ -5,16 +5,15 @@ import pytest
 
 from seastar_gym import Numerics, Scene, Seastar, SmaPulse
 from seastar_gym.der.rods import make_work
+from seastar_gym.der.stepping.interval import cover_interval, note_hub_angles
 from seastar_gym.der.stepping.report import COVERED, HALVINGS, REPORT_ROWS, SMALLEST_HUB_T, STEPS
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stages import (
     Stage,
     begin_stage,
-    cover_interval,
     end_stage,
     end_step,
     forget_accelerations,
-    note_hub_angles,
     step_error,
     store_share,
 )

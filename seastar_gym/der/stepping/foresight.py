@@ -20,7 +20,7 @@ EASY = 3.0  # Newton steps: a stage that took more is not predictable
 LATE = 10.0  # times CURVATURE for the last of the easy steps
 FORESEEABLE_T = 4.0  # larger values of tan(phi/2) are too near its pole for that
 SLENDER = 5000.0  # square of an edge's length over its radius: slenderer edges do not curve the potential more
-CALM_STRAIN_ENERGY = 1e-3  # over EA times the length of all limbs: more energy strains or moves a robot violently
+PREDICTABLE_STRAIN = 1e-3  # over EA times the length of all limbs: more energy strains or moves a robot violently
 
 
 class Foresight(NamedTuple):
@@ -28,12 +28,12 @@ class Foresight(NamedTuple):
 
     shortest_edge: Smallest natural length of an edge [m].
     curvature_rate: How fast the foreseeable length shrinks with the step [1/s^2].
-    calm: Potential [J] up to which Newton steps can be foreseen.
+    energy: Potential [J] up to which Newton steps are predictable.
     """
 
     shortest_edge: np.ndarray
     curvature_rate: np.ndarray
-    calm: np.ndarray
+    energy: np.ndarray
 
 
 def coefficients(mesh: Mesh, stretching: Stretching, density: float) -> Foresight:
@@ -41,8 +41,8 @@ def coefficients(mesh: Mesh, stretching: Stretching, density: float) -> Foresigh
     shortest, thinnest = float(mesh.root_edges.min()), min(map(min, mesh.radius_at_nodes))
     slenderness = min(1.0, (shortest / thinnest) ** 2 / SLENDER)
     rate = max(map(max, mesh.modulus_at_nodes)) / (density * shortest**2) * slenderness
-    calm = CALM_STRAIN_ENERGY * mean(stretching.EA) * mesh.n_limbs * mean(mesh.limb_lengths)
-    return Foresight(np.array([shortest]), np.array([rate]), np.array([calm]))
+    energy = PREDICTABLE_STRAIN * mean(stretching.EA) * mesh.n_limbs * mean(mesh.limb_lengths)
+    return Foresight(np.array([shortest]), np.array([rate]), np.array([energy]))
 
 
 @kernel
@@ -53,7 +53,7 @@ def predictable(rods, work, iterations, setbacks, phi, move, tolerated):
     Potential before the step [J]. move: Largest node move of the step [m]. tolerated: Tolerance times the foreseeable
     length [m^2].
     """
-    easy = (setbacks <= 0.0) & (iterations <= EASY) & (phi <= load(rods.foresight.calm, 0))
+    easy = (setbacks <= 0.0) & (iterations <= EASY) & (phi <= load(rods.foresight.energy, 0))
     easy = those_apart(work.contact, easy)
     late = select(iterations < EASY, splat(1.0), LATE)
     foreseen = late * move * move <= tolerated

@@ -20,23 +20,20 @@ SHORTEST_STEP = 2.0**-30  # of the Newton step: shorter ones move nothing
 
 
 @inlined_kernel
-def minimise(rods, work, stage, active, tolerance, patience):
+def minimise(rods, work, stage, active, tolerance, iteration_limit):
     """Minimise Phi over work.q, in place, for the robots in the mask `active`.
 
-    tolerance: Largest node move of the last Newton step [m], or of the one that is left out because it can be foreseen:
-    Newton's method converges quadratically, so after one of its first steps, of size d, and without trouble, the next
-    is at most d^2/(foreseeable length).
+    tolerance: Largest node move of the last Newton step [m], or of the one that is left out because it is predictable,
+        see foresight.py. iteration_limit: Most Newton steps per robot.
 
-    patience: Most Newton steps per robot.
-
-    Returns (converged, Phi, iterations, repairs, backtracks), per robot: a mask, the potential before the last step
-    [J], and three counts.
+    Returns (converged, Phi, iterations, regularised, backtracks), per robot: a mask, the potential before the last step
+    [J], and counts of Newton steps, of those with a convex matrix, and of shortened ones.
     """
     zero, one = splat(0.0), splat(1.0)
     quadratic_length = foreseeable_length(rods, stage)
     nobody = one < zero
     running, converged, convex = active, nobody, nobody
-    iterations, repairs, backtracks = zero, zero, zero
+    iterations, regularised, backtracks = zero, zero, zero
     best, expected, fraction = splat(1e300), zero, one
     while any_lane(running):
         if any_lane(convex):
@@ -48,7 +45,7 @@ def minimise(rods, work, stage, active, tolerance, patience):
         if any_lane(indefinite):
             # Their matrices are made again from convex parts; the others wait and find the same numbers again.
             convex = convex | indefinite
-            repairs += select(indefinite, one, zero)
+            regularised += select(indefinite, one, zero)
             continue
         stepping = running & low_enough & (pivot > 0.0)
         decrement = solve_coupled(work.contact, rods, work, stepping, decrement)
@@ -63,12 +60,14 @@ def minimise(rods, work, stage, active, tolerance, patience):
         count = select(stepping, one, zero)
         iterations += count
         backtracks += select(shortening, one, zero)
-        foreseen = predictable(rods, work, iterations, repairs + backtracks, phi, move, tolerance * quadratic_length)
+        foreseen = predictable(
+            rods, work, iterations, regularised + backtracks, phi, move, tolerance * quadratic_length
+        )
         done = stepping & ((move <= tolerance) | (~convex & foreseen))
         converged = converged | done
         convex = convex & ~stepping
-        running = (stepping | shortening) & ~done & (iterations < patience)
-    return converged, best, iterations, repairs, backtracks
+        running = (stepping | shortening) & ~done & (iterations < iteration_limit)
+    return converged, best, iterations, regularised, backtracks
 
 
 @kernel

@@ -1,9 +1,12 @@
 """What a stroke reports of every robot: counts and extremes."""
 
+from seastar_gym.simd.compilation import kernel
+from seastar_gym.simd.lanes import load, store
+
 # Rows of a lane group's report, shape (len(REPORT_ROWS), N_LANES): what happened to its robots.
 REPORT_ROWS = (
     "newton_iterations",
-    "repairs",  # Newton steps that needed the convex matrix
+    "regularised",  # Newton steps that needed the convex matrix
     "backtracks",  # halvings of a Newton step by the line search
     "steps",  # time steps taken
     "halvings",  # halvings of a time step that did not converge
@@ -12,6 +15,11 @@ REPORT_ROWS = (
     "covered",  # time [s]
     "smallest_hub_t",  # smallest tan(phi/2) of a hub hinge
 )
-NEWTON_ITERATIONS, REPAIRS, BACKTRACKS, STEPS, HALVINGS, REJECTIONS, ENERGY_CUTS, COVERED, SMALLEST_HUB_T = range(
+NEWTON_ITERATIONS, REGULARISED, BACKTRACKS, STEPS, HALVINGS, REJECTIONS, ENERGY_CUTS, COVERED, SMALLEST_HUB_T = range(
     len(REPORT_ROWS)
 )
+
+
+@kernel
+def add_to_report(report, row, amount):
+    store(report, row, load(report, row) + amount)

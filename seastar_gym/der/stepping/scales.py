@@ -36,11 +36,11 @@ def coefficients(
     """Scales of a robot in a fluid (density or drag coefficient zero: vacuum)."""
     area = mesh.per_node(lambda r: np.pi * r**2)
     broadside = mean(mesh.per_node(lambda r: drag_per_length(fluid_density, C_d, r)))
-    length, calm = mean(mesh.limb_lengths), float(foresight.calm[0])
+    length, energy = mean(mesh.limb_lengths), float(foresight.energy[0])
     stiffness_over_mass = float((stretching.EA_over_l / (density * area * mesh.dl)[1:]).max())
     edges = mesh.nodes_per_limb - 1
     return Scales(
-        damped=np.array([calm * min(1.0, broadside * length / (density * mean(area)))]),
+        damped=np.array([energy * min(1.0, broadside * length / (density * mean(area)))]),
         unsettled_rate=np.array([stiffness_over_mass * edges**2 if broadside > 0.0 else np.inf]),
         held=held,
     )

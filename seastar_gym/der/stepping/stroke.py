@@ -1,8 +1,8 @@
 """A whole sequence of time intervals for many robots, in one compiled call."""
 
 from seastar_gym.der.geometry import larger
+from seastar_gym.der.stepping.interval import cover_interval
 from seastar_gym.der.stepping.report import NEWTON_ITERATIONS
-from seastar_gym.der.stepping.stages import cover_interval
 from seastar_gym.simd.compilation import entry_point, kernel
 from seastar_gym.simd.lanes import borrow, load, select, splat, store
 

@@ -1,0 +1,156 @@
+"""One time step: its stages, its error, and the guard's verdict on the energy that it ends with."""
+
+from typing import Any, NamedTuple
+
+from seastar_gym.der.stepping.guard import (
+    LARGEST_CUT,
+    add_work_of_loads,
+    allowed_energy,
+    frame_velocity,
+    hold_to_energy,
+    may_gain,
+    put_back,
+    set_aside,
+    through_poles,
+)
+from seastar_gym.der.stepping.momentum import settle_momentum
+from seastar_gym.der.stepping.newton import minimise
+from seastar_gym.der.stepping.report import (
+    BACKTRACKS,
+    ENERGY_CUTS,
+    NEWTON_ITERATIONS,
+    REGULARISED,
+    add_to_report,
+)
+from seastar_gym.der.stepping.stages import (
+    LAST_STEP,
+    begin_stage,
+    end_stage,
+    end_step,
+    memory_row,
+    start_standing,
+    step_error,
+)
+from seastar_gym.der.terms.crossing import those_uncrossed
+from seastar_gym.der.terms.damping import freeze_strains
+from seastar_gym.der.terms.fluid import add_work_of_current, freeze_fluid
+from seastar_gym.der.terms.hub import set_natural_hub_angles
+from seastar_gym.der.terms.near_pairs import freeze_contact
+from seastar_gym.simd.compilation import kernel
+from seastar_gym.simd.lanes import any_lane, load, load_number, select, splat, store
+
+MOST_HALVINGS = 12.0  # a robot whose step fails once more has failed
+TURNABLE = 8.0  # after so many halvings, hinges may go through their poles, see guard.py
+SMALLEST_FRACTION = 2.0**-12  # of an interval: there is no shorter step
+
+
+class Step(NamedTuple):
+    """A time step of every robot; lanes.
+
+    start, size: Its beginning and its length, as shares of the interval. h: Its length [s].
+    iteration_limit: Most Newton iterations of a stage.
+    retrying: Mask of the robots that halved a step of this interval.
+    """
+
+    start: Any
+    size: Any
+    h: Any
+    iteration_limit: Any
+    retrying: Any
+
+
+@kernel
+def try_step(rods, work, scheme, actuation, q, v, a, step, active, limits, report):
+    """One step for the robots in the mask `active`.
+
+    a: What the last step left for this one, see LAST_STEP and SIZE; then what this one leaves for the next.
+
+    Returns (good, accepted, error rate): the mask of the robots whose stages all converged and created no energy, that
+    of those whose error is small enough besides, whose state has moved, and the error per time [m/s], zero if steps are
+    not adapted.
+    """
+    good, guarded, stage = solve_stages(rods, work, scheme, actuation, q, v, a, step, active, limits, report)
+    accepted, error_rate, last_h = good, splat(0.0), memory_row(rods, scheme, LAST_STEP)
+    if limits.adaptive and not scheme.dissipative:
+        error_rate = step_error(rods, work, stage, a, step.h, load(a, last_h)) / step.h
+        small = (error_rate <= load(limits.error_rate, 0)) | (step.size <= SMALLEST_FRACTION)
+        accepted = good & small
+        store(a, last_h, select(accepted, step.h, load(a, last_h)))
+    guarded = accepted & guarded
+    if not any_lane(guarded):
+        end_step(rods, work, scheme, stage, q, v, a, step.h, accepted)
+        return good, accepted, error_rate
+    refused = end_guarded_step(
+        rods, work, scheme, actuation, q, v, a, step, stage, accepted, guarded, limits, report
+    )
+    return good & ~refused, accepted & ~refused, error_rate
+
+
+@kernel
+def solve_stages(rods, work, scheme, actuation, q, v, a, step, active, limits, report):
+    """Solve the stages of a step for the robots in the mask `active`.
+
+    Returns (good, guarded, stage): the masks of the robots whose stages all converged, and of those whose energy has to
+    be looked at; the last stage.
+    """
+    good, guarded = active, step.retrying
+    tolerance = load(limits.tolerance, 0)
+    for k in range(scheme.n_stages):
+        stage = begin_stage(rods, work, scheme, k, q, v, a, step.h)
+        freeze_contact(rods.contact, rods, work, stage, q)
+        if any_lane(step.retrying):
+            start_standing(rods, work, stage, frame_velocity(rods.current, rods, q, v), step.retrying)
+        freeze_fluid(rods, work)
+        freeze_strains(rods.damping, rods, work, stage.q_hat)
+        set_natural_hub_angles(rods, work, actuation, step.start + load_number(scheme.c, k) * step.size)
+        left = limits.most_iterations - load(report, NEWTON_ITERATIONS)
+        most, good = select(left < step.iteration_limit, left, step.iteration_limit), good & (left > 0.0)
+        good, phi, iterations, regularised, backtracks = minimise(rods, work, stage, good, tolerance, most)
+        settle_momentum(rods, work, stage, good)
+        good = those_uncrossed(rods.contact, rods, work, stage, q, good)
+        guarded = guarded | (regularised + backtracks > 0.0)
+        if scheme.dissipative:
+            guarded = guarded | those_that_may_gain(rods, work, stage, phi, good & ~guarded)
+        add_to_report(report, NEWTON_ITERATIONS, iterations)
+        add_to_report(report, REGULARISED, regularised)
+        add_to_report(report, BACKTRACKS, backtracks)
+        if k < scheme.n_stages - 1:
+            end_stage(rods, work, scheme, k, stage, a, active)
+    return good, guarded, stage
+
+
+@kernel
+def those_that_may_gain(rods, work, stage, phi, robots):
+    """Mask of robots with so much energy that drag may not take what a step of implicit Euler creates.
+
+    robots: Mask of those that Newton's method has nothing to say about; of the predictable ones among them only those
+    are meant whose potential leaves room for it.
+    """
+    energetic = phi > load(rods.scales.damped, 0)
+    predictable = robots & energetic & (phi <= load(rods.foresight.energy, 0))
+    if any_lane(predictable):
+        gaining = may_gain(rods.current, rods.added_mass, rods, work, stage, phi, predictable)
+        energetic = (energetic & ~predictable) | gaining
+    return energetic
+
+
+@kernel
+def end_guarded_step(rods, work, scheme, actuation, q, v, a, step, stage, accepted, guarded, limits, report):
+    """End a step of the robots in the mask `accepted`, and hold those in `guarded` to their energy.
+
+    Returns the mask of the robots whose step was refused and undone.
+    """
+    set_aside(rods, work, scheme, q, v)
+    frame = frame_velocity(rods.current, rods, q, v)
+    allowed = allowed_energy(rods, work, scheme, actuation, step.start, step.start + step.size, q, v, frame)
+    end_step(rods, work, scheme, stage, q, v, a, step.h, accepted)
+    largest_cut = select(step.iteration_limit > MOST_HALVINGS * limits.max_iterations, splat(1.0), LARGEST_CUT)
+    allowed = add_work_of_current(rods.current, rods, work, v, step.h, frame, allowed)
+    allowed = add_work_of_loads(rods.load, rods, work, q, step.h, frame, allowed)
+    refused, cut = hold_to_energy(rods, work, scheme, q, v, step.h, frame, guarded, allowed, largest_cut)
+    turnable = guarded & (step.iteration_limit <= TURNABLE * limits.max_iterations)
+    refused = refused | through_poles(rods, work, q, turnable)
+    if any_lane(refused):
+        put_back(rods, work, scheme, q, v, refused)
+    add_to_report(report, ENERGY_CUTS, select(cut, splat(1.0), splat(0.0)))
+    return refused
