@@ -12,7 +12,7 @@ from seastar_gym.der.geometry import larger
 from seastar_gym.der.mesh import Mesh, mean
 from seastar_gym.der.terms.contact import those_apart
 from seastar_gym.der.terms.stretching import Stretching
-from seastar_gym.simd.compilation import kernel
+from seastar_gym.simd.compilation import inlined_kernel, kernel
 from seastar_gym.simd.lanes import load, select, splat
 
 CURVATURE = 40.0  # for light edges, the step after one of size d is below this times d^2 over the edge length
@@ -45,7 +45,7 @@ def coefficients(mesh: Mesh, stretching: Stretching, density: float) -> Foresigh
     return Foresight(np.array([shortest]), np.array([rate]), np.array([energy]))
 
 
-@kernel
+@inlined_kernel
 def predictable(rods, work, iterations, setbacks, phi, move, tolerated):
     """Mask of the robots whose next Newton step is sure to be small enough.
 

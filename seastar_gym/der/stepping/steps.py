@@ -36,7 +36,7 @@ from seastar_gym.der.terms.damping import freeze_strains
 from seastar_gym.der.terms.fluid import add_work_of_current, freeze_fluid
 from seastar_gym.der.terms.hub import set_natural_hub_angles
 from seastar_gym.der.terms.near_pairs import freeze_contact
-from seastar_gym.simd.compilation import kernel
+from seastar_gym.simd.compilation import inlined_kernel, kernel
 from seastar_gym.simd.lanes import any_lane, load, load_number, select, splat, store
 
 MOST_HALVINGS = 12.0  # a robot whose step fails once more has failed
@@ -86,7 +86,7 @@ def try_step(rods, work, scheme, actuation, q, v, a, step, active, limits, repor
     return good & ~refused, accepted & ~refused, error_rate
 
 
-@kernel
+@inlined_kernel
 def solve_stages(rods, work, scheme, actuation, q, v, a, step, active, limits, report):
     """Solve the stages of a step for the robots in the mask `active`.
 
@@ -119,7 +119,7 @@ def solve_stages(rods, work, scheme, actuation, q, v, a, step, active, limits, r
     return good, guarded, stage
 
 
-@kernel
+@inlined_kernel
 def those_that_may_gain(rods, work, stage, phi, robots):
     """Mask of robots with so much energy that drag may not take what a step of implicit Euler creates.
 
