@@ -75,7 +75,8 @@ def imports_of(*paths: Path) -> set[str]:
             modules |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.level == 0:
             modules.add(node.module)
-    own = {"seastar_gym", "agents", "studies", "train", *(file.stem for file in (ROOT / "tests").rglob("*.py"))}
+    tests = {path.stem for path in (ROOT / "tests").rglob("*")}
+    own = {"seastar_gym", "agents", "studies", "train", *tests}
     packages = {module.partition(".")[0] for module in modules} - sys.stdlib_module_names - own
     return {canonicalize_name(DISTRIBUTION_OF.get(package, package)) for package in packages}
 

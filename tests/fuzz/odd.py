@@ -27,11 +27,9 @@ from seastar_gym import (
     ShearCurrent,
     Simulator,
     SmaPulse,
-    SymmetryReduction,
     ThermalSma,
     Uniform,
     UniformCurrent,
-    VectorSymmetryReduction,
     Vortex,
     Water,
     relaxation_time,
@@ -102,8 +100,6 @@ PARTS: Calls = {
         num_envs=2, max_episode_steps=3, path="line", actions="pairs", fidelity="fast", scene=Scene(numerics=FAST),
         reward=RewardWeights(), waypoint_radius=0.01, random_heading=True, render_mode=None,
         autoreset_mode="NextStep", threads=1, randomization=None)),
-    "SymmetryReduction": (SymmetryReduction, dict(env=SeastarSwimEnv(fidelity="fast"))),
-    "VectorSymmetryReduction": (VectorSymmetryReduction, dict(env=SeastarSwimVectorEnv(2, fidelity="fast"))),
 }  # fmt: skip
 """What is made, and arguments with which it can be."""
 

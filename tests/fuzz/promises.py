@@ -127,7 +127,7 @@ def check_bits_in_other_lanes(case: Case) -> None:
 
 def check_bits_on_threads(case: Case) -> None:
     """A batch on one thread, on two and on three."""
-    robots = np.resize(np.arange(case.n_robots), 3 * N_LANES + 1)
+    robots = np.resize(np.arange(case.n_robots), 2 * N_LANES + 1)
     one, names = swim(case, robots)
     for threads in (2, 3):
         assert_same_bits(swim(case, robots, threads)[0], one, names, f"on {threads} threads")

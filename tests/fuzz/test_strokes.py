@@ -34,12 +34,12 @@ def test_a_scene_is_accepted_or_refused_in_one_sentence(terms, seed):
         assert_one_sentence(refusal)
 
 
-@drawn(30)
+@drawn(40)
 def test_strokes_end_finite_or_with_a_failure_that_is_told_and_in_bounded_work(terms, seed):
     promises.check_strokes_end(draw_case(Random(seed), terms))
 
 
-@drawn(30)
+@drawn(40)
 def test_a_robot_has_the_same_bits_alone_and_beside_robots_in_trouble(terms, seed):
     promises.check_bits_alone(draw_case(Random(seed), terms))
 
@@ -49,7 +49,7 @@ def test_a_robot_has_the_same_bits_in_every_lane_and_batch(terms, seed):
     promises.check_bits_in_other_lanes(draw_case(Random(seed), terms))
 
 
-@drawn(8)
+@drawn(5)
 def test_a_robot_has_the_same_bits_on_any_number_of_threads(terms, seed):
     promises.check_bits_on_threads(draw_case(Random(seed), terms))
 
@@ -59,12 +59,12 @@ def test_a_stroke_in_parts_and_a_state_that_is_set_again_go_on_to_the_same_bits(
     promises.check_bits_in_parts(draw_case(Random(seed), terms))
 
 
-@drawn(25, [PLAIN, CONTACT])
+@drawn(30, [PLAIN, CONTACT])
 def test_free_robots_in_vacuum_keep_their_momentum(terms, seed):
     promises.check_momentum(draw_case(Random(seed), terms))
 
 
-@drawn(25, [PLAIN])
+@drawn(30, [PLAIN])
 def test_implicit_euler_without_commands_creates_no_energy(terms, seed):
     promises.check_energy(draw_case(Random(seed), terms))
 
@@ -104,7 +104,7 @@ def check_everything(case: Case) -> None:
     promises.check_bits_in_other_lanes(case)
 
 
-@drawn(15, [CONTACT])
+@drawn(10, [CONTACT])
 def test_water_with_contact_and_nothing_else(terms, seed):
     check_everything(in_water(draw_case(Random(seed), terms)))
 
@@ -114,12 +114,12 @@ def test_contact_in_vacuum(terms, seed):
     check_everything(in_vacuum(draw_case(Random(seed), terms)))
 
 
-@drawn(10, [CONTACT])
+@drawn(15, [CONTACT])
 def test_chapter_like_robots_with_contact(terms, seed):
     check_everything(in_water(draw_case(Random(seed), terms, wild=False)))
 
 
-@drawn(10, [terms for terms in COMPILED if OWN in terms])
+@drawn(15, [terms for terms in COMPILED if OWN in terms])
 def test_robots_with_numbers_of_their_own_are_isolated(terms, seed):
     check_everything(draw_case(Random(seed), terms))
 
