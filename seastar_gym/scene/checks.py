@@ -1,19 +1,29 @@
 """Checks of what a scene is made of; what is no such number or choice is refused with a sentence that names it."""
 
 import math
+import sys
+from reprlib import Repr
 
 import numpy as np
+from numpy.typing import NDArray
 
 LONGEST_SHOWN = 200
 """Characters of a value that a sentence shows."""
 
+_SHORT = Repr()
+"""Writes the beginnings of large lists, tuples and dicts only."""
+_SHORT.maxlist = _SHORT.maxtuple = _SHORT.maxdict = 100
+_SHORT.maxstring = _SHORT.maxlong = _SHORT.maxother = 2 * LONGEST_SHOWN
+
 
 def shown(value: object) -> str:
-    """The value as a sentence shows it: on one line, and cut where it is long."""
+    """Text of a value for a sentence: on one line and cut where it is long."""
+    if isinstance(value, int) and abs(value) > sys.float_info.max:
+        return "a number beyond all floats"
     try:
-        text = " ".join(repr(value).split())
-    except ValueError:  # Python writes out no integers of thousands of digits
-        text = f"a number of {type(value).__name__}"
+        text = " ".join(_SHORT.repr(value).split())
+    except ValueError:  # Python writes out no integers of thousands of digits, not even within a list
+        return f"a {type(value).__name__}"
     return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
 
 
@@ -73,3 +83,14 @@ def require_numbers(name: str, values: object, unit: str) -> None:
     """A tuple of finite numbers."""
     if not isinstance(values, tuple) or not all(map(is_finite_number, values)):
         raise ValueError(f"{name} must be a tuple of finite numbers [{unit}], not {shown(values)}.")
+
+
+def as_floats(name: str, value: object) -> NDArray[np.float64]:
+    """Value as an array of floats, of whatever shape. ValueError if it is not made of numbers."""
+    try:
+        array = np.asarray(value)
+    except ValueError as ragged:
+        raise ValueError(f"{name} must be an array of numbers, not rows of different lengths.") from ragged
+    if array.dtype.kind not in "biuf":
+        raise ValueError(f"{name} must be numbers, not {array.dtype} values.")
+    return array.astype(float)

@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from seastar_gym.scene.checks import shown
 from seastar_gym.scene.per_robot import PerRobot
 
 VERSION = 1
@@ -151,12 +152,3 @@ def _made(kind: type, where: str, *arguments: Any, **fields: Any) -> Any:
         return kind(*arguments, **fields)
     except (TypeError, ArithmeticError) as unfit:
         raise ValueError(f"{where} is no {kind.__name__}: {' '.join(str(unfit).split()).rstrip('.')}.") from unfit
-
-
-def shown(value: object) -> str:
-    """A value in a sentence, however large it is."""
-    if isinstance(value, int) and abs(value) > sys.float_info.max:
-        return "a number beyond all floats"
-    if value is None or isinstance(value, bool | int | float):
-        return repr(value)
-    return repr(value) if isinstance(value, str) and len(value) < 40 else f"a {type(value).__name__}"

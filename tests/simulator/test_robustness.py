@@ -1,7 +1,7 @@
 """Whatever scene is accepted, its strokes end in finite, converged states, or say which robot failed, and why.
 
-What a single module promises stands with it: failing robots and refused states in test_simulator.py, refused scenes in
-test_scene.py, failing episodes in envs/, moderate conservation and symmetry in test_swim.py. Here is what is wild.
+What a single module promises stands with it: failing robots in test_simulator.py, refused scenes in scene/,
+failing episodes in envs/, moderate conservation and symmetry in test_swim.py. Here is what is wild.
 """
 
 import math
