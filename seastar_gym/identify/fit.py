@@ -3,8 +3,8 @@
 Parameters are fitted by their logarithms, so their errors are relative. Each column of the Jacobian comes from a scene
 in which one parameter has changed a little. These scenes and the scene itself are simulated side by side, as robots of
 one batch. With J the derivative of the residuals r and s^2 = |r|^2/(n - p), the covariance is s^2 (J^T J)^-1, which
-holds for independent errors of equal size in all coordinates. Where a combination of parameters, a singular vector of J,
-has a relative error above UNTOLD, the data do not determine it, and the estimate says so.
+holds for independent errors of equal size in all coordinates. Combinations of parameters, singular vectors of J, whose
+relative error is above UNTOLD are not determined by the data, and the estimate says so.
 """
 
 import math

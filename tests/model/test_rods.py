@@ -1,6 +1,5 @@
 """Coefficients of rods are the chapter's."""
 
-
 import math
 
 import numpy as np
