@@ -11,10 +11,9 @@ from seastar_gym.scene.scene import Scene
 
 
 def make_limits(scene: Scene, index: int = 0) -> Limits:
-    """Tolerances of a robot's solution for the kernels.
+    """Tolerances and limits of the solver for robot `index` of a scene.
 
-    The error that a step may make per second is `error_rate` limb lengths per stroke; how it follows from the
-    tolerance on the path was measured, see ADAPTATION.
+    The largest error of a step per second follows from the tolerance of the path, as was measured, see ADAPTATION.
     """
     numerics, length = scene.numerics, of_robot(scene.robot.limb_length, index)
     speed, tolerance = length / scene.actuator.period, numerics.path_tolerance

@@ -1,4 +1,4 @@
-"""From a scene to the coefficients of its rods, one robot at a time: every term is one line."""
+"""Coefficients of one robot of a scene for the kernels. Every term is one line."""
 
 from operator import itemgetter
 

@@ -1,4 +1,4 @@
-"""Currents: how the fluid moves, as frozen dataclasses in SI units; for numbers of each robot see per_robot.py."""
+"""Currents: velocity fields of the fluid. Some numbers may differ from robot to robot, see per_robot.py."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,15 +15,15 @@ from seastar_gym.scene.serial import register_part
 Floats = NDArray[np.float64]
 
 LARGEST_GRID = 4_000_000
-"""Points: more than this many velocities are no longer a sample of a smooth current."""
+"""Largest number of grid points."""
 
 
 @register_part
 @dataclass(frozen=True)
 class UniformCurrent:
-    """A fluid that moves as a whole with the velocity u_x, u_y [m/s].
+    """Uniform current: the fluid moves as a whole with the velocity (u_x, u_y) [m/s].
 
-    Numbers that differ from robot to robot are numpy arrays of shape (n_robots,) here: a tuple would be a vector.
+    Numbers that differ from robot to robot must be numpy arrays of shape (n_robots,), since a tuple could be a vector.
     """
 
     PER_ROBOT: ClassVar = ("u_x", "u_y")
@@ -43,9 +43,12 @@ class UniformCurrent:
 @register_part
 @dataclass(frozen=True)
 class ShearCurrent:
-    """A simple shear: u = rate y' along x', where x', y' are x, y turned by `direction`.
+    """Simple shear flow: u = rate y' along x', where the axes x', y' are x, y rotated by `direction`.
 
-    rate: [1/s]. direction: Of the flow [rad]. The fluid stands still on the line through the origin.
+    The fluid is at rest on the line through the origin along x'.
+
+    rate: Shear rate [1/s].
+    direction: Direction of the flow [rad], anti-clockwise from x.
     """
 
     PER_ROBOT: ClassVar = ("rate", "direction")
@@ -60,9 +63,11 @@ class ShearCurrent:
 @register_part
 @dataclass(frozen=True)
 class Vortex:
-    """A steady vortex with a smooth core, after Kaufmann and Scully: u = circulation/(2 pi) r/(r_c^2 + r^2) round it.
+    """Steady vortex with a smooth core after Kaufmann and Scully, with azimuthal velocity Gamma/(2 pi) r/(r_c^2 + r^2).
 
-    circulation: [m^2/s], + is anti-clockwise. x, y: Its centre [m]. core_radius: r_c, where it turns fastest [m].
+    circulation: Gamma [m^2/s], positive anti-clockwise.
+    x, y: Centre of the vortex [m].
+    core_radius: r_c [m], the radius at which the velocity is largest.
     """
 
     PER_ROBOT: ClassVar = ("circulation", "x", "y", "core_radius")
@@ -81,10 +86,13 @@ class Vortex:
 @register_part
 @dataclass(frozen=True)
 class GridCurrent:
-    """A current sampled on a grid, bilinear in between; beyond the grid it is that of the nearest point on its edge.
+    """Current sampled on a square grid, with bilinear interpolation.
 
-    corner: The grid's first point (x, y) [m]. spacing: Of its points, both ways [m].
-    velocities: u [m/s] at the points, shape (n_x, n_y, 2); any array, kept as tuples, so that equal grids are equal.
+    Outside the grid, the velocity is that of the nearest point on the grid's edge.
+
+    corner: First point of the grid (x, y) [m].
+    spacing: Distance between neighbouring points, along both axes [m].
+    velocities: Velocities at the points [m/s], an array of shape (n_x, n_y, 2), kept as tuples.
     """
 
     corner: tuple[float, float]
@@ -120,9 +128,11 @@ class GridCurrent:
         y: tuple[float, float],
         spacing: float,
     ) -> "GridCurrent":
-        """Sample (u_x, u_y) = function(x, y) [m/s] on the rectangle from x[0] to x[1] and from y[0] to y[1] [m].
+        """Sample a function on the rectangle from x[0] to x[1] and from y[0] to y[1] [m].
 
-        The function takes and gives arrays of one shape, or plain numbers where the current does not depend on place.
+        function: Velocity (u_x, u_y) [m/s] at arrays x, y [m] of one shape. It may return numbers where the velocity
+            does not depend on the position.
+        spacing: Distance between neighbouring points [m].
         """
         require_number("spacing", spacing, "m")
         if not callable(function):

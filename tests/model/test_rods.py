@@ -8,11 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from oracle import Star
-from seastar_gym import GridCurrent, Scene, Seastar, SmaPulse, Water
+from seastar_gym import Scene, Seastar, SmaPulse, Water
 from seastar_gym.model.rods import make_rods
-
-SAMPLED = GridCurrent((0.0, 0.0), 0.1, np.zeros((3, 2, 2)))
-FIDELITIES = ("fast", "balanced", "accurate", "reference", "chapter")
 
 
 @given(

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from refusals import assert_refused
-from seastar_gym import GridCurrent, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
+from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 from seastar_gym.model.rods import make_rods
 
-SAMPLED = GridCurrent((0.0, 0.0), 0.1, np.zeros((3, 2, 2)))
+FIDELITIES = ("fast", "balanced", "accurate", "reference", "chapter")
 NOT_POSITIVE = [0.0, -1.0, math.nan, math.inf, -math.inf, "0.1", None, True, 1j, [0.1]]
 
 
