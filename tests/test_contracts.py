@@ -58,7 +58,8 @@ def test_the_sources_keep_their_contracts(sources):
         ("agents/scripted.py", "studies.parser"),
         ("seastar_gym/scene/checks.py", "seastar_gym.scene.limb"),
         ("seastar_gym/simulator/clock.py", "seastar_gym.simulator.simulator"),
-        ("seastar_gym/der/terms/bending.py", "seastar_gym.der.terms.damping"),
+        ("seastar_gym/der/terms/stretching.py", "seastar_gym.der.terms.damping"),
+        ("seastar_gym/der/terms/bending.py", "seastar_gym.der.potential"),
         ("seastar_gym/scene/limb.py", "numba"),
         ("seastar_gym/identify/fit.py", "torch"),
     ],
@@ -71,8 +72,9 @@ def test_an_import_against_the_direction_is_found(sources, file, imported):
     assert "BROKEN" in done.stdout and Path(file).stem in done.stdout
 
 
-def test_a_module_that_no_layer_lists_is_found(sources):
-    plant(sources / "seastar_gym" / "helpers.py", "math")
+@pytest.mark.parametrize("room", ["seastar_gym", "seastar_gym/der"])
+def test_a_module_that_no_layer_lists_is_found(sources, room):
+    plant(sources / room / "helpers.py", "math")
     done = lint(sources)
     assert done.returncode == 1
     assert "helpers" in done.stdout

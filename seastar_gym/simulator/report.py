@@ -71,7 +71,10 @@ class StrokeReport(NamedTuple):
 
 
 def make_report(status: Floats, rows: Mapping[str, Floats], hub_hinge: str) -> StrokeReport:
-    """Report of a stroke from the kernels' numbers, shape (n_robots,) each; rows: see REPORT_ROWS in der/stepping/report.py."""
+    """Report of a stroke from the kernels' numbers, shape (n_robots,) each.
+
+    rows: Numbers by name, see REPORT_ROWS in der/stepping/report.py.
+    """
     angle = 2.0 * np.arctan(rows["smallest_hub_t"])
     if hub_hinge == "turning":
         angle += np.pi
