@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 from scipy.stats import t as student
 
 from seastar_gym.identify.measurement import Measurement
@@ -82,60 +82,84 @@ def identify(scene: Scene, parameters: Sequence[str], measurement: Measurement, 
         raise ValueError(f"parameters must be names of numbers, such as fluid.density, not {shown(parameters)}.")
     if not is_finite_number(confidence) or not 0.0 < confidence < 1.0:
         raise ValueError(f"confidence must be between 0 and 1, not {shown(confidence)}.")
-    names = tuple(parameters)
-    guess = np.array([get_parameter(scene, name) for name in names])
-    n_limbs = scene.robot.n_limbs
-    if measurement.commands.shape[1] != n_limbs or max(measurement.nodes) >= scene.robot.n_nodes:
-        raise ValueError(
-            f"Commands and nodes must be those of a robot of {n_limbs} limbs and {scene.robot.n_nodes} nodes."
-        )
-    seen = np.isfinite(measurement.positions)
-    if seen.sum() <= len(names):
-        raise ValueError(f"{seen.sum()} coordinates are too few for {len(names)} parameters.")
+    residuals = Residuals(scene, tuple(parameters), measurement)
+    bound = math.log(LARGEST_FACTOR)
+    start = np.zeros(len(parameters))
+    fit = least_squares(residuals, start, residuals.jacobian, (-bound, bound), xtol=1e-6, ftol=1e-8)
+    return estimate_of(fit, residuals, confidence)
 
-    changes = DIFFERENCE * np.vstack([np.zeros(len(names)), np.eye(len(names))])
 
-    def scenes_at(logarithms: ArrayLike) -> list[Scene]:
-        """Scenes with these parameters, and with each of them changed a little, shape (p + 1,)."""
-        return [with_parameters(scene, names, guess * np.exp(logarithms - change)) for change in changes]
+class Residuals:
+    """Simulated minus measured coordinates [m], as a function of the logarithms of parameters over their first guess.
 
-    @lru_cache(maxsize=1)
-    def simulate(*logarithms: float) -> Floats:
-        """Trajectories of those scenes, for the residuals and the Jacobian at once."""
-        return trajectories(scenes_at(logarithms), measurement)
+    names: Names of the p parameters.
+    guess: First guess of the parameters, shape (p,).
+    seen: Whether each coordinate was measured, shape (n, n_nodes_seen, 2).
+    """
 
-    def residuals(logarithms: Floats) -> Floats:
+    def __init__(self, scene: Scene, names: tuple[str, ...], measurement: Measurement):
+        self.names, self.measurement, self._scene = names, measurement, scene
+        self.guess = np.array([get_parameter(scene, name) for name in names])
+        robot = scene.robot
+        if measurement.commands.shape[1] != robot.n_limbs or max(measurement.nodes) >= robot.n_nodes:
+            raise ValueError(
+                f"Commands and nodes must be those of a robot of {robot.n_limbs} limbs and {robot.n_nodes} nodes."
+            )
+        self.seen = np.isfinite(measurement.positions)
+        if self.seen.sum() <= len(names):
+            raise ValueError(f"{self.seen.sum()} coordinates are too few for {len(names)} parameters.")
+        self._changes = DIFFERENCE * np.vstack([np.zeros(len(names)), np.eye(len(names))])
+        self._simulate = lru_cache(maxsize=1)(self._trajectories)  # for residuals and Jacobian at once
+
+    def scenes(self, logarithms: ArrayLike) -> list[Scene]:
+        """Scene with these parameters, and scenes in which one of them is changed a little; p + 1 scenes."""
+        values = (self.guess * np.exp(logarithms - change) for change in self._changes)
+        return [with_parameters(self._scene, self.names, row) for row in values]
+
+    def _trajectories(self, *logarithms: float) -> Floats:
+        return trajectories(self.scenes(logarithms), self.measurement)
+
+    def trajectory(self, logarithms: Floats) -> Floats:
+        """Simulated positions [m], shape (n, n_nodes_seen, 2)."""
+        return np.asarray(self._simulate(*logarithms)[0])
+
+    def __call__(self, logarithms: Floats) -> Floats:
+        """Residuals of the coordinates that were measured [m]; infinite where the simulation is impossible."""
         try:
-            scenes_at(logarithms)
+            self.scenes(logarithms)
         except ValueError:  # beyond what can be modelled: least_squares takes a shorter step
-            return np.full(seen.sum(), np.inf)
-        found = (simulate(*logarithms)[0] - measurement.positions)[seen]
+            return np.full(self.seen.sum(), np.inf)
+        found = (self.trajectory(logarithms) - self.measurement.positions)[self.seen]
         return np.where(np.isfinite(found), found, np.inf)
 
-    def jacobian(logarithms: Floats) -> Floats:
-        here, *changed = simulate(*logarithms)
-        return np.stack([(here - other)[seen] / DIFFERENCE for other in changed], axis=1)
+    def jacobian(self, logarithms: Floats) -> Floats:
+        """Derivative of the residuals by the logarithms [m], shape (n_seen, p)."""
+        here, *changed = self._simulate(*logarithms)
+        return np.stack([(here - other)[self.seen] / DIFFERENCE for other in changed], axis=1)
 
-    bound = math.log(LARGEST_FACTOR)
-    fit = least_squares(residuals, np.zeros(len(names)), jacobian, (-bound, bound), xtol=1e-6, ftol=1e-8)
-    spread = math.sqrt(2.0 * fit.cost / (seen.sum() - len(names)))
+
+def estimate_of(fit: OptimizeResult, residuals: Residuals, confidence: float) -> Estimate:
+    """Estimates with confidence intervals, from a least-squares fit of the residuals."""
+    names, guess = residuals.names, residuals.guess
+    freedom = residuals.seen.sum() - len(names)
+    spread = math.sqrt(2.0 * fit.cost / freedom)
     _, singular, directions = np.linalg.svd(fit.jac, full_matrices=False)
     errors = spread / np.maximum(singular, 1e-300)
     covariance = (directions.T * errors**2) @ directions
-    half = student.ppf(0.5 + 0.5 * confidence, seen.sum() - len(names)) * np.sqrt(np.diag(covariance))
-    found = simulate(*fit.x)[0]
+    variances = np.diag(covariance)
+    half = student.ppf(0.5 + 0.5 * confidence, freedom) * np.sqrt(variances)
     with np.errstate(over="ignore"):
         return Estimate(
             names=names,
             values=guess * np.exp(fit.x),
             lower=guess * np.exp(fit.x - half),
             upper=guess * np.exp(fit.x + half),
-            correlation=covariance / np.sqrt(np.outer(np.diag(covariance), np.diag(covariance))),
+            correlation=covariance / np.sqrt(np.outer(variances, variances)),
             untold=tuple(
                 tuple(name for name, part in zip(names, direction, strict=True) if abs(part) > SHARE)
                 for direction, error in zip(directions, errors, strict=True)
                 if error > UNTOLD
             ),
-            residuals=measurement.positions - found,
-            scene=scenes_at(fit.x)[0],
+            residuals=residuals.measurement.positions - residuals.trajectory(fit.x),
+            scene=residuals.scenes(fit.x)[0],
         )

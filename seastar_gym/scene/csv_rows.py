@@ -47,10 +47,10 @@ class Row(NamedTuple):
 
     def _number(self, field: str) -> float:
         if NOT_FINITE.fullmatch(field) or (NUMBER.fullmatch(field) and math.isinf(float(field))):
-            raise self.refused(f"{_shown(field)} is no finite number")
+            raise self.refused(f"{_quoted(field)} is no finite number")
         if not NUMBER.fullmatch(field):
             hint = ", decimals follow a point" if "," in field else ""
-            raise self.refused(f"{_shown(field)} is no number{hint}")
+            raise self.refused(f"{_quoted(field)} is no number{hint}")
         return float(field)
 
 
@@ -72,7 +72,7 @@ def read_numbers(file: str | Path, columns: str, n_columns: int | None = None) -
         if ";" in "".join(row.fields):
             raise row.refused("fields must be separated by commas, not by semicolons")
         if len(row.fields) != (n_columns or len(rows[0].fields)):
-            raise row.refused(f"every line must have {columns}, not {_shown(','.join(row.fields))}")
+            raise row.refused(f"every line must have {columns}, not {_quoted(','.join(row.fields))}")
     numbers = [row.numbers() for row in (rows[1:] if rows and rows[0].has_names() else rows)]
     if not numbers:
         raise ValueError(f"{file} has no line with {columns}.")
@@ -104,5 +104,5 @@ def _rows(file: str | Path) -> Iterator[Row]:
         raise ValueError(f"{file}, line {begin}: this is no CSV: {wrong}.") from None
 
 
-def _shown(field: str) -> str:
+def _quoted(field: str) -> str:
     return repr(field if len(field) <= LONGEST_SHOWN else field[:LONGEST_SHOWN] + "...")

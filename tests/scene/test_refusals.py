@@ -1,4 +1,4 @@
-"""What cannot be modelled is refused in one sentence."""
+"""Scenes that cannot be modelled are refused in one sentence."""
 
 import math
 

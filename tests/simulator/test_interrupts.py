@@ -45,7 +45,7 @@ def assert_same(simulator: Simulator, other: Simulator) -> None:
 
 
 def interrupt() -> None:
-    """What Ctrl-C does; this thread's own turn comes at its next call."""
+    """Interrupt the main thread as Ctrl-C does. It notices at its next call."""
     _thread.interrupt_main()
     time.sleep(0.001)
 

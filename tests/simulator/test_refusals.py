@@ -1,4 +1,4 @@
-"""What a simulator cannot do is refused in one sentence, before anything moves."""
+"""A simulator refuses bad arguments in one sentence, before anything moves."""
 
 import numpy as np
 import pytest

@@ -403,7 +403,7 @@ def test_smallest_opening_angle_is_that_of_the_limbs_during_the_stroke(hub_hinge
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("speed", [0.1, 1.0, 10.0])
 def test_robots_with_wild_velocities_arrive(scheme, speed):
-    """Where plain Newton ends in NaN; see design.md, section 3."""
+    """Plain Newton ends in NaN for these scenes."""
     simulator = Simulator(scene_of(scheme), n_robots=8)
     set_motion(simulator, random_velocities(8, speed))
     for command in random_commands(8):
