@@ -16,6 +16,7 @@ Floats = NDArray[np.float64]
 
 LARGEST_GRID = 4_000_000
 """Largest number of grid points."""
+TOO_MANY_POINTS = f"The grid has more than {LARGEST_GRID:,} points: use a larger spacing."
 
 
 @register_part
@@ -105,19 +106,7 @@ class GridCurrent:
         object.__setattr__(self, "corner", tuple(float(x) for x in self.corner))
         require_number("spacing", self.spacing, "m")
         object.__setattr__(self, "spacing", float(self.spacing))
-        try:
-            array = np.asarray(self.velocities)
-            array = array.astype(float) if array.dtype.kind in "iuf" else np.zeros(0)
-        except (TypeError, ValueError, OverflowError):
-            array = np.zeros(0)
-        if array.ndim != 3 or array.shape[2] != 2 or min(array.shape) < 2 or array.size > 2 * LARGEST_GRID:
-            raise ValueError(
-                f"velocities must have shape (n_x, n_y, 2), with two points or more each way and at most "
-                f"{LARGEST_GRID:,} points, not {array.shape}."
-            )
-        if not np.isfinite(array).all():
-            raise ValueError("velocities must be finite [m/s].")
-        rows: Any = array.tolist()
+        rows: Any = _checked_velocities(self.velocities).tolist()
         object.__setattr__(self, "velocities", tuple(tuple(map(tuple, row)) for row in rows))
 
     @classmethod
@@ -137,16 +126,9 @@ class GridCurrent:
         require_number("spacing", spacing, "m")
         if not callable(function):
             raise ValueError(f"function must be a function of x and y [m], not {shown(function)}.")
-        axes = []
-        for name, ends in (("x", x), ("y", y)):
-            two = isinstance(ends, tuple | list | np.ndarray) and np.shape(ends) == (2,)
-            if not two or not all(map(is_finite_number, ends)) or not ends[1] - ends[0] >= spacing:
-                raise ValueError(f"{name} must be two ends at least a spacing apart [m], not {shown(ends)}.")
-            if (ends[1] - ends[0]) / spacing > LARGEST_GRID:
-                raise ValueError(f"The grid has more than {LARGEST_GRID:,} points: use a larger spacing.")
-            axes.append(ends[0] + spacing * np.arange(int(np.ceil((ends[1] - ends[0]) / spacing - 1e-9)) + 1))
+        axes = [_axis("x", x, spacing), _axis("y", y, spacing)]
         if len(axes[0]) * len(axes[1]) > LARGEST_GRID:
-            raise ValueError(f"The grid has more than {LARGEST_GRID:,} points: use a larger spacing.")
+            raise ValueError(TOO_MANY_POINTS)
         xs, ys = np.meshgrid(*axes, indexing="ij")
         velocities = np.zeros((*xs.shape, 2))
         try:
@@ -154,6 +136,34 @@ class GridCurrent:
         except (TypeError, ValueError, OverflowError) as wrong:
             raise ValueError(f"function must make (u_x, u_y) [m/s] of arrays x and y: {shown(str(wrong))}.") from wrong
         return cls((float(x[0]), float(y[0])), float(spacing), velocities)  # type: ignore[arg-type]
+
+
+def _checked_velocities(velocities: object) -> Floats:
+    """Velocities of a grid [m/s] as an array of shape (n_x, n_y, 2). ValueError for anything else."""
+    try:
+        array = np.asarray(velocities)
+        array = array.astype(float) if array.dtype.kind in "iuf" else np.zeros(0)
+    except (TypeError, ValueError, OverflowError):
+        array = np.zeros(0)
+    if array.ndim != 3 or array.shape[2] != 2 or min(array.shape) < 2 or array.size > 2 * LARGEST_GRID:
+        raise ValueError(
+            f"velocities must have shape (n_x, n_y, 2), with two points or more each way and at most "
+            f"{LARGEST_GRID:,} points, not {array.shape}."
+        )
+    if not np.isfinite(array).all():
+        raise ValueError("velocities must be finite [m/s].")
+    return array
+
+
+def _axis(name: str, ends: Any, spacing: float) -> Floats:
+    """Coordinates of grid points [m], from the first end to the second or just beyond."""
+    two = isinstance(ends, tuple | list | np.ndarray) and np.shape(ends) == (2,)
+    if not two or not all(map(is_finite_number, ends)) or not ends[1] - ends[0] >= spacing:
+        raise ValueError(f"{name} must be two ends at least a spacing apart [m], not {shown(ends)}.")
+    n_spacings = (ends[1] - ends[0]) / spacing
+    if n_spacings > LARGEST_GRID:
+        raise ValueError(TOO_MANY_POINTS)
+    return np.asarray(ends[0] + spacing * np.arange(int(np.ceil(n_spacings - 1e-9)) + 1))
 
 
 AnyCurrent = UniformCurrent | ShearCurrent | Vortex | GridCurrent
