@@ -31,8 +31,7 @@ from seastar_gym.envs.observation import OBSERVATION_LAYOUT
 from seastar_gym.envs.symmetry import reduce_observations, restore_actions
 from seastar_gym.envs.task import scene_observation_size
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import is_finite_number, require_count
-from seastar_gym.scene.serial import shown
+from seastar_gym.scene.checks import is_finite_number, require_count, shown
 
 FORMAT = 2
 """Version of what a description says."""

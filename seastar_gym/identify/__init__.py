@@ -1,14 +1,9 @@
 """Fits numbers of a scene to measured trajectories: `python -m seastar_gym.identify --help`."""
 
-from seastar_gym.identify.identify import (
-    Estimate,
-    Measurement,
-    get_parameter,
-    identify,
-    synthetic,
-    trajectory,
-    with_parameters,
-)
+from seastar_gym.identify.fit import Estimate, identify
+from seastar_gym.identify.measurement import Measurement
+from seastar_gym.identify.parameters import get_parameter, with_parameters
+from seastar_gym.identify.trajectories import synthetic, trajectory
 
 __all__ = [
     "Estimate",

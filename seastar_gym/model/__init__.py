@@ -1,1 +1,5 @@
-"""From a scene to the coefficients that the kernels read."""
+"""Coefficients of a scene for the kernels of `der`.
+
+`mesh.py` divides limbs into edges and nodes, `rods.py` makes the coefficients of one robot, `limits.py` the tolerances
+of its solver, and `coefficients.py` joins those of a batch.
+"""

@@ -1,4 +1,4 @@
-"""What a scene's numbers are to the kernels: one set for all lane groups, or one for each with a lane per robot."""
+"""`Coefficients`: coefficients and limits of a batch of robots, one set for all lane groups or one for each."""
 
 from collections.abc import Iterable
 
@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from seastar_gym.der.rods import Rods
 from seastar_gym.der.stepping.limits import Limits
-from seastar_gym.model.rods import make_limits, make_rods
+from seastar_gym.model.limits import make_limits
+from seastar_gym.model.rods import make_rods
 from seastar_gym.scene import Scene
 from seastar_gym.scene.per_robot import frame_of, of_robot
 from seastar_gym.simd.lanes import N_LANES
@@ -17,10 +18,14 @@ Floats = NDArray[np.float64]
 
 
 class Coefficients:
-    """Of a batch of robots of one scene, shared by all lane groups where no number differs from robot to robot.
+    """Coefficients of a batch of robots of one scene.
 
-    rest: Node positions at rest [m], shape (n_sets, 2 n_nodes, N_LANES). limb_length: [m], shape (n_sets, 1, N_LANES).
-    n_sets is 1 or the number of lane groups.
+    If no number differs from robot to robot, all lane groups share one set. Otherwise each has its own, with one robot
+    per lane.
+
+    are_shared: Whether all lane groups share one set.
+    rest: Node positions at rest [m], shape (n_sets, 2 n_nodes, N_LANES).
+    limb_length: Limb length L of the robot [m], shape (n_sets, 1, N_LANES).
     """
 
     def __init__(self, scene: Scene, n_robots: int):
@@ -35,7 +40,7 @@ class Coefficients:
         if self.are_shared:
             self._rods, self._limits = [make_rods(scene)], [make_limits(scene)]
         else:
-            # Lanes that are left over do what the last robot does.
+            # Lanes left over repeat the last robot.
             robots = np.minimum(np.arange(n_sets * N_LANES), self.n_robots - 1).reshape(n_sets, N_LANES).tolist()
             self._rods = [side_by_side([make_rods(scene, robot) for robot in group]) for group in robots]
             self._limits = [side_by_side([make_limits(scene, robot) for robot in group]) for group in robots]
@@ -44,8 +49,8 @@ class Coefficients:
         self._put_lengths(range(n_sets * N_LANES))
 
     def _put_lengths(self, places: Iterable[int]) -> None:
-        """Write the lengths of robots into their lanes; robots of equal lengths have one shape."""
-        shapes: dict[tuple[float, ...], Floats] = {}
+        """Write rest positions and limb lengths of robots, by place (lane group times N_LANES plus lane)."""
+        shapes: dict[tuple[float, ...], Floats] = {}  # robots of equal lengths have equal shapes
         for place in places:
             (group, lane), robot = divmod(place, N_LANES), min(place, self.n_robots - 1)
             lengths = tuple(of_robot(numbers, robot) for numbers in self._scene.robot.lengths)
@@ -54,7 +59,10 @@ class Coefficients:
             self.rest[group, :, lane], self.limb_length[group, 0, lane] = shapes[lengths], lengths[0]
 
     def set_scene(self, scene: Scene, chosen: NDArray[np.bool_]) -> None:
-        """Go on with a scene that differs in numbers of `PER_ROBOT` alone, and those of the chosen robots only."""
+        """Continue with a scene that differs only in numbers that may differ from robot to robot.
+
+        chosen: Robots whose numbers have changed, shape (n_robots,).
+        """
         if not isinstance(scene, Scene) or frame_of(scene) != frame_of(self._scene):
             raise ValueError("set_scene needs a scene of the same terms that differs in numbers of each robot alone.")
         if self.are_shared or scene.n_robots != self.n_robots:
@@ -69,11 +77,11 @@ class Coefficients:
         self._put_lengths(robots)
 
     def rods(self, group: int) -> Rods:
-        """Those of a lane group."""
+        """Coefficients of a lane group."""
         return self._rods[group % len(self._rods)]
 
     def limits(self, group: int) -> Limits:
-        """What the solutions of a lane group have to keep."""
+        """Tolerances and limits of the solver for a lane group."""
         return self._limits[group % len(self._limits)]
 
     def nodes(self, robot: int | np.intp) -> Floats:

@@ -1,4 +1,4 @@
-"""Numbers of a current for the kernels, see der/terms/current.py."""
+"""Coefficients of a current, for the kernels in der/terms/current.py."""
 
 import math
 from functools import singledispatch
@@ -11,7 +11,7 @@ from seastar_gym.scene.currents import AnyCurrent, GridCurrent, ShearCurrent, Un
 
 @singledispatch
 def current_rows(current: AnyCurrent) -> Current:
-    """Kind and numbers of a current."""
+    """Kind and numbers of a current for the kernels."""
     raise TypeError(f"No kernel knows the current {current!r}.")
 
 

@@ -1,4 +1,4 @@
-"""A robot's limbs cut into edges and nodes."""
+"""Mesh of a robot: its limbs, divided into edges and nodes."""
 
 from collections.abc import Sequence
 
@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 
 def make_mesh(limbs: Sequence[LimbShape], nodes_per_limb: int) -> Mesh:
-    """Every limb in nodes_per_limb - 1 edges of equal lengths."""
+    """Mesh of limbs with nodes_per_limb - 1 edges of equal lengths each."""
     n_limbs, n_edges = len(limbs), nodes_per_limb - 1
     root_edges = np.array([limb.length / n_edges for limb in limbs])
     l = np.repeat(root_edges, n_edges)  # noqa: E741
@@ -35,10 +35,10 @@ def make_mesh(limbs: Sequence[LimbShape], nodes_per_limb: int) -> Mesh:
 
 
 def nodes_along(nodes_per_limb: int) -> Floats:
-    """Places of a limb's nodes, as shares of the way from hub to tip."""
+    """Positions of a limb's nodes as fractions of its length from hub to tip, shape (nodes_per_limb,)."""
     return np.arange(nodes_per_limb) / (nodes_per_limb - 1)
 
 
 def edges_along(nodes_per_limb: int) -> Floats:
-    """Middles of a limb's edges, as shares of the way from hub to tip."""
+    """Positions of the middles of a limb's edges as fractions of its length, shape (nodes_per_limb - 1,)."""
     return (np.arange(nodes_per_limb - 1) + 0.5) / (nodes_per_limb - 1)

@@ -1,19 +1,14 @@
-"""From a scene to the coefficients of its rods, one robot at a time: every term is one line."""
+"""Coefficients of one robot of a scene for the kernels. Every term is one line."""
 
-import math
 from operator import itemgetter
-
-import numpy as np
 
 from seastar_gym.der.rods import Rods
 from seastar_gym.der.stepping import foresight, scales
-from seastar_gym.der.stepping.limits import Limits
 from seastar_gym.der.terms import added_mass, bending, contact, damping, drag, gravity, hub, inertia, load, stretching
 from seastar_gym.model.currents import current_rows
 from seastar_gym.model.mesh import make_mesh
 from seastar_gym.scene.fluid import Water
-from seastar_gym.scene.numerics import ADAPTATION, MOST_ITERATIONS, MOST_ITERATIONS_PER_STEP
-from seastar_gym.scene.per_robot import chosen, of_robot
+from seastar_gym.scene.per_robot import chosen
 from seastar_gym.scene.scene import Scene
 from seastar_gym.scene.shape import natural_hub_angle
 
@@ -58,23 +53,4 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         scales=scales.coefficients(
             mesh, stretched, seen_ahead, robot.density, water.density, C_d, held=bool(scene.held_nodes)
         ),
-    )
-
-
-def make_limits(scene: Scene, index: int = 0) -> Limits:
-    """Tolerances of a robot's solution for the kernels.
-
-    The error that a step may make per second is `error_rate` limb lengths per stroke; how it follows from the
-    tolerance on the path was measured, see ADAPTATION.
-    """
-    numerics, length = scene.numerics, of_robot(scene.robot.limb_length, index)
-    speed, tolerance = length / scene.actuator.period, numerics.path_tolerance
-    error_rate = 0.0 if tolerance is None else speed * (tolerance / ADAPTATION[0]) ** ADAPTATION[1]
-    n_steps = math.ceil(scene.actuator.period / numerics.step)
-    return Limits(
-        tolerance=np.array([numerics.newton_tolerance * length]),
-        max_iterations=numerics.max_iterations,
-        most_iterations=MOST_ITERATIONS + MOST_ITERATIONS_PER_STEP * n_steps,
-        adaptive=tolerance is not None,
-        error_rate=np.array([error_rate]),
     )

@@ -1,4 +1,8 @@
-"""All that a user can say: robot, fluid, actuator, contact, numerics, and the scene that joins them."""
+"""Description of what is simulated: robot, fluid, actuator, contact and numerics, joined in a `Scene`.
+
+All parts are frozen dataclasses in SI units. `checks.py` refuses bad values, `per_robot.py` allows numbers that differ
+from robot to robot, `serial.py` writes scenes to plain data, and `fidelity.py` knows the measured errors of numerics.
+"""
 
 from seastar_gym.scene.actuators.limited import Limited
 from seastar_gym.scene.actuators.measured import MeasuredCurve

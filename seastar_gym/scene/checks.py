@@ -1,29 +1,39 @@
-"""Checks of what a scene is made of; what is no such number or choice is refused with a sentence that names it."""
+"""Checks of single values. Each refuses a bad value with a ValueError of one sentence that names it."""
 
 import math
+import sys
+from reprlib import Repr
 
 import numpy as np
+from numpy.typing import NDArray
 
 LONGEST_SHOWN = 200
-"""Characters of a value that a sentence shows."""
+"""Largest number of characters of a value in a sentence."""
+
+_SHORT = Repr()
+"""Writer of values that writes only the beginning of large lists, tuples and dicts."""
+_SHORT.maxlist = _SHORT.maxtuple = _SHORT.maxdict = 100
+_SHORT.maxstring = _SHORT.maxlong = _SHORT.maxother = 2 * LONGEST_SHOWN
 
 
 def shown(value: object) -> str:
-    """The value as a sentence shows it: on one line, and cut where it is long."""
+    """Text of a value for a sentence: on one line and cut where it is long."""
+    if isinstance(value, int) and abs(value) > sys.float_info.max:
+        return "a number beyond all floats"
     try:
-        text = " ".join(repr(value).split())
-    except ValueError:  # Python writes out no integers of thousands of digits
-        text = f"a number of {type(value).__name__}"
+        text = " ".join(_SHORT.repr(value).split())
+    except ValueError:  # Python writes out no integers of thousands of digits, not even within a list
+        return f"a {type(value).__name__}"
     return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
 
 
 def is_whole_number(value: object) -> bool:
-    """Whether the value is a whole number, not a flag and not a time."""
+    """Whether a value is a whole number. Flags and time differences are none."""
     return isinstance(value, int | np.integer) and not isinstance(value, bool | np.timedelta64)
 
 
 def is_finite_number(value: object) -> bool:
-    """Whether the value is a number, not a flag, and finite in double precision."""
+    """Whether a value is a number that is finite in double precision. Flags are none."""
     if not (is_whole_number(value) or isinstance(value, float | np.floating)):
         return False
     try:
@@ -33,43 +43,54 @@ def is_finite_number(value: object) -> bool:
 
 
 def require_number(name: str, value: float, unit: str, *, zero_allowed: bool = False) -> None:
-    """A positive, finite number, or zero where that is allowed."""
+    """Refuse what is no positive, finite number. Zero may be allowed. unit: Unit in the sentence."""
     if not is_finite_number(value) or value < 0 or (value == 0 and not zero_allowed):
         kind = "a finite number, not negative" if zero_allowed else "a positive, finite number"
         raise ValueError(f"{name} must be {kind} [{unit}], not {shown(value)}.")
 
 
 def require_finite(name: str, value: float, unit: str) -> None:
-    """A finite number."""
+    """Refuse what is no finite number. unit: Unit in the sentence."""
     if not is_finite_number(value):
         raise ValueError(f"{name} must be a finite number [{unit}], not {shown(value)}.")
 
 
 def require_count(name: str, value: int, smallest: int, largest: int) -> None:
-    """A whole number within bounds."""
+    """Refuse what is no whole number from `smallest` to `largest`."""
     if not is_whole_number(value) or not smallest <= value <= largest:
         raise ValueError(f"{name} must be a whole number from {smallest} to {largest}, not {shown(value)}.")
 
 
 def require_seed(seed: object) -> None:
-    """A whole number that is not negative, or None."""
+    """Refuse what is neither None nor a whole number that is not negative."""
     if seed is not None and (not is_whole_number(seed) or seed < 0):  # type: ignore[operator]
         raise ValueError(f"A seed is a whole number that is not negative, or None, not {shown(seed)}.")
 
 
 def require_flag(name: str, value: object) -> None:
-    """True or False, and nothing that Python takes for one of them."""
+    """Refuse what is neither True nor False, such as 0 or 1."""
     if not isinstance(value, bool | np.bool_):
         raise ValueError(f"{name} must be True or False, not {value!r}.")
 
 
 def require_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
-    """One of the choices."""
+    """Refuse what is not one of the choices."""
     if not isinstance(value, str) or value not in choices:
         raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}, not {shown(value)}.")
 
 
 def require_numbers(name: str, values: object, unit: str) -> None:
-    """A tuple of finite numbers."""
+    """Refuse what is no tuple of finite numbers. unit: Unit in the sentence."""
     if not isinstance(values, tuple) or not all(map(is_finite_number, values)):
         raise ValueError(f"{name} must be a tuple of finite numbers [{unit}], not {shown(values)}.")
+
+
+def as_floats(name: str, value: object) -> NDArray[np.float64]:
+    """Value as an array of floats, of whatever shape. ValueError if it is not made of numbers."""
+    try:
+        array = np.asarray(value)
+    except ValueError as ragged:
+        raise ValueError(f"{name} must be an array of numbers, not rows of different lengths.") from ragged
+    if array.dtype.kind not in "biuf":
+        raise ValueError(f"{name} must be numbers, not {array.dtype} values.")
+    return array.astype(float)

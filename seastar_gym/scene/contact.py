@@ -1,4 +1,4 @@
-"""What limbs do to each other where they touch, as a frozen dataclass in SI units."""
+"""`Contact`: forces between limbs that touch."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -12,12 +12,13 @@ from seastar_gym.scene.serial import register_part
 @register_part
 @dataclass(frozen=True)
 class Contact:
-    """Limbs do not pass through each other: they push each other apart, without friction, see der/contact.py.
+    """Contact between limbs: limbs that touch push each other apart, without friction. See der/terms/contact.py.
 
-    modulus: Force per length of limb and depth [Pa], or None for pi/6 of Young's modulus, that of incompressible
-        elastic cylinders side by side: pi/4 E*, 1/E* = 2 (1 - 0.5^2)/E (Popov, Contact Mechanics and Friction).
-    opening_angle: Limbs begin at one point, so near the hub they cannot be as thick as they are: they are cones there
-        that touch where they enclose this angle [rad].
+    modulus: Force per length of limb and per depth of overlap [Pa]. None means pi/6 of Young's modulus, the value of
+        incompressible elastic cylinders side by side: pi/4 E*, 1/E* = 2 (1 - 0.5^2)/E (Popov, Contact Mechanics and
+        Friction).
+    opening_angle: Angle between neighbouring limbs at the hub at which they touch [rad]. Since all limbs begin at one
+        point, they taper to cones near the hub, which fit into this angle.
     """
 
     PER_ROBOT: ClassVar = ("modulus",)

@@ -1,8 +1,8 @@
-"""CSV files as users have them: what cannot be read is refused in one sentence with the file and the line.
+"""Reader of CSV files. A file that cannot be read is refused in one sentence with its name and the line.
 
-Fields are separated by commas, numbers have a decimal point, the text is UTF-8, with a byte order mark or without.
-Empty lines are skipped, and a first line of names, in which every field begins with a letter and has no digit: a
-mistyped line of numbers is an error and not a header.
+Fields are separated by commas, numbers have a decimal point, and the text is UTF-8, with a byte order mark or without.
+Empty lines are skipped. The first line may hold names, each of which begins with a letter and has no digit. A mistyped
+line of numbers is therefore an error, not a header.
 """
 
 import csv
@@ -17,29 +17,29 @@ NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 NAME = re.compile(r"[^\W\d_]\D*")
 NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", re.IGNORECASE)
 LONGEST_SHOWN = 40
-"""Characters of a field that a sentence shows."""
+"""Largest number of characters of a field in a sentence."""
 
 
 class Row(NamedTuple):
-    """The fields of one line, and where it stands: "curve.csv, line 3"."""
+    """Fields of one line. where: File and line for sentences, such as "curve.csv, line 3"."""
 
     where: str
     fields: tuple[str, ...]
 
     def refused(self, reason: str) -> ValueError:
-        """The error that names the line."""
+        """Error that names the line and the reason."""
         return ValueError(f"{self.where}: {reason}.")
 
     def has_names(self) -> bool:
-        """Whether every field is a name: a letter first, no digit, and not nan or inf."""
+        """Whether every field is a name: it begins with a letter, has no digit and is neither nan nor inf."""
         return all(NAME.fullmatch(field) and not NOT_FINITE.fullmatch(field) for field in self.fields)
 
     def numbers(self, *, empty_allowed: bool = False) -> list[float]:
-        """Its finite numbers; NaN for an empty field where those are allowed."""
+        """Numbers of the line, all finite. Empty fields are NaN if they are allowed."""
         return [math.nan if empty_allowed and not field else self._number(field) for field in self.fields]
 
     def integers(self) -> list[int]:
-        """Its whole numbers."""
+        """Numbers of the line, all whole."""
         numbers = self.numbers()
         if not all(map(float.is_integer, numbers)):
             raise self.refused("its numbers must be whole")
@@ -47,32 +47,32 @@ class Row(NamedTuple):
 
     def _number(self, field: str) -> float:
         if NOT_FINITE.fullmatch(field) or (NUMBER.fullmatch(field) and math.isinf(float(field))):
-            raise self.refused(f"{_shown(field)} is no finite number")
+            raise self.refused(f"{_quoted(field)} is no finite number")
         if not NUMBER.fullmatch(field):
             hint = ", decimals follow a point" if "," in field else ""
-            raise self.refused(f"{_shown(field)} is no number{hint}")
+            raise self.refused(f"{_quoted(field)} is no number{hint}")
         return float(field)
 
 
 def read_rows(file: str | Path) -> list[Row]:
-    """Every line that is not empty. FileNotFoundError or ValueError, with one sentence, where it cannot be read."""
+    """All lines of a file that are not empty. FileNotFoundError or ValueError if it cannot be read."""
     if not Path(file).is_file():
         raise FileNotFoundError(f"There is no file {file}.")
     return [row for row in _rows(file) if row.fields not in ((), ("",))]
 
 
 def read_numbers(file: str | Path, columns: str, n_columns: int | None = None) -> list[list[float]]:
-    """Equally many numbers of every line, below one line of names if there is any.
+    """Numbers of all lines, equally many in each, without the first line if it holds names.
 
-    columns: What a line must have, for sentences: "a time [s] and an angle [rad]". n_columns: How many, or None for
-        as many as there are in the first line.
+    columns: Content of a line for sentences, such as "a time [s] and an angle [rad]".
+    n_columns: Numbers per line. None means as many as fields in the first line.
     """
     rows = read_rows(file)
     for row in rows:
         if ";" in "".join(row.fields):
             raise row.refused("fields must be separated by commas, not by semicolons")
         if len(row.fields) != (n_columns or len(rows[0].fields)):
-            raise row.refused(f"every line must have {columns}, not {_shown(','.join(row.fields))}")
+            raise row.refused(f"every line must have {columns}, not {_quoted(','.join(row.fields))}")
     numbers = [row.numbers() for row in (rows[1:] if rows and rows[0].has_names() else rows)]
     if not numbers:
         raise ValueError(f"{file} has no line with {columns}.")
@@ -93,7 +93,7 @@ def _text(file: str | Path) -> str:
 
 
 def _rows(file: str | Path) -> Iterator[Row]:
-    """Every row, with the number of the line on which it begins."""
+    """All rows, each with the number of the line on which it begins."""
     reader = csv.reader(io.StringIO(_text(file), newline=""), strict=True, skipinitialspace=True)
     begin = 1
     try:
@@ -104,5 +104,5 @@ def _rows(file: str | Path) -> Iterator[Row]:
         raise ValueError(f"{file}, line {begin}: this is no CSV: {wrong}.") from None
 
 
-def _shown(field: str) -> str:
+def _quoted(field: str) -> str:
     return repr(field if len(field) <= LONGEST_SHOWN else field[:LONGEST_SHOWN] + "...")

@@ -1,4 +1,4 @@
-"""Currents: how the fluid moves, as frozen dataclasses in SI units; for numbers of each robot see per_robot.py."""
+"""Currents: velocity fields of the fluid. Some numbers may differ from robot to robot, see per_robot.py."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,15 +15,16 @@ from seastar_gym.scene.serial import register_part
 Floats = NDArray[np.float64]
 
 LARGEST_GRID = 4_000_000
-"""Points: more than this many velocities are no longer a sample of a smooth current."""
+"""Largest number of grid points."""
+TOO_MANY_POINTS = f"The grid has more than {LARGEST_GRID:,} points: use a larger spacing."
 
 
 @register_part
 @dataclass(frozen=True)
 class UniformCurrent:
-    """A fluid that moves as a whole with the velocity u_x, u_y [m/s].
+    """Uniform current: the fluid moves as a whole with the velocity (u_x, u_y) [m/s].
 
-    Numbers that differ from robot to robot are numpy arrays of shape (n_robots,) here: a tuple would be a vector.
+    Numbers that differ from robot to robot must be numpy arrays of shape (n_robots,), since a tuple could be a vector.
     """
 
     PER_ROBOT: ClassVar = ("u_x", "u_y")
@@ -43,9 +44,12 @@ class UniformCurrent:
 @register_part
 @dataclass(frozen=True)
 class ShearCurrent:
-    """A simple shear: u = rate y' along x', where x', y' are x, y turned by `direction`.
+    """Simple shear flow: u = rate y' along x', where the axes x', y' are x, y rotated by `direction`.
 
-    rate: [1/s]. direction: Of the flow [rad]. The fluid stands still on the line through the origin.
+    The fluid is at rest on the line through the origin along x'.
+
+    rate: Shear rate [1/s].
+    direction: Direction of the flow [rad], anti-clockwise from x.
     """
 
     PER_ROBOT: ClassVar = ("rate", "direction")
@@ -60,9 +64,11 @@ class ShearCurrent:
 @register_part
 @dataclass(frozen=True)
 class Vortex:
-    """A steady vortex with a smooth core, after Kaufmann and Scully: u = circulation/(2 pi) r/(r_c^2 + r^2) round it.
+    """Steady vortex with a smooth core after Kaufmann and Scully, with azimuthal velocity Gamma/(2 pi) r/(r_c^2 + r^2).
 
-    circulation: [m^2/s], + is anti-clockwise. x, y: Its centre [m]. core_radius: r_c, where it turns fastest [m].
+    circulation: Gamma [m^2/s], positive anti-clockwise.
+    x, y: Centre of the vortex [m].
+    core_radius: r_c [m], the radius at which the velocity is largest.
     """
 
     PER_ROBOT: ClassVar = ("circulation", "x", "y", "core_radius")
@@ -81,10 +87,13 @@ class Vortex:
 @register_part
 @dataclass(frozen=True)
 class GridCurrent:
-    """A current sampled on a grid, bilinear in between; beyond the grid it is that of the nearest point on its edge.
+    """Current sampled on a square grid, with bilinear interpolation.
 
-    corner: The grid's first point (x, y) [m]. spacing: Of its points, both ways [m].
-    velocities: u [m/s] at the points, shape (n_x, n_y, 2); any array, kept as tuples, so that equal grids are equal.
+    Outside the grid, the velocity is that of the nearest point on the grid's edge.
+
+    corner: First point of the grid (x, y) [m].
+    spacing: Distance between neighbouring points, along both axes [m].
+    velocities: Velocities at the points [m/s], an array of shape (n_x, n_y, 2), kept as tuples.
     """
 
     corner: tuple[float, float]
@@ -97,19 +106,7 @@ class GridCurrent:
         object.__setattr__(self, "corner", tuple(float(x) for x in self.corner))
         require_number("spacing", self.spacing, "m")
         object.__setattr__(self, "spacing", float(self.spacing))
-        try:
-            array = np.asarray(self.velocities)
-            array = array.astype(float) if array.dtype.kind in "iuf" else np.zeros(0)
-        except (TypeError, ValueError, OverflowError):
-            array = np.zeros(0)
-        if array.ndim != 3 or array.shape[2] != 2 or min(array.shape) < 2 or array.size > 2 * LARGEST_GRID:
-            raise ValueError(
-                f"velocities must have shape (n_x, n_y, 2), with two points or more each way and at most "
-                f"{LARGEST_GRID:,} points, not {array.shape}."
-            )
-        if not np.isfinite(array).all():
-            raise ValueError("velocities must be finite [m/s].")
-        rows: Any = array.tolist()
+        rows: Any = _checked_velocities(self.velocities).tolist()
         object.__setattr__(self, "velocities", tuple(tuple(map(tuple, row)) for row in rows))
 
     @classmethod
@@ -120,23 +117,18 @@ class GridCurrent:
         y: tuple[float, float],
         spacing: float,
     ) -> "GridCurrent":
-        """Sample (u_x, u_y) = function(x, y) [m/s] on the rectangle from x[0] to x[1] and from y[0] to y[1] [m].
+        """Sample a function on the rectangle from x[0] to x[1] and from y[0] to y[1] [m].
 
-        The function takes and gives arrays of one shape, or plain numbers where the current does not depend on place.
+        function: Velocity (u_x, u_y) [m/s] at arrays x, y [m] of one shape. It may return numbers where the velocity
+            does not depend on the position.
+        spacing: Distance between neighbouring points [m].
         """
         require_number("spacing", spacing, "m")
         if not callable(function):
             raise ValueError(f"function must be a function of x and y [m], not {shown(function)}.")
-        axes = []
-        for name, ends in (("x", x), ("y", y)):
-            two = isinstance(ends, tuple | list | np.ndarray) and np.shape(ends) == (2,)
-            if not two or not all(map(is_finite_number, ends)) or not ends[1] - ends[0] >= spacing:
-                raise ValueError(f"{name} must be two ends at least a spacing apart [m], not {shown(ends)}.")
-            if (ends[1] - ends[0]) / spacing > LARGEST_GRID:
-                raise ValueError(f"The grid has more than {LARGEST_GRID:,} points: use a larger spacing.")
-            axes.append(ends[0] + spacing * np.arange(int(np.ceil((ends[1] - ends[0]) / spacing - 1e-9)) + 1))
+        axes = [_axis("x", x, spacing), _axis("y", y, spacing)]
         if len(axes[0]) * len(axes[1]) > LARGEST_GRID:
-            raise ValueError(f"The grid has more than {LARGEST_GRID:,} points: use a larger spacing.")
+            raise ValueError(TOO_MANY_POINTS)
         xs, ys = np.meshgrid(*axes, indexing="ij")
         velocities = np.zeros((*xs.shape, 2))
         try:
@@ -144,6 +136,34 @@ class GridCurrent:
         except (TypeError, ValueError, OverflowError) as wrong:
             raise ValueError(f"function must make (u_x, u_y) [m/s] of arrays x and y: {shown(str(wrong))}.") from wrong
         return cls((float(x[0]), float(y[0])), float(spacing), velocities)  # type: ignore[arg-type]
+
+
+def _checked_velocities(velocities: object) -> Floats:
+    """Velocities of a grid [m/s] as an array of shape (n_x, n_y, 2). ValueError for anything else."""
+    try:
+        array = np.asarray(velocities)
+        array = array.astype(float) if array.dtype.kind in "iuf" else np.zeros(0)
+    except (TypeError, ValueError, OverflowError):
+        array = np.zeros(0)
+    if array.ndim != 3 or array.shape[2] != 2 or min(array.shape) < 2 or array.size > 2 * LARGEST_GRID:
+        raise ValueError(
+            f"velocities must have shape (n_x, n_y, 2), with two points or more each way and at most "
+            f"{LARGEST_GRID:,} points, not {array.shape}."
+        )
+    if not np.isfinite(array).all():
+        raise ValueError("velocities must be finite [m/s].")
+    return array
+
+
+def _axis(name: str, ends: Any, spacing: float) -> Floats:
+    """Coordinates of grid points [m], from the first end to the second or just beyond."""
+    two = isinstance(ends, tuple | list | np.ndarray) and np.shape(ends) == (2,)
+    if not two or not all(map(is_finite_number, ends)) or not ends[1] - ends[0] >= spacing:
+        raise ValueError(f"{name} must be two ends at least a spacing apart [m], not {shown(ends)}.")
+    n_spacings = (ends[1] - ends[0]) / spacing
+    if n_spacings > LARGEST_GRID:
+        raise ValueError(TOO_MANY_POINTS)
+    return np.asarray(ends[0] + spacing * np.arange(int(np.ceil(n_spacings - 1e-9)) + 1))
 
 
 AnyCurrent = UniformCurrent | ShearCurrent | Vortex | GridCurrent

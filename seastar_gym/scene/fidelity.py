@@ -1,9 +1,8 @@
-"""What the settings of `Numerics` keep, as measured: errors and speeds of `presets.json`, which comes with the package.
+"""Measured errors and speeds of settings of `Numerics`.
 
-`python -m studies.accuracy --store` measures and writes them, for the chapter's robot in the chapter's
-water, over ten strokes from rest:
-
-    promise("fast").path_error  ->  0.05: the hub's path is off by 5 % of its length at most
+They are stored in `presets.json`, and were measured by `python -m studies.accuracy --store` for the chapter's robot in
+the chapter's water, over ten strokes from rest. For example, promise("fast").path_error is 0.05 if the hub strays from
+its converged path by at most 5 % of the path's length.
 """
 
 import json
@@ -22,16 +21,17 @@ SETTING = ("scheme", "step", "newton_tolerance", "path_tolerance")
 
 @dataclass(frozen=True)
 class Promise:
-    """A setting of `Numerics` and what it keeps. Errors are against the solution that no time step errs in (h -> 0).
+    """Measured errors and speed of a setting of `Numerics`. Errors are relative to the solution for h -> 0.
 
-    scheme, step [s], newton_tolerance, path_tolerance: The setting.
-    path_error: Largest distance of the hub from its converged path, at the ends of strokes, over the length of that
-        path: the worst of the straight swim, the four pairs of Fig. 13.8, the pentagon and random commands.
-    gait_error: The same for whatever command of -, 0, + is repeated, the hardest that a robot can be asked.
-    straight_error: The same for the straight swim alone.
-    heading_error: Largest error of the heading [deg], over what path_error looks at.
-    end_error: Distance from the converged end over the length of the path, the worst likewise.
-    speed: Simulated over computing seconds, in batch on one core of the machine named in presets.json.
+    scheme, step [s], newton_tolerance, path_tolerance: Setting, see `Numerics`.
+    path_error: Largest distance of the hub from its converged path at the ends of strokes, as a fraction of the path's
+        length. It is the largest over the straight swim, the four pairs of Fig. 13.8, the pentagon and random commands.
+    gait_error: Path error as above, the largest over repetitions of any command of -1, 0 and 1 per limb.
+    straight_error: Path error of the straight swim.
+    heading_error: Largest error of the heading [deg] in the swims of path_error.
+    end_error: Distance of the hub from its converged end, as a fraction of the path's length, the largest over the
+        swims of path_error.
+    speed: Simulated time over computing time, for a batch on one core of the machine named in presets.json.
     """
 
     scheme: str
@@ -51,7 +51,7 @@ class Promise:
 
 
 class Setting(Protocol):
-    """A `Numerics`, as far as a promise depends on it."""
+    """Fields of `Numerics` on which errors depend."""
 
     @property
     def scheme(self) -> str: ...
@@ -70,17 +70,17 @@ def _stored() -> dict[str, Any]:
 
 
 def machine() -> str:
-    """Where the speeds were measured."""
+    """Name of the machine on which the speeds were measured."""
     return str(_stored()["machine"])
 
 
 def promises() -> tuple[Promise, ...]:
-    """The stored settings, fastest first: those that no other measured setting beats in both error and speed."""
+    """Stored settings, fastest first. No other measured setting beats any of them in both error and speed."""
     return tuple(Promise(**row) for row in _stored()["front"])
 
 
 def promise(setting: str | Setting) -> Promise:
-    """What a preset, by its name, or a `Numerics` keeps; ValueError for settings that were not measured."""
+    """Errors and speed of a preset or a `Numerics`. ValueError if it was not measured."""
     presets = {name: Promise(**row) for name, row in _stored()["presets"].items()}
     if not isinstance(setting, str) and not all(hasattr(setting, name) for name in SETTING):
         raise ValueError(f"A promise is asked of a preset's name or a Numerics, not of {shown(setting)}.")
@@ -95,7 +95,7 @@ def promise(setting: str | Setting) -> Promise:
 
 
 def measured(setting: Setting) -> Promise | None:
-    """What a `Numerics` keeps, or None if it was not measured."""
+    """Errors and speed of a `Numerics`, or None if it was not measured."""
     known = (*(Promise(**row) for row in _stored()["presets"].values()), *promises())
     return next((row for row in known if _identity(row) == _identity(setting)), None)
 
@@ -105,9 +105,9 @@ def _identity(setting: Setting) -> tuple[str, float, float, float | None]:
 
 
 def cheapest(error: float, any_gait: bool = False) -> Promise:
-    """The fastest stored setting whose path error is at most `error`; ValueError if none can promise it.
+    """Fastest stored setting whose path error is at most `error`. ValueError if there is none.
 
-    any_gait: Ask it of gait_error, too.
+    any_gait: Require it for gait_error, too.
     """
     if not is_finite_number(error) or error <= 0.0:
         raise ValueError(f"error must be a positive, finite share of the path's length, not {shown(error)}.")

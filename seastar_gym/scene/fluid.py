@@ -1,4 +1,4 @@
-"""The fluid around the robot, as a frozen dataclass in SI units; for numbers of each robot see per_robot.py."""
+"""`Water`: the fluid around the robot."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -15,15 +15,16 @@ from seastar_gym.scene.serial import register_part
 @register_part
 @dataclass(frozen=True)
 class Water:
-    """A fluid with the quadratic drag of (13.8).
+    """Fluid with the quadratic drag of (13.8).
 
-    density: rho_f [kg/m^3]. drag_coefficient: C_d, of flow across a limb, and of all flow by default.
-    tangential_drag_coefficient: C_t, of flow along a limb; None for that of flow across. The friction C_t |w| w of all
-        flow and the pressure (C_d - C_t) |w_n| w_n of the flow across add up, w_n the normal part of w (after G. I.
-        Taylor, 1952): no less than C_t across, so C_t must not exceed C_d.
-    current: How the fluid moves, or None if it is at rest; w is the velocity relative to it.
-    added_mass_coefficient: C_a, mass of the fluid that a limb accelerates across itself over that which it displaces,
-        1 for a round limb; None for none, as in the chapter.
+    density: rho_f [kg/m^3].
+    drag_coefficient: C_d [1], drag coefficient of flow across a limb.
+    tangential_drag_coefficient: C_t [1], drag coefficient of flow along a limb, at most C_d. None means C_d. With the
+        velocity w relative to the fluid and its part w_n normal to the limb, the friction C_t |w| w and the pressure
+        (C_d - C_t) |w_n| w_n add up (after G. I. Taylor, 1952).
+    current: Velocity field of the fluid. None means that the fluid is at rest.
+    added_mass_coefficient: C_a [1], mass of the fluid that a limb accelerates when it moves sideways, over the mass of
+        the fluid that it displaces; 1 for a round limb. None means no added mass, as in the chapter.
     """
 
     PER_ROBOT: ClassVar = ("density", "drag_coefficient", "tangential_drag_coefficient", "added_mass_coefficient")

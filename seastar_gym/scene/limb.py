@@ -1,4 +1,4 @@
-"""A limb that is not like the robot's others, and what a profile along it says."""
+"""`Limb`: a limb that differs from the robot's others, with profiles along its length."""
 
 import math
 from dataclasses import dataclass
@@ -13,19 +13,21 @@ from seastar_gym.scene.per_robot import Numbers, PerRobot, require_each
 from seastar_gym.scene.serial import register_part
 
 Profile = float | tuple[float, ...]
-"""A number, or numbers at equally spaced points from hub to tip (both included), linear in between."""
+"""Number, or numbers at equally spaced points from hub to tip (both included), linear in between."""
 
 
 @register_part
 @dataclass(frozen=True)
 class Limb:
-    """What one limb has of its own; None: what the robot says for all.
+    """Overrides for one limb. `None` means the robot's value.
 
-    direction: Of its root edge at rest [rad], anti-clockwise from limb 1's.
-    length [m]. radius [m] and youngs_modulus [Pa], along the limb: a taper is radius=(root, tip).
-    natural_curvature: Of the limb at rest [1/m], + bends it anti-clockwise on the way to its tip.
+    direction: Direction of the root edge at rest [rad], anti-clockwise from that of limb 1.
+    length: Length of the limb [m].
+    radius: Radius [m], a number or a profile along the limb. For example, radius=(root, tip) is a taper.
+    youngs_modulus: Young's modulus [Pa], a number or a profile along the limb.
+    natural_curvature: Curvature of the limb at rest [1/m]. Positive values bend it anti-clockwise towards its tip.
 
-    Numbers that differ from robot to robot are numpy arrays of shape (n_robots,) here: a tuple is a profile.
+    Numbers that differ from robot to robot must be numpy arrays of shape (n_robots,), since a tuple is a profile.
     """
 
     PER_ROBOT: ClassVar = ("length", "radius", "youngs_modulus", "natural_curvature")
@@ -59,7 +61,7 @@ def _require_positive(name: str, value: float, unit: str) -> None:
 
 
 class LimbShape(NamedTuple):
-    """A limb with nothing left open; see Limb. gap: Angle to the next limb's root edge, anti-clockwise [rad]."""
+    """Limb with all values filled in, see Limb. gap: Angle to the next limb's root edge, anti-clockwise [rad]."""
 
     direction: float
     gap: float
@@ -69,7 +71,7 @@ class LimbShape(NamedTuple):
     natural_curvature: float
 
     def extreme_edges(self, nodes_per_limb: int) -> list[tuple[float, float, float, float]]:
-        """(l^2 [m^2], EA/l [N/m], EI/l [N m], volume [m^3]) of the smallest and the largest edge there may be."""
+        """Bounds of (l^2 [m^2], EA/l [N/m], EI/l [N m], volume [m^3]) over the edges: smallest and largest values."""
         l = self.length / (nodes_per_limb - 1)  # noqa: E741
         found = []
         for choose in (min, max):
@@ -80,12 +82,12 @@ class LimbShape(NamedTuple):
 
 
 def as_tuple(profile: Profile) -> tuple[float, ...]:
-    """The numbers of a profile."""
+    """Profile as a tuple of numbers."""
     return profile if isinstance(profile, tuple) else (profile,)
 
 
 def along(profile: tuple[float, ...], share: NDArray[np.float64]) -> list[float]:
-    """A profile at shares of the way from hub to tip."""
+    """Values of a profile at fractions of the length from hub to tip."""
     if len(profile) == 1:
         return [*profile] * len(share)
     return np.interp(share, np.linspace(0.0, 1.0, len(profile)), profile).tolist()

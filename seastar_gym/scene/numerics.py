@@ -1,4 +1,4 @@
-"""Time stepping: scheme, step and tolerances, by hand, by a preset's name or by the error that is asked for."""
+"""`Numerics`: scheme, step and tolerances of time stepping, chosen by value, by preset or by error."""
 
 from dataclasses import dataclass, field
 from typing import Literal, cast, get_args
@@ -11,32 +11,33 @@ SchemeName = Literal["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
 Fidelity = Literal["fast", "balanced", "accurate", "reference", "chapter"]
 
 MAX_STEPS = 10_000_000
-"""Most time steps of a stroke: more take minutes even for one robot."""
-
+"""Largest number of time steps in a stroke. More would take minutes even for one robot."""
 
 MOST_ITERATIONS, MOST_ITERATIONS_PER_STEP = 200_000, 100
-"""Newton iterations that a robot has for a stroke, and for each of its steps besides: seconds of computing.
+"""Limit of a robot's Newton iterations in a stroke: a constant, and an allowance for every time step.
 
-Four times what any stroke of the atlas of stability needs; strokes of adapted steps in vacuum may need half of it.
+The limit amounts to seconds of computing. It is four times what any stroke in the study of stability needs.
+Strokes with adapted steps in vacuum may need half of it.
 """
 
 
 @register_part
 @dataclass(frozen=True)
 class Numerics:
-    """Time stepping.
+    """Settings of time stepping.
 
-    scheme: "implicit-euler" is the chapter's (13.9). step: h [s]; the last step before a corner of the pulse is
-        shortened.
-    newton_tolerance: Largest node move of the last Newton update, or of the one that is left out because it can be
-        foreseen, over the limb length.
-    max_iterations: Newton iterations per stage before the robot's step is halved, down to 1/4096. For a whole stroke a
-        robot has 200,000 and 100 for every step besides; if it needs more, it fails with
+    scheme: Implicit Runge-Kutta scheme. "implicit-euler" is the chapter's (13.9).
+    step: Time step h [s]. The last step before a corner of the actuation is shortened.
+    newton_tolerance: Newton stops when the largest displacement of a node in an update is below this fraction of the
+        limb length. If quadratic convergence guarantees that the next update would be, it is skipped.
+    max_iterations: Limit of Newton iterations per stage. Beyond it, the step is halved, down to 1/4096. A stroke has a
+        limit of its own, 200,000 iterations and 100 more per time step; a robot beyond it fails with
         SolverStatus.ITERATION_LIMIT.
-    path_tolerance: Adapt the steps, up to `step`, so that the hub's path errs by about this share of its length at
-        most, from 0.001 to 0.02; for scheme "implicit-midpoint". None for steps of one length.
-    named: Whether somebody chose these numerics. False for those of a `Scene` that was given none: a `Simulator` steps
-        by them, an environment by its fidelity. Equal numerics may differ in it; changed ones are named.
+    path_tolerance: Error of the hub's path as a fraction of its length, from 0.001 to 0.02, by which steps are adapted
+        (up to `step`). Only for the scheme "implicit-midpoint". None means steps of equal length.
+    named: Whether these numerics were chosen. False only for those of a `Scene` that was given none. A `Simulator` uses
+        them in either case, while an environment prefers its own fidelity if they are not named. It does not count in
+        comparisons.
     """
 
     scheme: SchemeName = "implicit-euler"
@@ -64,26 +65,28 @@ class Numerics:
 
     @classmethod
     def preset(cls, fidelity: Fidelity) -> "Numerics":
-        """The numerics that a fidelity stands for: "chapter" is the chapter's, the others go from fast to exact.
+        """Numerics of a fidelity: "fast", "balanced", "accurate", "reference", or "chapter" for those of the chapter.
 
-        `seastar_gym.scene.fidelity.promise` tells how far off each is, and how fast.
+        `seastar_gym.scene.fidelity.promise` returns the measured errors and speed of each.
         """
         require_choice("fidelity", fidelity, get_args(Fidelity))
         return _PRESETS[fidelity]
 
     @classmethod
     def for_error(cls, error: float, any_gait: bool = False) -> "Numerics":
-        """The fastest measured setting whose path error is at most `error`, a share of the path's length.
+        """Fastest measured numerics whose path error is at most `error`. ValueError if there are none.
 
-        ValueError if none can promise it. Measured for the chapter's robot, see `seastar_gym.scene.fidelity`; any_gait
-        asks it of any command that is repeated, too, the hardest that a robot can be asked.
+        The errors were measured for the chapter's robot, see `seastar_gym.scene.fidelity`.
+
+        error: Error of the hub's path as a fraction of its length.
+        any_gait: Require it for the repetition of any command, too, which is the hardest task measured.
         """
         best = cheapest(error, any_gait)
         return cls(cast(SchemeName, best.scheme), best.step, best.newton_tolerance, path_tolerance=best.path_tolerance)
 
 
 ADAPTATION = (0.04, 2.0)
-"""(c, p): steps with an error rate of (tolerance/c)^p limb lengths per stroke keep the path's tolerance."""
+"""Constants (c, p): steps with an error rate of (tolerance/c)^p limb lengths per stroke keep the path's tolerance."""
 
 _PRESETS: dict[Fidelity, Numerics] = {
     "fast": Numerics("sdirk2", 20e-3, newton_tolerance=1e-6),

@@ -1,7 +1,7 @@
-"""Numbers that may differ from robot to robot in a batch.
+"""Numbers of a scene that may differ from robot to robot in a batch.
 
-A part of a scene names them in `PER_ROBOT`. Each is a number, or an array of shape (n_robots,), which is kept as
-`PerRobot`, a tuple, so that parts stay equal by value, hashable and frozen.
+A part of a scene lists their names in `PER_ROBOT`. Each is one number for all robots, or an array of shape (n_robots,).
+Arrays are kept as tuples (`PerRobot`), so that parts are frozen, hashable and equal by value.
 """
 
 import dataclasses
@@ -13,20 +13,20 @@ import numpy as np
 Part = TypeVar("Part")
 
 Numbers: TypeAlias = float | Any
-"""A number for all robots, or an array or tuple of shape (n_robots,) with one for each.
+"""Number for all robots, or an array or tuple of shape (n_robots,) with one for each.
 
-Any stands for the latter: whoever reads the scene of one robot reads a float, and need not say so.
+Typed as Any for the latter, so that code for the scene of one robot may read a float.
 """
 
 
 class PerRobot(tuple[float, ...]):
-    """Numbers of each robot; a plain tuple may be something else, such as a profile along a limb."""
+    """Numbers of each robot, shape (n_robots,). Plain tuples may be something else, such as profiles along a limb."""
 
     __slots__ = ()
 
 
 def require_each(part: Any, name: str, check: Callable[[str, float], None]) -> None:
-    """Check a number of a part, or that of each robot, and keep an array as a tuple, numbers of numpy as Python's."""
+    """Check a number of a part, or the number of each robot, and store them as a Python number or as PerRobot."""
     value = getattr(part, name)
     if not isinstance(value, np.ndarray | tuple):
         check(name, value)
@@ -41,23 +41,25 @@ def require_each(part: Any, name: str, check: Callable[[str, float], None]) -> N
 
 
 def _plain(number: Any) -> Any:
-    """A number of numpy as Python's: one of single precision would go on computing to single precision."""
+    """Python number of a number of numpy, which could force single precision on later results."""
     return number.item() if isinstance(number, np.generic) else number
 
 
 def column(numbers: Numbers, n_axes: int = 1) -> Any:
-    """A number as it is, numbers of each robot as an array of shape (n_robots, 1, ..), with n_axes axes of length 1."""
+    """Numbers of each robot as an array of shape (n_robots, 1, ..), with n_axes axes of length 1; others unchanged."""
     return numbers if np.ndim(numbers) == 0 else np.asarray(numbers, dtype=float).reshape(-1, *(1,) * n_axes)
 
 
 def of_robot(numbers: Numbers, index: int) -> float:
-    """The number of one robot."""
+    """Number of one robot."""
     return float(numbers[index]) if isinstance(numbers, PerRobot) else float(numbers)
 
 
 def numbers_of(part: Any) -> dict[str, Any]:
-    """The numbers that may differ from robot to robot, by their names, "fluid.density" or "robot.limbs.0.length", with
-    None for what is not modelled."""
+    """Numbers of a part that may differ from robot to robot, by name, such as "robot.limbs.0.length".
+
+    Values are None for what is not modelled.
+    """
     found = {}
     for name, value in _contents(part).items():
         if name in getattr(part, "PER_ROBOT", ()):
@@ -69,7 +71,7 @@ def numbers_of(part: Any) -> dict[str, Any]:
 
 
 def _contents(part: Any) -> dict[str, Any]:
-    """What a part is made of, by name; nothing for what is no part."""
+    """Fields of a part by name, or elements of a tuple of parts by index; empty for everything else."""
     if dataclasses.is_dataclass(part):
         return {field.name: getattr(part, field.name) for field in dataclasses.fields(part) if field.compare}
     is_tuple_of_parts = isinstance(part, tuple) and part and all(map(dataclasses.is_dataclass, part))
@@ -81,7 +83,7 @@ def _is_profile(value: Any) -> bool:
 
 
 def with_numbers(part: Part, numbers: dict[str, Any]) -> Part:
-    """The part with some of its numbers changed, named as `numbers_of` names them; also an element of any tuple."""
+    """Part with other values of numbers, named as by `numbers_of`. Elements of any tuple may be replaced, too."""
     inner: dict[str, dict[str, Any]] = {}
     own = {}
     for name, value in numbers.items():
@@ -98,13 +100,13 @@ def with_numbers(part: Part, numbers: dict[str, Any]) -> Part:
 
 
 def side_by_side(parts: Sequence[Part]) -> Part:
-    """The part of a batch of robots, each with the numbers of one of the parts, all of one frame (see `frame_of`)."""
+    """Part for a batch in which robot k has the numbers of parts[k]. All parts must have one frame, see `frame_of`."""
     columns = {name: [numbers_of(part)[name] for part in parts] for name in numbers_of(parts[0])}
     return with_numbers(parts[0], {name: PerRobot(values) for name, values in columns.items() if len(set(values)) > 1})
 
 
 def batch_size(part: Any) -> int | None:
-    """Robots that the numbers of a part are for, or None if they are for any number of robots."""
+    """Number of robots for which a part has numbers, or None if it suits any number."""
     sizes = {name: len(value) for name, value in numbers_of(part).items() if isinstance(value, PerRobot)}
     if len(set(sizes.values())) > 1:
         raise ValueError(f"Numbers that differ from robot to robot must be for equally many robots, not {sizes}.")
@@ -112,14 +114,17 @@ def batch_size(part: Any) -> int | None:
 
 
 def chosen(part: Part, choose: Callable[[tuple[float, ...]], float]) -> Part:
-    """The part with one number chosen of each that differs from robot to robot."""
+    """Part in which `choose` has replaced the numbers of each robot by one number."""
     numbers = numbers_of(part)
     return with_numbers(part, {name: choose(value) for name, value in numbers.items() if isinstance(value, PerRobot)})
 
 
 def frame_of(part: Any) -> Any:
-    """A part's kind and fields, nested, with only whether they are modelled for those that may differ from robot to
-    robot: equal for scenes that run the same code on memory of the same shape."""
+    """Frame of a part: its kind and fields, nested, without the values that may differ from robot to robot.
+
+    Of such values it keeps only whether they are None. Scenes of equal frames run the same code on memory of the same
+    shape.
+    """
     contents, free = _contents(part), getattr(part, "PER_ROBOT", ())
     if not contents:
         return part

@@ -1,4 +1,4 @@
-"""The robot: limbs around a hub."""
+"""`Seastar`: a robot of limbs around a hub."""
 
 import math
 from dataclasses import dataclass
@@ -21,19 +21,23 @@ HubHinge = Literal["opening", "turning"]
 @register_part
 @dataclass(frozen=True)
 class Seastar:
-    """A robot of limbs around a hub (Fig. 13.4a): straight, equal, uniform and evenly spread, but for `limbs`.
+    """Robot of limbs around a hub (Fig. 13.4a). Limbs are straight, equal, uniform and evenly spread unless overridden.
 
-    n_limbs: Number of limbs. nodes_per_limb: N, with the hub. limb_length: L [m], the unit of a robot's
-        tolerances and observations, too. rod_radius: r_0 [m]. youngs_modulus: E [Pa]. density: rho_m [kg/m^3].
-    hub_hinge: "opening" measures a hub hinge by the angle psi between its two limbs, from 0 to pi, a wider gap by what
-        is missing to a full turn; "turning" by the interior turning angle pi - psi, as the published codes of the
-        chapter's authors do.
-    limbs: What limbs have of their own, one Limb each, or () for nothing.
-    relaxation_time: Of material damping after Kelvin and Voigt [s], see der/damping.py and `relaxation_time`; None for
-        none, as in the chapter.
+    n_limbs: Number of limbs.
+    nodes_per_limb: N, the number of nodes of a limb including the hub.
+    limb_length: L [m]. It is also the unit of length of tolerances and observations.
+    rod_radius: r_0 [m], radius of the limbs.
+    youngs_modulus: E [Pa].
+    density: rho_m [kg/m^3], density of the limbs.
+    hub_hinge: Measure of the hinge between two limbs at the hub. "opening" is the angle psi between the limbs, from 0
+        to pi; for a gap wider than pi it is the gap less a full turn. "turning" is the interior turning angle pi - psi,
+        as in the published codes of the chapter's authors.
+    limbs: Overrides, one `Limb` for each limb, or () for none.
+    relaxation_time: Relaxation time of Kelvin-Voigt damping [s], see der/terms/damping.py and `relaxation_time`. None
+        means no damping, as in the chapter.
 
-    Two limbs have one hub hinge; straight ones, with hub_hinge="turning", make a plain rod. One limb has none: it
-    swings freely about the hub, and no actuator turns it.
+    Two limbs have one hub hinge; straight limbs with hub_hinge="turning" then form a plain rod. A single limb has no
+    hub hinge: it swings freely about the hub, and no actuator turns it.
     """
 
     PER_ROBOT: ClassVar = ("limb_length", "rod_radius", "youngs_modulus", "density", "relaxation_time")
@@ -80,7 +84,7 @@ class Seastar:
             )
 
     def limb_shapes(self, index: int = 0) -> tuple[LimbShape, ...]:
-        """Every limb with nothing left open; of robot `index`, where numbers differ from robot to robot."""
+        """Limbs with all values filled in, for robot `index` of a batch."""
         robot = chosen(self, itemgetter(index))
         limbs = robot.limbs or (Limb(),) * self.n_limbs
         directions = [limb.direction for limb in limbs if limb.direction is not None]
@@ -98,13 +102,13 @@ class Seastar:
         )
 
     def limbs_that_may_touch(self) -> list[tuple[int, int]]:
-        """(right, left) limbs, counted from 0."""
+        """Pairs of limbs that may touch, (right, left), counted from 0."""
         alike = all(limb.length is None for limb in self.limbs)
         return limbs_that_may_touch([shape.gap for shape in self.limb_shapes()], alike)
 
     @property
     def is_symmetric(self) -> bool:
-        """Whether a turn by one limb and a mirror at limb 1 leave the robot, or all of them, as it is."""
+        """Whether rotation by one limb and reflection at limb 1 leave the robot unchanged; in a batch, every robot."""
         robots = [self.limb_shapes(index) for index in range(batch_size(self) or 1)]
         alike = all(len({shape._replace(direction=0.0, gap=0.0) for shape in shapes}) == 1 for shapes in robots)
         straight = not any(shape.natural_curvature for shapes in robots for shape in shapes)
@@ -117,12 +121,12 @@ class Seastar:
 
     @property
     def edge_length(self) -> Numbers:
-        """Natural length of an edge of a limb of length L [m]."""
+        """Natural length of an edge [m], for a limb of length L."""
         return np.divide(self.limb_length, self.nodes_per_limb - 1)
 
     @property
     def lengths(self) -> tuple[Numbers, ...]:
-        """Numbers that the shape at rest depends on."""
+        """Numbers on which the shape at rest depends: lengths [m] and natural curvatures [1/m]."""
         of_limbs = [number for limb in self.limbs for number in (limb.length, limb.natural_curvature)]
         return self.limb_length, *(number for number in of_limbs if number is not None)
 
@@ -132,15 +136,15 @@ class Seastar:
         return min(shape.gap for shape in self.limb_shapes())
 
     def nodes(self, index: int = 0) -> NDArray[np.float64]:
-        """Node positions at rest [m], shape (n_nodes, 2): hub, {1,1}..{1,N-1}, {2,1}.. ; limb 1 along +x.
+        """Node positions at rest [m], shape (n_nodes, 2). Order: hub, {1,1}..{1,N-1}, {2,1}..; limb 1 along +x.
 
-        index: Of which robot, where numbers differ from robot to robot.
+        index: Robot of a batch, where numbers differ from robot to robot.
         """
         return rest_positions(self.limb_shapes(index), self.nodes_per_limb)
 
 
 def relaxation_time(loss_factor: float, frequency: float) -> float:
-    """Relaxation time [s] of a material whose loss factor is known at a frequency [Hz]: eta = omega tau."""
+    """Relaxation time tau [s] of a material with a loss factor eta = omega tau at a frequency [Hz]."""
     require_number("loss_factor", loss_factor, "1", zero_allowed=True)
     require_number("frequency", frequency, "Hz")
     return loss_factor / (2.0 * math.pi * frequency)

@@ -1,8 +1,8 @@
-"""What is modelled: robot, fluid, actuator, contact and numerics, as frozen dataclasses in SI units.
+"""`Scene`: robot, fluid, actuator, contact and numerics of a simulation.
 
-Each part checks itself, and a `Scene` checks what the parts can be together; what cannot be modelled is refused with
-a sentence that says why. Numbers named in a part's `PER_ROBOT` may be arrays of shape (n_robots,), one for each robot
-of a batch.
+Each part checks itself, and a `Scene` checks the parts together. What cannot be modelled is refused with a ValueError
+that says why in one sentence. Numbers listed in a part's `PER_ROBOT` may be arrays of shape (n_robots,), one for each
+robot of a batch.
 """
 
 import math
@@ -29,15 +29,20 @@ from seastar_gym.scene.shape import cross_at_rest, n_hub_hinges, natural_hub_ang
 @register_part
 @dataclass(frozen=True)
 class Scene:
-    """A robot, the fluid around it (None: vacuum), its actuator and the numerics.
+    """Description of a simulation: robot, fluid, actuator, contact, forces and numerics.
 
-    numerics: The chapter's where none are named; environments then take those of their fidelity.
-    held_nodes: Indices of nodes that stay where they are; hub and root node held clamp a limb.
-    loads: Dead loads on nodes, (node, F_x, F_y) [N] each.
-    limb_strengths: Share of its rotation that every limb still makes, from 0 (failed) to 1; () for all of it.
-    contact: What limbs do to each other where they touch; None lets them pass through each other, as in the chapter.
-    gravity: Acceleration of free fall in the plane (g_x, g_y) [m/s^2]; limbs feel their weight less the buoyancy of the
-        fluid that they displace. None for none: limbs as dense as the fluid, or a plane that lies level.
+    robot: Robot of limbs around a hub.
+    fluid: Fluid around the robot. None means vacuum.
+    actuator: Actuator that turns the limbs at the hub.
+    numerics: Settings of time stepping. Without any, a `Simulator` uses the chapter's and an environment those of its
+        fidelity.
+    held_nodes: Indices of nodes that do not move. Holding the hub and a limb's first node clamps the limb.
+    loads: Constant forces on nodes, (node, F_x, F_y) [N] each.
+    limb_strengths: Factors by which the rotations of the limbs are reduced, from 0 (no rotation) to 1 (full), one per
+        limb. () means full rotation.
+    contact: Contact between limbs. None lets limbs pass through each other, as in the chapter.
+    gravity: Gravitational acceleration in the plane (g_x, g_y) [m/s^2]. Limbs feel their weight minus the buoyancy of
+        the fluid that they displace. None means no gravity in the plane.
     """
 
     robot: Seastar = field(default_factory=Seastar)
@@ -108,7 +113,7 @@ class Scene:
                 )
 
     def _check_coefficients(self) -> None:
-        """What is finite alone may overflow or vanish together."""
+        """Refuse numbers that are finite alone but overflow or vanish together, and too many steps."""
         if self.actuator.period / self.numerics.step > MAX_STEPS:
             raise ValueError(
                 f"A step of {self.numerics.step:.4g} s makes more than {MAX_STEPS:,} steps of a stroke of "
@@ -137,7 +142,10 @@ class Scene:
         return bool((np.isfinite(found) & (found > 0.0)).all())
 
     def _check_hub_hinges(self) -> None:
-        """Neighbours turned apart turn their hub hinge by two peak angles; at pi its curvature is infinite."""
+        """Refuse peak angles at which a hub hinge reaches pi, where its curvature is infinite.
+
+        Neighbours that are turned apart turn the hinge between them by two peak angles.
+        """
         robot, peak = self.robot, float(np.max(self.actuator.peak_angle))
         hinges = robot.limb_shapes()[: n_hub_hinges(robot.n_limbs)]
         if not hinges:
@@ -162,19 +170,19 @@ class Scene:
             )
 
     def to_dict(self) -> dict[str, Any]:
-        """The scene as plain data for JSON, see serial.py. ValueError: an actuator that could not be read back."""
+        """Scene as plain data for JSON, see serial.py. ValueError if it could not be read back."""
         return to_dict(self)
 
     @classmethod
     def from_dict(cls, data: object) -> "Scene":
-        """The scene that `to_dict` wrote. ValueError, with one sentence, for everything else."""
+        """Scene of the plain data that `to_dict` returned. ValueError for anything else."""
         return from_dict(data, cls)
 
     @property
     def n_robots(self) -> int | None:
-        """Robots that the scene is for, or None if no number differs from robot to robot."""
+        """Number of robots for which the scene has numbers, or None if it suits any number."""
         return batch_size(self)
 
     def of_robot(self, index: int) -> "Scene":
-        """The scene of one robot of a batch."""
+        """Scene of one robot of a batch."""
         return chosen(self, itemgetter(index))

@@ -1,12 +1,12 @@
-"""Scenes as plain data: numbers, texts, lists and dicts that any JSON library writes and reads.
+"""Scenes as plain data: numbers, texts, lists and dicts that any JSON library can write and read.
 
     data = json.loads(json.dumps(scene.to_dict()))
     assert Scene.from_dict(data) == scene  # to the last bit
 
-A part of a scene is a dict of its `kind` and its constructor's arguments; arguments that are left out have their
-defaults, so that scenes written before a new term can be read. A tuple is a list, and numbers of each robot
-are a kind of their own. The outermost dict has the `version` of this form, too. What could not be read back is refused
-when it is written. Reading makes parts of registered classes and nothing else: no text is evaluated, nothing imported.
+A part of a scene is a dict of its `kind` and its constructor's arguments. Arguments that are left out have their
+defaults, so that scenes written before a new term was added can be read. A tuple is a list, and numbers of each robot
+are a kind of their own. The outermost dict also has the `version` of this form. What could not be read back is refused
+when it is written. Reading constructs parts of registered classes only: it evaluates no text and imports nothing.
 """
 
 import inspect
@@ -16,27 +16,28 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from seastar_gym.scene.checks import shown
 from seastar_gym.scene.per_robot import PerRobot
 
 VERSION = 1
 """Version of the plain form."""
 DEEPEST = 32
-"""Lists and dicts within each other that are read."""
+"""Largest depth of nested lists and dicts that is read."""
 
 Part = TypeVar("Part")
 
 KINDS: dict[str, type] = {}
-"""Classes that are written by the arguments of their constructors, by name."""
+"""Registered classes by name. They are written by the arguments of their constructors."""
 COLLECTIONS: dict[str, type] = {"per robot": PerRobot, "mapping": dict}
-"""Classes that are written by their items; those of a dict are pairs, because JSON libraries may sort its names."""
+"""Classes that are written by their items. Items of a dict are pairs, since JSON libraries may sort its names."""
 
 
 def register_part(kind: type[Part]) -> type[Part]:
-    """Class decorator: scenes with parts of this class, such as an actuator of your own, can be written and read.
+    """Register a class, such as an actuator of your own, so that scenes with it can be written and read. A decorator.
 
-    The class keeps its constructor's arguments as attributes of the same names and compares by value, as a dataclass
-    does; the arguments are numbers, texts, None, tuples, dicts and parts of registered classes. Whoever reads such a
-    scene has registered the class before.
+    The class must keep its constructor's arguments as attributes of the same names and compare by value, as a dataclass
+    does. The arguments may be numbers, texts, None, tuples, dicts and parts of registered classes. The class must be
+    registered before a scene with it is read.
     """
     known = KINDS.setdefault(kind.__name__, kind)
     if (known.__module__, known.__qualname__) != (kind.__module__, kind.__qualname__):
@@ -49,11 +50,8 @@ def _arguments(kind: type) -> list[str]:
     return list(inspect.signature(kind).parameters)
 
 
-# --- writing ---------------------------------------------------------------------------------------------------------
-
-
 def to_dict(part: Any) -> dict[str, Any]:
-    """The plain form of a part. ValueError, with one sentence, where it could not be read back as it is."""
+    """Plain data of a part. ValueError if it could not be read back unchanged."""
     name = type(part).__name__
     data = {"version": VERSION, **_written(part, name)}
     if from_dict(data, type(part)) != part:
@@ -96,11 +94,8 @@ def _written_items(values: tuple[Any, ...], where: str) -> list[Any]:
     return [_written(value, f"{where}[{k}]") for k, value in enumerate(values)]
 
 
-# --- reading ---------------------------------------------------------------------------------------------------------
-
-
 def from_dict(data: object, kind: type[Part]) -> Part:
-    """The part that `to_dict` wrote. ValueError, with one sentence, for everything else."""
+    """Part of the plain data that `to_dict` returned. ValueError for anything else."""
     if not isinstance(data, dict) or "version" not in data:
         raise ValueError(f"A plain {kind.__name__} is a dict with a version, as to_dict writes it, not {shown(data)}.")
     version = data["version"]
@@ -151,12 +146,3 @@ def _made(kind: type, where: str, *arguments: Any, **fields: Any) -> Any:
         return kind(*arguments, **fields)
     except (TypeError, ArithmeticError) as unfit:
         raise ValueError(f"{where} is no {kind.__name__}: {' '.join(str(unfit).split()).rstrip('.')}.") from unfit
-
-
-def shown(value: object) -> str:
-    """A value in a sentence, however large it is."""
-    if isinstance(value, int) and abs(value) > sys.float_info.max:
-        return "a number beyond all floats"
-    if value is None or isinstance(value, bool | int | float):
-        return repr(value)
-    return repr(value) if isinstance(value, str) and len(value) < 40 else f"a {type(value).__name__}"

@@ -1,4 +1,4 @@
-"""The shape of a robot at rest: where its nodes are, how limbs bend, which hub hinges exist, who may touch whom."""
+"""Geometry of a robot at rest: node positions, natural angles of hinges, and limbs that may touch."""
 
 import itertools
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 
 
 def rest_positions(limbs: Sequence[LimbShape], nodes_per_limb: int) -> Floats:
-    """Nodes of the undeformed robot [m], shape (n_nodes, 2): hub at the origin, limb after limb.
+    """Node positions of the undeformed robot [m], shape (n_nodes, 2): hub at the origin, limb after limb.
 
     Edges of a limb have equal lengths and turn by its natural curvature times that length, so its nodes lie on an arc.
     """
@@ -34,21 +34,25 @@ def turn_per_hinge(limb: LimbShape, nodes_per_limb: int) -> float:
 
 
 def natural_hub_angle(gap: float, hub_hinge: str) -> float:
-    """Angle of an unactuated hub hinge over a gap [rad], as its hinge measures it: from -pi to pi."""
+    """Natural angle of an unactuated hub hinge [rad], from -pi to pi.
+
+    gap: Angle between the two limbs [rad]. hub_hinge: Measure of the hinge, see `Seastar`.
+    """
     if hub_hinge == "turning":
         return gap - np.pi
     return gap if gap <= np.pi else gap - 2.0 * np.pi
 
 
 def n_hub_hinges(n_limbs: int) -> int:
-    """One per gap; two limbs have one, not the same one twice, so that straight ones make a plain rod."""
+    """Number of hub hinges: one between neighbouring limbs, and one in all for two limbs."""
     return n_limbs if n_limbs > 2 else n_limbs - 1
 
 
 def limbs_that_may_touch(gaps: Sequence[float], alike: bool) -> list[tuple[int, int]]:
-    """(right, left) limbs with less than a half turn in between: neighbours, or all such pairs, if limbs are not alike.
+    """Pairs of limbs (right, left) less than half a turn apart: neighbours, or all such pairs if lengths differ.
 
-    gaps: Angle from every limb to the next [rad]. alike: Whether none is longer, and could reach over another.
+    gaps: Angle from every limb to the next [rad]. alike: Whether limbs have equal lengths, so that none can reach over
+        another.
     """
     n_limbs = len(gaps)
     turns = {
@@ -59,7 +63,7 @@ def limbs_that_may_touch(gaps: Sequence[float], alike: bool) -> list[tuple[int, 
 
 
 def cross_at_rest(nodes: NDArray[np.float64], n_limbs: int, pairs: Sequence[tuple[int, int]]) -> bool:
-    """Whether edges of limbs that may touch cross; nodes: [m], shape (n_nodes, 2)."""
+    """Whether limbs of any of the pairs cross. nodes: Node positions [m], shape (n_nodes, 2)."""
     limbs = [np.concatenate([nodes[:1], limb]) for limb in nodes[1:].reshape(n_limbs, -1, 2)]
 
     def cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,6 +1,12 @@
-"""A batch of robots of one scene, advanced stroke by stroke."""
+"""A batch of robots of one scene, advanced stroke by stroke.
+
+`simulator.py` offers what users call, `batch.py` holds the robots' numbers and calls the kernels, `drive.py` turns
+commands into rotations of limbs, `clock.py` counts time, `lock.py` keeps strokes whole and `workers.py` shares a batch
+out over threads.
+"""
 
 from seastar_gym.simulator.report import SolverStatus, StrokeReport
-from seastar_gym.simulator.simulator import Simulator, State
+from seastar_gym.simulator.simulator import Simulator
+from seastar_gym.simulator.state import State
 
 __all__ = ["Simulator", "SolverStatus", "State", "StrokeReport"]

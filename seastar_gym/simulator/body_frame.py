@@ -1,4 +1,4 @@
-"""The body frame: the rotation of the rest shape that fits the nodes best."""
+"""Heading of the body frame, by the rotation of the rest shape that fits the nodes best."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,9 +7,9 @@ Floats = NDArray[np.float64]
 
 
 def best_fit_heading(positions: Floats, rest: Floats) -> Floats:
-    """Turn of the rest shape about the hub that fits best to the nodes, by least squares [rad], shape (n_robots,).
+    """Rotation of the rest shape about the hub that fits the nodes best in least squares [rad], shape (n_robots,).
 
-    positions: [m], shape (n_robots, n_nodes, 2). rest: Node positions at rest [m], shape (n_nodes, 2).
+    positions: Node positions [m], shape (n_robots, n_nodes, 2). rest: Node positions at rest [m], shape (n_nodes, 2).
     """
     x, y = np.moveaxis(positions - positions[:, :1], -1, 0)
     return np.asarray(np.arctan2(y @ rest[:, 0] - x @ rest[:, 1], x @ rest[:, 0] + y @ rest[:, 1]))

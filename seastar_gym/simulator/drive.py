@@ -1,4 +1,4 @@
-"""The actuators of a batch of robots: from commands to the rotation of every limb during a stroke."""
+"""`Drive`: the actuators of a batch of robots, from commands to rotations of limbs."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,15 +9,14 @@ Floats = NDArray[np.float64]
 
 
 class Drive:
-    """One actuator per limb of `n_robots` robots.
+    """Actuators of a batch of robots, one for each limb.
 
     times: Ends of a stroke's time steps [s].
-
-    strengths: Share of its rotation that every limb still makes, shape (n_robots, n_limbs).
-    curve: Rotation by command 1 at `times`, shape (n_times,), or (n_times, n_robots, 1) where numbers differ from robot
-        to robot [rad]; None for actuators that remember something.
-    state: What the actuators remember now, shape (n_robots, n_limbs, n_state); n_state is 0 for most.
-    at_rest: The same of actuators that were left alone.
+    strengths: Factor by which every limb's rotation is reduced, shape (n_robots, n_limbs).
+    curve: Rotation by command 1 at `times` [rad], shape (n_times,), or (n_times, n_robots, 1) where numbers differ from
+        robot to robot. None for actuators with memory.
+    state: Present state of the actuators, shape (n_robots, n_limbs, n_state); n_state is 0 without memory.
+    at_rest: State of the actuators at rest, of the shape of `state`.
     """
 
     def __init__(self, actuator: Actuator, n_robots: int, n_limbs: int, times: Floats):
@@ -26,10 +25,10 @@ class Drive:
         self.strengths = np.ones((n_robots, n_limbs))
         self.set_actuator(actuator)
         self.state = self.at_rest.copy()
-        self._before = self._after = self.state  # as the stroke that is under way begins and ends
+        self._before = self._after = self.state  # at the beginning and the end of the present stroke
 
     def set_actuator(self, actuator: Actuator) -> None:
-        """Go on with an actuator that differs in numbers of `PER_ROBOT` alone."""
+        """Continue with an actuator that differs only in numbers that may differ from robot to robot."""
         self._stateful = actuator if isinstance(actuator, StatefulActuator) else None
         self.curve = None if self._stateful else np.asarray(actuator.delta_psi(self._times))
         if self.curve is not None and self.curve.ndim > 1:
@@ -38,9 +37,10 @@ class Drive:
         self.at_rest = np.broadcast_to(rest, (*self.strengths.shape, rest.shape[-1]))
 
     def begin_stroke(self, commands: Floats) -> tuple[Floats, Floats | None]:
-        """(peaks, shape) of a stroke with these commands: limbs turn by their peak times the shape.
+        """Begin a stroke with these commands. Limbs rotate by the returned peaks times the returned shape.
 
-        peaks: Shape (n_robots, n_limbs). shape: Shape (n_times, n_robots, n_limbs) [rad], or None for `curve`.
+        Returns peaks of shape (n_robots, n_limbs) and rotations [rad] of shape (n_times, n_robots, n_limbs), or None
+        where the rotations are `curve`.
         """
         if self._stateful is None:
             return commands * self.strengths, None
@@ -49,19 +49,19 @@ class Drive:
         return self.strengths, turned
 
     def advance(self, end: int) -> None:
-        """Bring the state to the time step `end` of the stroke that is under way."""
+        """Bring the state to the time step `end` of the present stroke."""
         if end == len(self._times) - 1:
             self.state = self._after
         elif self._stateful is not None:
             self.state = self._stateful.respond(self._times[: end + 1], self._commands, self._before)[1]
 
     def observe(self) -> Floats:
-        """The state as numbers of order one, shape (n_robots, k), limb after limb; k is 0 for most actuators."""
+        """State as numbers of order one, shape (n_robots, k), limb after limb; k = 0 without memory."""
         seen = self.state if self._stateful is None else self._stateful.observe(self.state)
         return seen.reshape(len(seen), -1)
 
     def rotations(self) -> Floats:
-        """Of limbs between two strokes [rad], shape (n_robots, n_limbs)."""
+        """Rotations of limbs between two strokes [rad], shape (n_robots, n_limbs)."""
         if self._stateful is None:
             return np.zeros_like(self.strengths)
         return self.strengths * self._stateful.respond(np.zeros(1), np.zeros_like(self.strengths), self.state)[0][0]

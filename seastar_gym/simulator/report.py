@@ -1,5 +1,6 @@
-"""How a stroke ended and what it cost, robot by robot."""
+"""`StrokeReport`: the solver's status and counts for every robot after a stroke."""
 
+from collections.abc import Mapping
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -10,7 +11,7 @@ Floats = NDArray[np.float64]
 
 
 class SolverStatus(IntEnum):
-    """Whether a robot's stroke was computed, and if not, why."""
+    """Outcome of a robot's stroke. Every value but CONVERGED is a failure."""
 
     CONVERGED = 0
     NOT_CONVERGED = 1
@@ -19,7 +20,7 @@ class SolverStatus(IntEnum):
 
     @property
     def sentence(self) -> str:
-        """What to tell the user."""
+        """Explanation for the user, in one sentence."""
         return {
             SolverStatus.CONVERGED: "The stroke converged.",
             SolverStatus.NOT_CONVERGED: (
@@ -42,17 +43,19 @@ COUNTS = ("newton_iterations", "regularised", "backtracks", "steps", "halvings",
 
 
 class StrokeReport(NamedTuple):
-    """What a stroke cost and how it ended; every array has shape (n_robots,).
+    """Outcome and cost of a stroke; every array has shape (n_robots,).
 
-    status: SolverStatus of every robot.
-    newton_iterations, regularised, backtracks: Counts of Newton steps, of those that needed the convex matrix, and of
-        those that the line search halved.
-    steps, halvings, rejections: Counts of time steps taken, of those that did not converge or created energy and were
-        halved (or, at the shortest, tried again), and of those whose error was too large and were halved
-        (Numerics.path_tolerance).
-    energy_cuts: Steps after which velocities were cut, because the energy had grown a little, see der/guard.py.
+    status: SolverStatus.
+    newton_iterations: Newton iterations.
+    regularised: Newton iterations that used the regularised matrix.
+    backtracks: Halvings of a Newton update by the line search.
+    steps: Time steps accepted.
+    halvings: Time steps that did not converge or created energy. They are halved or, at the shortest, tried again.
+    rejections: Time steps that were halved because their error was too large (Numerics.path_tolerance).
+    energy_cuts: Steps after which velocities were reduced because the energy had grown a little, see
+        der/stepping/guard.py.
     covered: Time covered [s].
-    smallest_opening_angle: Smallest angle between neighbouring limbs at the hub [rad]; below zero, limbs crossed.
+    smallest_opening_angle: Smallest angle between neighbouring limbs at the hub [rad]. Below zero, limbs crossed.
     """
 
     status: NDArray[np.int64]
@@ -65,3 +68,19 @@ class StrokeReport(NamedTuple):
     energy_cuts: NDArray[np.int64]
     covered: Floats
     smallest_opening_angle: Floats
+
+
+def make_report(status: Floats, rows: Mapping[str, Floats], hub_hinge: str) -> StrokeReport:
+    """Report of a stroke from the kernels' numbers, shape (n_robots,) each.
+
+    rows: Numbers by name, see REPORT_ROWS in der/stepping/report.py.
+    """
+    angle = 2.0 * np.arctan(rows["smallest_hub_t"])
+    if hub_hinge == "turning":
+        angle += np.pi
+    return StrokeReport(
+        status=status.astype(np.int64),
+        covered=rows["covered"],
+        smallest_opening_angle=angle,
+        **{name: rows[name].astype(np.int64) for name in COUNTS},
+    )

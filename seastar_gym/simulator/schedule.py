@@ -1,17 +1,18 @@
-"""The times between which a simulator steps through one actuation period."""
+"""Time steps of a stroke."""
 
 from itertools import pairwise
 
 import numpy as np
 
-SAME_TIME = 1e-9  # of a step: shorter remainders are rounding of the division, not a step
+SAME_TIME = 1e-9
+"""Fraction of a step. A shorter remainder before a corner is rounding of the division, not a step."""
 
 
 def step_times(corners: tuple[float, ...], step: float) -> np.ndarray:
     """Ends of the time steps [s] from the first corner to the last, shape (n_steps + 1,).
 
-    Every step has the length `step` [s], but for the last one before a corner, which is shortened: the ramp of
-    Fig. 13.5b has its corners at 0, 0.1 and 1.0 s, and no step may straddle one.
+    All steps have the length `step` [s], except that the last one before a corner is shortened, since no step may
+    straddle a corner. The ramp of Fig. 13.5b has its corners at 0, 0.1 and 1.0 s.
     """
     times = [np.array([corners[0]])]
     for begin, end in pairwise(corners):

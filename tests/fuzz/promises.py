@@ -11,7 +11,8 @@ from fuzz.frames import FRAMES, MOVING, REST, Frame, can_be_seen_from
 from fuzz.scenes import IN_WATER, Case, Terms
 from seastar_gym import Numerics, Scene, Simulator, SolverStatus, State, StrokeReport, UniformCurrent
 from seastar_gym.der.stepping.schemes import SCHEMES
-from seastar_gym.model.rods import make_limits, make_rods
+from seastar_gym.model.limits import make_limits
+from seastar_gym.model.rods import make_rods
 from seastar_gym.scene.per_robot import side_by_side
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator.schedule import step_times

@@ -1,1 +1,1 @@
-"""Actuators: how far every limb is turned at the hub, and when."""
+"""Actuators: rotation of every limb at the hub as a function of time and command."""

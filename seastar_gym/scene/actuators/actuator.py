@@ -1,10 +1,10 @@
-"""What an actuator is to a scene: how far a command turns a limb, when, and, for some, what it remembers.
+"""Interface of actuators, with and without memory.
 
-A rotation delta_psi [rad] is positive anti-clockwise. A command is a number in [-1, 1] per limb and stroke.
+A command is a number in [-1, 1] per limb and stroke. It makes the actuator rotate the limb by delta_psi [rad], positive
+anti-clockwise.
 
 Where numbers of an actuator differ from robot to robot (see per_robot.py), curves have one more axis, shape
-(*t.shape, n_robots), and commands the shape (n_robots, n_limbs). Durations are the same for all robots of a batch:
-they share the clock.
+(*t.shape, n_robots), and commands the shape (n_robots, n_limbs). Durations are equal for all robots of a batch.
 """
 
 from typing import Protocol, runtime_checkable
@@ -19,9 +19,10 @@ Floats = NDArray[np.float64]
 
 @runtime_checkable
 class Actuator(Protocol):
-    """Turns every limb by its command times one curve that begins and ends every stroke at zero.
+    """Actuator that rotates every limb by its command times one curve, which is zero at both ends of a stroke.
 
-    peak_angle: Largest rotation [rad], or that of each robot. period: Length of a stroke [s].
+    peak_angle: Largest rotation [rad], a number or one for each robot.
+    period: Length of a stroke [s].
     corners: Times within a stroke [s], from 0 to the period, that no time step may straddle.
     """
 
@@ -35,15 +36,15 @@ class Actuator(Protocol):
     def corners(self) -> tuple[float, ...]: ...
 
     def delta_psi(self, t: ArrayLike) -> Floats:
-        """Rotation of a limb with command 1 at time t [s] of a stroke that begins at rest [rad]; t of any shape."""
+        """Rotation by command 1 at time t [s] of a stroke that begins at rest [rad]. t may have any shape."""
         ...
 
 
 @runtime_checkable
 class StatefulActuator(Actuator, Protocol):
-    """Turns every limb in a way of its own, that depends on what came before the stroke.
+    """Actuator with memory: the rotation of a limb depends on its earlier commands, too.
 
-    rest: State of an actuator that was left alone, shape (n_state,), or (n_robots, 1, n_state).
+    rest: State of an actuator at rest, shape (n_state,), or (n_robots, 1, n_state).
     """
 
     @property
@@ -52,25 +53,26 @@ class StatefulActuator(Actuator, Protocol):
     def respond(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
         """Rotations during a stroke [rad], shape (len(t), *S), and the state at t[-1], shape (*S, n_state).
 
-        t: Increasing times since the stroke began [s], the first one 0. commands: Shape S, any.
-        state: At t = 0, shape (*S, n_state).
+        t: Increasing times since the stroke began [s]. The first is 0.
+        commands: Commands of any shape S.
+        state: State at t = 0, shape (*S, n_state).
         """
         ...
 
     def observe(self, state: Floats) -> Floats:
-        """The state, shape (..., n_state), as numbers of order one, zero at rest."""
+        """State as numbers of order one that are zero at rest, shape (..., n_state)."""
         ...
 
 
 def is_actuator(value: object) -> bool:
-    """Whether a scene can have the value for its actuator."""
+    """Whether a value has the attributes of an actuator."""
     return isinstance(value, Actuator) and not isinstance(value, type)
 
 
 def check_actuator(actuator: Actuator) -> None:
-    """Refuse a curve that does not begin and end at rest, or that its other numbers contradict.
+    """Refuse an actuator whose curve does not begin and end at zero, or contradicts its corners or peak angle.
 
-    Limbs turned at a stroke's beginning would jump when their command changes, which no rate of turning can follow.
+    If the curve did not begin at zero, limbs would jump when their command changes.
     """
     corners, period = np.asarray(actuator.corners, dtype=float), actuator.period
     if corners.ndim != 1 or len(corners) < 2 or not np.isfinite(corners).all() or (np.diff(corners) <= 0.0).any():

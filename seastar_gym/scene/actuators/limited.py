@@ -1,4 +1,4 @@
-"""An actuator that can turn no farther and no faster than its drive allows."""
+"""`Limited`: an actuator with a largest angle and a largest rate of rotation."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -18,13 +18,14 @@ Floats = NDArray[np.float64]
 @register_part
 @dataclass(frozen=True)
 class Limited:
-    """Follows another actuator's curve as far and as fast as it can.
+    """Actuator that follows another one's curve within a largest angle and a largest rate of rotation.
 
-    actuator: What is followed, one that remembers nothing.
-    largest_angle: Where the limb stops [rad], None for no stop. largest_rate: How fast it turns [rad/s], None for any.
+    actuator: Actuator to follow, one without memory.
+    largest_angle: Largest rotation [rad]. None means no limit.
+    largest_rate: Largest rate of rotation [rad/s]. None means no limit.
 
-    A limb that is slow may still be turned when the next stroke begins, and goes on from there: the state is its
-    rotation [rad]. A partial command asks less of it. Between time steps the rotation is linear.
+    A slow limb may still be rotated when the next stroke begins, and continues from there: the state is its rotation
+    [rad]. Between time steps the rotation is linear.
     """
 
     PER_ROBOT: ClassVar = ("largest_angle", "largest_rate")
@@ -34,7 +35,7 @@ class Limited:
 
     def __post_init__(self) -> None:
         if not is_actuator(self.actuator) or isinstance(self.actuator, StatefulActuator):
-            raise ValueError(f"Limited follows an actuator that remembers nothing, not {self.actuator!r}.")
+            raise ValueError(f"Limited follows an actuator without memory, not {self.actuator!r}.")
         if self.largest_angle is not None:
             require_each(self, "largest_angle", partial(require_number, unit="rad"))
         if self.largest_rate is not None:
@@ -59,11 +60,11 @@ class Limited:
 
     @property
     def rest(self) -> Floats:
-        """Not turned."""
+        """State at rest: no rotation [rad], shape (1,)."""
         return np.zeros(1)
 
     def delta_psi(self, t: ArrayLike) -> Floats:
-        """Rotation of a limb with command 1 at time t [s] of a stroke that begins at rest [rad]; t of any shape."""
+        """Rotation by command 1 at time t [s] of a stroke that begins at rest [rad]. t may have any shape."""
         times, n_robots = np.union1d(self.corners, t), batch_size(self)
         if n_robots is None:
             return np.asarray(self.respond(times, np.ones(()), self.rest)[0][np.searchsorted(times, t)])
@@ -71,7 +72,7 @@ class Limited:
         return np.asarray(turned[np.searchsorted(times, t), :, 0])
 
     def respond(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
-        """See StatefulActuator: exact at the times t where the followed curve is linear between them."""
+        """Rotations and state as in `StatefulActuator`, exact if the followed curve is linear between the times t."""
         curve, peak, rate = self.actuator.delta_psi(t), column(self.peak_angle), column(self.largest_rate)
         wanted = curve.reshape(*curve.shape, *(1,) * (1 + commands.ndim - curve.ndim)) * commands
         wanted = np.clip(wanted, -peak, peak)
@@ -84,6 +85,6 @@ class Limited:
         return turned, turned[-1][..., None].copy()
 
     def observe(self, state: Floats) -> Floats:
-        """Rotation over the largest one."""
+        """Rotation as a fraction of the largest one, shape of `state`."""
         peak = np.asarray(column(self.peak_angle, 2))
         return state / np.where(peak > 0.0, peak, 1.0)

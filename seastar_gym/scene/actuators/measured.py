@@ -1,4 +1,4 @@
-"""An actuator that was measured: angles at times, for instance filmed on the bench."""
+"""`MeasuredCurve`: an actuator given by measured angles at times."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -17,12 +17,13 @@ from seastar_gym.scene.serial import register_part
 @register_part
 @dataclass(frozen=True)
 class MeasuredCurve:
-    """Rotation of a limb with command 1 over one stroke, linear between samples, the same in every stroke.
+    """Actuator with a measured curve of rotation, linear between samples and equal in every stroke.
 
-    times: Increasing, the first one 0, the last one the period [s]. No time step straddles a sample, so samples closer
-        than the step shorten it: leave out those that a straight line says as well.
-    angles: Rotation at those times [rad], 0 at both ends, so that limbs do not jump when their command changes.
-    scale: What a robot's limbs make of these angles.
+    times: Increasing times [s], from 0 to the period. No time step straddles a sample, so samples closer than the step
+        shorten it: leave out samples on a straight line between others.
+    angles: Rotation by command 1 at those times [rad]. It is 0 at both ends, so that limbs do not jump when their
+        command changes.
+    scale: Factor of the angles [1].
     """
 
     PER_ROBOT: ClassVar = ("scale",)
@@ -48,9 +49,9 @@ class MeasuredCurve:
 
     @classmethod
     def from_csv(cls, file: str | Path) -> "MeasuredCurve":
-        """From a file with a time [s] and an angle [rad] in every line, below one line of names if it has any.
+        """Curve from a CSV file with a time [s] and an angle [rad] in every line. The first line may hold names.
 
-        Names have no digits: a mistyped first line is an error, see `seastar_gym.scene.csv_rows`.
+        Names have no digits, so a mistyped first line is an error, see `seastar_gym.scene.csv_rows`.
         """
         if not Path(file).is_file():
             raise FileNotFoundError(f"There is no measured curve at {file}: give the path of a CSV file.")
@@ -62,7 +63,7 @@ class MeasuredCurve:
 
     @property
     def peak_angle(self) -> Numbers:
-        """Largest rotation [rad], to either side."""
+        """Largest rotation to either side [rad]."""
         return np.multiply(self.scale, max(map(abs, self.angles)))
 
     @property
@@ -72,9 +73,9 @@ class MeasuredCurve:
 
     @property
     def corners(self) -> tuple[float, ...]:
-        """The sample times [s]."""
+        """Times of the samples [s], which no time step may straddle."""
         return self.times
 
     def delta_psi(self, t: ArrayLike) -> NDArray[np.float64]:
-        """Rotation of a limb with command 1 at time t [s] of a stroke [rad]; t of any shape."""
+        """Rotation by command 1 at time t [s] of a stroke [rad]. t may have any shape."""
         return np.multiply.outer(np.interp(np.asarray(t, float), self.times, self.angles), self.scale)

@@ -1,4 +1,4 @@
-"""The shape memory alloy actuator of Fig. 13.5b: a linear ramp up while heated, a linear ramp down while cooling."""
+"""`SmaPulse`: the shape memory alloy actuator of Fig. 13.5b, with linear ramps while it is heated and cools."""
 
 import math
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from seastar_gym.scene.serial import register_part
 
 
 def pulse(t: ArrayLike, heating_time: float, cooling_time: float) -> NDArray[np.float64]:
-    """Share of the peak angle at time t [s] of the actuation period, in [0, 1]; t of any shape.
+    """Fraction of the peak angle at time t [s] of a stroke, in [0, 1]. t may have any shape.
 
     Zero at t = 0, one at t = heating_time, zero again at t = heating_time + cooling_time (Fig. 13.5b).
     """
@@ -25,14 +25,14 @@ def pulse(t: ArrayLike, heating_time: float, cooling_time: float) -> NDArray[np.
 
 
 class HeatingAndCooling:
-    """A stroke of two phases. heating_time: Delta t_1 [s]. cooling_time: Delta t_2 [s]."""
+    """Stroke of two phases. heating_time: Delta t_1 [s]. cooling_time: Delta t_2 [s]."""
 
     heating_time: float
     cooling_time: float
 
     @property
     def period(self) -> float:
-        """Delta t_0 [s], the length of a stroke."""
+        """Length of a stroke, Delta t_0 [s]."""
         return self.heating_time + self.cooling_time
 
     @property
@@ -44,7 +44,12 @@ class HeatingAndCooling:
 @register_part
 @dataclass(frozen=True)
 class SmaPulse(HeatingAndCooling):
-    """The actuator of Fig. 13.5b. peak_angle [rad], heating_time: Delta t_1 [s], cooling_time: Delta t_2 [s]."""
+    """Actuator of Fig. 13.5b: rotation rises linearly while the alloy is heated and falls linearly while it cools.
+
+    peak_angle: Largest rotation [rad].
+    heating_time: Delta t_1 [s].
+    cooling_time: Delta t_2 [s].
+    """
 
     PER_ROBOT: ClassVar = ("peak_angle",)
     peak_angle: Numbers = math.pi / 5
@@ -57,5 +62,5 @@ class SmaPulse(HeatingAndCooling):
         require_number("cooling_time", self.cooling_time, "s")
 
     def delta_psi(self, t: ArrayLike) -> NDArray[np.float64]:
-        """Rotation of a limb with command 1 at time t [s] of a stroke [rad]; t of any shape."""
+        """Rotation by command 1 at time t [s] of a stroke [rad]. t may have any shape."""
         return np.multiply.outer(pulse(t, self.heating_time, self.cooling_time), self.peak_angle)

@@ -1,24 +1,24 @@
-"""A shape memory alloy actuator with its heat: Joule heating, cooling in water, transformation with hysteresis.
+"""`ThermalSma`: a shape memory alloy actuator with Joule heating, cooling in water and hysteresis.
 
-Every limb has two wires, one that turns it either way; a command heats one of them for its share of the heating time
-(pulse width). A wire of heat capacity C and electric power P that loses heat to water by convection, h A per kelvin, is
-one temperature, as it is thin:
+Every limb has two wires, one for each direction of rotation. A command heats one of them for a fraction of the heating
+time (pulse width). A wire is thin and has one temperature T. With its heat capacity C, the electric power P and the
+heat transfer to the water h A per kelvin,
 
     C dT/dt = P - h A (T - T_water)    =>    T = T_inf + (T_0 - T_inf) exp(-t/tau),    tau = C/(h A),
 
-T_inf = T_water + P/(h A) while heated and T_water while it cools. Its share of austenite xi lies between two lines,
+where T_inf = T_water + P/(h A) while it is heated and T_water while it cools. Its austenite fraction xi lies between
 
-    up(T), from 0 at A_s to 1 at A_f,    and    down(T), from 0 at M_f to 1 at M_s:
+    up(T), from 0 at A_s to 1 at A_f,    and    down(T), from 0 at M_f to 1 at M_s.
 
-heating pushes it up along the first, cooling down along the second, and between them it stays as it is. Within a phase
-the temperature is monotone, so xi = clip(xi_0, up(T), down(T)) at any time. The limb turns by the peak angle times
-xi_+ - xi_-. Latent heat and the heat of the limb are left out.
+Heating raises it along the first line, cooling lowers it along the second, and between them it is constant. Within a
+phase the temperature is monotone, so xi = clip(xi_0, up(T), down(T)) at any time. The limb rotates by the peak angle
+times xi_+ - xi_-. Latent heat and the heat of the limb are neglected.
 
-The defaults are those with which a full command comes nearest to the pulse of Fig. 13.5b, from cold water and in later
-strokes, rounded; `python -m studies.scenes.thermal` fits them. It comes to within 6 to 7 % of the peak angle, root
-mean square, and 16 % at most: at a stroke's end, where an exponential has a tail and the pulse has none. More physics
-does not mend that: latent heat, gentle transformation, natural convection or a shorter pulse come to 5.3 % at best, and
-are left out. The defaults are effective numbers, not those of one alloy.
+The defaults make a full command come closest to the pulse of Fig. 13.5b, from rest and in later strokes, rounded;
+`python -m studies.scenes.thermal` fits them. The deviation is 6 to 7 % of the peak angle in the root mean square and
+16 % at most, at the end of a stroke, where an exponential has a tail and the pulse has none. Latent heat, gradual
+transformation, natural convection or a shorter pulse reduce it to 5.3 % at best, and are not modelled. The defaults are
+effective numbers, not those of one alloy.
 """
 
 import math
@@ -40,13 +40,18 @@ Floats = NDArray[np.float64]
 @register_part
 @dataclass(frozen=True)
 class ThermalSma(HeatingAndCooling):
-    """Two wires per limb; the state of a limb is (T_+, T_-, xi_+, xi_-), temperatures [deg C] and shares of austenite.
+    """Actuator of two shape memory alloy wires per limb, with heat and hysteresis.
 
-    peak_angle: Rotation by austenite alone [rad]. heating_time: Pulse width of a full command [s]. cooling_time: The
-        rest of the stroke [s]. Shorter pulses end within a time step.
-    time_constant: tau = C/(h A) [s]. steady_rise: P/(h A) [K], above the water if heated for ever.
-    water_temperature [deg C]. austenite_start, austenite_finish, martensite_start, martensite_finish: A_s, A_f, M_s and
-        M_f [deg C], with T_water <= M_f <= A_s and M_s <= A_f.
+    The state of a limb is (T_+, T_-, xi_+, xi_-): temperatures [deg C] and austenite fractions [1] of its two wires.
+
+    peak_angle: Rotation if one wire is all austenite and the other all martensite [rad].
+    heating_time: Pulse width of a full command [s]. Pulses of partial commands may end within a time step.
+    cooling_time: Time from a full pulse to the end of the stroke [s].
+    time_constant: tau = C/(h A) [s].
+    steady_rise: P/(h A) [K], temperature above the water that constant heating tends to.
+    water_temperature: T_water [deg C].
+    austenite_start, austenite_finish: A_s and A_f [deg C].
+    martensite_start, martensite_finish: M_s and M_f [deg C]. T_water <= M_f <= A_s < A_f and M_f < M_s <= A_f.
     """
 
     TEMPERATURES: ClassVar = (
@@ -85,19 +90,19 @@ class ThermalSma(HeatingAndCooling):
 
     @property
     def rest(self) -> Floats:
-        """Cold martensite."""
+        """State at rest: water temperature, no austenite; shape (4,), or (n_robots, 1, 4)."""
         water = column(self.water_temperature)
         return np.stack(np.broadcast_arrays(water, water, 0.0, 0.0), axis=-1)
 
     def delta_psi(self, t: ArrayLike) -> Floats:
-        """Rotation of a limb with command 1 at time t [s] of a stroke that begins at rest [rad]; t of any shape."""
+        """Rotation by command 1 at time t [s] of a stroke that begins at rest [rad]. t may have any shape."""
         t, n_robots = np.asarray(t, dtype=float), batch_size(self)
         if n_robots is None:
             return self.respond(t.ravel(), np.ones(()), self.rest)[0].reshape(t.shape)
         return self.respond(t.ravel(), np.ones((n_robots, 1)), self.rest)[0].reshape(*t.shape, n_robots)
 
     def respond(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
-        """See StatefulActuator; exact at all times t."""
+        """Rotations and state as in `StatefulActuator`, exact at all times t."""
         heated = self.heating_time * np.stack([np.maximum(commands, 0.0), np.maximum(-commands, 0.0)], axis=-1)
         tau, cold = column(self.time_constant, 2), column(self.water_temperature, 2)
         hot = cold + column(self.steady_rise, 2)
@@ -116,7 +121,7 @@ class ThermalSma(HeatingAndCooling):
         return turned, np.concatenate([temperature[-1], austenite[-1]], axis=-1)
 
     def transform(self, temperature: Floats, austenite: Floats) -> Floats:
-        """Share of austenite after the temperature [deg C] went straight to another, from a share before."""
+        """Austenite fraction after the temperature [deg C] has changed monotonically, from the fraction before."""
         _, M_f, A_s, M_s, A_f = (column(getattr(self, name), 2) for name in self.TEMPERATURES)
         up = (temperature - A_s) / (A_f - A_s)
         down = (temperature - M_f) / (M_s - M_f)
@@ -125,7 +130,7 @@ class ThermalSma(HeatingAndCooling):
         return np.clip(up, 0.0, 1.0, out=up)
 
     def observe(self, state: Floats) -> Floats:
-        """Temperatures above the water over A_f - T_water, and the shares of austenite."""
+        """Temperatures above the water over A_f - T_water, and austenite fractions, shape of `state`."""
         water, A_f = column(self.water_temperature, 2), column(self.austenite_finish, 2)
         warm = (state[..., :2] - water) / (A_f - water)
         return np.concatenate([warm, state[..., 2:]], axis=-1)

@@ -1,7 +1,7 @@
 """Whatever scene is accepted, its strokes end in finite, converged states, or say which robot failed, and why.
 
-What a single module promises stands with it: failing robots and refused states in test_simulator.py, refused scenes in
-test_scene.py, failing episodes in envs/, moderate conservation and symmetry in test_swim.py. Here is what is wild.
+What a single module promises stands with it: failing robots in test_simulator.py, refused scenes in scene/,
+failing episodes in envs/, moderate conservation and symmetry in test_swim.py. Here is what is wild.
 """
 
 import math
@@ -54,13 +54,13 @@ def assert_told(simulator: Simulator, report: StrokeReport) -> None:
 
 
 def powers(smallest: float, largest: float) -> st.SearchStrategy[float]:
-    """Of ten, from 10^smallest to 10^largest."""
+    """Powers of ten from 10^smallest to 10^largest."""
     return st.floats(smallest, largest).map(lambda exponent: 10.0**exponent)
 
 
 @st.composite
 def scenes(draw: st.DrawFn, schemes: list[str] = SCHEMES, most_limbs: int = 12, most_steps: int = 40) -> Scene:
-    """Far beyond what anybody swims with, at steps from 10 microseconds to a second."""
+    """Scenes far beyond those that anybody swims with, at steps from 10 microseconds to a second."""
     n_limbs, step = draw(st.integers(3, most_limbs)), draw(powers(-5.0, 0.0))
     robot = Seastar(
         n_limbs=n_limbs,
@@ -284,7 +284,7 @@ def test_50_strokes_turn_and_mirror_with_their_commands_to_a_multiple_of_roundin
 
 
 def energies(numerics: Numerics, fluid: Water | None, speed: float, n_steps: int = 60) -> np.ndarray:
-    """Of eight rattled robots after every step, over the first, shape (n_steps + 1, 8)."""
+    """Energies of eight rattled robots after every step, over the first, shape (n_steps + 1, 8)."""
     half = 0.5 * n_steps * numerics.step
     simulator = rattled(Simulator(Scene(Seastar(), fluid, SmaPulse(0.0, half, half), numerics), 8), speed)
     found = [simulator.elastic_energy() + simulator.kinetic_energy()]

@@ -1,4 +1,4 @@
-"""`Threads`: parts of a batch, shared out over threads."""
+"""`Workers`: threads that share the parts of a batch."""
 
 import os
 import threading
@@ -6,8 +6,11 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 
-class Threads:
-    """`n` threads, started when they are first needed, and again after `close`; one is the caller's own."""
+class Workers:
+    """Threads that share the parts of a batch. They start with the first run, and again after `close`.
+
+    n: Number of threads. If it is 1, the caller's own thread does the work.
+    """
 
     def __init__(self, n: int):
         self.n = n
@@ -16,9 +19,9 @@ class Threads:
         self._process = os.getpid()
 
     def run(self, work: Callable[[int, slice], None], parts: Iterable[slice]) -> None:
-        """Do work(thread, part) for all parts; whoever is ready takes the next.
+        """Call work(thread, part) for all parts. A thread that has finished one takes the next.
 
-        If a part fails or the caller is interrupted, no thread is at work any more when the exception leaves.
+        If a part fails or the caller is interrupted, all threads have stopped before the exception is raised.
         """
         waiting = iter(list(parts))
         if self.n == 1:
@@ -39,7 +42,7 @@ class Threads:
             raise
 
     def _get_pool(self) -> ThreadPoolExecutor:
-        """The threads of this process: a fork inherits the pool of its parent, but not the threads in it."""
+        """Pool of this process. A fork inherits its parent's pool, but not the threads in it."""
         if self._pool is None or self._process != os.getpid():
             self._process = os.getpid()
             self._at_work = [threading.Lock() for _ in range(self.n)]
@@ -54,7 +57,7 @@ class Threads:
 
 
 def _stop(waiting: Iterator[slice], at_work: Iterable[threading.Lock]) -> None:
-    """Leave nothing to take, and wait until nobody is at work; a thread that is late finds nothing."""
+    """Take all waiting parts away and wait for the threads. A thread that is late finds no part."""
     try:
         for _ in waiting:
             pass

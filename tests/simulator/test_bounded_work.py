@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State, StrokeReport
-from seastar_gym import scene as module
 from seastar_gym.der.stepping.report import STEPS
-from seastar_gym.model.rods import make_limits
+from seastar_gym.model import limits as module
+from seastar_gym.model.limits import make_limits
 
 SCHEMES = ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint", "adaptive"]
 SHORTEST = 4096  # of an interval
@@ -33,7 +33,7 @@ def in_parts(simulator: Simulator, commands: np.ndarray, parts: int) -> tuple[np
             next(stroke)
         except StopIteration as finished:
             return np.diff(steps, axis=0), finished.value
-        steps.append(simulator._report[:, STEPS].reshape(-1)[: simulator.n_robots].copy())
+        steps.append(simulator._batch.report[:, STEPS].reshape(-1)[: simulator.n_robots].copy())
 
 
 def test_error_control_and_halvings_together_keep_the_shortest_step_and_the_bound():

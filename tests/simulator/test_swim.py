@@ -79,7 +79,7 @@ def test_fidelities_are_as_far_off_as_their_names_say(fidelity, error):
 
 
 def test_robot_swims_forward_while_heated_and_back_while_cooling():
-    """As Fig. 13.6 shows: it gains way while it is heated, glides on, and in the second half loses most of it again."""
+    """It gains way while it is heated, glides on, and loses most of it again in the second half, as in Fig. 13.6."""
     simulator = swimmer("implicit-midpoint", 1e-3)
     simulator.stroke(STRAIGHT)
     start = simulator.hub_position()[0, 0]

@@ -124,7 +124,7 @@ def test_terminal_speed_is_where_load_and_drag_balance(along):
 
 @pytest.mark.parametrize("along", [0.0, 0.3, 1.2])
 def test_a_robot_at_rest_drifts_until_it_moves_with_the_current(along):
-    """Of quadratic drag: 1 - v/u = 1/(1 + k u t). A stiff cross has half its length along the current, half across."""
+    """Quadratic drag: 1 - v/u = 1/(1 + k u t). A stiff cross has half its length along the current, half across."""
     u, time = 0.1, 2.0
     robot = Seastar(n_limbs=4, youngs_modulus=1e9, relaxation_time=0.0)
     scene = Scene(
@@ -162,7 +162,7 @@ def ring(water: Water, robot: Seastar, time: float) -> tuple[np.ndarray, np.ndar
 
 
 def frequency_and_decrement(times: np.ndarray, tips: np.ndarray) -> tuple[float, float]:
-    """Of a decaying oscillation, from a fit of exp(-delta t) (a cos + b sin), and its logarithmic decrement."""
+    """Frequency and logarithmic decrement of an oscillation, from a fit of exp(-delta t) (a cos + b sin)."""
 
     def misfit(unknowns):
         delta, omega, *_ = unknowns
@@ -176,7 +176,7 @@ def frequency_and_decrement(times: np.ndarray, tips: np.ndarray) -> tuple[float,
 
 
 def first_frequency(robot: Seastar) -> float:
-    """Of a clamped beam in vacuum [Hz]; the clamp is at half the first edge."""
+    """Frequency of a clamped beam in vacuum [Hz]; the clamp is at half the first edge."""
     length = robot.limb_length - robot.edge_length / 2.0
     omega = (FIRST_ROOT / length) ** 2 * np.sqrt(robot.youngs_modulus / robot.density) * robot.rod_radius / 2.0
     return float(omega / (2.0 * np.pi))

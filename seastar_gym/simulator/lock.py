@@ -1,4 +1,4 @@
-"""`Turn`: one stroke at a time changes a simulator, and one that was broken off in the middle of a change is known."""
+"""`StrokeLock`: one stroke at a time changes a simulator, and an interrupted change is noticed."""
 
 import os
 import threading
@@ -20,11 +20,11 @@ def _this_thread() -> tuple[int, int]:
     return os.getpid(), threading.get_ident()
 
 
-class Turn:
-    """Whose turn it is to change a simulator.
+class StrokeLock:
+    """Lock that a stroke or another change of a simulator holds.
 
-    Idle, nobody has it. In a stroke, the stroke's thread has it, or the stroke alone while it pauses. Whoever asks and
-    has it already was interrupted: nothing gave the turn back, so that the simulator is `broken` until it is cured.
+    A stroke is held by its thread, and during a pause by the stroke alone. A thread that asks for a lock which it
+    holds already was interrupted before it could release it: the simulator is then `broken` until it is repaired.
     """
 
     def __init__(self) -> None:
@@ -33,15 +33,15 @@ class Turn:
         self._thread: tuple[int, int] | None = None
         self.broken = False
 
-    def take(self) -> object:
-        """Begin a change: returns what the turn is given back with. RuntimeError while it is somebody else's."""
+    def acquire(self) -> object:
+        """Begin a change. Returns its holder for `resume`; RuntimeError while another change is under way."""
         with self._lock:
             self._refuse_others()
             self._holder, self._thread = object(), _this_thread()
             return self._holder
 
     def _refuse_others(self) -> None:
-        """Where the holder is this thread, or one of a process that this one was forked from, nobody is at it."""
+        """RuntimeError if another thread holds the lock. Threads of a parent process do not run in a fork."""
         if self._holder is None:
             return
         if self._thread is None:
@@ -50,8 +50,8 @@ class Turn:
             raise RuntimeError(ELSEWHERE)
         self.broken = True
 
-    def require_whole(self) -> None:
-        """Refuse to go on from a broken state, or from one that another thread is changing; a pause is fine."""
+    def require_intact(self) -> None:
+        """RuntimeError if a change was interrupted or another thread is making one. A paused stroke is allowed."""
         with self._lock:
             if self._thread is not None:
                 self._refuse_others()
@@ -59,30 +59,30 @@ class Turn:
                 raise RuntimeError(BROKEN_OFF)
 
     def pause(self) -> None:
-        """Keep the turn for the stroke, whichever thread goes on with it."""
+        """Keep the lock for the stroke, whichever thread continues it."""
         self._thread = None
 
     def resume(self, holder: object) -> bool:
-        """Whether it is still this holder's turn; its thread is this one from now on."""
+        """Continue a stroke in this thread. Returns whether it still holds the lock."""
         with self._lock:
             if self._holder is holder:
                 self._thread = _this_thread()
             return self._holder is holder
 
-    def give_back(self) -> None:
-        """End a change that is whole."""
+    def release(self) -> None:
+        """End a completed change."""
         with self._lock:
             self._holder = self._thread = None
 
     @contextmanager
-    def change(self, cures: bool = False) -> Iterator[None]:
-        """Around a change of its own; if it `cures`, nothing is left of what was broken."""
-        self.take()
+    def change(self, repairs: bool = False) -> Iterator[None]:
+        """Context of a change. repairs: Whether it repairs what an interrupted change left."""
+        self.acquire()
         try:
             yield
         except ValueError:  # refused before anything changed
-            self.give_back()
+            self.release()
             raise
-        if cures:
+        if repairs:
             self.broken = False
-        self.give_back()
+        self.release()

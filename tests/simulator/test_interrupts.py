@@ -15,12 +15,13 @@ import numpy as np
 import pytest
 
 from seastar_gym import DomainRandomization, Scene, Seastar, Simulator, State, ThermalSma, Uniform
-from seastar_gym import simulator as module
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.model.coefficients import Coefficients
 from seastar_gym.scene import Numerics
 from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simulator import batch as module
+from seastar_gym.simulator.clock import Clock
 
 FAST = Numerics.preset("fast")
 N_ROBOTS = 20 * N_LANES + 1
@@ -44,7 +45,7 @@ def assert_same(simulator: Simulator, other: Simulator) -> None:
 
 
 def interrupt() -> None:
-    """What Ctrl-C does; this thread's own turn comes at its next call."""
+    """Interrupt the main thread as Ctrl-C does. It notices at its next call."""
     _thread.interrupt_main()
     time.sleep(0.001)
 
@@ -213,7 +214,7 @@ def break_off(monkeypatch, simulator: Simulator, what: str) -> None:
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    owner, name = {"reset": (Simulator, "_set_time"), "set_scene": (Coefficients, "set_scene")}[what]
+    owner, name = {"reset": (Clock, "set"), "set_scene": (Coefficients, "set_scene")}[what]
     with monkeypatch.context() as patch:
         patch.setattr(owner, name, interrupted)
         with pytest.raises(KeyboardInterrupt):
@@ -342,7 +343,7 @@ def break_off_reset(monkeypatch, env, what: str) -> None:
         raise KeyboardInterrupt
 
     env.reset(seed=5)
-    owner, name = {"reset": (Simulator, "_set_time"), "set_scene": (Coefficients, "set_scene")}[what]
+    owner, name = {"reset": (Clock, "set"), "set_scene": (Coefficients, "set_scene")}[what]
     with monkeypatch.context() as patch:
         patch.setattr(owner, name, interrupted)
         with pytest.raises(KeyboardInterrupt):

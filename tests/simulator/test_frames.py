@@ -20,8 +20,10 @@ PARTS, FORESEEABLE = 100, 10
 
 
 def seen_from(boost: np.ndarray, scene: Scene, noise: float, shake: float = 0.0) -> tuple[np.ndarray, int]:
-    """Positions [m] in the frame, shape (PARTS, n_robots, n_nodes, 2), on the way of a stroke from some noise [m] on
-    the nodes, with `boost` added to all motion and `shake` [m] to the nodes; and how many steps were halved or cut.
+    """Positions during a stroke, seen from the frame [m], and the number of steps that were halved or cut.
+
+    Positions have the shape (PARTS, n_robots, n_nodes, 2). boost: Velocity added to all motion [m/s]. noise, shake:
+    Sizes of two random displacements of the nodes [m].
     """
     if scene.fluid is not None:
         scene = replace(scene, fluid=replace(scene.fluid, current=UniformCurrent(*boost)))
@@ -30,20 +32,22 @@ def seen_from(boost: np.ndarray, scene: Scene, noise: float, shake: float = 0.0)
     positions = scene.robot.nodes() + noise * moved + shake * shaken
     simulator.set_state(State(positions, 50.0 * noise * velocities + boost, np.zeros(N_LANES)))
     stroke = simulator.stroke_in_parts(rng.integers(-1, 2, (N_LANES, scene.robot.n_limbs)).astype(float), PARTS)
-    way = []
-    while True:
-        try:
-            way.append(-boost * next(stroke) + simulator.positions)
-        except StopIteration as end:
-            report = end.value
-            break
+    way, report = [], None
+
+    def swim():
+        nonlocal report
+        report = yield from stroke
+
+    for time in swim():
+        way.append(-boost * time + simulator.positions)
     assert np.median(report.status) == 0
     return np.array(way), int(report.halvings.sum() + report.energy_cuts.sum())
 
 
 def assert_seen_alike(scene: Scene, noise: float = 1e-3) -> int:
-    """In another frame robots part no farther than from ones that are shaken by rounding, in the median: those that
-    ring wildly are chaotic. Returns how much trouble they had.
+    """Another frame moves robots no farther than shaking them by rounding does, in the median.
+
+    Robots that ring wildly are chaotic. Returns the number of steps that were halved or cut.
     """
     home, needed = seen_from(np.zeros(2), scene, noise)
     moving, _ = seen_from(np.array([0.31, -0.17]), scene, noise)

@@ -8,18 +8,9 @@ import pytest
 
 from refusals import assert_refused
 from seastar_gym import Contact, Limited, MeasuredCurve, Numerics, Scene, Seastar, Simulator, SmaPulse
-from seastar_gym.identify.identify import (
-    TRUTH,
-    Measurement,
-    draw,
-    get_parameter,
-    identify,
-    main,
-    synthetic,
-    trajectories,
-    trajectory,
-    with_parameters,
-)
+from seastar_gym.identify import Measurement, get_parameter, identify, synthetic, trajectory, with_parameters
+from seastar_gym.identify.command import TRUTH, draw, main
+from seastar_gym.identify.trajectories import trajectories
 from seastar_gym.scene.per_robot import numbers_of
 
 SCENE = Scene(numerics=Numerics("implicit-midpoint", 0.01))

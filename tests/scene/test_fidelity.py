@@ -1,4 +1,4 @@
-"""What the stored table promises holds for commands that the study has never seen, and nothing else is promised."""
+"""Promises of the stored table hold for commands that the study has never seen, and nothing else is promised."""
 
 import json
 import subprocess

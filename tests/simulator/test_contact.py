@@ -70,7 +70,7 @@ def test_distinct_commands_stand_for_all():
 
 
 def test_limbs_cross_without_contact():
-    """What the other tests are for."""
+    """The other tests would show nothing if they did not."""
     simulator = Simulator(Scene(numerics=Numerics.preset("balanced")), len(CLOSING))
     crossed, _ = crossed_on_the_way(simulator, CLOSING, 40)
     assert crossed.sum() >= 10
@@ -199,7 +199,7 @@ def test_schemes_agree_on_limbs_that_meet():
 
 
 def test_a_long_limb_meets_one_beyond_its_neighbour():
-    """Where lengths differ, every pair may touch: limbs 1 and 3 reach over a short limb 2."""
+    """If lengths differ, every pair may touch: limbs 1 and 3 reach over a short limb 2."""
     limbs = (Limb(), Limb(length=0.03), Limb(), Limb(), Limb())
     rods = make_rods(Scene(robot=Seastar(limbs=limbs), contact=Contact()))
     pairs = {tuple(pair) for pair in rods.contact.pairs.reshape(-1, 2).astype(int).tolist()}

@@ -101,6 +101,6 @@ def test_a_robot_of_every_term_moves_alike_in_nasty_company(scheme, kinds, step,
 
 
 def test_a_neighbours_listed_pairs_take_no_place_from_a_robot_with_long_chains():
-    """Chains are too long for a list of all pairs of node and edge: those near a robot are counted robot by robot."""
+    """Chains too long for all pairs of node and edge at once; the pairs near a robot are counted robot by robot."""
     scene = brief("implicit-euler", 5e-3, robot=Seastar(nodes_per_limb=40), contact=Contact())
     assert_alike_in_company(scene, ["shifted", *["crumpled"] * (N_LANES - 2), "crossed"], 1)

@@ -369,7 +369,7 @@ def test_what_is_nested_without_end_is_refused(depth):
 
 
 def places(data, path=()):
-    """Where every value of nested data stands."""
+    """Places of all values in nested data."""
     inner = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
     for key, value in inner:
         yield (*path, key)

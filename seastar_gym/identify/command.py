@@ -1,0 +1,79 @@
+"""Fits numbers of a scene to measured trajectories: `python -m seastar_gym.identify --help`.
+
+The trajectory is a CSV file with a line of names, `time,x0,y0,x9,y9,..`, and then one line for every time: the time [s]
+and the coordinates [m] of any nodes. Node 0 is the hub, node j (N - 1) the tip of limb j. The robot begins at rest with
+its hub at the origin and limb 1 along +x. Empty fields are nodes that were not seen. A second CSV file has one line for
+every stroke, with one command per limb.
+
+Parameters are positive numbers of the scene, by name: fluid.drag_coefficient, robot.youngs_modulus, robot.limb_length,
+robot.limbs.0.length, actuator.peak_angle, or actuator.angles.2, a point of a measured curve. Their first guesses are
+the values of the chapter's scene.
+
+With `--synthetic`, the data are simulated with known parameters and 1 mm of noise, to show that the fit finds them.
+"""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+from seastar_gym.extras import require_extra
+from seastar_gym.identify.fit import Estimate, identify
+from seastar_gym.identify.measurement import Measurement
+from seastar_gym.identify.trajectories import synthetic
+from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water
+
+TRUTH = {"fluid.drag_coefficient": 1.3, "robot.youngs_modulus": 1.4e6, "actuator.peak_angle": 0.55}
+"""Parameters of the synthetic data."""
+
+
+def draw(estimate: Estimate, measurement: Measurement, file: Path) -> None:
+    """Draw measured and fitted paths, and the residuals over time, into a file."""
+    import matplotlib.pyplot as plt
+
+    figure, (paths, over_time) = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained")
+    fitted = measurement.positions - estimate.residuals
+    for k, node in enumerate(measurement.nodes):
+        (line,) = paths.plot(*1e3 * fitted[:, k].T, label="hub" if node == 0 else f"node {node}")
+        paths.plot(*1e3 * measurement.positions[:, k].T, ".", color=line.get_color(), markersize=3, alpha=0.4)
+        over_time.plot(measurement.time, 1e3 * estimate.residuals[:, k], ".", color=line.get_color(), markersize=3)
+    paths.set(xlabel="x [mm]", ylabel="y [mm]", title="dots: measured, lines: fitted", aspect="equal")
+    figure.legend(loc="outside lower center", ncols=len(measurement.nodes))
+    over_time.axhline(0.0, color="black", linewidth=0.8)
+    over_time.set(xlabel="time [s]", ylabel="measured minus fitted, x and y [mm]")
+    over_time.set_title(f"{1e3 * estimate.root_mean_square:.2f} mm root mean square")
+    figure.savefig(file, dpi=120)
+    plt.close(figure)
+
+
+def main() -> int:
+    """Command line; returns the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("trajectory", nargs="?", type=Path, help="CSV file with a first line time,x0,y0,..")
+    parser.add_argument("commands", nargs="?", type=Path, help="CSV file with one line of commands per stroke")
+    names = "names of the parameters to fit (default: %(default)s)"
+    parser.add_argument("--fit", nargs="+", default=list(TRUTH), metavar="PARAMETER", help=names)
+    parser.add_argument("--step", type=float, default=5e-3, help="time step of the implicit midpoint rule [s]")
+    parser.add_argument("--picture", type=Path, help="file for a picture of the fit")
+    parser.add_argument("--synthetic", action="store_true", help="fit simulated data with known parameters")
+    options = parser.parse_args()
+    if not options.synthetic and options.commands is None:
+        parser.error("give a trajectory and its commands, or --synthetic")
+    try:
+        if options.picture is not None:
+            require_extra("Pictures", "studies", "matplotlib")
+        scene = Scene(Seastar(), Water(), SmaPulse(), Numerics("implicit-midpoint", options.step))
+        if options.synthetic:
+            measurement = synthetic(scene, TRUTH)
+            print("truth:", ", ".join(f"{name} = {value:g}" for name, value in TRUTH.items()))
+        else:
+            measurement = Measurement.from_csv(options.trajectory, options.commands)
+        begin = time.perf_counter()
+        estimate = identify(scene, options.fit, measurement)
+        print(estimate.report(), f"{time.perf_counter() - begin:.1f} s", sep="\n")
+        if options.picture is not None:
+            draw(estimate, measurement, options.picture)
+    except (ValueError, OSError, ModuleNotFoundError) as bad_input:
+        print(bad_input, file=sys.stderr)
+        return 2
+    return 0

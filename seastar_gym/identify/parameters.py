@@ -1,0 +1,37 @@
+"""Parameters: positive numbers of a scene, read and replaced by name."""
+
+from collections.abc import Sequence
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import is_finite_number, shown
+from seastar_gym.scene.per_robot import with_numbers
+
+Floats = NDArray[np.float64]
+
+
+def get_parameter(scene: Scene, name: str) -> float:
+    """Value of a parameter of the scene. ValueError if no positive number, counts excepted, has that name."""
+    if not isinstance(scene, Scene) or not isinstance(name, str):
+        raise ValueError(f"A Scene and a parameter's name are needed, not {shown(scene)} and {shown(name)}.")
+    first, *rest = name.split(".")
+    value: Any = getattr(scene, first) if first in ("robot", "fluid", "actuator", "contact") else None
+    for step in rest:
+        if isinstance(value, tuple) and step.isdigit() and int(step) < len(value):
+            value = value[int(step)]
+        else:
+            own = fields(value) if is_dataclass(value) else ()
+            known = step in {field.name for field in own if field.type not in (int, "int")}
+            value = getattr(value, step) if known else None
+    if not is_finite_number(value) or value <= 0.0:
+        raise ValueError(f"{name!r} is no positive number of this scene, such as fluid.drag_coefficient.")
+    return float(value)
+
+
+def with_parameters(scene: Scene, names: Sequence[str], values: Sequence[float] | Floats) -> Scene:
+    """Scene with other values of the named parameters."""
+    return with_numbers(scene, {name: float(value) for name, value in zip(names, values, strict=True)})

@@ -1,0 +1,215 @@
+"""`Batch`: the numbers of all robots in memory, one robot per SIMD lane, and the kernels that advance them."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.der.energy import energies
+from seastar_gym.der.rods import Work, make_work
+from seastar_gym.der.stepping.report import REPORT_ROWS, SMALLEST_HUB_T
+from seastar_gym.der.stepping.schemes import SCHEMES
+from seastar_gym.der.stepping.stroke import advance
+from seastar_gym.der.terms.hub import Actuation
+from seastar_gym.model.coefficients import Coefficients
+from seastar_gym.scene import Scene
+from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simd.rows import aligned_rows, from_rows, to_rows, write_rows
+from seastar_gym.simulator.report import SolverStatus
+from seastar_gym.simulator.workers import Workers
+
+Floats = NDArray[np.float64]
+
+PARTS_PER_THREAD = 8
+"""Parts of a batch for every thread. With more parts than threads, a thread that is held up by another process leaves
+its share to the others."""
+LARGEST_PART = 64
+"""Lane groups in a part at most. An interrupt waits for the parts under way."""
+ROWS = ("q", "v", "a", "peaks", "rotations", "status", "report")
+"""Arrays of a batch, each of shape (n_groups, k, N_LANES)."""
+MOVED = ("q", "v", "peaks", "rotations", "status", "last_hub")
+"""Arrays of a batch that a stroke changes and the next stroke does not make anew."""
+
+
+class Batch:
+    """Numbers of all robots in memory, and the kernels that advance them.
+
+    Most arrays have the shape (n_groups, k, N_LANES): a group of robots after the other, one robot per lane.
+
+    coefficients: The scene's coefficients for the kernels.
+    memory: Working memory of every thread, (Work, Actuation) of `der`.
+    q, v: Node positions [m] and velocities [m/s], k = 2 n_nodes.
+    a: Accelerations at the stages of a step.
+    peaks: Factors by which limbs follow `shape`, k = n_limbs.
+    shape: Rotation of limbs at the ends of the time steps, per unit of `peaks`: shape (n_times,), or
+        (n_groups, n_times, n_limbs, N_LANES) if it differs between limbs.
+    rotations: Rotations of the limbs by their actuators now [rad], k = n_limbs.
+    status: SolverStatus, k = 1.
+    report: Counts of the present stroke, k = len(REPORT_ROWS).
+    last_hub: Hub position at the end of the last stroke [m], shape (n_robots, 2).
+    """
+
+    def __init__(self, scene: Scene, n_robots: int, threads: int, times: Floats):
+        self._scene, self.n_robots, self._times = scene, n_robots, times
+        n_groups, n_limbs, n_rows = -(-n_robots // N_LANES), scene.robot.n_limbs, 2 * scene.robot.n_nodes
+        self._scheme = SCHEMES[scene.numerics.scheme]
+        self.make_coefficients(scene)
+        self.q = aligned_rows(n_groups, n_rows, N_LANES)
+        self.v = aligned_rows(n_groups, n_rows, N_LANES)
+        self.q[:] = self.coefficients.rest
+        self.a = aligned_rows(n_groups, (n_rows + 1) * self._scheme.n_stages + 2, N_LANES)
+        self.peaks = np.zeros((n_groups, n_limbs, N_LANES))
+        self.shape = np.zeros_like(times)
+        self.rotations = np.zeros((n_groups, n_limbs, N_LANES))
+        self.status = np.zeros((n_groups, 1, N_LANES))
+        self.report = np.zeros((n_groups, len(REPORT_ROWS), N_LANES))
+        self._held_rows = np.array([2 * node + axis for node in scene.held_nodes for axis in (0, 1)], dtype=int)
+        self._held = self.q[:, self._held_rows]
+        self.last_hub = self.hub_position()
+        self.workers = Workers(threads)
+        self.memory = [self._make_memory() for _ in range(threads)]
+
+    def make_coefficients(self, scene: Scene) -> None:
+        """Make the coefficients of all robots anew, from a scene of the same terms."""
+        self.coefficients = Coefficients(scene, self.n_robots)
+
+    def _make_memory(self) -> tuple[Work, Actuation]:
+        n_limbs = self._scene.robot.n_limbs
+        rotations = Actuation(np.zeros((n_limbs, N_LANES)), np.zeros((n_limbs, N_LANES)))
+        return make_work(self.coefficients.rods(0), self._scheme.n_stages), rotations
+
+    def read(self, rows: Floats) -> Floats:
+        """Copy of rows (n_groups, k, N_LANES) robot by robot, shape (n_robots, k)."""
+        return np.asarray(from_rows(rows, self.n_robots))
+
+    def shape_rows(self, shape: Floats) -> Floats:
+        """Rotations of shape (n_times, n_robots, n_limbs) as rows for the kernels; shape (n_times,) stays as it is."""
+        if shape.ndim == 1:
+            return shape
+        rows = to_rows(shape.transpose(1, 0, 2))
+        return rows.reshape(len(self.q), *shape[:, 0].shape, N_LANES)
+
+    def hub_position(self) -> Floats:
+        """Hub positions [m], shape (n_robots, 2)."""
+        return self.read(self.q[:, :2])
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Robots whose solver has given up, shape (n_robots,)."""
+        return self.read(self.status)[:, 0] > 0.0
+
+    def rows(self) -> dict[str, Floats]:
+        """Copies of the arrays by name, robot by robot: their reader may have another lane width."""
+        return {name: self.read(getattr(self, name)) for name in ROWS}
+
+    def put_rows(self, rows: dict[str, Floats]) -> None:
+        """Write the arrays that `rows` returned."""
+        for name, values in rows.items():
+            write_rows(getattr(self, name), values)
+        self.last_hub = self.hub_position()
+
+    def put_nodes(self, robot: int | np.intp, nodes: Floats) -> None:
+        """Put a robot's nodes at positions [m], shape (n_nodes, 2), without velocity."""
+        group, lane = divmod(robot, N_LANES)
+        self.q[group, :, lane] = nodes.reshape(-1)
+        self.v[group, :, lane] = 0.0
+
+    def put_at_rest(self, robot: np.intp, angle: float) -> None:
+        """Put a robot at rest with the hub at the origin and limb 1 in the direction `angle` [rad]."""
+        nodes = self.coefficients.nodes(robot)
+        # At heading zero the nodes are exactly those of rest, so that symmetric scenes stay symmetric.
+        c, s = np.cos(angle), np.sin(angle)
+        self.put_nodes(robot, np.stack([c * nodes[:, 0] - s * nodes[:, 1], s * nodes[:, 0] + c * nodes[:, 1]], axis=1))
+        group, lane = divmod(robot, N_LANES)
+        for rows in (self.peaks, self.rotations, self.status):
+            rows[group, :, lane] = 0.0
+        self.last_hub[robot] = 0.0
+
+    def put_state(self, positions: Floats, velocities: Floats) -> None:
+        """Put all robots at node positions [m] with velocities [m/s], each of shape (n_robots, n_nodes, 2)."""
+        write_rows(self.q, positions)
+        write_rows(self.v, velocities)
+        self.peaks[:] = 0.0
+        self.status[:] = 0.0
+        self.last_hub = self.hub_position()
+
+    def moved(self) -> dict[str, Any]:
+        """Copies of what a stroke changes, for `put_back`."""
+        return {name: getattr(self, name).copy() for name in MOVED}
+
+    def put_back(self, moved: dict[str, Any]) -> None:
+        """Undo a stroke, from the copies that `moved` made before it."""
+        for name, values in moved.items():
+            getattr(self, name)[:] = values
+
+    def energies(self) -> tuple[Floats, Floats]:
+        """Elastic energy at the present rotations (13.14) and kinetic energy [J], shape (n_robots,) each."""
+        work, actuation = self.memory[0]
+        both = np.zeros((2, len(self.q), 1, N_LANES))
+        for group in range(len(self.q)):
+            actuation.delta_psi_start[:] = actuation.delta_psi_end[:] = self.rotations[group]
+            rods = self.coefficients.rods(group)
+            energies(rods, work, actuation, self.q[group], self.v[group], both[0, group], both[1, group])
+        return self.read(both[0])[:, 0], self.read(both[1])[:, 0]
+
+    def begin_stroke(self, peaks: Floats, shape: Floats) -> None:
+        """Begin a stroke in which limbs turn by `peaks`, shape (n_robots, n_limbs), times `shape` (see the class)."""
+        write_rows(self.peaks, peaks)
+        self.shape = shape
+        self._held = self.q[:, self._held_rows]
+        self.v[:, self._held_rows] = 0.0
+        self.a[:] = 0.0  # a stroke depends on the state at its beginning only
+        self.report[:] = 0.0
+        self.report[:, SMALLEST_HUB_T] = np.inf
+
+    def advance(self, begin: int, end: int) -> None:
+        """Advance all robots from the time step `begin` of the stroke to `end`."""
+        times = self._times[begin : end + 1]
+
+        def swim(thread: int, part: slice) -> None:
+            work, actuation = self.memory[thread]
+            shape = self.shape[begin : end + 1]
+            if self.shape.ndim > 1:
+                shape = np.ascontiguousarray(self.shape[part, begin : end + 1])
+            advance(
+                self.coefficients.rods(part.start), work, self._scheme, SCHEMES["implicit-euler"], actuation,
+                self.q[part], self.v[part], self.a[part], self.peaks[part], times, shape, self.status[part],
+                self.report[part], self.coefficients.limits(part.start),
+            )  # fmt: skip
+
+        bounds = self._part_bounds()
+        self.workers.run(swim, map(slice, bounds[:-1], bounds[1:]))
+
+    def _part_bounds(self) -> NDArray[np.int64]:
+        """Lane groups at which one part of the batch ends and the next begins. Coefficients hold for a whole part."""
+        n_groups, threads = len(self.q), self.workers.n
+        n_parts = 1 if threads == 1 else min(n_groups, PARTS_PER_THREAD * threads)
+        n_parts = max(n_parts, -(-n_groups // LARGEST_PART))
+        if not self.coefficients.are_shared:
+            n_parts = n_groups
+        return np.asarray(n_groups * np.arange(n_parts + 1) // n_parts)
+
+    def covered(self) -> Floats:
+        """Time covered since the stroke began [s], shape (n_robots,)."""
+        return self.read(self.report)[:, REPORT_ROWS.index("covered")]
+
+    def show_rotations(self, end: int) -> None:
+        """Set the rotations of the limbs to those at the time step `end` of the stroke."""
+        self.rotations[:] = self.peaks * (self.shape[end] if self.shape.ndim == 1 else self.shape[:, end])
+
+    def end_stroke(self) -> dict[str, Floats]:
+        """End a stroke: release held nodes, put failed robots at rest. Returns the report's rows, (n_robots,) each."""
+        self.q[:, self._held_rows] = self._held
+        self.v[:, self._held_rows] = 0.0
+        if self.failed.any():
+            self._put_lost_robots_at_rest()
+        self.last_hub = self.hub_position()
+        return dict(zip(REPORT_ROWS, self.read(self.report).T, strict=True))
+
+    def _put_lost_robots_at_rest(self) -> None:
+        """Put failed robots whose state is not finite at rest where their hub was last."""
+        lost = self.failed & ~np.isfinite(self.read(self.q) + self.read(self.v)).all(axis=1)
+        for robot in np.flatnonzero(lost):
+            self.put_nodes(robot, self.last_hub[robot] + self.coefficients.nodes(robot))
+            group, lane = divmod(robot, N_LANES)
+            self.status[group, 0, lane] = SolverStatus.NOT_FINITE

@@ -1,0 +1,46 @@
+"""Coefficients of rods are the chapter's."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from oracle import Star
+from seastar_gym import Scene, Seastar, SmaPulse, Water
+from seastar_gym.model.rods import make_rods
+
+
+@given(
+    n_limbs=st.integers(3, 12), nodes_per_limb=st.integers(2, 40), limb_length=st.floats(0.01, 1.0),
+    rod_radius=st.floats(1e-4, 1e-2), density=st.floats(100.0, 1e4),
+)  # fmt: skip
+def test_total_mass_is_that_of_the_limbs(n_limbs, nodes_per_limb, limb_length, rod_radius, density):
+    robot = Seastar(n_limbs, nodes_per_limb, limb_length, rod_radius, density=density)
+    mass = make_rods(Scene(robot=robot, actuator=SmaPulse(peak_angle=0.1))).mass
+    assert mass.shape == (robot.n_nodes,)
+    assert mass.sum() == pytest.approx(n_limbs * limb_length * math.pi * rod_radius**2 * density, rel=1e-12)
+
+
+@pytest.mark.parametrize("hub_hinge", ["opening", "turning"])
+def test_coefficients_are_the_oracles(hub_hinge):
+    values = {"n_limbs": 4, "nodes_per_limb": 6, "limb_length": 0.2, "rod_radius": 2e-3, "youngs_modulus": 3e5}
+    robot, water = Seastar(**values, density=1200.0, hub_hinge=hub_hinge), Water(density=900.0, drag_coefficient=1.3)
+    star = Star(**values, density=1200.0, hub_hinge=hub_hinge, fluid_density=900.0, drag_coefficient=1.3)
+    rods = make_rods(Scene(robot, water, SmaPulse(peak_angle=0.1)))
+    np.testing.assert_allclose(rods.mass, star.masses, rtol=1e-14)
+    np.testing.assert_allclose(rods.drag, star.drag, rtol=1e-14)
+    np.testing.assert_allclose(rods.stretching.EA, star.EA, rtol=1e-14)
+    np.testing.assert_allclose(rods.stretching.EA_over_l * rods.stretching.l_over_EA, 1.0, rtol=1e-14)
+    np.testing.assert_allclose(rods.stretching.EA_over_l, star.EA / star.edge_length, rtol=1e-14)
+    np.testing.assert_allclose(rods.bending.EI_over_dl, star.EI / star.edge_length, rtol=1e-14)
+    np.testing.assert_allclose(rods.bending.EI_over_dl * rods.bending.dl_over_EI, 1.0, rtol=1e-14)
+    assert rods.hub.side == {"opening": 1.0, "turning": -1.0}[hub_hinge]
+    assert rods.hub.angle == pytest.approx(math.pi / 2 if hub_hinge == "opening" else -math.pi / 2)
+    assert len(rods.stretching.EA) == len(star.edges) and len(rods.bending.EI_over_dl) == len(star.hinges)
+
+
+@pytest.mark.parametrize("fluid", [None, Water(density=0.0), Water(drag_coefficient=0.0)])
+def test_vacuum_has_no_drag(fluid):
+    assert not make_rods(Scene(fluid=fluid)).drag.any()
