@@ -28,7 +28,7 @@ def get_parameter(scene: Scene, name: str) -> float:
             known = step in {field.name for field in own if field.type not in (int, "int")}
             value = getattr(value, step) if known else None
     if not is_finite_number(value) or value <= 0.0:
-        raise ValueError(f"{name!r} is no positive number of this scene, such as fluid.drag_coefficient.")
+        raise ValueError(f"{shown(name)} is no positive number of this scene, such as fluid.drag_coefficient.")
     return float(value)
 
 

@@ -70,7 +70,7 @@ def require_seed(seed: object) -> None:
 def require_flag(name: str, value: object) -> None:
     """Refuse what is neither True nor False, such as 0 or 1."""
     if not isinstance(value, bool | np.bool_):
-        raise ValueError(f"{name} must be True or False, not {value!r}.")
+        raise ValueError(f"{name} must be True or False, not {shown(value)}.")
 
 
 def require_choice(name: str, value: str, choices: tuple[str, ...]) -> None:

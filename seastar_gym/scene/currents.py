@@ -35,7 +35,7 @@ class UniformCurrent:
         if type(self.u_x) in (tuple, list):
             raise ValueError(
                 "UniformCurrent takes u_x and u_y [m/s], or a numpy array of each with a number for every robot, not "
-                f"the vector {self.u_x!r}."
+                f"the vector {shown(self.u_x)}."
             )
         require_each(self, "u_x", partial(require_finite, unit="m/s"))
         require_each(self, "u_y", partial(require_finite, unit="m/s"))
@@ -102,7 +102,7 @@ class GridCurrent:
 
     def __post_init__(self) -> None:
         if not isinstance(self.corner, tuple | list) or list(map(is_finite_number, self.corner)) != [True, True]:
-            raise ValueError(f"corner must be two finite numbers [m], not {self.corner!r}.")
+            raise ValueError(f"corner must be two finite numbers [m], not {shown(self.corner)}.")
         object.__setattr__(self, "corner", tuple(float(x) for x in self.corner))
         require_number("spacing", self.spacing, "m")
         object.__setattr__(self, "spacing", float(self.spacing))
@@ -157,7 +157,7 @@ def _checked_velocities(velocities: object) -> Floats:
 
 def _axis(name: str, ends: Any, spacing: float) -> Floats:
     """Coordinates of grid points [m], from the first end to the second or just beyond."""
-    two = isinstance(ends, tuple | list | np.ndarray) and np.shape(ends) == (2,)
+    two = isinstance(ends, tuple | list | np.ndarray) and len(np.atleast_1d(np.asarray(ends, dtype=object))) == 2
     if not two or not all(map(is_finite_number, ends)) or not ends[1] - ends[0] >= spacing:
         raise ValueError(f"{name} must be two ends at least a spacing apart [m], not {shown(ends)}.")
     n_spacings = (ends[1] - ends[0]) / spacing

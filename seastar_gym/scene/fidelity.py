@@ -86,11 +86,11 @@ def promise(setting: str | Setting) -> Promise:
         raise ValueError(f"A promise is asked of a preset's name or a Numerics, not of {shown(setting)}.")
     if isinstance(setting, str):
         if setting not in presets:
-            raise ValueError(f"A preset is one of {', '.join(map(repr, presets))}, not {setting!r}.")
+            raise ValueError(f"A preset is one of {', '.join(map(repr, presets))}, not {shown(setting)}.")
         return presets[setting]
     known = measured(setting)
     if known is None:
-        raise ValueError(f"Nothing was measured, so nothing can be promised, for {setting!r}.")
+        raise ValueError(f"Nothing was measured, so nothing can be promised, for {shown(setting)}.")
     return known
 
 

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.checks import require_number, shown
 from seastar_gym.scene.currents import AnyCurrent
 from seastar_gym.scene.per_robot import Numbers, batch_size, require_each
 from seastar_gym.scene.serial import register_part
@@ -44,9 +44,9 @@ class Water:
             if np.any(np.greater(self.tangential_drag_coefficient, self.drag_coefficient)):
                 raise ValueError(
                     "tangential_drag_coefficient must not exceed drag_coefficient, that of flow across a limb: "
-                    f"{self.tangential_drag_coefficient!r} is more than {self.drag_coefficient!r}."
+                    f"{shown(self.tangential_drag_coefficient)} is more than {shown(self.drag_coefficient)}."
                 )
         if self.added_mass_coefficient is not None:
             require_each(self, "added_mass_coefficient", partial(not_negative, unit="1"))
         if not isinstance(self.current, AnyCurrent | None):
-            raise ValueError(f"current must be a current such as UniformCurrent(u_x=0.001), not {self.current!r}.")
+            raise ValueError(f"current must be a current such as UniformCurrent(u_x=0.001), not {shown(self.current)}.")

@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.checks import is_finite_number, require_finite, require_number, require_numbers
+from seastar_gym.scene.checks import is_finite_number, require_finite, require_number, require_numbers, shown
 from seastar_gym.scene.per_robot import Numbers, PerRobot, require_each
 from seastar_gym.scene.serial import register_part
 
@@ -40,7 +40,7 @@ class Limb:
     def __post_init__(self) -> None:
         if self.direction is not None and not (is_finite_number(self.direction) and 0 <= self.direction < 2 * math.pi):
             raise ValueError(
-                f"A limb's direction must be from 0 to below 2 pi [rad], for all robots, not {self.direction!r}."
+                f"A limb's direction must be from 0 to below 2 pi [rad], for all robots, not {shown(self.direction)}."
             )
         if self.length is not None:
             require_each(self, "length", partial(_require_positive, unit="m"))
@@ -53,7 +53,7 @@ class Limb:
                 continue
             require_numbers(f"A limb's {name}", profile, unit)
             if not profile or min(profile) <= 0.0:
-                raise ValueError(f"A limb's {name} must be positive all along it [{unit}], not {profile!r}.")
+                raise ValueError(f"A limb's {name} must be positive all along it [{unit}], not {shown(profile)}.")
 
 
 def _require_positive(name: str, value: float, unit: str) -> None:

@@ -3,7 +3,14 @@
 from dataclasses import dataclass, field
 from typing import Literal, cast, get_args
 
-from seastar_gym.scene.checks import is_finite_number, require_choice, require_count, require_flag, require_number
+from seastar_gym.scene.checks import (
+    is_finite_number,
+    require_choice,
+    require_count,
+    require_flag,
+    require_number,
+    shown,
+)
 from seastar_gym.scene.fidelity import cheapest
 from seastar_gym.scene.serial import register_part
 
@@ -54,12 +61,12 @@ class Numerics:
         require_number("newton_tolerance", self.newton_tolerance, "limb lengths")
         require_count("max_iterations", self.max_iterations, 2, 10_000)
         if self.newton_tolerance > 1e-2:
-            raise ValueError(f"newton_tolerance must be at most 0.01 limb lengths, not {self.newton_tolerance!r}.")
+            raise ValueError(f"newton_tolerance must be at most 0.01 limb lengths, not {shown(self.newton_tolerance)}.")
         if self.path_tolerance is not None:
             if not is_finite_number(self.path_tolerance) or not 1e-3 <= self.path_tolerance <= 0.02:
-                raise ValueError(f"path_tolerance must be from 0.001 to 0.02, not {self.path_tolerance!r}.")
+                raise ValueError(f"path_tolerance must be from 0.001 to 0.02, not {shown(self.path_tolerance)}.")
             if self.scheme != "implicit-midpoint":
-                raise ValueError(f'path_tolerance needs the scheme "implicit-midpoint", not {self.scheme!r}.')
+                raise ValueError(f'path_tolerance needs the scheme "implicit-midpoint", not {shown(self.scheme)}.')
         if not self.named and self != Numerics():
             object.__setattr__(self, "named", True)
 

@@ -10,6 +10,8 @@ from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
+from seastar_gym.scene.checks import shown
+
 Part = TypeVar("Part")
 
 Numbers: TypeAlias = float | Any
@@ -34,7 +36,7 @@ def require_each(part: Any, name: str, check: Callable[[str, float], None]) -> N
         return
     numbers = value.tolist() if isinstance(value, np.ndarray) else list(map(_plain, value))
     if not isinstance(numbers, list) or not numbers or isinstance(numbers[0], list):
-        raise ValueError(f"{name} must be a number, or one for every robot of shape (n_robots,), not {value!r}.")
+        raise ValueError(f"{name} must be a number, or one for every robot of shape (n_robots,), not {shown(value)}.")
     for number in numbers:
         check(name, number)
     object.__setattr__(part, name, PerRobot(numbers))

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.checks import require_choice, require_count, require_number
+from seastar_gym.scene.checks import require_choice, require_count, require_number, shown
 from seastar_gym.scene.limb import Limb, LimbShape, as_tuple
 from seastar_gym.scene.per_robot import Numbers, batch_size, chosen, require_each
 from seastar_gym.scene.serial import register_part
@@ -67,14 +67,14 @@ class Seastar:
 
     def _check_limbs(self) -> None:
         if not isinstance(self.limbs, tuple) or not all(isinstance(limb, Limb) for limb in self.limbs):
-            raise ValueError(f"limbs must be a tuple of Limb, not {self.limbs!r}.")
+            raise ValueError(f"limbs must be a tuple of Limb, not {shown(self.limbs)}.")
         if len(self.limbs) not in (0, self.n_limbs):
             raise ValueError(f"limbs must be one Limb for each of the {self.n_limbs}, or none, not {len(self.limbs)}.")
         directions = [limb.direction for limb in self.limbs if limb.direction is not None]
         if len(directions) not in (0, self.n_limbs):
             raise ValueError("Either every limb has a direction or none has.")
         if directions and (directions[0] != 0.0 or (np.diff(directions) <= 0.0).any()):
-            raise ValueError(f"Directions of limbs must begin at 0 and increase [rad], not {directions!r}.")
+            raise ValueError(f"Directions of limbs must begin at 0 and increase [rad], not {shown(directions)}.")
         most = chosen(self, partial(max, key=abs))
         turn = max(abs(turn_per_hinge(shape, self.nodes_per_limb)) for shape in most.limb_shapes())
         if turn >= math.pi:

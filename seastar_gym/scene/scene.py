@@ -16,7 +16,7 @@ import numpy as np
 
 from seastar_gym.scene.actuators.actuator import Actuator, StatefulActuator, check_actuator, is_actuator
 from seastar_gym.scene.actuators.pulse import SmaPulse
-from seastar_gym.scene.checks import is_finite_number, require_count, require_numbers
+from seastar_gym.scene.checks import is_finite_number, require_count, require_numbers, shown
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.fluid import Water
 from seastar_gym.scene.numerics import MAX_STEPS, Numerics
@@ -63,9 +63,9 @@ class Scene:
             ("contact", self.contact, Contact | None),
         ):
             if not isinstance(value, kinds):
-                raise ValueError(f"Scene.{name} must be a {kinds}, not {value!r}.")
+                raise ValueError(f"Scene.{name} must be a {kinds}, not {shown(value)}.")
         if not is_actuator(self.actuator):
-            raise ValueError(f"Scene.actuator must be an Actuator such as SmaPulse(), not {self.actuator!r}.")
+            raise ValueError(f"Scene.actuator must be an Actuator such as SmaPulse(), not {shown(self.actuator)}.")
         check_actuator(self.actuator)
         batch_size(self)
         self._check_hub_hinges()
@@ -77,20 +77,22 @@ class Scene:
     def _check_strengths(self) -> None:
         require_numbers("limb_strengths", self.limb_strengths, "1")
         if len(self.limb_strengths) not in (0, self.robot.n_limbs):
-            raise ValueError(f"limb_strengths must be one number per limb, not {self.limb_strengths!r}.")
+            raise ValueError(f"limb_strengths must be one number per limb, not {shown(self.limb_strengths)}.")
         if not all(0.0 <= strength <= 1.0 for strength in self.limb_strengths):
-            raise ValueError(f"limb_strengths must be from 0 to 1, not {self.limb_strengths!r}.")
+            raise ValueError(f"limb_strengths must be from 0 to 1, not {shown(self.limb_strengths)}.")
 
     def _check_holds_and_loads(self) -> None:
         if not isinstance(self.held_nodes, tuple) or not isinstance(self.loads, tuple):
-            raise ValueError(f"held_nodes and loads must be tuples, not {self.held_nodes!r} and {self.loads!r}.")
+            raise ValueError(
+                f"held_nodes and loads must be tuples, not {shown(self.held_nodes)} and {shown(self.loads)}."
+            )
         for load in self.loads:
             if not isinstance(load, tuple) or len(load) != 3 or not all(map(is_finite_number, load[1:])):
-                raise ValueError(f"A load is (node, F_x, F_y) with finite forces [N], not {load!r}.")
+                raise ValueError(f"A load is (node, F_x, F_y) with finite forces [N], not {shown(load)}.")
         if self.gravity is not None:
             require_numbers("gravity", self.gravity, "m/s^2")
             if len(self.gravity) != 2:
-                raise ValueError(f"gravity must be two numbers (g_x, g_y) [m/s^2], not {self.gravity!r}.")
+                raise ValueError(f"gravity must be two numbers (g_x, g_y) [m/s^2], not {shown(self.gravity)}.")
         for node in (*self.held_nodes, *(load[0] for load in self.loads)):
             require_count("a held or loaded node", node, 0, self.robot.n_nodes - 1)
 
@@ -126,7 +128,7 @@ class Scene:
             sound = False
         if not sound:
             raise ValueError(
-                f"The stiffnesses or masses of {self.robot!r} overflow or vanish in double precision: use numbers "
+                f"The stiffnesses or masses of {shown(self.robot)} overflow or vanish in double precision: use numbers "
                 "closer to those of a robot."
             )
 

@@ -135,7 +135,7 @@ def _read_part(kind: str, fields: dict[Any, object], where: str, depth: int) -> 
     unknown = [name for name in fields if name not in names]
     missing = [name for name in names if name not in fields and parameters[name].default is inspect.Parameter.empty]
     if unknown or missing:
-        problem = f"says {shown(unknown[0])}, which no {kind} has" if unknown else f"does not say {missing[0]!r}"
+        problem = f"says {shown(unknown[0])}, which no {kind} has" if unknown else f"does not say {shown(missing[0])}"
         raise ValueError(f"{where} {problem}: a {kind} is written with {', '.join(names) or 'nothing'}.")
     values = {name: _read(fields[name], f"{where}.{name}", depth + 1) for name in names if name in fields}
     return _made(KINDS[kind], where, **values)

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import as_floats
+from seastar_gym.scene.checks import as_floats, shown
 from seastar_gym.scene.per_robot import column
 
 Floats = NDArray[np.float64]
@@ -19,7 +19,7 @@ def checked_commands(commands: ArrayLike, scene: Scene, strengths: Floats) -> Fl
     if not good.all():
         robot, limb = np.argwhere(~good)[0]
         raise ValueError(
-            f"commands must be numbers in [-1, 1]; robot {robot} has {array[robot, limb]!r} for limb {limb + 1}."
+            f"commands must be numbers in [-1, 1]; robot {robot} has {shown(array[robot, limb])} for limb {limb + 1}."
         )
     if scene.robot.hub_hinge == "turning":
         _check_turning_hub(strengths * array, scene)

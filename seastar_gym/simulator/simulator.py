@@ -12,7 +12,7 @@ from seastar_gym.der.rods import Work
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.coefficients import Coefficients
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import as_floats, require_count
+from seastar_gym.scene.checks import as_floats, require_count, shown
 from seastar_gym.scene.numerics import MAX_STEPS
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import write_rows
@@ -53,7 +53,7 @@ class Simulator:
 
     def __init__(self, scene: Scene, n_robots: int = 1, threads: int | None = None):
         if not isinstance(scene, Scene):
-            raise ValueError(f"Simulator needs a Scene, not {scene!r}.")
+            raise ValueError(f"Simulator needs a Scene, not {shown(scene)}.")
         require_count("n_robots", n_robots, 1, MAX_ROBOTS)
         if threads is not None:
             require_count("threads", threads, 1, MAX_THREADS)

@@ -12,6 +12,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.scene.checks import shown
 from seastar_gym.scene.per_robot import Numbers
 
 Floats = NDArray[np.float64]
@@ -76,16 +77,16 @@ def check_actuator(actuator: Actuator) -> None:
     """
     corners, period = np.asarray(actuator.corners, dtype=float), actuator.period
     if corners.ndim != 1 or len(corners) < 2 or not np.isfinite(corners).all() or (np.diff(corners) <= 0.0).any():
-        raise ValueError(f"An actuator's corners must be increasing times [s], not {actuator.corners!r}.")
+        raise ValueError(f"An actuator's corners must be increasing times [s], not {shown(actuator.corners)}.")
     if corners[0] != 0.0 or corners[-1] != period:
         raise ValueError(
-            f"An actuator's corners must go from 0 to its period ({period!r} s), not {actuator.corners!r}."
+            f"An actuator's corners must go from 0 to its period ({shown(period)} s), not {shown(actuator.corners)}."
         )
     angles = np.asarray(actuator.delta_psi(corners), dtype=float)
     if angles.shape[:1] != corners.shape or angles.ndim > 2 or not np.isfinite(angles).all():
-        raise ValueError(f"An actuator's delta_psi must be one finite angle [rad] per time, not {angles!r}.")
+        raise ValueError(f"An actuator's delta_psi must be one finite angle [rad] per time, not {shown(angles)}.")
     peak = np.asarray(actuator.peak_angle, dtype=float)
     if not np.isfinite(peak).all() or (np.abs(angles).max(axis=0) > peak * (1.0 + 1e-12)).any():
-        raise ValueError(f"An actuator's peak_angle must be its largest angle, not {actuator.peak_angle!r} rad.")
+        raise ValueError(f"An actuator's peak_angle must be its largest angle, not {shown(actuator.peak_angle)} rad.")
     if angles[0].any() or (angles[-1].any() and not isinstance(actuator, StatefulActuator)):
         raise ValueError("An actuator's curve must begin and end a stroke at 0 rad: otherwise limbs would jump.")

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.scene.actuators.actuator import Actuator, StatefulActuator, is_actuator
-from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.checks import require_number, shown
 from seastar_gym.scene.per_robot import Numbers, batch_size, column, require_each
 from seastar_gym.scene.serial import register_part
 
@@ -35,7 +35,7 @@ class Limited:
 
     def __post_init__(self) -> None:
         if not is_actuator(self.actuator) or isinstance(self.actuator, StatefulActuator):
-            raise ValueError(f"Limited follows an actuator without memory, not {self.actuator!r}.")
+            raise ValueError(f"Limited follows an actuator without memory, not {shown(self.actuator)}.")
         if self.largest_angle is not None:
             require_each(self, "largest_angle", partial(require_number, unit="rad"))
         if self.largest_rate is not None:

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.scene.checks import require_number, require_numbers
+from seastar_gym.scene.checks import require_number, require_numbers, shown
 from seastar_gym.scene.csv_rows import read_numbers
 from seastar_gym.scene.per_robot import Numbers, require_each
 from seastar_gym.scene.serial import register_part
@@ -40,11 +40,11 @@ class MeasuredCurve:
                 f"A curve needs as many angles as times, two or more, not {len(self.angles)} and {len(self.times)}."
             )
         if self.times[0] != 0.0 or (np.diff(self.times) <= 0.0).any():
-            raise ValueError(f"times must begin at 0 and increase [s], not {self.times!r}.")
+            raise ValueError(f"times must begin at 0 and increase [s], not {shown(self.times)}.")
         if self.angles[0] != 0.0 or self.angles[-1] != 0.0:
             raise ValueError(
-                f"A measured curve must begin and end at 0 rad, not at {self.angles[0]!r} and {self.angles[-1]!r}: "
-                "otherwise limbs would jump when their command changes."
+                f"A measured curve must begin and end at 0 rad, not at {self.angles[0]} and {self.angles[-1]}: otherwise "
+                "limbs would jump when their command changes."
             )
 
     @classmethod
