@@ -43,8 +43,8 @@ class MeasuredCurve:
             raise ValueError(f"times must begin at 0 and increase [s], not {shown(self.times)}.")
         if self.angles[0] != 0.0 or self.angles[-1] != 0.0:
             raise ValueError(
-                f"A measured curve must begin and end at 0 rad, not at {self.angles[0]} and {self.angles[-1]}: otherwise "
-                "limbs would jump when their command changes."
+                f"A measured curve must begin and end at 0 rad, not at {self.angles[0]} and {self.angles[-1]}: "
+                "otherwise limbs would jump when their command changes."
             )
 
     @classmethod
