@@ -27,6 +27,7 @@ EDGE_ROWS = 7  # numbers of an Edge
 
 @kernel
 def larger(a, b):
+    """The larger of two numbers."""
     return select(a > b, a, b)
 
 

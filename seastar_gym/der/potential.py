@@ -19,8 +19,8 @@ edge and P_i = s_i grad theta(outer edge) grad theta(inner edge)^T at node i, th
     B_i = -K_inner - P_i - P_{i-1}                            with node i - 1,
     C_i = P_{i-1}                                             with node i - 2.
 
-A limb is assembled and eliminated in one sweep from tip to root. Positive definite without trouble; where a pivot
-is not positive, the robot's matrix is made again from the convex parts alone (mask `convex`): the Gauss-Newton part
+A limb is assembled and eliminated in one sweep from tip to root. Where a pivot is not positive, the robot's matrix is
+regularised: made again from the convex parts alone (mask `convex`): the Gauss-Newton part
 of bending, no compression in T/|e| n n^T, no mu Hess theta. That matrix is positive definite by construction, and the
 full one, with its quadratic convergence, is used wherever its pivots allow it.
 """
@@ -103,6 +103,7 @@ def hinge_slopes(rods, work, stage, hinge, t, EI_kappa_bar, convex):
 
 @kernel
 def positive_part(x):
+    """x where it is positive, else 0."""
     return select(x > 0.0, x, 0.0)
 
 

@@ -45,7 +45,7 @@ class Kernel(CPUDispatcher):
 
     @property
     def plain(self):
-        """The same in plain Python, on the lanes of numpy_lanes.py."""
+        """The kernel in plain Python, on the lanes of numpy_lanes.py."""
         return plain_kernels()(self)
 
 

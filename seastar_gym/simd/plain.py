@@ -30,10 +30,10 @@ KEPT = (__name__, numpy_lanes.__name__)  # modules without kernels: one of each 
 class PlainKernels:
     """The kernels once more, as plain functions; the compiled ones stay what they are.
 
-    n_lanes: Number of robots in a row of memory. folder: Source of `der`. functions: Those of the interface that
-    numpy_lanes.py describes that are replaced by other ones.
+    n_lanes: Number of robots in a row of memory. folder: Source of `der`. functions: Replacements for functions of the
+    interface that numpy_lanes.py describes, by name.
 
-    Called with a kernel, or whatever else a module with kernels defines, it returns the same of its own.
+    Called with a kernel, or with anything else that a module with kernels defines, it returns its own version.
     """
 
     def __init__(self, n_lanes: int = N_LANES, folder: Path = FOLDER, **functions: Callable):

@@ -237,7 +237,7 @@ def load_root(work, root):
 
 @kernel
 def store_root(work, root, D, H, r):
-    """Put away what load_root reads."""
+    """Store (D, H, r) of a root node for load_root."""
     row = RING_ROWS * root
     for k in range(3):
         store(work.ring, row + k, D[k])
@@ -339,7 +339,7 @@ def substitute_ring(work, n_limbs, hub):
 
 @kernel
 def solve_lone_root(work, D_hub, r_hub):
-    """What solve_ring does, for one limb: its root node couples with the hub alone."""
+    """Solve for root node and hub of a single limb, see solve_ring: its root node couples with the hub alone."""
     zero = splat(0.0)
     nothing = (zero, zero, zero, zero)
     D, H, r = load_root(work, 0)

@@ -1,4 +1,4 @@
-"""Solutions of an eliminated star of chains, see star_matrix.py: of its own right-hand side, and of another one."""
+"""Solutions of an eliminated star of chains, see star_matrix.py, for its own right-hand side and for another one."""
 
 from seastar_gym.der.linear.star_matrix import (
     NODE_ROWS,
@@ -70,7 +70,7 @@ def solve_ring_again(work, n_limbs, r_hub):
 
 @kernel
 def eliminate_again(work, node, r, r_1, r_2):
-    """What eliminate_node does to right-hand sides: those of the next node and the second next, updated."""
+    """Right-hand sides of the next node and the second next, updated as eliminate_node does."""
     row = NODE_ROWS * node
     inverse_x, inverse_y = load_pair(work.pivots, 2 * node)
     wr = subtract_product(r[1], load(work.factors, row), r[0])
@@ -88,7 +88,7 @@ def eliminate_again(work, node, r, r_1, r_2):
 
 @kernel
 def eliminate_root_again(work, root, r, r_next, r_last, r_hub):
-    """What eliminate_root does to right-hand sides: those of the next root, the last one and the hub, updated."""
+    """Right-hand sides of the next root, the last one and the hub, updated as eliminate_root does."""
     row = ROOT_ROWS * root
     inverse_x, inverse_y = load_pair(work.root_pivots, 2 * root)
     wr = subtract_product(r[1], load(work.root_factors, row), r[0])

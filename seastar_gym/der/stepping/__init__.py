@@ -1,1 +1,1 @@
-"""Time stepping: Newton's method, implicit stages, the guard of troubled steps, whole strokes."""
+"""Time stepping: Newton's method, implicit stages, the guard of energies, whole strokes."""

@@ -1,4 +1,4 @@
-"""The guard of troubled steps: none creates energy, none turns a hinge through its pole.
+"""The guard of retried and regularised steps: none creates energy, none turns a hinge through its pole.
 
 With U at the natural hub angles of the step's end, implicit Euler (13.9) over dq = q_1 - q_0 ends with the energy
 
@@ -7,10 +7,11 @@ With U at the natural hub angles of the step's end, implicit Euler (13.9) over d
 U'' taken somewhere on the way: what the robot would have had, had it stood still while its actuators moved, less what
 inertia, drag and a convex U take. Where U is not convex along the step the last term may create energy, little
 (compressed edges that turn) or much (a minimum of Phi beyond the pole of tan(phi/2), edges that collapse). In water at
-moderate speeds, drag takes more than that, so only steps that had trouble, or much energy to lose, are looked at; in
-vacuum those that may have created energy by what Newton knows at their end.
+moderate speeds, drag takes more than that. So the guard looks only at steps that were retried, regularised or
+shortened, and at those with much energy to lose; in vacuum at those that may have created energy by what Newton's
+method knows at their end.
 
-All that is measured in a frame that moves with the velocity c of the fluid at the hub, in vacuum with that of the
+Energies are measured in a frame that moves with the velocity c of the fluid at the hub, in vacuum with that of the
 centre of mass. Seen from there, the kinetic energy is that of v - c, a current u does the work h drag (u - c), and a
 dead load F does F (dq - h c). With the balance of momentum, P_1 - P_0 = h (drag + F), any c says the same: another one
 changes the energy's growth by -c (P_1 - P_0) and the work by -c h (drag + F). But only implicit Euler has the drag of
@@ -22,8 +23,8 @@ A step that created energy is refused, or, where little is to be taken away, its
 the same momenta are cut down to the energy allowed: momentum and angular momentum, with those of added mass, stay, and
 the cut is of the order of the scheme's own error.
 
-Schemes of higher order take the energy in the middle of a step and promise no such balance. In a step that had trouble
-they are held to the larger of the energies that the robot standing still has at the step's ends, and what moving the
+Schemes of higher order take the energy in the middle of a step and promise no such balance. In a guarded step they are
+held to the larger of the energies that the robot standing still has at the step's ends, and what moving the
 natural hub angles alone can store. What limbs store that press each other, and may get back, counts at the start of all
 steps, and at the end of implicit Euler's: where others look ahead (contact.py), limbs that part get nothing back.
 
@@ -107,7 +108,7 @@ def put_back(rods, work, scheme, q, v, robots):
 
 @kernel
 def moved_hub_energy(rods, work, actuation, start, end):
-    """What hub hinges at their natural angles would store once those moved from `start` to `end` [J]."""
+    """Energy of hub hinges at their natural angles, once those have moved from `start` to `end` of the interval [J]."""
     set_natural_hub_angles(rods, work, actuation, start)
     for limb in range(rods.n_limbs):
         store(work.hub_moment, limb, load(work.hub_EI_kappa_bar, limb))
@@ -122,9 +123,9 @@ def moved_hub_energy(rods, work, actuation, start, end):
 
 @kernel
 def allowed_energy(rods, work, scheme, actuation, start, end, q, v, frame):
-    """Most energy that a step from (q, v) may end with [J], at the natural hub angles of its end, left in `work`.
+    """Largest energy that a step from (q, v) may end with [J], at the natural hub angles of its end, left in `work`.
 
-    But for the work of currents and loads, which is known when the step is.
+    The work of currents and loads is added when the step is known.
     """
     allowed = splat(0.0)
     if not scheme.dissipative:
@@ -141,13 +142,13 @@ def allowed_energy(rods, work, scheme, actuation, start, end, q, v, frame):
 
 @kernel
 def may_gain(current, added_mass, rods, work, stage, phi, robots):
-    """Of the robots in the mask, those whose step of implicit Euler might create energy, by what Newton knows already.
+    """Mask of those among `robots` whose step of implicit Euler might create energy, as far as Newton's method knows.
 
     phi: Phi before Newton's last step [J], which is not less than at its end. There Phi is |v_1 - v_0|^2_M / 2 + U(q_1)
         and what dissipation adds, less h F (v_1 - v_0) of loads F, so the energy ends at most
         Phi + v_0 M (v_1 - v_0) - h F v_0 - U(q_0) above the one allowed.
 
-    All of them in scenes whose fluid gives energy or takes it up.
+    It is the whole of `robots` in scenes whose fluid gives energy or takes it up.
     """
     if current is None and added_mass is None:
         gain = phi - elastic_energy(rods, work, stage.q_hat)
@@ -222,7 +223,7 @@ def cut_velocities(rods, q, v, frame, motion, share, robots):
 
 @kernel
 def through_poles(rods, work, q, robots):
-    """Of the robots in the mask, those with a hinge that came here through its pole from the state put aside.
+    """Mask of those among `robots` with a hinge that turned through its pole since the state put aside.
 
     Edges a and b that turned by alpha and beta (less than pi) take a hinge from phi to phi + beta - alpha. That is
     beyond the pole where cos((phi + beta - alpha)/2) < 0; written in half-angle tangents, without their cosines.
@@ -239,7 +240,7 @@ def through_poles(rods, work, q, robots):
 
 @kernel
 def energy_noise(rods, q, h, mass, potential, kinetic):
-    """What rounding of positions may change an energy by [J]: its slope sqrt(2 m K) and its curvature m, times a move.
+    """Change of an energy that rounding of positions may make [J]: slope sqrt(2 m K) and curvature m, times a move.
 
     Velocities are differences of positions over h; stretching and bending are as stiff as `stiffness` [N/m] at most.
     """

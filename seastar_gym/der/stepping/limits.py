@@ -1,4 +1,4 @@
-"""What the solution of a stroke has to keep."""
+"""Tolerances and bounds of the solution of a stroke."""
 
 from typing import NamedTuple
 
@@ -6,11 +6,11 @@ import numpy as np
 
 
 class Limits(NamedTuple):
-    """What a solution has to keep.
+    """Tolerances and bounds that the kernels keep.
 
-    tolerance: Largest node move of the last Newton update [m], one row.
-    max_iterations: Newton steps per stage before a time step is halved.
-    most_iterations: Newton steps per stroke before the robot has failed.
+    tolerance: Largest displacement of a node in the last Newton update [m], one row.
+    max_iterations: Newton steps of a stage before its time step is halved.
+    most_iterations: Newton steps of a stroke before the robot has failed.
     adaptive: Whether time steps are adapted to their error.
     error_rate: Largest error per time [m/s], one row.
     """

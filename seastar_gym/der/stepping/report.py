@@ -1,4 +1,4 @@
-"""What a stroke reports of every robot: counts and extremes."""
+"""The report of a stroke: counts and extremes of every robot."""
 
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import load, store

@@ -63,7 +63,7 @@ class Step(NamedTuple):
 def try_step(rods, work, scheme, actuation, q, v, a, step, active, limits, report):
     """One step for the robots in the mask `active`.
 
-    a: What the last step left for this one, see LAST_STEP and SIZE; then what this one leaves for the next.
+    a: Memory from one step to the next, see LAST_STEP and SIZE; read at the beginning and written at the end.
 
     Returns (good, accepted, error rate): the mask of the robots whose stages all converged and created no energy, that
     of those whose error is small enough besides, whose state has moved, and the error per time [m/s], zero if steps are

@@ -11,7 +11,7 @@ STUCK, SPENT = 1.0, 3.0  # SolverStatus.NOT_CONVERGED and ITERATION_LIMIT
 
 @kernel
 def shape_of_limb(shape, group, k, limb):
-    """Rotation of a limb at time k, see `advance`; for robots that turn alike a number, whoever the limb is."""
+    """Rotation of a limb at time k, see `advance`; one number where all robots turn alike."""
     if shape.ndim == 1:
         return shape[k]
     return load(borrow(shape[group, k]), limb % shape.shape[2])
@@ -21,17 +21,17 @@ def shape_of_limb(shape, group, k, limb):
 def advance(rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shape, failed, report, limits):
     """Advance lane groups through the intervals between `times`, in place.
 
-    scheme, fallback: How time steps are made, and how they are made where they give trouble (with one stage).
+    scheme, fallback: Tableaux of the time steps, and of the steps of robots that had to retry often (one stage).
     q, v: Positions and velocities [m, m/s], shape (n_groups, 2 n_nodes, N_LANES).
-    a: What a time step leaves for the next: accelerations of its stages [m/s^2], their shares in the next guess, length
-        and size, shape (n_groups, n_stages (2 n_nodes + 1) + 2, N_LANES).
+    a: Memory from one time step to the next: accelerations of its stages [m/s^2], their shares in the next guess, its
+        length and size, shape (n_groups, n_stages (2 n_nodes + 1) + 2, N_LANES).
     peaks: Share of `shape` that every limb follows, shape (n_groups, n_limbs, N_LANES).
     times: Ends of the intervals [s], shape (n_intervals + 1,).
     shape: Rotation of the limbs at those times [rad], shape (n_intervals + 1,) if all limbs turn alike, else
         (n_groups, n_intervals + 1, n_limbs, N_LANES), or with 1 for n_limbs if those of a robot do.
     failed: 0 for robots that go on, else their SolverStatus, shape (n_groups, 1, N_LANES).
     report: Counts and extremes, added to, shape (n_groups, len(REPORT_ROWS), N_LANES).
-    limits: What the solution has to keep.
+    limits: Tolerances and bounds, see limits.py.
     """
     rods_rows, memory, rotation = borrow(rods), borrow(work), borrow(actuation)
     tableau, fallback_tableau, bounds = borrow(scheme), borrow(fallback), borrow(limits)

@@ -43,6 +43,7 @@ def freeze_added_mass(added_mass, rods, work):
 
 @kernel
 def add_half_edge_mass(m, normals, e, xx, xy, yy):
+    """Add the mass m n n^T of half of edge e [kg]."""
     nx, ny = load(normals, 2 * e), load(normals, 2 * e + 1)
     mx, my = m * nx, m * ny
     return add_product(xx, mx, nx), add_product(xy, mx, ny), add_product(yy, my, ny)
@@ -50,6 +51,7 @@ def add_half_edge_mass(m, normals, e, xx, xy, yy):
 
 @kernel
 def momentum(added_mass, node, vx, vy):
+    """Momentum of the fluid that a node of velocity (vx, vy) carries along [kg m/s]."""
     xx, xy, yy = load(added_mass, 3 * node), load(added_mass, 3 * node + 1), load(added_mass, 3 * node + 2)
     return add_product(xx * vx, xy, vy), add_product(xy * vx, yy, vy)
 

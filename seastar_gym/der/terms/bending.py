@@ -62,13 +62,13 @@ def n_hub_hinges(n_limbs: int) -> int:
 
 @kernel
 def moment(rods, hinge, t, EI_kappa_bar):
-    """EI (kappa - kappa_bar) [N m]."""
+    """Bending moment EI (kappa - kappa_bar) [N m] of a hinge whose half angle has the tangent t."""
     return add_product(-EI_kappa_bar, 2.0 * load(rods.bending.EI_over_dl, hinge), t)
 
 
 @kernel
 def bending_energy(rods, hinge, moment):
-    """E_b [J]."""
+    """Bending energy E_b [J] of a hinge under a moment [N m]."""
     return 0.5 * load(rods.bending.dl_over_EI, hinge) * moment * moment
 
 

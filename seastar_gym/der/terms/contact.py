@@ -41,11 +41,11 @@ fewer. In longer ones a node that is not crumpled is near to one or two."""
 
 
 class Contact(NamedTuple):
-    """Who may touch whom, see contact.py.
+    """Coefficients of contact: limbs that may touch, thickness and stiffness of their nodes.
 
     n_pairs, pairs: Limbs that may touch, (right, left) each, counted from 0, shape (2 n_pairs,), for all robots.
     thickness: Distance from the centre line at which a node is touched [m]. widest: Twice the largest [m].
-    stiffness: Of a touched node [N/m].
+    stiffness: Stiffness of a touched node [N/m].
     """
 
     n_pairs: int
@@ -58,13 +58,14 @@ class Contact(NamedTuple):
 class ContactWork(NamedTuple):
     """Memory of contact; rows per coordinate but for `listed`, `slots`, `own`, `missed` and `touching`.
 
-    share: Most pairs of node and edge of one robot that can be listed. own: How many are.
-    listed: How many are of all robots together, then node and edge of each, shared. slots: SLOT_ROWS of each.
+    share: Largest number of pairs of node and edge that one robot can list. own: Number that it has listed.
+    listed: Number of pairs that all robots together have listed, then node and edge of each. slots: SLOT_ROWS of each.
     missed: 1 for robots whose pairs did not all fit into their share, or whose step was not found.
     touching: 1 for robots that touch.
-    ends: Positions where contact is asked for [m]. seen: The same along the gap between two limbs and across it.
-    force: Of contact [N].
-    x, r, z, p, Hp, w: See coupled.py.
+    ends: Positions at which contact is looked for [m]. seen: These positions along the gap between two limbs and
+        across it.
+    force: Forces of contact [N].
+    x, r, z, p, Hp, w: Vectors of the conjugate gradients, see linear/coupled.py.
     """
 
     share: float
@@ -142,13 +143,13 @@ def memory(contact: Contact | None, n_limbs: int, nodes_per_limb: int) -> Contac
 
 @kernel
 def lead_of(stage):
-    """How far contact is asked for from q_hat, over how far the stage is."""
+    """Distance from q_hat at which contact is looked for, over that of the stage."""
     return 4.0 if stage.ahead else 1.0
 
 
 @kernel
 def looked_at(work, stage, row):
-    """Coordinate where contact is asked for, as the iterate has it [m]."""
+    """Coordinate at which contact is looked for, by the iterate [m]."""
     q_hat = load(stage.q_hat, row)
     if stage.ahead:
         q_hat = subtract_product(q_hat, stage.gamma, load(stage.v_hat, row))
@@ -182,7 +183,7 @@ def gap(rods, work, slot, x):
 
 @kernel
 def gap_at_rest(rods, work, stage, slot):
-    """What a gap has that does not depend on Q."""
+    """Part of a gap that does not depend on Q [m]."""
     if stage.ahead:
         return subtract_product(
             -3.0 * gap(rods, work, slot, stage.q_hat), stage.gamma, gap(rods, work, slot, stage.v_hat)
@@ -238,7 +239,7 @@ def contact_force(contact, node):
 
 @kernel
 def those_apart(contact, robots):
-    """Of the robots in the mask, those that did not touch when last asked for their slopes."""
+    """Mask of those among `robots` that did not touch when their slopes were last computed."""
     if contact is None:
         return robots
     return robots & ~(load(contact.touching, 0) > 0.0)

@@ -1,4 +1,4 @@
-"""Limbs that came to cross in a step: it is refused, so that limbs do not pass through each other in long steps."""
+"""Limbs that came to cross in a step: such a step is refused, so that limbs do not pass through each other."""
 
 import numpy as np
 
@@ -11,9 +11,9 @@ from seastar_gym.simd.lanes import add_product, any_lane, load, load_number, sel
 
 @kernel
 def those_uncrossed(contact, rods, work, stage, q_0, robots):
-    """Of the robots in the mask, those without edges of different limbs that cross now and did not when the step began.
+    """Mask of those among `robots` without edges of different limbs that cross now and did not when the step began.
 
-    Not those either whose neighbours did not all fit into the list, or whose Newton step was not found.
+    Robots whose near pairs did not all fit into the list, or whose Newton step was not found, are left out.
     """
     if contact is None:
         return robots

@@ -17,11 +17,11 @@ class Current(NamedTuple):
     """A current of some kind; one type for all kinds, so that one machine code serves them.
 
     kind: LINEAR, VORTEX or GRID.
-    numbers: Of a linear current u_x, u_y at the origin [m/s], then their gradient [1/s], u_x,x u_x,y u_y,x u_y,y. Of a
-        vortex x and y of the centre [m], circulation/(2 pi) [m^2/s], core radius squared [m^2]. Of a grid x and y of
+    numbers: For a linear current u_x, u_y at the origin [m/s], then their gradient u_x,x u_x,y u_y,x u_y,y [1/s]. For
+        a vortex x and y of the centre [m], circulation/(2 pi) [m^2/s], core radius squared [m^2]. For a grid x and y of
         its first point [m], one over its spacing [1/m].
     n_x, n_y: Numbers of points of a grid.
-    velocities: Of a grid u_x, u_y [m/s] point by point, y running fastest.
+    velocities: u_x, u_y [m/s] at the points of a grid, y running fastest.
     """
 
     kind: int
@@ -33,6 +33,7 @@ class Current(NamedTuple):
 
 @kernel
 def linear_velocity(numbers, x, y):
+    """(u_x, u_y) of a uniform current or a shear [m/s]."""
     u_x = add_product(add_product(load(numbers, 0), load(numbers, 2), x), load(numbers, 3), y)
     u_y = add_product(add_product(load(numbers, 1), load(numbers, 4), x), load(numbers, 5), y)
     return u_x, u_y
@@ -40,6 +41,7 @@ def linear_velocity(numbers, x, y):
 
 @kernel
 def vortex_velocity(numbers, x, y):
+    """(u_x, u_y) of a vortex with a smooth core [m/s]."""
     dx, dy = x - load(numbers, 0), y - load(numbers, 1)
     turning = load(numbers, 2) / add_product(add_product(load(numbers, 3), dx, dx), dy, dy)
     return -dy * turning, dx * turning
@@ -49,7 +51,7 @@ def vortex_velocity(numbers, x, y):
 def cell(coordinate, n):
     """(index of the cell's first point, place in the cell from 0 to 1) of a coordinate in spacings, kept in the grid.
 
-    What is not a number goes to the first point.
+    A coordinate that is not a number goes to the first point.
     """
     inside = select(coordinate > 0.0, coordinate, 0.0)
     inside = select(inside < n - 1.0, inside, n - 1.0)
@@ -60,6 +62,7 @@ def cell(coordinate, n):
 
 @kernel
 def grid_velocity(grid, x, y):
+    """(u_x, u_y) between the points of a grid [m/s]."""
     i, a = cell((x - load(grid.numbers, 0)) * load(grid.numbers, 2), grid.n_x)
     j, b = cell((y - load(grid.numbers, 1)) * load(grid.numbers, 2), grid.n_y)
     row = 2.0 * add_product(j, i, float(grid.n_y))
@@ -72,7 +75,7 @@ def grid_velocity(grid, x, y):
 
 @kernel
 def bilinear(values, row, next_row, a, b):
-    """Between the points of a cell: at `row` and behind it (in y), at `next_row` (in x) and behind it."""
+    """Bilinear interpolation in a cell: rows `row` and the next one (in y), and `next_row` (in x) and the next one."""
     before = mix(load_at(values, row), load_at(values, row + 2.0), b)
     after = mix(load_at(values, next_row), load_at(values, next_row + 2.0), b)
     return mix(before, after, a)
@@ -80,6 +83,7 @@ def bilinear(values, row, next_row, a, b):
 
 @kernel
 def mix(first, second, share):
+    """Number at a share of the way from the first to the second."""
     return add_product(subtract_product(first, share, first), share, second)
 
 

@@ -1,4 +1,4 @@
-"""What a stage takes from the first guess of its iterate and keeps: normals of edges, the current at the nodes.
+"""The frozen part of a fluid: normals of edges and the current at the nodes, taken from the first guess of a stage.
 
 The first guess is off by the square of the step, so schemes keep their order up to 2 (a uniform current is exact), and
 the potential stays one that is minimised, with an exact Hessian.
@@ -23,6 +23,7 @@ def freeze_fluid(rods, work):
 
 @kernel
 def freeze_normals(rods, normals, q):
+    """Fill `normals` with the unit normals of the edges at q, in scenes that have them."""
     if normals is None:
         return
     for e in range(n_nodes(rods) - 1):
@@ -34,6 +35,7 @@ def freeze_normals(rods, normals, q):
 
 @kernel
 def freeze_current(current, rods, work):
+    """Fill work.current with the velocity of the fluid at the nodes [m/s], in scenes with a current."""
     if current is None:
         return
     for node in range(n_nodes(rods)):

@@ -31,5 +31,5 @@ def tension(rods, e, length):
 
 @kernel
 def stretching_energy(rods, e, tension):
-    """E_s [J]."""
+    """Stretching energy E_s [J] of edge e under a tension [N]."""
     return 0.5 * load(rods.stretching.l_over_EA, e) * tension * tension
