@@ -1,7 +1,7 @@
 """Newton's method with a backtracking line search, (13.11), on the incremental potential of one implicit stage.
 
-Every robot of a lane group has its own state of the search: a robot that has converged, failed or was never active
-is frozen by a mask, and nothing that one robot needs (a regularised matrix, a shorter step) changes another robot's bits.
+Every robot of a lane group has its own state of the search: a robot that has converged, failed or was never active is
+frozen by a mask, and nothing that one robot needs (a regularised matrix, a shorter step) changes another robot's bits.
 """
 
 from seastar_gym.der.geometry import larger
