@@ -101,7 +101,7 @@ class Scene:
             return
         robot, pairs = self.robot, self.robot.limbs_that_may_touch()
         if not pairs:
-            raise ValueError("Contact is modelled between limbs less than half a turn apart, which this robot has not.")
+            raise ValueError("Contact is modelled between limbs less than half a turn apart, and this robot has none.")
         if self.contact.opening_angle >= robot.opening_angle:
             raise ValueError(
                 f"Limbs that touch at an opening angle of {self.contact.opening_angle:.4g} rad touch at rest, where "
@@ -157,7 +157,7 @@ class Scene:
         widest = max(abs(natural_hub_angle(hinge.gap, robot.hub_hinge)) for hinge in hinges)
         limit = 0.5 * (math.pi - widest)
         if robot.hub_hinge == "turning":
-            # A stroke that remembers nothing comes to the limit for some commands only: the simulator refuses those.
+            # Without memory, only some commands reach the limit, and the simulator refuses those.
             limit *= 1.0 - 1e-12 if isinstance(self.actuator, StatefulActuator) else 1.0 + 1e-12
             if peak > limit:
                 raise ValueError(

@@ -84,7 +84,7 @@ class ThermalSma(HeatingAndCooling):
         in_order = (water <= M_f) & (M_f <= A_s) & (A_s < A_f) & (M_f < M_s) & (M_s <= A_f)
         if not in_order.all():
             raise ValueError(
-                f"Wires come back only if T_water <= M_f <= A_s < A_f and M_f < M_s <= A_f [deg C], not with "
+                f"Wires cool back only if T_water <= M_f <= A_s < A_f and M_f < M_s <= A_f [deg C], not with "
                 f"T_water = {water}, M_f = {M_f}, A_s = {A_s}, A_f = {A_f} and M_s = {M_s}."
             )
 
