@@ -161,7 +161,7 @@ def test_what_a_robot_remembers_does_not_depend_on_its_neighbours():
 def test_limits_are_positive_numbers(arguments):
     with pytest.raises(ValueError, match=next(iter(arguments))):
         Limited(SmaPulse(), **arguments)
-    with pytest.raises(ValueError, match="remembers nothing"):
+    with pytest.raises(ValueError, match="without memory"):
         Limited(SLOW)
 
 
