@@ -55,7 +55,6 @@ try:
     from agents.vec_env import BatchVecEnv
     from seastar_gym import RewardWeights
     from seastar_gym.command import refused_by_disk
-    from seastar_gym.envs.paths import PathName
     from seastar_gym.envs.seastar_swim import SeastarSwimEnv
     from seastar_gym.envs.task import make_scene
     from seastar_gym.scene.numerics import Fidelity
@@ -74,7 +73,7 @@ class Options:
 
     strokes: int = 300_000
     """Strokes to train for, of all robots together."""
-    path: PathName = "random"
+    path: str = "random"
     """What to train on. Random paths teach every direction and every turn; the pentagon is then just one of them."""
     random_heading: bool = True
     """Turn the robots at random at the start of every episode."""

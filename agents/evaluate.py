@@ -32,7 +32,7 @@ from agents.report.playback import Playback, RecordingEnv
 from agents.roster import load_agents
 from agents.swim import Policy, Swim, actions_of, require_fit, swim
 from seastar_gym.command import run_command
-from seastar_gym.envs.paths import PATH_NAMES, make_path
+from seastar_gym.envs.paths import PATHS, make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
 from seastar_gym.scene import Scene
@@ -250,7 +250,7 @@ class Options:
 
 def _load_path(name: str) -> Any:
     """The name of a path, or the waypoints [m] of a text file."""
-    if name in PATH_NAMES or not Path(name).is_file():
+    if name in PATHS or not Path(name).is_file():
         make_path(name, np.random.default_rng(0))
         return name
     waypoints = read_numbers(name, "x and y [m] of a waypoint", 2)

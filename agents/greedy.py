@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions, command_table
 from seastar_gym.envs.observation import scene_layout
-from seastar_gym.envs.paths import AIM, shortest_way
+from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.scene import Scene
 from seastar_gym.simulator import Simulator
 from seastar_gym.simulator.body_frame import best_fit_heading
@@ -74,16 +74,6 @@ def displacement_map(scene: Scene, actions: Actions = "joint") -> Displacements:
     return measured
 
 
-def remaining_way(hub: Floats, current: Floats, after: Floats, radius: float) -> Floats:
-    """Way [m] from hub well through the circle of the current waypoint to the next one, as the reward measures it.
-
-    All of shape (..., 2), in any one frame; `after` equals `current` on the last leg, as in an observation.
-    """
-    last = (current == after).all(axis=-1)
-    to_current = np.hypot(hub[..., 0] - current[..., 0], hub[..., 1] - current[..., 1])
-    return np.where(last, to_current, shortest_way(hub, current, after, AIM * radius))
-
-
 def waypoints_of(observations: NDArray[np.float32], scene: Scene) -> tuple[Floats, Floats]:
     """Current and next waypoint [m] relative to the hub in the body frame, (n, 2) each."""
     at, length = scene_layout(scene), scene.robot.limb_length
@@ -113,18 +103,19 @@ class Searcher(ABC):
 
 
 class GreedyPolicy(Searcher):
-    """The command whose mean displacement leaves the least way to go.
+    """Agent that chooses the command whose mean displacement leaves the shortest rewarded route.
 
-    scene: What the map is made of; the environment's own for a fair comparison. waypoint_radius: [m].
+    scene: Scene in which displacements are measured; that of the environment, for a fair comparison.
+    waypoint_radius: Radius of the waypoints [m]. reward: Reward whose route is shortened.
     """
 
     actions = "joint"
 
-    def __init__(self, scene: Scene, waypoint_radius: float = 0.01):
-        self.scene, self.waypoint_radius = scene, waypoint_radius
+    def __init__(self, scene: Scene, waypoint_radius: float = 0.01, reward: RewardWeights = RewardWeights()):
+        self.scene, self.waypoint_radius, self.reward = scene, waypoint_radius, reward
         self._hub = displacement_map(scene, self.actions).hub
 
     def choose(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
-        """Actions for observations of shape (n, size)."""
-        current, after = waypoints_of(observations, self.scene)
-        return np.argmin(remaining_way(self._hub, current[:, None], after[:, None], self.waypoint_radius), axis=1)
+        """Actions, shape (n,), for observations of shape (n, size)."""
+        current, following = (waypoint[:, None] for waypoint in waypoints_of(observations, self.scene))
+        return np.argmin(self.reward.way_to_next(self._hub, current, following, self.waypoint_radius), axis=1)

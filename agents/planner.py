@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.greedy import Searcher, remaining_way, waypoints_of
+from agents.greedy import Searcher, waypoints_of
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout
+from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.simulator import Simulator, State
 
@@ -84,9 +85,10 @@ class Planner(Searcher):
         waypoint_radius: float = 0.01,
         budget: Budget = Budget(),
         threads: int | None = None,
+        reward: RewardWeights = RewardWeights(),
     ):
         self.scene = Scene(numerics=Numerics.preset("fast")) if scene is None else scene
-        self.waypoint_radius, self.budget, self.threads = waypoint_radius, budget, threads
+        self.waypoint_radius, self.budget, self.reward = waypoint_radius, budget, reward
         self._commands = command_table(self.actions, self.scene.robot.n_limbs)
         self._swim_all = Branching(self.scene, self._commands, threads)
 
@@ -123,7 +125,7 @@ class Planner(Searcher):
         """Way to go [m], whether the current waypoint is passed, and whether it was the last; shape (n, candidates)."""
         current, after = current[:, None], after[:, None]
         passed = passed | (np.hypot(*np.moveaxis(hub - current, -1, 0)) <= self.waypoint_radius)
-        way = remaining_way(hub, current, after, self.waypoint_radius)
+        way = self.reward.way_to_next(hub, current, after, self.waypoint_radius)
         beyond = np.hypot(*np.moveaxis(hub - after, -1, 0))
         last = (current == after).all(axis=-1)
         return np.where(passed & ~last, beyond, way), passed, passed & last

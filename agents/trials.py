@@ -26,7 +26,6 @@ from agents.roster import load_agents
 from agents.swim import Policy, Swim, actions_of, require_fit
 from seastar_gym.command import run_command
 from seastar_gym.envs.commands import to_commands
-from seastar_gym.envs.paths import PathName
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.task import Path as SwimPath
 from seastar_gym.envs.task import SwimTask, make_scene
@@ -38,7 +37,7 @@ HELD_OUT_SEED = 1_000
 """Seed of the paths that policies are measured on; trainings draw theirs from small seeds."""
 MM = 1000.0
 RESAMPLES, CONFIDENCE = 2000, 0.95
-NOMINAL: tuple[PathName, ...] = ("pentagon", "square", "triangle", "figure-eight")
+NOMINAL: tuple[str, ...] = ("pentagon", "square", "triangle", "figure-eight")
 
 Interval = tuple[float, float, float]
 """Mean, and the ends of its confidence interval."""
@@ -144,11 +143,11 @@ def trials(agents: Mapping[str, Policy], fidelity: Fidelity, options: "Options")
     return rows
 
 
-def _sets(options: "Options") -> list[tuple[PathName, str, int]]:
+def _sets(options: "Options") -> list[tuple[str, str, int]]:
     """Path, disturbance and number of swims of every set; the disturbed pentagon for all directions and limbs."""
-    nominal: list[tuple[PathName, str, int]] = [(path, "none", 1) for path in NOMINAL]
-    random: list[tuple[PathName, str, int]] = [("random", name, options.swims) for name in DISTURBANCES]
-    pentagon: list[tuple[PathName, str, int]] = [
+    nominal: list[tuple[str, str, int]] = [(path, "none", 1) for path in NOMINAL]
+    random: list[tuple[str, str, int]] = [("random", name, options.swims) for name in DISTURBANCES]
+    pentagon: list[tuple[str, str, int]] = [
         ("pentagon", name, 5 * CURRENT_DIRECTIONS) for name in DISTURBANCES if name != "none"
     ]
     known = {"nominal": nominal, "random": random, "pentagon": pentagon}

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seastar_gym.envs.paths import PATH_NAMES, make_path
+from seastar_gym.envs.paths import PATHS, make_path
 from seastar_gym.envs.rendering import (
     CURRENT,
     HEATED_MINUS,
@@ -184,7 +184,7 @@ def test_the_current_waypoint_has_its_own_colour():
         np.testing.assert_allclose(ring[index], expected, atol=40)
 
 
-@pytest.mark.parametrize("name", PATH_NAMES)
+@pytest.mark.parametrize("name", PATHS)
 @pytest.mark.parametrize("size", [(480, 360), (960, 720)])
 def test_the_robot_is_in_view_at_the_start_and_at_every_waypoint(name, size):
     renderer = renderer_of(name, size)
