@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions, to_commands
 from seastar_gym.envs.randomization import DomainRandomization
-from seastar_gym.envs.rendering import Frame, Renderer, limb_nodes
+from seastar_gym.envs.rendering import Frame, Renderer, renderer_of
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.task import Outcome, Path, Plain, SwimTask, make_scene
 from seastar_gym.envs.task_env import TaskEnv, checked_options
@@ -242,13 +242,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     def _get_renderer(self) -> Renderer:
         if self._renderer is None:
             robot = self.simulator.scene.of_robot(0).robot
-            self._renderer = Renderer(
-                limb_nodes(robot.n_limbs, robot.nodes_per_limb),
-                self.waypoints,
-                limb_length=robot.limb_length,
-                rod_radius=robot.rod_radius,
-                waypoint_radius=self._task.waypoint_radius,
-            )
+            self._renderer = renderer_of(robot, self.waypoints, self._task.waypoint_radius)
         return self._renderer
 
     def render(self) -> NDArray[np.uint8] | list[NDArray[np.uint8]] | None:  # type: ignore[override]
