@@ -12,7 +12,7 @@ import re
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, command_table
+from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, choices, command_table
 from seastar_gym.gaits import pair_gait, pentagon_gait, straight_gait
 
 Floats = NDArray[np.float64]
@@ -76,7 +76,7 @@ class RandomPolicy:
     def __init__(self, rng: np.random.Generator, actions: Actions = "limbs", n_limbs: int = 5):
         self.actions: Actions = actions
         self._rng = rng
-        self._n_choices = len(LIMB_COMMANDS if actions == "limbs" else command_table(actions, n_limbs))
+        _, self._n_choices = choices(actions, n_limbs)
         self._shape = (n_limbs,) if actions == "limbs" else ()
 
     def predict(
