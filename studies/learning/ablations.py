@@ -24,8 +24,9 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
 from agents.files import write_atomically
+from agents.hyperparameters import Hyperparameters
 from agents.policy import LearnedPolicy
-from agents.ppo import Hyperparameters, make_model, make_training_env, policy_of
+from agents.ppo import make_model, make_training_env, policy_of
 from agents.report.pictures import COLOURS, FAINT_INK
 from agents.swim import Policy
 from agents.trials import HELD_OUT_SEED, swim_many

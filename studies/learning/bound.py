@@ -26,7 +26,7 @@ from scipy.spatial import ConvexHull
 from agents.files import write_atomically
 from agents.greedy import Displacements, measure_gaits
 from agents.planner import Branching
-from agents.roster import load_agents
+from agents.roster import AgentNames, load_agents
 from agents.swim import Policy
 from agents.trials import swim_many
 from seastar_gym.command import run_command
@@ -151,8 +151,7 @@ class Options:
     """Width of the beam search round the pentagon, over pairs of limbs [states]."""
     only_pentagon: bool = False
     """Search only the pentagon, print the number of strokes found, and write nothing."""
-    agents: tuple[str, ...] = ("learned",)
-    """Agents whose speeds are measured for comparison, named as for agents.evaluate."""
+    agents: AgentNames = ("learned",)
     out: Path = Path("docs/bound.json")
     """File of the results. The picture has the same name with the suffix .png."""
 

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from agents.evaluate import COLUMNS, evaluate, main
+from agents.evaluate import evaluate, main
 from agents.report.charts import Curve, curves_figure, read_progress, speeds_figure, to_html
 from agents.report.page import MEASURED, Remarks, number, read_trials, table_html
 from agents.report.playback import UNIT, RecordingEnv
+from agents.results import COLUMNS
 from agents.scripted import scripted
 from agents.swim import swim
 from refusals import assert_refused

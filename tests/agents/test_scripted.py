@@ -6,7 +6,7 @@ import pytest
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 
-from agents.scripted import SCRIPTED_NAMES, OpenLoopPolicy, scripted, to_actions
+from agents.scripted import GAITS, OpenLoopPolicy, scripted, to_actions
 from seastar_gym import Numerics, Scene, Simulator
 from seastar_gym.envs.commands import action_space, to_commands
 from seastar_gym.gaits import pair_gait, pentagon_gait, straight_gait
@@ -154,7 +154,7 @@ def test_gaits_fit_robots_of_other_limbs():
 def test_an_unknown_name_is_answered_with_the_known_ones(name):
     with pytest.raises(ValueError, match="Unknown scripted agent") as refusal:
         scripted(name)
-    assert all(known in str(refusal.value) for known in SCRIPTED_NAMES)
+    assert all(known in str(refusal.value) for known in GAITS)
 
 
 @pytest.mark.parametrize("name", ["1+,1-", "1+,6-", "0+,1-"])
