@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import tyro
@@ -145,14 +145,15 @@ def _write_report(
     )
 
 
+PATH_HELP = f"Name of a path ({', '.join(PATHS)}), or a text file with x and y [m] of one waypoint per line."
+
+
 @dataclass(frozen=True)
 class Options:
     """Compare agents on a path: print a table and write it as CSV, with a picture of the traces and a video of each."""
 
     agents: AgentNames = ("learned", "pentagon")
-    path: str = "pentagon"
-    """Name of a path (pentagon, square, triangle, line, figure-eight, random), or a text file with x and y [m] of one
-    waypoint per line."""
+    path: Annotated[str, tyro.conf.arg(help=PATH_HELP)] = "pentagon"
     fidelity: Fidelity = "balanced"
     """Accuracy of the simulation."""
     out: Path = Path("runs/evaluate")

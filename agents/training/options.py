@@ -11,11 +11,15 @@ import tyro
 
 from agents.hyperparameters import Hyperparameters
 from seastar_gym import RewardWeights
-from seastar_gym.envs.paths import make_path
+from seastar_gym.envs.paths import PATHS, make_path
 from seastar_gym.scene.numerics import Fidelity
 
 MAX_STROKES = 400
 """Time limit of an evaluated swim [strokes]; the scripted gait takes 241 round the pentagon."""
+PATH_HELP = (
+    f"Name of the path to train on: {', '.join(PATHS)}. Random paths teach every direction and every turn, also those "
+    "of the pentagon."
+)
 
 
 @dataclass(frozen=True)
@@ -24,8 +28,7 @@ class Options:
 
     strokes: int = 300_000
     """Length of the training [strokes], all robots together."""
-    path: str = "random"
-    """Name of the path to train on. Random paths teach every direction and every turn, also those of the pentagon."""
+    path: Annotated[str, tyro.conf.arg(help=PATH_HELP)] = "random"
     random_heading: bool = True
     """Turn every robot at random at the start of an episode."""
     fidelity: Fidelity = "balanced"
