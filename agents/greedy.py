@@ -1,9 +1,9 @@
-"""The greedy agent: the command that closes best on the waypoint, by a map of what every command does on average.
+"""Greedy agent: it chooses commands by a map of the mean displacement that each of them makes.
 
     python -m agents.evaluate --agents greedy planner pentagon
 
-The map says, for every command, how far and which way the hub moves in the body frame, and how far the robot turns, per
-stroke once the gait has settled. It is computed once for every scene and kept in the user's cache folder.
+The map has the displacement of the hub in the body frame and the turn of the robot, per stroke of every command, once
+the repeated command swims steadily. It is computed once for every scene and kept in the user's cache folder.
 """
 
 import hashlib
@@ -29,7 +29,7 @@ SETTLING_STROKES, MEASURED_STROKES = 6, 4
 
 
 class Displacements(NamedTuple):
-    """What a stroke of every command of a table does. hub: [m], body frame, shape (n, 2). turn: [rad], shape (n,)."""
+    """Mean displacements of the hub [m] in the body frame, shape (n, 2), and turns [rad], shape (n,), of n gaits."""
 
     hub: Floats
     turn: Floats
@@ -44,8 +44,8 @@ def turned(vectors: Floats, angles: Floats) -> Floats:
 def measure_gaits(scene: Scene, commands: Floats, settling: int, measured: int) -> Displacements:
     """Mean displacement and turn per stroke of periodic gaits, in the body frame when the measured strokes begin.
 
-    commands: Of every gait and stroke of its period, shape (n, period, n_limbs). settling, measured: Strokes, measured
-    a multiple of the period.
+    commands: Commands of every gait, shape (n, period, n_limbs). settling, measured: Numbers of strokes before and
+    during the measurement; `measured` is a multiple of the period.
     """
     simulator, rest = Simulator(scene, len(commands)), scene.robot.nodes()
     for stroke in range(settling + measured):
@@ -58,7 +58,7 @@ def measure_gaits(scene: Scene, commands: Floats, settling: int, measured: int) 
 
 
 def displacement_map(scene: Scene, actions: Actions = "joint") -> Displacements:
-    """The map of a scene, from the cache or measured now."""
+    """Map of a scene for the commands of an action mode, from the cache or measured now."""
     key = hashlib.sha256(repr((scene, actions, SETTLING_STROKES, MEASURED_STROKES)).encode()).hexdigest()[:24]
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "seastar-gym"
     file = cache / f"displacements-{key}.npz"
@@ -82,13 +82,13 @@ def waypoints_of(observations: NDArray[np.float32], scene: Scene) -> tuple[Float
 
 
 class Searcher(ABC):
-    """What chooses by the state that an observation shows, for one robot or for many; in Stable-Baselines3's form."""
+    """Base of policies that choose actions by observations alone, for one robot or for many."""
 
     actions: Actions
 
     @abstractmethod
     def choose(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
-        """Actions for observations of shape (n, size)."""
+        """Actions, shape (n,), for observations of shape (n, size)."""
 
     def predict(
         self,
@@ -97,7 +97,7 @@ class Searcher(ABC):
         episode_start: Any = None,
         deterministic: bool = False,
     ) -> tuple[NDArray[np.int64], None]:
-        """Actions for observations of shape (size,) or (n, size); there is no state."""
+        """Actions for observations of shape (size,) or (n, size), and None: there is no state."""
         chosen = self.choose(np.atleast_2d(observation))
         return (chosen[0] if np.ndim(observation) == 1 else chosen), None
 

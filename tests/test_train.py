@@ -220,7 +220,7 @@ def test_a_checkpoint_that_a_kill_cut_short_is_completed(finished, tmp_path):
     assert (folder / "checkpoints" / "model_000000512.zip").is_file()
 
 
-# --- what cannot be --------------------------------------------------------------------------------------------------
+# What cannot be
 
 
 def assert_one_sentence(capsys, *words):
@@ -276,7 +276,7 @@ def test_a_device_that_is_not_there_is_refused_before_anything_is_written(tmp_pa
     assert refused.value.code == 2
 
 
-# --- the policy in the box -------------------------------------------------------------------------------------------
+# The policy in the box
 
 
 @pytest.fixture

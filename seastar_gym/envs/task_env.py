@@ -1,4 +1,4 @@
-"""What the environment of one robot and the batch share: a swim task, an action mode, and options of a reset."""
+"""Common base of the environments of one robot and of a batch: task, action mode, and options of a reset."""
 
 from typing import Any
 

@@ -40,7 +40,7 @@ def made_up_swim(hub, waypoint_index, waypoints=((0.1, 0.0), (0.1, 0.1)), limbs_
     )
 
 
-# --- measures of a swim ----------------------------------------------------------------------------------------------
+# Measures of a swim
 
 
 def test_following_the_path_round_a_corner_is_no_error():
@@ -119,7 +119,7 @@ def test_a_path_may_come_with_the_reset():
     assert done.finished
 
 
-# --- what is written -------------------------------------------------------------------------------------------------
+# What is written
 
 
 @pytest.fixture(scope="module")
@@ -241,7 +241,7 @@ def test_what_cannot_be_evaluated_is_refused(agents, more, complaint):
         evaluate(agents, SHORT, **EASY, **more)
 
 
-# --- the command line ------------------------------------------------------------------------------------------------
+# The command line
 
 
 def test_command_line_evaluates_scripted_agents(tmp_path, capsys):

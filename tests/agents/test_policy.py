@@ -54,7 +54,7 @@ def observations(scene=Scene(), n=2000, seed=0):
     return np.random.default_rng(seed).normal(size=(n, size)).astype(np.float32)
 
 
-# --- the network -----------------------------------------------------------------------------------------------------
+# The network
 
 
 @pytest.mark.parametrize("actions", ["joint", "pairs", "limbs"])
@@ -109,7 +109,7 @@ def test_any_network_behind_the_symmetry_is_equivariant(policy):
         np.testing.assert_array_equal(carried, symmetry.transform_actions(actions, elements, "joint", 5))
 
 
-# --- on disk ---------------------------------------------------------------------------------------------------------
+# On disk
 
 
 def test_weights_and_description_survive_the_disk_to_the_last_bit(policy, file):
@@ -358,7 +358,7 @@ def damaged(data: bytes, rng: np.random.Generator, n_first: int | None = None) -
     return bytes(out) or b"\0"
 
 
-# --- in an environment -----------------------------------------------------------------------------------------------
+# In an environment
 
 
 @pytest.mark.parametrize(
@@ -390,7 +390,7 @@ def test_another_scene_is_told_but_other_numerics_are_not(policy):
     assert "fluid.density 1000.0 (here None)" in policy.differences(Scene(fluid=None))
 
 
-# --- the policy in the box -------------------------------------------------------------------------------------------
+# The policy in the box
 
 
 def test_the_policy_in_the_box_says_how_it_was_made():

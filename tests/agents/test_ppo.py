@@ -78,7 +78,7 @@ def test_hyperparameters_that_cannot_be_are_refused(change, sentence):
         replace(SMALL, **change)
 
 
-# --- a policy on disk ------------------------------------------------------------------------------------------------
+# A policy on disk
 
 
 @pytest.mark.parametrize("hyperparameters, scene", [(SMALL, None), (OTHER, OTHER_SCENE)])
@@ -178,7 +178,7 @@ def test_stable_baselines_reads_the_file_as_its_own(learner, file):
         assert torch.equal(tensor, theirs.policy.state_dict()[name])
 
 
-# --- saving ----------------------------------------------------------------------------------------------------------
+# Saving
 
 
 def test_saving_replaces_the_file_in_one_go(learner, file, monkeypatch):
@@ -207,7 +207,7 @@ def test_the_description_says_what_the_policy_expects(learner, file):
     assert facts["strokes_trained"] == learner.num_timesteps
 
 
-# --- files that are no policy ----------------------------------------------------------------------------------------
+# Files that are no policy
 
 
 def rewritten(file, **changes):
@@ -325,7 +325,7 @@ def test_a_device_that_is_not_there_is_refused(device, sentence, monkeypatch):
         make_model(make_learner().get_env(), SMALL, seed=0, device=device)
 
 
-# --- learning on -----------------------------------------------------------------------------------------------------
+# Learning on
 
 
 def numbers_of(learner):

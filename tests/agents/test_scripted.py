@@ -36,7 +36,7 @@ def strokes_of(policy, n_strokes, observation=OBSERVATION):
     return np.array(actions)
 
 
-# --- the chapter's swims ---------------------------------------------------------------------------------------------
+# The chapter's swims
 
 
 def test_pentagon_gait_is_the_sequence_of_13_15():
@@ -75,7 +75,7 @@ def test_pairs_of_fig_13_8_move_along_their_bisectors(name, bisector):
     assert np.hypot(*end) > 1e-3
 
 
-# --- policies --------------------------------------------------------------------------------------------------------
+# Policies
 
 
 @pytest.mark.parametrize("actions", MODES)
@@ -147,7 +147,7 @@ def test_gaits_fit_robots_of_other_limbs():
     np.testing.assert_array_equal(action, [0, 1, 0, 0, 0, 2])
 
 
-# --- refusals --------------------------------------------------------------------------------------------------------
+# Refusals
 
 
 @pytest.mark.parametrize("name", ["pentagram", "", "2+", "2+,5+", "2-,5-", "a+,b-", "1+,2-,3+"])
