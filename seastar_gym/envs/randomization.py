@@ -140,7 +140,7 @@ class DomainRandomization:
                 )
         bounds = {name: self.distributions[name].bounds for name in numbers}
         lowest = {name: low for name, (low, _) in bounds.items()}
-        # What a scene forbids it forbids of one number, of two together, or of all if they are large.
+        # Scene checks involve one number, a pair, or all at their maxima: testing those bounds suffices.
         with_numbers(scene, {name: high for name, (_, high) in bounds.items()})
         for first, second in itertools.combinations_with_replacement(numbers, 2):
             for pair in itertools.product(bounds[first], bounds[second]):
