@@ -6,7 +6,7 @@ robot of a batch.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from operator import itemgetter
@@ -128,9 +128,20 @@ class Scene:
             sound = False
         if not sound:
             raise ValueError(
-                f"The stiffnesses or masses of {shown(self.robot)} overflow or vanish in double precision: use numbers "
+                f"Stiffnesses or masses overflow or vanish in double precision {self._named_coefficients()}: use numbers "
                 "closer to those of a robot."
             )
+
+    def _named_coefficients(self) -> str:
+        """Numbers that stiffnesses and masses are made of, in words."""
+        robots = [chosen(self.robot, choose) for choose in (min, max)]
+        limbs = [limb for robot in robots for limb in robot.limb_shapes()]
+        return (
+            f"for limbs {_span(limb.length for limb in limbs)} m long, "
+            f"with radii of {_span(r for limb in limbs for r in limb.radius)} m, "
+            f"Young's moduli of {_span(E for limb in limbs for E in limb.youngs_modulus)} Pa "
+            f"and densities of {_span(robot.density for robot in robots)} kg/m^3"
+        )
 
     def _has_sound_coefficients(self, choose: Callable[[tuple[float, ...]], float]) -> bool:
         """Whether squared lengths, stiffnesses and masses of edges, and their reciprocals, are positive and finite."""
@@ -188,3 +199,10 @@ class Scene:
     def of_robot(self, index: int) -> "Scene":
         """Scene of one robot of a batch."""
         return chosen(self, itemgetter(index))
+
+
+def _span(numbers: Iterable[float]) -> str:
+    """The smallest and the largest number, or the only one."""
+    found = sorted(numbers)
+    ends = dict.fromkeys(f"{end:.4g}" for end in (found[0], found[-1]))
+    return " to ".join(ends)

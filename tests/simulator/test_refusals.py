@@ -114,3 +114,9 @@ def test_headings_of_another_shape_are_refused_with_a_sentence(heading):
 def test_a_stroke_has_one_part_or_more(parts):
     with assert_refused("parts"):
         next(Simulator(Scene()).stroke_in_parts(STRAIGHT, parts))
+
+
+@pytest.mark.parametrize("change", [lambda s, m: s.reset(m), lambda s, m: s.set_scene(SCENE, m)], ids=["reset", "scene"])
+def test_a_mask_of_rows_of_different_lengths_is_refused(change):
+    with assert_refused("mask", "rows of different lengths"):
+        change(Simulator(SCENE, 2), [[True], [True, False]])
