@@ -34,7 +34,7 @@ from seastar_gym.envs.paths import PATHS, make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.checks import require_number, shown
 from seastar_gym.scene.csv_rows import read_numbers
 from seastar_gym.scene.numerics import Fidelity
 
@@ -68,7 +68,7 @@ def evaluate(
     if not agents:
         raise ValueError("There is nothing to evaluate: name at least one agent.")
     if max_strokes < 1:
-        raise ValueError(f"max_strokes must be at least 1, not {max_strokes!r}.")
+        raise ValueError(f"max_strokes must be at least 1, not {shown(max_strokes)}.")
     console = Console() if console is None else console
     folder = None if out is None else Path(out)
     videos = {} if folder is None or not video else _video_files(agents, folder)

@@ -60,7 +60,7 @@ class Hyperparameters:
         for name in ("learning_rate", "discount", "gae_lambda", "clip_range", "entropy"):
             require_finite(name, getattr(self, name), "1")
         if not isinstance(self.symmetry, bool) or not isinstance(self.reward, RewardWeights):
-            raise ValueError(f"symmetry must be True or False, and reward RewardWeights, not {self.symmetry!r}.")
+            raise ValueError(f"symmetry must be True or False, and reward RewardWeights, not {shown(self.symmetry)}.")
         strokes = int(self.num_envs) * int(self.rollout)
         if strokes % int(self.batch_size):
             raise ValueError(

@@ -109,7 +109,7 @@ def positive_part(x):
 
 @kernel
 def node_slopes(contact, rods, work, stage, node):
-    """(energy, gradient, Hessian) of a node's inertia, drag and load, with the force that contact has left (or None)."""
+    """(energy, gradient, Hessian) of a node's inertia, drag and load, and of what contact pushes it (or None)."""
     qx, qy = load(work.q, 2 * node), load(work.q, 2 * node + 1)
     vx = (qx - load(stage.q_hat, 2 * node)) * stage.inverse_gamma
     vy = (qy - load(stage.q_hat, 2 * node + 1)) * stage.inverse_gamma

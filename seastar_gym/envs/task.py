@@ -20,7 +20,7 @@ from seastar_gym.envs.paths import FARTHEST, cross_track_error, make_path
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, drawn_scene
 from seastar_gym.envs.reward import RewardWeights, reward_terms
 from seastar_gym.scene import Numerics, Scene
-from seastar_gym.scene.checks import require_flag, require_number
+from seastar_gym.scene.checks import require_flag, require_number, shown
 from seastar_gym.scene.fidelity import measured
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.serial import Part, from_dict
@@ -51,13 +51,13 @@ def make_scene(scene: Scene | Plain | None, fidelity: Fidelity | None) -> Scene:
     """
     scene = Scene() if scene is None else read(scene, Scene)
     if not isinstance(scene, Scene):
-        raise ValueError(f"scene must be a Scene, not {scene!r}.")
+        raise ValueError(f"scene must be a Scene, not {shown(scene)}.")
     if fidelity is None and scene.numerics.named:
         return scene
     numerics = Numerics.preset(DEFAULT_FIDELITY if fidelity is None else fidelity)
     if scene.numerics.named and scene.numerics != numerics:
         raise ValueError(
-            f'fidelity="{fidelity}" contradicts the numerics that the scene names, {scene.numerics!r}: '
+            f'fidelity="{fidelity}" contradicts the numerics that the scene names, {shown(scene.numerics)}: '
             "give one of them."
         )
     return replace(scene, numerics=numerics)
@@ -101,13 +101,13 @@ class SwimTask:
     ):
         randomization, reward = read(randomization, DomainRandomization), read(reward, RewardWeights)
         if not isinstance(randomization, DomainRandomization | None):
-            raise ValueError(f"randomization must be a DomainRandomization or None, not {randomization!r}.")
+            raise ValueError(f"randomization must be a DomainRandomization or None, not {shown(randomization)}.")
         require_number("waypoint_radius", waypoint_radius, "m")
         if waypoint_radius > FARTHEST:
-            raise ValueError(f"waypoint_radius must be at most {FARTHEST:g} m, not {waypoint_radius!r}.")
+            raise ValueError(f"waypoint_radius must be at most {FARTHEST:g} m, not {shown(waypoint_radius)}.")
         require_flag("random_heading", random_heading)
         if not isinstance(reward, RewardWeights):
-            raise ValueError(f"reward must be RewardWeights, not {reward!r}.")
+            raise ValueError(f"reward must be RewardWeights, not {shown(reward)}.")
         waypoints = make_path(path, np.random.default_rng(0))  # refuses a bad path now, not at the first reset
         self.scene, self.randomization = scene, randomization
         self.drawn = {} if randomization is None else randomization.first_values(scene, n_robots)

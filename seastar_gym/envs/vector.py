@@ -21,7 +21,7 @@ from seastar_gym.envs.seastar_swim import FRAMES_PER_STROKE
 from seastar_gym.envs.task import Path, Plain, SwimTask, make_scene
 from seastar_gym.envs.task_env import checked_options
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import require_choice, require_count, require_seed
+from seastar_gym.scene.checks import require_choice, require_count, require_seed, shown
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator.simulator import MAX_ROBOTS
 
@@ -74,7 +74,8 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
     ):
         if render_mode is not None and not (isinstance(render_mode, str) and render_mode == "rgb_array"):
             raise ValueError(
-                f'The batch draws with render_mode="rgb_array" only, not {render_mode!r}: use gym.make for one robot.'
+                f'The batch draws with render_mode="rgb_array" only, not {shown(render_mode)}: '
+                "use gym.make for one robot."
             )
         require_count("num_envs", num_envs, 1, MAX_ROBOTS)
         if max_episode_steps is not None:

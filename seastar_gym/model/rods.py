@@ -30,13 +30,14 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
     mesh = make_mesh(limbs, robot.nodes_per_limb)
     stretched = stretching.coefficients(mesh)
     seen_ahead = foresight.coefficients(mesh, stretched, robot.density)
+    mass = inertia.coefficients(mesh, robot.density, scene.held_nodes)
     return Rods(
         n_limbs=mesh.n_limbs,
         nodes_per_limb=mesh.nodes_per_limb,
         stretching=stretched,
         bending=bending.coefficients(mesh),
         hub=hub.coefficients(hub_angles, turning=robot.hub_hinge == "turning"),
-        mass=inertia.coefficients(mesh, robot.density, scene.held_nodes),
+        mass=mass,
         drag=drag.coefficients(mesh, water.density, C_d if C_t is None else C_t),
         cross_drag=drag.cross_coefficients(mesh, water.density, C_d, C_t),
         added_mass=added_mass.coefficients(mesh, water.density, C_a),
@@ -51,6 +52,6 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         else contact.coefficients(mesh, scene.robot.limbs_that_may_touch(), touch.modulus, touch.opening_angle),
         foresight=seen_ahead,
         scales=scales.coefficients(
-            mesh, stretched, seen_ahead, robot.density, water.density, C_d, held=bool(scene.held_nodes)
+            mesh, stretched, seen_ahead, robot.density, water.density, C_d, mass, scene.held_nodes
         ),
     )

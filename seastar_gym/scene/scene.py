@@ -128,8 +128,8 @@ class Scene:
             sound = False
         if not sound:
             raise ValueError(
-                f"Stiffnesses or masses overflow or vanish in double precision {self._named_coefficients()}: use numbers "
-                "closer to those of a robot."
+                f"Stiffnesses or masses overflow or vanish in double precision {self._named_coefficients()}: use "
+                "numbers closer to those of a robot."
             )
 
     def _named_coefficients(self) -> str:

@@ -116,7 +116,7 @@ def test_a_stroke_has_one_part_or_more(parts):
         next(Simulator(Scene()).stroke_in_parts(STRAIGHT, parts))
 
 
-@pytest.mark.parametrize("change", [lambda s, m: s.reset(m), lambda s, m: s.set_scene(SCENE, m)], ids=["reset", "scene"])
-def test_a_mask_of_rows_of_different_lengths_is_refused(change):
+@pytest.mark.parametrize("name, arguments", [("reset", ()), ("set_scene", (SCENE,))])
+def test_a_mask_of_rows_of_different_lengths_is_refused(name, arguments):
     with assert_refused("mask", "rows of different lengths"):
-        change(Simulator(SCENE, 2), [[True], [True, False]])
+        getattr(Simulator(SCENE, 2), name)(*arguments, mask=[[True], [True, False]])

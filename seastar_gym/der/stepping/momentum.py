@@ -29,8 +29,8 @@ def settle_momentum(rods, work, stage, robots):
 def move_as_a_whole(rods, work, stage, robots):
     """Newton step of a stage in which all nodes of a robot move alike.
 
-    Contact, which cancels but for its rounding, is left out: its forces are those of where Newton's last step began, or,
-    as long as others in the lanes go on, of where it has ended.
+    Contact, which cancels but for its rounding, is left out: its forces are those of where Newton's last step began,
+    or, as long as others in the lanes go on, of where it has ended.
     """
     zero = splat(0.0)
     fx, fy, xx, xy, yy = zero, zero, zero, zero, zero
