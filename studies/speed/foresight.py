@@ -41,6 +41,8 @@ ITERATIONS, STEPS, RAMP = 6, 60, 6
 TRACED = 4  # numbers that are kept of an iteration
 LARGEST_TOLERANCE, ROUNDED = 1e-2, 1e-13
 """Limb lengths: the largest Newton tolerance that a scene may have, and moves that are rounding."""
+LIGHT, STIFF = 4.0, 400.0
+"""Values of curvature_rate gamma^2 that are small, and large, beside a curvature of some tens."""
 
 
 @entry_point
@@ -95,9 +97,11 @@ class Draw:
 
 
 STROKES = Draw()
+LONG = Draw(slenderness=(70.0, 500.0))
 VIOLENT = Draw(speed=(1e-2, 1.0))
-POLES = Draw(slenderness=(3.0, 12.0), nodes=(3, 5), limbs=(3,), hinges=("opening",), peak=(0.9, 0.999))
-"""Ordinary strokes; robots in violent motion; thick limbs with hub hinges near their poles."""
+NEAR_POLES = Draw(hinges=("opening",), peak=(0.9, 0.999))
+THICK_NEAR_POLES = Draw(slenderness=(3.0, 12.0), nodes=(3, 5), limbs=(3,), hinges=("opening",), peak=(0.9, 0.999))
+"""Ordinary strokes; long thin edges; violent motion; hub hinges near their poles; the same of thick limbs."""
 
 
 class Stages(NamedTuple):
@@ -231,39 +235,38 @@ def decisions(stages: Stages) -> Decisions:
     )  # fmt: skip
 
 
-def early(seen: Decisions) -> Mask:
-    """Decisions before the last easy step, away from the poles."""
-    return (seen.iteration < foresight.EASY) & (seen.hub_t < foresight.FORESEEABLE_T)
+def before_poles(seen: Decisions, first: float, last: float) -> Mask:
+    """Decisions after iterations in (first, last], away from the poles of the hub hinges."""
+    return (seen.iteration > first) & (seen.iteration <= last) & (seen.hub_t < foresight.FORESEEABLE_T)
 
 
 def curvatures_of_light_edges(seen: Decisions) -> Floats:
     """Curvatures where edges are light, so that CURVATURE alone decides."""
-    return seen.curvature[early(seen) & (seen.rate < 0.1 * foresight.CURVATURE)]
+    return seen.curvature[before_poles(seen, 0, foresight.EASY - 1) & (seen.rate < LIGHT)]
 
 
-def rates_of_slender_edges(seen: Decisions) -> Floats:
-    """Curvature beyond CURVATURE over E gamma^2/(rho l^2), where edges are slender and that much larger; 1 is allowed."""
-    slender = early(seen) & (seen.slenderness**2 > foresight.SLENDER) & (seen.stiffness > 10.0 * foresight.CURVATURE)
-    return (seen.curvature - foresight.CURVATURE)[slender] / seen.stiffness[slender]
+def excesses_of_stiff_edges(seen: Decisions) -> Floats:
+    """Curvatures over what is allowed, where edges are so slender and stiff that their rate decides."""
+    slender = (seen.slenderness**2 > foresight.SLENDER) & (seen.rate > STIFF)
+    return seen.excess[before_poles(seen, 0, foresight.EASY - 1) & slender]
 
 
-def needs_of_thick_edges(seen: Decisions) -> Floats:
-    """1/SLENDER that the curvature beyond CURVATURE needs, where edges are thick and heavy; negative: none."""
-    thick = early(seen) & (seen.slenderness**2 < 1e3) & (seen.stiffness * seen.slenderness**2 > 1e5)
+def slenderness_that_thick_edges_need(seen: Decisions, share: float) -> float:
+    """The SLENDER that allows this share of the curvatures where edges are thick and stiff."""
     rate = seen.stiffness * seen.slenderness**2
-    return (seen.curvature - foresight.CURVATURE)[thick] / rate[thick]
+    thick = before_poles(seen, 0, foresight.EASY - 1) & (seen.slenderness < 30.0) & (rate > 1e5)
+    return 1.0 / float(np.quantile((seen.curvature - foresight.CURVATURE)[thick] / rate[thick], share))
 
 
 def late_excesses(seen: Decisions) -> Floats:
-    """Curvatures after the last easy step over what is allowed before it; LATE is allowed."""
-    return seen.excess[(seen.iteration == foresight.EASY) & (seen.hub_t < foresight.FORESEEABLE_T)]
+    """Curvatures after the last easy step over what is allowed before it, which LATE multiplies."""
+    return seen.excess[before_poles(seen, foresight.EASY - 1, foresight.EASY)]
 
 
-def excesses_after(seen: Decisions, low: float, high: float) -> Floats:
-    """Curvatures after iterations in (low, high] over what is allowed; LATE counts from EASY on."""
-    chosen = (seen.iteration > low) & (seen.iteration <= high) & (seen.hub_t < foresight.FORESEEABLE_T)
+def excesses_after(seen: Decisions, first: float, last: float) -> Floats:
+    """Curvatures after iterations in (first, last] over what is allowed; LATE counts from EASY on."""
     late = np.where(seen.iteration < foresight.EASY, 1.0, foresight.LATE)
-    return (seen.excess / late)[chosen]
+    return (seen.excess / late)[before_poles(seen, first, last)]
 
 
 def excesses_near_poles(seen: Decisions, low: float, high: float) -> Floats:
@@ -274,10 +277,83 @@ def excesses_near_poles(seen: Decisions, low: float, high: float) -> Floats:
 def gains(stages: Stages, low: float, high: float) -> Floats:
     """Energy that steps in water created, over the allowed one, by plain Newton that needed no help.
 
-    low, high: Range of Phi before the last step that is taken, in units of the potential that is not looked at.
+    low, high: Range of Phi before the last step that is taken, in units of the potential up to which it is not looked
+    at.
     """
     converged = stages.sound[:, -1] & (stages.move[:, -1] < 1e-9 * stages.limb)
     last = np.argmax(stages.move < 1e-8 * stages.limb[:, None], axis=1)
     unit = foresight.PREDICTABLE_STRAIN * stages.strain_energy * stages.damped
     phi = np.take_along_axis(stages.phi, last[:, None], axis=1)[:, 0] / np.where(unit > 0.0, unit, np.nan)
     return stages.gained[converged & (phi > low) & (phi <= high)]
+
+
+def share_that_gains(stages: Stages, low: float, high: float) -> float:
+    """Share of such steps that created energy, beyond rounding."""
+    return float(np.mean(gains(stages, low, high) > 1e-9))
+
+
+class Row(NamedTuple):
+    """A line of the table: what is measured, over how many decisions, and what was found."""
+
+    what: str
+    allowed: str
+    n: int
+    found: str
+
+
+def quantiles(numbers: Floats) -> str:
+    return " / ".join(f"{x:.3g}" for x in (*np.quantile(numbers, [0.99, 0.999]), numbers.max()))
+
+
+def ranked(what: str, allowed: float, numbers: Floats) -> Row:
+    return Row(what, f"{allowed:g}", len(numbers), quantiles(numbers))
+
+
+def measure(n: int, seed: int = 0) -> list[Row]:
+    """Everything that the constants decide, from n strokes of every kind."""
+    draws = (STROKES, LONG, VIOLENT, NEAR_POLES, THICK_NEAR_POLES)
+    strokes, long, violent, near, thick = (sample(draw, n, seed, tqdm) for draw in draws)
+    ordinary, wild, polar = decisions(strokes), decisions(violent), decisions(thick)
+    easy, t = foresight.EASY, foresight.FORESEEABLE_T
+    need = " / ".join(f"{slenderness_that_thick_edges_need(ordinary, share):.0f}" for share in (0.99, 0.999))
+    rows = [
+        ranked("next step over the one foreseen", 1.0, excesses_after(ordinary, 0, easy)),
+        ranked("CURVATURE: next step l/d^2, light edges", foresight.CURVATURE, curvatures_of_light_edges(ordinary)),
+        ranked("curvature_rate: over the one foreseen, stiff edges", 1.0, excesses_of_stiff_edges(decisions(long))),
+        Row("SLENDER that thick stiff edges need", f"{foresight.SLENDER:g}", len(ordinary.excess), need),
+        ranked("LATE: third step's, without it", foresight.LATE, late_excesses(ordinary)),
+    ]
+    for k in range(1, ITERATIONS):
+        rows.append(ranked(f"EASY: over the one foreseen after step {k}, violent", 1.0, excesses_after(wild, k - 1, k)))
+    for low, high in ((0.25 * t, 0.5 * t), (0.5 * t, t), (t, 2.5 * t), (2.5 * t, 10.0 * t)):
+        said = f"FORESEEABLE_T: over the one foreseen, t to {high:g}"
+        rows.append(ranked(said, 1.0, excesses_near_poles(polar, low, high)))
+    for low in (0.01, 0.1, 1.0, 10.0):
+        said = f"PREDICTABLE_STRAIN: steps that gain, energy to {10.0 * low:g} of it"
+        found = f"{100.0 * share_that_gains(near, low, 10.0 * low):.2g} % of them"
+        rows.append(Row(said, "0", len(gains(near, low, 10.0 * low)), found))
+    return rows
+
+
+def as_table(rows: list[Row]) -> Table:
+    """Rows as a table for the terminal."""
+    table = Table(title="What the constants of der/stepping/foresight.py allow, and what plain Newton needs")
+    table.add_column("measured", no_wrap=True)
+    for name in ("in use", "steps", "99 % / 99.9 % / worst"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for row in rows:
+        table.add_row(row.what, row.allowed, str(row.n), row.found)
+    return table
+
+
+def main() -> None:
+    """Command line: measure and print the table."""
+    parser = study_parser("studies.speed.foresight", __doc__)
+    parser.add_argument("--strokes", type=int, default=1000, help="drawn strokes of each kind (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the draws (default: %(default)s)")
+    options = parser.parse_args()
+    Console().print(as_table(measure(options.strokes, options.seed)))
+
+
+if __name__ == "__main__":
+    run_command(main)
