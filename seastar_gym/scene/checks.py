@@ -91,7 +91,7 @@ def as_array(name: str, value: object) -> NDArray[Any]:
     try:
         return np.asarray(value)
     except ValueError as ragged:
-        raise ValueError(f"{name} must be one array, not rows of different lengths.") from ragged
+        raise ValueError(f"{name} must be one array of numbers or flags, not rows of different lengths.") from ragged
 
 
 def as_floats(name: str, value: object) -> NDArray[np.float64]:
