@@ -91,11 +91,11 @@ def in_vacuum(case: Case) -> Case:
 
 
 def limited(case: Case) -> Case:
-    """The same robots, whose actuators are too slow and too short."""
+    """The same robots, whose actuators are too slow and too short, and begin at rest: they may remember otherwise."""
     peak, period = float(np.max(case.scene.actuator.peak_angle)), case.scene.actuator.period
     pulse = SmaPulse(peak, 0.4 * period, 0.6 * period)
     actuator = Limited(pulse, 0.8 * peak or None, 2.0 * peak / period or None)
-    return case._replace(scene=replace(case.scene, actuator=actuator))
+    return case._replace(scene=replace(case.scene, actuator=actuator), state=case.state._replace(actuators=None))
 
 
 def check_everything(case: Case) -> None:
