@@ -183,8 +183,12 @@ def check_momentum(case: Case) -> None:
         assert np.all(drift <= rounding + tolerated), f"{drift} m/s"
 
 
+PUT_BACK = 1e-11
+"""Way of held nodes that a stroke's end takes back, of a limb's length: their mass is not infinite (HELD)."""
+
+
 def energy_noise(simulator: Simulator, robot: int, energy: float, h: float) -> float:
-    """What rounding of positions changes an energy by [J]: its slope times a move, and its curvature; see der/guard.py.
+    """What rounding of positions changes an energy by [J]: its slope times a move, and its curvature; see der/stepping/guard.py.
 
     h: Of the shortest step [s]; velocities are differences of positions over it.
     """
@@ -193,6 +197,8 @@ def energy_noise(simulator: Simulator, robot: int, energy: float, h: float) -> f
     stretching, bending = rods.stretching.EA_over_l.max(), rods.bending.EI_over_dl.max()
     stiffness = (len(rods.mass) - 1) * float(stretching + 4.0 * bending / length**2)
     move = 10.0 * EPSILON * (float(np.abs(simulator.positions[robot]).max()) + rods.nodes_per_limb * length)
+    if simulator.scene.held_nodes:
+        move += PUT_BACK * rods.nodes_per_limb * length
     curvature = max(stiffness, mass / h**2)
     return move * math.sqrt(2.0 * curvature * energy) + 0.5 * curvature * move**2
 
