@@ -16,6 +16,7 @@ from seastar_gym.scene.serial import register_part
 from seastar_gym.scene.shape import limbs_that_may_touch, rest_positions, turn_per_hinge
 
 HubHinge = Literal["opening", "turning"]
+Discretisation = Literal["chapter", "continuum"]
 
 
 @register_part
@@ -50,6 +51,7 @@ class Seastar:
     hub_hinge: HubHinge = "opening"
     limbs: tuple[Limb, ...] = ()
     relaxation_time: Numbers | None = None
+    discretisation: Discretisation = "chapter"
 
     def __post_init__(self) -> None:
         require_count("n_limbs", self.n_limbs, 1, 12)
@@ -61,6 +63,7 @@ class Seastar:
         if self.relaxation_time is not None:
             require_each(self, "relaxation_time", partial(require_number, unit="s", zero_allowed=True))
         require_choice("hub_hinge", self.hub_hinge, get_args(HubHinge))
+        require_choice("discretisation", self.discretisation, get_args(Discretisation))
         if self.n_limbs == 1 and self.hub_hinge != "opening":
             raise ValueError("One limb has no hub hinge that could be measured by its turning angle.")
         self._check_limbs()
