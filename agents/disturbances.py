@@ -1,7 +1,7 @@
-"""What may go wrong on a swim: a current, a weak limb, noise on what is seen, lost strokes; for a batch of robots.
+"""Disturbances of the swims of a batch: a current, a weak limb, noise on observations, lost strokes.
 
 A uniform current is a change of frame: the robots swim in still water, towards waypoints that drift the other way, and
-everything they see and are measured by is carried back. So every robot of a batch has a direction of its own.
+observations and positions are carried back. So every robot of a batch has a current in a direction of its own.
 """
 
 from dataclasses import dataclass
@@ -23,10 +23,12 @@ CURRENT_DIRECTIONS = 8
 
 @dataclass(frozen=True)
 class Disturbance:
-    """Of all robots of a batch; the zeros disturb nothing.
+    """Strengths of the disturbances of a batch; zeros disturb nothing.
 
-    current: Speed [m/s]; robot i is carried along i/8 of a full turn. weakness: Share of its strength that limb i mod n
-    of robot i lacks. noise: Standard deviation of every seen node position [m]. lost: Probability that a stroke fails.
+    current: Speed of the current [m/s], which has the direction of i/8 of a full turn for robot i.
+    weakness: Share of its strength that limb i mod n of robot i lacks.
+    noise: Standard deviation of the observed position of every node [m].
+    lost: Probability that a stroke fails.
     """
 
     current: float = 0.0
@@ -52,7 +54,7 @@ DISTURBANCES = {
 
 
 class DisturbedTask:
-    """A task whose robots are disturbed; positions are those of the world, where the waypoints stand still."""
+    """Task whose robots are disturbed; positions are those in the world, where the waypoints stand still."""
 
     def __init__(self, task: SwimTask, disturbance: Disturbance, rng: np.random.Generator):
         self.task, self.disturbance, self._rng = task, disturbance, rng
@@ -71,11 +73,11 @@ class DisturbedTask:
         self._carried[:] = 0.0
 
     def hub_position(self) -> Floats:
-        """[m], shape (n_robots, 2)."""
+        """Positions of the hubs in the world [m], shape (n_robots, 2)."""
         return self.task.simulator.hub_position() + self._carried
 
     def observe(self) -> NDArray[np.float32]:
-        """What the robots see of themselves and of their waypoints."""
+        """Observations of the disturbed robots, shape (n_robots, size)."""
         seen, scene = self.task.observe(), self.task.simulator.scene
         at = scene_layout(scene)
         if self.disturbance.current > 0.0:

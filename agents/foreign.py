@@ -29,9 +29,9 @@ def is_function(name: str) -> bool:
 
 
 def call_function(name: str, env: SeastarSwimEnv) -> Policy:
-    """What the function, or class, of this name returns for an environment: anything with Stable-Baselines3's predict.
+    """Policy that the function, or class, of this name returns for an environment.
 
-    env: For the function to look at, to simulate or to learn in; the evaluation swims in another one.
+    env: Environment that the function may inspect, simulate or learn in; the evaluation has another one.
     ValueError, with one sentence, if there is no such function or it returns no policy.
     """
     module, _, function = name.partition(":")

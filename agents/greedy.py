@@ -1,9 +1,9 @@
-"""The greedy agent: the command that closes best on the waypoint, by a map of what every command does on average.
+"""Greedy agent: it chooses commands by a map of the mean displacement that each of them makes.
 
     python -m agents.evaluate --agents greedy planner pentagon
 
-The map says, for every command, how far and which way the hub moves in the body frame, and how far the robot turns, per
-stroke once the gait has settled. It is computed once for every scene and kept in the user's cache folder.
+The map has the displacement of the hub in the body frame and the turn of the robot, per stroke of every command, once
+the repeated command swims steadily. It is computed once for every scene and kept in the user's cache folder.
 """
 
 import hashlib
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions, command_table
 from seastar_gym.envs.observation import scene_layout
-from seastar_gym.envs.paths import AIM, shortest_way
+from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.scene import Scene
 from seastar_gym.simulator import Simulator
 from seastar_gym.simulator.body_frame import best_fit_heading
@@ -29,7 +29,7 @@ SETTLING_STROKES, MEASURED_STROKES = 6, 4
 
 
 class Displacements(NamedTuple):
-    """What a stroke of every command of a table does. hub: [m], body frame, shape (n, 2). turn: [rad], shape (n,)."""
+    """Mean displacements of the hub [m] in the body frame, shape (n, 2), and turns [rad], shape (n,), of n gaits."""
 
     hub: Floats
     turn: Floats
@@ -44,8 +44,8 @@ def turned(vectors: Floats, angles: Floats) -> Floats:
 def measure_gaits(scene: Scene, commands: Floats, settling: int, measured: int) -> Displacements:
     """Mean displacement and turn per stroke of periodic gaits, in the body frame when the measured strokes begin.
 
-    commands: Of every gait and stroke of its period, shape (n, period, n_limbs). settling, measured: Strokes, measured
-    a multiple of the period.
+    commands: Commands of every gait, shape (n, period, n_limbs). settling, measured: Numbers of strokes before and
+    during the measurement; `measured` is a multiple of the period.
     """
     simulator, rest = Simulator(scene, len(commands)), scene.robot.nodes()
     for stroke in range(settling + measured):
@@ -58,7 +58,7 @@ def measure_gaits(scene: Scene, commands: Floats, settling: int, measured: int) 
 
 
 def displacement_map(scene: Scene, actions: Actions = "joint") -> Displacements:
-    """The map of a scene, from the cache or measured now."""
+    """Map of a scene for the commands of an action mode, from the cache or measured now."""
     key = hashlib.sha256(repr((scene, actions, SETTLING_STROKES, MEASURED_STROKES)).encode()).hexdigest()[:24]
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "seastar-gym"
     file = cache / f"displacements-{key}.npz"
@@ -74,16 +74,6 @@ def displacement_map(scene: Scene, actions: Actions = "joint") -> Displacements:
     return measured
 
 
-def remaining_way(hub: Floats, current: Floats, after: Floats, radius: float) -> Floats:
-    """Way [m] from hub well through the circle of the current waypoint to the next one, as the reward measures it.
-
-    All of shape (..., 2), in any one frame; `after` equals `current` on the last leg, as in an observation.
-    """
-    last = (current == after).all(axis=-1)
-    to_current = np.hypot(hub[..., 0] - current[..., 0], hub[..., 1] - current[..., 1])
-    return np.where(last, to_current, shortest_way(hub, current, after, AIM * radius))
-
-
 def waypoints_of(observations: NDArray[np.float32], scene: Scene) -> tuple[Floats, Floats]:
     """Current and next waypoint [m] relative to the hub in the body frame, (n, 2) each."""
     at, length = scene_layout(scene), scene.robot.limb_length
@@ -92,13 +82,13 @@ def waypoints_of(observations: NDArray[np.float32], scene: Scene) -> tuple[Float
 
 
 class Searcher(ABC):
-    """What chooses by the state that an observation shows, for one robot or for many; in Stable-Baselines3's form."""
+    """Base of policies that choose actions by observations alone, for one robot or for many."""
 
     actions: Actions
 
     @abstractmethod
     def choose(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
-        """Actions for observations of shape (n, size)."""
+        """Actions, shape (n,), for observations of shape (n, size)."""
 
     def predict(
         self,
@@ -107,24 +97,25 @@ class Searcher(ABC):
         episode_start: Any = None,
         deterministic: bool = False,
     ) -> tuple[NDArray[np.int64], None]:
-        """Actions for observations of shape (size,) or (n, size); there is no state."""
+        """Actions for observations of shape (size,) or (n, size), and None: there is no state."""
         chosen = self.choose(np.atleast_2d(observation))
         return (chosen[0] if np.ndim(observation) == 1 else chosen), None
 
 
 class GreedyPolicy(Searcher):
-    """The command whose mean displacement leaves the least way to go.
+    """Agent that chooses the command whose mean displacement leaves the shortest rewarded route.
 
-    scene: What the map is made of; the environment's own for a fair comparison. waypoint_radius: [m].
+    scene: Scene in which displacements are measured; that of the environment, for a fair comparison.
+    waypoint_radius: Radius of the waypoints [m]. reward: Reward whose route is shortened.
     """
 
     actions = "joint"
 
-    def __init__(self, scene: Scene, waypoint_radius: float = 0.01):
-        self.scene, self.waypoint_radius = scene, waypoint_radius
+    def __init__(self, scene: Scene, waypoint_radius: float = 0.01, reward: RewardWeights = RewardWeights()):
+        self.scene, self.waypoint_radius, self.reward = scene, waypoint_radius, reward
         self._hub = displacement_map(scene, self.actions).hub
 
     def choose(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
-        """Actions for observations of shape (n, size)."""
-        current, after = waypoints_of(observations, self.scene)
-        return np.argmin(remaining_way(self._hub, current[:, None], after[:, None], self.waypoint_radius), axis=1)
+        """Actions, shape (n,), for observations of shape (n, size)."""
+        current, following = (waypoint[:, None] for waypoint in waypoints_of(observations, self.scene))
+        return np.argmin(self.reward.way_to_next(self._hub, current, following, self.waypoint_radius), axis=1)

@@ -1,8 +1,8 @@
-"""The planner: an online controller that tries sequences of commands on a batch of the simulator before every stroke.
+"""Planner: a controller that tries sequences of commands on a batch of the simulator before every stroke.
 
-It sees what every agent sees. An observation is the whole state of the robot, to single precision, so the search begins
-from there: all pairs of limbs, from the best few states of the stroke before, for a few strokes; then it swims the
-first command of the sequence that leaves the least way to go.
+It has the observations of any agent. An observation is the whole state of the robot, to single precision, so a beam
+search can begin from it: in each of a few strokes, all pairs of limbs are tried from the best few states so far. The
+planner then swims the first command of the sequence that leaves the shortest rewarded route.
 """
 
 from dataclasses import dataclass
@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.greedy import Searcher, remaining_way, waypoints_of
+from agents.greedy import Searcher, waypoints_of
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout
+from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.simulator import Simulator, State
 
@@ -21,7 +22,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Budget:
-    """What the search may cost: at most 21 + 21 beam (depth - 1) simulated strokes per stroke of a five-limb robot."""
+    """Limits of the search: it simulates 21 + 21 beam (depth - 1) strokes or fewer per stroke of a five-limb robot."""
 
     depth: int = 3
     """Strokes looked ahead. One costs a stroke or so round the pentagon; more than three gain nothing."""
@@ -34,9 +35,9 @@ class Budget:
 
 
 def state_of(observations: NDArray[np.float32], scene: Scene) -> State:
-    """The state that observations, shape (n, size), were made from: in the body frame, the hub at its origin.
+    """State that observations, shape (n, size), were made from, in the body frame with the hub at its origin.
 
-    Actuators that remember something are taken to be at rest: what is seen of them is not all of their state.
+    Actuators with a memory are taken to be at rest, because observations do not have all of their state.
     """
     n, robot, at = len(observations), scene.robot, scene_layout(scene)
     nodes, velocities, hub_velocity = (
@@ -52,14 +53,14 @@ def state_of(observations: NDArray[np.float32], scene: Scene) -> State:
 
 
 class Branching:
-    """Every state after every command: what a tree search does at each of its levels."""
+    """Simulation of every command from every state, the step of a tree search."""
 
     def __init__(self, scene: Scene, commands: Floats, threads: int | None = None):
         self.scene, self.commands, self.threads = scene, commands, threads
         self._simulators: dict[int, Simulator] = {}
 
     def __call__(self, states: State) -> State:
-        """States one stroke on, those of a state side by side, shape (states * commands, ...)."""
+        """States after one stroke, shape (states * commands, ...), those of the same state side by side."""
         n_states, n_commands = len(states.time), len(self.commands)
         n = n_states * n_commands
         if n not in self._simulators:
@@ -71,9 +72,11 @@ class Branching:
 
 
 class Planner(Searcher):
-    """Beam search over pairs of limbs, anew before every stroke.
+    """Agent that runs a beam search over pairs of limbs before every stroke.
 
-    scene: What the search swims in, by default the chapter's at fidelity "fast". waypoint_radius: [m].
+    scene: Scene of the search, by default the chapter's at fidelity "fast". waypoint_radius: Radius of the waypoints
+    [m]. budget: Limits of the search. threads: Number of threads of the simulator, by default one for every processor.
+    reward: Reward whose route is shortened.
     """
 
     actions = "pairs"
@@ -84,9 +87,10 @@ class Planner(Searcher):
         waypoint_radius: float = 0.01,
         budget: Budget = Budget(),
         threads: int | None = None,
+        reward: RewardWeights = RewardWeights(),
     ):
         self.scene = Scene(numerics=Numerics.preset("fast")) if scene is None else scene
-        self.waypoint_radius, self.budget, self.threads = waypoint_radius, budget, threads
+        self.waypoint_radius, self.budget, self.reward = waypoint_radius, budget, reward
         self._commands = command_table(self.actions, self.scene.robot.n_limbs)
         self._swim_all = Branching(self.scene, self._commands, threads)
 
@@ -95,7 +99,7 @@ class Planner(Searcher):
         return self._search(state_of(observations, self.scene), *waypoints_of(observations, self.scene))
 
     def _search(self, start: State, current: Floats, after: Floats) -> NDArray[np.int64]:
-        """The first action of the best sequence for every robot, shape (n,)."""
+        """First action of the best sequence for every robot, shape (n,)."""
         robots, n_commands = np.arange(len(current))[:, None], len(self._commands)
         states, width = start, 1
         passed = np.zeros((len(current), 1), bool)
@@ -123,7 +127,7 @@ class Planner(Searcher):
         """Way to go [m], whether the current waypoint is passed, and whether it was the last; shape (n, candidates)."""
         current, after = current[:, None], after[:, None]
         passed = passed | (np.hypot(*np.moveaxis(hub - current, -1, 0)) <= self.waypoint_radius)
-        way = remaining_way(hub, current, after, self.waypoint_radius)
+        way = self.reward.way_to_next(hub, current, after, self.waypoint_radius)
         beyond = np.hypot(*np.moveaxis(hub - after, -1, 0))
         last = (current == after).all(axis=-1)
         return np.where(passed & ~last, beyond, way), passed, passed & last

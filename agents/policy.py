@@ -1,4 +1,4 @@
-"""Learned policies on disk: weights in a safetensors file, and beside it a JSON file that says what they are for.
+"""Learned policies on disk: weights in a safetensors file, and a description in JSON beside it.
 
     from agents.policy import load
 
@@ -6,118 +6,45 @@
     env = gym.make("SeastarSwim-v0", actions=policy.actions, scene=policy.scene)
 
 The network is plain numpy: layers `W x + b` with tanh between them (`0.weight`, `0.bias`, `1.weight`, ...), whose last
-numbers are the logits of the actions. Nothing is unpickled, and neither torch nor Stable-Baselines3 is needed.
+outputs are the logits of the actions. Nothing is unpickled, and neither torch nor Stable-Baselines3 is needed.
 """
 
 import hashlib
-import json
-import math
 import os
 from collections.abc import Mapping
 from dataclasses import asdict
-from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import Any
 
 import numpy as np
 import safetensors
 import safetensors.numpy
 from numpy.typing import NDArray
 
-import seastar_gym
+from agents.description import Description, read_facts
 from agents.files import write_atomically
-from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, command_table
-from seastar_gym.envs.observation import OBSERVATION_LAYOUT
+from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.symmetry import reduce_observations, restore_actions
 from seastar_gym.envs.task import scene_observation_size
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import is_finite_number, require_count, shown
+from seastar_gym.scene.checks import is_finite_number
 
-FORMAT = 2
-"""Version of what a description says."""
-WIDEST = 1_000_000
-"""Neurons of a layer that a description may claim."""
 SHIPPED = Path(__file__).parent / "policies" / "seastar.safetensors"
-"""The policy in the box; `python train.py --ship` replaces it."""
+"""File of the policy in the box; `python train.py --ship` replaces it."""
 
 Weights = dict[str, NDArray[np.float32]]
 
 
-# --- what a policy expects -------------------------------------------------------------------------------------------
-
-
-class Description(NamedTuple):
-    """What a learned policy expects of its environment, and its network's shape."""
-
-    actions: Actions
-    symmetry: bool
-    scene: Scene
-    hidden: tuple[int, ...]
-
-    def to_json(self, **more: Any) -> str:
-        """As text; `more` is for people to read."""
-        facts = {
-            "format": FORMAT,
-            "seastar_gym": seastar_gym.__version__,
-            "observation_layout": OBSERVATION_LAYOUT,
-            "observation_size": scene_observation_size(self.scene),
-            **self._asdict(),
-            "scene": self.scene.to_dict(),
-            **more,
-        }
-        return json.dumps(facts, indent=2, default=str, allow_nan=False)
-
-    @classmethod
-    def from_json(cls, text: str | bytes) -> "Description":
-        """From `to_json`, see from_facts."""
-        return cls.from_facts(read_facts(text))
-
-    @classmethod
-    def from_facts(cls, facts: Mapping[str, Any]) -> "Description":
-        """From the names and values of `to_json`. KeyError: one is missing. ValueError: one cannot be."""
-        for name, ours in (("format", FORMAT), ("observation_layout", OBSERVATION_LAYOUT)):
-            if facts[name] != ours or isinstance(facts[name], bool):
-                raise ValueError(f"its {name} is {shown(facts[name])}, this version of seastar_gym knows {ours}")
-        actions, symmetry, hidden = facts["actions"], facts["symmetry"], facts["hidden"]
-        if actions not in get_args(Actions):
-            known = ", ".join(map(repr, get_args(Actions)))
-            raise ValueError(f"its actions must be one of {known}, not {shown(actions)}")
-        if not isinstance(symmetry, bool):
-            raise ValueError(f"its symmetry must be true or false, not {shown(symmetry)}")
-        if not isinstance(hidden, list):
-            raise ValueError(f"its hidden must be a list of widths, not {shown(hidden)}")
-        for width in hidden:
-            require_count("a width of its hidden layers", width, 1, WIDEST)
-        return cls(actions, symmetry, Scene.from_dict(facts["scene"]), tuple(hidden))
-
-    @property
-    def distributions(self) -> tuple[int, int]:
-        """Categorical distributions over actions, and choices of each."""
-        n_limbs = self.scene.robot.n_limbs
-        if self.actions == "limbs":
-            return n_limbs, len(LIMB_COMMANDS)
-        return 1, len(command_table(self.actions, n_limbs))
-
-    def shapes(self) -> dict[str, tuple[int, ...]]:
-        """Shape of every array of weights."""
-        n, choices = self.distributions
-        widths = [scene_observation_size(self.scene), *self.hidden, n * choices]
-        shapes: dict[str, tuple[int, ...]] = {}
-        for layer, (inputs, outputs) in enumerate(pairwise(widths)):
-            shapes |= {f"{layer}.weight": (outputs, inputs), f"{layer}.bias": (outputs,)}
-        return shapes
-
-
-# --- the policy ------------------------------------------------------------------------------------------------------
-
-
 class LearnedPolicy:
-    """A trained policy in Stable-Baselines3's form: raw observations of the environment in, its actions out.
+    """Trained policy with the `predict` of Stable-Baselines3, from observations of the environment to its actions.
 
-    actions: Action mode of the environment that it is for: `gym.make("SeastarSwim-v0", actions=policy.actions)`.
-    scene: What was modelled when it was trained.
-    training: How it came to be, as far as its file says.
-    rng: Draws the actions where they are not deterministic.
+    description: Environment and network that the weights are for.
+    weights: Arrays "0.weight" (outputs, inputs), "0.bias" (outputs,), "1.weight", ... of the layers.
+    training: Seed, commands, versions and progress of the training, as far as the policy's file has them.
+    rng: Random generator of actions that are not deterministic.
+
+    The environment is made with the policy's own attributes: `gym.make("SeastarSwim-v0", actions=policy.actions,
+    scene=policy.scene)`.
     """
 
     def __init__(
@@ -146,7 +73,10 @@ class LearnedPolicy:
         episode_start: NDArray[np.bool_] | None = None,
         deterministic: bool = False,
     ) -> tuple[NDArray[Any], tuple[NDArray[Any], ...] | None]:
-        """Actions for observations of shape (size,) or (n, size); there is no state."""
+        """Actions for observations of shape (size,) or (n, size), and None: the policy has no state.
+
+        deterministic: Whether the most probable action is taken, rather than one drawn by its probability.
+        """
         observation, robot = np.asarray(observation), self.scene.robot
         size = scene_observation_size(self.scene)
         if observation.ndim not in (1, 2) or observation.shape[-1] != size:
@@ -169,7 +99,7 @@ class LearnedPolicy:
         return chosen if self.actions == "limbs" else chosen[..., 0]
 
     def logits(self, observation: NDArray[Any]) -> NDArray[np.float32]:
-        """Of every distribution's choices, for (reduced) observations (..., size): (..., distributions, choices)."""
+        """Logits, shape (..., distributions, choices), for (reduced) observations of shape (..., size)."""
         layers = len(self.weights) // 2
         x = observation.astype(np.float32)
         for layer in range(layers):
@@ -192,7 +122,7 @@ class LearnedPolicy:
             )
 
     def differences(self, scene: Scene) -> str:
-        """How this scene differs from the one of the training, numerics apart; empty where it does not."""
+        """Sentence on how a scene differs from that of the training, numerics apart; empty where it does not."""
         ours, theirs = _flat(asdict(self.scene)), _flat(asdict(scene))
         parts = [
             f"{name} {ours.get(name)} (here {theirs.get(name)})"
@@ -203,20 +133,17 @@ class LearnedPolicy:
 
 
 def _flat(facts: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """{"robot": {"n_limbs": 5}} -> {"robot.n_limbs": 5}"""
+    """Nested entries with dotted names: {"robot": {"n_limbs": 5}} -> {"robot.n_limbs": 5}."""
     flat: dict[str, Any] = {}
     for name, value in facts.items():
         flat |= _flat(value, f"{prefix}{name}.") if isinstance(value, Mapping) else {prefix + name: value}
     return flat
 
 
-# --- on disk ---------------------------------------------------------------------------------------------------------
-
-
 def save(policy: LearnedPolicy, path: str | os.PathLike[str], **training: Any) -> None:
-    """Write the weights to `path` (.safetensors) and what they are for beside it (.json).
+    """Write the weights of a policy to `path` (.safetensors) and its description beside it (.json).
 
-    training: How the policy came to be: the command, the seed, versions of libraries, ...
+    training: Entries on how the policy was trained: commands, seed, versions of libraries, ...
     """
     path = _checked_suffix(path)
     data = safetensors.numpy.save({name: np.ascontiguousarray(array) for name, array in policy.weights.items()})
@@ -226,7 +153,10 @@ def save(policy: LearnedPolicy, path: str | os.PathLike[str], **training: Any) -
 
 
 def load(path: str | os.PathLike[str] = SHIPPED) -> LearnedPolicy:
-    """The policy that `save` wrote. FileNotFoundError or ValueError, with one sentence, if there is none."""
+    """Policy that `save` wrote; by default the one in the box.
+
+    FileNotFoundError or ValueError, with one sentence, if there is none.
+    """
     path = _checked_suffix(path)
     for file in (path, path.with_suffix(".json")):
         if not file.is_file():
@@ -243,31 +173,13 @@ def load(path: str | os.PathLike[str] = SHIPPED) -> LearnedPolicy:
 
 
 def reason_of(unfit: Exception) -> str:
-    """What an exception says first, to end a sentence with."""
+    """First sentence of an exception, without its full stop, to end another sentence with."""
     said = f"it does not say {unfit}" if isinstance(unfit, KeyError) else " ".join(str(unfit).split())
     return said.split(". ")[0].rstrip(".")
 
 
-def read_facts(text: str | bytes) -> dict[str, Any]:
-    """What a description in JSON says. ValueError for anything but an object of finite numbers."""
-    text = text if isinstance(text, str) else text.decode()
-    try:
-        facts = json.loads(text, parse_constant=_finite, parse_float=_finite)
-    except RecursionError:
-        raise ValueError("its description is nested too deeply") from None
-    if not isinstance(facts, dict):
-        raise ValueError(f"its description is a {type(facts).__name__}, not an object with names")
-    return facts
-
-
-def _finite(text: str) -> float:
-    if not math.isfinite(float(text)):
-        raise ValueError(f"its description says {text}, which is no finite number")
-    return float(text)
-
-
 def checked_training(training: object) -> dict[str, Any]:
-    """How a policy came to be, as far as the reports read it."""
+    """Entries on the training of a policy; ValueError where reports could not read them."""
     if not isinstance(training, dict):
         raise ValueError(f"its training is a {type(training).__name__}, not an object with names")
     progress, commands = training.get("progress", []), training.get("commands", [])

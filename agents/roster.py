@@ -1,28 +1,50 @@
-"""Agents by the names that the command lines know."""
+"""Agents by the names that the command lines know.
 
-from collections.abc import Sequence
+A new agent is a class with `predict` and one line in `AGENTS`. An agent of one's own needs no line: it is asked for by
+the name of the function that makes it, "module:function".
+"""
+
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Annotated, TypeAlias
 
 import numpy as np
+import tyro
 
 from agents import foreign
 from agents import policy as learned
 from agents.greedy import GreedyPolicy
 from agents.planner import Planner
-from agents.scripted import scripted
+from agents.scripted import GAITS, scripted
 from agents.swim import Policy
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
+from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 
-OTHERS = ("learned", "greedy", "planner")
-"""Agents that are not scripted."""
+AGENTS: dict[str, Callable[[Scene], Policy]] = {
+    "learned": lambda scene: learned.load(),
+    "greedy": GreedyPolicy,
+    "planner": lambda scene: Planner(),  # it always plans at fidelity "fast"
+}
+"""Functions that make the agents that are not scripted, by name, for the scene that they swim in."""
+
+HELP = (
+    f"Agents: {', '.join(AGENTS)} (learned is the policy in the box); scripted gaits, {', '.join(GAITS)}, random, or a "
+    "pair of limbs such as 4+,1-; files of policies (.safetensors, or a model.zip of train.py or of plain "
+    "Stable-Baselines3); module:function, which gets an environment and returns anything with predict. A model.zip of "
+    "plain Stable-Baselines3 and module:function execute the code of whoever made them: load only files that you trust."
+)
+"""Help of options that name agents."""
+
+AgentNames: TypeAlias = Annotated[tuple[str, ...], tyro.conf.arg(help=HELP)]
 
 
 def load_agents(names: Sequence[str], seed: int = 0, fidelity: Fidelity = "balanced") -> dict[str, Policy]:
-    """Policies by name: the one in the box, scripted ones, the greedy one by a map of a fidelity's physics, the
-    planner, which always plans with the fast ones, files under their names without the ending, and "module:function"
-    for what a function returns that gets an environment; see foreign.py for what the last two may execute."""
+    """Policies by name; those of files have the file's name without its ending.
+
+    names: Names as in `HELP`. seed: Seed of the random agent. fidelity: Accuracy of the simulation that agents know.
+    """
     agents: dict[str, Policy] = {}
     for name in names:
         label = Path(name).stem if _is_file(name) else name
@@ -38,26 +60,28 @@ def _is_file(name: str) -> bool:
 
 
 def _load_agent(name: str, seed: int, fidelity: Fidelity) -> Policy:
-    if name == "learned":
-        return learned.load()
-    if name == "greedy":
-        return GreedyPolicy(make_scene(None, fidelity))
-    if name == "planner":
-        return Planner()
+    if name in AGENTS:
+        return AGENTS[name](make_scene(None, fidelity))
     if foreign.is_function(name):
         return foreign.call_function(name, SeastarSwimEnv(fidelity=fidelity))
-    if not _is_file(name):
-        try:
-            return scripted(name, rng=np.random.default_rng(seed))
-        except ValueError as unknown:
-            others = f"{', '.join(OTHERS)}, files of policies, and module:function"
-            raise ValueError(f"{unknown} Others are {others}.") from unknown
+    return _load_file(name) if _is_file(name) else _scripted(name, seed)
+
+
+def _scripted(name: str, seed: int) -> Policy:
+    try:
+        return scripted(name, rng=np.random.default_rng(seed))
+    except ValueError as unknown:
+        others = f"{', '.join(AGENTS)}, files of policies, and module:function"
+        raise ValueError(f"{unknown} Others are {others}.") from unknown
+
+
+def _load_file(name: str) -> Policy:
     if not name.endswith(".zip"):
         return learned.load(name)
     try:
         if foreign.is_model(name):
             return foreign.load_model(name)
-        from agents import ppo
+        from agents import learner_file
     except ModuleNotFoundError as missing:
         raise ValueError(f'A model.zip needs {missing.name}: pip install "seastar-gym[train]".') from missing
-    return ppo.load(name)
+    return learner_file.load(name)

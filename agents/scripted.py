@@ -1,30 +1,29 @@
-"""Gaits that swim by the clock: the straight gait, the pairs of Fig. 13.8, and the pentagon gait (13.15).
+"""Scripted gaits: the straight gait, the pairs of Fig. 13.8, the pentagon gait (13.15), and random actions.
 
-A gait looks at no observation. What it has to remember, how many strokes it has swum, is the recurrent state of
-Stable-Baselines3's `predict`, so one gait may drive any number of robots:
+A gait looks at no observation. The number of strokes that it has swum is the recurrent state of Stable-Baselines3's
+`predict`, so one gait may drive any number of robots:
 
     gait, state = scripted("pentagon"), None
     action, state = gait.predict(observation, state)
 """
 
 import re
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, command_table
+from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, choices, command_table
 from seastar_gym.gaits import pair_gait, pentagon_gait, straight_gait
 
 Floats = NDArray[np.float64]
 PolicyState = tuple[NDArray[np.int64], ...] | None
 
-SCRIPTED_NAMES = ("pentagon", "straight", "rest", "random")
-
 _PAIR = re.compile(r"\{?(\d+)([+-]),(\d+)([+-])\}?")
 
 
 def to_actions(commands: ArrayLike, actions: Actions, n_limbs: int) -> NDArray[np.int64]:
-    """The actions that mean these commands: shape (..., n_limbs) -> the same for "limbs", else (...)."""
+    """Actions that mean commands of shape (..., n_limbs): the same shape for "limbs", otherwise (...)."""
     commands = np.asarray(commands, dtype=np.float64)
     if actions == "limbs":
         means = commands[..., None] == LIMB_COMMANDS
@@ -36,10 +35,10 @@ def to_actions(commands: ArrayLike, actions: Actions, n_limbs: int) -> NDArray[n
 
 
 class OpenLoopPolicy:
-    """A gait, over and over: a policy in Stable-Baselines3's form whose state counts the strokes.
+    """Policy that repeats a gait; its state counts the strokes.
 
-    commands: Values -1, 0, 1, shape (n_strokes, n_limbs).
-    actions: How the environment is told: its argument of the same name.
+    commands: Commands of the gait, shape (n_strokes, n_limbs), values -1, 0, 1.
+    actions: Action mode of the environment.
     """
 
     def __init__(self, commands: ArrayLike, actions: Actions = "limbs"):
@@ -56,11 +55,11 @@ class OpenLoopPolicy:
         episode_start: NDArray[np.bool_] | None = None,
         deterministic: bool = False,
     ) -> tuple[NDArray[np.int64], PolicyState]:
-        """Action of the next stroke, and the state to hand in for the one after.
+        """Action of the next stroke, and the state for the call after it.
 
-        observation: Of one robot, shape (size,), or of a batch, shape (n, size); only its shape is looked at.
-        state: What the last call returned, None before the first: strokes swum, shape (n,), in a tuple.
-        episode_start: Where an episode begins with this stroke, shape (n,); the gait then starts again.
+        observation: Observation of one robot, shape (size,), or of a batch, shape (n, size); only its shape matters.
+        state: State that the last call returned, the strokes swum, shape (n,), in a tuple; None before the first call.
+        episode_start: Whether an episode begins with this stroke, so that the gait starts again, shape (n,).
         """
         alone = np.ndim(observation) == 1
         swum = np.zeros(1 if alone else len(observation), dtype=np.int64) if state is None else state[0]
@@ -71,12 +70,12 @@ class OpenLoopPolicy:
 
 
 class RandomPolicy:
-    """Uniformly random actions, the baseline that any gait has to beat."""
+    """Policy of uniformly random actions, the baseline that any gait has to beat."""
 
     def __init__(self, rng: np.random.Generator, actions: Actions = "limbs", n_limbs: int = 5):
         self.actions: Actions = actions
         self._rng = rng
-        self._n_choices = len(LIMB_COMMANDS if actions == "limbs" else command_table(actions, n_limbs))
+        _, self._n_choices = choices(actions, n_limbs)
         self._shape = (n_limbs,) if actions == "limbs" else ()
 
     def predict(
@@ -86,18 +85,31 @@ class RandomPolicy:
         episode_start: NDArray[np.bool_] | None = None,
         deterministic: bool = False,
     ) -> tuple[NDArray[np.int64], PolicyState]:
-        """An action of one robot for an observation of shape (size,), of n robots for (n, size)."""
+        """Action of one robot for an observation of shape (size,), or of n robots for shape (n, size)."""
         batch = np.shape(observation)[:-1]
         return np.asarray(self._rng.integers(self._n_choices, size=batch + self._shape)), None
+
+
+def _pentagon(n_limbs: int) -> Floats:
+    if n_limbs != 5:
+        raise ValueError(f"The pentagon gait (13.15) is for five limbs, not {n_limbs}.")
+    return pentagon_gait()
+
+
+def _rest(n_limbs: int) -> Floats:
+    return np.zeros((1, n_limbs))
+
+
+GAITS: dict[str, Callable[[int], Floats]] = {"pentagon": _pentagon, "straight": straight_gait, "rest": _rest}
+"""Functions that make the commands of a gait, shape (n_strokes, n_limbs), for a number of limbs, by name."""
 
 
 def scripted(
     name: str, actions: Actions = "limbs", n_limbs: int = 5, rng: np.random.Generator | None = None
 ) -> OpenLoopPolicy | RandomPolicy:
-    """The policy of a name: "pentagon", "straight", "rest", "random", or a pair such as "4+,1-".
+    """Policy with the name of a gait in `GAITS`, "random", or a pair such as "4+,1-".
 
-    actions: How the environment is told: its argument of the same name.
-    rng: What the random policy draws from; a generator with seed 0 if None.
+    actions: Action mode of the environment. rng: Generator of the random policy; by default one with seed 0.
     """
     if name == "random":
         return RandomPolicy(np.random.default_rng(0) if rng is None else rng, actions, n_limbs)
@@ -109,13 +121,7 @@ def _gait(name: str, n_limbs: int) -> Floats:
     if pair is not None and pair[2] != pair[4]:
         limbs = {pair[2]: int(pair[1]), pair[4]: int(pair[3])}
         return pair_gait(limbs["+"], limbs["-"], n_limbs)
-    if name == "straight":
-        return straight_gait(n_limbs)
-    if name == "rest":
-        return np.zeros((1, n_limbs))
-    if name == "pentagon":
-        if n_limbs != 5:
-            raise ValueError(f"The pentagon gait (13.15) is for five limbs, not {n_limbs}.")
-        return pentagon_gait()
-    names = ", ".join(SCRIPTED_NAMES)
+    if name in GAITS:
+        return GAITS[name](n_limbs)
+    names = ", ".join((*GAITS, "random"))
     raise ValueError(f'Unknown scripted agent {name!r}: choose one of {names}, or a pair of a + and a - limb: "4+,1-".')

@@ -54,7 +54,7 @@ def require_fit(policy: Policy, scene: Scene, actions: Actions) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Swim:
-    """What one agent did on one path.
+    """Record of one agent on one path.
 
     hub, waypoint_index and time are those at the start and after every stroke, strokes + 1 of them.
     """

@@ -1,9 +1,8 @@
-"""Many swims of every agent: on named paths, on random ones, and disturbed; means with their confidence intervals.
+"""Many swims of every agent, on named and random paths, nominal and disturbed: means with confidence intervals.
 
     python -m agents.trials --agents learned greedy pentagon --swims 1000 --out runs/trials.csv
 
-Random paths come with random headings. The disturbed pentagon is there for the scripted gait, which knows no other
-path.
+Random paths have random headings. The disturbed pentagon is there for the scripted gait, which knows no other path.
 """
 
 import csv
@@ -22,11 +21,10 @@ from rich.table import Table
 from scipy.stats import bootstrap
 
 from agents.disturbances import CURRENT_DIRECTIONS, DISTURBANCES, Disturbance, DisturbedTask
-from agents.roster import load_agents
+from agents.roster import AgentNames, load_agents
 from agents.swim import Policy, Swim, actions_of, require_fit
 from seastar_gym.command import run_command
 from seastar_gym.envs.commands import to_commands
-from seastar_gym.envs.paths import PathName
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.task import Path as SwimPath
 from seastar_gym.envs.task import SwimTask, make_scene
@@ -38,7 +36,7 @@ HELD_OUT_SEED = 1_000
 """Seed of the paths that policies are measured on; trainings draw theirs from small seeds."""
 MM = 1000.0
 RESAMPLES, CONFIDENCE = 2000, 0.95
-NOMINAL: tuple[PathName, ...] = ("pentagon", "square", "triangle", "figure-eight")
+NOMINAL: tuple[str, ...] = ("pentagon", "square", "triangle", "figure-eight")
 
 Interval = tuple[float, float, float]
 """Mean, and the ends of its confidence interval."""
@@ -57,7 +55,10 @@ def swim_many(
     seed: int = 0,
     threads: int | None = None,
 ) -> list[Swim]:
-    """Swims side by side, each to its last waypoint or for `max_strokes` strokes; random paths with random headings."""
+    """Swims of `n_swims` robots side by side, each to its last waypoint or for `max_strokes` strokes.
+
+    The path "random" has random headings. waypoint_radius: Radius of the waypoints [m].
+    """
     actions = actions_of(policy, scene.robot.n_limbs)
     require_fit(policy, scene, actions)
     with_heading = isinstance(path, str) and path == "random"
@@ -99,7 +100,7 @@ def _up_to_the_last_waypoint(done: Swim) -> Swim:
 
 
 def mean_with_interval(values: NDArray[np.float64]) -> Interval:
-    """Mean and its bootstrap confidence interval; NaN where there is nothing."""
+    """Mean of values and the ends of its bootstrap confidence interval; NaN where there are no values."""
     if len(values) == 0:
         return np.nan, np.nan, np.nan
     if np.ptp(values) == 0.0:
@@ -112,7 +113,7 @@ def mean_with_interval(values: NDArray[np.float64]) -> Interval:
 
 
 def statistics(swims: Sequence[Swim]) -> dict[str, Interval]:
-    """What is measured of a set of swims; strokes of those that finished."""
+    """Mean measures of a set of swims, by name, with their intervals; strokes are those of finished swims."""
     finished = np.array([done.finished for done in swims], dtype=np.float64)
     strokes = np.array([done.strokes for done in swims if done.finished], dtype=np.float64)
     errors = MM * np.array([done.cross_track_errors.mean() for done in swims])
@@ -127,7 +128,7 @@ def statistics(swims: Sequence[Swim]) -> dict[str, Interval]:
 
 
 def trials(agents: Mapping[str, Policy], fidelity: Fidelity, options: "Options") -> list[dict[str, str | int | float]]:
-    """A row for every agent and set of swims."""
+    """Rows of the results, one for every set of swims and agent."""
     rows = []
     scene = make_scene(None, fidelity)
     for path, label, n_swims in _sets(options):
@@ -144,39 +145,38 @@ def trials(agents: Mapping[str, Policy], fidelity: Fidelity, options: "Options")
     return rows
 
 
-def _sets(options: "Options") -> list[tuple[PathName, str, int]]:
-    """Path, disturbance and number of swims of every set; the disturbed pentagon for all directions and limbs."""
-    nominal: list[tuple[PathName, str, int]] = [(path, "none", 1) for path in NOMINAL]
-    random: list[tuple[PathName, str, int]] = [("random", name, options.swims) for name in DISTURBANCES]
-    pentagon: list[tuple[PathName, str, int]] = [
+def _sets(options: "Options") -> list[tuple[str, str, int]]:
+    """Path, disturbance and number of swims of every set that was asked for.
+
+    The disturbed pentagon is swum for every combination of a current's direction and a weak limb.
+    """
+    nominal: list[tuple[str, str, int]] = [(path, "none", 1) for path in NOMINAL]
+    random: list[tuple[str, str, int]] = [("random", name, options.swims) for name in DISTURBANCES]
+    pentagon: list[tuple[str, str, int]] = [
         ("pentagon", name, 5 * CURRENT_DIRECTIONS) for name in DISTURBANCES if name != "none"
     ]
     known = {"nominal": nominal, "random": random, "pentagon": pentagon}
     return [one for name in options.sets for one in known[name]]
 
 
-# --- the command line ------------------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Options:
-    """Many swims of every agent, nominal and disturbed: a table, the same as CSV."""
+    """Many swims of every agent, nominal and disturbed: print a table of means, and write it as CSV."""
 
-    agents: tuple[str, ...] = ("learned", "greedy", "pentagon")
-    """As for agents.evaluate. A model.zip of plain Stable-Baselines3 and module:function execute the code of whoever
-    made them: load only files that you trust."""
+    agents: AgentNames = ("learned", "greedy", "pentagon")
     sets: tuple[Literal["nominal", "random", "pentagon"], ...] = ("nominal", "random", "pentagon")
-    """The named paths, random paths under every disturbance, the disturbed pentagon."""
+    """Sets of swims: nominal, the named paths undisturbed; random, random paths under every disturbance; pentagon, the
+    pentagon under every disturbance."""
     swims: int = 1000
-    """Random paths of every set."""
+    """Number of random paths of every set."""
     fidelity: tuple[Fidelity, ...] = ("balanced",)
-    """How exactly the swims are computed; each in turn."""
+    """Accuracies of the simulation, each in turn."""
     seed: int = 0
-    """Of paths, headings and disturbances; the same for every agent."""
+    """Seed of paths, headings and disturbances, which are the same for every agent."""
     num_threads: int | None = None
-    """Threads of the simulator; all processors by default."""
+    """Number of threads of the simulator; by default one for every processor."""
     out: Path = Path("runs/trials.csv")
-    """File of the results."""
+    """CSV file of the results."""
 
     def __post_init__(self) -> None:
         require_count("swims", self.swims, 1, 1_000_000)
@@ -212,7 +212,7 @@ def _print(rows: Sequence[dict[str, str | int | float]]) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
-    options = tyro.cli(Options, args=arguments)
+    options = tyro.cli(Options, prog="python -m agents.trials", args=arguments)
     rows = []
     try:
         for fidelity in options.fidelity:

@@ -149,7 +149,7 @@ class BatchVecEnv(VecEnv):
 
 
 def _names(info: Info) -> list[str]:
-    """What an info tells about robots; the masks beside it and the final values are for the adapter."""
+    """Names of an info that describe robots, without the masks and the final values, which the adapter uses itself."""
     return [name for name in info if not name.startswith("_") and name not in ("final_obs", "final_info")]
 
 

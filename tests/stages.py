@@ -28,7 +28,7 @@ def direction(rods, work, q, q_0, gamma, ahead, convex, result):
     stage = Stage(memory.q_hat, memory.v_hat, h, 1.0 / h, ahead)
     freeze_fluid(rods_rows, memory)
     freeze_contact(rods_rows.contact, rods_rows, memory, stage, borrow(q_0))
-    freeze_strains(rods_rows.relaxation_time, rods_rows, memory, memory.q_hat)
+    freeze_strains(rods_rows.damping, rods_rows, memory, memory.q_hat)
     for row in range(q.shape[0]):
         store(memory.q, row, load(borrow(q), row))
     if any_lane(mask):

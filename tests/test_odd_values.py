@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from agents.ppo import Hyperparameters
+from agents.hyperparameters import Hyperparameters
 from seastar_gym import (
     Contact,
     DomainRandomization,

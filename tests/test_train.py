@@ -21,7 +21,10 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 
 import train
 from agents import policy as policies
-from agents.ppo import load
+from agents.learner_file import load
+from agents.training import box as shipping
+from agents.training.folder import claim
+from agents.training.options import Options, read_options, saved_options
 
 REPOSITORY = Path(train.__file__).parent
 TINY = shlex.split(
@@ -60,9 +63,9 @@ def test_the_config_says_which_command_made_it(finished):
     config = json.loads((finished / "config.json").read_text())
     (command,) = config["commands"]
     assert shlex.split(command)[:2] == ["python", "train.py"]
-    again = train.read_options(shlex.split(command)[2:])
-    assert again == train.Options(
-        **{**train.saved_options(finished).__dict__, "resume": None},
+    again = read_options(shlex.split(command)[2:])
+    assert again == Options(
+        **{**saved_options(finished).__dict__, "resume": None},
     )
     assert config["versions"]["stable_baselines3"]
 
@@ -110,7 +113,7 @@ def test_the_exported_policy_is_the_model_s(finished):
 
 def test_one_option_puts_the_policy_in_the_box(finished, tmp_path, monkeypatch):
     shutil.copytree(finished, tmp_path / "tiny")
-    monkeypatch.setattr(train, "SHIPPED", tmp_path / "box" / "seastar.safetensors")
+    monkeypatch.setattr(shipping, "SHIPPED", tmp_path / "box" / "seastar.safetensors")
     assert train.main(["--resume", str(tmp_path / "tiny")]) == 0
     assert not (tmp_path / "box").exists()
     assert train.main(["--resume", str(tmp_path / "tiny"), "--ship"]) == 0
@@ -125,7 +128,7 @@ def test_a_finished_run_can_be_trained_for_more_strokes(finished, tmp_path, caps
     assert (folder / "checkpoints" / "model_000000768.zip").is_file()
     config = json.loads((folder / "config.json").read_text())
     assert len(config["commands"]) == 2
-    assert train.saved_options(folder).ppo == train.saved_options(finished).ppo
+    assert saved_options(folder).ppo == saved_options(finished).ppo
     steps = [step for step, _ in scalars(folder)["time/fps"]]
     assert steps == sorted(steps) and steps[-1] == 768
     trained = np.loadtxt(folder / "progress.csv", delimiter=",")[:, 0]
@@ -201,10 +204,10 @@ def test_a_run_killed_before_its_first_checkpoint_is_continued_from_its_beginnin
 
 def test_an_empty_folder_is_taken(tmp_path):
     (tmp_path / "config.json.part").write_text("{")
-    train.claim(tmp_path)
+    claim(tmp_path)
     (tmp_path / "somebody's").write_text("work")
     with pytest.raises(ValueError, match="exists already"):
-        train.claim(tmp_path)
+        claim(tmp_path)
 
 
 def test_a_checkpoint_that_a_kill_cut_short_is_completed(finished, tmp_path):
@@ -217,7 +220,7 @@ def test_a_checkpoint_that_a_kill_cut_short_is_completed(finished, tmp_path):
     assert (folder / "checkpoints" / "model_000000512.zip").is_file()
 
 
-# --- what cannot be --------------------------------------------------------------------------------------------------
+# What cannot be
 
 
 def assert_one_sentence(capsys, *words):
@@ -273,7 +276,7 @@ def test_a_device_that_is_not_there_is_refused_before_anything_is_written(tmp_pa
     assert refused.value.code == 2
 
 
-# --- the policy in the box -------------------------------------------------------------------------------------------
+# The policy in the box
 
 
 @pytest.fixture
@@ -281,7 +284,7 @@ def box(tmp_path, monkeypatch):
     """The box with the policy that swims best, to be overwritten without regret."""
     file = tmp_path / "box" / "seastar.safetensors"
     shutil.copytree(policies.SHIPPED.parent, file.parent)
-    monkeypatch.setattr(train, "SHIPPED", file)
+    monkeypatch.setattr(shipping, "SHIPPED", file)
     return file
 
 
@@ -301,13 +304,13 @@ def test_a_worse_policy_goes_into_the_box_only_when_asked_twice(finished, tmp_pa
 
 def test_a_policy_no_worse_than_that_in_the_box_needs_no_second_word(finished, box):
     policies.save(policies.load(finished / "policy.safetensors"), box)
-    assert train.why_not(policies.load(finished / "policy.safetensors"), train.saved_options(finished)) is None
+    assert shipping.why_not(policies.load(finished / "policy.safetensors"), saved_options(finished)) is None
 
 
 def test_a_box_that_cannot_be_read_is_not_overwritten_at_once(finished, box):
     box.write_bytes(b"")
-    policy, options = policies.load(finished / "policy.safetensors"), train.saved_options(finished)
-    assert "nothing to compare with" in train.why_not(policy, options)
+    policy, options = policies.load(finished / "policy.safetensors"), saved_options(finished)
+    assert "nothing to compare with" in shipping.why_not(policy, options)
 
 
 def test_a_quick_run_is_asked_twice_before_it_begins(tmp_path, capsys):
@@ -326,8 +329,8 @@ def test_a_folder_in_use_is_not_written_over(finished, capsys):
 
 
 def test_quick_is_short_and_fast():
-    options = train.read_options(["--quick"])
-    assert options.strokes < 100_000 < train.Options().strokes
+    options = read_options(["--quick"])
+    assert options.strokes < 100_000 < Options().strokes
     assert options.fidelity == "fast"
 
 

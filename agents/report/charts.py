@@ -37,9 +37,6 @@ def to_html(figure: go.Figure, name: str) -> str:
     return str(plotly.io.to_html(figure, config=options, include_plotlyjs=False, full_html=False, div_id=name))
 
 
-# --- paths -----------------------------------------------------------------------------------------------------------
-
-
 def paths_figure(swims: Sequence[Swim], waypoint_radius: float) -> go.Figure:
     """The hubs' ways along the path of the first swim. waypoint_radius: [m]."""
     path = MM * np.concatenate([np.zeros((1, 2)), swims[0].waypoints])
@@ -84,12 +81,9 @@ def _rounded(values: Floats) -> list[float]:
     return np.round(values, 1).tolist()
 
 
-# --- learning curves -------------------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """What one training came to."""
+    """Learning curve of one training."""
 
     name: str
     trained: Floats
@@ -160,9 +154,6 @@ def _at(curve: Curve, trained: float) -> float:
 
 def _with_gaps(values: Floats) -> list[float | None]:
     return [None if np.isnan(value) else float(value) for value in values]
-
-
-# --- speeds ----------------------------------------------------------------------------------------------------------
 
 
 def speeds_figure(directions: Sequence[float], speeds: Mapping[str, Sequence[float]], n_limbs: int = 5) -> go.Figure:

@@ -38,7 +38,7 @@ class ResultsTable:
 
 @dataclass(frozen=True, eq=False)
 class Remarks:
-    """What a report says besides the evaluation."""
+    """Remarks of a report besides the evaluation: texts, commands, learning curves and further results."""
 
     title: str = "Evaluation"
     sentences: Sequence[str] = ()
@@ -46,7 +46,7 @@ class Remarks:
     curves: Sequence[Curve] = ()
     tables: Sequence[ResultsTable] = ()
     bound: Mapping[str, Any] | None = None
-    """What studies.learning.bound wrote."""
+    """Results of studies.learning.bound."""
 
 
 def write_report(
@@ -91,9 +91,6 @@ def _section(title: str, content: str) -> str:
 
 def _figure(figure: str, shape: str) -> str:
     return f'<div class="figure {shape}">{figure}</div>'
-
-
-# --- tables ----------------------------------------------------------------------------------------------------------
 
 
 def table_html(table: ResultsTable) -> str:
@@ -168,15 +165,10 @@ def number(value: Any) -> str:
     return f"{value:.1f}" if isinstance(value, float) else str(value)
 
 
-# --- remarks ---------------------------------------------------------------------------------------------------------
-
-
 def _remarks(remarks: Remarks) -> str:
     sentences = "\n".join(f"<p>{html.escape(sentence)}</p>" for sentence in remarks.sentences)
     return f"{sentences}\n<pre>{html.escape(chr(10).join(remarks.commands))}</pre>"
 
-
-# --- playback --------------------------------------------------------------------------------------------------------
 
 TEXT_MARGIN = 30.0
 """[mm]: for the names of heated limbs, beyond their tips."""
@@ -196,7 +188,7 @@ PLAYER = """<div id="agents" role="radiogroup" aria-label="agent"></div>
 
 
 def _recorded(playbacks: Sequence[Playback], waypoints: Any, waypoint_radius: float) -> str:
-    """What the page's player reads, as JSON; lengths in millimetres."""
+    """Recorded swims for the page's player, as JSON; lengths in millimetres."""
     path = 1e3 * np.concatenate([np.zeros((1, 2)), waypoints])
     reach = 1e3 * max(float(np.ptp(playback.frames[0].positions, axis=0).max()) for playback in playbacks) / 2
     low, high = path.min(axis=0) - reach - TEXT_MARGIN, path.max(axis=0) + reach + TEXT_MARGIN

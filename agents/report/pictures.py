@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 FRAMES_PER_STROKE, FPS = 3, 30
-"""Of a video: strokes of one second pass ten times as fast."""
+"""Frames of a video per stroke and per second: strokes of one second pass ten times as fast."""
 CLOSING_SECONDS = 1.5
 """How long a video rests on its last picture."""
 
@@ -31,9 +31,6 @@ STROKES_PER_DOT = 10
 STRAY, MARGIN = 0.3, 0.12
 """Room around the path [path extents]: for swims that go astray, and for all."""
 MM = 1000.0
-
-
-# --- traces ----------------------------------------------------------------------------------------------------------
 
 
 def draw_traces(swims: Sequence[Swim], waypoint_radius: float, file: Path) -> None:
@@ -121,9 +118,6 @@ def _draw_trace(axes: Axes, swim: Swim, number: int) -> None:
     axes.plot(*dots.T, color=colour, linestyle="", marker="o", markersize=width + 2.0, zorder=level)
     marker = "o" if swim.finished else "X"
     axes.plot(*hub[-1], color=colour, marker=marker, markersize=9, markeredgecolor="w", zorder=level + 0.5)
-
-
-# --- videos ----------------------------------------------------------------------------------------------------------
 
 
 @contextmanager

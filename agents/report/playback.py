@@ -24,10 +24,10 @@ class Playback:
     frames: tuple[Frame, ...]
 
     def packed(self) -> dict[str, Any]:
-        """As plain lists, to be written as JSON: little text, because a swim has hundreds of frames.
+        """Swim as plain lists of few digits, to be written as JSON: a swim has hundreds of frames.
 
-        Of every frame: `nodes`, x, y, x, y, ... [UNIT] from the hub on; `stroke`, 0 at the start; `waypoint`, how many
-        are reached; `time` [s]. Of every stroke: `commands`, a number per limb; stroke 0 has none.
+        For every frame: `nodes`, x, y, x, y, ... [UNIT] from the hub on; `stroke`, 0 at the start; `waypoint`, how many
+        are reached; `time` [s]. For every stroke: `commands`, a number per limb, zeros for stroke 0.
         """
         strokes = [int(np.ceil(frame.time / self.stroke_time - 1e-6)) for frame in self.frames]
         last_frames = dict(zip(strokes, self.frames, strict=True))
@@ -60,5 +60,5 @@ class RecordingEnv(SeastarSwimEnv):
             super()._draw_frame()
 
     def playback(self, agent: str) -> Playback:
-        """What was recorded since the last reset."""
+        """Playback of the frames since the last reset."""
         return Playback(agent, self.waypoints, self.simulator.stroke_time, tuple(self._recorded))

@@ -128,8 +128,8 @@ def positive_part(x):
 
 
 @kernel
-def node_slopes(rods, work, stage, node):
-    """(energy, gradient, Hessian) of a node's inertia, drag and load."""
+def node_slopes(contact, rods, work, stage, node):
+    """(energy, gradient, Hessian) of a node's inertia, drag and load, and of what contact pushes it (or None)."""
     qx, qy = load(work.q, 2 * node), load(work.q, 2 * node + 1)
     vx = (qx - load(stage.q_hat, 2 * node)) * stage.inverse_gamma
     vy = (qy - load(stage.q_hat, 2 * node + 1)) * stage.inverse_gamma
@@ -142,7 +142,7 @@ def node_slopes(rods, work, stage, node):
     sx, sy = c_over_speed * wx, c_over_speed * wy
     diagonal = (m_over_gamma + c_speed) * stage.inverse_gamma
     Fx, Fy = nodal_load(rods.load, node)
-    push_x, push_y = contact_force(work.contact, node)
+    push_x, push_y = contact_force(contact, node)
     slopes = (
         add_product(
             0.5 * m * add_product(dx * dx, dy, dy), stage.gamma, potential - load_power(rods.load, node, dx, dy)
@@ -234,7 +234,7 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
         t = half_angle(before, edge, 1.0)
         E_b, slope_before, s_before = hinge_slopes(rods, work, stage, e, t, load(rods.bending.EI_kappa_bar, e), convex)
         E_s, f, K = edge_slopes(rods, work, stage, e, edge, slope_before - slope, s_before + s, convex)
-        E_n, g, inertia = node_slopes(rods, work, stage, node)
+        E_n, g, inertia = node_slopes(work.contact, rods, work, stage, node)
         energy += (E_s + E_n) + E_b
         P = coupling(s_before, edge, before)
         D_1 = (D_before[0] + K[0] + 2.0 * P[0], D_before[1] + K[1] + (P[1] + P[2]), D_before[2] + K[2] + 2.0 * P[3])
@@ -259,7 +259,7 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
         slope, s, edge = slope_before, s_before, before
     net_moment, stiffness = load(work.hub_moment, limb) - slope, load(work.hub_stiffness, limb) + s
     E_s, f, K = edge_slopes(rods, work, stage, first, edge, net_moment, stiffness, convex)
-    E_n, g, inertia = node_slopes(rods, work, stage, first + 1)
+    E_n, g, inertia = node_slopes(work.contact, rods, work, stage, first + 1)
     E_m, g_m, h_m = middle_slopes(rods.middle_drag, work, stage, first, 0, first + 1)
     energy = add_scalar(rods.middle_drag, energy, E_m)
     store_root(
@@ -288,7 +288,7 @@ def factorise(rods, work, stage, convex):
     which is not positive (or NaN) where the Hessian is not positive definite.
     """
     energy = add_contact(rods.contact, rods, work, stage, assemble_hub(rods.clamp, rods, work, stage, convex))
-    E_n, r_hub, D_hub = node_slopes(rods, work, stage, 0)
+    E_n, r_hub, D_hub = node_slopes(work.contact, rods, work, stage, 0)
     energy += E_n
     decrement, pivot = splat(0.0), splat(np.inf)
     for limb in range(rods.n_limbs):

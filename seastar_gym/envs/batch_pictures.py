@@ -7,29 +7,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.rendering import Camera, Frame, Renderer, limb_nodes
+from seastar_gym.envs.camera import Camera
+from seastar_gym.envs.rendering import LARGEST, SMALLEST, Frame, Renderer, renderer_of
 from seastar_gym.envs.task import SwimTask
 
 Picture = NDArray[np.uint8]
 
-LARGEST, SMALLEST = (960, 720), (320, 240)
-"""Width and height of a picture [px]: that of one robot alone, and that of one among many."""
 SHEET_WIDTH = 1920
 """Width [px] of a sheet of pictures side by side, as long as they are no smaller than SMALLEST."""
 
 
 def picture_size(n_pictures: int) -> tuple[int, int]:
-    """Width and height [px] of each of so many pictures, for a sheet that can still be looked at."""
+    """Width and height [px] of each of `n_pictures` pictures, for a sheet that can still be looked at."""
     width = min(LARGEST[0], max(SMALLEST[0], SHEET_WIDTH // math.ceil(math.sqrt(n_pictures))))
     width -= width % 4  # videos need even numbers
     return width, width * 3 // 4
 
 
 class BatchPictures:
-    """Trails and views of all robots of a task, drawn when they are asked for.
-
-    One renderer draws them all, one after the other.
-    """
+    """Trails and views of all robots of a task, drawn one after the other by one renderer when they are asked for."""
 
     def __init__(self, task: SwimTask):
         self._task = task
@@ -41,19 +37,22 @@ class BatchPictures:
         return {**self.__dict__, "_renderer": None}
 
     def begin(self, robots: NDArray[np.bool_]) -> None:
-        """Forget what the robots in the mask did before: they begin an episode where they are."""
+        """Forget the trails and views of the robots in a mask, shape (n_robots,): they begin an episode."""
         hub = self._task.simulator.hub_position()
         for robot in np.flatnonzero(robots).tolist():
             self._trails[robot] = [hub[robot]]
             self._cameras.pop(robot, None)
 
     def follow(self) -> None:
-        """Extend the trails to where the robots are now."""
+        """Extend all trails to the present positions of the hubs."""
         for trail, hub in zip(self._trails, self._task.simulator.hub_position(), strict=True):
             trail.append(hub)
 
     def draw(self, robots: Iterable[int], commands: NDArray[np.float64]) -> tuple[Picture, ...]:
-        """Pictures of some robots after a stroke with the commands of all, shape (height, width, 3) each."""
+        """Pictures of the robots of these numbers, shape (height, width, 3) each.
+
+        commands: Commands of all robots in the last stroke, shape (n_robots, n_limbs).
+        """
         task, simulator = self._task, self._task.simulator
         positions, time = simulator.positions, simulator.time
         return tuple(
@@ -81,12 +80,6 @@ class BatchPictures:
     def _get_renderer(self) -> Renderer:
         if self._renderer is None:
             body = self._task.simulator.scene.of_robot(0).robot
-            self._renderer = Renderer(
-                limb_nodes(body.n_limbs, body.nodes_per_limb),
-                self._task.waypoints_of(0),
-                limb_length=body.limb_length,
-                rod_radius=body.rod_radius,
-                waypoint_radius=self._task.waypoint_radius,
-                size=picture_size(self._task.n_robots),
-            )
+            size = picture_size(self._task.n_robots)
+            self._renderer = renderer_of(body, self._task.waypoints_of(0), self._task.waypoint_radius, size)
         return self._renderer

@@ -1,4 +1,4 @@
-"""What an action means: which limbs are heated, and which way they turn."""
+"""Actions and the commands they mean: which limbs are heated, and which way they turn."""
 
 import functools
 import itertools
@@ -13,22 +13,26 @@ from seastar_gym.scene.checks import require_choice
 Actions: TypeAlias = Literal["limbs", "joint", "pairs"]
 
 MOST_LIMBS = 8
-"""With more, actions="joint" would have more than 6,561 actions."""
+"""Largest number of limbs for actions="joint", which then has 6,561 actions."""
 
 LIMB_COMMANDS = np.array([0.0, 1.0, -1.0])
 """Command of a limb for its action 0, 1, 2: leave it alone, actuate + (anti-clockwise), actuate -."""
 
 
 def action_space(actions: Actions, n_limbs: int) -> spaces.MultiDiscrete | spaces.Discrete:
-    """The space of one robot's actions."""
+    """Space of one robot's actions."""
+    numbers, n_choices = choices(actions, n_limbs)
+    return spaces.MultiDiscrete([n_choices] * numbers) if actions == "limbs" else spaces.Discrete(n_choices)
+
+
+def choices(actions: Actions, n_limbs: int) -> tuple[int, int]:
+    """Count of the numbers that one action consists of, and of the values that each can take (from 0 on)."""
     require_choice("actions", actions, get_args(Actions))
-    if actions == "limbs":
-        return spaces.MultiDiscrete([3] * n_limbs)
-    return spaces.Discrete(len(command_table(actions, n_limbs)))
+    return (n_limbs, len(LIMB_COMMANDS)) if actions == "limbs" else (1, len(command_table(actions, n_limbs)))
 
 
 def command_table(actions: Actions, n_limbs: int) -> NDArray[np.float64]:
-    """Command of every action of a `Discrete` space, shape (n_actions, n_limbs), values -1, 0, 1; read-only.
+    """Commands of all actions of a `Discrete` space, shape (n_actions, n_limbs), values -1, 0, 1; read-only.
 
     "joint": every command, limb 1 varying slowest, each limb in the order 0, +, -. "pairs": no limb, then every pair
     of one + and one - limb. "limbs" has no table: it is one action per limb.
@@ -57,7 +61,7 @@ def _command_table(actions: Actions, n_limbs: int) -> NDArray[np.float64]:
 
 
 def as_array(value: object) -> NDArray[Any]:
-    """The value as an array; rows of different lengths as one of objects, so that they can be refused in a sentence."""
+    """Value as an array; an array of objects for rows of different lengths, so that they are refused in a sentence."""
     try:
         return np.asarray(value)
     except ValueError:
@@ -68,7 +72,7 @@ def to_commands(actions: Actions, n_limbs: int, action: object, n_robots: int) -
     """Commands of `n_robots` robots, shape (n_robots, n_limbs), or ValueError for what is not an action of theirs."""
     array = as_array(action)
     shape = (n_robots, n_limbs) if actions == "limbs" else (n_robots,)
-    n_choices = 3 if actions == "limbs" else len(command_table(actions, n_limbs))
+    _, n_choices = choices(actions, n_limbs)
     if array.dtype.kind not in "iu" or array.shape != shape:
         raise ValueError(
             f'With actions="{actions}" the actions of {n_robots} robot(s) are whole numbers of shape {shape}, '

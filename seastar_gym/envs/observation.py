@@ -1,21 +1,21 @@
-"""What a controller sees: node states, hub velocity and waypoints, in a frame that turns with the robot.
+"""Observation of a robot: states of its nodes, velocity of the hub and waypoints, in a frame that turns with it.
 
-The body frame has its origin at the hub; its x axis is the direction of limb 1 of the rest shape after the rotation
-that fits the rest shape best to the nodes (least squares over all nodes). Every number is of order one; the unit
-of lengths is the robot's own limb length:
+The body frame has its origin at the hub. Its x axis is the direction of limb 1 of the rest shape, after the rotation
+that fits the rest shape best to the nodes (least squares over all nodes). Every number is of order one; lengths are in
+units of the robot's own limb length:
 
-index                 what                                              unit
+index                 meaning                                           unit
 0 .. 2m-1             node positions relative to the hub, x and y       limb lengths
 2m .. 4m-1            node velocities relative to the hub, x and y      VELOCITY_SCALE
 4m, 4m+1              hub velocity, x and y                             VELOCITY_SCALE
 4m+2, 4m+3            current waypoint relative to the hub, x and y     limb lengths
 4m+4, 4m+5            next waypoint relative to the hub, x and y        limb lengths
 
-Where actuators remember something (a `StatefulActuator`), what its `observe` says of limb 1, limb 2.. stands before the
-waypoints, which are the last four numbers always. `Layout` names all these places.
-
 with m = n_nodes - 1 nodes in the order {1,1}..{1,N-1}, {2,1}.. (m = 45 for the chapter's robot: 186 numbers). On the
-last leg the next waypoint is the current one. The waypoint's distance is not clipped: its full length can be read.
+last leg the next waypoint is the current one. Distances of waypoints are not clipped.
+
+If actuators have a memory (a `StatefulActuator`), the numbers of its `observe` for limb 1, limb 2, .. stand before the
+waypoints, which are always the last four numbers. `Layout` names all these places.
 """
 
 from functools import cache
@@ -30,13 +30,13 @@ from seastar_gym.simd.compilation import entry_point, kernel
 from seastar_gym.simd.lanes import add_product, borrow, load, select, splat, sqrt, store
 
 OBSERVATION_LAYOUT = 1
-"""Number of this table. A change of order, unit or frame makes it another one: saved policies say which they know."""
+"""Version of this table, which saved policies name. A change of order, unit or frame gives it another number."""
 VELOCITY_SCALE = 0.025
-"""[m/s]: nodes and hub move at 12 to 24 mm/s root mean square after strokes of random commands."""
+"""Unit of velocities [m/s]: nodes and hub move at 12 to 24 mm/s root mean square after strokes of random commands."""
 
 
 class Layout(NamedTuple):
-    """Places in an observation, as slices of its last axis; the table above says what stands there."""
+    """Places in an observation, as slices of its last axis; the table of this module tells their meaning."""
 
     positions: slice
     velocities: slice
@@ -47,12 +47,12 @@ class Layout(NamedTuple):
 
     @property
     def nodes_and_hub(self) -> slice:
-        """Positions, velocities and the hub's velocity: all that the rods are doing."""
+        """Place of the positions, the velocities and the hub's velocity."""
         return slice(0, self.hub_velocity.stop)
 
     @property
     def waypoints(self) -> slice:
-        """The current waypoint and the next."""
+        """Place of the current waypoint and the next."""
         return slice(self.current_waypoint.start, self.next_waypoint.stop)
 
     @property
@@ -87,7 +87,7 @@ def observation_size(n_nodes: int) -> int:
 
 
 def with_memory(observations: NDArray[Any], remembered: NDArray[Any]) -> NDArray[Any]:
-    """Observations (n, size) with what actuators remember, (n, k), put in its place; the same array where k = 0."""
+    """Observations, shape (n, size), with the memory of actuators, shape (n, k), in its place; unchanged if k = 0."""
     if remembered.shape[1] == 0:
         return observations
     bare = layout_of_size(observations.shape[1])

@@ -3,33 +3,42 @@
 A path is an array of waypoints [m], shape (n, 2), that the hub visits in order. It starts from the origin, where the
 hub rests after a reset; the origin is the start, not a waypoint, so a path that closes on itself ends with the waypoint
 (0, 0).
+
+A path of one's own needs no name: environments take arrays of waypoints. With a name it can be asked for by text:
+
+    @register_path("zigzag")
+    def zigzag(rng):
+        return np.array([[0.1, 0.1], [0.2, 0.0], [0.3, 0.1]])
+
+    env = gym.make("SeastarSwim-v0", path="zigzag")
 """
 
-from typing import Literal, TypeAlias, get_args
+from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-PathName: TypeAlias = Literal["pentagon", "square", "triangle", "line", "figure-eight", "random"]
-PATH_NAMES: tuple[PathName, ...] = get_args(PathName)
+Waypoints: TypeAlias = NDArray[np.float64]
+MakePath: TypeAlias = Callable[[np.random.Generator], Waypoints]
+
+PATHS: dict[str, MakePath] = {}
+"""Functions that make the waypoints [m], shape (n, 2), of the named paths, see `register_path`."""
 
 PENTAGON_SIDE = 0.1636
 """Side [m] of the pentagon that the scripted gait (13.15) traces: 45 strokes, then 5 at rest, per side."""
-SQUARE_SIDE = 0.2
-TRIANGLE_SIDE = 0.25
 LINE_LENGTH = 0.3
+"""Length of the path "line" [m]."""
 
 FIGURE_EIGHT_WIDTH = 0.4
+"""Width of the path "figure-eight" [m]."""
 FIGURE_EIGHT_WAYPOINTS = 16
 
 FARTHEST = 1e6
 """Largest coordinate of a waypoint [m], and largest radius: beyond it a stroke's progress is lost in rounding."""
 
-AIM = 0.7
-"""Share of a waypoint's radius that a way to go keeps to. A way that only touches the circle goes nowhere within it,
-and no stroke need ever end there."""
 TOUCH_BISECTIONS = 12
-"""Of the arc on which a way touches a waypoint's circle: the way errs by less than 1e-6 radii."""
+"""Bisections of the arc on which a route touches a waypoint's circle: its length errs by less than 1e-6 radii."""
 
 RANDOM_WAYPOINTS = 5
 RANDOM_LEG = (0.1, 0.2)
@@ -38,30 +47,74 @@ RANDOM_TURN = np.radians(120.0)
 """Largest turn [rad], to either side, from one leg of a random path to the next; the first leg is turned from +x."""
 
 
-def make_path(path: PathName | ArrayLike, rng: np.random.Generator) -> NDArray[np.float64]:
-    """The waypoints [m], shape (n, 2), of a path given by its name or as an array of waypoints [m].
+def register_path(name: str) -> Callable[[MakePath], MakePath]:
+    """Decorator that gives a path a name.
 
-    Only "random" draws from `rng`. The result is a fresh array. ValueError: an unknown name, or an array that is not
-    one or more finite points of the plane.
+    The decorated function gets the episode's random generator and returns the waypoints [m], shape (n, 2). ValueError:
+    another path has the name.
+    """
+
+    def register(make: MakePath) -> MakePath:
+        if PATHS.setdefault(name, make) is not make:
+            raise ValueError(f"There is a path of the name {name!r} already: give this one another name.")
+        return make
+
+    return register
+
+
+def make_path(path: str | ArrayLike, rng: np.random.Generator) -> Waypoints:
+    """Waypoints [m], shape (n, 2), a fresh array, of a path given by its name or as an array of waypoints [m].
+
+    rng: Generator of paths that are drawn, such as "random". ValueError: the name is unknown, or the array is not one
+    or more finite points of the plane.
     """
     if not isinstance(path, str):
         return _checked_waypoints(path)
-    match path:
-        case "pentagon":
-            return _regular_polygon(5, PENTAGON_SIDE)
-        case "square":
-            return _regular_polygon(4, SQUARE_SIDE)
-        case "triangle":
-            return _regular_polygon(3, TRIANGLE_SIDE)
-        case "line":
-            return np.array([[LINE_LENGTH, 0.0]])
-        case "figure-eight":
-            return _figure_eight(FIGURE_EIGHT_WIDTH, FIGURE_EIGHT_WAYPOINTS)
-        case "random":
-            return _random_path(rng)
-        case _:
-            names = ", ".join(PATH_NAMES)
-            raise ValueError(f"Unknown path {path!r}: choose one of {names}, or give an array of waypoints.")
+    if path not in PATHS:
+        raise ValueError(f"Unknown path {path!r}: choose one of {', '.join(PATHS)}, or give an array of waypoints.")
+    return _checked_waypoints(PATHS[path](rng))
+
+
+@register_path("pentagon")
+def pentagon(rng: np.random.Generator) -> Waypoints:
+    """Regular pentagon, anti-clockwise; the path of the chapter's scripted gait (13.15)."""
+    return _regular_polygon(5, PENTAGON_SIDE)
+
+
+@register_path("square")
+def square(rng: np.random.Generator) -> Waypoints:
+    """Square with sides of 0.2 m, anti-clockwise."""
+    return _regular_polygon(4, 0.2)
+
+
+@register_path("triangle")
+def triangle(rng: np.random.Generator) -> Waypoints:
+    """Equilateral triangle with sides of 0.25 m, anti-clockwise."""
+    return _regular_polygon(3, 0.25)
+
+
+@register_path("line")
+def line(rng: np.random.Generator) -> Waypoints:
+    """One waypoint on the x axis."""
+    return np.array([[LINE_LENGTH, 0.0]])
+
+
+@register_path("figure-eight")
+def figure_eight(rng: np.random.Generator) -> Waypoints:
+    """Gerono's lemniscate, from its crossing at the origin through both loops and back."""
+    n = FIGURE_EIGHT_WAYPOINTS
+    t = 2.0 * np.pi * np.arange(1, n + 1) / n
+    waypoints = FIGURE_EIGHT_WIDTH / 2.0 * np.column_stack([np.sin(t), np.sin(t) * np.cos(t)])
+    waypoints[[n // 2 - 1, -1]] = 0.0  # the crossing, exactly
+    return waypoints
+
+
+@register_path("random")
+def random(rng: np.random.Generator) -> Waypoints:
+    """Walk of RANDOM_WAYPOINTS legs, with lengths and turns drawn anew for every episode."""
+    legs = rng.uniform(*RANDOM_LEG, size=RANDOM_WAYPOINTS)
+    turns = rng.uniform(-RANDOM_TURN, RANDOM_TURN, size=RANDOM_WAYPOINTS)
+    return _walk(legs, np.cumsum(turns))
 
 
 def cross_track_error(position: ArrayLike, start: ArrayLike, end: ArrayLike) -> NDArray[np.float64]:
@@ -82,7 +135,7 @@ def cross_track_error(position: ArrayLike, start: ArrayLike, end: ArrayLike) -> 
 
 
 def path_length(start: ArrayLike, waypoints: ArrayLike) -> NDArray[np.float64]:
-    """Length [m], shape (...), of the way from start [m], shape (..., 2), through waypoints [m], shape (..., n, 2)."""
+    """Length [m], shape (...), of the path from start [m], shape (..., 2), through waypoints [m], shape (..., n, 2)."""
     start, waypoints = np.asarray(start, dtype=np.float64), np.asarray(waypoints, dtype=np.float64)
     first_leg = waypoints[..., 0, :] - start
     later_legs = np.diff(waypoints, axis=-2)
@@ -92,10 +145,11 @@ def path_length(start: ArrayLike, waypoints: ArrayLike) -> NDArray[np.float64]:
 
 
 def shortest_way(position: ArrayLike, waypoint: ArrayLike, after: ArrayLike, radius: float) -> NDArray[np.float64]:
-    """Length [m], shape (...), of the shortest way from position to `after` that comes within `radius` of waypoint.
+    """Length [m], shape (...), of the shortest route from position to `after` that comes within `radius` of waypoint.
 
-    position, waypoint, after: [m], shape (..., 2). The way touches the circle where it is reflected, between the
-    directions of position and `after`: bisection. It is straight where a straight way comes near enough.
+    position, waypoint, after: Points [m], shape (..., 2). radius: [m]. The route is straight where a straight line
+    comes near enough, and so wherever `after` equals waypoint. Otherwise it touches the circle where it is reflected,
+    at an angle between those of position and `after` that is found by bisection.
     """
     p, w, n = (np.asarray(point, dtype=np.float64) for point in (position, waypoint, after))
     p_x, p_y, n_x, n_y = p[..., 0] - w[..., 0], p[..., 1] - w[..., 1], n[..., 0] - w[..., 0], n[..., 1] - w[..., 1]
@@ -138,28 +192,14 @@ def _checked_waypoints(path: ArrayLike) -> NDArray[np.float64]:
     return waypoints
 
 
-def _regular_polygon(n_sides: int, side: float) -> NDArray[np.float64]:
-    """The corners from the second one round to the origin again: the first side along +x, turning left."""
+def _regular_polygon(n_sides: int, side: float) -> Waypoints:
+    """Corners [m], shape (n_sides, 2), from the second one to the origin again; the first side [m] lies along +x."""
     headings = 2.0 * np.pi / n_sides * np.arange(n_sides, dtype=np.float64)
     waypoints = _walk(np.full(n_sides, side), headings)
     waypoints[-1] = 0.0  # closes exactly, not to rounding
     return waypoints
 
 
-def _figure_eight(width: float, n_waypoints: int) -> NDArray[np.float64]:
-    """Gerono's lemniscate, from its crossing at the origin through both loops and back; n_waypoints must be even."""
-    t = 2.0 * np.pi * np.arange(1, n_waypoints + 1) / n_waypoints
-    waypoints = width / 2.0 * np.column_stack([np.sin(t), np.sin(t) * np.cos(t)])
-    waypoints[[n_waypoints // 2 - 1, -1]] = 0.0  # the crossing, exactly
-    return waypoints
-
-
-def _random_path(rng: np.random.Generator) -> NDArray[np.float64]:
-    legs = rng.uniform(*RANDOM_LEG, size=RANDOM_WAYPOINTS)
-    turns = rng.uniform(-RANDOM_TURN, RANDOM_TURN, size=RANDOM_WAYPOINTS)
-    return _walk(legs, np.cumsum(turns))
-
-
 def _walk(legs: NDArray[np.float64], headings: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Where a walk from the origin, with legs [m] along headings [rad], turns."""
+    """Corners [m], shape (n, 2), of a walk from the origin with legs [m] along headings [rad], shape (n,) each."""
     return np.cumsum(legs[:, None] * np.column_stack([np.cos(headings), np.sin(headings)]), axis=0)

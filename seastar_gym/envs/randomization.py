@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import require_finite, require_number
+from seastar_gym.scene.checks import require_finite, require_number, shown
 from seastar_gym.scene.per_robot import numbers_of, with_numbers
 from seastar_gym.scene.serial import register_part
 
@@ -32,9 +32,9 @@ class Uniform:
         require_finite("low", self.low, "of its number")
         require_finite("high", self.high, "of its number")
         if not self.low <= self.high:
-            raise ValueError(f"low must not exceed high: {self.low!r} is more than {self.high!r}.")
+            raise ValueError(f"low must not exceed high: {shown(self.low)} is more than {shown(self.high)}.")
         if not math.isfinite(self.high - self.low):
-            raise ValueError(f"high - low must be finite: {self.low!r} and {self.high!r} are too far apart.")
+            raise ValueError(f"high - low must be finite: {shown(self.low)} and {shown(self.high)} are too far apart.")
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -108,10 +108,10 @@ class DomainRandomization:
 
     def __init__(self, distributions: Mapping[str, Distribution]):
         if not isinstance(distributions, Mapping) or not distributions:
-            raise ValueError(f"DomainRandomization needs distributions by name, not {distributions!r}.")
+            raise ValueError(f"DomainRandomization needs distributions by name, not {shown(distributions)}.")
         for name, distribution in distributions.items():
             if not isinstance(distribution, Distribution):
-                raise ValueError(f"{name} needs a Uniform, LogUniform or Normal, not {distribution!r}.")
+                raise ValueError(f"{name} needs a Uniform, LogUniform or Normal, not {shown(distribution)}.")
         strength = distributions.get(LIMB_STRENGTHS)
         if strength is not None and not (strength.bounds[0] >= 0.0 and strength.bounds[1] <= 1.0):
             raise ValueError(f"limb_strengths must be drawn from 0 to 1, not from {strength.bounds}.")
@@ -136,11 +136,11 @@ class DomainRandomization:
         for name in numbers:
             if name not in known:
                 raise ValueError(
-                    f"The scene has no number {name!r} to draw: it has {', '.join(known)}, {LIMB_STRENGTHS}."
+                    f"The scene has no number {shown(name)} to draw: it has {', '.join(known)}, {LIMB_STRENGTHS}."
                 )
         bounds = {name: self.distributions[name].bounds for name in numbers}
         lowest = {name: low for name, (low, _) in bounds.items()}
-        # What a scene forbids it forbids of one number, of two together, or of all if they are large.
+        # Scene checks involve one number, a pair, or all at their maxima: testing those bounds suffices.
         with_numbers(scene, {name: high for name, (_, high) in bounds.items()})
         for first, second in itertools.combinations_with_replacement(numbers, 2):
             for pair in itertools.product(bounds[first], bounds[second]):

@@ -1,4 +1,4 @@
-"""`SeastarSwim-v0`: one robot."""
+"""`SeastarSwim-v0`: the environment of one robot. Its docstring is the contract that users read."""
 
 import contextlib
 from collections.abc import Generator, Iterator
@@ -6,87 +6,118 @@ from typing import Any, Literal
 
 import gymnasium as gym
 import numpy as np
-from gymnasium import spaces
 from numpy.typing import NDArray
 
-from seastar_gym.envs.commands import Actions, action_space, command_table, to_commands
+from seastar_gym.envs.commands import Actions, to_commands
 from seastar_gym.envs.randomization import DomainRandomization
-from seastar_gym.envs.rendering import Frame, Renderer, limb_nodes
+from seastar_gym.envs.rendering import Frame, Renderer, renderer_of
 from seastar_gym.envs.reward import RewardWeights
-from seastar_gym.envs.spec import PlainSpec
 from seastar_gym.envs.task import Outcome, Path, Plain, SwimTask, make_scene
+from seastar_gym.envs.task_env import TaskEnv, checked_options
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import require_choice, require_count, require_seed, shown
+from seastar_gym.scene.checks import require_choice, require_count, require_seed
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.simulator import Simulator
 
 FRAMES_PER_STROKE = 10
 Observation = NDArray[np.float32]
 
 
-class SeastarSwimEnv(PlainSpec, gym.Env[Observation, Any]):
-    """A five-limb soft robot, driven by shape memory alloy actuators, swims along waypoints.
+class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
+    """Environment of a five-limb soft robot that swims along waypoints, driven by shape memory alloy (SMA) actuators.
 
-    ## Action
-    One step is one stroke: the chosen limbs are heated for 0.1 s and cool for 0.9 s (Fig. 13.5b).
+    The robot lies in a plane, and all its limbs meet in the hub. Limbs, nodes and angles are numbered and measured
+    anti-clockwise; node {i,j} is node j of limb i, counted from the hub. n is the number of limbs.
 
-    | `actions`           | space                     | meaning                                                    |
-    |---------------------|---------------------------|------------------------------------------------------------|
-    | `"limbs"` (default) | `MultiDiscrete([3] * n)`  | per limb: 0 rest, 1 actuate + (anti-clockwise), 2 actuate - |
-    | `"joint"`           | `Discrete(3**n)`          | one whole command; `command_table` lists them              |
-    | `"pairs"`           | `Discrete(1 + n (n - 1))` | no limb, or one + and one - limb; see `command_table`      |
+    ## Action space
+    A step is one stroke of 1 s: commanded limbs are heated for 0.1 s and turn about the hub by up to 36 degrees, then
+    they cool for 0.9 s and turn back (Fig. 13.5b). `actions` chooses how a command is written:
 
-    ## Observation
-    A `float32` vector in a body frame that turns with the robot; the table stands in `envs/observation.py`. For the
-    chapter's robot, 186 numbers:
+    | `actions` | space                     | index  | range      | meaning                                       |
+    |-----------|---------------------------|--------|------------|-----------------------------------------------|
+    | `"limbs"` | `MultiDiscrete([3] * n)`  | 0..n-1 | 0..2       | limb: 0 rest, 1 anti-clockwise, 2 clockwise   |
+    | `"joint"` | `Discrete(3**n)`          | -      | 0..3**n-1  | number of a command: every combination        |
+    | `"pairs"` | `Discrete(1 + n*(n - 1))` | -      | 0..n*(n-1) | number of a command: none, or one + and one - |
 
-    | index    | what                                                            | unit       | range       |
-    |----------|-----------------------------------------------------------------|------------|-------------|
-    | 0..89    | positions of nodes {1,1}..{5,9} relative to the hub, x and y    | 0.1 m      | (-inf, inf) |
-    | 90..179  | their velocities relative to the hub, x and y                   | 0.025 m/s  | (-inf, inf) |
-    | 180, 181 | velocity of the hub                                             | 0.025 m/s  | (-inf, inf) |
-    | 182, 183 | current waypoint relative to the hub                            | 0.1 m      | (-inf, inf) |
-    | 184, 185 | next waypoint relative to the hub (on the last leg the current) | 0.1 m      | (-inf, inf) |
+    Actions have no unit. `env.command_table[number]` is the command of every limb: 0, 1 (+) or -1 (-).
 
-    Where the scene's actuators remember something, such as the temperatures of `ThermalSma`, that stands before the
-    waypoints, limb after limb.
+    ## Observation space
+    `Box(-inf, inf, (186,), float32)` for the chapter's robot. Vectors are seen in a body frame: its origin is the hub,
+    and its x axis turns with the robot, see `seastar_gym.envs.observation`. Lengths are in units of the limb's length:
+
+    | index    | meaning                                                              | unit      | range       |
+    |----------|----------------------------------------------------------------------|-----------|-------------|
+    | 0..89    | positions relative to the hub of nodes {1,1}..{5,9}: x, y, x, y, ..  | 0.1 m     | (-inf, inf) |
+    | 90..179  | velocities relative to the hub of nodes {1,1}..{5,9}: x, y, x, y, .. | 0.025 m/s | (-inf, inf) |
+    | 180..181 | velocity of the hub: x, y                                            | 0.025 m/s | (-inf, inf) |
+    | 182..183 | current waypoint relative to the hub: x, y                           | 0.1 m     | (-inf, inf) |
+    | 184..185 | next waypoint relative to the hub: x, y; on the last leg the current | 0.1 m     | (-inf, inf) |
+
+    Other robots have other numbers of nodes. If a scene's actuators have a memory, such as the temperatures of
+    `ThermalSma`, it stands before the waypoints, limb after limb. `seastar_gym.envs.observation.Layout` names all
+    these places.
 
     ## Reward
-    `reward_progress` (metres by which the way to go became shorter: the shortest one that passes the current waypoint
-    well within `waypoint_radius`, then from waypoint to waypoint) + `reward_waypoint` (waypoints reached) +
-    `reward_effort` (minus the limbs heated), with the weights in `RewardWeights`; the terms are in `info`.
+    The sum of three terms, with the weights of `RewardWeights`; each term is in `info`, too:
+
+    | term              | meaning                                                      | default weight |
+    |-------------------|--------------------------------------------------------------|----------------|
+    | `reward_progress` | decrease of the length of the route to the last waypoint [m] | 200 per metre  |
+    | `reward_waypoint` | waypoints reached in the stroke                              | 1 per waypoint |
+    | `reward_effort`   | minus the limbs heated in the stroke                         | 0.01 per limb  |
+
+    The route is the shortest one that passes the current waypoint within 0.7 of its radius (`RewardWeights.aim`) on the
+    way to the next, and leads from centre to centre after that.
 
     ## Info
-    `time` [s], `hub_position` [m], `waypoint_index` (waypoints reached so far), `distance` [m] from the hub to the
-    current waypoint, `cross_track_error` [m] from the leg it is on, `is_success`, `limbs_heated`, `newton_iterations`,
-    `solver_status` (0: converged), `smallest_opening_angle` [rad] between neighbouring limbs during the stroke (below
-    zero: limbs crossed, which this scene allows), and the reward's terms. `solver_message` says what to do about a
-    status other than 0, and is empty for 0. `path_error` (by what share of its length the hub's path may be off) and
-    `real_time_factor` (in batch, on one core) are what was measured of the fidelity, see
-    `seastar_gym.scene.fidelity`; NaN for other robots and scenes. A reset gives the same names as a step, with zeros
-    for what only a stroke can tell.
+    A reset gives the same entries as a step, with zeros for counts and an empty message.
 
-    ## Episode
-    Starts at rest with the hub at the origin. `terminated` when the last waypoint is reached, or when the solver gave
-    up (never seen within a scene's limits; the observation is then the last good one). `truncated` by the time limit.
+    | name                     | type       | unit | meaning                                                          |
+    |--------------------------|------------|------|------------------------------------------------------------------|
+    | `time`                   | float      | s    | simulated time since the reset                                   |
+    | `hub_position`           | array (2,) | m    | position of the hub in the world: x, y                           |
+    | `waypoint_index`         | int        | 1    | number of waypoints reached so far                               |
+    | `distance`               | float      | m    | distance of the hub from the current waypoint                    |
+    | `cross_track_error`      | float      | m    | distance of the hub from the current leg of the path             |
+    | `path_error`             | float      | 1    | measured error of the hub's path, as a fraction of its length    |
+    | `real_time_factor`       | float      | 1    | measured simulated time per computing time, batch on one core    |
+    | `is_success`             | bool       | -    | whether the last waypoint is reached                             |
+    | `limbs_heated`           | int        | 1    | number of limbs heated in the stroke                             |
+    | `newton_iterations`      | int        | 1    | Newton iterations of the stroke                                  |
+    | `solver_status`          | int        | -    | `SolverStatus` of the stroke, 0: converged                       |
+    | `solver_message`         | str        | -    | what to do about a status other than 0; empty for 0              |
+    | `smallest_opening_angle` | float      | rad  | smallest angle between neighbouring limbs; below 0: they crossed |
+    | `reward_progress`        | float      | 1    | term of the reward                                               |
+    | `reward_waypoint`        | float      | 1    | term of the reward                                               |
+    | `reward_effort`          | float      | 1    | term of the reward                                               |
+
+    `path_error` and `real_time_factor` belong to the fidelity (see `seastar_gym.scene.fidelity`) and are NaN for other
+    robots and scenes than the chapter's. With `randomization`, `info` has the drawn numbers by their names, too.
+
+    ## Starting state
+    The robot rests with its hub at the origin and limb 1 along +x, or in a random direction with `random_heading`.
+
+    ## Episode end
+    `terminated`: the last waypoint is reached, or the solver failed, which has never been seen within a scene's limits;
+    the observation is then of the last good state. `truncated`: the time limit of `gym.make`, by default 400 strokes.
 
     ## Arguments
-    path: "pentagon", "square", "triangle", "line", "figure-eight", "random", or waypoints [m] of shape (n, 2); also
-        through `reset(options={"path": ...})`, for that episode.
-    actions: see above.
-    fidelity: "fast", "balanced" (default), "accurate", "reference" or "chapter". Where `scene` names its numerics,
-        those hold, and another fidelity is refused.
-    scene: What is modelled; the chapter's robot in water by default.
+    path: Name of a path - "pentagon", "square", "triangle", "line", "figure-eight", "random", or one that
+        `seastar_gym.envs.paths.register_path` added - or waypoints [m], shape (n, 2), from the origin.
+        `reset(options={"path": ...})` chooses another path for one episode.
+    actions: How commands are written: "limbs", "joint" or "pairs", see above.
+    fidelity: Accuracy of the simulation: "fast", "balanced" (default), "accurate", "reference" or "chapter". If `scene`
+        names its numerics, they are used, and another fidelity is refused.
+    scene: Robot, actuators, fluid and numerics; by default the chapter's robot in water.
     reward: Weights of the reward's terms.
-    waypoint_radius: A waypoint is reached within this distance [m].
-    random_heading: Turn the robot at random at the start of every episode; otherwise limb 1 points along +x.
-    render_mode: "rgb_array" draws the end of a stroke, "rgb_array_list" collects `frames_per_stroke` frames in every
-        stroke, "human" shows as many in a window.
-    frames_per_stroke: See render_mode; at equal times, the last one at the end of the stroke.
-    randomization: Numbers of the scene that are drawn at the start of every episode; `info` has them by name.
+    waypoint_radius: Distance of the hub [m] within which a waypoint is reached.
+    random_heading: Whether the robot is turned at random at the start of every episode.
+    render_mode: "rgb_array": `render` returns a picture of the end of the stroke. "rgb_array_list": `render` returns
+        `frames_per_stroke` pictures of the stroke. "human": a window shows as many.
+    frames_per_stroke: Number of pictures of a stroke, at equal intervals; the last shows the end of the stroke.
+    randomization: Distributions of numbers of the scene that are drawn at the start of every episode.
 
-    scene, reward and randomization may be in plain form, as `Scene.to_dict` and
-    `seastar_gym.scene.serial.to_dict` write them. `spec` has them so:
+    `scene`, `reward` and `randomization` may be given as plain data, as `Scene.to_dict` and
+    `seastar_gym.scene.serial.to_dict` write them. `env.spec` has them so:
     `gym.make(EnvSpec.from_json(env.spec.to_json()))` is the same environment.
     """
 
@@ -111,35 +142,14 @@ class SeastarSwimEnv(PlainSpec, gym.Env[Observation, Any]):
         self.render_mode = render_mode
         self.frames_per_stroke = frames_per_stroke
         self.metadata = {**self.metadata, "render_fps": frames_per_stroke}
-        self.actions = actions
-        self._task = SwimTask(
-            make_scene(scene, fidelity), 1, path, reward, waypoint_radius, random_heading, 1, randomization
-        )
-        n_limbs = self.scene.robot.n_limbs
-        self.action_space = action_space(actions, n_limbs)
-        size = self._task.observation_size
-        self.observation_space = spaces.Box(-np.inf, np.inf, (size,), np.float32)
-        self.command_table = None if actions == "limbs" else command_table(actions, n_limbs)
+        modelled = make_scene(scene, fidelity)
+        task = SwimTask(modelled, 1, path, reward, waypoint_radius, random_heading, 1, randomization)
+        self.action_space, self.observation_space = self._set_task(task, actions)
         self._running = False
-        self._command = np.zeros(n_limbs)
+        self._command = np.zeros(self.scene.robot.n_limbs)
         self._trail = np.zeros((0, 2))
         self._frames: list[NDArray[np.uint8]] = []
         self._renderer: Renderer | None = None
-
-    @property
-    def scene(self) -> Scene:
-        """What is modelled, before anything is drawn by `randomization`."""
-        return self._task.scene
-
-    @property
-    def randomization(self) -> DomainRandomization | None:
-        """Numbers of the scene that are drawn for every episode."""
-        return self._task.randomization
-
-    @property
-    def simulator(self) -> Simulator:
-        """The simulator, with one robot."""
-        return self._task.simulator
 
     @property
     def waypoints(self) -> NDArray[np.float64]:
@@ -149,7 +159,10 @@ class SeastarSwimEnv(PlainSpec, gym.Env[Observation, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begin an episode. options: {"path": name or waypoints [m]} for this episode."""
+        """Begin an episode; returns its first observation and info.
+
+        seed: Seed of paths, headings and drawn numbers. options: {"path": name or waypoints [m]} for this episode.
+        """
         require_seed(seed)
         super().reset(seed=None if seed is None else int(seed))
         with self._until_whole():
@@ -165,7 +178,7 @@ class SeastarSwimEnv(PlainSpec, gym.Env[Observation, Any]):
         return self._task.observe()[0], _of_one_robot(self._task.first_info())
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """One stroke."""
+        """Swim one stroke; returns observation, reward, terminated, truncated and info."""
         if not self._running:
             raise gym.error.ResetNeeded(
                 "The episode has not begun, is over or was interrupted: call reset() before step()."
@@ -180,7 +193,7 @@ class SeastarSwimEnv(PlainSpec, gym.Env[Observation, Any]):
 
     @contextlib.contextmanager
     def _until_whole(self) -> Iterator[None]:
-        """Around a step or reset: if it is interrupted, robot and task may have come differently far."""
+        """Context of a step or reset: after an interruption, robot and task disagree, and only a reset helps."""
         was_running, self._running = self._running, False
         try:
             yield
@@ -229,17 +242,11 @@ class SeastarSwimEnv(PlainSpec, gym.Env[Observation, Any]):
     def _get_renderer(self) -> Renderer:
         if self._renderer is None:
             robot = self.simulator.scene.of_robot(0).robot
-            self._renderer = Renderer(
-                limb_nodes(robot.n_limbs, robot.nodes_per_limb),
-                self.waypoints,
-                limb_length=robot.limb_length,
-                rod_radius=robot.rod_radius,
-                waypoint_radius=self._task.waypoint_radius,
-            )
+            self._renderer = renderer_of(robot, self.waypoints, self._task.waypoint_radius)
         return self._renderer
 
     def render(self) -> NDArray[np.uint8] | list[NDArray[np.uint8]] | None:  # type: ignore[override]
-        """The picture, shape (720, 960, 3), or those of the last stroke ("rgb_array_list"), or None ("human")."""
+        """Picture, shape (720, 960, 3); "rgb_array_list": those since the last call; "human": None."""
         if self.render_mode is None:
             gym.logger.warn('render() without a render_mode draws nothing: make the environment with "rgb_array".')
             return None
@@ -257,16 +264,6 @@ class SeastarSwimEnv(PlainSpec, gym.Env[Observation, Any]):
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_renderer": None}
-
-
-def checked_options(options: dict[str, Any] | None, known: set[str]) -> dict[str, Any]:
-    """Options of a reset; a name that means nothing is refused, not ignored."""
-    if options is not None and not isinstance(options, dict):
-        raise ValueError(f"options must be a dictionary with any of {sorted(known)}, or None, not {shown(options)}.")
-    unknown = set(options or {}) - known
-    if unknown:
-        raise ValueError(f"Unknown reset option(s) {shown(sorted(unknown, key=str))}: known are {sorted(known)}.")
-    return options or {}
 
 
 def _of_one_robot(info: dict[str, NDArray[Any]]) -> dict[str, Any]:

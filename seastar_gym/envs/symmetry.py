@@ -28,6 +28,7 @@ from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import StatefulActuator
+from seastar_gym.scene.checks import shown
 
 Elements = NDArray[np.intp]
 
@@ -238,7 +239,7 @@ def _of_symmetric(env: Any) -> tuple[Actions, int]:
     """Action mode and number of limbs of an environment, or of a batch of them; ValueError if it is not symmetric."""
     inner = getattr(env, "unwrapped", env)
     if not isinstance(inner, SeastarSwimEnv | SeastarSwimVectorEnv):
-        raise ValueError(f"Symmetry is known of SeastarSwim-v0 alone, not of {inner!r}.")
+        raise ValueError(f"Symmetry is known of SeastarSwim-v0 alone, not of {shown(inner)}.")
     require_symmetry(inner.scene, inner.randomization)
     return inner.actions, inner.scene.robot.n_limbs
 

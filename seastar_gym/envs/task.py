@@ -16,11 +16,11 @@ from seastar_gym.envs.observation import (
     to_float32,
     with_memory,
 )
-from seastar_gym.envs.paths import AIM, FARTHEST, PathName, cross_track_error, make_path, shortest_way
+from seastar_gym.envs.paths import FARTHEST, cross_track_error, make_path
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, drawn_scene
 from seastar_gym.envs.reward import RewardWeights, reward_terms
 from seastar_gym.scene import Numerics, Scene
-from seastar_gym.scene.checks import require_flag, require_number
+from seastar_gym.scene.checks import require_flag, require_number, shown
 from seastar_gym.scene.fidelity import measured
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.serial import Part, from_dict
@@ -28,15 +28,16 @@ from seastar_gym.simd.rows import to_rows
 from seastar_gym.simulator import Simulator, SolverStatus, StrokeReport
 
 Floats = NDArray[np.float64]
-Path = PathName | ArrayLike
+Path = str | ArrayLike
+"""Path by its name, or waypoints [m], shape (n, 2)."""
 Plain = dict[str, Any]
-"""A part of a scene, or of the task, as plain data, see `seastar_gym.scene.serial`."""
+"""Part of a scene, or of the task, as plain data, see `seastar_gym.scene.serial`."""
 
 DEFAULT_FIDELITY: Fidelity = "balanced"
 
 
 class Outcome(NamedTuple):
-    """What a stroke did for the task; arrays over robots."""
+    """Reward, end and info of a stroke; arrays over robots."""
 
     reward: Floats
     terminated: NDArray[np.bool_]
@@ -44,31 +45,31 @@ class Outcome(NamedTuple):
 
 
 def make_scene(scene: Scene | Plain | None, fidelity: Fidelity | None) -> Scene:
-    """The scene with the numerics that it names, else with those of `fidelity`, which is "balanced" by default.
+    """Scene with the numerics that it names, otherwise with those of `fidelity`, by default "balanced".
 
     ValueError where scene and fidelity name different ones.
     """
     scene = Scene() if scene is None else read(scene, Scene)
     if not isinstance(scene, Scene):
-        raise ValueError(f"scene must be a Scene, not {scene!r}.")
+        raise ValueError(f"scene must be a Scene, not {shown(scene)}.")
     if fidelity is None and scene.numerics.named:
         return scene
     numerics = Numerics.preset(DEFAULT_FIDELITY if fidelity is None else fidelity)
     if scene.numerics.named and scene.numerics != numerics:
         raise ValueError(
-            f'fidelity="{fidelity}" contradicts the numerics that the scene names, {scene.numerics!r}: '
+            f'fidelity="{fidelity}" contradicts the numerics that the scene names, {shown(scene.numerics)}: '
             "give one of them."
         )
     return replace(scene, numerics=numerics)
 
 
 def read(part: Part | Plain, kind: type[Any]) -> Part:
-    """The part, whether it comes as it is or in plain form."""
+    """Part that was given as an object or in plain form."""
     return from_dict(part, kind) if isinstance(part, dict) else part
 
 
 def promised(scene: Scene) -> dict[str, float]:
-    """What was measured of the scene's numerics, see `fidelity.Promise`; NaN for other scenes than the chapter's."""
+    """Measured path error and speed of the scene's numerics, as `info` names them; NaN for scenes not measured."""
     known = measured(scene.numerics) if replace(scene, numerics=Numerics()) == Scene() else None
     return {
         "path_error": math.nan if known is None else known.path_error,
@@ -82,7 +83,7 @@ def scene_observation_size(scene: Scene) -> int:
 
 
 class SwimTask:
-    """`n_robots` robots that swim along waypoints.
+    """Task of `n_robots` robots that swim along waypoints, for the arguments see `SeastarSwimEnv`.
 
     Every robot has its own path and its own generator, so a robot of a batch does what it would do alone.
     """
@@ -100,13 +101,13 @@ class SwimTask:
     ):
         randomization, reward = read(randomization, DomainRandomization), read(reward, RewardWeights)
         if not isinstance(randomization, DomainRandomization | None):
-            raise ValueError(f"randomization must be a DomainRandomization or None, not {randomization!r}.")
+            raise ValueError(f"randomization must be a DomainRandomization or None, not {shown(randomization)}.")
         require_number("waypoint_radius", waypoint_radius, "m")
         if waypoint_radius > FARTHEST:
-            raise ValueError(f"waypoint_radius must be at most {FARTHEST:g} m, not {waypoint_radius!r}.")
+            raise ValueError(f"waypoint_radius must be at most {FARTHEST:g} m, not {shown(waypoint_radius)}.")
         require_flag("random_heading", random_heading)
         if not isinstance(reward, RewardWeights):
-            raise ValueError(f"reward must be RewardWeights, not {reward!r}.")
+            raise ValueError(f"reward must be RewardWeights, not {shown(reward)}.")
         waypoints = make_path(path, np.random.default_rng(0))  # refuses a bad path now, not at the first reset
         self.scene, self.randomization = scene, randomization
         self.drawn = {} if randomization is None else randomization.first_values(scene, n_robots)
@@ -133,7 +134,10 @@ class SwimTask:
         return scene_observation_size(self.simulator.scene)
 
     def reset(self, robots: NDArray[np.bool_], generators: list[np.random.Generator], path: Path | None = None) -> None:
-        """Begin a new episode for the robots in the mask; their generators draw path, heading, then numbers."""
+        """Begin a new episode of the robots in a mask, shape (n_robots,).
+
+        generators: Random generator of every robot, which draws its path, its heading, then numbers of its scene.
+        """
         headings = np.zeros(self.n_robots)
         for robot in np.flatnonzero(robots):
             self._set_path(robot, make_path(self.path if path is None else path, generators[robot]))
@@ -173,16 +177,14 @@ class SwimTask:
         return np.where((k < 0)[:, None], 0.0, found)
 
     def _measure_way_to_go(self, hub: Floats) -> Floats:
-        """The shortest way through the current waypoint's circle to the next waypoint, then from centre to centre.
+        """Length [m], shape (n_robots,), of the rewarded route from hub positions [m], shape (n_robots, 2), to the end.
 
-        A way to the centre of every waypoint would pay for corners that need not be swum.
+        It passes the circle of the current waypoint on the way to the next; from there it leads from centre to centre.
+        A route through the centre of the current waypoint would pay for corners that need not be swum.
         """
-        k = np.minimum(self.waypoint_index, self.n_waypoints - 1)
-        after = np.minimum(k + 1, self.n_waypoints - 1)
-        current, robots = self._waypoint(k), np.arange(self.n_robots)
-        last = _length(current - hub)
-        through = shortest_way(hub, current, self._waypoint(after), AIM * self.waypoint_radius)
-        return np.where(k == after, last, through + self._way_after[robots, after])
+        k, robots = self.waypoint_index, np.arange(self.n_robots)
+        to_next = self.reward.way_to_next(hub, self._waypoint(k), self._waypoint(k + 1), self.waypoint_radius)
+        return to_next + self._way_after[robots, np.minimum(k + 1, self.n_waypoints - 1)]
 
     def observe(self) -> NDArray[np.float32]:
         """Observations, shape (n_robots, size), a fresh array; see observation.py."""
@@ -199,7 +201,7 @@ class SwimTask:
         return self._judge(commands, self.simulator.stroke(commands))
 
     def step_in_parts(self, commands: Floats, parts: int) -> Generator[float, None, Outcome]:
-        """One stroke that pauses to be looked at; yields the time in it [s]. The Outcome is its return value."""
+        """One stroke in `parts` parts; yields the time since it began [s] after each, and returns the Outcome."""
         report = yield from self.simulator.stroke_in_parts(commands, parts)
         return self._judge(commands, report)
 
@@ -225,7 +227,7 @@ class SwimTask:
         return Outcome(reward, success | (report.status != SolverStatus.CONVERGED), info)
 
     def first_info(self) -> dict[str, NDArray[Any]]:
-        """What there is to tell before the first stroke, by the names and in the types of a stroke's info."""
+        """Info before the first stroke, with the names and types of a stroke's info."""
         counts = np.zeros(self.n_robots, np.int64)
         return {
             **self.facts(),
@@ -239,7 +241,7 @@ class SwimTask:
         }
 
     def _pass_waypoints(self, hub: Floats) -> NDArray[np.int64]:
-        """Move on to the next waypoint as often as the current one is within reach; returns how often."""
+        """Move on while the current waypoint is within its radius; returns the number reached, shape (n_robots,)."""
         reached = np.zeros(self.n_robots, np.int64)
         while True:
             near = _length(self._waypoint(self.waypoint_index) - hub) <= self.waypoint_radius
@@ -250,7 +252,7 @@ class SwimTask:
             reached += near
 
     def facts(self, hub: Floats | None = None) -> dict[str, NDArray[Any]]:
-        """Where every robot is on its path; arrays over robots, units as in the environment's docstring."""
+        """Place of every robot on its path; arrays over robots, units as in the environment's docstring."""
         hub = self.simulator.hub_position() if hub is None else hub
         current = self._waypoint(self.waypoint_index)
         leg = np.minimum(self.waypoint_index, self.n_waypoints - 1)
@@ -265,7 +267,7 @@ class SwimTask:
         }
 
     def _promised(self) -> dict[str, Floats]:
-        """What was measured of the scene that the simulator has now; NaN for robots with weak limbs."""
+        """Measured path error and speed, shape (n_robots,) each; NaN for robots with weak limbs."""
         simulator = self.simulator
         if simulator.scene is not self._promise[0]:
             self._promise = simulator.scene, promised(simulator.scene)
@@ -274,7 +276,7 @@ class SwimTask:
 
 
 def _messages(status: NDArray[np.int64]) -> NDArray[Any]:
-    """What to do about a status, shape (n_robots,); empty where the solver converged."""
+    """Sentences on what to do about each status, shape (n_robots,); empty where the solver converged."""
     messages = np.full(len(status), "", dtype=object)
     for robot in np.flatnonzero(status != SolverStatus.CONVERGED):
         messages[robot] = SolverStatus(status[robot]).sentence

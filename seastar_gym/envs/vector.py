@@ -1,4 +1,4 @@
-"""`SeastarSwim-v0` as a native batch: all robots of one simulator, the same numbers as one environment each."""
+"""`SeastarSwim-v0` as a native batch: all robots in one simulator, with the bits of one environment each."""
 
 import contextlib
 from collections.abc import Iterable, Iterator
@@ -6,48 +6,50 @@ from typing import Any, Literal
 
 import gymnasium as gym
 import numpy as np
-from gymnasium import spaces
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from seastar_gym.envs.batch_attributes import BatchAttributes
+from seastar_gym.envs.batch_info import Info, of_some, with_masks
 from seastar_gym.envs.batch_pictures import BatchPictures, Picture
-from seastar_gym.envs.commands import Actions, action_space, as_array, command_table, to_commands
+from seastar_gym.envs.commands import Actions, as_array, to_commands
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.reward import RewardWeights
-from seastar_gym.envs.seastar_swim import FRAMES_PER_STROKE, checked_options
-from seastar_gym.envs.spec import PlainSpec
+from seastar_gym.envs.seastar_swim import FRAMES_PER_STROKE
 from seastar_gym.envs.task import Path, Plain, SwimTask, make_scene
+from seastar_gym.envs.task_env import checked_options
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import require_choice, require_count, require_seed
+from seastar_gym.scene.checks import require_choice, require_count, require_seed, shown
 from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.simulator import Simulator
 from seastar_gym.simulator.simulator import MAX_ROBOTS
 
 Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]
-Info = dict[str, Any]
 
 
-class SeastarSwimVectorEnv(PlainSpec, gym.vector.VectorEnv[Observations, Any, Any]):
-    """`num_envs` robots side by side; spaces, rewards, info and arguments are those of `SeastarSwimEnv`.
+class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, Any, Any]):
+    """Environment of `num_envs` robots side by side; `SeastarSwimEnv` documents spaces, rewards, info and arguments.
 
-    Robot i has the seed `seed + i` and then does to the last bit what `SeastarSwimEnv` does with that seed and the same
-    actions.
+    Robot i has the seed `seed + i` and does to the last bit what `SeastarSwimEnv` does with that seed and the same
+    actions. Arrays of actions, observations, rewards and flags have a first axis of length `num_envs`, and so have the
+    entries of `info`; `info["_name"]` is the mask of the robots for which `info["name"]` is valid.
 
+    ## Arguments besides those of `SeastarSwimEnv`
+    num_envs: Number of robots.
     max_episode_steps: Time limit [strokes], applied here; None for none.
-    autoreset_mode: NEXT_STEP (default): the step after the end of an episode ignores its action and returns the first
-        observation of the next one with reward 0. SAME_STEP: the step that ends an episode returns the next one's first
-        observation, and its own last one in `info["final_obs"]`, `info["final_info"]`. DISABLED: `reset` with
-        `options={"reset_mask": ...}` before the next step.
-    threads: Threads of the simulator; all processors if None.
-    render_mode: "rgb_array": `render` draws every robot after its stroke, the smaller the more there are;
+    autoreset_mode: When an episode that is over is followed by the next one. NEXT_STEP (default): the next step ignores
+        the robot's action and returns the first observation of its next episode with reward 0. SAME_STEP: the step that
+        ends an episode returns the first observation of the next one, and puts the last observation and info into
+        `info["final_obs"]` and `info["final_info"]`. DISABLED: `reset` with `options={"reset_mask": ...}` is needed
+        before the next step.
+    threads: Number of threads of the simulator; by default one for every processor.
+    render_mode: "rgb_array": `render` returns a picture of every robot, the smaller the more there are;
         `render_robots` draws some of them.
 
-    `call`, `get_attr` and `set_attr` are those of Gymnasium's `SyncVectorEnv`. What a robot has of its own
-    (`waypoints`, `scene`, `np_random`, `render`..) they give robot by robot; everything else is one and the same for
-    all robots.
+    `call`, `get_attr` and `set_attr` are those of Gymnasium's `SyncVectorEnv`. What each robot has for itself
+    (`waypoints`, `scene`, `np_random`, `render`, ..) they give robot by robot; everything else is common to all robots.
     """
 
     metadata = {
@@ -72,7 +74,8 @@ class SeastarSwimVectorEnv(PlainSpec, gym.vector.VectorEnv[Observations, Any, An
     ):
         if render_mode is not None and not (isinstance(render_mode, str) and render_mode == "rgb_array"):
             raise ValueError(
-                f'The batch draws with render_mode="rgb_array" only, not {render_mode!r}: use gym.make for one robot.'
+                f'The batch draws with render_mode="rgb_array" only, not {shown(render_mode)}: '
+                "use gym.make for one robot."
             )
         require_count("num_envs", num_envs, 1, MAX_ROBOTS)
         if max_episode_steps is not None:
@@ -82,47 +85,27 @@ class SeastarSwimVectorEnv(PlainSpec, gym.vector.VectorEnv[Observations, Any, An
         self.autoreset_mode = _checked_mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
-        self.actions = actions
-        self._task = SwimTask(
-            make_scene(scene, fidelity), num_envs, path, reward, waypoint_radius, random_heading, threads, randomization
-        )
-        n_limbs = self.simulator.scene.robot.n_limbs
-        self.single_action_space = action_space(actions, n_limbs)
+        modelled = make_scene(scene, fidelity)
+        task = SwimTask(modelled, num_envs, path, reward, waypoint_radius, random_heading, threads, randomization)
+        self.single_action_space, self.single_observation_space = self._set_task(task, actions)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self.single_observation_space = spaces.Box(-np.inf, np.inf, (self._task.observation_size,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.command_table = None if actions == "limbs" else command_table(actions, n_limbs)
         self._generators, self._seeds = map(list, zip(*(seeding.np_random(None) for _ in range(num_envs)), strict=True))
-        self._commands = np.zeros((num_envs, n_limbs))
+        self._commands = np.zeros((num_envs, modelled.robot.n_limbs))
         self._pictures = BatchPictures(self._task)
-        self._attributes: dict[str, tuple[Any, ...]] = {}
+        self._own_attributes: dict[str, tuple[Any, ...]] = {}
         self._elapsed = np.zeros(num_envs, np.int64)
         self._needs_reset = np.ones(num_envs, bool)
         self._has_begun = False
 
     @property
-    def scene(self) -> Scene:
-        """What is modelled, before anything is drawn by `randomization`."""
-        return self._task.scene
-
-    @property
-    def randomization(self) -> DomainRandomization | None:
-        """Numbers of the scene that are drawn for every episode."""
-        return self._task.randomization
-
-    @property
-    def simulator(self) -> Simulator:
-        """The simulator of all robots."""
-        return self._task.simulator
-
-    @property
     def waypoints(self) -> tuple[NDArray[np.float64], ...]:
-        """Waypoints of every robot's present episode [m], shape (n, 2) each."""
+        """Waypoints [m] of the present episode of every robot, shape (n, 2) each."""
         return tuple(map(self._task.waypoints_of, range(self.num_envs)))
 
     @property  # type: ignore[override]
     def np_random(self) -> tuple[np.random.Generator, ...]:
-        """What every robot's paths, headings and numbers are drawn from."""
+        """Random generator of every robot, which draws its paths, headings and numbers."""
         return tuple(self._generators)
 
     @np_random.setter  # type: ignore[override]
@@ -131,13 +114,17 @@ class SeastarSwimVectorEnv(PlainSpec, gym.vector.VectorEnv[Observations, Any, An
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
-        """The seed of every robot's generator."""
+        """Seed of the random generator of every robot."""
         return tuple(self._seeds)
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, Info]:
-        """Begin episodes. options: "path" (name or waypoints [m]), "reset_mask" (which robots, shape (num_envs,))."""
+        """Begin episodes; returns their first observations and infos.
+
+        seed: Seed of robot 0, followed by those of the others, or a list with a seed for every robot. options: "path"
+        (name or waypoints [m]) and "reset_mask" (whether each robot begins an episode, shape (num_envs,)).
+        """
         chosen = checked_options(options, {"path", "reset_mask"})
         mask = self._checked_mask(chosen.get("reset_mask"))
         seeds = checked_seeds(seed, self.num_envs)
@@ -146,7 +133,7 @@ class SeastarSwimVectorEnv(PlainSpec, gym.vector.VectorEnv[Observations, Any, An
                 self._generators[robot], self._seeds[robot] = seeding.np_random(seeds[robot])
         with self._until_whole():
             self._begin_episodes(mask, chosen.get("path"))
-        return self._task.observe(), _with_masks(self._task.first_info(), mask)
+        return self._task.observe(), with_masks(self._task.first_info(), mask)
 
     def _checked_mask(self, mask: Any) -> Flags:
         if mask is None:
@@ -167,7 +154,7 @@ class SeastarSwimVectorEnv(PlainSpec, gym.vector.VectorEnv[Observations, Any, An
             self._pictures.begin(mask)
 
     def step(self, actions: Any) -> tuple[Observations, NDArray[np.float64], Flags, Flags, Info]:
-        """One stroke of every robot."""
+        """Swim one stroke with every robot; returns observations, rewards, terminated, truncated and info."""
         if not self._has_begun:
             raise gym.error.ResetNeeded("The episodes have not begun or were interrupted: call reset() before step().")
         if self.autoreset_mode is AutoresetMode.DISABLED and self._needs_reset.any():
@@ -183,7 +170,7 @@ class SeastarSwimVectorEnv(PlainSpec, gym.vector.VectorEnv[Observations, Any, An
 
     @contextlib.contextmanager
     def _until_whole(self) -> Iterator[None]:
-        """Around a step or reset: if it is interrupted, robots and task may have come differently far."""
+        """Context of a step or reset: after an interruption, robots and task disagree, and only a reset helps."""
         had_begun, self._has_begun = self._has_begun, False
         try:
             yield
@@ -217,59 +204,25 @@ class SeastarSwimVectorEnv(PlainSpec, gym.vector.VectorEnv[Observations, Any, An
         self.simulator.close()
 
     def render(self) -> tuple[Picture, ...] | None:
-        """A picture of every robot, shape (height, width, 3) each; None without a render_mode."""
+        """Picture of every robot, shape (height, width, 3) each; None without a render_mode."""
         return self.render_robots(range(self.num_envs))
 
     def render_robots(self, robots: Iterable[int]) -> tuple[Picture, ...] | None:
-        """Pictures of some robots; None without a render_mode."""
+        """Pictures of the robots of these numbers, shape (height, width, 3) each; None without a render_mode."""
         if self.render_mode is None:
             gym.logger.warn('render() without a render_mode draws nothing: make the batch with "rgb_array".')
             return None
         return self._pictures.draw(robots, self._commands)
 
-    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """An attribute, or the result of a method, once for every robot."""
-        if name in ("reset", "step", "close"):
-            raise ValueError(f"The robots share one simulator: use {name}() of the batch, not call({name!r}).")
-        if name in ("action_space", "observation_space"):
-            name = f"single_{name}"
-        if name == "scene":
-            return tuple(map(self.scene.of_robot, range(self.num_envs)))
-        value = self._attributes[name] if name in self._attributes else getattr(self, name)
-        value = value(*args, **kwargs) if callable(value) else value
-        of_each = name in self._attributes or name in ("np_random", "np_random_seed", "render", "waypoints")
-        return value if of_each and value is not None else (value,) * self.num_envs
-
-    def get_attr(self, name: str) -> tuple[Any, ...]:
-        """An attribute, once for every robot."""
-        return self.call(name)
-
-    def set_attr(self, name: str, values: Any) -> None:
-        """Set an attribute: a list or tuple has a value for every robot, anything else is the value for all.
-
-        Robots may have different values of new attributes and of `np_random`; what the batch has already, all share.
-        """
-        values = tuple(values) if isinstance(values, list | tuple) else (values,) * self.num_envs
-        if len(values) != self.num_envs:
-            raise ValueError(f"{name} must be one value or {self.num_envs} of them, not {len(values)}.")
-        if name == "np_random":
-            self.np_random = values
-        elif not hasattr(self, name):
-            self._attributes[name] = values
-        elif all(value is values[0] or np.all(value == values[0]) for value in values):
-            setattr(self, name, values[0])
-        else:
-            raise ValueError(f"The robots share one batch, so {name} must be the same for all of them.")
-
     def _begin_next_episodes(
         self, observations: Observations, strokes: dict[str, NDArray[Any]]
     ) -> tuple[Observations, Info]:
-        """SAME_STEP: put away the last observations and infos of the episodes that are over, and begin the next."""
+        """Begin the next episodes in mode SAME_STEP; info keeps the last observations and infos of the old ones."""
         over = self._needs_reset.copy()
         final_obs = np.full(self.num_envs, None, dtype=object)
         for robot in np.flatnonzero(over):
             final_obs[robot] = observations[robot]
-        final_info = _with_masks({name: _of_some(values, over) for name, values in strokes.items()}, over)
+        final_info = with_masks({name: of_some(values, over) for name, values in strokes.items()}, over)
         self._begin_episodes(over)
         return self._task.observe(), {
             **self._info(strokes, over),
@@ -280,16 +233,16 @@ class SeastarSwimVectorEnv(PlainSpec, gym.vector.VectorEnv[Observations, Any, An
         }
 
     def _info(self, strokes: dict[str, NDArray[Any]], begun: Flags) -> Info:
-        """What a stroke says of the robots, and a reset of those that have begun anew."""
+        """Info of the stroke, and of the reset for robots in the mask of those that have `begun` an episode."""
         info = {name: values.copy() for name, values in strokes.items()}
         if begun.any():
             for name, values in self._task.first_info().items():
                 info[name][begun] = values[begun]
-        return _with_masks(info, np.ones_like(begun))
+        return with_masks(info, np.ones_like(begun))
 
 
 def checked_seeds(seed: object, n_robots: int) -> list[int | None]:
-    """The seed of every robot: one number and those that follow it, or a list with one for each."""
+    """Seeds of all robots: one number and those that follow it, or a list with one for each."""
     if isinstance(seed, list):
         if len(seed) != n_robots:
             raise ValueError(f"seed must be one number or {n_robots} of them, not {len(seed)}.")
@@ -304,15 +257,3 @@ def _checked_mode(mode: AutoresetMode | str) -> AutoresetMode:
     if not isinstance(mode, AutoresetMode):
         require_choice("autoreset_mode", mode, tuple(one.value for one in AutoresetMode))
     return AutoresetMode(mode)
-
-
-def _of_some(values: NDArray[Any], mask: Flags) -> NDArray[Any]:
-    """The values of the robots in the mask; nothing, as Gymnasium writes it, for the others."""
-    values = values.copy()
-    values[~mask] = None if values.dtype == object else 0
-    return values
-
-
-def _with_masks(values: dict[str, NDArray[Any]], mask: Flags) -> Info:
-    """Gymnasium's form of a batch's info: beside every array a mask of the robots that it tells about."""
-    return values | {f"_{name}": mask.copy() for name in values}

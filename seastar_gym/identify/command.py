@@ -48,10 +48,12 @@ def draw(estimate: Estimate, measurement: Measurement, file: Path) -> None:
 
 def main() -> int:
     """Command line; returns the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        "python -m seastar_gym.identify", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("trajectory", nargs="?", type=Path, help="CSV file with a first line time,x0,y0,..")
     parser.add_argument("commands", nargs="?", type=Path, help="CSV file with one line of commands per stroke")
-    names = "names of the parameters to fit (default: %(default)s)"
+    names = f"names of the parameters to fit (default: {' '.join(TRUTH)})"
     parser.add_argument("--fit", nargs="+", default=list(TRUTH), metavar="PARAMETER", help=names)
     parser.add_argument("--step", type=float, default=5e-3, help="time step of the implicit midpoint rule [s]")
     parser.add_argument("--picture", type=Path, help="file for a picture of the fit")

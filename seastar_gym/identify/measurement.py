@@ -44,7 +44,7 @@ class Measurement:
         if self.commands.ndim != 2 or not len(self.commands):
             raise ValueError("commands must have one row per stroke with one number per limb.")
         if not np.isfinite(self.time).all() or self.time.min() < 0.0 or (np.diff(self.time) < 0.0).any():
-            raise ValueError("Times must be finite, not negative, and in increasing order [s].")
+            raise ValueError("Times must be finite, not negative, and in order [s].")
 
     @classmethod
     def from_csv(cls, trajectory: str | Path, commands: str | Path) -> "Measurement":

@@ -46,6 +46,7 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         at_nodes, in_middle = drag.simpson_coefficients(mesh, water.density, C_d if C_t is None else C_t)
     stretched = stretching.coefficients(mesh)
     seen_ahead = foresight.coefficients(mesh, stretched, robot.density)
+    mass = inertia.coefficients(mesh, robot.density, scene.held_nodes)
     return Rods(
         n_limbs=mesh.n_limbs,
         nodes_per_limb=mesh.nodes_per_limb,
@@ -53,7 +54,7 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         bending=bending.coefficients(mesh, gregory=continuum),
         hub=hub.coefficients(hub_angles, turning=robot.hub_hinge == "turning"),
         clamp=clamp.coefficients(mesh, [limb.direction for limb in limbs]) if continuum else None,
-        mass=inertia.coefficients(mesh, robot.density, scene.held_nodes),
+        mass=mass,
         edge_mass=inertia.edge_coefficients(mesh, robot.density) if continuum else None,
         drag=at_nodes,
         middle_drag=in_middle,
@@ -70,6 +71,6 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         else contact.coefficients(mesh, scene.robot.limbs_that_may_touch(), touch.modulus, touch.opening_angle),
         foresight=seen_ahead,
         scales=scales.coefficients(
-            mesh, stretched, seen_ahead, robot.density, water.density, C_d, held=bool(scene.held_nodes)
+            mesh, stretched, seen_ahead, robot.density, water.density, C_d, mass, scene.held_nodes
         ),
     )

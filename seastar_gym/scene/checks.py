@@ -3,6 +3,7 @@
 import math
 import sys
 from reprlib import Repr
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,12 +86,17 @@ def require_numbers(name: str, values: object, unit: str) -> None:
         raise ValueError(f"{name} must be a tuple of finite numbers [{unit}], not {shown(values)}.")
 
 
+def as_array(name: str, value: object) -> NDArray[Any]:
+    """Value as an array, of whatever shape and numbers. ValueError if its rows differ in length."""
+    try:
+        return np.asarray(value)
+    except ValueError as ragged:
+        raise ValueError(f"{name} must be one array, not rows of different lengths.") from ragged
+
+
 def as_floats(name: str, value: object) -> NDArray[np.float64]:
     """Value as an array of floats, of whatever shape. ValueError if it is not made of numbers."""
-    try:
-        array = np.asarray(value)
-    except ValueError as ragged:
-        raise ValueError(f"{name} must be an array of numbers, not rows of different lengths.") from ragged
+    array = as_array(name, value)
     if array.dtype.kind not in "biuf":
         raise ValueError(f"{name} must be numbers, not {array.dtype} values.")
     return array.astype(float)

@@ -83,7 +83,7 @@ def promise(setting: str | Setting) -> Promise:
     """Errors and speed of a preset or a `Numerics`. ValueError if it was not measured."""
     presets = {name: Promise(**row) for name, row in _stored()["presets"].items()}
     if not isinstance(setting, str) and not all(hasattr(setting, name) for name in SETTING):
-        raise ValueError(f"A promise is asked of a preset's name or a Numerics, not of {shown(setting)}.")
+        raise ValueError(f"promise needs the name of a preset or a Numerics, not {shown(setting)}.")
     if isinstance(setting, str):
         if setting not in presets:
             raise ValueError(f"A preset is one of {', '.join(map(repr, presets))}, not {shown(setting)}.")

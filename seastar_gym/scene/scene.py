@@ -6,7 +6,7 @@ robot of a batch.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from operator import itemgetter
@@ -68,11 +68,29 @@ class Scene:
             raise ValueError(f"Scene.actuator must be an Actuator such as SmaPulse(), not {shown(self.actuator)}.")
         check_actuator(self.actuator)
         batch_size(self)
+        self._check_discretisation()
         self._check_hub_hinges()
         self._check_strengths()
         self._check_holds_and_loads()
         self._check_contact()
         self._check_coefficients()
+
+    def _check_discretisation(self) -> None:
+        """Refuse terms that the continuum's discretisation does not have yet."""
+        robot, fluid = self.robot, self.fluid
+        if robot.discretisation == "chapter":
+            return
+        absent = {
+            'hub_hinge="turning"': robot.hub_hinge == "turning",
+            "a natural curvature": any(np.any(limb.natural_curvature) for limb in robot.limbs),
+            "material damping": robot.relaxation_time is not None,
+            "drag of its own along limbs": fluid is not None and fluid.tangential_drag_coefficient is not None,
+            "added mass": fluid is not None and fluid.added_mass_coefficient is not None,
+            "contact": self.contact is not None,
+        }
+        named = [name for name, is_named in absent.items() if is_named]
+        if named:
+            raise ValueError(f'discretisation="continuum" does not have {named[0]} yet: use discretisation="chapter".')
 
     def _check_strengths(self) -> None:
         require_numbers("limb_strengths", self.limb_strengths, "1")
@@ -101,7 +119,7 @@ class Scene:
             return
         robot, pairs = self.robot, self.robot.limbs_that_may_touch()
         if not pairs:
-            raise ValueError("Contact is modelled between limbs less than half a turn apart, which this robot has not.")
+            raise ValueError("Contact is modelled between limbs less than half a turn apart, and this robot has none.")
         if self.contact.opening_angle >= robot.opening_angle:
             raise ValueError(
                 f"Limbs that touch at an opening angle of {self.contact.opening_angle:.4g} rad touch at rest, where "
@@ -128,9 +146,20 @@ class Scene:
             sound = False
         if not sound:
             raise ValueError(
-                f"The stiffnesses or masses of {shown(self.robot)} overflow or vanish in double precision: use numbers "
-                "closer to those of a robot."
+                f"Stiffnesses or masses overflow or vanish in double precision {self._named_coefficients()}: use "
+                "numbers closer to those of a robot."
             )
+
+    def _named_coefficients(self) -> str:
+        """Numbers that stiffnesses and masses are made of, in words."""
+        robots = [chosen(self.robot, choose) for choose in (min, max)]
+        limbs = [limb for robot in robots for limb in robot.limb_shapes()]
+        return (
+            f"for limbs {_span(limb.length for limb in limbs)} m long, "
+            f"with radii of {_span(r for limb in limbs for r in limb.radius)} m, "
+            f"Young's moduli of {_span(E for limb in limbs for E in limb.youngs_modulus)} Pa "
+            f"and densities of {_span(robot.density for robot in robots)} kg/m^3"
+        )
 
     def _has_sound_coefficients(self, choose: Callable[[tuple[float, ...]], float]) -> bool:
         """Whether squared lengths, stiffnesses and masses of edges, and their reciprocals, are positive and finite."""
@@ -149,6 +178,10 @@ class Scene:
         Neighbours that are turned apart turn the hinge between them by two peak angles.
         """
         robot, peak = self.robot, float(np.max(self.actuator.peak_angle))
+        if robot.discretisation == "continuum" and robot.n_limbs > 1:
+            if peak >= math.pi:
+                raise ValueError(f"A peak angle must stay below pi, not {peak:.4g} rad.")
+            return
         hinges = robot.limb_shapes()[: n_hub_hinges(robot.n_limbs)]
         if not hinges:
             if peak > 0.0:
@@ -157,7 +190,7 @@ class Scene:
         widest = max(abs(natural_hub_angle(hinge.gap, robot.hub_hinge)) for hinge in hinges)
         limit = 0.5 * (math.pi - widest)
         if robot.hub_hinge == "turning":
-            # A stroke that remembers nothing comes to the limit for some commands only: the simulator refuses those.
+            # Without memory, only some commands reach the limit, and the simulator refuses those.
             limit *= 1.0 - 1e-12 if isinstance(self.actuator, StatefulActuator) else 1.0 + 1e-12
             if peak > limit:
                 raise ValueError(
@@ -188,3 +221,10 @@ class Scene:
     def of_robot(self, index: int) -> "Scene":
         """Scene of one robot of a batch."""
         return chosen(self, itemgetter(index))
+
+
+def _span(numbers: Iterable[float]) -> str:
+    """The smallest and the largest number, or the only one."""
+    found = sorted(numbers)
+    ends = dict.fromkeys(f"{end:.4g}" for end in (found[0], found[-1]))
+    return " to ".join(ends)

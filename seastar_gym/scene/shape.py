@@ -20,7 +20,7 @@ def rest_positions(limbs: Sequence[LimbShape], nodes_per_limb: int) -> Floats:
     nodes = [np.zeros((1, 2))]
     for limb in limbs:
         half_turn = 0.5 * turn_per_hinge(limb, nodes_per_limb)
-        # The sum of i unit vectors, each turned from the last by twice half_turn.
+        # Length of the sum of i unit vectors, each turned from the last by twice half_turn, over i.
         chord = np.sin(i * half_turn) / (i * np.sin(half_turn)) if half_turn else 1.0
         distance = limb.length * i / (nodes_per_limb - 1) * chord
         angle = limb.direction + (i - 1) * half_turn

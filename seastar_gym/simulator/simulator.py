@@ -12,7 +12,7 @@ from seastar_gym.der.rods import Work
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.coefficients import Coefficients
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import as_floats, require_count, shown
+from seastar_gym.scene.checks import as_array, as_floats, require_count, shown
 from seastar_gym.scene.numerics import MAX_STEPS
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import write_rows
@@ -29,6 +29,9 @@ from seastar_gym.simulator.state import State, checked_state
 Floats = NDArray[np.float64]
 
 MAX_ROBOTS, MAX_THREADS = 100_000_000, 4096
+
+ROUNDING = 1e-12
+"""Fraction of a time. An end of a step that is no nearer to it is the next one."""
 
 
 class Before(NamedTuple):
@@ -121,7 +124,7 @@ class Simulator:
             yield
 
     def _checked_mask(self, mask: ArrayLike | None) -> NDArray[np.bool_]:
-        chosen = np.ones(self.n_robots, bool) if mask is None else np.asarray(mask)
+        chosen = np.ones(self.n_robots, bool) if mask is None else as_array("mask", mask)
         if chosen.dtype != bool or chosen.shape != (self.n_robots,):
             raise ValueError(f"mask must be boolean of shape ({self.n_robots},), not {chosen.dtype} {chosen.shape}.")
         return chosen
@@ -268,7 +271,7 @@ class Simulator:
         require_count("parts", parts, 1, MAX_STEPS)
         with self._whole_stroke(commands) as stroke:
             wanted = self._times[-1] * np.arange(1, parts + 1) / parts
-            ends = np.unique(np.clip(np.searchsorted(self._times, wanted - 1e-12), 1, len(self._times) - 1))
+            ends = np.unique(np.clip(np.searchsorted(self._times, wanted * (1.0 - ROUNDING)), 1, len(self._times) - 1))
             begin = 0
             for end in ends:
                 self._batch.advance(begin, end)

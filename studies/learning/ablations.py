@@ -16,7 +16,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
-from unittest.mock import patch
 
 import numpy as np
 import torch
@@ -25,13 +24,14 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
 from agents.files import write_atomically
+from agents.hyperparameters import Hyperparameters
 from agents.policy import LearnedPolicy
-from agents.ppo import Hyperparameters, make_model, make_training_env, policy_of
+from agents.ppo import make_model, make_training_env, policy_of
 from agents.report.pictures import COLOURS, FAINT_INK
 from agents.swim import Policy
 from agents.trials import HELD_OUT_SEED, swim_many
 from seastar_gym.command import run_command
-from seastar_gym.envs.paths import AIM, PathName
+from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.task import make_scene
 from seastar_gym.scene.numerics import Fidelity
 
@@ -47,13 +47,11 @@ class Variant:
     """A training that differs from the default of the study.
 
     changes: Hyperparameters that differ from `COMMON`, as pairs of name and value.
-    aim: Distance from a waypoint's centre, as a fraction of its radius, at which the rewarded route passes it.
     first_path: Path of the first third of the training, or None for random paths throughout.
     """
 
     changes: tuple[tuple[str, Any], ...] = ()
-    aim: float = AIM
-    first_path: PathName | None = None
+    first_path: str | None = None
 
     @property
     def hyperparameters(self) -> Hyperparameters:
@@ -80,13 +78,13 @@ VARIANTS: dict[str, Variant] = {
     "512 robots": _with(num_envs=512, batch_size=2048),
     "width 256": _with(hidden=(256, 256)),
     "one waypoint first": Variant(first_path="line"),
-    "aim 0.4": Variant(aim=0.4),
-    "aim 0.9": Variant(aim=0.9),
+    "aim 0.4": _with(reward=RewardWeights(aim=0.4)),
+    "aim 0.9": _with(reward=RewardWeights(aim=0.9)),
 }
 """Trainings by the choice in which they differ."""
 
 
-def mean_strokes(policy: Policy, path: PathName, n_swims: int, options: "Options") -> float:
+def mean_strokes(policy: Policy, path: str, n_swims: int, options: "Options") -> float:
     """Mean number of strokes of swims by a policy; path: "random" means the held-out paths."""
     scene, seed = make_scene(None, options.fidelity), HELD_OUT_SEED
     swims = swim_many(
@@ -124,18 +122,16 @@ def learn(variant: Variant, seed: int, options: "Options") -> dict[str, Any]:
     hyperparameters, fidelity = variant.hyperparameters, options.fidelity
     measuring, n = Measuring(options), hyperparameters.num_envs * hyperparameters.rollout
     rounds = max(1, options.strokes // n)
-
-    with patch("seastar_gym.envs.task.AIM", variant.aim):
-        first = variant.first_path or "random"
-        env = make_training_env(hyperparameters, first, True, fidelity, threads=options.num_threads)
-        model = make_model(env, hyperparameters, seed)
-        if variant.first_path is not None:
-            model.learn(rounds // 3 * n, measuring)
-            rounds -= rounds // 3
-            env.close()
-            env = make_training_env(hyperparameters, "random", True, fidelity, threads=options.num_threads)
-            model.set_env(env)
-        model.learn(rounds * n, measuring, reset_num_timesteps=variant.first_path is None)
+    first = variant.first_path or "random"
+    env = make_training_env(hyperparameters, first, True, fidelity, threads=options.num_threads)
+    model = make_model(env, hyperparameters, seed)
+    if variant.first_path is not None:
+        model.learn(rounds // 3 * n, measuring)
+        rounds -= rounds // 3
+        env.close()
+        env = make_training_env(hyperparameters, "random", True, fidelity, threads=options.num_threads)
+        model.set_env(env)
+    model.learn(rounds * n, measuring, reset_num_timesteps=variant.first_path is None)
     policy = measuring.measure()
     env.close()
     return {"curve": measuring.curve, "pentagon": round(mean_strokes(policy, "pentagon", 1, options))}

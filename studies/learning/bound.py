@@ -24,14 +24,15 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from agents.files import write_atomically
-from agents.greedy import Displacements, measure_gaits, remaining_way
+from agents.greedy import Displacements, measure_gaits
 from agents.planner import Branching
-from agents.roster import load_agents
+from agents.roster import AgentNames, load_agents
 from agents.swim import Policy
 from agents.trials import swim_many
 from seastar_gym.command import run_command
 from seastar_gym.envs.commands import Actions, command_table
 from seastar_gym.envs.paths import LINE_LENGTH, make_path
+from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import action_table
 from seastar_gym.envs.task import make_scene
 from seastar_gym.scene import Scene
@@ -119,7 +120,8 @@ def search_path(scene: Scene, waypoints: Floats, actions: Actions, beam: int, ma
         hub = states.positions[:, 0]
         reached = reached + (np.linalg.norm(waypoints[np.minimum(reached, last)] - hub, axis=1) <= WAYPOINT_RADIUS)
         current, after = np.minimum(reached, last), np.minimum(reached + 1, last)
-        way = remaining_way(hub, waypoints[current], waypoints[after], WAYPOINT_RADIUS) + way_after[after]
+        to_next = RewardWeights().way_to_next(hub, waypoints[current], waypoints[after], WAYPOINT_RADIUS)
+        way = to_next + way_after[after]
         best = np.argsort(way)[:beam]
         states, actions_so_far = _keep(states, actions_so_far, best, len(swim_all.commands))
         reached = reached[best]
@@ -149,8 +151,7 @@ class Options:
     """Width of the beam search round the pentagon, over pairs of limbs [states]."""
     only_pentagon: bool = False
     """Search only the pentagon, print the number of strokes found, and write nothing."""
-    agents: tuple[str, ...] = ("learned",)
-    """Agents whose speeds are measured for comparison, named as for agents.evaluate."""
+    agents: AgentNames = ("learned",)
     out: Path = Path("docs/bound.json")
     """File of the results. The picture has the same name with the suffix .png."""
 

@@ -1,12 +1,11 @@
 """The study of trainings goes all the way, continues where it stopped, and says what it found."""
 
 import json
-from unittest.mock import patch
 
 import pytest
 
-from seastar_gym.envs import task
-from seastar_gym.envs.paths import AIM
+from seastar_gym import RewardWeights
+from seastar_gym.envs.task import SwimTask
 from studies.learning import ablations
 from studies.learning.ablations import VARIANTS, Options, Variant, final_strokes, learn, main, table
 
@@ -55,26 +54,25 @@ def test_trainings_are_measured_and_not_repeated(variants, tmp_path, capsys):
 
 @pytest.fixture
 def seen(monkeypatch):
-    """(path, share of a waypoint's radius that the way keeps to) in environments, in order."""
-    found, measure, shortest_way = [], task.SwimTask._measure_way_to_go, task.shortest_way
+    """Path and aim of the task in every stroke of an environment, in order."""
+    found, step = [], SwimTask.step
 
-    def observed(swim, hub):
-        def way(position, waypoint, after, radius):
-            found.append((swim.path, round(radius / swim.waypoint_radius, 6)))
-            return shortest_way(position, waypoint, after, radius)
+    def observed(task, commands):
+        found.append((task.path, task.reward.aim))
+        return step(task, commands)
 
-        with patch.object(task, "shortest_way", way):
-            return measure(swim, hub)
-
-    monkeypatch.setattr(task.SwimTask, "_measure_way_to_go", observed)
+    monkeypatch.setattr(SwimTask, "step", observed)
     return found
 
 
 @pytest.mark.parametrize(
     ("variant", "stages"),
     [
-        (Variant(tuple(TINY.items())), [("random", AIM)]),
-        (Variant(tuple(TINY.items()), aim=0.4, first_path="line"), [("line", 0.4), ("random", 0.4)]),
+        (Variant(tuple(TINY.items())), [("random", RewardWeights().aim)]),
+        (
+            Variant((*TINY.items(), ("reward", RewardWeights(aim=0.4))), first_path="line"),
+            [("line", 0.4), ("random", 0.4)],
+        ),
     ],
 )
 def test_a_training_swims_the_paths_of_its_variant_and_keeps_to_its_aim(variant, stages, seen, monkeypatch):
@@ -82,7 +80,7 @@ def test_a_training_swims_the_paths_of_its_variant_and_keeps_to_its_aim(variant,
     learn(variant, 0, Options(strokes=192, every=64, num_threads=1))
     assert [stage for stage, before in zip(seen, [None, *seen], strict=False) if stage != before] == stages
     if len(stages) == 2:
-        assert 8 < seen.count(stages[0]) < seen.count(stages[1])  # a third of the training, then the rest
+        assert list(map(seen.count, stages)) == [8, 16]  # strokes: a third of the training, then the rest
 
 
 def test_the_default_training_alone_is_drawn(variants, tmp_path):

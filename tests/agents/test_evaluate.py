@@ -12,8 +12,9 @@ import pytest
 from matplotlib.colors import to_rgb
 from rich.console import Console
 
+from agents.description import Description
 from agents.evaluate import evaluate, main
-from agents.policy import Description, LearnedPolicy, save
+from agents.policy import LearnedPolicy, save
 from agents.report.pictures import CLOSING_SECONDS, COLOURS, FPS, FRAMES_PER_STROKE
 from agents.roster import load_agents
 from agents.scripted import scripted
@@ -39,7 +40,7 @@ def made_up_swim(hub, waypoint_index, waypoints=((0.1, 0.0), (0.1, 0.1)), limbs_
     )
 
 
-# --- measures of a swim ----------------------------------------------------------------------------------------------
+# Measures of a swim
 
 
 def test_following_the_path_round_a_corner_is_no_error():
@@ -118,7 +119,7 @@ def test_a_path_may_come_with_the_reset():
     assert done.finished
 
 
-# --- what is written -------------------------------------------------------------------------------------------------
+# What is written
 
 
 @pytest.fixture(scope="module")
@@ -182,7 +183,7 @@ def frames_of(video):
 
 
 def test_a_path_that_ends_where_it_starts_can_be_drawn(tmp_path):
-    (done,) = evaluate({"a": scripted("rest")}, [[4e-3, 0.0], [0.0, 0.0]], out=tmp_path, video=False, **EASY)
+    (done,) = evaluate({"a": scripted("rest")}, [[1e-3, 0.0], [0.0, 0.0]], out=tmp_path, video=False, **EASY)
     assert done.finished
     assert (tmp_path / "traces.png").is_file()
 
@@ -240,7 +241,7 @@ def test_what_cannot_be_evaluated_is_refused(agents, more, complaint):
         evaluate(agents, SHORT, **EASY, **more)
 
 
-# --- the command line ------------------------------------------------------------------------------------------------
+# The command line
 
 
 def test_command_line_evaluates_scripted_agents(tmp_path, capsys):
@@ -322,7 +323,7 @@ def test_models_go_by_the_names_of_their_files(monkeypatch, tmp_path):
     (tmp_path / "runs").mkdir()
     for file in files:
         Path(file).touch()
-    monkeypatch.setattr("agents.ppo.load", lambda file: file)
+    monkeypatch.setattr("agents.learner_file.load", lambda file: file)
     monkeypatch.setattr("agents.policy.load", lambda file: file)
     assert load_agents(files) == {"best": "best.zip", "last": "runs/last.safetensors", "runs/best": "runs/best.zip"}
 

@@ -13,8 +13,8 @@ import pytest
 from stable_baselines3 import A2C, DQN, PPO
 
 from agents import evaluate, trials
+from agents.description import Description
 from agents.foreign import load_model
-from agents.policy import Description
 from agents.roster import load_agents
 from agents.swim import actions_of, swim
 from agents.trials import swim_many

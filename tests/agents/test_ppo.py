@@ -15,8 +15,10 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.evaluation import evaluate_policy
 
-from agents import ppo
-from agents.ppo import Hyperparameters, load, make_model, make_training_env, policy_of, resume, save
+from agents import learner_file
+from agents.hyperparameters import Hyperparameters
+from agents.learner_file import load, resume, save
+from agents.ppo import make_model, make_training_env, policy_of
 from agents.vec_env import BatchVecEnv
 from seastar_gym import Numerics, Scene, Seastar, Water
 from seastar_gym.envs import symmetry
@@ -76,7 +78,7 @@ def test_hyperparameters_that_cannot_be_are_refused(change, sentence):
         replace(SMALL, **change)
 
 
-# --- a policy on disk ------------------------------------------------------------------------------------------------
+# A policy on disk
 
 
 @pytest.mark.parametrize("hyperparameters, scene", [(SMALL, None), (OTHER, OTHER_SCENE)])
@@ -148,11 +150,11 @@ def test_loading_unpickles_nothing(file, tmp_path):
     """Stable-Baselines3's pickles are not even looked at, neither to swim nor to learn on."""
     without = tmp_path / "without.zip"
     with zipfile.ZipFile(file) as old, zipfile.ZipFile(without, "w") as new:
-        for name in (ppo.DESCRIPTION, ppo.LEARNER, ppo.FACTS):
+        for name in (learner_file.DESCRIPTION, learner_file.LEARNER, learner_file.FACTS):
             new.writestr(name, old.read(name))
         for name in set(old.namelist()) - set(new.namelist()):
             new.writestr(name, pickle.dumps(Bomb(tmp_path / "exploded")))
-    assert load(without).actions == ppo.Hyperparameters().actions
+    assert load(without).actions == Hyperparameters().actions
     assert resume(without, make_learner().get_env()).num_timesteps == 3 * 64
     assert not (tmp_path / "exploded").exists()
     with zipfile.ZipFile(without) as archive:
@@ -176,7 +178,7 @@ def test_stable_baselines_reads_the_file_as_its_own(learner, file):
         assert torch.equal(tensor, theirs.policy.state_dict()[name])
 
 
-# --- saving ----------------------------------------------------------------------------------------------------------
+# Saving
 
 
 def test_saving_replaces_the_file_in_one_go(learner, file, monkeypatch):
@@ -198,29 +200,29 @@ def test_saving_replaces_the_file_in_one_go(learner, file, monkeypatch):
 
 def test_the_description_says_what_the_policy_expects(learner, file):
     with zipfile.ZipFile(file) as archive:
-        facts = json.loads(archive.read(ppo.DESCRIPTION))
+        facts = json.loads(archive.read(learner_file.DESCRIPTION))
     assert facts["observation_layout"] == 1
-    assert (facts["actions"], facts["symmetry"], facts["hidden"]) == (ppo.Hyperparameters().actions, True, [16, 8])
+    assert (facts["actions"], facts["symmetry"], facts["hidden"]) == (Hyperparameters().actions, True, [16, 8])
     assert facts["scene"]["numerics"]["scheme"] == FAST.scheme
     assert facts["strokes_trained"] == learner.num_timesteps
 
 
-# --- files that are no policy ----------------------------------------------------------------------------------------
+# Files that are no policy
 
 
 def rewritten(file, **changes):
     """The file with other facts in its description, or without one of its entries (None)."""
     with zipfile.ZipFile(file) as archive:
         entries = {name: archive.read(name) for name in archive.namelist()}
-    facts = json.loads(entries[ppo.DESCRIPTION])
+    facts = json.loads(entries[learner_file.DESCRIPTION])
     for name, value in changes.items():
         entry = name.replace("__", ".")
         if entry in entries:
             del entries[entry]
         else:
             facts[name] = value
-    if ppo.DESCRIPTION in entries:
-        entries[ppo.DESCRIPTION] = json.dumps(facts).encode()
+    if learner_file.DESCRIPTION in entries:
+        entries[learner_file.DESCRIPTION] = json.dumps(facts).encode()
     with zipfile.ZipFile(file, "w") as archive:
         for name, data in entries.items():
             archive.writestr(name, data)
@@ -249,7 +251,7 @@ def test_a_cut_file_is_said_to_be_damaged(file, keep):
 def test_a_flipped_bit_is_found(file):
     data = bytearray(file.read_bytes())
     with zipfile.ZipFile(file) as archive:
-        data[archive.getinfo(ppo.LEARNER).header_offset + 5000] ^= 1
+        data[archive.getinfo(learner_file.LEARNER).header_offset + 5000] ^= 1
     file.write_bytes(bytes(data))
     with pytest.raises(ValueError, match=r"is damaged.*Bad CRC-32"):
         load(file)
@@ -282,9 +284,9 @@ def with_learner(file, change):
     """The file after a change of its learner's facts and tensors, in place."""
     with zipfile.ZipFile(file) as archive:
         entries = {name: archive.read(name) for name in archive.namelist()}
-    facts, tensors = json.loads(entries[ppo.FACTS]), safetensors.torch.load(entries[ppo.LEARNER])
+    facts, tensors = json.loads(entries[learner_file.FACTS]), safetensors.torch.load(entries[learner_file.LEARNER])
     change(facts, tensors)
-    entries |= {ppo.FACTS: json.dumps(facts).encode(), ppo.LEARNER: safetensors.torch.save(tensors)}
+    entries |= {learner_file.FACTS: json.dumps(facts).encode(), learner_file.LEARNER: safetensors.torch.save(tensors)}
     with zipfile.ZipFile(file, "w") as archive:
         for name, data in entries.items():
             archive.writestr(name, data)
@@ -323,7 +325,7 @@ def test_a_device_that_is_not_there_is_refused(device, sentence, monkeypatch):
         make_model(make_learner().get_env(), SMALL, seed=0, device=device)
 
 
-# --- learning on -----------------------------------------------------------------------------------------------------
+# Learning on
 
 
 def numbers_of(learner):

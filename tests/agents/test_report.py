@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from agents.evaluate import COLUMNS, evaluate, main
+from agents.evaluate import evaluate, main
 from agents.report.charts import Curve, curves_figure, read_progress, speeds_figure, to_html
 from agents.report.page import MEASURED, Remarks, number, read_trials, table_html
 from agents.report.playback import UNIT, RecordingEnv
+from agents.results import COLUMNS
 from agents.scripted import scripted
 from agents.swim import swim
 from refusals import assert_refused
@@ -62,7 +63,7 @@ def text(evaluated):
     return (evaluated[0] / "report.html").read_text(encoding="utf-8")
 
 
-# --- recording -------------------------------------------------------------------------------------------------------
+# Recording
 
 
 def test_a_recording_is_the_swim_in_frames():
@@ -92,7 +93,7 @@ def test_a_new_episode_is_a_new_recording():
     assert len(env.playback("a").frames) == 3
 
 
-# --- the page as text ------------------------------------------------------------------------------------------------
+# The page as text
 
 
 def test_the_page_needs_nothing_beside_it_and_is_light(text):
@@ -151,7 +152,7 @@ def test_trials_are_shown_with_their_confidence_intervals(tmp_path):
             read_trials(tmp_path / "other.csv")
 
 
-# --- learning curves -------------------------------------------------------------------------------------------------
+# Learning curves
 
 
 def test_a_curve_has_a_gap_where_the_pentagon_was_not_finished(tmp_path):
@@ -196,7 +197,7 @@ def test_names_in_pictures_are_text_not_markup():
     assert STRAY not in page
 
 
-# --- the command line ------------------------------------------------------------------------------------------------
+# The command line
 
 
 def test_command_line_writes_the_report_with_the_curves_of_runs(tmp_path, capsys):
@@ -218,7 +219,7 @@ def test_a_folder_without_a_run_is_answered_with_one_sentence(tmp_path, capsys):
     assert "progress.csv" in printed and printed.count("\n") == 1
 
 
-# --- in a browser ----------------------------------------------------------------------------------------------------
+# In a browser
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import pytest
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 
-from agents.scripted import SCRIPTED_NAMES, OpenLoopPolicy, scripted, to_actions
+from agents.scripted import GAITS, OpenLoopPolicy, scripted, to_actions
 from seastar_gym import Numerics, Scene, Simulator
 from seastar_gym.envs.commands import action_space, to_commands
 from seastar_gym.gaits import pair_gait, pentagon_gait, straight_gait
@@ -36,7 +36,7 @@ def strokes_of(policy, n_strokes, observation=OBSERVATION):
     return np.array(actions)
 
 
-# --- the chapter's swims ---------------------------------------------------------------------------------------------
+# The chapter's swims
 
 
 def test_pentagon_gait_is_the_sequence_of_13_15():
@@ -75,7 +75,7 @@ def test_pairs_of_fig_13_8_move_along_their_bisectors(name, bisector):
     assert np.hypot(*end) > 1e-3
 
 
-# --- policies --------------------------------------------------------------------------------------------------------
+# Policies
 
 
 @pytest.mark.parametrize("actions", MODES)
@@ -147,14 +147,14 @@ def test_gaits_fit_robots_of_other_limbs():
     np.testing.assert_array_equal(action, [0, 1, 0, 0, 0, 2])
 
 
-# --- refusals --------------------------------------------------------------------------------------------------------
+# Refusals
 
 
 @pytest.mark.parametrize("name", ["pentagram", "", "2+", "2+,5+", "2-,5-", "a+,b-", "1+,2-,3+"])
 def test_an_unknown_name_is_answered_with_the_known_ones(name):
     with pytest.raises(ValueError, match="Unknown scripted agent") as refusal:
         scripted(name)
-    assert all(known in str(refusal.value) for known in SCRIPTED_NAMES)
+    assert all(known in str(refusal.value) for known in GAITS)
 
 
 @pytest.mark.parametrize("name", ["1+,1-", "1+,6-", "0+,1-"])

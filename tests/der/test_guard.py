@@ -64,7 +64,7 @@ def hold(rods, work, scheme, q, v, frame, robots, limit, largest_cut, result):
     mask = load(borrow(robots), 0) > 0.0
     q_rows, v_rows = borrow(q), borrow(v)
     seen_from, h = (load(borrow(frame), 0), load(borrow(frame), 1)), splat(0.01)
-    store(out, 0, rigid_motion(rows, memory, q_rows, v_rows, seen_from)[6])
+    store(out, 0, rigid_motion(rows, memory, q_rows, v_rows, seen_from)[5])
     refused, cut = hold_to_energy(
         rows, memory, tableau, q_rows, v_rows, h, seen_from, mask, load(borrow(limit), 0), splat(largest_cut)
     )

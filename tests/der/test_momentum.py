@@ -14,6 +14,7 @@ from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
 from slopes import nodes, plain, rows
 from stages import RandomStages, robot_and_star
+from touching import touching_limbs
 
 ROBOT, GAMMA = Seastar(nodes_per_limb=4), 5e-3
 
@@ -26,7 +27,7 @@ def moved(scene: Scene, robots: np.ndarray, times: int = 1):
     stage = Stage(work.q_hat, work.v_hat, Lanes(GAMMA), Lanes(1.0 / GAMMA), False)
 
     def unbalanced() -> np.ndarray:
-        slopes = [node_slopes.plain(rods, work, stage, node)[1] for node in range(ROBOT.n_nodes)]
+        slopes = [node_slopes.plain(None, rods, work, stage, node)[1] for node in range(ROBOT.n_nodes)]
         return np.linalg.norm(np.sum(plain(tuple(slopes)), axis=0), axis=0)
 
     before, q = unbalanced(), nodes(work.q)
@@ -95,3 +96,14 @@ def test_in_a_fluid_steps_that_leave_digits_enough_stay_what_they_are():
             for x in (stages.q, q)
         )
         assert after < before
+
+
+def test_what_contact_pushed_when_it_was_last_asked_moves_no_robot_as_a_whole():
+    """As long as others in the lanes go on, contact is asked again where a robot has arrived already."""
+    found = []
+    for force in (0.0, 1.0):
+        limbs = touching_limbs()
+        limbs.work.contact.force[:] = force * np.random.default_rng(1).standard_normal(limbs.work.q.shape)
+        move_as_a_whole.plain(limbs.rods, limbs.work, limbs.stage, Mask(EVERYONE))
+        found.append(limbs.work.q.copy())
+    np.testing.assert_array_equal(*found)

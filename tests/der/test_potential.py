@@ -104,13 +104,20 @@ def test_a_matrix_that_is_not_a_number_does_not_pass_for_positive_definite():
         assert np.all(found.pivot[others] > 0.0) and np.isfinite(found.direction[others]).all()
 
 
+def scaled(part, **scales):
+    """A term's coefficients, some of them times a number per lane."""
+    return part._replace(**{name: getattr(part, name)[:, None] * scale for name, scale in scales.items()})
+
+
 def test_every_robot_may_have_coefficients_of_its_own():
     robot = Seastar(nodes_per_limb=4)
     shared = make_rods(Scene(robot=robot))
     stiffness, weight = np.linspace(0.5, 2.0, N_LANES), np.linspace(1.0, 3.0, N_LANES)
-    scales = {"mass": weight} | dict.fromkeys(("EA", "EA_over_l", "EI_over_dl"), stiffness)
-    scales |= dict.fromkeys(("l_over_EA", "dl_over_EI"), 1.0 / stiffness)
-    own = shared._replace(**{name: getattr(shared, name)[:, None] * scale for name, scale in scales.items()})
+    own = shared._replace(
+        mass=shared.mass[:, None] * weight,
+        stretching=scaled(shared.stretching, EA=stiffness, EA_over_l=stiffness, l_over_EA=1.0 / stiffness),
+        bending=scaled(shared.bending, EI_over_dl=stiffness, dl_over_EI=1.0 / stiffness),
+    )
     stages = RandomStages(Star(nodes_per_limb=4), 0.01)
     for lane in range(N_LANES):
         star = Star(nodes_per_limb=4, youngs_modulus=1e6 * stiffness[lane], density=1000.0 * weight[lane])

@@ -39,7 +39,7 @@ def test_a_node_has_the_slopes_of_its_inertia_drag_and_load(rods):
 
     def slopes(q):
         work.q[2 * NODE : 2 * NODE + 2] = q
-        energy, force, hessian = node_slopes.plain(rods, work, stage, NODE)
+        energy, force, hessian = node_slopes.plain(work.contact, rods, work, stage, NODE)
         return plain(energy), np.array(plain(force)), symmetric(hessian)
 
     q = GAMMA * RNG.standard_normal((2, N_LANES))

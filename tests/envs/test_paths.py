@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from seastar_gym.envs.paths import PATH_NAMES, cross_track_error, make_path, path_length, shortest_way
+from seastar_gym.envs import paths
+from seastar_gym.envs.paths import PATHS, cross_track_error, make_path, path_length, register_path, shortest_way
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 
 ORIGIN = np.zeros(2)
 
@@ -20,10 +22,10 @@ def legs_and_turns(waypoints):
 
 
 def test_names_are_the_documented_ones():
-    assert PATH_NAMES == ("pentagon", "square", "triangle", "line", "figure-eight", "random")
+    assert tuple(PATHS) == ("pentagon", "square", "triangle", "line", "figure-eight", "random")
 
 
-@pytest.mark.parametrize("name", PATH_NAMES)
+@pytest.mark.parametrize("name", PATHS)
 def test_every_name_makes_finite_waypoints_away_from_each_other(name):
     waypoints = path_of(name)
     assert waypoints.dtype == np.float64
@@ -81,7 +83,7 @@ def test_random_paths_follow_their_seed():
     assert not np.array_equal(path_of("random", 7), path_of("random", 8))
 
 
-@pytest.mark.parametrize("name", [name for name in PATH_NAMES if name != "random"])
+@pytest.mark.parametrize("name", [name for name in PATHS if name != "random"])
 def test_only_random_paths_draw_from_the_generator(name):
     rng = np.random.default_rng(3)
     before = rng.bit_generator.state
@@ -206,3 +208,30 @@ def test_the_shortest_way_is_the_shortest_of_those_by_any_point_of_the_circle():
     np.testing.assert_allclose(ways[near], straight[near], rtol=1e-14)
     np.testing.assert_allclose(ways[~near], by_touch[~near], atol=2e-6)
     assert (ways >= straight * (1.0 - 1e-14)).all()
+
+
+# Paths of one's own
+
+
+def test_a_registered_path_can_be_asked_for_by_its_name(monkeypatch):
+    monkeypatch.setattr(paths, "PATHS", dict(PATHS))
+
+    @register_path("zigzag")
+    def zigzag(rng):
+        return [[0.1, 0.1], [0.2, 0.0]]
+
+    env = SeastarSwimEnv("zigzag", fidelity="fast")
+    env.reset(seed=0)
+    np.testing.assert_array_equal(env.waypoints, [[0.1, 0.1], [0.2, 0.0]])
+
+
+def test_a_name_is_given_to_one_path_only():
+    with pytest.raises(ValueError, match="a path of the name 'line' already"):
+        register_path("line")(lambda rng: np.ones((1, 2)))
+    np.testing.assert_array_equal(path_of("line"), [[0.3, 0.0]])
+
+
+def test_waypoints_of_a_registered_path_are_checked(monkeypatch):
+    monkeypatch.setattr(paths, "PATHS", {"nowhere": lambda rng: np.zeros((1, 2))})
+    with pytest.raises(ValueError, match="must lead away from the origin"):
+        path_of("nowhere")

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seastar_gym.envs.paths import PATH_NAMES, make_path
+from seastar_gym.envs.paths import PATHS, make_path
 from seastar_gym.envs.rendering import (
     CURRENT,
     HEATED_MINUS,
@@ -16,8 +16,8 @@ from seastar_gym.envs.rendering import (
     STATE_COLOURS,
     Frame,
     Renderer,
-    _waypoint_labels,
 )
+from seastar_gym.envs.waypoint_labels import waypoint_labels
 
 pygame = pytest.importorskip("pygame")
 
@@ -184,7 +184,7 @@ def test_the_current_waypoint_has_its_own_colour():
         np.testing.assert_allclose(ring[index], expected, atol=40)
 
 
-@pytest.mark.parametrize("name", PATH_NAMES)
+@pytest.mark.parametrize("name", PATHS)
 @pytest.mark.parametrize("size", [(480, 360), (960, 720)])
 def test_the_robot_is_in_view_at_the_start_and_at_every_waypoint(name, size):
     renderer = renderer_of(name, size)
@@ -224,14 +224,14 @@ def test_a_new_path_is_drawn_as_by_a_new_renderer():
 
 def test_a_place_visited_twice_carries_both_numbers():
     path = np.concatenate([np.zeros((1, 2)), make_path("figure-eight", np.random.default_rng(0))])
-    numbers = [[index + 1 for index in label.indices] for label in _waypoint_labels(path)]
+    numbers = [[index + 1 for index in label.indices] for label in waypoint_labels(path)]
     assert [8, 16] in numbers
     assert sorted(index for together in numbers for index in together) == list(range(1, 17))
 
 
 def test_corners_are_numbered_on_their_outer_side():
     path = np.concatenate([np.zeros((1, 2)), make_path("pentagon", np.random.default_rng(0))])
-    for label in _waypoint_labels(path):
+    for label in waypoint_labels(path):
         outward = label.place - path[1:].mean(axis=0)
         assert label.direction @ outward > 0.99 * np.hypot(*outward)
 

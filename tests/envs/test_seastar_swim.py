@@ -14,7 +14,7 @@ from gymnasium.utils.env_checker import check_env
 import seastar_gym
 from refusals import assert_refused
 from seastar_gym import DomainRandomization, Numerics, RewardWeights, Scene, Seastar, SmaPulse, SolverStatus, Uniform
-from seastar_gym.envs.paths import AIM, PATH_NAMES, cross_track_error, shortest_way
+from seastar_gym.envs.paths import PATHS, cross_track_error, shortest_way
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.fidelity import promise
@@ -298,7 +298,7 @@ def test_no_observation_shares_memory_with_the_next_or_with_the_simulator():
 
 def test_reward_is_the_sum_of_its_terms_and_they_are_what_their_names_say():
     path = np.array([[0.002, 0.001], [0.004, 0.0], [0.15, 0.1]])
-    weights = RewardWeights(progress=150.0, waypoint=2.5, effort=0.03)
+    weights = RewardWeights(progress=150.0, waypoint=2.5, effort=0.03, aim=0.6)
     env, rng = fast(path=path, waypoint_radius=0.004, reward=weights), np.random.default_rng(0)
     env.reset(seed=0)
     hub, index = np.zeros(2), 0
@@ -307,7 +307,7 @@ def test_reward_is_the_sum_of_its_terms_and_they_are_what_their_names_say():
         if index == 2:
             return np.linalg.norm(path[2] - hub)
         after = np.linalg.norm(np.diff(path[index + 1 :], axis=0), axis=1).sum()
-        return shortest_way(hub, path[index], path[index + 1], AIM * 0.004) + after
+        return shortest_way(hub, path[index], path[index + 1], 0.6 * 0.004) + after
 
     indices = []
     for _ in range(15):
@@ -412,7 +412,7 @@ def test_no_state_leaks_across_a_reset():
     np.testing.assert_array_equal(one[1], other[1])
 
 
-@pytest.mark.parametrize("path", [*PATH_NAMES, [[0.1, 0.2]], np.array([[1, 2], [3, 4]])], ids=str)
+@pytest.mark.parametrize("path", [*PATHS, [[0.1, 0.2]], np.array([[1, 2], [3, 4]])], ids=str)
 def test_every_path_can_be_asked_for_at_making_and_at_a_reset(path):
     made, asked = fast(path=path), fast(path="line")
     made.reset(seed=4)

@@ -63,7 +63,7 @@ def direction(observations):
     return np.arctan2(observations[..., -3], observations[..., -4])
 
 
-# --- the group -------------------------------------------------------------------------------------------------------
+# The group
 
 
 @pytest.mark.parametrize("n_limbs", N_LIMBS)
@@ -93,7 +93,7 @@ def test_limbs_go_where_the_rest_shape_goes(n_limbs):
         np.testing.assert_allclose(carried[symmetry.limb_order(n_limbs)[element]], tips, atol=1e-15)
 
 
-# --- observations ----------------------------------------------------------------------------------------------------
+# Observations
 
 
 @pytest.mark.parametrize("n_limbs", N_LIMBS)
@@ -159,7 +159,7 @@ def test_observations_of_another_robot_are_refused():
         symmetry.reduce_observations(observations_of(5), 7)
 
 
-# --- boundaries ------------------------------------------------------------------------------------------------------
+# Boundaries
 
 
 def aimed(n_limbs, current, following, distance=1.0):
@@ -189,7 +189,7 @@ def test_a_waypoint_at_the_hub_lies_in_sector_zero():
     assert symmetry.sectors(aimed(5, 0.0, 0.0, distance=0.0), 5) == 0
 
 
-# --- commands and actions --------------------------------------------------------------------------------------------
+# Commands and actions
 
 
 def test_a_mirror_swaps_plus_and_minus():
@@ -249,7 +249,7 @@ def test_cached_tables_cannot_be_changed():
             table[0] = table[1]
 
 
-# --- a policy behind it ----------------------------------------------------------------------------------------------
+# A policy behind it
 
 
 def a_policy(reduced):
@@ -313,7 +313,7 @@ def test_a_random_policy_in_the_wrapper_swims_the_carried_way(n_limbs):
         np.testing.assert_allclose(hubs_along(path @ carry.T), hubs @ carry.T, atol=1e-9)
 
 
-# --- wrappers --------------------------------------------------------------------------------------------------------
+# Wrappers
 
 SQUARE_ROBOT = Scene(robot=Seastar(n_limbs=4, nodes_per_limb=4), numerics=Numerics.preset("fast"))
 SETTINGS = {"path": "random", "random_heading": True, "scene": SQUARE_ROBOT}
@@ -403,7 +403,7 @@ def test_the_wrapper_of_a_batch_refuses_actions_of_another_number_of_robots(mode
             batch.step(actions)
 
 
-# --- which scenes are symmetric --------------------------------------------------------------------------------------
+# Which scenes are symmetric
 
 FAST = Numerics.preset("fast")
 STAR = Seastar(4, 4)
@@ -489,7 +489,7 @@ def test_a_refusal_has_its_reason_in_the_swim(name, monkeypatch):
     """Were the scene accepted, the same reduced actions would not earn the same in a world that is turned."""
     scene, randomization, _ = ASYMMETRIC[name]
     actions = pairs_for(scene, 5)
-    monkeypatch.setattr(symmetry, "require_symmetry", lambda *_: None)
+    monkeypatch.setattr(symmetry.wrappers, "require_symmetry", lambda *_: None)
     swims = [reduced_swim(scene, randomization, element, actions)[0] for element in range(8)]
     assert np.ptp(swims, axis=0).max() > 1e-3
 

@@ -21,7 +21,7 @@ import pytest
 
 import train
 from agents import policy as policies
-from agents.ppo import load
+from agents.learner_file import load
 from agents.report.charts import read_progress
 
 DRIVER = Path(__file__).with_name("killed_training.py")

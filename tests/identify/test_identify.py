@@ -103,6 +103,15 @@ def test_the_command_line_fits_files(measurement, tmp_path, monkeypatch, capsys)
     assert "actuator.peak_angle = " in capsys.readouterr().out
 
 
+def test_help_names_the_command_and_its_defaults(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["__main__.py", "--help"])
+    with pytest.raises(SystemExit):
+        main()
+    text = " ".join(capsys.readouterr().out.split())
+    assert text.startswith("usage: python -m seastar_gym.identify ")
+    assert f"default: {' '.join(TRUTH)})" in text
+
+
 HEADER, ROW, COMMAND = "time,x0,y0\n", "0,0,0\n", "0,1,0,0,-1\n"
 
 

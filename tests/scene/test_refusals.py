@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from refusals import assert_refused
-from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, Water
+from seastar_gym import Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 from seastar_gym.model.rods import make_rods
 
 FIDELITIES = ("fast", "balanced", "accurate", "reference", "chapter")
@@ -174,6 +174,12 @@ def test_a_turning_hub_refuses_peaks_that_close_it_and_an_opening_hub_allows_cro
 def test_a_scene_refuses_what_has_no_finite_positive_coefficients(scene):
     with assert_refused():
         make_rods(Scene(robot=Seastar(**scene["robot"])))
+
+
+def test_whose_coefficients_overflow_is_told_in_the_numbers_that_they_are_made_of():
+    limbs = tuple(Limb(direction=2.0 * math.pi * j / 12, radius=(1e-3, 1e-90), youngs_modulus=1e6) for j in range(12))
+    with assert_refused("limbs 0.1 m long", "radii of 1e-90 to 0.001 m", "moduli of 1e+06 Pa", "1100 kg/m^3"):
+        Scene(robot=Seastar(12, limbs=limbs, density=1100.0))
 
 
 def test_a_step_too_short_to_count_is_refused():

@@ -114,3 +114,9 @@ def test_headings_of_another_shape_are_refused_with_a_sentence(heading):
 def test_a_stroke_has_one_part_or_more(parts):
     with assert_refused("parts"):
         next(Simulator(Scene()).stroke_in_parts(STRAIGHT, parts))
+
+
+@pytest.mark.parametrize("name, arguments", [("reset", ()), ("set_scene", (SCENE,))])
+def test_a_mask_of_rows_of_different_lengths_is_refused(name, arguments):
+    with assert_refused("mask", "rows of different lengths"):
+        getattr(Simulator(SCENE, 2), name)(*arguments, mask=[[True], [True, False]])

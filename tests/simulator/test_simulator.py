@@ -267,6 +267,13 @@ def test_a_stroke_in_parts_gives_the_same_bits_as_a_whole_one(scheme, parts):
             np.testing.assert_array_equal(one, other)
 
 
+def test_a_stroke_of_any_length_pauses_after_equal_times():
+    numerics = Numerics("implicit-midpoint", 1e-29)
+    simulator = Simulator(Scene(actuator=SmaPulse(0.1, 1e-28, 9e-28), numerics=numerics))
+    times, _ = finish(simulator.stroke_in_parts(np.zeros((1, 5)), 10))
+    np.testing.assert_allclose(times, 1e-28 * np.arange(1, 11), rtol=1e-9, atol=0.0)
+
+
 def test_time_runs_on_within_a_stroke_in_parts():
     simulator = Simulator(scene_of(), 2)
     simulator.stroke(random_commands(2)[0])

@@ -205,7 +205,7 @@ def momentum_of(added_mass, rods, node, vx, vy):
 
 @kernel
 def rigid_motion(rods, work, q, v, frame):
-    """(mass, x, y, v_x, v_y, omega, energy): the motion of a rigid robot with the same momentum and angular momentum.
+    """(x, y, v_x, v_y, omega, energy): the motion of a rigid robot with the same momentum and angular momentum.
 
     x, y: Centre of mass [m]. v_x, v_y: Its velocity, as seen from the frame [m/s]. omega: Angular velocity [rad/s].
     energy: Its kinetic energy there. Momenta and energy are those of robot and fluid that moves along.
@@ -238,13 +238,13 @@ def rigid_motion(rods, work, q, v, frame):
     omega = (spin_left - turn_lower * y_left) / (turn - turn_lower * y_turn)
     v_y = (y_left - y_turn * omega) / yy
     v_x = (p_x - xy * v_y - x_turn * omega) / xx
-    return mass, x, y, v_x, v_y, omega, 0.5 * (p_x * v_x + p_y * v_y + spin * omega)
+    return x, y, v_x, v_y, omega, 0.5 * (p_x * v_x + p_y * v_y + spin * omega)
 
 
 @kernel
 def cut_velocities(rods, q, v, frame, motion, share, robots):
     """Keep `share` of the velocities of the robots in the mask about a rigid motion that is seen from the frame."""
-    _, x, y, v_x, v_y, omega, _ = motion
+    x, y, v_x, v_y, omega, _ = motion
     less = share - 1.0
     for node in range(n_nodes(rods)):
         vx, vy = load(v, 2 * node), load(v, 2 * node + 1)
@@ -282,11 +282,13 @@ def through_poles(rods, work, q, robots):
 
 
 @kernel
-def energy_noise(rods, q, h, mass, potential, kinetic):
+def energy_noise(rods, q, h, potential, kinetic):
     """Change of an energy that rounding of positions may make [J]: slope sqrt(2 m K) and curvature m, times a move.
 
     Velocities are differences of positions over h; stretching and bending are as stiff as `stiffness` [N/m] at most.
+    Held nodes have a huge mass and no velocity.
     """
+    mass = load(rods.scales.free_mass, 0)
     edges = rods.n_limbs * (rods.nodes_per_limb - 1)
     length = load(rods.foresight.shortest_edge, 0)
     stretching, bending = load(rods.stretching.EA_over_l, 0), load(rods.bending.EI_over_dl, 0)
@@ -335,9 +337,9 @@ def hold_to_energy(rods, work, scheme, q, v, h, frame, robots, allowed, largest_
     cut = grown & ~grown
     if any_lane(grown):
         motion = rigid_motion(rods, work, q, v, frame)
-        noise = energy_noise(rods, q, h, motion[0], potential, kinetic)
+        noise = energy_noise(rods, q, h, potential, kinetic)
         grown = grown & (potential + kinetic > allowed + noise)
-        rigid = motion[6]
+        rigid = motion[5]
         about = kinetic - rigid
         left = allowed + noise - potential - rigid
         cut = grown & (left >= 0.0) & (left >= (1.0 - largest_cut) * about)

@@ -28,11 +28,15 @@ def settle_momentum(rods, work, stage, robots):
 
 @kernel
 def move_as_a_whole(rods, work, stage, robots):
-    """Newton step of a stage in which all nodes of a robot move alike."""
+    """Newton step of a stage in which all nodes of a robot move alike.
+
+    Contact, which cancels but for its rounding, is left out: its forces are those of where Newton's last step began,
+    or, as long as others in the lanes go on, of where it has ended.
+    """
     zero = splat(0.0)
     fx, fy, xx, xy, yy = zero, zero, zero, zero, zero
     for node in range(n_nodes(rods)):
-        _, gradient, hessian = node_slopes(rods, work, stage, node)
+        _, gradient, hessian = node_slopes(None, rods, work, stage, node)
         fx, fy = fx + gradient[0], fy + gradient[1]
         xx, xy, yy = xx + hessian[0], xy + hessian[1], yy + hessian[2]
     fx, fy, xx, xy, yy = add_middles(rods.middle_drag, rods, work, stage, fx, fy, xx, xy, yy)

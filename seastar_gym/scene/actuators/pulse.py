@@ -19,8 +19,9 @@ def pulse(t: ArrayLike, heating_time: float, cooling_time: float) -> NDArray[np.
     Zero at t = 0, one at t = heating_time, zero again at t = heating_time + cooling_time (Fig. 13.5b).
     """
     t = np.asarray(t, dtype=float)
-    rising = t / heating_time
-    falling = (heating_time + cooling_time - t) / cooling_time
+    with np.errstate(over="ignore"):  # ramps that are steeper than any float are jumps
+        rising = t / heating_time
+        falling = (heating_time + cooling_time - t) / cooling_time
     return np.clip(np.minimum(rising, falling), 0.0, 1.0)
 
 

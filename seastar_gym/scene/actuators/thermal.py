@@ -78,13 +78,13 @@ class ThermalSma(HeatingAndCooling):
         for name in self.TEMPERATURES:
             require_each(self, name, partial(require_finite, unit="deg C"))
         batch_size(self)
-        if self.heating_time > 100.0 * np.min(self.time_constant):
+        if self.heating_time / 100.0 > np.min(self.time_constant):
             raise ValueError("heating_time must be at most 100 time constants, after which nothing changes any more.")
         water, M_f, A_s, M_s, A_f = (np.asarray(getattr(self, name)) for name in self.TEMPERATURES)
         in_order = (water <= M_f) & (M_f <= A_s) & (A_s < A_f) & (M_f < M_s) & (M_s <= A_f)
         if not in_order.all():
             raise ValueError(
-                f"Wires come back only if T_water <= M_f <= A_s < A_f and M_f < M_s <= A_f [deg C], not with "
+                f"Wires cool back only if T_water <= M_f <= A_s < A_f and M_f < M_s <= A_f [deg C], not with "
                 f"T_water = {water}, M_f = {M_f}, A_s = {A_s}, A_f = {A_f} and M_s = {M_s}."
             )
 
@@ -107,7 +107,8 @@ class ThermalSma(HeatingAndCooling):
         tau, cold = column(self.time_constant, 2), column(self.water_temperature, 2)
         hot = cold + column(self.steady_rise, 2)
         start, before = state[..., :2], state[..., 2:]
-        decay = np.exp(-t.reshape(-1, *(1,) * heated.ndim) / tau)
+        with np.errstate(over="ignore"):  # so many time constants that nothing is left
+            decay = np.exp(-t.reshape(-1, *(1,) * heated.ndim) / tau)
         growth = np.exp(heated / tau)
         hottest = hot + (start - hot) / growth
         after = self.transform(hottest, before)

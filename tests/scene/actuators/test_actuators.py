@@ -2,12 +2,13 @@
 
 import pickle
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
 from refusals import assert_refused
-from seastar_gym import Limited, MeasuredCurve, Numerics, Scene, Seastar, Simulator, SmaPulse
+from seastar_gym import Limited, MeasuredCurve, Numerics, Scene, Seastar, Simulator, SmaPulse, ThermalSma
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import SymmetryReduction
 from seastar_gym.scene.actuators.actuator import Actuator, StatefulActuator
@@ -161,7 +162,7 @@ def test_what_a_robot_remembers_does_not_depend_on_its_neighbours():
 def test_limits_are_positive_numbers(arguments):
     with pytest.raises(ValueError, match=next(iter(arguments))):
         Limited(SmaPulse(), **arguments)
-    with pytest.raises(ValueError, match="remembers nothing"):
+    with pytest.raises(ValueError, match="without memory"):
         Limited(SLOW)
 
 
@@ -273,3 +274,19 @@ def test_symmetry_is_refused_where_the_scene_has_none(scene, words):
 def test_a_missing_file_of_a_curve_is_said_in_one_sentence(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"^There is no measured curve at .*none\.csv: .*\.$"):
         MeasuredCurve.from_csv(tmp_path / "none.csv")
+
+
+@pytest.mark.parametrize(
+    "actuator",
+    [
+        partial(ThermalSma, time_constant=1e308),
+        partial(ThermalSma, cooling_time=1e308),
+        partial(SmaPulse, heating_time=5e-324),
+        partial(SmaPulse, cooling_time=1e308),
+    ],
+    ids=str,
+)
+def test_extreme_numbers_of_an_actuator_warn_of_nothing(actuator):
+    """Warnings are errors in tests; what is refused is refused in a sentence."""
+    curve = actuator().delta_psi([0.0, 1e-3, 1e307])
+    assert np.isfinite(curve).all()

@@ -1,0 +1,70 @@
+"""Results of an evaluation: a row of numbers for every swim, printed as a table and written as CSV."""
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+from rich.text import Text
+
+from agents.report.page import number
+from agents.swim import Swim
+
+MM = 1000.0
+"""Millimetres in a metre."""
+
+COLUMNS = {
+    "agent": "agent",
+    "strokes_to_finish": "strokes\nto\nfinish",
+    "simulated_time_s": "simulated\ntime\n[s]",
+    "waypoints_reached": "waypoints\nreached",
+    "mean_cross_track_error_mm": "mean\ncross-track\nerror [mm]",
+    "largest_cross_track_error_mm": "largest\ncross-track\nerror [mm]",
+    "limbs_heated_per_metre": "limbs\nheated per\nmetre [1/m]",
+}
+"""Titles of the printed columns, by the names of the CSV's."""
+
+
+def results(swims: Sequence[Swim]) -> list[dict[str, str | int | float | None]]:
+    """Rows of the table, by the names of the CSV; None where there is no number, as for an unfinished swim."""
+    return [
+        {
+            "agent": done.agent,
+            "strokes_to_finish": done.strokes if done.finished else None,
+            "simulated_time_s": float(done.time[-1]),
+            "waypoints_reached": done.waypoints_reached,
+            "waypoints": len(done.waypoints),
+            "mean_cross_track_error_mm": MM * float(done.cross_track_errors.mean()),
+            "largest_cross_track_error_mm": MM * float(done.cross_track_errors.max()),
+            "limbs_heated_per_metre": done.heated_per_metre,
+        }
+        for done in swims
+    ]
+
+
+def results_table(swims: Sequence[Swim]) -> Table:
+    """Table for print."""
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False, pad_edge=False)
+    for name, title in COLUMNS.items():
+        if name == "agent":
+            table.add_column(title, vertical="bottom", overflow="fold")
+        else:
+            table.add_column(Text(title), justify="right", no_wrap=True)
+    for row in in_words(swims):
+        table.add_row(*(Text(number(row[name])) for name in COLUMNS))
+    return table
+
+
+def in_words(swims: Sequence[Swim]) -> list[dict[str, str | int | float | None]]:
+    """Rows of `results` with the waypoints reached in words."""
+    return [{**row, "waypoints_reached": f"{row['waypoints_reached']} of {row['waypoints']}"} for row in results(swims)]
+
+
+def write_csv(swims: Sequence[Swim], file: Path) -> None:
+    """Write the rows of `results` as CSV."""
+    rows = results(swims)
+    with file.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.DictWriter(stream, fieldnames=list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)

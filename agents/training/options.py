@@ -1,0 +1,104 @@
+"""Options of a training run: from the command line, or from the folder of a run that is continued."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+import tyro
+
+from agents.hyperparameters import Hyperparameters
+from seastar_gym import RewardWeights
+from seastar_gym.envs.paths import PATHS, make_path
+from seastar_gym.scene.numerics import Fidelity
+
+MAX_STROKES = 400
+"""Time limit of an evaluated swim [strokes]; the scripted gait takes 241 round the pentagon."""
+PATH_HELP = (
+    f"Name of the path to train on: {', '.join(PATHS)}. Random paths teach every direction and every turn, also those "
+    "of the pentagon."
+)
+
+
+@dataclass(frozen=True)
+class Options:
+    """Train a swimmer with PPO and compare it with the scripted pentagon gait."""
+
+    strokes: int = 300_000
+    """Length of the training [strokes], all robots together."""
+    path: Annotated[str, tyro.conf.arg(help=PATH_HELP)] = "random"
+    random_heading: bool = True
+    """Turn every robot at random at the start of an episode."""
+    fidelity: Fidelity = "balanced"
+    """Accuracy of the simulation, in the training and in the comparison."""
+    seed: int = 0
+    """Seed of the network, the exploration and the paths."""
+    num_threads: int | None = None
+    """Number of threads of the simulator; by default one for every processor. The network always uses one."""
+    device: Literal["cpu", "cuda", "auto"] = "cpu"
+    """Device of the network, which is so small that a GPU is no faster."""
+    save_freq: int = 25_000
+    """Interval between checkpoints [strokes]."""
+    video: bool = True
+    """Write videos of the swims of the comparison."""
+    out: Path | None = None
+    """Folder of the run; by default a folder in runs/ named after the time."""
+    ship: bool = False
+    """Make the trained policy the one in the box, the default of agents.evaluate, unless that one needs fewer strokes
+    on held-out random paths."""
+    ship_anyway: bool = False
+    """Confirm --ship for a worse policy, or for that of a --quick run."""
+    resume: Path | None = None
+    """Folder of a run to continue with its own options; strokes, num_threads, device, save_freq, video and ship may
+    differ. It is safe to continue a run of others: its files are read as JSON and tensors, and nothing is unpickled.
+    Stable-Baselines3's own PPO.load, however, would execute code in its model.zip."""
+    quick: bool = False
+    """Train for 32,768 strokes at fidelity "fast": the whole run takes less than a minute."""
+    ppo: Annotated[Hyperparameters, tyro.conf.arg(name="")] = Hyperparameters()
+
+    def __post_init__(self) -> None:
+        if self.strokes < 1 or self.save_freq < 1:
+            raise ValueError("strokes and save_freq must be at least 1.")
+        make_path(self.path, np.random.default_rng(0))
+
+
+CHANGEABLE = {"strokes", "num_threads", "device", "save_freq", "video", "ship", "ship_anyway", "out", "resume", "quick"}
+"""Names of the options that may change when a run is continued."""
+
+
+def read_options(arguments: Sequence[str]) -> Options:
+    """Options of the command line; with --resume, those of the run where the command line has no others."""
+    options = tyro.cli(Options, prog="python train.py", args=arguments)
+    if options.resume is None:
+        return replace(options, strokes=32_768, save_freq=16_384, fidelity="fast") if options.quick else options
+    saved = replace(saved_options(options.resume), out=options.resume, resume=options.resume)
+    options = tyro.cli(Options, prog="python train.py", args=arguments, default=saved)
+    changed = [name for name in saved.__dict__ if getattr(options, name) != getattr(saved, name)]
+    if forbidden := sorted(set(changed) - CHANGEABLE):
+        raise ValueError(f"The run in {options.resume} cannot continue with another {', '.join(forbidden)}.")
+    return replace(options, out=options.resume)
+
+
+def saved_options(folder: Path) -> Options:
+    """Options of the run in a folder, without --ship, which has to be asked for again."""
+    file = folder / "config.json"
+    if not file.is_file():
+        raise FileNotFoundError(f"There is no run to continue in {folder}: it has no config.json.")
+    try:
+        options = json.loads(file.read_text(encoding="utf-8"))["options"]
+        ppo = options.pop("ppo")
+        ppo |= {"hidden": tuple(ppo["hidden"]), "reward": RewardWeights(**ppo["reward"])}
+        here = {"out": folder, "resume": None, "ppo": Hyperparameters(**ppo), "ship": False, "ship_anyway": False}
+        return Options(**{**options, **here})
+    except (AttributeError, KeyError, RecursionError, TypeError, ValueError) as damaged:
+        raise ValueError(f"{file} is damaged or from another version: {str(damaged).rstrip('.')}.") from damaged
+
+
+def require_consent(options: Options) -> None:
+    """ValueError where --ship is not confirmed for the policy of a --quick run, or is confirmed but not asked for."""
+    if options.ship_anyway and not options.ship:
+        raise ValueError("--ship-anyway confirms --ship: give both.")
+    if options.ship and options.quick and not options.ship_anyway:
+        raise ValueError("A --quick run replaces the policy in the box only with --ship-anyway beside --ship.")

@@ -1,0 +1,111 @@
+"""Canvas: thick lines, discs and text on a picture, painted larger and smoothed down with pygame.
+
+pygame is imported when a canvas is made, so that an environment that draws nothing does without it. Places and sizes
+are in pixels of the finished picture, counted from the upper left corner, y down.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    import pygame
+
+FloatArray = NDArray[np.float64]
+Colour = tuple[int, int, int]
+
+SUPERSAMPLING = 3
+"""Pictures are painted this many times larger and smoothed down."""
+
+
+class Canvas:
+    """Picture that is being painted.
+
+    size: Width and height of the picture [px]. text_height: Height of letters [px].
+    """
+
+    def __init__(self, size: tuple[int, int], text_height: int) -> None:
+        self._pygame = import_pygame()
+        self.size, self.text_height = size, text_height
+        self._large = self._pygame.Surface((SUPERSAMPLING * size[0], SUPERSAMPLING * size[1]), depth=32)
+        self.picture: pygame.Surface = self._pygame.Surface(size, depth=32)
+
+    def begin(self, background: Colour) -> None:
+        """Fill the picture with a background."""
+        self._font = self._new_font()
+        self._large.fill(background)
+
+    def finish(self) -> None:
+        """Smooth down what was painted to `picture`."""
+        self._pygame.transform.smoothscale(self._large, self.size, self.picture)
+
+    def pixels(self) -> NDArray[np.uint8]:
+        """Red, green and blue of the finished picture, shape (height, width, 3), a fresh array."""
+        width, height = self.size
+        pixels = np.frombuffer(self._pygame.image.tobytes(self.picture, "RGB"), dtype=np.uint8)
+        return pixels.reshape(height, width, 3).copy()
+
+    def polyline(self, points: FloatArray, colour: Colour, width: int) -> None:
+        """Line through points [px], shape (n, 2), as pygame draws it."""
+        corners = np.rint(SUPERSAMPLING * points - 0.5).tolist()
+        self._pygame.draw.lines(self._large, colour, False, corners, width * SUPERSAMPLING)
+
+    def stroke(self, points: FloatArray, colour: Colour, width: float) -> None:
+        """Thick line through points [px], shape (n, 2), with round joints and ends; width [px].
+
+        It is a row of discs: pygame's own thick lines and polygons come out up to a fifth thinner in some directions.
+        """
+        radius = max(1, round(0.5 * SUPERSAMPLING * width))
+        for centre in np.rint(SUPERSAMPLING * _along(points, 2.0 / SUPERSAMPLING)).tolist():
+            self._pygame.draw.circle(self._large, colour, centre, radius)
+
+    def dot(self, centre: FloatArray, colour: Colour, radius: float) -> None:
+        """Disc around a centre [px], shape (2,); radius [px]."""
+        x, y = np.rint(SUPERSAMPLING * centre).tolist()
+        self._pygame.draw.circle(self._large, colour, (x, y), round(SUPERSAMPLING * radius))
+
+    def text_size(self, text: str) -> FloatArray:
+        """Width and height of a written text [px], shape (2,)."""
+        return np.array(self._font.size(text)) / SUPERSAMPLING
+
+    def write(self, text: str, place: ArrayLike, colour: Colour, anchor: tuple[float, float]) -> float:
+        """Write a text with its anchor (0 to 1 from the upper left) at a place [px]; returns the x [px] of its end."""
+        written = self._font.render(text, True, colour)
+        corner = np.rint(SUPERSAMPLING * np.asarray(place) - np.array(anchor) * written.get_size())
+        self._large.blit(written, corner.tolist())
+        return (float(corner[0]) + written.get_width()) / SUPERSAMPLING
+
+    def _new_font(self) -> pygame.font.Font:
+        """Font for one picture: it dies when another part of the program calls pygame.quit()."""
+        self._pygame.font.init()
+        name, height = self._pygame.font.get_default_font(), SUPERSAMPLING * self.text_height
+        font: pygame.font.Font = self._pygame.font.Font(name, height)
+        return font
+
+
+def _along(points: FloatArray, spacing: float) -> FloatArray:
+    """Points [px], shape (m, 2), along the line through points [px], shape (n, 2), about a spacing [px] apart."""
+    edges = np.diff(points, axis=0)
+    arc_length = np.append(0.0, np.cumsum(np.hypot(edges[:, 0], edges[:, 1])))
+    stations = np.linspace(0.0, arc_length[-1], 2 + int(arc_length[-1] / spacing))
+    return np.column_stack([np.interp(stations, arc_length, points[:, axis]) for axis in (0, 1)])
+
+
+def mixed(colour: Colour, other: Colour, fraction: float) -> Colour:
+    """Mixture of a fraction of one colour with the rest of another."""
+    red, green, blue = (round(fraction * a + (1.0 - fraction) * b) for a, b in zip(colour, other, strict=True))
+    return red, green, blue
+
+
+def import_pygame() -> Any:
+    """The module pygame; ImportError, with the command that installs it, where there is none."""
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+    try:
+        import pygame
+    except ImportError as missing:
+        raise ImportError('Rendering needs pygame-ce: pip install "seastar-gym[render]".') from missing
+    return pygame

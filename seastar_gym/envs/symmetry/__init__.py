@@ -1,0 +1,38 @@
+"""Symmetry of the regular n-gon: a robot of n equal limbs swims alike in every sector.
+
+Directions in the body frame fall into 2n sectors; sector g spans the angles [g pi/n, (g + 1) pi/n]. *Element* g of the
+symmetry group is the turn (g even) or the turn and mirror (g odd) that brings sector g onto sector 0:
+
+    element 2k:      turn by -2 pi k/n
+    element 2k - 1:  turn by -2 pi k/n, then mirror at the x axis (y -> -y), for k = 1..n
+
+An element carries a robot with its waypoints onto another robot, whose limb j was limb `limb_order(n)[g, j]`; a mirror
+swaps the commands + and -. A controller that sees only waypoints in sector 0 and whose actions are carried back is
+equivariant: in a turned or mirrored world it swims the turned or mirrored way.
+
+The functions take batches: observations of shape (..., size), as laid out in `observation.py`, and elements of shape
+(...).
+"""
+
+from seastar_gym.envs.symmetry.actions import action_table, restore_actions, transform_actions, transform_commands
+from seastar_gym.envs.symmetry.group import compose, inverse, limb_order, turns
+from seastar_gym.envs.symmetry.observations import reduce_observations, sectors, transform_observations
+from seastar_gym.envs.symmetry.scenes import require_symmetry
+from seastar_gym.envs.symmetry.wrappers import SymmetryReduction, VectorSymmetryReduction
+
+__all__ = [
+    "SymmetryReduction",
+    "VectorSymmetryReduction",
+    "action_table",
+    "compose",
+    "inverse",
+    "limb_order",
+    "reduce_observations",
+    "require_symmetry",
+    "restore_actions",
+    "sectors",
+    "transform_actions",
+    "transform_commands",
+    "transform_observations",
+    "turns",
+]

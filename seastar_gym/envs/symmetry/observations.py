@@ -1,0 +1,69 @@
+"""Observations under the symmetry group: sectors of waypoints, and what a turned or mirrored robot sees."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seastar_gym.envs.observation import layout_of_size
+from seastar_gym.envs.symmetry.group import Elements, is_mirror, limb_order, read_only, turns
+
+BOUNDARY_WIDTH = 1e-6
+"""Angle [rad] from a boundary between two sectors within which a waypoint lies on it. It is far above the rounding of
+observations: not rounding, but the next waypoint chooses the sector of a robot that is aimed along a limb."""
+
+
+def sectors(observations: NDArray[np.floating[Any]], n_limbs: int) -> Elements:
+    """Sectors of the current waypoints, 0 to 2 n_limbs - 1, shape (...), in observations of shape (..., size).
+
+    A waypoint on a boundary belongs to the sector on the side of the next waypoint, and where that lies on the same
+    line (or there is none) to the sector anti-clockwise of the boundary. A waypoint at the hub lies in sector 0.
+    """
+    at = layout_of_size(observations.shape[-1])
+    current = np.asarray(observations[..., at.current_waypoint], np.float64)
+    towards_next = np.asarray(observations[..., at.next_waypoint], np.float64)
+    width = np.pi / n_limbs
+    angle = np.arctan2(current[..., 1], current[..., 0])
+    boundary = np.rint(angle / width)  # the nearest one
+    on_boundary = np.abs(angle - boundary * width) <= BOUNDARY_WIDTH
+    c, s = np.cos(boundary * width), np.sin(boundary * width)
+    aside = c * towards_next[..., 1] - s * towards_next[..., 0]
+    next_is_right = aside < -BOUNDARY_WIDTH * np.hypot(towards_next[..., 0], towards_next[..., 1])
+    sector = np.where(on_boundary, boundary - next_is_right, np.floor(angle / width))
+    return sector.astype(np.intp) % (2 * n_limbs)
+
+
+@cache
+def _vector_order(n_limbs: int, n_vectors: int) -> NDArray[np.intp]:
+    """Order of vectors, shape (2 n_limbs, n_vectors): vector i after element g was vector order[g, i] before."""
+    at = layout_of_size(2 * n_vectors)
+    n_nodes = at.velocities.start // 2
+    nodes = np.arange(n_nodes).reshape(n_limbs, -1)[limb_order(n_limbs)].reshape(-1, n_nodes)
+    others = np.tile(np.arange(at.hub_velocity.start // 2, n_vectors), (2 * n_limbs, 1))
+    return read_only(np.concatenate([nodes, n_nodes + nodes, others], axis=1))
+
+
+def transform_observations(
+    observations: NDArray[np.floating[Any]], elements: ArrayLike, n_limbs: int
+) -> NDArray[np.floating[Any]]:
+    """Observations of the robots carried by the elements: a fresh array of the same shape and type."""
+    observations, elements = np.asarray(observations), np.asarray(elements, dtype=np.intp)
+    size = observations.shape[-1]
+    at = layout_of_size(size)
+    if at.size != size or at.velocities.start % (2 * n_limbs) or at.velocities.start <= 0:
+        raise ValueError(f"An observation of {size} numbers is not that of a robot of {n_limbs} limbs.")
+    as_vectors = np.result_type(observations, np.complex64)  # pairs of numbers as x + iy
+    vectors = np.ascontiguousarray(observations).view(as_vectors)
+    vectors = np.take_along_axis(vectors, _vector_order(n_limbs, size // 2)[elements], axis=-1)
+    vectors *= turns(n_limbs)[elements][..., None].astype(as_vectors)
+    np.conjugate(vectors, out=vectors, where=is_mirror(elements)[..., None])
+    return vectors.view(observations.dtype)
+
+
+def reduce_observations(
+    observations: NDArray[np.floating[Any]], n_limbs: int
+) -> tuple[NDArray[np.floating[Any]], Elements]:
+    """Observations with the current waypoint brought into sector 0, and the elements that did it."""
+    elements = sectors(observations, n_limbs)
+    return transform_observations(observations, elements, n_limbs), elements

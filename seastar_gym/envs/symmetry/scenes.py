@@ -1,0 +1,35 @@
+"""Scenes that have the symmetry of the regular polygon, and the reasons why others have not."""
+
+from collections.abc import Iterable, Iterator
+
+from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization
+from seastar_gym.scene import Scene
+from seastar_gym.scene.actuators.actuator import StatefulActuator
+
+
+def require_symmetry(scene: Scene, randomization: DomainRandomization | None = None) -> None:
+    """ValueError for scenes, and draws of their numbers, that a turn or a mirror would change."""
+    why = next(_asymmetries(scene, () if randomization is None else randomization.distributions), None)
+    if why is not None:
+        raise ValueError(f"This scene has not the symmetry of the regular polygon: {why}.")
+
+
+def _asymmetries(scene: Scene, drawn: Iterable[str]) -> Iterator[str]:
+    """Reasons why a scene, some of whose numbers are drawn, is not symmetric."""
+    if not scene.robot.is_symmetric:
+        yield "its limbs are not alike, straight and evenly spread"
+    if len(set(scene.limb_strengths)) > 1:
+        yield "its limbs are not equally strong"
+    if isinstance(scene.actuator, StatefulActuator):
+        yield "its actuators remember what they did, and no table says how that is carried from limb to limb"
+    if any(node != 0 for node in scene.held_nodes):
+        yield "nodes of limbs are held"
+    if scene.loads:
+        yield "its nodes are loaded"
+    if scene.gravity is not None:
+        yield "gravity has a direction"
+    if scene.fluid is not None and scene.fluid.current is not None:
+        yield "its water has a current"
+    for name in drawn:
+        if name == LIMB_STRENGTHS or name.startswith("robot.limbs."):
+            yield f"{name} is drawn for every limb by itself"

@@ -1,0 +1,51 @@
+"""Common base of the environments of one robot and of a batch: task, action mode, and options of a reset."""
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from seastar_gym.envs.commands import Actions, action_space, command_table
+from seastar_gym.envs.randomization import DomainRandomization
+from seastar_gym.envs.spec import PlainSpec
+from seastar_gym.envs.task import SwimTask
+from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import shown
+from seastar_gym.simulator import Simulator
+
+
+class TaskEnv(PlainSpec):
+    """Base of the environments: their task, and the spaces of one robot."""
+
+    def _set_task(self, task: SwimTask, actions: Actions) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
+        """Take the task and the action mode; returns the spaces of one robot's actions and observations."""
+        n_limbs = task.scene.robot.n_limbs
+        self._task, self.actions = task, actions
+        actions_of_one = action_space(actions, n_limbs)
+        self.command_table = None if actions == "limbs" else command_table(actions, n_limbs)
+        return actions_of_one, spaces.Box(-np.inf, np.inf, (task.observation_size,), np.float32)
+
+    @property
+    def scene(self) -> Scene:
+        """Scene as it was given, before `randomization` draws any of its numbers."""
+        return self._task.scene
+
+    @property
+    def randomization(self) -> DomainRandomization | None:
+        """Distributions of the numbers that are drawn for every episode."""
+        return self._task.randomization
+
+    @property
+    def simulator(self) -> Simulator:
+        """Simulator of all robots of the environment."""
+        return self._task.simulator
+
+
+def checked_options(options: dict[str, Any] | None, known: set[str]) -> dict[str, Any]:
+    """Options of a reset. ValueError: an option has a name that is not known, and would be ignored."""
+    if options is not None and not isinstance(options, dict):
+        raise ValueError(f"options must be a dictionary with any of {sorted(known)}, or None, not {shown(options)}.")
+    unknown = set(options or {}) - known
+    if unknown:
+        raise ValueError(f"Unknown reset option(s) {shown(sorted(unknown, key=str))}: known are {sorted(known)}.")
+    return options or {}

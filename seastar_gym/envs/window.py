@@ -1,0 +1,56 @@
+"""Window in which finished pictures are shown."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from seastar_gym.envs.canvas import import_pygame
+
+if TYPE_CHECKING:
+    import pygame
+
+
+class Window:
+    """Window of pygame that opens with the first picture and stays closed once the user closed it."""
+
+    def __init__(self) -> None:
+        self._pygame = import_pygame()
+        self._surface: pygame.Surface | None = None
+        self._clock = self._pygame.time.Clock()
+        self._closed_by_user = False
+
+    def is_wanted(self, size: tuple[int, int]) -> bool:
+        """Whether there is a window to show a picture of this width and height [px] in; opens it where needed."""
+        if self._closed_by_user:
+            return False
+        if self._surface is None or self._surface is not self._pygame.display.get_surface():
+            self._surface = self._open(size)
+        if any(event.type == self._pygame.QUIT for event in self._pygame.event.get()):
+            self.close()
+            self._closed_by_user = True
+        return not self._closed_by_user
+
+    def show(self, picture: pygame.Surface, fps: float | None) -> None:
+        """Show a picture, and wait until 1/fps seconds have passed since the one before, where fps is given."""
+        assert self._surface is not None
+        self._surface.blit(picture, (0, 0))
+        self._pygame.display.flip()
+        if fps is not None:
+            self._clock.tick(fps)
+
+    def close(self) -> None:
+        """Close the window, if one is open; may be called again."""
+        if self._surface is not None:
+            self._surface = None
+            self._pygame.display.quit()
+
+    def _open(self, size: tuple[int, int]) -> pygame.Surface:
+        try:
+            self._pygame.display.init()
+            self._pygame.display.set_caption("SeastarSwim")
+            surface: pygame.Surface = self._pygame.display.set_mode(size)
+        except self._pygame.error as no_display:
+            raise RuntimeError(
+                f'No window can be opened here ({no_display}): render with render_mode="rgb_array" instead.'
+            ) from no_display
+        return surface

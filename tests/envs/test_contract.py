@@ -1,0 +1,85 @@
+"""The docstrings of the environments, which users read as the contract, say what the code does."""
+
+import inspect
+import re
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from seastar_gym import RewardWeights, Scene
+from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout
+from seastar_gym.envs.paths import PATHS
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
+
+CONTRACT = inspect.getdoc(SeastarSwimEnv)
+TYPES = {"float": float, "int": int, "bool": bool, "str": str}
+
+
+def section(title: str, text: str = CONTRACT) -> str:
+    """Text of the section whose title begins so."""
+    return re.split(r"^## ", re.split(rf"^## {title}.*$", text, flags=re.MULTILINE)[1], flags=re.MULTILINE)[0]
+
+
+def table(title: str) -> list[dict[str, str]]:
+    """Rows of the section's table, by the titles of the columns."""
+    lines = [line for line in section(title).splitlines() if line.startswith("|")]
+    head, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    return [dict(zip(head, row, strict=True)) for row in rows]
+
+
+def arguments(text: str) -> list[str]:
+    return re.findall(r"^(\w+): ", text, flags=re.MULTILINE)
+
+
+@pytest.mark.parametrize("row", table("Action"), ids=lambda row: row["`actions`"])
+def test_the_actions_are_those_of_the_table(row):
+    env = SeastarSwimEnv(actions=row["`actions`"].strip("`").strip('"'))
+    named = {"MultiDiscrete": gym.spaces.MultiDiscrete, "Discrete": gym.spaces.Discrete, "n": 5}
+    assert env.action_space == eval(row["space"].strip("`"), named)
+    highest = env.action_space.nvec.max() - 1 if row["index"] != "-" else env.action_space.n - 1
+    assert eval(row["range"].split("..")[1], {"n": 5}) == highest
+
+
+def test_the_observation_is_that_of_the_table():
+    rows, at = table("Observation"), scene_layout(Scene())
+    documented = [slice(int(first), int(last) + 1) for first, last in (row["index"].split("..") for row in rows)]
+    assert documented == [at.positions, at.velocities, at.hub_velocity, at.current_waypoint, at.next_waypoint]
+    lengths = {"0.1 m": Scene().robot.limb_length, "0.025 m/s": VELOCITY_SCALE}
+    assert [lengths[row["unit"]] for row in rows] == [0.1, 0.025, 0.025, 0.1, 0.1]
+    space = SeastarSwimEnv().observation_space
+    assert f"`{space}`" in section("Observation") and space.shape == (documented[-1].stop,)
+    assert {row["range"] for row in rows} == {f"({space.low.min()}, {space.high.max()})"}
+
+
+def test_the_reward_has_the_terms_and_weights_of_the_table():
+    weights = RewardWeights()
+    documented = {row["term"].strip("`"): float(row["default weight"].split()[0]) for row in table("Reward")}
+    expected = {"progress": weights.progress, "waypoint": weights.waypoint, "effort": weights.effort}
+    assert documented == {f"reward_{name}": weight for name, weight in expected.items()}
+    assert f"within {weights.aim} of its radius" in section("Reward")
+
+
+def test_info_has_the_names_and_types_of_the_table():
+    env = SeastarSwimEnv(fidelity="fast")
+    for info in (env.reset(seed=0)[1], env.step([0, 1, 0, 0, 2])[4]):
+        documented = {row["name"].strip("`"): row["type"] for row in table("Info")}
+        assert set(info) == set(documented)
+        for name, kind in documented.items():
+            if kind == "array (2,)":
+                assert isinstance(info[name], np.ndarray) and info[name].shape == (2,)
+            else:
+                assert type(info[name]) is TYPES[kind], name
+
+
+def test_the_arguments_are_those_of_the_constructors():
+    of_one = list(inspect.signature(SeastarSwimEnv).parameters)
+    assert arguments(section("Arguments")) == of_one
+    of_batch = arguments(section("Arguments", inspect.getdoc(SeastarSwimVectorEnv)))
+    missing = {"frames_per_stroke"}  # a batch draws the ends of strokes
+    assert {*of_one, *of_batch} - missing == set(inspect.signature(SeastarSwimVectorEnv).parameters)
+
+
+def test_every_named_path_is_documented():
+    assert all(f'"{name}"' in section("Arguments") for name in PATHS)
