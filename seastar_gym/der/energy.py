@@ -3,6 +3,7 @@
 from seastar_gym.der.geometry import half_angle
 from seastar_gym.der.star import edge_of
 from seastar_gym.der.terms.bending import bending_energy, moment
+from seastar_gym.der.terms.clamp import clamp_energy
 from seastar_gym.der.terms.hub import set_natural_hub_angles
 from seastar_gym.der.terms.inertia import kinetic_energy
 from seastar_gym.der.terms.stretching import stretching_energy, tension
@@ -17,16 +18,33 @@ def hinge_energy(rods, e, first, second, side, EI_kappa_bar):
 
 
 @kernel
+def rigid_hub_energy(clamp, rods, work, q):
+    """Energy of the clamps of a rigid hub [J]; 0 where limbs are joined by hinges (None)."""
+    if clamp is None:
+        return splat(0.0)
+    return clamp_energy(clamp, rods, work, q)
+
+
+@kernel
+def hub_hinge_energy(clamp, rods, work, q, limb, edge):
+    """Energy of the hub hinge from a limb, whose root edge is given, to the next one [J]; 0 with a rigid hub."""
+    if clamp is not None:
+        return splat(0.0)
+    edges = rods.nodes_per_limb - 1
+    root = limb * edges
+    next_root = edge_of(rods, q, (root + edges) % (rods.n_limbs * edges))
+    return hinge_energy(rods, root, edge, next_root, rods.hub.side, load(work.hub_EI_kappa_bar, limb))
+
+
+@kernel
 def elastic_energy(rods, work, q):
     """Stretching and bending energy (13.14) at the natural hub angles in `work` [J]."""
-    total = splat(0.0)
+    total = rigid_hub_energy(rods.clamp, rods, work, q)
     edges = rods.nodes_per_limb - 1
     for limb in range(rods.n_limbs):
         root = limb * edges
         edge = edge_of(rods, q, root)
-        next_root = edge_of(rods, q, (root + edges) % (rods.n_limbs * edges))
-        EI_kappa_bar = load(work.hub_EI_kappa_bar, limb)
-        hinge = hinge_energy(rods, root, edge, next_root, rods.hub.side, EI_kappa_bar)
+        hinge = hub_hinge_energy(rods.clamp, rods, work, q, limb, edge)
         total += stretching_energy(rods, root, tension(rods, root, edge.length)) + hinge
         for e in range(root + 1, root + edges):
             before, edge = edge, edge_of(rods, q, e)

@@ -27,7 +27,8 @@ full one, with its quadratic convergence, is used wherever its pivots allow it.
 
 import numpy as np
 
-from seastar_gym.der.geometry import EDGE_ROWS, Edge, edge_geometry, half_angle
+from seastar_gym.der.geometry import EDGE_ROWS, edge_geometry, half_angle
+from seastar_gym.der.linear.rigid_hub import solve_rigid_hub
 from seastar_gym.der.linear.star_matrix import (
     add_symmetric,
     eliminate_node,
@@ -37,11 +38,23 @@ from seastar_gym.der.linear.star_matrix import (
     solve_ring,
     store_root,
 )
+from seastar_gym.der.star import load_root_edge, tail_node
 from seastar_gym.der.terms.added_mass import add_fluid_inertia
 from seastar_gym.der.terms.bending import bending_energy, bending_slopes, moment
+from seastar_gym.der.terms.clamp import assemble_clamp
 from seastar_gym.der.terms.contact import add_contact, contact_force
 from seastar_gym.der.terms.damping import damped_energy, damped_stiffness, damped_stress
-from seastar_gym.der.terms.drag import add_cross_flow, drag_slopes, relative
+from seastar_gym.der.terms.drag import (
+    add_cross_flow,
+    add_middle,
+    add_scalar,
+    couple_middle,
+    drag_slopes,
+    middle_slopes,
+    push_middle,
+    relative,
+)
+from seastar_gym.der.terms.inertia import less_edge_inertia
 from seastar_gym.der.terms.load import load_power, nodal_load
 from seastar_gym.der.terms.stretching import stretching_energy, tension
 from seastar_gym.simd.compilation import inlined_kernel, kernel
@@ -50,6 +63,13 @@ from seastar_gym.simd.lanes import add_product, load, select, splat, store, subt
 
 @kernel
 def edge_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex):
+    """(E, f, K) of an edge: elasticity, damping and, with consistent masses, what its inertia differs from lumped."""
+    slopes = elastic_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex)
+    return less_edge_inertia(rods.edge_mass, work, stage, e, tail_node(rods, e), slopes)
+
+
+@kernel
+def elastic_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex):
     """(E_s, f, K): stretching energy, gradient and Hessian of U in edge e, whose geometry is `edge`, with damping.
 
     With n = (u_y, -u_x): K = across |u|^2 1 + (along - across) u u^T + mu (u n^T + n u^T), along = EA |e|^2/l.
@@ -145,23 +165,8 @@ def coupling(s, outer, inner):
 
 
 @kernel
-def load_root_edge(work, limb):
-    """The root Edge of a limb, as it was put away."""
-    row = EDGE_ROWS * limb
-    return Edge(
-        load(work.root_edges, row),
-        load(work.root_edges, row + 1),
-        load(work.root_edges, row + 2),
-        load(work.root_edges, row + 3),
-        load(work.root_edges, row + 4),
-        load(work.root_edges, row + 5),
-        load(work.root_edges, row + 6),
-    )
-
-
-@kernel
-def assemble_hub_hinges(rods, work, stage, convex):
-    """Root edges, hub hinges and their couplings, into `work`; returns the hinges' energy [J]."""
+def assemble_hub(clamp, rods, work, stage, convex):
+    """Root edges, the hub's moments on them, stiffnesses and couplings, into `work`; returns the hub's energy [J]."""
     n_limbs, edges = rods.n_limbs, rods.nodes_per_limb - 1
     for limb in range(n_limbs):
         edge = edge_geometry(work.q, 0, limb * edges + 1)
@@ -169,6 +174,16 @@ def assemble_hub_hinges(rods, work, stage, convex):
             store(work.root_edges, EDGE_ROWS * limb + k, edge[k])
         store(work.hub_moment, limb, 0.0)
         store(work.hub_stiffness, limb, 0.0)
+        store(work.hub_t, limb, 0.0)
+    if clamp is None:
+        return assemble_hub_hinges(rods, work, stage, convex)
+    return assemble_clamp(clamp, rods, work, convex)
+
+
+@kernel
+def assemble_hub_hinges(rods, work, stage, convex):
+    """Hub hinges and their couplings, into `work`; returns the hinges' energy [J]."""
+    n_limbs, edges = rods.n_limbs, rods.nodes_per_limb - 1
     energy = splat(0.0)
     for a in range(n_limbs):
         b = a + 1 if a + 1 < n_limbs else 0
@@ -224,17 +239,19 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
         P = coupling(s_before, edge, before)
         D_1 = (D_before[0] + K[0] + 2.0 * P[0], D_before[1] + K[1] + (P[1] + P[2]), D_before[2] + K[2] + 2.0 * P[3])
         K_P = (K[0] + P[0], K[1] + P[1], K[1] + P[2], K[2] + P[3])
+        E_m, g_m, h_m = middle_slopes(rods.middle_drag, work, stage, e, node - 1, node)
+        energy = add_scalar(rods.middle_drag, energy, E_m)
         D, B, D_before, r, r_before, part, node_pivot = eliminate_node(
             work,
             node,
-            add_symmetric(D, add_symmetric(inertia, K)),
-            (B[0] - K_P[0], B[1] - K_P[1], B[2] - K_P[2], B[3] - K_P[3]),
+            add_middle(rods.middle_drag, add_symmetric(D, add_symmetric(inertia, K)), h_m),
+            couple_middle(rods.middle_drag, (B[0] - K_P[0], B[1] - K_P[1], B[2] - K_P[2], B[3] - K_P[3]), h_m),
             P,
-            (r[0] + (g[0] + f[0]), r[1] + (g[1] + f[1])),
-            D_1,
+            push_middle(rods.middle_drag, (r[0] + (g[0] + f[0]), r[1] + (g[1] + f[1])), g_m),
+            add_middle(rods.middle_drag, D_1, h_m),
             negative(P),
             (zero, zero, zero),
-            (r_before[0] - f[0], r_before[1] - f[1]),
+            push_middle(rods.middle_drag, (r_before[0] - f[0], r_before[1] - f[1]), g_m),
             (zero, zero),
         )
         decrement += part
@@ -243,16 +260,18 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
     net_moment, stiffness = load(work.hub_moment, limb) - slope, load(work.hub_stiffness, limb) + s
     E_s, f, K = edge_slopes(rods, work, stage, first, edge, net_moment, stiffness, convex)
     E_n, g, inertia = node_slopes(work.contact, rods, work, stage, first + 1)
+    E_m, g_m, h_m = middle_slopes(rods.middle_drag, work, stage, first, 0, first + 1)
+    energy = add_scalar(rods.middle_drag, energy, E_m)
     store_root(
         work,
         limb,
-        add_symmetric(D, add_symmetric(inertia, K)),
-        (B[0] - K[0], B[1] - K[1], B[2] - K[1], B[3] - K[2]),
-        (r[0] + (g[0] + f[0]), r[1] + (g[1] + f[1])),
+        add_middle(rods.middle_drag, add_symmetric(D, add_symmetric(inertia, K)), h_m),
+        couple_middle(rods.middle_drag, (B[0] - K[0], B[1] - K[1], B[2] - K[1], B[3] - K[2]), h_m),
+        push_middle(rods.middle_drag, (r[0] + (g[0] + f[0]), r[1] + (g[1] + f[1])), g_m),
     )
     return (
-        add_symmetric(D_hub, add_symmetric(D_before, K)),
-        (r_hub[0] + r_before[0] - f[0], r_hub[1] + r_before[1] - f[1]),
+        add_middle(rods.middle_drag, add_symmetric(D_hub, add_symmetric(D_before, K)), h_m),
+        push_middle(rods.middle_drag, (r_hub[0] + r_before[0] - f[0], r_hub[1] + r_before[1] - f[1]), g_m),
         energy + E_s + E_n,
         decrement,
         pivot,
@@ -268,7 +287,7 @@ def factorise(rods, work, stage, convex):
     Returns (Phi, decrement, pivot): the potential [J], gradient^T Hessian^-1 gradient [J], and the smallest pivot,
     which is not positive (or NaN) where the Hessian is not positive definite.
     """
-    energy = add_contact(rods.contact, rods, work, stage, assemble_hub_hinges(rods, work, stage, convex))
+    energy = add_contact(rods.contact, rods, work, stage, assemble_hub(rods.clamp, rods, work, stage, convex))
     E_n, r_hub, D_hub = node_slopes(work.contact, rods, work, stage, 0)
     energy += E_n
     decrement, pivot = splat(0.0), splat(np.inf)
@@ -279,8 +298,18 @@ def factorise(rods, work, stage, convex):
         energy += limb_energy
         decrement += limb_decrement
         pivot = smaller(pivot, limb_pivot)
+    hub_decrement, hub_pivot = solve_hub(rods.clamp, rods, work, D_hub, r_hub)
+    return energy, decrement + hub_decrement, smaller(pivot, hub_pivot)
+
+
+@kernel
+def solve_hub(clamp, rods, work, D_hub, r_hub):
+    """Eliminate the root nodes and the hub, and solve for them, into work.root_solution.
+
+    Returns the part of the Newton decrement [J] and the smallest pivot.
+    """
+    if clamp is not None:
+        return solve_rigid_hub(rods, work, D_hub, r_hub)
     if rods.n_limbs > 1:
-        ring_decrement, ring_pivot = solve_ring(work, rods.n_limbs, D_hub, r_hub)
-    else:
-        ring_decrement, ring_pivot = solve_lone_root(work, D_hub, r_hub)
-    return energy, decrement + ring_decrement, smaller(pivot, ring_pivot)
+        return solve_ring(work, rods.n_limbs, D_hub, r_hub)
+    return solve_lone_root(work, D_hub, r_hub)

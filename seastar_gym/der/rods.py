@@ -13,6 +13,7 @@ from seastar_gym.der.stepping.foresight import Foresight
 from seastar_gym.der.stepping.scales import Scales
 from seastar_gym.der.terms import contact
 from seastar_gym.der.terms.bending import Bending
+from seastar_gym.der.terms.clamp import Clamp
 from seastar_gym.der.terms.current import Current
 from seastar_gym.der.terms.hub import Hub
 from seastar_gym.der.terms.stretching import Stretching
@@ -25,6 +26,8 @@ class Rods(NamedTuple):
 
     n_limbs, nodes_per_limb: Numbers of limbs, and of nodes of a limb with the hub.
     stretching, bending, hub: Coefficients of edges, hinges and hub hinges.
+    clamp: Rigid hub; edge_mass: Consistent masses [kg]; middle_drag: Drag in the middle of edges [kg/m]; per edge. The
+        three are those of the continuum's discretisation.
     mass: Lumped mass, per node [kg]. drag: 1/2 rho_f C_d D dl_i of (13.8), per node [kg/m].
     cross_drag, added_mass: Coefficients of flow across half edges [kg/m], [kg]; two rows per node.
     damping: Relaxation time tau [s], one row. current: How the fluid moves.
@@ -37,8 +40,11 @@ class Rods(NamedTuple):
     stretching: Stretching
     bending: Bending
     hub: Hub
+    clamp: Clamp | None
     mass: np.ndarray
+    edge_mass: np.ndarray | None
     drag: np.ndarray
+    middle_drag: np.ndarray | None
     cross_drag: np.ndarray | None
     added_mass: np.ndarray | None
     damping: np.ndarray | None
@@ -59,7 +65,7 @@ class Work(NamedTuple):
     hub_moment, hub_stiffness: Sums over the hub hinges of a limb's root edge, per limb [N m].
     hub_coupling: 2 x 2 block of every hub hinge, four rows per limb [N/m].
     hub_EI_kappa_bar: Natural moment of the hub hinges, per limb [N m].
-    hub_t: tan(phi/2) of the hub hinges, per limb.
+    hub_t: tan(phi/2) of the hub hinges, per limb. hub_direction: Natural directions of a rigid hub's clamps.
     stage_v: Velocities of the stages of a time step [m/s].
     normals: Unit normals of the edges where a stage began, or None in scenes that need none; see fluid.py.
     current: Velocity of the fluid at every node there [m/s], or None.
@@ -83,6 +89,7 @@ class Work(NamedTuple):
     hub_coupling: np.ndarray
     hub_EI_kappa_bar: np.ndarray
     hub_t: np.ndarray
+    hub_direction: np.ndarray | None
     stage_v: np.ndarray
     normals: np.ndarray | None
     current: np.ndarray | None
@@ -117,6 +124,7 @@ def make_work(rods: Rods, n_stages: int) -> Work:
         hub_coupling=rows(4 * n_limbs),
         hub_EI_kappa_bar=rows(n_limbs),
         hub_t=rows(n_limbs),
+        hub_direction=None if rods.clamp is None else rows(2 * n_limbs),
         stage_v=rows(2 * n_nodes * n_stages),
         normals=None if rods.cross_drag is None and rods.added_mass is None else rows(2 * n_nodes),
         current=None if rods.current is None else rows(2 * n_nodes),

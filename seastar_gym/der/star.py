@@ -7,8 +7,9 @@ the hub hinge from limb j to limb j + 1, whose first edge is the root edge of li
 limb has none: hinges that are not there have no stiffness.
 """
 
-from seastar_gym.der.geometry import edge_geometry
+from seastar_gym.der.geometry import EDGE_ROWS, Edge, edge_geometry
 from seastar_gym.simd.compilation import kernel
+from seastar_gym.simd.lanes import load
 
 
 @kernel
@@ -36,3 +37,18 @@ def hinge_edges(rods, e):
 def edge_of(rods, q, e):
     """Geometry of edge e."""
     return edge_geometry(q, tail_node(rods, e), e + 1)
+
+
+@kernel
+def load_root_edge(work, limb):
+    """The root Edge of a limb, as it was put away."""
+    row = EDGE_ROWS * limb
+    return Edge(
+        load(work.root_edges, row),
+        load(work.root_edges, row + 1),
+        load(work.root_edges, row + 2),
+        load(work.root_edges, row + 3),
+        load(work.root_edges, row + 4),
+        load(work.root_edges, row + 5),
+        load(work.root_edges, row + 6),
+    )

@@ -4,7 +4,19 @@ from operator import itemgetter
 
 from seastar_gym.der.rods import Rods
 from seastar_gym.der.stepping import foresight, scales
-from seastar_gym.der.terms import added_mass, bending, contact, damping, drag, gravity, hub, inertia, load, stretching
+from seastar_gym.der.terms import (
+    added_mass,
+    bending,
+    clamp,
+    contact,
+    damping,
+    drag,
+    gravity,
+    hub,
+    inertia,
+    load,
+    stretching,
+)
 from seastar_gym.model.currents import current_rows
 from seastar_gym.model.mesh import make_mesh
 from seastar_gym.scene.fluid import Water
@@ -28,6 +40,10 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
     hub_angles = [natural_hub_angle(limb.gap, robot.hub_hinge) for limb in limbs]
     C_d, C_t, C_a = water.drag_coefficient, water.tangential_drag_coefficient, water.added_mass_coefficient
     mesh = make_mesh(limbs, robot.nodes_per_limb)
+    continuum = robot.discretisation == "continuum"
+    at_nodes, in_middle = drag.coefficients(mesh, water.density, C_d if C_t is None else C_t), None
+    if continuum:
+        at_nodes, in_middle = drag.simpson_coefficients(mesh, water.density, C_d if C_t is None else C_t)
     stretched = stretching.coefficients(mesh)
     seen_ahead = foresight.coefficients(mesh, stretched, robot.density)
     mass = inertia.coefficients(mesh, robot.density, scene.held_nodes)
@@ -35,10 +51,13 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         n_limbs=mesh.n_limbs,
         nodes_per_limb=mesh.nodes_per_limb,
         stretching=stretched,
-        bending=bending.coefficients(mesh),
+        bending=bending.coefficients(mesh, gregory=continuum),
         hub=hub.coefficients(hub_angles, turning=robot.hub_hinge == "turning"),
+        clamp=clamp.coefficients(mesh, [limb.direction for limb in limbs]) if continuum else None,
         mass=mass,
-        drag=drag.coefficients(mesh, water.density, C_d if C_t is None else C_t),
+        edge_mass=inertia.edge_coefficients(mesh, robot.density) if continuum else None,
+        drag=at_nodes,
+        middle_drag=in_middle,
         cross_drag=drag.cross_coefficients(mesh, water.density, C_d, C_t),
         added_mass=added_mass.coefficients(mesh, water.density, C_a),
         damping=damping.coefficients(robot.relaxation_time),

@@ -16,6 +16,7 @@ from seastar_gym.scene.serial import register_part
 from seastar_gym.scene.shape import limbs_that_may_touch, rest_positions, turn_per_hinge
 
 HubHinge = Literal["opening", "turning"]
+Discretisation = Literal["chapter", "continuum"]
 
 
 @register_part
@@ -35,6 +36,10 @@ class Seastar:
     limbs: Overrides, one `Limb` for each limb, or () for none.
     relaxation_time: Relaxation time of Kelvin-Voigt damping [s], see der/terms/damping.py and `relaxation_time`. None
         means no damping, as in the chapter.
+    discretisation: "chapter" joins neighbouring limbs by hinges at the hub, and lumps mass and drag at the nodes.
+        "continuum" clamps limbs into a rigid hub that turns freely, with consistent masses, Simpson's rule for drag and
+        Gregory's weights for bending. With ten nodes it is within a per cent of infinitely many, where the chapter's is
+        12 to 26 % off. It is new and does not have every term yet: a scene refuses what it lacks.
 
     Two limbs have one hub hinge; straight limbs with hub_hinge="turning" then form a plain rod. A single limb has no
     hub hinge: it swings freely about the hub, and no actuator turns it.
@@ -50,6 +55,7 @@ class Seastar:
     hub_hinge: HubHinge = "opening"
     limbs: tuple[Limb, ...] = ()
     relaxation_time: Numbers | None = None
+    discretisation: Discretisation = "chapter"
 
     def __post_init__(self) -> None:
         require_count("n_limbs", self.n_limbs, 1, 12)
@@ -61,6 +67,7 @@ class Seastar:
         if self.relaxation_time is not None:
             require_each(self, "relaxation_time", partial(require_number, unit="s", zero_allowed=True))
         require_choice("hub_hinge", self.hub_hinge, get_args(HubHinge))
+        require_choice("discretisation", self.discretisation, get_args(Discretisation))
         if self.n_limbs == 1 and self.hub_hinge != "opening":
             raise ValueError("One limb has no hub hinge that could be measured by its turning angle.")
         self._check_limbs()

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from seastar_gym.der.linear.star_matrix import solve_ring
-from seastar_gym.der.potential import assemble_hub_hinges, sweep_limb
+from seastar_gym.der.potential import assemble_hub, solve_hub, sweep_limb
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.newton import take_step
 from seastar_gym.der.stepping.schemes import SCHEMES
@@ -93,10 +92,10 @@ def count_operations(scene: Scene, folder: Path = FOLDER) -> dict[str, Counter[s
 
     stage = counting(begin_stage)(rods, work, scheme, 0, *state, a, h)
     counting(set_natural_hub_angles)(rods, work, actuation, Counted(1.0))
-    counted("hub hinges", lambda: counting(assemble_hub_hinges)(rods, work, stage, None))
+    counted("hub hinges", lambda: counting(assemble_hub)(rods.clamp, rods, work, stage, None))
     counted("limbs", limbs)
     unit = (Counted(1.0), Counted(0.0), Counted(1.0))
-    counted("ring", lambda: counting(solve_ring)(work, rods.n_limbs, unit, unit[:2]))
+    counted("ring", lambda: counting(solve_hub)(rods.clamp, rods, work, unit, unit[:2]))
     counted("substitution", lambda: counting(take_step)(rods, work, Mask(True), Mask(False), Counted(1.0)))
     parts["iteration"] = sum(parts.values(), Counter())
     counted("step", step)

@@ -4,8 +4,7 @@ import time
 
 import numpy as np
 
-from seastar_gym.der.linear.star_matrix import solve_ring
-from seastar_gym.der.potential import assemble_hub_hinges, sweep_limb
+from seastar_gym.der.potential import assemble_hub, solve_hub, sweep_limb
 from seastar_gym.der.stepping.newton import take_step
 from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.model.rods import make_rods
@@ -26,12 +25,12 @@ def repeat_part(rods, work, q_0, v_0, step, part, n):
     seen = zero
     for _ in range(n):
         if part == 0:
-            seen += assemble_hub_hinges(rows, memory, stage, None)
+            seen += assemble_hub(rows.clamp, rows, memory, stage, None)
         elif part == 1:
             for limb in range(rods.n_limbs):
                 seen += sweep_limb(rows, memory, stage, limb, None, (zero, zero, zero), (zero, zero))[2]
         elif part == 2:
-            seen += solve_ring(memory, rods.n_limbs, (one, zero, one), (one, zero))[1]
+            seen += solve_hub(rows.clamp, rows, memory, (one, zero, one), (one, zero))[1]
         else:
             seen += take_step(rows, memory, seen < 0.0, None, zero)
     return any_lane(seen > 0.0)

@@ -34,13 +34,14 @@ over at no such cost.
 """
 
 from seastar_gym.der.energy import elastic_energy
-from seastar_gym.der.geometry import half_angle, larger
-from seastar_gym.der.star import edge_of, hinge_edges, n_nodes
+from seastar_gym.der.geometry import edge_vector, half_angle, larger
+from seastar_gym.der.star import edge_of, hinge_edges, n_nodes, tail_node
 from seastar_gym.der.terms.added_mass import add_fluid_energy, add_fluid_momentum
+from seastar_gym.der.terms.clamp import moved_clamp_energy
 from seastar_gym.der.terms.contact import add_contact_energy
 from seastar_gym.der.terms.fluid import fluid_velocity
 from seastar_gym.der.terms.hub import set_natural_hub_angles
-from seastar_gym.der.terms.inertia import kinetic_energy
+from seastar_gym.der.terms.inertia import edge_change, kinetic_energy
 from seastar_gym.der.terms.load import load_power
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import absolute, add_product, any_lane, load, select, splat, sqrt, store, subtract_product
@@ -107,8 +108,10 @@ def put_back(rods, work, scheme, q, v, robots):
 
 
 @kernel
-def moved_hub_energy(rods, work, actuation, start, end):
+def moved_hub_energy(clamp, rods, work, actuation, start, end):
     """Energy of hub hinges at their natural angles, once those have moved from `start` to `end` of the interval [J]."""
+    if clamp is not None:
+        return moved_clamp_energy(clamp, rods, work, actuation, start, end)
     set_natural_hub_angles(rods, work, actuation, start)
     for limb in range(rods.n_limbs):
         store(work.hub_moment, limb, load(work.hub_EI_kappa_bar, limb))
@@ -131,7 +134,7 @@ def allowed_energy(rods, work, scheme, actuation, start, end, q, v, frame):
     if not scheme.dissipative:
         set_natural_hub_angles(rods, work, actuation, start)
         allowed = elastic_energy(rods, work, q)
-        moved = moved_hub_energy(rods, work, actuation, start, end)
+        moved = moved_hub_energy(rods.clamp, rods, work, actuation, start, end)
         at_end = elastic_energy(rods, work, q)
         allowed = select(at_end > allowed, at_end, allowed) + moved
     else:
@@ -160,8 +163,37 @@ def may_gain(current, added_mass, rods, work, stage, phi, robots):
                 gain = add_product(gain, m * v_0, change)
             power = load_power(rods.load, node, load(stage.v_hat, 2 * node), load(stage.v_hat, 2 * node + 1))
             gain = subtract_product(gain, stage.gamma, power)
+        gain = less_edge_gain(rods.edge_mass, rods, work, stage, gain)
         return robots & ~(gain <= 0.0)
     return robots
+
+
+@kernel
+def less_edge_gain(edge_mass, rods, work, stage, gain):
+    """Gain less v_0 mu (v_1 - v_0) of the differences along the edges [J]; unchanged for lumped masses (None)."""
+    if edge_mass is None:
+        return gain
+    for e in range(n_nodes(rods) - 1):
+        tail, mu = tail_node(rods, e), load(edge_mass, e)
+        for axis in range(2):
+            head_row, tail_row = 2 * (e + 1) + axis, 2 * tail + axis
+            v_0 = load(stage.v_hat, head_row) - load(stage.v_hat, tail_row)
+            gain = subtract_product(gain, mu * v_0, edge_change(work, stage, head_row, tail_row))
+    return gain
+
+
+@kernel
+def less_edge_turn(edge_mass, rods, q, v, spin, turn):
+    """(angular momentum, moment of inertia) less those of edges' differences; unchanged for lumped masses (None)."""
+    if edge_mass is None:
+        return spin, turn
+    for e in range(n_nodes(rods) - 1):
+        tail, mu = tail_node(rods, e), load(edge_mass, e)
+        rx, ry = edge_vector(q, tail, e + 1)
+        vx, vy = edge_vector(v, tail, e + 1)
+        spin = subtract_product(spin, mu, rx * vy - ry * vx)
+        turn = subtract_product(turn, mu, rx * rx + ry * ry)
+    return spin, turn
 
 
 @kernel
@@ -197,6 +229,7 @@ def rigid_motion(rods, work, q, v, frame):
         p_x, p_y, spin = p_x + p[0], p_y + p[1], spin + (r_x * p[1] - r_y * p[0])
         xx, xy, yy = xx + along_x[0], xy + along_x[1], yy + along_y[1]
         x_turn, y_turn, turn = x_turn + about[0], y_turn + about[1], turn + (r_x * about[1] - r_y * about[0])
+    spin, turn = less_edge_turn(rods.edge_mass, rods, q, v, spin, turn)
     # Elimination of x, then y.
     lower, turn_lower = xy / xx, x_turn / xx
     yy, y_turn, turn = yy - lower * xy, y_turn - lower * x_turn, turn - turn_lower * x_turn
@@ -222,6 +255,14 @@ def cut_velocities(rods, q, v, frame, motion, share, robots):
 
 
 @kernel
+def is_clamped(clamp, rods, e):
+    """Whether hinge e is a clamp of a rigid hub, which has no pole."""
+    if clamp is None:
+        return False
+    return e % (rods.nodes_per_limb - 1) == 0
+
+
+@kernel
 def through_poles(rods, work, q, robots):
     """Mask of those among `robots` with a hinge that turned through its pole since the state put aside.
 
@@ -230,6 +271,8 @@ def through_poles(rods, work, q, robots):
     """
     through = robots & ~robots
     for e in range(rods.n_limbs * (rods.nodes_per_limb - 1)):
+        if is_clamped(rods.clamp, rods, e):
+            continue
         a, b, side = hinge_edges(rods, e)
         a_0, b_0 = edge_of(rods, work.step, a), edge_of(rods, work.step, b)
         t = half_angle(a_0, b_0, side)

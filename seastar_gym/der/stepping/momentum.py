@@ -10,7 +10,8 @@ of its own after the others: from the residual summed over the nodes, and its sl
 """
 
 from seastar_gym.der.potential import node_slopes
-from seastar_gym.der.star import n_nodes
+from seastar_gym.der.star import n_nodes, tail_node
+from seastar_gym.der.terms.drag import middle_slopes
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import any_lane, load, select, splat, store
 
@@ -38,9 +39,22 @@ def move_as_a_whole(rods, work, stage, robots):
         _, gradient, hessian = node_slopes(None, rods, work, stage, node)
         fx, fy = fx + gradient[0], fy + gradient[1]
         xx, xy, yy = xx + hessian[0], xy + hessian[1], yy + hessian[2]
+    fx, fy, xx, xy, yy = add_middles(rods.middle_drag, rods, work, stage, fx, fy, xx, xy, yy)
     determinant = xx * yy - xy * xy
     dx, dy = (yy * fx - xy * fy) / determinant, (xx * fy - xy * fx) / determinant
     for node in range(n_nodes(rods)):
         x, y = load(work.q, 2 * node), load(work.q, 2 * node + 1)
         store(work.q, 2 * node, select(robots, x - dx, x))
         store(work.q, 2 * node + 1, select(robots, y - dy, y))
+
+
+@kernel
+def add_middles(middle_drag, rods, work, stage, fx, fy, xx, xy, yy):
+    """Add the drag in the middle of edges to the residual and slope of a move of the whole robot."""
+    if middle_drag is None:
+        return fx, fy, xx, xy, yy
+    for e in range(n_nodes(rods) - 1):
+        _, g, h = middle_slopes(middle_drag, work, stage, e, tail_node(rods, e), e + 1)
+        fx, fy = fx + 2.0 * g[0], fy + 2.0 * g[1]
+        xx, xy, yy = xx + 4.0 * h[0], xy + 4.0 * h[1], yy + 4.0 * h[2]
+    return fx, fy, xx, xy, yy

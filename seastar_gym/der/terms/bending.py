@@ -28,8 +28,15 @@ class Bending(NamedTuple):
     EI_kappa_bar: np.ndarray
 
 
-def coefficients(mesh: Mesh) -> Bending:
-    """Bending stiffnesses and natural moments, with modulus and radius at the nodes."""
+GREGORY = (5.0 / 12.0, 13.0 / 12.0)
+"""Weights of the quadrature of curvature at the root and at node 1 of a limb, of second order and a tiny constant."""
+
+
+def coefficients(mesh: Mesh, gregory: bool = False) -> Bending:
+    """Bending stiffnesses and natural moments, with modulus and radius at the nodes.
+
+    gregory: Whether the first hinge of a limb has Gregory's weight, as the continuum's discretisation has it.
+    """
     n_edges = mesh.nodes_per_limb - 1
     EI = np.array(
         [
@@ -38,12 +45,31 @@ def coefficients(mesh: Mesh) -> Bending:
             for E, r in zip(moduli[:-1], radii[:-1], strict=True)
         ]
     )
-    EI_over_dl, dl_over_EI = EI / mesh.l, mesh.l / EI
+    dl = mesh.l * np.tile(hinge_weights(n_edges, gregory), mesh.n_limbs)
+    EI_over_dl, dl_over_EI = EI / dl, dl / EI
     EI_kappa_bar = 2.0 * EI_over_dl * np.tan(0.5 * np.repeat(mesh.natural_turn, n_edges))
     roots = n_edges * np.arange(mesh.n_limbs)
     EI_kappa_bar[roots] = 0.0
     EI_over_dl[roots], dl_over_EI[roots] = hub_stiffnesses(EI_over_dl[roots], dl_over_EI[roots])
     return Bending(EI_over_dl, dl_over_EI, EI_kappa_bar)
+
+
+def hinge_weights(n_edges: int, gregory: bool) -> Floats:
+    """Voronoi lengths of the hinges of a limb over its edges' length, the root's first."""
+    weights = np.ones(n_edges)
+    if gregory and n_edges > 1:
+        weights[1] = GREGORY[1]
+    return weights
+
+
+def clamp_stiffnesses(mesh: Mesh) -> Floats:
+    """K = EI/(w_0 l) of the clamps of a rigid hub, per limb [N m]."""
+    return np.array(
+        [
+            moduli[0] * np.pi * radii[0] ** 4 / 4.0 / (GREGORY[0] * length)
+            for moduli, radii, length in zip(mesh.modulus_at_nodes, mesh.radius_at_nodes, mesh.root_edges, strict=True)
+        ]
+    )
 
 
 def hub_stiffnesses(EI_over_dl: Floats, dl_over_EI: Floats) -> tuple[Floats, Floats]:

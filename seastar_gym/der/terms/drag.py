@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.der.mesh import Mesh
 from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.lanes import absolute, add_product, load, select, sqrt
+from seastar_gym.simd.lanes import absolute, add_product, load, select, splat, sqrt
 
 Floats = NDArray[np.float64]
 
@@ -25,6 +25,12 @@ def drag_per_length(density: float, coefficient: float, radius: float) -> float:
 def coefficients(mesh: Mesh, density: float, C: float) -> Floats:
     """c = 1/2 rho_f C D dl of flow in any direction, per node [kg/m]."""
     return mesh.per_node(lambda r: drag_per_length(density, C, r)) * mesh.dl
+
+
+def simpson_coefficients(mesh: Mesh, density: float, C: float) -> tuple[Floats, Floats]:
+    """(c per node, c per edge) [kg/m] by Simpson's rule: a third at the nodes, the rest in the middle of edges."""
+    in_middle = np.array([drag_per_length(density, C, r) for r in mesh.radius_at_edges]) * mesh.l * (2.0 / 3.0)
+    return coefficients(mesh, density, C) / 3.0, in_middle
 
 
 def cross_coefficients(mesh: Mesh, density: float, C_d: float, C_t: float | None) -> Floats | None:
@@ -90,3 +96,74 @@ def relative(current, node, vx, vy):
     if current is None:
         return vx, vy
     return vx - load(current, 2 * node), vy - load(current, 2 * node + 1)
+
+
+@kernel
+def middle_slopes(middle_drag, work, stage, e, tail, head):
+    """(potential, force on either end, Hessian block) of the drag in the middle of edge e; zeros without (None).
+
+    w = (w_tail + w_head)/2 has the potential gamma c |w|^3/3, half of the force c |w| w goes to either end, and the
+    block c (|w| 1 + w w^T/|w|)/(4 gamma) to both ends and to their coupling.
+    """
+    zero = splat(0.0)
+    if middle_drag is None:
+        return zero, (zero, zero), (zero, zero, zero)
+    wx, wy = middle_velocity(work, stage, tail, head)
+    potential, c_speed, c_over_speed = drag_slopes(load(middle_drag, e), wx, wy)
+    quarter = 0.25 * stage.inverse_gamma
+    sx, sy = quarter * c_over_speed * wx, quarter * c_over_speed * wy
+    diagonal = quarter * c_speed
+    half = 0.5 * c_speed
+    return (
+        stage.gamma * potential,
+        (half * wx, half * wy),
+        (add_product(diagonal, sx, wx), sx * wy, add_product(diagonal, sy, wy)),
+    )
+
+
+@kernel
+def middle_velocity(work, stage, tail, head):
+    """Velocity of the middle of an edge relative to the fluid [m/s]."""
+    ax, ay = node_velocity(work, stage, tail)
+    bx, by = node_velocity(work, stage, head)
+    return 0.5 * (ax + bx), 0.5 * (ay + by)
+
+
+@kernel
+def node_velocity(work, stage, node):
+    """Velocity of a node relative to the fluid, by the iterate [m/s]."""
+    vx = (load(work.q, 2 * node) - load(stage.q_hat, 2 * node)) * stage.inverse_gamma
+    vy = (load(work.q, 2 * node + 1) - load(stage.q_hat, 2 * node + 1)) * stage.inverse_gamma
+    return relative(work.current, node, vx, vy)
+
+
+@kernel
+def add_scalar(middle_drag, total, amount):
+    """total + amount, in scenes with drag in the middle of edges."""
+    if middle_drag is None:
+        return total
+    return total + amount
+
+
+@kernel
+def add_middle(middle_drag, D, h):
+    """D + h, symmetric blocks, in scenes with drag in the middle of edges."""
+    if middle_drag is None:
+        return D
+    return D[0] + h[0], D[1] + h[1], D[2] + h[2]
+
+
+@kernel
+def couple_middle(middle_drag, B, h):
+    """B + h, a coupling and a symmetric block, in scenes with drag in the middle of edges."""
+    if middle_drag is None:
+        return B
+    return B[0] + h[0], B[1] + h[1], B[2] + h[1], B[3] + h[2]
+
+
+@kernel
+def push_middle(middle_drag, r, g):
+    """r + g, in scenes with drag in the middle of edges."""
+    if middle_drag is None:
+        return r
+    return r[0] + g[0], r[1] + g[1]

@@ -68,4 +68,22 @@ def add_work_of_current(current, rods, work, v, h, frame, energy):
         _, (fx, fy), _ = add_cross_flow(rods.cross_drag, rods, work.normals, node, wx, wy, 1.0, 1.0, slopes)
         power = subtract_product(power, fx, load(work.current, 2 * node) - frame[0])
         power = subtract_product(power, fy, load(work.current, 2 * node + 1) - frame[1])
+    power = add_power_in_middle(rods.middle_drag, rods, work, v, frame, power)
     return add_product(energy, h, power)
+
+
+@kernel
+def add_power_in_middle(middle_drag, rods, work, v, frame, power):
+    """Add the power that drag in the middle of edges takes from the fluid's motion [W]."""
+    if middle_drag is None:
+        return power
+    for e in range(n_nodes(rods) - 1):
+        a, b = tail_node(rods, e), e + 1
+        ax, ay = relative(work.current, a, load(v, 2 * a), load(v, 2 * a + 1))
+        bx, by = relative(work.current, b, load(v, 2 * b), load(v, 2 * b + 1))
+        wx, wy = 0.5 * (ax + bx), 0.5 * (ay + by)
+        _, c_speed, _ = drag_slopes(load(middle_drag, e), wx, wy)
+        u_x = 0.5 * (load(work.current, 2 * a) + load(work.current, 2 * b)) - frame[0]
+        u_y = 0.5 * (load(work.current, 2 * a + 1) + load(work.current, 2 * b + 1)) - frame[1]
+        power = subtract_product(subtract_product(power, c_speed * wx, u_x), c_speed * wy, u_y)
+    return power

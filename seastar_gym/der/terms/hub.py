@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from seastar_gym.der.geometry import tangent
+from seastar_gym.der.terms.clamp import set_natural_directions
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, store
 
@@ -35,10 +36,19 @@ def coefficients(angles: Sequence[float], turning: bool) -> Hub:
 
 @kernel
 def set_natural_hub_angles(rods, work, actuation, fraction):
+    """Natural state of the hub at `fraction` (lanes) of an interval: of its hinges, or of a rigid hub's clamps."""
+    set_natural_moments(rods.clamp, rods, work, actuation, fraction)
+    set_natural_directions(rods.clamp, rods, work, actuation, fraction)
+
+
+@kernel
+def set_natural_moments(clamp, rods, work, actuation, fraction):
     """Natural moments of the hub hinges at `fraction` (lanes) of an interval, (13.13).
 
     The hinge from limb j to limb j + 1 has the natural angle hub_angle_j + delta_psi_{j+1} - delta_psi_j.
     """
+    if clamp is not None:
+        return
     for a in range(rods.n_limbs):
         b = (a + 1) % rods.n_limbs
         start = load(actuation.delta_psi_start, b) - load(actuation.delta_psi_start, a)

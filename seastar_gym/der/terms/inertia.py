@@ -5,10 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.der.geometry import edge_vector
 from seastar_gym.der.mesh import Mesh
-from seastar_gym.der.star import n_nodes
+from seastar_gym.der.star import n_nodes, tail_node
 from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.lanes import add_product, load, splat
+from seastar_gym.simd.lanes import add_product, load, splat, subtract_product
 
 HELD = 1e15
 """A held node has this many times its mass: it moves by about 1e-13 m in a stroke of the chapter's robot, which the
@@ -22,6 +23,38 @@ def coefficients(mesh: Mesh, density: float, held_nodes: Sequence[int] = ()) -> 
     return mass
 
 
+def edge_coefficients(mesh: Mesh, density: float) -> NDArray[np.float64]:
+    """mu = rho_m A l/6, per edge [kg]: with consistent masses an edge has mu |d_head - d_tail|^2/2 less inertia."""
+    area = np.array([np.pi * r**2 for r in mesh.radius_at_edges])
+    return density * area * mesh.l / 6.0
+
+
+@kernel
+def less_edge_inertia(edge_mass, work, stage, e, tail, slopes):
+    """(E, f, K) of an edge less mu |d_head - d_tail|^2/2, d = v - v_hat; unchanged for lumped masses (None)."""
+    if edge_mass is None:
+        return slopes
+    energy, (fx, fy), (xx, xy, yy) = slopes
+    mu = load(edge_mass, e)
+    dx = edge_change(work, stage, 2 * (e + 1), 2 * tail)
+    dy = edge_change(work, stage, 2 * (e + 1) + 1, 2 * tail + 1)
+    mu_over_gamma = mu * stage.inverse_gamma
+    stiffness = mu_over_gamma * stage.inverse_gamma
+    return (
+        subtract_product(energy, 0.5 * mu, add_product(dx * dx, dy, dy)),
+        (subtract_product(fx, mu_over_gamma, dx), subtract_product(fy, mu_over_gamma, dy)),
+        (xx - stiffness, xy, yy - stiffness),
+    )
+
+
+@kernel
+def edge_change(work, stage, head_row, tail_row):
+    """Difference of v - v_hat between the ends of an edge, along one axis [m/s]."""
+    head = load(work.q, head_row) - load(stage.q_hat, head_row)
+    along = head - (load(work.q, tail_row) - load(stage.q_hat, tail_row))
+    return along * stage.inverse_gamma - (load(stage.v_hat, head_row) - load(stage.v_hat, tail_row))
+
+
 @kernel
 def kinetic_energy(rods, v, frame):
     """Kinetic energy [J] as seen from a frame that moves with the velocity `frame` [m/s]."""
@@ -29,4 +62,15 @@ def kinetic_energy(rods, v, frame):
     for node in range(n_nodes(rods)):
         vx, vy = load(v, 2 * node) - frame[0], load(v, 2 * node + 1) - frame[1]
         total = add_product(total, 0.5 * load(rods.mass, node), vx * vx + vy * vy)
-    return total
+    return less_edge_energy(rods.edge_mass, rods, v, total)
+
+
+@kernel
+def less_edge_energy(edge_mass, rods, v, energy):
+    """Kinetic energy less mu |v_head - v_tail|^2/2 of the edges [J]; unchanged for lumped masses (None)."""
+    if edge_mass is None:
+        return energy
+    for e in range(n_nodes(rods) - 1):
+        dx, dy = edge_vector(v, tail_node(rods, e), e + 1)
+        energy = subtract_product(energy, 0.5 * load(edge_mass, e), add_product(dx * dx, dy, dy))
+    return energy

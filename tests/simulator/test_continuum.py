@@ -1,0 +1,68 @@
+"""The continuum's discretisation: ten nodes swim as infinitely many do, and keep what mechanics keeps."""
+
+import numpy as np
+import pytest
+
+from refusals import assert_refused
+from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, State, Water
+from seastar_gym.gaits import PAIRS, STRAIGHT
+from seastar_gym.model.rods import make_rods
+
+TEN = Seastar(discretisation="continuum")
+LIMIT = {"straight": 34.360, "{1-,2+}": 28.189, "{1-,4+}": 39.355, "{1-,5+}": 32.282}
+"""Distances after ten strokes with N to infinity and h to 0 [mm]."""
+OF_TEN_NODES = {"straight": 34.364, "{1-,2+}": 27.977, "{1-,4+}": 39.333, "{1-,5+}": 32.085}
+"""The same with ten nodes and h to 0."""
+
+
+def test_ten_nodes_swim_as_infinitely_many_do():
+    commands = np.array([STRAIGHT, *(PAIRS[name] for name in list(LIMIT)[1:])])
+    simulator = Simulator(Scene(TEN, numerics=Numerics("implicit-midpoint", 1e-3)), len(commands))
+    for _ in range(10):
+        assert not simulator.stroke(commands).status.any()
+    distances = 1e3 * np.hypot(*simulator.hub_position().T)
+    np.testing.assert_allclose(distances, list(OF_TEN_NODES.values()), rtol=1e-3)
+    np.testing.assert_allclose(distances, list(LIMIT.values()), rtol=1e-2)
+    assert abs(simulator.hub_position()[0, 1]) < 1e-9
+
+
+def test_in_vacuum_momentum_angular_momentum_and_small_energies_stay():
+    scene = Scene(TEN, None, SmaPulse(0.0), Numerics("implicit-midpoint", 5e-4, newton_tolerance=1e-12))
+    rods, rng, simulator = make_rods(scene), np.random.default_rng(0), Simulator(scene)
+    noise = 1e-3 * rng.standard_normal((1, 46, 2))
+    simulator.set_state(State(TEN.nodes()[None], noise, np.zeros(1)))
+    tails = np.array([0 if e % 9 == 0 else e for e in range(45)])
+
+    def kept() -> np.ndarray:
+        q, v = simulator.positions[0], simulator.velocities[0]
+        turn = np.sum(rods.mass * (q[:, 0] * v[:, 1] - q[:, 1] * v[:, 0]))
+        e, w = q[1:] - q[tails], v[1:] - v[tails]
+        turn -= np.sum(rods.edge_mass * (e[:, 0] * w[:, 1] - e[:, 1] * w[:, 0]))
+        return np.array([*(rods.mass @ v), turn])
+
+    before, energy = kept(), simulator.elastic_energy() + simulator.kinetic_energy()
+    simulator.stroke(np.zeros((1, 5)))
+    np.testing.assert_allclose(kept(), before, rtol=1e-8, atol=1e-14)
+    np.testing.assert_allclose(simulator.elastic_energy() + simulator.kinetic_energy(), energy, rtol=0.02)
+
+
+@pytest.mark.parametrize(
+    "parts, word",
+    [
+        ({"robot": Seastar(hub_hinge="turning", discretisation="continuum")}, "turning"),
+        ({"robot": Seastar(relaxation_time=1e-3, discretisation="continuum")}, "damping"),
+        ({"robot": Seastar(limbs=(Limb(natural_curvature=1.0),) * 5, discretisation="continuum")}, "curvature"),
+        ({"robot": TEN, "fluid": Water(tangential_drag_coefficient=0.1)}, "along limbs"),
+        ({"robot": TEN, "fluid": Water(added_mass_coefficient=1.0)}, "added mass"),
+        ({"robot": TEN, "contact": Contact()}, "contact"),
+        ({"robot": TEN, "actuator": SmaPulse(3.2)}, "pi"),
+    ],
+)
+def test_what_it_does_not_have_yet_is_refused(parts, word):
+    with assert_refused(word):
+        Scene(**parts)
+
+
+def test_a_discretisation_that_is_not_known_is_refused():
+    with assert_refused("discretisation must be one of"):
+        Seastar(discretisation="fine")
