@@ -188,7 +188,7 @@ PUT_BACK = 1e-11
 
 
 def energy_noise(simulator: Simulator, robot: int, energy: float, h: float) -> float:
-    """What rounding of positions changes an energy by [J]: its slope times a move, and its curvature; see der/stepping/guard.py.
+    """What rounding of positions changes an energy by [J]: its slope times a move, and its curvature (guard.py).
 
     h: Of the shortest step [s]; velocities are differences of positions over it.
     """
