@@ -338,7 +338,7 @@ def measure(n: int, seed: int = 0) -> list[Row]:
 def as_table(rows: list[Row]) -> Table:
     """Rows as a table for the terminal."""
     table = Table(title="What the constants of der/stepping/foresight.py allow, and what plain Newton needs")
-    table.add_column("measured", no_wrap=True)
+    table.add_column("measured")
     for name in ("in use", "steps", "99 % / 99.9 % / worst"):
         table.add_column(name, justify="right", no_wrap=True)
     for row in rows:

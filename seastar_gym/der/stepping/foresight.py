@@ -1,7 +1,21 @@
-"""When Newton's last step may be left out, because quadratic convergence guarantees that it would be small enough.
+"""When Newton's last step may be left out, because quadratic convergence foretells that it would be small enough.
 
-After one of its first steps, of size d, the next is at most d^2/(foreseeable length). The numbers below were measured
-over stiff, soft, slender and thick robots in random strokes, see `python -m studies.speed.foresight`.
+After one of its first steps, of size d, the next is expected to be at most d^2/(foreseeable length). That is measured,
+not proved, by `python -m studies.speed.foresight` (here 1000 strokes of every kind): in drawn strokes of stiff and soft
+robots with edges of 3 to 50 radii, steps of 0.1 to 20 ms, in water and in vacuum, as if every step were just small
+enough. The step that is left out was
+
+    smaller than foreseen                         in 99 % of the cases, at most 1.6 times as large in 99.9 %, 33 at worst
+    d^2 over the edge length times, light edges   19 in 99 %, 39 in 99.9 %, 150 at worst                      CURVATURE
+    over what edges E gamma^2/(rho l^2) make      0.4 in 99 %, 0.9 in 99.9 %, 2 at worst           foreseeable_length
+    for thick ones reduced with a SLENDER of      2800 in 99 %, 580 in 99.9 %                                   SLENDER
+    after the third step that much larger         1.8 in 99 %, 4 in 99.9 %, 26 at worst                            LATE
+    in violent motion                             foreseen in 99.9 % up to the third step, then up to 1e6 times    EASY
+    with hub hinges of t up to 4, 10 and 40       larger by 1.2, 2.3 and 5 in 99 %                        FORESEEABLE_T
+
+In water, no drawn step with hub hinges near their poles created energy from potentials below a tenth of
+PREDICTABLE_STRAIN, 0.02 % did below it, 0.13 % below ten times as much. Edges of more than 100 radii feel more of the
+drag's curvature, about l rho_f C_d/(pi r rho_m), than CURVATURE allows. Contact is not foreseen at all.
 """
 
 from typing import NamedTuple
@@ -47,7 +61,7 @@ def coefficients(mesh: Mesh, stretching: Stretching, density: float) -> Foresigh
 
 @inlined_kernel
 def predictable(rods, work, iterations, setbacks, phi, move, tolerated):
-    """Mask of the robots whose next Newton step is sure to be small enough.
+    """Mask of the robots whose next Newton step is expected to be small enough.
 
     iterations, setbacks: Newton steps so far, and how many of them were shortened or needed a convex matrix. phi:
     Potential before the step [J]. move: Largest node move of the step [m]. tolerated: Tolerance times the foreseeable
@@ -64,8 +78,8 @@ def predictable(rods, work, iterations, setbacks, phi, move, tolerated):
 def foreseeable_length(rods, stage):
     """Length [m] that a Newton step's square is divided by to foresee the size of the next one.
 
-    Measured over stiff, soft, slender and thick robots in random strokes: turning an edge stretches it, and the tension
-    that this makes moves nodes the farther, the stiffer the edges are against the nodes' inertia.
+    Turning an edge stretches it, and the tension that this makes moves nodes the farther, the stiffer the edges are
+    against the nodes' inertia.
     """
     rate = load(rods.foresight.curvature_rate, 0)
     return load(rods.foresight.shortest_edge, 0) / (CURVATURE + rate * stage.gamma * stage.gamma)
