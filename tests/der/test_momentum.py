@@ -120,6 +120,6 @@ def test_where_momentum_begins_to_be_settled_in_a_fluid_rounding_is_some_1e_10_o
     stage = Stage(work.q_hat, work.v_hat, Lanes(gamma), Lanes(1.0 / gamma), False)
     factorise.plain(rods, work, stage, None)
     move = plain(take_step.plain(rods, work, Mask(EVERYONE), None, Lanes(0.0)))
-    forces = [node_slopes.plain(rods, work, stage, node)[1] for node in range(robot.n_nodes)]
+    forces = [node_slopes.plain(None, rods, work, stage, node)[1] for node in range(robot.n_nodes)]
     shift = np.linalg.norm(np.sum(plain(tuple(forces)), axis=0), axis=0) * gamma**2 / rods.mass.sum()
     assert 3e-11 < (shift / move).max() < 1e-9

@@ -1,21 +1,24 @@
 """When Newton's last step may be left out, because quadratic convergence foretells that it would be small enough.
 
 After one of its first steps, of size d, the next is expected to be at most d^2/(foreseeable length). That is measured,
-not proved, by `python -m studies.speed.foresight` (here 1000 strokes of every kind): in drawn strokes of stiff and soft
-robots with edges of 3 to 50 radii, steps of 0.1 to 20 ms, in water and in vacuum, as if every step were just small
-enough. The step that is left out was
+not proved: by `python -m studies.speed.foresight`, in 1000 strokes of every kind by eight robots, stiff and soft, with
+edges of 3 to 50 radii, at steps of 0.1 to 20 ms, in water and in vacuum. Had every step been just small enough, the one
+left out would have been
 
-    smaller than foreseen                         in 99 % of the cases, at most 1.6 times as large in 99.9 %, 33 at worst
-    d^2 over the edge length times, light edges   19 in 99 %, 39 in 99.9 %, 150 at worst                      CURVATURE
-    over what edges E gamma^2/(rho l^2) make      0.4 in 99 %, 0.9 in 99.9 %, 2 at worst           foreseeable_length
-    for thick ones reduced with a SLENDER of      2800 in 99 %, 580 in 99.9 %                                   SLENDER
-    after the third step that much larger         1.8 in 99 %, 4 in 99.9 %, 26 at worst                            LATE
-    in violent motion                             foreseen in 99.9 % up to the third step, then up to 1e6 times    EASY
-    with hub hinges of t up to 4, 10 and 40       larger by 1.2, 2.3 and 5 in 99 %                        FORESEEABLE_T
+    99 %     99.9 %    worst
+    0.7      1.6       18       times as large as foreseen
+    19       43        190      times d^2 over the edge length, where edges are light: CURVATURE
+    0.4      0.9       2        times as large as foreseen, where edges of 70 to 500 radii are stiff against inertia
+    2900     840                as SLENDER would allow for it, where edges are thick and stiff
+    1.9      4.3       23       times as large as foreseen without LATE, after the third step
+    0.2      0.5       1e3      times as large as foreseen after the third step, EASY, in violent motion
+    0.4      1e6       2e8      the same after the fifth
+    1.2      3         40       times as large where the largest hub t is 2 to 4, which is FORESEEABLE_T, of thick limbs
+    3.7      24        30       the same from 10 to 40
 
-In water, no drawn step with hub hinges near their poles created energy from potentials below a tenth of
-PREDICTABLE_STRAIN, 0.02 % did below it, 0.13 % below ten times as much. Edges of more than 100 radii feel more of the
-drag's curvature, about l rho_f C_d/(pi r rho_m), than CURVATURE allows. Contact is not foreseen at all.
+In water with hub hinges near their poles, steps from potentials below a tenth of that of PREDICTABLE_STRAIN created no
+energy; 0.02 % did up to PREDICTABLE_STRAIN, 0.1 % up to ten times and 0.5 % up to a hundred times as much. Edges of
+more than 100 radii feel more of the curvature of drag, about l rho_f C_d/(pi r rho_m), than CURVATURE allows for.
 """
 
 from typing import NamedTuple
