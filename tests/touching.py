@@ -18,7 +18,7 @@ from slopes import rotated, rows
 GAMMA = 2e-4
 
 
-def touching_limbs(ahead: bool = False, apart: int = 0) -> SimpleNamespace:
+def touching_limbs(ahead: bool = False, apart: int = 0, gamma: float = GAMMA) -> SimpleNamespace:
     """Limbs 1 and 2 of five lie along each other, but for those of the first `apart` robots, which are at rest."""
     robot, star = Seastar(5, 4), Star(5, 4)
     rods = make_rods(Scene(robot, actuator=SmaPulse(0.1), contact=Contact()))
@@ -32,6 +32,6 @@ def touching_limbs(ahead: bool = False, apart: int = 0) -> SimpleNamespace:
     work.q[:], work.q_hat[:], work.v_hat[:] = rows(q), rows(q - 1e-4), 0.1 * rng.standard_normal(work.q.shape)
     kappa_bar = 2.0 * np.tan(oracle.natural_angles(star, np.zeros(5))[-5:] / 2.0) / star.edge_length
     work.hub_EI_kappa_bar[:] = star.EI * kappa_bar[:, None]
-    stage = Stage(work.q_hat, work.v_hat, Lanes(GAMMA), Lanes(1.0 / GAMMA), ahead)
+    stage = Stage(work.q_hat, work.v_hat, Lanes(gamma), Lanes(1.0 / gamma), ahead)
     freeze_contact.plain(rods.contact, rods, work, stage, rows(q_0))
     return SimpleNamespace(rods=rods, work=work, stage=stage, q_0=rows(q_0))

@@ -36,7 +36,7 @@ class Numerics:
     scheme: Implicit Runge-Kutta scheme. "implicit-euler" is the chapter's (13.9).
     step: Time step h [s]. The last step before a corner of the actuation is shortened.
     newton_tolerance: Newton stops when the largest displacement of a node in an update is below this fraction of the
-        limb length. If quadratic convergence guarantees that the next update would be, it is skipped.
+        limb length. If quadratic convergence foretells that the next update would be, it is skipped.
     max_iterations: Limit of Newton iterations per stage. Beyond it, the step is halved, down to 1/4096. A stroke has a
         limit of its own, 200,000 iterations and 100 more per time step; a robot beyond it fails with
         SolverStatus.ITERATION_LIMIT.

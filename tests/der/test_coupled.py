@@ -69,3 +69,37 @@ def test_dot_is_the_product_of_rows_robot_by_robot():
 def test_without_contact_the_decrement_is_the_stars():
     one = Lanes(1.0)
     assert solve_coupled.plain(None, None, None, None, one) is one
+
+
+def test_few_iterations_solve_it_as_exactly_as_a_step_of_5_ms_allows(monkeypatch):
+    """To 1e-10 of the decrement: about what rounding leaves where edges are that much stiffer than inertia."""
+    touching, left, product_of = touching_limbs(gamma=5e-3), [], dot.plain
+    rods, work = touching.rods, touching.work
+    _, alone, _ = factorise.plain(rods, work, touching.stage, None)
+
+    def noted(rods, a, b):
+        product = product_of(rods, a, b)
+        if a is work.contact.r:
+            left.append(plain(product))
+        return product
+
+    monkeypatch.setitem(solve_coupled.plain.__globals__, "dot", noted)
+    decrement = plain(solve_coupled.plain(work.contact, rods, work, Mask(EVERYONE), alone))
+    assert not work.contact.missed.any() and len(left) < 20
+    assert np.any(left[-2] > 1e-10 * decrement)
+    assert 1e-11 < (left[-1] / decrement).max() < 1e-10
+
+
+def test_whoever_does_not_arrive_in_200_iterations_is_missed(monkeypatch):
+    touching, iterations = touching_limbs(), []
+    rods, work = touching.rods, touching.work
+    _, alone, _ = factorise.plain(rods, work, touching.stage, None)
+
+    def never_less(rods, a, b):
+        if a is work.contact.r:
+            iterations.append(1.0)
+        return Lanes(1.0)
+
+    monkeypatch.setitem(solve_coupled.plain.__globals__, "dot", never_less)
+    solve_coupled.plain(work.contact, rods, work, Mask(EVERYONE), alone)
+    assert work.contact.missed.all() and len(iterations) == 1 + 200

@@ -12,6 +12,7 @@ from oracle import Star
 from seastar_gym import Scene, Seastar, SmaPulse, Vortex, Water
 from seastar_gym.der.rods import Rods, make_work
 from seastar_gym.der.stepping.guard import (
+    LARGEST_CUT,
     add_work_of_loads,
     allowed_energy,
     hold_to_energy,
@@ -167,7 +168,7 @@ def inertia(star: Star, lane_q: np.ndarray) -> np.ndarray:
 
 
 def held(
-    share: float, largest_cut: float = 0.01, robots: np.ndarray | None = None, star: Star = STAR
+    share: float, largest_cut: float = LARGEST_CUT, robots: np.ndarray | None = None, star: Star = STAR
 ) -> SimpleNamespace:
     """Robots held to their potential energy, that of their rigid motion, and `share` of the rest, seen from FRAME."""
     q, v = moving_robots()

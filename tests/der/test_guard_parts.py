@@ -5,7 +5,15 @@ import pytest
 
 from seastar_gym import Scene, Seastar, UniformCurrent, Water
 from seastar_gym.der.rods import make_work
-from seastar_gym.der.stepping.guard import cut_velocities, energy_noise, frame_velocity, rigid_motion, through_poles
+from seastar_gym.der.stepping.guard import (
+    cut_velocities,
+    energy_noise,
+    frame_velocity,
+    hold_to_energy,
+    rigid_motion,
+    through_poles,
+)
+from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
@@ -67,3 +75,23 @@ def test_a_limb_that_is_folded_over_its_hinge_has_gone_through_its_pole(degrees,
         folded.append(rows(q))
     work.step[:] = folded[0]
     assert np.all(plain(through_poles.plain(RODS, work, folded[1], EVERYONE)) == through)
+
+
+def test_growth_is_seen_from_the_share_on_that_is_rounding():
+    """That of the kinetic energy, of robots at rest in shape that move at 1 m/s: half of it is not, five times is."""
+    work, q, v = make_work(RODS, 1), rows(ROBOT.nodes()), rows(V)
+    work.hub_EI_kappa_bar[:] = 2.0 * np.tan(np.pi / 5.0) * RODS.bending.EI_over_dl[0]
+    kinetic = 0.5 * np.sum(RODS.mass[:, None] * V**2)
+    for growth, seen in ((0.5, False), (5.0, True)):
+        allowed = Lanes(kinetic * (1.0 - growth * 1e-12))
+        args = RODS, work, SCHEMES["implicit-euler"], q, v.copy(), Lanes(10.0), STILL, EVERYONE, allowed, Lanes(1.0)
+        _, cut = plain(hold_to_energy.plain(*args))
+        assert np.all(cut == seen)
+
+
+def test_noise_is_that_of_positions_that_are_all_rounded_the_same_way():
+    """By one unit in the last place, in their difference over a step, a kilometre away; several units are allowed."""
+    h, far, v = 1e-3, ROBOT.nodes() + 1e3, np.ones((ROBOT.n_nodes, 2))
+    before, after = (0.5 * np.sum(RODS.mass[:, None] * each**2) for each in (v, v + np.spacing(far) / h))
+    noise = plain(energy_noise.plain(RODS, rows(far), Lanes(h), Lanes(0.0), Lanes(before)))
+    assert np.all((0.05 * noise < after - before) & (after - before < 0.5 * noise))

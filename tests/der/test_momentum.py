@@ -5,15 +5,16 @@ import pytest
 
 import oracle
 from seastar_gym import Scene, Seastar, SmaPulse
-from seastar_gym.der.potential import node_slopes
+from seastar_gym.der.potential import factorise, node_slopes
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.momentum import LOST, move_as_a_whole, settle_momentum
+from seastar_gym.der.stepping.newton import take_step
 from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
 from slopes import nodes, plain, rows
-from stages import RandomStages, robot_and_star
+from stages import RandomStages, robot_and_star, rods_of
 from touching import touching_limbs
 
 ROBOT, GAMMA = Seastar(nodes_per_limb=4), 5e-3
@@ -107,3 +108,18 @@ def test_what_contact_pushed_when_it_was_last_asked_moves_no_robot_as_a_whole():
         move_as_a_whole.plain(limbs.rods, limbs.work, limbs.stage, Mask(EVERYONE))
         found.append(limbs.work.q.copy())
     np.testing.assert_array_equal(*found)
+
+
+def test_where_momentum_begins_to_be_settled_in_a_fluid_rounding_is_some_1e_10_of_a_newton_step():
+    """Measured with limbs of three edges and in vacuum, where nothing else is left of the momentum."""
+    robot, star = robot_and_star(5, 4, fluid=False)
+    rods, rate = rods_of(robot, fluid=False), float(rods_of(robot).scales.unsettled_rate[0])
+    gamma = np.sqrt(LOST / rate)
+    stages, work = RandomStages(star, gamma, bend=1e-3, stretch=1e-6, speed=1e-3), make_work(rods, 1)
+    work.q[:], work.q_hat[:] = rows(stages.q), rows(stages.q_hat)
+    stage = Stage(work.q_hat, work.v_hat, Lanes(gamma), Lanes(1.0 / gamma), False)
+    factorise.plain(rods, work, stage, None)
+    move = plain(take_step.plain(rods, work, Mask(EVERYONE), None, Lanes(0.0)))
+    forces = [node_slopes.plain(None, rods, work, stage, node)[1] for node in range(robot.n_nodes)]
+    shift = np.linalg.norm(np.sum(plain(tuple(forces)), axis=0), axis=0) * gamma**2 / rods.mass.sum()
+    assert 3e-11 < (shift / move).max() < 1e-9

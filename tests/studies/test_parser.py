@@ -5,7 +5,7 @@ import importlib
 import pytest
 
 ROOMS = ("accuracy", "stability", "chapter", "validation")
-MODULES = ("speed.throughput", "speed.terms", "scenes.gallery", "scenes.damping", "scenes.thermal")
+MODULES = ("speed.throughput", "speed.terms", "speed.foresight", "scenes.gallery", "scenes.damping", "scenes.thermal")
 
 
 @pytest.mark.parametrize("command", [*ROOMS, *MODULES])

@@ -46,9 +46,9 @@ from seastar_gym.der.terms.load import load_power
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import absolute, add_product, any_lane, load, select, splat, sqrt, store, subtract_product
 
-ROUNDING = 1e-12  # growth below this share of the energy is taken for rounding
-UNITS = 1e-15  # a few units in the last place: positions are exact to this share of their size
-LARGEST_CUT = 0.01  # of the kinetic energy about the rigid motion; where more is too much, a step is refused
+ROUNDING = 1e-12  # of the kinetic energy, some 10,000 units in the last place: growth below it is rounding
+UNITS = 1e-15  # positions are exact to this share of their size: some five to ten times half a unit in the last place
+LARGEST_CUT = 0.01  # of the kinetic energy about the rigid motion, a choice; where more is too much, a step is refused
 
 
 @kernel

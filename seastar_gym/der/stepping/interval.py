@@ -15,10 +15,10 @@ from seastar_gym.der.stepping.steps import MOST_HALVINGS, SMALLEST_FRACTION, Ste
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import any_lane, floor, load, select, splat, store
 
-FALLBACK_AFTER = 4.0  # halvings, from which on a robot's steps are implicit Euler's
-SOONEST_GROWTH = 4.0  # steps after a halving before a step is doubled; the next doubling waits twice as long
-FIRST_FRACTION = 2.0**-3  # of an interval: an adapted stroke begins with this step
-GROWTH_MARGIN = 5.0  # a step is doubled when its error rate is this many times below the limit
+FALLBACK_AFTER = 4.0  # halvings, a choice: from there on a robot's steps are implicit Euler's
+SOONEST_GROWTH = 4.0  # steps after a halving before a step is doubled, a choice; the next doubling waits twice as long
+FIRST_FRACTION = 2.0**-3  # of an interval, a choice: an adapted stroke begins with this step
+GROWTH_MARGIN = 5.0  # how far below the limit a doubled step's error rate has to be, which is then four times as large
 
 
 @kernel

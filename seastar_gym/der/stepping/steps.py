@@ -40,7 +40,7 @@ from seastar_gym.simd.compilation import inlined_kernel, kernel
 from seastar_gym.simd.lanes import any_lane, load, load_number, select, splat, store
 
 MOST_HALVINGS = 12.0  # a robot whose step fails once more has failed
-TURNABLE = 8.0  # after so many halvings, hinges may go through their poles, see guard.py
+TURNABLE = 8.0  # after so many halvings, a choice, hinges may go through their poles, see guard.py
 SMALLEST_FRACTION = 2.0**-12  # of an interval: there is no shorter step
 
 
