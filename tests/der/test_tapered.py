@@ -92,6 +92,13 @@ def test_the_hub_has_half_of_every_root_edge_with_the_mean_of_what_the_limbs_hav
     assert RODS.drag[0] == pytest.approx(0.5 * 950.0 * 0.2 * 2.0 * np.mean(roots) * 2.5 * EDGE, rel=1e-12)
 
 
+def test_tips_have_no_outer_edge_and_the_hubs_edges_are_those_of_its_neighbours():
+    for per_half_edge in (RODS.cross_drag, RODS.added_mass):
+        inner, outer = per_half_edge.reshape(-1, 2).T
+        np.testing.assert_array_equal(np.flatnonzero(inner == 0.0), [0])
+        np.testing.assert_array_equal(np.flatnonzero(outer == 0.0), [0, 3, 6, 9, 12, 15])
+
+
 def test_two_limbs_have_one_hub_hinge():
     bending = make_rods(Scene(Seastar(2, 4, hub_hinge="turning"))).bending
     assert bending.EI_over_dl[0] == pytest.approx(bending.EI_over_dl[1]) and bending.EI_over_dl[3] == 0.0
