@@ -5,13 +5,14 @@ import pytest
 
 import oracle
 from seastar_gym import Scene, Seastar, SmaPulse
-from seastar_gym.der.energy import elastic_energy
+from seastar_gym.der.energy import elastic_energy, energies
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
 from seastar_gym.der.terms.inertia import kinetic_energy
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes
+from seastar_gym.simd.plain import plain_kernels
 from slopes import gradient, plain, rotated, rows
 from stages import random_shape
 
@@ -64,3 +65,12 @@ def test_kinetic_energy_is_half_the_masses_times_the_speeds_squared_that_a_frame
     rods = make_rods(Scene(Seastar(5, 4)))
     found = plain(kinetic_energy.plain(rods, rows(v), frame))[0]
     assert found == pytest.approx(oracle.kinetic_energy(STAR, v - frame), rel=1e-13)
+
+
+def test_energies_of_a_state_are_those_of_its_shape_and_of_its_velocities_in_the_laboratory():
+    rods, v = make_rods(Scene(Seastar(5, 4), actuator=SmaPulse(0.2))), RNG.standard_normal(SHAPE.shape)
+    turns, (elastic, kinetic) = np.tile(TURNS[:, None], N_LANES), np.zeros((2, 1, N_LANES))
+    actuation = Actuation(np.zeros_like(turns), turns)
+    plain_kernels()(energies)(rods, make_work(rods, 1), actuation, rows(SHAPE), rows(v), elastic, kinetic)
+    np.testing.assert_allclose(elastic, energy(SHAPE), rtol=1e-13)
+    np.testing.assert_allclose(kinetic, oracle.kinetic_energy(STAR, v), rtol=1e-13)

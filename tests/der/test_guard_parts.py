@@ -3,21 +3,28 @@
 import numpy as np
 import pytest
 
+import oracle
+from oracle import Star
 from seastar_gym import Scene, Seastar, UniformCurrent, Water
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.guard import (
+    add_held_energy,
     cut_velocities,
     energy_noise,
     frame_velocity,
     hold_to_energy,
+    may_gain,
     rigid_motion,
     through_poles,
 )
 from seastar_gym.der.stepping.schemes import SCHEMES
+from seastar_gym.der.stepping.stages import Stage
+from seastar_gym.der.terms.contact import add_contact_energy
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
 from slopes import nodes, plain, rotated, rows
+from touching import touching_limbs
 
 ROBOT = Seastar(5, 4)
 RODS = make_rods(Scene(ROBOT, None))
@@ -95,3 +102,43 @@ def test_noise_is_that_of_positions_that_are_all_rounded_the_same_way():
     before, after = (0.5 * np.sum(RODS.mass[:, None] * each**2) for each in (v, v + np.spacing(far) / h))
     noise = plain(energy_noise.plain(RODS, rows(far), Lanes(h), Lanes(0.0), Lanes(before)))
     assert np.all((0.05 * noise < after - before) & (after - before < 0.5 * noise))
+
+
+LOADS = tuple((node, *force) for node, force in enumerate(RNG.standard_normal((ROBOT.n_nodes, 2)).tolist()))
+
+
+@pytest.mark.parametrize("loads", [(), LOADS], ids=["free", "with loads"])
+def test_a_step_may_gain_energy_where_what_newton_knows_does_not_rule_it_out(loads):
+    """Phi + v_0 M (v_1 - v_0) - h F v_0 - U(q_0), from the oracle, just above zero or just below."""
+    rods, star, h = make_rods(Scene(ROBOT, None, loads=loads)), Star(5, 4, drag_coefficient=0.0), 0.01
+    q_1, v_0 = Q + 1e-3 * RNG.standard_normal(Q.shape), V
+    force = np.array([force for _, *force in loads]) if loads else np.zeros_like(V)
+    change = (q_1 - Q) / h - v_0
+    least = oracle.elastic_energy(star, Q, np.zeros(5)) - np.sum(star.masses[:, None] * v_0 * change)
+    least += h * np.sum(force * v_0)
+    work = make_work(rods, 1)
+    kappa_bar = 2.0 * np.tan(oracle.natural_angles(star, np.zeros(5))[-5:] / 2.0) / star.edge_length
+    work.hub_EI_kappa_bar[:] = star.EI * kappa_bar[:, None]
+    work.q[:] = rows(q_1)
+    stage = Stage(rows(Q), rows(v_0), Lanes(h), Lanes(1.0 / h), False)
+    above = np.arange(N_LANES) % 2 == 0
+    phi = Lanes(least + np.where(above, 1e-9, -1e-9) * abs(least))
+    found = plain(may_gain.plain(None, None, rods, work, stage, phi, EVERYONE))
+    np.testing.assert_array_equal(found, above)
+    assert not plain(may_gain.plain(None, None, rods, work, stage, phi, ~EVERYONE)).any()
+
+
+def test_in_fluid_that_moves_or_moves_along_any_step_may_gain():
+    assert may_gain.plain(object(), None, None, None, None, None, EVERYONE) is EVERYONE
+    assert may_gain.plain(None, object(), None, None, None, None, EVERYONE) is EVERYONE
+
+
+def test_what_limbs_that_press_each_other_store_counts_where_the_scheme_gives_it_back():
+    touching = touching_limbs()
+    args = touching.rods.contact, touching.rods, touching.work
+    stored = plain(add_contact_energy.plain(*args, touching.work.q, Lanes(2.0)))
+    assert np.all(stored > 2.0)
+    for name, scheme in SCHEMES.items():
+        found = plain(add_held_energy.plain(*args, scheme, touching.work.q, Lanes(2.0)))
+        np.testing.assert_array_equal(found, stored if name == "implicit-euler" else 2.0)
+    assert add_held_energy.plain(None, None, None, SCHEMES["sdirk2"], None, 2.0) == 2.0

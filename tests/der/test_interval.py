@@ -1,99 +1,306 @@
-"""How steps are halved and doubled, with steps that succeed or fail as told."""
+"""How an interval is covered, told by steps whose outcome the test decides: halvings, doublings, fallback, failure."""
 
-from typing import NamedTuple
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from seastar_gym import Numerics, Scene, Seastar
+from seastar_gym import Scene, Seastar
 from seastar_gym.der.rods import make_work
-from seastar_gym.der.stepping.interval import FALLBACK_AFTER, cover_interval
-from seastar_gym.der.stepping.report import REPORT_ROWS
+from seastar_gym.der.stepping.interval import cover_interval, note_hub_angles
+from seastar_gym.der.stepping.limits import Limits
+from seastar_gym.der.stepping.report import (
+    COVERED,
+    HALVINGS,
+    NEWTON_ITERATIONS,
+    REJECTIONS,
+    REPORT_ROWS,
+    SMALLEST_HUB_T,
+    STEPS,
+)
 from seastar_gym.der.stepping.schemes import SCHEMES
-from seastar_gym.der.stepping.steps import MOST_HALVINGS, SMALLEST_FRACTION, TURNABLE
-from seastar_gym.model.limits import make_limits
+from seastar_gym.der.stepping.stages import LAST_STEP, SIZE, memory_row
+from seastar_gym.der.stepping.steps import Step, end_guarded_step, solve_stages, try_step
+from seastar_gym.der.stepping.stroke import advance
+from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
-from slopes import plain, rows
+from seastar_gym.simd.plain import plain_kernels
+from slopes import plain, rotated, rows
 
-ROBOT = Seastar(5, 2)
+ROBOT = Seastar(5, 3)
 RODS = make_rods(Scene(ROBOT))
-EVERYONE = Mask(np.ones(N_LANES, bool))
 MIDPOINT, EULER = SCHEMES["implicit-midpoint"], SCHEMES["implicit-euler"]
+EVERYONE, NOBODY = np.ones(N_LANES, bool), np.zeros(N_LANES, bool)
+FIRST = np.arange(N_LANES) == 0
+LIMIT, DURATION, MOST = 2.0, 0.4, 1000
+SMALL, LARGE = 0.1 * LIMIT, 0.5 * LIMIT
+"""Errors that let a step be doubled, and not."""
 
 
-class Trial(NamedTuple):
-    """A step that was tried: its start and size, as shares of the interval, and whether it was the fallback's."""
-
-    start: float
-    size: float
-    on_fallback: bool
+def lanes(x) -> np.ndarray:
+    return np.broadcast_to(plain(x), N_LANES)
 
 
-def number(lanes: Lanes) -> float:
-    """The number that all lanes have."""
-    return float(np.unique(lanes.numbers).item())
+class Script:
+    """Steps of robot 0: 's' is stuck, 'r' rejected, 'a' accepted with a large error, any other with a small one.
+
+    All other robots' steps are accepted with a large error.
+    """
+
+    def __init__(self, outcomes: str, iterations: float = 0.0):
+        self.outcomes, self.iterations, self.tried = outcomes, iterations, []
+
+    def __call__(self, rods, work, tableau, actuation, q, v, a, step, going, limits, report):
+        going = going.robots
+        good, accepted, error = going.copy(), going.copy(), np.full(N_LANES, LARGE)
+        if going[0]:
+            outcome = self.outcomes[min(len(self.tried), len(self.outcomes) - 1)]
+            self.tried.append(
+                SimpleNamespace(
+                    start=lanes(step.start)[0], size=lanes(step.size)[0], h=lanes(step.h)[0],
+                    most=lanes(step.iteration_limit)[0], retrying=lanes(step.retrying)[0], fallback=tableau is EULER,
+                )
+            )  # fmt: skip
+            good[0], accepted[0] = outcome != "s", outcome not in "sr"
+            error[0] = {"r": 2.0 * LIMIT, "a": LARGE}.get(outcome, SMALL)
+        report[NEWTON_ITERATIONS] += self.iterations * going
+        return Mask(good), Mask(accepted), Lanes(error)
 
 
-@pytest.fixture
-def tried(monkeypatch):
-    """Cover an interval with steps whose verdict (converged, error rate over the limit) a function of them tells."""
-
-    def cover(verdict, adapted=True):
-        numerics = Numerics("implicit-midpoint", 5e-3, path_tolerance=0.01 if adapted else None)
-        limits, trials = make_limits(Scene(ROBOT, numerics=numerics)), []
-
-        def try_step(rods, work, tableau, actuation, q, v, a, step, going, limits, report):
-            trials.append(Trial(number(step.start), number(step.size), tableau is EULER))
-            good, error = verdict(trials)
-            accepted = good and error <= 1.0
-            return (
-                going & Mask(np.full(N_LANES, good)),
-                going & Mask(np.full(N_LANES, accepted)),
-                Lanes(error * float(limits.error_rate[0])),
-            )
-
-        monkeypatch.setitem(cover_interval.plain.__globals__, "try_step", try_step)
-        q, report = rows(ROBOT.nodes()), np.zeros((len(REPORT_ROWS), N_LANES))
-        v, a = np.zeros_like(q), np.zeros((len(q) + 3, N_LANES))
-        work, h = make_work(RODS, 1), Lanes(5e-3)
-        args = RODS, work, MIDPOINT, EULER, None, q, v, a, h, EVERYONE, limits, report
-        return plain(cover_interval.plain(*args)).all(), trials
-
-    return cover
+def cover(monkeypatch, outcomes: str, adaptive=False, last_size=0.0, iterations=0.0, alive=EVERYONE):
+    script = Script(outcomes, iterations)
+    monkeypatch.setitem(cover_interval.plain.__globals__, "try_step", script)
+    limits = Limits(np.array([1e-9]), 20, MOST, adaptive, np.array([LIMIT]))
+    report = np.zeros((len(REPORT_ROWS), N_LANES))
+    a = np.zeros((2 * ROBOT.n_nodes + 3, N_LANES))
+    a[memory_row.plain(RODS, MIDPOINT, SIZE)] = last_size
+    args = RODS, make_work(RODS, 1), MIDPOINT, EULER, None, rows(ROBOT.nodes()), None, a, DURATION
+    arrived = lanes(cover_interval.plain(*args, Mask(alive), limits, report))
+    return SimpleNamespace(
+        tried=script.tried, arrived=arrived, report=report, sizes=[step.size for step in script.tried],
+        size=a[memory_row.plain(RODS, MIDPOINT, SIZE)],
+    )  # fmt: skip
 
 
-def test_after_four_halvings_steps_are_the_fallbacks_and_after_the_twelfth_the_robot_has_failed(tried):
-    arrived, trials = tried(lambda trials: (False, 0.0), adapted=False)
-    assert not arrived
-    assert [trial.on_fallback for trial in trials] == [False] * 4 + [True] * 9
-    assert [trial.size for trial in trials] == [2.0**-k for k in range(13)]
+def test_robots_without_trouble_take_one_step(monkeypatch):
+    found = cover(monkeypatch, "a")
+    (step,) = found.tried
+    assert (step.start, step.size, step.h, step.most, step.retrying) == (0.0, 1.0, DURATION, 20.0, False)
+    assert found.arrived.all() and np.all(found.report[STEPS] == 1.0) and not found.report[HALVINGS].any()
+    np.testing.assert_allclose(found.report[COVERED], DURATION)
 
 
-def test_a_robot_is_first_helped_by_short_steps_then_by_the_fallback_then_by_letting_hinges_go_through_poles():
-    assert 1.0 <= FALLBACK_AFTER < TURNABLE < MOST_HALVINGS == -np.log2(SMALLEST_FRACTION)
+def test_robots_that_have_failed_before_are_left_alone(monkeypatch):
+    found = cover(monkeypatch, "a", alive=~FIRST)
+    assert not found.tried and not found.report[STEPS, 0]
+    np.testing.assert_array_equal(found.arrived, ~FIRST)
 
 
-def test_an_adapted_stroke_begins_with_a_short_step_and_finds_the_longest_soon(tried):
-    arrived, trials = tried(lambda trials: (True, 0.0))
-    assert arrived and [trial.size for trial in trials] == [2.0**-3, 2.0**-3, 0.25, 0.5]
+def test_a_robot_that_is_stuck_halves_its_step_has_more_iterations_and_covers_the_rest_in_small_ones(monkeypatch):
+    found = cover(monkeypatch, "ssa")
+    assert found.sizes == [1.0, 0.5, 0.25, 0.25, 0.25, 0.25] and found.arrived.all()
+    assert [step.start for step in found.tried] == [0.0, 0.0, 0.0, 0.25, 0.5, 0.75]
+    assert [step.most for step in found.tried] == [20.0, 40.0, 60.0, 60.0, 60.0, 60.0]
+    assert [step.retrying for step in found.tried] == [False, True, True, True, True, True]
+    np.testing.assert_array_equal(found.report[HALVINGS], 2.0 * FIRST)
+    np.testing.assert_array_equal(found.report[STEPS], 1.0 + 3.0 * FIRST)
+    np.testing.assert_allclose(found.report[COVERED], DURATION)
 
 
-def test_steps_grow_to_where_their_errors_let_them_and_are_not_refused_there(tried):
-    """The error per time of a step that is twice as long is four times as large; a quarter of the interval is hard."""
-
-    def verdict(largest: float, trial: Trial) -> tuple[bool, float]:
-        return True, (trial.size / (largest if trial.start >= 0.25 else 2.0**-8)) ** 2
-
-    for largest in 2.0 ** np.linspace(-4.9, -3.1, 8):
-        arrived, trials = tried(lambda trials, largest=largest: verdict(largest, trials[-1]))
-        settled = np.array([trial.size for trial in trials if trial.start > 0.5])
-        assert arrived and np.all((settled > 0.4 * largest) & (settled <= largest))
+def test_after_four_halvings_a_robot_goes_on_with_the_fallback(monkeypatch):
+    found = cover(monkeypatch, "ssssa")
+    assert [step.fallback for step in found.tried] == 4 * [False] + 16 * [True]
+    assert found.report[STEPS, 0] == 16.0
 
 
-def test_after_a_halving_the_fifth_step_is_longer_again_and_the_next_doubling_waits_twice_as_long(tried):
-    _, trials = tried(lambda trials: (len(trials) > 2, 0.0))
-    sizes = [trial.size for trial in trials[2:]]
-    assert sizes[:4] == [2.0**-5] * 4 and sizes[4] == 2.0**-4
-    assert sizes[4:12] == [2.0**-4] * 8 and sizes[12] == 2.0**-3
+def test_a_robot_that_is_stuck_at_the_shortest_step_has_failed_and_keeps_nobody(monkeypatch):
+    found = cover(monkeypatch, "s")
+    assert found.sizes == [0.5**k for k in range(13)] and found.report[HALVINGS, 0] == 13.0
+    np.testing.assert_array_equal(found.arrived, ~FIRST)
+
+
+def test_a_robot_whose_iterations_are_spent_fails_when_it_is_stuck_and_not_before(monkeypatch):
+    for outcomes, arrives in (("s", False), ("a", True)):
+        found = cover(monkeypatch, outcomes, iterations=MOST)
+        assert len(found.tried) == 1 and found.arrived[0] == arrives
+
+
+# Steps adapted to their error
+
+
+def test_adapted_steps_begin_with_an_eighth_and_double_on_the_grid_of_their_own_size(monkeypatch):
+    found = cover(monkeypatch, "+", adaptive=True)
+    assert found.sizes == [0.125, 0.125, 0.25, 0.5] and found.size[0] == 1.0
+    assert np.all(found.report[STEPS, 1:] == 8.0) and np.all(found.size[1:] == 0.125)
+
+
+def test_adapted_steps_go_on_with_the_last_ones_length(monkeypatch):
+    assert cover(monkeypatch, "a", adaptive=True, last_size=0.5).sizes == [0.5, 0.5]
+    assert cover(monkeypatch, "+", adaptive=True, last_size=1.0).size[0] == 1.0
+
+
+def test_a_step_whose_error_is_too_large_is_halved_and_is_no_halving_of_a_robot_in_trouble(monkeypatch):
+    found = cover(monkeypatch, "ra", adaptive=True, last_size=0.5)
+    assert found.sizes == [0.5, 0.25, 0.25, 0.25, 0.25] and not any(step.retrying for step in found.tried)
+    assert found.report[REJECTIONS, 0] == 1.0 and found.report[HALVINGS, 0] == 0.0
+    assert not found.report[REJECTIONS, 1:].any()
+
+
+def test_after_a_halving_adapted_steps_double_after_four_accepted_steps(monkeypatch):
+    found = cover(monkeypatch, "s+", adaptive=True, last_size=2.0**-4)
+    shorter = 2.0**-5
+    assert found.sizes[:6] == [2.0**-4] + 4 * [shorter] + [2 * shorter]
+    assert not found.tried[5].retrying and found.tried[4].retrying
+
+
+def test_after_a_second_halving_they_double_after_eight_accepted_steps(monkeypatch):
+    found = cover(monkeypatch, "s++++s+", adaptive=True, last_size=2.0**-4)
+    again = [step.retrying for step in found.tried[6:]]
+    assert again[:8] == 8 * [True] and not any(again[8:])
+
+
+def test_no_doubling_leads_back_from_the_fallback(monkeypatch):
+    found = cover(monkeypatch, "ssss+", adaptive=True, last_size=1.0)
+    assert found.sizes[4:] == 16 * [2.0**-4] and all(step.fallback for step in found.tried[4:])
+
+
+def test_a_robot_that_is_stuck_at_the_smallest_fraction_tries_again_with_more_iterations(monkeypatch):
+    found = cover(monkeypatch, "ss" + 100 * "a", adaptive=True, last_size=2.0**-12)
+    assert found.sizes[:3] == 3 * [2.0**-12] and [step.most for step in found.tried[:3]] == [20.0, 40.0, 60.0]
+
+
+# One step
+
+
+def step_of(h=0.01, size=1.0, limit=20.0, retrying=NOBODY) -> Step:
+    return Step(Lanes(0.0), Lanes(size), Lanes(h), Lanes(limit), Mask(retrying))
+
+
+def stroke_limits(adaptive=False, most=MOST) -> Limits:
+    return Limits(np.array([1e-9]), 20, most, adaptive, np.array([LIMIT]))
+
+
+@pytest.mark.parametrize("iterations_before, limit, most", [(0.0, 20.0, 20.0), (990.0, 20.0, 10.0), (1000.0, 9.0, 0.0)])
+def test_newton_has_what_the_step_and_the_stroke_leave_it_and_is_counted(monkeypatch, iterations_before, limit, most):
+    asked, counts = [], (7.0, 2.0, 3.0)
+
+    def minimise(rods, work, stage, robots, tolerance, limit):
+        asked.append((robots.robots.copy(), lanes(limit)[0], work.q[:].copy()))
+        return robots, Lanes(0.0), *map(Lanes, counts)
+
+    monkeypatch.setitem(solve_stages.plain.__globals__, "minimise", minimise)
+    q, v = rows(ROBOT.nodes()), np.full((2 * ROBOT.n_nodes, N_LANES), 0.3)
+    work, report = make_work(RODS, 1), np.zeros((len(REPORT_ROWS), N_LANES))
+    report[NEWTON_ITERATIONS] = iterations_before
+    a, still = np.zeros((2 * ROBOT.n_nodes + 3, N_LANES)), Actuation(*np.zeros((2, 5, N_LANES)))
+    step = step_of(limit=limit, retrying=FIRST)
+    args = RODS, work, MIDPOINT, still, q, v, a, step, Mask(EVERYONE), stroke_limits(), report
+    good, guarded, _ = solve_stages.plain(*args)
+    ((robots, limit_asked, start),) = asked
+    assert limit_asked == most and np.all(robots == (most > 0.0)) and np.all(lanes(good) == robots)
+    assert lanes(guarded).all()  # regularised or shortened
+    np.testing.assert_array_equal(report[:3, 0], [iterations_before + 7.0, 2.0, 3.0])
+    # In still water a robot that tries again starts where it stands, the others where their velocity leads them.
+    np.testing.assert_allclose(start - q, 0.005 * v * ~FIRST, rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize("size, error, accepted", [(1.0, 0.9, True), (1.0, 1.1, False), (2.0**-12, 1.1, True)])
+def test_a_step_is_accepted_whose_error_is_small_or_that_is_the_shortest(monkeypatch, size, error, accepted):
+    """Its length is then kept for the next."""
+    h, stuck = 0.01, FIRST
+    fakes = {
+        "solve_stages": lambda *_: (Mask(~stuck), Mask(NOBODY), None), "end_step": lambda *args: ended.append(args[-1]),
+        "step_error": lambda *args: Lanes(error * LIMIT * h),
+    }  # fmt: skip
+    for name, fake in fakes.items():
+        monkeypatch.setitem(try_step.plain.__globals__, name, fake)
+    a, ended = np.full((2 * ROBOT.n_nodes + 3, N_LANES), 9.0), []
+    args = RODS, None, MIDPOINT, None, None, None, a, step_of(h, size), Mask(EVERYONE), stroke_limits(True), None
+    good, taken, error_rate = map(lanes, try_step.plain(*args))
+    np.testing.assert_array_equal(good, ~stuck)
+    np.testing.assert_array_equal(taken, ~stuck & accepted)
+    np.testing.assert_array_equal(ended[0].robots, taken)
+    np.testing.assert_allclose(error_rate, error * LIMIT)
+    np.testing.assert_array_equal(a[memory_row.plain(RODS, MIDPOINT, LAST_STEP)], np.where(taken, h, 9.0))
+
+
+@pytest.mark.parametrize(
+    "halvings, cut, turns_back",
+    [(0, 0.01, True), (7, 0.01, True), (8, 0.01, False), (11, 0.01, False), (12, 1.0, False)],
+)
+def test_the_guard_is_milder_after_eight_halvings_and_after_twelve(monkeypatch, halvings, cut, turns_back):
+    asked = {}
+
+    def hold(rods, work, scheme, q, v, h, frame, robots, allowed, largest_cut):
+        asked.update(cut=lanes(largest_cut)[0], held=robots.robots)
+        return Mask(NOBODY), Mask(EVERYONE)
+
+    def poles(rods, work, q, robots):
+        asked.update(turnable=robots.robots)
+        return Mask(NOBODY)
+
+    space = end_guarded_step.plain.__globals__
+    for name, fake in {"hold_to_energy": hold, "through_poles": poles, "end_step": lambda *_: None}.items():
+        monkeypatch.setitem(space, name, fake)
+    q, v = rows(ROBOT.nodes()), np.zeros((2 * ROBOT.n_nodes, N_LANES))
+    work, report = make_work(RODS, 1), np.zeros((len(REPORT_ROWS), N_LANES))
+    still, step = Actuation(*np.zeros((2, 5, N_LANES))), step_of(limit=20.0 * (1 + halvings))
+    masks = Mask(EVERYONE), Mask(FIRST)
+    end_guarded_step.plain(
+        RODS, work, MIDPOINT, still, q, v, np.zeros((2 * ROBOT.n_nodes + 3, N_LANES)), step, None, *masks,
+        stroke_limits(), report,
+    )  # fmt: skip
+    assert asked["cut"] == cut
+    np.testing.assert_array_equal(asked["held"], FIRST)
+    np.testing.assert_array_equal(asked["turnable"], FIRST & turns_back)
+    np.testing.assert_array_equal(report[REPORT_ROWS.index("energy_cuts")], 1.0)
+
+
+# A stroke
+
+
+@pytest.mark.parametrize("alike", [True, False])
+def test_every_group_follows_its_own_peaks_through_all_intervals_and_says_why_it_failed(monkeypatch, alike):
+    covered, stroke = [], plain_kernels()(advance)
+
+    def cover(rods, work, scheme, fallback, rotation, q, v, a, duration, alive, limits, report):
+        covered.append((rotation.delta_psi_start.copy(), rotation.delta_psi_end.copy(), duration, q[0, 0]))
+        report[NEWTON_ITERATIONS] += 0.5 * MOST * (np.arange(N_LANES) == 1)
+        return alive & Mask(np.arange(N_LANES) > 1)
+
+    monkeypatch.setitem(stroke.__wrapped__.__globals__, "cover_interval", cover)
+    rng = np.random.default_rng(0)
+    peaks, times = rng.standard_normal((2, 5, N_LANES)), np.array([0.0, 0.1, 0.4])
+    shape = rng.standard_normal(3) if alike else rng.standard_normal((2, 3, 5, N_LANES))
+    failed, report = np.zeros((2, 1, N_LANES)), np.zeros((2, len(REPORT_ROWS), N_LANES))
+    failed[0, 0, -1] = 2.0
+    rotation, q = Actuation(*np.zeros((2, 5, N_LANES))), np.arange(2.0)[:, None, None] * np.ones((2, 1, N_LANES))
+    stroke(RODS, None, MIDPOINT, EULER, rotation, q, q, q, peaks, times, shape, failed, report, stroke_limits())
+    assert [group for *_, group in covered] == [0.0, 0.0, 1.0, 1.0]
+    np.testing.assert_allclose([duration for *_, duration, _ in covered], [0.1, 0.3, 0.1, 0.3])
+    for k, (start, end, *_) in enumerate(covered):
+        group, interval = divmod(k, 2)
+        turned = peaks[group] * (shape[:, None, None] if alike else shape[group])
+        np.testing.assert_allclose([start, end], turned[interval : interval + 2])
+    np.testing.assert_array_equal(failed[:, 0, :3], [[1.0, 3.0, 0.0]] * 2)
+    np.testing.assert_array_equal(failed[:, 0, -1], [2.0, 0.0])
+
+
+# Hub angles
+
+
+@pytest.mark.parametrize("limb", range(5))
+def test_the_smallest_hub_angle_may_be_any_gaps_but_wide_ones_do_not_count(limb):
+    """Limb j turned towards the next; a gap of more than pi may close as it likes."""
+    nodes = ROBOT.nodes()
+    nodes[2 * limb + 1 : 2 * limb + 3] = rotated(nodes[2 * limb + 1 : 2 * limb + 3], 0.5)
+    for wide in (None, limb):
+        angle = RODS.hub.angle.copy()
+        if wide is not None:
+            angle[wide] = -0.1
+        rods, report = RODS._replace(hub=RODS.hub._replace(angle=angle)), np.full((len(REPORT_ROWS), N_LANES), np.inf)
+        note_hub_angles.plain(rods, rows(nodes), Mask(EVERYONE), report)
+        gap = 0.4 * np.pi - (0.5 if wide is None else 0.0)
+        np.testing.assert_allclose(report[SMALLEST_HUB_T], np.tan(gap / 2.0), rtol=1e-12)

@@ -42,6 +42,13 @@ def test_draws_have_their_mean_and_stay_within_their_bounds(distribution):
     assert drawn.min() < low + 0.25 * (high - low) and drawn.max() > high - 0.25 * (high - low)
 
 
+def test_a_normal_distribution_is_cut_at_three_standard_deviations():
+    rng, normal = np.random.default_rng(0), Normal(5.0, 0.5)
+    assert normal.bounds == (3.5, 6.5)
+    drawn = (np.array([normal.draw(rng) for _ in range(20_000)]) - 5.0) / 0.5
+    assert 2.8 < np.abs(drawn).max() <= 3.0 and drawn.std() == pytest.approx(0.987, abs=0.02)
+
+
 def test_a_robot_is_drawn_alone_as_in_a_batch_and_swims_as_the_robot_that_was_drawn():
     batch = gym.make_vec(
         "SeastarSwim-v0", 3, "vector_entry_point", fidelity="fast", randomization=DRAWS, max_episode_steps=2

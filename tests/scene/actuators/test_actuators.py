@@ -37,6 +37,14 @@ def test_a_measured_curve_that_samples_the_pulse_reproduces_it_to_rounding():
     np.testing.assert_allclose(curve.positions, pulse.positions, atol=1e-11)
 
 
+def test_a_measured_curve_is_linear_between_its_samples_and_as_large_as_its_scale():
+    curve = MeasuredCurve((0.0, 0.2, 0.6, 0.8), (0.0, 0.3, -0.5, 0.0), scale=1.5)
+    np.testing.assert_allclose(curve.delta_psi([0.1, 0.2, 0.4, 0.7]), 1.5 * np.array([0.15, 0.3, -0.1, -0.25]))
+    assert (curve.peak_angle, curve.period, curve.corners) == (0.75, 0.8, curve.times)
+    each = MeasuredCurve(curve.times, curve.angles, scale=np.array([1.0, 2.0]))
+    np.testing.assert_allclose(each.delta_psi([[0.2, 0.6]]), [[[0.3, 0.6], [-0.5, -1.0]]])
+
+
 def test_time_steps_end_at_every_sample():
     curve = MeasuredCurve((0.0, 0.013, 0.5, 0.8), (0.0, 0.3, 0.2, 0.0))
     simulator = Simulator(Scene(actuator=curve, numerics=NUMERICS))
@@ -105,6 +113,29 @@ def test_a_limited_limb_turns_as_far_and_as_fast_as_it_may():
     half, _ = actuator.respond(t, np.full((), 0.5), np.zeros(1))
     meeting = (np.pi / 10 / 0.9) / (2.0 + np.pi / 10 / 0.9)  # [s], where 2 t meets half the falling pulse
     assert half.max() == pytest.approx(2.0 * meeting, rel=0.01)
+
+
+def test_a_limited_limb_turns_as_far_and_as_fast_to_either_side_from_wherever_it_is():
+    actuator, t = Limited(SmaPulse(), largest_angle=0.4, largest_rate=2.0), np.linspace(0.0, 1.0, 101)
+    commands, state = np.array([[1.0, -1.0, 0.3, -0.3]]), np.array([[[0.1], [-0.1], [-0.2], [0.2]]])
+    turned, after = actuator.respond(t, commands, state)
+    np.testing.assert_array_equal(turned[..., 1::2], -turned[..., ::2])
+    np.testing.assert_array_equal(turned[0, 0], state[0, :, 0])
+    np.testing.assert_array_equal(after[..., 0], turned[-1])
+    np.testing.assert_allclose([turned.max(), turned.min()], [0.4, -0.4])
+    steps = np.diff(turned, axis=0)
+    np.testing.assert_allclose([steps.max(), steps.min()], [2.0 * 0.01, -2.0 * 0.01])
+    np.testing.assert_allclose(actuator.observe(state)[0, :, 0], [0.25, -0.25, -0.5, 0.5])
+
+
+def test_a_limb_that_only_has_a_stop_follows_its_curve_up_to_it():
+    t = np.linspace(0.0, 1.0, 101)
+    for actuator, stop in ((Limited(SmaPulse(), largest_angle=0.4), 0.4), (Limited(SmaPulse()), np.pi / 5)):
+        assert actuator.peak_angle == stop and actuator.period == 1.0 and actuator.corners == SmaPulse().corners
+        for side in (1.0, -1.0):
+            turned, _ = actuator.respond(t, np.full((), side), np.zeros(1))
+            np.testing.assert_array_equal(turned, side * np.minimum(SmaPulse().delta_psi(t), stop))
+        np.testing.assert_array_equal(actuator.delta_psi(t), np.minimum(SmaPulse().delta_psi(t), stop))
 
 
 def test_a_slow_limb_goes_on_from_where_the_last_stroke_left_it():
