@@ -139,6 +139,7 @@ def test_attributes_and_methods_are_those_of_the_batch(symmetry):
     with pytest.raises(ValueError, match="for all of them"):
         batch.set_attr("max_episode_steps", 5, indices=0)
     batch.reset()
+    assert len(batch.env_method("reset", seed=1)) == N
     facts = batch.env_method("reset", seed=1, indices=[1])
     assert len(facts) == 1 and facts[0][0].shape == (N, 186)
     assert batch.env_is_wrapped(VectorSymmetryReduction) == [symmetry] * N

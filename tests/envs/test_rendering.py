@@ -49,6 +49,16 @@ def mid_limb(limb):
     return resting_robot()[LIMB_NODES[limb - 1, 5]]
 
 
+def test_the_scale_bar_has_a_tick_at_either_end(monkeypatch):
+    strokes, renderer = [], renderer_of()
+    renderer.draw(frame_of())
+    monkeypatch.setattr(renderer._canvas, "stroke", lambda points, colour, width: strokes.append(points.tolist()))
+    renderer._scale_bar(10.0, 50.0, 90.0)
+    (_, *ticks) = strokes
+    assert strokes[0] == [[10.0, 90.0], [50.0, 90.0]] and [start[0] for start, _ in ticks] == [10.0, 50.0]
+    assert all(start[0] == end[0] and start[1] + end[1] == 180.0 and end[1] - start[1] > 4.0 for start, end in ticks)
+
+
 def is_blue(colour):
     red, green, blue = colour
     return blue > 150 and blue > red + 100 and blue > green + 50

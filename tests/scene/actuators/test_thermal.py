@@ -104,6 +104,14 @@ def test_the_other_wire_turns_the_other_way_while_the_first_is_still_warm():
     assert turned[1] == pytest.approx(actuator.peak_angle * (after[2] - after[3])) and turned[1] < -0.3
 
 
+def test_every_robot_turns_as_its_own_wires_do():
+    each = ThermalSma(peak_angle=np.array([0.5, 0.6]), water_temperature=np.array([20.0, 21.0]))
+    alone = [ThermalSma(peak_angle=0.5), ThermalSma(peak_angle=0.6, water_temperature=21.0)]
+    t = np.array([[0.0, 0.05], [0.2, 1.0]])
+    np.testing.assert_array_equal(each.delta_psi(t), np.stack([one.delta_psi(t) for one in alone], axis=-1))
+    assert each.delta_psi(t)[1, 0].min() > 0.1 and ThermalSma().peak_angle == SmaPulse().peak_angle
+
+
 def test_robots_swim_and_cool_down_and_are_cold_after_a_reset():
     simulator = Simulator(SCENE, 2)
     for _ in range(2):
@@ -148,6 +156,7 @@ def test_temperatures_are_observed():
     [
         {"water_temperature": 22.0}, {"austenite_start": 80.0}, {"martensite_start": 80.0}, {"martensite_finish": 24.0},
         {"austenite_finish": np.nan}, {"time_constant": 0.0}, {"steady_rise": -1.0}, {"peak_angle": -0.1},
+        {"time_constant": 0.9e-3},
     ],
 )  # fmt: skip
 def test_wires_that_cannot_be_are_refused(change):
