@@ -118,6 +118,10 @@ def test_a_swim_ends_at_its_last_waypoint():
     numbers = statistics(swims)
     assert numbers["success_rate"][0] == 1.0
     assert all(done.strokes < 90 and done.waypoint_index[-2] == 0 for done in swims)
+    assert numbers["strokes_to_finish"][0] == pytest.approx(np.mean([done.strokes for done in swims]))
+    assert numbers["limbs_heated_per_metre"][0] == pytest.approx(np.mean([done.heated_per_metre for done in swims]))
+    errors = [1e3 * done.cross_track_errors.mean() for done in swims]
+    assert numbers["mean_cross_track_error_mm"][0] == pytest.approx(np.mean(errors))
 
 
 @pytest.mark.parametrize("draw", ["normal", "exponential"])
@@ -156,5 +160,7 @@ def test_named_paths_on_two_fidelities(tmp_path, capsys):
         rows = list(csv.DictReader(stream))
     assert [row["fidelity"] for row in rows] == ["fast"] * 4 + ["balanced"] * 4
     assert {float(row["success_rate"]) for row in rows} == {0.0}
+    printed = capsys.readouterr().out
+    assert all(name in printed for name in ("path", "fidelity", "success", "cross-track", "heated", "0.0% [0.0%, 0.0%]"))
     with pytest.raises(ValueError, match="nothing to swim"):
         Options(sets=())
