@@ -161,6 +161,7 @@ def test_named_paths_on_two_fidelities(tmp_path, capsys):
     assert [row["fidelity"] for row in rows] == ["fast"] * 4 + ["balanced"] * 4
     assert {float(row["success_rate"]) for row in rows} == {0.0}
     printed = capsys.readouterr().out
-    assert all(name in printed for name in ("path", "fidelity", "success", "cross-track", "heated", "0.0% [0.0%, 0.0%]"))
+    words = ("path", "fidelity", "success", "cross-track", "heated", "0.0% [0.0%, 0.0%]")
+    assert all(word in printed for word in words)
     with pytest.raises(ValueError, match="nothing to swim"):
         Options(sets=())
