@@ -60,6 +60,8 @@ def test_a_step_that_is_not_accepted_changes_no_bit():
     for now, then in zip((q, v), before, strict=True):
         np.testing.assert_array_equal(now[:, ~chosen], then[:, ~chosen])
         assert np.all(now[:, chosen] != then[:, chosen])
+    accelerations = a[SIZE : 2 * SIZE]  # of the last stage, kept for the next step's first guess
+    assert accelerations[:, chosen].all() and not accelerations[:, ~chosen].any()
 
 
 def test_the_share_of_an_acceleration_is_kept_from_zero_to_one():
