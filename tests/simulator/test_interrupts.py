@@ -372,7 +372,7 @@ def test_close_ends_the_threads_and_a_stroke_starts_them_again():
     before = others()
     simulator = swimmers(2)
     for _ in range(2):
-        assert len(others() - before) == 2
+        assert 1 <= len(others() - before) <= 2  # a pool starts its second thread when the first is busy
         simulator.close()
         simulator.close()
         assert not others() - before
@@ -393,7 +393,7 @@ def test_close_of_the_batch_ends_its_threads_however_often_it_is_used_again():
     env.reset(seed=0)
     for _ in range(2):
         env.step(env.action_space.sample())
-        assert len(others() - before) == 2
+        assert 1 <= len(others() - before) <= 2  # a pool starts its second thread when the first is busy
         env.close()
         env.close()
         assert not others() - before
