@@ -1,9 +1,14 @@
 """Options and settings that every test shares."""
 
 import os
+import signal
 
 import pytest
 from hypothesis import settings
+
+# A shell that starts the tests in the background has them, and what they start, ignore Ctrl-C, which they are about.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Before anything imports matplotlib, here or in a subprocess: the tests have no display.
 os.environ["MPLBACKEND"] = "Agg"
