@@ -21,7 +21,7 @@ FIDELITIES = ("fast", "balanced", "accurate", "reference", "chapter")
 
 def test_defaults_are_the_chapters_values():
     robot, water, actuator = Seastar(), Water(), SmaPulse()
-    assert dataclasses.astuple(robot) == (5, 10, 0.1, 1.6e-3, 1e6, 1000.0, "opening", (), None)
+    assert dataclasses.astuple(robot) == (5, 10, 0.1, 1.6e-3, 1e6, 1000.0, "opening", (), None, "chapter")
     assert dataclasses.astuple(water) == (1000.0, 1.0, None, None, None)
     assert dataclasses.astuple(actuator) == (math.pi / 5, 0.1, 0.9)
     assert Numerics().scheme == "implicit-euler"
