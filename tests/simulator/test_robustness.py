@@ -266,7 +266,7 @@ SYMMETRY_ROUNDING = 1e4 * EPSILON * 0.1
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("step", [0.005, 0.05])
 def test_50_strokes_turn_and_mirror_with_their_commands_to_a_multiple_of_rounding(scheme, step):
-    """A robot whose limbs buckle either way by rounding alone, at far too long steps, parts from its nudged twin, too."""
+    """Robots whose limbs buckle either way by rounding, at far too long steps, part from their nudged twins, too."""
     mirror, robots = [0, 4, 3, 2, 1], [Simulator(Scene(numerics=Numerics(scheme, step)), N_LANES) for _ in range(4)]
     at_rest = robots[3].get_state()
     nudge = 1e-16 * np.random.default_rng(0).standard_normal(at_rest.positions.shape)
