@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 INK, FAINT_INK, MARK, EMPTY = "#3a404a", "#80868f", "#d62728", "#eceff3"
 NEEDS = ("plain Newton", "regularised matrix or line search", "substeps", "failed")
-"""What the solver needed, from least to most."""
+"""Needs of the solver, from least to most."""
 NEED_COLOURS = ("#c7e0f4", "#5aa2d6", "#1b4f8f", "#d62728")
 NAMES = {
     "implicit-euler": "Implicit Euler",
