@@ -45,16 +45,12 @@ def test_a_robot_of_any_shape_rests_without_energy_and_without_force(star):
 
 def test_a_curved_limb_rests_on_the_arc_that_leaves_the_hub_along_its_direction():
     star = unlike_limbs(3, 6)
-    for limb, (direction, curvature) in enumerate(zip(star.directions, star.curvatures, strict=True)):
-        centre = np.array([-np.sin(direction), np.cos(direction)]) / curvature
+    for limb, (direction, turn_of_edge) in enumerate(zip(star.directions, star.natural_turns, strict=True)):
+        radius = star.edge_lengths[star.edge(limb, 0)] / (2.0 * np.sin(0.5 * turn_of_edge))
+        centre = radius * np.array([-np.sin(direction), np.cos(direction)])
         nodes = star.rest[[star.node(limb, i) for i in range(6)]]
-        distances = np.linalg.norm(nodes - centre, axis=1)
-        np.testing.assert_allclose(distances, distances[0], rtol=1e-13)
-        # The arc through the nodes has chords of length l, so it is that of the limb but for their sagitta.
-        turn_of_edge = star.natural_turns[limb]
-        middle = star.rest[star.node(limb, 1)] / star.edge_lengths[star.edge(limb, 0)]
-        angle = direction + 0.5 * turn_of_edge
-        np.testing.assert_allclose(middle, [np.cos(angle), np.sin(angle)], atol=1e-14)
+        np.testing.assert_allclose(np.linalg.norm(nodes - centre, axis=1), abs(radius), rtol=1e-13)
+        assert radius == pytest.approx(1.0 / star.curvatures[limb], rel=1e-3)
 
 
 def test_limbs_turned_by_delta_psi_and_all_of_them_by_any_angle_store_no_energy():
@@ -125,7 +121,9 @@ def test_elastic_gradient_and_hessian_are_derivatives(star, soft):
     if soft:  # so that stretching does not hide bending
         star = Continuum(5, 4, youngs_modulus=1.0, rod_radius=1.0)
     q = shaken(star, 1e-3)
-    assert_derivative(lambda x: oracle.elastic_energy(star, x, DELTA_PSI), oracle.elastic_gradient(star, q, DELTA_PSI), q)
+    assert_derivative(
+        lambda x: oracle.elastic_energy(star, x, DELTA_PSI), oracle.elastic_gradient(star, q, DELTA_PSI), q
+    )
     hessian = oracle.elastic_hessian(star, q, DELTA_PSI)
     assert_derivative(lambda x: oracle.elastic_gradient(star, x, DELTA_PSI), hessian, q)
     np.testing.assert_allclose(hessian, hessian.T, rtol=0.0, atol=1e-12 * np.abs(hessian).max())
@@ -207,7 +205,7 @@ def test_energy_never_grows_in_an_unactuated_implicit_euler_run(terms):
 
 def test_a_held_node_stays_and_a_load_pulls_the_others():
     star = Continuum(3, 3, held_nodes=(0, 1), loads=((2, 0.0, 1e-4),), drag_coefficient=0.0)
-    q, v = oracle.step(star, star.rest, np.zeros_like(star.rest), 0.0, 0.01, np.zeros(3), "implicit-euler")
+    q, _ = oracle.step(star, star.rest, np.zeros_like(star.rest), 0.0, 0.01, np.zeros(3), "implicit-euler")
     np.testing.assert_array_equal(q[:2], star.rest[:2])
     assert q[2, 1] > 1e-5
 
@@ -220,15 +218,14 @@ def limbs_moved(q: Array, order: ArrayLike) -> Array:
     return np.vstack([q[:1], q[1:].reshape(5, -1, 2)[np.asarray(order)].reshape(-1, 2)])
 
 
-@pytest.mark.parametrize("star", [Continuum(nodes_per_limb=6), with_all_terms(nodes_per_limb=4)], ids=["plain", "all"])
-def test_commanding_the_next_limb_turns_the_swim_by_72_degrees_and_mirrored_commands_mirror_it(star):
-    if star.current is not None:  # nothing that has a direction or a place
-        star = Continuum(
-            nodes_per_limb=4, tangential_drag_coefficient=0.2, added_mass_coefficient=0.8, relaxation_time=4e-3
-        )
+@pytest.mark.parametrize(
+    "terms", [{}, {"tangential_drag_coefficient": 0.2, "added_mass_coefficient": 0.8, "relaxation_time": 1e-3}]
+)
+def test_commanding_the_next_limb_turns_the_swim_by_72_degrees_and_mirrored_commands_mirror_it(terms):
+    star = Continuum(nodes_per_limb=5, **terms)
     v, mirror = np.zeros_like(star.rest), [0, 4, 3, 2, 1]
     q = few_steps(star, COMMAND, star.rest, v, 3)
-    assert np.abs(q - star.rest).max() > 1e-3
+    assert np.abs(q - star.rest).max() > 5e-4
     turned = turn(limbs_moved(q, [4, 0, 1, 2, 3]), 2.0 * np.pi / 5.0)
     np.testing.assert_allclose(few_steps(star, np.roll(COMMAND, 1), star.rest, v, 3), turned, rtol=0.0, atol=1e-13)
     mirrored = limbs_moved(q, mirror) * [1.0, -1.0]
