@@ -5,6 +5,7 @@ import pytest
 
 import oracle
 from continuum_oracle import Continuum
+from currents import CURRENTS, velocity
 from seastar_gym import Scene, Seastar, SmaPulse, Water
 from seastar_gym.der.rods import Rods
 from seastar_gym.model.rods import make_rods
@@ -23,7 +24,11 @@ def rods_and_stages(n_limbs: int, nodes_per_limb: int, gamma: float, **wildness)
 @pytest.mark.parametrize("gamma", [1e-3, 1e-2])
 @pytest.mark.parametrize("n_limbs, nodes_per_limb", SHAPES)
 def test_potential_and_newton_direction_are_those_of_the_oracle(n_limbs, nodes_per_limb, gamma):
-    rods, stages = rods_and_stages(n_limbs, nodes_per_limb, gamma, bend=0.05)
+    assert_agree(*rods_and_stages(n_limbs, nodes_per_limb, gamma, bend=0.05))
+
+
+def assert_agree(rods: Rods, stages: RandomStages) -> None:
+    """Potential, Newton's direction and its decrement in every lane."""
     found = stages.run(rods)
     for lane in range(N_LANES):
         gradient = oracle.incremental_gradient(stages.star, stages.q[lane], *stages.data(lane))
@@ -32,6 +37,20 @@ def test_potential_and_newton_direction_are_those_of_the_oracle(n_limbs, nodes_p
         assert found.phi[lane] == pytest.approx(phi, rel=1e-12)
         assert found.decrement[lane] == pytest.approx(np.sum(gradient * direction), rel=1e-10)
         np.testing.assert_allclose(found.direction[lane], direction, rtol=0.0, atol=1e-10 * np.abs(direction).max())
+
+
+@pytest.mark.parametrize("current, along", [("shear", 0.02), ("vortex", 1.3)])
+@pytest.mark.parametrize("n_limbs, nodes_per_limb", [(5, 4), (2, 3), (3, 2)])
+def test_potential_and_newton_direction_with_every_term_are_those_of_the_oracle(
+    n_limbs, nodes_per_limb, current, along
+):
+    robot = Seastar(n_limbs, nodes_per_limb, relaxation_time=4e-3, discretisation="continuum")
+    star = Continuum(
+        n_limbs, nodes_per_limb, fluid_density=950.0, drag_coefficient=1.3, tangential_drag_coefficient=along,
+        added_mass_coefficient=0.8, relaxation_time=4e-3, current=lambda places: velocity(current, places),
+    )  # fmt: skip
+    rods = make_rods(Scene(robot, Water(950.0, 1.3, along, CURRENTS[current], 0.8), SmaPulse(0.1)))
+    assert_agree(rods, RandomStages(star, 1e-2, bend=0.05))
 
 
 def test_newton_direction_of_wildly_bent_robots_is_as_good_as_their_matrix_allows():
