@@ -72,8 +72,8 @@ def assert_steps_agree(scene: Scene, star: Star, n_steps: int = 4) -> None:
     for k in range(n_steps):
         next(stroke)
         q, v = oracle.step(star, q, v, k * H, H, command, scene.numerics.scheme, **PULSE)
-    np.testing.assert_allclose(simulator.positions[0], q, rtol=0.0, atol=1e-11 * star.limb_length)
-    np.testing.assert_allclose(simulator.velocities[0], v, rtol=0.0, atol=1e-9 * np.abs(v).max())
+    np.testing.assert_allclose(simulator.positions[0], q, rtol=0.0, atol=1e-12 * star.limb_length)
+    np.testing.assert_allclose(simulator.velocities[0], v, rtol=0.0, atol=1e-10 * np.abs(v).max())
 
 
 # Coefficients
@@ -113,7 +113,8 @@ def test_four_steps_with_other_numbers_of_limbs_and_nodes_are_those_of_the_oracl
 @pytest.mark.parametrize("n_limbs", [2, 4])
 def test_four_steps_of_unlike_limbs_are_those_of_the_oracle(n_limbs, fluid):
     robot, star = shaped(UNLIKE[:n_limbs], 5, (0.0,) * n_limbs, drag_coefficient=1.0 if fluid else 0.0)
-    assert_steps_agree(make_scene(robot, fluid, "implicit-midpoint"), star)
+    # The energy guard cuts what the implicit midpoint lets an undamped robot gain, and the oracle has no guard.
+    assert_steps_agree(make_scene(robot, fluid, "sdirk2"), star)
 
 
 HELD = {"held_nodes": (0, 1, 2)}
@@ -176,18 +177,21 @@ def test_limbs_that_touch_push_each_other_as_the_oracle_says():
     h, opening = 2e-4, 0.3
     robot, star = alike(5, 4)
     numerics = Numerics("implicit-euler", h, newton_tolerance=1e-13)
-    simulator = Simulator(Scene(robot, Water(), SmaPulse(0.0, 2.0 * h, 2.0 * h), numerics, contact=Contact(opening)))
+    simulator = Simulator(
+        Scene(robot, Water(), SmaPulse(0.0, 2.0 * h, 2.0 * h), numerics, contact=Contact(opening_angle=opening))
+    )
     rng, q_0 = np.random.default_rng(0), star.rest.copy()
-    for limb, angle in ((0, 0.62), (1, -0.62)):
+    for limb, angle in ((0, 0.588), (1, -0.588)):
         own, (c, s) = [star.node(limb, i) for i in range(1, 4)], (np.cos(angle), np.sin(angle))
         q_0[own] = q_0[own] @ np.array([[c, s], [-s, c]])
-    q_0 += 1e-4 * rng.standard_normal(q_0.shape)
+    q_0 += 2e-5 * rng.standard_normal(q_0.shape)
     v_0 = 1e-3 * rng.standard_normal(q_0.shape)
     simulator.set_state((q_0[None], v_0[None], np.zeros(1)))
-    next(simulator.stroke_in_parts(np.zeros((1, 5)), 4))
+    stroke = simulator.stroke_in_parts(np.zeros((1, 5)), 4)
+    next(stroke)
     q = simulator.positions[0]
     found = oracle.touches(star, q_0 + h * v_0, q_0, opening)
     pushes = np.array([touch.stiffness * touch.depth(q) * touch.gradient for touch in found])
     assert np.count_nonzero(pushes.any(axis=1)) > 3
     residual = oracle.incremental_gradient(star, q, q_0, v_0, h, np.zeros(5)).ravel() - pushes.sum(axis=0)
-    np.testing.assert_allclose(residual, 0.0, atol=1e-6 * np.abs(pushes).max())
+    np.testing.assert_allclose(residual, 0.0, atol=1e-11 * np.abs(pushes).max())
