@@ -55,7 +55,7 @@ class Seastar:
     hub_hinge: HubHinge = "opening"
     limbs: tuple[Limb, ...] = ()
     relaxation_time: Numbers | None = None
-    discretisation: Discretisation = "chapter"
+    discretisation: Discretisation = "continuum"
 
     def __post_init__(self) -> None:
         require_count("n_limbs", self.n_limbs, 1, 12)
