@@ -25,8 +25,11 @@ MakePath: TypeAlias = Callable[[np.random.Generator], Waypoints]
 PATHS: dict[str, MakePath] = {}
 """Functions that make the waypoints [m], shape (n, 2), of the named paths, see `register_path`."""
 
-PENTAGON_SIDE = 0.1636
-"""Side [m] of the pentagon that the scripted gait (13.15) traces: 45 strokes, then 5 at rest, per side."""
+PENTAGON_SIDE = 0.1437
+"""Side [m] of the pentagon that the scripted gait (13.15) traces: 45 strokes, then 5 at rest, per side.
+
+It is 0.1437 m at "reference" with 10 and with 37 nodes per limb, and 0.1436 m at "balanced".
+"""
 LINE_LENGTH = 0.3
 """Length of the path "line" [m]."""
 

@@ -1,28 +1,50 @@
 """The continuum's discretisation: ten nodes swim as infinitely many do, and keep what mechanics keeps."""
 
 import numpy as np
+import pytest
 
 from refusals import assert_refused
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, State
 from seastar_gym.gaits import PAIRS, STRAIGHT
 from seastar_gym.model.rods import make_rods
 
-TEN = Seastar(discretisation="continuum")
+TEN = Seastar()
 LIMIT = {"straight": 34.360, "{1-,2+}": 28.189, "{1-,4+}": 39.355, "{1-,5+}": 32.282}
 """Distances after ten strokes with N to infinity and h to 0 [mm]."""
-OF_TEN_NODES = {"straight": 34.364, "{1-,2+}": 27.977, "{1-,4+}": 39.333, "{1-,5+}": 32.085}
-"""The same with ten nodes and h to 0."""
+AFTER_ONE = 4.708
+"""That of the straight swim after one stroke [mm]."""
+OF_NODES = {
+    10: (34.364, 27.977, 39.333, 32.085),
+    19: (34.365, 28.159, 39.362, 32.229),
+    37: (34.361, 28.182, 39.358, 32.279),
+}
+"""Those after ten strokes with h to 0, over the nodes per limb, as a prototype of its own found them [mm]."""
+
+
+def distances(nodes_per_limb: int, step: float) -> np.ndarray:
+    """Distances after ten strokes [mm] of the commands of LIMIT, after the first stroke of the straight one, too."""
+    commands = np.array([STRAIGHT, *(PAIRS[name] for name in list(LIMIT)[1:])])
+    robot = Seastar(nodes_per_limb=nodes_per_limb)
+    simulator, found = Simulator(Scene(robot, numerics=Numerics("implicit-midpoint", step)), len(commands)), []
+    for _ in range(10):
+        assert not simulator.stroke(commands).status.any()
+        found.append(1e3 * np.hypot(*simulator.hub_position().T))
+    assert abs(simulator.hub_position()[0, 1]) < 1e-9
+    return np.array([*found[-1], found[0][0]])
+
+
+@pytest.mark.parametrize("nodes_per_limb", OF_NODES)
+def test_few_nodes_swim_as_the_prototype_did(nodes_per_limb):
+    np.testing.assert_allclose(distances(nodes_per_limb, 5e-4)[:4], OF_NODES[nodes_per_limb], rtol=1e-3)
 
 
 def test_ten_nodes_swim_as_infinitely_many_do():
-    commands = np.array([STRAIGHT, *(PAIRS[name] for name in list(LIMIT)[1:])])
-    simulator = Simulator(Scene(TEN, numerics=Numerics("implicit-midpoint", 1e-3)), len(commands))
-    for _ in range(10):
-        assert not simulator.stroke(commands).status.any()
-    distances = 1e3 * np.hypot(*simulator.hub_position().T)
-    np.testing.assert_allclose(distances, list(OF_TEN_NODES.values()), rtol=1e-3)
-    np.testing.assert_allclose(distances, list(LIMIT.values()), rtol=1e-2)
-    assert abs(simulator.hub_position()[0, 1]) < 1e-9
+    np.testing.assert_allclose(distances(10, 1e-3)[:4], list(LIMIT.values()), rtol=1e-2)
+
+
+@pytest.mark.slow
+def test_73_nodes_swim_as_infinitely_many_do():
+    np.testing.assert_allclose(distances(73, 5e-5), [*LIMIT.values(), AFTER_ONE], rtol=1e-4)
 
 
 def test_in_vacuum_momentum_angular_momentum_and_small_energies_stay():

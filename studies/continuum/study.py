@@ -1,0 +1,164 @@
+"""Errors of space: how far the hub is from where it is with infinitely many nodes.
+
+Every scene swims ten strokes from rest with some commands, repeated, in both discretisations and with more and more
+nodes per limb. The error is the hub's largest distance, at ends of strokes, from that of the continuum's discretisation
+with 73 nodes, as a fraction of that path's length; of all commands the worst. Time steps of 1 ms add about the same
+error to both, which cancels. Orders are slopes of a line through the logarithms of errors and edge lengths.
+
+Writes a page with the table, and a picture.
+"""
+
+import math
+from pathlib import Path
+from typing import Any, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from seastar_gym.gaits import PAIRS, STRAIGHT
+from seastar_gym.scene.robot import Discretisation
+from seastar_gym.simulator import Simulator
+from studies.accuracy.cases import hub_path_lengths
+from studies.accuracy.style import INK, PERCENT, as_percent, subplots
+from studies.continuum.scenes import NAMES, scene
+from studies.parser import study_parser
+
+Floats = NDArray[np.float64]
+
+NODES = (6, 10, 19, 37)
+REFERENCE_NODES = 73
+FITTED = (10, 19, 37)
+"""Numbers of nodes that the order is fitted to."""
+STROKES = 10
+LUMPED = "added mass, lumped"
+"""What the continuum's discretisation is without the consistent part of added mass."""
+
+
+class Row(NamedTuple):
+    """Errors of a scene in one discretisation, for each of NODES, as fractions of the path; order: Fitted order."""
+
+    name: str
+    discretisation: str
+    errors: Floats
+    order: float
+
+
+def commands(n_limbs: int) -> Floats:
+    """Repeated commands, shape (n, n_limbs): those of the chapter for five limbs, else two opposed limbs."""
+    if n_limbs == 5:
+        more = [[1.0, 0.0, -1.0, 0.5, 0.0], [-1.0, 1.0, 1.0, -1.0, 0.0]]
+        return np.array([STRAIGHT, *PAIRS.values(), *more])
+    pairs = np.zeros((2, n_limbs))
+    pairs[0, [1, -1]] = pairs[1, [0, -1]] = 1.0, -1.0
+    return pairs
+
+
+def swim(name: str, discretisation: Discretisation, nodes_per_limb: int, lumped: bool = False) -> Floats:
+    """Hub at the ends of strokes [m], shape (STROKES, n_commands, 2); lumped: without the consistent added mass."""
+    swum = scene(name, discretisation, nodes_per_limb)
+    each = commands(swum.robot.n_limbs)
+    simulator, hub = Simulator(swum, len(each), threads=1), []
+    edge_added_mass = simulator.coefficients.rods(0).edge_added_mass
+    if lumped and edge_added_mass is not None:
+        edge_added_mass[:] = 0.0
+    for _ in range(STROKES):
+        if simulator.stroke(each).status.any():
+            return np.full((STROKES, len(each), 2), np.nan)
+        hub.append(simulator.hub_position())
+    return np.array(hub)
+
+
+def error(hub: Floats, reference: Floats) -> float:
+    """Largest distance of the hub from the reference over the length of its path, of all commands the worst."""
+    return float((np.linalg.norm(hub - reference, axis=-1).max(axis=0) / hub_path_lengths(reference)).max())
+
+
+def order(errors: Floats, nodes: tuple[int, ...] = NODES) -> float:
+    """Slope of log error over log edge length, for the numbers of nodes in FITTED."""
+    fitted = [nodes.index(n) for n in FITTED]
+    return float(np.polyfit(-np.log(np.subtract(FITTED, 1)), np.log(errors[fitted]), 1)[0])
+
+
+def measure(names: tuple[str, ...] = NAMES, bar: Any = None) -> list[Row]:
+    """Rows of scenes, two each and one for lumped added mass."""
+    rows = []
+    for name in names:
+        reference = swim(name, "continuum", REFERENCE_NODES)
+        kinds = [(name, discretisation, False) for discretisation in get_args(Discretisation)]
+        for label, discretisation, lumped in [*kinds, *([(LUMPED, "continuum", True)] if name == "added mass" else [])]:
+            errors = np.array([error(swim(name, discretisation, n, lumped), reference) for n in NODES])
+            rows.append(Row(label, discretisation, errors, order(errors)))
+        if bar is not None:
+            bar.update()
+    return rows
+
+
+def as_markdown(rows: list[Row]) -> str:
+    """Page with the table of errors and orders."""
+    head = f"| scene | discretisation | {' | '.join(f'N = {n}' for n in NODES)} | order |"
+    lines = [
+        "# Errors of space",
+        "",
+        "Written by `python -m studies.continuum`; its docstring (`--help`) tells what is measured. Errors in per cent "
+        "of the path. The order is fitted to 10, 19 and 37 nodes; where an error changes its sign between them (twelve "
+        "limbs), it says nothing. With undamped limbs 1 ms of time step is part of the smallest errors. Contact is of "
+        "first order in time and in space.",
+        "",
+        head,
+        f"|---|---|{'---:|' * (len(NODES) + 1)}",
+        *(
+            f"| {row.name} | {row.discretisation} | "
+            + " | ".join(f"{PERCENT * each:.2g}" for each in row.errors)
+            + f" | {row.order:.1f} |"
+            for row in rows
+        ),
+        "",
+        "![Errors over the number of nodes](continuum.png)",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def draw(rows: list[Row], path: Path) -> None:
+    """Picture of errors over nodes, one line per scene; colours tell the discretisations apart."""
+    figure, axes = subplots(figsize=(6.4, 4.8))
+    colours = {"chapter": "#cc7a00", "continuum": "#3366aa"}
+    label: dict[str, Any] = {"transform": axes.transAxes, "ha": "right", "fontweight": "bold"}
+    for discretisation, colour in colours.items():
+        lines = [row.errors for row in rows if row.discretisation == discretisation and row.name != LUMPED]
+        for errors in lines:
+            axes.loglog(NODES, PERCENT * errors, "-", color=colour, lw=0.8, alpha=0.5)
+        middle = np.exp(np.mean(np.log(lines), axis=0))
+        axes.loglog(NODES, PERCENT * middle, "o-", color=colour, lw=2.2)
+    axes.text(0.98, 0.95, "chapter's discretisation", color=colours["chapter"], **label)
+    axes.text(0.45, 0.06, "continuum's discretisation", color=colours["continuum"], **label)
+    touching = next((row.errors for row in rows if row.name == "contact" and row.discretisation == "continuum"), None)
+    if touching is not None:
+        axes.annotate("limbs that touch", (NODES[2], PERCENT * touching[2]), xytext=(6, 6),
+                      textcoords="offset points", color=colours["continuum"], fontsize=9)  # fmt: skip
+    axes.set_xticks(NODES, [str(n) for n in NODES])
+    axes.minorticks_off()
+    as_percent(axes.yaxis)
+    axes.set_xlabel("nodes per limb")
+    axes.set_ylabel("largest error of the hub's path")
+    axes.set_title("A line per scene, thick lines their geometric mean", color=INK, fontsize=10, loc="left")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=130)
+
+
+def main() -> None:
+    """Command line: measure all scenes, write page and picture, print the table."""
+    parser = study_parser("studies.continuum", __doc__)
+    parser.add_argument(
+        "--out", type=Path, default=Path("docs/continuum.md"), help="page to write (default: %(default)s)"
+    )
+    options = parser.parse_args()
+    with tqdm(total=len(NAMES), unit="scene") as bar:
+        rows = measure(NAMES, bar)
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    options.out.write_text(as_markdown(rows), encoding="utf-8")
+    draw(rows, options.out.with_suffix(".png"))
+    print(as_markdown(rows))
+    if not all(math.isfinite(row.order) for row in rows):
+        raise SystemExit("The solver failed in a scene, see the empty errors.")

@@ -1,0 +1,57 @@
+"""Both discretisations tend to the same robot, the chapter's with order 1 and the continuum's with order 2 or more."""
+
+import numpy as np
+import pytest
+
+from studies.continuum import study
+from studies.continuum.scenes import NAMES, scene
+
+
+@pytest.fixture(scope="module")
+def rows():
+    return study.measure(("damped", "three limbs", "unequal, tapered limbs", "curved limbs", "soft limbs"))
+
+
+def test_both_discretisations_tend_to_the_same_robot(rows):
+    for row in rows:
+        assert (np.diff(row.errors) < 0.0).all(), row
+        assert row.errors[-1] < (0.12 if row.discretisation == "chapter" else 1e-3), row
+
+
+def test_the_chapters_order_is_one_and_the_continuums_two_or_more(rows):
+    orders = {kind: [row.order for row in rows if row.discretisation == kind] for kind in ("chapter", "continuum")}
+    assert min(orders["chapter"]) > 0.7 and max(orders["chapter"]) < 1.3
+    assert min(orders["continuum"]) > 1.9
+
+
+def test_ten_nodes_are_within_about_a_per_cent(rows):
+    ten = study.NODES.index(10)
+    assert max(row.errors[ten] for row in rows if row.discretisation == "continuum") < 0.013
+
+
+@pytest.mark.slow
+def test_every_scene_and_consistent_added_mass_which_is_better_than_lumped():
+    rows = study.measure(NAMES)
+    errors = {(row.name, row.discretisation): row.errors for row in rows}
+    for name in NAMES:
+        assert (errors[name, "continuum"] < 0.4 * errors[name, "chapter"]).all(), name
+    consistent, lumped = errors["added mass", "continuum"], errors[study.LUMPED, "continuum"]
+    assert (consistent < 0.7 * lumped).all()
+
+
+def test_orders_are_slopes_over_the_edge_length():
+    errors = np.array([1.0, 0.1, 0.025, 0.00625])
+    assert study.order(errors) == pytest.approx(2.0)
+
+
+def test_the_page_has_a_row_for_every_scene_and_discretisation(rows, tmp_path):
+    page = study.as_markdown(rows)
+    assert all(f"| {row.name} | {row.discretisation} |" in page for row in rows)
+    study.draw(rows, tmp_path / "continuum.png")
+    assert (tmp_path / "continuum.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_scene_has_the_nodes_and_the_discretisation_asked_for(name):
+    robot = scene(name, "chapter", 7).robot
+    assert (robot.nodes_per_limb, robot.discretisation) == (7, "chapter")
