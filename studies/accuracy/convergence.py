@@ -16,7 +16,7 @@ from studies.accuracy.settings import Plan, Resolution
 
 Floats = NDArray[np.float64]
 
-TIGHT = 1e-10
+TIGHT = 1e-9
 """Newton tolerance of the swims that others are compared with."""
 
 Job = tuple[Cases, Scene]
@@ -89,17 +89,19 @@ def n_groups(batches: Sequence[Cases]) -> int:
     return sum(len(in_groups(batch)) for batch in batches)
 
 
-def fine_settings(plan: Plan, resolutions: Sequence[Resolution]) -> list[Setting]:
-    """Settings that stand for infinitely short steps."""
-    most, longer = plan.limit
-    return [tight(*each, longer if each[1] >= most else plan.fine) for each in resolutions]
+def fine_setting(plan: Plan, resolution: Resolution) -> Setting:
+    """Setting that stands for infinitely short steps."""
+    discretisation, nodes = resolution
+    if discretisation == "chapter" and nodes > plan.finest:
+        return tight(*resolution, 4.0 * plan.fine)
+    return tight(*resolution, plan.limit[1] if nodes >= plan.limit[0] else plan.fine)
 
 
 def converge(
     batches: Sequence[Cases], plan: Plan, resolutions: Sequence[Resolution], bar: Any, physics: Scene = Scene()
 ) -> Exact:
     """Swims that others are compared with."""
-    wanted = [tight("continuum", *plan.limit), *fine_settings(plan, resolutions)]
+    wanted = [tight("continuum", *plan.limit), *(fine_setting(plan, each) for each in resolutions)]
     limit, *fine = swim_batches(batches, [scene_of(each, physics) for each in wanted], bar)
     return Exact(limit, dict(zip(resolutions, fine, strict=True)))
 
