@@ -4,13 +4,14 @@ from types import SimpleNamespace
 
 import numpy as np
 
-import oracle
 from oracle import Star
 from seastar_gym import Contact, Scene, Seastar, SmaPulse
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.stages import Stage
+from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
 from seastar_gym.der.terms.near_pairs import freeze_contact
 from seastar_gym.model.rods import make_rods
+from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes
 from slopes import rotated, rows
@@ -18,9 +19,11 @@ from slopes import rotated, rows
 GAMMA = 2e-4
 
 
-def touching_limbs(ahead: bool = False, apart: int = 0, gamma: float = GAMMA) -> SimpleNamespace:
+def touching_limbs(
+    ahead: bool = False, apart: int = 0, gamma: float = GAMMA, discretisation: Discretisation = "chapter"
+) -> SimpleNamespace:
     """Limbs 1 and 2 of five lie along each other, but for those of the first `apart` robots, which are at rest."""
-    robot, star = Seastar(5, 4), Star(5, 4)
+    robot, star = Seastar(5, 4, discretisation=discretisation), Star(5, 4)
     rods = make_rods(Scene(robot, actuator=SmaPulse(0.1), contact=Contact()))
     q_0, rng = np.tile(star.rest, (N_LANES, 1, 1)), np.random.default_rng(0)
     q = q_0.copy()
@@ -30,8 +33,8 @@ def touching_limbs(ahead: bool = False, apart: int = 0, gamma: float = GAMMA) ->
     q += 2e-4 * rng.standard_normal(q.shape)
     work = make_work(rods, 1)
     work.q[:], work.q_hat[:], work.v_hat[:] = rows(q), rows(q - 1e-4), 0.1 * rng.standard_normal(work.q.shape)
-    kappa_bar = 2.0 * np.tan(oracle.natural_angles(star, np.zeros(5))[-5:] / 2.0) / star.edge_length
-    work.hub_EI_kappa_bar[:] = star.EI * kappa_bar[:, None]
+    still = np.zeros((5, N_LANES))
+    set_natural_hub_angles.plain(rods, work, Actuation(still, still), Lanes(1.0))
     stage = Stage(work.q_hat, work.v_hat, Lanes(gamma), Lanes(1.0 / gamma), ahead)
     freeze_contact.plain(rods.contact, rods, work, stage, rows(q_0))
     return SimpleNamespace(rods=rods, work=work, stage=stage, q_0=rows(q_0))

@@ -22,7 +22,7 @@ def rigid_hub_energy(clamp, rods, work, q):
     """Energy of the clamps of a rigid hub [J]; 0 where limbs are joined by hinges (None)."""
     if clamp is None:
         return splat(0.0)
-    return clamp_energy(clamp, rods, work, q)
+    return clamp_energy(rods, work, q)
 
 
 @kernel

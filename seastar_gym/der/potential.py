@@ -39,9 +39,9 @@ from seastar_gym.der.linear.star_matrix import (
     store_root,
 )
 from seastar_gym.der.star import load_root_edge, tail_node
-from seastar_gym.der.terms.added_mass import add_fluid_inertia
+from seastar_gym.der.terms.added_mass import add_fluid_inertia, less_edge_fluid_inertia
 from seastar_gym.der.terms.bending import bending_energy, bending_slopes, moment
-from seastar_gym.der.terms.clamp import assemble_clamp
+from seastar_gym.der.terms.clamp import assemble_clamps
 from seastar_gym.der.terms.contact import add_contact, contact_force
 from seastar_gym.der.terms.damping import damped_energy, damped_stiffness, damped_stress
 from seastar_gym.der.terms.drag import (
@@ -65,7 +65,9 @@ from seastar_gym.simd.lanes import add_product, load, select, splat, store, subt
 def edge_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex):
     """(E, f, K) of an edge: elasticity, damping and, with consistent masses, what its inertia differs from lumped."""
     slopes = elastic_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex)
-    return less_edge_inertia(rods.edge_mass, work, stage, e, tail_node(rods, e), slopes)
+    tail = tail_node(rods, e)
+    slopes = less_edge_inertia(rods.edge_mass, work, stage, e, tail, slopes)
+    return less_edge_fluid_inertia(rods.edge_added_mass, work, stage, e, tail, slopes)
 
 
 @kernel
@@ -177,7 +179,7 @@ def assemble_hub(clamp, rods, work, stage, convex):
         store(work.hub_t, limb, 0.0)
     if clamp is None:
         return assemble_hub_hinges(rods, work, stage, convex)
-    return assemble_clamp(clamp, rods, work, convex)
+    return assemble_clamps(rods, work, stage, convex)
 
 
 @kernel
@@ -239,7 +241,7 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
         P = coupling(s_before, edge, before)
         D_1 = (D_before[0] + K[0] + 2.0 * P[0], D_before[1] + K[1] + (P[1] + P[2]), D_before[2] + K[2] + 2.0 * P[3])
         K_P = (K[0] + P[0], K[1] + P[1], K[1] + P[2], K[2] + P[3])
-        E_m, g_m, h_m = middle_slopes(rods.middle_drag, work, stage, e, node - 1, node)
+        E_m, g_m, h_m = middle_slopes(rods.middle_drag, rods, work, stage, e, node - 1, node)
         energy = add_scalar(rods.middle_drag, energy, E_m)
         D, B, D_before, r, r_before, part, node_pivot = eliminate_node(
             work,
@@ -260,7 +262,7 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
     net_moment, stiffness = load(work.hub_moment, limb) - slope, load(work.hub_stiffness, limb) + s
     E_s, f, K = edge_slopes(rods, work, stage, first, edge, net_moment, stiffness, convex)
     E_n, g, inertia = node_slopes(work.contact, rods, work, stage, first + 1)
-    E_m, g_m, h_m = middle_slopes(rods.middle_drag, work, stage, first, 0, first + 1)
+    E_m, g_m, h_m = middle_slopes(rods.middle_drag, rods, work, stage, first, 0, first + 1)
     energy = add_scalar(rods.middle_drag, energy, E_m)
     store_root(
         work,

@@ -26,8 +26,9 @@ class Rods(NamedTuple):
 
     n_limbs, nodes_per_limb: Numbers of limbs, and of nodes of a limb with the hub.
     stretching, bending, hub: Coefficients of edges, hinges and hub hinges.
-    clamp: Rigid hub; edge_mass: Consistent masses [kg]; middle_drag: Drag in the middle of edges [kg/m]; per edge. The
-        three are those of the continuum's discretisation.
+    clamp: Rigid hub; edge_mass, edge_added_mass: What consistent masses take from lumped ones [kg]; middle_drag,
+        middle_cross_drag: Drag in the middle of edges, and that of flow across [kg/m]; per edge. All are those of the
+        continuum's discretisation.
     mass: Lumped mass, per node [kg]. drag: 1/2 rho_f C_d D dl_i of (13.8), per node [kg/m].
     cross_drag, added_mass: Coefficients of flow across half edges [kg/m], [kg]; two rows per node.
     damping: Relaxation time tau [s], one row. current: How the fluid moves.
@@ -46,7 +47,9 @@ class Rods(NamedTuple):
     drag: np.ndarray
     middle_drag: np.ndarray | None
     cross_drag: np.ndarray | None
+    middle_cross_drag: np.ndarray | None
     added_mass: np.ndarray | None
+    edge_added_mass: np.ndarray | None
     damping: np.ndarray | None
     current: Current | None
     load: np.ndarray | None
@@ -62,10 +65,12 @@ class Work(NamedTuple):
     step: Last Newton step taken, per coordinate [m].
     factors, ring, root_factors, root_solution: The linear system, see star_matrix.py.
     root_edges: Geometry of the root edges, see geometry.py.
-    hub_moment, hub_stiffness: Sums over the hub hinges of a limb's root edge, per limb [N m].
-    hub_coupling: 2 x 2 block of every hub hinge, four rows per limb [N/m].
+    hub_moment, hub_stiffness: Sums over the hub hinges, or clamps, of a limb's root edge, per limb [N m].
+    hub_coupling: 2 x 2 block of every hub hinge, four rows per limb [N/m]; stiffnesses of clamps, see clamp.py [N m].
     hub_EI_kappa_bar: Natural moment of the hub hinges, per limb [N m].
-    hub_t: tan(phi/2) of the hub hinges, per limb. hub_direction: Natural directions of a rigid hub's clamps.
+    hub_t: tan(phi/2) of the hub hinges, per limb.
+    hub_direction, hub_turn, hub_hat: Natural directions of a rigid hub's clamps, what root edges are turned from them,
+        and their directions where a stage began, (x, y) per limb; None with hub hinges, hub_hat without damping.
     stage_v: Velocities of the stages of a time step [m/s].
     normals: Unit normals of the edges where a stage began, or None in scenes that need none; see fluid.py.
     current: Velocity of the fluid at every node there [m/s], or None.
@@ -90,6 +95,8 @@ class Work(NamedTuple):
     hub_EI_kappa_bar: np.ndarray
     hub_t: np.ndarray
     hub_direction: np.ndarray | None
+    hub_turn: np.ndarray | None
+    hub_hat: np.ndarray | None
     stage_v: np.ndarray
     normals: np.ndarray | None
     current: np.ndarray | None
@@ -125,6 +132,8 @@ def make_work(rods: Rods, n_stages: int) -> Work:
         hub_EI_kappa_bar=rows(n_limbs),
         hub_t=rows(n_limbs),
         hub_direction=None if rods.clamp is None else rows(2 * n_limbs),
+        hub_turn=None if rods.clamp is None else rows(2 * n_limbs),
+        hub_hat=None if rods.clamp is None or rods.damping is None else rows(2 * n_limbs),
         stage_v=rows(2 * n_nodes * n_stages),
         normals=None if rods.cross_drag is None and rods.added_mass is None else rows(2 * n_nodes),
         current=None if rods.current is None else rows(2 * n_nodes),

@@ -4,7 +4,7 @@ A star has `n_limbs` chains of nodes that share node 0, the hub. Node {j, i} (li
 j (nodes_per_limb - 1) + i. Edge e ends at node e + 1; it starts at the hub if it is the root edge of its limb, else
 at node e. Hinge e ends with edge e: within a limb it sits at the tail of edge e, and for a root edge of limb j it is
 the hub hinge from limb j to limb j + 1, whose first edge is the root edge of limb j. Two limbs have one hub hinge, one
-limb has none: hinges that are not there have no stiffness.
+limb has none: hinges that are not there have no stiffness. With a rigid hub, the hinge of a root edge is its clamp.
 """
 
 from seastar_gym.der.geometry import EDGE_ROWS, Edge, edge_geometry
@@ -31,6 +31,14 @@ def hinge_edges(rods, e):
     if e % edges == 0:
         return e, (e + edges) % (rods.n_limbs * edges), rods.hub.side
     return e - 1, e, 1.0
+
+
+@kernel
+def is_clamped(clamp, rods, e):
+    """Whether hinge e is a clamp of a rigid hub, and no hinge between two edges."""
+    if clamp is None:
+        return False
+    return e % (rods.nodes_per_limb - 1) == 0
 
 
 @kernel

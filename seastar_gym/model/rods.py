@@ -41,9 +41,12 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
     C_d, C_t, C_a = water.drag_coefficient, water.tangential_drag_coefficient, water.added_mass_coefficient
     mesh = make_mesh(limbs, robot.nodes_per_limb)
     continuum = robot.discretisation == "continuum"
-    at_nodes, in_middle = drag.coefficients(mesh, water.density, C_d if C_t is None else C_t), None
+    along = C_d if C_t is None else C_t
+    at_nodes, in_middle = drag.coefficients(mesh, water.density, along), None
+    across, across_middle = drag.cross_coefficients(mesh, water.density, C_d, C_t), None
     if continuum:
-        at_nodes, in_middle = drag.simpson_coefficients(mesh, water.density, C_d if C_t is None else C_t)
+        at_nodes, in_middle = drag.simpson_coefficients(mesh, water.density, along)
+        across, across_middle = drag.simpson_cross_coefficients(mesh, water.density, C_d, C_t)
     stretched = stretching.coefficients(mesh)
     seen_ahead = foresight.coefficients(mesh, stretched, robot.density)
     mass = inertia.coefficients(mesh, robot.density, scene.held_nodes)
@@ -58,8 +61,10 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         edge_mass=inertia.edge_coefficients(mesh, robot.density) if continuum else None,
         drag=at_nodes,
         middle_drag=in_middle,
-        cross_drag=drag.cross_coefficients(mesh, water.density, C_d, C_t),
+        cross_drag=across,
+        middle_cross_drag=across_middle,
         added_mass=added_mass.coefficients(mesh, water.density, C_a),
+        edge_added_mass=added_mass.edge_coefficients(mesh, water.density, C_a) if continuum else None,
         damping=damping.coefficients(robot.relaxation_time),
         current=None if water.current is None else current_rows(water.current),
         load=load.total(

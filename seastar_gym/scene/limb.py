@@ -21,7 +21,8 @@ Profile = float | tuple[float, ...]
 class Limb:
     """Overrides for one limb. `None` means the robot's value.
 
-    direction: Direction of the root edge at rest [rad], anti-clockwise from that of limb 1.
+    direction: Direction of the limb at the hub, at rest [rad], anti-clockwise from that of limb 1. In the chapter's
+        discretisation it is that of the root edge, which differs in curved limbs.
     length: Length of the limb [m].
     radius: Radius [m], a number or a profile along the limb. For example, radius=(root, tip) is a taper.
     youngs_modulus: Young's modulus [Pa], a number or a profile along the limb.

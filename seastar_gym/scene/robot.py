@@ -30,19 +30,19 @@ class Seastar:
     rod_radius: r_0 [m], radius of the limbs.
     youngs_modulus: E [Pa].
     density: rho_m [kg/m^3], density of the limbs.
-    hub_hinge: Measure of the hinge between two limbs at the hub. "opening" is the angle psi between the limbs, from 0
-        to pi; for a gap wider than pi it is the gap less a full turn. "turning" is the interior turning angle pi - psi,
-        as in the published codes of the chapter's authors.
+    hub_hinge: Measure of the hinge between two limbs at the hub, which only discretisation="chapter" has. "opening" is
+        the angle psi between the limbs, from 0 to pi; for a gap wider than pi it is the gap less a full turn. "turning"
+        is the interior turning angle pi - psi, as in the published codes of the chapter's authors.
     limbs: Overrides, one `Limb` for each limb, or () for none.
     relaxation_time: Relaxation time of Kelvin-Voigt damping [s], see der/terms/damping.py and `relaxation_time`. None
         means no damping, as in the chapter.
-    discretisation: "chapter" joins neighbouring limbs by hinges at the hub, and lumps mass and drag at the nodes.
-        "continuum" clamps limbs into a rigid hub that turns freely, with consistent masses, Simpson's rule for drag and
-        Gregory's weights for bending. With ten nodes it is within a per cent of infinitely many, where the chapter's is
-        12 to 26 % off. It is new and does not have every term yet: a scene refuses what it lacks.
+    discretisation: "continuum" clamps limbs into a rigid hub that turns freely, with consistent masses, Simpson's rule
+        for drag and Gregory's weights for bending. With ten nodes it is within a per cent of infinitely many.
+        "chapter" joins neighbouring limbs by hinges at the hub, and lumps mass and drag at the nodes, as the chapter
+        does: with ten nodes it is 12 to 26 % off. With infinitely many nodes the two are the same robot.
 
-    Two limbs have one hub hinge; straight limbs with hub_hinge="turning" then form a plain rod. A single limb has no
-    hub hinge: it swings freely about the hub, and no actuator turns it.
+    A single limb swings freely about the hub, and no actuator turns it. In the chapter's discretisation two limbs have
+    one hub hinge; straight limbs with hub_hinge="turning" then form a plain rod.
     """
 
     PER_ROBOT: ClassVar = ("limb_length", "rod_radius", "youngs_modulus", "density", "relaxation_time")
@@ -68,6 +68,11 @@ class Seastar:
             require_each(self, "relaxation_time", partial(require_number, unit="s", zero_allowed=True))
         require_choice("hub_hinge", self.hub_hinge, get_args(HubHinge))
         require_choice("discretisation", self.discretisation, get_args(Discretisation))
+        if self.discretisation == "continuum" and self.hub_hinge != "opening":
+            raise ValueError(
+                f'hub_hinge="{self.hub_hinge}" measures hinges at the hub, which only discretisation="chapter" has: '
+                "name that, too."
+            )
         if self.n_limbs == 1 and self.hub_hinge != "opening":
             raise ValueError("One limb has no hub hinge that could be measured by its turning angle.")
         self._check_limbs()
@@ -147,7 +152,7 @@ class Seastar:
 
         index: Robot of a batch, where numbers differ from robot to robot.
         """
-        return rest_positions(self.limb_shapes(index), self.nodes_per_limb)
+        return rest_positions(self.limb_shapes(index), self.nodes_per_limb, self.discretisation == "continuum")
 
 
 def relaxation_time(loss_factor: float, frequency: float) -> float:

@@ -69,29 +69,11 @@ class Scene:
             raise ValueError(f"Scene.actuator must be an Actuator such as SmaPulse(), not {shown(self.actuator)}.")
         check_actuator(self.actuator)
         batch_size(self)
-        self._check_discretisation()
         self._check_hub_hinges()
         self._check_strengths()
         self._check_holds_and_loads()
         self._check_contact()
         self._check_coefficients()
-
-    def _check_discretisation(self) -> None:
-        """Refuse terms that the continuum's discretisation does not have yet."""
-        robot, fluid = self.robot, self.fluid
-        if robot.discretisation == "chapter":
-            return
-        absent = {
-            'hub_hinge="turning"': robot.hub_hinge == "turning",
-            "a natural curvature": any(np.any(limb.natural_curvature) for limb in robot.limbs),
-            "material damping": robot.relaxation_time is not None,
-            "drag of its own along limbs": fluid is not None and fluid.tangential_drag_coefficient is not None,
-            "added mass": fluid is not None and fluid.added_mass_coefficient is not None,
-            "contact": self.contact is not None,
-        }
-        named = [name for name, is_named in absent.items() if is_named]
-        if named:
-            raise ValueError(f'discretisation="continuum" does not have {named[0]} yet: use discretisation="chapter".')
 
     def _check_strengths(self) -> None:
         require_numbers("limb_strengths", self.limb_strengths, "1")

@@ -11,10 +11,12 @@ from seastar_gym.scene.limb import LimbShape
 Floats = NDArray[np.float64]
 
 
-def rest_positions(limbs: Sequence[LimbShape], nodes_per_limb: int) -> Floats:
+def rest_positions(limbs: Sequence[LimbShape], nodes_per_limb: int, tangent: bool) -> Floats:
     """Node positions of the undeformed robot [m], shape (n_nodes, 2): hub at the origin, limb after limb.
 
     Edges of a limb have equal lengths and turn by its natural curvature times that length, so its nodes lie on an arc.
+
+    tangent: Whether a limb's direction is that of the arc at the hub, rather than that of its root edge.
     """
     i = np.arange(1, nodes_per_limb)
     nodes = [np.zeros((1, 2))]
@@ -23,7 +25,7 @@ def rest_positions(limbs: Sequence[LimbShape], nodes_per_limb: int) -> Floats:
         # Length of the sum of i unit vectors, each turned from the last by twice half_turn, over i.
         chord = np.sin(i * half_turn) / (i * np.sin(half_turn)) if half_turn else 1.0
         distance = limb.length * i / (nodes_per_limb - 1) * chord
-        angle = limb.direction + (i - 1) * half_turn
+        angle = limb.direction + (i if tangent else i - 1) * half_turn
         nodes.append(np.stack([distance * np.cos(angle), distance * np.sin(angle)], axis=1))
     return np.concatenate(nodes)
 

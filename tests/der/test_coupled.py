@@ -1,6 +1,7 @@
 """The Newton step where limbs touch solves the star's matrix plus that of contact."""
 
 import numpy as np
+import pytest
 
 from seastar_gym.der.linear.coupled import add_contact_product, dot, solve_coupled
 from seastar_gym.der.linear.star_solution import solve_again, substitute_star
@@ -23,9 +24,10 @@ def steps(touching, robots=EVERYONE):
     return star, work.contact.x.copy(), plain(alone), plain(together)
 
 
-def test_the_step_solves_the_star_and_contact_together():
+@pytest.mark.parametrize("discretisation", ["chapter", "continuum"])
+def test_the_step_solves_the_star_and_contact_together(discretisation):
     """H x + C K C^T x = H x_star: what contact takes, solved by the star, is where the two steps differ."""
-    touching = touching_limbs()
+    touching = touching_limbs(discretisation=discretisation)
     star, x, _, _ = steps(touching)
     taken, moved = np.zeros_like(x), np.zeros_like(x)
     add_contact_product.plain(touching.rods, touching.work, x, -1.0, taken)

@@ -1,16 +1,40 @@
 """Root nodes and a rigid hub: root nodes couple with the hub's place and orientation, not with each other.
 
-The hub has three unknowns, its place and its orientation Phi; Phi stands in the first row of a 2 x 2 block whose second
-row is a dummy. A root node couples with Phi by -C grad theta, the hub by the sum of +C grad theta, Phi with itself by
-the sum of C (see terms/clamp.py).
+The hub's unknowns are its place and its turns (see terms/clamp.py): that of elasticity, Phi, and that of damping, a
+dummy where there is none. A root node couples with a turn by -C grad theta, the hub by the sum of +C grad theta, the
+turn with itself by the sum of C.
 """
 
 import numpy as np
 
-from seastar_gym.der.linear.star_matrix import eliminate_node, load_root, smaller, store_pair, substitute_node
+from seastar_gym.der.linear.star_matrix import (
+    eliminate_node,
+    keep_pivots,
+    load_root,
+    pivots,
+    smaller,
+    store_pair,
+    substitute_node,
+)
 from seastar_gym.der.star import load_root_edge
+from seastar_gym.der.terms.clamp import CLAMP_ROWS, ELASTIC, VISCOUS
 from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.lanes import add_product, load, splat
+from seastar_gym.simd.lanes import add_product, load, splat, subtract_product
+
+
+@kernel
+def turn_stiffnesses(relaxation_time, work, limb):
+    """C of a limb's clamp, of elasticity and of damping [N m]."""
+    C = load(work.hub_coupling, CLAMP_ROWS * limb + ELASTIC)
+    if relaxation_time is None:
+        return C, splat(0.0)
+    return C, load(work.hub_coupling, CLAMP_ROWS * limb + VISCOUS)
+
+
+@kernel
+def dummy(relaxation_time):
+    """What the turn of damping has on the diagonal at first: without damping it is no unknown."""
+    return splat(1.0 if relaxation_time is None else 0.0)
 
 
 @kernel
@@ -19,37 +43,44 @@ def solve_rigid_hub(rods, work, D_hub, r_hub):
 
     Returns the part of the Newton decrement and the smallest pivot.
     """
-    edges, zero, one = rods.nodes_per_limb - 1, splat(0.0), splat(1.0)
+    edges, zero = rods.nodes_per_limb - 1, splat(0.0)
     nothing = (zero, zero, zero, zero)
-    B_hub, r_phi = nothing, (zero, zero)
-    D_phi = (zero, zero, one)
+    B_hub, r_turn = nothing, (zero, zero)
+    D_turn = (zero, zero, dummy(rods.damping))
     decrement, pivot = zero, splat(np.inf)
     for limb in range(rods.n_limbs):
         D, H, r = load_root(work, limb)
-        edge, C = load_root_edge(work, limb), load(work.hub_stiffness, limb)
+        edge = load_root_edge(work, limb)
+        C, C_d = turn_stiffnesses(rods.damping, work, limb)
         # grad theta = (-u_y, u_x) in the root node, its opposite in the hub.
-        x, y = C * edge.uy, -C * edge.ux
-        B_hub = (B_hub[0] - x, B_hub[1], B_hub[2] - y, B_hub[3])
-        D_phi = (D_phi[0] + C, D_phi[1], D_phi[2])
-        D_hub, B_hub, D_phi, r_hub, r_phi, part, root_pivot = eliminate_node(
-            work, limb * edges + 1, D, H, (x, zero, y, zero), r, D_hub, B_hub, D_phi, r_hub, r_phi
+        x, y, x_d, y_d = C * edge.uy, -C * edge.ux, C_d * edge.uy, -C_d * edge.ux
+        B_hub = (B_hub[0] - x, B_hub[1] - x_d, B_hub[2] - y, B_hub[3] - y_d)
+        D_turn = (D_turn[0] + C, D_turn[1], D_turn[2] + C_d)
+        D_hub, B_hub, D_turn, r_hub, r_turn, part, root_pivot = eliminate_node(
+            work, limb * edges + 1, D, H, (x, x_d, y, y_d), r, D_hub, B_hub, D_turn, r_hub, r_turn
         )
         decrement += part
         pivot = smaller(pivot, root_pivot)
-    D_phi, _, _, r_phi, _, part, hub_pivot = eliminate_node(
-        work, 0, D_hub, B_hub, nothing, r_hub, D_phi, nothing, (zero, zero, zero), r_phi, (zero, zero)
+    D_turn, _, _, r_turn, _, part, hub_pivot = eliminate_node(
+        work, 0, D_hub, B_hub, nothing, r_hub, D_turn, nothing, (zero, zero, zero), r_turn, (zero, zero)
     )
     decrement += part
-    phi = r_phi[0] / D_phi[0]
-    substitute_rigid_hub(rods, work, phi)
-    return add_product(decrement, phi, r_phi[0]), smaller(smaller(pivot, hub_pivot), D_phi[0])
+    inverse, lower, inverse_d, r_d, turn_pivot = pivots(D_turn, r_turn)
+    keep_pivots(work.root_pivots, 0, inverse, inverse_d)
+    keep_pivots(work.root_pivots, 1, lower, lower)
+    turn_d = r_d * inverse_d
+    turn = subtract_product(r_turn[0] * inverse, lower, turn_d)
+    substitute_rigid_hub(rods, work, turn, turn_d)
+    decrement += add_product(r_turn[0] * r_turn[0] * inverse, turn_d, r_d)
+    return decrement, smaller(smaller(pivot, hub_pivot), turn_pivot)
 
 
 @kernel
-def substitute_rigid_hub(rods, work, phi):
-    """Solutions of the hub and of the root nodes, into work.root_solution, from that of Phi."""
+def substitute_rigid_hub(rods, work, turn, turn_d):
+    """Solutions of the hub and of the root nodes, into work.root_solution, from those of the hub's turns."""
     edges, zero = rods.nodes_per_limb - 1, splat(0.0)
-    hub = substitute_node(work, 0, phi, zero, zero, zero)
+    hub = substitute_node(work, 0, turn, turn_d, zero, zero)
     store_pair(work.root_solution, 2 * rods.n_limbs, hub)
     for limb in range(rods.n_limbs):
-        store_pair(work.root_solution, 2 * limb, substitute_node(work, limb * edges + 1, hub[0], hub[1], phi, zero))
+        root = substitute_node(work, limb * edges + 1, hub[0], hub[1], turn, turn_d)
+        store_pair(work.root_solution, 2 * limb, root)

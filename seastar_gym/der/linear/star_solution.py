@@ -1,5 +1,6 @@
 """Solutions of an eliminated star of chains, see star_matrix.py, for its own right-hand side and for another one."""
 
+from seastar_gym.der.linear.rigid_hub import substitute_rigid_hub
 from seastar_gym.der.linear.star_matrix import (
     NODE_ROWS,
     RING_ROWS,
@@ -42,8 +43,32 @@ def solve_again(rods, work, r, x):
             r_next, r_second = eliminate_again(work, node, add(load_pair(r, 2 * node), r_next), r_second, (zero, zero))
         store_pair(work.ring, RING_ROWS * limb + 7, add(load_pair(r, 2 * (first + 1)), r_next))
         r_hub = add(r_hub, r_second)
-    solve_ring_again(work, rods.n_limbs, r_hub)
+    solve_hub_again(rods.clamp, rods, work, r_hub)
     substitute_star(rods, work, x)
+
+
+@kernel
+def solve_hub_again(clamp, rods, work, r_hub):
+    """Solve for the root nodes, whose right-hand sides are in work.ring, and the hub."""
+    if clamp is None:
+        solve_ring_again(work, rods.n_limbs, r_hub)
+    else:
+        solve_rigid_hub_again(rods, work, r_hub)
+
+
+@kernel
+def solve_rigid_hub_again(rods, work, r_hub):
+    """solve_hub_again where the hub is rigid; its turns have no right-hand side of their own."""
+    edges, zero = rods.nodes_per_limb - 1, splat(0.0)
+    r_turn = (zero, zero)
+    for limb in range(rods.n_limbs):
+        r = load_pair(work.ring, RING_ROWS * limb + 7)
+        r_hub, r_turn = eliminate_again(work, limb * edges + 1, r, r_hub, r_turn)
+    r_turn, _ = eliminate_again(work, 0, r_hub, r_turn, (zero, zero))
+    inverse, inverse_d = load_pair(work.root_pivots, 0)
+    lower = load(work.root_pivots, 2)
+    turn_d = subtract_product(r_turn[1], lower, r_turn[0]) * inverse_d
+    substitute_rigid_hub(rods, work, subtract_product(r_turn[0] * inverse, lower, turn_d), turn_d)
 
 
 @kernel

@@ -35,8 +35,8 @@ over at no such cost.
 
 from seastar_gym.der.energy import elastic_energy
 from seastar_gym.der.geometry import edge_vector, half_angle, larger
-from seastar_gym.der.star import edge_of, hinge_edges, n_nodes, tail_node
-from seastar_gym.der.terms.added_mass import add_fluid_energy, add_fluid_momentum
+from seastar_gym.der.star import edge_of, hinge_edges, is_clamped, n_nodes, tail_node
+from seastar_gym.der.terms.added_mass import add_fluid_energy, add_fluid_momentum, less_edge_fluid_energy
 from seastar_gym.der.terms.clamp import moved_clamp_energy
 from seastar_gym.der.terms.contact import add_contact_energy
 from seastar_gym.der.terms.fluid import fluid_velocity
@@ -72,7 +72,8 @@ def frame_velocity(current, rods, q, v):
 @kernel
 def moving_energy(rods, work, v, frame):
     """Kinetic energy of the robot, and of fluid that moves along at the normals of the last stage [J]."""
-    return add_fluid_energy(work.added_mass, rods, v, frame, kinetic_energy(rods, v, frame))
+    energy = add_fluid_energy(work.added_mass, rods, v, frame, kinetic_energy(rods, v, frame))
+    return less_edge_fluid_energy(rods.edge_added_mass, rods, work, v, energy)
 
 
 @kernel
@@ -197,6 +198,22 @@ def less_edge_turn(edge_mass, rods, q, v, spin, turn):
 
 
 @kernel
+def less_edge_fluid_turn(edge_added_mass, rods, work, q, v, spin, turn):
+    """The same less those of the fluid that edges carry along across themselves; unchanged where there is none."""
+    if edge_added_mass is None:
+        return spin, turn
+    for e in range(n_nodes(rods) - 1):
+        tail, mu = tail_node(rods, e), load(edge_added_mass, e)
+        nx, ny = load(work.normals, 2 * e), load(work.normals, 2 * e + 1)
+        rx, ry = edge_vector(q, tail, e + 1)
+        vx, vy = edge_vector(v, tail, e + 1)
+        arm = subtract_product(rx * ny, ry, nx)
+        spin = subtract_product(spin, mu * arm, add_product(vx * nx, vy, ny))
+        turn = subtract_product(turn, mu * arm, arm)
+    return spin, turn
+
+
+@kernel
 def momentum_of(added_mass, rods, node, vx, vy):
     """Momentum of a node at the velocity (vx, vy) [kg m/s], with that of the fluid it carries along."""
     m = load(rods.mass, node)
@@ -230,6 +247,7 @@ def rigid_motion(rods, work, q, v, frame):
         xx, xy, yy = xx + along_x[0], xy + along_x[1], yy + along_y[1]
         x_turn, y_turn, turn = x_turn + about[0], y_turn + about[1], turn + (r_x * about[1] - r_y * about[0])
     spin, turn = less_edge_turn(rods.edge_mass, rods, q, v, spin, turn)
+    spin, turn = less_edge_fluid_turn(rods.edge_added_mass, rods, work, q, v, spin, turn)
     # Elimination of x, then y.
     lower, turn_lower = xy / xx, x_turn / xx
     yy, y_turn, turn = yy - lower * xy, y_turn - lower * x_turn, turn - turn_lower * x_turn
@@ -252,14 +270,6 @@ def cut_velocities(rods, q, v, frame, motion, share, robots):
         about_y = vy - frame[1] - (v_y + omega * (load(q, 2 * node) - x))
         store(v, 2 * node, select(robots, add_product(vx, less, about_x), vx))
         store(v, 2 * node + 1, select(robots, add_product(vy, less, about_y), vy))
-
-
-@kernel
-def is_clamped(clamp, rods, e):
-    """Whether hinge e is a clamp of a rigid hub, which has no pole."""
-    if clamp is None:
-        return False
-    return e % (rods.nodes_per_limb - 1) == 0
 
 
 @kernel

@@ -54,7 +54,7 @@ def add_middles(middle_drag, rods, work, stage, fx, fy, xx, xy, yy):
     if middle_drag is None:
         return fx, fy, xx, xy, yy
     for e in range(n_nodes(rods) - 1):
-        _, g, h = middle_slopes(middle_drag, work, stage, e, tail_node(rods, e), e + 1)
+        _, g, h = middle_slopes(middle_drag, rods, work, stage, e, tail_node(rods, e), e + 1)
         fx, fy = fx + 2.0 * g[0], fy + 2.0 * g[1]
         xx, xy, yy = xx + 4.0 * h[0], xy + 4.0 * h[1], yy + 4.0 * h[2]
     return fx, fy, xx, xy, yy

@@ -3,23 +3,38 @@
 Half an edge adds m_a n n^T, m_a = rho_f C_a pi r_0^2 l/2, to the mass of each of its nodes, n its normal where the
 stage's first guess has it, off by the square of the step: a constant of the minimisation. What the turning of n, and a
 current's own acceleration, would add is left out.
+
+The continuum's discretisation takes it as consistently as the robot's own mass: velocities are linear along an edge, so
+it has m_a/3 ((d_head - d_tail) n)^2/2 less than the lumped masses, d = v - v_hat.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.der.geometry import edge_vector
 from seastar_gym.der.mesh import Mesh
-from seastar_gym.der.star import n_nodes
+from seastar_gym.der.star import n_nodes, tail_node
+from seastar_gym.der.terms.inertia import edge_change
 from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.lanes import add_product, load, splat, store
+from seastar_gym.simd.lanes import add_product, load, splat, store, subtract_product
 
 
 def coefficients(mesh: Mesh, density: float, C_a: float | None) -> NDArray[np.float64] | None:
     """m_a = rho_f C_a pi r_0^2 l/2, per half edge as in drag.py [kg]; None for none."""
     if C_a is None:
         return None
+    return mesh.per_half_edge(half_edges(mesh, density, C_a))
+
+
+def half_edges(mesh: Mesh, density: float, C_a: float) -> NDArray[np.float64]:
+    """m_a of every edge [kg]."""
     area = np.array([np.pi * r**2 for r in mesh.radius_at_edges])
-    return mesh.per_half_edge(density * C_a * area * 0.5 * mesh.l)
+    return density * C_a * area * 0.5 * mesh.l
+
+
+def edge_coefficients(mesh: Mesh, density: float, C_a: float | None) -> NDArray[np.float64] | None:
+    """m_a/3, per edge [kg]: what the differences along an edge take from the lumped masses; None for none."""
+    return None if C_a is None else half_edges(mesh, density, C_a) / 3.0
 
 
 @kernel
@@ -82,6 +97,39 @@ def add_fluid_inertia(added_mass, node, dx, dy, inverse_gamma, slopes):
             add_product(yy, load(added_mass, 3 * node + 2), squared),
         ),
     )
+
+
+@kernel
+def less_edge_fluid_inertia(edge_added_mass, work, stage, e, tail, slopes):
+    """(E, f, K) of an edge less mu ((d_head - d_tail) n)^2/2; unchanged where no such mass is named (None)."""
+    if edge_added_mass is None:
+        return slopes
+    energy, (fx, fy), (xx, xy, yy) = slopes
+    mu = load(edge_added_mass, e)
+    nx, ny = load(work.normals, 2 * e), load(work.normals, 2 * e + 1)
+    dx = edge_change(work, stage, 2 * (e + 1), 2 * tail)
+    dy = edge_change(work, stage, 2 * (e + 1) + 1, 2 * tail + 1)
+    across = add_product(dx * nx, dy, ny)
+    force = mu * stage.inverse_gamma * across
+    slope = mu * stage.inverse_gamma * stage.inverse_gamma
+    sx, sy = slope * nx, slope * ny
+    return (
+        subtract_product(energy, 0.5 * mu * across, across),
+        (subtract_product(fx, force, nx), subtract_product(fy, force, ny)),
+        (subtract_product(xx, sx, nx), subtract_product(xy, sx, ny), subtract_product(yy, sy, ny)),
+    )
+
+
+@kernel
+def less_edge_fluid_energy(edge_added_mass, rods, work, v, energy):
+    """Kinetic energy of the fluid [J] less what velocities that are linear along edges take from lumped masses'."""
+    if edge_added_mass is None:
+        return energy
+    for e in range(n_nodes(rods) - 1):
+        dx, dy = edge_vector(v, tail_node(rods, e), e + 1)
+        across = add_product(dx * load(work.normals, 2 * e), dy, load(work.normals, 2 * e + 1))
+        energy = subtract_product(energy, 0.5 * load(edge_added_mass, e) * across, across)
+    return energy
 
 
 @kernel

@@ -20,7 +20,8 @@ Floats = NDArray[np.float64]
 class Bending(NamedTuple):
     """Coefficients per hinge: EI over Voronoi length [N m], its reciprocal [1/(N m)], and the natural moment [N m].
 
-    The natural moments of hub hinges come from the actuators instead, see hub.py.
+    The natural moments of hub hinges come from the actuators instead, see hub.py. With a rigid hub the first hinge of
+    a limb is its clamp, see clamp.py.
     """
 
     EI_over_dl: np.ndarray
@@ -35,7 +36,8 @@ GREGORY = (5.0 / 12.0, 13.0 / 12.0)
 def coefficients(mesh: Mesh, gregory: bool = False) -> Bending:
     """Bending stiffnesses and natural moments, with modulus and radius at the nodes.
 
-    gregory: Whether the first hinge of a limb has Gregory's weight, as the continuum's discretisation has it.
+    gregory: Whether the first two hinges of a limb have Gregory's weights, and the first is the clamp of a rigid hub,
+        as in the continuum's discretisation. Otherwise the first is a hub hinge.
     """
     n_edges = mesh.nodes_per_limb - 1
     EI = np.array(
@@ -50,26 +52,17 @@ def coefficients(mesh: Mesh, gregory: bool = False) -> Bending:
     EI_kappa_bar = 2.0 * EI_over_dl * np.tan(0.5 * np.repeat(mesh.natural_turn, n_edges))
     roots = n_edges * np.arange(mesh.n_limbs)
     EI_kappa_bar[roots] = 0.0
-    EI_over_dl[roots], dl_over_EI[roots] = hub_stiffnesses(EI_over_dl[roots], dl_over_EI[roots])
+    if not gregory:
+        EI_over_dl[roots], dl_over_EI[roots] = hub_stiffnesses(EI_over_dl[roots], dl_over_EI[roots])
     return Bending(EI_over_dl, dl_over_EI, EI_kappa_bar)
 
 
 def hinge_weights(n_edges: int, gregory: bool) -> Floats:
     """Voronoi lengths of the hinges of a limb over its edges' length, the root's first."""
     weights = np.ones(n_edges)
-    if gregory and n_edges > 1:
-        weights[1] = GREGORY[1]
+    if gregory:
+        weights[:2] = GREGORY[:n_edges]
     return weights
-
-
-def clamp_stiffnesses(mesh: Mesh) -> Floats:
-    """K = EI/(w_0 l) of the clamps of a rigid hub, per limb [N m]."""
-    return np.array(
-        [
-            moduli[0] * np.pi * radii[0] ** 4 / 4.0 / (GREGORY[0] * length)
-            for moduli, radii, length in zip(mesh.modulus_at_nodes, mesh.radius_at_nodes, mesh.root_edges, strict=True)
-        ]
-    )
 
 
 def hub_stiffnesses(EI_over_dl: Floats, dl_over_EI: Floats) -> tuple[Floats, Floats]:

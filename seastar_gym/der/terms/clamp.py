@@ -1,7 +1,7 @@
 """The rigid hub of the continuum: limbs clamped at given angles into a massless point that turns freely.
 
 Limb j: root edge e_j, t_j = e_j/|e_j|, natural direction n_j (at rest, turned by its actuator), stiffness
-K_j = EI_j/(w_0 l_j) with Gregory's weight w_0 (see continuum.py). The hub's orientation Phi makes its energy least:
+K_j = EI_j/(w_0 l_j) with Gregory's weight w_0 (see bending.py). The hub's orientation Phi makes its energy least:
 
     c_j = t_j . n_j,  s_j = n_j x t_j,  S = sum_j K_j (c_j, s_j),
     E = min over Phi of sum_j K_j (1 - cos(theta_j - natural_j - Phi)) = sum_j K_j - |S|.
@@ -13,6 +13,10 @@ With p = S/|S| = (cos Phi, sin Phi), C_j = K_j (c_j p_x + s_j p_y) and M_j = K_j
 For Newton's method Phi is a third unknown of the hub: C_j is the stiffness of root edge j, -C_j grad theta_j its
 coupling with Phi, and sum_j C_j the stiffness of Phi, whose residual is zero. Only relative angles matter: no pole, no
 trigonometry of the state, no coupling between limbs. C_j is replaced by max(C_j, 0) where the matrix is regularised.
+
+Damping (see damping.py) is the same function once more: K_j tau/gamma for K_j, and for n_j the direction t_j that the
+root edge had when the stage began. The hub turns by an angle of its own there, a fourth unknown: moments of both kinds
+add up to zero each, so nothing has to be remembered of the hub.
 """
 
 from collections.abc import Sequence
@@ -23,22 +27,33 @@ import numpy as np
 from seastar_gym.der.geometry import edge_vector, tangent
 from seastar_gym.der.mesh import Mesh
 from seastar_gym.der.star import load_root_edge
-from seastar_gym.der.terms.bending import clamp_stiffnesses
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, select, splat, sqrt, store, subtract_product
 
 
 class Clamp(NamedTuple):
-    """Natural directions (x, y) of the root edges at rest, two rows per limb, and their stiffness K, per limb [N m]."""
+    """Natural directions (x, y) of the root edges at rest, two rows per limb; bending.py has their stiffnesses K."""
 
     direction: np.ndarray
-    stiffness: np.ndarray
+
+
+ELASTIC, VISCOUS = 0, 1
+"""Columns of a limb in work.hub_coupling: C_j of elasticity and of damping."""
+CLAMP_ROWS = 2
 
 
 def coefficients(mesh: Mesh, directions: Sequence[float]) -> Clamp:
-    """Clamps of limbs with these directions of their root edges at rest [rad]."""
-    at_rest = np.stack([np.cos(directions), np.sin(directions)], axis=1).reshape(-1)
-    return Clamp(at_rest, clamp_stiffnesses(mesh))
+    """Clamps of limbs with these directions at the hub at rest [rad]; root edges of curved limbs turn by half a hinge's
+    natural angle more.
+    """
+    angles = np.add(directions, 0.5 * np.array(mesh.natural_turn))
+    return Clamp(np.stack([np.cos(angles), np.sin(angles)], axis=1).reshape(-1))
+
+
+@kernel
+def clamp_stiffness(rods, limb):
+    """K_j [N m]."""
+    return load(rods.bending.EI_over_dl, limb * (rods.nodes_per_limb - 1))
 
 
 @kernel
@@ -57,10 +72,22 @@ def set_natural_directions(clamp, rods, work, actuation, fraction):
 
 
 @kernel
-def turn_from_natural(work, limb, ex, ey, inverse_length):
-    """(c, s) = (t . n, n x t) of a root edge e."""
-    nx, ny = load(work.hub_direction, 2 * limb), load(work.hub_direction, 2 * limb + 1)
-    return add_product(ex * nx, ey, ny) * inverse_length, subtract_product(nx * ey, ny, ex) * inverse_length
+def freeze_directions(clamp, rods, work, q_hat):
+    """Fill work.hub_hat with the directions of the root edges at q_hat, in scenes with a rigid hub and damping."""
+    if clamp is None:
+        return
+    for limb in range(rods.n_limbs):
+        ex, ey = edge_vector(q_hat, 0, limb * (rods.nodes_per_limb - 1) + 1)
+        inverse = 1.0 / sqrt(add_product(ex * ex, ey, ey))
+        store(work.hub_hat, 2 * limb, ex * inverse)
+        store(work.hub_hat, 2 * limb + 1, ey * inverse)
+
+
+@kernel
+def turn_from(directions, limb, tx, ty):
+    """(c, s) = (t . n, n x t) of a root edge's direction t and that in rows, n."""
+    nx, ny = load(directions, 2 * limb), load(directions, 2 * limb + 1)
+    return add_product(tx * nx, ty, ny), subtract_product(nx * ty, ny, tx)
 
 
 @kernel
@@ -68,22 +95,6 @@ def orientation(S_x, S_y):
     """(cos Phi, sin Phi) of the hub; (1, 0) where every orientation is as good."""
     size = sqrt(add_product(S_x * S_x, S_y, S_y))
     return select(size > 0.0, S_x / size, 1.0), select(size > 0.0, S_y / size, 0.0)
-
-
-@kernel
-def clamp_energy(clamp, rods, work, q):
-    """E [J] at the natural directions in `work`."""
-    edges = rods.nodes_per_limb - 1
-    S_x, S_y, total = splat(0.0), splat(0.0), splat(0.0)
-    for limb in range(rods.n_limbs):
-        c, s, _ = root_turn(work, q, limb, edges)
-        K = load(clamp.stiffness, limb)
-        S_x, S_y = add_product(S_x, K, c), add_product(S_y, K, s)
-    p_x, p_y = orientation(S_x, S_y)
-    for limb in range(rods.n_limbs):
-        c, s, _ = root_turn(work, q, limb, edges)
-        total += turned_energy(load(clamp.stiffness, limb), c, s, p_x, p_y)
-    return total
 
 
 @kernel
@@ -95,57 +106,88 @@ def turned_energy(K, c, s, p_x, p_y):
 
 
 @kernel
-def root_turn(work, q, limb, edges):
-    """(c, s, 1/|e|) of the root edge of a limb at q."""
-    ex, ey = edge_vector(q, 0, limb * edges + 1)
-    inverse = 1.0 / sqrt(add_product(ex * ex, ey, ey))
-    c, s = turn_from_natural(work, limb, ex, ey, inverse)
-    return c, s, inverse
+def energy_of_turns(rods, turns):
+    """E [J] of root edges turned by (c, s), two rows per limb, from their natural directions."""
+    S_x, S_y, total = splat(0.0), splat(0.0), splat(0.0)
+    for limb in range(rods.n_limbs):
+        K = clamp_stiffness(rods, limb)
+        S_x, S_y = add_product(S_x, K, load(turns, 2 * limb)), add_product(S_y, K, load(turns, 2 * limb + 1))
+    p_x, p_y = orientation(S_x, S_y)
+    for limb in range(rods.n_limbs):
+        c, s = load(turns, 2 * limb), load(turns, 2 * limb + 1)
+        total += turned_energy(clamp_stiffness(rods, limb), c, s, p_x, p_y)
+    return total
 
 
 @kernel
-def assemble_clamp(clamp, rods, work, convex):
-    """Moments M_j and stiffnesses C_j of the root edges, into work.hub_moment and work.hub_stiffness.
-
-    Returns E [J].
-    """
-    S_x, S_y = splat(0.0), splat(0.0)
+def clamp_energy(rods, work, q):
+    """E [J] at the natural directions in `work`."""
     for limb in range(rods.n_limbs):
-        edge = load_root_edge(work, limb)
-        c, s = turn_from_natural(work, limb, edge.x, edge.y, edge.length * edge.inverse)
-        K = load(clamp.stiffness, limb)
-        S_x, S_y = add_product(S_x, K, c), add_product(S_y, K, s)
-        store(work.hub_moment, limb, c)
-        store(work.hub_stiffness, limb, s)
-    p_x, p_y = orientation(S_x, S_y)
-    energy = splat(0.0)
-    for limb in range(rods.n_limbs):
-        K = load(clamp.stiffness, limb)
-        c, s = load(work.hub_moment, limb), load(work.hub_stiffness, limb)
-        energy += turned_energy(K, c, s, p_x, p_y)
-        C = K * add_product(c * p_x, s, p_y)
-        store(work.hub_moment, limb, K * subtract_product(s * p_x, c, p_y))
-        store(work.hub_stiffness, limb, select(convex, select(C > 0.0, C, 0.0), C))
-    return energy
+        ex, ey = edge_vector(q, 0, limb * (rods.nodes_per_limb - 1) + 1)
+        inverse = 1.0 / sqrt(add_product(ex * ex, ey, ey))
+        c, s = turn_from(work.hub_direction, limb, ex * inverse, ey * inverse)
+        store(work.hub_turn, 2 * limb, c)
+        store(work.hub_turn, 2 * limb + 1, s)
+    return energy_of_turns(rods, work.hub_turn)
 
 
 @kernel
 def moved_clamp_energy(clamp, rods, work, actuation, start, end):
     """Energy of a robot at its natural directions, once those have moved from `start` to `end` of the interval [J]."""
     set_natural_directions(clamp, rods, work, actuation, start)
-    for limb in range(rods.n_limbs):
-        store(work.hub_moment, limb, load(work.hub_direction, 2 * limb))
-        store(work.hub_stiffness, limb, load(work.hub_direction, 2 * limb + 1))
+    for row in range(2 * rods.n_limbs):
+        store(work.hub_turn, row, load(work.hub_direction, row))
     set_natural_directions(clamp, rods, work, actuation, end)
-    S_x, S_y, total = splat(0.0), splat(0.0), splat(0.0)
     for limb in range(rods.n_limbs):
-        x, y = load(work.hub_moment, limb), load(work.hub_stiffness, limb)
-        c, s = turn_from_natural(work, limb, x, y, splat(1.0))
-        K = load(clamp.stiffness, limb)
+        c, s = turn_from(work.hub_direction, limb, load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1))
+        store(work.hub_turn, 2 * limb, c)
+        store(work.hub_turn, 2 * limb + 1, s)
+    return energy_of_turns(rods, work.hub_turn)
+
+
+@kernel
+def assemble_clamps(rods, work, stage, convex):
+    """Moments on root edges and their stiffnesses, into work.hub_moment, hub_stiffness and hub_coupling.
+
+    Returns E [J], with that of damping.
+    """
+    energy = add_clamps(rods, work, work.hub_direction, splat(1.0), convex, ELASTIC)
+    return add_clamp_damping(rods.damping, rods, work, stage, convex, energy)
+
+
+@kernel
+def add_clamp_damping(relaxation_time, rods, work, stage, convex, energy):
+    """Add what damps the clamps, in scenes with damping, to their energy [J] and their slopes."""
+    if relaxation_time is None:
+        return energy
+    ratio = load(relaxation_time, 0) * stage.inverse_gamma
+    return energy + add_clamps(rods, work, work.hub_hat, ratio, convex, VISCOUS)
+
+
+@kernel
+def add_clamps(rods, work, directions, ratio, convex, column):
+    """Add clamps of `ratio` times the stiffness, with these natural directions, in this column of work.hub_coupling.
+
+    Returns their energy [J].
+    """
+    S_x, S_y = splat(0.0), splat(0.0)
+    for limb in range(rods.n_limbs):
+        edge, K = load_root_edge(work, limb), ratio * clamp_stiffness(rods, limb)
+        inverse = edge.length * edge.inverse
+        c, s = turn_from(directions, limb, edge.x * inverse, edge.y * inverse)
         S_x, S_y = add_product(S_x, K, c), add_product(S_y, K, s)
+        store(work.hub_turn, 2 * limb, c)
+        store(work.hub_turn, 2 * limb + 1, s)
     p_x, p_y = orientation(S_x, S_y)
+    energy = splat(0.0)
     for limb in range(rods.n_limbs):
-        x, y = load(work.hub_moment, limb), load(work.hub_stiffness, limb)
-        c, s = turn_from_natural(work, limb, x, y, splat(1.0))
-        total += turned_energy(load(clamp.stiffness, limb), c, s, p_x, p_y)
-    return total
+        K = ratio * clamp_stiffness(rods, limb)
+        c, s = load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1)
+        energy += turned_energy(K, c, s, p_x, p_y)
+        C = K * add_product(c * p_x, s, p_y)
+        C = select(convex, select(C > 0.0, C, 0.0), C)
+        moment = K * subtract_product(s * p_x, c, p_y)
+        store(work.hub_moment, limb, load(work.hub_moment, limb) + moment)
+        store(work.hub_stiffness, limb, load(work.hub_stiffness, limb) + C)
+        store(work.hub_coupling, CLAMP_ROWS * limb + column, C)
+    return energy

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.der.geometry import half_angle
-from seastar_gym.der.star import edge_of, hinge_edges, n_nodes
+from seastar_gym.der.star import edge_of, hinge_edges, is_clamped, n_nodes
 from seastar_gym.der.terms.bending import moment
+from seastar_gym.der.terms.clamp import freeze_directions
 from seastar_gym.der.terms.stretching import tension
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, splat, store
@@ -28,11 +29,17 @@ def coefficients(relaxation_time: float | None) -> NDArray[np.float64] | None:
 
 @kernel
 def freeze_strains(relaxation_time, rods, work, q_hat):
-    """Fill work.tension with EA eps_hat [N] and work.bending with EI kappa_hat [N m], in scenes with damping."""
+    """Fill work.tension with EA eps_hat [N] and work.bending with EI kappa_hat [N m], in scenes with damping.
+
+    With a rigid hub, also the directions that its clamps had.
+    """
     if relaxation_time is None:
         return
+    freeze_directions(rods.clamp, rods, work, q_hat)
     for e in range(n_nodes(rods) - 1):
         store(work.tension, e, tension(rods, e, edge_of(rods, q_hat, e).length))
+        if is_clamped(rods.clamp, rods, e):
+            continue
         a, b, side = hinge_edges(rods, e)
         t = half_angle(edge_of(rods, q_hat, a), edge_of(rods, q_hat, b), side)
         store(work.bending, e, moment(rods, e, t, splat(0.0)))

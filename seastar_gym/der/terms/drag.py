@@ -5,6 +5,9 @@ c has C_t for C_d, and the flow across each edge that a node ends adds -c_n |w_n
 c_n |w_n|^3 / 3: half the edge belongs to the node, so c_n = 1/2 rho_f (C_d - C_t) D l/2. Across a limb the two make
 C_d, along it C_t; both potentials are convex. n is the edge's normal where the stage's first guess has it, which is off
 by the square of the step: a constant of the minimisation, and schemes keep their order up to 2.
+
+The continuum's discretisation integrates both potentials by Simpson's rule: a third of that at the nodes, and the rest
+in the middle of edges, where w is the mean of the ends' velocities.
 """
 
 import numpy as np
@@ -40,8 +43,23 @@ def cross_coefficients(mesh: Mesh, density: float, C_d: float, C_t: float | None
     """
     if C_t is None:
         return None
+    return mesh.per_half_edge(across_half_edges(mesh, density, C_d, C_t))
+
+
+def across_half_edges(mesh: Mesh, density: float, C_d: float, C_t: float) -> Floats:
+    """c_n of every edge [kg/m]."""
     added = [drag_per_length(density, C_d, r) - drag_per_length(density, C_t, r) for r in mesh.radius_at_edges]
-    return mesh.per_half_edge(np.array(added) * 0.5 * mesh.l)
+    return np.array(added) * 0.5 * mesh.l
+
+
+def simpson_cross_coefficients(
+    mesh: Mesh, density: float, C_d: float, C_t: float | None
+) -> tuple[Floats | None, Floats | None]:
+    """(c_n per half edge as above, c_n per edge) [kg/m] by Simpson's rule; None for isotropic drag."""
+    if C_t is None:
+        return None, None
+    halves = across_half_edges(mesh, density, C_d, C_t)
+    return mesh.per_half_edge(halves / 3.0), halves * (4.0 / 3.0)
 
 
 @kernel
@@ -99,7 +117,7 @@ def relative(current, node, vx, vy):
 
 
 @kernel
-def middle_slopes(middle_drag, work, stage, e, tail, head):
+def middle_slopes(middle_drag, rods, work, stage, e, tail, head):
     """(potential, force on either end, Hessian block) of the drag in the middle of edge e; zeros without (None).
 
     w = (w_tail + w_head)/2 has the potential gamma c |w|^3/3, half of the force c |w| w goes to either end, and the
@@ -109,16 +127,31 @@ def middle_slopes(middle_drag, work, stage, e, tail, head):
     if middle_drag is None:
         return zero, (zero, zero), (zero, zero, zero)
     wx, wy = middle_velocity(work, stage, tail, head)
-    potential, c_speed, c_over_speed = drag_slopes(load(middle_drag, e), wx, wy)
-    quarter = 0.25 * stage.inverse_gamma
-    sx, sy = quarter * c_over_speed * wx, quarter * c_over_speed * wy
-    diagonal = quarter * c_speed
-    half = 0.5 * c_speed
-    return (
-        stage.gamma * potential,
-        (half * wx, half * wy),
+    energy, (fx, fy), (xx, xy, yy) = middle_drag_slopes(rods, work.normals, e, wx, wy, stage.gamma, stage.inverse_gamma)
+    return energy, (0.5 * fx, 0.5 * fy), (0.25 * xx, 0.25 * xy, 0.25 * yy)
+
+
+@kernel
+def middle_drag_slopes(rods, normals, e, wx, wy, gamma, inverse_gamma):
+    """(potential, force, Hessian over gamma) in w of the drag in the middle of edge e."""
+    potential, c_speed, c_over_speed = drag_slopes(load(rods.middle_drag, e), wx, wy)
+    c_over_speed *= inverse_gamma
+    sx, sy = c_over_speed * wx, c_over_speed * wy
+    diagonal = c_speed * inverse_gamma
+    slopes = (
+        gamma * potential,
+        (c_speed * wx, c_speed * wy),
         (add_product(diagonal, sx, wx), sx * wy, add_product(diagonal, sy, wy)),
     )
+    return add_middle_cross_flow(rods.middle_cross_drag, normals, e, wx, wy, gamma, inverse_gamma, slopes)
+
+
+@kernel
+def add_middle_cross_flow(middle_cross_drag, normals, e, wx, wy, gamma, inverse_gamma, slopes):
+    """Add the drag of flow across edge e in its middle; unchanged without such drag (None)."""
+    if middle_cross_drag is None:
+        return slopes
+    return add_half_edge(load(middle_cross_drag, e), normals, e, wx, wy, gamma, inverse_gamma, slopes)
 
 
 @kernel
