@@ -94,7 +94,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
 
     `path_error` is the sum of `space_error` and `time_error`, for the worst of the swims measured. These and
     `real_time_factor` belong to the robot's resolution and the numerics (see `seastar_gym.scene.fidelity`) and are NaN
-    for other robots and scenes than the chapter's, and for what was not measured. With `randomization`, `info` has the drawn numbers by their names, too.
+    for other robots and scenes than the chapter's, and for what was not measured.
+    With `randomization`, `info` has the drawn numbers by their names, too.
 
     ## Starting state
     The robot rests with its hub at the origin and limb 1 along +x, or in a random direction with `random_heading`.

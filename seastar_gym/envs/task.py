@@ -47,8 +47,8 @@ class Outcome(NamedTuple):
 def make_scene(scene: Scene | Plain | None, fidelity: Fidelity | None) -> Scene:
     """Scene with the numerics that it names, otherwise with those of `fidelity`, by default "balanced".
 
-    Without a scene, it is the fidelity's own, with its nodes per limb and its discretisation. ValueError where scene and
-    fidelity name different numerics.
+    Without a scene, it is the fidelity's own, with its nodes per limb and its discretisation. ValueError where scene
+    and fidelity name different numerics.
     """
     if scene is None:
         return Scene.preset(DEFAULT_FIDELITY if fidelity is None else fidelity)
@@ -71,7 +71,9 @@ def read(part: Part | Plain, kind: type[Any]) -> Part:
     return from_dict(part, kind) if isinstance(part, dict) else part
 
 
-PROMISED = {"path_error": "path_error", "space_error": "space_error", "time_error": "time_error", "real_time_factor": "speed"}
+PROMISED = {
+    "path_error": "path_error", "space_error": "space_error", "time_error": "time_error", "real_time_factor": "speed",
+}  # fmt: skip
 """Fields of a `Promise` by their names in `info`."""
 
 

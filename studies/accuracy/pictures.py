@@ -68,7 +68,8 @@ def draw_all(found: Study, folder: Path) -> list[Path]:
 def work_precision(found: Study) -> Figure:
     """Total error over speed: ours, the chapter's discretisation, the presets, and published codes."""
     figure, (path, straight) = subplots(2, 1, figsize=(7.2, 11.5))
-    for axes, column in ((path, "path"), (straight, "straight")):
+    panels: tuple[tuple[Axes, Column], ...] = ((path, "path"), (straight, "straight"))
+    for axes, column in panels:
         _draw_settings(axes, found.rows, column)
         _mark_presets(axes, found.rows, column, left=column == "straight")
         axes.set(xscale="log", yscale="log", xlabel="simulated over computing time, one core  (faster →)")
@@ -91,7 +92,10 @@ def _speed(row: Row, column: Column) -> float:
 
 def _draw_settings(axes: Axes, rows: Sequence[Row], column: Column) -> None:
     """Draw all settings as dots, and what can be promised at a speed as a line."""
-    for discretisation, colour, name in (("continuum", OURS, "our discretisation"), ("chapter", CHAPTERS, "the chapter's")):
+    for discretisation, colour, name in (
+        ("continuum", OURS, "our discretisation"),
+        ("chapter", CHAPTERS, "the chapter's"),
+    ):
         mine = [row for row in rows if row.setting.discretisation == discretisation]
         x, y = [_speed(row, column) for row in mine], [PERCENT * row.total(column) for row in mine]
         axes.plot(x, y, "o", ms=3.6, mew=0, alpha=0.35, color=colour)
@@ -158,7 +162,8 @@ def convergence(found: Study) -> Figure:
             if row.setting.discretisation == discretisation
         }
         for kind, colour in list(COLOURS.items())[:4]:
-            points = sorted((MS * h, PERCENT * row.time.path) for (scheme, h), row in rows.items() if scheme == kind)
+            mine = [(h, row) for (scheme, h), row in rows.items() if scheme == kind]
+            points = sorted((MS * h, PERCENT * row.time.path) for h, row in mine)
             label = kind if discretisation == "continuum" else None
             if points:
                 time.loglog(*np.array(points).T, f"o{line}", ms=4, lw=1.4, color=colour, label=label)
@@ -173,7 +178,7 @@ def convergence(found: Study) -> Figure:
     for discretisation, colour, name in (("chapter", CHAPTERS, "the chapter's"), ("continuum", OURS, "ours")):
         by_nodes = {row.resolution[1]: row.space for row in found.rows if row.setting.discretisation == discretisation}
         edges = np.array(sorted(n for n in by_nodes if by_nodes[n].path > 0.0))
-        for column, line, what in (("path", "-", "worst path"), ("gait", "--", "any gait"), ("straight", ":", "straight")):
+        for column, line, what in (("path", "-", "worst path"), ("gait", "--", "gaits"), ("straight", ":", "straight")):
             values = [PERCENT * getattr(by_nodes[n], column) for n in edges]
             space.loglog(edges - 1, values, f"o{line}", ms=4, lw=1.4, color=colour, label=f"{name}, {what}")
     space.set_xticks([n - 1 for n in nodes], [str(n) for n in nodes])

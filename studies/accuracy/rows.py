@@ -54,8 +54,13 @@ def figures(batches: Sequence[Cases], found: Sequence[Errors]) -> Figures:
         return float(path[kinds == kind].max(initial=0.0))
 
     return Figures(
-        float(path[main].max()),
-        *(largest(kind) for kind in ("straight", "pair", "pentagon", "random", "slow", "gait")),
+        path=float(path[main].max()),
+        straight=largest("straight"),
+        pair=largest("pair"),
+        pentagon=largest("pentagon"),
+        random=largest("random"),
+        slow=largest("slow"),
+        gait=largest("gait"),
         heading=float(np.degrees(heading[main].max())),
         end=float(end[main].max()),
         worst=str(names[main][path[main].argmax()]),
@@ -183,11 +188,15 @@ def path_front(rows: Iterable[Row]) -> list[Row]:
     return front(rows, lambda row: row.promise("path"), lambda row: row.speed)
 
 
+def any_gait_front(rows: Iterable[Row]) -> list[Row]:
+    """Front of the worse of path and gait error that can be promised, fastest first."""
+    return front(rows, lambda row: max(row.promise("path"), row.promise("gait")), lambda row: row.speed)
+
+
 def fronts(rows: Sequence[Row]) -> list[Row]:
     """For every resolution, rows on the front of the path error or of the worse of path and gait, fastest first."""
     chosen: dict[Setting, Row] = {}
     for resolution in dict.fromkeys(row.resolution for row in rows):
         mine = [row for row in rows if row.resolution == resolution]
-        any_gait = front(mine, lambda row: max(row.promise("path"), row.promise("gait")), lambda row: row.speed)
-        chosen |= {row.setting: row for row in (*path_front(mine), *any_gait)}
+        chosen |= {row.setting: row for row in (*path_front(mine), *any_gait_front(mine))}
     return sorted(chosen.values(), key=lambda row: -row.speed)

@@ -103,7 +103,7 @@ def _numerics(plan: Plan, resolution: Resolution) -> list[Numerics]:
         if step * MS >= shortest and (nodes <= plan.finest or tolerance == 1e-7 or step * MS < 1 * MS)
     ]
     adapted = [
-        Numerics("implicit-midpoint", LARGEST_ADAPTED, 1e-7, path_tolerance=path_tolerance) for path_tolerance in ADAPTED
+        Numerics("implicit-midpoint", LARGEST_ADAPTED, 1e-7, path_tolerance=tolerance) for tolerance in ADAPTED
     ]
     return fixed + (adapted if nodes <= plan.finest else [])
 

@@ -93,8 +93,11 @@ def test_no_stored_setting_is_worse_than_another_of_its_resolution_in_everything
     def figures(row: Promise) -> tuple[float, ...]:
         return -row.speed, row.path_error, row.gait_error
 
+    def resolution(row: Promise) -> tuple[str, int]:
+        return row.discretisation, row.nodes_per_limb
+
     for row in promises():
-        alike = [r for r in promises() if (r.discretisation, r.nodes_per_limb) == (row.discretisation, row.nodes_per_limb)]
+        alike = [each for each in promises() if resolution(each) == resolution(row)]
         better = [each for each in alike if all(np.array(figures(each)) < figures(row))]
         assert not better, f"{better[0]} beats {row}"
 
@@ -176,7 +179,7 @@ def test_for_error_refuses_ten_of_the_chapters_nodes_what_none_of_their_steps_ca
 
 @pytest.mark.parametrize("robot", [Seastar(youngs_modulus=2e6), Seastar(n_limbs=3), "seastar", 10])
 def test_for_error_refuses_another_robot(robot):
-    with pytest.raises(ValueError, match=r"^(Errors were measured for the chapter's robot|robot must be a Seastar).*\.$"):
+    with pytest.raises(ValueError, match=r"^(Errors were measured for the chapter's|robot must be a Seastar).*\.$"):
         Scene.for_error(0.01, robot=robot)
 
 
