@@ -93,10 +93,10 @@ class Setting(NamedTuple):
 
 
 PRESETS: dict[Fidelity, Setting] = {
-    "fast": Setting("continuum", 8, Numerics("sdirk2", 20e-3, newton_tolerance=1e-6)),
-    "balanced": Setting("continuum", 10, Numerics("implicit-midpoint", 5e-3, newton_tolerance=1e-6)),
-    "accurate": Setting("continuum", 13, Numerics("implicit-midpoint", 2e-3, newton_tolerance=1e-7)),
-    "reference": Setting("continuum", 37, Numerics("implicit-midpoint", 0.3e-3, newton_tolerance=1e-9)),
+    "fast": Setting("continuum", 7, Numerics("implicit-midpoint", 5e-3, newton_tolerance=1e-5)),
+    "balanced": Setting("continuum", 12, Numerics("implicit-midpoint", 5e-3, newton_tolerance=1e-5)),
+    "accurate": Setting("continuum", 19, Numerics("implicit-midpoint", 1e-3, newton_tolerance=1e-6)),
+    "reference": Setting("continuum", 37, Numerics("implicit-midpoint", 0.3e-3)),
     "chapter": Setting("chapter", 10, Numerics("implicit-euler", 3e-3)),
 }
 """Chosen from the front that `python -m studies.accuracy` measures."""
