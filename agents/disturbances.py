@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from agents.greedy import turned
 from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout
+from seastar_gym.envs.stations import body_heading
 from seastar_gym.envs.task import SwimTask
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.per_robot import column
-from seastar_gym.simulator.body_frame import best_fit_heading
 
 Floats = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ class Disturbance:
 
     current: Speed of the current [m/s], which has the direction of i/8 of a full turn for robot i.
     weakness: Share of its strength that limb i mod n of robot i lacks.
-    noise: Standard deviation of the observed position of every node [m].
+    noise: Standard deviation of the observed position of the hub and of every station [m].
     lost: Probability that a stroke fails.
     """
 
@@ -81,10 +81,11 @@ class DisturbedTask:
         seen, scene = self.task.observe(), self.task.simulator.scene
         at = scene_layout(scene)
         if self.disturbance.current > 0.0:
-            axes = best_fit_heading(self.task.simulator.positions, scene.robot.nodes())
+            axes = body_heading(self.task.simulator.positions, scene.robot)
             seen[:, at.hub_velocity] += turned(self._current, -axes) / VELOCITY_SCALE
         if self.disturbance.noise > 0.0:
-            error = self._rng.normal(0.0, self.disturbance.noise, (len(seen), scene.robot.n_nodes, 2))
+            n_places = 1 + seen[:, at.positions].shape[1] // 2
+            error = self._rng.normal(0.0, self.disturbance.noise, (len(seen), n_places, 2))
             error /= column(scene.robot.limb_length, 2)
             seen[:, at.positions] += (error[:, 1:] - error[:, :1]).reshape(len(seen), -1)
             seen[:, at.waypoints] -= np.tile(error[:, 0], 2)

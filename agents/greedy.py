@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions, command_table
-from seastar_gym.envs.observation import scene_layout
+from seastar_gym.envs.observation import OBSERVATION_LAYOUT, scene_layout
 from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.stations import body_heading
 from seastar_gym.scene import Scene
 from seastar_gym.simulator import Simulator
-from seastar_gym.simulator.body_frame import best_fit_heading
 
 Floats = NDArray[np.float64]
 
@@ -47,19 +47,20 @@ def measure_gaits(scene: Scene, commands: Floats, settling: int, measured: int) 
     commands: Commands of every gait, shape (n, period, n_limbs). settling, measured: Numbers of strokes before and
     during the measurement; `measured` is a multiple of the period.
     """
-    simulator, rest = Simulator(scene, len(commands)), scene.robot.nodes()
+    simulator = Simulator(scene, len(commands))
     for stroke in range(settling + measured):
         if stroke == settling:
-            hub, heading = simulator.hub_position(), best_fit_heading(simulator.positions, rest)
+            hub, heading = simulator.hub_position(), body_heading(simulator.positions, scene.robot)
         simulator.stroke(commands[:, stroke % commands.shape[1]])
-    turn = best_fit_heading(simulator.positions, rest) - heading
+    turn = body_heading(simulator.positions, scene.robot) - heading
     turn -= 2.0 * np.pi * np.rint(turn / (2.0 * np.pi))
     return Displacements(turned(simulator.hub_position() - hub, -heading) / measured, turn / measured)
 
 
 def displacement_map(scene: Scene, actions: Actions = "joint") -> Displacements:
     """Map of a scene for the commands of an action mode, from the cache or measured now."""
-    key = hashlib.sha256(repr((scene, actions, SETTLING_STROKES, MEASURED_STROKES)).encode()).hexdigest()[:24]
+    asked = scene, actions, SETTLING_STROKES, MEASURED_STROKES, OBSERVATION_LAYOUT
+    key = hashlib.sha256(repr(asked).encode()).hexdigest()[:24]
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "seastar-gym"
     file = cache / f"displacements-{key}.npz"
     if file.is_file():

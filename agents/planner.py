@@ -2,7 +2,8 @@
 
 It has the observations of any agent. An observation is the whole state of the robot, to single precision, so a beam
 search can begin from it: in each of a few strokes, all pairs of limbs are tried from the best few states so far. The
-planner then swims the first command of the sequence that leaves the shortest rewarded route.
+planner then swims the first command of the sequence that leaves the shortest rewarded route. A robot of more than ten
+nodes per limb is taken to lie smoothly through the stations that are observed.
 """
 
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from agents.greedy import Searcher, waypoints_of
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout
 from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.stations import N_STATIONS, node_weights
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.simulator import Simulator, State
 
@@ -40,10 +42,12 @@ def state_of(observations: NDArray[np.float32], scene: Scene) -> State:
     Actuators with a memory are taken to be at rest, because observations do not have all of their state.
     """
     n, robot, at = len(observations), scene.robot, scene_layout(scene)
-    nodes, velocities, hub_velocity = (
-        observations[:, place].astype(np.float64).reshape(n, -1, 2)
-        for place in (at.positions, at.velocities, at.hub_velocity)
+    at_stations = node_weights(robot.nodes_per_limb)
+    nodes, velocities = (
+        (at_stations @ observations[:, place].astype(np.float64).reshape(n, -1, N_STATIONS, 2)).reshape(n, -1, 2)
+        for place in (at.positions, at.velocities)
     )
+    hub_velocity = observations[:, None, at.hub_velocity].astype(np.float64)
     zero = np.zeros((n, 1, 2))
     return State(
         positions=robot.limb_length * np.concatenate([zero, nodes], axis=1),

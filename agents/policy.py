@@ -77,18 +77,18 @@ class LearnedPolicy:
 
         deterministic: Whether the most probable action is taken, rather than one drawn by its probability.
         """
-        observation, robot = np.asarray(observation), self.scene.robot
+        observation, n_limbs = np.asarray(observation), self.scene.robot.n_limbs
         size = scene_observation_size(self.scene)
         if observation.ndim not in (1, 2) or observation.shape[-1] != size:
             raise ValueError(
-                f"This policy was trained on a robot of {robot.n_limbs} limbs of {robot.nodes_per_limb} nodes: "
-                f"it sees {size} numbers, not an observation of shape {observation.shape}."
+                f"This policy was trained on a robot of {n_limbs} limbs: it sees {size} numbers, not an observation of "
+                f"shape {observation.shape}."
             )
         if not self.description.symmetry:
             return self._choose(observation, deterministic), None
-        reduced, elements = reduce_observations(observation, robot.n_limbs)
+        reduced, elements = reduce_observations(observation, n_limbs)
         chosen = self._choose(reduced, deterministic)
-        return restore_actions(chosen, elements, self.actions, robot.n_limbs), None
+        return restore_actions(chosen, elements, self.actions, n_limbs), None
 
     def _choose(self, observation: NDArray[Any], deterministic: bool) -> NDArray[np.intp]:
         logits = self.logits(observation)
@@ -110,12 +110,9 @@ class LearnedPolicy:
 
     def require_fit(self, scene: Scene, actions: Actions) -> None:
         """ValueError, with one sentence, where this policy cannot drive the robot of an environment."""
-        ours, robot = self.scene.robot, scene.robot
-        if (ours.n_limbs, ours.nodes_per_limb) != (robot.n_limbs, robot.nodes_per_limb):
-            raise ValueError(
-                f"The policy was trained on a robot of {ours.n_limbs} limbs of {ours.nodes_per_limb} nodes, "
-                f"the environment's has {robot.n_limbs} limbs of {robot.nodes_per_limb} nodes."
-            )
+        ours, theirs = self.scene.robot.n_limbs, scene.robot.n_limbs
+        if ours != theirs:
+            raise ValueError(f"The policy was trained on a robot of {ours} limbs, the environment's has {theirs}.")
         if actions != self.actions:
             raise ValueError(
                 f'The policy answers with actions="{self.actions}", the environment takes actions="{actions}".'

@@ -21,6 +21,15 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class Clamp:
+    """A limb clamped into a rigid hub: its root edge, the natural direction of that [rad], stiffness K [N m]."""
+
+    edge: int
+    direction: float
+    stiffness: float
+
+
+@dataclass(frozen=True)
 class Star:
     """A star of limbs in a fluid, with the values of section 13.4; SI units, drag_coefficient = 0 is vacuum.
 
@@ -28,6 +37,8 @@ class Star:
     added_mass_coefficient: Fluid accelerated across a limb over that displaced.
     relaxation_time: Of Kelvin-Voigt damping [s].
     current: Velocities of the fluid [m/s] at places [m], both of shape (n, 2), or None if it is at rest.
+    loads: Dead loads (node, F_x, F_y) [N]. gravity: Acceleration of free fall [m/s^2], less buoyancy.
+    held_nodes: Nodes that keep their velocity.
     """
 
     n_limbs: int = 5
@@ -43,6 +54,9 @@ class Star:
     current: Callable[[Array], Array] | None = None
     added_mass_coefficient: float = 0.0
     relaxation_time: float = 0.0
+    loads: tuple[tuple[int, float, float], ...] = ()
+    gravity: tuple[float, float] = (0.0, 0.0)
+    held_nodes: tuple[int, ...] = ()
 
     @property
     def n_nodes(self) -> int:
@@ -89,6 +103,25 @@ class Star:
         """Voronoi length of every hinge [m]."""
         return np.full(len(self.hinges), self.edge_length)
 
+    def node_EI(self, limb: int, i: int) -> float:
+        """Bending stiffness of a limb at its node {limb, i} [N m2]."""
+        return self.EI
+
+    @cached_property
+    def limb_directions(self) -> Array:
+        """Directions of the limbs at the hub at rest [rad], shape (n_limbs,)."""
+        return 2.0 * np.pi * np.arange(self.n_limbs) / self.n_limbs
+
+    @cached_property
+    def natural_turns(self) -> Array:
+        """Natural angle of the hinges within each limb [rad], shape (n_limbs,)."""
+        return np.zeros(self.n_limbs)
+
+    @cached_property
+    def clamps(self) -> list[Clamp]:
+        """Limbs clamped into a rigid hub; none where hinges join them."""
+        return []
+
     @cached_property
     def gaps(self) -> Array:
         """Angle from every limb to the next at rest [rad], shape (n_limbs,)."""
@@ -97,7 +130,7 @@ class Star:
     @cached_property
     def inner_angles(self) -> Array:
         """Natural angle of the hinges within the limbs [rad]."""
-        return np.zeros(len(self.hinges) - self.n_hub_hinges)
+        return np.repeat(self.natural_turns, self.nodes_per_limb - 2)
 
     def node(self, limb: int, i: int) -> int:
         """Row of node {limb, i}, limb counted from 0; i = 0 is the hub."""
@@ -157,11 +190,50 @@ class Star:
         return self.density * np.pi * self.rod_radius**2 * self.voronoi_lengths
 
     @cached_property
+    def forces(self) -> Array:
+        """Constant forces on the nodes [N], shape (n_nodes, 2): loads, and weight less buoyancy."""
+        volumes = self.masses / self.density
+        forces = np.outer((self.density - self.fluid_density) * volumes, self.gravity)
+        for node, *force in self.loads:
+            forces[node] += force
+        return forces
+
+    @cached_property
+    def free(self) -> NDArray[np.bool_]:
+        """Which coordinates may move as they like, shape (2 n_nodes,)."""
+        return np.repeat(~np.isin(np.arange(self.n_nodes), self.held_nodes), 2)
+
+    @cached_property
+    def edge_mass(self) -> Array:
+        """mu of every edge [kg], which has mu |v_head - v_tail|^2/2 less energy than its lumped masses: here none."""
+        return np.zeros(len(self.edges))
+
+    @property
+    def isotropic_coefficient(self) -> float:
+        """C_t where there is one, or C_d: drag of flow in any direction."""
+        along = self.tangential_drag_coefficient
+        return self.drag_coefficient if along is None else along
+
+    @cached_property
     def drag(self) -> Array:
         """1/2 rho_f C_d D dl_i of (13.8) [kg/m], shape (n_nodes,); C_t for C_d where there is one."""
-        along = self.tangential_drag_coefficient
-        coefficient = self.drag_coefficient if along is None else along
-        return 0.5 * self.fluid_density * coefficient * 2.0 * self.rod_radius * self.voronoi_lengths
+        per_speed = 0.5 * self.fluid_density * self.isotropic_coefficient
+        return per_speed * 2.0 * self.rod_radius * self.voronoi_lengths
+
+    @cached_property
+    def drag_places(self) -> tuple[Array, Array]:
+        """(A, c): drag c |w|^3/3 acts on each of the velocities w = A v, shape (n_places, n_nodes): of the nodes."""
+        return np.eye(self.n_nodes), self.drag
+
+    def cross_places(self, edge: int) -> list[tuple[int, float]]:
+        """(row of A, weight) of the velocities across an edge that have drag, weighted by that of half the edge."""
+        tail, head = self.edges[edge]
+        return [(tail, 1.0), (head, 1.0)]
+
+    @cached_property
+    def added_mass_coupling(self) -> Array:
+        """Of every edge [kg], times ((v_head - v_tail) n)^2/2 less energy than that of its ends: here none."""
+        return np.zeros(len(self.edges))
 
     @cached_property
     def edge_radii(self) -> Array:
@@ -233,8 +305,16 @@ class Shaped(Star):
             [self.modulus(limb, i + 0.5) * np.pi * self.radius(limb, i + 0.5) ** 2 for limb, i in self._limb_edges]
         )
 
-    def _EI(self, limb: int, i: int) -> float:
+    def node_EI(self, limb: int, i: int) -> float:
         return self.modulus(limb, i) * np.pi * self.radius(limb, i) ** 4 / 4.0
+
+    @cached_property
+    def limb_directions(self) -> Array:
+        return np.array(self.directions)
+
+    @cached_property
+    def natural_turns(self) -> Array:
+        return np.array(self.curvatures) * np.array(self.lengths) / (self.nodes_per_limb - 1)
 
     @cached_property
     def hinge_dl(self) -> Array:
@@ -247,7 +327,7 @@ class Shaped(Star):
         for (a, b, _), dl in zip(self.hinges, self.hinge_dl, strict=True):
             (limb_a, i_a), (limb_b, i_b) = self._limb_edges[a], self._limb_edges[b]
             at_a, at_b = (limb_b, i_b) if i_b > 0 else (limb_a, i_a), (limb_b, i_b)
-            halves = 0.5 * self.edge_lengths[a] / self._EI(*at_a) + 0.5 * self.edge_lengths[b] / self._EI(*at_b)
+            halves = 0.5 * self.edge_lengths[a] / self.node_EI(*at_a) + 0.5 * self.edge_lengths[b] / self.node_EI(*at_b)
             stiffness.append(dl / halves)
         return np.array(stiffness)
 
@@ -255,16 +335,16 @@ class Shaped(Star):
     def gaps(self) -> Array:
         return np.diff([*self.directions, 2.0 * np.pi])
 
-    @cached_property
-    def inner_angles(self) -> Array:
-        angles = [k * L / (self.nodes_per_limb - 1) for k, L in zip(self.curvatures, self.lengths, strict=True)]
-        return np.repeat(angles, self.nodes_per_limb - 2)
+    @property
+    def edges_before_the_arc(self) -> float:
+        """Edges from the hub to where a curved limb has its direction: its root edge has it."""
+        return 0.0
 
     @cached_property
     def rest(self) -> Array:
         q = np.zeros((self.n_nodes, 2))
         for limb, i in self._limb_edges:
-            angle = self.directions[limb] + i * self.curvatures[limb] * self.lengths[limb] / (self.nodes_per_limb - 1)
+            angle = self.directions[limb] + (i + self.edges_before_the_arc) * self.natural_turns[limb]
             edge = self.edge_lengths[self.edge(limb, i)] * np.array([np.cos(angle), np.sin(angle)])
             q[self.node(limb, i + 1)] = q[self.node(limb, i)] + edge
         return q
@@ -283,9 +363,7 @@ class Shaped(Star):
 
     @cached_property
     def drag(self) -> Array:
-        along = self.tangential_drag_coefficient
-        coefficient = self.drag_coefficient if along is None else along
-        return self._per_node(lambda r: 0.5 * self.fluid_density * coefficient * 2.0 * r)
+        return self._per_node(lambda r: 0.5 * self.fluid_density * self.isotropic_coefficient * 2.0 * r)
 
 
 def stretching_energy(e: Array, EA: float, length: float) -> float:
@@ -355,10 +433,11 @@ def hinge_terms(star: Star, q: Array, delta_psi: ArrayLike) -> Iterator[tuple[in
 
 
 def elastic_energy(star: Star, q: Array, delta_psi: ArrayLike) -> float:
-    """Total elastic energy [J] (13.14), each hub hinge with the length dl that (13.13) lacks."""
+    """Total elastic energy [J] (13.14), each hub hinge with the length dl that (13.13) lacks; or that of clamps."""
     stretching = sum(map(stretching_energy, edge_vectors(star, q), star.edge_EA, star.edge_lengths))
     hinges = zip(hinge_terms(star, q, delta_psi), star.hinge_EI, star.hinge_dl, strict=True)
-    return float(stretching + sum(0.5 * EI * bent**2 * dl for (*_, bent), EI, dl in hinges))
+    bending = sum(0.5 * EI * bent**2 * dl for (*_, bent), EI, dl in hinges)
+    return float(stretching + bending + clamp_slopes(star, q, clamp_turns(star, q, delta_psi))[0])
 
 
 def elastic_gradient(star: Star, q: Array, delta_psi: ArrayLike) -> Array:
@@ -372,6 +451,7 @@ def elastic_gradient(star: Star, q: Array, delta_psi: ArrayLike) -> Array:
         kappa_phi = (1.0 + np.tan(phi / 2.0) ** 2) / dl
         phi_q = D[b].T @ direction_gradient(e[b]) - D[a].T @ direction_gradient(e[a])
         gradient += EI * dl * bent * kappa_phi * phi_q
+    gradient += clamp_slopes(star, q, clamp_turns(star, q, delta_psi))[1]
     return gradient.reshape(-1, 2)
 
 
@@ -389,7 +469,53 @@ def elastic_hessian(star: Star, q: Array, delta_psi: ArrayLike) -> Array:
         phi_qq = D[b].T @ direction_hessian(e[b]) @ D[b] - D[a].T @ direction_hessian(e[a]) @ D[a]
         hessian += EI * dl * (kappa_phi**2 + bent * kappa_phi_phi) * np.outer(phi_q, phi_q)
         hessian += EI * dl * bent * kappa_phi * phi_qq
-    return hessian
+    return hessian + clamp_slopes(star, q, clamp_turns(star, q, delta_psi))[2]
+
+
+def root_angles(star: Star, q: Array) -> Array:
+    """theta [rad] of the root edges that are clamped."""
+    e = edge_vectors(star, q)
+    return np.array([np.arctan2(e[clamp.edge][1], e[clamp.edge][0]) for clamp in star.clamps])
+
+
+def clamp_turns(star: Star, q: Array, delta_psi: ArrayLike) -> Array:
+    """Angles [rad] of clamped root edges from their natural directions, on a hub that is not turned."""
+    natural = (
+        np.array([clamp.direction for clamp in star.clamps]) + np.asarray(delta_psi, dtype=float)[: len(star.clamps)]
+    )
+    return root_angles(star, q) - natural
+
+
+def hub_orientation(turns: Array, K: Array) -> float:
+    """Phi [rad] with the least sum of K (1 - cos(turn - Phi)): the best of many, then Newton's method."""
+    tried = np.linspace(-np.pi, np.pi, 360)
+    phi = tried[np.argmin(np.sum(K * (1.0 - np.cos(turns - tried[:, None])), axis=1))]
+    for _ in range(6):
+        phi += np.sum(K * np.sin(turns - phi)) / np.sum(K * np.cos(turns - phi))
+    return float(phi)
+
+
+def clamp_slopes(star: Star, q: Array, turns: Array) -> tuple[float, Array, Array]:
+    """min over Phi of sum K (1 - cos(turn - Phi)) [J] with its gradient, flat, and Hessian, of root edges so turned.
+
+    At the least energy Phi adds nothing to the gradient, and takes its Schur complement from the Hessian.
+    """
+    n = 2 * star.n_nodes
+    energy, gradient, hessian = 0.0, np.zeros(n), np.zeros((n, n))
+    if not star.clamps:
+        return energy, gradient, hessian
+    K, e = np.array([clamp.stiffness for clamp in star.clamps]), edge_vectors(star, q)
+    off = turns - hub_orientation(turns, K)
+    moments, stiffnesses = K * np.sin(off), K * np.cos(off)
+    coupling = np.zeros(n)
+    for clamp, moment, stiffness in zip(star.clamps, moments, stiffnesses, strict=True):
+        D = star.differences[clamp.edge]
+        theta_q = D.T @ direction_gradient(e[clamp.edge])
+        gradient += moment * theta_q
+        hessian += stiffness * np.outer(theta_q, theta_q) + moment * D.T @ direction_hessian(e[clamp.edge]) @ D
+        coupling -= stiffness * theta_q
+    energy = float(np.sum(2.0 * K * np.sin(off / 2.0) ** 2))
+    return energy, gradient, hessian - np.outer(coupling, coupling) / np.sum(stiffnesses)
 
 
 def relative_velocities(star: Star, v: Array, frozen: Array | None) -> Array:
@@ -397,79 +523,106 @@ def relative_velocities(star: Star, v: Array, frozen: Array | None) -> Array:
     return v if star.current is None else v - star.current(frozen)
 
 
-def half_edges(star: Star, frozen: Array | None) -> Iterator[tuple[int, int, Array]]:
-    """(edge, node, unit normal) of both halves of every edge, where flow across a limb has drag or mass of its own."""
-    if star.cross_drag.any() or star.added_mass.any():
-        for i, e in enumerate(edge_vectors(star, frozen)):
-            normal = np.array([-e[1], e[0]]) / np.linalg.norm(e)
-            for node in star.edges[i]:
-                yield i, node, normal
+def edge_normals(star: Star, frozen: Array | None) -> list[Array]:
+    """Unit normals of the edges, where flow across a limb has drag or mass of its own; else none."""
+    if not (star.cross_drag.any() or star.added_mass.any()):
+        return []
+    return [np.array([-e[1], e[0]]) / np.linalg.norm(e) for e in edge_vectors(star, frozen)]
+
+
+def flows(star: Star, v: Array, frozen: Array | None) -> Array:
+    """Velocities [m/s] relative to the fluid where drag acts, shape (n_places, 2)."""
+    return star.drag_places[0] @ relative_velocities(star, v, frozen)
+
+
+def cross_flows(star: Star, frozen: Array | None) -> Iterator[tuple[int, float, Array]]:
+    """(place, coefficient, unit normal) of the flows across edges that have drag of their own."""
+    for i, normal in enumerate(edge_normals(star, frozen)):
+        for place, weight in star.cross_places(i):
+            yield place, weight * star.cross_drag[i], normal
 
 
 def drag_potential(star: Star, v: Array, frozen: Array | None = None) -> float:
-    """Dissipation potential 1/6 rho_f C_d D |w|^3 dl, summed over the nodes [W], and that of flow across edges."""
-    w = relative_velocities(star, v, frozen)
-    across = sum(star.cross_drag[i] * abs(w[node] @ normal) ** 3 for i, node, normal in half_edges(star, frozen))
-    return float(np.sum(star.drag * np.linalg.norm(w, axis=1) ** 3 / 3.0) + across / 3.0)
+    """Dissipation potential 1/6 rho_f C_d D |w|^3 dl, summed over the places [W], and that of flow across edges."""
+    w, c = flows(star, v, frozen), star.drag_places[1]
+    across = sum(c_n * abs(w[place] @ normal) ** 3 for place, c_n, normal in cross_flows(star, frozen))
+    return float(np.sum(c * np.linalg.norm(w, axis=1) ** 3 / 3.0) + across / 3.0)
 
 
 def drag_force(star: Star, v: Array, frozen: Array | None = None) -> Array:
     """Drag force on every node [N], shape (n_nodes, 2) (13.8)."""
-    w = relative_velocities(star, v, frozen)
+    w, (A, c) = flows(star, v, frozen), star.drag_places
     speed: Array = np.linalg.norm(w, axis=1)
-    force: Array = -(star.drag * speed)[:, None] * w
-    for i, node, normal in half_edges(star, frozen):
-        across = w[node] @ normal
-        force[node] -= star.cross_drag[i] * abs(across) * across * normal
-    return force
+    force: Array = -(c * speed)[:, None] * w
+    for place, c_n, normal in cross_flows(star, frozen):
+        across = w[place] @ normal
+        force[place] -= c_n * abs(across) * across * normal
+    return A.T @ force
 
 
 def drag_jacobian(star: Star, v: Array, frozen: Array | None = None) -> Array:
     """Derivative of (13.8) in the velocities [N s/m], shape (2 n_nodes, 2 n_nodes); zero for a node at rest."""
-    jacobian = np.zeros((2 * star.n_nodes, 2 * star.n_nodes))
-    w = relative_velocities(star, v, frozen)
+    w, (A, c) = flows(star, v, frozen), star.drag_places
+    jacobian = np.zeros((2 * len(w), 2 * len(w)))
     for i, w_i in enumerate(w):
         speed = np.linalg.norm(w_i)
         if speed > 0.0:
-            block = -star.drag[i] * (speed * np.eye(2) + np.outer(w_i, w_i) / speed)
+            block = -c[i] * (speed * np.eye(2) + np.outer(w_i, w_i) / speed)
             jacobian[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = block
-    for i, node, normal in half_edges(star, frozen):
-        across = 2.0 * star.cross_drag[i] * abs(w[node] @ normal)
-        jacobian[2 * node : 2 * node + 2, 2 * node : 2 * node + 2] -= across * np.outer(normal, normal)
-    return jacobian
+    for i, c_n, normal in cross_flows(star, frozen):
+        across = 2.0 * c_n * abs(w[i] @ normal)
+        jacobian[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] -= across * np.outer(normal, normal)
+    at_places = np.kron(A, np.eye(2))
+    return at_places.T @ jacobian @ at_places
 
 
 def kinetic_energy(star: Star, v: Array) -> float:
     """1/2 v M v [J]."""
-    return float(0.5 * np.sum(star.masses[:, None] * v**2))
+    return float(0.5 * v.ravel() @ inertia_matrix(star) @ v.ravel())
+
+
+def inertia_matrix(star: Star) -> Array:
+    """Lumped masses less what consistent ones take [kg], shape (2 n_nodes, 2 n_nodes)."""
+    matrix = np.diag(np.repeat(star.masses, 2))
+    for mu, D in zip(star.edge_mass, star.differences, strict=True):
+        if mu:
+            matrix -= mu * D.T @ D
+    return matrix
 
 
 def mass_matrix(star: Star, frozen: Array | None) -> Array:
-    """Lumped masses and added mass [kg], shape (2 n_nodes, 2 n_nodes)."""
-    matrix = np.diag(np.repeat(star.masses, 2))
-    for i, node, normal in half_edges(star, frozen):
-        matrix[2 * node : 2 * node + 2, 2 * node : 2 * node + 2] += star.added_mass[i] * np.outer(normal, normal)
+    """Masses and added mass [kg], shape (2 n_nodes, 2 n_nodes)."""
+    matrix = inertia_matrix(star)
+    for i, normal in enumerate(edge_normals(star, frozen)):
+        across, D = np.outer(normal, normal), star.differences[i]
+        for node in star.edges[i]:
+            matrix[2 * node : 2 * node + 2, 2 * node : 2 * node + 2] += star.added_mass[i] * across
+        matrix -= star.added_mass_coupling[i] * D.T @ across @ D
     return matrix
 
 
 def strains(star: Star, q: Array) -> Iterator[tuple[float, float, Array, Array]]:
     """Of every edge (EA l, eps, grad eps, Hess eps), of every hinge (EI dl, kappa, grad kappa, Hess kappa)."""
-    D, e, dl = star.differences, edge_vectors(star, q), star.edge_length
-    for D_e, e_i in zip(D, e, strict=True):
+    D, e = star.differences, edge_vectors(star, q)
+    for D_e, e_i, EA, length in zip(D, e, star.edge_EA, star.edge_lengths, strict=True):
         size = np.linalg.norm(e_i)
         along = e_i / size
         across = (np.eye(2) - np.outer(along, along)) / size
-        yield star.EA * dl, float(size / dl - 1.0), D_e.T @ along / dl, D_e.T @ across @ D_e / dl
-    for (a, b, sign), (_, _, phi, _) in zip(star.hinges, hinge_terms(star, q, np.zeros(star.n_limbs)), strict=True):
+        yield EA * length, float(size / length - 1.0), D_e.T @ along / length, D_e.T @ across @ D_e / length
+    phis = [phi for _, _, phi, _ in hinge_terms(star, q, np.zeros(star.n_limbs))]
+    for (a, b, sign), phi, EI, dl in zip(star.hinges, phis, star.hinge_EI, star.hinge_dl, strict=True):
         t = np.tan(phi / 2.0)
         phi_q = D[b].T @ direction_gradient(e[b]) - D[a].T @ direction_gradient(sign * e[a]) * sign
         phi_qq = D[b].T @ direction_hessian(e[b]) @ D[b] - D[a].T @ direction_hessian(e[a]) @ D[a]
         slope = (1.0 + t**2) / dl
-        yield star.EI * dl, curvature(phi, dl), slope * phi_q, slope * phi_qq + t * slope * np.outer(phi_q, phi_q)
+        yield EI * dl, curvature(phi, dl), slope * phi_q, slope * phi_qq + t * slope * np.outer(phi_q, phi_q)
 
 
 def damping_potential(star: Star, q: Array, q_hat: Array, gamma: float) -> tuple[float, Array, Array]:
-    """gamma R [J] with its gradient, flat, and Hessian: 1/2 tau EA l (d eps/dt)^2 + 1/2 tau EI dl (d kappa/dt)^2."""
+    """gamma R [J] with its gradient, flat, and Hessian: 1/2 tau EA l (d eps/dt)^2 + 1/2 tau EI dl (d kappa/dt)^2.
+
+    Clamped root edges are damped as they are held, with the directions that they had before for natural ones.
+    """
     n = 2 * star.n_nodes
     potential, gradient, hessian = 0.0, np.zeros(n), np.zeros((n, n))
     if star.relaxation_time > 0.0:
@@ -480,6 +633,11 @@ def damping_potential(star: Star, q: Array, q_hat: Array, gamma: float) -> tuple
             potential += gamma * 0.5 * star.relaxation_time * stiffness * rate**2
             gradient += star.relaxation_time * stiffness * rate * slope
             hessian += star.relaxation_time * stiffness * (np.outer(slope, slope) / gamma + rate * bend)
+        at_hub = clamp_slopes(star, q, root_angles(star, q) - root_angles(star, q_hat))
+        ratio = star.relaxation_time / gamma
+        potential, gradient, hessian = (
+            x + ratio * y for x, y in zip((potential, gradient, hessian), at_hub, strict=True)
+        )
     return potential, gradient, hessian
 
 
@@ -492,7 +650,8 @@ def incremental_potential(
     """
     d = ((q - q_hat) / gamma - v_hat).ravel()
     inertia = float(0.5 * d @ mass_matrix(star, frozen) @ d) + damping_potential(star, q, q_hat, gamma)[0]
-    return inertia + elastic_energy(star, q, delta_psi) + gamma * drag_potential(star, (q - q_hat) / gamma, frozen)
+    forced = elastic_energy(star, q, delta_psi) - float(np.sum(star.forces * q))
+    return inertia + forced + gamma * drag_potential(star, (q - q_hat) / gamma, frozen)
 
 
 def incremental_gradient(
@@ -502,7 +661,7 @@ def incremental_gradient(
     v = (q - q_hat) / gamma
     drag = drag_force(star, v, frozen)
     inertia = mass_matrix(star, frozen) @ (v - v_hat).ravel() / gamma + damping_potential(star, q, q_hat, gamma)[1]
-    return inertia.reshape(-1, 2) + elastic_gradient(star, q, delta_psi) - drag
+    return inertia.reshape(-1, 2) + elastic_gradient(star, q, delta_psi) - drag - star.forces
 
 
 def incremental_hessian(
@@ -551,7 +710,10 @@ def stage(
     data = q_hat, v_hat, gamma, delta_psi, frozen
     for _ in range(max_iterations):
         gradient = incremental_gradient(star, q, *data)
-        update = descent(incremental_hessian(star, q, q_hat, gamma, delta_psi, frozen), gradient)
+        hessian = incremental_hessian(star, q, q_hat, gamma, delta_psi, frozen)
+        update = np.zeros_like(q)
+        free = star.free.reshape(-1, 2)
+        update[free] = descent(hessian[np.ix_(star.free, star.free)], gradient[free]).ravel()
         fraction = backtracked(star, q, update, float(np.sum(gradient * update)), *data)
         q = q + fraction * update
         if fraction == 1.0 and np.max(np.abs(update)) <= 1e-12 * star.limb_length:

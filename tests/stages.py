@@ -75,20 +75,31 @@ class RandomStages:
 
     def convex_hessian(self, lane: int) -> np.ndarray:
         """The Hessian without what may be negative: compression, curvature of the angles, bending's second part."""
-        star, q, dl = self.star, self.q[lane], self.star.edge_length
-        hessian = np.diag(np.repeat(star.masses, 2)) / self.gamma**2
+        star, q = self.star, self.q[lane]
+        hessian = oracle.inertia_matrix(star) / self.gamma**2
         hessian -= oracle.drag_jacobian(star, (q - self.q_hat[lane]) / self.gamma) / self.gamma
         D, edges = star.differences, oracle.edge_vectors(star, q)
-        for D_e, e in zip(D, edges, strict=True):
+        for D_e, e, EA, length in zip(D, edges, star.edge_EA, star.edge_lengths, strict=True):
             size = np.linalg.norm(e)
             along = np.outer(e, e) / size**2
-            pull = max(star.EA * (size / dl - 1.0), 0.0) / size
-            hessian += D_e.T @ (star.EA / dl * along + pull * (np.eye(2) - along)) @ D_e
-        for a, b, phi, _ in oracle.hinge_terms(star, q, self.delta_psi[lane]):
+            pull = max(EA * (size / length - 1.0), 0.0) / size
+            hessian += D_e.T @ (EA / length * along + pull * (np.eye(2) - along)) @ D_e
+        hinges = zip(oracle.hinge_terms(star, q, self.delta_psi[lane]), star.hinge_EI, star.hinge_dl, strict=True)
+        for (a, b, phi, _), EI, dl in hinges:
             kappa_q = D[b].T @ oracle.direction_gradient(edges[b]) - D[a].T @ oracle.direction_gradient(edges[a])
             kappa_q *= (1.0 + np.tan(phi / 2.0) ** 2) / dl
-            hessian += star.EI * dl * np.outer(kappa_q, kappa_q)
-        return hessian
+            hessian += EI * dl * np.outer(kappa_q, kappa_q)
+        return hessian + self.convex_clamps(lane) if star.clamps else hessian
+
+    def convex_clamps(self, lane: int) -> np.ndarray:
+        """Clamps without the curvature of angles, and those turned by more than a quarter without stiffness."""
+        star, edges = self.star, oracle.edge_vectors(self.star, self.q[lane])
+        turns = oracle.clamp_turns(star, self.q[lane], self.delta_psi[lane])
+        K = np.array([clamp.stiffness for clamp in star.clamps])
+        C = np.maximum(K * np.cos(turns - oracle.hub_orientation(turns, K)), 0.0)
+        roots = [clamp.edge for clamp in star.clamps]
+        theta_q = np.array([star.differences[e].T @ oracle.direction_gradient(edges[e]) for e in roots])
+        return theta_q.T @ (np.diag(C) - np.outer(C, C) / C.sum()) @ theta_q
 
     def run(self, rods: Rods, convex=0.0, q=None, q_0=None, ahead=False):
         """Phi, decrement and pivot per lane, and the Newton direction, shape (N_LANES, n_nodes, 2)."""
@@ -96,8 +107,12 @@ class RandomStages:
         work = make_work(rods, 1)
         for rows, nodes in ((work.q, self.frozen), (work.q_hat, self.q_hat), (work.v_hat, self.v_hat)):
             rows[:] = nodes.reshape(N_LANES, -1).T
-        natural = np.array([oracle.natural_angles(star, d)[-star.n_limbs :] for d in self.delta_psi])
-        work.hub_EI_kappa_bar[:] = star.EI * 2.0 * np.tan(natural.T / 2.0) / star.edge_length
+        if star.clamps:
+            natural = np.array([clamp.direction for clamp in star.clamps]) + self.delta_psi
+            work.hub_direction[:] = np.stack([np.cos(natural), np.sin(natural)], axis=2).reshape(N_LANES, -1).T
+        else:
+            natural = np.array([oracle.natural_angles(star, d)[-star.n_limbs :] for d in self.delta_psi])
+            work.hub_EI_kappa_bar[:] = star.EI * 2.0 * np.tan(natural.T / 2.0) / star.edge_length
         result = np.zeros((4, N_LANES))
         rows, rows_0 = (np.ascontiguousarray(x.reshape(N_LANES, -1).T) for x in (q, self.q if q_0 is None else q_0))
         direction(rods, work, rows, rows_0, self.gamma, ahead, np.full((1, N_LANES), convex), result)

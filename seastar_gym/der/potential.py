@@ -38,7 +38,8 @@ from seastar_gym.der.linear.star_matrix import (
     solve_ring,
     store_root,
 )
-from seastar_gym.der.star import load_root_edge, tail_node
+from seastar_gym.der.motion import Motion, node_motion
+from seastar_gym.der.star import load_root_edge
 from seastar_gym.der.terms.added_mass import add_fluid_inertia, less_edge_fluid_inertia
 from seastar_gym.der.terms.bending import bending_energy, bending_slopes, moment
 from seastar_gym.der.terms.clamp import assemble_clamps
@@ -46,13 +47,11 @@ from seastar_gym.der.terms.contact import add_contact, contact_force
 from seastar_gym.der.terms.damping import damped_energy, damped_stiffness, damped_stress
 from seastar_gym.der.terms.drag import (
     add_cross_flow,
-    add_middle,
     add_scalar,
-    couple_middle,
     drag_slopes,
     middle_slopes,
-    push_middle,
-    relative,
+    push_ends,
+    with_middle,
 )
 from seastar_gym.der.terms.inertia import less_edge_inertia
 from seastar_gym.der.terms.load import load_power, nodal_load
@@ -62,12 +61,14 @@ from seastar_gym.simd.lanes import add_product, load, select, splat, store, subt
 
 
 @kernel
-def edge_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex):
-    """(E, f, K) of an edge: elasticity, damping and, with consistent masses, what its inertia differs from lumped."""
+def edge_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex, tail, head):
+    """(E, f, K) of an edge: elasticity, damping and, with consistent masses, what its inertia differs from lumped.
+
+    tail, head: Motions of its ends.
+    """
     slopes = elastic_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex)
-    tail = tail_node(rods, e)
-    slopes = less_edge_inertia(rods.edge_mass, work, stage, e, tail, slopes)
-    return less_edge_fluid_inertia(rods.edge_added_mass, work, stage, e, tail, slopes)
+    slopes = less_edge_inertia(rods.edge_mass, stage, e, tail, head, slopes)
+    return less_edge_fluid_inertia(rods.edge_added_mass, work, stage, e, tail, head, slopes)
 
 
 @kernel
@@ -130,15 +131,11 @@ def positive_part(x):
 
 
 @kernel
-def node_slopes(contact, rods, work, stage, node):
+def node_slopes(contact, rods, work, stage, node, motion):
     """(energy, gradient, Hessian) of a node's inertia, drag and load, and of what contact pushes it (or None)."""
-    qx, qy = load(work.q, 2 * node), load(work.q, 2 * node + 1)
-    vx = (qx - load(stage.q_hat, 2 * node)) * stage.inverse_gamma
-    vy = (qy - load(stage.q_hat, 2 * node + 1)) * stage.inverse_gamma
-    dx, dy = vx - load(stage.v_hat, 2 * node), vy - load(stage.v_hat, 2 * node + 1)
+    dx, dy, wx, wy = motion
     m = load(rods.mass, node)
     m_over_gamma = m * stage.inverse_gamma
-    wx, wy = relative(work.current, node, vx, vy)
     potential, c_speed, c_over_speed = drag_slopes(load(rods.drag, node), wx, wy)
     c_over_speed *= stage.inverse_gamma
     sx, sy = c_over_speed * wx, c_over_speed * wy
@@ -213,6 +210,14 @@ def inner_edge(work, limb, first, i):
     return edge_geometry(work.q, first + i - 1, first + i)
 
 
+@kernel
+def hub_motion(clamp, work, stage):
+    """Motion of the hub for the root edges, where a rigid hub's discretisation asks for it."""
+    if clamp is None:
+        return Motion(splat(0.0), splat(0.0), splat(0.0), splat(0.0))
+    return node_motion(work, stage, 0)
+
+
 @inlined_kernel
 def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
     """Assemble and eliminate a limb from its tip to node 2, and put its root node into the ring.
@@ -228,52 +233,60 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
     D, B, r = (zero, zero, zero), (zero, zero, zero, zero), (zero, zero)
     D_before, r_before = D, r
     slope, s = zero, zero
-    edge = inner_edge(work, limb, first, edges)
+    edge, motion = inner_edge(work, limb, first, edges), node_motion(work, stage, first + edges)
     for i in range(edges, 1, -1):
         node = first + i
         e = node - 1
-        before = inner_edge(work, limb, first, i - 1)
+        before, motion_before = inner_edge(work, limb, first, i - 1), node_motion(work, stage, node - 1)
         t = half_angle(before, edge, 1.0)
         E_b, slope_before, s_before = hinge_slopes(rods, work, stage, e, t, load(rods.bending.EI_kappa_bar, e), convex)
-        E_s, f, K = edge_slopes(rods, work, stage, e, edge, slope_before - slope, s_before + s, convex)
-        E_n, g, inertia = node_slopes(work.contact, rods, work, stage, node)
+        net_moment, stiffness = slope_before - slope, s_before + s
+        E_s, f, K = edge_slopes(
+            rods, work, stage, e, edge, net_moment, stiffness, convex, motion_before, motion
+        )
+        E_n, g, inertia = node_slopes(work.contact, rods, work, stage, node, motion)
         energy += (E_s + E_n) + E_b
         P = coupling(s_before, edge, before)
-        D_1 = (D_before[0] + K[0] + 2.0 * P[0], D_before[1] + K[1] + (P[1] + P[2]), D_before[2] + K[2] + 2.0 * P[3])
-        K_P = (K[0] + P[0], K[1] + P[1], K[1] + P[2], K[2] + P[3])
-        E_m, g_m, h_m = middle_slopes(rods.middle_drag, rods, work, stage, e, node - 1, node)
+        E_m, g_m, h_m = middle_slopes(rods.middle_drag, rods, work, stage, e, motion_before, motion)
         energy = add_scalar(rods.middle_drag, energy, E_m)
+        f_head, f_tail = push_ends(rods.middle_drag, f, g_m)
+        K, K_B = with_middle(rods.middle_drag, K, h_m)
+        D_1 = (D_before[0] + K[0] + 2.0 * P[0], D_before[1] + K[1] + (P[1] + P[2]), D_before[2] + K[2] + 2.0 * P[3])
+        K_P = (K_B[0] + P[0], K_B[1] + P[1], K_B[1] + P[2], K_B[2] + P[3])
         D, B, D_before, r, r_before, part, node_pivot = eliminate_node(
             work,
             node,
-            add_middle(rods.middle_drag, add_symmetric(D, add_symmetric(inertia, K)), h_m),
-            couple_middle(rods.middle_drag, (B[0] - K_P[0], B[1] - K_P[1], B[2] - K_P[2], B[3] - K_P[3]), h_m),
+            add_symmetric(D, add_symmetric(inertia, K)),
+            (B[0] - K_P[0], B[1] - K_P[1], B[2] - K_P[2], B[3] - K_P[3]),
             P,
-            push_middle(rods.middle_drag, (r[0] + (g[0] + f[0]), r[1] + (g[1] + f[1])), g_m),
-            add_middle(rods.middle_drag, D_1, h_m),
+            (r[0] + (g[0] + f_head[0]), r[1] + (g[1] + f_head[1])),
+            D_1,
             negative(P),
             (zero, zero, zero),
-            push_middle(rods.middle_drag, (r_before[0] - f[0], r_before[1] - f[1]), g_m),
+            (r_before[0] - f_tail[0], r_before[1] - f_tail[1]),
             (zero, zero),
         )
         decrement += part
         pivot = smaller(pivot, node_pivot)
-        slope, s, edge = slope_before, s_before, before
+        slope, s, edge, motion = slope_before, s_before, before, motion_before
     net_moment, stiffness = load(work.hub_moment, limb) - slope, load(work.hub_stiffness, limb) + s
-    E_s, f, K = edge_slopes(rods, work, stage, first, edge, net_moment, stiffness, convex)
-    E_n, g, inertia = node_slopes(work.contact, rods, work, stage, first + 1)
-    E_m, g_m, h_m = middle_slopes(rods.middle_drag, rods, work, stage, first, 0, first + 1)
+    of_hub = hub_motion(rods.clamp, work, stage)
+    E_s, f, K = edge_slopes(rods, work, stage, first, edge, net_moment, stiffness, convex, of_hub, motion)
+    E_n, g, inertia = node_slopes(work.contact, rods, work, stage, first + 1, motion)
+    E_m, g_m, h_m = middle_slopes(rods.middle_drag, rods, work, stage, first, of_hub, motion)
     energy = add_scalar(rods.middle_drag, energy, E_m)
+    f_head, f_tail = push_ends(rods.middle_drag, f, g_m)
+    K, K_B = with_middle(rods.middle_drag, K, h_m)
     store_root(
         work,
         limb,
-        add_middle(rods.middle_drag, add_symmetric(D, add_symmetric(inertia, K)), h_m),
-        couple_middle(rods.middle_drag, (B[0] - K[0], B[1] - K[1], B[2] - K[1], B[3] - K[2]), h_m),
-        push_middle(rods.middle_drag, (r[0] + (g[0] + f[0]), r[1] + (g[1] + f[1])), g_m),
+        add_symmetric(D, add_symmetric(inertia, K)),
+        (B[0] - K_B[0], B[1] - K_B[1], B[2] - K_B[1], B[3] - K_B[2]),
+        (r[0] + (g[0] + f_head[0]), r[1] + (g[1] + f_head[1])),
     )
     return (
-        add_middle(rods.middle_drag, add_symmetric(D_hub, add_symmetric(D_before, K)), h_m),
-        push_middle(rods.middle_drag, (r_hub[0] + r_before[0] - f[0], r_hub[1] + r_before[1] - f[1]), g_m),
+        add_symmetric(D_hub, add_symmetric(D_before, K)),
+        (r_hub[0] + r_before[0] - f_tail[0], r_hub[1] + r_before[1] - f_tail[1]),
         energy + E_s + E_n,
         decrement,
         pivot,
@@ -290,7 +303,7 @@ def factorise(rods, work, stage, convex):
     which is not positive (or NaN) where the Hessian is not positive definite.
     """
     energy = add_contact(rods.contact, rods, work, stage, assemble_hub(rods.clamp, rods, work, stage, convex))
-    E_n, r_hub, D_hub = node_slopes(work.contact, rods, work, stage, 0)
+    E_n, r_hub, D_hub = node_slopes(work.contact, rods, work, stage, 0, node_motion(work, stage, 0))
     energy += E_n
     decrement, pivot = splat(0.0), splat(np.inf)
     for limb in range(rods.n_limbs):

@@ -1,18 +1,21 @@
-"""Observation of a robot: states of its nodes, velocity of the hub and waypoints, in a frame that turns with it.
+"""Observation of a robot: positions and velocities of its stations, velocity of the hub and waypoints, in a body frame.
+
+A limb has nine stations, evenly spaced from hub to tip, whatever its nodes, see stations.py: observations, and policies
+made for them, do not depend on the mesh. Stations of the chapter's robot are its nodes.
 
 The body frame has its origin at the hub. Its x axis is the direction of limb 1 of the rest shape, after the rotation
-that fits the rest shape best to the nodes (least squares over all nodes). Every number is of order one; lengths are in
-units of the robot's own limb length:
+that fits the rest shape best to the robot (least squares over all stations). Every number is of order one; lengths are
+in units of the robot's own limb length:
 
 index                 meaning                                           unit
-0 .. 2m-1             node positions relative to the hub, x and y       limb lengths
-2m .. 4m-1            node velocities relative to the hub, x and y      VELOCITY_SCALE
+0 .. 2m-1             station positions relative to the hub, x and y    limb lengths
+2m .. 4m-1            station velocities relative to the hub, x and y   VELOCITY_SCALE
 4m, 4m+1              hub velocity, x and y                             VELOCITY_SCALE
 4m+2, 4m+3            current waypoint relative to the hub, x and y     limb lengths
 4m+4, 4m+5            next waypoint relative to the hub, x and y        limb lengths
 
-with m = n_nodes - 1 nodes in the order {1,1}..{1,N-1}, {2,1}.. (m = 45 for the chapter's robot: 186 numbers). On the
-last leg the next waypoint is the current one. Distances of waypoints are not clipped.
+with m = 9 n_limbs stations in the order {1,1}..{1,9}, {2,1}.. (m = 45 for five limbs: 186 numbers). On the last leg the
+next waypoint is the current one. Distances of waypoints are not clipped.
 
 If actuators have a memory (a `StatefulActuator`), the numbers of its `observe` for limb 1, limb 2, .. stand before the
 waypoints, which are always the last four numbers. `Layout` names all these places.
@@ -24,12 +27,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.envs.stations import N_STATIONS
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import StatefulActuator
 from seastar_gym.simd.compilation import entry_point, kernel
-from seastar_gym.simd.lanes import add_product, borrow, load, select, splat, sqrt, store
+from seastar_gym.simd.lanes import add_product, borrow, load, load_number, select, splat, sqrt, store
 
-OBSERVATION_LAYOUT = 1
+OBSERVATION_LAYOUT = 2
 """Version of this table, which saved policies name. A change of order, unit or frame gives it another number."""
 VELOCITY_SCALE = 0.025
 """Unit of velocities [m/s]: nodes and hub move at 12 to 24 mm/s root mean square after strokes of random commands."""
@@ -46,7 +50,7 @@ class Layout(NamedTuple):
     next_waypoint: slice
 
     @property
-    def nodes_and_hub(self) -> slice:
+    def stations_and_hub(self) -> slice:
         """Place of the positions, the velocities and the hub's velocity."""
         return slice(0, self.hub_velocity.stop)
 
@@ -62,49 +66,62 @@ class Layout(NamedTuple):
 
 
 @cache
-def layout(n_nodes: int, n_remembered: int = 0) -> Layout:
-    """Layout for a robot of n_nodes nodes whose actuators remember n_remembered numbers in all."""
-    nodes = 2 * (n_nodes - 1)
-    ends = np.cumsum([nodes, nodes, 2, n_remembered, 2, 2]).tolist()
+def layout(n_limbs: int, n_remembered: int = 0) -> Layout:
+    """Layout for a robot of n_limbs limbs whose actuators remember n_remembered numbers in all."""
+    along_limbs = 2 * N_STATIONS * n_limbs
+    ends = np.cumsum([along_limbs, along_limbs, 2, n_remembered, 2, 2]).tolist()
     return Layout(*map(slice, [0, *ends[:-1]], ends))
-
-
-def layout_of_size(size: int) -> Layout:
-    """Layout of an observation of `size` numbers, for actuators that remember nothing."""
-    return layout((size - 6) // 4 + 1)
 
 
 def scene_layout(scene: Scene) -> Layout:
     """Layout for the robot of a scene."""
-    actuator, robot = scene.actuator, scene.robot
+    actuator, n_limbs = scene.actuator, scene.robot.n_limbs
     remembered = actuator.observe(actuator.rest).shape[-1] if isinstance(actuator, StatefulActuator) else 0
-    return layout(robot.n_nodes, remembered * robot.n_limbs)
+    return layout(n_limbs, remembered * n_limbs)
 
 
-def observation_size(n_nodes: int) -> int:
-    """Length of the observation of a robot of n_nodes nodes whose actuators remember nothing."""
-    return layout(n_nodes).size
+def observation_size(n_limbs: int) -> int:
+    """Length of the observation of a robot of n_limbs limbs whose actuators remember nothing."""
+    return layout(n_limbs).size
 
 
-def with_memory(observations: NDArray[Any], remembered: NDArray[Any]) -> NDArray[Any]:
+def with_memory(observations: NDArray[Any], remembered: NDArray[Any], n_limbs: int) -> NDArray[Any]:
     """Observations, shape (n, size), with the memory of actuators, shape (n, k), in its place; unchanged if k = 0."""
     if remembered.shape[1] == 0:
         return observations
-    bare = layout_of_size(observations.shape[1])
-    parts = observations[:, bare.nodes_and_hub], remembered.astype(observations.dtype), observations[:, bare.waypoints]
+    at = layout(n_limbs)
+    parts = observations[:, at.stations_and_hub], remembered.astype(observations.dtype), observations[:, at.waypoints]
     return np.hstack(parts)
 
 
 @kernel
-def body_axis(rest, q, n_nodes):
-    """(cos, sin) of the rotation that fits the rest shape best to the nodes around the hub; (1, 0) if none does."""
+def at_station(rows, stations, limb, station):
+    """(x, y) at a station of a limb relative to the hub, of rows that have x and y of every node.
+
+    At a station that is a node, no bit differs from the node's.
+    """
+    first, last = int(load_number(stations.first, station)), int(load_number(stations.last, station))
+    to_node, to_weight = 1 + limb * stations.n_nodes, station * stations.n_nodes
+    hub_x, hub_y = load(rows, 0), load(rows, 1)
+    weight, row = load_number(stations.weights, to_weight + first), 2 * (to_node + first)
+    x, y = weight * (load(rows, row) - hub_x), weight * (load(rows, row + 1) - hub_y)
+    for node in range(first + 1, last):
+        weight, row = load_number(stations.weights, to_weight + node), 2 * (to_node + node)
+        x = add_product(x, weight, load(rows, row) - hub_x)
+        y = add_product(y, weight, load(rows, row + 1) - hub_y)
+    return x, y
+
+
+@kernel
+def body_axis(rest, q, stations, n_limbs):
+    """(cos, sin) of the rotation that fits the rest shape best to the stations around the hub; (1, 0) if none does."""
     c, s = splat(0.0), splat(0.0)
-    hub_x, hub_y = load(q, 0), load(q, 1)
-    for node in range(1, n_nodes):
-        rest_x, rest_y = load(rest, 2 * node), load(rest, 2 * node + 1)
-        x, y = load(q, 2 * node) - hub_x, load(q, 2 * node + 1) - hub_y
-        c = add_product(add_product(c, rest_x, x), rest_y, y)
-        s = add_product(s, rest_x, y) - rest_y * x
+    for limb in range(n_limbs):
+        for station in range(stations.n_stations):
+            rest_x, rest_y = at_station(rest, stations, limb, station)
+            x, y = at_station(q, stations, limb, station)
+            c = add_product(add_product(c, rest_x, x), rest_y, y)
+            s = add_product(s, rest_x, y) - rest_y * x
     norm = sqrt(c * c + s * s)
     lost = norm == 0.0
     return select(lost, 1.0, c / norm), select(lost, 0.0, s / norm)
@@ -118,15 +135,18 @@ def store_turned(out, row, x, y, c, s):
 
 
 @entry_point
-def observe(rest, limb_length, q, v, targets, velocity_scale, out):
+def observe(rest, limb_length, q, v, stations, targets, velocity_scale, out):
     """Fill the observations of lane groups.
 
     rest: Rest positions [m], shape (n_groups, 2 n_nodes, N_LANES), or (1, ..) for all groups. limb_length: Unit of
         lengths [m], shape (n_groups, 1, N_LANES), likewise. q, v: [m], [m/s], shape (n_groups, 2 n_nodes, N_LANES).
-    targets: Current and next waypoint in the world frame [m], shape (n_groups, 4, N_LANES).
+    stations: `Stations` of the robot. targets: Current and next waypoint in the world frame [m], shape
+        (n_groups, 4, N_LANES).
     out: Observations, shape (n_groups, observation size, N_LANES).
     """
-    n_nodes, per_velocity = rest.shape[1] // 2, 1.0 / velocity_scale
+    n_limbs, per_velocity = (rest.shape[1] // 2 - 1) // stations.n_nodes, 1.0 / velocity_scale
+    places = borrow(stations)
+    velocities = 2 * n_limbs * stations.n_stations
     for group in range(q.shape[0]):
         rest_rows = borrow(rest[group % rest.shape[0]])
         per_length = 1.0 / load(borrow(limb_length[group % limb_length.shape[0]]), 0)
@@ -136,16 +156,16 @@ def observe(rest, limb_length, q, v, targets, velocity_scale, out):
             borrow(targets[group]),
             borrow(out[group]),
         )
-        c, s = body_axis(rest_rows, position, n_nodes)
+        c, s = body_axis(rest_rows, position, places, n_limbs)
         hub_x, hub_y = load(position, 0), load(position, 1)
         hub_vx, hub_vy = load(velocity, 0), load(velocity, 1)
-        velocities = 2 * (n_nodes - 1)
-        for node in range(1, n_nodes):
-            row = 2 * (node - 1)
-            x, y = load(position, 2 * node) - hub_x, load(position, 2 * node + 1) - hub_y
-            store_turned(rows, row, x * per_length, y * per_length, c, s)
-            vx, vy = load(velocity, 2 * node) - hub_vx, load(velocity, 2 * node + 1) - hub_vy
-            store_turned(rows, velocities + row, vx * per_velocity, vy * per_velocity, c, s)
+        for limb in range(n_limbs):
+            for station in range(stations.n_stations):
+                row = 2 * (limb * stations.n_stations + station)
+                x, y = at_station(position, places, limb, station)
+                store_turned(rows, row, x * per_length, y * per_length, c, s)
+                vx, vy = at_station(velocity, places, limb, station)
+                store_turned(rows, velocities + row, vx * per_velocity, vy * per_velocity, c, s)
         row = 2 * velocities
         store_turned(rows, row, hub_vx * per_velocity, hub_vy * per_velocity, c, s)
         for k in range(2):

@@ -41,20 +41,22 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     Actions have no unit. `env.command_table[number]` is the command of every limb: 0, 1 (+) or -1 (-).
 
     ## Observation space
-    `Box(-inf, inf, (186,), float32)` for the chapter's robot. Vectors are seen in a body frame: its origin is the hub,
-    and its x axis turns with the robot, see `seastar_gym.envs.observation`. Lengths are in units of the limb's length:
+    `Box(-inf, inf, (186,), float32)` for five limbs. A limb is seen at nine stations, evenly spaced from hub to tip,
+    whatever its nodes; {i,k} is station k of limb i, for the chapter's robot a node. Vectors are seen in a body frame:
+    its origin is the hub, and its x axis turns with the robot, see `seastar_gym.envs.observation`. Lengths are in units
+    of the limb's length:
 
     | index    | meaning                                                              | unit      | range       |
     |----------|----------------------------------------------------------------------|-----------|-------------|
-    | 0..89    | positions relative to the hub of nodes {1,1}..{5,9}: x, y, x, y, ..  | 0.1 m     | (-inf, inf) |
-    | 90..179  | velocities relative to the hub of nodes {1,1}..{5,9}: x, y, x, y, .. | 0.025 m/s | (-inf, inf) |
+    | 0..89    | positions of stations {1,1}..{5,9} relative to the hub: x, y, ..     | 0.1 m     | (-inf, inf) |
+    | 90..179  | velocities of stations {1,1}..{5,9} relative to the hub: x, y, ..    | 0.025 m/s | (-inf, inf) |
     | 180..181 | velocity of the hub: x, y                                            | 0.025 m/s | (-inf, inf) |
     | 182..183 | current waypoint relative to the hub: x, y                           | 0.1 m     | (-inf, inf) |
     | 184..185 | next waypoint relative to the hub: x, y; on the last leg the current | 0.1 m     | (-inf, inf) |
 
-    Other robots have other numbers of nodes. If a scene's actuators have a memory, such as the temperatures of
-    `ThermalSma`, it stands before the waypoints, limb after limb. `seastar_gym.envs.observation.Layout` names all
-    these places.
+    A robot of other than five limbs has as many times nine stations. If a scene's actuators have a memory, such as the
+    temperatures of `ThermalSma`, it stands before the waypoints, limb after limb.
+    `seastar_gym.envs.observation.Layout` names all these places.
 
     ## Reward
     The sum of three terms, with the weights of `RewardWeights`; each term is in `info`, too:

@@ -19,6 +19,7 @@ from seastar_gym.envs.observation import (
 from seastar_gym.envs.paths import FARTHEST, cross_track_error, make_path
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, drawn_scene
 from seastar_gym.envs.reward import RewardWeights, reward_terms
+from seastar_gym.envs.stations import stations
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.scene.checks import require_flag, require_number, shown
 from seastar_gym.scene.fidelity import measured
@@ -197,10 +198,11 @@ class SwimTask:
         simulator = self.simulator
         targets = np.concatenate([self._waypoint(self.waypoint_index), self._waypoint(self.waypoint_index + 1)], axis=1)
         target_rows = to_rows(targets)
-        own, n_nodes = simulator.coefficients, simulator.scene.robot.n_nodes
-        out = np.empty((len(target_rows), observation_size(n_nodes), target_rows.shape[2]))
-        observe(own.rest, own.limb_length, simulator.q, simulator.v, target_rows, VELOCITY_SCALE, out)
-        return with_memory(to_float32(out, self.n_robots), simulator.observe_actuators())
+        own, robot = simulator.coefficients, simulator.scene.robot
+        out = np.empty((len(target_rows), observation_size(robot.n_limbs), target_rows.shape[2]))
+        places = stations(robot.nodes_per_limb)
+        observe(own.rest, own.limb_length, simulator.q, simulator.v, places, target_rows, VELOCITY_SCALE, out)
+        return with_memory(to_float32(out, self.n_robots), simulator.observe_actuators(), robot.n_limbs)
 
     def step(self, commands: Floats) -> Outcome:
         """One stroke of every robot."""

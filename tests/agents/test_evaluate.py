@@ -292,7 +292,7 @@ def ragged_path(folder):
         (lambda folder: ["--agents", str(folder / "none.zip")], "There is no trained policy at"),
         (lambda folder: ["--agents", str(folder / "none.safetensors")], "There is no trained policy at"),
         (lambda folder: ["--agents", damaged_policy(folder)], "is damaged"),
-        (lambda folder: ["--agents", policy_of_four_limbs(folder)], "trained on a robot of 4 limbs of 10 nodes"),
+        (lambda folder: ["--agents", policy_of_four_limbs(folder)], "trained on a robot of 4 limbs, "),
         (lambda folder: ["--agents", damaged_model(folder)], "damaged"),
         (lambda folder: ["--agents", "pentagram"], "Unknown scripted agent 'pentagram'"),
         (lambda folder: ["--agents", "rest", "rest"], "'rest' is named twice"),

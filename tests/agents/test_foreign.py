@@ -111,7 +111,7 @@ def test_the_documentation_says_what_may_be_executed():
 def test_a_model_of_another_robot_is_refused_before_the_first_stroke(actions):
     policy = train(actions, Scene(Seastar(n_limbs=4, nodes_per_limb=4), numerics=FAST.numerics)).policy
     env = SeastarSwimEnv(actions=actions, scene=FAST)
-    with assert_refused("sees observations of shape (54,), the environment's have (186,)"):
+    with assert_refused("sees observations of shape (150,), the environment's have (186,)"):
         swim("mine", policy, env, max_strokes=1)
     with assert_refused("acts in"):
         swim_many("mine", policy, "line", 2, FAST, threads=1)
@@ -224,4 +224,3 @@ def test_a_function_that_makes_no_policy_is_refused(own, name, words, capsys):
         load_agents([name])
     assert evaluate.main(["--agents", name]) == 2
     assert capsys.readouterr().err.count("\n") == 1
-

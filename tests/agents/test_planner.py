@@ -23,9 +23,10 @@ def swum(n_robots=3, strokes=4, scene=FAST):
     return env, observations
 
 
-@pytest.mark.parametrize("scene", [FAST, Scene(robot=Seastar(n_limbs=4, nodes_per_limb=5), numerics=FAST.numerics)])
-def test_an_observation_is_the_whole_state(scene):
+@pytest.mark.parametrize("robot", [Seastar(), Seastar(4, 5), Seastar(nodes_per_limb=7), Seastar(nodes_per_limb=19)])
+def test_an_observation_is_the_whole_state(robot):
     """From the state read off the observations, the same commands go the same way, as seen in the body frame."""
+    scene = Scene(robot, numerics=FAST.numerics)
     env, observations = swum(scene=scene)
     state = state_of(observations, scene)
     twin = Simulator(scene, 3, threads=1)

@@ -201,7 +201,7 @@ def test_saving_replaces_the_file_in_one_go(learner, file, monkeypatch):
 def test_the_description_says_what_the_policy_expects(learner, file):
     with zipfile.ZipFile(file) as archive:
         facts = json.loads(archive.read(learner_file.DESCRIPTION))
-    assert facts["observation_layout"] == 1
+    assert facts["observation_layout"] == 2
     assert (facts["actions"], facts["symmetry"], facts["hidden"]) == (Hyperparameters().actions, True, [16, 8])
     assert facts["scene"]["numerics"]["scheme"] == FAST.scheme
     assert facts["strokes_trained"] == learner.num_timesteps
@@ -265,7 +265,7 @@ NO_LIMBS = Scene().to_dict() | {"robot": Scene().to_dict()["robot"] | {"n_limbs"
     [
         ({"policy__json": None}, "no policy saved by this project: There is no item"),
         ({"learner__safetensors": None}, "no policy saved by this project: There is no item"),
-        ({"observation_layout": 0}, "its observation_layout is 0, this version of seastar_gym knows 1"),
+        ({"observation_layout": 1}, "its observation_layout is 1, this version of seastar_gym knows 2"),
         ({"format": 99}, "its format is 99"),
         ({"actions": "waves"}, "actions must be one of"),
         ({"hidden": [16, 9]}, "does not fit"),

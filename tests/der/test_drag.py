@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from seastar_gym.der.terms.drag import drag_slopes, relative
+from seastar_gym.der.motion import relative
+from seastar_gym.der.terms.drag import drag_slopes
 from seastar_gym.simd.numpy_lanes import Lanes
 from slopes import gradient, plain
 

@@ -5,6 +5,7 @@ import pytest
 
 import oracle
 from seastar_gym import Scene, Seastar, SmaPulse
+from seastar_gym.der.motion import node_motion
 from seastar_gym.der.potential import factorise, node_slopes
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.momentum import LOST, move_as_a_whole, settle_momentum
@@ -20,6 +21,10 @@ from touching import touching_limbs
 ROBOT, GAMMA = Seastar(nodes_per_limb=4), 5e-3
 
 
+def force(rods, work, stage, node):
+    return node_slopes.plain(None, rods, work, stage, node, node_motion.plain(work, stage, node))[1]
+
+
 def moved(scene: Scene, robots: np.ndarray, times: int = 1):
     """(unbalanced forces before and after [N], positions before and after)."""
     rods, rng = make_rods(scene), np.random.default_rng(0)
@@ -28,7 +33,7 @@ def moved(scene: Scene, robots: np.ndarray, times: int = 1):
     stage = Stage(work.q_hat, work.v_hat, Lanes(GAMMA), Lanes(1.0 / GAMMA), False)
 
     def unbalanced() -> np.ndarray:
-        slopes = [node_slopes.plain(None, rods, work, stage, node)[1] for node in range(ROBOT.n_nodes)]
+        slopes = [force(rods, work, stage, node) for node in range(ROBOT.n_nodes)]
         return np.linalg.norm(np.sum(plain(tuple(slopes)), axis=0), axis=0)
 
     before, q = unbalanced(), nodes(work.q)
@@ -120,6 +125,6 @@ def test_where_momentum_begins_to_be_settled_in_a_fluid_rounding_is_some_1e_10_o
     stage = Stage(work.q_hat, work.v_hat, Lanes(gamma), Lanes(1.0 / gamma), False)
     factorise.plain(rods, work, stage, None)
     move = plain(take_step.plain(rods, work, Mask(EVERYONE), None, Lanes(0.0)))
-    forces = [node_slopes.plain(None, rods, work, stage, node)[1] for node in range(robot.n_nodes)]
+    forces = [force(rods, work, stage, node) for node in range(robot.n_nodes)]
     shift = np.linalg.norm(np.sum(plain(tuple(forces)), axis=0), axis=0) * gamma**2 / rods.mass.sum()
     assert 3e-11 < (shift / move).max() < 1e-9

@@ -14,6 +14,7 @@ from seastar_gym import Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, 
 from seastar_gym.der.terms import drag
 from seastar_gym.der.terms.drag import drag_slopes
 from seastar_gym.envs.observation import body_axis
+from seastar_gym.envs.stations import stations
 from seastar_gym.simd import lanes, numpy_lanes
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
@@ -98,7 +99,7 @@ def test_a_kernel_runs_in_plain_python_beside_itself():
 def test_a_kernel_outside_the_rods_has_its_plain_twin_too():
     square = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 1.0])[:, None]
     turned = np.array([0.0, 0.0, 0.0, 1.0, -1.0, 0.0])[:, None]
-    np.testing.assert_allclose(plain(body_axis.plain(square, turned, 3)), [[0.0], [1.0]], atol=1e-15)
+    np.testing.assert_allclose(plain(body_axis.plain(square, turned, stations(2), 2)), [[0.0], [1.0]], atol=1e-15)
 
 
 def test_loading_plain_kernels_leaves_every_module_as_it_was():

@@ -5,7 +5,8 @@ import pytest
 
 from seastar_gym import Numerics, Scene, Seastar, UniformCurrent, Water
 from seastar_gym.der.geometry import edge_geometry
-from seastar_gym.der.potential import coupling, edge_slopes, node_slopes, positive_part
+from seastar_gym.der.motion import node_motion
+from seastar_gym.der.potential import coupling, elastic_slopes, node_slopes, positive_part
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.der.terms.load import load_power, nodal_load
@@ -39,7 +40,9 @@ def test_a_node_has_the_slopes_of_its_inertia_drag_and_load(rods):
 
     def slopes(q):
         work.q[2 * NODE : 2 * NODE + 2] = q
-        energy, force, hessian = node_slopes.plain(work.contact, rods, work, stage, NODE)
+        energy, force, hessian = node_slopes.plain(
+            work.contact, rods, work, stage, NODE, node_motion.plain(work, stage, NODE)
+        )
         return plain(energy), np.array(plain(force)), symmetric(hessian)
 
     q = GAMMA * RNG.standard_normal((2, N_LANES))
@@ -57,7 +60,7 @@ def test_an_edge_has_the_slopes_of_its_stretching_and_of_the_moments_that_turn_i
 
     def slopes(e):
         edge = edge_geometry.plain(np.array([0.0 * e[0], 0.0 * e[1], *e]), 0, 1)
-        energy, force, hessian = edge_slopes.plain(rods, work, stage, EDGE, edge, Lanes(mu), Lanes(sigma), None)
+        energy, force, hessian = elastic_slopes.plain(rods, work, stage, EDGE, edge, Lanes(mu), Lanes(sigma), None)
         turn = np.arctan2(e[1], e[0]) - theta_0
         softer = sigma * turn * np.array([-e[1], e[0]]) / (e**2).sum(axis=0)
         return plain(energy) + mu * turn, np.array(plain(force)), symmetric(hessian), softer
@@ -73,7 +76,7 @@ def test_the_convex_part_of_an_edge_is_never_negative():
     edge = edge_geometry.plain(np.array([0.0 * EDGES[0], 0.0 * EDGES[1], *(0.7 * EDGES)]), 0, 1)
     args = NOTHING_BUT_LIMBS, work, stage, EDGE, edge, Lanes(1e-3), Lanes(0.0)
     smallest = [
-        np.linalg.eigvalsh(symmetric(edge_slopes.plain(*args, convex)[2]).transpose(2, 0, 1)).min()
+        np.linalg.eigvalsh(symmetric(elastic_slopes.plain(*args, convex)[2]).transpose(2, 0, 1)).min()
         for convex in (None, Mask(np.ones(N_LANES, bool)))
     ]
     assert smallest[0] < 0.0 and smallest[1] > -1e-9

@@ -4,53 +4,61 @@ import numpy as np
 import pytest
 
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, ThermalSma
-from seastar_gym.envs.observation import VELOCITY_SCALE, layout, observation_size, observe, scene_layout, to_float32
+from seastar_gym.envs.observation import (
+    VELOCITY_SCALE,
+    at_station,
+    layout,
+    observation_size,
+    observe,
+    scene_layout,
+    to_float32,
+)
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.stations import at_stations, stations
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import to_rows
+from seastar_gym.simulator import State
 
 SCENES = [
     Scene(numerics=Numerics.preset("fast")),
     Scene(Seastar(3, 4, limb_length=0.2), actuator=SmaPulse(0.3), numerics=Numerics.preset("fast")),
+    Scene(Seastar(nodes_per_limb=7), numerics=Numerics.preset("fast")),
 ]
 
 
 def observations_of(simulator: Simulator, targets: np.ndarray) -> np.ndarray:
     """float64 observations, shape (n_robots, size), for targets of shape (n_robots, 4) [m]."""
     rows, robot = to_rows(targets), simulator.scene.robot
-    out = np.full((len(rows), observation_size(robot.n_nodes), N_LANES), np.nan)
-    own = simulator.coefficients
-    observe(own.rest, own.limb_length, simulator.q, simulator.v, rows, VELOCITY_SCALE, out)
+    out = np.full((len(rows), observation_size(robot.n_limbs), N_LANES), np.nan)
+    own, places = simulator.coefficients, stations(robot.nodes_per_limb)
+    observe(own.rest, own.limb_length, simulator.q, simulator.v, places, rows, VELOCITY_SCALE, out)
     return out.transpose(0, 2, 1).reshape(-1, out.shape[1])[: simulator.n_robots]
 
 
 def expected_observation(robot: Seastar, q: np.ndarray, v: np.ndarray, waypoint, following) -> np.ndarray:
     """The table once more, with complex numbers: x + iy turned by exp(-i angle)."""
-    rest, q, v, targets = (np.asarray(x) @ [1.0, 1j] for x in (robot.nodes(), q, v, [waypoint, following]))
-    angle = np.angle(np.sum(np.conj(rest) * (q - q[0])))  # least squares: the sum's argument
-    parts = [
-        (q[1:] - q[0]) / robot.limb_length,
-        (v[1:] - v[0]) / 0.025,
-        v[:1] / 0.025,
-        (targets - q[0]) / robot.limb_length,
-    ]
+    rest, seen_q, seen_v = (at_stations(x, robot)[1:] @ [1.0, 1j] for x in (robot.nodes(), q, v))
+    hub, hub_v, targets = (np.asarray(x) @ [1.0, 1j] for x in (q[:1], v[:1], [waypoint, following]))
+    angle = np.angle(np.sum(np.conj(rest) * seen_q))  # least squares: the sum's argument
+    parts = [seen_q / robot.limb_length, seen_v / 0.025, hub_v / 0.025, (targets - hub) / robot.limb_length]
     turned = np.concatenate(parts) * np.exp(-1j * angle)
     return np.stack([turned.real, turned.imag], axis=1).reshape(-1)
 
 
 def test_scale_and_size_are_the_documented_ones():
     assert VELOCITY_SCALE == 0.025
-    assert observation_size(46) == 186
+    assert observation_size(5) == 186
 
 
-@pytest.mark.parametrize("n_nodes, n_remembered", [(46, 0), (46, 20), (10, 3)])
-def test_a_layout_names_every_place_once_and_in_the_order_of_the_table(n_nodes, n_remembered):
-    at = layout(n_nodes, n_remembered)
+@pytest.mark.parametrize("n_limbs, n_remembered", [(5, 0), (5, 20), (1, 3)])
+def test_a_layout_names_every_place_once_and_in_the_order_of_the_table(n_limbs, n_remembered):
+    at = layout(n_limbs, n_remembered)
     places = np.arange(at.size)
     np.testing.assert_array_equal(np.concatenate([places[place] for place in at]), places)
-    assert [len(places[place]) for place in at] == [2 * (n_nodes - 1)] * 2 + [2, n_remembered, 2, 2]
+    assert [len(places[place]) for place in at] == [2 * 9 * n_limbs] * 2 + [2, n_remembered, 2, 2]
     np.testing.assert_array_equal(places[at.waypoints], places[-4:])
-    np.testing.assert_array_equal(places[at.nodes_and_hub], places[: 4 * (n_nodes - 1) + 2])
+    np.testing.assert_array_equal(places[at.stations_and_hub], places[: 4 * 9 * n_limbs + 2])
 
 
 def test_the_layout_of_a_scene_finds_what_its_actuators_remember():
@@ -101,6 +109,54 @@ def test_an_observation_is_the_same_wherever_the_robot_is_and_whichever_way_it_p
     both = np.stack([targets.ravel(), (targets @ turn + place).ravel()])
     here, there = observations_of(simulator, both)
     np.testing.assert_allclose(there, here, rtol=0.0, atol=1e-11)
+
+
+@pytest.mark.parametrize("nodes_per_limb, every", [(10, 1), (19, 2), (37, 4)])
+def test_a_station_that_is_a_node_has_its_bits(nodes_per_limb, every):
+    robot, places = Seastar(nodes_per_limb=nodes_per_limb), stations(nodes_per_limb)
+    rows = np.random.default_rng(3).normal(size=(2 * robot.n_nodes, N_LANES))
+    for limb, station in np.ndindex(5, 9):
+        node = 1 + limb * (nodes_per_limb - 1) + (station + 1) * every - 1
+        x, y = at_station.plain(rows, places, limb, station)
+        np.testing.assert_array_equal(x.numbers, rows[2 * node] - rows[0])
+        np.testing.assert_array_equal(y.numbers, rows[2 * node + 1] - rows[1])
+
+
+@pytest.mark.parametrize("nodes_per_limb", [2, 7, 19])
+def test_one_robot_sees_what_it_sees_in_a_batch_to_the_last_bit(nodes_per_limb):
+    scene = Scene(Seastar(nodes_per_limb=nodes_per_limb), numerics=Numerics.preset("fast"))
+    one, batch = SeastarSwimEnv(scene=scene), SeastarSwimVectorEnv(3, scene=scene, threads=1)
+    alone, together = one.reset(seed=0)[0], batch.reset(seed=0)[0]
+    np.testing.assert_array_equal(together, [alone] * 3)
+    for command in ([0, 1, 0, 0, 2], [1, 0, 2, 0, 0]):
+        alone, together = one.step(command)[0], batch.step(np.array([command] * 3))[0]
+        np.testing.assert_array_equal(together, [alone] * 3)
+
+
+def seen_of_a_bent_robot(nodes_per_limb: int) -> np.ndarray:
+    """Observation of smoothly bent and moving limbs, sampled at so many nodes."""
+    robot = Seastar(nodes_per_limb=nodes_per_limb)
+    s = np.arange(1, nodes_per_limb) / (nodes_per_limb - 1)
+    limbs = [np.exp(2j * np.pi * i / 5) * s * np.exp(1j * np.sin((2.0 + 0.2 * i) * s)) for i in range(5)]
+    moving = [(0.2 + 0.1j * i) * s * np.cos(3.0 * s) for i in range(5)]
+    positions, velocities = (np.concatenate([[0.0], *parts]) for parts in (limbs, moving))
+    simulator = Simulator(Scene(robot, numerics=Numerics.preset("fast")))
+    in_plane = [np.stack([z.real, z.imag], axis=1)[None] for z in (0.1 * positions, 0.025 * velocities)]
+    simulator.set_state(State(*in_plane, np.zeros(1)))
+    return observations_of(simulator, np.ones((1, 4)))[0]
+
+
+def test_meshes_that_have_a_node_at_every_station_see_the_same():
+    for nodes_per_limb in (19, 37):
+        np.testing.assert_allclose(seen_of_a_bent_robot(nodes_per_limb), seen_of_a_bent_robot(10), rtol=0.0, atol=1e-13)
+
+
+def test_what_is_seen_of_a_smooth_robot_converges_with_the_fourth_power_of_the_edge():
+    """To what a mesh with nodes at all stations sees; in these, stations stand at like places between nodes."""
+    n_edges, exact = np.array([35, 71, 143, 287]), seen_of_a_bent_robot(10)
+    errors = [np.abs(seen_of_a_bent_robot(n + 1) - exact).max() for n in n_edges]
+    slope = -np.polyfit(np.log(n_edges), np.log(errors), 1)[0]
+    assert 3.8 < slope < 4.4 and errors[0] < 1e-6, (slope, errors)
 
 
 def test_a_robot_without_a_direction_is_seen_in_the_world_frame_not_as_nan():

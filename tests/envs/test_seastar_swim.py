@@ -89,7 +89,7 @@ def test_spaces_follow_the_robot(n_limbs, nodes_per_limb):
     env = SeastarSwimEnv(scene=scene)
     assert env.action_space == gym.spaces.MultiDiscrete([3] * n_limbs)
     observation, _ = env.reset(seed=0)
-    assert observation.shape == env.observation_space.shape == (4 * n_limbs * (nodes_per_limb - 1) + 6,)
+    assert observation.shape == env.observation_space.shape == (4 * 9 * n_limbs + 6,)
     assert env.step([1] + [2] * (n_limbs - 1))[0].shape == observation.shape
 
 

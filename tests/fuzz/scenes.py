@@ -37,28 +37,33 @@ from seastar_gym import (
 from seastar_gym.scene.actuators.actuator import Actuator
 from seastar_gym.scene.currents import AnyCurrent
 from seastar_gym.scene.numerics import Fidelity
+from seastar_gym.scene.robot import Discretisation, HubHinge
 from seastar_gym.scene.shape import n_hub_hinges, natural_hub_angle
 
 Terms = frozenset[str]
 
 OWN = "numbers of each robot"
 ROTATIONS = "rotations of each limb"
+CHAPTER = "chapter's discretisation"
 IN_WATER = ("drag along limbs", "added mass", "current")
-TERMS = (*IN_WATER, "damping", "loads", "contact", OWN, ROTATIONS)
+TERMS = (*IN_WATER, "damping", "loads", "contact", OWN, ROTATIONS, CHAPTER)
 """What a scene has or has not: every set of them is machine code of its own, 20 to 40 s to compile."""
 
 PLAIN: Terms = frozenset()
 CONTACT: Terms = frozenset({"contact"})
 FLUID: Terms = frozenset({*IN_WATER, "damping"})
-EVERYTHING: Terms = frozenset(TERMS) - {OWN}
+EVERYTHING: Terms = frozenset(TERMS) - {OWN, CHAPTER}
 COMPILED: tuple[Terms, ...] = (
     PLAIN, CONTACT, frozenset({ROTATIONS}), frozenset({OWN}), frozenset({OWN, ROTATIONS}), frozenset({OWN, "contact"}),
-    FLUID, frozenset({"loads"}),
+    FLUID, frozenset({"loads"}), frozenset({CHAPTER}), frozenset({CHAPTER, "contact"}),
 )  # fmt: skip
 """The sets that other tests compile, too."""
 
 MOST_STEPS = 20
 """Of half a stroke."""
+
+TAME_PEAK = 1.0
+"""Largest peak angle [rad] of scenes that are not wild."""
 
 N_ROBOTS, N_STROKES = 4, 2
 SEEDS = st.integers(0, 2**32 - 1)
@@ -114,12 +119,13 @@ class Draw:
 
 def draw_robot(draw: Draw, terms: Terms) -> Seastar:
     rng = draw.rng
+    discretisation: Discretisation = "chapter" if CHAPTER in terms else "continuum"
     if not draw.wild and draw.n_robots is None and draw.maybe(0.3):
-        return Seastar(relaxation_time=0.0 if "damping" in terms else None)
+        return Seastar(relaxation_time=0.0 if "damping" in terms else None, discretisation=discretisation)
     n_limbs = rng.choice([1, 2, 3, 5, 5, 8, 12]) if draw.wild else rng.choice([3, 4, 5, 6])
     if "contact" in terms:
         n_limbs = max(n_limbs, 3)
-    hub_hinge = "turning" if n_limbs > 1 and draw.maybe(0.2) else "opening"
+    hub_hinge: HubHinge = "turning" if n_limbs > 1 and CHAPTER in terms and draw.maybe(0.2) else "opening"
     return Seastar(
         n_limbs=n_limbs,
         nodes_per_limb=rng.randint(2, 12) if draw.wild else rng.randint(4, 10),
@@ -130,6 +136,7 @@ def draw_robot(draw: Draw, terms: Terms) -> Seastar:
         hub_hinge=hub_hinge,
         limbs=draw_limbs(draw, n_limbs) if draw.maybe(0.4) else (),
         relaxation_time=draw.each(lambda: draw.or_zero(draw.power(-6.0, -1.0))) if "damping" in terms else None,
+        discretisation=discretisation,
     )
 
 
@@ -191,6 +198,8 @@ def largest_peak(robot: Seastar) -> float:
     """Largest angle [rad] by which a scene lets limbs of the robot turn, and any command be given."""
     if robot.n_limbs == 1:
         return 0.0
+    if robot.discretisation == "continuum":
+        return 0.999 * math.pi
     hinges = robot.limb_shapes()[: n_hub_hinges(robot.n_limbs)]
     widest = max(abs(natural_hub_angle(hinge.gap, robot.hub_hinge)) for hinge in hinges)
     return 0.499 * (math.pi - widest)
@@ -199,7 +208,7 @@ def largest_peak(robot: Seastar) -> float:
 def draw_actuator(draw: Draw, terms: Terms, robot: Seastar, step: float) -> Actuator:
     """Whose stroke takes some steps; not all of them of whole steps."""
     share = draw.rng.choice([0.0, 1.0, draw.rng.random()]) if draw.wild else draw.rng.uniform(0.2, 0.8)
-    peak = share * largest_peak(robot)
+    peak = share * (largest_peak(robot) if draw.wild else min(largest_peak(robot), TAME_PEAK))
     heating, cooling = (step * (draw.rng.randint(1, MOST_STEPS) - 0.3 * draw.maybe(0.2)) for _ in range(2))
     own = draw if ROTATIONS in terms else replace(draw, n_robots=None)
     if draw.maybe(0.7):

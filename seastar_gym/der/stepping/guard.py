@@ -35,13 +35,14 @@ over at no such cost.
 
 from seastar_gym.der.energy import elastic_energy
 from seastar_gym.der.geometry import edge_vector, half_angle, larger
+from seastar_gym.der.motion import node_motion
 from seastar_gym.der.star import edge_of, hinge_edges, is_clamped, n_nodes, tail_node
 from seastar_gym.der.terms.added_mass import add_fluid_energy, add_fluid_momentum, less_edge_fluid_energy
 from seastar_gym.der.terms.clamp import moved_clamp_energy
 from seastar_gym.der.terms.contact import add_contact_energy
 from seastar_gym.der.terms.fluid import fluid_velocity
 from seastar_gym.der.terms.hub import set_natural_hub_angles
-from seastar_gym.der.terms.inertia import edge_change, kinetic_energy
+from seastar_gym.der.terms.inertia import kinetic_energy
 from seastar_gym.der.terms.load import load_power
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import absolute, add_product, any_lane, load, select, splat, sqrt, store, subtract_product
@@ -176,10 +177,10 @@ def less_edge_gain(edge_mass, rods, work, stage, gain):
         return gain
     for e in range(n_nodes(rods) - 1):
         tail, mu = tail_node(rods, e), load(edge_mass, e)
-        for axis in range(2):
-            head_row, tail_row = 2 * (e + 1) + axis, 2 * tail + axis
-            v_0 = load(stage.v_hat, head_row) - load(stage.v_hat, tail_row)
-            gain = subtract_product(gain, mu * v_0, edge_change(work, stage, head_row, tail_row))
+        of_tail, of_head = node_motion(work, stage, tail), node_motion(work, stage, e + 1)
+        v_x, v_y = edge_vector(stage.v_hat, tail, e + 1)
+        gain = subtract_product(gain, mu * v_x, of_head.dx - of_tail.dx)
+        gain = subtract_product(gain, mu * v_y, of_head.dy - of_tail.dy)
     return gain
 
 

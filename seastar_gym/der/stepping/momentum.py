@@ -9,6 +9,7 @@ So where that can be seen, at any step in vacuum and in a fluid at very long one
 of its own after the others: from the residual summed over the nodes, and its slope. In vacuum it is exact.
 """
 
+from seastar_gym.der.motion import node_motion
 from seastar_gym.der.potential import node_slopes
 from seastar_gym.der.star import n_nodes, tail_node
 from seastar_gym.der.terms.drag import middle_slopes
@@ -36,7 +37,7 @@ def move_as_a_whole(rods, work, stage, robots):
     zero = splat(0.0)
     fx, fy, xx, xy, yy = zero, zero, zero, zero, zero
     for node in range(n_nodes(rods)):
-        _, gradient, hessian = node_slopes(None, rods, work, stage, node)
+        _, gradient, hessian = node_slopes(None, rods, work, stage, node, node_motion(work, stage, node))
         fx, fy = fx + gradient[0], fy + gradient[1]
         xx, xy, yy = xx + hessian[0], xy + hessian[1], yy + hessian[2]
     fx, fy, xx, xy, yy = add_middles(rods.middle_drag, rods, work, stage, fx, fy, xx, xy, yy)
@@ -54,7 +55,8 @@ def add_middles(middle_drag, rods, work, stage, fx, fy, xx, xy, yy):
     if middle_drag is None:
         return fx, fy, xx, xy, yy
     for e in range(n_nodes(rods) - 1):
-        _, g, h = middle_slopes(middle_drag, rods, work, stage, e, tail_node(rods, e), e + 1)
+        tail, head = node_motion(work, stage, tail_node(rods, e)), node_motion(work, stage, e + 1)
+        _, g, h = middle_slopes(middle_drag, rods, work, stage, e, tail, head)
         fx, fy = fx + 2.0 * g[0], fy + 2.0 * g[1]
         xx, xy, yy = xx + 4.0 * h[0], xy + 4.0 * h[1], yy + 4.0 * h[2]
     return fx, fy, xx, xy, yy

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from seastar_gym.der.geometry import edge_vector
 from seastar_gym.der.mesh import Mesh
 from seastar_gym.der.star import n_nodes, tail_node
-from seastar_gym.der.terms.inertia import edge_change
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, splat, store, subtract_product
 
@@ -100,15 +99,14 @@ def add_fluid_inertia(added_mass, node, dx, dy, inverse_gamma, slopes):
 
 
 @kernel
-def less_edge_fluid_inertia(edge_added_mass, work, stage, e, tail, slopes):
+def less_edge_fluid_inertia(edge_added_mass, work, stage, e, tail, head, slopes):
     """(E, f, K) of an edge less mu ((d_head - d_tail) n)^2/2; unchanged where no such mass is named (None)."""
     if edge_added_mass is None:
         return slopes
     energy, (fx, fy), (xx, xy, yy) = slopes
     mu = load(edge_added_mass, e)
     nx, ny = load(work.normals, 2 * e), load(work.normals, 2 * e + 1)
-    dx = edge_change(work, stage, 2 * (e + 1), 2 * tail)
-    dy = edge_change(work, stage, 2 * (e + 1) + 1, 2 * tail + 1)
+    dx, dy = head.dx - tail.dx, head.dy - tail.dy
     across = add_product(dx * nx, dy, ny)
     force = mu * stage.inverse_gamma * across
     slope = mu * stage.inverse_gamma * stage.inverse_gamma

@@ -31,9 +31,12 @@ def coefficients(mesh: Mesh, density: float, C: float) -> Floats:
 
 
 def simpson_coefficients(mesh: Mesh, density: float, C: float) -> tuple[Floats, Floats]:
-    """(c per node, c per edge) [kg/m] by Simpson's rule: a third at the nodes, the rest in the middle of edges."""
+    """(c per node, c per edge) [kg/m] by Simpson's rule: a third at the nodes, the rest in the middle of edges.
+
+    That per edge is an eighth of what the middle has, see middle_slopes.
+    """
     in_middle = np.array([drag_per_length(density, C, r) for r in mesh.radius_at_edges]) * mesh.l * (2.0 / 3.0)
-    return coefficients(mesh, density, C) / 3.0, in_middle
+    return coefficients(mesh, density, C) / 3.0, in_middle / 8.0
 
 
 def cross_coefficients(mesh: Mesh, density: float, C_d: float, C_t: float | None) -> Floats | None:
@@ -55,11 +58,11 @@ def across_half_edges(mesh: Mesh, density: float, C_d: float, C_t: float) -> Flo
 def simpson_cross_coefficients(
     mesh: Mesh, density: float, C_d: float, C_t: float | None
 ) -> tuple[Floats | None, Floats | None]:
-    """(c_n per half edge as above, c_n per edge) [kg/m] by Simpson's rule; None for isotropic drag."""
+    """(c_n per half edge, c_n per edge) [kg/m] by Simpson's rule as above; None for isotropic drag."""
     if C_t is None:
         return None, None
     halves = across_half_edges(mesh, density, C_d, C_t)
-    return mesh.per_half_edge(halves / 3.0), halves * (4.0 / 3.0)
+    return mesh.per_half_edge(halves / 3.0), halves * (4.0 / 3.0) / 8.0
 
 
 @kernel
@@ -109,65 +112,42 @@ def add_cross_flow(cross_drag, rods, normals, node, wx, wy, gamma, inverse_gamma
 
 
 @kernel
-def relative(current, node, vx, vy):
-    """Velocity of a node relative to the fluid at rest (None) or in motion."""
-    if current is None:
-        return vx, vy
-    return vx - load(current, 2 * node), vy - load(current, 2 * node + 1)
-
-
-@kernel
 def middle_slopes(middle_drag, rods, work, stage, e, tail, head):
     """(potential, force on either end, Hessian block) of the drag in the middle of edge e; zeros without (None).
 
-    w = (w_tail + w_head)/2 has the potential gamma c |w|^3/3, half of the force c |w| w goes to either end, and the
-    block c (|w| 1 + w w^T/|w|)/(4 gamma) to both ends and to their coupling.
+    With s = w_tail + w_head, twice the velocity of the middle, the potential is gamma c |s|^3/3, c an eighth of the
+    middle's own coefficient. So s has the slopes of a node's w, each end feels the force c |s| s, and the block
+    c (|s| 1 + s s^T/|s|)/gamma stands at both ends and couples them. tail, head: Motions of the ends.
     """
     zero = splat(0.0)
     if middle_drag is None:
         return zero, (zero, zero), (zero, zero, zero)
-    wx, wy = middle_velocity(work, stage, tail, head)
-    energy, (fx, fy), (xx, xy, yy) = middle_drag_slopes(rods, work.normals, e, wx, wy, stage.gamma, stage.inverse_gamma)
-    return energy, (0.5 * fx, 0.5 * fy), (0.25 * xx, 0.25 * xy, 0.25 * yy)
+    return middle_drag_slopes(
+        rods, work.normals, e, tail.wx + head.wx, tail.wy + head.wy, stage.gamma, stage.inverse_gamma
+    )
 
 
 @kernel
-def middle_drag_slopes(rods, normals, e, wx, wy, gamma, inverse_gamma):
-    """(potential, force, Hessian over gamma) in w of the drag in the middle of edge e."""
-    potential, c_speed, c_over_speed = drag_slopes(load(rods.middle_drag, e), wx, wy)
+def middle_drag_slopes(rods, normals, e, sx, sy, gamma, inverse_gamma):
+    """(potential, force on either end, Hessian over gamma) of the drag in the middle of edge e, see middle_slopes."""
+    potential, c_speed, c_over_speed = drag_slopes(load(rods.middle_drag, e), sx, sy)
     c_over_speed *= inverse_gamma
-    sx, sy = c_over_speed * wx, c_over_speed * wy
+    hx, hy = c_over_speed * sx, c_over_speed * sy
     diagonal = c_speed * inverse_gamma
     slopes = (
         gamma * potential,
-        (c_speed * wx, c_speed * wy),
-        (add_product(diagonal, sx, wx), sx * wy, add_product(diagonal, sy, wy)),
+        (c_speed * sx, c_speed * sy),
+        (add_product(diagonal, hx, sx), hx * sy, add_product(diagonal, hy, sy)),
     )
-    return add_middle_cross_flow(rods.middle_cross_drag, normals, e, wx, wy, gamma, inverse_gamma, slopes)
+    return add_middle_cross_flow(rods.middle_cross_drag, normals, e, sx, sy, gamma, inverse_gamma, slopes)
 
 
 @kernel
-def add_middle_cross_flow(middle_cross_drag, normals, e, wx, wy, gamma, inverse_gamma, slopes):
+def add_middle_cross_flow(middle_cross_drag, normals, e, sx, sy, gamma, inverse_gamma, slopes):
     """Add the drag of flow across edge e in its middle; unchanged without such drag (None)."""
     if middle_cross_drag is None:
         return slopes
-    return add_half_edge(load(middle_cross_drag, e), normals, e, wx, wy, gamma, inverse_gamma, slopes)
-
-
-@kernel
-def middle_velocity(work, stage, tail, head):
-    """Velocity of the middle of an edge relative to the fluid [m/s]."""
-    ax, ay = node_velocity(work, stage, tail)
-    bx, by = node_velocity(work, stage, head)
-    return 0.5 * (ax + bx), 0.5 * (ay + by)
-
-
-@kernel
-def node_velocity(work, stage, node):
-    """Velocity of a node relative to the fluid, by the iterate [m/s]."""
-    vx = (load(work.q, 2 * node) - load(stage.q_hat, 2 * node)) * stage.inverse_gamma
-    vy = (load(work.q, 2 * node + 1) - load(stage.q_hat, 2 * node + 1)) * stage.inverse_gamma
-    return relative(work.current, node, vx, vy)
+    return add_half_edge(load(middle_cross_drag, e), normals, e, sx, sy, gamma, inverse_gamma, slopes)
 
 
 @kernel
@@ -179,24 +159,16 @@ def add_scalar(middle_drag, total, amount):
 
 
 @kernel
-def add_middle(middle_drag, D, h):
-    """D + h, symmetric blocks, in scenes with drag in the middle of edges."""
+def with_middle(middle_drag, K, h):
+    """(K + h, K - h): what an edge of Hessian K adds to the blocks of its ends, and takes from that between them."""
     if middle_drag is None:
-        return D
-    return D[0] + h[0], D[1] + h[1], D[2] + h[2]
+        return K, K
+    return (K[0] + h[0], K[1] + h[1], K[2] + h[2]), (K[0] - h[0], K[1] - h[1], K[2] - h[2])
 
 
 @kernel
-def couple_middle(middle_drag, B, h):
-    """B + h, a coupling and a symmetric block, in scenes with drag in the middle of edges."""
+def push_ends(middle_drag, f, g):
+    """(f + g, f - g): what an edge of gradient f adds to that of its head, and takes from that of its tail."""
     if middle_drag is None:
-        return B
-    return B[0] + h[0], B[1] + h[1], B[2] + h[1], B[3] + h[2]
-
-
-@kernel
-def push_middle(middle_drag, r, g):
-    """r + g, in scenes with drag in the middle of edges."""
-    if middle_drag is None:
-        return r
-    return r[0] + g[0], r[1] + g[1]
+        return f, f
+    return (f[0] + g[0], f[1] + g[1]), (f[0] - g[0], f[1] - g[1])

@@ -5,10 +5,11 @@ the potential stays one that is minimised, with an exact Hessian.
 """
 
 from seastar_gym.der.geometry import edge_vector
+from seastar_gym.der.motion import relative
 from seastar_gym.der.star import n_nodes, tail_node
 from seastar_gym.der.terms.added_mass import freeze_added_mass
 from seastar_gym.der.terms.current import current_velocity
-from seastar_gym.der.terms.drag import add_cross_flow, drag_slopes, middle_drag_slopes, relative
+from seastar_gym.der.terms.drag import add_cross_flow, drag_slopes, middle_drag_slopes
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, splat, sqrt, store, subtract_product
 
@@ -81,9 +82,8 @@ def add_power_in_middle(middle_drag, rods, work, v, frame, power):
         a, b = tail_node(rods, e), e + 1
         ax, ay = relative(work.current, a, load(v, 2 * a), load(v, 2 * a + 1))
         bx, by = relative(work.current, b, load(v, 2 * b), load(v, 2 * b + 1))
-        wx, wy = 0.5 * (ax + bx), 0.5 * (ay + by)
-        _, (fx, fy), _ = middle_drag_slopes(rods, work.normals, e, wx, wy, 1.0, 1.0)
-        u_x = 0.5 * (load(work.current, 2 * a) + load(work.current, 2 * b)) - frame[0]
-        u_y = 0.5 * (load(work.current, 2 * a + 1) + load(work.current, 2 * b + 1)) - frame[1]
+        _, (fx, fy), _ = middle_drag_slopes(rods, work.normals, e, ax + bx, ay + by, 1.0, 1.0)
+        u_x = load(work.current, 2 * a) - frame[0] + (load(work.current, 2 * b) - frame[0])
+        u_y = load(work.current, 2 * a + 1) - frame[1] + (load(work.current, 2 * b + 1) - frame[1])
         power = subtract_product(subtract_product(power, fx, u_x), fy, u_y)
     return power

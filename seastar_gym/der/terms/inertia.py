@@ -30,14 +30,13 @@ def edge_coefficients(mesh: Mesh, density: float) -> NDArray[np.float64]:
 
 
 @kernel
-def less_edge_inertia(edge_mass, work, stage, e, tail, slopes):
+def less_edge_inertia(edge_mass, stage, e, tail, head, slopes):
     """(E, f, K) of an edge less mu |d_head - d_tail|^2/2, d = v - v_hat; unchanged for lumped masses (None)."""
     if edge_mass is None:
         return slopes
     energy, (fx, fy), (xx, xy, yy) = slopes
     mu = load(edge_mass, e)
-    dx = edge_change(work, stage, 2 * (e + 1), 2 * tail)
-    dy = edge_change(work, stage, 2 * (e + 1) + 1, 2 * tail + 1)
+    dx, dy = head.dx - tail.dx, head.dy - tail.dy
     mu_over_gamma = mu * stage.inverse_gamma
     stiffness = mu_over_gamma * stage.inverse_gamma
     return (
@@ -45,14 +44,6 @@ def less_edge_inertia(edge_mass, work, stage, e, tail, slopes):
         (subtract_product(fx, mu_over_gamma, dx), subtract_product(fy, mu_over_gamma, dy)),
         (xx - stiffness, xy, yy - stiffness),
     )
-
-
-@kernel
-def edge_change(work, stage, head_row, tail_row):
-    """Difference of v - v_hat between the ends of an edge, along one axis [m/s]."""
-    head = load(work.q, head_row) - load(stage.q_hat, head_row)
-    along = head - (load(work.q, tail_row) - load(stage.q_hat, tail_row))
-    return along * stage.inverse_gamma - (load(stage.v_hat, head_row) - load(stage.v_hat, tail_row))
 
 
 @kernel

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.envs.observation import layout_of_size
+from seastar_gym.envs.observation import Layout, layout
 from seastar_gym.envs.symmetry.group import Elements, is_mirror, limb_order, read_only, turns
 
 BOUNDARY_WIDTH = 1e-6
@@ -20,7 +20,7 @@ def sectors(observations: NDArray[np.floating[Any]], n_limbs: int) -> Elements:
     A waypoint on a boundary belongs to the sector on the side of the next waypoint, and where that lies on the same
     line (or there is none) to the sector anti-clockwise of the boundary. A waypoint at the hub lies in sector 0.
     """
-    at = layout_of_size(observations.shape[-1])
+    at = _layout(observations, n_limbs)
     current = np.asarray(observations[..., at.current_waypoint], np.float64)
     towards_next = np.asarray(observations[..., at.next_waypoint], np.float64)
     width = np.pi / n_limbs
@@ -34,14 +34,22 @@ def sectors(observations: NDArray[np.floating[Any]], n_limbs: int) -> Elements:
     return sector.astype(np.intp) % (2 * n_limbs)
 
 
+def _layout(observations: NDArray[np.floating[Any]], n_limbs: int) -> Layout:
+    """Layout of observations, shape (..., size); ValueError if they are of a robot of other limbs."""
+    at, size = layout(n_limbs), observations.shape[-1]
+    if size != at.size:
+        raise ValueError(f"An observation of {size} numbers is not that of a robot of {n_limbs} limbs.")
+    return at
+
+
 @cache
-def _vector_order(n_limbs: int, n_vectors: int) -> NDArray[np.intp]:
-    """Order of vectors, shape (2 n_limbs, n_vectors): vector i after element g was vector order[g, i] before."""
-    at = layout_of_size(2 * n_vectors)
-    n_nodes = at.velocities.start // 2
-    nodes = np.arange(n_nodes).reshape(n_limbs, -1)[limb_order(n_limbs)].reshape(-1, n_nodes)
-    others = np.tile(np.arange(at.hub_velocity.start // 2, n_vectors), (2 * n_limbs, 1))
-    return read_only(np.concatenate([nodes, n_nodes + nodes, others], axis=1))
+def _vector_order(n_limbs: int) -> NDArray[np.intp]:
+    """Order of vectors, shape (2 n_limbs, size/2): vector i after element g was vector order[g, i] before."""
+    at = layout(n_limbs)
+    n_stations = at.velocities.start // 2
+    stations = np.arange(n_stations).reshape(n_limbs, -1)[limb_order(n_limbs)].reshape(-1, n_stations)
+    others = np.tile(np.arange(at.hub_velocity.start // 2, at.size // 2), (2 * n_limbs, 1))
+    return read_only(np.concatenate([stations, n_stations + stations, others], axis=1))
 
 
 def transform_observations(
@@ -49,13 +57,10 @@ def transform_observations(
 ) -> NDArray[np.floating[Any]]:
     """Observations of the robots carried by the elements: a fresh array of the same shape and type."""
     observations, elements = np.asarray(observations), np.asarray(elements, dtype=np.intp)
-    size = observations.shape[-1]
-    at = layout_of_size(size)
-    if at.size != size or at.velocities.start % (2 * n_limbs) or at.velocities.start <= 0:
-        raise ValueError(f"An observation of {size} numbers is not that of a robot of {n_limbs} limbs.")
+    _layout(observations, n_limbs)
     as_vectors = np.result_type(observations, np.complex64)  # pairs of numbers as x + iy
     vectors = np.ascontiguousarray(observations).view(as_vectors)
-    vectors = np.take_along_axis(vectors, _vector_order(n_limbs, size // 2)[elements], axis=-1)
+    vectors = np.take_along_axis(vectors, _vector_order(n_limbs)[elements], axis=-1)
     vectors *= turns(n_limbs)[elements][..., None].astype(as_vectors)
     np.conjugate(vectors, out=vectors, where=is_mirror(elements)[..., None])
     return vectors.view(observations.dtype)
