@@ -7,7 +7,7 @@ robot of a batch.
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from operator import itemgetter
 from typing import Any, cast, get_args
@@ -210,7 +210,7 @@ class Scene:
         """
         if not isinstance(robot, Seastar | None):
             raise ValueError(f"robot must be a Seastar or None, not {shown(robot)}.")
-        if robot is not None and not cls(robot).is_chapters:
+        if robot is not None and not _is_chapters(robot):
             raise ValueError(NOT_MEASURED.format(shown(robot)))
         best = cheapest(error, any_gait, *(() if robot is None else (robot.discretisation, robot.nodes_per_limb)))
         numerics = Numerics(
@@ -222,9 +222,7 @@ class Scene:
     @property
     def is_chapters(self) -> bool:
         """Whether all is the chapter's except numerics, nodes per limb and discretisation."""
-        plain = Seastar()
-        robot = replace(self.robot, nodes_per_limb=plain.nodes_per_limb, discretisation=plain.discretisation)
-        return replace(self, robot=robot, numerics=Numerics()) == Scene()
+        return _is_chapters(self.robot) and self == Scene(self.robot, numerics=self.numerics)
 
     def to_dict(self) -> dict[str, Any]:
         """Scene as plain data for JSON, see serial.py. ValueError if it could not be read back."""
@@ -243,6 +241,11 @@ class Scene:
     def of_robot(self, index: int) -> "Scene":
         """Scene of one robot of a batch."""
         return chosen(self, itemgetter(index))
+
+
+def _is_chapters(robot: Seastar) -> bool:
+    """Whether a robot is the chapter's except for its nodes per limb and its discretisation."""
+    return robot == Seastar(nodes_per_limb=robot.nodes_per_limb, discretisation=robot.discretisation)
 
 
 def _span(numbers: Iterable[float]) -> str:

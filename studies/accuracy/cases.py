@@ -65,7 +65,7 @@ class Swim(NamedTuple):
 class Errors(NamedTuple):
     """Errors of every robot against another swim of the same commands, shape (n_robots,).
 
-    path, end: Largest and last distance of the hub from the other path, as fractions of that path's length.
+    path, end: Largest and last distance of the hub from the other path, as fractions of a path's length.
     heading: Largest difference of the heading [rad].
     """
 
@@ -181,11 +181,14 @@ def hub_path_lengths(hub: Floats) -> Floats:
     return path_length(np.zeros(2), np.moveaxis(hub, 0, 1))
 
 
-def errors(swum: Swim, exact: Swim) -> Errors:
-    """Errors of a swim against another; infinite for all robots if one failed."""
+def errors(swum: Swim, exact: Swim, lengths: Floats | None = None) -> Errors:
+    """Errors of a swim against another; infinite for all robots if one failed.
+
+    lengths: Lengths of paths [m], shape (n_robots,), of which the errors are fractions. None means those of `exact`.
+    """
     if swum.failed:
         return Errors(*np.full((3, swum.hub.shape[1]), np.inf))
     distance = np.linalg.norm(swum.hub - exact.hub, axis=-1)
     turn = np.angle(np.exp(1j * (swum.heading - exact.heading)))
-    length = hub_path_lengths(exact.hub)
+    length = hub_path_lengths(exact.hub) if lengths is None else lengths
     return Errors(distance.max(axis=0) / length, np.abs(turn).max(axis=0), distance[-1] / length)

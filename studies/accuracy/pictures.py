@@ -135,8 +135,8 @@ def _draw_published(axes: Axes, limit: float) -> None:
         axes.plot([each.speed for each in mine], [error] * len(mine), marker, ms=7, color=OTHERS, mec=INK, mew=0.8)
         first = min(mine, key=lambda each: each.speed)
         axes.annotate(
-            f"h = {MS * step:g} ms", (first.speed, error), (-9, 0), textcoords="offset points", fontsize=9.5,
-            ha="right", va="center", color=INK,
+            f"h = {MS * step:g} ms", (first.speed, error), (-9, 3 if step == 10e-3 else -6),
+            textcoords="offset points", fontsize=9.5, ha="right", va="center", color=INK,
         )  # fmt: skip
     top = PERCENT * published_error(10e-3, limit)
     for name, speed, ha in (
@@ -181,10 +181,10 @@ def convergence(found: Study) -> Figure:
         for column, line, what in (("path", "-", "worst path"), ("gait", "--", "gaits"), ("straight", ":", "straight")):
             values = [PERCENT * getattr(by_nodes[n], column) for n in edges]
             space.loglog(edges - 1, values, f"o{line}", ms=4, lw=1.4, color=colour, label=f"{name}, {what}")
-    space.set_xticks([n - 1 for n in nodes], [str(n) for n in nodes])
+    space.set_xticks([n - 1 for n in nodes], ["" if n == 12 else str(n) for n in nodes])
     space.minorticks_off()
     space.set(xlabel="nodes per limb N", ylabel="error of space")
     space.set_title("Space: against infinitely many nodes", fontsize=10.5, loc="left")
     as_percent(space.yaxis)
-    space.legend(frameon=False, fontsize=8.5, ncols=2)
+    space.legend(frameon=False, fontsize=8.5, loc="center right")
     return figure

@@ -43,7 +43,7 @@ class Plan:
     opinion: Nodes per limb and time step [s] with which SDIRK3 gives a second opinion.
     resolutions: Resolutions that are measured.
     shortest: Shortest time step of the settings [s].
-    finest: Most nodes per limb with which settings are measured at all steps.
+    finest: Most nodes per limb with which settings are measured at all tolerances, and adapted steps.
     rounds: Rounds of timing.
     n_others, limit_of_others, fine_of_others: Random sequences, limit and fine step [s] of the second table.
     """
@@ -60,7 +60,7 @@ class Plan:
     )  # fmt: skip
     shortest: float = 0.1 * MS
     finest: int = 19
-    rounds: int = 4
+    rounds: int = 3
     n_others: int = 16
     limit_of_others: tuple[int, float] = (37, 0.1 * MS)
     fine_of_others: float = 0.1 * MS
@@ -81,7 +81,7 @@ def presets() -> dict[str, Setting]:
 def tolerances(step: float) -> tuple[float, ...]:
     """Newton tolerances that are measured with a time step [s]: short steps bring small updates, so need small ones."""
     if step >= 5 * MS:
-        return 1e-5, 1e-6, 1e-7
+        return 1e-5, 1e-6
     return (1e-6, 1e-7) if step >= 1 * MS else (1e-8,)
 
 
@@ -93,14 +93,14 @@ def settings(plan: Plan) -> list[Setting]:
 
 def _numerics(plan: Plan, resolution: Resolution) -> list[Numerics]:
     """Numerics that are measured with a resolution: fewer with many nodes, which are dear."""
-    _, nodes = resolution
-    shortest = plan.shortest if nodes <= plan.finest else max(plan.shortest, 10 * MS / nodes)
+    discretisation, nodes = resolution
+    shortest = max(plan.shortest, 0.1 * MS if nodes == 10 else 0.3 * MS if discretisation == "continuum" else 1 * MS)
     fixed = [
         Numerics(scheme, step * MS, tolerance)
         for scheme, steps in STEPS.items()
         for step in steps
         for tolerance in tolerances(step * MS)
-        if step * MS >= shortest and (nodes <= plan.finest or tolerance == 1e-7 or step * MS < 1 * MS)
+        if step * MS >= shortest and (nodes <= plan.finest or tolerance == tolerances(step * MS)[-1])
     ]
     adapted = [
         Numerics("implicit-midpoint", LARGEST_ADAPTED, 1e-7, path_tolerance=tolerance) for tolerance in ADAPTED

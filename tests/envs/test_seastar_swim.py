@@ -227,7 +227,7 @@ def test_table_actions_do_what_the_limb_actions_they_stand_for_do(actions):
 
 def test_observation_is_that_of_the_simulators_state():
     """Recomputed from positions and velocities with complex numbers, index by index."""
-    env, rng = fast(path="random", random_heading=True), np.random.default_rng(0)
+    env, rng = fast(path="random", random_heading=True, scene=Scene()), np.random.default_rng(0)
     observation, _ = env.reset(seed=3)
     rest = env.scene.robot.nodes() @ [1.0, 1j]
     for _ in range(10):
@@ -435,11 +435,11 @@ def test_a_path_is_copied_when_the_environment_is_made():
 
 
 def test_random_heading_turns_the_robot_and_its_absence_does_not():
-    env = fast(random_heading=True)
+    env = fast(random_heading=True, scene=Scene())
     env.reset(seed=0)
     tip = env.simulator.positions[0, 9]
     assert np.hypot(*tip) == pytest.approx(0.1) and abs(tip[1]) > 1e-3
-    plain = fast()
+    plain = fast(scene=Scene())
     plain.reset(seed=0)
     np.testing.assert_array_equal(plain.simulator.positions[0], Seastar().nodes())
 

@@ -51,7 +51,7 @@ def test_a_path_error_is_the_sum_of_space_and_time():
     """Never their difference, although they cancel in some swims."""
     for row in (*map(promise, NAMES), *promises()):
         assert row.path_error == pytest.approx(row.space_error + row.time_error, rel=1e-5)
-        assert row.end_error <= row.path_error and row.straight_error <= 1.2 * row.path_error
+        assert max(row.end_error, row.straight_error) <= 1.1 * row.path_error  # all are rounded upwards
 
 
 def test_promises_are_of_the_presets_as_they_are():

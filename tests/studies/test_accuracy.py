@@ -135,6 +135,14 @@ def test_path_error_is_the_largest_distance_over_the_length_of_the_converged_pat
     assert off.path == pytest.approx([0.05]) and off.end == pytest.approx([0.01])
 
 
+def test_space_and_time_of_the_same_length_bound_the_whole_error():
+    """Of a path of its own, the error of time of a robot that swims too far would be too small."""
+    limit, fine, coarse = (swum([[[length, 0.0]]]) for length in (1.0, 2.0, 2.5))
+    lengths = hub_path_lengths(limit.hub)
+    parts = errors(fine, limit).path + errors(coarse, fine, lengths).path
+    assert errors(coarse, limit).path == pytest.approx(parts) == pytest.approx([1.5])
+
+
 def test_heading_error_knows_that_a_turn_is_a_turn():
     hub = [[[1.0, 0.0]]]
     assert errors(swum(hub, [[3.1]]), swum(hub, [[-3.1]])).heading == pytest.approx([2.0 * np.pi - 6.2])
@@ -282,7 +290,7 @@ def test_study_finds_the_converged_straight_swim_and_that_finer_limbs_converge(f
 
 def test_presets_and_the_chapters_steps_are_among_the_settings():
     measured = settings(Plan())
-    chapter = {Setting("chapter", 10, Numerics("implicit-euler", 20 * MS, 1e-7))}
+    chapter = {Setting("chapter", 10, Numerics("implicit-euler", 20 * MS, 1e-6))}
     assert {*presets().values()} | chapter <= set(measured)
     assert len(measured) == len(set(measured))
 
