@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from seastar_gym.scene.checks import is_finite_number, shown
+from seastar_gym.scene.checks import is_finite_number, require_choice, require_count, shown
 
 PRESETS = Path(__file__).with_name("presets.json")
 NOT_MEASURED = (
@@ -166,6 +166,10 @@ def cheapest(
         raise ValueError(f"error must be a positive, finite share of the path's length, not {shown(error)}.")
     if not isinstance(any_gait, bool | np.bool_):
         raise ValueError(f"any_gait must be True or False, not {shown(any_gait)}.")
+    if discretisation is not None:
+        require_choice("discretisation", discretisation, ("chapter", "continuum"))
+    if nodes_per_limb is not None:
+        require_count("nodes_per_limb", nodes_per_limb, 2, 10_000)
     known = sorted(_of_resolution(discretisation, nodes_per_limb), key=lambda row: -row.speed)
 
     def kept(row: Promise) -> float:
