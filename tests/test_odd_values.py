@@ -103,7 +103,8 @@ def reset_batch(seed, options):
 TARGETS = [
     (Seastar, {}), (Limb, {}), (Water, {}), (Contact, {}), (SmaPulse, {}), (MeasuredCurve, CURVE), (ThermalSma, {}),
     (Limited, {"actuator": SmaPulse()}), (Numerics, {}), (Numerics.preset, {"fidelity": "fast"}),
-    (Numerics.for_error, {"error": 0.05}), (Scene, {}), (UniformCurrent, {}), (ShearCurrent, {"rate": 1.0}),
+    (Scene.for_error, {"error": 0.05}), (Scene.preset, {"fidelity": "fast"}), (Scene, {}), (UniformCurrent, {}),
+    (ShearCurrent, {"rate": 1.0}),
     (Vortex, {"circulation": 1.0}), (Uniform, {"low": 1.0, "high": 2.0}), (LogUniform, {"low": 1.0, "high": 2.0}),
     (Normal, {"mean": 1.0, "deviation": 1.0}), (DomainRandomization, {"distributions": {}}), (RewardWeights, {}),
     (relaxation_time, {"loss_factor": 0.1, "frequency": 10.0}), (promise, {"setting": "fast"}),

@@ -81,6 +81,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `distance`               | float      | m    | distance of the hub from the current waypoint                    |
     | `cross_track_error`      | float      | m    | distance of the hub from the current leg of the path             |
     | `path_error`             | float      | 1    | measured error of the hub's path, as a fraction of its length    |
+    | `space_error`            | float      | 1    | part of it that more nodes per limb would remove                 |
+    | `time_error`             | float      | 1    | part of it that shorter time steps would remove                  |
     | `real_time_factor`       | float      | 1    | measured simulated time per computing time, batch on one core    |
     | `is_success`             | bool       | -    | whether the last waypoint is reached                             |
     | `limbs_heated`           | int        | 1    | number of limbs heated in the stroke                             |
@@ -92,8 +94,10 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `reward_waypoint`        | float      | 1    | term of the reward                                               |
     | `reward_effort`          | float      | 1    | term of the reward                                               |
 
-    `path_error` and `real_time_factor` belong to the fidelity (see `seastar_gym.scene.fidelity`) and are NaN for other
-    robots and scenes than the chapter's. With `randomization`, `info` has the drawn numbers by their names, too.
+    `path_error` is the sum of `space_error` and `time_error`, for the worst of the swims measured. These and
+    `real_time_factor` belong to the robot's resolution and the numerics (see `seastar_gym.scene.fidelity`) and are NaN
+    for other robots and scenes than the chapter's, and for what was not measured.
+    With `randomization`, `info` has the drawn numbers by their names, too.
 
     ## Starting state
     The robot rests with its hub at the origin and limb 1 along +x, or in a random direction with `random_heading`.
@@ -107,8 +111,9 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         `seastar_gym.envs.paths.register_path` added - or waypoints [m], shape (n, 2), from the origin.
         `reset(options={"path": ...})` chooses another path for one episode.
     actions: How commands are written: "limbs", "joint" or "pairs", see above.
-    fidelity: Accuracy of the simulation: "fast", "balanced" (default), "accurate", "reference" or "chapter". If `scene`
-        names its numerics, they are used, and another fidelity is refused.
+    fidelity: Accuracy of the simulation: "fast", "balanced" (default), "accurate", "reference" or "chapter". Without a
+        `scene` it chooses nodes per limb, discretisation and numerics, as `Scene.preset` does, otherwise the numerics
+        alone. If `scene` names its numerics, they are used, and another fidelity is refused.
     scene: Robot, actuators, fluid and numerics; by default the chapter's robot in water.
     reward: Weights of the reward's terms.
     waypoint_radius: Distance of the hub [m] within which a waypoint is reached.

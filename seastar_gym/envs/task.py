@@ -48,9 +48,12 @@ class Outcome(NamedTuple):
 def make_scene(scene: Scene | Plain | None, fidelity: Fidelity | None) -> Scene:
     """Scene with the numerics that it names, otherwise with those of `fidelity`, by default "balanced".
 
-    ValueError where scene and fidelity name different ones.
+    Without a scene, it is the fidelity's own, with its nodes per limb and its discretisation. ValueError where scene
+    and fidelity name different numerics.
     """
-    scene = Scene() if scene is None else read(scene, Scene)
+    if scene is None:
+        return Scene.preset(DEFAULT_FIDELITY if fidelity is None else fidelity)
+    scene = read(scene, Scene)
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a Scene, not {shown(scene)}.")
     if fidelity is None and scene.numerics.named:
@@ -69,13 +72,16 @@ def read(part: Part | Plain, kind: type[Any]) -> Part:
     return from_dict(part, kind) if isinstance(part, dict) else part
 
 
+PROMISED = {
+    "path_error": "path_error", "space_error": "space_error", "time_error": "time_error", "real_time_factor": "speed",
+}  # fmt: skip
+"""Fields of a `Promise` by their names in `info`."""
+
+
 def promised(scene: Scene) -> dict[str, float]:
-    """Measured path error and speed of the scene's numerics, as `info` names them; NaN for scenes not measured."""
-    known = measured(scene.numerics) if replace(scene, numerics=Numerics()) == Scene() else None
-    return {
-        "path_error": math.nan if known is None else known.path_error,
-        "real_time_factor": math.nan if known is None else known.speed,
-    }
+    """Measured errors and speed of a scene, as `info` names them; NaN for scenes not measured."""
+    known = measured(scene)
+    return {name: math.nan if known is None else getattr(known, field) for name, field in PROMISED.items()}
 
 
 def scene_observation_size(scene: Scene) -> int:
@@ -269,7 +275,7 @@ class SwimTask:
         }
 
     def _promised(self) -> dict[str, Floats]:
-        """Measured path error and speed, shape (n_robots,) each; NaN for robots with weak limbs."""
+        """Measured errors and speed, shape (n_robots,) each; NaN for robots with weak limbs."""
         simulator = self.simulator
         if simulator.scene is not self._promise[0]:
             self._promise = simulator.scene, promised(simulator.scene)

@@ -1,8 +1,8 @@
-"""Measured errors and speeds of settings of `Numerics`.
+"""Measured errors and speeds of resolutions and numerics of the chapter's robot.
 
 They are stored in `presets.json`, and were measured by `python -m studies.accuracy --store` for the chapter's robot in
-the chapter's water, over ten strokes from rest. For example, promise("fast").path_error is 0.05 if the hub strays from
-its converged path by at most 5 % of the path's length.
+the chapter's water, over ten strokes from rest. For example, promise("fast").path_error is 0.03 if the hub strays from
+the continuum's path, that of infinitely many nodes and infinitely short steps, by at most 3 % of the path's length.
 """
 
 import json
@@ -13,33 +13,50 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from seastar_gym.scene.checks import is_finite_number, shown
+from seastar_gym.scene.checks import is_finite_number, require_choice, require_count, shown
 
 PRESETS = Path(__file__).with_name("presets.json")
-SETTING = ("scheme", "step", "newton_tolerance", "path_tolerance")
+NOT_MEASURED = (
+    "Errors were measured for the chapter's robot in the chapter's water only, so nothing can be promised for {}: "
+    "measure it as `python -m studies.accuracy` does."
+)
+"""Refusal to promise errors of another robot or scene."""
 
 
 @dataclass(frozen=True)
 class Promise:
-    """Measured errors and speed of a setting of `Numerics`. Errors are relative to the solution for h -> 0.
+    """Measured errors and speed of a resolution and numerics.
 
-    scheme, step [s], newton_tolerance, path_tolerance: Setting, see `Numerics`.
-    path_error: Largest distance of the hub from its converged path at the ends of strokes, as a fraction of the path's
-        length. It is the largest over the straight swim, the four pairs of Fig. 13.8, the pentagon and random commands.
-    gait_error: Path error as above, the largest over repetitions of any command of -1, 0 and 1 per limb.
-    straight_error: Path error of the straight swim.
-    heading_error: Largest error of the heading [deg] in the swims of path_error.
-    end_error: Distance of the hub from its converged end, as a fraction of the path's length, the largest over the
-        swims of path_error.
+    Errors are sums of the error in space, that of N nodes per limb with infinitely short steps against infinitely many
+    nodes, and of the error in time, that of the steps against infinitely short ones with the same nodes. Where the two
+    cancel, the sum is promised all the same.
+
+    discretisation, nodes_per_limb: Resolution of the robot, see `Seastar`.
+    scheme, step [s], newton_tolerance, path_tolerance: See `Numerics`.
+    space_error, time_error: Largest distance of the hub from its path at the ends of strokes, as a fraction of the
+        path's length: the largest over the straight swim, the four pairs of Fig. 13.8, the pentagon, and random
+        commands, of -1, 0 and 1 or from between.
+    path_error: The sum of the two.
+    gait_error: Such a sum, the largest over repetitions of any command and alternations of two.
+    slow_error: Such a sum, the largest over random and repeated commands of a tenth of the amplitude, whose paths are
+        short. No choice by error heeds it.
+    straight_error: Such a sum, of the straight swim.
+    heading_error: Such a sum for the heading [deg], the largest over the swims of path_error.
+    end_error: Such a sum for the hub after the last stroke, the largest over the swims of path_error.
     speed: Simulated time over computing time, for a batch on one core of the machine named in presets.json.
     """
 
+    discretisation: str
+    nodes_per_limb: int
     scheme: str
     step: float
     newton_tolerance: float
     path_tolerance: float | None
+    space_error: float
+    time_error: float
     path_error: float
     gait_error: float
+    slow_error: float
     straight_error: float
     heading_error: float
     end_error: float
@@ -47,10 +64,19 @@ class Promise:
 
     def __str__(self) -> str:
         adapted = "" if self.path_tolerance is None else f" adapted to {100 * self.path_tolerance:g} %"
-        return f'"{self.scheme}" at {1e3 * self.step:g} ms{adapted}'
+        return f'"{self.scheme}" at {1e3 * self.step:g} ms{adapted} with {self.nodes_per_limb} nodes per limb'
 
 
-class Setting(Protocol):
+class Robot(Protocol):
+    """Resolution of a robot."""
+
+    @property
+    def discretisation(self) -> str: ...
+    @property
+    def nodes_per_limb(self) -> int: ...
+
+
+class Numbers(Protocol):
     """Fields of `Numerics` on which errors depend."""
 
     @property
@@ -61,6 +87,17 @@ class Setting(Protocol):
     def newton_tolerance(self) -> float: ...
     @property
     def path_tolerance(self) -> float | None: ...
+
+
+class Measurable(Protocol):
+    """Parts of a `Scene` on which errors depend."""
+
+    @property
+    def robot(self) -> Robot: ...
+    @property
+    def numerics(self) -> Numbers: ...
+    @property
+    def is_chapters(self) -> bool: ...
 
 
 @cache
@@ -75,45 +112,65 @@ def machine() -> str:
 
 
 def promises() -> tuple[Promise, ...]:
-    """Stored settings, fastest first. No other measured setting beats any of them in both error and speed."""
-    return tuple(Promise(**row) for row in _stored()["front"])
+    """Stored settings, fastest first. None of equal resolution beats another in both errors and speed."""
+    return tuple(Promise(**row) for row in _stored()["settings"])
 
 
-def promise(setting: str | Setting) -> Promise:
-    """Errors and speed of a preset or a `Numerics`. ValueError if it was not measured."""
-    presets = {name: Promise(**row) for name, row in _stored()["presets"].items()}
-    if not isinstance(setting, str) and not all(hasattr(setting, name) for name in SETTING):
-        raise ValueError(f"promise needs the name of a preset or a Numerics, not {shown(setting)}.")
+def promise(setting: str | Measurable) -> Promise:
+    """Errors and speed of a preset or a `Scene`. ValueError if it was not measured."""
+    presets = _presets()
     if isinstance(setting, str):
         if setting not in presets:
             raise ValueError(f"A preset is one of {', '.join(map(repr, presets))}, not {shown(setting)}.")
         return presets[setting]
+    if not hasattr(setting, "is_chapters"):
+        raise ValueError(f"promise needs the name of a preset or a Scene, not {shown(setting)}.")
+    if not setting.is_chapters:
+        raise ValueError(NOT_MEASURED.format(shown(setting)))
     known = measured(setting)
     if known is None:
         raise ValueError(f"Nothing was measured, so nothing can be promised, for {shown(setting)}.")
     return known
 
 
-def measured(setting: Setting) -> Promise | None:
-    """Errors and speed of a `Numerics`, or None if it was not measured."""
-    known = (*(Promise(**row) for row in _stored()["presets"].values()), *promises())
-    return next((row for row in known if _identity(row) == _identity(setting)), None)
+def measured(scene: Measurable) -> Promise | None:
+    """Errors and speed of a `Scene`, or None if it was not measured."""
+    if not scene.is_chapters:
+        return None
+    known = (*_presets().values(), *promises())
+    wanted = (_resolution(scene.robot), _setting(scene.numerics))
+    return next((row for row in known if (_resolution(row), _setting(row)) == wanted), None)
 
 
-def _identity(setting: Setting) -> tuple[str, float, float, float | None]:
-    return setting.scheme, setting.step, setting.newton_tolerance, setting.path_tolerance
+def _presets() -> dict[str, Promise]:
+    return {name: Promise(**row) for name, row in _stored()["presets"].items()}
 
 
-def cheapest(error: float, any_gait: bool = False) -> Promise:
+def _resolution(robot: Robot) -> tuple[str, int]:
+    return robot.discretisation, robot.nodes_per_limb
+
+
+def _setting(numerics: Numbers) -> tuple[str, float, float, float | None]:
+    return numerics.scheme, numerics.step, numerics.newton_tolerance, numerics.path_tolerance
+
+
+def cheapest(
+    error: float, any_gait: bool = False, discretisation: str | None = None, nodes_per_limb: int | None = None
+) -> Promise:
     """Fastest stored setting whose path error is at most `error`. ValueError if there is none.
 
     any_gait: Require it for gait_error, too.
+    discretisation, nodes_per_limb: Resolution to keep. None chooses it.
     """
     if not is_finite_number(error) or error <= 0.0:
         raise ValueError(f"error must be a positive, finite share of the path's length, not {shown(error)}.")
     if not isinstance(any_gait, bool | np.bool_):
         raise ValueError(f"any_gait must be True or False, not {shown(any_gait)}.")
-    known = sorted(promises(), key=lambda row: -row.speed)
+    if discretisation is not None:
+        require_choice("discretisation", discretisation, ("chapter", "continuum"))
+    if nodes_per_limb is not None:
+        require_count("nodes_per_limb", nodes_per_limb, 2, 10_000)
+    known = sorted(_of_resolution(discretisation, nodes_per_limb), key=lambda row: -row.speed)
 
     def kept(row: Promise) -> float:
         return max(row.path_error, row.gait_error) if any_gait else row.path_error
@@ -126,3 +183,16 @@ def cheapest(error: float, any_gait: bool = False) -> Promise:
         f"No measured setting keeps the path error below {100 * error:g} %: "
         f"the best, {best}, keeps {100 * kept(best):g} %."
     )
+
+
+def _of_resolution(discretisation: str | None, nodes_per_limb: int | None) -> list[Promise]:
+    """Stored settings of a resolution; ValueError if there are none."""
+    alike = [row for row in promises() if discretisation in (None, row.discretisation)]
+    found = [row for row in alike if nodes_per_limb in (None, row.nodes_per_limb)]
+    if not found:
+        measured_nodes = ", ".join(str(n) for n in sorted({row.nodes_per_limb for row in alike}))
+        raise ValueError(
+            f"Errors were measured with {measured_nodes or 'no'} nodes per limb for "
+            f"discretisation={shown(discretisation)}, not with {shown(nodes_per_limb)}."
+        )
+    return found

@@ -1,7 +1,7 @@
-"""`Numerics`: scheme, step and tolerances of time stepping, chosen by value, by preset or by error."""
+"""`Numerics`: scheme, step and tolerances of time stepping, chosen by value or by preset."""
 
 from dataclasses import dataclass, field
-from typing import Literal, cast, get_args
+from typing import Literal, NamedTuple, get_args
 
 from seastar_gym.scene.checks import (
     is_finite_number,
@@ -11,7 +11,7 @@ from seastar_gym.scene.checks import (
     require_number,
     shown,
 )
-from seastar_gym.scene.fidelity import cheapest
+from seastar_gym.scene.robot import Discretisation
 from seastar_gym.scene.serial import register_part
 
 SchemeName = Literal["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
@@ -74,31 +74,29 @@ class Numerics:
     def preset(cls, fidelity: Fidelity) -> "Numerics":
         """Numerics of a fidelity: "fast", "balanced", "accurate", "reference", or "chapter" for those of the chapter.
 
-        `seastar_gym.scene.fidelity.promise` returns the measured errors and speed of each.
+        What a fidelity promises holds with its nodes per limb and its discretisation: `Scene.preset` chooses them, too.
         """
         require_choice("fidelity", fidelity, get_args(Fidelity))
-        return _PRESETS[fidelity]
-
-    @classmethod
-    def for_error(cls, error: float, any_gait: bool = False) -> "Numerics":
-        """Fastest measured numerics whose path error is at most `error`. ValueError if there are none.
-
-        The errors were measured for the chapter's robot, see `seastar_gym.scene.fidelity`.
-
-        error: Error of the hub's path as a fraction of its length.
-        any_gait: Require it for the repetition of any command, too, which is the hardest task measured.
-        """
-        best = cheapest(error, any_gait)
-        return cls(cast(SchemeName, best.scheme), best.step, best.newton_tolerance, path_tolerance=best.path_tolerance)
+        return PRESETS[fidelity].numerics
 
 
 ADAPTATION = (0.04, 2.0)
 """Constants (c, p): steps with an error rate of (tolerance/c)^p limb lengths per stroke keep the path's tolerance."""
 
-_PRESETS: dict[Fidelity, Numerics] = {
-    "fast": Numerics("sdirk2", 20e-3, newton_tolerance=1e-6),
-    "balanced": Numerics("implicit-midpoint", 5e-3, newton_tolerance=1e-6),
-    "accurate": Numerics("implicit-midpoint", 5e-3, path_tolerance=0.015),
-    "reference": Numerics("implicit-midpoint", 0.3e-3, newton_tolerance=1e-9),
-    "chapter": Numerics("implicit-euler", 3e-3),
+
+class Setting(NamedTuple):
+    """Resolution of a robot, see `Seastar`, and numerics: what errors depend on."""
+
+    discretisation: Discretisation
+    nodes_per_limb: int
+    numerics: Numerics
+
+
+PRESETS: dict[Fidelity, Setting] = {
+    "fast": Setting("continuum", 7, Numerics("implicit-midpoint", 5e-3, newton_tolerance=1e-5)),
+    "balanced": Setting("continuum", 12, Numerics("implicit-midpoint", 5e-3, newton_tolerance=1e-5)),
+    "accurate": Setting("continuum", 19, Numerics("implicit-midpoint", 1e-3, newton_tolerance=1e-6)),
+    "reference": Setting("continuum", 37, Numerics("implicit-midpoint", 0.3e-3)),
+    "chapter": Setting("chapter", 10, Numerics("implicit-euler", 3e-3)),
 }
+"""Chosen from the front that `python -m studies.accuracy` measures."""

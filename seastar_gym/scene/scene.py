@@ -10,18 +10,19 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from operator import itemgetter
-from typing import Any
+from typing import Any, cast, get_args
 
 import numpy as np
 
 from seastar_gym.scene.actuators.actuator import Actuator, StatefulActuator, check_actuator, is_actuator
 from seastar_gym.scene.actuators.pulse import SmaPulse
-from seastar_gym.scene.checks import is_finite_number, require_count, require_numbers, shown
+from seastar_gym.scene.checks import is_finite_number, require_choice, require_count, require_numbers, shown
 from seastar_gym.scene.contact import Contact
+from seastar_gym.scene.fidelity import NOT_MEASURED, cheapest
 from seastar_gym.scene.fluid import Water
-from seastar_gym.scene.numerics import MAX_STEPS, Numerics
+from seastar_gym.scene.numerics import MAX_STEPS, PRESETS, Fidelity, Numerics, SchemeName
 from seastar_gym.scene.per_robot import batch_size, chosen
-from seastar_gym.scene.robot import Seastar
+from seastar_gym.scene.robot import Discretisation, Seastar
 from seastar_gym.scene.serial import from_dict, register_part, to_dict
 from seastar_gym.scene.shape import cross_at_rest, n_hub_hinges, natural_hub_angle
 
@@ -186,6 +187,43 @@ class Scene:
                 + (', or use hub_hinge="turning".' if robot.n_limbs == 2 else ".")
             )
 
+    @classmethod
+    def preset(cls, fidelity: Fidelity) -> "Scene":
+        """The chapter's robot and water with the nodes per limb, discretisation and numerics of a fidelity.
+
+        "fast", "balanced", "accurate" and "reference" are of the continuum, "chapter" is the chapter's discretisation.
+        `seastar_gym.scene.fidelity.promise` returns the measured errors and speed of each.
+        """
+        require_choice("fidelity", fidelity, get_args(Fidelity))
+        discretisation, nodes_per_limb, numerics = PRESETS[fidelity]
+        return cls(Seastar(nodes_per_limb=nodes_per_limb, discretisation=discretisation), numerics=numerics)
+
+    @classmethod
+    def for_error(cls, error: float, any_gait: bool = False, robot: Seastar | None = None) -> "Scene":
+        """The chapter's robot and water at the fastest measured setting whose path error is at most `error`.
+
+        The error is that of the hub's path against infinitely many nodes and infinitely short steps, as a fraction of
+        the path's length. ValueError if no measured setting keeps it, or if the robot was not measured.
+
+        any_gait: Require it for the repetition of any command, too, which is harder.
+        robot: The chapter's robot with the nodes per limb and the discretisation that it is to keep. None chooses them.
+        """
+        if not isinstance(robot, Seastar | None):
+            raise ValueError(f"robot must be a Seastar or None, not {shown(robot)}.")
+        if robot is not None and not _is_chapters(robot):
+            raise ValueError(NOT_MEASURED.format(shown(robot)))
+        best = cheapest(error, any_gait, *(() if robot is None else (robot.discretisation, robot.nodes_per_limb)))
+        numerics = Numerics(
+            cast(SchemeName, best.scheme), best.step, best.newton_tolerance, path_tolerance=best.path_tolerance
+        )
+        discretisation = cast(Discretisation, best.discretisation)
+        return cls(Seastar(nodes_per_limb=best.nodes_per_limb, discretisation=discretisation), numerics=numerics)
+
+    @property
+    def is_chapters(self) -> bool:
+        """Whether all is the chapter's except numerics, nodes per limb and discretisation."""
+        return _is_chapters(self.robot) and self == Scene(self.robot, numerics=self.numerics)
+
     def to_dict(self) -> dict[str, Any]:
         """Scene as plain data for JSON, see serial.py. ValueError if it could not be read back."""
         return to_dict(self)
@@ -203,6 +241,11 @@ class Scene:
     def of_robot(self, index: int) -> "Scene":
         """Scene of one robot of a batch."""
         return chosen(self, itemgetter(index))
+
+
+def _is_chapters(robot: Seastar) -> bool:
+    """Whether a robot is the chapter's except for its nodes per limb and its discretisation."""
+    return robot == Seastar(nodes_per_limb=robot.nodes_per_limb, discretisation=robot.discretisation)
 
 
 def _span(numbers: Iterable[float]) -> str:

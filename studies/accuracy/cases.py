@@ -1,7 +1,7 @@
-"""Swims of the accuracy study: command sequences, the simulated swim, and its error against a converged swim."""
+"""Swims of the accuracy study: command sequences, the simulated swim, and its error against another."""
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -9,14 +9,17 @@ from numpy.typing import NDArray
 
 from seastar_gym.envs.paths import path_length
 from seastar_gym.gaits import PAIRS, STRAIGHT, pentagon_gait
-from seastar_gym.scene import Numerics, Scene, Seastar
+from seastar_gym.scene import Scene
+from seastar_gym.scene.numerics import Setting
 from seastar_gym.simulator import Simulator, SolverStatus
 
 Floats = NDArray[np.float64]
-Kind = Literal["straight", "pair", "pentagon", "random", "gait"]
+Kind = Literal["straight", "pair", "pentagon", "random", "slow", "gait"]
 
 STROKES = 10
 """Strokes of a swim, except round the pentagon."""
+SLOW = 0.1
+"""Factor of the commands of slow swims."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +63,9 @@ class Swim(NamedTuple):
 
 
 class Errors(NamedTuple):
-    """Errors of every robot against its converged swim, shape (n_robots,).
+    """Errors of every robot against another swim of the same commands, shape (n_robots,).
 
-    path, end: Largest and last distance of the hub from the converged path, as fractions of that path's length.
+    path, end: Largest and last distance of the hub from the other path, as fractions of a path's length.
     heading: Largest difference of the heading [rad].
     """
 
@@ -90,6 +93,13 @@ def random_sequences(n: int, rng: np.random.Generator) -> Cases:
     return Cases(tuple(f"random {k + 1}" for k in range(n)), tuple(kinds), commands)
 
 
+def slow_sequences(n: int, rng: np.random.Generator) -> Cases:
+    """Random sequences of n robots at a tenth of the amplitude, whose short paths feel a Newton tolerance most."""
+    some = random_sequences(n, rng)
+    kinds: list[Kind] = ["slow"] * n
+    return Cases(tuple(f"slow {k + 1}" for k in range(n)), tuple(kinds), SLOW * some.commands)
+
+
 def gaits() -> Cases:
     """Repetitions of every command of -1, 0 and +1 that is not in `swims`, once per class under the robot's symmetry.
 
@@ -100,6 +110,26 @@ def gaits() -> Cases:
     forms = sorted({symmetric_form(np.array(command)) for command in itertools.product((-1, 0, 1), repeat=5)} - known)
     names = ["".join("-0+"[sign + 1] for sign in form) for form in forms]
     return repeated(names, ["gait"] * len(forms), np.array(forms, float))
+
+
+def random_gaits(n: int, rng: np.random.Generator) -> Cases:
+    """Gaits of n robots each: a command in [-1, 1] repeated, a tenth of it repeated, and two commands in alternation.
+
+    Half of those in alternation are drawn from -1, 0 and 1.
+    """
+    once, some = rng.uniform(-1.0, 1.0, (n, 5)), random_sequences(n, rng).commands[:2]
+    alternating = np.tile(some, (STROKES // 2, 1, 1))
+    gait: list[Kind] = ["gait"] * n
+    slow: list[Kind] = ["slow"] * n
+
+    def named(name: str) -> list[str]:
+        return [f"{name} {k + 1}" for k in range(n)]
+
+    return joined(
+        repeated(named("gait"), gait, once),
+        repeated(named("slow gait"), slow, SLOW * once),
+        Cases(tuple(named("alternating")), tuple(gait), alternating),
+    )
 
 
 def symmetric_form(command: Floats) -> tuple[int, ...]:
@@ -120,20 +150,16 @@ def joined(*cases: Cases) -> Cases:
     return Cases(names, kinds, np.concatenate([each.commands for each in cases], axis=1))
 
 
-def scene_of(numerics: Numerics, nodes_per_limb: int = 10, relaxation_time: float | None = None) -> Scene:
-    """The chapter's scene with these numerics; relaxation_time: That of a damped material [s], or None."""
-    return Scene(robot=Seastar(nodes_per_limb=nodes_per_limb, relaxation_time=relaxation_time), numerics=numerics)
+def scene_of(setting: Setting, physics: Scene = Scene()) -> Scene:
+    """Scene of a robot, a fluid and an actuator, by default the chapter's, at a setting."""
+    discretisation, nodes_per_limb, numerics = setting
+    robot = replace(physics.robot, discretisation=discretisation, nodes_per_limb=nodes_per_limb)
+    return replace(physics, robot=robot, numerics=numerics)
 
 
-def swim(
-    cases: Cases,
-    numerics: Numerics,
-    nodes_per_limb: int = 10,
-    threads: int | None = 1,
-    relaxation_time: float | None = None,
-) -> Swim:
+def swim(cases: Cases, scene: Scene, threads: int | None = 1) -> Swim:
     """Simulate all robots from rest through their commands."""
-    simulator = Simulator(scene_of(numerics, nodes_per_limb, relaxation_time), len(cases), threads)
+    simulator = Simulator(scene, len(cases), threads)
     hub, heading, reports = [], [], []
     for commands in cases.commands:
         reports.append(simulator.stroke(commands))
@@ -155,11 +181,14 @@ def hub_path_lengths(hub: Floats) -> Floats:
     return path_length(np.zeros(2), np.moveaxis(hub, 0, 1))
 
 
-def errors(swum: Swim, converged: Swim) -> Errors:
-    """Errors of a swim against the converged one; infinite for all robots if one failed."""
+def errors(swum: Swim, exact: Swim, lengths: Floats | None = None) -> Errors:
+    """Errors of a swim against another; infinite for all robots if one failed.
+
+    lengths: Lengths of paths [m], shape (n_robots,), of which the errors are fractions. None means those of `exact`.
+    """
     if swum.failed:
         return Errors(*np.full((3, swum.hub.shape[1]), np.inf))
-    distance = np.linalg.norm(swum.hub - converged.hub, axis=-1)
-    turn = np.angle(np.exp(1j * (swum.heading - converged.heading)))
-    length = hub_path_lengths(converged.hub)
+    distance = np.linalg.norm(swum.hub - exact.hub, axis=-1)
+    turn = np.angle(np.exp(1j * (swum.heading - exact.heading)))
+    length = hub_path_lengths(exact.hub) if lengths is None else lengths
     return Errors(distance.max(axis=0) / length, np.abs(turn).max(axis=0), distance[-1] / length)

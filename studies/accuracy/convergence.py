@@ -1,30 +1,35 @@
-"""Converged swims, and errors of settings against them in time and in space."""
+"""Swims that stand for the continuum and for infinitely short steps, and errors of settings against them."""
 
-import itertools
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene import Numerics
-from studies.accuracy.cases import Cases, Errors, Swim, errors, hub_path_lengths, swim
-from studies.accuracy.rows import Row, Space
-from studies.accuracy.settings import FINE_NODES, Plan
+from seastar_gym.scene import Numerics, Scene
+from seastar_gym.scene.numerics import Setting
+from studies.accuracy.cases import Cases, Swim, errors, hub_path_lengths, scene_of, swim
+from studies.accuracy.rows import Figures, Row, figures
+from studies.accuracy.settings import Plan, Resolution
 
 Floats = NDArray[np.float64]
 
-TIGHT = 1e-12
-"""Newton tolerance of converged solutions."""
+TIGHT = 1e-9
+"""Newton tolerance of the swims that others are compared with."""
 
-Job = tuple[Cases, Numerics, int]
+Job = tuple[Cases, Scene]
 
 
 def swim_all(jobs: Sequence[Job], bar: Any) -> list[Swim]:
-    """Swims of all jobs (cases, numerics, nodes per limb), computed on all processors, the longest first."""
-    order = sorted(range(len(jobs)), key=lambda k: jobs[k][1].step / (jobs[k][2] * jobs[k][0].commands[..., 0].size))
+    """Swims of all jobs, computed on all processors, the longest first."""
+
+    def cost(job: Job) -> float:
+        cases, scene = job
+        return scene.robot.nodes_per_limb * cases.commands[..., 0].size / scene.numerics.step
+
+    order = sorted(range(len(jobs)), key=lambda k: -cost(jobs[k]))
 
     def run(k: int) -> Swim:
         swum = swim(*jobs[k])
@@ -36,7 +41,7 @@ def swim_all(jobs: Sequence[Job], bar: Any) -> list[Swim]:
     return [swum[k] for k in range(len(jobs))]
 
 
-def in_groups(cases: Cases, n: int = 8) -> list[Cases]:
+def in_groups(cases: Cases, n: int = 16) -> list[Cases]:
     """Cases split into batches of n robots, to be shared among processors."""
     parts = [slice(k, k + n) for k in range(0, len(cases), n)]
     return [Cases(cases.names[part], cases.kinds[part], cases.commands[:, part]) for part in parts]
@@ -57,85 +62,105 @@ def together(swum: Sequence[Swim]) -> Swim:
     )
 
 
-def converge(batches: Sequence[Cases], plan: Plan, bar: Any) -> tuple[list[Swim], dict[str, float]]:
-    """Converged swim of every batch by the first of plan.converged, and the second's largest path error by kind."""
-    found: list[list[Swim]] = []
-    jobs: list[Job] = []
-    for scheme, step in plan.converged:
-        numerics = Numerics(scheme, step, TIGHT)
-        jobs += [(group, numerics, 10) for batch in batches for group in in_groups(batch)]
+class Exact(NamedTuple):
+    """Swims that others are compared with, every one a list over batches.
+
+    limit: Those that stand for the continuum. fine: Those that stand for infinitely short steps, by resolution.
+    """
+
+    limit: list[Swim]
+    fine: dict[Resolution, list[Swim]]
+
+
+def tight(discretisation: str, nodes: int, step: float, scheme: str = "implicit-midpoint") -> Setting:
+    """Setting of a swim that others are compared with."""
+    return Setting(discretisation, nodes, Numerics(scheme, step, TIGHT))  # type: ignore[arg-type]
+
+
+def swim_batches(batches: Sequence[Cases], scenes: Sequence[Scene], bar: Any) -> list[list[Swim]]:
+    """Swims of all batches with every scene, split into groups for the processors."""
+    jobs = [(group, scene) for scene in scenes for batch in batches for group in in_groups(batch)]
     swum = iter(swim_all(jobs, bar))
-    for _ in plan.converged:
-        found.append([together([next(swum) for _ in in_groups(batch)]) for batch in batches])
-    agreement: dict[str, float] = {}
-    for batch, first, second in zip(batches, *found, strict=True):
-        for kind, error in zip(batch.kinds, errors(second, first).path, strict=True):
-            agreement[kind] = max(agreement.get(kind, 0.0), float(error))
-    return found[0], agreement
+    return [[together([next(swum) for _ in in_groups(batch)]) for batch in batches] for _ in scenes]
 
 
-def as_row(numerics: Numerics, nodes: int, batches: Sequence[Cases], swum: Sequence[Swim], found: list[Errors]) -> Row:
-    """Row of a setting from the swims and errors of all batches."""
-    kinds = np.array([kind for batch in batches for kind in batch.kinds])
-    names = np.array([name for batch in batches for name in batch.names])
-    path, heading, end = (np.concatenate(column) for column in zip(*found, strict=True))
-    some = kinds != "gait"
-
-    def largest(kind: str) -> float:
-        return float(path[kinds == kind].max(initial=0.0))
-
-    size = np.array([len(batch) * len(batch.commands) for batch in batches])
-    return Row(
-        numerics,
-        nodes,
-        path=float(path[some].max()),
-        worst=str(names[some][path[some].argmax()]),
-        straight=largest("straight"),
-        pair=largest("pair"),
-        pentagon=largest("pentagon"),
-        random=largest("random"),
-        median=float(np.median(path[kinds == "random"])) if (kinds == "random").any() else 0.0,
-        gait=largest("gait"),
-        heading=float(np.degrees(heading[some].max())),
-        end=float(end[some].max()),
-        iterations=float(size @ [each.iterations for each in swum] / size.sum()),
-        steps=float(size @ [each.steps for each in swum] / size.sum()),
-        rejections=sum(each.rejections for each in swum),
-        halvings=sum(each.halvings for each in swum),
-    )
+def n_groups(batches: Sequence[Cases]) -> int:
+    """Number of groups that `swim_batches` makes."""
+    return sum(len(in_groups(batch)) for batch in batches)
 
 
-def measure_errors(
-    batches: Sequence[Cases], converged: Sequence[Swim], all_numerics: Sequence[Numerics], nodes: int, bar: Any
+def fine_setting(plan: Plan, resolution: Resolution) -> Setting:
+    """Setting that stands for infinitely short steps."""
+    discretisation, nodes = resolution
+    if discretisation == "chapter" and nodes > plan.finest:
+        return tight(*resolution, 4.0 * plan.fine)
+    return tight(*resolution, plan.limit[1] if nodes >= plan.limit[0] else plan.fine)
+
+
+def converge(
+    batches: Sequence[Cases], plan: Plan, resolutions: Sequence[Resolution], bar: Any, physics: Scene = Scene()
+) -> Exact:
+    """Swims that others are compared with."""
+    wanted = [tight("continuum", *plan.limit), *(fine_setting(plan, each) for each in resolutions)]
+    limit, *fine = swim_batches(batches, [scene_of(each, physics) for each in wanted], bar)
+    return Exact(limit, dict(zip(resolutions, fine, strict=True)))
+
+
+def compared(batches: Sequence[Cases], swum: Sequence[Swim], exact: Sequence[Swim], limit: Sequence[Swim]) -> Figures:
+    """Largest errors of swims of all batches against others, as fractions of the lengths of the limit's paths.
+
+    With the same lengths for space and time, no swim errs by more than the sum of the two.
+    """
+    all_three = zip(swum, exact, limit, strict=True)
+    return figures(batches, [errors(each, other, hub_path_lengths(last.hub)) for each, other, last in all_three])
+
+
+def second_opinion(cases: Cases, plan: Plan, bar: Any) -> dict[str, Figures]:
+    """Errors of the limit itself on some cases, by what they are from.
+
+    Space: Twice the edges bring a quarter of the error, so a third of the difference that they make is left. Time: The
+    same for half the steps. Scheme: SDIRK3 against the midpoint rule, with the same nodes.
+    """
+    nodes, step = plan.opinion
+    finer = 2 * nodes - 1
+    wanted = [
+        tight("continuum", nodes, step), tight("continuum", finer, step), tight("continuum", nodes, 0.5 * step),
+        tight("continuum", nodes, step, "sdirk3"),
+    ]  # fmt: skip
+    plain, fine, short, other = (found[0] for found in swim_batches([cases], [scene_of(each) for each in wanted], bar))
+
+    def against(each: Swim, other: Swim) -> Figures:
+        return compared([cases], [each], [other], [fine])
+
+    def third(found: Figures) -> Figures:
+        return found._replace(path=found.path / 3.0, straight=found.straight / 3.0, pair=found.pair / 3.0)
+
+    return {
+        f"space, from {nodes} and {finer} nodes": third(against(plain, fine)),
+        f"time, midpoint {1e3 * step:g} ms": against(plain, short),
+        f"scheme, sdirk3 {1e3 * step:g} ms": against(other, short),
+    }
+
+
+def measure(
+    batches: Sequence[Cases], exact: Exact, settings: Sequence[Setting], bar: Any, physics: Scene = Scene()
 ) -> list[Row]:
-    """Rows of all settings, with errors against the converged solution of the same N."""
-    swum = iter(swim_all([(batch, numerics, nodes) for numerics in all_numerics for batch in batches], bar))
+    """Rows of all settings, yet without speeds."""
+    space = {each: compared(batches, fine, exact.limit, exact.limit) for each, fine in exact.fine.items()}
+    swum = swim_batches(batches, [scene_of(each, physics) for each in settings], bar)
+    size = np.array([len(batch) * len(batch.commands) for batch in batches])
     rows = []
-    for numerics in all_numerics:
-        mine = [next(swum) for _ in batches]
-        found = [errors(each, exact) for each, exact in zip(mine, converged, strict=True)]
-        rows.append(as_row(numerics, nodes, batches, mine, found))
+    for setting, mine in zip(settings, swum, strict=True):
+        resolution = setting.discretisation, setting.nodes_per_limb
+        rows.append(
+            Row(
+                setting,
+                space[resolution],
+                compared(batches, mine, exact.fine[resolution], exact.limit),
+                iterations=float(size @ [each.iterations for each in mine] / size.sum()),
+                steps=float(size @ [each.steps for each in mine] / size.sum()),
+                rejections=sum(each.rejections for each in mine),
+                halvings=sum(each.halvings for each in mine),
+            )
+        )
     return rows
-
-
-def extrapolated(paths: Sequence[Floats]) -> Floats:
-    """Limit of paths whose edge length halves from each to the next; removes errors of first and second order."""
-    once = [2.0 * finer - coarser for coarser, finer in itertools.pairwise(paths)]
-    return (4.0 * once[-1] - once[-2]) / 3.0
-
-
-def measure_space(cases: Cases, plan: Plan, bar: Any) -> tuple[dict[int, Swim], list[Space], float]:
-    """Converged swims by N, their spatial errors, and the straight swim's final hub x for N -> infinity [m]."""
-    nodes = sorted({*plan.coarse_nodes, *plan.nodes, *FINE_NODES[: plan.n_fine]})
-
-    def numerics(n: int) -> Numerics:
-        return Numerics("implicit-midpoint", plan.fine * (2.5 if n > 40 else 1.0), 1e-10)
-
-    swum = dict(zip(nodes, swim_all([(cases, numerics(n), n) for n in nodes], bar), strict=True))
-    limit = extrapolated([swum[n].hub for n in FINE_NODES[: plan.n_fine]])
-    lengths = hub_path_lengths(limit)
-    space = []
-    for n in nodes:
-        error = np.linalg.norm(swum[n].hub - limit, axis=-1).max(axis=0) / lengths
-        space.append(Space(n, float(error.max()), float(error[0])))
-    return swum, space, float(limit[-1, 0, 0])

@@ -1,17 +1,19 @@
-"""Pictures of the accuracy study: work against precision, and convergence in time and space."""
+"""Pictures of the accuracy study: work against precision, and errors of space and of time."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene import Numerics
 from studies.accuracy.ringing import ringing
-from studies.accuracy.style import COLOURS, DPI, FAINT, INK, MS, PERCENT, as_numbers, as_percent, subplots
+from studies.accuracy.rows import Column, front
+from studies.accuracy.settings import presets
+from studies.accuracy.style import COLOURS, DPI, INK, MS, PERCENT, as_numbers, as_percent, subplots
+from studies.validation.published import PUBLISHED_FINALS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,10 +23,30 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
+OURS, CHAPTERS, OTHERS = "#3366aa", "#cc7a00", "#80868f"
+PUBLISHED_LIMIT = 38.65e-3
+"""Hub x [m] after ten strokes to which the published codes tend for short steps."""
 
-def kind_of(numerics: Numerics) -> str:
-    """Key of COLOURS for a setting: its scheme, or "adapted"."""
-    return numerics.scheme if numerics.path_tolerance is None else "adapted"
+
+class Published(NamedTuple):
+    """A published code's speed in real time with steps [s] of ten nodes per limb, one core, its stock tolerances."""
+
+    name: str
+    step: float
+    speed: float
+
+
+PUBLISHED = (
+    Published("dismech-rods", 10e-3, 11.8),
+    Published("DDG_Tutorial_Fast", 10e-3, 8.5),
+    Published("dismech-python", 10e-3, 2.4),
+    Published("DDG_Tutorial (Octave)", 10e-3, 0.18),
+    Published("dismech-rods", 3e-3, 4.3),
+    Published("DDG_Tutorial_Fast", 3e-3, 3.5),
+    Published("dismech-python", 3e-3, 0.75),
+    Published("DDG_Tutorial (Octave)", 3e-3, 0.07),
+)
+"""Measured on the chapter's scene with hub hinges bent by their turning angle, on a 2-core AMD EPYC."""
 
 
 def draw_all(found: Study, folder: Path) -> list[Path]:
@@ -44,114 +66,125 @@ def draw_all(found: Study, folder: Path) -> list[Path]:
 
 
 def work_precision(found: Study) -> Figure:
-    """Error over speed: all settings, the front, the presets and the chapter's two time steps."""
-    figure, axes = subplots(1, 2, figsize=(12.5, 5.6), sharey=True)
-    rows = [row for row in found.rows if row.nodes_per_limb == 10]
-    panels: tuple[tuple[str, str, str, str], ...] = (
-        ("path", "path_promise", "speed", "Worst of pairs, pentagon and random commands; mixed batch"),
-        ("straight", "straight_promise", "straight_speed", "Straight swim {2+, 5-} alone; batch of straight swims"),
-    )
-    for each, (error, promise, speed, title) in zip(axes, panels, strict=True):
-        _draw_settings(each, rows, lambda row: getattr(row, error), lambda row: getattr(row, speed))  # noqa: B023
-        _draw_front(each, rows, lambda row: getattr(row, promise), lambda row: getattr(row, speed))  # noqa: B023
-        _mark(each, rows, lambda row: getattr(row, promise), lambda row: getattr(row, speed))  # noqa: B023
-        each.set(xscale="log", yscale="log", xlabel="simulated over computing seconds, one core  (faster →)")
-        each.set_title(title, fontsize=10.5, loc="left")
-        as_numbers(each.xaxis)
-    axes[0].set(ylabel="path error over 10 strokes, of the path's length", ylim=(0.004, 80.0))
-    as_percent(axes[0].yaxis)
-    axes[0].legend(frameon=False, fontsize=8.5, loc="upper left", ncols=2)
-    figure.suptitle("What speed costs: every dot is a scheme, a time step and a Newton tolerance", x=0.01, ha="left")
+    """Total error over speed: ours, the chapter's discretisation, the presets, and published codes."""
+    figure, (path, straight) = subplots(2, 1, figsize=(7.2, 11.5))
+    panels: tuple[tuple[Axes, Column], ...] = ((path, "path"), (straight, "straight"))
+    for axes, column in panels:
+        _draw_settings(axes, found.rows, column)
+        _mark_presets(axes, found.rows, column, left=column == "straight")
+        axes.set(xscale="log", yscale="log", xlabel="simulated over computing time, one core  (faster →)")
+        axes.tick_params(labelsize=11)
+        as_numbers(axes.xaxis)
+        as_percent(axes.yaxis)
+    _draw_published(straight, found.distances["straight"])
+    path.set_title("Worst of pairs, pentagon and random commands", fontsize=12.5, loc="left")
+    straight.set_title("Straight swim, with published codes", fontsize=12.5, loc="left")
+    path.set_ylabel("error of space + error of time", fontsize=11.5)
+    straight.set_ylabel("error of space + error of time", fontsize=11.5)
+    path.set_xlim(right=3.0 * path.get_xlim()[1])
+    figure.legend(*path.get_legend_handles_labels(), frameon=False, fontsize=11, loc="outside upper left")
     return figure
 
 
-RowNumber = Callable[["Row"], float]
+def _speed(row: Row, column: Column) -> float:
+    return row.straight_speed if column == "straight" else row.speed
 
 
-def _draw_settings(axes: Axes, rows: Sequence[Row], error: RowNumber, speed: RowNumber) -> None:
-    for kind, colour in COLOURS.items():
-        mine = [row for row in rows if kind_of(row.numerics) == kind]
-        name = "implicit-midpoint, adapted steps" if kind == "adapted" else kind
-        x, y = [speed(row) for row in mine], [PERCENT * error(row) for row in mine]
-        axes.plot(x, y, "o", ms=3.6, mew=0, alpha=0.45, color=colour, label=name)
+def _draw_settings(axes: Axes, rows: Sequence[Row], column: Column) -> None:
+    """Draw all settings as dots, and what can be promised at a speed as a line."""
+    for discretisation, colour, name in (
+        ("continuum", OURS, "our discretisation"),
+        ("chapter", CHAPTERS, "the chapter's"),
+    ):
+        mine = [row for row in rows if row.setting.discretisation == discretisation]
+        x, y = [_speed(row, column) for row in mine], [PERCENT * row.total(column) for row in mine]
+        axes.plot(x, y, "o", ms=3.6, mew=0, alpha=0.35, color=colour)
+        best = front(mine, lambda row: row.promise(column), lambda row: _speed(row, column))
+        x, y = np.array([(_speed(row, column), PERCENT * row.promise(column)) for row in best]).T
+        label = f"{name}: the least error that can be promised"
+        axes.plot(x, y, drawstyle="steps-pre", color=colour, lw=1.8, label=label)
 
 
-def _draw_front(axes: Axes, rows: Sequence[Row], error: RowNumber, speed: RowNumber) -> None:
-    from studies.accuracy.rows import front
-
-    best = front(rows, error, speed)
-    x, y = np.array([(speed(row), PERCENT * error(row)) for row in best]).T
-    axes.plot(x, y, drawstyle="steps-pre", color=INK, lw=1.3, label="front: the least error that can be promised")
-
-
-def _mark(axes: Axes, rows: Sequence[Row], error: RowNumber, speed: RowNumber) -> None:
-    """Mark the presets and the chapter's two time steps."""
+def _mark_presets(axes: Axes, rows: Sequence[Row], column: Column, left: bool) -> None:
+    """Mark the presets, with their names on the left or on the lower right."""
     from matplotlib.patheffects import withStroke
 
-    from studies.accuracy.rows import presets
-
-    by_numerics = {row.numerics: row for row in rows}
-    marks = [(f'"{name}"', by_numerics[n], "s") for name, n in presets().items() if name != "chapter"]
-    for step in (3e-3, 20e-3):
-        row = by_numerics.get(Numerics("implicit-euler", step))
-        if row is not None:
-            marks.append((f"the chapter's scheme, {MS * step:g} ms", row, "*"))
-    for name, row, marker in marks:
-        x, y, chapter = speed(row), PERCENT * error(row), marker == "*"
-        axes.plot(x, y, marker, ms=12 if chapter else 7, color=COLOURS[kind_of(row.numerics)], mec=INK, mew=1.0)
-        left = chapter or row.numerics.path_tolerance is not None
+    by_setting = {row.setting: row for row in rows}
+    for name, setting in presets().items():
+        row = by_setting[setting]
+        x, y = _speed(row, column), PERCENT * row.promise(column)
+        colour = CHAPTERS if name == "chapter" else OURS
+        axes.plot(x, y, "s", ms=8, color=colour, mec=INK, mew=1.0)
         axes.annotate(
-            name, (x, y), (10, 9) if chapter else (-6 if left else 6, -14), textcoords="offset points", fontsize=8.5,
-            color=INK, ha="right" if left else "left", path_effects=[withStroke(linewidth=2.5, foreground="white")],
+            f"{name}, N = {setting.nodes_per_limb}", (x, y), (-9, -4) if left else (7, -14), textcoords="offset points",
+            fontsize=10.5, color=INK, ha="right" if left else "left",
+            path_effects=[withStroke(linewidth=3, foreground="white")],
         )  # fmt: skip
 
 
+def published_error(step: float, limit: float) -> float:
+    """Error of space plus error of time of the published codes' straight swim; limit: the continuum's distance [m]."""
+    finals = PUBLISHED_FINALS | {3e-3: 37.7359448e-3}
+    return abs(PUBLISHED_LIMIT / limit - 1.0) + abs(finals[step] / PUBLISHED_LIMIT - 1.0)
+
+
+def _draw_published(axes: Axes, limit: float) -> None:
+    for step, marker in ((10e-3, "D"), (3e-3, "^")):
+        mine = [each for each in PUBLISHED if each.step == step]
+        error = PERCENT * published_error(step, limit)
+        axes.plot([each.speed for each in mine], [error] * len(mine), marker, ms=7, color=OTHERS, mec=INK, mew=0.8)
+        first = min(mine, key=lambda each: each.speed)
+        axes.annotate(
+            f"h = {MS * step:g} ms", (first.speed, error), (-9, 3 if step == 10e-3 else -6),
+            textcoords="offset points", fontsize=9.5, ha="right", va="center", color=INK,
+        )  # fmt: skip
+    top = PERCENT * published_error(10e-3, limit)
+    for name, speed, ha in (
+        ("DDG_Tutorial\n(Octave)", 0.18, "center"), ("dismech-\npython", 2.4, "center"),
+        ("DDG_Tutorial_Fast,\ndismech-rods", 8.5, "left"),
+    ):  # fmt: skip
+        axes.annotate(name, (speed, top), (0, 9), textcoords="offset points", fontsize=9.5, color=INK, ha=ha)
+    axes.set_xlim(left=0.004)
+    axes.set_ylim(top=4.0 * top)
+
+
 def convergence(found: Study) -> Figure:
-    """Error over the time step for the straight swim and the worst swim, and error over the nodes per limb."""
-    figure, (straight, worst, space) = subplots(1, 3, figsize=(13.5, 4.6))
-    fixed = [row for row in found.rows if row.nodes_per_limb == 10 and row.numerics.path_tolerance is None]
-    tightest_last = sorted(fixed, key=lambda row: -row.numerics.newton_tolerance)
-    rows = list({(row.numerics.scheme, row.numerics.step): row for row in tightest_last}.values())
-    for axes, error, title in (
-        (straight, "straight", "Time step: straight swim"),
-        (worst, "path", "Time step: worst of pairs and random commands"),
-    ):
+    """Error of time over the time step, and error of space over the nodes per limb, for both discretisations."""
+    from matplotlib.ticker import NullLocator
+
+    figure, (time, space) = subplots(1, 2, figsize=(11.5, 4.9))
+    fixed = [row for row in found.rows if row.resolution[1] == 10 and row.setting.numerics.path_tolerance is None]
+    tightest_last = sorted(fixed, key=lambda row: -row.setting.numerics.newton_tolerance)
+    for discretisation, line in (("chapter", ":"), ("continuum", "-")):
+        rows = {
+            (row.setting.numerics.scheme, row.setting.numerics.step): row
+            for row in tightest_last
+            if row.setting.discretisation == discretisation
+        }
         for kind, colour in list(COLOURS.items())[:4]:
-            points = sorted(
-                (MS * row.numerics.step, PERCENT * getattr(row, error)) for row in rows if row.numerics.scheme == kind
-            )
-            axes.loglog(*np.array(points).T, "o-", ms=4, lw=1.4, color=colour, label=kind)
-        axes.set(xlabel="time step h [ms]", ylim=(0.001, 40.0))
-        axes.set_title(title, fontsize=10.5, loc="left")
-    _slopes(straight, (0.25, 20.0), {1: 1.3e-1, 2: 2.0e-3})
-    for axes in (straight, worst):
-        as_percent(axes.yaxis)
-        as_numbers(axes.xaxis)
-    straight.set_ylabel("path error against h → 0, same N")
-    straight.legend(frameon=False, fontsize=8.5, loc="upper left")
-    edges = np.array([each.nodes_per_limb - 1 for each in found.space])
-    for error, colour, name in (("path", INK, "worst path"), ("straight", FAINT, "straight swim")):
-        values = PERCENT * np.array([getattr(each, error) for each in found.space])
-        space.loglog(edges + 1, values, "o-", ms=4, lw=1.4, color=colour, label=name)
-    ten = next(each for each in found.space if each.nodes_per_limb == 10)
-    space.annotate(
-        "the chapter's N = 10", (10, PERCENT * ten.straight), (0, -30), textcoords="offset points", fontsize=8.5,
-        ha="center", arrowprops={"arrowstyle": "-", "color": FAINT},
-    )  # fmt: skip
-    space.set(xlabel="nodes per limb N", ylabel="path error against N → ∞, h → 0")
-    space.set_xticks(edges + 1, [str(n + 1) for n in edges])
-    space.set_yticks([0.5, 1, 2, 5, 10, 20, 50])
+            mine = [(h, row) for (scheme, h), row in rows.items() if scheme == kind]
+            points = sorted((MS * h, PERCENT * row.time.path) for h, row in mine)
+            label = kind if discretisation == "continuum" else None
+            if points:
+                time.loglog(*np.array(points).T, f"o{line}", ms=4, lw=1.4, color=colour, label=label)
+    time.set(xlabel="time step h [ms]", ylabel="error of time, worst path, N = 10")
+    time.set_title("Time: the chapter's discretisation dotted, ours solid", fontsize=10.5, loc="left")
+    time.legend(frameon=False, fontsize=8.5)
+    time.set_xticks([0.1, 0.3, 1, 3, 10, 30], minor=False)
+    time.xaxis.set_minor_locator(NullLocator())
+    as_numbers(time.xaxis)
+    as_percent(time.yaxis)
+    nodes = sorted({row.resolution[1] for row in found.rows})
+    for discretisation, colour, name in (("chapter", CHAPTERS, "the chapter's"), ("continuum", OURS, "ours")):
+        by_nodes = {row.resolution[1]: row.space for row in found.rows if row.setting.discretisation == discretisation}
+        edges = np.array(sorted(n for n in by_nodes if by_nodes[n].path > 0.0))
+        for column, line, what in (("path", "-", "worst path"), ("gait", "--", "gaits"), ("straight", ":", "straight")):
+            values = [PERCENT * getattr(by_nodes[n], column) for n in edges]
+            space.loglog(edges - 1, values, f"o{line}", ms=4, lw=1.4, color=colour, label=f"{name}, {what}")
+    space.set_xticks([n - 1 for n in nodes], ["" if n == 12 else str(n) for n in nodes])
     space.minorticks_off()
+    space.set(xlabel="nodes per limb N", ylabel="error of space")
+    space.set_title("Space: against infinitely many nodes", fontsize=10.5, loc="left")
     as_percent(space.yaxis)
-    space.set_title("Resolution of the limbs", fontsize=10.5, loc="left")
-    space.legend(frameon=False, fontsize=8.5)
+    space.legend(frameon=False, fontsize=8.5, loc="center right")
     return figure
-
-
-def _slopes(axes: Axes, ends: tuple[float, float], orders: dict[int, float]) -> None:
-    """Draw dashed lines error = c h^order; ends: first and last h [ms], orders: c of every order."""
-    for order, c in orders.items():
-        h = np.array(ends)
-        axes.loglog(h, c * h**order, "--", lw=0.9, color=FAINT)
-        axes.annotate(f"order {order}", (h[1], c * h[1] ** order), (4, 0), textcoords="offset points", fontsize=8,
-                      color=FAINT, va="center", annotation_clip=False)  # fmt: skip

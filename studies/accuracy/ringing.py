@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from seastar_gym.gaits import PAIRS
 from seastar_gym.model.rods import make_rods
-from seastar_gym.scene import Numerics
+from seastar_gym.scene import Numerics, Scene, Seastar
+from seastar_gym.scene.numerics import Setting
 from seastar_gym.simulator import Simulator
 from studies.accuracy.cases import STROKES, scene_of
 
@@ -68,7 +69,8 @@ def ringing(found: Study) -> Figure:
 
 def record(numerics: Numerics, relaxation_time: float | None = None) -> tuple[Floats, Floats, Floats]:
     """Second stroke: times [s], velocity across limb 1 at its middle [m/s], r.m.s. lengthening speed of limbs [m/s]."""
-    simulator = Simulator(scene_of(numerics, relaxation_time=relaxation_time), 1, threads=1)
+    physics = Scene(Seastar(relaxation_time=relaxation_time))
+    simulator = Simulator(scene_of(Setting("chapter", 10, numerics), physics), 1, threads=1)
     command = PAIRS[RINGING][None]
     simulator.stroke(command)
     time, velocity, stretching = [], [], []
@@ -99,7 +101,7 @@ def swum(numerics: Numerics, freeze_lengths: bool = False) -> Floats:
 
     freeze_lengths: Every 2 ms, remove the lengthening speed of all edges by impulses between their ends.
     """
-    simulator = Simulator(scene_of(numerics), 1, threads=1)
+    simulator = Simulator(scene_of(Setting("chapter", 10, numerics)), 1, threads=1)
     masses = np.repeat(make_rods(simulator.scene).mass, 2)
     distances = []
     for _ in range(STROKES):

@@ -3,97 +3,141 @@
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, get_args
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.scene import Numerics
-from seastar_gym.scene.numerics import Fidelity
+from seastar_gym.scene.numerics import Setting
+from studies.accuracy.cases import Cases, Errors
 
 Floats = NDArray[np.float64]
 
 NOTICEABLE = 0.03
 """A slower setting joins the front if it reduces the error by at least this fraction."""
 
+Column = Literal["path", "straight", "pair", "pentagon", "random", "slow", "gait", "heading", "end"]
+
+
+class Figures(NamedTuple):
+    """Largest errors of swims. Path and end errors are fractions of the path's length.
+
+    path: Largest path error of all swims except gaits and slow ones. worst: Name of the swim with that error.
+    straight, pair, pentagon, random, slow, gait: Largest path error of the swims of one kind.
+    worst_gait: Name of the gait with the largest path error.
+    heading, end: Largest heading error [deg] and end error of the swims of `path`.
+    """
+
+    path: float = math.nan
+    straight: float = math.nan
+    pair: float = math.nan
+    pentagon: float = math.nan
+    random: float = math.nan
+    slow: float = math.nan
+    gait: float = math.nan
+    heading: float = math.nan
+    end: float = math.nan
+    worst: str = ""
+    worst_gait: str = ""
+
+
+def figures(batches: Sequence[Cases], found: Sequence[Errors]) -> Figures:
+    """Largest errors of all batches."""
+    kinds = np.array([kind for batch in batches for kind in batch.kinds])
+    names = np.array([name for batch in batches for name in batch.names])
+    path, heading, end = (np.concatenate(column) for column in zip(*found, strict=True))
+    gait = kinds == "gait"
+    main = ~gait & (kinds != "slow")
+
+    def largest(kind: str) -> float:
+        return float(path[kinds == kind].max(initial=0.0))
+
+    return Figures(
+        path=float(path[main].max()),
+        straight=largest("straight"),
+        pair=largest("pair"),
+        pentagon=largest("pentagon"),
+        random=largest("random"),
+        slow=largest("slow"),
+        gait=largest("gait"),
+        heading=float(np.degrees(heading[main].max())),
+        end=float(end[main].max()),
+        worst=str(names[main][path[main].argmax()]),
+        worst_gait=str(names[gait][path[gait].argmax()]) if gait.any() else "",
+    )
+
+
+def at_least(some: Sequence[Figures]) -> Figures:
+    """The largest of every column."""
+    columns = {name: max(getattr(each, name) for each in some) for name in Figures._fields if "worst" not in name}
+    return some[0]._replace(**columns)
+
 
 @dataclass(frozen=True)
 class Row:
-    """A setting, its errors and its cost. Path and end errors are fractions of the converged path's length.
+    """A setting, its errors and its cost.
 
-    path: Largest path error of all swims except gaits. worst: Name of the swim with that error.
-    straight, pair, pentagon, random, gait: Largest path error of the swims of one kind.
-    median: Median path error of the random sequences.
-    heading, end: Largest heading error [deg] and end error of all swims except gaits.
+    space: Errors of swims converged in time with N nodes per limb against the continuum.
+    time: Errors of the setting's swims against those converged in time with the same nodes.
     iterations, steps: Newton iterations and time steps per stroke.
     rejections, halvings: Numbers of rejected and of halved time steps, in all swims.
-    spatial, spatial_straight: Path errors of the converged solution with N nodes per limb against N -> infinity, the
-        largest and that of the straight swim.
-    path_promise, straight_promise, gait_promise: Largest error of this setting and of all finer ones, see `promised`.
     speed, straight_speed: Real-time factors on one core, for mixed commands and for the straight swim.
+    sure_space, sure_time: Errors that can be promised, see `promised`.
     """
 
-    numerics: Numerics
-    nodes_per_limb: int
-    path: float
-    worst: str
-    straight: float
-    pair: float
-    pentagon: float
-    random: float
-    median: float
-    gait: float
-    heading: float
-    end: float
+    setting: Setting
+    space: Figures
+    time: Figures
     iterations: float
     steps: float
     rejections: int
     halvings: int
-    spatial: float = math.nan
-    spatial_straight: float = math.nan
-    path_promise: float = math.nan
-    straight_promise: float = math.nan
-    gait_promise: float = math.nan
     speed: float = math.nan
     straight_speed: float = math.nan
+    sure_space: Figures = Figures()
+    sure_time: Figures = Figures()
+
+    @property
+    def resolution(self) -> tuple[str, int]:
+        """Discretisation and nodes per limb."""
+        return self.setting.discretisation, self.setting.nodes_per_limb
 
     @property
     def label(self) -> str:
         """Scheme and step as a reader sees them, such as "sdirk2 20 ms"."""
-        adapted = self.numerics.path_tolerance
+        numerics = self.setting.numerics
+        adapted = numerics.path_tolerance
         how = "" if adapted is None else f", adapted to {100 * adapted:g} %"
-        return f"{self.numerics.scheme} {1e3 * self.numerics.step:g} ms{how}"
+        return f"{numerics.scheme} {1e3 * numerics.step:g} ms{how}"
 
+    def total(self, column: Column) -> float:
+        """Measured error of space and of time, added."""
+        return float(getattr(self.space, column) + getattr(self.time, column))
 
-class Space(NamedTuple):
-    """Path errors of the converged solution with N nodes per limb: largest of all swims, and of the straight swim."""
-
-    nodes_per_limb: int
-    path: float
-    straight: float
+    def promise(self, column: Column) -> float:
+        """Sum of the two errors that can be promised: they may cancel, and a promise does not rely on that."""
+        return float(getattr(self.sure_space, column) + getattr(self.sure_time, column))
 
 
 @dataclass(frozen=True)
 class Study:
     """Results of the study.
 
-    rows: One row per setting, those with N = 10 first.
-    agreement: Largest path difference of the two converged solutions, by kind of swim.
-    space: Errors of the converged solutions over N.
-    straight: Hub x of the converged straight swim after every stroke [m].
-    limit: Hub x of the converged straight swim after the last stroke for N -> infinity [m].
+    rows: One row per setting.
+    others: Rows of the second table by the name of its physics.
+    refused: Why a physics of the second table was left out, by its name.
+    doubt: Errors of the limit itself, by what they are from.
+    distances: Distances of the straight swim and the pairs after ten strokes in the limit [m], by name.
+    first_stroke: Hub x of the straight swim after one stroke in the limit [m].
     """
 
     rows: list[Row]
-    agreement: dict[str, float]
-    space: list[Space]
-    straight: Floats
-    limit: float
-
-
-def presets() -> dict[str, Numerics]:
-    """The presets of `Numerics` by name."""
-    return {name: Numerics.preset(name) for name in get_args(Fidelity)}
+    others: dict[str, list[Row]]
+    refused: dict[str, str]
+    doubt: dict[str, Figures]
+    distances: dict[str, float]
+    first_stroke: float
 
 
 def no_coarser(other: Numerics, numerics: Numerics) -> bool:
@@ -108,15 +152,25 @@ def no_coarser(other: Numerics, numerics: Numerics) -> bool:
 
 
 def promised(rows: Sequence[Row]) -> list[Row]:
-    """Rows with their promises: the largest error of a setting and of all settings that are no coarser.
+    """Rows with what can be promised.
 
-    At some steps errors of opposite sign cancel. A promise does not rely on that.
+    At some steps, and with some numbers of nodes, errors of opposite sign cancel. So the error of time is the largest
+    of the setting and of all that are no coarser, and that of space the largest of N nodes and of more.
     """
     found = []
     for row in rows:
-        finer = [each for each in rows if no_coarser(each.numerics, row.numerics)]
-        worst = {kind: max(getattr(each, kind) for each in finer) for kind in ("path", "straight", "gait")}
-        found.append(replace(row, **{f"{kind}_promise": error for kind, error in worst.items()}))
+        more = [
+            each.space
+            for each in rows
+            if each.setting.discretisation == row.setting.discretisation
+            and each.setting.nodes_per_limb >= row.setting.nodes_per_limb
+        ]
+        finer = [
+            each.time
+            for each in rows
+            if each.resolution == row.resolution and no_coarser(each.setting.numerics, row.setting.numerics)
+        ]
+        found.append(replace(row, sure_space=at_least([row.space, *more]), sure_time=at_least([row.time, *finer])))
     return found
 
 
@@ -129,11 +183,20 @@ def front(rows: Iterable[Row], error: Callable[[Row], float], speed: Callable[[R
     return [row for row in chosen if math.isfinite(error(row))]
 
 
+def path_front(rows: Iterable[Row]) -> list[Row]:
+    """Front of the path error that can be promised, fastest first."""
+    return front(rows, lambda row: row.promise("path"), lambda row: row.speed)
+
+
+def any_gait_front(rows: Iterable[Row]) -> list[Row]:
+    """Front of the worse of path and gait error that can be promised, fastest first."""
+    return front(rows, lambda row: max(row.promise("path"), row.promise("gait")), lambda row: row.speed)
+
+
 def fronts(rows: Sequence[Row]) -> list[Row]:
-    """Rows on the front of the path error, of the gait error or of the straight swim's, fastest first."""
-    chosen = {
-        row.numerics: row
-        for kind in ("path", "gait", "straight")
-        for row in front(rows, lambda row: getattr(row, f"{kind}_promise"), lambda row: row.speed)  # noqa: B023
-    }
+    """For every resolution, rows on the front of the path error or of the worse of path and gait, fastest first."""
+    chosen: dict[Setting, Row] = {}
+    for resolution in dict.fromkeys(row.resolution for row in rows):
+        mine = [row for row in rows if row.resolution == resolution]
+        chosen |= {row.setting: row for row in (*path_front(mine), *any_gait_front(mine))}
     return sorted(chosen.values(), key=lambda row: -row.speed)

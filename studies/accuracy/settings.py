@@ -1,85 +1,116 @@
 """Settings that the accuracy study measures, and its size."""
 
-import itertools
 from dataclasses import dataclass
+from typing import get_args
 
-from seastar_gym.scene import Numerics
-from seastar_gym.scene.numerics import SchemeName
-from studies.accuracy.rows import presets
+from seastar_gym.scene import Numerics, Scene, Seastar, Water
+from seastar_gym.scene.numerics import PRESETS, Fidelity, SchemeName, Setting
+from seastar_gym.scene.robot import Discretisation
+from studies.speed.terms import SILICONE
 
 MS = 1e-3
 """Seconds per millisecond."""
 STEPS: dict[SchemeName, tuple[float, ...]] = {
-    "implicit-euler": (20, 10, 5, 3, 2, 1, 0.5, 0.25),
-    "sdirk2": (50, 30, 20, 15, 10, 5, 2, 1, 0.5, 0.2),
-    "sdirk3": (50, 30, 20, 10, 5, 2, 1, 0.5, 0.2),
-    "implicit-midpoint": (10, 8, 5, 4, 3, 2, 1.5, 1, 0.8, 0.6, 0.5, 0.4, 0.3, 0.25, 0.2, 0.1),
+    "implicit-euler": (20, 10, 5, 3, 1),
+    "sdirk2": (50, 30, 20, 15, 10, 5),
+    "sdirk3": (30, 20, 10),
+    "implicit-midpoint": (10, 8, 6, 5, 4, 3, 2, 1, 0.5, 0.3, 0.1),
 }
-"""Time steps [ms] of every scheme, each combined with every Newton tolerance."""
-ADAPTED = (0.02, 0.015, 0.01, 0.007, 0.005, 0.003, 0.002, 0.001)
+"""Time steps [ms] of every scheme."""
+ADAPTED = (0.02, 0.01, 0.005)
 """Path tolerances of the settings with adapted steps."""
 LARGEST_ADAPTED = 5 * MS
 """Largest adapted time step [s]."""
-FINE_NODES = (10, 19, 37, 73)
-"""Nodes per limb for the extrapolation N -> infinity: each number halves the edge length of the one before."""
+PHYSICS: dict[str, Scene] = {
+    "drag along limbs": Scene(fluid=Water(tangential_drag_coefficient=0.1)),
+    "silicone": Scene(Seastar(relaxation_time=SILICONE)),
+}
+"""Scenes of the second table: a tenth of the drag along limbs, and the damping of a soft silicone."""
+Resolution = tuple[Discretisation, int]
+"""Discretisation and nodes per limb N."""
 
 
 @dataclass(frozen=True)
 class Plan:
     """Size of the study.
 
-    n_random: Number of random sequences.
+    n_random, n_slow: Numbers of random and of slow sequences.
+    n_gaits: Number of robots of each kind in `random_gaits`.
     side: Strokes of swimming and of rest on a side of the pentagon.
-    converged: The two schemes and time steps [s] whose solutions have to agree.
+    limit: Nodes per limb and time step [s] of the swims that stand for the continuum.
+    fine: Time step [s] of the swims that stand for infinitely short steps, with fewer nodes than `limit`. The chapter's
+        discretisation with more than `finest` nodes, whose error is one of space, has four times that.
+    opinion: Nodes per limb and time step [s] with which SDIRK3 gives a second opinion.
+    resolutions: Resolutions that are measured.
     shortest: Shortest time step of the settings [s].
-    tolerances: Newton tolerances of the settings.
-    nodes: Nodes per limb N, besides 10, whose settings are measured.
-    fine: Time step of the converged solutions for other N [s].
-    coarse_nodes: Further N in the picture of convergence.
-    n_fine: How many of FINE_NODES are computed.
-    n_spatial: Number of robots for other N.
+    finest: Most nodes per limb with which settings are measured at all tolerances, and adapted steps.
     rounds: Rounds of timing.
+    n_others, limit_of_others, fine_of_others: Random sequences, limit and fine step [s] of the second table.
     """
 
-    n_random: int = 64
-    side: tuple[int, int] = (9, 1)
-    converged: tuple[tuple[SchemeName, float], ...] = (("sdirk3", 0.01 * MS), ("implicit-midpoint", 0.005 * MS))
+    n_random: int = 51
+    n_slow: int = 8
+    n_gaits: int = 20
+    side: tuple[int, int] = (6, 1)
+    limit: tuple[int, float] = (73, 0.1 * MS)
+    fine: float = 0.05 * MS
+    opinion: tuple[int, float] = (37, 0.1 * MS)
+    resolutions: tuple[Resolution, ...] = (
+        *(("continuum", n) for n in (6, 7, 8, 10, 12, 13, 19, 37)), *(("chapter", n) for n in (10, 37, 73)),
+    )  # fmt: skip
     shortest: float = 0.1 * MS
-    tolerances: tuple[float, ...] = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
-    nodes: tuple[int, ...] = (5, 19, 37)
-    fine: float = 0.02 * MS
-    coarse_nodes: tuple[int, ...] = (4, 5, 7)
-    n_fine: int = 4
-    n_spatial: int = 16
-    rounds: int = 5
+    finest: int = 19
+    rounds: int = 3
+    n_others: int = 16
+    limit_of_others: tuple[int, float] = (37, 0.1 * MS)
+    fine_of_others: float = 0.1 * MS
 
 
 QUICK = Plan(
-    n_random=8, side=(4, 1), converged=(("sdirk3", 0.05 * MS), ("implicit-midpoint", 0.025 * MS)), shortest=0.25 * MS,
-    tolerances=(1e-6, 1e-8), nodes=(), fine=0.1 * MS, coarse_nodes=(5,), n_fine=3, n_spatial=8, rounds=2,
+    n_random=6, n_slow=2, n_gaits=2, side=(1, 0), limit=(37, 0.4 * MS), fine=0.4 * MS, opinion=(10, 1 * MS),
+    resolutions=(("continuum", 7), ("continuum", 10), ("chapter", 10)), shortest=2 * MS, rounds=1, n_others=2,
+    limit_of_others=(19, 1 * MS), fine_of_others=1 * MS,
 )  # fmt: skip
 
 
-def settings(plan: Plan) -> list[Numerics]:
-    """All settings that are measured for N = 10."""
+def presets() -> dict[str, Setting]:
+    """Settings of the presets by name."""
+    return {name: PRESETS[name] for name in get_args(Fidelity)}
+
+
+def tolerances(step: float) -> tuple[float, ...]:
+    """Newton tolerances that are measured with a time step [s]: short steps bring small updates, so need small ones."""
+    if step >= 5 * MS:
+        return 1e-5, 1e-6
+    return (1e-6, 1e-7) if step >= 1 * MS else (1e-8,)
+
+
+def settings(plan: Plan) -> list[Setting]:
+    """All settings that are measured, and the presets whatever the plan leaves out."""
+    found = [Setting(*resolution, each) for resolution in plan.resolutions for each in _numerics(plan, resolution)]
+    return list(dict.fromkeys([*found, *presets().values()]))
+
+
+def _numerics(plan: Plan, resolution: Resolution) -> list[Numerics]:
+    """Numerics that are measured with a resolution: fewer with many nodes, which are dear."""
+    discretisation, nodes = resolution
+    shortest = max(plan.shortest, 0.1 * MS if nodes == 10 else 0.3 * MS if discretisation == "continuum" else 1 * MS)
     fixed = [
         Numerics(scheme, step * MS, tolerance)
         for scheme, steps in STEPS.items()
-        for step, tolerance in itertools.product(steps, plan.tolerances)
-        if step * MS >= plan.shortest
+        for step in steps
+        for tolerance in tolerances(step * MS)
+        if step * MS >= shortest and (nodes <= plan.finest or tolerance == tolerances(step * MS)[-1])
     ]
     adapted = [
-        Numerics("implicit-midpoint", LARGEST_ADAPTED, tolerance, path_tolerance=path_tolerance)
-        for path_tolerance, tolerance in itertools.product(ADAPTED, plan.tolerances)
-        if tolerance <= 1e-6
+        Numerics("implicit-midpoint", LARGEST_ADAPTED, 1e-7, path_tolerance=tolerance) for tolerance in ADAPTED
     ]
-    return list(dict.fromkeys([*presets().values(), *fixed, *adapted]))
+    return fixed + (adapted if nodes <= plan.finest else [])
 
 
-def settings_for_other_nodes() -> list[Numerics]:
-    """The smaller selection of settings that is measured for other N."""
-    steps: dict[SchemeName, tuple[float, ...]] = {
-        "implicit-euler": (20, 3), "sdirk2": (20, 5, 1), "sdirk3": (20, 5), "implicit-midpoint": (5, 2, 1, 0.5),
-    }  # fmt: skip
-    fixed = [Numerics(scheme, step * MS) for scheme, each in steps.items() for step in each]
-    return list(dict.fromkeys([*presets().values(), *fixed]))
+def settings_of_others() -> list[Setting]:
+    """The few settings of the second table."""
+    some = (Numerics("sdirk2", 20 * MS, 1e-6), Numerics("implicit-midpoint", 5 * MS, 1e-6),
+            Numerics("implicit-midpoint", 1 * MS, 1e-7))  # fmt: skip
+    nodes: tuple[Resolution, ...] = (("continuum", 7), ("continuum", 10), ("continuum", 19), ("chapter", 10))
+    return [Setting(*resolution, numerics) for resolution in nodes for numerics in some]

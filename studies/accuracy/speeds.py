@@ -8,28 +8,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.gaits import STRAIGHT
-from seastar_gym.scene import Numerics
+from seastar_gym.scene import Scene
 from seastar_gym.simulator import Simulator
-from studies.accuracy.cases import random_sequences, scene_of
+from studies.accuracy.cases import random_sequences
 
 Floats = NDArray[np.float64]
 
 
-def measure_speeds(keys: Sequence[tuple[Numerics, int]], rounds: int, bar: Any, n_robots: int = 32) -> Floats:
-    """Real-time factors on one core for mixed commands and for the straight swim, shape (len(keys), 2).
+def measure_speeds(scenes: Sequence[Scene], rounds: int, bar: Any, n_robots: int = 32) -> Floats:
+    """Real-time factors on one core for mixed commands and for the straight swim, shape (len(scenes), 2).
 
     Every round times all settings once, after the first stroke from rest. The best round counts, because other work of
     the machine can only add time.
     """
     mixed = random_sequences(n_robots, np.random.default_rng(1)).commands[:3]
     workloads = [mixed, np.broadcast_to(STRAIGHT, mixed.shape)]
-    best = np.full((len(keys), 2), np.inf)
+    best = np.full((len(scenes), 2), np.inf)
     simulators: dict[tuple[int, int], tuple[Simulator, Any]] = {}
     for _ in range(rounds):
-        for k, (numerics, nodes) in enumerate(keys):
+        for k, scene in enumerate(scenes):
             for w, commands in enumerate(workloads):
                 if (k, w) not in simulators:
-                    simulator = Simulator(scene_of(numerics, nodes), n_robots, threads=1)
+                    simulator = Simulator(scene, n_robots, threads=1)
                     simulator.stroke(commands[0])
                     simulators[k, w] = simulator, simulator.get_state()
                 simulator, state = simulators[k, w]
@@ -39,5 +39,5 @@ def measure_speeds(keys: Sequence[tuple[Numerics, int]], rounds: int, bar: Any, 
                     simulator.stroke(command)
                 best[k, w] = min(best[k, w], time.thread_time() - start)
             bar.update()
-    simulated = n_robots * (len(mixed) - 1) * scene_of(Numerics()).actuator.period
+    simulated = n_robots * (len(mixed) - 1) * Scene().actuator.period
     return simulated / best

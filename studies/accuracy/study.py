@@ -1,11 +1,13 @@
-"""Error and speed of every scheme, time step and tolerance.
+"""Error and speed of every resolution, scheme, time step and tolerance.
 
-Computes the converged solution with two schemes of different kind, then the error of every setting against it and its
-computing time. Writes `accuracy.csv`, the summary `accuracy.md` and three pictures. `--store` also writes the table of
-`seastar_gym.scene.fidelity`, from which `Numerics.for_error` and the presets take their errors and speeds.
+Errors are against the continuum: infinitely many nodes per limb and infinitely short steps. The error of space is that
+of N nodes with short steps against the continuum. The error of time is that of the setting against short steps with the
+same nodes. Their sum is what can be promised, because where they cancel it is by luck. Writes `accuracy.csv`, the
+summary `accuracy.md` and three pictures. `--store` also writes the table of `seastar_gym.scene.fidelity`, from which
+`Scene.for_error` and the presets take their errors and speeds.
 
-The error is the hub's distance from its converged path at the ends of strokes, as a fraction of that path's length.
-Times are processor times of one thread, the best of several rounds, for a batch of random commands.
+The error is the hub's distance from the other path at the ends of strokes, as a fraction of that path's length. Times
+are processor times of one thread, the best of several rounds, for a batch of random commands.
 """
 
 from dataclasses import replace
@@ -16,48 +18,76 @@ import numpy as np
 from rich.console import Console
 from tqdm import tqdm
 
-from seastar_gym.scene import fidelity
-from studies.accuracy.cases import gaits, joined, pentagon, random_sequences, swims
-from studies.accuracy.convergence import converge, in_groups, measure_errors, measure_space
-from studies.accuracy.rows import Study, promised
-from studies.accuracy.settings import FINE_NODES, QUICK, Plan, settings, settings_for_other_nodes
+from seastar_gym.gaits import PAIRS
+from seastar_gym.scene import Scene, fidelity
+from studies.accuracy.cases import (
+    gaits,
+    joined,
+    pentagon,
+    random_gaits,
+    random_sequences,
+    scene_of,
+    slow_sequences,
+    swims,
+)
+from studies.accuracy.convergence import converge, measure, n_groups, second_opinion
+from studies.accuracy.rows import Row, Study, promised
+from studies.accuracy.settings import PHYSICS, QUICK, Plan, settings, settings_of_others
 from studies.accuracy.speeds import measure_speeds
-from studies.accuracy.tables import TABLE_WIDTH, as_markdown, as_table, facts, store, write_csv
+from studies.accuracy.tables import TABLE_WIDTH, as_markdown, as_tables, facts, store, write_csv
 from studies.parser import study_parser
 
 
 def study(plan: Plan, progress: bool = True) -> Study:
     """Run the whole study; drawing is left to the caller."""
-    cases = joined(swims(), random_sequences(plan.n_random, np.random.default_rng(0)), gaits())
-    batches = [cases, pentagon(*plan.side)]
-    mine, others = settings(plan), settings_for_other_nodes() if plan.nodes else []
+    rng = np.random.default_rng(0)
+    some = joined(swims(), random_sequences(plan.n_random, rng), slow_sequences(plan.n_slow, rng))
+    batches = [joined(some, gaits(), random_gaits(plan.n_gaits, rng)), pentagon(*plan.side)]
+    mine = settings(plan)
+    resolutions = list(dict.fromkeys((each.discretisation, each.nodes_per_limb) for each in mine))
 
     def bar(what: str, total: int) -> Any:
         return tqdm(total=total, desc=what, disable=not progress, unit="swim")
 
-    with bar("converging", len(plan.converged) * sum(len(in_groups(batch)) for batch in batches)) as each:
-        converged, agreement = converge(batches, plan, each)
-    with bar("nodes", len({*plan.coarse_nodes, *plan.nodes, *FINE_NODES[: plan.n_fine]})) as each:
-        few = cases.first(plan.n_spatial)
-        fine, space, limit = measure_space(few, plan, each)
-    with bar("errors", len(batches) * len(mine) + len(plan.nodes) * len(others)) as each:
-        rows = promised(measure_errors(batches, converged, mine, 10, each))
-        for nodes in plan.nodes:
-            rows += measure_errors([few], [fine[nodes]], others, nodes, each)
+    with bar("converging", n_groups(batches) * (1 + len(resolutions))) as each:
+        exact = converge(batches, plan, resolutions, each)
+    few = joined(swims(), random_sequences(min(11, plan.n_random), rng))
+    with bar("second opinion", 4 * n_groups([few])) as each:
+        doubt = second_opinion(few, plan, each)
+    with bar("errors", n_groups(batches) * len(mine)) as each:
+        rows = measure(batches, exact, mine, each)
+    others: dict[str, list[Row]] = {}
+    refused: dict[str, str] = {}
+    for name, physics in PHYSICS.items():
+        try:
+            others[name] = study_other(name, physics, plan, bar)
+        except ValueError as refusal:  # of a scene that cannot be modelled
+            refused[name] = str(refusal)
     with bar("speeds", plan.rounds * len(rows)) as each:
-        speeds = measure_speeds([(row.numerics, row.nodes_per_limb) for row in rows], plan.rounds, each)
-    errors_of = {each.nodes_per_limb: each for each in space}
-    rows = [
-        replace(
-            row,
-            speed=float(speed),
-            straight_speed=float(straight_speed),
-            spatial=errors_of[row.nodes_per_limb].path,
-            spatial_straight=errors_of[row.nodes_per_limb].straight,
-        )
-        for row, (speed, straight_speed) in zip(rows, speeds, strict=True)
-    ]
-    return Study(rows, agreement, space, converged[0].hub[:, 0, 0], limit)
+        rows = with_speeds(rows, Scene(), plan, each)
+    hub = exact.limit[0].hub
+    distances = dict(zip(("straight", *PAIRS), np.hypot(*hub[-1, :5].T).tolist(), strict=True))
+    return Study(rows, others, refused, doubt, distances, float(hub[0, 0, 0]))
+
+
+def study_other(name: str, physics: Scene, plan: Plan, bar: Any) -> list[Row]:
+    """Rows of the few settings of the second table for other physics. ValueError if its scene cannot be modelled."""
+    cases = joined(swims(), random_sequences(plan.n_others, np.random.default_rng(0)))
+    mine = settings_of_others()
+    resolutions = list(dict.fromkeys((each.discretisation, each.nodes_per_limb) for each in mine))
+    plan = replace(plan, limit=plan.limit_of_others, fine=plan.fine_of_others)
+    with bar(name, n_groups([cases]) * (1 + len(resolutions) + len(mine))) as each:
+        exact = converge([cases], plan, resolutions, each, physics)
+        rows = measure([cases], exact, mine, each, physics)
+    with bar(f"{name}, speeds", plan.rounds * len(rows)) as each:
+        return with_speeds(rows, physics, plan, each)
+
+
+def with_speeds(rows: list[Row], physics: Scene, plan: Plan, bar: Any) -> list[Row]:
+    """Rows with their speeds and promises."""
+    speeds = measure_speeds([scene_of(row.setting, physics) for row in rows], plan.rounds, bar)
+    timed = zip(rows, speeds, strict=True)
+    return promised([replace(row, speed=float(mixed), straight_speed=float(alone)) for row, (mixed, alone) in timed])
 
 
 def main() -> None:
@@ -77,12 +107,13 @@ def main() -> None:
 
     found = study(QUICK if options.quick else Plan())
     options.out.mkdir(parents=True, exist_ok=True)
-    write_csv(found.rows, options.out / "accuracy.csv")
+    write_csv(found, options.out / "accuracy.csv")
     (options.out / "accuracy.md").write_text(as_markdown(found), encoding="utf-8")
     pictures = accuracy_pictures.draw_all(found, options.out)
     console = Console()
     console.width = max(console.width, TABLE_WIDTH)
-    console.print(as_table(found))
+    for table in as_tables(found):
+        console.print(table)
     for fact in facts(found):
         console.print(fact)
     if options.store:

@@ -3,44 +3,51 @@
 import csv
 import json
 import math
-from collections.abc import Sequence
-from dataclasses import fields
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from rich.table import Table
 
 from seastar_gym.scene import fidelity
-from studies.accuracy.rows import Row, Study, front, fronts, presets
+from studies.accuracy.rows import Figures, Row, Study, fronts, path_front
+from studies.accuracy.settings import presets
 from studies.speed.timing import machine
 
-AGREEMENT = {"straight": 1e-5, "pair": 1e-4, "pentagon": 1e-4, "random": 1e-4}
-"""Largest path difference of the two converged solutions, by kind of swim, with which results are stored."""
-TABLE_WIDTH = 112
+LARGEST_DOUBT = 3e-4
+"""Largest path error of the limit itself, of each kind, with which results are stored."""
+TABLE_WIDTH = 160
 """Width of the printed table [characters]."""
 
 
 def summary(found: Study) -> list[tuple[str, Row]]:
     """Presets, by name, and the front of the path error, fastest first."""
-    own = [row for row in found.rows if row.nodes_per_limb == 10]
-    names = {numerics: name for name, numerics in presets().items()}
-    chosen = {row.numerics: row for row in front(own, lambda row: row.path_promise, lambda row: row.speed)}
-    chosen.update({row.numerics: row for row in own if row.numerics in names})
-    return [(names.get(row.numerics, ""), row) for row in sorted(chosen.values(), key=lambda row: -row.speed)]
+    names = {setting: name for name, setting in presets().items()}
+    chosen = {row.setting: row for row in path_front(found.rows)}
+    chosen.update({row.setting: row for row in found.rows if row.setting in names})
+    return [(names.get(row.setting, ""), row) for row in sorted(chosen.values(), key=lambda row: -row.speed)]
 
 
 COLUMNS = (
-    "preset", "scheme and step", "Newton tolerance", "path error", "any gait", "straight", "heading", "x real time",
+    "preset", "N", "scheme and step", "Newton tolerance", "space", "time", "path error", "any gait", "slow", "straight",
+    "x real time",
 )  # fmt: skip
 
 
 def as_cells(name: str, row: Row) -> tuple[str, ...]:
     """Cells of one line of the summary; errors in per cent, speed as real-time factor."""
-    promises = (row.path_promise, row.gait_promise, row.straight_promise)
+    space, time, entry = row.sure_space.path, row.sure_time.path, as_promise(row)
+    total = [entry[f"{kind}_error"] for kind in ("path", "gait", "slow", "straight")]
     return (
-        name, row.label, f"{row.numerics.newton_tolerance:.0e}", *(f"{100 * error:.2g} %" for error in promises),
-        f"{row.heading:.2g}°", f"{two_digits(row.speed):,.0f}",
+        name, nodes_of(row), row.label, f"{row.setting.numerics.newton_tolerance:.0e}",
+        *(f"{100 * error:.2g} %" if error else "-" for error in (space, time, *total)), f"{two_digits(row.speed):,.0f}",
     )  # fmt: skip
+
+
+def nodes_of(row: Row) -> str:
+    """Nodes per limb, and whose discretisation if not the continuum's."""
+    discretisation, nodes = row.resolution
+    return str(nodes) if discretisation == "continuum" else f"{nodes}, chapter's"
 
 
 def two_digits(value: float, up: bool = False) -> float:
@@ -52,48 +59,74 @@ def two_digits(value: float, up: bool = False) -> float:
 
 
 def facts(found: Study) -> list[str]:
-    """Sentences about convergence that go below the table."""
-    ten = next(each for each in found.space if each.nodes_per_limb == 10)
-    agreement = ", ".join(f"{kind} {error:.0e}" for kind, error in found.agreement.items())
+    """Sentences about the limit that go below the table."""
+    distances = ", ".join(f"{name} {1e3 * distance:.3f}" for name, distance in found.distances.items())
+    doubts = ", ".join(f"{name}: {100 * each.path:.2g} %" for name, each in found.doubt.items())
     return [
-        f"Converged straight swim, N = 10: {1e3 * found.straight[0]:.5f} mm after one stroke, "
-        f"{1e3 * found.straight[-1]:.4f} mm after {len(found.straight)}.",
-        f"Two schemes agree on the path, as a share of its length: {agreement}.",
-        f"N = 10 against N -> infinity: {100 * ten.path:.2g} % on the worst path, {100 * ten.straight:.2g} % on the "
-        f"straight swim, which then goes {1e3 * found.limit:.2f} mm.",
+        f"Limit: {1e3 * found.first_stroke:.4f} mm after one stroke straight on, and after ten {distances} mm.",
+        f"Error of the limit itself, worst path: {doubts}.",
+        *(f"Left out is {name}: {why}" for name, why in found.refused.items()),
     ]
 
 
 def as_markdown(found: Study) -> str:
     """Summary in Markdown."""
-    lines = [f"| {' | '.join(COLUMNS)} |", "|---|---|---:|" + "---:|" * (len(COLUMNS) - 3)]
-    lines += [f"| {' | '.join(as_cells(name, row))} |" for name, row in summary(found)]
-    return "\n".join([*lines, "", *facts(found), f"Speeds: one core of {machine()}."]) + "\n"
+    tables = [(summary(found), ""), *((_unnamed(rows), name) for name, rows in found.others.items())]
+    lines = []
+    for table, name in tables:
+        lines += [f"{name.capitalize()}:", ""] if name else []
+        lines += [f"| {' | '.join(COLUMNS)} |", "|---|---:|---|---:|" + "---:|" * (len(COLUMNS) - 4)]
+        lines += [f"| {' | '.join(as_cells(preset, row))} |" for preset, row in table]
+        lines.append("")
+    return "\n".join([*lines, *facts(found), f"Speeds: one core of {machine()}."]) + "\n"
 
 
-def as_table(found: Study) -> Table:
-    """Summary for the terminal."""
-    table = Table(title=f"Errors against h -> 0, worst cases; speed on one core ({machine()})")
+def as_tables(found: Study) -> list[Table]:
+    """Summary for the terminal: the chapter's robot, then other physics."""
+    head = f"Errors against the continuum, worst cases; speed on one core ({machine()})"
+    others = [_as_table(name.capitalize(), _unnamed(rows)) for name, rows in found.others.items()]
+    return [_as_table(head, summary(found)), *others]
+
+
+def _unnamed(rows: Sequence[Row]) -> list[tuple[str, Row]]:
+    return [("", row) for row in rows]
+
+
+def _as_table(title: str, lines: Iterable[tuple[str, Row]]) -> Table:
+    table = Table(title=title)
     for column in COLUMNS:
-        table.add_column(column, justify="left" if column in COLUMNS[:2] else "right")
-    for name, row in summary(found):
+        table.add_column(column, justify="left" if column in ("preset", "scheme and step") else "right")
+    for name, row in lines:
         table.add_row(*as_cells(name, row), style="bold" if name else "")
     return table
 
 
-def write_csv(rows: Sequence[Row], path: Path) -> None:
-    """Write all columns of all settings; errors are fractions of the path's length unless the name has a unit."""
-    units = {"heading": "heading_deg", "iterations": "iterations_per_stroke", "steps": "steps_per_stroke"}
-    names = [field.name for field in fields(Row) if field.name != "numerics"]
+COSTS = ("iterations", "steps", "rejections", "halvings", "speed", "straight_speed")
+
+
+def write_csv(found: Study, path: Path) -> None:
+    """Write all columns of all settings; errors are fractions of the path's length unless the name has a unit.
+
+    Columns of the error of space begin with `space_`, of the error of time with `time_`, and of the promised sum with
+    `promise_`.
+    """
+    names = [name.replace("heading", "heading_deg") for name in Figures._fields]
+    numbers = [k for k, name in enumerate(names) if not name.startswith("worst")]
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(
-            ["scheme", "step_s", "newton_tolerance", "path_tolerance", *(units.get(name, name) for name in names)]
-        )
-        for row in rows:
-            n = row.numerics
+        writer.writerow([
+            "physics", "discretisation", "nodes_per_limb", "scheme", "step_s", "newton_tolerance", "path_tolerance",
+            *(f"space_{name}" for name in names), *(f"time_{name}" for name in names),
+            *(f"promise_{names[k]}" for k in numbers), *COSTS,
+        ])  # fmt: skip
+        for physics, row in [("chapter", row) for row in found.rows] + [
+            (name, row) for name, rows in found.others.items() for row in rows
+        ]:
+            n = row.setting.numerics
             key = [n.scheme, n.step, n.newton_tolerance, "" if n.path_tolerance is None else n.path_tolerance]
-            writer.writerow([*key, *(_cell(getattr(row, name)) for name in names)])
+            sums = [row.sure_space[k] + row.sure_time[k] for k in numbers]  # type: ignore[operator]
+            costs = [getattr(row, name) for name in COSTS]
+            writer.writerow([physics, *row.resolution, *key, *map(_cell, (*row.space, *row.time, *sums, *costs))])
 
 
 def _cell(value: Any) -> Any:
@@ -102,35 +135,40 @@ def _cell(value: Any) -> Any:
 
 def as_promise(row: Row) -> dict[str, Any]:
     """Fields of a `fidelity.Promise` from a row: errors rounded upwards to two digits, speed rounded to two digits."""
-    n = row.numerics
+    n = row.setting.numerics
+
+    def up(error: float) -> float:
+        return two_digits(error, up=True)
+
+    space, time = up(row.sure_space.path), up(row.sure_time.path)
     return {
+        "discretisation": row.setting.discretisation,
+        "nodes_per_limb": row.setting.nodes_per_limb,
         "scheme": n.scheme,
         "step": n.step,
         "newton_tolerance": n.newton_tolerance,
         "path_tolerance": n.path_tolerance,
-        "path_error": two_digits(row.path_promise, up=True),
-        "gait_error": two_digits(row.gait_promise, up=True),
-        "straight_error": two_digits(row.straight_promise, up=True),
-        "heading_error": two_digits(row.heading, up=True),
-        "end_error": two_digits(row.end, up=True),
+        "space_error": space,
+        "time_error": time,
+        "path_error": float(f"{space + time:.6g}"),
+        **{f"{kind}_error": up(row.promise(kind)) for kind in ("gait", "slow", "straight", "heading", "end")},
         "speed": two_digits(row.speed),
     }
 
 
 def store(found: Study, path: Path = fidelity.PRESETS) -> None:
-    """Write the package's table; ValueError if the two converged solutions of the study do not agree."""
-    for kind, allowed in AGREEMENT.items():
-        if not found.agreement[kind] <= allowed:
+    """Write the package's table; ValueError if the limit is in doubt."""
+    for name, doubt in found.doubt.items():
+        if not doubt.path <= LARGEST_DOUBT:
             raise ValueError(
-                f"The two converged solutions differ by {found.agreement[kind]:.1e} of the path on the {kind} swims, "
-                f"and {allowed:.0e} is allowed: nothing is stored."
+                f"The limit is in doubt by {doubt.path:.1e} of the path ({name}), and {LARGEST_DOUBT:.0e} is allowed: "
+                "nothing is stored."
             )
-    own = [row for row in found.rows if row.nodes_per_limb == 10]
-    by_numerics = {row.numerics: row for row in own}
+    by_setting = {row.setting: row for row in found.rows}
     table = {
         "about": "Written by python -m studies.accuracy --store; read by seastar_gym.scene.fidelity.",
         "machine": machine(),
-        "presets": {name: as_promise(by_numerics[numerics]) for name, numerics in presets().items()},
-        "front": [as_promise(row) for row in fronts(own)],
+        "presets": {name: as_promise(by_setting[setting]) for name, setting in presets().items()},
+        "settings": [as_promise(row) for row in fronts(found.rows)],
     }
     path.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")

@@ -25,9 +25,9 @@ from tqdm import tqdm
 
 from seastar_gym.command import run_command
 from seastar_gym.gaits import PAIRS
-from seastar_gym.scene import Numerics
-from seastar_gym.scene.numerics import SchemeName
-from studies.accuracy.cases import Cases, Swim, errors, joined, random_sequences, swim, swims
+from seastar_gym.scene import Numerics, Scene, Seastar
+from seastar_gym.scene.numerics import SchemeName, Setting
+from studies.accuracy.cases import Cases, Swim, errors, joined, random_sequences, scene_of, swim, swims
 from studies.parser import study_parser
 from studies.speed.terms import SILICONE
 
@@ -89,11 +89,16 @@ class Study:
     pairs: dict[str, Floats]
 
 
+def scene(numerics: Numerics, tau: float | None) -> Scene:
+    """The chapter's robot, discretised as in the chapter, with a relaxation time tau [s]."""
+    return scene_of(Setting("chapter", 10, numerics), Scene(Seastar(relaxation_time=tau)))
+
+
 def timed(cases: Cases, numerics: Numerics, tau: float | None) -> tuple[Swim, float]:
     """Swim with a relaxation time tau [s], and its real-time factor."""
-    swim(cases.first(1), numerics, relaxation_time=tau)  # compiles the kernels for this scene outside the timing
+    swim(cases.first(1), scene(numerics, tau))  # compiles the kernels for this scene outside the timing
     start = time.thread_time()
-    swum = swim(cases, numerics, relaxation_time=tau)
+    swum = swim(cases, scene(numerics, tau))
     return swum, len(cases) * len(cases.commands) / (time.thread_time() - start)
 
 
@@ -108,7 +113,7 @@ def study(plan: Plan, progress: bool = True) -> Study:
         for material, tau in MATERIALS.items():
             found = []
             for scheme, step in plan.converged:
-                found.append(swim(cases, Numerics(scheme, step, 1e-11), threads=None, relaxation_time=tau))
+                found.append(swim(cases, scene(Numerics(scheme, step, 1e-11), tau), threads=None))
                 bar.update()
             # The midpoint rule is the more accurate reference for undamped rods.
             exact = found[-1]

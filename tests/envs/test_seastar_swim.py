@@ -22,7 +22,8 @@ from seastar_gym.scene.fidelity import promise
 STRAIGHT = np.array([0, 1, 0, 0, 2])
 REST = np.zeros(5, int)
 FACTS = {
-    "time", "hub_position", "waypoint_index", "distance", "cross_track_error", "path_error", "real_time_factor",
+    "time", "hub_position", "waypoint_index", "distance", "cross_track_error", "path_error",
+    "space_error", "time_error", "real_time_factor",
 }  # fmt: skip
 OF_A_STROKE = {
     "is_success", "limbs_heated", "newton_iterations", "solver_status", "solver_message", "smallest_opening_angle",
@@ -76,7 +77,7 @@ def test_make_gives_the_documented_environment():
     assert isinstance(env.unwrapped, SeastarSwimEnv)
     assert env.action_space == gym.spaces.MultiDiscrete([3] * 5)
     assert env.observation_space == gym.spaces.Box(-np.inf, np.inf, (186,), np.float32)
-    assert env.unwrapped.scene == Scene(numerics=Numerics.preset("balanced"))
+    assert env.unwrapped.scene == Scene.preset("balanced")
     assert env.spec.max_episode_steps == 400
     assert env.unwrapped.simulator.n_robots == 1
     assert "SeastarSwim-v0" in gym.registry and seastar_gym.__version__
@@ -95,10 +96,13 @@ def test_spaces_follow_the_robot(n_limbs, nodes_per_limb):
 @pytest.mark.parametrize("fidelity", ["fast", "chapter"])
 def test_info_tells_what_was_measured_of_the_fidelity(fidelity):
     _, info = SeastarSwimEnv(fidelity=fidelity).reset(seed=0)
-    assert (info["path_error"], info["real_time_factor"]) == (promise(fidelity).path_error, promise(fidelity).speed)
+    known = promise(fidelity)
+    found = [info[name] for name in ("path_error", "space_error", "time_error", "real_time_factor")]
+    assert found == [known.path_error, known.space_error, known.time_error, known.speed]
+    assert info["path_error"] == pytest.approx(info["space_error"] + info["time_error"], rel=1e-5)
 
 
-@pytest.mark.parametrize("scene", [Scene(Seastar(youngs_modulus=2e6)), Scene(fluid=None)])
+@pytest.mark.parametrize("scene", [Scene(Seastar(youngs_modulus=2e6)), Scene(fluid=None), Scene(Seastar(5, 9))])
 def test_info_promises_nothing_for_scenes_that_were_not_measured(scene):
     _, info = SeastarSwimEnv(scene=scene, fidelity="fast").reset(seed=0)
     assert np.isnan([info["path_error"], info["real_time_factor"]]).all()
@@ -115,7 +119,7 @@ def test_info_promises_nothing_once_the_scene_or_a_strength_was_changed():
     env = fast()
     known = env.reset(seed=0)[1]["path_error"]
     chapters = env.simulator.scene
-    env.simulator.set_scene(replace(chapters, robot=Seastar(youngs_modulus=1.5e6)))
+    env.simulator.set_scene(replace(chapters, robot=replace(chapters.robot, youngs_modulus=1.5e6)))
     assert np.isnan(env.step(STRAIGHT)[4]["path_error"])
     env.simulator.set_scene(chapters)
     assert env.step(STRAIGHT)[4]["path_error"] == known
@@ -134,7 +138,7 @@ def test_a_scene_that_names_no_numerics_swims_at_the_fidelity(fidelity):
 def test_numerics_that_a_scene_names_are_kept():
     for numerics in (Numerics("sdirk3", 0.05), Numerics(), replace(Scene().numerics, step=2e-3)):
         assert SeastarSwimEnv(scene=Scene(numerics=numerics)).scene.numerics == numerics
-    chapters = Scene(numerics=Numerics.preset("chapter"))
+    chapters = Scene.preset("chapter")
     assert SeastarSwimEnv(scene=chapters, fidelity="chapter").scene == chapters
 
 
@@ -223,7 +227,7 @@ def test_table_actions_do_what_the_limb_actions_they_stand_for_do(actions):
 
 def test_observation_is_that_of_the_simulators_state():
     """Recomputed from positions and velocities with complex numbers, index by index."""
-    env, rng = fast(path="random", random_heading=True), np.random.default_rng(0)
+    env, rng = fast(path="random", random_heading=True, scene=Scene()), np.random.default_rng(0)
     observation, _ = env.reset(seed=3)
     rest = env.scene.robot.nodes() @ [1.0, 1j]
     for _ in range(10):
@@ -431,11 +435,11 @@ def test_a_path_is_copied_when_the_environment_is_made():
 
 
 def test_random_heading_turns_the_robot_and_its_absence_does_not():
-    env = fast(random_heading=True)
+    env = fast(random_heading=True, scene=Scene())
     env.reset(seed=0)
     tip = env.simulator.positions[0, 9]
     assert np.hypot(*tip) == pytest.approx(0.1) and abs(tip[1]) > 1e-3
-    plain = fast()
+    plain = fast(scene=Scene())
     plain.reset(seed=0)
     np.testing.assert_array_equal(plain.simulator.positions[0], Seastar().nodes())
 

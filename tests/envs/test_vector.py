@@ -170,7 +170,7 @@ def test_make_vec_gives_the_native_batch_with_the_registered_time_limit():
     batch = gym.make_vec("SeastarSwim-v0", num_envs=2)
     assert isinstance(batch, SeastarSwimVectorEnv)
     assert batch.max_episode_steps == 400 and batch.num_envs == 2
-    assert batch.simulator.scene == Scene(numerics=Numerics.preset("balanced"))
+    assert batch.simulator.scene == Scene.preset("balanced")
 
 
 @pytest.mark.parametrize("autoreset_mode", [NEXT_STEP, SAME_STEP, DISABLED])

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from seastar_gym import DomainRandomization, Limited, Numerics, Scene, SmaPulse, ThermalSma, Uniform
+from seastar_gym import DomainRandomization, Limited, Scene, SmaPulse, ThermalSma, Uniform
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.fidelity import promise
@@ -21,7 +21,7 @@ N_STROKES, N_ROBOTS = 10, 16
 
 def hub_paths(fidelity: Fidelity, commands: np.ndarray) -> np.ndarray:
     """Hub positions [m] from rest, shape (n_strokes + 1, n_robots, 2)."""
-    simulator = Simulator(Scene(numerics=Numerics.preset(fidelity)), commands.shape[1])
+    simulator = Simulator(Scene.preset(fidelity), commands.shape[1])
     path = [simulator.hub_position()]
     for command in commands:
         assert not simulator.stroke(command).status.any()

@@ -3,17 +3,30 @@
 import json
 import subprocess
 import sys
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
 import numpy as np
 import pytest
 
-from seastar_gym import Numerics, Scene, Simulator
+from seastar_gym import Contact, Numerics, Scene, Seastar, SmaPulse, Water
 from seastar_gym.scene import fidelity
 from seastar_gym.scene.fidelity import Promise, cheapest, promise, promises
-from seastar_gym.scene.numerics import Fidelity
-from studies.accuracy.cases import errors, gaits, joined, pentagon, random_sequences, swim, swims
+from seastar_gym.scene.numerics import PRESETS, Fidelity
+from studies.accuracy.cases import (
+    Cases,
+    errors,
+    gaits,
+    joined,
+    pentagon,
+    random_gaits,
+    random_sequences,
+    slow_sequences,
+    swim,
+    swims,
+)
 
 NAMES = get_args(Fidelity)
 UNSEEN = random_sequences(24, np.random.default_rng(20_261_121))
@@ -29,52 +42,118 @@ def test_table_comes_with_the_package_and_is_complete():
     assert list(stored["presets"]) == list(NAMES)
     assert fidelity.machine() == stored["machine"] != ""
     for row in promises():
-        assert 0.0 < row.path_error < 0.5 and 0.0 < row.straight_error < 0.5
-        assert min(row.gait_error, row.end_error, row.heading_error) > 0.0 and row.speed > 50.0
+        assert 0.0 < row.path_error < 0.6 and 0.0 < row.straight_error < 0.6
+        assert min(row.gait_error, row.slow_error, row.end_error, row.heading_error, row.time_error) > 0.0
+        assert row.speed > 5.0
+
+
+def test_a_path_error_is_the_sum_of_space_and_time():
+    """Never their difference, although they cancel in some swims."""
+    for row in (*map(promise, NAMES), *promises()):
+        assert row.path_error == pytest.approx(row.space_error + row.time_error, rel=1e-5)
+        assert max(row.end_error, row.straight_error) <= 1.1 * row.path_error  # all are rounded upwards
 
 
 def test_promises_are_of_the_presets_as_they_are():
     """If this fails, presets were changed without `python -m studies.accuracy --store`."""
     for name in NAMES:
-        row, numerics = promise(name), Numerics.preset(name)
+        row, (discretisation, nodes_per_limb, numerics) = promise(name), PRESETS[name]
+        assert (row.discretisation, row.nodes_per_limb) == (discretisation, nodes_per_limb)
         assert (row.scheme, row.step) == (numerics.scheme, numerics.step)
         assert (row.newton_tolerance, row.path_tolerance) == (numerics.newton_tolerance, numerics.path_tolerance)
-        assert promise(numerics) == row
+        assert promise(Scene.preset(name)) == row
 
 
 def test_presets_keep_what_their_names_say():
-    assert promise("fast").path_error <= 0.05
-    assert promise("accurate").path_error < 0.01
-    assert promise("reference").path_error < 0.002
+    assert promise("fast").path_error <= 0.03
+    assert promise("balanced").path_error <= 0.012
+    assert promise("accurate").path_error <= 0.004
+    assert promise("reference").path_error <= 0.0015
     speeds = [promise(name).speed for name in ("fast", "balanced", "accurate", "reference")]
     assert speeds == sorted(speeds, reverse=True)
     assert promise("fast").speed > promise("chapter").speed
-    assert promise("fast").path_error < promise("chapter").path_error
+    assert promise("chapter").path_error > 0.2
 
 
-def test_no_stored_setting_is_worse_than_another_in_everything():
+def test_the_chapters_ten_nodes_are_far_off_the_continuum_and_no_step_mends_that():
+    """12 % on the straight swim and 26 % on the worst path, where ours are within a per cent."""
+    ten = [row for row in promises() if row.nodes_per_limb == 10]
+    assert min(row.space_error for row in ten if row.discretisation == "chapter") > 0.2
+    assert max(row.space_error for row in ten if row.discretisation == "continuum") < 0.01
+
+
+def test_space_errors_fall_with_the_nodes():
+    for discretisation in ("chapter", "continuum"):
+        by_nodes = {row.nodes_per_limb: row.space_error for row in promises() if row.discretisation == discretisation}
+        falling = [by_nodes[n] for n in sorted(by_nodes)]
+        assert falling == sorted(falling, reverse=True) and len(falling) >= 3
+
+
+def test_no_stored_setting_is_worse_than_another_of_its_resolution_in_everything():
     def figures(row: Promise) -> tuple[float, ...]:
-        return -row.speed, row.path_error, row.gait_error, row.straight_error
+        return -row.speed, row.path_error, row.gait_error
+
+    def resolution(row: Promise) -> tuple[str, int]:
+        return row.discretisation, row.nodes_per_limb
 
     for row in promises():
-        better = [each for each in promises() if all(np.array(figures(each)) < figures(row))]
+        alike = [each for each in promises() if resolution(each) == resolution(row)]
+        better = [each for each in alike if all(np.array(figures(each)) < figures(row))]
         assert not better, f"{better[0]} beats {row}"
 
 
-@pytest.mark.parametrize("setting", ["exact", "", Numerics("sdirk3", 7.77e-3), Numerics("sdirk2", 20e-3, 3e-3)])
-def test_what_was_not_measured_is_not_promised(setting):
-    with pytest.raises(ValueError, match=r"^(A preset is one of|Nothing was measured).*\.$"):
+@pytest.mark.parametrize("setting", ["exact", "", Numerics(), None])
+def test_what_is_no_preset_and_no_scene_is_refused(setting):
+    with pytest.raises(ValueError, match=r"^(A preset is one of|promise needs the name of a preset or a Scene).*\.$"):
         promise(setting)
 
 
-# for_error
+FAST = Scene.preset("fast")
+OTHERS = [
+    replace(FAST, robot=replace(FAST.robot, youngs_modulus=2e6)),
+    replace(FAST, robot=replace(FAST.robot, n_limbs=4)),
+    replace(FAST, fluid=None),
+    replace(FAST, fluid=Water(drag_coefficient=1.1)),
+    replace(FAST, actuator=SmaPulse(0.3)),
+    replace(FAST, limb_strengths=(1.0, 1.0, 1.0, 1.0, 0.5)),
+    replace(FAST, gravity=(0.0, -1.0)),
+    Scene(Seastar(discretisation="chapter"), contact=Contact(), numerics=Numerics.preset("chapter")),
+]
+
+
+@pytest.mark.parametrize("scene", OTHERS)
+def test_another_robot_or_fluid_is_promised_nothing_and_the_sentence_names_a_way(scene):
+    assert fidelity.measured(scene) is None
+    with pytest.raises(ValueError, match=r"^Errors were measured for the chapter's robot.*studies\.accuracy.*\.$"):
+        promise(scene)
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        replace(FAST, numerics=Numerics("sdirk3", 7.77e-3)),
+        replace(FAST, robot=replace(FAST.robot, nodes_per_limb=9)),
+        replace(FAST, robot=replace(FAST.robot, discretisation="chapter")),
+    ],
+)
+def test_the_chapters_robot_at_a_setting_that_was_not_measured_is_promised_nothing(scene):
+    assert fidelity.measured(scene) is None
+    with pytest.raises(ValueError, match=r"^Nothing was measured, so nothing can be promised.*\.$"):
+        promise(scene)
+
+
+# Choice by error
+
+WANTED = [0.2, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005]
 
 
 @pytest.mark.parametrize("any_gait", [False, True])
-@pytest.mark.parametrize("error", [0.2, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005])
+@pytest.mark.parametrize("error", WANTED)
 def test_for_error_picks_the_fastest_setting_that_keeps_the_error(error, any_gait):
-    chosen = promise(Numerics.for_error(error, any_gait))
-    assert chosen == cheapest(error, any_gait)
+    scene = Scene.for_error(error, any_gait)
+    chosen = promise(scene)
+    assert scene.is_chapters and scene.numerics.named
+    assert chosen.speed == cheapest(error, any_gait).speed
     assert max(chosen.path_error, chosen.gait_error if any_gait else 0.0) <= error
     for row in promises():
         if row.speed > chosen.speed:
@@ -82,23 +161,46 @@ def test_for_error_picks_the_fastest_setting_that_keeps_the_error(error, any_gai
 
 
 def test_a_smaller_error_is_never_faster():
-    speeds = [promise(Numerics.for_error(error)).speed for error in np.logspace(-0.5, -2.5, 40)]
+    speeds = [promise(Scene.for_error(error)).speed for error in np.logspace(-0.5, -2.5, 40)]
     assert speeds == sorted(speeds, reverse=True)
+
+
+@pytest.mark.parametrize("robot", [Seastar(nodes_per_limb=n, discretisation="continuum") for n in (8, 10, 19)])
+def test_for_error_of_a_robot_keeps_its_resolution(robot):
+    scene = Scene.for_error(0.02, robot=robot)
+    assert scene.robot == robot
+    assert promise(scene).path_error <= 0.02
+
+
+def test_for_error_refuses_ten_of_the_chapters_nodes_what_none_of_their_steps_can_keep():
+    with pytest.raises(ValueError, match=r"^No measured setting keeps the path error below 1 %"):
+        Scene.for_error(0.01, robot=Seastar(discretisation="chapter"))
+
+
+@pytest.mark.parametrize("robot", [Seastar(youngs_modulus=2e6), Seastar(n_limbs=3), "seastar", 10])
+def test_for_error_refuses_another_robot(robot):
+    with pytest.raises(ValueError, match=r"^(Errors were measured for the chapter's|robot must be a Seastar).*\.$"):
+        Scene.for_error(0.01, robot=robot)
+
+
+def test_for_error_refuses_numbers_of_nodes_that_were_not_measured():
+    with pytest.raises(ValueError, match=r"^Errors were measured with 6, 7, .* not with 9\.$"):
+        Scene.for_error(0.01, robot=Seastar(nodes_per_limb=9, discretisation="continuum"))
 
 
 @pytest.mark.parametrize("any_gait", [False, True])
 def test_for_error_refuses_what_the_table_cannot_promise_and_names_the_best(any_gait):
     best = min(max(row.path_error, row.gait_error if any_gait else 0.0) for row in promises())
     with pytest.raises(ValueError, match=r"^No measured setting keeps .*: the best, .* keeps .* %\.$") as refusal:
-        Numerics.for_error(0.9 * best, any_gait)
+        Scene.for_error(0.9 * best, any_gait)
     assert f"{100 * best:g} %" in str(refusal.value)
-    assert Numerics.for_error(best, any_gait)
+    assert Scene.for_error(best, any_gait)
 
 
 @pytest.mark.parametrize("error", [0.0, -0.1, float("nan"), float("inf"), True, "1 %", None])
 def test_an_error_that_is_no_positive_number_is_refused(error):
     with pytest.raises(ValueError, match=r"^error must be a positive, finite share"):
-        Numerics.for_error(error)
+        Scene.for_error(error)
 
 
 def test_reading_a_promise_compiles_and_simulates_nothing():
@@ -113,47 +215,66 @@ def test_reading_a_promise_compiles_and_simulates_nothing():
 @pytest.fixture(scope="module")
 def reference():
     """Swims at fidelity "reference": unseen random commands with the pairs, and the pentagon."""
-    batches = [joined(swims(), UNSEEN), pentagon(4, 1)]
-    return batches, [swim(batch, Numerics.preset("reference"), threads=None) for batch in batches]
+    batches = [joined(swims(), UNSEEN), pentagon(2, 1)]
+    return batches, [swim(batch, Scene.preset("reference"), threads=None) for batch in batches]
 
 
 @pytest.mark.parametrize("name", ["fast", "balanced", "accurate", "chapter"])
 def test_runs_at_a_fidelity_and_at_reference_differ_by_no_more_than_promised(name, reference):
-    """Gaits and random commands alike; the reference's own promise is part of the difference."""
+    """Whole and continuous commands alike; the reference's own promise is part of the difference."""
     batches, exact = reference
     for batch, reference_swim in zip(batches, exact, strict=True):
-        off = errors(swim(batch, Numerics.preset(name), threads=None), reference_swim)
+        off = errors(swim(batch, Scene.preset(name), threads=None), reference_swim)
         allowed = promise(name).path_error + promise("reference").path_error
         assert off.path.max() <= allowed
-        # The worst is not far below, or the promise would be worth little: within a factor of three on the pairs.
+        # The worst is not far below, or the promise would be worth little.
         if batch is batches[0]:
-            assert off.path.max() > allowed / 3.0
+            assert off.path.max() > allowed / 4.0
 
 
 @pytest.mark.parametrize("error", [0.05, 0.01])
 def test_for_error_keeps_the_error_on_unseen_commands(error, reference):
     batches, exact = reference
-    found = swim(batches[0], Numerics.for_error(error), threads=None)
+    found = swim(batches[0], Scene.for_error(error), threads=None)
     assert errors(found, exact[0]).path.max() <= error + promise("reference").path_error
 
 
+def unseen_cases() -> Cases:
+    """200 sequences that the study did not use: 88 random, 64 gaits, 24 classes of gaits, 24 slow."""
+    rng = np.random.default_rng(99)
+    some = random_gaits(32, rng)
+    moving = [k for k, kind in enumerate(some.kinds) if kind == "gait"]
+    alone = Cases(tuple(some.names[k] for k in moving), ("gait",) * len(moving), some.commands[:, moving])
+    return joined(random_sequences(88, rng), alone, gaits(), slow_sequences(24, rng))
+
+
+def promised_errors(row: Promise, kinds: Iterable[str]) -> np.ndarray:
+    """Error that is promised of every sequence."""
+    return np.array([{"gait": row.gait_error, "slow": row.slow_error}.get(kind, row.path_error) for kind in kinds])
+
+
+@pytest.fixture(scope="module")
+def unseen():
+    """Unseen sequences and their swims at fidelity "reference"."""
+    cases = unseen_cases()
+    return cases, swim(cases, Scene.preset("reference"), threads=None)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("error", [0.1, 0.02])
+@pytest.mark.parametrize("name", ["fast", "balanced", "accurate", "chapter", 0.02, 0.01, 0.005])
+def test_promises_hold_on_200_sequences_that_the_study_did_not_use(name, unseen):
+    cases, exact = unseen
+    assert len(cases) == 200
+    scene = Scene.preset(name) if isinstance(name, str) else Scene.for_error(name)
+    off = errors(swim(cases, scene, threads=None), exact).path
+    allowed = promised_errors(promise(scene), cases.kinds) + promised_errors(promise("reference"), cases.kinds)
+    broken = [(cases.names[k], off[k], allowed[k]) for k in np.flatnonzero(off > allowed)]
+    assert not broken
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("error", [0.1, 0.03])
 def test_for_error_of_any_gait_keeps_it_whatever_command_is_repeated(error):
-    exact = swim(gaits(), Numerics.preset("reference"), threads=None)
-    found = swim(gaits(), Numerics.for_error(error, any_gait=True), threads=None)
+    exact = swim(gaits(), Scene.preset("reference"), threads=None)
+    found = swim(gaits(), Scene.for_error(error, any_gait=True), threads=None)
     assert errors(found, exact).path.max() <= error + promise("reference").gait_error
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["fast", "balanced"])
-def test_many_unseen_sequences_stay_within_the_promise(name):
-    many = random_sequences(256, np.random.default_rng(99))
-    exact = swim(many, Numerics.preset("reference"), threads=None)
-    off = errors(swim(many, Numerics.preset(name), threads=None), exact)
-    assert off.path.max() <= promise(name).path_error + promise("reference").path_error
-
-
-def test_a_fidelity_of_an_environment_has_a_promise():
-    simulator = Simulator(Scene(numerics=Numerics.for_error(0.05)))
-    assert promise(simulator.scene.numerics).path_error <= 0.05

@@ -81,6 +81,12 @@ def test_fidelities_go_from_fast_to_exact():
     assert presets["balanced"].scheme == presets["accurate"].scheme == presets["reference"].scheme
     steps = [presets[name].step for name in FIDELITIES[:4]]
     assert steps == sorted(steps, reverse=True)
+    for name in FIDELITIES:
+        scene = Scene.preset(name)
+        assert scene.is_chapters and scene.numerics == presets[name]
+        assert scene.robot.discretisation == ("chapter" if name == "chapter" else "continuum")
+    nodes = [Scene.preset(name).robot.nodes_per_limb for name in FIDELITIES[:4]]
+    assert nodes == sorted(nodes)
 
 
 @pytest.mark.parametrize("part", [Seastar(), Water(), SmaPulse(), Numerics(), Scene(), SAMPLED])

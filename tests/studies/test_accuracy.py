@@ -7,42 +7,59 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seastar_gym import Numerics
+from seastar_gym import Numerics, Scene
 from seastar_gym.gaits import PAIRS, STRAIGHT
 from seastar_gym.scene.fidelity import Promise
+from seastar_gym.scene.numerics import Setting
 from seastar_gym.simulator import Simulator
 from studies.accuracy import convergence
 from studies.accuracy import rows as accuracy_rows
 from studies.accuracy import study as accuracy
 from studies.accuracy import tables as accuracy_tables
 from studies.accuracy.cases import (
+    SLOW,
     Cases,
+    Errors,
     Swim,
     errors,
     gaits,
     hub_path_lengths,
     joined,
     pentagon,
+    random_gaits,
     random_sequences,
     scene_of,
+    slow_sequences,
     swim,
     swims,
     symmetric_form,
 )
-from studies.accuracy.rows import Row
-from studies.accuracy.settings import MS, Plan
+from studies.accuracy.rows import Figures, Row
+from studies.accuracy.settings import MS, Plan, presets, settings
 
 TINY = Plan(
-    n_random=2, side=(1, 0), converged=(("sdirk3", 1 * MS), ("implicit-midpoint", 0.5 * MS)), shortest=10 * MS,
-    tolerances=(1e-6, 1e-8), nodes=(4,), fine=2 * MS, coarse_nodes=(), n_fine=3, n_spatial=6, rounds=1,
+    n_random=2, n_slow=1, n_gaits=1, side=(1, 0), limit=(13, 5 * MS), fine=5 * MS, opinion=(4, 5 * MS),
+    resolutions=(("continuum", 10), ("chapter", 4)), shortest=10 * MS, rounds=1, n_others=1,
+    limit_of_others=(7, 5 * MS), fine_of_others=5 * MS,
 )  # fmt: skip
+KINDS = ("path", "straight", "pair", "pentagon", "random", "slow", "gait", "heading", "end")
 
 
-def row(scheme="sdirk2", step=0.01, tolerance=1e-8, path_tolerance=None, error=0.01, speed=1000.0, **others) -> Row:
+def ten(numerics: Numerics, discretisation: str = "chapter", nodes: int = 10) -> Scene:
+    return scene_of(Setting(discretisation, nodes, numerics))
+
+
+def same(error: float) -> Figures:
+    return Figures(*[error] * len(KINDS), "{1-,2+}", "+0-00")
+
+
+def row(
+    scheme="sdirk2", step=0.01, tolerance=1e-8, path_tolerance=None, space=0.1, time=0.01, speed=1000.0, nodes=10,
+    discretisation="continuum",
+) -> Row:  # fmt: skip
     numerics = Numerics(scheme, step, tolerance, path_tolerance=path_tolerance)
-    figures = dict.fromkeys(("straight", "pair", "pentagon", "random", "median", "gait", "heading", "end"), error)
     costs = {"iterations": 100.0, "steps": 50.0, "rejections": 0, "halvings": 0, "speed": speed}
-    return Row(numerics, 10, path=error, worst="{1-,2+}", **figures, **costs, **others)
+    return Row(Setting(discretisation, nodes, numerics), same(space), same(time), **costs)
 
 
 # Cases
@@ -63,7 +80,7 @@ def test_commands_of_one_kind_swim_the_same_distance_and_others_do_not():
     assert symmetric_form(turned) == symmetric_form(mirrored) == symmetric_form(PAIRS["{1-,4+}"])
     commands = np.array([PAIRS["{1-,4+}"], turned, mirrored, PAIRS["{1-,5+}"]])
     cases = Cases(tuple("abcd"), ("gait",) * 4, np.repeat(commands[None], 2, axis=0))
-    distance = np.hypot(*swim(cases, Numerics("implicit-midpoint", 2e-3)).hub[-1].T)
+    distance = np.hypot(*swim(cases, ten(Numerics("implicit-midpoint", 2e-3))).hub[-1].T)
     np.testing.assert_allclose(distance[:3], distance[0], rtol=1e-7)
     assert abs(distance[3] / distance[0] - 1.0) > 1e-3
 
@@ -85,6 +102,24 @@ def test_random_sequences_are_reproducible_and_half_of_them_are_actions_of_the_e
     assert np.abs(commands).max() <= 1.0
 
 
+def test_slow_swims_are_a_tenth_of_random_ones_and_gaits_repeat():
+    slow = slow_sequences(4, np.random.default_rng(2)).commands
+    np.testing.assert_array_equal(slow, SLOW * random_sequences(4, np.random.default_rng(2)).commands)
+    found = random_gaits(3, np.random.default_rng(2))
+    assert found.kinds == ("gait",) * 3 + ("slow",) * 3 + ("gait",) * 3
+    once, slow, alternating = np.split(found.commands, 3, axis=1)
+    assert (once == once[0]).all() and (alternating == np.tile(alternating[:2], (5, 1, 1))).all()
+    np.testing.assert_array_equal(slow, SLOW * once)
+    assert np.isin(alternating[:, ::2], (-1.0, 0.0, 1.0)).all()
+
+
+def test_a_scene_of_a_setting_is_the_physics_with_its_resolution_and_numerics():
+    numerics = Numerics("sdirk3", 0.05)
+    scene = ten(numerics, "continuum", 7)
+    assert scene.is_chapters and scene.numerics == numerics
+    assert (scene.robot.discretisation, scene.robot.nodes_per_limb) == ("continuum", 7)
+
+
 # Errors
 
 
@@ -100,6 +135,15 @@ def test_path_error_is_the_largest_distance_over_the_length_of_the_converged_pat
     assert off.path == pytest.approx([0.05]) and off.end == pytest.approx([0.01])
 
 
+def test_space_and_time_of_the_same_length_bound_the_whole_error():
+    """Of a path of its own, the error of time of a robot that swims too far would be too small."""
+    limit, fine, coarse = (swum([[[length, 0.0]]]) for length in (1.0, 2.0, 2.5))
+    lengths = hub_path_lengths(limit.hub)
+    parts = errors(fine, limit).path + errors(coarse, fine, lengths).path
+    assert errors(coarse, limit).path == pytest.approx(parts.tolist())
+    assert parts == pytest.approx([1.5])
+
+
 def test_heading_error_knows_that_a_turn_is_a_turn():
     hub = [[[1.0, 0.0]]]
     assert errors(swum(hub, [[3.1]]), swum(hub, [[-3.1]])).heading == pytest.approx([2.0 * np.pi - 6.2])
@@ -111,34 +155,45 @@ def test_a_failed_robot_makes_every_error_infinite():
 
 
 def test_heading_is_what_a_robot_was_turned_by():
-    simulator = Simulator(scene_of(Numerics()), 3)
+    simulator = Simulator(ten(Numerics()), 3)
     simulator.reset(heading=[0.0, 0.4, -2.5])
     np.testing.assert_allclose(simulator.heading(), [0.0, 0.4, -2.5], atol=1e-12)
 
 
 def test_groups_swim_as_the_whole_batch_does():
     cases = joined(swims(), random_sequences(7, np.random.default_rng(5)))
-    numerics = Numerics("sdirk2", 20 * MS)
-    whole, groups = swim(cases, numerics), convergence.in_groups(cases)
+    scene = ten(Numerics("sdirk2", 20 * MS))
+    whole, groups = swim(cases, scene), convergence.in_groups(cases, 8)
     assert [len(group) for group in groups] == [8, 4]
-    parts = convergence.together([swim(group, numerics) for group in groups])
+    parts = convergence.together([swim(group, scene) for group in groups])
     np.testing.assert_array_equal(parts.hub, whole.hub)
     assert parts.iterations == pytest.approx(whole.iterations)
     assert parts.steps == pytest.approx(whole.steps) == 50.0
 
 
-def test_extrapolation_is_exact_for_errors_of_first_and_second_order():
-    limit = np.array([[1.0, -2.0]])
-    paths = [limit + 0.3 / edges + 5.0 / edges**2 for edges in (9, 18, 36, 72)]
-    np.testing.assert_allclose(convergence.extrapolated(paths), limit, rtol=1e-13)
+def test_figures_leave_gaits_and_slow_swims_out_of_the_path_error():
+    cases = Cases(("a", "b", "c", "d"), ("straight", "random", "gait", "slow"), np.zeros((1, 4, 5)))
+    path = np.array([0.1, 0.2, 0.3, 0.4])
+    found = accuracy_rows.figures([cases], [Errors(path, np.radians(path), 0.5 * path)])
+    assert (found.path, found.worst, found.straight, found.random) == (0.2, "b", 0.1, 0.2)
+    assert (found.gait, found.worst_gait, found.slow, found.pair) == (0.3, "c", 0.4, 0.0)
+    assert (found.heading, found.end) == (pytest.approx(0.2), 0.1)
+
+
+@pytest.mark.slow
+def test_limit_is_that_of_the_continuum():
+    """34.360 mm after ten strokes straight on, 28.189, 34.360, 39.355 and 32.282 mm of the pairs, to 1e-4."""
+    found = swim(swims(), scene_of(convergence.tight("continuum", *Plan().limit)), threads=None)
+    distances = np.hypot(*found.hub[-1].T)
+    np.testing.assert_allclose(1e3 * distances, [34.360, 28.189, 34.360, 39.355, 32.282], rtol=1e-4)
 
 
 @pytest.mark.slow
 def test_two_schemes_of_different_kind_agree_on_the_converged_straight_swim():
-    """38.4133 mm after ten strokes and 4.91276 mm after one, to 1e-5."""
+    """38.4133 mm after ten strokes and 4.91276 mm after one in the chapter's discretisation, to 1e-5."""
     straight = swims().first(1)
-    sdirk3 = swim(straight, Numerics("sdirk3", 0.02 * MS, convergence.TIGHT))
-    midpoint = swim(straight, Numerics("implicit-midpoint", 0.01 * MS, convergence.TIGHT))
+    sdirk3 = swim(straight, ten(Numerics("sdirk3", 0.02 * MS, 1e-12)))
+    midpoint = swim(straight, ten(Numerics("implicit-midpoint", 0.01 * MS, 1e-12)))
     assert errors(midpoint, sdirk3).path[0] < 1e-5
     for found in (sdirk3, midpoint):
         assert found.hub[0, 0, 0] == pytest.approx(4.91276e-3, rel=1e-5)
@@ -148,30 +203,56 @@ def test_two_schemes_of_different_kind_agree_on_the_converged_straight_swim():
 # Promises
 
 
-def test_a_promise_is_the_worst_of_all_settings_that_are_no_coarser():
+def test_a_promise_is_the_sum_of_space_and_time():
+    (only,) = accuracy_rows.promised([row(space=0.1, time=0.02)])
+    assert only.total("path") == only.promise("path") == pytest.approx(0.12)
+
+
+def promised_times(rows: list[Row]) -> list[float]:
+    return [each.sure_time.gait for each in accuracy_rows.promised(rows)]
+
+
+def test_a_promised_error_of_time_is_the_worst_of_all_settings_that_are_no_coarser():
     rows = [
-        row(step=0.02, error=0.02),
-        row(step=0.01, error=0.03),
-        row(step=0.005, error=0.01),
-        row(step=0.02, tolerance=1e-6, error=0.01),
-        row(step=0.005, tolerance=1e-4, error=0.5),
-        row("sdirk3", step=0.005, error=0.7),
+        row(step=0.02, time=0.02),
+        row(step=0.01, time=0.03),
+        row(step=0.005, time=0.01),
+        row(step=0.02, tolerance=1e-6, time=0.01),
+        row(step=0.005, tolerance=1e-4, time=0.5),
+        row("sdirk3", step=0.005, time=0.7),
+        row(step=0.001, time=0.9, nodes=19),
+        row(step=0.001, time=0.9, discretisation="chapter"),
     ]
-    assert [each.path_promise for each in accuracy_rows.promised(rows)] == [0.03, 0.03, 0.01, 0.03, 0.5, 0.7]
+    assert promised_times(rows)[:6] == [0.03, 0.03, 0.01, 0.03, 0.5, 0.7]
+
+
+def test_a_promised_error_of_space_is_the_worst_of_as_many_nodes_and_more():
+    rows = [row(nodes=n, space=e) for n, e in ((6, 0.02), (10, 0.001), (19, 0.005))]
+    rows.append(row(nodes=37, space=0.3, discretisation="chapter"))
+    assert [each.sure_space.path for each in accuracy_rows.promised(rows)] == [0.02, 0.005, 0.005, 0.3]
 
 
 def test_adapted_steps_are_promised_by_themselves():
-    fixed = row("implicit-midpoint", step=0.001, error=0.5)
-    tight = row("implicit-midpoint", step=0.005, path_tolerance=0.005, error=0.02)
-    loose = row("implicit-midpoint", step=0.005, path_tolerance=0.02, error=0.01)
-    assert [each.path_promise for each in accuracy_rows.promised([fixed, tight, loose])] == [0.5, 0.02, 0.02]
+    fixed = row("implicit-midpoint", step=0.001, time=0.5)
+    tight = row("implicit-midpoint", step=0.005, path_tolerance=0.005, time=0.02)
+    loose = row("implicit-midpoint", step=0.005, path_tolerance=0.02, time=0.01)
+    assert promised_times([fixed, tight, loose]) == [0.5, 0.02, 0.02]
 
 
 def test_front_keeps_what_no_other_setting_beats():
-    rows = [row(step=s, error=e, speed=v) for s, e, v in ((1, 0.1, 9e3), (2, 0.2, 8e3), (3, 0.05, 7e3), (4, 0.05, 6e3))]
-    best = accuracy_rows.front(rows, lambda each: each.path, lambda each: each.speed)
-    assert [each.numerics.step for each in best] == [1, 3]
-    assert accuracy_rows.front([row(error=np.inf)], lambda each: each.path, lambda each: each.speed) == []
+    steps = ((1, 0.1, 9e3), (2, 0.2, 8e3), (3, 0.05, 7e3), (4, 0.05, 6e3))
+    rows = [row(step=s, time=e, space=0.0, speed=v) for s, e, v in steps]
+    best = accuracy_rows.front(rows, lambda each: each.total("path"), lambda each: each.speed)
+    assert [each.setting.numerics.step for each in best] == [1, 3]
+    failed = [row(time=np.inf)]
+    assert accuracy_rows.front(failed, lambda each: each.total("path"), lambda each: each.speed) == []
+
+
+def test_every_resolution_has_a_front_of_its_own():
+    fast, dear = row(nodes=7, space=0.01, speed=9e3), row(nodes=19, space=0.02, speed=1e3)
+    assert [each.setting for each in accuracy_rows.fronts(accuracy_rows.promised([dear, fast]))] == [
+        fast.setting, dear.setting,
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -191,41 +272,49 @@ def found():
 
 
 def test_study_measures_every_setting_in_time_and_space(found):
-    own = [each for each in found.rows if each.nodes_per_limb == 10]
-    assert [each.numerics for each in own] == accuracy.settings(TINY)
-    assert {each.nodes_per_limb for each in found.rows} == {10, 4}
+    assert [each.setting for each in found.rows] == settings(TINY)
+    assert {("continuum", 10), ("chapter", 4)} <= {each.resolution for each in found.rows}
     for each in found.rows:
-        assert 0.0 < each.path < 0.5 and 0.0 < each.spatial < 1.0 and each.speed > 0.0 and each.straight_speed > 0.0
-        assert each.path == max(each.straight, each.pair, each.pentagon, each.random)
-    assert all(each.path_promise >= each.path for each in own)
+        assert 0.0 < each.time.path < 0.6 and 0.0 <= each.space.path < 1.0
+        assert each.speed > 0.0 and each.straight_speed > 0.0
+        for part in (each.space, each.time):
+            assert part.path == max(part.straight, part.pair, part.pentagon, part.random)
+        assert each.promise("path") >= each.total("path") and each.promise("gait") >= each.total("gait")
 
 
-def test_study_finds_the_converged_straight_swim_and_that_finer_limbs_converge(found):
-    assert found.straight[-1] == pytest.approx(38.41e-3, rel=5e-3)
-    assert 33e-3 < found.limit < 36e-3
-    errors_over_nodes = [each.straight for each in found.space]
-    assert errors_over_nodes == sorted(errors_over_nodes, reverse=True)
-    assert found.agreement["straight"] < 1e-2
+def test_study_knows_its_limit_and_the_doubt_about_it(found):
+    assert found.distances["straight"] == pytest.approx(34.36e-3, rel=0.01)
+    assert list(found.distances) == ["straight", *PAIRS]
+    assert len(found.doubt) == 3 and all(0.0 < each.path < 0.2 for each in found.doubt.values())
 
 
 def test_presets_and_the_chapters_steps_are_among_the_settings():
-    measured = accuracy.settings(Plan())
-    chapter = (Numerics("implicit-euler", 3 * MS), Numerics("implicit-euler", 20 * MS))
-    assert {*accuracy_rows.presets().values(), *chapter} <= set(measured)
+    measured = settings(Plan())
+    chapter = {Setting("chapter", 10, Numerics("implicit-euler", 20 * MS, 1e-6))}
+    assert {*presets().values()} | chapter <= set(measured)
     assert len(measured) == len(set(measured))
 
 
 def test_tables_and_csv_are_written(found, tmp_path):
-    accuracy_tables.write_csv(found.rows, tmp_path / "a.csv")
+    accuracy_tables.write_csv(found, tmp_path / "a.csv")
     rows = list(csv.DictReader((tmp_path / "a.csv").read_text().splitlines()))
-    assert len(rows) == len(found.rows)
-    assert {"scheme", "step_s", "nodes_per_limb", "path", "spatial", "heading_deg", "end", "speed"} <= set(rows[0])
-    assert float(rows[0]["path"]) == pytest.approx(found.rows[0].path, rel=1e-4)
+    others = sum(map(len, found.others.values()))
+    assert len(rows) == len(found.rows) + others
+    some = {"physics", "scheme", "step_s", "nodes_per_limb", "space_path", "time_gait", "promise_heading_deg", "speed"}
+    assert some <= set(rows[0])
+    assert float(rows[0]["time_path"]) == pytest.approx(found.rows[0].time.path, rel=1e-4)
+    assert float(rows[0]["promise_path"]) == pytest.approx(found.rows[0].promise("path"), rel=1e-4)
     lines = accuracy_tables.as_markdown(found).splitlines()
     assert all(line.count("|") == len(accuracy_tables.COLUMNS) + 1 for line in lines if line.startswith("|"))
-    for name in accuracy_rows.presets():
+    for name in presets():
         assert any(line.startswith(f"| {name} |") for line in lines)
-    assert accuracy_tables.as_table(found).row_count == len(accuracy_tables.summary(found))
+    assert accuracy_tables.as_tables(found)[0].row_count == len(accuracy_tables.summary(found))
+    assert set(found.others) == {"drag along limbs", "silicone"} and not found.refused
+
+
+def test_physics_that_a_scene_refuses_are_left_out_with_a_reason(found):
+    lines = accuracy_tables.as_markdown(replace(found, others={}, refused={"honey": "Too thick."}))
+    assert "Left out is honey: Too thick." in lines
 
 
 def test_pictures_are_drawn(found, tmp_path):
@@ -236,23 +325,25 @@ def test_pictures_are_drawn(found, tmp_path):
 
 
 def test_what_is_stored_can_be_promised(found, tmp_path):
-    agreed = replace(found, agreement=dict.fromkeys(accuracy_tables.AGREEMENT, 1e-6))
-    accuracy_tables.store(agreed, tmp_path / "presets.json")
+    sure = replace(found, doubt=dict.fromkeys(found.doubt, same(1e-6)))
+    accuracy_tables.store(sure, tmp_path / "presets.json")
     stored = json.loads((tmp_path / "presets.json").read_text())
-    assert list(stored["presets"]) == list(accuracy_rows.presets())
-    by_numerics = {each.numerics: each for each in found.rows if each.nodes_per_limb == 10}
-    for entry in (*stored["presets"].values(), *stored["front"]):
+    assert list(stored["presets"]) == list(presets())
+    by_setting = {each.setting: each for each in found.rows}
+    for entry in (*stored["presets"].values(), *stored["settings"]):
         kept = Promise(**entry)
         numerics = Numerics(kept.scheme, kept.step, kept.newton_tolerance, path_tolerance=kept.path_tolerance)
-        measured = by_numerics[numerics]
-        assert measured.path <= kept.path_error <= 1.11 * measured.path_promise
-    speeds = [entry["speed"] for entry in stored["front"]]
+        measured = by_setting[Setting(kept.discretisation, kept.nodes_per_limb, numerics)]
+        assert measured.total("path") <= kept.path_error * (1 + 1e-5)
+        assert kept.path_error <= 1.11 * measured.promise("path") + 1e-12
+        assert kept.path_error == pytest.approx(kept.space_error + kept.time_error, rel=1e-5)
+    speeds = [entry["speed"] for entry in stored["settings"]]
     assert speeds == sorted(speeds, reverse=True)
 
 
-def test_a_study_without_a_converged_solution_is_not_stored(found, tmp_path):
-    doubtful = replace(found, agreement={**dict.fromkeys(accuracy_tables.AGREEMENT, 1e-6), "pair": 2e-4})
-    with pytest.raises(ValueError, match=r"2.0e-04 of the path on the pair swims.*nothing is stored"):
+def test_a_study_whose_limit_is_in_doubt_is_not_stored(found, tmp_path):
+    doubtful = replace(found, doubt={"space, from 37 and 73 nodes": same(4e-4)})
+    with pytest.raises(ValueError, match=r"in doubt by 4.0e-04 of the path \(space.*nothing is stored"):
         accuracy_tables.store(doubtful, tmp_path / "presets.json")
     assert not (tmp_path / "presets.json").exists()
 
