@@ -547,7 +547,7 @@ def test_what_is_no_action_is_refused_and_changes_nothing(action):
         ({"randomization": {}}, "DomainRandomization"),
         ({"render_mode": "ansi"}, "render_mode"),
         ({"frames_per_stroke": 0}, "frames_per_stroke"),
-        ({"scene": Scene(Seastar(hub_hinge="turning"))}, "turning"),
+        ({"scene": Scene(Seastar(hub_hinge="turning", discretisation="chapter"))}, "turning"),
     ],
     ids=str,
 )
