@@ -122,7 +122,8 @@ def draw_straight(continuum: Swim, chapter: Swim, file: Path) -> None:
         axes.plot(continuum.time, MM * continuum_values[:, 1], color=ACTUATED, linewidth=1.3, label="y, both")
         for stroke in range(len(continuum.commands)):
             begin = stroke * continuum.scene.actuator.period
-            axes.axvspan(begin, begin + continuum.scene.actuator.corners[1], color="#f7e3e1", linewidth=0, zorder=0.5)
+            heating = begin, begin + continuum.scene.actuator.corners[1]
+            axes.axvspan(*heating, color="#f7e3e1", linewidth=0, zorder=0.5)
         axes.set_xticks(range(11))
     span = (0.0, continuum.time[-1])
     heated, after, back, turn = stroke_motion(continuum)

@@ -111,7 +111,8 @@ def cost_statements(costs: Sequence[Cost]) -> list[Statement]:
     faster = "faster than real time when h is 3 ms or more"
     return [
         Statement(faster, "real-time factor at 3 ms, one robot alone", "", tuple(1.0 / c.alone[at_3] for c in costs)),
-        Statement(faster, f"the same per robot of {costs[0].n_robots}", "", tuple(1.0 / c.in_batch[at_3] for c in costs)),
+        Statement(faster, f"the same per robot of {costs[0].n_robots}", "",
+                  tuple(1.0 / c.in_batch[at_3] for c in costs)),
         Statement("time linearly scales with step size", "exponent of h", "", tuple(slopes)),
         Statement("numerical issues at h of 20 ms or more", "smallest h at which Newton's matrix is indefinite", "ms",
                   tuple(firsts)),

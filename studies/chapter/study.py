@@ -1,7 +1,7 @@
 """The chapter's Figs. 13.2 and 13.5b to 13.9, recomputed and written as PNG.
 
-Each swim is computed three times: with the chapter's setting, with its ten nodes converged in time, and in the continuum,
-which ten nodes of this project's own discretisation stand for. The pictures show the first and the last. The chapter's
+Each swim is computed three times: with the chapter's setting, with its ten nodes converged in time, and with ten nodes
+that are as good as a continuum. The pictures show the first and the last. The chapter's
 statements are printed beside the numbers of all three, and written to `statements.csv`.
 """
 

@@ -69,8 +69,8 @@ def exhibits() -> list[Exhibit]:
         ),
         Exhibit(
             "two limbs",
-            'Seastar(2, hub_hinge="turning")',
-            five(robot=Seastar(2, hub_hinge="turning")),
+            "Seastar(2)",
+            five(robot=Seastar(2)),
             (1.0, -1.0),
         ),
         Exhibit(

@@ -64,7 +64,7 @@ def elastica() -> Section:
     return Section(
         "Clamped limbs under tip loads",
         "Two limbs in a line, whose hub is held, carry equal dead loads P across their tips. Both loads turn the hub "
-        "alike in opposite senses, so that each limb is clamped at the hub. Implicit Euler brings them to rest in water "
-        "with 16 steps of 0.5 s. Reference: the extensible elastica of length L, by shooting.",
+        "alike in opposite senses, so that each limb is clamped at the hub. Implicit Euler brings them to rest in "
+        "water with 16 steps of 0.5 s. Reference: the extensible elastica of length L, by shooting.",
         rows,
     )

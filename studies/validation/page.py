@@ -63,9 +63,9 @@ def as_page(sections: Sequence[Section]) -> str:
         "# Verification against exact solutions and published codes",
         "",
         "Written by `python -m studies.validation`. `tests/test_validation.py` checks each line against a bound.",
-        'Robot and fluid are the chapter\'s unless a section says otherwise, and l is the length of an edge. "continuum"',
-        'and "chapter" are the two discretisations of a `Seastar`. The difference is ours minus the reference; in brackets',
-        "it is relative to the reference.",
+        "Robot and fluid are the chapter's unless a section says otherwise, and l is the length of an edge. Continuum",
+        "and chapter are the two discretisations of a `Seastar`. The difference is ours minus the reference; in",
+        "brackets it is relative to the reference.",
     ]
     for section in sections:
         lines += ["", f"## {section.title}", "", section.method, ""]
