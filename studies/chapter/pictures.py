@@ -128,8 +128,8 @@ def draw_straight(continuum: Swim, chapter: Swim, file: Path) -> None:
     span = (0.0, continuum.time[-1])
     heated, after, back, turn = stroke_motion(continuum)
     moves = (
-        f"The last stroke: {MM * heated:.1f} mm forward while heated,\n{MM * after:.1f} mm more until {turn:.2f} s into "
-        f"the stroke, then {MM * back:.1f} mm back"
+        f"The last stroke: {MM * heated:.1f} mm forward while heated,\n{MM * after:.1f} mm more until {turn:.2f} s "
+        f"into the stroke, then {MM * back:.1f} mm back"
     )
     style(panels["b"], ylabel="hub position [mm]", title=f"(b)  pink: limbs 2 and 5 are heated. {moves}", xlim=span)
     style(panels["c"], ylabel="hub velocity [mm/s]", xlabel="time [s]", title="(c)", xlim=span)
