@@ -1,4 +1,4 @@
-"""Ringing of the limbs, and the error of schemes that damp it."""
+"""Ringing of limbs, and the error of schemes that damp it: large with the chapter's hub, small with a rigid one."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from seastar_gym.gaits import PAIRS
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene import Numerics, Scene, Seastar
-from seastar_gym.scene.numerics import Setting
+from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simulator import Simulator
-from studies.accuracy.cases import STROKES, scene_of
+from studies.accuracy.cases import STROKES
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from studies.accuracy.rows import Study
@@ -32,45 +33,69 @@ SHOWN: tuple[tuple[str, Numerics, str, float], ...] = (
     ("sdirk2 0.5 ms: damps it", Numerics("sdirk2", 0.5e-3), "#ee9922", 1.4),
     ("sdirk2 20 ms", Numerics("sdirk2", 20e-3), COLOURS["sdirk2"], 1.4),
 )
+TITLES: dict[Discretisation, tuple[str, str, str]] = {
+    "chapter": (
+        "1. The chapter's hub: limbs ring lengthwise",
+        "2. SDIRK2 damps the ringing",
+        "3. Robots that do not ring swim too far",
+    ),
+    "continuum": (
+        "4. A rigid hub: the same, without that ringing",
+        "5. Lengthening is a sixth to a thirteenth",
+        "6. At 0.5 ms no error is left of SDIRK2",
+    ),
+}
 SAMPLES = 4000
 """Samples of a stroke, where the time steps are short enough."""
 
 
 def ringing(found: Study) -> Figure:
-    """Speed of a limb within a stroke, strength of its ringing, and the excess distance swum, for several schemes."""
-    figure, (close, strength, path) = subplots(1, 3, figsize=(13.5, 4.7))
-    begin, end = 0.42, 0.45
-    for name, numerics, colour, width in SHOWN:
-        time, velocity, stretching = record(numerics)
-        some = (time >= begin - 0.02) & (time <= end + 0.02)
-        close.plot(MS * time[some], MM * velocity[some], lw=width, color=colour)
-        strength.semilogy(time, MM * smoothed(stretching, time), color=colour, lw=width, label=name)
-        path.plot(*excess(swum(numerics)), "o-", ms=3.5, lw=width, color=colour)
-    strokes, frozen = excess(swum(EXACT, freeze_lengths=True))
-    path.plot(strokes, frozen, "o--", ms=3.5, mfc="white", lw=1.4, color=INK)
-    path.annotate(
-        "converged, but every 2 ms the\nlengthwise ringing is taken out", (9, frozen[8]),
-        (-12, 14), textcoords="offset points", ha="right", fontsize=8.5, color=INK,
-    )  # fmt: skip
-    close.set(xlim=(MS * begin, MS * end), ylim=(2, 18), xlabel="time in the stroke [ms]")
-    close.set_ylabel("speed of a node in the middle of limb 1 [mm/s]")
-    close.set_title("1. Limbs ring lengthwise, at hundreds of hertz", fontsize=10.5, loc="left")
-    strength.set(
-        xlabel="time in the stroke [s]", ylabel="lengthening speed of limbs, r.m.s. [mm/s]", ylim=(0.03, 100.0)
-    )
-    strength.set_title("2. SDIRK2 damps the ringing, the midpoint rule keeps it", fontsize=10.5, loc="left")
-    strength.legend(frameon=False, fontsize=8.5, loc="upper right")
-    path.set(xlabel="strokes", ylabel="farther from the start than the converged robot", xticks=range(0, 11, 2))
-    path.set_title("3. Robots that do not ring swim too far", fontsize=10.5, loc="left")
-    as_percent(path.yaxis)
-    figure.suptitle(f"Why damped ringing costs accuracy: the pair {RINGING} of Fig. 13.8", x=0.01, ha="left")
+    """Ringing of limbs, its strength, and the excess distance swum, for several schemes and both discretisations."""
+    figure, rows = subplots(2, 3, figsize=(11.0, 5.9), sharex="col", sharey="col")
+    for discretisation, row in zip(TITLES, rows, strict=True):
+        draw_row(discretisation, *row)
+    rows[1, 1].legend(frameon=False, fontsize=8.5, loc="upper right")
+    for axes, label in zip(rows[1], ("time in the stroke [ms]", "time in the stroke [s]", "strokes"), strict=True):
+        axes.set_xlabel(label)
+    figure.suptitle(f"What damped ringing costs: the pair {RINGING} of Fig. 13.8", x=0.01, ha="left")
     return figure
 
 
-def record(numerics: Numerics, relaxation_time: float | None = None) -> tuple[Floats, Floats, Floats]:
+def draw_row(discretisation: Discretisation, close: Axes, strength: Axes, path: Axes) -> None:
+    """Draw one discretisation's panels."""
+    begin, end = 0.42, 0.45
+    for name, numerics, colour, width in SHOWN:
+        time, velocity, stretching = record(numerics, discretisation=discretisation)
+        some = (time >= begin - 0.02) & (time <= end + 0.02)
+        close.plot(MS * time[some], MM * velocity[some], lw=width, color=colour)
+        thin = max(1, len(time) // 200)
+        strength.semilogy(time[::thin], MM * smoothed(stretching, time)[::thin], color=colour, lw=width, label=name)
+        path.plot(*excess(numerics, discretisation), "o-", ms=3.5, lw=width, color=colour)
+    if discretisation == "chapter":
+        strokes, frozen = excess(EXACT, discretisation, freeze_lengths=True)
+        path.plot(strokes, frozen, "o--", ms=3.5, mfc="white", lw=1.4, color=INK)
+        path.annotate(
+            "converged, but every 2 ms the\nlengthwise ringing is taken out", (9, frozen[8]), (9.7, 1.0),
+            ha="right", fontsize=8.5, color=INK, arrowprops={"arrowstyle": "-", "color": INK, "lw": 0.8},
+        )  # fmt: skip
+    close.set(xlim=(MS * begin, MS * end), ylabel="middle node of limb 1 [mm/s]")
+    strength.set(ylabel="lengthening, r.m.s. [mm/s]", ylim=(0.03, 100.0))
+    path.set(ylabel="farther than converged", xticks=range(0, 11, 2))
+    for axes, title in zip((close, strength, path), TITLES[discretisation], strict=True):
+        axes.set_title(title, fontsize=10.5, loc="left")
+    as_percent(path.yaxis)
+
+
+def scene(numerics: Numerics, discretisation: Discretisation, relaxation_time: float | None = None) -> Scene:
+    """The chapter's scene with these numerics; relaxation_time: That of a damped material [s], or None."""
+    return Scene(Seastar(discretisation=discretisation, relaxation_time=relaxation_time), numerics=numerics)
+
+
+def record(
+    numerics: Numerics, relaxation_time: float | None = None, discretisation: Discretisation = "chapter"
+) -> tuple[Floats, Floats, Floats]:
     """Second stroke: times [s], velocity across limb 1 at its middle [m/s], r.m.s. lengthening speed of limbs [m/s]."""
-    physics = Scene(Seastar(relaxation_time=relaxation_time))
-    simulator = Simulator(scene_of(Setting("chapter", 10, numerics), physics), 1, threads=1)
+    simulator = Simulator(scene(numerics, discretisation, relaxation_time), 1, threads=1)
     command = PAIRS[RINGING][None]
     simulator.stroke(command)
     time, velocity, stretching = [], [], []
@@ -96,12 +121,13 @@ def lengthening(simulator: Simulator) -> Floats:
 
 
 @cache
-def swum(numerics: Numerics, freeze_lengths: bool = False) -> Floats:
+def swum(numerics: Numerics, discretisation: Discretisation, freeze_lengths: bool = False) -> Floats:
     """Distances of the hub from the start at the ends of strokes [m], shape (STROKES,).
 
-    freeze_lengths: Every 2 ms, remove the lengthening speed of all edges by impulses between their ends.
+    freeze_lengths: Every 2 ms, remove the lengthening speed of all edges by impulses between their ends. Masses must be
+        lumped for that, as the chapter's are.
     """
-    simulator = Simulator(scene_of(Setting("chapter", 10, numerics)), 1, threads=1)
+    simulator = Simulator(scene(numerics, discretisation), 1, threads=1)
     masses = np.repeat(make_rods(simulator.scene).mass, 2)
     distances = []
     for _ in range(STROKES):
@@ -114,9 +140,14 @@ def swum(numerics: Numerics, freeze_lengths: bool = False) -> Floats:
     return np.array(distances)
 
 
-def excess(distances: Floats) -> tuple[Floats, Floats]:
-    """Numbers of strokes, and relative excess of the distance from the start over the converged robot's [%]."""
-    exact = swum(EXACT)
+def excess(
+    numerics: Numerics, discretisation: Discretisation, freeze_lengths: bool = False
+) -> tuple[Floats, Floats]:
+    """Numbers of strokes, and relative excess of the distance from the start over the converged robot's [%].
+
+    The converged robot has the same discretisation.
+    """
+    distances, exact = swum(numerics, discretisation, freeze_lengths), swum(EXACT, discretisation)
     return np.arange(1.0, STROKES + 1.0), PERCENT * (distances / exact - 1.0)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.gaits import STRAIGHT
-from seastar_gym.scene import Numerics, Scene
+from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.simulator import Simulator
 from studies.speed.timing import repeat
 
@@ -49,11 +49,11 @@ def needs_regularisation(scene: Scene) -> bool:
     return any(simulator.stroke(STRAIGHT[None]).regularised[0] > 0 for _ in range(10))
 
 
-def measure_cost(steps: Floats, seconds: float, progress: Callable[[], object] = lambda: None) -> Cost:
+def measure_cost(robot: Seastar, steps: Floats, seconds: float, progress: Callable[[], object] = lambda: None) -> Cost:
     """Measure Fig. 13.9 on one thread; steps: Time steps [s], seconds: Duration of the measurement per point [s]."""
     alone, in_batch, regularised = [], [], []
     for step in steps:
-        scene = Scene(numerics=Numerics("implicit-euler", float(step)))
+        scene = Scene(robot, numerics=Numerics("implicit-euler", float(step)))
         period = scene.actuator.period
         alone.append(computing_seconds(Simulator(scene, 1, threads=1), seconds) / period)
         in_batch.append(computing_seconds(Simulator(scene, BATCH, threads=1), seconds) / period / BATCH)

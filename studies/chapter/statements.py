@@ -11,7 +11,7 @@ from rich.table import Table
 from seastar_gym import gaits
 from studies.chapter import REAL_TIME_FROM
 from studies.chapter.cost import Cost
-from studies.chapter.swims import MM, Swim
+from studies.chapter.swims import MM, MS, Swim
 
 PAIRS = {
     name.replace(",", ", ").replace("-", "⁻").replace("+", "⁺"): command for name, command in gaits.PAIRS.items()
@@ -26,7 +26,7 @@ BISECTORS = (36.0, 72.0, 108.0, 144.0)
 class Statement:
     """A statement of the chapter and a quantity that it is about.
 
-    values: Value with the chapter's numerics, then converged, in `unit`.
+    values: Values in `unit`, of every setting of `swims.SETTINGS`, or of every discretisation.
     """
 
     sentence: str
@@ -89,6 +89,7 @@ def pair_statements(swims: Sequence[Swim]) -> list[Statement]:
     """Statements about Fig. 13.8, the pairs of limbs."""
     ends = [s.positions[-1, :, 0] for s in swims]
     order = "the maximum with limbs #1 and #4, a lower efficiency with #1 and #2"
+    farther = [np.hypot(*(end[1])) / np.hypot(*end[3]) for end in ends]
     rows = [
         Statement(order, f"distance of {name}", "mm", tuple(MM * np.hypot(*end[k]) for end in ends))
         for k, name in enumerate(PAIRS)
@@ -96,38 +97,50 @@ def pair_statements(swims: Sequence[Swim]) -> list[Statement]:
     off = [np.degrees(np.arctan2(end[:, 1], end[:, 0])) - BISECTORS for end in ends]
     return [
         *rows,
+        Statement(order, "distance of {1⁻, 3⁺} over that of {1⁻, 5⁺}", "", tuple(farther)),
         Statement("always moves along the bisector", "largest angle off it", "degrees",
                   tuple(np.abs(o).max() for o in off)),
     ]  # fmt: skip
 
 
-def cost_statements(cost: Cost) -> list[Statement]:
-    """Statements about Fig. 13.9, the cost. They have one value each, by implicit Euler as in the chapter."""
-    at_3 = int(np.argmin(np.abs(cost.steps - REAL_TIME_FROM)))
-    slope = np.polyfit(np.log(cost.steps), np.log(cost.in_batch), 1)[0]
+def cost_statements(costs: Sequence[Cost]) -> list[Statement]:
+    """Statements about Fig. 13.9, the cost of implicit Euler as in the chapter, in either discretisation."""
+    at_3 = int(np.argmin(np.abs(costs[0].steps - REAL_TIME_FROM)))
+    slopes = (np.polyfit(np.log(cost.steps), np.log(cost.in_batch), 1)[0] for cost in costs)
+    firsts = [MS * cost.steps[cost.regularised].min(initial=np.inf) for cost in costs]
     faster = "faster than real time when h is 3 ms or more"
     return [
-        Statement(faster, "real-time factor at 3 ms, one robot alone", "", (1.0 / cost.alone[at_3],)),
-        Statement(faster, f"the same per robot of {cost.n_robots}", "", (1.0 / cost.in_batch[at_3],)),
-        Statement("time linearly scales with step size", "exponent of h", "", (slope,)),
+        Statement(faster, "real-time factor at 3 ms, one robot alone", "", tuple(1.0 / c.alone[at_3] for c in costs)),
+        Statement(faster, f"the same per robot of {costs[0].n_robots}", "",
+                  tuple(1.0 / c.in_batch[at_3] for c in costs)),
+        Statement("time linearly scales with step size", "exponent of h", "", tuple(slopes)),
         Statement("numerical issues at h of 20 ms or more", "smallest h at which Newton's matrix is indefinite", "ms",
-                  tuple(1e3 * cost.steps[cost.regularised][:1])),
+                  tuple(firsts)),
     ]  # fmt: skip
+
+
+COLUMNS = ("its setting", "its ten nodes, converged", "continuum")
+"""Columns of values. Of the cost, the second is empty."""
+
+
+def cells(row: Statement) -> tuple[float | None, ...]:
+    """A row's values in COLUMNS."""
+    return row.values if len(row.values) == len(COLUMNS) else (row.values[0], None, *row.values[1:])
 
 
 def as_table(statements: Sequence[Statement]) -> Table:
     """Statements as a table for the terminal."""
-    table = Table(title="Statements of the chapter, and values with its setting and converged")
+    table = Table(title="Statements of the chapter, and computed values")
     table.add_column("the chapter", max_width=36)
     table.add_column("quantity", max_width=30)
-    for column in ("its setting", "converged"):
-        table.add_column(column, justify="right", no_wrap=True)
+    for column in COLUMNS:
+        table.add_column(column, justify="right", max_width=16)
     last = ""
     for row in statements:
-        cells = [f"{value:.4g} {row.unit}".rstrip() for value in row.values]
+        values = ["" if value is None else f"{value:.4g} {row.unit}".rstrip() for value in cells(row)]
         if row.sentence != last:
             table.add_section()
-        table.add_row("" if row.sentence == last else row.sentence, row.quantity, *cells)
+        table.add_row("" if row.sentence == last else row.sentence, row.quantity, *values)
         last = row.sentence
     return table
 
@@ -136,5 +149,5 @@ def write_csv(statements: Sequence[Statement], file: Path) -> None:
     """Write statements as CSV."""
     with file.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
-        writer.writerow(["the chapter", "quantity", "unit", "its setting", "converged"])
-        writer.writerows([row.sentence, row.quantity, row.unit, *row.values] for row in statements)
+        writer.writerow(["the chapter", "quantity", "unit", *COLUMNS])
+        writer.writerows([row.sentence, row.quantity, row.unit, *cells(row)] for row in statements)

@@ -69,8 +69,8 @@ def exhibits() -> list[Exhibit]:
         ),
         Exhibit(
             "two limbs",
-            'Seastar(2, hub_hinge="turning")',
-            five(robot=Seastar(2, hub_hinge="turning")),
+            "Seastar(2)",
+            five(robot=Seastar(2)),
             (1.0, -1.0),
         ),
         Exhibit(
@@ -160,7 +160,7 @@ def page(shown: Sequence[Exhibit], costs: Floats, per_step: Floats, machine: str
         f"its hub's path over {STROKES} strokes is red. Pictures are 256 mm wide. The cost is the processor time of a",
         "stroke of random commands relative to the default scene in the same run, to within a few per cent",
         f"(`python -m studies.scenes.gallery`; {machine}; {ROBOTS} robots, one thread, fidelity `balanced`). Thin tips",
-        "and limbs that open nearly to pi take more Newton iterations, and some of these a regularised matrix.",
+        "take more Newton iterations, and some of these a regularised matrix.",
         "",
         "| | scene | cost | Newton iterations per step |",
         "|---|---|---:|---:|",

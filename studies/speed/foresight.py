@@ -152,7 +152,7 @@ def drawn_stages(draw: Draw, rng: np.random.Generator) -> Stages:
     modulus, density, gamma = (logarithmic(rng, ends) for ends in (draw.modulus, draw.density, draw.gamma))
     edge = limb / (nodes - 1)
     length, radius, E, rho = (tuple(each.tolist()) for each in (limb, edge / slenderness, modulus, density))
-    robot = Seastar(n_limbs, nodes, length, radius, E, rho, hinge)
+    robot = Seastar(n_limbs, nodes, length, radius, E, rho, hinge, discretisation="chapter")
     gap = 2.0 * np.pi / n_limbs
     rotations = drawn_rotations(draw, np.pi - gap if hinge == "opening" else gap, n_limbs, rng)
     fluid = None if rng.random() < 0.3 else Water()

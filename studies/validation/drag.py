@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene import Numerics, Scene, Seastar, Water
+from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simulator import Simulator, State
 from studies.validation import exact
 from studies.validation.page import Row, Section
@@ -24,10 +25,11 @@ def driven_speed(acceleration: float, time: float) -> float:
     return float(simulator.hub_velocity()[0, 0])
 
 
-def coasted(speed: float, time: float) -> Floats:
+def coasted(speed: float, time: float, discretisation: Discretisation = "continuum") -> Floats:
     """(speed [m/s], distance [m]) of a straight robot that coasts for a time [s] from an initial speed [m/s]."""
-    simulator = Simulator(Scene(Seastar(), Water(), pause(time), DRAG_NUMERICS))
-    velocities = np.tile([speed, 0.0], (1, Seastar().n_nodes, 1))
+    robot = Seastar(discretisation=discretisation)
+    simulator = Simulator(Scene(robot, Water(), pause(time), DRAG_NUMERICS))
+    velocities = np.tile([speed, 0.0], (1, robot.n_nodes, 1))
     simulator.set_state(State(simulator.positions, velocities, simulator.time))
     let_pass(simulator)
     return np.array([simulator.hub_velocity()[0, 0], simulator.hub_position()[0, 0]])
@@ -46,9 +48,9 @@ def quadratic_drag() -> Section:
             rows.append(Row(f"{name} after coasting {time:g} s", reference, ours, unit, 5e-6 * reference))
     return Section(
         "Quadratic drag",
-        "Drag and mass of a node are both proportional to its Voronoi length, so a straight robot translates without "
-        "bending: dv/dt = a - k v² with k = rho_f C_d / (pi r_0 rho_m) = 199/m. It is driven from rest by loads of "
-        "a times each node's mass, or coasts from v_0 = 0.1 m/s (SDIRK3, h = 2 ms). Reference: v = sqrt(a/k) "
-        "tanh(sqrt(a k) t); v = v_0 / (1 + k v_0 t), x = log(1 + k v_0 t) / k.",
+        "In either discretisation the drag on a straight robot that translates is shared among its nodes as its mass "
+        "is, so it does not bend: dv/dt = a - k v² with k = rho_f C_d / (pi r_0 rho_m) = 199/m. It is driven from "
+        "rest by loads of a times each node's mass, or coasts from v_0 = 0.1 m/s (SDIRK3, h = 2 ms). Reference: "
+        "v = sqrt(a/k) tanh(sqrt(a k) t); v = v_0 / (1 + k v_0 t), x = log(1 + k v_0 t) / k.",
         rows,
     )

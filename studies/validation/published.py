@@ -21,11 +21,11 @@ PUBLISHED_FINALS = {10e-3: 36.2827089e-3, 1e-3: 38.2752941e-3}
 def straight_swim(step: float, parts: int = 10) -> Floats:
     """Hub x [m] in ten strokes of {2+,5-}, at the ends of `parts` equal parts of each stroke, shape (10 parts,).
 
-    Hub hinges bend by their turning angle. The scheme is implicit Euler with time step [s] `step` and a tight Newton
-    tolerance.
+    The discretisation is the chapter's, whose hub hinges bend by their turning angle. The scheme is implicit Euler with
+    time step [s] `step` and a tight Newton tolerance.
     """
     numerics = Numerics("implicit-euler", step, newton_tolerance=1e-12)
-    simulator = Simulator(Scene(Seastar(hub_hinge="turning"), numerics=numerics))
+    simulator = Simulator(Scene(Seastar(hub_hinge="turning", discretisation="chapter"), numerics=numerics))
     return np.array(
         [simulator.hub_position()[0, 0] for _ in range(10) for _ in simulator.stroke_in_parts(straight_gait(), parts)]
     )
@@ -54,12 +54,12 @@ def published_codes() -> Section:
         rows.append(Row(what, MM * x[worst], MM * ours[worst], "mm", 2.0 * MM * stopping_error, digits=9))
     return Section(
         "Published codes",
-        "Hub x in the straight swim {2+,5-} with implicit Euler. Hub hinges bend by their turning angle, and the ramp "
-        "is evaluated at the end of each step. Code A is dismech-rods in its planar mode and code B is "
-        "DDG_Tutorial_Fast (2d_curve); both were given this scene. The first two lines compare swims with Newton "
-        "converged tightly in all codes. The others compare A's and B's swims every 0.1 s, at h = 10 ms, where Newton "
-        f"stops at a force residual of 1e-8; this leaves them {MM * max(stopping_errors):.1e} mm from their own "
-        "converged result. At h = 3 ms those codes step across the corners of the ramp and ours does not, so those "
-        "swims are not comparable.",
+        "Hub x in the straight swim {2+,5-} with implicit Euler. The discretisation is the chapter's, whose "
+        "hub hinges bend by their turning angle, and the ramp is evaluated at the end of each step. Code A is "
+        "dismech-rods in its planar mode and code B is DDG_Tutorial_Fast (2d_curve); both were given this scene. The "
+        "first two lines compare swims with Newton converged tightly in all codes. The others compare A's and B's "
+        "swims every 0.1 s, at h = 10 ms, where Newton stops at a force residual of 1e-8; this leaves them "
+        f"{MM * max(stopping_errors):.1e} mm from their own converged result. At h = 3 ms those codes step across the "
+        "corners of the ramp and ours does not, so those swims are not comparable.",
         rows,
     )

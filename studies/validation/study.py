@@ -1,7 +1,7 @@
-"""The simulator against exact solutions and published codes; writes `docs/validation.md`.
+"""Verification of the simulator against exact solutions and published codes; writes `docs/validation.md`.
 
-The exact solutions are the elastica, the vibrating beam, quadratic drag and bending waves. Two published codes computed
-the chapter's straight swim.
+The exact solutions are the elastica, the vibrating beam, quadratic drag and bending waves, for either discretisation.
+Two published codes computed the chapter's straight swim. Validation would need measurements of a robot.
 """
 
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Setup of robots that are not actuated: pauses, and a clamped limb."""
+"""Setup of robots that are not actuated: pauses, and clamped limbs."""
 
 import numpy as np
 
@@ -21,11 +21,8 @@ def let_pass(simulator: Simulator) -> None:
         raise RuntimeError(SolverStatus.NOT_CONVERGED.sentence)
 
 
-CLAMP = (0, 1)
-"""Held nodes that clamp limb 1: the hub and its root node. The root hinge measures the angle between the held edge and
-the next one and bends from the middle of the one to the middle of the other, so the limb is clamped at l/2."""
-
-
-def free_length(robot: Seastar) -> float:
-    """Free length L - l/2 [m] of a limb that is clamped by CLAMP."""
-    return robot.limb_length - 0.5 * robot.edge_length
+HUB = (0,)
+"""Held nodes that clamp limbs of IN_LINE at the hub."""
+IN_LINE = {"continuum": Seastar(2), "chapter": Seastar(2, hub_hinge="turning", discretisation="chapter")}
+"""Two limbs in a line, in either discretisation. What mirrors itself in them does not turn them about the hub, so that
+each is clamped there."""

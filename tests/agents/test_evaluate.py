@@ -20,6 +20,7 @@ from agents.roster import load_agents
 from agents.scripted import scripted
 from agents.swim import Swim, swim
 from seastar_gym import Scene, Seastar
+from seastar_gym.envs.paths import PENTAGON_SIDE, make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -89,7 +90,8 @@ def test_a_policy_gets_its_state_back_and_hears_of_the_start_once():
 
 
 def test_the_scripted_pentagon_rounds_the_pentagon():
-    (done,) = evaluate({"script": scripted("pentagon")}, "pentagon", fidelity="balanced", console=Console(quiet=True))
+    traced = make_path("pentagon", np.random.default_rng(0)) * (0.14356 / PENTAGON_SIDE)  # by the scripted gait
+    (done,) = evaluate({"script": scripted("pentagon")}, traced, fidelity="balanced", console=Console(quiet=True))
     assert done.waypoints_reached == 5
     assert 240 <= done.strokes <= 242  # it enters the last waypoint's radius before it stops
     assert done.cross_track_errors.mean() < 1e-3

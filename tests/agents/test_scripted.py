@@ -55,7 +55,7 @@ def test_pentagon_gait_traces_a_regular_pentagon_that_closes():
     sides = np.diff(corners, axis=0)
     lengths = np.hypot(*sides.T)
     turns = np.degrees(np.diff(np.unwrap(np.arctan2(sides[:, 1], sides[:, 0]))))
-    assert lengths.mean() == pytest.approx(0.1636, abs=2e-4)
+    assert lengths.mean() == pytest.approx(0.1439, abs=2e-4)
     np.testing.assert_allclose(lengths, lengths.mean(), rtol=5e-4)
     np.testing.assert_allclose(turns, 72.0, atol=0.05)
     assert np.hypot(*corners[-1]) < 0.2e-3

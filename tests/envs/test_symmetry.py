@@ -416,8 +416,8 @@ EVERYTHING = Scene(
 SYMMETRIC = {
     "three limbs": Scene(Seastar(3, 4), actuator=SmaPulse(0.3)),
     "five limbs": Scene(Seastar(5, 4)),
-    "turning hub": Scene(Seastar(4, 4, hub_hinge="turning"), actuator=SmaPulse(0.4)),
-    "rod": Scene(Seastar(2, 4, hub_hinge="turning"), actuator=SmaPulse(0.4)),
+    "turning hub": Scene(Seastar(4, 4, hub_hinge="turning", discretisation="chapter"), actuator=SmaPulse(0.4)),
+    "rod": Scene(Seastar(2, 4, hub_hinge="turning", discretisation="chapter"), actuator=SmaPulse(0.4)),
     "profiles": Scene(TAPERED),
     "curve": Scene(STAR, actuator=MeasuredCurve((0.0, 0.2, 1.0), (0.0, 0.5, 0.0))),
     "every term": EVERYTHING,

@@ -572,7 +572,7 @@ def test_a_list_of_seeds_has_one_for_every_robot():
         ({"scene": Seastar()}, "Scene"),
         ({"reward": 1.0}, "RewardWeights"),
         ({"waypoint_radius": np.nan}, "waypoint_radius"),
-        ({"scene": Scene(Seastar(hub_hinge="turning"), actuator=SmaPulse())}, "turning"),
+        ({"scene": Scene(Seastar(hub_hinge="turning", discretisation="chapter"), actuator=SmaPulse())}, "turning"),
     ],
     ids=str,
 )

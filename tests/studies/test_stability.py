@@ -48,12 +48,10 @@ def test_the_grid_covers_every_range_and_the_quick_one_keeps_the_ends():
         assert {sweep.values[0], sweep.values[-1], sweep.chapter} <= set(quick.values) < set(sweep.values)
 
 
-def test_every_cell_has_finite_numbers_or_was_refused_with_a_sentence(cells):
+def test_every_cell_has_finite_numbers_and_none_is_refused(cells):
     assert len(cells) == len(STEPS) * sum(len(sweep.values) for sweep in GRID)
-    refused = [cell for cell in cells if cell.refused]
-    assert {(cell.sweep, cell.value) for cell in refused} == {("peak_angle", 54.0)}
-    assert all("reach pi" in cell.refused and cell.refused.endswith(".") for cell in refused)
-    for cell in (cell for cell in cells if not cell.refused):
+    for cell in cells:
+        assert not cell.refused
         assert cell.failed == 0 and cell.robots == (243 if cell.sweep == "peak_angle" else 8)
         assert all(math.isfinite(x) for x in (cell.iterations, cell.strain, cell.speed, cell.opening_angle))
         assert max(cell.growth, cell.growth_in_vacuum) < stability.GROWTH_ROUNDING
