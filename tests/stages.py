@@ -5,11 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 
 import oracle
+from continuum_oracle import Continuum
+from hubs import robot_with
 from oracle import Star
 from seastar_gym import Scene, Seastar, SmaPulse, Water
 from seastar_gym.der.linear.coupled import solve_coupled
 from seastar_gym.der.potential import factorise
-from seastar_gym.der.rods import Rods, make_work
+from seastar_gym.der.rods import Rods, Work, make_work
 from seastar_gym.der.stepping.newton import move_along
 from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.der.terms.damping import freeze_strains
@@ -41,17 +43,27 @@ def direction(rods, work, q, q_0, gamma, ahead, convex, result):
     store(out, 3, move_along(memory.contact, rods_rows, memory, h > 0.0, h < 0.0, splat(1.0)))
 
 
-def robot_and_star(n_limbs=5, nodes_per_limb=10, hub_hinge="opening", fluid=True):
+def robot_and_star(n_limbs=5, nodes_per_limb=10, hub="rigid", fluid=True):
     """The same robot for the kernels and for the oracle."""
-    robot = Seastar(n_limbs=n_limbs, nodes_per_limb=nodes_per_limb, hub_hinge=hub_hinge)
-    star = Star(
-        n_limbs=n_limbs, nodes_per_limb=nodes_per_limb, hub_hinge=hub_hinge, drag_coefficient=1.0 if fluid else 0.0
-    )
-    return robot, star
+    shape, drag = {"n_limbs": n_limbs, "nodes_per_limb": nodes_per_limb}, 1.0 if fluid else 0.0
+    robot = robot_with(hub, **shape)
+    if hub == "rigid":
+        return robot, Continuum(**shape, drag_coefficient=drag)
+    return robot, Star(**shape, hub_hinge=hub, drag_coefficient=drag)
 
 
 def rods_of(robot: Seastar, fluid: bool = True) -> Rods:
     return make_rods(Scene(robot=robot, fluid=Water() if fluid else None, actuator=SmaPulse(peak_angle=0.1)))
+
+
+def turn_limbs(work: Work, star: Star, delta_psi: np.ndarray) -> None:
+    """Fill `work` with what is natural at the hub of limbs turned by delta_psi [rad], shape (N_LANES, n_limbs)."""
+    if star.clamps:
+        natural = np.array([clamp.direction for clamp in star.clamps]) + delta_psi
+        work.hub_direction[:] = np.stack([np.cos(natural), np.sin(natural)], axis=2).reshape(N_LANES, -1).T
+    else:
+        natural = np.array([oracle.natural_angles(star, one)[-star.n_limbs :] for one in delta_psi])
+        work.hub_EI_kappa_bar[:] = star.EI * 2.0 * np.tan(natural.T / 2.0) / star.edge_length
 
 
 class RandomStages:
@@ -107,12 +119,7 @@ class RandomStages:
         work = make_work(rods, 1)
         for rows, nodes in ((work.q, self.frozen), (work.q_hat, self.q_hat), (work.v_hat, self.v_hat)):
             rows[:] = nodes.reshape(N_LANES, -1).T
-        if star.clamps:
-            natural = np.array([clamp.direction for clamp in star.clamps]) + self.delta_psi
-            work.hub_direction[:] = np.stack([np.cos(natural), np.sin(natural)], axis=2).reshape(N_LANES, -1).T
-        else:
-            natural = np.array([oracle.natural_angles(star, d)[-star.n_limbs :] for d in self.delta_psi])
-            work.hub_EI_kappa_bar[:] = star.EI * 2.0 * np.tan(natural.T / 2.0) / star.edge_length
+        turn_limbs(work, star, self.delta_psi)
         result = np.zeros((4, N_LANES))
         rows, rows_0 = (np.ascontiguousarray(x.reshape(N_LANES, -1).T) for x in (q, self.q if q_0 is None else q_0))
         direction(rods, work, rows, rows_0, self.gamma, ahead, np.full((1, N_LANES), convex), result)

@@ -20,7 +20,7 @@ GAMMA = 2e-4
 
 
 def touching_limbs(
-    ahead: bool = False, apart: int = 0, gamma: float = GAMMA, discretisation: Discretisation = "chapter"
+    ahead: bool = False, apart: int = 0, gamma: float = GAMMA, discretisation: Discretisation = "continuum"
 ) -> SimpleNamespace:
     """Limbs 1 and 2 of five lie along each other, but for those of the first `apart` robots, which are at rest."""
     robot, star = Seastar(5, 4, discretisation=discretisation), Star(5, 4)

@@ -11,7 +11,7 @@ from slopes import plain, slope
 
 ROBOT = Seastar(nodes_per_limb=4)
 RODS, HINGE = make_rods(Scene(ROBOT)), 1
-EI, DL = ROBOT.youngs_modulus * np.pi * ROBOT.rod_radius**4 / 4.0, ROBOT.edge_length
+EI, DL = ROBOT.youngs_modulus * np.pi * ROBOT.rod_radius**4 / 4.0, 13.0 / 12.0 * ROBOT.edge_length
 ANGLES = np.linspace(-2.5, 2.5, 21)
 
 

@@ -36,6 +36,7 @@ def memory(turns: np.ndarray = TURNS):
 SCENES = {
     "plain": Scene(ROBOT),
     "damping": Scene(replace(ROBOT, relaxation_time=2e-3)),
+    "damping that is none": Scene(replace(ROBOT, relaxation_time=0.0)),
     "drag along limbs": Scene(ROBOT, Water(tangential_drag_coefficient=0.1)),
     "added mass": Scene(ROBOT, Water(added_mass_coefficient=1.0)),
     "curved limbs, everything": Scene(

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import oracle
+from hubs import HUBS
 from oracle import Star
 from seastar_gym import Contact, Scene, SmaPulse
 from seastar_gym.model.rods import make_rods
@@ -29,8 +30,8 @@ def folded(star: Star, stages: RandomStages, turn: float) -> np.ndarray:
     return q
 
 
-def touching_stages(n_limbs: int, nodes_per_limb: int, seed: int = 0, turn_share: float = 0.9):
-    robot, star = robot_and_star(n_limbs, nodes_per_limb)
+def touching_stages(n_limbs: int, nodes_per_limb: int, hub: str, seed: int = 0, turn_share: float = 0.9):
+    robot, star = robot_and_star(n_limbs, nodes_per_limb, hub)
     stages = RandomStages(star, 2e-4, bend=0.05, speed=0.05, seed=seed)
     stages.q = folded(star, stages, turn_share * np.pi / n_limbs)
     stages.q_hat = folded(star, stages, 0.0) - 1e-4 * np.random.default_rng(seed).standard_normal(stages.q.shape)
@@ -50,10 +51,11 @@ def of_lane(star, stages, lane, ahead):
     return depths, np.array([touch.gradient for touch in found]), np.array([touch.stiffness for touch in found])
 
 
+@pytest.mark.parametrize("hub", HUBS[:2])
 @pytest.mark.parametrize("ahead", [False, True])
 @pytest.mark.parametrize(("n_limbs", "nodes_per_limb"), [(5, 10), (5, 4), (3, 9), (6, 6), (8, 7)])
-def test_energy_forces_and_step_are_the_oracles(n_limbs, nodes_per_limb, ahead):
-    robot, star, stages = touching_stages(n_limbs, nodes_per_limb)
+def test_energy_forces_and_step_are_the_oracles(n_limbs, nodes_per_limb, ahead, hub):
+    robot, star, stages = touching_stages(n_limbs, nodes_per_limb, hub)
     found = stages.run(make_rods(scene(robot)), ahead=ahead)
     touched, lead = 0, 4.0 if ahead else 1.0
     for lane in range(N_LANES):

@@ -1,4 +1,7 @@
-"""Potential, gradient and Hessian of the continuum's discretisation are those of its dense oracle."""
+"""Potential, gradient and Hessian of the continuum's discretisation are those of its dense oracle.
+
+Beside test_potential.py: few limbs, every term at once, limbs far from where the hub would have them.
+"""
 
 import numpy as np
 import pytest
@@ -12,11 +15,11 @@ from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from stages import RandomStages
 
-SHAPES = [(5, 10), (1, 4), (2, 3), (3, 2), (12, 3)]  # n_limbs, nodes_per_limb
+SHAPES = [(1, 4), (2, 3), (3, 2)]  # n_limbs, nodes_per_limb
 
 
 def rods_and_stages(n_limbs: int, nodes_per_limb: int, gamma: float, **wildness) -> tuple[Rods, RandomStages]:
-    robot = Seastar(n_limbs, nodes_per_limb, discretisation="continuum")
+    robot = Seastar(n_limbs, nodes_per_limb)
     scene = Scene(robot, Water(), SmaPulse(0.0 if n_limbs == 1 else 0.1))
     return make_rods(scene), RandomStages(Continuum(n_limbs, nodes_per_limb), gamma, **wildness)
 
@@ -44,7 +47,7 @@ def assert_agree(rods: Rods, stages: RandomStages) -> None:
 def test_potential_and_newton_direction_with_every_term_are_those_of_the_oracle(
     n_limbs, nodes_per_limb, current, along
 ):
-    robot = Seastar(n_limbs, nodes_per_limb, relaxation_time=4e-3, discretisation="continuum")
+    robot = Seastar(n_limbs, nodes_per_limb, relaxation_time=4e-3)
     star = Continuum(
         n_limbs, nodes_per_limb, fluid_density=950.0, drag_coefficient=1.3, tangential_drag_coefficient=along,
         added_mass_coefficient=0.8, relaxation_time=4e-3, current=lambda places: velocity(current, places),
@@ -65,27 +68,3 @@ def test_newton_direction_of_wildly_bent_robots_is_as_good_as_their_matrix_allow
         assert error < 1e-14 * np.linalg.cond(hessian)
         turned = max(turned, np.abs(oracle.clamp_turns(star, stages.q[lane], stages.delta_psi[lane])).max())
     assert turned > np.pi / 2.0
-
-
-@pytest.mark.parametrize("gamma", [3e-3, 5e-3, 7e-3])
-def test_smallest_pivot_is_positive_exactly_where_the_hessian_is_positive_definite(gamma):
-    definite = []
-    for seed in range(8):
-        rods, stages = rods_and_stages(5, 4, gamma, bend=0.3, stretch=0.02, seed=seed)
-        found = stages.run(rods)
-        smallest = [np.linalg.eigvalsh(stages.hessian(lane))[0] for lane in range(N_LANES)]
-        np.testing.assert_array_equal(found.pivot > 0.0, np.array(smallest) > 0.0)
-        definite += list(found.pivot > 0.0)
-    assert 0 < sum(definite) < len(definite)
-
-
-def test_repaired_matrix_is_the_sum_of_the_convex_parts_and_is_always_positive_definite():
-    rods, stages = rods_and_stages(5, 5, 0.05, bend=0.8, stretch=0.2, speed=1.0)
-    found = stages.run(rods, convex=1.0)
-    assert np.all(found.pivot > 0.0)
-    assert not all(np.linalg.eigvalsh(stages.hessian(lane))[0] > 0.0 for lane in range(N_LANES))
-    for lane in range(N_LANES):
-        gradient = oracle.incremental_gradient(stages.star, stages.q[lane], *stages.data(lane))
-        direction = np.linalg.solve(stages.convex_hessian(lane), gradient.ravel()).reshape(-1, 2)
-        assert found.decrement[lane] == pytest.approx(np.sum(gradient * direction), rel=1e-8)
-        np.testing.assert_allclose(found.direction[lane], direction, rtol=0.0, atol=1e-8 * np.abs(direction).max())

@@ -1,6 +1,7 @@
 """Drag of flow across half an edge, where a limb has another coefficient along than across."""
 
 import numpy as np
+import pytest
 
 from seastar_gym import Scene, Seastar, Water
 from seastar_gym.der.terms.drag import add_cross_flow, add_half_edge, drag_slopes
@@ -42,9 +43,10 @@ def test_the_hessian_is_never_negative():
     assert np.linalg.eigvalsh(slopes(FLOWS)[2].transpose(2, 0, 1)).min() > -1e-13
 
 
-def test_a_straight_limb_has_the_one_coefficient_along_and_the_other_across():
-    """A node within limb 1, which lies along x: C_t of flow in x, C_d of flow in y."""
-    rods = make_rods(Scene(Seastar(nodes_per_limb=4), Water(1000.0, 1.2, 0.3)))
+@pytest.mark.parametrize("discretisation, share", [("chapter", 1.0), ("continuum", 1.0 / 3.0)])
+def test_a_straight_limb_has_the_one_coefficient_along_and_the_other_across(discretisation, share):
+    """Limb 1 lies along x: a node in it feels C_t of flow in x, C_d of flow in y, all of it or a third (Simpson)."""
+    rods = make_rods(Scene(Seastar(nodes_per_limb=4, discretisation=discretisation), Water(1000.0, 1.2, 0.3)))
     node, normals = 2, np.tile([0.0, 1.0], 15)[:, None] * np.ones(1)
     for flow, coefficient in (((0.2, 0.0), 0.3), ((0.0, 0.2), 1.2)):
         _, c_speed, _ = drag_slopes.plain(Lanes(rods.drag[node]), *map(Lanes, flow))
@@ -52,7 +54,7 @@ def test_a_straight_limb_has_the_one_coefficient_along_and_the_other_across():
         _, force, _ = add_cross_flow.plain(
             rods.cross_drag, rods, normals, node, *map(Lanes, flow), Lanes(1.0), Lanes(1.0), start
         )
-        size = 0.5 * 1000.0 * coefficient * 2.0 * 1.6e-3 * (0.1 / 3) * 0.2**2
+        size = share * 0.5 * 1000.0 * coefficient * 2.0 * 1.6e-3 * (0.1 / 3) * 0.2**2
         np.testing.assert_allclose(np.hypot(*plain(force)), size, rtol=1e-12)
 
 

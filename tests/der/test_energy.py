@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import oracle
-from seastar_gym import Scene, Seastar, SmaPulse
+from hubs import HUBS
+from seastar_gym import Scene, SmaPulse
 from seastar_gym.der.energy import elastic_energy, energies
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
@@ -14,61 +15,68 @@ from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes
 from seastar_gym.simd.plain import plain_kernels
 from slopes import gradient, plain, rotated, rows
-from stages import random_shape
+from stages import random_shape, robot_and_star
 
-STAR = oracle.Star(5, 4)
+ROBOT, STAR = robot_and_star(5, 4)
 RNG = np.random.default_rng(0)
 SHAPE = random_shape(STAR, 0.3, 0.05, RNG)
 TURNS = RNG.uniform(-0.2, 0.2, 5)
+EVERY_HUB = pytest.mark.parametrize("hub", HUBS)
 
 
-def energy(q: np.ndarray, delta_psi=TURNS, hub_hinge: str = "opening") -> float:
+def energy(q: np.ndarray, delta_psi=TURNS, hub: str = "rigid") -> float:
     """Elastic energy [J] with limbs turned by their actuators."""
-    rods = make_rods(Scene(Seastar(5, 4, hub_hinge=hub_hinge), actuator=SmaPulse(0.2)))
+    rods = make_rods(Scene(robot_and_star(5, 4, hub)[0], actuator=SmaPulse(0.2)))
     turns = np.tile(np.asarray(delta_psi)[:, None], N_LANES)
     work = make_work(rods, 1)
     set_natural_hub_angles.plain(rods, work, Actuation(turns, turns), Lanes(1.0))
     return float(plain(elastic_energy.plain(rods, work, rows(q)))[0])
 
 
-@pytest.mark.parametrize("hub_hinge", ["opening", "turning"])
-def test_elastic_energy_is_that_of_the_oracle(hub_hinge):
-    star = oracle.Star(5, 4, hub_hinge=hub_hinge)
-    assert energy(SHAPE, hub_hinge=hub_hinge) == pytest.approx(oracle.elastic_energy(star, SHAPE, TURNS), rel=1e-12)
+@EVERY_HUB
+def test_elastic_energy_is_that_of_the_oracle(hub):
+    _, star = robot_and_star(5, 4, hub)
+    assert energy(SHAPE, hub=hub) == pytest.approx(oracle.elastic_energy(star, SHAPE, TURNS), rel=1e-12)
 
 
-def test_a_robot_at_rest_stores_nothing():
-    assert energy(STAR.rest, np.zeros(5)) < 1e-25
+@EVERY_HUB
+def test_a_robot_at_rest_stores_nothing(hub):
+    assert energy(STAR.rest, np.zeros(5), hub) < 1e-25
 
 
-def test_where_a_robot_lies_and_how_it_is_turned_stores_nothing():
-    assert energy(rotated(SHAPE, 1.3) + [0.2, -0.5]) == pytest.approx(energy(SHAPE), rel=1e-10)
+@EVERY_HUB
+def test_where_a_robot_lies_and_how_it_is_turned_stores_nothing(hub):
+    assert energy(rotated(SHAPE, 1.3) + [0.2, -0.5], hub=hub) == pytest.approx(energy(SHAPE, hub=hub), rel=1e-10)
 
 
-def test_a_mirrored_robot_stores_the_same():
+@EVERY_HUB
+def test_a_mirrored_robot_stores_the_same(hub):
     """Limbs 2 and 5, 3 and 4 change places, and turn the other way."""
     limbs = np.array([0, 4, 3, 2, 1])
     nodes = np.concatenate([[0], *(3 * limb + np.arange(1, 4) for limb in limbs)])
-    assert energy(SHAPE[nodes] * [1.0, -1.0], -TURNS[limbs]) == pytest.approx(energy(SHAPE), rel=1e-10)
+    mirrored = energy(SHAPE[nodes] * [1.0, -1.0], -TURNS[limbs], hub)
+    assert mirrored == pytest.approx(energy(SHAPE, hub=hub), rel=1e-10)
 
 
-def test_internal_forces_neither_push_nor_turn_the_robot():
-    force = gradient(lambda q: energy(q.reshape(-1, 2)), SHAPE.ravel(), 1e-6).reshape(-1, 2)
+@EVERY_HUB
+def test_internal_forces_neither_push_nor_turn_the_robot(hub):
+    force = gradient(lambda q: energy(q.reshape(-1, 2), hub=hub), SHAPE.ravel(), 1e-6).reshape(-1, 2)
     spin = SHAPE[:, 0] * force[:, 1] - SHAPE[:, 1] * force[:, 0]
     size = np.abs(force).max()
     np.testing.assert_allclose(force.sum(axis=0), 0.0, atol=1e-6 * size)
     assert abs(spin.sum()) < 1e-6 * size * 0.1
 
 
-def test_kinetic_energy_is_half_the_masses_times_the_speeds_squared_that_a_frame_sees():
+@EVERY_HUB
+def test_kinetic_energy_is_that_of_the_oracle_of_the_velocities_that_a_frame_sees(hub):
+    robot, star = robot_and_star(5, 4, hub)
     v, frame = RNG.standard_normal(SHAPE.shape), (0.3, -0.7)
-    rods = make_rods(Scene(Seastar(5, 4)))
-    found = plain(kinetic_energy.plain(rods, rows(v), frame))[0]
-    assert found == pytest.approx(oracle.kinetic_energy(STAR, v - frame), rel=1e-13)
+    found = plain(kinetic_energy.plain(make_rods(Scene(robot)), rows(v), frame))[0]
+    assert found == pytest.approx(oracle.kinetic_energy(star, v - frame), rel=1e-13)
 
 
 def test_energies_of_a_state_are_those_of_its_shape_and_of_its_velocities_in_the_laboratory():
-    rods, v = make_rods(Scene(Seastar(5, 4), actuator=SmaPulse(0.2))), RNG.standard_normal(SHAPE.shape)
+    rods, v = make_rods(Scene(ROBOT, actuator=SmaPulse(0.2))), RNG.standard_normal(SHAPE.shape)
     turns, (elastic, kinetic) = np.tile(TURNS[:, None], N_LANES), np.zeros((2, 1, N_LANES))
     actuation = Actuation(np.zeros_like(turns), turns)
     plain_kernels()(energies)(rods, make_work(rods, 1), actuation, rows(SHAPE), rows(v), elastic, kinetic)

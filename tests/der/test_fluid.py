@@ -1,35 +1,40 @@
 """Terms that a scene may have, all together, against the oracle: fluids and material damping."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import oracle
+from continuum_oracle import Continuum
 from currents import CURRENTS, velocity
 from oracle import Star
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
-from stages import RandomStages, random_shape
+from stages import RandomStages, random_shape, robot_and_star
 
 TERMS = [("uniform", 0.0), ("shear", 0.02), ("vortex", 0.1), ("grid", 1.3)]
+OF_HUBS = [("rigid", *terms) for terms in TERMS] + [("opening", *terms) for terms in TERMS]
 TAU = 4e-3
 
 
-def robot_water_and_star(current: str, along: float, **shape) -> tuple[Seastar, Water, Star]:
+def robot_water_and_star(hub: str, current: str, along: float, **shape) -> tuple[Seastar, Water, Star]:
     """The same scene, with all terms, for the kernels and for the oracle."""
-    star = Star(
+    star = (Continuum if hub == "rigid" else Star)(
         fluid_density=950.0, drag_coefficient=1.3, tangential_drag_coefficient=along, relaxation_time=TAU,
         added_mass_coefficient=0.8, current=lambda places: velocity(current, places), **shape,
     )  # fmt: skip
-    return Seastar(relaxation_time=TAU, **shape), Water(950.0, 1.3, along, CURRENTS[current], 0.8), star
+    robot = replace(robot_and_star(hub=hub, **shape)[0], relaxation_time=TAU)
+    return robot, Water(950.0, 1.3, along, CURRENTS[current], 0.8), star
 
 
 # Against the oracle
 
 
-@pytest.mark.parametrize("current, along", TERMS)
-def test_potential_and_newton_direction_in_a_fluid_are_those_of_the_oracle(current, along):
-    robot, water, star = robot_water_and_star(current, along, nodes_per_limb=4)
+@pytest.mark.parametrize("hub, current, along", OF_HUBS)
+def test_potential_and_newton_direction_in_a_fluid_are_those_of_the_oracle(hub, current, along):
+    robot, water, star = robot_water_and_star(hub, current, along, nodes_per_limb=4)
     scene = Scene(robot, water)
     stages = RandomStages(star, 1e-2, bend=0.05)
     found = stages.run(make_rods(scene))
@@ -58,9 +63,9 @@ def test_the_oracles_damping_has_the_slopes_of_its_potential(hub_hinge):
         np.testing.assert_allclose(hessian[:, k], column, rtol=1e-5, atol=1e-6 * np.abs(hessian).max())
 
 
-@pytest.mark.parametrize("current, along", TERMS)
-def test_the_oracles_drag_in_a_fluid_is_the_slope_of_its_potential(current, along):
-    _, _, star = robot_water_and_star(current, along, nodes_per_limb=3)
+@pytest.mark.parametrize("hub, current, along", OF_HUBS)
+def test_the_oracles_drag_in_a_fluid_is_the_slope_of_its_potential(hub, current, along):
+    _, _, star = robot_water_and_star(hub, current, along, nodes_per_limb=3)
     rng = np.random.default_rng(2)
     frozen, v = random_shape(star, 0.3, 0.01, rng), rng.standard_normal((star.n_nodes, 2))
     force, jacobian = oracle.drag_force(star, v, frozen), oracle.drag_jacobian(star, v, frozen)
@@ -74,10 +79,10 @@ def test_the_oracles_drag_in_a_fluid_is_the_slope_of_its_potential(current, alon
         np.testing.assert_allclose(jacobian[:, k], column, rtol=1e-6, atol=1e-9)
 
 
-@pytest.mark.parametrize("current, along", TERMS)
-def test_a_step_in_a_fluid_is_the_oracles(current, along):
+@pytest.mark.parametrize("hub, current, along", OF_HUBS)
+def test_a_step_in_a_fluid_is_the_oracles(hub, current, along):
     h = 0.01
-    robot, water, star = robot_water_and_star(current, along, nodes_per_limb=4)
+    robot, water, star = robot_water_and_star(hub, current, along, nodes_per_limb=4)
     numerics = Numerics("implicit-euler", h, newton_tolerance=1e-13)
     simulator = Simulator(Scene(robot, water, SmaPulse(0.3, 2.0 * h, 2.0 * h), numerics))
     rng = np.random.default_rng(3)

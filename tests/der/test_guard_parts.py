@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import oracle
-from oracle import Star
+from continuum_oracle import Continuum
 from seastar_gym import Scene, Seastar, UniformCurrent, Water
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.guard import (
@@ -24,10 +24,11 @@ from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
 from slopes import nodes, plain, rotated, rows
+from stages import turn_limbs
 from touching import touching_limbs
 
 ROBOT = Seastar(5, 4)
-RODS = make_rods(Scene(ROBOT, None))
+RODS, STAR = make_rods(Scene(ROBOT, None)), Continuum(5, 4, drag_coefficient=0.0)
 STILL, EVERYONE = (Lanes(0.0), Lanes(0.0)), Mask(np.ones(N_LANES, bool))
 RNG = np.random.default_rng(0)
 Q, V = ROBOT.nodes() + 1e-3 * RNG.standard_normal((ROBOT.n_nodes, 2)), RNG.standard_normal((ROBOT.n_nodes, 2))
@@ -50,7 +51,7 @@ def test_a_rigid_motion_is_found_again_with_its_energy():
     rigid = np.array([0.2, -0.1]) + 1.5 * (Q - c) @ np.array([[0.0, 1.0], [-1.0, 0.0]])
     x, y, v_x, v_y, omega, energy = (float(np.ravel(part)[0]) for part in plain(motion_of(rigid)))
     np.testing.assert_allclose([x, y, v_x, v_y, omega], [*c, 0.2, -0.1, 1.5], rtol=1e-12)
-    assert energy == pytest.approx(0.5 * np.sum(RODS.mass[:, None] * rigid**2), rel=1e-12)
+    assert energy == pytest.approx(oracle.kinetic_energy(STAR, rigid), rel=1e-12)
 
 
 @pytest.mark.parametrize("share", [1.0, 0.5, 0.0])
@@ -59,7 +60,7 @@ def test_a_cut_keeps_that_share_of_what_is_not_rigid_and_all_that_is(share):
     cut_velocities.plain(RODS, rows(Q), v, STILL, motion, Lanes(share), EVERYONE)
     after = plain(motion_of(nodes(v)[0]))
     np.testing.assert_allclose([part[0] for part in after[2:]], [part[0] for part in plain(motion)[2:]], rtol=1e-11)
-    kinetic, before = (0.5 * np.sum(RODS.mass[:, None] * each**2) for each in (nodes(v)[0], V))
+    kinetic, before = (oracle.kinetic_energy(STAR, each) for each in (nodes(v)[0], V))
     rigid = float(after[-1][0])
     assert kinetic - rigid == pytest.approx(share**2 * (before - rigid), rel=1e-9, abs=1e-15)
 
@@ -87,8 +88,8 @@ def test_a_limb_that_is_folded_over_its_hinge_has_gone_through_its_pole(degrees,
 def test_growth_is_seen_from_the_share_on_that_is_rounding():
     """That of the kinetic energy, of robots at rest in shape that move at 1 m/s: half of it is not, five times is."""
     work, q, v = make_work(RODS, 1), rows(ROBOT.nodes()), rows(V)
-    work.hub_EI_kappa_bar[:] = 2.0 * np.tan(np.pi / 5.0) * RODS.bending.EI_over_dl[0]
-    kinetic = 0.5 * np.sum(RODS.mass[:, None] * V**2)
+    turn_limbs(work, STAR, np.zeros((N_LANES, 5)))
+    kinetic = oracle.kinetic_energy(STAR, V)
     for growth, seen in ((0.5, False), (5.0, True)):
         allowed = Lanes(kinetic * (1.0 - growth * 1e-12))
         args = RODS, work, SCHEMES["implicit-euler"], q, v.copy(), Lanes(10.0), STILL, EVERYONE, allowed, Lanes(1.0)
@@ -99,7 +100,7 @@ def test_growth_is_seen_from_the_share_on_that_is_rounding():
 def test_noise_is_that_of_positions_that_are_all_rounded_the_same_way():
     """By one unit in the last place, in their difference over a step, a kilometre away; several units are allowed."""
     h, far, v = 1e-3, ROBOT.nodes() + 1e3, np.ones((ROBOT.n_nodes, 2))
-    before, after = (0.5 * np.sum(RODS.mass[:, None] * each**2) for each in (v, v + np.spacing(far) / h))
+    before, after = (oracle.kinetic_energy(STAR, each) for each in (v, v + np.spacing(far) / h))
     noise = plain(energy_noise.plain(RODS, rows(far), Lanes(h), Lanes(0.0), Lanes(before)))
     assert np.all((0.05 * noise < after - before) & (after - before < 0.5 * noise))
 
@@ -110,15 +111,15 @@ LOADS = tuple((node, *force) for node, force in enumerate(RNG.standard_normal((R
 @pytest.mark.parametrize("loads", [(), LOADS], ids=["free", "with loads"])
 def test_a_step_may_gain_energy_where_what_newton_knows_does_not_rule_it_out(loads):
     """Phi + v_0 M (v_1 - v_0) - h F v_0 - U(q_0), from the oracle, just above zero or just below."""
-    rods, star, h = make_rods(Scene(ROBOT, None, loads=loads)), Star(5, 4, drag_coefficient=0.0), 0.01
+    rods, h = make_rods(Scene(ROBOT, None, loads=loads)), 0.01
     q_1, v_0 = Q + 1e-3 * RNG.standard_normal(Q.shape), V
     force = np.array([force for _, *force in loads]) if loads else np.zeros_like(V)
     change = (q_1 - Q) / h - v_0
-    least = oracle.elastic_energy(star, Q, np.zeros(5)) - np.sum(star.masses[:, None] * v_0 * change)
+    gained = v_0.ravel() @ oracle.mass_matrix(STAR, Q) @ change.ravel()
+    least = oracle.elastic_energy(STAR, Q, np.zeros(5)) - gained
     least += h * np.sum(force * v_0)
     work = make_work(rods, 1)
-    kappa_bar = 2.0 * np.tan(oracle.natural_angles(star, np.zeros(5))[-5:] / 2.0) / star.edge_length
-    work.hub_EI_kappa_bar[:] = star.EI * kappa_bar[:, None]
+    turn_limbs(work, STAR, np.zeros((N_LANES, 5)))
     work.q[:] = rows(q_1)
     stage = Stage(rows(Q), rows(v_0), Lanes(h), Lanes(1.0 / h), False)
     above = np.arange(N_LANES) % 2 == 0

@@ -16,7 +16,8 @@ BEGIN, END = np.random.default_rng(0).uniform(-0.3, 0.3, (2, 5, N_LANES))
 
 def natural_curvatures(begin, end, fraction: float, hub_hinge: str = "opening") -> np.ndarray:
     """kappa_bar [1/m] of the hub hinges, shape (5, N_LANES)."""
-    rods = make_rods(Scene(Seastar(5, 4, hub_hinge=hub_hinge), actuator=SmaPulse(0.3)))
+    robot = Seastar(5, 4, hub_hinge=hub_hinge, discretisation="chapter")
+    rods = make_rods(Scene(robot, actuator=SmaPulse(0.3)))
     work = make_work(rods, 1)
     set_natural_hub_angles.plain(rods, work, Actuation(begin, end), Lanes(fraction))
     return work.hub_EI_kappa_bar / oracle.Star(5, 4).EI

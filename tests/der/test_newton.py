@@ -14,7 +14,7 @@ from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
 from slopes import nodes, plain, rows
-from stages import RandomStages, robot_and_star, rods_of
+from stages import RandomStages, robot_and_star, rods_of, turn_limbs
 
 ROBOT, STAR = robot_and_star(5, 4)
 RODS, GAMMA = rods_of(ROBOT), 5e-3
@@ -24,8 +24,7 @@ EVERYONE = np.ones(N_LANES, bool)
 def minimised(active=EVERYONE, tolerance=1e-13, limit=60.0, speed=0.05, bend=0.05, gamma=GAMMA):
     stages, work = RandomStages(STAR, gamma, bend=bend, speed=speed), make_work(RODS, 1)
     work.q[:], work.q_hat[:], work.v_hat[:] = rows(stages.q), rows(stages.q_hat), rows(stages.v_hat)
-    natural = np.array([oracle.natural_angles(STAR, d)[-5:] for d in stages.delta_psi])
-    work.hub_EI_kappa_bar[:] = STAR.EI * 2.0 * np.tan(natural.T / 2.0) / STAR.edge_length
+    turn_limbs(work, STAR, stages.delta_psi)
     stage = Stage(work.q_hat, work.v_hat, Lanes(gamma), Lanes(1.0 / gamma), False)
     found = minimise.plain(RODS, work, stage, Mask(active), Lanes(tolerance), Lanes(limit))
     converged, phi, iterations, regularised, backtracks = plain(found)
@@ -94,6 +93,7 @@ def test_larger_is_the_larger():
 def test_a_robot_whose_state_is_not_a_number_does_not_converge_and_stops_nobody(lane):
     work, stages = make_work(RODS, 1), RandomStages(STAR, GAMMA, bend=0.05)
     work.q[:], work.q_hat[:], work.v_hat[:] = rows(stages.q), rows(stages.q_hat), rows(stages.v_hat)
+    turn_limbs(work, STAR, stages.delta_psi)
     work.q[5, lane] = np.nan
     stage = Stage(work.q_hat, work.v_hat, Lanes(GAMMA), Lanes(1.0 / GAMMA), False)
     converged = plain(minimise.plain(RODS, work, stage, Mask(EVERYONE), Lanes(1e-10), Lanes(60.0))[0])

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from seastar_gym import Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, Vortex, Water
+from seastar_gym.der import motion
 from seastar_gym.der.terms import drag
 from seastar_gym.der.terms.drag import drag_slopes
 from seastar_gym.envs.observation import body_axis
@@ -112,7 +113,7 @@ def test_loading_plain_kernels_leaves_every_module_as_it_was():
 def test_functions_of_the_interface_can_be_replaced():
     loaded = []
     kernels = PlainKernels(load=lambda rows, row: loaded.append(row) or numpy_lanes.load(rows, row))
-    kernels(drag.relative)(np.zeros((4, 1)), 1, Lanes(1.0), Lanes(2.0))
+    kernels(motion.relative)(np.zeros((4, 1)), 1, Lanes(1.0), Lanes(2.0))
     assert loaded == [2, 3]
 
 

@@ -8,8 +8,10 @@ import functools
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 import oracle
+from continuum_oracle import Continuum
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, State
 from seastar_gym.der.stepping.schemes import SCHEMES
 
@@ -59,17 +61,16 @@ def test_implicit_midpoint_alone_keeps_the_amplitude_of_every_oscillation():
 
 @pytest.fixture(scope="module")
 def modes():
-    """Frequencies [1/s] and shapes of the robot's normal modes in vacuum, stiffest last; masses by coordinate."""
-    star = oracle.Star(nodes_per_limb=ROBOT.nodes_per_limb)
-    masses = np.repeat(star.masses, 2)
-    stiffness = oracle.elastic_hessian(star, star.rest, np.zeros(5))
-    squared, shapes = np.linalg.eigh(stiffness / np.sqrt(np.outer(masses, masses)))
-    return np.sqrt(np.maximum(squared, 0.0)), shapes / np.sqrt(masses)[:, None], masses
+    """Frequencies [1/s] and shapes of the robot's normal modes in vacuum, stiffest last, and its mass matrix."""
+    star = Continuum(nodes_per_limb=ROBOT.nodes_per_limb)
+    mass = oracle.mass_matrix(star, star.rest)
+    squared, shapes = eigh(oracle.elastic_hessian(star, star.rest, np.zeros(5)), mass)
+    return np.sqrt(np.maximum(squared, 0.0)), shapes, mass
 
 
 def oscillate(scheme: str, modes, mode: int, h: float, n_steps: int, amplitude: float = 1e-7) -> complex:
     """Factor of v + i omega q after n_steps, for a mode started at its largest swing; amplitude of the swing [m]."""
-    omega, shapes, masses = modes
+    omega, shapes, mass = modes
     shape = shapes[:, mode] * amplitude / np.abs(shapes[:, mode]).max()
     actuator = SmaPulse(0.0, heating_time=h * (n_steps // 2), cooling_time=h * (n_steps - n_steps // 2))
     numerics = Numerics(scheme, h, newton_tolerance=1e-14)
@@ -78,7 +79,7 @@ def oscillate(scheme: str, modes, mode: int, h: float, n_steps: int, amplitude: 
     simulator.set_state(State((rest + shape.reshape(-1, 2))[None], np.zeros((1, *rest.shape)), np.zeros(1)))
     report = simulator.stroke(np.zeros((1, 5)))
     assert report.status[0] == 0 and report.halvings[0] == 0 and report.steps[0] == n_steps
-    weights = masses * shape / (masses @ shape**2)
+    weights = mass @ shape / (shape @ mass @ shape)
     q = weights @ (simulator.positions[0] - rest).ravel()
     v = weights @ simulator.velocities[0].ravel()
     return complex(v + 1j * omega[mode] * q) / (1j * omega[mode])

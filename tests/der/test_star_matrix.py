@@ -59,7 +59,8 @@ def random_system(n_limbs: int, nodes_per_limb: int, hub: np.ndarray):
 
 def solution(n_limbs: int, nodes_per_limb: int, matrix: np.ndarray, r: np.ndarray, hub: np.ndarray):
     """(x, decrement, smallest pivot) by the kernels, limb by limb from tip to root, then ring and hub."""
-    robot = Seastar(n_limbs, nodes_per_limb, hub_hinge="opening" if n_limbs == 1 else "turning")
+    measure = "opening" if n_limbs == 1 else "turning"
+    robot = Seastar(n_limbs, nodes_per_limb, hub_hinge=measure, discretisation="chapter")
     rods = make_rods(Scene(robot, actuator=SmaPulse(0.0)))
     work, edges = make_work(rods, 1), nodes_per_limb - 1
     work.hub_coupling[:] = hub.reshape(-1, N_LANES)

@@ -1,8 +1,11 @@
 """Solutions of an eliminated system for other right-hand sides."""
 
+import itertools
+
 import numpy as np
 import pytest
 
+from hubs import HUBS
 from seastar_gym import Contact, Scene, SmaPulse
 from seastar_gym.der.linear.star_solution import solve_again, substitute_star
 from seastar_gym.der.potential import factorise
@@ -12,21 +15,22 @@ from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes
 from slopes import rows
-from stages import RandomStages, robot_and_star
+from stages import RandomStages, robot_and_star, turn_limbs
 
 GAMMA = 1e-3
 
 
-@pytest.fixture(scope="module", params=[(5, 4), (3, 3), (6, 2)], ids=str)
+@pytest.fixture(scope="module", params=itertools.product([(5, 4), (3, 3), (6, 2)], HUBS[:2]), ids=str)
 def eliminated(request):
     """(rods, work, stages) after an elimination; pivots are kept in scenes with contact."""
-    robot, star = robot_and_star(*request.param)
+    shape, hub = request.param
+    robot, star = robot_and_star(*shape, hub)
     rods = make_rods(Scene(robot, actuator=SmaPulse(0.1), contact=Contact()))
     stages = RandomStages(star, GAMMA, bend=0.05)
     stages.delta_psi[:] = 0.0
     work = make_work(rods, 1)
     work.q[:], work.q_hat[:], work.v_hat[:] = rows(stages.q), rows(stages.q_hat), rows(stages.v_hat)
-    work.hub_EI_kappa_bar[:] = 2.0 * star.EI * np.tan(np.pi / star.n_limbs) / star.edge_length
+    turn_limbs(work, star, stages.delta_psi)
     factorise.plain(rods, work, Stage(work.q_hat, work.v_hat, Lanes(GAMMA), Lanes(1.0 / GAMMA), False), None)
     return rods, work, stages
 

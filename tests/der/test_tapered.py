@@ -1,4 +1,7 @@
-"""Coefficients of limbs that taper, edge by edge and node by node, from the formulas themselves."""
+"""Coefficients of limbs that taper, edge by edge and node by node, from the chapter's formulas themselves.
+
+Those of the continuum are made of them, see tests/simulator/test_continuum_steps.py.
+"""
 
 import numpy as np
 import pytest
@@ -15,7 +18,7 @@ from slopes import plain, rows, symmetric
 
 LENGTH, EDGE = 0.09, 0.03
 LIMBS = tuple(Limb(length=LENGTH, radius=(2e-3 + 2e-4 * k, 1e-3)) for k in range(5))
-ROBOT = Seastar(5, 4, limbs=LIMBS, density=1100.0)
+ROBOT = Seastar(5, 4, limbs=LIMBS, density=1100.0, discretisation="chapter")
 WATER = Water(950.0, 1.3, 0.2, None, 0.7)
 RODS = make_rods(Scene(ROBOT, WATER, gravity=(0.3, -9.81), loads=((7, 0.1, 0.0), (7, 0.2, -0.5))))
 Q = ROBOT.nodes() + 2e-3 * np.random.default_rng(0).standard_normal((ROBOT.n_nodes, 2))
@@ -100,6 +103,6 @@ def test_tips_have_no_outer_edge_and_the_hubs_edges_are_those_of_its_neighbours(
 
 
 def test_two_limbs_have_one_hub_hinge():
-    bending = make_rods(Scene(Seastar(2, 4, hub_hinge="turning"))).bending
+    bending = make_rods(Scene(Seastar(2, 4, hub_hinge="turning", discretisation="chapter"))).bending
     assert bending.EI_over_dl[0] == pytest.approx(bending.EI_over_dl[1]) and bending.EI_over_dl[3] == 0.0
     assert bending.dl_over_EI[0] == pytest.approx(bending.dl_over_EI[1]) and bending.dl_over_EI[3] == 0.0

@@ -19,7 +19,7 @@ from seastar_gym.der.linear.star_matrix import (
 from seastar_gym.der.star import load_root_edge
 from seastar_gym.der.terms.clamp import CLAMP_ROWS, ELASTIC, VISCOUS
 from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.lanes import add_product, load, splat, subtract_product
+from seastar_gym.simd.lanes import add_product, load, select, splat, subtract_product
 
 
 @kernel
@@ -33,8 +33,10 @@ def turn_stiffnesses(relaxation_time, work, limb):
 
 @kernel
 def dummy(relaxation_time):
-    """What the turn of damping has on the diagonal at first: without damping it is no unknown."""
-    return splat(1.0 if relaxation_time is None else 0.0)
+    """What the turn of damping has on the diagonal at first: without damping, or with none of it, it is no unknown."""
+    if relaxation_time is None:
+        return splat(1.0)
+    return select(load(relaxation_time, 0) > 0.0, splat(0.0), 1.0)
 
 
 @kernel
