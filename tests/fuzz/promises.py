@@ -200,7 +200,7 @@ def energy_noise(simulator: Simulator, robot: int, energy: float, h: float) -> f
     if simulator.scene.held_nodes:
         move += PUT_BACK * rods.nodes_per_limb * length
     curvature = max(stiffness, mass / h**2)
-    return move * math.sqrt(2.0 * curvature * energy) + 0.5 * curvature * move**2
+    return move * math.sqrt(2.0 * curvature) * math.sqrt(energy) + 0.5 * curvature * move**2
 
 
 def check_energy(case: Case) -> None:
