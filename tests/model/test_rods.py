@@ -1,4 +1,4 @@
-"""Coefficients of rods are the chapter's."""
+"""Coefficients of rods are the chapter's; those of the continuum: tests/simulator/test_continuum_steps.py."""
 
 import math
 
@@ -26,7 +26,8 @@ def test_total_mass_is_that_of_the_limbs(n_limbs, nodes_per_limb, limb_length, r
 @pytest.mark.parametrize("hub_hinge", ["opening", "turning"])
 def test_coefficients_are_the_oracles(hub_hinge):
     values = {"n_limbs": 4, "nodes_per_limb": 6, "limb_length": 0.2, "rod_radius": 2e-3, "youngs_modulus": 3e5}
-    robot, water = Seastar(**values, density=1200.0, hub_hinge=hub_hinge), Water(density=900.0, drag_coefficient=1.3)
+    robot = Seastar(**values, density=1200.0, hub_hinge=hub_hinge, discretisation="chapter")
+    water = Water(density=900.0, drag_coefficient=1.3)
     star = Star(**values, density=1200.0, hub_hinge=hub_hinge, fluid_density=900.0, drag_coefficient=1.3)
     rods = make_rods(Scene(robot, water, SmaPulse(peak_angle=0.1)))
     np.testing.assert_allclose(rods.mass, star.masses, rtol=1e-14)
@@ -43,4 +44,5 @@ def test_coefficients_are_the_oracles(hub_hinge):
 
 @pytest.mark.parametrize("fluid", [None, Water(density=0.0), Water(drag_coefficient=0.0)])
 def test_vacuum_has_no_drag(fluid):
-    assert not make_rods(Scene(fluid=fluid)).drag.any()
+    rods = make_rods(Scene(fluid=fluid))
+    assert not rods.drag.any() and not rods.middle_drag.any()
