@@ -31,7 +31,7 @@ import sys, numpy, test_plain
 numpy.savez(sys.argv[1], **test_plain.ends())
 """
 MEETING = SmaPulse(0.62, 0.06, 0.02)
-BLOWS = {"implicit-euler": 3.0, "contact": 1.0, "no contact": 1.0}
+BLOWS = {"implicit-euler": 20.0, "contact": 1.0, "no contact": 1.0}
 """Velocities of some robots when a stroke begins [m/s], 0.3 in other scenes: steps are halved, limbs meet."""
 
 

@@ -1,4 +1,4 @@
-"""Coefficients of rods are the chapter's."""
+"""Coefficients of rods are the chapter's; those of the continuum: tests/simulator/test_continuum_steps.py."""
 
 import math
 
@@ -44,4 +44,5 @@ def test_coefficients_are_the_oracles(hub_hinge):
 
 @pytest.mark.parametrize("fluid", [None, Water(density=0.0), Water(drag_coefficient=0.0)])
 def test_vacuum_has_no_drag(fluid):
-    assert not make_rods(Scene(fluid=fluid)).drag.any()
+    rods = make_rods(Scene(fluid=fluid))
+    assert not rods.drag.any() and not rods.middle_drag.any()

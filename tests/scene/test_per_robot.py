@@ -212,7 +212,7 @@ def test_a_scene_knows_its_robots():
         (lambda: Limb(radius=np.array([0.1, 0.0])), ("limb's radius", "positive")),
         (lambda: Limb(direction=np.array([0.1, 0.2])), ("direction", "for all robots")),
         (lambda: SmaPulse(heating_time=np.array([0.1, 0.2])), ("heating_time", "positive")),
-        (lambda: Scene(actuator=SmaPulse(np.array([0.1, 3.0]))), ("peak angle of 3 rad",)),
+        (lambda: Scene(actuator=SmaPulse(np.array([0.1, 3.2]))), ("below pi", "3.2 rad")),
         (lambda: ThermalSma(water_temperature=np.array([20.0, 30.0])), ("T_water",)),
         (lambda: Limited(SmaPulse(np.ones(2)), np.ones(3)), ("equally many",)),
         (lambda: Simulator(Scene(), 2).set_scene(Scene(actuator=SmaPulse(cooling_time=2.0))), ("same terms",)),

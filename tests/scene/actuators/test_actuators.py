@@ -270,7 +270,7 @@ def test_an_actuator_that_contradicts_itself_is_refused(changes, words):
 
 
 def test_a_turning_hub_has_no_room_for_a_stroke_that_begins_turned():
-    robot = Seastar(hub_hinge="turning")
+    robot = Seastar(hub_hinge="turning", discretisation="chapter")
     with pytest.raises(ValueError, match="above zero"):
         Scene(robot, actuator=Limited(SmaPulse(), largest_rate=1.0))
 
