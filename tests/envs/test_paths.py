@@ -35,7 +35,7 @@ def test_every_name_makes_finite_waypoints_away_from_each_other(name):
     assert lengths.min() > 0.03
 
 
-@pytest.mark.parametrize("name, n_sides, side", [("pentagon", 5, 0.1636), ("square", 4, 0.2), ("triangle", 3, 0.25)])
+@pytest.mark.parametrize("name, n_sides, side", [("pentagon", 5, 0.1437), ("square", 4, 0.2), ("triangle", 3, 0.25)])
 def test_polygons_have_equal_sides_equal_left_turns_and_close_exactly(name, n_sides, side):
     waypoints = path_of(name)
     lengths, turns = legs_and_turns(waypoints)
@@ -178,7 +178,7 @@ def test_cross_track_error_broadcasts_one_segment_over_many_positions():
 
 
 def test_path_length_sums_the_legs_from_the_start():
-    assert path_length(ORIGIN, path_of("pentagon")) == pytest.approx(5 * 0.1636, rel=1e-12)
+    assert path_length(ORIGIN, path_of("pentagon")) == pytest.approx(5 * 0.1437, rel=1e-12)
     assert path_length([0.3, 0.4], path_of("line")) == pytest.approx(0.4, rel=1e-12)
 
 
