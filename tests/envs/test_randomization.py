@@ -135,7 +135,7 @@ def test_a_limb_that_has_failed_does_not_move():
         (lambda: SeastarSwimEnv(randomization="all"), ("DomainRandomization", "'all'")),
         (lambda: env_with("robot.n_limbs", 3, 5), ("robot.n_limbs", "robot.density")),
         (lambda: env_with("robot.limb_length", -0.1, 0.2), ("limb_length", "positive")),
-        (lambda: env_with("actuator.peak_angle", 0.1, 2.0), ("peak angle", "2 rad")),
+        (lambda: env_with("actuator.peak_angle", 0.1, 4.0), ("peak angle", "4 rad")),
         (lambda: env_with("fluid.current.u_x", 0.1, 0.2), ("fluid.current.u_x",)),
         (lambda: env_with("robot.density", -1.0, 0.2), ("density", "positive")),
     ],
