@@ -397,7 +397,7 @@ def test_the_policy_in_the_box_says_how_it_was_made():
     shipped = load()
     facts = json.loads(SHIPPED.with_suffix(".json").read_text(encoding="utf-8"))
     assert facts["scene"] == shipped.scene.to_dict()
-    assert shipped.scene.robot == Seastar() and shipped.scene.fluid == Water()
+    assert shipped.scene == Scene.preset("balanced")
     assert shipped.training["strokes"] > 0 and isinstance(shipped.training["seed"], int)
     assert shipped.training["commands"][0].startswith("python train.py")
     assert {"seastar_gym", "numpy", "torch", "stable_baselines3"} <= set(shipped.training["versions"])
