@@ -78,10 +78,50 @@ PROMISED = {
 """Fields of a `Promise` by their names in `info`."""
 
 
-def promised(scene: Scene) -> dict[str, float]:
-    """Measured errors and speed of a scene, as `info` names them; NaN for scenes not measured."""
-    known = measured(scene)
-    return {name: math.nan if known is None else getattr(known, field) for name, field in PROMISED.items()}
+def promised(scene: Scene, certificate: Certificate | None = None) -> dict[str, float]:
+    """Measured errors and speed of a scene, as `info` names them; NaN for scenes not measured.
+
+    certificate: Where they stand, the package's own table of the chapter's robot if None.
+    """
+    if certificate is None:
+        known = measured(scene)
+        return {name: math.nan if known is None else getattr(known, field) for name, field in PROMISED.items()}
+    setting = certificate.of(scene) if physics(scene) == physics(certificate.scene) else None
+    if setting is None:
+        return dict.fromkeys(PROMISED, math.nan)
+    return {
+        "path_error": setting.error(certificate.actions), "space_error": setting.space_error,
+        "time_error": setting.time_error, "real_time_factor": setting.speed,
+    }  # fmt: skip
+
+
+def read_certificate(certificate: Certificate | str | PathLike[str] | None, scene: Scene) -> Certificate | None:
+    """Certificate of an object or a file; ValueError where it has lapsed for the scene."""
+    if certificate is None:
+        return None
+    if isinstance(certificate, str | PathLike):
+        certificate = Certificate.load(FilePath(certificate))
+    if not isinstance(certificate, Certificate):
+        raise ValueError(f"certificate must be a Certificate or a file of one, not {shown(certificate)}.")
+    certificate.require_valid(scene, package_version())
+    return certificate
+
+
+def package_version() -> str:
+    """Version of this package, to which a certificate belongs."""
+    from seastar_gym import __version__
+
+    return __version__
+
+
+def warn_uncertified(scene: Scene, fidelity: Fidelity | None, certificate: Certificate | None) -> None:
+    """Warn where a fidelity is asked of a scene for which nothing was measured."""
+    if fidelity is not None and certificate is None and measured(scene) is None:
+        warnings.warn(
+            f'Errors of this scene were not measured, so fidelity="{fidelity}" promises nothing for it, and errors in '
+            "info are NaN: python -m seastar_gym.certify measures them.",
+            stacklevel=4,
+        )
 
 
 def scene_observation_size(scene: Scene) -> int:
@@ -105,6 +145,7 @@ class SwimTask:
         random_heading: bool,
         threads: int | None,
         randomization: DomainRandomization | Plain | None = None,
+        certificate: Certificate | str | PathLike[str] | None = None,
     ):
         randomization, reward = read(randomization, DomainRandomization), read(reward, RewardWeights)
         if not isinstance(randomization, DomainRandomization | None):
@@ -119,7 +160,8 @@ class SwimTask:
         self.scene, self.randomization = scene, randomization
         self.drawn = {} if randomization is None else randomization.first_values(scene, n_robots)
         self.simulator = Simulator(drawn_scene(scene, self.drawn), n_robots, threads)
-        self._promise = self.simulator.scene, promised(self.simulator.scene)
+        self.certificate = read_certificate(certificate, scene)
+        self._promise = self.simulator.scene, promised(self.simulator.scene, self.certificate)
         peak = np.max(self.simulator.scene.actuator.peak_angle)  # before the first draw the largest that may be drawn
         if scene.robot.hub_hinge == "turning" and 2 * peak >= scene.robot.opening_angle * (1 - 1e-9):
             raise ValueError(
@@ -278,7 +320,7 @@ class SwimTask:
         """Measured errors and speed, shape (n_robots,) each; NaN for robots with weak limbs."""
         simulator = self.simulator
         if simulator.scene is not self._promise[0]:
-            self._promise = simulator.scene, promised(simulator.scene)
+            self._promise = simulator.scene, promised(simulator.scene, self.certificate)
         strong = (simulator.limb_strengths == 1.0).all(axis=1)
         return {name: np.where(strong, value, np.nan) for name, value in self._promise[1].items()}
 
