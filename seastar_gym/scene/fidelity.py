@@ -37,9 +37,10 @@ class Promise:
         path's length: the largest over the straight swim, the four pairs of Fig. 13.8, the pentagon, and random
         commands, of -1, 0 and 1 or from between.
     path_error: The sum of the two.
-    gait_error: Such a sum, the largest over repetitions of any command and alternations of two.
-    slow_error: Such a sum, the largest over random and repeated commands of a tenth of the amplitude, whose paths are
-        short. No choice by error heeds it.
+    gait_error: Such a sum, the largest over repetitions of any command and alternations of two, and half as much again
+        for those that were not measured.
+    slow_error: The same for random and repeated commands of a tenth of the amplitude, whose paths are short. No choice
+        by error heeds it.
     straight_error: Such a sum, of the straight swim.
     heading_error: Such a sum for the heading [deg], the largest over the swims of path_error.
     end_error: Such a sum for the hub after the last stroke, the largest over the swims of path_error.

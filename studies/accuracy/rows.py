@@ -17,6 +17,13 @@ Floats = NDArray[np.float64]
 NOTICEABLE = 0.03
 """A slower setting joins the front if it reduces the error by at least this fraction."""
 
+UNSEEN = 1.5
+"""Promised over measured error of gaits and slow swims.
+
+Of 64 random gaits that the study did not use, the worst erred by 1.3 times the largest error of the 40 that it did, see
+tests/scene/test_fidelity.py. Errors of other swims are largest for the pairs, which are all measured.
+"""
+
 Column = Literal["path", "straight", "pair", "pentagon", "random", "slow", "gait", "heading", "end"]
 
 
@@ -116,8 +123,12 @@ class Row:
         return float(getattr(self.space, column) + getattr(self.time, column))
 
     def promise(self, column: Column) -> float:
-        """Sum of the two errors that can be promised: they may cancel, and a promise does not rely on that."""
-        return float(getattr(self.sure_space, column) + getattr(self.sure_time, column))
+        """Sum of the two errors that can be promised, with a margin for what varies most among commands.
+
+        The two may cancel, and a promise does not rely on that.
+        """
+        margin = UNSEEN if column in ("gait", "slow") else 1.0
+        return margin * float(getattr(self.sure_space, column) + getattr(self.sure_time, column))
 
 
 @dataclass(frozen=True)

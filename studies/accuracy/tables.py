@@ -5,12 +5,12 @@ import json
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from rich.table import Table
 
 from seastar_gym.scene import fidelity
-from studies.accuracy.rows import Figures, Row, Study, fronts, path_front
+from studies.accuracy.rows import Column, Figures, Row, Study, fronts, path_front
 from studies.accuracy.settings import presets
 from studies.speed.timing import machine
 
@@ -111,20 +111,20 @@ def write_csv(found: Study, path: Path) -> None:
     `promise_`.
     """
     names = [name.replace("heading", "heading_deg") for name in Figures._fields]
-    numbers = [k for k, name in enumerate(names) if not name.startswith("worst")]
+    columns = get_args(Column)
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow([
             "physics", "discretisation", "nodes_per_limb", "scheme", "step_s", "newton_tolerance", "path_tolerance",
             *(f"space_{name}" for name in names), *(f"time_{name}" for name in names),
-            *(f"promise_{names[k]}" for k in numbers), *COSTS,
+            *(f"promise_{name.replace('heading', 'heading_deg')}" for name in columns), *COSTS,
         ])  # fmt: skip
         for physics, row in [("chapter", row) for row in found.rows] + [
             (name, row) for name, rows in found.others.items() for row in rows
         ]:
             n = row.setting.numerics
             key = [n.scheme, n.step, n.newton_tolerance, "" if n.path_tolerance is None else n.path_tolerance]
-            sums = [row.sure_space[k] + row.sure_time[k] for k in numbers]  # type: ignore[operator]
+            sums = [row.promise(column) for column in columns]
             costs = [getattr(row, name) for name in COSTS]
             writer.writerow([physics, *row.resolution, *key, *map(_cell, (*row.space, *row.time, *sums, *costs))])
 

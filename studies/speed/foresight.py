@@ -7,7 +7,7 @@ of that file beside what was measured.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
 from seastar_gym.der.terms.inertia import kinetic_energy
 from seastar_gym.model.coefficients import Coefficients
 from seastar_gym.scene import Scene, Seastar, SmaPulse, Water
-from seastar_gym.scene.robot import HubHinge
+from seastar_gym.scene.robot import Discretisation, HubHinge
 from seastar_gym.simd.compilation import entry_point
 from seastar_gym.simd.lanes import N_LANES, borrow, load, splat, store
 from seastar_gym.simd.rows import aligned_rows
@@ -144,17 +144,19 @@ def drawn_rotations(draw: Draw, room: float, n_limbs: int, rng: np.random.Genera
     return np.ascontiguousarray((1.0 - share) * corners[ramp] + share * corners[ramp + 1])
 
 
-def drawn_stages(draw: Draw, rng: np.random.Generator) -> Stages:
+def drawn_stages(draw: Draw, rng: np.random.Generator, discretisation: Discretisation) -> Stages:
     """Stages of one stroke of N_LANES robots."""
     nodes, n_limbs = int(rng.choice(draw.nodes)), int(rng.choice(draw.limbs))
     hinge = draw.hinges[rng.integers(len(draw.hinges))]
+    room = np.pi - 2.0 * np.pi / n_limbs if hinge == "opening" else 2.0 * np.pi / n_limbs
+    if discretisation == "continuum":
+        hinge, room = "opening", np.pi
     limb, slenderness = logarithmic(rng, (0.03, 0.3)), logarithmic(rng, draw.slenderness)
     modulus, density, gamma = (logarithmic(rng, ends) for ends in (draw.modulus, draw.density, draw.gamma))
     edge = limb / (nodes - 1)
     length, radius, E, rho = (tuple(each.tolist()) for each in (limb, edge / slenderness, modulus, density))
-    robot = Seastar(n_limbs, nodes, length, radius, E, rho, hinge, discretisation="chapter")
-    gap = 2.0 * np.pi / n_limbs
-    rotations = drawn_rotations(draw, np.pi - gap if hinge == "opening" else gap, n_limbs, rng)
+    robot = Seastar(n_limbs, nodes, length, radius, E, rho, hinge, discretisation=discretisation)
+    rotations = drawn_rotations(draw, room, n_limbs, rng)
     fluid = None if rng.random() < 0.3 else Water()
     coefficients = Coefficients(Scene(robot, fluid, SmaPulse(0.01)), N_LANES)
     rods, q = coefficients.rods(0), coefficients.rest[0].copy()
@@ -186,11 +188,13 @@ def without_setbacks(move: Floats, phi: Floats, pivot: Floats) -> Mask:
     return np.logical_and.accumulate(fine, axis=1)
 
 
-def sample(draw: Draw, n: int, seed: int, progress: Callable[[range], Any] = iter) -> Stages:
+def sample(
+    draw: Draw, n: int, seed: int, progress: Callable[[range], Any] = iter, discretisation: Discretisation = "chapter"
+) -> Stages:
     """Stages of n strokes, of N_LANES robots each."""
     rng = np.random.default_rng(seed)
     with np.errstate(all="ignore"):  # plain Newton may fail
-        strokes = [drawn_stages(draw, rng) for _ in progress(range(n))]
+        strokes = [drawn_stages(draw, rng, discretisation) for _ in progress(range(n))]
     return Stages(*(np.concatenate(parts) for parts in zip(*strokes, strict=True)))
 
 
@@ -317,11 +321,13 @@ def ranked(what: str, allowed: float, numbers: Floats) -> Row:
     return Row(what, f"{allowed:g}", len(numbers), quantiles(numbers))
 
 
-def measure(n: int, seed: int = 0) -> list[Row]:
-    """Everything that the constants decide, from n strokes of every kind."""
-    draws = (STROKES, LONG, VIOLENT, NEAR_POLES, THICK_NEAR_POLES)
-    strokes, long, violent, near, thick = (sample(draw, n, seed, tqdm) for draw in draws)
-    ordinary, wild, polar = decisions(strokes), decisions(violent), decisions(thick)
+def measure(n: int, seed: int = 0, discretisation: Discretisation = "chapter") -> list[Row]:
+    """Everything that the constants decide, from n strokes of every kind.
+
+    The last two kinds are about hub hinges: in the continuum's discretisation, which has none, they are left out.
+    """
+    strokes, long, violent = (sample(draw, n, seed, tqdm, discretisation) for draw in (STROKES, LONG, VIOLENT))
+    ordinary, wild = decisions(strokes), decisions(violent)
     easy, t = foresight.EASY, foresight.FORESEEABLE_T
     need = " / ".join(f"{slenderness_that_thick_edges_need(ordinary, share):.0f}" for share in (0.99, 0.999))
     rows = [
@@ -333,6 +339,10 @@ def measure(n: int, seed: int = 0) -> list[Row]:
     ]
     for k in range(1, ITERATIONS):
         rows.append(ranked(f"EASY: over the one foreseen after step {k}, violent", 1.0, excesses_after(wild, k - 1, k)))
+    if discretisation == "continuum":
+        return rows
+    near, thick = (sample(draw, n, seed, tqdm) for draw in (NEAR_POLES, THICK_NEAR_POLES))
+    polar = decisions(thick)
     for low, high in ((0.25 * t, 0.5 * t), (0.5 * t, t), (t, 2.5 * t), (2.5 * t, 10.0 * t)):
         said = f"FORESEEABLE_T: over the one foreseen, t to {high:g}"
         rows.append(ranked(said, 1.0, excesses_near_poles(polar, low, high)))
@@ -359,8 +369,12 @@ def main() -> None:
     parser = study_parser("studies.speed.foresight", __doc__)
     parser.add_argument("--strokes", type=int, default=1000, help="drawn strokes of each kind (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="seed of the draws (default: %(default)s)")
+    parser.add_argument(
+        "--discretisation", choices=get_args(Discretisation), default="continuum",
+        help="discretisation of the robots (default: %(default)s)",
+    )  # fmt: skip
     options = parser.parse_args()
-    Console().print(as_table(measure(options.strokes, options.seed)))
+    Console().print(as_table(measure(options.strokes, options.seed, options.discretisation)))
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ def test_an_agent_of_one_line_is_made_for_the_scene_of_the_fidelity(monkeypatch)
 
     monkeypatch.setitem(AGENTS, "mine", mine)
     assert list(load_agents(["mine", "rest"], fidelity="fast")) == ["mine", "rest"]
-    assert [type(scene) for scene in scenes] == [Scene] and scenes[0].numerics.step == 0.02
+    assert [type(scene) for scene in scenes] == [Scene] and scenes[0] == Scene.preset("fast")
 
 
 @pytest.mark.parametrize("command", [evaluate.main, trials.main])

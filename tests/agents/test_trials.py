@@ -11,12 +11,12 @@ from agents.greedy import GreedyPolicy
 from agents.scripted import scripted
 from agents.swim import swim
 from agents.trials import Options, main, mean_with_interval, statistics, swim_many
-from seastar_gym import Numerics, RewardWeights, Scene, ThermalSma
+from seastar_gym import RewardWeights, Scene, ThermalSma
 from seastar_gym.envs.observation import scene_layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import SwimTask
 
-FAST = Scene(numerics=Numerics.preset("fast"))
+FAST = Scene.preset("fast")
 N = 16
 
 

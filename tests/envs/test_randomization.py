@@ -1,5 +1,7 @@
 """Numbers drawn for every episode: from their distributions, the same alone and in a batch, and told in `info`."""
 
+from dataclasses import replace
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -67,7 +69,8 @@ def test_a_robot_is_drawn_alone_as_in_a_batch_and_swims_as_the_robot_that_was_dr
         np.testing.assert_array_equal(observations[robot], observation)
         np.testing.assert_array_equal(info["limb_strengths"][robot], own["limb_strengths"])
         modulus, drag = own["robot.youngs_modulus"], own["fluid.drag_coefficient"]
-        robot = Seastar(youngs_modulus=modulus, limb_length=own["robot.limb_length"])
+        fast = Scene.preset("fast")
+        robot = replace(fast.robot, youngs_modulus=modulus, limb_length=own["robot.limb_length"])
         pulse = SmaPulse(own["actuator.peak_angle"])
         scene = Scene(robot, Water(drag_coefficient=drag), pulse, numerics=Numerics.preset("fast"))
         env.simulator.reset()
