@@ -49,7 +49,7 @@ PARTS = {
     "contact of each robot": {"contact": Contact(1e5 * EACH)},
     "loads": {"loads": ((9, 0.0, 1e-3 / 3), (18, -1e-4, 0.0))},
     "held nodes": {"held_nodes": (3, 0)},
-    "hub hinges": {"robot": Seastar(nodes_per_limb=8, hub_hinge="turning", discretisation="chapter")},
+    "hub hinges": {"robot": Seastar(nodes_per_limb=8, discretisation="chapter")},
     "gravity": {"gravity": (1 / 3, -9.81)},
     "strengths": {"limb_strengths": (1.0, 0.0, 1 / 3, 1.0, 0.5)},
     "limbs": {"robot": Seastar(limbs=(Limb(radius=(2e-3, 1e-3 / 3)), *(Limb(length=0.1 / 3),) * 4))},

