@@ -45,8 +45,8 @@ def as_text(certificate: Certificate) -> str:
         shares = " ".join(f"{100 * error:>6.2g} %" for error in errors)
         lines.append(f"{each!s:44} {shares} {each.speed:>12,.0f}")
     lines.append(
-        f"With {100 * certificate.confidence():.0f} % confidence, at most 5 % of the sequences of a class exceed its error "
-        f"({certificate.samples} sequences per class). The limit's own error: {100 * certificate.limit_error:.2g} %."
+        f"With {100 * certificate.confidence():.0f} % confidence, at most 5 % of the sequences of a class exceed its "
+        f"error ({certificate.samples} of each were measured). The limit errs by {100 * certificate.limit_error:.2g} %."
     )
     return "\n".join(lines)
 

@@ -23,6 +23,7 @@ from seastar_gym.scene import Numerics, Scene
 from seastar_gym.scene.certificate import Certificate, CertifiedSetting
 from seastar_gym.scene.checks import require_count, require_seed, shown
 from seastar_gym.simulator import Simulator
+from seastar_gym.version import __version__
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float], None]
@@ -98,15 +99,26 @@ def certify(scene: Scene, samples: int = SAMPLES, seed: int = 0, progress: Progr
     return Certificate(
         physics_of(scene), tuple(found), PROMISED, ACTIONS, samples,
         limit_error=max(by_class(of_limit, samples)[name] for name in PROMISED),
-        classes=VERSION, version=package_version(), machine=machine(),
+        classes=VERSION, version=__version__, machine=machine(),
     )  # fmt: skip
 
 
-def package_version() -> str:
-    """Version of this package, to which a certificate belongs."""
-    from seastar_gym import __version__
+def exceeded(
+    certificate: Certificate, scene: Scene, samples: int, seed: int, progress: Progress | None = None
+) -> dict[str, float]:
+    """Share of fresh sequences, by class, whose error exceeds the certificate's, for a scene at a measured setting.
 
-    return __version__
+    The error is the whole one, against the limit. samples: Sequences per class. seed: Of these sequences; take another
+    one than that of the certificate.
+    """
+    setting = certificate.of(scene)
+    if setting is None:
+        raise ValueError(f"This setting was not measured: {shown(scene.numerics)}.")
+    commands = draw_classes(samples, scene.robot.n_limbs, seed)
+    limit, hub = swim_all([at(scene, MANY_NODES, SHORT), scene], commands, progress)
+    distances = _finite(np.linalg.norm(hub - limit, axis=-1).max(axis=0))
+    errors = (distances / path_lengths(limit, float(np.max(scene.robot.limb_length)))).reshape(len(CLASSES), samples)
+    return {name: float(np.mean(each > setting.errors[name])) for name, each in zip(CLASSES, errors, strict=True)}
 
 
 def machine() -> str:

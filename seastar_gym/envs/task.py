@@ -1,8 +1,8 @@
 """The task behind both environments: a batch of robots, each on a path of its own, advanced by strokes."""
 
-import math
 from collections.abc import Generator
 from dataclasses import replace
+from os import PathLike
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,12 +17,13 @@ from seastar_gym.envs.observation import (
     with_memory,
 )
 from seastar_gym.envs.paths import FARTHEST, cross_track_error, make_path
+from seastar_gym.envs.promises import promised, read_certificate
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, drawn_scene
 from seastar_gym.envs.reward import RewardWeights, reward_terms
 from seastar_gym.envs.stations import stations
 from seastar_gym.scene import Numerics, Scene
+from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.checks import require_flag, require_number, shown
-from seastar_gym.scene.fidelity import measured
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.serial import Part, from_dict
 from seastar_gym.simd.rows import to_rows
@@ -70,58 +71,6 @@ def make_scene(scene: Scene | Plain | None, fidelity: Fidelity | None) -> Scene:
 def read(part: Part | Plain, kind: type[Any]) -> Part:
     """Part that was given as an object or in plain form."""
     return from_dict(part, kind) if isinstance(part, dict) else part
-
-
-PROMISED = {
-    "path_error": "path_error", "space_error": "space_error", "time_error": "time_error", "real_time_factor": "speed",
-}  # fmt: skip
-"""Fields of a `Promise` by their names in `info`."""
-
-
-def promised(scene: Scene, certificate: Certificate | None = None) -> dict[str, float]:
-    """Measured errors and speed of a scene, as `info` names them; NaN for scenes not measured.
-
-    certificate: Where they stand, the package's own table of the chapter's robot if None.
-    """
-    if certificate is None:
-        known = measured(scene)
-        return {name: math.nan if known is None else getattr(known, field) for name, field in PROMISED.items()}
-    setting = certificate.of(scene) if physics(scene) == physics(certificate.scene) else None
-    if setting is None:
-        return dict.fromkeys(PROMISED, math.nan)
-    return {
-        "path_error": setting.error(certificate.actions), "space_error": setting.space_error,
-        "time_error": setting.time_error, "real_time_factor": setting.speed,
-    }  # fmt: skip
-
-
-def read_certificate(certificate: Certificate | str | PathLike[str] | None, scene: Scene) -> Certificate | None:
-    """Certificate of an object or a file; ValueError where it has lapsed for the scene."""
-    if certificate is None:
-        return None
-    if isinstance(certificate, str | PathLike):
-        certificate = Certificate.load(FilePath(certificate))
-    if not isinstance(certificate, Certificate):
-        raise ValueError(f"certificate must be a Certificate or a file of one, not {shown(certificate)}.")
-    certificate.require_valid(scene, package_version())
-    return certificate
-
-
-def package_version() -> str:
-    """Version of this package, to which a certificate belongs."""
-    from seastar_gym import __version__
-
-    return __version__
-
-
-def warn_uncertified(scene: Scene, fidelity: Fidelity | None, certificate: Certificate | None) -> None:
-    """Warn where a fidelity is asked of a scene for which nothing was measured."""
-    if fidelity is not None and certificate is None and measured(scene) is None:
-        warnings.warn(
-            f'Errors of this scene were not measured, so fidelity="{fidelity}" promises nothing for it, and errors in '
-            "info are NaN: python -m seastar_gym.certify measures them.",
-            stacklevel=4,
-        )
 
 
 def scene_observation_size(scene: Scene) -> int:

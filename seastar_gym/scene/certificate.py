@@ -15,6 +15,7 @@ from seastar_gym.scene.checks import is_finite_number, shown
 from seastar_gym.scene.numerics import Numerics, SchemeName
 from seastar_gym.scene.robot import Discretisation
 from seastar_gym.scene.scene import Scene
+from seastar_gym.version import __version__
 
 FORMAT = 1
 """Version of the file's form."""
@@ -84,16 +85,17 @@ class Certificate:
         """Confidence that at most this share of all sequences of a class errs by more than the error of the class."""
         return 1.0 - (1.0 - share) ** self.samples
 
-    def require_valid(self, scene: Scene, version: str) -> None:
+    def require_valid(self, scene: Scene) -> None:
         """ValueError where the certificate has lapsed: for another scene or version of the package."""
-        if version != self.version:
+        if self.version != __version__:
             raise ValueError(
-                f"The certificate is of version {self.version} of seastar_gym, not {version}: certify the scene again."
+                f"The certificate is of version {self.version} of seastar_gym, not of this one, {__version__}: certify "
+                "the scene again."
             )
         if physics(scene) != physics(self.scene):
             raise ValueError(
-                "The certificate is of another scene: all but numerics and nodes per limb must be the same. Certify this "
-                "one with python -m seastar_gym.certify."
+                "The certificate is of another scene, which differs in more than numerics and nodes per limb: certify "
+                "this one with python -m seastar_gym.certify."
             )
 
     def of(self, scene: Scene) -> CertifiedSetting | None:
@@ -146,8 +148,8 @@ class Certificate:
             settings = tuple(_read_setting(each) for each in data.pop("settings"))
             if not settings:
                 raise ValueError("it has no setting")
-            names = {name: tuple(data.pop(name)) for name in ("promised", "actions")}
-            return cls(scene=Scene.from_dict(data.pop("scene")), settings=settings, **names, **data)
+            promised, actions = tuple(data.pop("promised")), tuple(data.pop("actions"))
+            return cls(Scene.from_dict(data.pop("scene")), settings, promised, actions, **data)
         except (AttributeError, KeyError, TypeError, ValueError) as damaged:
             raise ValueError(f"{file} is no certificate: {str(damaged).rstrip('.')}.") from damaged
 
