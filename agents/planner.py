@@ -16,7 +16,7 @@ from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.stations import N_STATIONS, node_weights
-from seastar_gym.scene import Numerics, Scene
+from seastar_gym.scene import Scene
 from seastar_gym.simulator import Simulator, State
 
 Floats = NDArray[np.float64]
@@ -93,7 +93,7 @@ class Planner(Searcher):
         threads: int | None = None,
         reward: RewardWeights = RewardWeights(),
     ):
-        self.scene = Scene(numerics=Numerics.preset("fast")) if scene is None else scene
+        self.scene = Scene.preset("fast") if scene is None else scene
         self.waypoint_radius, self.budget, self.reward = waypoint_radius, budget, reward
         self._commands = command_table(self.actions, self.scene.robot.n_limbs)
         self._swim_all = Branching(self.scene, self._commands, threads)

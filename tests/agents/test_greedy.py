@@ -43,7 +43,7 @@ def test_the_map_is_measured_once_for_every_scene(cache, monkeypatch):
     np.testing.assert_array_equal(displacement_map(FAST).hub, first.hub)
     assert list((cache / "seastar-gym").iterdir()) == files
     with pytest.raises(TypeError):
-        displacement_map(Scene(numerics=Numerics.preset("balanced")))
+        displacement_map(Scene(numerics=Numerics.preset("accurate")))
 
 
 def test_gaits_of_several_strokes_are_measured_over_whole_periods():

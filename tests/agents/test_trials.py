@@ -55,7 +55,7 @@ def test_a_current_carries_the_robots_its_own_way_and_the_waypoints_stay():
     np.testing.assert_allclose(np.hypot(*seen[:, at.hub_velocity].T) * 0.025, speed, rtol=0.2)
     to_waypoint = np.linalg.norm([0.1437, 0.0] - hubs[-1], axis=1)
     np.testing.assert_allclose(np.linalg.norm(seen[:, at.current_waypoint], axis=1), to_waypoint / 0.1, rtol=1e-5)
-    assert waypoint == pytest.approx(1.636)
+    assert waypoint == pytest.approx(1.437)
 
 
 def test_a_current_is_seen_in_the_hubs_velocity_whatever_actuators_remember():

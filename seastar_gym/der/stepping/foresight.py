@@ -1,9 +1,9 @@
 """When Newton's last step may be left out, because quadratic convergence foretells that it would be small enough.
 
 After one of its first steps, of size d, the next is expected to be at most d^2/(foreseeable length). That is measured,
-not proved: by `python -m studies.speed.foresight`, in 1000 strokes of every kind by eight robots, stiff and soft, with
-edges of 3 to 50 radii, at steps of 0.1 to 20 ms, in water and in vacuum. Had every step been just small enough, the one
-left out would have been
+not proved: by `python -m studies.speed.foresight --discretisation chapter`, in 1000 strokes of every kind by eight
+robots, stiff and soft, with edges of 3 to 50 radii, at steps of 0.1 to 20 ms, in water and in vacuum. Had every step
+been just small enough, the one left out would have been
 
     99 %     99.9 %    worst
     0.7      1.6       18       times as large as foreseen
@@ -15,6 +15,9 @@ left out would have been
     0.4      1e6       2e8      the same after the fifth
     1.2      3         40       times as large where the largest hub t is 2 to 4, which is FORESEEABLE_T, of thick limbs
     3.7      24        30       the same from 10 to 40
+
+With a rigid hub, which has no poles, the numbers of the first, second, third and fifth line are 0.9, 1.8 and 9; 26, 51
+and 220 times d^2 over the edge length; 0.8, 1.7 and 3; 2.6, 5.8 and 15 (300 strokes of every kind).
 
 In water with hub hinges near their poles, steps from potentials below a tenth of that of PREDICTABLE_STRAIN created no
 energy; 0.02 % did up to PREDICTABLE_STRAIN, 0.1 % up to ten times and 0.5 % up to a hundred times as much. Edges of
