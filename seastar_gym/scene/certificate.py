@@ -142,7 +142,11 @@ class Certificate:
     def load(cls, file: Path | str) -> "Certificate":
         """Read a certificate. ValueError for a file that is none."""
         try:
-            data = json.loads(Path(file).read_text(encoding="utf-8"))
+            text = Path(file).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as unread:
+            raise ValueError(f"A certificate cannot be read from {shown(str(file))}.") from unread
+        try:
+            data = json.loads(text)
             if data.pop("format") != FORMAT:
                 raise ValueError("it has another form")
             settings = tuple(_read_setting(each) for each in data.pop("settings"))

@@ -141,6 +141,8 @@ def test_a_certificate_lapses_with_the_version(certificate):
 def test_a_certificate_is_one_or_a_file_of_one():
     with assert_refused("certificate must be a Certificate"):
         gym.make("SeastarSwim-v0", certificate=3)
+    with assert_refused("cannot be read"):
+        gym.make("SeastarSwim-v0", certificate="not there.json")
 
 
 def test_a_fidelity_for_an_uncertified_scene_warns_with_the_command_that_measures_it():
