@@ -5,6 +5,7 @@ Importing this package registers `SeastarSwim-v0`.
 
 from gymnasium.envs.registration import register
 
+from seastar_gym.certify.measure import certify
 from seastar_gym.envs.randomization import DomainRandomization, LogUniform, Normal, Uniform
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
@@ -12,15 +13,16 @@ from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water, relaxat
 from seastar_gym.scene.actuators.limited import Limited
 from seastar_gym.scene.actuators.measured import MeasuredCurve
 from seastar_gym.scene.actuators.thermal import ThermalSma
+from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
 from seastar_gym.scene.limb import Limb
 from seastar_gym.scene.serial import register_part
 from seastar_gym.simulator import Simulator, SolverStatus, State, StrokeReport
-
-__version__ = "0.1.0"
+from seastar_gym.version import __version__
 
 __all__ = [
+    "Certificate",
     "Contact",
     "DomainRandomization",
     "GridCurrent",
@@ -47,6 +49,7 @@ __all__ = [
     "Vortex",
     "Water",
     "__version__",
+    "certify",
     "register_part",
     "relaxation_time",
 ]

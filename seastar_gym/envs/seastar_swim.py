@@ -2,6 +2,7 @@
 
 import contextlib
 from collections.abc import Generator, Iterator
+from os import PathLike
 from typing import Any, Literal
 
 import gymnasium as gym
@@ -9,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions, to_commands
+from seastar_gym.envs.promises import warn_uncertified
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.rendering import Frame, Renderer, renderer_of
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.task import Outcome, Path, Plain, SwimTask, make_scene
 from seastar_gym.envs.task_env import TaskEnv, checked_options
 from seastar_gym.scene import Scene
+from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.checks import require_choice, require_count, require_seed
 from seastar_gym.scene.numerics import Fidelity
 
@@ -94,9 +97,10 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `reward_waypoint`        | float      | 1    | term of the reward                                               |
     | `reward_effort`          | float      | 1    | term of the reward                                               |
 
-    `path_error` is the sum of `space_error` and `time_error`, for the worst of the swims measured. These and
-    `real_time_factor` belong to the robot's resolution and the numerics (see `seastar_gym.scene.fidelity`) and are NaN
-    for other robots and scenes than the chapter's, and for what was not measured.
+    `path_error` is that over every sequence of the environment's actions, repeated ones included; `space_error` and
+    `time_error` are those of the usual swims, straight, round the pentagon, or of random commands. They belong to the
+    robot's resolution and the numerics (see `seastar_gym.scene.fidelity`), and are NaN for other robots and scenes than
+    the chapter's, unless a `certificate` has them, and for what was not measured.
     With `randomization`, `info` has the drawn numbers by their names, too.
 
     ## Starting state
@@ -122,6 +126,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         `frames_per_stroke` pictures of the stroke. "human": a window shows as many.
     frames_per_stroke: Number of pictures of a stroke, at equal intervals; the last shows the end of the stroke.
     randomization: Distributions of numbers of the scene that are drawn at the start of every episode.
+    certificate: Measured errors of the scene for `info`: a `Certificate`, or the file of one that
+        `python -m seastar_gym.certify` wrote. Refused where it is of another scene or version.
 
     `scene`, `reward` and `randomization` may be given as plain data, as `Scene.to_dict` and
     `seastar_gym.scene.serial.to_dict` write them. `env.spec` has them so:
@@ -142,6 +148,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         render_mode: Literal["human", "rgb_array", "rgb_array_list"] | None = None,
         frames_per_stroke: int = FRAMES_PER_STROKE,
         randomization: DomainRandomization | Plain | None = None,
+        certificate: Certificate | str | PathLike[str] | None = None,
     ):
         if render_mode is not None:
             require_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
@@ -150,7 +157,10 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         self.frames_per_stroke = frames_per_stroke
         self.metadata = {**self.metadata, "render_fps": frames_per_stroke}
         modelled = make_scene(scene, fidelity)
-        task = SwimTask(modelled, 1, path, reward, waypoint_radius, random_heading, 1, randomization)
+        warn_uncertified(modelled, fidelity, certificate)
+        task = SwimTask(
+            modelled, 1, path, reward, waypoint_radius, random_heading, 1, randomization, certificate
+        )
         self.action_space, self.observation_space = self._set_task(task, actions)
         self._running = False
         self._command = np.zeros(self.scene.robot.n_limbs)

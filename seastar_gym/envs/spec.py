@@ -6,6 +6,7 @@
 
 from dataclasses import fields, replace
 from enum import Enum
+from os import PathLike, fspath
 from typing import Any
 
 import numpy as np
@@ -57,6 +58,8 @@ def _plain(value: Any) -> Any:
             return to_dict(value)
         case Enum():
             return value.value
+        case PathLike():
+            return fspath(value)
         case np.ndarray() | np.generic():
             return value.tolist()
         case list() | tuple():

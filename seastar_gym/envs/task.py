@@ -1,8 +1,8 @@
 """The task behind both environments: a batch of robots, each on a path of its own, advanced by strokes."""
 
-import math
 from collections.abc import Generator
 from dataclasses import replace
+from os import PathLike
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,12 +17,13 @@ from seastar_gym.envs.observation import (
     with_memory,
 )
 from seastar_gym.envs.paths import FARTHEST, cross_track_error, make_path
+from seastar_gym.envs.promises import promised, read_certificate
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, drawn_scene
 from seastar_gym.envs.reward import RewardWeights, reward_terms
 from seastar_gym.envs.stations import stations
 from seastar_gym.scene import Numerics, Scene
+from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.checks import require_flag, require_number, shown
-from seastar_gym.scene.fidelity import measured
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.serial import Part, from_dict
 from seastar_gym.simd.rows import to_rows
@@ -72,18 +73,6 @@ def read(part: Part | Plain, kind: type[Any]) -> Part:
     return from_dict(part, kind) if isinstance(part, dict) else part
 
 
-PROMISED = {
-    "path_error": "path_error", "space_error": "space_error", "time_error": "time_error", "real_time_factor": "speed",
-}  # fmt: skip
-"""Fields of a `Promise` by their names in `info`."""
-
-
-def promised(scene: Scene) -> dict[str, float]:
-    """Measured errors and speed of a scene, as `info` names them; NaN for scenes not measured."""
-    known = measured(scene)
-    return {name: math.nan if known is None else getattr(known, field) for name, field in PROMISED.items()}
-
-
 def scene_observation_size(scene: Scene) -> int:
     """Length of the observation of a scene's robot."""
     return scene_layout(scene).size
@@ -105,6 +94,7 @@ class SwimTask:
         random_heading: bool,
         threads: int | None,
         randomization: DomainRandomization | Plain | None = None,
+        certificate: Certificate | str | PathLike[str] | None = None,
     ):
         randomization, reward = read(randomization, DomainRandomization), read(reward, RewardWeights)
         if not isinstance(randomization, DomainRandomization | None):
@@ -119,7 +109,8 @@ class SwimTask:
         self.scene, self.randomization = scene, randomization
         self.drawn = {} if randomization is None else randomization.first_values(scene, n_robots)
         self.simulator = Simulator(drawn_scene(scene, self.drawn), n_robots, threads)
-        self._promise = self.simulator.scene, promised(self.simulator.scene)
+        self.certificate = read_certificate(certificate, scene)
+        self._promise = self.simulator.scene, promised(self.simulator.scene, self.certificate)
         peak = np.max(self.simulator.scene.actuator.peak_angle)  # before the first draw the largest that may be drawn
         if scene.robot.hub_hinge == "turning" and 2 * peak >= scene.robot.opening_angle * (1 - 1e-9):
             raise ValueError(
@@ -278,7 +269,7 @@ class SwimTask:
         """Measured errors and speed, shape (n_robots,) each; NaN for robots with weak limbs."""
         simulator = self.simulator
         if simulator.scene is not self._promise[0]:
-            self._promise = simulator.scene, promised(simulator.scene)
+            self._promise = simulator.scene, promised(simulator.scene, self.certificate)
         strong = (simulator.limb_strengths == 1.0).all(axis=1)
         return {name: np.where(strong, value, np.nan) for name, value in self._promise[1].items()}
 

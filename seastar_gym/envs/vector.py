@@ -2,6 +2,7 @@
 
 import contextlib
 from collections.abc import Iterable, Iterator
+from os import PathLike
 from typing import Any, Literal
 
 import gymnasium as gym
@@ -15,12 +16,14 @@ from seastar_gym.envs.batch_attributes import BatchAttributes
 from seastar_gym.envs.batch_info import Info, of_some, with_masks
 from seastar_gym.envs.batch_pictures import BatchPictures, Picture
 from seastar_gym.envs.commands import Actions, as_array, to_commands
+from seastar_gym.envs.promises import warn_uncertified
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.seastar_swim import FRAMES_PER_STROKE
 from seastar_gym.envs.task import Path, Plain, SwimTask, make_scene
 from seastar_gym.envs.task_env import checked_options
 from seastar_gym.scene import Scene
+from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.checks import require_choice, require_count, require_seed, shown
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator.simulator import MAX_ROBOTS
@@ -71,6 +74,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
         randomization: DomainRandomization | Plain | None = None,
+        certificate: Certificate | str | PathLike[str] | None = None,
     ):
         if render_mode is not None and not (isinstance(render_mode, str) and render_mode == "rgb_array"):
             raise ValueError(
@@ -86,7 +90,10 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
         modelled = make_scene(scene, fidelity)
-        task = SwimTask(modelled, num_envs, path, reward, waypoint_radius, random_heading, threads, randomization)
+        warn_uncertified(modelled, fidelity, certificate)
+        task = SwimTask(
+            modelled, num_envs, path, reward, waypoint_radius, random_heading, threads, randomization, certificate
+        )
         self.single_action_space, self.single_observation_space = self._set_task(task, actions)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)

@@ -144,5 +144,5 @@ def test_plain_arguments_that_are_none_are_refused(make, arguments, words):
 def test_the_arguments_of_the_tables_are_those_of_the_environment():
     """A new argument is not forgotten."""
     told = {name for arguments in ARGUMENTS.values() for name in arguments}
-    drawing = {"render_mode", "frames_per_stroke"}
+    drawing = {"render_mode", "frames_per_stroke", "certificate"}  # a certificate has tests of its own
     assert told | drawing == set(inspect.signature(SeastarSwimEnv).parameters)

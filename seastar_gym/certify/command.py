@@ -1,0 +1,104 @@
+"""Measures what speed costs a scene in accuracy: `python -m seastar_gym.certify my_scene.py --error 0.01`.
+
+The scene is a Python file that defines `scene`, a JSON file as `Scene.to_dict` writes it, or none for the chapter's. A
+file of Python is executed. Errors are those of the hub's path in space, in time and in sum, over classes of commands
+that are listed in seastar_gym/certify/commands.py, against swims with 37 nodes per limb and steps of 0.25 ms.
+
+Writes a certificate (JSON), and a picture of error over speed where matplotlib is installed. `Certificate.load(file)`
+reads it, `certificate.for_error(0.01)` is the scene at the fastest setting that keeps 1 %, and
+`gym.make("SeastarSwim-v0", scene=..., certificate=file)` tells its errors in `info`.
+"""
+
+import argparse
+import json
+import runpy
+import sys
+from pathlib import Path
+
+from tqdm import tqdm
+
+from seastar_gym.certify.measure import SAMPLES, certify
+from seastar_gym.scene import Scene
+from seastar_gym.scene.certificate import Certificate
+
+
+def load_scene(file: Path | None) -> Scene:
+    """Scene of a file of Python or JSON, the chapter's for none."""
+    if file is None:
+        return Scene()
+    if file.suffix == ".json":
+        return Scene.from_dict(json.loads(file.read_text(encoding="utf-8")))
+    found = runpy.run_path(str(file)).get("scene")
+    if not isinstance(found, Scene):
+        raise ValueError(f"{file} must define `scene`, a Scene.")
+    return found
+
+
+def as_text(certificate: Certificate) -> str:
+    """Table of the certificate, fastest settings first."""
+    lines = [f"{'setting':44} {'space':>8} {'time':>8} {'sum':>8} {'actions':>8} {'small':>8} {'x real time':>12}"]
+    for each in sorted(certificate.settings, key=lambda each: -each.speed):
+        errors = (
+            each.space_error, each.time_error, each.error(certificate.promised), each.error(certificate.actions),
+            each.errors["small"],
+        )  # fmt: skip
+        shares = " ".join(f"{100 * error:>6.2g} %" for error in errors)
+        lines.append(f"{each!s:44} {shares} {each.speed:>12,.0f}")
+    lines.append(
+        f"With {100 * certificate.confidence():.0f} % confidence, at most 5 % of the sequences of a class exceed its "
+        f"error ({certificate.samples} of each were measured). The limit errs by {100 * certificate.limit_error:.2g} %."
+    )
+    return "\n".join(lines)
+
+
+def draw(certificate: Certificate, file: Path) -> None:
+    """Picture of the error over speed, one line for each number of nodes."""
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(6.4, 4.4), layout="constrained")
+    for nodes in sorted({each.nodes_per_limb for each in certificate.settings}):
+        some = sorted((each for each in certificate.settings if each.nodes_per_limb == nodes), key=lambda x: x.speed)
+        errors = [100 * each.error(certificate.promised) for each in some]
+        axes.loglog([each.speed for each in some], errors, "o-", label=f"{nodes} nodes per limb")
+    axes.set(xlabel="x real time, batch on one core", ylabel="largest error of the hub's path [%]")
+    axes.grid(True, which="major", color="0.9")
+    axes.legend(frameon=False)
+    figure.savefig(file, dpi=130)
+    plt.close(figure)
+
+
+def main() -> int:
+    """Command line; returns the exit code."""
+    parser = argparse.ArgumentParser(
+        "python -m seastar_gym.certify", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    default = "(default: %(default)s)"
+    parser.add_argument("scene", nargs="?", type=Path, help="file of the scene, .py or .json (default: the chapter's)")
+    parser.add_argument("--error", type=float, help="print the fastest setting that keeps this error, such as 0.01")
+    parser.add_argument("--samples", type=int, default=SAMPLES, help=f"sequences per class {default}")
+    parser.add_argument("--seed", type=int, default=0, help=f"seed of the sequences {default}")
+    parser.add_argument("--out", type=Path, default=Path("certificate.json"), help=f"file to write {default}")
+    options = parser.parse_args()
+    try:
+        scene = load_scene(options.scene)
+        with tqdm(total=100, unit="%", bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as bar:
+
+            def progress(share: float) -> None:
+                bar.update(100.0 * share - bar.n)
+
+            certificate = certify(scene, options.samples, options.seed, progress)
+        certificate.save(options.out)
+        print(as_text(certificate))
+        print(f"Written: {options.out}")
+        try:
+            draw(certificate, options.out.with_suffix(".png"))
+            print(f"Written: {options.out.with_suffix('.png')}")
+        except ModuleNotFoundError:
+            print('No picture: that needs matplotlib, pip install "seastar-gym[studies]".')
+        if options.error is not None:
+            chosen = certificate.for_error(options.error)
+            print(f"{100 * options.error:g} %: nodes_per_limb={chosen.robot.nodes_per_limb}, {chosen.numerics}")
+    except (ValueError, ModuleNotFoundError) as bad_input:
+        print(bad_input, file=sys.stderr)
+        return 2
+    return 0

@@ -1,0 +1,203 @@
+"""Errors of space and time of any scene.
+
+Sequences of all classes of commands (commands.py) are swum with every resolution and numerics of SETTINGS, with the
+same nodes and very short steps, and with many nodes and very short steps: the last stand for the continuum. The error
+of space is that of few nodes with short steps against many nodes; that of time is that of a setting against short steps
+with the same nodes; both are largest distances of the hub at ends of strokes, as fractions of the length of the hub's
+path. The sum of the two bounds the whole error, also where they cancel.
+"""
+
+import os
+import platform
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.certify.commands import ACTIONS, CLASSES, PROMISED, STROKES, VERSION, draw_classes
+from seastar_gym.scene import Numerics, Scene
+from seastar_gym.scene.certificate import Certificate, CertifiedSetting
+from seastar_gym.scene.checks import require_count, require_seed, shown
+from seastar_gym.simulator import Simulator
+from seastar_gym.version import __version__
+
+Floats = NDArray[np.float64]
+Progress = Callable[[float], None]
+"""Called with the share of the work that is done, from 0 to 1."""
+
+NODES = (7, 10, 13, 19)
+MANY_NODES = 37
+"""Nodes per limb of settings, and of the swims that stand for the continuum."""
+NUMERICS = (
+    Numerics("sdirk2", 20e-3, 1e-6),
+    Numerics("implicit-midpoint", 5e-3, 1e-6),
+    Numerics("implicit-midpoint", 2e-3, 1e-7),
+    Numerics("implicit-midpoint", 1e-3, 1e-7),
+)
+SHORT = Numerics("implicit-midpoint", 0.25e-3, 1e-9)
+"""Numerics that stand for infinitely short steps."""
+SAMPLES = 60
+"""Sequences per class: with the confidence 95 %, at most 5 % of all sequences of a class exceed the largest error."""
+GROUP = 32
+"""Robots that are swum together."""
+SHORTEST_PATH = 1e-3
+"""Errors of paths that are shorter than this many limb lengths are fractions of that."""
+
+
+class Job(NamedTuple):
+    """Sequences to be swum in one batch. cost: Roughly, in units of its own."""
+
+    scene: Scene
+    commands: Floats
+    cost: float
+
+
+def certify(scene: Scene, samples: int = SAMPLES, seed: int = 0, progress: Progress | None = None) -> Certificate:
+    """Measure errors and speeds of a scene's settings: some minutes on two cores.
+
+    scene: Any scene for one robot. Its nodes per limb, discretisation and numerics do not matter.
+    samples: Sequences per class of commands. seed: Seed of the sequences. progress: Called as the work goes on.
+    """
+    if not isinstance(scene, Scene):
+        raise ValueError(f"certify needs a Scene, not {shown(scene)}.")
+    if scene.n_robots is not None:
+        raise ValueError("A scene with numbers of each robot has no one certificate: certify scene.of_robot(0), say.")
+    if scene.held_nodes or scene.loads:
+        raise ValueError("Held and loaded nodes belong to one mesh, so a scene with some cannot be certified.")
+    if float(np.max(scene.actuator.peak_angle)) == 0.0:
+        raise ValueError("Nothing moves this robot: its peak angle is zero.")
+    require_count("samples", samples, 2, 100_000)
+    require_seed(seed)
+    commands = draw_classes(samples, scene.robot.n_limbs, seed)
+    resolved = [at(scene, nodes, SHORT) for nodes in (MANY_NODES, *NODES)]
+    settings = [(nodes, numerics) for nodes in NODES for numerics in NUMERICS]
+    scenes = [*resolved, *(at(scene, *setting) for setting in settings)]
+    limit, *swum = swim_all(scenes, commands, progress)
+    lengths = path_lengths(limit, float(np.max(scene.robot.limb_length)))
+
+    def distance(hub: Floats, other: Floats) -> Floats:
+        return _finite(np.linalg.norm(hub - other, axis=-1).max(axis=0)) / lengths
+
+    fine = dict(zip(NODES, swum, strict=False))
+    of_limit = distance(fine[NODES[-1]], limit) / 3.0  # of second order in the edges, which are half as long there
+    found = []
+    for (nodes, numerics), hub in zip(settings, swum[len(NODES) :], strict=True):
+        space, in_time = distance(fine[nodes], limit) + of_limit, distance(hub, fine[nodes])
+        found.append(
+            CertifiedSetting(
+                nodes, numerics.scheme, numerics.step, numerics.newton_tolerance,
+                errors=by_class(space + in_time, samples),
+                space_error=_rounded(max(by_class(space, samples)[name] for name in PROMISED)),
+                time_error=_rounded(max(by_class(in_time, samples)[name] for name in PROMISED)),
+                speed=_rounded(speed(at(scene, nodes, numerics), commands)),
+            )
+        )  # fmt: skip
+    return Certificate(
+        physics_of(scene), tuple(found), PROMISED, ACTIONS, samples,
+        limit_error=max(by_class(of_limit, samples)[name] for name in PROMISED),
+        classes=VERSION, version=__version__, machine=machine(),
+    )  # fmt: skip
+
+
+def exceeded(
+    certificate: Certificate, scene: Scene, samples: int, seed: int, progress: Progress | None = None
+) -> dict[str, float]:
+    """Share of fresh sequences, by class, whose error exceeds the certificate's, for a scene at a measured setting.
+
+    The error is the whole one, against the limit. samples: Sequences per class. seed: Of these sequences; take another
+    one than that of the certificate.
+    """
+    setting = certificate.of(scene)
+    if setting is None:
+        raise ValueError(f"This setting was not measured: {shown(scene.numerics)}.")
+    commands = draw_classes(samples, scene.robot.n_limbs, seed)
+    limit, hub = swim_all([at(scene, MANY_NODES, SHORT), scene], commands, progress)
+    distances = _finite(np.linalg.norm(hub - limit, axis=-1).max(axis=0))
+    errors = (distances / path_lengths(limit, float(np.max(scene.robot.limb_length)))).reshape(len(CLASSES), samples)
+    return {name: float(np.mean(each > setting.errors[name])) for name, each in zip(CLASSES, errors, strict=True)}
+
+
+def machine() -> str:
+    """Machine that speeds are measured on."""
+    return f"{os.cpu_count()} cores, {platform.machine()}, Python {platform.python_version()}"
+
+
+def at(scene: Scene, nodes_per_limb: int, numerics: Numerics) -> Scene:
+    """The scene at a resolution of the continuum's discretisation and numerics."""
+    robot = replace(
+        scene.robot, nodes_per_limb=nodes_per_limb, discretisation="continuum", hub_hinge="opening"
+    )
+    return replace(scene, robot=robot, numerics=numerics)
+
+
+def physics_of(scene: Scene) -> Scene:
+    """The scene that a certificate keeps."""
+    return at(scene, 10, Numerics())
+
+
+def swim(scene: Scene, commands: Floats) -> Floats:
+    """Hub at the ends of strokes from rest [m], shape (STROKES, n, 2); NaN for robots on which the solver failed."""
+    simulator, hub = Simulator(scene, commands.shape[1], threads=1), []
+    for each in commands:
+        failed = simulator.stroke(each).status > 0
+        hub.append(np.where(failed[:, None], np.nan, simulator.hub_position()))
+    return np.array(hub)
+
+
+def swim_all(scenes: list[Scene], commands: Floats, progress: Progress | None = None) -> list[Floats]:
+    """Swims of all sequences with every scene, on all processors, the dearest first."""
+    groups = [slice(k, k + GROUP) for k in range(0, commands.shape[1], GROUP)]
+    jobs = [
+        Job(scene, commands[:, group], scene.robot.nodes_per_limb * scene.robot.n_limbs / scene.numerics.step)
+        for scene in scenes
+        for group in groups
+    ]
+    order, done, total = sorted(range(len(jobs)), key=lambda k: -jobs[k].cost), 0.0, sum(job.cost for job in jobs)
+    found: dict[int, Floats] = {}
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for k, hub in zip(order, pool.map(lambda k: swim(jobs[k].scene, jobs[k].commands), order), strict=True):
+            found[k] = hub
+            done += jobs[k].cost
+            if progress is not None:
+                progress(done / total)
+    parts = [found[k] for k in range(len(jobs))]
+    n = len(groups)
+    return [np.concatenate(parts[k * n : (k + 1) * n], axis=1) for k in range(len(scenes))]
+
+
+def path_lengths(hub: Floats, limb_length: float) -> Floats:
+    """Lengths of paths from the origin, at the ends of strokes [m], at least SHORTEST_PATH limb lengths."""
+    steps = np.diff(np.concatenate([np.zeros((1, *hub.shape[1:])), hub]), axis=0)
+    return np.fmax(np.linalg.norm(steps, axis=-1).sum(axis=0), SHORTEST_PATH * limb_length)
+
+
+def by_class(errors: Floats, samples: int) -> dict[str, float]:
+    """Largest error of every class, rounded upwards to two digits."""
+    largest = errors.reshape(len(CLASSES), samples).max(axis=1)
+    return {name: _rounded(float(error)) for name, error in zip(CLASSES, largest, strict=True)}
+
+
+def speed(scene: Scene, commands: Floats, strokes: int = 3) -> float:
+    """Simulated time over processor time of a batch on one core, the best of some strokes."""
+    simulator, best = Simulator(scene, min(64, commands.shape[1]), threads=1), np.inf
+    for k in range(strokes):
+        begin = time.thread_time()
+        simulator.stroke(commands[k % STROKES, : simulator.n_robots])
+        best = min(best, time.thread_time() - begin)
+    return float(scene.actuator.period * simulator.n_robots / best)
+
+
+def _finite(distances: Floats) -> Floats:
+    return np.where(np.isnan(distances), np.inf, distances)
+
+
+def _rounded(number: float, digits: int = 2) -> float:
+    """Rounded upwards, so that a promise is not less than what was measured."""
+    if not np.isfinite(number) or number <= 0.0:
+        return number
+    unit = 10.0 ** (np.floor(np.log10(number)) - digits + 1)
+    return float(f"{np.ceil(number / unit - 1e-9) * unit:.{digits}g}")

@@ -1,0 +1,61 @@
+"""Errors and speed that `info` promises: of the package's own table, or of a certificate."""
+
+import math
+import warnings
+from os import PathLike
+from pathlib import Path
+
+from seastar_gym.scene import Scene
+from seastar_gym.scene.certificate import Certificate, physics
+from seastar_gym.scene.checks import shown
+from seastar_gym.scene.fidelity import measured
+from seastar_gym.scene.numerics import Fidelity
+
+NAMES = ("path_error", "space_error", "time_error", "real_time_factor")
+"""Entries of `info`."""
+
+
+def promised(scene: Scene, certificate: Certificate | None = None) -> dict[str, float]:
+    """Measured errors and speed of a scene by their names in `info`; NaN for scenes not measured.
+
+    The path error is that over every sequence of an environment's actions, repeated ones included.
+
+    certificate: Where they stand, the package's own table of the chapter's robot if None.
+    """
+    if certificate is None:
+        return _by_the_table(scene)
+    setting = certificate.of(scene) if physics(scene) == physics(certificate.scene) else None
+    if setting is None:
+        return dict.fromkeys(NAMES, math.nan)
+    numbers = setting.error(certificate.actions), setting.space_error, setting.time_error, setting.speed
+    return dict(zip(NAMES, numbers, strict=True))
+
+
+def _by_the_table(scene: Scene) -> dict[str, float]:
+    known = measured(scene)
+    if known is None:
+        return dict.fromkeys(NAMES, math.nan)
+    numbers = max(known.path_error, known.gait_error), known.space_error, known.time_error, known.speed
+    return dict(zip(NAMES, numbers, strict=True))
+
+
+def read_certificate(certificate: Certificate | str | PathLike[str] | None, scene: Scene) -> Certificate | None:
+    """Certificate of an object or a file; ValueError where it has lapsed for the scene."""
+    if certificate is None:
+        return None
+    if isinstance(certificate, str | PathLike):
+        certificate = Certificate.load(Path(certificate))
+    if not isinstance(certificate, Certificate):
+        raise ValueError(f"certificate must be a Certificate or a file of one, not {shown(certificate)}.")
+    certificate.require_valid(scene)
+    return certificate
+
+
+def warn_uncertified(scene: Scene, fidelity: Fidelity | None, certificate: object) -> None:
+    """Warn where a fidelity is asked of a scene for which nothing was measured."""
+    if fidelity is not None and certificate is None and measured(scene) is None:
+        warnings.warn(
+            f'Errors of this scene were not measured, so fidelity="{fidelity}" promises nothing for it, and errors in '
+            "info are NaN: python -m seastar_gym.certify measures them.",
+            stacklevel=3,
+        )

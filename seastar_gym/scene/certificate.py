@@ -1,0 +1,174 @@
+"""`Certificate`: measured errors of one scene, written by `python -m seastar_gym.certify`.
+
+A certificate is a JSON file. It lapses where the scene's physics or the version of the package differ: then it is
+refused with a sentence.
+"""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, cast
+
+from seastar_gym.scene.checks import is_finite_number, shown
+from seastar_gym.scene.numerics import Numerics, SchemeName
+from seastar_gym.scene.robot import Discretisation
+from seastar_gym.scene.scene import Scene
+from seastar_gym.version import __version__
+
+FORMAT = 1
+"""Version of the file's form."""
+
+
+@dataclass(frozen=True)
+class CertifiedSetting:
+    """A resolution and numerics, with the errors and the speed of one scene.
+
+    Errors are fractions of the hub's path in the continuum, over ten strokes from rest, each the largest of all
+    sequences of a class. An error is the sum of that of space and that of time, sequence by sequence.
+
+    nodes_per_limb, scheme, step [s], newton_tolerance: The setting, of the continuum's discretisation.
+    errors: Sum of the errors of space and time, by class of commands, see `seastar_gym.certify.commands`.
+    space_error, time_error: Largest errors of all classes of full amplitude.
+    speed: Simulated time over computing time, for a batch on one core.
+    """
+
+    nodes_per_limb: int
+    scheme: str
+    step: float
+    newton_tolerance: float
+    errors: Mapping[str, float]
+    space_error: float
+    time_error: float
+    speed: float
+
+    @property
+    def numerics(self) -> Numerics:
+        """Numerics of the setting."""
+        return Numerics(cast(SchemeName, self.scheme), self.step, self.newton_tolerance)
+
+    def error(self, classes: tuple[str, ...]) -> float:
+        """Largest error over some classes."""
+        return max(self.errors[name] for name in classes)
+
+    def __str__(self) -> str:
+        return f'"{self.scheme}" at {1e3 * self.step:g} ms with {self.nodes_per_limb} nodes per limb'
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Errors of a handful of settings for one scene.
+
+    scene: The scene; its nodes per limb, discretisation and numerics do not count.
+    settings: Measured settings.
+    promised: Classes of commands over which `for_error` promises; the others are there to be read.
+    actions: Those of them that an environment's actions can make.
+    samples: Sequences per class. With n of them, at most a share s of all sequences of a class errs by more than the
+        largest that was measured, with the confidence 1 - (1 - s)^n.
+    limit_error: Error of the swims that stand for the continuum, estimated from half as many edges; it is in all
+        errors.
+    classes, version, machine: Version of the classes of commands, of the package, and where speeds were measured.
+    """
+
+    scene: Scene
+    settings: tuple[CertifiedSetting, ...]
+    promised: tuple[str, ...]
+    actions: tuple[str, ...]
+    samples: int
+    limit_error: float
+    classes: int
+    version: str
+    machine: str
+
+    def confidence(self, share: float = 0.05) -> float:
+        """Confidence that at most this share of all sequences of a class errs by more than the error of the class."""
+        return 1.0 - (1.0 - share) ** self.samples
+
+    def require_valid(self, scene: Scene) -> None:
+        """ValueError where the certificate has lapsed: for another scene or version of the package."""
+        if self.version != __version__:
+            raise ValueError(
+                f"The certificate is of version {self.version} of seastar_gym, not of this one, {__version__}: certify "
+                "the scene again."
+            )
+        if physics(scene) != physics(self.scene):
+            raise ValueError(
+                "The certificate is of another scene, which differs in more than numerics and nodes per limb: certify "
+                "this one with python -m seastar_gym.certify."
+            )
+
+    def of(self, scene: Scene) -> CertifiedSetting | None:
+        """The setting of a scene, None where it was not measured."""
+        if scene.robot.discretisation != "continuum":
+            return None
+        wanted = scene.robot.nodes_per_limb, scene.numerics
+        return next((each for each in self.settings if (each.nodes_per_limb, each.numerics) == wanted), None)
+
+    def for_error(self, error: float, classes: tuple[str, ...] | None = None) -> Scene:
+        """The scene at the fastest setting whose error is at most `error`; ValueError if there is none.
+
+        error: Of the hub's path, as a fraction of its length. classes: Classes of commands, `promised` if None.
+        """
+        if not is_finite_number(error) or error <= 0.0:
+            raise ValueError(f"error must be a positive, finite share of the path's length, not {shown(error)}.")
+        asked = self.promised if classes is None else classes
+        if unknown := sorted(set(asked) - set(self.settings[0].errors)):
+            known = ", ".join(self.settings[0].errors)
+            raise ValueError(f"Classes of commands are {known}, not {', '.join(map(str, unknown))}.")
+        for setting in sorted(self.settings, key=lambda each: -each.speed):
+            if setting.error(asked) <= error:
+                return self.at(setting)
+        best = min(self.settings, key=lambda each: each.error(asked))
+        raise ValueError(
+            f"No measured setting keeps the path error of this scene below {100 * error:g} %: the best, {best}, keeps "
+            f"{100 * best.error(asked):.2g} %."
+        )
+
+    def at(self, setting: CertifiedSetting) -> Scene:
+        """The scene at a setting."""
+        robot = replace(self.scene.robot, nodes_per_limb=setting.nodes_per_limb, discretisation="continuum")
+        return replace(self.scene, robot=robot, numerics=setting.numerics)
+
+    def save(self, file: Path | str) -> None:
+        """Write the certificate as JSON."""
+        data = {
+            "format": FORMAT, **{name: getattr(self, name) for name in self.__dataclass_fields__},
+            "scene": self.scene.to_dict(), "settings": [asdict(each) for each in self.settings],
+        }  # fmt: skip
+        Path(file).write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+
+    @classmethod
+    def load(cls, file: Path | str) -> "Certificate":
+        """Read a certificate. ValueError for a file that is none."""
+        try:
+            text = Path(file).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as unread:
+            raise ValueError(f"A certificate cannot be read from {shown(str(file))}.") from unread
+        try:
+            data = json.loads(text)
+            if data.pop("format") != FORMAT:
+                raise ValueError("it has another form")
+            settings = tuple(_read_setting(each) for each in data.pop("settings"))
+            if not settings:
+                raise ValueError("it has no setting")
+            promised, actions = tuple(data.pop("promised")), tuple(data.pop("actions"))
+            return cls(Scene.from_dict(data.pop("scene")), settings, promised, actions, **data)
+        except (AttributeError, KeyError, TypeError, ValueError) as damaged:
+            raise ValueError(f"{file} is no certificate: {str(damaged).rstrip('.')}.") from damaged
+
+
+def _read_setting(data: dict[str, Any]) -> CertifiedSetting:
+    setting = CertifiedSetting(**data)
+    numbers = (*setting.errors.values(), setting.space_error, setting.time_error, setting.speed)
+    if not all(isinstance(number, float | int) and not math.isnan(number) for number in numbers):
+        raise ValueError("an error is no number")
+    _ = setting.numerics
+    return setting
+
+
+def physics(scene: Scene) -> Scene:
+    """The scene with one resolution and numerics for all: what a certificate is about."""
+    discretisation: Discretisation = "continuum"
+    robot = replace(scene.robot, nodes_per_limb=10, discretisation=discretisation, hub_hinge="opening")
+    return replace(scene, robot=robot, numerics=Numerics())

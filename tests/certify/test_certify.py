@@ -1,0 +1,223 @@
+"""Certificates of scenes: what they measure, promise and refuse, and when they lapse."""
+
+import json
+import sys
+import warnings
+from dataclasses import replace
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import seastar_gym
+from refusals import assert_refused
+from seastar_gym import Certificate, Contact, Numerics, Scene, Seastar, Simulator, SmaPulse
+from seastar_gym.certify import command, commands, measure
+from seastar_gym.envs.spec import PlainSpec
+
+SMALL_ROBOT = Seastar(limb_length=0.08)
+SCENE = Scene(SMALL_ROBOT)
+SAMPLES = 2
+
+
+@pytest.fixture(scope="module")
+def few_settings():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(measure, "NODES", (5, 9))
+        patch.setattr(measure, "MANY_NODES", 17)
+        patch.setattr(measure, "SHORT", Numerics("implicit-midpoint", 1e-3, 1e-8))
+        patch.setattr(measure, "NUMERICS", (Numerics("sdirk2", 2e-2, 1e-6), Numerics("implicit-midpoint", 2e-3, 1e-7)))
+        yield
+
+
+@pytest.fixture(scope="module")
+def certificate(few_settings):
+    return seastar_gym.certify(SCENE, SAMPLES)
+
+
+def test_every_setting_has_the_errors_of_every_class_and_more_nodes_leave_less_error_of_space(certificate):
+    assert [each.nodes_per_limb for each in certificate.settings] == [5, 5, 9, 9]
+    for each in certificate.settings:
+        assert set(each.errors) == set(commands.CLASSES)
+        assert 0.0 < each.time_error < each.error(certificate.promised) <= each.space_error + each.time_error + 1e-2
+    coarse, fine = certificate.settings[0], certificate.settings[2]
+    assert fine.space_error < 0.6 * coarse.space_error
+    assert 0.0 < certificate.limit_error < fine.space_error
+
+
+def test_errors_bound_those_of_the_sequences_they_were_measured_on(certificate):
+    drawn = commands.draw_classes(SAMPLES, 5, 0)
+    limit = measure.swim(measure.at(SCENE, 33, measure.SHORT), drawn)
+    lengths = measure.path_lengths(limit, 0.08)
+    for each in certificate.settings:
+        hub = measure.swim(certificate.at(each), drawn)
+        errors = np.linalg.norm(hub - limit, axis=-1).max(axis=0) / lengths
+        for name, found in zip(commands.CLASSES, errors.reshape(-1, SAMPLES), strict=True):
+            assert found.max() <= each.errors[name] * 1.05, (str(each), name)
+
+
+def test_for_error_is_the_fastest_setting_that_keeps_it(certificate):
+    errors = {each.error(certificate.promised): each for each in certificate.settings}
+    fastest = max(certificate.settings, key=lambda each: each.speed)
+    assert certificate.for_error(max(errors)).numerics == fastest.numerics
+    best = certificate.for_error(min(errors))
+    assert (best.robot.nodes_per_limb, best.numerics) == (
+        errors[min(errors)].nodes_per_limb, errors[min(errors)].numerics,
+    )  # fmt: skip
+    assert best.robot.limb_length == 0.08
+    with assert_refused("No measured setting keeps"):
+        certificate.for_error(1e-9)
+    with assert_refused("positive, finite"):
+        certificate.for_error(-1.0)
+    with assert_refused("Classes of commands are"):
+        certificate.for_error(0.1, ("of yesterday",))
+
+
+def test_the_share_of_fresh_sequences_that_exceed_an_error_is_counted(certificate):
+    shares = measure.exceeded(certificate, certificate.at(certificate.settings[3]), 4, seed=1)
+    assert set(shares) == set(commands.CLASSES) and all(0.0 <= share <= 1.0 for share in shares.values())
+    nothing = tuple(replace(each, errors=dict.fromkeys(commands.CLASSES, 0.0)) for each in certificate.settings)
+    none_kept = replace(certificate, settings=nothing)
+    assert set(measure.exceeded(none_kept, certificate.at(certificate.settings[3]), 2, seed=1).values()) == {1.0}
+    with assert_refused("not measured"):
+        measure.exceeded(certificate, replace(SCENE, numerics=Numerics("sdirk3", 1e-3)), 2, seed=1)
+
+
+def test_a_certificate_is_read_back_as_it_was_written(certificate, tmp_path):
+    certificate.save(tmp_path / "mine.json")
+    assert Certificate.load(tmp_path / "mine.json") == certificate
+
+
+DAMAGES = (
+    lambda data: data.pop("settings"),
+    lambda data: data.update(format=7),
+    lambda data: data["settings"][0].update(speed="fast"),
+    lambda data: data.update(settings=[]),
+    lambda data: data.update(scene={}),
+)
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_certificate_is_refused(certificate, tmp_path, damage):
+    certificate.save(tmp_path / "mine.json")
+    data = json.loads((tmp_path / "mine.json").read_text(encoding="utf-8"))
+    damage(data)
+    (tmp_path / "mine.json").write_text(json.dumps(data), encoding="utf-8")
+    with assert_refused("is no certificate"):
+        Certificate.load(tmp_path / "mine.json")
+
+
+def test_the_environment_tells_the_errors_of_a_certified_scene(certificate, tmp_path):
+    setting = certificate.settings[2]
+    certificate.save(tmp_path / "mine.json")
+    for given in (certificate, tmp_path / "mine.json", str(tmp_path / "mine.json")):
+        env = gym.make("SeastarSwim-v0", scene=certificate.at(setting), certificate=given)
+        info = env.reset(seed=0)[1]
+        assert info["path_error"] == setting.error(certificate.actions)
+        assert (info["space_error"], info["time_error"]) == (setting.space_error, setting.time_error)
+        assert info["real_time_factor"] == setting.speed
+    envs = gym.make_vec("SeastarSwim-v0", 3, vectorization_mode="vector_entry_point",
+                        scene=certificate.at(setting), certificate=certificate)  # fmt: skip
+    assert (envs.reset(seed=0)[1]["path_error"] == setting.error(certificate.actions)).all()
+    assert isinstance(env.unwrapped, PlainSpec)
+    assert json.loads(env.spec.to_json())["kwargs"]["certificate"] == str(tmp_path / "mine.json")
+    unmeasured = gym.make(
+        "SeastarSwim-v0", scene=replace(certificate.at(setting), numerics=Numerics()), certificate=certificate
+    )
+    assert np.isnan(unmeasured.reset(seed=0)[1]["path_error"])
+
+
+@pytest.mark.parametrize("other", [Scene(), replace(SCENE, contact=Contact()), replace(SCENE, actuator=SmaPulse(0.5))])
+def test_a_certificate_lapses_for_another_scene(certificate, other):
+    with assert_refused("of another scene"):
+        gym.make("SeastarSwim-v0", scene=other, certificate=certificate)
+
+
+def test_a_certificate_lapses_with_the_version(certificate):
+    with assert_refused("of version 0.0.1"):
+        gym.make("SeastarSwim-v0", scene=SCENE, certificate=replace(certificate, version="0.0.1"))
+
+
+def test_a_certificate_is_one_or_a_file_of_one():
+    with assert_refused("certificate must be a Certificate"):
+        gym.make("SeastarSwim-v0", certificate=3)
+    with assert_refused("cannot be read"):
+        gym.make("SeastarSwim-v0", certificate="not there.json")
+
+
+def test_a_fidelity_for_an_uncertified_scene_warns_with_the_command_that_measures_it():
+    with pytest.warns(UserWarning, match=r"python -m seastar_gym\.certify"):
+        gym.make("SeastarSwim-v0", scene=SCENE, fidelity="fast")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        gym.make("SeastarSwim-v0", fidelity="fast")
+
+
+def test_scenes_without_one_answer_are_refused():
+    for scene, word in (
+        (Scene(Seastar(limb_length=np.array([0.1, 0.2]))), "of_robot"),
+        (Scene(held_nodes=(0,)), "Held and loaded nodes"),
+        (Scene(actuator=SmaPulse(0.0)), "Nothing moves"),
+        (3, "needs a Scene"),
+    ):
+        with assert_refused(word):
+            seastar_gym.certify(scene)
+    with assert_refused("samples"):
+        seastar_gym.certify(Scene(), samples=1)
+
+
+@pytest.mark.parametrize("n_limbs", [1, 2, 3, 5, 12])
+def test_classes_are_drawn_for_any_number_of_limbs(n_limbs):
+    drawn = commands.draw_classes(4, n_limbs, 0)
+    assert drawn.shape == (commands.STROKES, 4 * len(commands.CLASSES), n_limbs)
+    assert np.abs(drawn).max() <= 1.0
+    np.testing.assert_array_equal(drawn, commands.draw_classes(4, n_limbs, 0))
+    classes = dict(zip(commands.CLASSES, np.split(drawn, len(commands.CLASSES), axis=1), strict=True))
+    assert np.isin(classes["random ternary"], (-1, 0, 1)).all()
+    assert classes["random ternary"].any(axis=-1).all()
+    assert (classes["repeated continuous"] == classes["repeated continuous"][0]).all()
+    assert (classes["alternating ternary"] == classes["alternating ternary"][[0, 1] * 5]).all()
+    assert (np.count_nonzero(classes["opposed neighbours"], axis=-1) == min(2, n_limbs)).all()
+    assert np.abs(classes["small"]).max() <= 0.1
+
+
+def test_confidence_is_that_of_the_largest_of_so_many_samples(certificate):
+    assert replace(certificate, samples=60).confidence() == pytest.approx(0.954, abs=1e-3)
+
+
+def test_failed_robots_have_no_bound():
+    assert measure._rounded(np.inf) == np.inf
+    assert measure._rounded(0.0123) == 0.013
+    assert measure._rounded(0.012) == 0.012
+
+
+def test_the_command_writes_certificate_and_picture(few_settings, tmp_path, monkeypatch, capsys):
+    (tmp_path / "mine.py").write_text(
+        "from seastar_gym import Scene, Seastar\nscene = Scene(Seastar(limb_length=0.08))\n", encoding="utf-8"
+    )
+    out = tmp_path / "certificate.json"
+    arguments = [str(tmp_path / "mine.py"), "--samples", "2", "--error", "0.9", "--out", str(out)]
+    monkeypatch.setattr(sys, "argv", ["certify", *arguments])
+    assert command.main() == 0
+    assert Certificate.load(out).scene.robot.limb_length == 0.08
+    assert out.with_suffix(".png").stat().st_size > 10_000
+    assert "90 %: nodes_per_limb=5" in capsys.readouterr().out
+    (tmp_path / "mine.py").write_text("scene = 3\n", encoding="utf-8")
+    assert command.main() == 2
+    assert "must define `scene`" in capsys.readouterr().err
+    file_of_scene = tmp_path / "mine.json"
+    file_of_scene.write_text(json.dumps(SCENE.to_dict()), encoding="utf-8")
+    assert command.load_scene(file_of_scene) == SCENE
+    assert command.load_scene(None) == Scene()
+
+
+def test_swims_of_many_groups_are_those_of_one_batch(monkeypatch):
+    monkeypatch.setattr(measure, "GROUP", 5)
+    drawn, scene = commands.draw_classes(2, 5, 1), measure.at(SCENE, 5, Numerics("sdirk2", 2e-2, 1e-6))
+    shares = []
+    (swum,) = measure.swim_all([scene], drawn, shares.append)
+    np.testing.assert_array_equal(swum, measure.swim(scene, drawn))
+    assert shares[-1] == pytest.approx(1.0)
+    simulator = Simulator(scene, drawn.shape[1])
+    simulator.stroke(drawn[0])
+    np.testing.assert_array_equal(swum[0], simulator.hub_position())
