@@ -83,10 +83,10 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `waypoint_index`         | int        | 1    | number of waypoints reached so far                               |
     | `distance`               | float      | m    | distance of the hub from the current waypoint                    |
     | `cross_track_error`      | float      | m    | distance of the hub from the current leg of the path             |
-    | `error_estimate`         | float      | m    | estimate of the hub's error since the reset; NaN: no `error_bars` |
     | `path_error`             | float      | 1    | measured error of the hub's path, as a fraction of its length    |
     | `space_error`            | float      | 1    | part of it that more nodes per limb would remove                 |
     | `time_error`             | float      | 1    | part of it that shorter time steps would remove                  |
+    | `error_estimate`         | float      | m    | estimate of the hub's error, only with `error_bars`              |
     | `real_time_factor`       | float      | 1    | measured simulated time per computing time, batch on one core    |
     | `is_success`             | bool       | -    | whether the last waypoint is reached                             |
     | `limbs_heated`           | int        | 1    | number of limbs heated in the stroke                             |
@@ -102,7 +102,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     `time_error` are those of the usual swims, straight, round the pentagon, or of random commands. They belong to the
     robot's resolution and the numerics (see `seastar_gym.scene.fidelity`), and are NaN for other robots and scenes than
     the chapter's, unless a `certificate` has them, and for what was not measured. `error_estimate` is of the very swim,
-    of any robot: the true error, of space and time, lies below it in about 95 % of strokes (docs/error_bars.md).
+    of any robot: the true error since the reset, of space and time, lies below it in about 95 % of strokes
+    (docs/error_bars.md); NaN after a failure.
     With `randomization`, `info` has the drawn numbers by their names, too.
 
     ## Starting state

@@ -110,6 +110,7 @@ class SwimTask:
         self.scene, self.randomization = scene, randomization
         self.drawn = {} if randomization is None else randomization.first_values(scene, n_robots)
         self.simulator = Simulator(drawn_scene(scene, self.drawn), n_robots, threads, error_bars)
+        self._error_bars = error_bars
         self.certificate = read_certificate(certificate, scene)
         self._promise = self.simulator.scene, promised(self.simulator.scene, self.certificate)
         peak = np.max(self.simulator.scene.actuator.peak_angle)  # before the first draw the largest that may be drawn
@@ -262,8 +263,8 @@ class SwimTask:
             "waypoint_index": self.waypoint_index.copy(),
             "distance": _length(current - hub),
             "cross_track_error": cross_track_error(hub, self._waypoint(leg - 1), self._waypoint(leg)),
-            "error_estimate": self.simulator.error_estimate,
             **self._promised(),
+            **({"error_estimate": self.simulator.error_estimate} if self._error_bars else {}),
             **{name: values.copy() for name, values in self.drawn.items()},
         }
 

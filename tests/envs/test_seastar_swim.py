@@ -22,8 +22,8 @@ from seastar_gym.scene.fidelity import promise
 STRAIGHT = np.array([0, 1, 0, 0, 2])
 REST = np.zeros(5, int)
 FACTS = {
-    "time", "hub_position", "waypoint_index", "distance", "cross_track_error", "error_estimate",
-    "path_error", "space_error", "time_error", "real_time_factor",
+    "time", "hub_position", "waypoint_index", "distance", "cross_track_error", "path_error",
+    "space_error", "time_error", "real_time_factor",
 }  # fmt: skip
 OF_A_STROKE = {
     "is_success", "limbs_heated", "newton_iterations", "solver_status", "solver_message", "smallest_opening_angle",

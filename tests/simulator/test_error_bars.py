@@ -286,9 +286,10 @@ def test_info_has_the_estimate_alone_as_in_the_batch():
 
 
 def test_info_has_no_estimate_without_error_bars():
+    """NaN would differ from itself in Gymnasium's checker, which compares two runs."""
     env = SeastarSwimEnv(fidelity="fast")
-    assert np.isnan(env.reset(seed=0)[1]["error_estimate"])
-    assert np.isnan(env.step([0, 1, 0, 0, 2])[4]["error_estimate"])
+    assert "error_estimate" not in env.reset(seed=0)[1]
+    assert "error_estimate" not in env.step([0, 1, 0, 0, 2])[4]
 
 
 def test_drawn_robots_have_estimates():
