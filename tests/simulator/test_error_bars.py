@@ -18,6 +18,7 @@ from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator import batch as module
 from seastar_gym.simulator import error_bars
+from seastar_gym.simulator import simulator as simulator_module
 
 FAST = Scene.preset("fast")
 N_ROBOTS = N_LANES + 3
@@ -164,6 +165,19 @@ def test_an_interrupted_stroke_has_not_begun_for_the_twin_either(monkeypatch, ca
     assert_same(simulator, other)
     simulator.stroke(COMMANDS[1])
     other.stroke(COMMANDS[1])
+    assert_same(simulator, other)
+
+
+def test_a_stroke_interrupted_at_its_very_end_leaves_the_estimate_as_it_was(monkeypatch):
+    simulator, other = swimmers(), swimmers()
+
+    def interrupt(*arguments):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(simulator_module, "make_report", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            simulator.stroke(COMMANDS[2])
     assert_same(simulator, other)
 
 
