@@ -95,6 +95,7 @@ class SwimTask:
         threads: int | None,
         randomization: DomainRandomization | Plain | None = None,
         certificate: Certificate | str | PathLike[str] | None = None,
+        error_bars: bool = False,
     ):
         randomization, reward = read(randomization, DomainRandomization), read(reward, RewardWeights)
         if not isinstance(randomization, DomainRandomization | None):
@@ -108,7 +109,8 @@ class SwimTask:
         waypoints = make_path(path, np.random.default_rng(0))  # refuses a bad path now, not at the first reset
         self.scene, self.randomization = scene, randomization
         self.drawn = {} if randomization is None else randomization.first_values(scene, n_robots)
-        self.simulator = Simulator(drawn_scene(scene, self.drawn), n_robots, threads)
+        self.simulator = Simulator(drawn_scene(scene, self.drawn), n_robots, threads, error_bars)
+        self._error_bars = error_bars
         self.certificate = read_certificate(certificate, scene)
         self._promise = self.simulator.scene, promised(self.simulator.scene, self.certificate)
         peak = np.max(self.simulator.scene.actuator.peak_angle)  # before the first draw the largest that may be drawn
@@ -262,6 +264,7 @@ class SwimTask:
             "distance": _length(current - hub),
             "cross_track_error": cross_track_error(hub, self._waypoint(leg - 1), self._waypoint(leg)),
             **self._promised(),
+            **({"error_estimate": self.simulator.error_estimate} if self._error_bars else {}),
             **{name: values.copy() for name, values in self.drawn.items()},
         }
 

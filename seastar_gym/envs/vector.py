@@ -75,6 +75,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         threads: int | None = None,
         randomization: DomainRandomization | Plain | None = None,
         certificate: Certificate | str | PathLike[str] | None = None,
+        error_bars: bool = False,
     ):
         if render_mode is not None and not (isinstance(render_mode, str) and render_mode == "rgb_array"):
             raise ValueError(
@@ -92,8 +93,9 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         modelled = make_scene(scene, fidelity)
         warn_uncertified(modelled, fidelity, certificate)
         task = SwimTask(
-            modelled, num_envs, path, reward, waypoint_radius, random_heading, threads, randomization, certificate
-        )
+            modelled, num_envs, path, reward, waypoint_radius, random_heading, threads, randomization, certificate,
+            error_bars,
+        )  # fmt: skip
         self.single_action_space, self.single_observation_space = self._set_task(task, actions)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)

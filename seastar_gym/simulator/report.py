@@ -56,6 +56,8 @@ class StrokeReport(NamedTuple):
         der/stepping/guard.py.
     covered: Time covered [s].
     smallest_opening_angle: Smallest angle between neighbouring limbs at the hub [rad]. Below zero, limbs crossed.
+    error_estimate: Estimate of the hub's error, of space and time [m]: a bound that holds in about 95 % of strokes, see
+        error_bars.py. NaN without `error_bars`.
     """
 
     status: NDArray[np.int64]
@@ -68,9 +70,12 @@ class StrokeReport(NamedTuple):
     energy_cuts: NDArray[np.int64]
     covered: Floats
     smallest_opening_angle: Floats
+    error_estimate: Floats
 
 
-def make_report(status: Floats, rows: Mapping[str, Floats], hub_hinge: str) -> StrokeReport:
+def make_report(
+    status: Floats, rows: Mapping[str, Floats], hub_hinge: str, error_estimate: Floats
+) -> StrokeReport:
     """Report of a stroke from the kernels' numbers, shape (n_robots,) each.
 
     rows: Numbers by name, see REPORT_ROWS in der/stepping/report.py.
@@ -82,5 +87,6 @@ def make_report(status: Floats, rows: Mapping[str, Floats], hub_hinge: str) -> S
         status=status.astype(np.int64),
         covered=rows["covered"],
         smallest_opening_angle=angle,
+        error_estimate=error_estimate,
         **{name: rows[name].astype(np.int64) for name in COUNTS},
     )

@@ -12,7 +12,7 @@ from seastar_gym.der.rods import Work
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.coefficients import Coefficients
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import as_array, as_floats, require_count, shown
+from seastar_gym.scene.checks import as_array, as_floats, require_count, require_flag, shown
 from seastar_gym.scene.numerics import MAX_STEPS
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import write_rows
@@ -21,6 +21,7 @@ from seastar_gym.simulator.body_frame import best_fit_heading
 from seastar_gym.simulator.clock import Clock
 from seastar_gym.simulator.commands import checked_commands
 from seastar_gym.simulator.drive import Drive
+from seastar_gym.simulator.error_bars import ErrorBars, twin_scene
 from seastar_gym.simulator.lock import BROKEN_OFF, StrokeLock
 from seastar_gym.simulator.report import StrokeReport, make_report
 from seastar_gym.simulator.schedule import step_times
@@ -40,6 +41,7 @@ class Before(NamedTuple):
     rows: dict[str, Any]
     clock: Clock
     drive: dict[str, Any]
+    bars: Any
 
 
 class Simulator:
@@ -49,17 +51,20 @@ class Simulator:
     n_robots: Number of robots.
     threads: Number of threads that share the lane groups; all processors if None. A robot's trajectory is the same to
         the last bit whatever the batch, the lane and the number of threads.
+    error_bars: Whether to estimate the hub's error by a twin of shorter edges and steps, see error_bars.py. It changes
+        no bit of a trajectory, and a stroke takes four to five times as long.
 
     A stroke that is not completed (Ctrl-C, an exception, a generator that is closed or dropped) is undone. While a
     stroke is under way, other calls that would change the simulator are refused with a RuntimeError.
     """
 
-    def __init__(self, scene: Scene, n_robots: int = 1, threads: int | None = None):
+    def __init__(self, scene: Scene, n_robots: int = 1, threads: int | None = None, error_bars: bool = False):
         if not isinstance(scene, Scene):
             raise ValueError(f"Simulator needs a Scene, not {shown(scene)}.")
         require_count("n_robots", n_robots, 1, MAX_ROBOTS)
         if threads is not None:
             require_count("threads", threads, 1, MAX_THREADS)
+        require_flag("error_bars", error_bars)
         self.scene = scene
         self.n_robots = int(n_robots)
         available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -69,6 +74,9 @@ class Simulator:
         self._drive = Drive(scene.actuator, self.n_robots, scene.robot.n_limbs, self._times)
         self._clock = Clock(self.n_robots, scene.actuator.period)
         self._lock = StrokeLock()
+        self._bars: ErrorBars | None = None
+        if error_bars:
+            self._bars = ErrorBars(Simulator(twin_scene(scene), self.n_robots, self.threads), self.n_robots)
         self._make_curve()
         self.set_limb_strengths(scene.limb_strengths or 1.0)
 
@@ -99,7 +107,10 @@ class Simulator:
         """
         chosen = self._checked_mask(mask)
         with self._lock.change():
+            of_twin = None if self._bars is None else twin_scene(scene)  # may refuse, before anything changes
             self.coefficients.set_scene(scene, chosen)
+            if self._bars is not None and of_twin is not None:
+                self._bars.twin.set_scene(of_twin, chosen)
             if scene.actuator != self.scene.actuator:
                 self._set_actuator(scene)
             self.scene = scene
@@ -119,6 +130,8 @@ class Simulator:
             if self._lock.broken and of_all:
                 self._batch.make_coefficients(self.scene)
                 self._set_actuator(self.scene)
+                if self._bars is not None:
+                    self._bars.twin.set_scene(twin_scene(self.scene))
             elif self._lock.broken:
                 raise RuntimeError(BROKEN_OFF)
             yield
@@ -132,18 +145,22 @@ class Simulator:
     def close(self) -> None:
         """End the threads. A later stroke starts them again."""
         self._batch.workers.close()
+        if self._bars is not None:
+            self._bars.twin.close()
 
     def __getstate__(self) -> dict[str, Any]:
         self._lock.require_intact()
         drive = {"state": self._drive.state, "strengths": self._drive.strengths}
         arguments = (self.scene, self.n_robots, self.threads)
-        return {"arguments": arguments, "rows": self._batch.rows(), "clock": self._clock, "drive": drive}
+        rows = self._batch.rows()
+        return {"arguments": arguments, "rows": rows, "clock": self._clock, "drive": drive, "bars": self._bars}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__init__(*state["arguments"])  # type: ignore[misc]
         self._batch.put_rows(state["rows"])
         self._clock.put(state["clock"])
         vars(self._drive).update(state["drive"])
+        self._bars = state["bars"]
 
     def reset(self, mask: ArrayLike | None = None, heading: ArrayLike = 0.0) -> None:
         """Put robots at rest, with the hub at the origin and limb 1 in the direction `heading`.
@@ -162,6 +179,8 @@ class Simulator:
                 self._batch.put_at_rest(robot, angles[robot])
             self._drive.put(chosen, self._drive.at_rest[chosen])
             self._clock.set(chosen, 0.0)
+            if self._bars is not None:
+                self._bars.reset(chosen, angles)
 
     def get_state(self) -> State:
         """Copy of the state. After `set_state` with it, strokes give the same bits, if it was taken between strokes."""
@@ -169,7 +188,10 @@ class Simulator:
         return State(self.positions, self.velocities, self.time, self._drive.state.copy())
 
     def set_state(self, state: State) -> None:
-        """Put all robots into a state. Robots that had failed swim again."""
+        """Put all robots into a state. Robots that had failed swim again.
+
+        Their errors are not estimated until they are reset: the state has no like on the mesh of the twin.
+        """
         arrays = checked_state(state, self.n_robots, self.scene.robot.n_nodes, self._drive.at_rest)
         positions, velocities, time, actuators = arrays
         with self._new_state(of_all=True):
@@ -177,6 +199,8 @@ class Simulator:
             self._clock.set(slice(None), time)
             self._drive.put(slice(None), actuators)
             write_rows(self._batch.rotations, self._drive.rotations())
+            if self._bars is not None:
+                self._bars.lose()
 
     @property
     def actuators(self) -> Floats:
@@ -203,6 +227,8 @@ class Simulator:
             raise ValueError(f"limb_strengths must be numbers from 0 to 1 of shape {wanted[1:]} or {wanted}.")
         with self._lock.change():
             self._drive.strengths = np.broadcast_to(array, wanted).copy()
+            if self._bars is not None:
+                self._bars.twin.set_limb_strengths(array)
 
     @property
     def positions(self) -> Floats:
@@ -228,6 +254,14 @@ class Simulator:
     def failed(self) -> NDArray[np.bool_]:
         """Robots whose solver has given up, shape (n_robots,). They stay where they are until they are reset."""
         return self._batch.failed
+
+    @property
+    def error_estimate(self) -> Floats:
+        """Estimate of the error of every robot's hub [m], shape (n_robots,), as in the last StrokeReport.
+
+        0 at rest after a reset. NaN without `error_bars`, and until the next reset after `set_state` or a failure.
+        """
+        return np.full(self.n_robots, np.nan) if self._bars is None else self._bars.estimate
 
     def hub_position(self) -> Floats:
         """Position of the hub [m], world frame, shape (n_robots, 2)."""
@@ -288,7 +322,8 @@ class Simulator:
         checked = checked_commands(commands, self.scene, self._drive.strengths)
         self._lock.require_intact()
         stroke = self._lock.acquire()
-        before = Before(self._batch.moved(), self._clock.copy(), dict(vars(self._drive)))
+        bars = None if self._bars is None else self._bars.before()
+        before = Before(self._batch.moved(), self._clock.copy(), dict(vars(self._drive)), bars)
         try:
             self._begin_stroke(checked)
             yield stroke
@@ -304,6 +339,8 @@ class Simulator:
                 self._batch.put_back(before.rows)
                 self._clock.put(before.clock)
                 vars(self._drive).update(before.drive)
+                if self._bars is not None:
+                    self._bars.put_back(before.bars)
                 self._lock.release()
         except BaseException:  # interrupted once more: the robots are put back all the same
             self._put_back(stroke, before)
@@ -313,6 +350,8 @@ class Simulator:
         peaks, shape = self._drive.begin_stroke(commands)
         self._batch.begin_stroke(peaks, self._curve if shape is None else self._batch.shape_rows(shape))
         self._clock.begin_stroke()
+        if self._bars is not None:
+            self._bars.twin.stroke(commands)
 
     def _show(self, end: int) -> None:
         """Bring clock, actuators and rotations to the time step `end` of the stroke."""
@@ -325,4 +364,7 @@ class Simulator:
         self._clock.end_stroke(self.failed, rows["covered"])
         self._drive.advance(len(self._times) - 1)
         write_rows(self._batch.rotations, self._drive.rotations())
-        return make_report(self._batch.read(self._batch.status)[:, 0], rows, self.scene.robot.hub_hinge)
+        if self._bars is not None:
+            self._bars.compare(self.hub_position(), self.failed)
+        status = self._batch.read(self._batch.status)[:, 0]
+        return make_report(status, rows, self.scene.robot.hub_hinge, self.error_estimate)

@@ -62,7 +62,7 @@ def test_the_reward_has_the_terms_and_weights_of_the_table():
 
 
 def test_info_has_the_names_and_types_of_the_table():
-    env = SeastarSwimEnv(fidelity="fast")
+    env = SeastarSwimEnv(fidelity="fast", error_bars=True)
     for info in (env.reset(seed=0)[1], env.step([0, 1, 0, 0, 2])[4]):
         documented = {row["name"].strip("`"): row["type"] for row in table("Info")}
         assert set(info) == set(documented)

@@ -39,6 +39,7 @@ ARGUMENTS = {
         "randomization": DomainRandomization({"robot.density": Normal(1e3, 10 / 3), "fluid.density": Uniform(9, 99)}),
         "scene": SCENE,
     },
+    "error_bars": {"error_bars": True, "scene": SCENE},
     "plain": {
         "scene": SCENE.to_dict(),
         "reward": to_dict(RewardWeights(1.0)),

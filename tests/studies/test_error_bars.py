@@ -1,0 +1,46 @@
+"""The study of error bars: its shares against closed forms, and its page."""
+
+import numpy as np
+import pytest
+
+from seastar_gym.certify.commands import CLASSES, STROKES
+from studies.accuracy import error_bars as study
+
+N = 2 * len(CLASSES)
+
+
+def test_a_row_has_the_share_of_covered_strokes_and_the_class_with_the_lowest():
+    true, estimate = np.full((STROKES, N), 1e-5), np.full((STROKES, N), 3e-5)
+    true[:5, 6:8] = 4e-5  # two sequences of the fourth class
+    row = study.judged("a robot", "fast", 1.5, true, estimate)
+    assert row.coverage == pytest.approx(1.0 - 10 / true.size)
+    assert (row.lowest, row.lowest_class) == (0.5, list(CLASSES)[3])
+    assert row.sharpness == pytest.approx(3.0) and row.error == pytest.approx(1e-5)
+
+
+def test_a_robot_whose_solver_fails_is_not_covered(monkeypatch):
+    hub = np.zeros((STROKES, N, 2))
+    monkeypatch.setattr(study, "swim_with_bars", lambda scene, commands: (hub, np.full((STROKES, N), np.nan)))
+    true, estimate = study.true_and_estimated(None, None, hub + 1e-5)
+    assert study.judged("a robot", "fast", np.inf, true, estimate).coverage == 0.0
+
+
+def test_the_page_and_the_picture_show_every_robot(tmp_path):
+    pytest.importorskip("matplotlib")
+    rows = [
+        study.Row(robot, setting, 2.0, 0.97, 0.8, "small", 3.0, 1e-5)
+        for robot in study.ROBOTS for setting in study.SETTINGS
+    ]  # fmt: skip
+    page = study.as_markdown(rows, dict.fromkeys(study.SETTINGS, 4.0), samples=6)
+    for robot in study.ROBOTS:
+        assert page.count(f"| {robot} |") == len(study.FIDELITIES)
+    for setting in study.SETTINGS:
+        assert f"| {setting} | " in page
+    study.draw(rows, tmp_path / "error_bars.png")
+    assert (tmp_path / "error_bars.png").stat().st_size > 10_000
+
+
+@pytest.mark.slow
+def test_error_bars_of_the_chapters_robot_cover_fresh_sequences():
+    for row in study.measure(("the chapter's",), 2, (51, 52)):
+        assert row.coverage >= 0.9 and 1.0 < row.sharpness < 8.0
