@@ -35,6 +35,10 @@ SHIPPED = Path(__file__).parent / "policies" / "seastar.safetensors"
 Weights = dict[str, NDArray[np.float32]]
 
 
+RESOLUTION = "robot.nodes_per_limb"
+"""Fact of a scene that a policy does not depend on."""
+
+
 class LearnedPolicy:
     """Trained policy with the `predict` of Stable-Baselines3, from observations of the environment to its actions.
 
@@ -119,12 +123,15 @@ class LearnedPolicy:
             )
 
     def differences(self, scene: Scene) -> str:
-        """Sentence on how a scene differs from that of the training, numerics apart; empty where it does not."""
+        """Sentence on how a scene differs from the training's, but for resolution and numerics; empty if it does not.
+
+        A policy sees the same stations of any mesh.
+        """
         ours, theirs = _flat(asdict(self.scene)), _flat(asdict(scene))
         parts = [
             f"{name} {ours.get(name)} (here {theirs.get(name)})"
             for name in sorted(ours | theirs)
-            if ours.get(name) != theirs.get(name) and name.split(".")[0] != "numerics"
+            if ours.get(name) != theirs.get(name) and name.split(".")[0] != "numerics" and name != RESOLUTION
         ]
         return f"trained in another scene, with {', '.join(parts)}." if parts else ""
 
