@@ -26,7 +26,7 @@ Kernels are called by entry points alone, or one by one as plain Python: `drag_s
 ask of a processor is listed in numpy_lanes.py. NUMBA_DISABLE_JIT=1 runs everything so, in any debugger, thousands of
 times slower.
 
-Work of a Newton iteration of the chapter's robot (46 nodes), counted by studies.speed.operations; shares of the
+Work of a Newton iteration of the chapter's discretisation (46 nodes), counted by studies.speed.operations; shares of the
 time are those of an AVX-512 processor, `python -m studies.speed.throughput` measures them on any:
 
 part            kflop   time    what
@@ -35,7 +35,10 @@ limbs            9.5    80 %    assembly and elimination in one sweep, 211 flop 
 ring             0.8     8 %    elimination of root nodes and hub (star_matrix.py)
 substitution     1.0     9 %    back through the limbs, and the Newton step (star_matrix.py, newton.py)
 
-A node of a limb takes 58 products, 52 fused products, 42 sums, 4.6 divisions and 1.9 roots. The sweep runs at half the
+In the continuum's discretisation limbs take 11.8 kflop, because the middles of edges have drag and inertia too, the hub
+0.7 instead of the ring, 13.7 in all.
+
+A node of the chapter's limbs takes 58 products, 52 fused products, 42 sums, 4.6 divisions and 1.9 roots. The sweep runs at half the
 peak of fused products; it is bound by the number of instructions (twice the lanes take twice the time, half the lanes
 save a tenth), not by the divider (a quarter busy), nor by the chain of pivots. What is left: fewer products in the edge
 Hessians and couplings, and fewer iterations (1.3 per step of 3 ms, where one is the least).
