@@ -26,8 +26,8 @@ Kernels are called by entry points alone, or one by one as plain Python: `drag_s
 ask of a processor is listed in numpy_lanes.py. NUMBA_DISABLE_JIT=1 runs everything so, in any debugger, thousands of
 times slower.
 
-Work of a Newton iteration of the chapter's discretisation (46 nodes), counted by studies.speed.operations; shares of the
-time are those of an AVX-512 processor, `python -m studies.speed.throughput` measures them on any:
+Work of a Newton iteration of the chapter's discretisation (46 nodes), counted by studies.speed.operations; shares of
+the time are those of an AVX-512 processor, `python -m studies.speed.throughput` measures them on any:
 
 part            kflop   time    what
 hub hinges       0.2     3 %    root edges, five hinges, their couplings (potential.py)
@@ -38,8 +38,8 @@ substitution     1.0     9 %    back through the limbs, and the Newton step (sta
 In the continuum's discretisation limbs take 11.8 kflop, because the middles of edges have drag and inertia too, the hub
 0.7 instead of the ring, 13.7 in all.
 
-A node of the chapter's limbs takes 58 products, 52 fused products, 42 sums, 4.6 divisions and 1.9 roots. The sweep runs at half the
-peak of fused products; it is bound by the number of instructions (twice the lanes take twice the time, half the lanes
-save a tenth), not by the divider (a quarter busy), nor by the chain of pivots. What is left: fewer products in the edge
-Hessians and couplings, and fewer iterations (1.3 per step of 3 ms, where one is the least).
+A node of the chapter's limbs takes 58 products, 52 fused products, 42 sums, 4.6 divisions and 1.9 roots. The sweep runs
+at half the peak of fused products; it is bound by the number of instructions (twice the lanes take twice the time, half
+the lanes save a tenth), not by the divider (a quarter busy), nor by the chain of pivots. What is left: fewer products in
+the edge Hessians and couplings, and fewer iterations (1.3 per step of 3 ms, where one is the least).
 """
