@@ -190,6 +190,9 @@ PUT_BACK = 1e-11
 def energy_noise(simulator: Simulator, robot: int, energy: float, h: float) -> float:
     """What rounding of positions changes an energy by [J]: its slope times a move, and its curvature (guard.py).
 
+    Newton's method stops at moves below its tolerance, which store energy, too: a robot without weight, whose drag
+    has no curvature where it stands still, comes to rest in as many steps as halve its move.
+
     h: Of the shortest step [s]; velocities are differences of positions over it.
     """
     rods = make_rods(simulator.scene, robot if simulator.scene.n_robots else 0)
@@ -200,7 +203,9 @@ def energy_noise(simulator: Simulator, robot: int, energy: float, h: float) -> f
     if simulator.scene.held_nodes:
         move += PUT_BACK * rods.nodes_per_limb * length
     curvature = max(stiffness, mass / h**2)
-    return move * math.sqrt(2.0 * curvature) * math.sqrt(energy) + 0.5 * curvature * move**2
+    left = simulator.scene.numerics.newton_tolerance * rods.nodes_per_limb * length
+    of_rounding = move * math.sqrt(2.0 * curvature) * math.sqrt(energy) + 0.5 * curvature * move**2
+    return of_rounding + 0.5 * stiffness * left**2
 
 
 def check_energy(case: Case) -> None:

@@ -496,8 +496,8 @@ def test_a_robot_that_cannot_be_solved_fails_alone_with_a_status_and_a_finite_st
         assert_same_bits(well.get_state().of_robots(others), ill.get_state().of_robots(others))
         np.testing.assert_array_equal(ill.positions[broken], 0.25)
         assert ill.time[broken] == 0.0 and ill.time[0] == k
-    for field in report:
-        assert np.isfinite(field).all()
+    for name, field in report._asdict().items():
+        assert name == "error_estimate" or np.isfinite(field).all()  # there are no error bars here
 
 
 def test_a_failed_robot_is_well_again_after_a_reset_or_a_new_state():
