@@ -12,7 +12,6 @@ import platform
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +19,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.certify.commands import ACTIONS, CLASSES, PROMISED, STROKES, VERSION, draw_classes
 from seastar_gym.scene import Numerics, Scene
-from seastar_gym.scene.certificate import Certificate, CertifiedSetting
+from seastar_gym.scene.certificate import Certificate, CertifiedSetting, physics, resolved
 from seastar_gym.scene.checks import require_count, require_seed, shown
 from seastar_gym.simulator import Simulator
 from seastar_gym.version import __version__
@@ -73,9 +72,9 @@ def certify(scene: Scene, samples: int = SAMPLES, seed: int = 0, progress: Progr
     require_count("samples", samples, 2, 100_000)
     require_seed(seed)
     commands = draw_classes(samples, scene.robot.n_limbs, seed)
-    resolved = [at(scene, nodes, SHORT) for nodes in (MANY_NODES, *NODES)]
+    exact = [resolved(scene, nodes, SHORT) for nodes in (MANY_NODES, *NODES)]
     settings = [(nodes, numerics) for nodes in NODES for numerics in NUMERICS]
-    scenes = [*resolved, *(at(scene, *setting) for setting in settings)]
+    scenes = [*exact, *(resolved(scene, *setting) for setting in settings)]
     limit, *swum = swim_all(scenes, commands, progress)
     lengths = path_lengths(limit, float(np.max(scene.robot.limb_length)))
 
@@ -93,11 +92,11 @@ def certify(scene: Scene, samples: int = SAMPLES, seed: int = 0, progress: Progr
                 errors=by_class(space + in_time, samples),
                 space_error=_rounded(max(by_class(space, samples)[name] for name in PROMISED)),
                 time_error=_rounded(max(by_class(in_time, samples)[name] for name in PROMISED)),
-                speed=_rounded(speed(at(scene, nodes, numerics), commands)),
+                speed=_rounded(speed(resolved(scene, nodes, numerics), commands)),
             )
         )  # fmt: skip
     return Certificate(
-        physics_of(scene), tuple(found), PROMISED, ACTIONS, samples,
+        physics(scene), tuple(found), PROMISED, ACTIONS, samples,
         limit_error=max(by_class(of_limit, samples)[name] for name in PROMISED),
         classes=VERSION, version=__version__, machine=machine(),
     )  # fmt: skip
@@ -115,7 +114,7 @@ def exceeded(
     if setting is None:
         raise ValueError(f"This setting was not measured: {shown(scene.numerics)}.")
     commands = draw_classes(samples, scene.robot.n_limbs, seed)
-    limit, hub = swim_all([at(scene, MANY_NODES, SHORT), scene], commands, progress)
+    limit, hub = swim_all([resolved(scene, MANY_NODES, SHORT), scene], commands, progress)
     distances = _finite(np.linalg.norm(hub - limit, axis=-1).max(axis=0))
     errors = (distances / path_lengths(limit, float(np.max(scene.robot.limb_length)))).reshape(len(CLASSES), samples)
     return {name: float(np.mean(each > setting.errors[name])) for name, each in zip(CLASSES, errors, strict=True)}
@@ -124,19 +123,6 @@ def exceeded(
 def machine() -> str:
     """Machine that speeds are measured on."""
     return f"{os.cpu_count()} cores, {platform.machine()}, Python {platform.python_version()}"
-
-
-def at(scene: Scene, nodes_per_limb: int, numerics: Numerics) -> Scene:
-    """The scene at a resolution of the continuum's discretisation and numerics."""
-    robot = replace(
-        scene.robot, nodes_per_limb=nodes_per_limb, discretisation="continuum", hub_hinge="opening"
-    )
-    return replace(scene, robot=robot, numerics=numerics)
-
-
-def physics_of(scene: Scene) -> Scene:
-    """The scene that a certificate keeps."""
-    return at(scene, 10, Numerics())
 
 
 def swim(scene: Scene, commands: Floats) -> Floats:

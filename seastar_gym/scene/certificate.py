@@ -13,7 +13,6 @@ from typing import Any, cast
 
 from seastar_gym.scene.checks import is_finite_number, shown
 from seastar_gym.scene.numerics import Numerics, SchemeName
-from seastar_gym.scene.robot import Discretisation
 from seastar_gym.scene.scene import Scene
 from seastar_gym.version import __version__
 
@@ -127,8 +126,7 @@ class Certificate:
 
     def at(self, setting: CertifiedSetting) -> Scene:
         """The scene at a setting."""
-        robot = replace(self.scene.robot, nodes_per_limb=setting.nodes_per_limb, discretisation="continuum")
-        return replace(self.scene, robot=robot, numerics=setting.numerics)
+        return resolved(self.scene, setting.nodes_per_limb, setting.numerics)
 
     def save(self, file: Path | str) -> None:
         """Write the certificate as JSON."""
@@ -167,8 +165,12 @@ def _read_setting(data: dict[str, Any]) -> CertifiedSetting:
     return setting
 
 
+def resolved(scene: Scene, nodes_per_limb: int, numerics: Numerics) -> Scene:
+    """The scene with a resolution of the continuum's discretisation and numerics."""
+    robot = replace(scene.robot, nodes_per_limb=nodes_per_limb, discretisation="continuum", hub_hinge="opening")
+    return replace(scene, robot=robot, numerics=numerics)
+
+
 def physics(scene: Scene) -> Scene:
     """The scene with one resolution and numerics for all: what a certificate is about."""
-    discretisation: Discretisation = "continuum"
-    robot = replace(scene.robot, nodes_per_limb=10, discretisation=discretisation, hub_hinge="opening")
-    return replace(scene, robot=robot, numerics=Numerics())
+    return resolved(scene, 10, Numerics())

@@ -18,7 +18,7 @@ from seastar_gym.scene.checks import is_finite_number, require_choice, require_c
 PRESETS = Path(__file__).with_name("presets.json")
 NOT_MEASURED = (
     "Errors were measured for the chapter's robot in the chapter's water only, so nothing can be promised for {}: "
-    "measure it as `python -m studies.accuracy` does."
+    "`python -m seastar_gym.certify` measures it."
 )
 """Refusal to promise errors of another robot or scene."""
 

@@ -37,9 +37,10 @@ class Seastar:
     relaxation_time: Relaxation time of Kelvin-Voigt damping [s], see der/terms/damping.py and `relaxation_time`. None
         means no damping, as in the chapter.
     discretisation: "continuum" clamps limbs into a rigid hub that turns freely, with consistent masses, Simpson's rule
-        for drag and Gregory's weights for bending. With ten nodes it is within a per cent of infinitely many.
+        for drag and Gregory's weights for bending. With ten nodes, the chapter's robot is within a per cent of
+        infinitely many.
         "chapter" joins neighbouring limbs by hinges at the hub, and lumps mass and drag at the nodes, as the chapter
-        does: with ten nodes it is 12 to 26 % off. With infinitely many nodes the two are the same robot.
+        does: with ten nodes that robot is 12 to 26 % off. With infinitely many nodes the two are the same robot.
 
     A single limb swings freely about the hub, and no actuator turns it. In the chapter's discretisation two limbs have
     one hub hinge; straight limbs with hub_hinge="turning" then form a plain rod.

@@ -14,6 +14,7 @@ from refusals import assert_refused
 from seastar_gym import Certificate, Contact, Numerics, Scene, Seastar, Simulator, SmaPulse
 from seastar_gym.certify import command, commands, measure
 from seastar_gym.envs.spec import PlainSpec
+from seastar_gym.scene.certificate import resolved
 
 SMALL_ROBOT = Seastar(limb_length=0.08)
 SCENE = Scene(SMALL_ROBOT)
@@ -47,7 +48,7 @@ def test_every_setting_has_the_errors_of_every_class_and_more_nodes_leave_less_e
 
 def test_errors_bound_those_of_the_sequences_they_were_measured_on(certificate):
     drawn = commands.draw_classes(SAMPLES, 5, 0)
-    limit = measure.swim(measure.at(SCENE, 33, measure.SHORT), drawn)
+    limit = measure.swim(resolved(SCENE, 33, measure.SHORT), drawn)
     lengths = measure.path_lengths(limit, 0.08)
     for each in certificate.settings:
         hub = measure.swim(certificate.at(each), drawn)
@@ -213,7 +214,7 @@ def test_the_command_writes_certificate_and_picture(few_settings, tmp_path, monk
 
 def test_swims_of_many_groups_are_those_of_one_batch(monkeypatch):
     monkeypatch.setattr(measure, "GROUP", 5)
-    drawn, scene = commands.draw_classes(2, 5, 1), measure.at(SCENE, 5, Numerics("sdirk2", 2e-2, 1e-6))
+    drawn, scene = commands.draw_classes(2, 5, 1), resolved(SCENE, 5, Numerics("sdirk2", 2e-2, 1e-6))
     shares = []
     (swum,) = measure.swim_all([scene], drawn, shares.append)
     np.testing.assert_array_equal(swum, measure.swim(scene, drawn))

@@ -124,7 +124,7 @@ OTHERS = [
 @pytest.mark.parametrize("scene", OTHERS)
 def test_another_robot_or_fluid_is_promised_nothing_and_the_sentence_names_a_way(scene):
     assert fidelity.measured(scene) is None
-    with pytest.raises(ValueError, match=r"^Errors were measured for the chapter's robot.*studies\.accuracy.*\.$"):
+    with pytest.raises(ValueError, match=r"^Errors were measured for the chapter's robot.*seastar_gym\.certify.*\.$"):
         promise(scene)
 
 

@@ -200,7 +200,10 @@ def less_edge_turn(edge_mass, rods, q, v, spin, turn):
 
 @kernel
 def less_edge_fluid_turn(edge_added_mass, rods, work, q, v, spin, turn):
-    """The same less those of the fluid that edges carry along across themselves; unchanged where there is none."""
+    """(angular momentum, moment of inertia) less those of edges' differences in the fluid that moves along.
+
+    Unchanged without consistent added mass (None).
+    """
     if edge_added_mass is None:
         return spin, turn
     for e in range(n_nodes(rods) - 1):
