@@ -1,6 +1,6 @@
 """Trains a swimmer with PPO, then compares it with the scripted pentagon gait.
 
-    python train.py                        one or two minutes on two cores
+    python train.py                        about three minutes on two cores
     python train.py --quick                a short training with everything that follows, in under a minute
     python train.py --resume runs/FOLDER   continues a run that was stopped (by Ctrl-C or killed), or trains it for more
                                            --strokes

@@ -177,8 +177,8 @@ def as_markdown(rows: list[Row], costs: dict[str, float], samples: int) -> str:
         *(_line(row) for row in rows if row.setting in FIDELITIES),
         "",
         "Medians of true errors and of ratios. The factor needed would cover 95 % of the calibration's strokes, which "
-        "are of another seed; the package's factors were chosen with those in view, and before the strokes of this "
-        "table were drawn. " + _shortfall(rows),
+        "are of another seed; the package's factors were chosen with those and a third seed's in view, before those of "
+        "this table were drawn. " + _shortfall(rows),
         "",
         "![Coverage and sharpness over robots](error_bars.png)",
         "",
