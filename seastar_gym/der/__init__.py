@@ -38,7 +38,7 @@ substitution     1.0     9 %    back through the limbs, and the Newton step (sta
 In the continuum's discretisation limbs take 11.8 kflop, because the middles of edges have drag and inertia too, the hub
 0.7 instead of the ring, 13.7 in all.
 
-A node of the chapter's limbs takes 58 products, 52 fused products, 42 sums, 4.6 divisions and 1.9 roots. The sweep runs
+A node of a limb takes 58 products, 52 fused products, 42 sums, 4.6 divisions and 1.9 roots. The sweep runs
 at half the peak of fused products; it is bound by the number of instructions (twice the lanes take twice the time,
 half the lanes save a tenth), not by the divider (a quarter busy), nor by the chain of pivots. What is left: fewer
 products in the edge Hessians and couplings, and fewer iterations (1.3 per step of 3 ms, where one is the least).
