@@ -86,7 +86,7 @@ SWEEPS = (
     ),
     Sweep(
         "peak_angle", "peak angle, all 243 commands", "°",
-        (9.0, 18.0, 27.0, 36.0, 45.0, 50.0, 53.0, 53.9, 54.0, 60.0),
+        (9.0, 18.0, 36.0, 54.0, 72.0, 90.0, 108.0, 135.0, 162.0, 179.0),
         lambda angle: Case(peak_angle=math.radians(_number(angle)), all_commands=True), 36.0,
     ),
 )  # fmt: skip
