@@ -218,7 +218,7 @@ def study(options: Options) -> dict[str, Any]:
         "fastest_gaits": fastest,
         "directions_deg": np.degrees(directions).tolist(),
         "mm_per_stroke": {
-            "gaits in turns": (MM * mixed).tolist(),
+            "best periodic gaits, mixed": (MM * mixed).tolist(),
             "beam search": (MM * np.array(lines)).tolist(),
             **{agent: speeds.tolist() for agent, speeds in agents.items()},
         },

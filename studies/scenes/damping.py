@@ -90,8 +90,8 @@ class Study:
 
 
 def scene(numerics: Numerics, tau: float | None) -> Scene:
-    """The chapter's robot, discretised as in the chapter, with a relaxation time tau [s]."""
-    return scene_of(Setting("chapter", 10, numerics), Scene(Seastar(relaxation_time=tau)))
+    """The chapter's robot with a relaxation time tau [s]."""
+    return scene_of(Setting("continuum", 10, numerics), Scene(Seastar(relaxation_time=tau)))
 
 
 def timed(cases: Cases, numerics: Numerics, tau: float | None) -> tuple[Swim, float]:
