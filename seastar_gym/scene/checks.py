@@ -99,4 +99,5 @@ def as_floats(name: str, value: object) -> NDArray[np.float64]:
     array = as_array(name, value)
     if array.dtype.kind not in "biuf":
         raise ValueError(f"{name} must be numbers, not {array.dtype} values.")
-    return array.astype(float)
+    with np.errstate(over="ignore"):  # what no float can hold is infinite, and refused where it must be finite
+        return array.astype(float)

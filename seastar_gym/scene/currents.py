@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.checks import is_finite_number, require_finite, require_number, shown
+from seastar_gym.scene.checks import as_floats, is_finite_number, require_finite, require_number, shown
 from seastar_gym.scene.per_robot import Numbers, require_each
 from seastar_gym.scene.serial import register_part
 
@@ -140,11 +140,7 @@ class GridCurrent:
 
 def _checked_velocities(velocities: object) -> Floats:
     """Velocities of a grid [m/s] as an array of shape (n_x, n_y, 2). ValueError for anything else."""
-    try:
-        array = np.asarray(velocities)
-        array = array.astype(float) if array.dtype.kind in "iuf" else np.zeros(0)
-    except (TypeError, ValueError, OverflowError):
-        array = np.zeros(0)
+    array = as_floats("velocities", velocities)
     if array.ndim != 3 or array.shape[2] != 2 or min(array.shape) < 2 or array.size > 2 * LARGEST_GRID:
         raise ValueError(
             f"velocities must have shape (n_x, n_y, 2), with two points or more each way and at most "

@@ -1,8 +1,6 @@
 """Arguments that nobody should give, for everything that takes arguments."""
 
 # ruff: noqa: C408 - what is given reads as a call
-import fractions
-import math
 from collections.abc import Callable
 from random import Random
 from typing import Any
@@ -11,6 +9,7 @@ import gymnasium as gym
 import numpy as np
 
 from fuzz.sentences import assert_one_sentence
+from odd_values import ODD
 from seastar_gym import (
     Contact,
     DomainRandomization,
@@ -40,22 +39,7 @@ from seastar_gym.scene.fidelity import promise
 
 Calls = dict[str, tuple[Callable[..., Any], dict[str, Any]]]
 
-VALUES: tuple[Callable[[], Any], ...] = (
-    lambda: None, lambda: True, lambda: False, lambda: 0, lambda: -1, lambda: 1, lambda: 3, lambda: 10**400,
-    lambda: -(10**400), lambda: 2**63, lambda: 0.0, lambda: -0.0, lambda: 0.5, lambda: -1.5, lambda: 1e308,
-    lambda: 5e-324, lambda: 1e-200, lambda: 1e200, lambda: math.nan, lambda: math.inf, lambda: -math.inf,
-    lambda: 1j, lambda: fractions.Fraction(1, 3), lambda: "", lambda: "abc", lambda: "1.0", lambda: "two\nlines",
-    lambda: b"abc", lambda: (), lambda: [], lambda: {}, lambda: set(), lambda: (1.0, 2.0), lambda: [1, "a"],
-    lambda: [[1.0], [1.0, 2.0]], lambda: {"a": 1}, lambda: ((0, 1.0, math.nan),), lambda: ((0, 1.0),),
-    lambda: np.zeros(0), lambda: np.array([1.0, np.nan]), lambda: np.array([1.0, -1.0]), lambda: np.ones((2, 2)),
-    lambda: np.ones((3, 3, 2)), lambda: np.array(["a", "b"]), lambda: np.array([None, 1.0]), lambda: np.array(1.0),
-    lambda: np.float32(0.1), lambda: np.int64(2), lambda: np.bool_(True), lambda: np.datetime64("2020-01-01"),
-    lambda: np.ones(2, dtype=complex), lambda: np.full(5, 1e308), lambda: range(3), lambda: iter([1.0]),
-    object, lambda: int, lambda: len, lambda: Seastar, lambda: Seastar(), lambda: Water(), lambda: SmaPulse(),
-    lambda: Numerics(), lambda: Scene(), lambda: Contact(), lambda: (Limb(),) * 2, lambda: (Limb(), None),
-    lambda: Seastar(youngs_modulus=np.array([1e6, 2e6])), lambda: Uniform(0.0, 1.0),
-)  # fmt: skip
-"""What is odd at one place may be right at another: it is taken or refused."""
+VALUES = tuple(ODD.values())
 
 FAST = Numerics.preset("fast")
 

@@ -19,6 +19,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+pytest.importorskip("tensorboard", reason="train.py writes its log for TensorBoard")
+
 import train
 from agents import policy as policies
 from agents.learner_file import load

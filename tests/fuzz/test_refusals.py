@@ -3,6 +3,7 @@
 import pytest
 
 from fuzz import odd
+from odd_values import ODD
 from seastar_gym import State
 
 
@@ -10,8 +11,8 @@ from seastar_gym import State
     "name, argument", [(name, argument) for name, (_, given) in odd.PARTS.items() for argument in given]
 )
 def test_a_part_is_made_or_refused_in_one_sentence(name, argument, subtests):
-    for value in odd.VALUES:
-        with subtests.test(f"{value()!r:.60}"):
+    for label, value in ODD.items():
+        with subtests.test(label):
             odd.check_odd_part(name, argument, value)
 
 
@@ -19,15 +20,15 @@ def test_a_part_is_made_or_refused_in_one_sentence(name, argument, subtests):
     "name, argument", [(name, argument) for name, (_, given) in odd.SIMULATOR_CALLS.items() for argument in given]
 )
 def test_a_simulator_refuses_in_one_sentence_and_loses_nothing(name, argument, subtests):
-    for value in odd.VALUES:
-        with subtests.test(f"{value()!r:.60}"):
+    for label, value in ODD.items():
+        with subtests.test(label):
             odd.check_odd_call(name, argument, value)
 
 
 @pytest.mark.parametrize("field", State._fields)
 def test_a_state_is_set_or_refused_in_one_sentence(field, subtests):
-    for value in odd.VALUES:
-        with subtests.test(f"{value()!r:.60}"):
+    for label, value in ODD.items():
+        with subtests.test(label):
             odd.check_odd_state(field, value)
 
 
@@ -35,6 +36,6 @@ def test_a_state_is_set_or_refused_in_one_sentence(field, subtests):
     "name, argument", [(name, argument) for name, (_, given) in odd.ENV_CALLS.items() for argument in given]
 )
 def test_an_environment_refuses_in_one_sentence_and_goes_on(name, argument, subtests):
-    for value in odd.VALUES:
-        with subtests.test(f"{value()!r:.60}"):
+    for label, value in ODD.items():
+        with subtests.test(label):
             odd.check_odd_env_call(name, argument, value)
