@@ -32,7 +32,7 @@ def test_temperature_solves_the_heat_equation(command):
         power = actuator.steady_rise if t < heated else 0.0
         return (power - (T - actuator.water_temperature)) / actuator.time_constant
 
-    start = np.array([35.0, 20.0, 0.25, 0.0])
+    start = np.array([35.0, 20.0, 0.25, 0.0, 0.0, 0.0])
     t, found, _ = history(actuator, command, start, n=201)
     ends = [0.0, *([heated] if heated else []), 1.0]
     expected, T = [35.0], 35.0
@@ -77,7 +77,7 @@ def test_a_small_loop_within_the_large_one_closes_and_stays_inside():
 
 
 def test_between_the_lines_the_share_of_austenite_stands_still():
-    _, T, austenite = history(ThermalSma(), 0.0, np.array([45.0, 20.0, 0.5, 0.0]))
+    _, T, austenite = history(ThermalSma(), 0.0, np.array([45.0, 20.0, 0.5, 0.0, 0.0, 0.0]))
     still = austenite == 0.5
     assert still.any() and not still.all()
     assert T[still].min() == pytest.approx(21.5 + 0.5 * (56.0 - 21.5), abs=0.05)
@@ -118,7 +118,7 @@ def test_robots_swim_and_cool_down_and_are_cold_after_a_reset():
         report = simulator.stroke([[0, 1, 0, 0, -1], [0, 0.5, 0, 0, 0]])
         assert not report.status.any()
     state = simulator.get_state()
-    assert state.actuators.shape == (2, 5, 4)
+    assert state.actuators.shape == (2, 5, 6)
     assert state.actuators[0, 1, 0] > 25.0 and state.actuators[0, 4, 1] > 25.0 and state.actuators[0, 1, 1] == 20.0
     assert state.actuators[0, 1, 0] > state.actuators[1, 1, 0] > 20.0  # half the pulse, less heat
     assert simulator.hub_position()[0, 0] > 5e-3
