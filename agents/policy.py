@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from agents.description import Description, read_facts
 from agents.files import write_atomically
 from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.symmetry import reduce_observations, restore_actions
+from seastar_gym.envs.symmetry import memory_mirror, reduce_observations, restore_actions
 from seastar_gym.envs.task import scene_observation_size
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import is_finite_number
@@ -90,7 +90,7 @@ class LearnedPolicy:
             )
         if not self.description.symmetry:
             return self._choose(observation, deterministic), None
-        reduced, elements = reduce_observations(observation, n_limbs)
+        reduced, elements = reduce_observations(observation, n_limbs, memory_mirror(self.scene.actuator))
         chosen = self._choose(reduced, deterministic)
         return restore_actions(chosen, elements, self.actions, n_limbs), None
 

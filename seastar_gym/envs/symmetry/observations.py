@@ -8,19 +8,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.envs.observation import Layout, layout
 from seastar_gym.envs.symmetry.group import Elements, is_mirror, limb_order, read_only, turns
+from seastar_gym.scene.actuators.heating import Mirror
 
 BOUNDARY_WIDTH = 1e-6
 """Angle [rad] from a boundary between two sectors within which a waypoint lies on it. It is far above the rounding of
 observations: not rounding, but the next waypoint chooses the sector of a robot that is aimed along a limb."""
 
 
-def sectors(observations: NDArray[np.floating[Any]], n_limbs: int) -> Elements:
+def sectors(observations: NDArray[np.floating[Any]], n_limbs: int, mirror: Mirror = ()) -> Elements:
     """Sectors of the current waypoints, 0 to 2 n_limbs - 1, shape (...), in observations of shape (..., size).
 
     A waypoint on a boundary belongs to the sector on the side of the next waypoint, and where that lies on the same
     line (or there is none) to the sector anti-clockwise of the boundary. A waypoint at the hub lies in sector 0.
+
+    mirror: What a mirror does to the memory of a limb's actuator, see `memory_mirror`; () if actuators have none.
     """
-    at = _layout(observations, n_limbs)
+    at = _layout(observations, n_limbs, mirror)
     current = np.asarray(observations[..., at.current_waypoint], np.float64)
     towards_next = np.asarray(observations[..., at.next_waypoint], np.float64)
     width = np.pi / n_limbs
@@ -34,9 +37,9 @@ def sectors(observations: NDArray[np.floating[Any]], n_limbs: int) -> Elements:
     return sector.astype(np.intp) % (2 * n_limbs)
 
 
-def _layout(observations: NDArray[np.floating[Any]], n_limbs: int) -> Layout:
+def _layout(observations: NDArray[np.floating[Any]], n_limbs: int, mirror: Mirror) -> Layout:
     """Layout of observations, shape (..., size); ValueError if they are of a robot of other limbs."""
-    at, size = layout(n_limbs), observations.shape[-1]
+    at, size = layout(n_limbs, len(mirror) * n_limbs), observations.shape[-1]
     if size != at.size:
         raise ValueError(f"An observation of {size} numbers is not that of a robot of {n_limbs} limbs.")
     return at
@@ -53,11 +56,38 @@ def _vector_order(n_limbs: int) -> NDArray[np.intp]:
 
 
 def transform_observations(
-    observations: NDArray[np.floating[Any]], elements: ArrayLike, n_limbs: int
+    observations: NDArray[np.floating[Any]], elements: ArrayLike, n_limbs: int, mirror: Mirror = ()
 ) -> NDArray[np.floating[Any]]:
-    """Observations of the robots carried by the elements: a fresh array of the same shape and type."""
+    """Observations of the robots carried by the elements: a fresh array of the same shape and type.
+
+    mirror: What a mirror does to the memory of a limb's actuator, see `memory_mirror`; () if actuators have none.
+    """
     observations, elements = np.asarray(observations), np.asarray(elements, dtype=np.intp)
-    _layout(observations, n_limbs)
+    at = _layout(observations, n_limbs, mirror)
+    if not mirror:
+        return _transform_vectors(observations, elements, n_limbs)
+    hub = at.hub_velocity.stop
+    vectors = np.concatenate([observations[..., at.stations_and_hub], observations[..., at.waypoints]], axis=-1)
+    vectors = _transform_vectors(vectors, elements, n_limbs)
+    remembered = _transform_memory(observations[..., at.actuators], elements, n_limbs, mirror)
+    return np.concatenate([vectors[..., :hub], remembered, vectors[..., hub:]], axis=-1)
+
+
+def _transform_memory(
+    remembered: NDArray[np.floating[Any]], elements: Elements, n_limbs: int, mirror: Mirror
+) -> NDArray[np.floating[Any]]:
+    """Memory of actuators, shape (..., n_limbs len(mirror)), moved with the limbs and mirrored where the robots are."""
+    of_limbs = remembered.reshape(*remembered.shape[:-1], n_limbs, len(mirror))
+    of_limbs = np.take_along_axis(of_limbs, limb_order(n_limbs)[elements][..., None], axis=-2)
+    index, sign = np.array(mirror, dtype=int).T
+    swapped = of_limbs[..., index] * sign.astype(remembered.dtype)
+    return np.where(is_mirror(elements)[..., None, None], swapped, of_limbs).reshape(remembered.shape)
+
+
+def _transform_vectors(
+    observations: NDArray[np.floating[Any]], elements: Elements, n_limbs: int
+) -> NDArray[np.floating[Any]]:
+    """Pairs of numbers of observations without memory, turned, mirrored and moved with their limbs."""
     as_vectors = np.result_type(observations, np.complex64)  # pairs of numbers as x + iy
     vectors = np.ascontiguousarray(observations).view(as_vectors)
     vectors = np.take_along_axis(vectors, _vector_order(n_limbs)[elements], axis=-1)
@@ -67,8 +97,11 @@ def transform_observations(
 
 
 def reduce_observations(
-    observations: NDArray[np.floating[Any]], n_limbs: int
+    observations: NDArray[np.floating[Any]], n_limbs: int, mirror: Mirror = ()
 ) -> tuple[NDArray[np.floating[Any]], Elements]:
-    """Observations with the current waypoint brought into sector 0, and the elements that did it."""
-    elements = sectors(observations, n_limbs)
-    return transform_observations(observations, elements, n_limbs), elements
+    """Observations with the current waypoint brought into sector 0, and the elements that did it.
+
+    mirror: What a mirror does to the memory of a limb's actuator, see `memory_mirror`; () if actuators have none.
+    """
+    elements = sectors(observations, n_limbs, mirror)
+    return transform_observations(observations, elements, n_limbs, mirror), elements

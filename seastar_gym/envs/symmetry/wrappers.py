@@ -10,8 +10,9 @@ from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry.actions import restore_actions
 from seastar_gym.envs.symmetry.observations import reduce_observations
-from seastar_gym.envs.symmetry.scenes import require_symmetry
+from seastar_gym.envs.symmetry.scenes import memory_mirror, require_symmetry
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.scene.actuators.heating import Mirror
 
 if TYPE_CHECKING:
     _VectorWrapper = gym.vector.VectorWrapper[Any, Any, Any, Any, Any]
@@ -19,13 +20,13 @@ else:
     _VectorWrapper = gym.vector.VectorWrapper  # not generic in gymnasium 1.2
 
 
-def _mode_and_limbs(env: Any) -> tuple[Actions, int]:
-    """Action mode and number of limbs of an environment or a batch; ValueError if its scene is not symmetric."""
+def _mode_limbs_and_mirror(env: Any) -> tuple[Actions, int, Mirror]:
+    """Action mode, number of limbs and `memory_mirror` of an environment or a batch; ValueError if not symmetric."""
     inner = getattr(env, "unwrapped", env)
     if not isinstance(inner, SeastarSwimEnv | SeastarSwimVectorEnv):
         raise ValueError(f"Symmetry is known of SeastarSwim-v0 alone, not of {inner!r}.")
     require_symmetry(inner.scene, inner.randomization)
-    return inner.actions, inner.scene.robot.n_limbs
+    return inner.actions, inner.scene.robot.n_limbs, memory_mirror(inner.scene.actuator)
 
 
 class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorArgs):
@@ -34,11 +35,11 @@ class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstru
     def __init__(self, env: gym.Env[Any, Any]):
         gym.utils.RecordConstructorArgs.__init__(self)
         gym.Wrapper.__init__(self, env)
-        self._mode, self._n_limbs = _mode_and_limbs(env)
+        self._mode, self._n_limbs, self._mirror = _mode_limbs_and_mirror(env)
         self._element = np.zeros((), np.intp)
 
     def _reduced(self, observation: NDArray[np.float32]) -> NDArray[np.floating[Any]]:
-        reduced, self._element = reduce_observations(observation, self._n_limbs)
+        reduced, self._element = reduce_observations(observation, self._n_limbs, self._mirror)
         return reduced
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
@@ -61,11 +62,11 @@ class VectorSymmetryReduction(_VectorWrapper):
 
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any]):
         super().__init__(env)
-        self._mode, self._n_limbs = _mode_and_limbs(env)
+        self._mode, self._n_limbs, self._mirror = _mode_limbs_and_mirror(env)
         self._elements = np.zeros(env.num_envs, np.intp)
 
     def _reduced(self, observations: NDArray[np.float32]) -> NDArray[np.floating[Any]]:
-        reduced, self._elements = reduce_observations(observations, self._n_limbs)
+        reduced, self._elements = reduce_observations(observations, self._n_limbs, self._mirror)
         return reduced
 
     def reset(
@@ -82,6 +83,6 @@ class VectorSymmetryReduction(_VectorWrapper):
         if "final_obs" in info:
             final = info["final_obs"].copy()
             for robot in np.flatnonzero(info["_final_obs"]):
-                final[robot], _ = reduce_observations(final[robot], self._n_limbs)
+                final[robot], _ = reduce_observations(final[robot], self._n_limbs, self._mirror)
             info = {**info, "final_obs": final}
         return self._reduced(observations), rewards, terminated, truncated, info
