@@ -223,11 +223,13 @@ def draw(results: dict[str, Any], file: Path) -> None:
             if curves.size:
                 trained, strokes = 1e-3 * curves[0, :, 0], curves[:, :, 1]
                 axes.fill_between(trained, strokes.min(axis=0), strokes.max(axis=0), color=colour, alpha=0.25, lw=0)
-                axes.plot(trained, strokes.mean(axis=0), color=colour)
+                axes.plot(trained, strokes.mean(axis=0), color=colour, label=label if label == DEFAULT else "this one")
         axes.set_title(name, fontsize=9)
-        axes.set(ylim=(155.0, 190.0))
+        axes.set(ylim=(165.0, 210.0))
         axes.tick_params(labelsize=8, labelbottom=True)
         axes.grid(alpha=0.3)
+    lines = panels.flat[0].get_lines()
+    figure.legend(handles=lines, loc="outside lower right", ncols=2, frameon=False, fontsize=9)
     figure.supxlabel("strokes trained [thousands]", fontsize=9)
     figure.supylabel("strokes on held-out paths", fontsize=9)
     figure.savefig(file, dpi=130)
