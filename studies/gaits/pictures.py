@@ -57,11 +57,13 @@ def draw_front(results: dict[str, Any], file: Path) -> None:
         [each["joules_per_m"] for each in priced], [each["mm_per_s"] for each in priced], "D", ms=5,
         color=COLOURS["re-heated"], zorder=3, label="evolved, re-heated wires",
     )  # fmt: skip
-    for name, side in (("synchronous", -1), ("one at a time", 1), ("lag 0.6", 1), ("thrifty", -1), ("thriftier", -1)):
+    for name, side, down in (
+        ("synchronous", 1, 11), ("one at a time", -1, -4), ("lag 0.6", 1, 11), ("thrifty", -1, -4), ("thriftier", -1, 4),
+    ):  # fmt: skip
         each = results["named"][name]["fast"]
         axes.plot(each["joules_per_m"], each["mm_per_s"], "o", color=COLOURS["from rest"], zorder=4)
         axes.annotate(
-            name, (each["joules_per_m"], each["mm_per_s"]), xytext=(6 * side, -11), textcoords="offset points",
+            name, (each["joules_per_m"], each["mm_per_s"]), xytext=(7 * side, -down), textcoords="offset points",
             ha="left" if side > 0 else "right", fontsize=9, color=COLOURS["from rest"],
         )  # fmt: skip
     axes.set(xlim=(150.0, 900.0), ylim=(0.0, 11.0), xlabel="electric energy per metre [J/m]", ylabel="speed [mm/s]")
@@ -77,7 +79,7 @@ def draw_lag(results: dict[str, Any], file: Path) -> None:
         axes.plot(lag["lag_s"], speeds, ".-", color=colour, label=name)
     synchronous = results["named"]["synchronous"]["fast"]["mm_per_s"]
     axes.axhline(synchronous, color=FAINT, ls="--", lw=1)
-    axes.text(0.99, synchronous + 0.1, "the chapter's strokes in turn", ha="right", fontsize=9, color=FAINT)
+    axes.text(0.01, synchronous + 0.1, "the chapter's strokes in turn", fontsize=9, color=FAINT)
     axes.set(xlabel="{3+,4-} after {2+,5-} by [s], period 1 s", ylabel="speed [mm/s]", xlim=(0.0, 1.0), ylim=(0.0, 8.5))
     axes.legend(loc="lower center", frameon=False, fontsize=9)
     figure.savefig(file, dpi=DPI)
