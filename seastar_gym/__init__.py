@@ -13,6 +13,7 @@ from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water, relaxat
 from seastar_gym.scene.actuators.limited import Limited
 from seastar_gym.scene.actuators.measured import MeasuredCurve
 from seastar_gym.scene.actuators.thermal import ThermalSma
+from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
@@ -38,6 +39,7 @@ __all__ = [
     "ShearCurrent",
     "Simulator",
     "SmaPulse",
+    "SmaWires",
     "SolverStatus",
     "State",
     "StrokeReport",

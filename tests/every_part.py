@@ -15,6 +15,7 @@ from seastar_gym import (
     Seastar,
     ShearCurrent,
     SmaPulse,
+    SmaWires,
     ThermalSma,
     UniformCurrent,
     Vortex,
@@ -35,6 +36,9 @@ ACTUATORS = {
     "limited curve": Limited(CURVE, None, 3.0),
     "limits of each robot": Limited(SmaPulse(0.4), 0.3 * EACH, None),
     "thermal": ThermalSma(austenite_finish=70.1),
+    "thermal with a limit": ThermalSma(largest_temperature=60.0 + 1 / 3, heating_power=1 / 3),
+    "wires": SmaWires(0.3 + 1e-16, 1 / 7, 6 / 7, period=1 / 3),
+    "deaf wires of each robot": SmaWires(0.5 * EACH, deaf=True),
     "thermal of each robot": ThermalSma(water_temperature=20.0 + EACH),
 }
 PARTS = {

@@ -8,6 +8,7 @@ from seastar_gym.scene.actuators.limited import Limited
 from seastar_gym.scene.actuators.measured import MeasuredCurve
 from seastar_gym.scene.actuators.pulse import SmaPulse
 from seastar_gym.scene.actuators.thermal import ThermalSma
+from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
 from seastar_gym.scene.fluid import Water
@@ -27,6 +28,7 @@ __all__ = [
     "Seastar",
     "ShearCurrent",
     "SmaPulse",
+    "SmaWires",
     "ThermalSma",
     "UniformCurrent",
     "Vortex",

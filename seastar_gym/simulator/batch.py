@@ -28,7 +28,7 @@ LARGEST_PART = 64
 ROWS = ("q", "v", "a", "peaks", "rotations", "status", "report")
 """Arrays of a batch, each of shape (n_groups, k, N_LANES)."""
 MOVED = ("q", "v", "peaks", "rotations", "status", "last_hub")
-"""Arrays of a batch that a stroke changes and the next stroke does not make anew."""
+"""Arrays of a batch that an interval changes and the next one does not make anew."""
 
 
 class Batch:
@@ -41,16 +41,17 @@ class Batch:
     q, v: Node positions [m] and velocities [m/s], k = 2 n_nodes.
     a: Accelerations at the stages of a step.
     peaks: Factors by which limbs follow `shape`, k = n_limbs.
-    shape: Rotation of limbs at the ends of the time steps, per unit of `peaks`: shape (n_times,), or
+    times: Ends of the time steps of the present interval [s], shape (n_times,).
+    shape: Rotation of limbs at `times`, per unit of `peaks`: shape (n_times,), or
         (n_groups, n_times, n_limbs, N_LANES) if it differs between limbs.
     rotations: Rotations of the limbs by their actuators now [rad], k = n_limbs.
     status: SolverStatus, k = 1.
-    report: Counts of the present stroke, k = len(REPORT_ROWS).
-    last_hub: Hub position at the end of the last stroke [m], shape (n_robots, 2).
+    report: Counts of the present interval, k = len(REPORT_ROWS).
+    last_hub: Hub position at the end of the last interval [m], shape (n_robots, 2).
     """
 
-    def __init__(self, scene: Scene, n_robots: int, threads: int, times: Floats):
-        self._scene, self.n_robots, self._times = scene, n_robots, times
+    def __init__(self, scene: Scene, n_robots: int, threads: int):
+        self._scene, self.n_robots = scene, n_robots
         n_groups, n_limbs, n_rows = -(-n_robots // N_LANES), scene.robot.n_limbs, 2 * scene.robot.n_nodes
         self._scheme = SCHEMES[scene.numerics.scheme]
         self.make_coefficients(scene)
@@ -59,7 +60,7 @@ class Batch:
         self.q[:] = self.coefficients.rest
         self.a = aligned_rows(n_groups, (n_rows + 1) * self._scheme.n_stages + 2, N_LANES)
         self.peaks = np.zeros((n_groups, n_limbs, N_LANES))
-        self.shape = np.zeros_like(times)
+        self.times = self.shape = np.zeros(1)
         self.rotations = np.zeros((n_groups, n_limbs, N_LANES))
         self.status = np.zeros((n_groups, 1, N_LANES))
         self.report = np.zeros((n_groups, len(REPORT_ROWS), N_LANES))
@@ -82,7 +83,7 @@ class Batch:
         """Copy of rows (n_groups, k, N_LANES) robot by robot, shape (n_robots, k)."""
         return np.asarray(from_rows(rows, self.n_robots))
 
-    def shape_rows(self, shape: Floats) -> Floats:
+    def _shape_rows(self, shape: Floats) -> Floats:
         """Rotations of shape (n_times, n_robots, n_limbs) as rows for the kernels; shape (n_times,) stays as it is."""
         if shape.ndim == 1:
             return shape
@@ -134,11 +135,11 @@ class Batch:
         self.last_hub = self.hub_position()
 
     def moved(self) -> dict[str, Any]:
-        """Copies of what a stroke changes, for `put_back`."""
+        """Copies of what an interval changes, for `put_back`."""
         return {name: getattr(self, name).copy() for name in MOVED}
 
     def put_back(self, moved: dict[str, Any]) -> None:
-        """Undo a stroke, from the copies that `moved` made before it."""
+        """Undo an interval, from the copies that `moved` made before it."""
         for name, values in moved.items():
             getattr(self, name)[:] = values
 
@@ -152,19 +153,22 @@ class Batch:
             energies(rods, work, actuation, self.q[group], self.v[group], both[0, group], both[1, group])
         return self.read(both[0])[:, 0], self.read(both[1])[:, 0]
 
-    def begin_stroke(self, peaks: Floats, shape: Floats) -> None:
-        """Begin a stroke in which limbs turn by `peaks`, shape (n_robots, n_limbs), times `shape` (see the class)."""
+    def begin(self, times: Floats, peaks: Floats, shape: Floats) -> None:
+        """Begin an interval in which limbs turn by `peaks`, shape (n_robots, n_limbs), times `shape`.
+
+        times: Ends of the time steps [s]. shape: Rotations at those times, as `Drive.begin` returns them.
+        """
         write_rows(self.peaks, peaks)
-        self.shape = shape
+        self.times, self.shape = times, self._shape_rows(shape)
         self._held = self.q[:, self._held_rows]
         self.v[:, self._held_rows] = 0.0
-        self.a[:] = 0.0  # a stroke depends on the state at its beginning only
+        self.a[:] = 0.0  # an interval depends on the state at its beginning only
         self.report[:] = 0.0
         self.report[:, SMALLEST_HUB_T] = np.inf
 
     def advance(self, begin: int, end: int) -> None:
-        """Advance all robots from the time step `begin` of the stroke to `end`."""
-        times = self._times[begin : end + 1]
+        """Advance all robots from the time step `begin` of the interval to `end`."""
+        times = self.times[begin : end + 1]
 
         def swim(thread: int, part: slice) -> None:
             work, actuation = self.memory[thread]
@@ -190,15 +194,15 @@ class Batch:
         return np.asarray(n_groups * np.arange(n_parts + 1) // n_parts)
 
     def covered(self) -> Floats:
-        """Time covered since the stroke began [s], shape (n_robots,)."""
+        """Time covered since the interval began [s], shape (n_robots,)."""
         return self.read(self.report)[:, REPORT_ROWS.index("covered")]
 
     def show_rotations(self, end: int) -> None:
-        """Set the rotations of the limbs to those at the time step `end` of the stroke."""
+        """Set the rotations of the limbs to those at the time step `end` of the interval."""
         self.rotations[:] = self.peaks * (self.shape[end] if self.shape.ndim == 1 else self.shape[:, end])
 
-    def end_stroke(self) -> dict[str, Floats]:
-        """End a stroke: release held nodes, put failed robots at rest. Returns the report's rows, (n_robots,) each."""
+    def end(self) -> dict[str, Floats]:
+        """End an interval: release held nodes, put lost robots at rest. Returns the report's rows, (n_robots,) each."""
         self.q[:, self._held_rows] = self._held
         self.v[:, self._held_rows] = 0.0
         if self.failed.any():

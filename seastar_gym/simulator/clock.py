@@ -7,52 +7,67 @@ Floats = NDArray[np.float64]
 
 
 class Clock:
-    """Simulated time of every robot. Strokes are counted, so that rounding does not accumulate.
+    """Simulated time of every robot. Equal intervals are counted, so that rounding does not accumulate.
 
-    period: Length of a stroke [s].
-    start: Time at which the count of strokes began [s], shape (n_robots,).
-    strokes: Strokes completed since `start`, shape (n_robots,).
-    within: Time since the present stroke began [s], shape (n_robots,); zero between strokes, except for robots that
+    duration: Length of the intervals that are counted now [s].
+    start: Time at which that count began [s], shape (n_robots,).
+    lost: What rounding has left out of `start` [s], shape (n_robots,).
+    intervals: Intervals completed since `start`, shape (n_robots,).
+    within: Time since the present interval began [s], shape (n_robots,); zero between intervals, except for robots that
         failed within one.
     """
 
-    def __init__(self, n_robots: int, period: float):
-        self.period = period
+    def __init__(self, n_robots: int):
+        self.duration = 0.0
         self.start = np.zeros(n_robots)
-        self.strokes = np.zeros(n_robots, dtype=np.int64)
+        self.lost = np.zeros(n_robots)
+        self.intervals = np.zeros(n_robots, dtype=np.int64)
         self.within = np.zeros(n_robots)
 
     @property
     def time(self) -> Floats:
         """Simulated time [s], shape (n_robots,)."""
-        return np.asarray(self.start + self.strokes * self.period + self.within)
+        return np.asarray(self.start + self.intervals * self.duration + self.within + self.lost)
 
     def set(self, chosen: NDArray[np.bool_] | slice, time: Floats | float) -> None:
-        """Set the time [s] of the chosen robots, between strokes."""
+        """Set the time [s] of the chosen robots, between intervals."""
         self.start[chosen] = time
-        self.strokes[chosen] = 0
-        self.within[chosen] = 0.0
+        for counted in (self.lost, self.intervals, self.within):
+            counted[chosen] = 0
 
-    def begin_stroke(self) -> None:
-        """Begin a stroke now, even where the last one was not completed."""
-        self.start += self.within
+    def begin(self, duration: float) -> None:
+        """Begin an interval of this length [s] now, even where the last one was not completed."""
+        if duration != self.duration:
+            self._add(np.asarray(self.intervals * self.duration))
+            self.intervals[:] = 0
+            self.duration = duration
+        self._add(self.within)
         self.within[:] = 0.0
 
+    def _add(self, time: Floats) -> None:
+        """Add to the start, and keep what rounding leaves out [s] (Knuth's two-sum), shape (n_robots,)."""
+        total = self.start + time
+        added = total - self.start
+        self.lost += (self.start - (total - added)) + (time - added)
+        self.start[:] = total
+
     def show(self, covered: Floats) -> None:
-        """Show the time covered since the stroke began [s], shape (n_robots,)."""
+        """Show the time covered since the interval began [s], shape (n_robots,)."""
         self.within[:] = covered
 
-    def end_stroke(self, failed: NDArray[np.bool_], covered: Floats) -> None:
-        """Count the stroke, or add the time covered [s] for robots that failed; shapes (n_robots,)."""
-        self.strokes += ~failed
+    def end(self, failed: NDArray[np.bool_], covered: Floats) -> None:
+        """Count the interval, or add the time covered [s] for robots that failed; shapes (n_robots,)."""
+        self.intervals += ~failed
         self.within = np.where(failed, covered, 0.0)
 
     def copy(self) -> "Clock":
         """A clock of its own that shows the same time."""
-        clock = Clock(len(self.start), self.period)
+        clock = Clock(len(self.start))
         clock.put(self)
         return clock
 
     def put(self, other: "Clock") -> None:
         """Show the time of another clock."""
-        self.start[:], self.strokes[:], self.within[:] = other.start, other.strokes, other.within
+        self.duration = other.duration
+        for name in ("start", "lost", "intervals", "within"):
+            getattr(self, name)[:] = getattr(other, name)

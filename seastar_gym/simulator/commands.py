@@ -1,4 +1,4 @@
-"""Checks of the commands for a stroke."""
+"""Checks of the commands of limbs."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,16 +10,16 @@ from seastar_gym.scene.per_robot import column
 Floats = NDArray[np.float64]
 
 
-def checked_commands(commands: ArrayLike, scene: Scene, strengths: Floats) -> Floats:
+def checked_commands(commands: ArrayLike, scene: Scene, strengths: Floats, name: str = "commands") -> Floats:
     """Commands as an array of the shape of `strengths`, (n_robots, n_limbs). ValueError if one cannot be followed."""
-    array = as_floats("commands", commands)
+    array = as_floats(name, commands)
     if array.shape != strengths.shape:
-        raise ValueError(f"commands must have shape (n_robots, n_limbs) = {strengths.shape}, not {array.shape}.")
+        raise ValueError(f"{name} must have shape (n_robots, n_limbs) = {strengths.shape}, not {array.shape}.")
     good = np.abs(array) <= 1.0
     if not good.all():
         robot, limb = np.argwhere(~good)[0]
         raise ValueError(
-            f"commands must be numbers in [-1, 1]; robot {robot} has {shown(array[robot, limb])} for limb {limb + 1}."
+            f"{name} must be numbers in [-1, 1]; robot {robot} has {shown(array[robot, limb])} for limb {limb + 1}."
         )
     if scene.robot.hub_hinge == "turning":
         _check_turning_hub(strengths * array, scene)

@@ -1,72 +1,150 @@
 """`Drive`: the actuators of a batch of robots, from commands to rotations of limbs."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.actuators.actuator import Actuator, StatefulActuator
+from seastar_gym.scene.actuators.actuator import Actuator, Deaf, StatefulActuator, stroke_at
+from seastar_gym.scene.actuators.heating import Heated
+from seastar_gym.scene.per_robot import column
+from seastar_gym.simulator.schedule import SAME_TIME, interval_times
 
 Floats = NDArray[np.float64]
+
+KNOWN_INTERVALS = 64
+"""Largest number of intervals whose time steps are kept."""
+JUMP = 1e-9
+"""Rotation over the peak angle. A limb that would turn by more at once would jump."""
 
 
 class Drive:
     """Actuators of a batch of robots, one for each limb.
 
-    times: Ends of a stroke's time steps [s].
+    step: Length of a time step [s].
     strengths: Factor by which every limb's rotation is reduced, shape (n_robots, n_limbs).
-    curve: Rotation by command 1 at `times` [rad], shape (n_times,), or (n_times, n_robots, 1) where numbers differ from
-        robot to robot. None for actuators with memory.
     state: Present state of the actuators, shape (n_robots, n_limbs, n_state); n_state is 0 without memory.
     at_rest: State of the actuators at rest, of the shape of `state`.
+    commands: Commands under way, shape (n_robots, n_limbs); 0 where none are.
+    phase: Time since they were given [s], 0 if none are under way.
+    times: Ends of the time steps of the present interval, since the commands were given [s].
+    heating_time: Time for which each robot's wires are heated in the present interval [s], shape (n_robots,).
     """
 
-    def __init__(self, actuator: Actuator, n_robots: int, n_limbs: int, times: Floats):
-        self._times = times
-        self._commands = np.zeros((n_robots, n_limbs))
+    def __init__(self, actuator: Actuator, n_robots: int, n_limbs: int, step: float):
+        self._step = step
         self.strengths = np.ones((n_robots, n_limbs))
+        self.commands = self._given = np.zeros((n_robots, n_limbs))
+        self.phase = 0.0
+        self.times, self.heating_time = np.zeros(1), np.zeros(n_robots)
         self.set_actuator(actuator)
         self.state = self.at_rest.copy()
-        self._before = self._after = self.state  # at the beginning and the end of the present stroke
+        self._before = self._after = self.state  # at the beginning and the end of the present interval
 
     def set_actuator(self, actuator: Actuator) -> None:
         """Continue with an actuator that differs only in numbers that may differ from robot to robot."""
+        self._actuator = actuator
         self._stateful = actuator if isinstance(actuator, StatefulActuator) else None
-        self.curve = None if self._stateful else np.asarray(actuator.delta_psi(self._times))
-        if self.curve is not None and self.curve.ndim > 1:
-            self.curve = self.curve[:, :, None]
+        self._heated = actuator if isinstance(actuator, Heated) else None
+        self._intervals: dict[tuple[float, float, bool], tuple[Floats, Floats]] = {}
         rest = self._stateful.rest if self._stateful else np.zeros(0)
         self.at_rest = np.broadcast_to(rest, (*self.strengths.shape, rest.shape[-1]))
 
-    def begin_stroke(self, commands: Floats) -> tuple[Floats, Floats | None]:
-        """Begin a stroke with these commands. Limbs rotate by the returned peaks times the returned shape.
+    @property
+    def longest(self) -> float:
+        """Time for which commands are under way [s]."""
+        return self._actuator.corners[-1]
 
-        Returns peaks of shape (n_robots, n_limbs) and rotations [rad] of shape (n_times, n_robots, n_limbs), or None
-        where the rotations are `curve`.
+    @property
+    def heating_power(self) -> float:
+        """Electric power of a heated wire [W], NaN if the actuator does not say it."""
+        return self._heated.heating_power if self._heated else math.nan
+
+    def begin(self, duration: float, commands: Floats | None) -> tuple[Floats, Floats]:
+        """Begin an interval [s] with these commands, or with those under way if they are None.
+
+        Limbs rotate by the returned peaks, shape (n_robots, n_limbs), times the returned shape [rad]: at the times of
+        the steps, shape (n_times,), (n_times, n_robots, 1) where a curve differs from robot to robot, or with memory
+        (n_times, n_robots, n_limbs).
         """
+        if commands is not None:
+            self._refuse_jump(commands)
+            self.commands, self.phase = commands, 0.0
+        self.times, curve = self._interval(duration, commands is not None)
+        self._given, self._before = self.commands, self.state
+        self.heating_time = np.full(len(self.state), math.nan)
+        if self._heated:
+            self.heating_time = self._heated.seconds_heated(self.times, self._given, self.state).sum(axis=1)
         if self._stateful is None:
-            return commands * self.strengths, None
-        self._commands, self._before = commands, self.state
-        turned, self._after = self._stateful.respond(self._times, commands, self.state)
+            return self._given * self.strengths, curve
+        turned, self._after = self._stateful.respond(self.times, self._given, self.state)
         return self.strengths, turned
 
+    def _refuse_jump(self, commands: Floats) -> None:
+        """ValueError if limbs cannot begin anew from where they are."""
+        if self.phase == 0.0:
+            return
+        now, then = self.rotations(), np.zeros_like(commands)
+        if self._stateful is not None:
+            then = self.strengths * self._stateful.respond(np.zeros(1), commands, self.state)[0][0]
+        jumps = np.abs(then - now) > JUMP * column(self._actuator.peak_angle)
+        if jumps.any():
+            robot, limb = np.argwhere(jumps)[0]
+            raise ValueError(
+                f"With these commands limbs would jump, such as limb {limb + 1} of robot {robot} by "
+                f"{abs(then[robot, limb] - now[robot, limb]):.4g} rad: advance without commands until the stroke under "
+                f"way ends, in {self.longest - self.phase:.4g} s, or use an actuator with memory such as SmaWires."
+            )
+
+    def _interval(self, duration: float, is_new: bool) -> tuple[Floats, Floats]:
+        """Ends of the time steps [s] and, unless it takes memory, rotations by command 1 at those times [rad]."""
+        key = self.phase, duration, is_new
+        if key not in self._intervals:
+            if len(self._intervals) >= KNOWN_INTERVALS:
+                self._intervals.clear()
+            corners = self._actuator.corners if is_new or self.phase > 0.0 else (0.0,)
+            times = interval_times(corners, self._step, self.phase, duration)
+            curve = np.zeros(0) if self._stateful else stroke_at(self._actuator, times)
+            self._intervals[key] = times, curve[:, :, None] if curve.ndim > 1 else curve
+        return self._intervals[key]
+
     def advance(self, end: int) -> None:
-        """Bring the state to the time step `end` of the present stroke."""
-        if end == len(self._times) - 1:
-            self.state = self._after
+        """Bring the actuators to the time step `end` of the present interval."""
+        if end == len(self.times) - 1:
+            self.state = self._after if self._stateful else self.state
         elif self._stateful is not None:
-            self.state = self._stateful.respond(self._times[: end + 1], self._commands, self._before)[1]
+            self.state = self._stateful.respond(self.times[: end + 1], self._given, self._before)[1]
+        is_over = self.times[end] >= self.longest - SAME_TIME * self._step
+        self.phase = 0.0 if is_over else float(self.times[end])
+        self.commands = np.zeros_like(self._given) if is_over else self._given
 
     def observe(self) -> Floats:
         """State as numbers of order one, shape (n_robots, k), limb after limb; k = 0 without memory."""
         seen = self.state if self._stateful is None else self._stateful.observe(self.state)
         return seen.reshape(len(seen), -1)
 
-    def rotations(self) -> Floats:
-        """Rotations of limbs between two strokes [rad], shape (n_robots, n_limbs)."""
-        if self._stateful is None:
-            return np.zeros_like(self.strengths)
-        return self.strengths * self._stateful.respond(np.zeros(1), np.zeros_like(self.strengths), self.state)[0][0]
+    def deaf_wires(self) -> NDArray[np.bool_]:
+        """Wires that cannot be heated now, shape (n_robots, n_limbs, 2)."""
+        if isinstance(self._actuator, Deaf):
+            return self._actuator.deaf_wires(self.state)
+        must_wait = self._stateful is None and bool(self.rotations().any())
+        return np.full((*self.strengths.shape, 2), must_wait)
 
-    def put(self, chosen: NDArray[np.bool_] | slice, state: Floats) -> None:
-        """Put the actuators of the chosen robots into states, between two strokes."""
-        self.state = np.array(self.state)
-        self.state[chosen] = state
+    def rotations(self) -> Floats:
+        """Rotations of limbs between two intervals [rad], shape (n_robots, n_limbs)."""
+        now = np.full(1, self.phase)
+        if self._stateful is not None:
+            return self.strengths * self._stateful.respond(now, self.commands, self.state)[0][0]
+        return self.commands * self.strengths * column(stroke_at(self._actuator, now)[0])
+
+    def put_at_rest(self, chosen: NDArray[np.bool_]) -> None:
+        """Put the actuators of the chosen robots at rest. The others go on with what is under way."""
+        self.state, self.commands = np.array(self.state), np.array(self.commands)
+        self.state[chosen], self.commands[chosen] = self.at_rest[chosen], 0.0
+        if chosen.all():
+            self.phase = 0.0
+
+    def put(self, state: Floats, commands: Floats, phase: Floats) -> None:
+        """Put all actuators into a state, see `State`: shapes of `state` and `commands`, and (n_robots,)."""
+        self.state, self.phase = state.copy(), float(phase.max())
+        self.commands = np.where(phase[:, None] > 0.0, commands, 0.0)

@@ -1,10 +1,10 @@
 """`ErrorBars`: how far the hub may be from where it is with infinitely many nodes and infinitely short steps.
 
 A twin of the simulator swims along: the same scene with edges and time steps half as long, the same commands and
-resets. The two are never brought together, so their distance has the errors of all strokes since the reset, of space
-and of time. The estimate is
+resets. The two are never brought together, so their distance has the errors of all intervals since the reset, of
+space and of time. The estimate is
 
-    factor * (largest distance of the two hubs at ends of strokes since the reset + newton_tolerance * limb_length).
+    factor * (largest distance of the two hubs at ends of intervals since the reset + newton_tolerance * limb_length).
 
 With errors of second order, the error is 4/3 of the distance. Undamped limbs ring longer than steps resolve, and errors
 of space and time may cancel in one robot and not in the other, so the factors are larger: those that cover the true
@@ -44,7 +44,7 @@ class Swimmers(Protocol):
 
     scene: Scene
 
-    def stroke(self, commands: ArrayLike) -> object: ...
+    def advance(self, duration: float, commands: ArrayLike | None = None) -> object: ...
     def reset(self, mask: ArrayLike | None = None, heading: ArrayLike = 0.0) -> None: ...
     def get_state(self) -> State: ...
     def set_state(self, state: State) -> None: ...
@@ -57,7 +57,7 @@ class Swimmers(Protocol):
 
 
 class Before(NamedTuple):
-    """Copies of what a stroke changes, made before it."""
+    """Copies of what an interval changes, made before it."""
 
     twin: State
     largest: Floats
@@ -97,7 +97,7 @@ class ErrorBars:
         return np.asarray(factor(scene) * np.where(self._largest > 0.0, self._largest + floor, self._largest))
 
     def compare(self, hub: Floats, failed: Mask) -> None:
-        """Compare hubs [m], shape (n_robots, 2), with those of the twin, after a stroke of both."""
+        """Compare hubs [m], shape (n_robots, 2), with those of the twin, after an interval of both."""
         distance = np.linalg.norm(hub - self.twin.hub_position(), axis=1)
         known = ~(failed | self.twin.failed)
         self._largest = np.maximum(self._largest, np.where(known, distance, np.nan))  # NaN stays until the reset
@@ -117,6 +117,6 @@ class ErrorBars:
         return Before(self.twin.get_state(), self._largest.copy())
 
     def put_back(self, before: Before) -> None:
-        """Undo a stroke. Robots on which the solver had failed swim again in the twin, but their estimate is lost."""
+        """Undo an interval. Robots on which the solver failed before swim again in the twin, but have no estimate."""
         self.twin.set_state(before.twin)
         self._largest = before.largest

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 PAUSED = (
-    "A stroke_in_parts of this simulator is under way: run it to its end, or close() it, which undoes it, before "
-    "anything else."
+    "A stroke_in_parts or advance_in_parts of this simulator is under way: run it to its end, or close() it, which "
+    "undoes it, before anything else."
 )
 ELSEWHERE = "Another thread is in the middle of a stroke of this simulator: take turns, or give each thread its own."
 BROKEN_OFF = (

@@ -1,4 +1,4 @@
-"""`StrokeReport`: the solver's status and counts for every robot after a stroke."""
+"""`StrokeReport`: the solver's status and counts for every robot after an interval of time, such as a stroke."""
 
 from collections.abc import Mapping
 from enum import IntEnum
@@ -11,7 +11,7 @@ Floats = NDArray[np.float64]
 
 
 class SolverStatus(IntEnum):
-    """Outcome of a robot's stroke. Every value but CONVERGED is a failure."""
+    """Outcome of a robot's interval. Every value but CONVERGED is a failure."""
 
     CONVERGED = 0
     NOT_CONVERGED = 1
@@ -43,7 +43,7 @@ COUNTS = ("newton_iterations", "regularised", "backtracks", "steps", "halvings",
 
 
 class StrokeReport(NamedTuple):
-    """Outcome and cost of a stroke; every array has shape (n_robots,).
+    """Outcome and cost of a stroke, or of any other interval; every array has shape (n_robots,).
 
     status: SolverStatus.
     newton_iterations: Newton iterations.
@@ -58,6 +58,8 @@ class StrokeReport(NamedTuple):
     smallest_opening_angle: Smallest angle between neighbouring limbs at the hub [rad]. Below zero, limbs crossed.
     error_estimate: Estimate of the hub's error, of space and time [m]: a bound that holds in about 95 % of strokes, see
         error_bars.py. NaN without `error_bars`.
+    heating_time: Time for which wires were heated, summed over limbs [s]; NaN if the actuator does not say it.
+    energy: Electric energy of that heat, with the actuator's heating power [J]; NaN if the actuator does not say it.
     """
 
     status: NDArray[np.int64]
@@ -71,13 +73,17 @@ class StrokeReport(NamedTuple):
     covered: Floats
     smallest_opening_angle: Floats
     error_estimate: Floats
+    heating_time: Floats
+    energy: Floats
 
 
 def make_report(
-    status: Floats, rows: Mapping[str, Floats], hub_hinge: str, error_estimate: Floats
-) -> StrokeReport:
-    """Report of a stroke from the kernels' numbers, shape (n_robots,) each.
+    status: Floats, rows: Mapping[str, Floats], hub_hinge: str, error_estimate: Floats, heating_time: Floats,
+    power: float,
+) -> StrokeReport:  # fmt: skip
+    """Report of an interval from the kernels' numbers, shape (n_robots,) each.
 
+    power: Electric power of a heated wire [W].
     rows: Numbers by name, see REPORT_ROWS in der/stepping/report.py.
     """
     angle = 2.0 * np.arctan(rows["smallest_hub_t"])
@@ -88,5 +94,7 @@ def make_report(
         covered=rows["covered"],
         smallest_opening_angle=angle,
         error_estimate=error_estimate,
+        heating_time=heating_time,
+        energy=power * heating_time,
         **{name: rows[name].astype(np.int64) for name in COUNTS},
     )

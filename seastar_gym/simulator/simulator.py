@@ -1,4 +1,4 @@
-"""`Simulator`: a batch of robots of one scene, advanced by whole strokes."""
+"""`Simulator`: a batch of robots of one scene, advanced by intervals of time, such as strokes."""
 
 import os
 from collections.abc import Generator, Iterator
@@ -24,7 +24,7 @@ from seastar_gym.simulator.drive import Drive
 from seastar_gym.simulator.error_bars import ErrorBars, twin_scene
 from seastar_gym.simulator.lock import BROKEN_OFF, StrokeLock
 from seastar_gym.simulator.report import StrokeReport, make_report
-from seastar_gym.simulator.schedule import step_times
+from seastar_gym.simulator.schedule import require_duration
 from seastar_gym.simulator.state import State, checked_state
 
 Floats = NDArray[np.float64]
@@ -36,7 +36,7 @@ ROUNDING = 1e-12
 
 
 class Before(NamedTuple):
-    """Copies of what a stroke changes, made before it."""
+    """Copies of what an interval changes, made before it."""
 
     rows: dict[str, Any]
     clock: Clock
@@ -54,8 +54,8 @@ class Simulator:
     error_bars: Whether to estimate the hub's error by a twin of shorter edges and steps, see error_bars.py. It changes
         no bit of a trajectory, and a stroke takes four to five times as long.
 
-    A stroke that is not completed (Ctrl-C, an exception, a generator that is closed or dropped) is undone. While a
-    stroke is under way, other calls that would change the simulator are refused with a RuntimeError.
+    A stroke, or any interval, that is not completed (Ctrl-C, an exception, a generator that is closed or dropped) is
+    undone. While one is under way, other calls that would change the simulator are refused with a RuntimeError.
     """
 
     def __init__(self, scene: Scene, n_robots: int = 1, threads: int | None = None, error_bars: bool = False):
@@ -69,15 +69,13 @@ class Simulator:
         self.n_robots = int(n_robots)
         available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         self.threads = min(-(-self.n_robots // N_LANES), available if threads is None else int(threads))
-        self._times = step_times(scene.actuator.corners, scene.numerics.step)
-        self._batch = Batch(scene, self.n_robots, self.threads, self._times)
-        self._drive = Drive(scene.actuator, self.n_robots, scene.robot.n_limbs, self._times)
-        self._clock = Clock(self.n_robots, scene.actuator.period)
+        self._batch = Batch(scene, self.n_robots, self.threads)
+        self._drive = Drive(scene.actuator, self.n_robots, scene.robot.n_limbs, scene.numerics.step)
+        self._clock = Clock(self.n_robots)
         self._lock = StrokeLock()
         self._bars: ErrorBars | None = None
         if error_bars:
             self._bars = ErrorBars(Simulator(twin_scene(scene), self.n_robots, self.threads), self.n_robots)
-        self._make_curve()
         self.set_limb_strengths(scene.limb_strengths or 1.0)
 
     @property
@@ -112,16 +110,8 @@ class Simulator:
             if self._bars is not None and of_twin is not None:
                 self._bars.twin.set_scene(of_twin, chosen)
             if scene.actuator != self.scene.actuator:
-                self._set_actuator(scene)
+                self._drive.set_actuator(scene.actuator)
             self.scene = scene
-
-    def _set_actuator(self, scene: Scene) -> None:
-        self._drive.set_actuator(scene.actuator)
-        self._make_curve()
-
-    def _make_curve(self) -> None:
-        curve = self._drive.curve
-        self._curve = np.zeros_like(self._times) if curve is None else self._batch.shape_rows(curve)
 
     @contextmanager
     def _new_state(self, of_all: bool) -> Iterator[None]:
@@ -129,7 +119,7 @@ class Simulator:
         with self._lock.change(repairs=of_all):
             if self._lock.broken and of_all:
                 self._batch.make_coefficients(self.scene)
-                self._set_actuator(self.scene)
+                self._drive.set_actuator(self.scene.actuator)
                 if self._bars is not None:
                     self._bars.twin.set_scene(twin_scene(self.scene))
             elif self._lock.broken:
@@ -150,7 +140,7 @@ class Simulator:
 
     def __getstate__(self) -> dict[str, Any]:
         self._lock.require_intact()
-        drive = {"state": self._drive.state, "strengths": self._drive.strengths}
+        drive = {name: getattr(self._drive, name) for name in ("state", "strengths", "commands", "phase")}
         arguments = (self.scene, self.n_robots, self.threads)
         rows = self._batch.rows()
         return {"arguments": arguments, "rows": rows, "clock": self._clock, "drive": drive, "bars": self._bars}
@@ -177,27 +167,30 @@ class Simulator:
         with self._new_state(bool(chosen.all())):
             for robot in np.flatnonzero(chosen):
                 self._batch.put_at_rest(robot, angles[robot])
-            self._drive.put(chosen, self._drive.at_rest[chosen])
+            self._drive.put_at_rest(chosen)
             self._clock.set(chosen, 0.0)
             if self._bars is not None:
                 self._bars.reset(chosen, angles)
 
     def get_state(self) -> State:
-        """Copy of the state. After `set_state` with it, strokes give the same bits, if it was taken between strokes."""
+        """Copy of the state. After `set_state` with it, intervals give the same bits, if none was under way."""
         self._lock.require_intact()
-        return State(self.positions, self.velocities, self.time, self._drive.state.copy())
+        drive = self._drive
+        phase = np.full(self.n_robots, drive.phase)
+        return State(self.positions, self.velocities, self.time, drive.state.copy(), drive.commands.copy(), phase)
 
     def set_state(self, state: State) -> None:
         """Put all robots into a state. Robots that had failed swim again.
 
         Their errors are not estimated until they are reset: the state has no like on the mesh of the twin.
         """
-        arrays = checked_state(state, self.n_robots, self.scene.robot.n_nodes, self._drive.at_rest)
-        positions, velocities, time, actuators = arrays
+        arrays = checked_state(state, self.scene.robot.n_nodes, self._drive.at_rest, self._drive.longest)
+        positions, velocities, time, actuators, commands, phase = arrays
+        checked_commands(commands, self.scene, self._drive.strengths, "State.commands")
         with self._new_state(of_all=True):
             self._batch.put_state(positions, velocities)
             self._clock.set(slice(None), time)
-            self._drive.put(slice(None), actuators)
+            self._drive.put(actuators, commands, phase)
             write_rows(self._batch.rotations, self._drive.rotations())
             if self._bars is not None:
                 self._bars.lose()
@@ -211,13 +204,21 @@ class Simulator:
         """Actuators' state as numbers of order one, shape (n_robots, k), limb after limb; k = 0 without memory."""
         return self._drive.observe()
 
+    def deaf_wires(self) -> NDArray[np.bool_]:
+        """Wires that cannot be heated now, for + and - of every limb, shape (n_robots, n_limbs, 2).
+
+        Commands to them are ignored. In the middle of a stroke of an actuator without memory it is all of them, and
+        commands are refused. An actuator of your own that has no `deaf_wires` has none.
+        """
+        return self._drive.deaf_wires()
+
     @property
     def limb_strengths(self) -> Floats:
         """Factor by which every limb's rotation is reduced, shape (n_robots, n_limbs), a copy."""
         return self._drive.strengths.copy()
 
     def set_limb_strengths(self, strengths: ArrayLike) -> None:
-        """Reduce the rotation of limbs from the next stroke on, by factors from 0 (no rotation) to 1 (full).
+        """Reduce the rotation of limbs from the next interval on, by factors from 0 (no rotation) to 1 (full).
 
         strengths: Shape (n_limbs,) or (n_robots, n_limbs), or one number for all limbs.
         """
@@ -248,7 +249,7 @@ class Simulator:
     @property
     def stroke_time(self) -> float:
         """Duration of a stroke [s], equal to the last time that `stroke_in_parts` yields."""
-        return float(self._times[-1])
+        return float(self.scene.actuator.period)
 
     @property
     def failed(self) -> NDArray[np.bool_]:
@@ -292,9 +293,7 @@ class Simulator:
         commands: Fraction of the actuator's curve for every limb, in [-1, 1], + is anti-clockwise, shape
             (n_robots, n_limbs).
         """
-        with self._whole_stroke(commands):
-            self._batch.advance(0, len(self._times) - 1)
-            return self._end_stroke()
+        return self.advance(self.scene.actuator.period, commands)
 
     def stroke_in_parts(self, commands: ArrayLike, parts: int) -> Generator[float, None, StrokeReport]:
         """Advance as `stroke` does, to the same bits, and pause `parts` times after about equal times.
@@ -302,40 +301,63 @@ class Simulator:
         Yields the time since the stroke began [s] and returns the StrokeReport. During a pause, the simulator may be
         read. Closing or dropping the generator before its end undoes the stroke.
         """
+        return (yield from self.advance_in_parts(self.scene.actuator.period, commands, parts))
+
+    def advance(self, duration: float, commands: ArrayLike | None = None) -> StrokeReport:
+        """Advance all robots by an interval of time.
+
+        duration: Length of the interval [s].
+        commands: Commands given now, as for `stroke`. None gives none, and what is under way continues.
+
+        An actuator without memory is at rest after its period, and refuses commands before: limbs would jump. Pieces
+        of an interval have the time steps of the whole, save that a step in which a piece ends is cut in two. Every
+        interval depends on the `State` at its beginning only, so Newton's first guess is made anew, and pieces equal
+        the whole to newton_tolerance, not to the last bit.
+        """
+        with self._whole_interval(duration, commands):
+            self._batch.advance(0, len(self._batch.times) - 1)
+            return self._end_interval()
+
+    def advance_in_parts(
+        self, duration: float, commands: ArrayLike | None, parts: int
+    ) -> Generator[float, None, StrokeReport]:
+        """Advance as `advance` does, to the same bits, and pause as `stroke_in_parts` does."""
         require_count("parts", parts, 1, MAX_STEPS)
-        with self._whole_stroke(commands) as stroke:
-            wanted = self._times[-1] * np.arange(1, parts + 1) / parts
-            ends = np.unique(np.clip(np.searchsorted(self._times, wanted * (1.0 - ROUNDING)), 1, len(self._times) - 1))
+        with self._whole_interval(duration, commands) as interval:
+            times = self._batch.times - self._batch.times[0]
+            wanted = times[-1] * np.arange(1, parts + 1) / parts
+            ends = np.unique(np.clip(np.searchsorted(times, wanted * (1.0 - ROUNDING)), 1, len(times) - 1))
             begin = 0
             for end in ends:
                 self._batch.advance(begin, end)
                 begin = end
                 self._show(end)
                 self._lock.pause()
-                yield float(self._times[end])
-                self._lock.resume(stroke)
-            return self._end_stroke()
+                yield float(times[end])
+                self._lock.resume(interval)
+            return self._end_interval()
 
     @contextmanager
-    def _whole_stroke(self, commands: ArrayLike) -> Iterator[object]:
-        """Context of a stroke, which is undone if it is not completed."""
-        checked = checked_commands(commands, self.scene, self._drive.strengths)
+    def _whole_interval(self, duration: float, commands: ArrayLike | None) -> Iterator[object]:
+        """Context of an interval, which is undone if it is not completed."""
+        require_duration(duration, self.scene.numerics.step)
+        checked = None if commands is None else checked_commands(commands, self.scene, self._drive.strengths)
         self._lock.require_intact()
-        stroke = self._lock.acquire()
+        interval = self._lock.acquire()
         bars = None if self._bars is None else self._bars.before()
         before = Before(self._batch.moved(), self._clock.copy(), dict(vars(self._drive)), bars)
         try:
-            self._begin_stroke(checked)
-            yield stroke
+            self._begin_interval(float(duration), checked)
+            yield interval
             self._lock.release()
         except BaseException:
-            self._put_back(stroke, before)
+            self._put_back(interval, before)
             raise
 
-    def _put_back(self, stroke: object, before: Before) -> None:
-        """Undo a stroke, unless robots were put into another state since."""
+    def _put_back(self, interval: object, before: Before) -> None:
+        """Undo an interval, unless robots were put into another state since."""
         try:
-            if self._lock.resume(stroke):
+            if self._lock.resume(interval):
                 self._batch.put_back(before.rows)
                 self._clock.put(before.clock)
                 vars(self._drive).update(before.drive)
@@ -343,28 +365,29 @@ class Simulator:
                     self._bars.put_back(before.bars)
                 self._lock.release()
         except BaseException:  # interrupted once more: the robots are put back all the same
-            self._put_back(stroke, before)
+            self._put_back(interval, before)
             raise
 
-    def _begin_stroke(self, commands: Floats) -> None:
-        peaks, shape = self._drive.begin_stroke(commands)
-        self._batch.begin_stroke(peaks, self._curve if shape is None else self._batch.shape_rows(shape))
-        self._clock.begin_stroke()
+    def _begin_interval(self, duration: float, commands: Floats | None) -> None:
+        peaks, shape = self._drive.begin(duration, commands)
+        self._batch.begin(self._drive.times, peaks, shape)
+        self._clock.begin(duration)
         if self._bars is not None:
-            self._bars.twin.stroke(commands)
+            self._bars.twin.advance(duration, commands)
 
     def _show(self, end: int) -> None:
-        """Bring clock, actuators and rotations to the time step `end` of the stroke."""
+        """Bring clock, actuators and rotations to the time step `end` of the interval."""
         self._clock.show(self._batch.covered())
         self._drive.advance(end)
         self._batch.show_rotations(end)
 
-    def _end_stroke(self) -> StrokeReport:
-        rows = self._batch.end_stroke()
-        self._clock.end_stroke(self.failed, rows["covered"])
-        self._drive.advance(len(self._times) - 1)
+    def _end_interval(self) -> StrokeReport:
+        rows = self._batch.end()
+        self._clock.end(self.failed, rows["covered"])
+        self._drive.advance(len(self._batch.times) - 1)
         write_rows(self._batch.rotations, self._drive.rotations())
         if self._bars is not None:
             self._bars.compare(self.hub_position(), self.failed)
-        status = self._batch.read(self._batch.status)[:, 0]
-        return make_report(status, rows, self.scene.robot.hub_hinge, self.error_estimate)
+        status, drive = self._batch.read(self._batch.status)[:, 0], self._drive
+        hub_hinge = self.scene.robot.hub_hinge
+        return make_report(status, rows, hub_hinge, self.error_estimate, drive.heating_time, drive.heating_power)

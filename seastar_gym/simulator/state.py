@@ -18,33 +18,61 @@ class State(NamedTuple):
     time: Simulated time [s], shape (n_robots,).
     actuators: State of every limb's actuator, shape (n_robots, n_limbs, n_state), where n_state is 0 for actuators
         without memory. `None` means at rest.
+    commands: Commands under way, shape (n_robots, n_limbs). `None` means none.
+    phase: Time since they were given [s], shape (n_robots,), 0 where none are under way. All robots that have commands
+        under way share it. `None` means 0.
     """
 
     positions: Floats
     velocities: Floats
     time: Floats
     actuators: Floats | None = None
+    commands: Floats | None = None
+    phase: Floats | None = None
 
     def of_robots(self, robots: NDArray[np.intp] | NDArray[np.bool_] | slice) -> "State":
         """State of the chosen robots, in their order."""
         return State(*(None if part is None else part[robots] for part in self))  # type: ignore[arg-type]
 
 
-def checked_state(state: object, n_robots: int, n_nodes: int, actuators_at_rest: Floats) -> list[Floats]:
-    """Arrays of a state, actuators at rest where it has None. ValueError if a shape is wrong or a number not finite."""
-    if not isinstance(state, tuple | list) or len(state) not in (3, 4):
+def checked_state(state: object, n_nodes: int, actuators_at_rest: Floats, longest: float) -> list[Floats]:
+    """Arrays of a state, at rest where it has None. ValueError if a shape or a number is wrong.
+
+    actuators_at_rest: Shape (n_robots, n_limbs, n_state). longest: Time for which commands may be under way [s].
+    """
+    if not isinstance(state, tuple | list) or not 3 <= len(state) <= len(State._fields):
         raise ValueError(f"A State of {', '.join(State._fields)} is needed, not {type(state).__name__}.")
-    state = State(*state)
-    if state.actuators is None:
-        state = state._replace(actuators=actuators_at_rest)
-    shape = (n_robots, n_nodes, 2)
-    shapes = (shape, shape, (n_robots,), actuators_at_rest.shape)
-    arrays = []
-    for name, value, wanted in zip(State._fields, state, shapes, strict=True):
-        array = as_floats(f"State.{name}", value)
-        if array.shape != wanted:
-            raise ValueError(f"State.{name} must have shape {wanted}, not {array.shape}.")
-        if not np.isfinite(array).all():
-            raise ValueError(f"State.{name} must be finite.")
-        arrays.append(array)
+    n_robots, n_limbs, _ = actuators_at_rest.shape
+    nodes, each = (n_robots, n_nodes, 2), np.zeros(n_robots)
+    positions, velocities, time, actuators, commands, phase = State(*state)
+    arrays = [
+        _checked_array("State.positions", positions, nodes),
+        _checked_array("State.velocities", velocities, nodes),
+        _checked_array("State.time", time, each.shape),
+        _checked_array("State.actuators", actuators, actuators_at_rest.shape, actuators_at_rest),
+        _checked_array("State.commands", commands, (n_robots, n_limbs), np.zeros((n_robots, n_limbs))),
+        _checked_array("State.phase", phase, each.shape, each),
+    ]
+    _check_phase(arrays[-1], longest)
     return arrays
+
+
+def _checked_array(name: str, value: object, wanted: tuple[int, ...], at_rest: Floats | None = None) -> Floats:
+    array = as_floats(name, at_rest if value is None and at_rest is not None else value)
+    if array.shape != wanted:
+        raise ValueError(f"{name} must have shape {wanted}, not {array.shape}.")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} must be finite.")
+    return array
+
+
+def _check_phase(phase: Floats, longest: float) -> None:
+    wrong = phase[(phase < 0.0) | (phase >= longest)]
+    if len(wrong):
+        raise ValueError(f"State.phase must be at least 0 and less than {longest:.4g} s, not {wrong[0]:.4g} s.")
+    different = np.unique(phase[phase > 0.0])
+    if len(different) > 1:
+        raise ValueError(
+            "State.phase must be one time for all robots that have commands under way, since they share time steps, "
+            f"not {different[0]:.4g} s and {different[1]:.4g} s."
+        )

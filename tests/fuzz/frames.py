@@ -14,12 +14,11 @@ from seastar_gym import (
     Scene,
     ShearCurrent,
     State,
-    ThermalSma,
     UniformCurrent,
     Vortex,
     Water,
 )
-from seastar_gym.scene.actuators.actuator import StatefulActuator
+from seastar_gym.scene.actuators.actuator import Mirrored, mirrored
 
 Floats = np.ndarray
 
@@ -68,8 +67,11 @@ class Frame:
         actuators = state.actuators
         if self.mirrored and actuators is not None:
             actuators = mirrored_actuators(actuators[:, swapped(scene.robot.n_limbs)], scene)
+        commands = state.commands
+        if self.mirrored and commands is not None:
+            commands = -commands[:, swapped(scene.robot.n_limbs)]
         moved = self.places(q) + np.multiply.outer(state.time, self.drift)[:, None]
-        return State(moved, self.velocities(v), state.time, actuators)
+        return State(moved, self.velocities(v), state.time, actuators, commands, state.phase)
 
     def case(self, case: Case) -> Case:
         commands = -case.commands[..., swapped(case.scene.robot.n_limbs)] if self.mirrored else case.commands
@@ -94,10 +96,8 @@ def mirrored_limb(limb: Limb) -> Limb:
 
 
 def mirrored_actuators(remembered: Floats, scene: Scene) -> Floats:
-    """Wires swap sides, rotations their sign."""
-    if isinstance(scene.actuator, ThermalSma):
-        return remembered[..., [1, 0, 3, 2]]
-    return -remembered if isinstance(scene.actuator, StatefulActuator) else remembered
+    """As the actuator says, if it remembers anything."""
+    return mirrored(scene.actuator, remembered) if isinstance(scene.actuator, Mirrored) else remembered
 
 
 # --- currents --------------------------------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from seastar_gym.model.limits import make_limits
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene.per_robot import side_by_side
 from seastar_gym.simd.lanes import N_LANES
-from seastar_gym.simulator.schedule import step_times
+from seastar_gym.simulator.schedule import interval_times
 
 FINEST = 4096
 """Steps are not cut finer than the nominal one over this."""
@@ -80,7 +80,8 @@ def assert_told(simulator: Simulator, report: StrokeReport) -> None:
 
 def assert_bounded(scene: Scene, report: StrokeReport) -> None:
     """No step is cut finer than documented, and no robot iterates for ever: a step that is begun is ended."""
-    n_steps = len(step_times(scene.actuator.corners, scene.numerics.step)) - 1
+    actuator = scene.actuator
+    n_steps = len(interval_times(actuator.corners, scene.numerics.step, 0.0, actuator.period)) - 1
     last_step = 14 * scene.numerics.max_iterations * SCHEMES[scene.numerics.scheme].n_stages
     assert np.all(report.steps <= FINEST * n_steps)
     assert np.all(report.newton_iterations <= make_limits(scene).most_iterations + last_step)
@@ -147,6 +148,23 @@ def check_bits_in_parts(case: Case) -> None:
         np.testing.assert_array_equal(cut.failed, whole.failed)
         for simulator in (cut, kept):
             for name, one, other in zip(State._fields, simulator.get_state(), whole.get_state(), strict=True):
+                np.testing.assert_array_equal(one, other, err_msg=name)
+
+
+def check_bits_of_pieces(case: Case) -> None:
+    """A stroke in two pieces, and one of which the second piece goes on from a state that was kept."""
+    cut, kept = make(case), make(case)
+    period = case.scene.actuator.period
+    for commands, share in zip(case.commands, np.resize([0.31, 0.05, 0.77], len(case.commands)), strict=True):
+        for simulator in (cut, kept):
+            simulator.advance(share * period, commands)
+        if not kept.failed.any():
+            kept.set_state(kept.get_state())
+        reports = [simulator.advance(period - share * period) for simulator in (cut, kept)]
+        for name, one, other in zip(StrokeReport._fields, *reports, strict=True):
+            np.testing.assert_array_equal(one, other, err_msg=name)
+        for name, one, other in zip(State._fields, cut.get_state(), kept.get_state(), strict=True):
+            if name != "time":  # the kept clock begins to count at the cut
                 np.testing.assert_array_equal(one, other, err_msg=name)
 
 
@@ -302,6 +320,7 @@ PROMISES = {
     "bits in other lanes": check_bits_in_other_lanes,
     "bits on threads": check_bits_on_threads,
     "bits in parts": check_bits_in_parts,
+    "bits of pieces": check_bits_of_pieces,
     "momentum": check_momentum,
     "energy": check_energy,
 }

@@ -28,6 +28,7 @@ from seastar_gym import (
     ShearCurrent,
     Simulator,
     SmaPulse,
+    SmaWires,
     State,
     ThermalSma,
     UniformCurrent,
@@ -220,6 +221,8 @@ def draw_actuator(draw: Draw, terms: Terms, robot: Seastar, step: float) -> Actu
         simple = MeasuredCurve(times, angles, own.each(lambda: draw.rng.random()))
     if ROTATIONS not in terms:
         return simple
+    if draw.maybe(0.3):
+        return draw_wires(draw, own.each(lambda: peak), heating, cooling)
     if draw.maybe(0.4):
         cold = draw.each(lambda: draw.rng.uniform(0.0, 21.0))
         return ThermalSma(own.each(lambda: peak), heating, cooling, draw.each(lambda: draw.around(2.0 * heating, 0.9)),
@@ -227,6 +230,12 @@ def draw_actuator(draw: Draw, terms: Terms, robot: Seastar, step: float) -> Actu
     angle = own.each(lambda: (peak or 1.0) * draw.rng.uniform(0.1, 1.5)) if draw.maybe(0.5) else None
     rate = own.each(lambda: draw.around((peak or 1.0) / heating, 1.0)) if draw.maybe(0.7) else None
     return Limited(simple, angle, rate)
+
+
+def draw_wires(draw: Draw, peak: Any, heating: float, cooling: float) -> SmaWires:
+    """Whose stroke ends before its wires are cold, then, or later."""
+    period = draw.rng.choice([None, draw.rng.uniform(0.3, 2.0) * (heating + cooling)])
+    return SmaWires(peak, heating, cooling, period, draw.maybe(0.3))
 
 
 def draw_numerics(draw: Draw) -> Numerics:

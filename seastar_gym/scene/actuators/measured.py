@@ -8,10 +8,13 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.scene.actuators.heating import WIRE_POWER, share_of_pulse
 from seastar_gym.scene.checks import require_number, require_numbers, shown
 from seastar_gym.scene.csv_rows import read_numbers
 from seastar_gym.scene.per_robot import Numbers, require_each
 from seastar_gym.scene.serial import register_part
+
+Floats = NDArray[np.float64]
 
 
 @register_part
@@ -24,15 +27,18 @@ class MeasuredCurve:
     angles: Rotation by command 1 at those times [rad]. It is 0 at both ends, so that limbs do not jump when their
         command changes.
     scale: Factor of the angles [1].
+    heating_power: Electric power of a heated wire [W], an assumption, see `heating.WIRE_POWER`.
     """
 
     PER_ROBOT: ClassVar = ("scale",)
     times: tuple[float, ...]
     angles: tuple[float, ...]
     scale: Numbers = 1.0
+    heating_power: float = WIRE_POWER
 
     def __post_init__(self) -> None:
         require_each(self, "scale", partial(require_number, unit="1", zero_allowed=True))
+        require_number("heating_power", self.heating_power, "W", zero_allowed=True)
         require_numbers("times", self.times, "s")
         require_numbers("angles", self.angles, "rad")
         if len(self.times) != len(self.angles) or len(self.times) < 2:
@@ -76,6 +82,15 @@ class MeasuredCurve:
         """Times of the samples [s], which no time step may straddle."""
         return self.times
 
-    def delta_psi(self, t: ArrayLike) -> NDArray[np.float64]:
+    def delta_psi(self, t: ArrayLike) -> Floats:
         """Rotation by command 1 at time t [s] of a stroke [rad]. t may have any shape."""
         return np.multiply.outer(np.interp(np.asarray(t, float), self.times, self.angles), self.scale)
+
+    @property
+    def heating_time(self) -> float:
+        """Time at which the curve is farthest from zero [s]. Until then the wire is taken to be heated."""
+        return self.times[int(np.argmax(np.abs(self.angles)))]
+
+    def seconds_heated(self, t: Floats, commands: Floats, state: Floats) -> Floats:
+        """Time for which limbs are heated from t[0] to t[-1] [s], shape of `commands`; half a command counts half."""
+        return share_of_pulse(t, commands, self.heating_time)

@@ -8,12 +8,15 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.scene.actuators.heating import WIRE_POWER, share_of_pulse
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.per_robot import Numbers, require_each
 from seastar_gym.scene.serial import register_part
 
+Floats = NDArray[np.float64]
 
-def pulse(t: ArrayLike, heating_time: float, cooling_time: float) -> NDArray[np.float64]:
+
+def pulse(t: ArrayLike, heating_time: float, cooling_time: float) -> Floats:
     """Fraction of the peak angle at time t [s] of a stroke, in [0, 1]. t may have any shape.
 
     Zero at t = 0, one at t = heating_time, zero again at t = heating_time + cooling_time (Fig. 13.5b).
@@ -50,18 +53,25 @@ class SmaPulse(HeatingAndCooling):
     peak_angle: Largest rotation [rad].
     heating_time: Delta t_1 [s].
     cooling_time: Delta t_2 [s].
+    heating_power: Electric power of a heated wire [W], an assumption, see `heating.WIRE_POWER`.
     """
 
     PER_ROBOT: ClassVar = ("peak_angle",)
     peak_angle: Numbers = math.pi / 5
     heating_time: float = 0.1
     cooling_time: float = 0.9
+    heating_power: float = WIRE_POWER
 
     def __post_init__(self) -> None:
         require_each(self, "peak_angle", partial(require_number, unit="rad", zero_allowed=True))
         require_number("heating_time", self.heating_time, "s")
         require_number("cooling_time", self.cooling_time, "s")
+        require_number("heating_power", self.heating_power, "W", zero_allowed=True)
 
-    def delta_psi(self, t: ArrayLike) -> NDArray[np.float64]:
+    def delta_psi(self, t: ArrayLike) -> Floats:
         """Rotation by command 1 at time t [s] of a stroke [rad]. t may have any shape."""
         return np.multiply.outer(pulse(t, self.heating_time, self.cooling_time), self.peak_angle)
+
+    def seconds_heated(self, t: Floats, commands: Floats, state: Floats) -> Floats:
+        """Time for which limbs are heated from t[0] to t[-1] [s], shape of `commands`; half a command counts half."""
+        return share_of_pulse(t, commands, self.heating_time)

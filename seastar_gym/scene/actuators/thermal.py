@@ -1,8 +1,9 @@
 """`ThermalSma`: a shape memory alloy actuator with Joule heating, cooling in water and hysteresis.
 
-Every limb has two wires, one for each direction of rotation. A command heats one of them for a fraction of the heating
-time (pulse width). A wire is thin and has one temperature T. With its heat capacity C, the electric power P and the
-heat transfer to the water h A per kelvin,
+Every limb has two wires, one for each direction of rotation. A command heats the wire of its sign for a fraction of the
+heating time (pulse width), from now on, however warm it is; the other wire goes on with what is left of its pulse. A
+wire is thin and has one temperature T. With its heat capacity C, the electric power P and the heat transfer to the
+water h A per kelvin,
 
     C dT/dt = P - h A (T - T_water)    =>    T = T_inf + (T_0 - T_inf) exp(-t/tau),    tau = C/(h A),
 
@@ -29,12 +30,23 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.scene.actuators.heating import (
+    MIRRORED_WIRES,
+    WIRE_POWER,
+    Mirror,
+    left_after,
+    pulse_left,
+    seconds_of_wires,
+)
 from seastar_gym.scene.actuators.pulse import HeatingAndCooling
-from seastar_gym.scene.checks import require_finite, require_number
+from seastar_gym.scene.checks import require_finite, require_number, shown
 from seastar_gym.scene.per_robot import Numbers, batch_size, column, require_each
 from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
+
+REACHED = 1e-9
+"""Share of the largest rise in temperature that rounding may leave of it."""
 
 
 @register_part
@@ -42,7 +54,9 @@ Floats = NDArray[np.float64]
 class ThermalSma(HeatingAndCooling):
     """Actuator of two shape memory alloy wires per limb, with heat and hysteresis.
 
-    The state of a limb is (T_+, T_-, xi_+, xi_-): temperatures [deg C] and austenite fractions [1] of its two wires.
+    The state of a limb is (T_+, T_-, xi_+, xi_-, r_+, r_-): temperatures [deg C], austenite fractions [1] and the time
+    for which either wire is still heated [s]. The first four are observed. The rest is zero at ends of intervals that
+    are not shorter than heating_time.
 
     peak_angle: Rotation if one wire is all austenite and the other all martensite [rad].
     heating_time: Pulse width of a full command [s]. Pulses of partial commands may end within a time step.
@@ -52,12 +66,15 @@ class ThermalSma(HeatingAndCooling):
     water_temperature: T_water [deg C].
     austenite_start, austenite_finish: A_s and A_f [deg C].
     martensite_start, martensite_finish: M_s and M_f [deg C]. T_water <= M_f <= A_s < A_f and M_f < M_s <= A_f.
+    largest_temperature: A pulse ends where the wire reaches it [deg C], and a wire that hot cannot be heated. None
+        means no limit: a wire that is heated for ever tends to T_water plus the steady rise.
+    heating_power: P [W], an assumption, see `heating.WIRE_POWER`.
     """
 
     TEMPERATURES: ClassVar = (
         "water_temperature", "martensite_finish", "austenite_start", "martensite_start", "austenite_finish",
     )  # fmt: skip
-    PER_ROBOT: ClassVar = ("peak_angle", "time_constant", "steady_rise", *TEMPERATURES)
+    PER_ROBOT: ClassVar = ("peak_angle", "time_constant", "steady_rise", *TEMPERATURES, "largest_temperature")
     peak_angle: Numbers = math.pi / 5
     heating_time: float = 0.1
     cooling_time: float = 0.9
@@ -68,6 +85,8 @@ class ThermalSma(HeatingAndCooling):
     austenite_finish: Numbers = 70.5
     martensite_start: Numbers = 56.0
     martensite_finish: Numbers = 21.5
+    largest_temperature: Numbers | None = None
+    heating_power: float = WIRE_POWER
 
     def __post_init__(self) -> None:
         require_each(self, "peak_angle", partial(require_number, unit="rad", zero_allowed=True))
@@ -77,6 +96,9 @@ class ThermalSma(HeatingAndCooling):
             require_each(self, name, partial(require_number, unit=unit))
         for name in self.TEMPERATURES:
             require_each(self, name, partial(require_finite, unit="deg C"))
+        require_number("heating_power", self.heating_power, "W", zero_allowed=True)
+        if self.largest_temperature is not None:
+            require_each(self, "largest_temperature", partial(require_finite, unit="deg C"))
         batch_size(self)
         if self.heating_time / 100.0 > np.min(self.time_constant):
             raise ValueError("heating_time must be at most 100 time constants, after which nothing changes any more.")
@@ -88,25 +110,36 @@ class ThermalSma(HeatingAndCooling):
                 f"T_water = {water}, M_f = {M_f}, A_s = {A_s}, A_f = {A_f} and M_s = {M_s}."
             )
 
+        if self.largest_temperature is not None and np.any(self.largest_temperature <= water):
+            raise ValueError(
+                f"largest_temperature must be above the water's {water} deg C, not {shown(self.largest_temperature)}."
+            )
+
     @property
     def rest(self) -> Floats:
-        """State at rest: water temperature, no austenite; shape (4,), or (n_robots, 1, 4)."""
+        """State at rest: water temperature, no austenite, no heat; shape (6,), or (n_robots, 1, 6)."""
         water = column(self.water_temperature)
-        return np.stack(np.broadcast_arrays(water, water, 0.0, 0.0), axis=-1)
+        return np.stack(np.broadcast_arrays(water, water, 0.0, 0.0, 0.0, 0.0), axis=-1)
+
+    @property
+    def mirror(self) -> Mirror:
+        """What a mirror does to the state: the wires change places, see `actuator.mirrored`."""
+        return (*MIRRORED_WIRES, (3, 1), (2, 1), (5, 1), (4, 1))
 
     def delta_psi(self, t: ArrayLike) -> Floats:
         """Rotation by command 1 at time t [s] of a stroke that begins at rest [rad]. t may have any shape."""
         t, n_robots = np.asarray(t, dtype=float), batch_size(self)
+        from_start = np.append(0.0, t.ravel())
         if n_robots is None:
-            return self.respond(t.ravel(), np.ones(()), self.rest)[0].reshape(t.shape)
-        return self.respond(t.ravel(), np.ones((n_robots, 1)), self.rest)[0].reshape(*t.shape, n_robots)
+            return self.respond(from_start, np.ones(()), self.rest)[0][1:].reshape(t.shape)
+        return self.respond(from_start, np.ones((n_robots, 1)), self.rest)[0][1:].reshape(*t.shape, n_robots)
 
     def respond(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
         """Rotations and state as in `StatefulActuator`, exact at all times t."""
-        heated = self.heating_time * np.stack([np.maximum(commands, 0.0), np.maximum(-commands, 0.0)], axis=-1)
+        heated, t = self._left(t, commands, state), t - t[0]
         tau, cold = column(self.time_constant, 2), column(self.water_temperature, 2)
         hot = cold + column(self.steady_rise, 2)
-        start, before = state[..., :2], state[..., 2:]
+        start, before = state[..., :2], state[..., 2:4]
         with np.errstate(over="ignore"):  # so many time constants that nothing is left
             decay = np.exp(-t.reshape(-1, *(1,) * heated.ndim) / tau)
         growth = np.exp(heated / tau)
@@ -119,7 +152,21 @@ class ThermalSma(HeatingAndCooling):
         temperature[early] = np.where(is_heated, hot + (start - hot) * decay[early], temperature[early])
         austenite[early] = self.transform(temperature[early], np.where(is_heated, before, after))
         turned = column(self.peak_angle) * (austenite[..., 0] - austenite[..., 1])
-        return turned, np.concatenate([temperature[-1], austenite[-1]], axis=-1)
+        left = left_after(t[-1], heated, self.heating_time)
+        return turned, np.concatenate([temperature[-1], austenite[-1], left], axis=-1)
+
+    def _left(self, t: Floats, commands: Floats, state: Floats) -> Floats:
+        """Time for which every wire is heated from t[0] on [s], shape (*S, 2)."""
+        left = pulse_left(t, commands, state[..., 4:], self.heating_time)
+        return left if self.largest_temperature is None else np.minimum(left, self._time_to_limit(state[..., :2]))
+
+    def _time_to_limit(self, temperature: Floats) -> Floats:
+        """Time until heated wires reach the largest temperature [s], infinite if they never do."""
+        limit, water = column(self.largest_temperature, 2), column(self.water_temperature, 2)
+        hot = water + column(self.steady_rise, 2)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            time = column(self.time_constant, 2) * np.log((hot - temperature) / (hot - limit))
+        return np.where(temperature >= limit, 0.0, np.where(hot > limit, time, np.inf))
 
     def transform(self, temperature: Floats, austenite: Floats) -> Floats:
         """Austenite fraction after the temperature [deg C] has changed monotonically, from the fraction before."""
@@ -131,7 +178,18 @@ class ThermalSma(HeatingAndCooling):
         return np.clip(up, 0.0, 1.0, out=up)
 
     def observe(self, state: Floats) -> Floats:
-        """Temperatures above the water over A_f - T_water, and austenite fractions, shape of `state`."""
+        """Temperatures above the water over A_f - T_water, and austenite fractions, shape (..., 4)."""
         water, A_f = column(self.water_temperature, 2), column(self.austenite_finish, 2)
         warm = (state[..., :2] - water) / (A_f - water)
-        return np.concatenate([warm, state[..., 2:]], axis=-1)
+        return np.concatenate([warm, state[..., 2:4]], axis=-1)
+
+    def deaf_wires(self, state: Floats) -> NDArray[np.bool_]:
+        """Wires that cannot be heated now, shape (..., 2): those at the largest temperature."""
+        if self.largest_temperature is None:
+            return np.zeros((*state.shape[:-1], 2), dtype=bool)
+        limit, water = column(self.largest_temperature, 2), column(self.water_temperature, 2)
+        return np.asarray(state[..., :2] >= limit - REACHED * (limit - water))
+
+    def seconds_heated(self, t: Floats, commands: Floats, state: Floats) -> Floats:
+        """Time for which the wires of each limb are heated from t[0] to t[-1] [s], shape of `commands`."""
+        return seconds_of_wires(t[-1] - t[0], self._left(t, commands, state))

@@ -32,7 +32,7 @@ def test_temperature_solves_the_heat_equation(command):
         power = actuator.steady_rise if t < heated else 0.0
         return (power - (T - actuator.water_temperature)) / actuator.time_constant
 
-    start = np.array([35.0, 20.0, 0.25, 0.0])
+    start = np.array([35.0, 20.0, 0.25, 0.0, 0.0, 0.0])
     t, found, _ = history(actuator, command, start, n=201)
     ends = [0.0, *([heated] if heated else []), 1.0]
     expected, T = [35.0], 35.0
@@ -77,7 +77,7 @@ def test_a_small_loop_within_the_large_one_closes_and_stays_inside():
 
 
 def test_between_the_lines_the_share_of_austenite_stands_still():
-    _, T, austenite = history(ThermalSma(), 0.0, np.array([45.0, 20.0, 0.5, 0.0]))
+    _, T, austenite = history(ThermalSma(), 0.0, np.array([45.0, 20.0, 0.5, 0.0, 0.0, 0.0]))
     still = austenite == 0.5
     assert still.any() and not still.all()
     assert T[still].min() == pytest.approx(21.5 + 0.5 * (56.0 - 21.5), abs=0.05)
@@ -118,7 +118,7 @@ def test_robots_swim_and_cool_down_and_are_cold_after_a_reset():
         report = simulator.stroke([[0, 1, 0, 0, -1], [0, 0.5, 0, 0, 0]])
         assert not report.status.any()
     state = simulator.get_state()
-    assert state.actuators.shape == (2, 5, 4)
+    assert state.actuators.shape == (2, 5, 6)
     assert state.actuators[0, 1, 0] > 25.0 and state.actuators[0, 4, 1] > 25.0 and state.actuators[0, 1, 1] == 20.0
     assert state.actuators[0, 1, 0] > state.actuators[1, 1, 0] > 20.0  # half the pulse, less heat
     assert simulator.hub_position()[0, 0] > 5e-3
@@ -151,12 +151,81 @@ def test_temperatures_are_observed():
     assert 0.0 < seen[0, 0] < 1.0 and 0.0 < seen[0, 2] < 1.0 and not seen[1:].any()
 
 
+# --- a largest temperature -------------------------------------------------------------------------------------------
+
+LIMIT = 75.0
+SAFE = ThermalSma(heating_time=0.1, cooling_time=0.1, largest_temperature=LIMIT)
+
+
+def test_a_wire_that_is_heated_for_ever_stays_below_the_largest_temperature():
+    state, t, hottest = SAFE.rest, np.linspace(0.0, 0.05, 51), 0.0
+    for _ in range(100):
+        for begin in (0.0, 0.05):
+            temperature = [SAFE.respond(begin + t[: k + 1], np.ones(()), state)[1][0] for k in range(1, len(t))]
+            hottest = max(hottest, *temperature)
+            _, state = SAFE.respond(begin + t, np.ones(()), state)
+    assert LIMIT - 0.5 < hottest <= LIMIT + 1e-9
+    free = ThermalSma(heating_time=0.1, cooling_time=0.1).rest
+    for _ in range(100):
+        _, free = ThermalSma(heating_time=0.1, cooling_time=0.1).respond(t, np.ones(()), free)
+    assert free[0] > 200.0
+
+
+def test_heating_ends_exactly_where_the_limit_is_reached():
+    hot, start = 240.0, 60.0
+    time = 0.42 * np.log((hot - start) / (hot - LIMIT))  # of (hot - T) falling to (hot - LIMIT)
+    state = np.array([start, 20.0, 0.5, 0.0, 0.0, 0.0])
+    assert SAFE.seconds_heated(np.array([0.0, 0.2]), np.ones(()), state) == pytest.approx(time, rel=1e-12)
+    _, at_limit = SAFE.respond(np.array([0.0, time]), np.ones(()), state)
+    assert at_limit[0] == pytest.approx(LIMIT, rel=1e-14) and at_limit[4] == 0.0
+    np.testing.assert_array_equal(SAFE.deaf_wires(np.stack([state, at_limit])), [[False, False], [True, False]])
+    _, after = SAFE.respond(np.array([0.0, time + 0.03]), np.ones(()), state)
+    assert after[0] == pytest.approx(20.0 + (LIMIT - 20.0) * np.exp(-0.03 / 0.42), rel=1e-12)
+
+
+def test_a_limit_that_is_never_reached_changes_no_bit():
+    t, commands = np.linspace(0.0, 1.0, 51), np.array([1.0, 0.3, -1.0, 0.0])
+    for limit in (100.0, 240.0, 1000.0):
+        one, other = ThermalSma(), ThermalSma(largest_temperature=limit)
+        rest = np.tile(one.rest, (4, 1))
+        for seen, wanted in zip(other.respond(t, commands, rest), one.respond(t, commands, rest), strict=True):
+            np.testing.assert_array_equal(seen, wanted)
+
+
+def test_every_robot_has_a_limit_of_its_own():
+    each = ThermalSma(largest_temperature=np.array([30.0, 50.0]))
+    _, state = each.respond(np.array([0.0, 0.02]), np.ones((2, 1)), np.broadcast_to(each.rest, (2, 1, 6)))
+    alone = ThermalSma(largest_temperature=30.0)
+    _, alone = alone.respond(np.array([0.0, 0.02]), np.ones(1), np.tile(alone.rest, (1, 1)))
+    np.testing.assert_array_equal(state[0], alone)
+    assert state[1, 0, 0] > state[0, 0, 0]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_pieces_of_an_interval_are_the_whole(seed):
+    rng = np.random.default_rng(seed)
+    for actuator in (ThermalSma(), ThermalSma(largest_temperature=60.0)):
+        state = np.tile(actuator.rest, (5, 1))
+        for _ in range(3):
+            cuts, commands, start = np.sort(rng.uniform(0.0, 0.5, 4)), rng.uniform(-1.0, 1.0, 5), state
+            whole, after = actuator.respond(np.append(0.0, cuts), commands, start)
+            heated = 0.0
+            for k, t in enumerate(pairwise([0.0, *cuts])):
+                heated = heated + actuator.seconds_heated(np.array(t), commands, state)
+                turned, state = actuator.respond(np.array(t), commands, state)
+                np.testing.assert_allclose(turned[-1], whole[k + 1], atol=1e-12)
+            np.testing.assert_allclose(state, after, atol=1e-11)
+            expected = actuator.seconds_heated(np.append(0.0, cuts), commands, start)
+            np.testing.assert_allclose(heated, expected, atol=1e-12)
+
+
 @pytest.mark.parametrize(
     "change",
     [
         {"water_temperature": 22.0}, {"austenite_start": 80.0}, {"martensite_start": 80.0}, {"martensite_finish": 24.0},
         {"austenite_finish": np.nan}, {"time_constant": 0.0}, {"steady_rise": -1.0}, {"peak_angle": -0.1},
-        {"time_constant": 0.9e-3},
+        {"time_constant": 0.9e-3}, {"largest_temperature": 20.0}, {"largest_temperature": np.inf},
+        {"heating_power": -1.0},
     ],
 )  # fmt: skip
 def test_wires_that_cannot_be_are_refused(change):
