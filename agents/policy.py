@@ -3,7 +3,9 @@
     from agents.policy import load
 
     policy = load()  # the one in the box; or load("runs/mine/policy.safetensors")
-    env = gym.make("SeastarSwim-v0", actions=policy.actions, scene=policy.scene)
+    env = gym.make(
+        "SeastarSwim-v0", actions=policy.actions, scene=policy.scene, decision_period=policy.decision_period
+    )
 
 The network is plain numpy: layers `W x + b` with tanh between them (`0.weight`, `0.bias`, `1.weight`, ...), whose last
 outputs are the logits of the actions. Nothing is unpickled, and neither torch nor Stable-Baselines3 is needed.
@@ -24,7 +26,7 @@ from numpy.typing import NDArray
 from agents.description import Description, read_facts
 from agents.files import write_atomically
 from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.symmetry import reduce_observations, restore_actions
+from seastar_gym.envs.symmetry import observed_mirror, reduce_observations, restore_actions
 from seastar_gym.envs.task import scene_observation_size
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import is_finite_number
@@ -48,7 +50,7 @@ class LearnedPolicy:
     rng: Random generator of actions that are not deterministic.
 
     The environment is made with the policy's own attributes: `gym.make("SeastarSwim-v0", actions=policy.actions,
-    scene=policy.scene)`.
+    scene=policy.scene, decision_period=policy.decision_period)`.
     """
 
     def __init__(
@@ -67,6 +69,8 @@ class LearnedPolicy:
         self.weights = weights
         self.actions = description.actions
         self.scene = description.scene
+        self.decision_period = description.decision_period or description.scene.actuator.period
+        self._mirror = observed_mirror(description.scene)
         self.training = training or {}
         self.rng = np.random.default_rng(0) if rng is None else rng
 
@@ -90,7 +94,7 @@ class LearnedPolicy:
             )
         if not self.description.symmetry:
             return self._choose(observation, deterministic), None
-        reduced, elements = reduce_observations(observation, n_limbs)
+        reduced, elements = reduce_observations(observation, n_limbs, self._mirror)
         chosen = self._choose(reduced, deterministic)
         return restore_actions(chosen, elements, self.actions, n_limbs), None
 
@@ -120,6 +124,11 @@ class LearnedPolicy:
         if actions != self.actions:
             raise ValueError(
                 f'The policy answers with actions="{self.actions}", the environment takes actions="{actions}".'
+            )
+        ours, theirs = scene_observation_size(self.scene), scene_observation_size(scene)
+        if ours != theirs:
+            raise ValueError(
+                f"The policy sees {ours} numbers, the environment shows {theirs}: their actuators remember differently."
             )
 
     def differences(self, scene: Scene) -> str:

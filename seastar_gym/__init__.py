@@ -3,6 +3,8 @@
 Importing this package registers `SeastarSwim-v0`, and the timed environments that decide several times a second.
 """
 
+from typing import Any
+
 from gymnasium.envs.registration import register
 
 from seastar_gym.certify.measure import certify
@@ -56,7 +58,7 @@ __all__ = [
     "relaxation_time",
 ]
 
-_ENTRY_POINTS = {
+_ENTRY_POINTS: dict[str, Any] = {
     "entry_point": "seastar_gym.envs.seastar_swim:SeastarSwimEnv",
     "vector_entry_point": "seastar_gym.envs.vector:SeastarSwimVectorEnv",
 }
@@ -72,5 +74,5 @@ for _id, _decision_period in TIMED.items():
         id=_id,
         max_episode_steps=round(TIME_LIMIT / _decision_period),
         kwargs={"decision_period": _decision_period, "actions": "pairs"},
-        **_ENTRY_POINTS,  # type: ignore[arg-type]
+        **_ENTRY_POINTS,
     )

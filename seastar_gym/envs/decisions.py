@@ -21,13 +21,13 @@ def checked_decision_period(seconds: float | None, scene: Scene) -> float:
     require_number("decision_period", seconds, "s")
     if not SHORTEST * step <= seconds <= MAX_STEPS * step:
         raise ValueError(
-            f"decision_period must be from {SHORTEST * step:.4g} to {MAX_STEPS * step:.4g} s, with steps of {step:.4g} s, "
-            f"not {seconds:.4g} s."
+            f"decision_period must be from {SHORTEST * step:.4g} to {MAX_STEPS * step:.4g} s, with steps of "
+            f"{step:.4g} s, not {seconds:.4g} s."
         )
     if not _can_begin_anew(actuator, float(seconds)):
         raise ValueError(
-            f"decision_period must be at least {actuator.period:.4g} s, the period of this {type(actuator).__name__}, whose "
-            f"limbs would jump at a new command after {seconds:.4g} s: use an actuator with memory, such as SmaWires."
+            f"decision_period must be at least {actuator.period:.4g} s, the period of this {type(actuator).__name__}: "
+            f"limbs would jump at a new command after {seconds:.4g} s. Use an actuator with memory, such as SmaWires."
         )
     return float(seconds)
 

@@ -30,7 +30,7 @@ def action_masks(actions: Actions, deaf: Mask) -> Mask:
         return ~deaf.reshape(n_robots, -1)
     if actions == "limbs":
         return np.concatenate([np.ones((n_robots, n_limbs, 1), bool), ~deaf], axis=-1).reshape(n_robots, -1)
-    return ~masked_limbs(command_table(actions, n_limbs), deaf[:, None]).any(axis=-1)
+    return np.asarray(~masked_limbs(command_table(actions, n_limbs), deaf[:, None]).any(axis=-1))
 
 
 def masked_limbs(commands: Floats, deaf: Mask) -> Mask:

@@ -18,7 +18,8 @@ with m = 9 n_limbs stations in the order {1,1}..{1,9}, {2,1}.. (m = 45 for five 
 next waypoint is the current one. Distances of waypoints are not clipped.
 
 If actuators have a memory (a `StatefulActuator`), the numbers of its `observe` for limb 1, limb 2, .. stand before the
-waypoints, which are always the last four numbers, unless the environment leaves them out. `Layout` names all these places.
+waypoints, which are always the last four numbers; an environment may leave the memory out. `Layout` names all these
+places.
 """
 
 from functools import cache

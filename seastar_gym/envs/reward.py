@@ -9,7 +9,6 @@ from seastar_gym.envs.paths import shortest_way
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.serial import register_part
 
-
 PULSE = 0.1
 """Heating time of one wire [s] that `RewardWeights.effort` is the price of."""
 
@@ -74,8 +73,8 @@ def reward_terms(
 def pulses_of(heating_time: NDArray[np.float64], commands: NDArray[np.float64]) -> NDArray[np.float64]:
     """Heat as a number of pulses of 0.1 s, shape (n_robots,).
 
-    heating_time: Time for which wires were heated, summed over limbs [s], shape (n_robots,). NaN where the actuator does
-        not say it: a command then counts as its share of a pulse.
+    heating_time: Time for which wires were heated, summed over limbs [s], shape (n_robots,). NaN where the actuator
+        does not say it: a command then counts as its share of a pulse.
     commands: Shape (n_robots, n_limbs).
     """
     whole = np.round(heating_time / PULSE, 12)  # sums of tenths of a second are whole pulses again

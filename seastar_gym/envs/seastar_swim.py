@@ -39,12 +39,12 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     about the hub by up to 36 degrees, then they cool for 0.9 s and turn back (Fig. 13.5b). `actions` chooses how a
     command is written:
 
-    | `actions`      | space                       | index  | range      | meaning                                        |
-    |----------------|-----------------------------|--------|------------|------------------------------------------------|
-    | `"limbs"`      | `MultiDiscrete([3] * n)`    | 0..n-1 | 0..2       | limb: 0 rest, 1 anti-clockwise, 2 clockwise    |
-    | `"joint"`      | `Discrete(3**n)`            | -      | 0..3**n-1  | number of a command: every combination         |
-    | `"pairs"`      | `Discrete(1 + n*(n - 1))`   | -      | 0..n*(n-1) | number of a command: none, or one + and one -  |
-    | `"continuous"` | `Box(-1, 1, (n,), float32)` | 0..n-1 | -1..1      | limb: share of a full command, + or -          |
+    | `actions`      | space                       | index  | range      | meaning                                     |
+    |----------------|-----------------------------|--------|------------|---------------------------------------------|
+    | `"limbs"`      | `MultiDiscrete([3] * n)`    | 0..n-1 | 0..2       | limb: 0 rest, 1 anti-clockwise, 2 clockwise |
+    | `"joint"`      | `Discrete(3**n)`            | -      | 0..3**n-1  | number of a command: every combination      |
+    | `"pairs"`      | `Discrete(1 + n*(n - 1))`   | -      | 0..n*(n-1) | number of a command: none, or a + and a -   |
+    | `"continuous"` | `Box(-1, 1, (n,), float32)` | 0..n-1 | -1..1      | limb: share of a full command, + or -       |
 
     Actions have no unit. `env.command_table[number]` is the command of every limb: 0, 1 (+) or -1 (-). A share is the
     width of the heating pulse, of 0.1 s at most, for wires (`SmaWires`, `ThermalSma`), and scales the rotation of other
@@ -93,15 +93,14 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     A robot of other than five limbs has as many times nine stations. If a scene's actuators have a memory, it stands
     before the waypoints, limb after limb, unless `observe_actuators` is False:
 
-    | actuator     | numbers of a limb                                                      | unit          | range   |
-    |--------------|------------------------------------------------------------------------|---------------|---------|
-    | `SmaWires`   | contractions of wires +, -                                             | 1             | 0..1    |
-    | `ThermalSma` | temperatures of wires +, - above the water; austenite of wires +, -    | A_f - T_w; 1  | 0..; 0..1 |
-    | `Limited`    | rotation                                                               | largest one   | -1..1   |
+    | actuator     | numbers of a limb                                          | unit              | range      |
+    |--------------|------------------------------------------------------------|-------------------|------------|
+    | `SmaWires`   | contractions of wires +, -                                 | 1                 | 0..1       |
+    | `ThermalSma` | temperatures of wires +, - above the water, then austenite | A_f - T_water; 1  | 0..; 0..1  |
+    | `Limited`    | rotation                                                   | the largest one   | -1..1      |
 
-    So an observation has 196 numbers in the timed environments. Such a limb and its waypoints are all that the future
-    depends on, if decisions are no shorter than the pulses. `seastar_gym.envs.observation.Layout` names all these
-    places.
+    So an observation has 196 numbers in the timed environments. Nothing else tells the future of the robot, unless
+    decisions are shorter than pulses. `seastar_gym.envs.observation.Layout` names all these places.
 
     ## Reward
     The sum of three terms, with the weights of `RewardWeights`; each term is in `info`, too:
@@ -112,8 +111,10 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `reward_waypoint` | waypoints reached in the decision                            | 1 per waypoint |
     | `reward_effort`   | minus the time for which wires were heated, in pulses        | 0.01 per pulse |
 
-    A pulse is 0.1 s of one wire, what a stroke takes of a limb; a limb and decision counts as its share of a pulse where
-    an actuator does not say how long it is heated. The route is the shortest one that passes the current waypoint within 0.7 of its radius (`RewardWeights.aim`) on the
+    A pulse is 0.1 s of one wire, what a stroke takes of a limb. Where an actuator does not say how long it is heated, a
+    command counts as its share of a pulse.
+
+    The route is the shortest one that passes the current waypoint within 0.7 of its radius (`RewardWeights.aim`) on the
     way to the next, and leads from centre to centre after that.
 
     ## Info
@@ -135,7 +136,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `limbs_heated`           | int        | 1    | number of limbs whose heating began in the decision              |
     | `heating_time`           | float      | s    | time for which wires were heated in it, summed over limbs        |
     | `energy`                 | float      | J    | electric energy of that heat                                     |
-    | `energy_per_metre`       | float      | J/m  | energy over the length of the hub's way, both since the reset    |
+    | `energy_per_metre`       | float      | J/m  | energy over the decrease of the route's length, since the reset  |
     | `newton_iterations`      | int        | 1    | Newton iterations of the decision                                |
     | `solver_status`          | int        | -    | `SolverStatus` of the decision, 0: converged                     |
     | `solver_message`         | str        | -    | what to do about a status other than 0; empty for 0              |
@@ -144,7 +145,9 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `reward_waypoint`        | float      | 1    | term of the reward                                               |
     | `reward_effort`          | float      | 1    | term of the reward                                               |
 
-    `energy_per_metre` is 0 before the hub moves; heat and energy are NaN for actuators that do not say it.
+    `energy_per_metre` is infinite where the route has not become shorter; heat and energy are NaN for actuators that do
+    not say it.
+    Measured errors and speed are there only where decisions are strokes.
     `path_error` is that over every sequence of strokes by whole commands, repeated ones included; `space_error` and
     `time_error` are those of the usual swims, straight, round the pentagon, or of random commands. They belong to the
     robot's resolution and the numerics (see `seastar_gym.scene.fidelity`), and are NaN for other robots and scenes than

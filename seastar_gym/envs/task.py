@@ -122,6 +122,7 @@ class SwimTask:
             raise ValueError(f"reward must be RewardWeights, not {shown(reward)}.")
         require_flag("observe_actuators", observe_actuators)
         self.decision_period = checked_decision_period(decision_period, scene)
+        self._in_strokes = self.decision_period == scene.actuator.period
         self.actions: Actions = actions
         self.observe_actuators = observe_actuators
         self._can_be_masked = can_be_masked(scene.actuator)
@@ -146,8 +147,7 @@ class SwimTask:
         self.n_waypoints = np.ones(n_robots, np.int64)
         self.waypoint_index = np.zeros(n_robots, np.int64)
         self._way_to_go = np.zeros(n_robots)
-        self._hub, self._way_swum = np.zeros((n_robots, 2)), np.zeros(n_robots)
-        self._energy = np.zeros(n_robots)  # since the reset [J]
+        self._way_at_reset, self._energy = np.zeros(n_robots), np.zeros(n_robots)  # [m]; since the reset [J]
 
     @property
     def observation_size(self) -> int:
@@ -172,9 +172,8 @@ class SwimTask:
             self.simulator.set_limb_strengths(strengths)
         self.simulator.reset(robots, headings)
         self.waypoint_index[robots] = 0
-        hub = self.simulator.hub_position()
-        self._way_to_go[robots] = self._measure_way_to_go(hub)[robots]
-        self._hub[robots], self._way_swum[robots], self._energy[robots] = hub[robots], 0.0, 0.0
+        self._way_to_go[robots] = self._measure_way_to_go(self.simulator.hub_position())[robots]
+        self._way_at_reset[robots], self._energy[robots] = self._way_to_go[robots], 0.0
 
     def _set_path(self, robot: np.intp, waypoints: Floats) -> None:
         missing = len(waypoints) - self.waypoints.shape[1]
@@ -244,7 +243,7 @@ class SwimTask:
         return self._judge(followed, np.count_nonzero(followed != commands, axis=1), report)
 
     def warmth(self) -> Floats | None:
-        """Contractions or temperatures of wires + and -, from 0 to 1, shape (n_robots, n_limbs, 2); None without any."""
+        """Contractions or temperatures of wires + and -, 0 to 1, shape (n_robots, n_limbs, 2); None without wires."""
         if not isinstance(self.scene.actuator, Deaf):
             return None
         numbers = self.simulator.observe_actuators()
@@ -257,9 +256,7 @@ class SwimTask:
         before = self._way_to_go
         self._way_to_go = self._measure_way_to_go(hub)
         success = self.waypoint_index == self.n_waypoints
-        self._way_swum += _length(hub - self._hub)
         self._energy += report.energy
-        self._hub = hub
         pulses = pulses_of(report.heating_time, commands)
         terms = reward_terms(self.reward, before - self._way_to_go, reached, pulses)
         reward = terms["reward_progress"] + terms["reward_waypoint"] + terms["reward_effort"]
@@ -298,8 +295,10 @@ class SwimTask:
         }
 
     def _energy_per_metre(self) -> Floats:
-        """Energy over the length of the hub's way, both since the reset [J/m]; 0 for hubs that have not moved."""
-        return np.divide(self._energy, self._way_swum, out=np.zeros(self.n_robots), where=self._way_swum > 0.0)
+        """Energy over the decrease of the way to go, both since the reset [J/m]; infinite where it did not decrease."""
+        energy, progress = self._energy, self._way_at_reset - self._way_to_go
+        found = np.divide(energy, progress, out=np.full(self.n_robots, np.inf), where=progress > 0.0)
+        return np.where(np.isnan(energy) | (energy == 0.0), energy, found)
 
     def _pass_waypoints(self, hub: Floats) -> NDArray[np.int64]:
         """Move on while the current waypoint is within its radius; returns the number reached, shape (n_robots,)."""
@@ -324,7 +323,7 @@ class SwimTask:
             "distance": _length(current - hub),
             "cross_track_error": cross_track_error(hub, self._waypoint(leg - 1), self._waypoint(leg)),
             **({"action_mask": self.action_masks().astype(np.int8)} if self._can_be_masked else {}),
-            **self._promised(),
+            **(self._promised() if self._in_strokes else {}),
             **({"error_estimate": self.simulator.error_estimate} if self._error_bars else {}),
             **{name: values.copy() for name, values in self.drawn.items()},
         }

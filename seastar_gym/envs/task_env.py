@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions, action_space, command_table
 from seastar_gym.envs.randomization import DomainRandomization

@@ -10,14 +10,19 @@ An element carries a robot with its waypoints onto another robot, whose limb j w
 swaps the commands + and -. A controller that sees only waypoints in sector 0 and whose actions are carried back is
 equivariant: in a turned or mirrored world it swims the turned or mirrored way.
 
+Actuators with a memory move with their limbs, and a mirror changes their numbers as they say (`mirror` of the actuator,
+for wires: + and - change places). Functions of observations take that as `mirror`, see `observed_mirror`; () is for
+observations without memory.
+
 The functions take batches: observations of shape (..., size), as laid out in `observation.py`, and elements of shape
 (...).
 """
 
 from seastar_gym.envs.symmetry.actions import action_table, restore_actions, transform_actions, transform_commands
 from seastar_gym.envs.symmetry.group import compose, inverse, limb_order, turns
+from seastar_gym.envs.symmetry.masks import transform_masks
 from seastar_gym.envs.symmetry.observations import reduce_observations, sectors, transform_observations
-from seastar_gym.envs.symmetry.scenes import require_symmetry
+from seastar_gym.envs.symmetry.scenes import observed_mirror, require_symmetry
 from seastar_gym.envs.symmetry.wrappers import SymmetryReduction, VectorSymmetryReduction
 
 __all__ = [
@@ -27,12 +32,14 @@ __all__ = [
     "compose",
     "inverse",
     "limb_order",
+    "observed_mirror",
     "reduce_observations",
     "require_symmetry",
     "restore_actions",
     "sectors",
     "transform_actions",
     "transform_commands",
+    "transform_masks",
     "transform_observations",
     "turns",
 ]

@@ -7,20 +7,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.envs.observation import Layout, layout
+from seastar_gym.envs.symmetry.actions import move_limbs
 from seastar_gym.envs.symmetry.group import Elements, is_mirror, limb_order, read_only, turns
+from seastar_gym.scene.actuators.heating import Mirror
 
 BOUNDARY_WIDTH = 1e-6
 """Angle [rad] from a boundary between two sectors within which a waypoint lies on it. It is far above the rounding of
 observations: not rounding, but the next waypoint chooses the sector of a robot that is aimed along a limb."""
 
 
-def sectors(observations: NDArray[np.floating[Any]], n_limbs: int) -> Elements:
+def sectors(observations: NDArray[np.floating[Any]], n_limbs: int, mirror: Mirror = ()) -> Elements:
     """Sectors of the current waypoints, 0 to 2 n_limbs - 1, shape (...), in observations of shape (..., size).
 
     A waypoint on a boundary belongs to the sector on the side of the next waypoint, and where that lies on the same
     line (or there is none) to the sector anti-clockwise of the boundary. A waypoint at the hub lies in sector 0.
     """
-    at = _layout(observations, n_limbs)
+    at = _layout(observations, n_limbs, mirror)
     current = np.asarray(observations[..., at.current_waypoint], np.float64)
     towards_next = np.asarray(observations[..., at.next_waypoint], np.float64)
     width = np.pi / n_limbs
@@ -34,11 +36,12 @@ def sectors(observations: NDArray[np.floating[Any]], n_limbs: int) -> Elements:
     return sector.astype(np.intp) % (2 * n_limbs)
 
 
-def _layout(observations: NDArray[np.floating[Any]], n_limbs: int) -> Layout:
-    """Layout of observations, shape (..., size); ValueError if they are of a robot of other limbs."""
-    at, size = layout(n_limbs), observations.shape[-1]
+def _layout(observations: NDArray[np.floating[Any]], n_limbs: int, mirror: Mirror) -> Layout:
+    """Layout of observations, shape (..., size); ValueError if they are of a robot of other limbs or another memory."""
+    at, size = layout(n_limbs, n_limbs * len(mirror)), observations.shape[-1]
     if size != at.size:
-        raise ValueError(f"An observation of {size} numbers is not that of a robot of {n_limbs} limbs.")
+        remembered = f" whose actuators remember {len(mirror)} numbers each" if mirror else ""
+        raise ValueError(f"An observation of {size} numbers is not that of a robot of {n_limbs} limbs{remembered}.")
     return at
 
 
@@ -53,11 +56,35 @@ def _vector_order(n_limbs: int) -> NDArray[np.intp]:
 
 
 def transform_observations(
-    observations: NDArray[np.floating[Any]], elements: ArrayLike, n_limbs: int
+    observations: NDArray[np.floating[Any]], elements: ArrayLike, n_limbs: int, mirror: Mirror = ()
 ) -> NDArray[np.floating[Any]]:
     """Observations of the robots carried by the elements: a fresh array of the same shape and type."""
     observations, elements = np.asarray(observations), np.asarray(elements, dtype=np.intp)
-    _layout(observations, n_limbs)
+    at = _layout(observations, n_limbs, mirror)
+    if not mirror:
+        return _transform_vectors(observations, elements, n_limbs)
+    memory = _transform_memory(observations[..., at.actuators], elements, n_limbs, mirror)
+    others = np.concatenate([observations[..., at.stations_and_hub], observations[..., at.waypoints]], axis=-1)
+    others = _transform_vectors(others, elements, n_limbs)
+    before = at.stations_and_hub.stop
+    return np.concatenate([others[..., :before], memory, others[..., before:]], axis=-1)
+
+
+def _transform_memory(
+    memory: NDArray[np.floating[Any]], elements: Elements, n_limbs: int, mirror: Mirror
+) -> NDArray[np.floating[Any]]:
+    """Memory of actuators, limb after limb, shape (..., k n_limbs): it moves with its limb, and is mirrored."""
+    of_limbs = memory.reshape(*memory.shape[:-1], n_limbs, len(mirror))
+    moved = np.stack([move_limbs(of_limbs[..., k], elements) for k in range(len(mirror))], axis=-1)
+    index, sign = np.array(mirror).T
+    mirrored = moved[..., index] * sign.astype(memory.dtype)
+    return np.where(is_mirror(elements)[..., None, None], mirrored, moved).reshape(memory.shape)
+
+
+def _transform_vectors(
+    observations: NDArray[np.floating[Any]], elements: Elements, n_limbs: int
+) -> NDArray[np.floating[Any]]:
+    """Observations without memory of the robots carried by the elements."""
     as_vectors = np.result_type(observations, np.complex64)  # pairs of numbers as x + iy
     vectors = np.ascontiguousarray(observations).view(as_vectors)
     vectors = np.take_along_axis(vectors, _vector_order(n_limbs)[elements], axis=-1)
@@ -67,8 +94,8 @@ def transform_observations(
 
 
 def reduce_observations(
-    observations: NDArray[np.floating[Any]], n_limbs: int
+    observations: NDArray[np.floating[Any]], n_limbs: int, mirror: Mirror = ()
 ) -> tuple[NDArray[np.floating[Any]], Elements]:
     """Observations with the current waypoint brought into sector 0, and the elements that did it."""
-    elements = sectors(observations, n_limbs)
-    return transform_observations(observations, elements, n_limbs), elements
+    elements = sectors(observations, n_limbs, mirror)
+    return transform_observations(observations, elements, n_limbs, mirror), elements

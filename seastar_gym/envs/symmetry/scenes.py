@@ -2,9 +2,11 @@
 
 from collections.abc import Iterable, Iterator
 
+from seastar_gym.envs.observation import scene_layout
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization
 from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.actuator import StatefulActuator
+from seastar_gym.scene.actuators.actuator import Mirrored, StatefulActuator
+from seastar_gym.scene.actuators.heating import Mirror
 
 
 def require_symmetry(scene: Scene, randomization: DomainRandomization | None = None) -> None:
@@ -14,14 +16,22 @@ def require_symmetry(scene: Scene, randomization: DomainRandomization | None = N
         raise ValueError(f"This scene has not the symmetry of the regular polygon: {why}.")
 
 
+def observed_mirror(scene: Scene, observe_actuators: bool = True) -> Mirror:
+    """What a mirror makes of the memory of a limb's actuator that observations of a scene have; () without any."""
+    at = scene_layout(scene, observe_actuators).actuators
+    if at.start == at.stop or not isinstance(scene.actuator, Mirrored):
+        return ()
+    return tuple(scene.actuator.mirror)[: (at.stop - at.start) // scene.robot.n_limbs]
+
+
 def _asymmetries(scene: Scene, drawn: Iterable[str]) -> Iterator[str]:
     """Reasons why a scene, some of whose numbers are drawn, is not symmetric."""
     if not scene.robot.is_symmetric:
         yield "its limbs are not alike, straight and evenly spread"
     if len(set(scene.limb_strengths)) > 1:
         yield "its limbs are not equally strong"
-    if isinstance(scene.actuator, StatefulActuator):
-        yield "its actuators remember what they did, and no table says how that is carried from limb to limb"
+    if isinstance(scene.actuator, StatefulActuator) and not isinstance(scene.actuator, Mirrored):
+        yield "its actuators remember what they did, and do not say what a mirror makes of that"
     if any(node != 0 for node in scene.held_nodes):
         yield "nodes of limbs are held"
     if scene.loads:
