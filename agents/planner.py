@@ -20,6 +20,7 @@ from seastar_gym.envs.stations import N_STATIONS, node_weights
 from seastar_gym.envs.task import make_scene
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Recalled
+from seastar_gym.scene.checks import require_number
 from seastar_gym.simulator import Simulator, State
 
 Floats = NDArray[np.float64]
@@ -33,15 +34,19 @@ class Budget:
     """Decisions looked ahead. Of strokes, one costs a stroke or so round the pentagon; more than three gain nothing."""
     beam: int = 8
     """States kept from one decision to the next."""
+    coasting: float = 0.0
+    """Time for which robots swim on without commands before they are compared [s]. Where decisions are shorter than the
+    wires' cooling, a comparison without it sees power strokes, but not what the limbs cost on their way back."""
 
     def __post_init__(self) -> None:
         if self.depth < 1 or self.beam < 1:
             raise ValueError(f"depth and beam must be at least 1, not {self.depth} and {self.beam}.")
+        require_number("coasting", self.coasting, "s", zero_allowed=True)
 
 
 SHARE = 0.2
 """Share of the time between decisions in which the planner is to answer, on two processors."""
-TIMED_BUDGETS = {0.5: Budget(4, 12), 0.2: Budget(4, 6), 0.1: Budget(3, 4)}
+TIMED_BUDGETS = {0.5: Budget(3, 8, 0.5), 0.2: Budget(3, 4, 0.8), 0.1: Budget(2, 3, 0.9)}
 """Budgets that keep SHARE, by time between decisions [s]."""
 
 
@@ -86,13 +91,23 @@ class Branching:
         self._duration = checked_decision_period(decision_period, scene)
         self._simulators: dict[int, Simulator] = {}
 
+    def coasted(self, states: State, seconds: float) -> Floats:
+        """Positions of the hubs [m] once the states have swum on without commands, shape (states, 2)."""
+        simulator = self._simulator(len(states.time))
+        simulator.set_state(states)
+        simulator.advance(seconds)
+        return simulator.hub_position()
+
+    def _simulator(self, n: int) -> Simulator:
+        """Simulator of n robots."""
+        if n not in self._simulators:
+            self._simulators[n] = Simulator(self.scene, n, self.threads)
+        return self._simulators[n]
+
     def __call__(self, states: State) -> State:
         """States after one decision, shape (states * commands, ...), those of the same state side by side."""
         n_states, n_commands = len(states.time), len(self.commands)
-        n = n_states * n_commands
-        if n not in self._simulators:
-            self._simulators[n] = Simulator(self.scene, n, self.threads)
-        simulator = self._simulators[n]
+        simulator = self._simulator(n_states * n_commands)
         simulator.set_state(states.of_robots(np.repeat(np.arange(n_states), n_commands)))
         simulator.advance(self._duration, np.tile(self.commands, (n_states, 1)))
         return simulator.get_state()._replace(commands=None, phase=None)  # the next commands take their place
@@ -139,6 +154,9 @@ class Planner(Searcher):
             states = self._swim_all(states)
             hub = states.positions[:, 0].reshape(len(current), -1, 2)
             way, passed, there = self._judge(hub, np.repeat(passed, n_commands, axis=1), current, after)
+            if self.budget.coasting > 0.0:
+                hub = self._swim_all.coasted(states, self.budget.coasting).reshape(hub.shape)
+                way, *_ = self._judge(hub, passed, current, after)
             first = (
                 np.tile(np.arange(n_commands), (len(current), 1)) if stroke == 0 else np.repeat(first, n_commands, 1)
             )

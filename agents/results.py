@@ -17,11 +17,11 @@ MM = 1000.0
 COLUMNS = {
     "agent": "agent",
     "strokes_to_finish": "strokes\nto\nfinish",
-    "simulated_time_s": "simulated\ntime\n[s]",
+    "simulated_time_s": "time\n[s]",
     "waypoints_reached": "waypoints\nreached",
     "mean_cross_track_error_mm": "mean\ncross-track\nerror [mm]",
     "largest_cross_track_error_mm": "largest\ncross-track\nerror [mm]",
-    "limbs_heated_per_metre": "limbs\nheated per\nmetre [1/m]",
+    "limbs_heated_per_metre": "limbs\nheated\n[1/m]",
     "energy_per_metre_J": "energy\n[J/m]",
 }
 """Titles of the printed columns, by the names of the CSV's."""

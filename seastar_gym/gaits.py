@@ -59,8 +59,8 @@ THRIFTY_LEVEL = 0.6
 WAVE = (5, 4, 3, 2, 1)
 """Limbs of the turning wave, in its order."""
 LAGGED_SIDES, LAGGED_REST = {0.5: 22, 0.6: 20}, 2
-"""Time of lagged swimming along a side of the pentagon [s], by lag [s], and of rest after it. Without rest, water that is
-still moving turns the robot at every corner, by 4 degrees."""
+"""Time of lagged swimming along a side of the pentagon [s], by lag [s], and of rest after it. Without rest, limbs that
+are still rotated turn the robot at every corner, by 4 degrees."""
 
 
 def in_time(strokes: Floats, decision_period: float) -> Floats:
@@ -111,7 +111,7 @@ def turning_wave(decision_period: float) -> Floats:
 
 
 def lagged_pentagon(decision_period: float) -> Floats:
-    """The lagged gait along five sides, with a rest after each, as decisions. A turn by 72 degrees moves all limbs on by one."""
+    """The lagged gait along five sides, with rest after each, as decisions. A turn by 72 degrees moves limbs on by one."""
     side = lagged_gait(decision_period)
     lag = decision_period * int(np.flatnonzero(side.any(axis=1))[-1])
     swimming = np.tile(side, (LAGGED_SIDES[min(LAGGED_SIDES, key=lambda known: abs(known - lag))], 1))
