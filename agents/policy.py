@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from agents.description import Description, read_facts
 from agents.files import write_atomically
 from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.symmetry import observed_mirror, reduce_observations, restore_actions
+from seastar_gym.envs.symmetry import memory_mirror, reduce_observations, restore_actions
 from seastar_gym.envs.task import scene_observation_size
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import is_finite_number
@@ -70,7 +70,6 @@ class LearnedPolicy:
         self.actions = description.actions
         self.scene = description.scene
         self.decision_period = description.decision_period or description.scene.actuator.period
-        self._mirror = observed_mirror(description.scene)
         self.training = training or {}
         self.rng = np.random.default_rng(0) if rng is None else rng
 
@@ -94,7 +93,7 @@ class LearnedPolicy:
             )
         if not self.description.symmetry:
             return self._choose(observation, deterministic), None
-        reduced, elements = reduce_observations(observation, n_limbs, self._mirror)
+        reduced, elements = reduce_observations(observation, n_limbs, memory_mirror(self.scene.actuator))
         chosen = self._choose(reduced, deterministic)
         return restore_actions(chosen, elements, self.actions, n_limbs), None
 

@@ -1,4 +1,4 @@
-"""`StrokeLock`: one stroke at a time changes a simulator, and an interrupted change is noticed."""
+"""`StrokeLock`: one stroke or other interval at a time changes a simulator, and an interrupted change is noticed."""
 
 import os
 import threading

@@ -396,7 +396,7 @@ def test_another_scene_is_told_but_other_numerics_are_not(policy):
 def test_the_policy_in_the_box_says_how_it_was_made():
     shipped = load()
     facts = json.loads(SHIPPED.with_suffix(".json").read_text(encoding="utf-8"))
-    assert facts["scene"] == shipped.scene.to_dict()
+    assert Scene.from_dict(facts["scene"]) == shipped.scene
     assert shipped.scene == Scene.preset("balanced")
     assert shipped.training["strokes"] > 0 and isinstance(shipped.training["seed"], int)
     assert shipped.training["commands"][0].startswith("python train.py")

@@ -234,7 +234,7 @@ def test_a_timed_policy_behind_the_symmetry_is_equivariant():
     description = Description("pairs", True, scene, (16,), 0.5)
     shapes = description.shapes()
     policy = LearnedPolicy(description, {name: rng.normal(size=shapes[name]).astype(np.float32) for name in shapes})
-    seen, mirror = rng.normal(size=(100, 196)).astype(np.float32), symmetry.observed_mirror(scene)
+    seen, mirror = rng.normal(size=(100, 196)).astype(np.float32), symmetry.memory_mirror(scene.actuator)
     actions, _ = policy.predict(seen, deterministic=True)
     for element in range(10):
         elements = np.full(len(seen), element)

@@ -320,6 +320,53 @@ def test_a_random_policy_in_the_wrapper_swims_the_carried_way(n_limbs, nodes_per
         np.testing.assert_allclose(hubs_along(path @ carry.T), hubs @ carry.T, atol=1e-9)
 
 
+MEMORIES = {
+    "wires": SmaWires(period=0.5),
+    "deaf": SmaWires(cooling_time=0.6, period=0.3, deaf=True),
+    "thermal": ThermalSma(heating_time=0.1, cooling_time=0.4, largest_temperature=60.0),
+    "limited": Limited(SmaPulse(), largest_rate=0.4),
+}
+
+
+@pytest.mark.parametrize("actuator", MEMORIES.values(), ids=MEMORIES)
+@pytest.mark.parametrize("n_limbs", [4, 5])
+def test_what_actuators_remember_is_carried_with_the_robot(actuator, n_limbs):
+    """From rest, along a carried path, for every element: the same reduced observations and the carried swim."""
+    path = np.array([[0.01, 0.013], [-0.03, 0.02], [0.02, -0.03]])
+    numerics, n_actions = Numerics("implicit-midpoint", 0.01, newton_tolerance=1e-10), 1 + n_limbs * (n_limbs - 1)
+    scene = Scene(Seastar(n_limbs, 4), actuator=actuator, numerics=numerics)
+
+    def swim_along(path):
+        env = SymmetryReduction(gym.make("SeastarSwim-v0", path=path, actions="pairs", scene=scene))
+        seen, hubs = [env.reset(seed=0)[0]], []
+        weights = np.random.default_rng(6).normal(size=(seen[0].size, n_actions))
+        for k in range(10):
+            observation, *_, info = env.step((np.argmax(seen[-1] @ weights) + 5 * k) % n_actions)
+            seen.append(observation)
+            hubs.append(info["hub_position"])
+        return np.array(seen), np.array(hubs)
+
+    seen, hubs = swim_along(path)
+    remembered = seen[1:, -4 - n_limbs * len(symmetry.memory_mirror(actuator)) : -4]
+    assert np.ptp(hubs, axis=0).max() > 1e-3 and (np.abs(remembered).max(axis=1) > 0.01).sum() > 5
+    for element in range(1, 2 * n_limbs):
+        carry = matrix(element, n_limbs)
+        carried_seen, carried_hubs = swim_along(path @ carry.T)
+        np.testing.assert_allclose(carried_hubs, hubs @ carry.T, atol=1e-9)
+        np.testing.assert_allclose(carried_seen, seen, atol=1e-5)
+
+
+def test_memory_is_restored_by_the_inverse_and_another_size_refused():
+    mirror = symmetry.memory_mirror(ThermalSma())
+    assert mirror == ((1, 1), (0, 1), (3, 1), (2, 1)) and symmetry.memory_mirror(SmaPulse()) == ()
+    observations = np.random.default_rng(0).normal(size=(50, observation_size(5) + 20))
+    reduced, elements = symmetry.reduce_observations(observations, 5, mirror)
+    restored = symmetry.transform_observations(reduced, symmetry.inverse(elements, 5), 5, mirror)
+    np.testing.assert_allclose(restored, observations, atol=1e-14)
+    with assert_refused("not that of a robot of 5 limbs"):
+        symmetry.reduce_observations(observations, 5)
+
+
 # Wrappers
 
 SQUARE_ROBOT = Scene(robot=Seastar(n_limbs=4, nodes_per_limb=4), numerics=Numerics.preset("fast"))
@@ -505,25 +552,25 @@ def test_a_refusal_has_its_reason_in_the_swim(name, monkeypatch):
     assert np.ptp(swims, axis=0).max() > 1e-3
 
 
-class Secretive:
-    """Actuator that remembers its last command, and does not say what a mirror makes of it."""
+class Remembering:
+    """Actuator with a memory that does not say what a mirror makes of it."""
 
-    peak_angle, period, corners = 0.3, 1.0, (0.0, 0.1, 1.0)
-    rest = np.zeros(1)
+    peak_angle, period, corners, rest = 0.3, 1.0, (0.0, 1.0), np.zeros(1)
 
     def delta_psi(self, t):
-        return SmaPulse(0.3).delta_psi(t)
+        return 0.3 * np.sin(np.pi * np.asarray(t)) ** 2
 
     def respond(self, t, commands, state):
-        return np.multiply.outer(self.delta_psi(t), commands), commands[..., None]
+        return np.multiply.outer(self.delta_psi(t), commands), state
 
     def observe(self, state):
         return state
 
 
-def test_actuators_that_do_not_say_what_a_mirror_makes_of_their_memory_are_refused():
-    with assert_refused("symmetry of the regular polygon", "mirror"):
-        SymmetryReduction(SeastarSwimEnv(scene=Scene(actuator=Secretive())))
+def test_actuators_that_remember_are_refused_unless_they_say_what_a_mirror_does():
+    with assert_refused("symmetry of the regular polygon", "remember"):
+        SymmetryReduction(SeastarSwimEnv(scene=Scene(actuator=Remembering())))
+    SymmetryReduction(SeastarSwimEnv(scene=Scene(actuator=ThermalSma())))
 
 
 # Actuators with a memory
@@ -541,7 +588,7 @@ REMEMBERING = {
 def test_a_carried_robot_swims_the_carried_way(name):
     """State, commands and observations are carried; after a decision, both are the same again."""
     scene = Scene(Seastar(5, 4), actuator=REMEMBERING[name], numerics=FAST)
-    mirror, rng = symmetry.observed_mirror(scene), np.random.default_rng(0)
+    mirror, rng = symmetry.memory_mirror(scene.actuator), np.random.default_rng(0)
     assert len(mirror) == {"limited": 1, "thermal": 4, "hot": 4}.get(name, 2)
     simulator, other = Simulator(scene, 10), Simulator(scene, 10)
     elements = np.arange(10)
@@ -623,11 +670,16 @@ def followed_as_a_whole(action, mask, mode):
 
 def test_observations_of_another_memory_are_refused():
     seen = observations_of(5)
-    mirror = symmetry.observed_mirror(Scene(actuator=SmaWires()))
+    mirror = symmetry.memory_mirror(SmaWires())
     with assert_refused("not that of a robot of 5 limbs"):
         symmetry.reduce_observations(seen, 5, mirror)
-    assert symmetry.observed_mirror(Scene(actuator=SmaWires()), observe_actuators=False) == ()
-    assert symmetry.observed_mirror(Scene()) == ()
+    assert symmetry.memory_mirror(SmaPulse()) == ()
+
+
+def test_unobserved_memory_is_not_carried():
+    """The environment without it is symmetric all the same."""
+    env = SymmetryReduction(SeastarSwimEnv(decision_period=0.5, observe_actuators=False))
+    assert env.reset(seed=0)[0].shape == (186,)
 
 
 def test_every_robot_of_a_batch_has_to_be_symmetric():

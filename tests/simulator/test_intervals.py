@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from refusals import assert_refused
 
+from refusals import assert_refused
 from seastar_gym import (
     Limited,
     MeasuredCurve,
@@ -183,7 +183,10 @@ class Remembering(Plain):
         return state
 
 
-@pytest.mark.parametrize("actuator", [Plain(), Remembering(), Limited(Plain(), 0.2)], ids=["plain", "memory", "limited"])
+SILENT = {"plain": Plain(), "memory": Remembering(), "limited": Limited(Plain(), 0.2)}
+
+
+@pytest.mark.parametrize("actuator", SILENT.values(), ids=SILENT)
 def test_an_actuator_that_says_nothing_of_heat_has_unknown_energy_and_no_deaf_wires(actuator):
     simulator = Simulator(scene_with(actuator))
     report = simulator.stroke(LEFT_RIGHT)

@@ -7,12 +7,9 @@ symmetry group is the turn (g even) or the turn and mirror (g odd) that brings s
     element 2k - 1:  turn by -2 pi k/n, then mirror at the x axis (y -> -y), for k = 1..n
 
 An element carries a robot with its waypoints onto another robot, whose limb j was limb `limb_order(n)[g, j]`; a mirror
-swaps the commands + and -. A controller that sees only waypoints in sector 0 and whose actions are carried back is
-equivariant: in a turned or mirrored world it swims the turned or mirrored way.
-
-Actuators with a memory move with their limbs, and a mirror changes their numbers as they say (`mirror` of the actuator,
-for wires: + and - change places). Functions of observations take that as `mirror`, see `observed_mirror`; () is for
-observations without memory.
+swaps the commands + and -, and does to the memory of actuators what they say (`memory_mirror`). A controller that sees
+only waypoints in sector 0 and whose actions are carried back is equivariant: in a turned or mirrored world it swims the
+turned or mirrored way.
 
 The functions take batches: observations of shape (..., size), as laid out in `observation.py`, and elements of shape
 (...).
@@ -22,7 +19,7 @@ from seastar_gym.envs.symmetry.actions import action_table, restore_actions, tra
 from seastar_gym.envs.symmetry.group import compose, inverse, limb_order, turns
 from seastar_gym.envs.symmetry.masks import transform_masks
 from seastar_gym.envs.symmetry.observations import reduce_observations, sectors, transform_observations
-from seastar_gym.envs.symmetry.scenes import observed_mirror, require_symmetry
+from seastar_gym.envs.symmetry.scenes import memory_mirror, require_symmetry
 from seastar_gym.envs.symmetry.wrappers import SymmetryReduction, VectorSymmetryReduction
 
 __all__ = [
@@ -32,7 +29,7 @@ __all__ = [
     "compose",
     "inverse",
     "limb_order",
-    "observed_mirror",
+    "memory_mirror",
     "reduce_observations",
     "require_symmetry",
     "restore_actions",

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.envs.observation import Layout, layout
-from seastar_gym.envs.symmetry.actions import move_limbs
 from seastar_gym.envs.symmetry.group import Elements, is_mirror, limb_order, read_only, turns
 from seastar_gym.scene.actuators.heating import Mirror
 
@@ -21,6 +20,8 @@ def sectors(observations: NDArray[np.floating[Any]], n_limbs: int, mirror: Mirro
 
     A waypoint on a boundary belongs to the sector on the side of the next waypoint, and where that lies on the same
     line (or there is none) to the sector anti-clockwise of the boundary. A waypoint at the hub lies in sector 0.
+
+    mirror: What a mirror does to the memory of a limb's actuator, see `memory_mirror`; () if actuators have none.
     """
     at = _layout(observations, n_limbs, mirror)
     current = np.asarray(observations[..., at.current_waypoint], np.float64)
@@ -37,11 +38,10 @@ def sectors(observations: NDArray[np.floating[Any]], n_limbs: int, mirror: Mirro
 
 
 def _layout(observations: NDArray[np.floating[Any]], n_limbs: int, mirror: Mirror) -> Layout:
-    """Layout of observations, shape (..., size); ValueError if they are of a robot of other limbs or another memory."""
-    at, size = layout(n_limbs, n_limbs * len(mirror)), observations.shape[-1]
+    """Layout of observations, shape (..., size); ValueError if they are of a robot of other limbs."""
+    at, size = layout(n_limbs, len(mirror) * n_limbs), observations.shape[-1]
     if size != at.size:
-        remembered = f" whose actuators remember {len(mirror)} numbers each" if mirror else ""
-        raise ValueError(f"An observation of {size} numbers is not that of a robot of {n_limbs} limbs{remembered}.")
+        raise ValueError(f"An observation of {size} numbers is not that of a robot of {n_limbs} limbs.")
     return at
 
 
@@ -58,33 +58,36 @@ def _vector_order(n_limbs: int) -> NDArray[np.intp]:
 def transform_observations(
     observations: NDArray[np.floating[Any]], elements: ArrayLike, n_limbs: int, mirror: Mirror = ()
 ) -> NDArray[np.floating[Any]]:
-    """Observations of the robots carried by the elements: a fresh array of the same shape and type."""
+    """Observations of the robots carried by the elements: a fresh array of the same shape and type.
+
+    mirror: What a mirror does to the memory of a limb's actuator, see `memory_mirror`; () if actuators have none.
+    """
     observations, elements = np.asarray(observations), np.asarray(elements, dtype=np.intp)
     at = _layout(observations, n_limbs, mirror)
     if not mirror:
         return _transform_vectors(observations, elements, n_limbs)
-    memory = _transform_memory(observations[..., at.actuators], elements, n_limbs, mirror)
-    others = np.concatenate([observations[..., at.stations_and_hub], observations[..., at.waypoints]], axis=-1)
-    others = _transform_vectors(others, elements, n_limbs)
-    before = at.stations_and_hub.stop
-    return np.concatenate([others[..., :before], memory, others[..., before:]], axis=-1)
+    hub = at.hub_velocity.stop
+    vectors = np.concatenate([observations[..., at.stations_and_hub], observations[..., at.waypoints]], axis=-1)
+    vectors = _transform_vectors(vectors, elements, n_limbs)
+    remembered = _transform_memory(observations[..., at.actuators], elements, n_limbs, mirror)
+    return np.concatenate([vectors[..., :hub], remembered, vectors[..., hub:]], axis=-1)
 
 
 def _transform_memory(
-    memory: NDArray[np.floating[Any]], elements: Elements, n_limbs: int, mirror: Mirror
+    remembered: NDArray[np.floating[Any]], elements: Elements, n_limbs: int, mirror: Mirror
 ) -> NDArray[np.floating[Any]]:
-    """Memory of actuators, limb after limb, shape (..., k n_limbs): it moves with its limb, and is mirrored."""
-    of_limbs = memory.reshape(*memory.shape[:-1], n_limbs, len(mirror))
-    moved = np.stack([move_limbs(of_limbs[..., k], elements) for k in range(len(mirror))], axis=-1)
-    index, sign = np.array(mirror).T
-    mirrored = moved[..., index] * sign.astype(memory.dtype)
-    return np.where(is_mirror(elements)[..., None, None], mirrored, moved).reshape(memory.shape)
+    """Memory of actuators, shape (..., n_limbs len(mirror)), moved with the limbs and mirrored where the robots are."""
+    of_limbs = remembered.reshape(*remembered.shape[:-1], n_limbs, len(mirror))
+    of_limbs = np.take_along_axis(of_limbs, limb_order(n_limbs)[elements][..., None], axis=-2)
+    index, sign = np.array(mirror, dtype=int).T
+    swapped = of_limbs[..., index] * sign.astype(remembered.dtype)
+    return np.where(is_mirror(elements)[..., None, None], swapped, of_limbs).reshape(remembered.shape)
 
 
 def _transform_vectors(
     observations: NDArray[np.floating[Any]], elements: Elements, n_limbs: int
 ) -> NDArray[np.floating[Any]]:
-    """Observations without memory of the robots carried by the elements."""
+    """Pairs of numbers of observations without memory, turned, mirrored and moved with their limbs."""
     as_vectors = np.result_type(observations, np.complex64)  # pairs of numbers as x + iy
     vectors = np.ascontiguousarray(observations).view(as_vectors)
     vectors = np.take_along_axis(vectors, _vector_order(n_limbs)[elements], axis=-1)
@@ -96,6 +99,9 @@ def _transform_vectors(
 def reduce_observations(
     observations: NDArray[np.floating[Any]], n_limbs: int, mirror: Mirror = ()
 ) -> tuple[NDArray[np.floating[Any]], Elements]:
-    """Observations with the current waypoint brought into sector 0, and the elements that did it."""
+    """Observations with the current waypoint brought into sector 0, and the elements that did it.
+
+    mirror: What a mirror does to the memory of a limb's actuator, see `memory_mirror`; () if actuators have none.
+    """
     elements = sectors(observations, n_limbs, mirror)
     return transform_observations(observations, elements, n_limbs, mirror), elements

@@ -2,10 +2,9 @@
 
 from collections.abc import Iterable, Iterator
 
-from seastar_gym.envs.observation import scene_layout
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization
 from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.actuator import Mirrored, StatefulActuator
+from seastar_gym.scene.actuators.actuator import Actuator, Mirrored, StatefulActuator
 from seastar_gym.scene.actuators.heating import Mirror
 
 
@@ -16,12 +15,11 @@ def require_symmetry(scene: Scene, randomization: DomainRandomization | None = N
         raise ValueError(f"This scene has not the symmetry of the regular polygon: {why}.")
 
 
-def observed_mirror(scene: Scene, observe_actuators: bool = True) -> Mirror:
-    """What a mirror makes of the memory of a limb's actuator that observations of a scene have; () without any."""
-    at = scene_layout(scene, observe_actuators).actuators
-    if at.start == at.stop or not isinstance(scene.actuator, Mirrored):
+def memory_mirror(actuator: Actuator) -> Mirror:
+    """What a mirror does to the numbers that are observed of a limb's actuator; empty without memory."""
+    if not isinstance(actuator, StatefulActuator) or not isinstance(actuator, Mirrored):
         return ()
-    return tuple(scene.actuator.mirror)[: (at.stop - at.start) // scene.robot.n_limbs]
+    return actuator.mirror[: actuator.observe(actuator.rest).shape[-1]]
 
 
 def _asymmetries(scene: Scene, drawn: Iterable[str]) -> Iterator[str]:
@@ -31,7 +29,7 @@ def _asymmetries(scene: Scene, drawn: Iterable[str]) -> Iterator[str]:
     if len(set(scene.limb_strengths)) > 1:
         yield "its limbs are not equally strong"
     if isinstance(scene.actuator, StatefulActuator) and not isinstance(scene.actuator, Mirrored):
-        yield "its actuators remember what they did, and do not say what a mirror makes of that"
+        yield "its actuators remember what they did, and do not say what a mirror makes of it (`mirror`)"
     if any(node != 0 for node in scene.held_nodes):
         yield "nodes of limbs are held"
     if scene.loads:

@@ -12,7 +12,7 @@ from seastar_gym.envs.symmetry.actions import restore_actions
 from seastar_gym.envs.symmetry.group import Elements
 from seastar_gym.envs.symmetry.masks import transform_masks
 from seastar_gym.envs.symmetry.observations import reduce_observations
-from seastar_gym.envs.symmetry.scenes import observed_mirror, require_symmetry
+from seastar_gym.envs.symmetry.scenes import memory_mirror, require_symmetry
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.actuators.heating import Mirror
 
@@ -52,7 +52,8 @@ def _kind(env: Any) -> _Kind:
     if not isinstance(inner, SeastarSwimEnv | SeastarSwimVectorEnv):
         raise ValueError(f"Symmetry is known of SeastarSwim-v0 and the timed environments alone, not of {inner!r}.")
     require_symmetry(inner.scene, inner.randomization)
-    return _Kind(inner.actions, inner.scene.robot.n_limbs, observed_mirror(inner.scene, inner.observe_actuators))
+    mirror = memory_mirror(inner.scene.actuator) if inner.observe_actuators else ()
+    return _Kind(inner.actions, inner.scene.robot.n_limbs, mirror)
 
 
 class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorArgs):

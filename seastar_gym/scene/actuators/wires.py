@@ -40,10 +40,10 @@ class SmaWires:
     The state of a limb is (x_+, x_-, r_+, r_-): contractions [1], and the time for which either wire is still heated
     [s]. The first two are observed. The rest is zero at ends of intervals that are not shorter than heating_time.
 
-    No time step straddles the end of a full pulse, nor the end of its cooling from rest. Corners that differ from limb
-    to limb (partial commands, and wires heated while they are warm) may lie within a step: rotations are exact at ends
-    of steps and linear in between. With random commands in [-1, 1] every 0.2 s, steps of 5 ms then cost 0.2 % of the
-    path at most, against steps ten times shorter; with commands 0 and +-1 it is 0.1 %.
+    No time step straddles the end of a full pulse of the last commands, nor the end of its cooling from rest. Corners
+    that differ from limb to limb (partial or earlier commands, wires heated while they are warm) may lie within a step:
+    rotations are exact at ends of steps and linear in between. With random commands in [-1, 1] every 0.2 s, steps of
+    5 ms then cost 0.2 % of the path at most, against steps ten times shorter; with commands 0 and +-1 it is 0.1 %.
 
     peak_angle: Rotation if one wire is all contracted and the other not at all [rad].
     heating_time: Time in which a heated wire contracts [s].

@@ -247,6 +247,18 @@ class Triangle:
         return np.interp(t, self.corners, (0.0, 0.3, 0.0))
 
 
+class Remembering(Triangle):
+    """One with a memory that does not say what a mirror makes of it."""
+
+    rest = np.zeros(1)
+
+    def respond(self, t, commands, state):
+        return np.multiply.outer(self.delta_psi(t), commands), state
+
+    def observe(self, state):
+        return state
+
+
 def test_a_scene_takes_any_actuator_that_says_what_it_does():
     assert isinstance(Triangle(), Actuator) and not isinstance(Triangle(), StatefulActuator)
     found = swim(Scene(actuator=Triangle(), numerics=NUMERICS))
@@ -292,7 +304,7 @@ def test_what_actuators_remember_is_seen_before_the_waypoints():
 @pytest.mark.parametrize(
     "scene, words",
     [
-        (Scene(actuator=SLOW), "remember"),
+        (Scene(actuator=Remembering()), "remember"),
         (Scene(limb_strengths=(1.0, 1.0, 0.5, 1.0, 1.0)), "equally strong"),
         (Scene(loads=((3, 1e-5, 0.0),)), "loaded"),
     ],

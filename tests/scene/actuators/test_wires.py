@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from refusals import assert_refused
 
+from refusals import assert_refused
 from seastar_gym import Limited, SmaPulse, SmaWires, ThermalSma
 from seastar_gym.scene.actuators.actuator import check_actuator, mirrored
 
@@ -108,10 +108,16 @@ def test_a_deaf_limb_ignores_commands_until_both_wires_are_cold():
     np.testing.assert_allclose(turned[1] / PEAK, [0.2 - 0.01, -0.01 + 0.008 / 0.9, -0.09], atol=SMALL)
 
 
-@pytest.mark.parametrize(
-    "actuator", [WIRES, SmaWires(deaf=True), ThermalSma(), ThermalSma(largest_temperature=50.0), Limited(SmaPulse(), 0.5, 2.0)],
-    ids=["wires", "deaf", "thermal", "hot", "limited"],
-)  # fmt: skip
+MIRRORED = {
+    "wires": WIRES,
+    "deaf": SmaWires(deaf=True),
+    "thermal": ThermalSma(),
+    "hot": ThermalSma(largest_temperature=50.0),
+    "limited": Limited(SmaPulse(), 0.5, 2.0),
+}
+
+
+@pytest.mark.parametrize("actuator", MIRRORED.values(), ids=MIRRORED)
 def test_a_mirrored_limb_turns_the_other_way(actuator):
     rng, t = np.random.default_rng(0), np.array([0.0, 0.03, 0.1, 0.4])
     state = np.broadcast_to(actuator.rest, (50, 5, len(actuator.rest)))
