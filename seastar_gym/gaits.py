@@ -111,7 +111,7 @@ def turning_wave(decision_period: float) -> Floats:
 
 
 def lagged_pentagon(decision_period: float) -> Floats:
-    """The lagged gait along five sides, with rest after each, as decisions. A turn by 72 degrees moves limbs on by one."""
+    """The lagged gait along five sides, with rest after each, as decisions. Turns of 72 degrees shift limbs by one."""
     side = lagged_gait(decision_period)
     lag = decision_period * int(np.flatnonzero(side.any(axis=1))[-1])
     swimming = np.tile(side, (LAGGED_SIDES[min(LAGGED_SIDES, key=lambda known: abs(known - lag))], 1))
