@@ -83,7 +83,8 @@ PARTS: Calls = {
     "SeastarSwimEnv": (SeastarSwimEnv, dict(
         path="line", actions="limbs", fidelity="fast", scene=Scene(numerics=FAST), reward=RewardWeights(),
         waypoint_radius=0.01, random_heading=False, render_mode=None, frames_per_stroke=2,
-        randomization=DomainRandomization({"robot.density": Uniform(900.0, 1100.0)}))),
+        randomization=DomainRandomization({"robot.density": Uniform(900.0, 1100.0)}), decision_period=1.0,
+        observe_actuators=True)),
     "SeastarSwimVectorEnv": (SeastarSwimVectorEnv, dict(
         num_envs=2, max_episode_steps=3, path="line", actions="pairs", fidelity="fast", scene=Scene(numerics=FAST),
         reward=RewardWeights(), waypoint_radius=0.01, random_heading=True, render_mode=None,
