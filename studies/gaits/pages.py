@@ -14,7 +14,7 @@ def lines_of(head: list[str], rows: list[list[str]]) -> str:
 def numbers(fast: Table, finest: Table) -> list[str]:
     """Speeds at both presets, turn, pulses and heat of a gait."""
     return [
-        f"{fast['mm_per_s']:.2f}", f"{finest['mm_per_s']:.2f}", f"{fast['turn_deg_per_s']:.1f}",
+        f"{fast['mm_per_s']:.2f}", f"{finest['mm_per_s']:.2f}", f"{round(fast['turn_deg_per_s'], 1) + 0.0:.1f}",
         f"{fast['pulses_per_s']:.1f}", f"{fast['joules_per_m']:.0f}",
     ]  # fmt: skip
 

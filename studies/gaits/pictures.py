@@ -58,7 +58,8 @@ def draw_front(results: dict[str, Any], file: Path) -> None:
         color=COLOURS["re-heated"], zorder=3, label="evolved, re-heated wires",
     )  # fmt: skip
     for name, side, down in (
-        ("synchronous", 1, 11), ("one at a time", -1, -4), ("lag 0.6", 1, 11), ("thrifty", -1, -4), ("thriftier", -1, 4),
+        ("synchronous", 1, 11), ("one at a time", -1, -4), ("lag 0.6", 1, 11), ("thrifty", -1, -4),
+        ("thriftier", -1, 4),
     ):  # fmt: skip
         each = results["named"][name]["fast"]
         axes.plot(each["joules_per_m"], each["mm_per_s"], "o", color=COLOURS["from rest"], zorder=4)
