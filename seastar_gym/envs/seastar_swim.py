@@ -219,7 +219,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
             require_count("frames_per_stroke", frames_per_stroke, 1, 1_000_000)
         self.render_mode = render_mode
         modelled = make_scene(scene, fidelity, decision_period)
-        warn_uncertified(modelled, fidelity, certificate)
+        if scene is not None:
+            warn_uncertified(modelled, fidelity, certificate)
         task = SwimTask(
             modelled, 1, path, reward, waypoint_radius, random_heading, 1, randomization, certificate, error_bars,
             actions, decision_period, observe_actuators,

@@ -93,7 +93,8 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
         modelled = make_scene(scene, fidelity, decision_period)
-        warn_uncertified(modelled, fidelity, certificate)
+        if scene is not None:
+            warn_uncertified(modelled, fidelity, certificate)
         task = SwimTask(
             modelled, num_envs, path, reward, waypoint_radius, random_heading, threads, randomization, certificate,
             error_bars, actions, decision_period, observe_actuators,
