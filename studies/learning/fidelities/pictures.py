@@ -20,13 +20,13 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
     values = np.array([[found[row, column].mean for column in SWUM] for row in rows])
     figure = Figure(figsize=(10.5, 2.2 + 0.36 * len(rows)), layout="constrained")
     axes = figure.subplots()
-    shown = axes.imshow(values, cmap="viridis_r", aspect="auto", vmax=min(values.max(), 1.15 * values.min()))
-    bright = shown.norm.vmin + 0.5 * (shown.norm.vmax - shown.norm.vmin)
+    low, high = float(values.min()), float(min(values.max(), 1.15 * values.min()))
+    shown = axes.imshow(values, cmap="viridis_r", aspect="auto", vmin=low, vmax=high)
     for (i, j), value in np.ndenumerate(values):
         best = value == values[:, j].min()
         axes.text(
             j, i, f"{value:.0f}", ha="center", va="center", fontsize=9, fontweight="bold" if best else "normal",
-            color="white" if value > bright else INK,
+            color="white" if value > 0.5 * (low + high) else INK,
         )  # fmt: skip
     axes.set_xticks(range(len(SWUM)), list(SWUM), rotation=40, ha="left", fontsize=9)
     axes.xaxis.tick_top()

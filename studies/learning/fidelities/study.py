@@ -64,7 +64,7 @@ class Options:
 
 
 def scores(policy: LearnedPolicy, options: Options, names: Sequence[str]) -> dict[str, Any]:
-    """Strokes of a policy on the held-out paths, by the physics that it is swum in, and round the pentagon at `DEAR`."""
+    """Strokes of a policy on the held-out paths, by the physics that it is swum in, and round the pentagon."""
     return {
         "random": {name: strokes_to_finish(policy, SWUM[name], "random", options.paths) for name in names},
         "pentagon": strokes_to_finish(policy, SWUM[DEAR], "pentagon", 1)[0],
