@@ -140,7 +140,9 @@ def swum(numerics: Numerics, discretisation: Discretisation, freeze_lengths: boo
     return np.array(distances)
 
 
-def excess(numerics: Numerics, discretisation: Discretisation, freeze_lengths: bool = False) -> tuple[Floats, Floats]:
+def excess(
+    numerics: Numerics, discretisation: Discretisation, freeze_lengths: bool = False
+) -> tuple[Floats, Floats]:
     """Numbers of strokes, and relative excess of the distance from the start over the converged robot's [%].
 
     The converged robot has the same discretisation.

@@ -128,8 +128,8 @@ def as_page(results: Mapping[str, Any], picture: str) -> str:
         f"The limit's own error is at most {PERCENT * doubt:.2g} %.", "",
         f"![Error over processor time per stroke]({picture})", "",
         "A line is what no other measured setting of its discretisation beats. Letters are the presets. Errors are "
-        "whole ones, not the promised sums of space and time ([accuracy.md](accuracy.md)), so they are smaller where the "
-        "two cancel.", "",
+        "whole ones, not the promised sums of space and time ([accuracy.md](accuracy.md)): they are smaller where "
+        "the two cancel.", "",
         "## Use this when", "",
         "| preset | use it for | largest error, chapter's robot | over the other robots | time per stroke [ms] |",
         "|---|---|---:|---:|---:|",
