@@ -30,7 +30,7 @@ class CertifiedSetting:
     sequences of a class. An error is the sum of that of space and that of time, sequence by sequence.
 
     nodes_per_limb, scheme, step [s], newton_tolerance: The setting, of the continuum's discretisation.
-    errors: Sum of the errors of space and time, by class of commands, see `seastar_gym.certify.commands`.
+    errors: Sum of the errors of space and time, by class of commands, see `seastar_gym.certification.commands`.
     space_error, time_error: Largest errors of all classes of full amplitude.
     speed: Simulated time over computing time, for a batch on one core.
     """

@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import beta
 
-from seastar_gym.certify import commands, measure
-from seastar_gym.certify.commands import CLASSES, draw_classes
+from seastar_gym.certification import commands, measure
+from seastar_gym.certification.commands import CLASSES, draw_classes
 from seastar_gym.command import run_command
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.scene.certificate import Certificate, resolved

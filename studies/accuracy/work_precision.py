@@ -2,10 +2,10 @@
 
 The chapter's robot, one of silicone, one with thermal actuators, one whose limbs touch, and ones of three and of twelve
 limbs swim ten strokes from rest, with sequences of every class of commands of full amplitude
-(`seastar_gym.certify.commands`). The error is the hub's largest distance, at the ends of strokes, from its path with 73
-nodes per limb of the continuum's discretisation and the implicit midpoint rule at 0.125 ms, over the length of that
-path: the whole error, which is smaller than the promised sum of space and time where the two cancel. The straight swim
-of the chapter's robot stands beside, with four published codes.
+(`seastar_gym.certification.commands`). The error is the hub's largest distance, at the ends of strokes, from its path
+with 73 nodes per limb of the continuum's discretisation and the implicit midpoint rule at 0.125 ms, over the length of
+that path: the whole error, which is smaller than the promised sum of space and time where the two cancel. The straight
+swim of the chapter's robot stands beside, with four published codes.
 
 Times are processor times of one thread per robot and stroke, the best of several strokes of a batch. Writes a page, a
 picture and the numbers (JSON). A robot whose numbers are in the file is not swum again.
@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from seastar_gym.certify import measure
-from seastar_gym.certify.commands import CLASSES, PROMISED, draw_classes
+from seastar_gym.certification import measure
+from seastar_gym.certification.commands import CLASSES, PROMISED, draw_classes
 from seastar_gym.command import run_command
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Contact, Numerics, Scene, Seastar, SmaPulse
@@ -92,6 +92,11 @@ def errors(hub: Floats, limit: Floats, limb_length: float) -> Floats:
     return np.where(np.isnan(distances), np.inf, distances) / measure.path_lengths(limit, limb_length)
 
 
+def finite(number: float) -> float | None:
+    """Number as JSON has it: none where the solver failed."""
+    return float(number) if np.isfinite(number) else None
+
+
 def examine(physics: Scene, straight: bool) -> dict[str, Any]:
     """Numbers of a problem. straight: Whether the chapter's straight swim stands beside the sequences, as the last."""
     commands = draw_sequences(physics.robot.n_limbs)
@@ -110,8 +115,8 @@ def examine(physics: Scene, straight: bool) -> dict[str, Any]:
             "newton_tolerance": setting.numerics.newton_tolerance,
             "preset": next((name for name, each in PRESETS.items() if each == setting), None),
             "ms_per_stroke": 1e3 * cost(scene),
-            "largest_error": float(own.max()), "median_error": float(np.median(own)),
-            **({"straight_error": float(found[-1])} if straight else {}),
+            "largest_error": finite(own.max()), "median_error": finite(np.median(own)),
+            **({"straight_error": finite(found[-1])} if straight else {}),
         })  # fmt: skip
     return {
         "sequences": commands.shape[1] - straight,

@@ -8,8 +8,8 @@ import pytest
 
 from refusals import assert_refused
 from seastar_gym import Certificate, Numerics, Scene, Seastar
-from seastar_gym.certify import measure
-from seastar_gym.certify.commands import CLASSES
+from seastar_gym.certification import measure
+from seastar_gym.certification.commands import CLASSES
 from studies.accuracy import promises
 
 ROBOT = "short, L = 5 cm"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from seastar_gym import Numerics, Scene, Seastar
-from seastar_gym.certify.commands import PROMISED
+from seastar_gym.certification.commands import PROMISED
 from seastar_gym.scene.numerics import PRESETS, Setting
 from studies.accuracy import work_precision as study
 from studies.accuracy import work_precision_page as page
@@ -43,7 +43,16 @@ def row(ms: float, error: float, discretisation: str = "continuum", preset: str 
 
 def test_the_front_has_what_no_other_setting_beats():
     rows = [row(1.0, 0.1), row(2.0, 0.2), row(3.0, 0.05), row(0.5, 0.4)]
-    assert [each["ms_per_stroke"] for each in page.front(rows, straight=False)] == [0.5, 1.0, 3.0]
+    assert [each["ms_per_stroke"] for each in page.front(rows, "largest_error")] == [0.5, 1.0, 3.0]
+
+
+def test_largest_errors_are_told_of_robots_whose_worst_sequences_have_a_limit():
+    rows = [row(1.0, 0.1, preset=name) for name in page.USES] + [row(2.0, 0.2, "chapter"), row(1.0, 0.05)]
+    problems = {"a": {"limit_error": 1e-4, "settings": rows}, "contact": {"limit_error": 0.3, "settings": rows}}
+    assert "Not so for contact, where 30 % are in doubt" in page._doubt(problems)
+    assert "2 to 2 times faster" in page._conclusion(problems)
+    rows[-1] |= {"largest_error": study.finite(np.inf)}
+    assert "fails, 5 %" in page._rows(problems)[-1]
 
 
 @pytest.fixture
