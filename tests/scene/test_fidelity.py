@@ -27,6 +27,8 @@ from studies.accuracy.cases import (
     swim,
     swims,
 )
+from studies.accuracy.settings import Plan
+from studies.accuracy.tables import measured_over
 
 NAMES = get_args(Fidelity)
 UNSEEN = random_sequences(24, np.random.default_rng(20_261_121))
@@ -45,6 +47,12 @@ def test_table_comes_with_the_package_and_is_complete():
         assert 0.0 < row.path_error < 0.6 and 0.0 < row.straight_error < 0.6
         assert min(row.gait_error, row.slow_error, row.end_error, row.heading_error, row.time_error) > 0.0
         assert row.speed > 5.0
+
+
+def test_the_table_says_over_which_commands_it_was_measured_and_with_which_confidence():
+    stored = fidelity.measured_over()
+    assert stored == json.loads(json.dumps(measured_over(Plan())))
+    assert "0.93 confidence" in stored["confidence"] and stored["path_error"]["random, ternary and continuous"] == 51
 
 
 def test_a_path_error_is_the_sum_of_space_and_time():
