@@ -1,15 +1,13 @@
 """Description of what is simulated: robot, fluid, actuator, contact and numerics, joined in a `Scene`.
 
 All parts are frozen dataclasses in SI units. `checks.py` refuses bad values, `per_robot.py` allows numbers that differ
-from robot to robot, `serial.py` writes scenes to plain data, `fidelity.py` knows the measured errors of numerics, and
-`certificate.py` those of any scene.
+from robot to robot, `serial.py` writes scenes to plain data, and `fidelity.py` knows the measured errors of numerics.
 """
 
 from seastar_gym.scene.actuators.limited import Limited
 from seastar_gym.scene.actuators.measured import MeasuredCurve
 from seastar_gym.scene.actuators.pulse import SmaPulse
 from seastar_gym.scene.actuators.thermal import ThermalSma
-from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
 from seastar_gym.scene.fluid import Water
@@ -19,7 +17,6 @@ from seastar_gym.scene.robot import Seastar, relaxation_time
 from seastar_gym.scene.scene import Scene
 
 __all__ = [
-    "Certificate",
     "Contact",
     "GridCurrent",
     "Limb",
