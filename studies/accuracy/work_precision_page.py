@@ -165,10 +165,9 @@ def _doubt(problems: Mapping[str, Any]) -> str:
     for name, found in problems.items():
         if not settled(found):
             said += (
-                f" Not so for {name}, where {PERCENT * found['limit_error']:.2g} % are in doubt on the worst sequence. "
-                "With 31 nodes per limb and more, whose edges are about as short as a limb is thick, paths of limbs "
-                "that touch depend on the mesh and the step; why is not known. There medians are drawn, and nothing "
-                "finer than `accurate` is to be trusted."
+                f" Not so for {name}, where {PERCENT * found['limit_error']:.2g} % are in doubt on the worst sequence: "
+                "while limbs press on each other, paths depend on the mesh and the step, and no refinement settles them; "
+                "why is not known. There medians are drawn."
             )
     return said.strip()
 
