@@ -166,8 +166,8 @@ def _doubt(problems: Mapping[str, Any]) -> str:
         if not settled(found):
             said += (
                 f" Not so for {name}, where {PERCENT * found['limit_error']:.2g} % are in doubt on the worst sequence: "
-                "while limbs press on each other, paths depend on the mesh and the step, and no refinement settles them; "
-                "why is not known. There medians are drawn."
+                "while limbs press on each other, paths depend on the mesh and the step, and no refinement settles "
+                "them; why is not known. There medians are drawn."
             )
     return said.strip()
 

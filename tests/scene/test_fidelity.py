@@ -11,7 +11,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from seastar_gym import Contact, Numerics, Scene, Seastar, SmaPulse, Water
+from seastar_gym import Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 from seastar_gym.scene import fidelity
 from seastar_gym.scene.fidelity import Promise, cheapest, promise, promises
 from seastar_gym.scene.numerics import PRESETS, Fidelity
@@ -286,3 +286,30 @@ def test_for_error_of_any_gait_keeps_it_whatever_command_is_repeated(error):
     exact = swim(gaits(), Scene.preset("reference"), threads=None)
     found = swim(gaits(), Scene.for_error(error, any_gait=True), threads=None)
     assert errors(found, exact).path.max() <= error + promise("reference").gait_error
+
+
+# Long swims
+
+
+def energy_gathered(scene: Scene, strokes: int = 200) -> float:
+    """Kinetic energy of the fastest gait at the end of so many strokes over that after 20."""
+    simulator = Simulator(scene, threads=1)
+    gait = np.array([[0.0, 0.0, 1.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0, -1.0]])
+    energies = []
+    for stroke in range(strokes):
+        simulator.stroke(gait[stroke % 2][None])
+        energies.append(simulator.kinetic_energy()[0])
+    return float(np.max(energies[-20:]) / np.max(energies[:20]))
+
+
+@pytest.mark.parametrize("name", ["fast", "balanced", pytest.param("accurate", marks=pytest.mark.slow), "chapter"])
+def test_presets_gather_no_energy_over_long_swims(name):
+    assert energy_gathered(Scene.preset(name)) < 1.5
+
+
+def test_nineteen_nodes_gather_energy_with_steps_of_5_ms_but_not_of_4():
+    """The midpoint rule damps nothing: some meshes resonate with some steps, long after a promise ends."""
+    scene = Scene.preset("balanced")
+    nineteen = replace(scene, robot=replace(scene.robot, nodes_per_limb=19))
+    assert energy_gathered(nineteen) > 10.0
+    assert energy_gathered(replace(nineteen, numerics=replace(scene.numerics, step=4e-3))) < 1.5
