@@ -150,8 +150,8 @@ def summary(results: dict[str, Any]) -> str:
             )
     lines += [
         "",
-        f"{samples} fresh sequences per class; certificates of all seven robots: {above} of {all_cells} classes and "
-        f"settings exceed in more than 5 % of sequences, where {SHARE * all_cells:.0f} may.",
+        f"{samples} fresh sequences per class; certificates of {len(results['robots'])} robots: {above} of {all_cells} "
+        f"classes and settings exceed in more than 5 % of sequences, where {SHARE * all_cells:.0f} may.",
     ]
     return "\n".join(lines)
 
