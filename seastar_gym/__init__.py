@@ -7,7 +7,7 @@ from typing import Any
 
 from gymnasium.envs.registration import register
 
-from seastar_gym.certify.measure import certify
+from seastar_gym.certification.measure import certify
 from seastar_gym.envs.randomization import DomainRandomization, LogUniform, Normal, Uniform
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction

@@ -69,7 +69,7 @@ PARTS: Calls = {
                                 path_tolerance=0.01)),
     "Numerics.preset": (Numerics.preset, dict(fidelity="fast")),
     "Scene.preset": (Scene.preset, dict(fidelity="fast")),
-    "Scene.for_error": (Scene.for_error, dict(error=0.1, any_gait=True, robot=None)),
+    "Scene.for_error": (Scene.for_error, dict(error=0.1, any_gait=True, robot=None, certificate=None)),
     "promise": (promise, dict(setting="fast")),
     "relaxation_time": (relaxation_time, dict(loss_factor=0.1, frequency=10.0)),
     "Scene": (Scene, dict(robot=Seastar(), fluid=Water(), actuator=SmaPulse(), numerics=FAST, held_nodes=(0,),
