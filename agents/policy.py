@@ -32,7 +32,7 @@ from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import is_finite_number
 
 SHIPPED = Path(__file__).parent / "policies" / "seastar.safetensors"
-"""File of the policy in the box; `python train.py --ship` replaces it."""
+"""File of the policy in the box that decides stroke by stroke; `python train.py --ship` replaces it."""
 
 Weights = dict[str, NDArray[np.float32]]
 
@@ -162,6 +162,13 @@ def save(policy: LearnedPolicy, path: str | os.PathLike[str], **training: Any) -
     text = policy.description.to_json(sha256=hashlib.sha256(data).hexdigest(), training={**policy.training, **training})
     write_atomically(path, data)
     write_atomically(path.with_suffix(".json"), f"{text}\n".encode())
+
+
+def in_the_box(decision_period: float | None, shipped: Path = SHIPPED) -> Path:
+    """File of the policy in the box for a time between decisions [s]. None means strokes."""
+    if decision_period is None:
+        return shipped
+    return shipped.with_name(f"{shipped.stem}-{decision_period:g}s{shipped.suffix}")
 
 
 def load(path: str | os.PathLike[str] = SHIPPED) -> LearnedPolicy:

@@ -23,7 +23,7 @@ from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 
 AGENTS: dict[str, Callable[[Scene, float | None], Policy]] = {
-    "learned": lambda scene, decision_period: learned.load(),
+    "learned": lambda scene, decision_period: learned.load(learned.in_the_box(decision_period)),
     "greedy": lambda scene, decision_period: GreedyPolicy(scene, decision_period=decision_period),
     "planner": lambda scene, decision_period: Planner(decision_period=decision_period),  # at fidelity "fast"
 }
@@ -31,10 +31,11 @@ AGENTS: dict[str, Callable[[Scene, float | None], Policy]] = {
 decisions [s], None for strokes."""
 
 HELP = (
-    f"Agents: {', '.join(AGENTS)} (learned is the policy in the box); scripted gaits, {', '.join(GAITS)}, random, or a "
-    "pair of limbs such as 4+,1-; files of policies (.safetensors, or a model.zip of train.py or of plain "
-    "Stable-Baselines3); module:function, which gets an environment and returns anything with predict. A model.zip of "
-    "plain Stable-Baselines3 and module:function execute the code of whoever made them: load only files that you trust."
+    f"Agents: {', '.join(AGENTS)} (learned is the policy in the box for the time between decisions); scripted gaits, "
+    f"{', '.join(GAITS)}, random, or a pair of limbs such as 4+,1-; files of policies (.safetensors, or a model.zip of "
+    "train.py or of plain Stable-Baselines3); module:function, which gets an environment and returns anything with "
+    "predict. A model.zip of plain Stable-Baselines3 and module:function execute the code of whoever made them: load "
+    "only files that you trust."
 )
 """Help of options that name agents."""
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from agents.policy import SHIPPED, LearnedPolicy
+from agents.policy import SHIPPED, LearnedPolicy, in_the_box
 from agents.policy import load as load_policy
 from agents.policy import save as save_policy
 from agents.training.folder import resume_command
@@ -24,32 +24,33 @@ def put_in_the_box(options: Options, folder: Path) -> int:
         command = f"{resume_command(folder)} --ship --ship-anyway"
         print(f"The policy in the box stays: {objection}. Replace it all the same with\n    {command}", file=sys.stderr)
         return 1
-    save_policy(policy, SHIPPED)
-    print(f"In the box: {SHIPPED}")
+    file = in_the_box(options.ppo.decision_period, SHIPPED)
+    save_policy(policy, file)
+    print(f"In the box: {file}")
     return 0
 
 
 def why_not(policy: LearnedPolicy, options: Options) -> str | None:
     """Reason against replacing the policy in the box by this one, None if there is none."""
-    if not SHIPPED.exists():
+    file = in_the_box(options.ppo.decision_period, SHIPPED)
+    if not file.exists():
         return None
     try:
-        box = load_policy(SHIPPED)
+        box = load_policy(file)
     except (ValueError, FileNotFoundError) as unreadable:
         return f"there is nothing to compare with, {str(unreadable).rstrip('.')}"
-    if policy.decision_period != box.decision_period:
-        return f"it decides every {box.decision_period:g} s, the new one every {policy.decision_period:g} s"
-    ours, theirs = (held_out_strokes(one, options) for one in (policy, box))
+    ours, theirs = (held_out_decisions(one, options) for one in (policy, box))
     if ours <= theirs:
         return None
-    return f"it takes {theirs:.1f} strokes on {HELD_OUT_PATHS} held-out random paths, the new one {ours:.1f}"
+    decisions = "strokes" if options.ppo.decision_period is None else "decisions"
+    return f"it takes {theirs:.1f} {decisions} on {HELD_OUT_PATHS} held-out random paths, the new one {ours:.1f}"
 
 
-def held_out_strokes(policy: LearnedPolicy, options: Options) -> float:
-    """Mean strokes to the last waypoint of held-out random paths; a swim that does not arrive counts as the limit."""
-    scene = make_scene(None, options.fidelity)
+def held_out_decisions(policy: LearnedPolicy, options: Options) -> float:
+    """Mean decisions to the last waypoint of held-out random paths; a swim that does not arrive counts as the limit."""
+    scene = make_scene(None, options.fidelity, options.ppo.decision_period)
     swims = swim_many(
-        "learned", policy, "random", HELD_OUT_PATHS, scene,
-        max_strokes=options.limit, seed=HELD_OUT_SEED, threads=options.num_threads,
+        "learned", policy, "random", HELD_OUT_PATHS, scene, max_strokes=options.limit, seed=HELD_OUT_SEED,
+        threads=options.num_threads, decision_period=options.ppo.decision_period,
     )  # fmt: skip
     return float(np.mean([done.strokes for done in swims]))

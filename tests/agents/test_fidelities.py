@@ -12,7 +12,7 @@ from studies.learning.fidelities.pictures import draw
 from studies.learning.fidelities.scenes import CHEAP, DEAR, FIDELITIES, PHYSICS, SWUM
 from studies.learning.fidelities.study import CONTESTANTS, Options, main, stages
 
-TINY = Hyperparameters(num_envs=8, rollout=8, batch_size=32, epochs=1, hidden=(8,), max_episode_steps=10)
+TINY = Hyperparameters(num_envs=8, rollout=8, batch_size=32, epochs=1, hidden=(8,), max_episode_time=10.0)
 RATES = {CHEAP: 1e-3, DEAR: 4e-3}
 
 

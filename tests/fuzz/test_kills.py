@@ -30,7 +30,7 @@ DRIVER = Path(__file__).with_name("killed_training.py")
 STROKES, BETWEEN = 512, 128
 TINY = shlex.split(
     f"--strokes {STROKES} --save-freq {BETWEEN} --seed 4 --fidelity fast --num-envs 16 --rollout 8 --batch-size 64 "
-    "--epochs 2 --hidden 16 16 --max-episode-steps 20 --no-video --num-threads 1"
+    "--epochs 2 --hidden 16 16 --max-episode-time 20 --no-video --num-threads 1"
 )
 
 

@@ -269,7 +269,7 @@ def test_a_violent_robot_in_a_current_is_guarded_and_finishes():
         (lambda: Vortex(np.nan), ("circulation",)),
         (lambda: Vortex(1.0, core_radius=0.0), ("core_radius", "positive")),
         (lambda: GridCurrent((0.0, 0.0), 0.1, np.zeros((1, 2, 2))), ("velocities", "(1, 2, 2)")),
-        (lambda: GridCurrent((0.0, 0.0), 0.1, "current"), ("velocities", "shape")),
+        (lambda: GridCurrent((0.0, 0.0), 0.1, "current"), ("velocities", "numbers")),
         (lambda: GridCurrent((0.0, 0.0), 0.1, np.full((2, 2, 2), np.nan)), ("velocities", "finite")),
         (lambda: GridCurrent((0.0, np.inf), 0.1, np.zeros((2, 2, 2))), ("corner",)),
         (lambda: GridCurrent((0.0, 0.0), -0.1, np.zeros((2, 2, 2))), ("spacing", "positive")),
