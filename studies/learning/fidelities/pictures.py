@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.learning.fidelities.scenes import FIDELITIES, NODES, SWUM
+from studies.learning.fidelities.scenes import FIDELITIES, PHYSICS, SWUM
 from studies.learning.fidelities.tables import matrix, trained
 
 INK = "#1b1f26"
@@ -33,11 +33,12 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
     axes.set_xlabel("swum on", fontsize=10)
     axes.xaxis.set_label_position("top")
     axes.set_ylabel("trained at", fontsize=10)
-    for column in (*range(len(NODES), len(FIDELITIES), len(NODES)), len(FIDELITIES)):
-        wide = column == len(FIDELITIES)
-        axes.axvline(column - 0.5, color="white", lw=4.0 if wide else 1.5)
-        if not wide and column < len(rows):
-            axes.axhline(column - 0.5, color="white", lw=1.5)
+    for names, line in ((list(SWUM), axes.axvline), (rows, axes.axhline)):
+        for k in range(1, len(names)):
+            if names[k] in PHYSICS and names[k - 1] in FIDELITIES:
+                line(k - 0.5, color="white", lw=4.0)
+            elif names[k] in FIDELITIES and names[k].split()[0] != names[k - 1].split()[0]:
+                line(k - 0.5, color="white", lw=1.5)
     axes.spines[:].set_visible(False)
     axes.tick_params(length=0)
     counts = sorted({len(results["runs"][row]) for row in rows})
