@@ -1,6 +1,7 @@
 """Trains a swimmer with PPO, then compares it with the scripted pentagon gait.
 
     python train.py                        about three minutes on two cores
+    python train.py --decision-period 0.5  the same for decisions twice a second, by wires
     python train.py --quick                a short training with everything that follows, in under a minute
     python train.py --resume runs/FOLDER   continues a run that was stopped (by Ctrl-C or killed), or trains it for more
                                            --strokes
@@ -18,7 +19,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 try:
@@ -34,9 +35,10 @@ try:
     from agents.report.charts import Curve, read_progress
     from agents.report.page import Remarks
     from agents.scripted import scripted
+    from agents.swim import Policy
     from agents.training.box import put_in_the_box
     from agents.training.folder import claim, export, is_unbegun, recorded, resume_command, write_config
-    from agents.training.options import MAX_STROKES, Options, read_options, require_consent
+    from agents.training.options import Options, read_options, require_consent
     from agents.training.watch import Interruption, Watch
     from seastar_gym.command import refused_by_disk
 except ModuleNotFoundError as missing:
@@ -66,16 +68,29 @@ def train(options: Options, folder: Path, stop: Callable[[], bool]) -> tuple[PPO
 
 
 def compare(options: Options, folder: Path, remarks: Remarks) -> None:
-    """Compare the learned policy with the scripted gait round the pentagon: table, CSV, picture, videos and report."""
+    """Compare the learned policy with the scripted gait round the pentagon: table, CSV, picture, videos and report.
+
+    The gait of a timed environment is the lagged one, where decisions allow it.
+    """
+    decision_period = options.ppo.decision_period
     evaluate(
-        {"learned": load_policy(folder / "policy.safetensors"), "script": scripted("pentagon")},
+        {"learned": load_policy(folder / "policy.safetensors"), **script(decision_period)},
         "pentagon",
-        max_strokes=MAX_STROKES,
+        max_strokes=options.limit,
+        decision_period=decision_period,
         fidelity=options.fidelity,
         video=options.video,
         report=remarks,
         out=folder / "evaluation",
     )
+
+
+def script(decision_period: float | None) -> dict[str, Policy]:
+    """Fastest scripted gait round the pentagon for a time between decisions [s], by its name; {} if there is none."""
+    for name in ("lagged-pentagon", "pentagon"):
+        with suppress(ValueError):  # the gait needs other decisions
+            return {"script": scripted(name, decision_period=decision_period)}
+    return {}
 
 
 def describe(options: Options, folder: Path, trained: int, watch: Watch) -> Remarks:
@@ -91,13 +106,15 @@ def describe(options: Options, folder: Path, trained: int, watch: Watch) -> Rema
             f"The last session took {seconds:.0f} s, {watch.strokes / seconds:.0f} strokes per second: {shares}."
         )
     policy = shlex.quote(str(folder / "policy.safetensors"))
+    decision_period = options.ppo.decision_period
+    timed = "" if decision_period is None else f" --decision-period {decision_period:g}"
     return Remarks(
         title="Learned against scripted round the pentagon",
         sentences=sentences,
         commands=[
             *json.loads((folder / "config.json").read_text(encoding="utf-8"))["commands"],
             f"tensorboard --logdir {shlex.quote(str(folder))}",
-            f"python -m agents.evaluate --agents {policy} pentagon --fidelity {options.fidelity} --report",
+            f"python -m agents.evaluate --agents {policy} pentagon --fidelity {options.fidelity} --report{timed}",
             f"{resume_command(folder)} --strokes {2 * trained}",
         ],
         curves=[Curve.of("learned", read_progress(folder))],

@@ -7,7 +7,8 @@ from itertools import pairwise
 from typing import Any, NamedTuple, get_args
 
 import seastar_gym
-from seastar_gym.envs.commands import Actions, choices
+from seastar_gym.envs.commands import Actions, Discrete, choices
+from seastar_gym.envs.decisions import checked_decision_period
 from seastar_gym.envs.observation import OBSERVATION_LAYOUT
 from seastar_gym.envs.task import scene_observation_size
 from seastar_gym.scene import Scene
@@ -23,13 +24,15 @@ class Description(NamedTuple):
     """Environment that a learned policy expects, and the shape of its network.
 
     actions: Action mode. symmetry: Whether the policy sees reduced observations, see `seastar_gym.envs.symmetry`.
-    scene: Scene of the training. hidden: Widths of the hidden layers.
+    scene: Scene of the training. hidden: Widths of the hidden layers. decision_period: Time between decisions [s].
+    None means strokes.
     """
 
     actions: Actions
     symmetry: bool
     scene: Scene
     hidden: tuple[int, ...]
+    decision_period: float | None = None
 
     def to_json(self, **more: Any) -> str:
         """Description as text; `more` adds entries for people to read."""
@@ -56,8 +59,8 @@ class Description(NamedTuple):
             if facts[name] != ours or isinstance(facts[name], bool):
                 raise ValueError(f"its {name} is {shown(facts[name])}, this version of seastar_gym knows {ours}")
         actions, symmetry, hidden = facts["actions"], facts["symmetry"], facts["hidden"]
-        if actions not in get_args(Actions):
-            known = ", ".join(map(repr, get_args(Actions)))
+        if actions not in get_args(Discrete):
+            known = ", ".join(map(repr, get_args(Discrete)))
             raise ValueError(f"its actions must be one of {known}, not {shown(actions)}")
         if not isinstance(symmetry, bool):
             raise ValueError(f"its symmetry must be true or false, not {shown(symmetry)}")
@@ -65,7 +68,11 @@ class Description(NamedTuple):
             raise ValueError(f"its hidden must be a list of widths, not {shown(hidden)}")
         for width in hidden:
             require_count("a width of its hidden layers", width, 1, WIDEST)
-        return cls(actions, symmetry, Scene.from_dict(facts["scene"]), tuple(hidden))
+        scene = Scene.from_dict(facts["scene"])
+        decision_period = facts.get("decision_period")  # older descriptions have none: strokes
+        if decision_period is not None:
+            checked_decision_period(decision_period, scene)
+        return cls(actions, symmetry, scene, tuple(hidden), decision_period)
 
     @property
     def distributions(self) -> tuple[int, int]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from agents.greedy import turned
 from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout
 from seastar_gym.envs.stations import body_heading
-from seastar_gym.envs.task import SwimTask
+from seastar_gym.envs.task import Outcome, SwimTask
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.per_robot import column
 
@@ -91,12 +91,11 @@ class DisturbedTask:
             seen[:, at.waypoints] -= np.tile(error[:, 0], 2)
         return seen
 
-    def step(self, commands: Floats) -> Floats:
-        """One stroke of every robot; returns the commands that were not lost, shape (n_robots, n_limbs)."""
+    def step(self, commands: Floats) -> Outcome:
+        """One decision of every robot; returns its outcome, with the commands that were followed and not lost."""
         lost = self._rng.random(len(commands)) < self.disturbance.lost
         commands = np.where(lost[:, None], 0.0, commands)
-        drift = self._current * self.task.simulator.scene.actuator.period
+        drift = self._current * self.task.decision_period
         self.task.waypoints -= drift[:, None]
         self._carried += drift
-        self.task.step(commands)
-        return commands
+        return self.task.step(commands)

@@ -28,7 +28,7 @@ from agents.report.pictures import FRAMES_PER_STROKE, draw_traces, film
 from agents.report.playback import Playback, RecordingEnv
 from agents.results import COLUMNS, in_words, results_table, write_csv
 from agents.roster import AgentNames, load_agents
-from agents.swim import Policy, Swim, actions_of, require_fit, swim
+from agents.swim import TIME_LIMIT, Policy, Swim, actions_of, decisions_in, require_fit, swim
 from seastar_gym.command import run_command
 from seastar_gym.envs.paths import PATHS, make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -45,9 +45,10 @@ def evaluate(
     *,
     seed: int | None = 0,
     reset_options: dict[str, Any] | None = None,
-    max_strokes: int = 400,
+    max_strokes: int | None = None,
     waypoint_radius: float = 0.01,
     scene: Scene | None = None,
+    decision_period: float | None = None,
     out: Path | str | None = None,
     video: bool = True,
     report: Remarks | None = None,
@@ -59,14 +60,16 @@ def evaluate(
     agents: Policies by name, see `Policy`.
     path: Name of a path, or waypoints [m], shape (n, 2).
     seed, reset_options: Seed and options of every agent's `reset`.
-    max_strokes: Time limit [strokes]. waypoint_radius: Radius of the waypoints [m].
+    max_strokes: Time limit [decisions]; by default that of 400 s. waypoint_radius: Radius of the waypoints [m].
     scene: Robot, actuators, fluid and numerics; by default the chapter's robot in water.
+    decision_period: Time between decisions [s]. None means a stroke.
     out: Folder for evaluation.csv, traces.png and, with `video`, an MP4 of every agent; nothing is written if None.
     report: Remarks for report.html, a page with the results and playbacks of the swims; it is not written if None.
     environment: Further arguments of `SeastarSwimEnv`, such as fidelity and random_heading.
     """
     if not agents:
         raise ValueError("There is nothing to evaluate: name at least one agent.")
+    max_strokes = decisions_in(TIME_LIMIT, decision_period) if max_strokes is None else max_strokes
     if max_strokes < 1:
         raise ValueError(f"max_strokes must be at least 1, not {shown(max_strokes)}.")
     console = Console() if console is None else console
@@ -74,7 +77,9 @@ def evaluate(
     videos = {} if folder is None or not video else _video_files(agents, folder)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-    environment |= {"path": path, "waypoint_radius": waypoint_radius, "scene": scene}
+    environment |= {
+        "path": path, "waypoint_radius": waypoint_radius, "scene": scene, "decision_period": decision_period
+    }  # fmt: skip
     episode = {"seed": seed, "reset_options": reset_options, "max_strokes": max_strokes}
     swims, playbacks = [], []
     for name, policy in agents.items():
@@ -88,7 +93,8 @@ def evaluate(
         if done.solver_message is not None:
             console.print(Text(f"{done.agent}: {done.solver_message}"))
     for name, policy in agents.items():
-        if isinstance(policy, learned.LearnedPolicy) and (differences := policy.differences(scene or Scene())):
+        swum_in = scene or make_scene(None, None, decision_period)
+        if isinstance(policy, learned.LearnedPolicy) and (differences := policy.differences(swum_in)):
             console.print(Text(f"{name}: {differences}"))
     if folder is not None:
         write_csv(swims, folder / "evaluation.csv")
@@ -105,7 +111,7 @@ def _swim_once(
     name: str, policy: Policy, environment: dict[str, Any], episode: dict[str, Any], video: Path | None, record: bool
 ) -> tuple[Swim, Playback | None]:
     """Swim of an agent, filmed if there is a file for the video, and its playback if `record` asks for one."""
-    scene = make_scene(environment["scene"], None)
+    scene = make_scene(environment["scene"], None, environment["decision_period"])
     environment = {"actions": actions_of(policy, scene.robot.n_limbs), **environment}
     if video is None and not record:
         return swim(name, policy, SeastarSwimEnv(**environment), **episode), None
@@ -160,8 +166,10 @@ class Options:
     """Folder of the results."""
     seed: int = 0
     """Seed of the random path, the random heading and the random agent. All agents get the same path and heading."""
-    max_strokes: int = 400
-    """Time limit [strokes]."""
+    decision_period: float | None = None
+    """Time between decisions [s]; by default a stroke of 1 s. With another, the robot has wires."""
+    max_strokes: int | None = None
+    """Time limit [decisions]; by default that of 400 s."""
     waypoint_radius: float = 0.01
     """Distance of the hub within which a waypoint is reached [m]."""
     random_heading: bool = False
@@ -178,7 +186,9 @@ class Options:
     """File of results of studies.learning.bound that the report shows, too, if it exists."""
 
     def __post_init__(self) -> None:
-        if self.max_strokes < 1:
+        if self.decision_period is not None:
+            require_number("decision_period", self.decision_period, "s")
+        if self.max_strokes is not None and self.max_strokes < 1:
             raise ValueError(f"max_strokes must be at least 1, not {self.max_strokes}.")
         require_number("waypoint_radius", self.waypoint_radius, "m")
 
@@ -217,9 +227,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     options = tyro.cli(Options, prog="python -m agents.evaluate", args=arguments)
     try:
-        agents, path = load_agents(options.agents, options.seed, options.fidelity), _load_path(options.path)
+        agents = load_agents(options.agents, options.seed, options.fidelity, options.decision_period)
+        path, scene = _load_path(options.path), make_scene(None, options.fidelity, options.decision_period)
         for agent in agents.values():
-            require_fit(agent, Scene(), actions_of(agent, Scene().robot.n_limbs))
+            require_fit(agent, scene, actions_of(agent, scene.robot.n_limbs), options.decision_period)
         remarks = _remarks(agents, options, arguments) if options.report else None
     except (ValueError, OSError) as bad_input:
         print(bad_input, file=sys.stderr)
@@ -229,6 +240,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         path,
         seed=options.seed,
         max_strokes=options.max_strokes,
+        decision_period=options.decision_period,
         waypoint_radius=options.waypoint_radius,
         out=options.out,
         video=options.video,

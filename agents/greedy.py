@@ -3,7 +3,8 @@
     python -m agents.evaluate --agents greedy planner pentagon
 
 The map has the displacement of the hub in the body frame and the turn of the robot, per stroke of every command, once
-the repeated command swims steadily. It is computed once for every scene and kept in the user's cache folder.
+the repeated command swims steadily. It is computed once for every scene and kept in the user's cache folder. In a timed
+environment, commands are repeated at every decision, which heats the same wires over and over: the map knows no lag.
 """
 
 import hashlib
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions, command_table
+from seastar_gym.envs.decisions import checked_decision_period
 from seastar_gym.envs.observation import OBSERVATION_LAYOUT, scene_layout
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.stations import body_heading
@@ -41,25 +43,33 @@ def turned(vectors: Floats, angles: Floats) -> Floats:
     return np.stack([c * vectors[:, 0] - s * vectors[:, 1], s * vectors[:, 0] + c * vectors[:, 1]], axis=1)
 
 
-def measure_gaits(scene: Scene, commands: Floats, settling: int, measured: int) -> Displacements:
+def measure_gaits(
+    scene: Scene, commands: Floats, settling: int, measured: int, decision_period: float | None = None
+) -> Displacements:
     """Mean displacement and turn per stroke of periodic gaits, in the body frame when the measured strokes begin.
 
     commands: Commands of every gait, shape (n, period, n_limbs). settling, measured: Numbers of strokes before and
-    during the measurement; `measured` is a multiple of the period.
+    during the measurement; `measured` is a multiple of the period. decision_period: Time between commands [s], called a
+    stroke here. None means a stroke of the actuator.
     """
-    simulator = Simulator(scene, len(commands))
+    simulator, duration = Simulator(scene, len(commands)), checked_decision_period(decision_period, scene)
     for stroke in range(settling + measured):
         if stroke == settling:
             hub, heading = simulator.hub_position(), body_heading(simulator.positions, scene.robot)
-        simulator.stroke(commands[:, stroke % commands.shape[1]])
+        simulator.advance(duration, commands[:, stroke % commands.shape[1]])
     turn = body_heading(simulator.positions, scene.robot) - heading
     turn -= 2.0 * np.pi * np.rint(turn / (2.0 * np.pi))
     return Displacements(turned(simulator.hub_position() - hub, -heading) / measured, turn / measured)
 
 
-def displacement_map(scene: Scene, actions: Actions = "joint") -> Displacements:
+def displacement_map(
+    scene: Scene, actions: Actions = "joint", decision_period: float | None = None
+) -> Displacements:
     """Map of a scene for the commands of an action mode, from the cache or measured now."""
-    asked = scene, actions, SETTLING_STROKES, MEASURED_STROKES, OBSERVATION_LAYOUT
+    asked: tuple[Any, ...] = scene, actions, SETTLING_STROKES, MEASURED_STROKES, OBSERVATION_LAYOUT
+    if decision_period is not None:
+        asked = *asked, decision_period
+    settling, measured_strokes = (_decisions(n, scene, decision_period) for n in (SETTLING_STROKES, MEASURED_STROKES))
     key = hashlib.sha256(repr(asked).encode()).hexdigest()[:24]
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "seastar-gym"
     file = cache / f"displacements-{key}.npz"
@@ -67,12 +77,18 @@ def displacement_map(scene: Scene, actions: Actions = "joint") -> Displacements:
         with np.load(file, allow_pickle=False) as known:
             return Displacements(known["hub"], known["turn"])
     commands = command_table(actions, scene.robot.n_limbs)[:, None]
-    measured = measure_gaits(scene, commands, SETTLING_STROKES, MEASURED_STROKES)
+    measured = measure_gaits(scene, commands, settling, measured_strokes, decision_period)
     cache.mkdir(parents=True, exist_ok=True)
     part = file.with_name(f"{file.stem}.{os.getpid()}.npz")  # whoever looks finds the whole file or none
     np.savez(part, hub=measured.hub, turn=measured.turn)
     os.replace(part, file)
     return measured
+
+
+def _decisions(strokes: int, scene: Scene, decision_period: float | None) -> int:
+    """Decisions in so many strokes, one at least."""
+    seconds = strokes * scene.actuator.period
+    return strokes if decision_period is None else max(1, round(seconds / decision_period))
 
 
 def waypoints_of(observations: NDArray[np.float32], scene: Scene) -> tuple[Floats, Floats]:
@@ -86,6 +102,8 @@ class Searcher(ABC):
     """Base of policies that choose actions by observations alone, for one robot or for many."""
 
     actions: Actions
+    decision_period: float | None = None
+    """Time between decisions [s]. None means a stroke."""
 
     @abstractmethod
     def choose(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
@@ -107,14 +125,22 @@ class GreedyPolicy(Searcher):
     """Agent that chooses the command whose mean displacement leaves the shortest rewarded route.
 
     scene: Scene in which displacements are measured; that of the environment, for a fair comparison.
-    waypoint_radius: Radius of the waypoints [m]. reward: Reward whose route is shortened.
+    waypoint_radius: Radius of the waypoints [m]. reward: Reward whose route is shortened. decision_period: Of the
+    environment [s]. None means a stroke.
     """
 
     actions = "joint"
 
-    def __init__(self, scene: Scene, waypoint_radius: float = 0.01, reward: RewardWeights = RewardWeights()):
+    def __init__(
+        self,
+        scene: Scene,
+        waypoint_radius: float = 0.01,
+        reward: RewardWeights = RewardWeights(),
+        decision_period: float | None = None,
+    ):
         self.scene, self.waypoint_radius, self.reward = scene, waypoint_radius, reward
-        self._hub = displacement_map(scene, self.actions).hub
+        self.decision_period = decision_period
+        self._hub = displacement_map(scene, self.actions, decision_period).hub
 
     def choose(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
         """Actions, shape (n,), for observations of shape (n, size)."""

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import get_args
 
 from seastar_gym import RewardWeights
-from seastar_gym.envs.commands import Actions
-from seastar_gym.scene.checks import require_choice, require_count, require_finite, shown
+from seastar_gym.envs.commands import Discrete
+from seastar_gym.scene.checks import require_choice, require_count, require_finite, require_number, shown
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class Hyperparameters:
     seeds that differ by up to 2 strokes, so smaller differences say nothing.
     """
 
-    actions: Actions = "pairs"
+    actions: Discrete = "pairs"
     """Action mode. "pairs" has one distribution over the 21 commands that heat no limb or two. "joint", over all 243,
     is as good on held-out paths, but learns later, and its seeds differ by more round the pentagon. "limbs", with one
     distribution per limb, scores 182: the fastest swim alternates between two pairs of limbs, which independent limbs
@@ -36,9 +36,12 @@ class Hyperparameters:
     """Passes over a rollout in an update."""
     learning_rate: float = 1e-3
     """Learning rate at the beginning. It falls linearly to zero, so that the last policy is a settled one."""
+    decision_period: float | None = None
+    """Time between decisions [s]. None means a stroke, of 1 s; with another, robots have wires."""
     discount: float = 0.8
-    """Discount per stroke. The effect of a stroke on the swimming is over after a few more: 0.5 scores the same as 0.8.
-    0.95 scores 165, because the noise of twenty strokes hides the value of one."""
+    """Discount per second, or per stroke where decisions are strokes. The effect of a stroke on the swimming is over
+    after a few more: 0.5 scores the same as 0.8. 0.95 scores 165, because noise of twenty strokes hides the value of
+    one."""
     gae_lambda: float = 0.9
     """Decay of the generalised advantage estimate. With so short a horizon it matters little."""
     clip_range: float = 0.2
@@ -47,16 +50,19 @@ class Hyperparameters:
     """Weight of the entropy bonus. Exploration lasts long enough without it: 0.01 gains nothing (162)."""
     hidden: tuple[int, ...] = (128, 128)
     """Widths of the hidden layers, of the policy and of the value network each. 256 gains no more than a seed (160)."""
-    max_episode_steps: int = 400
-    """Time limit of a training episode [strokes]. A random path takes about 160."""
+    max_episode_time: float = 400.0
+    """Time limit of a training episode [s]. A random path takes about 160."""
     reward: RewardWeights = RewardWeights()
     """Weights of the reward's terms. Progress dominates: a stroke of the best gaits earns about 1, and a heated limb
     costs 0.01."""
 
     def __post_init__(self) -> None:
-        require_choice("actions", self.actions, get_args(Actions))
-        for name in ("num_envs", "rollout", "batch_size", "epochs", "max_episode_steps"):
+        require_choice("actions", self.actions, get_args(Discrete))
+        for name in ("num_envs", "rollout", "batch_size", "epochs"):
             require_count(name, getattr(self, name), 1, 2**31)
+        require_number("max_episode_time", self.max_episode_time, "s")
+        if self.decision_period is not None:
+            require_number("decision_period", self.decision_period, "s")
         for name in ("learning_rate", "discount", "gae_lambda", "clip_range", "entropy"):
             require_finite(name, getattr(self, name), "1")
         if not isinstance(self.symmetry, bool) or not isinstance(self.reward, RewardWeights):
@@ -74,3 +80,18 @@ class Hyperparameters:
             raise ValueError(f"hidden must be widths of at least 1, not {shown(self.hidden)}.")
         for width in self.hidden:
             require_count("a width in hidden", width, 1, 2**20)
+
+    @property
+    def max_episode_steps(self) -> int:
+        """Time limit of a training episode [decisions]."""
+        return max(1, round(self.max_episode_time / self._seconds))
+
+    @property
+    def discount_per_decision(self) -> float:
+        """Discount from one decision to the next."""
+        return float(self.discount**self._seconds)
+
+    @property
+    def _seconds(self) -> float:
+        """Time between decisions [s]."""
+        return 1.0 if self.decision_period is None else self.decision_period

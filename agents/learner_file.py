@@ -91,7 +91,7 @@ def _facts(model: PPO) -> dict[str, Any]:
 
 
 def _hyperparameters(model: PPO) -> Hyperparameters:
-    """Hyperparameters of a learner; those of its environment have their defaults."""
+    """Hyperparameters of a learner; those of its environment have their defaults, so the discount is per decision."""
     assert callable(model.clip_range)
     return Hyperparameters(
         num_envs=model.n_envs,

@@ -3,7 +3,9 @@
     from agents.policy import load
 
     policy = load()  # the one in the box; or load("runs/mine/policy.safetensors")
-    env = gym.make("SeastarSwim-v0", actions=policy.actions, scene=policy.scene)
+    env = gym.make(
+        "SeastarSwim-v0", actions=policy.actions, scene=policy.scene, decision_period=policy.decision_period
+    )
 
 The network is plain numpy: layers `W x + b` with tanh between them (`0.weight`, `0.bias`, `1.weight`, ...), whose last
 outputs are the logits of the actions. Nothing is unpickled, and neither torch nor Stable-Baselines3 is needed.
@@ -48,7 +50,7 @@ class LearnedPolicy:
     rng: Random generator of actions that are not deterministic.
 
     The environment is made with the policy's own attributes: `gym.make("SeastarSwim-v0", actions=policy.actions,
-    scene=policy.scene)`.
+    scene=policy.scene, decision_period=policy.decision_period)`.
     """
 
     def __init__(
@@ -67,6 +69,7 @@ class LearnedPolicy:
         self.weights = weights
         self.actions = description.actions
         self.scene = description.scene
+        self.decision_period = description.decision_period or description.scene.actuator.period
         self.training = training or {}
         self.rng = np.random.default_rng(0) if rng is None else rng
 
@@ -120,6 +123,11 @@ class LearnedPolicy:
         if actions != self.actions:
             raise ValueError(
                 f'The policy answers with actions="{self.actions}", the environment takes actions="{actions}".'
+            )
+        ours, theirs = scene_observation_size(self.scene), scene_observation_size(scene)
+        if ours != theirs:
+            raise ValueError(
+                f"The policy sees {ours} numbers, the environment shows {theirs}: their actuators remember differently."
             )
 
     def differences(self, scene: Scene) -> str:

@@ -34,6 +34,7 @@ def make_training_env(
         num_envs=hyperparameters.num_envs,
         vectorization_mode="vector_entry_point",
         max_episode_steps=hyperparameters.max_episode_steps,
+        decision_period=hyperparameters.decision_period,
         path=path,
         random_heading=random_heading,
         actions=hyperparameters.actions,
@@ -62,7 +63,7 @@ def make_model(
         batch_size=hyperparameters.batch_size,
         n_epochs=hyperparameters.epochs,
         learning_rate=LinearSchedule(hyperparameters.learning_rate, 0.0, 1.0),
-        gamma=hyperparameters.discount,
+        gamma=hyperparameters.discount_per_decision,
         gae_lambda=hyperparameters.gae_lambda,
         clip_range=hyperparameters.clip_range,
         ent_coef=hyperparameters.entropy,
@@ -84,7 +85,9 @@ def require_device(device: str) -> None:
 def describe(env: BatchVecEnv, hidden: tuple[int, ...]) -> Description:
     """Description of a policy with these widths of hidden layers that learns in an environment."""
     batch: Any = env.env.unwrapped
-    return Description(batch.actions, env.env_is_wrapped(VectorSymmetryReduction)[0], batch.scene, hidden)
+    symmetry = env.env_is_wrapped(VectorSymmetryReduction)[0]
+    in_strokes = batch.decision_period == batch.scene.actuator.period
+    return Description(batch.actions, symmetry, batch.scene, hidden, None if in_strokes else batch.decision_period)
 
 
 def policy_of(model: PPO) -> LearnedPolicy:

@@ -17,11 +17,12 @@ MM = 1000.0
 COLUMNS = {
     "agent": "agent",
     "strokes_to_finish": "strokes\nto\nfinish",
-    "simulated_time_s": "simulated\ntime\n[s]",
+    "simulated_time_s": "time\n[s]",
     "waypoints_reached": "waypoints\nreached",
     "mean_cross_track_error_mm": "mean\ncross-track\nerror [mm]",
     "largest_cross_track_error_mm": "largest\ncross-track\nerror [mm]",
-    "limbs_heated_per_metre": "limbs\nheated per\nmetre [1/m]",
+    "limbs_heated_per_metre": "limbs\nheated\n[1/m]",
+    "energy_per_metre_J": "energy\n[J/m]",
 }
 """Titles of the printed columns, by the names of the CSV's."""
 
@@ -38,6 +39,8 @@ def results(swims: Sequence[Swim]) -> list[dict[str, str | int | float | None]]:
             "mean_cross_track_error_mm": MM * float(done.cross_track_errors.mean()),
             "largest_cross_track_error_mm": MM * float(done.cross_track_errors.max()),
             "limbs_heated_per_metre": done.heated_per_metre,
+            "heating_time_s": done.seconds_heated,
+            "energy_per_metre_J": done.joules_per_metre,
         }
         for done in swims
     ]

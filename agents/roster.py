@@ -22,12 +22,13 @@ from seastar_gym.envs.task import make_scene
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 
-AGENTS: dict[str, Callable[[Scene], Policy]] = {
-    "learned": lambda scene: learned.load(),
-    "greedy": GreedyPolicy,
-    "planner": lambda scene: Planner(),  # it always plans at fidelity "fast"
+AGENTS: dict[str, Callable[[Scene, float | None], Policy]] = {
+    "learned": lambda scene, decision_period: learned.load(),
+    "greedy": lambda scene, decision_period: GreedyPolicy(scene, decision_period=decision_period),
+    "planner": lambda scene, decision_period: Planner(decision_period=decision_period),  # at fidelity "fast"
 }
-"""Functions that make the agents that are not scripted, by name, for the scene that they swim in."""
+"""Functions that make the agents that are not scripted, by name, for the scene that they swim in and the time between
+decisions [s], None for strokes."""
 
 HELP = (
     f"Agents: {', '.join(AGENTS)} (learned is the policy in the box); scripted gaits, {', '.join(GAITS)}, random, or a "
@@ -40,10 +41,13 @@ HELP = (
 AgentNames: TypeAlias = Annotated[tuple[str, ...], tyro.conf.arg(help=HELP)]
 
 
-def load_agents(names: Sequence[str], seed: int = 0, fidelity: Fidelity = "balanced") -> dict[str, Policy]:
+def load_agents(
+    names: Sequence[str], seed: int = 0, fidelity: Fidelity = "balanced", decision_period: float | None = None
+) -> dict[str, Policy]:
     """Policies by name; those of files have the file's name without its ending.
 
     names: Names as in `HELP`. seed: Seed of the random agent. fidelity: Accuracy of the simulation that agents know.
+    decision_period: Time between decisions [s]. None means strokes.
     """
     agents: dict[str, Policy] = {}
     for name in names:
@@ -51,7 +55,7 @@ def load_agents(names: Sequence[str], seed: int = 0, fidelity: Fidelity = "balan
         label = str(Path(name).with_suffix("")) if label in agents else label
         if label in agents:
             raise ValueError(f"The agent {name!r} is named twice.")
-        agents[label] = _load_agent(name, seed, fidelity)
+        agents[label] = _load_agent(name, seed, fidelity, decision_period)
     return agents
 
 
@@ -59,18 +63,21 @@ def _is_file(name: str) -> bool:
     return name.endswith((".zip", ".safetensors", ".pth", ".pt", ".pkl")) or len(Path(name).parts) > 1
 
 
-def _load_agent(name: str, seed: int, fidelity: Fidelity) -> Policy:
+def _load_agent(name: str, seed: int, fidelity: Fidelity, decision_period: float | None) -> Policy:
     if name in AGENTS:
-        return AGENTS[name](make_scene(None, fidelity))
+        return AGENTS[name](make_scene(None, fidelity, decision_period), decision_period)
     if foreign.is_function(name):
-        return foreign.call_function(name, SeastarSwimEnv(fidelity=fidelity))
-    return _load_file(name) if _is_file(name) else _scripted(name, seed)
+        return foreign.call_function(name, SeastarSwimEnv(fidelity=fidelity, decision_period=decision_period))
+    return _load_file(name) if _is_file(name) else _scripted(name, seed, decision_period)
 
 
-def _scripted(name: str, seed: int) -> Policy:
+def _scripted(name: str, seed: int, decision_period: float | None) -> Policy:
+    known = (*GAITS, "random")
     try:
-        return scripted(name, rng=np.random.default_rng(seed))
+        return scripted(name, rng=np.random.default_rng(seed), decision_period=decision_period)
     except ValueError as unknown:
+        if name in known:
+            raise  # a gait that does not fit the time between decisions
         others = f"{', '.join(AGENTS)}, files of policies, and module:function"
         raise ValueError(f"{unknown} Others are {others}.") from unknown
 

@@ -1,20 +1,36 @@
-"""Scripted gaits: the straight gait, the pairs of Fig. 13.8, the pentagon gait (13.15), and random actions.
+"""Scripted gaits: the straight gait, the pairs of Fig. 13.8, the pentagon gait (13.15), gaits in time, random actions.
 
-A gait looks at no observation. The number of strokes that it has swum is the recurrent state of Stable-Baselines3's
+A gait looks at no observation. The number of decisions that it has made is the recurrent state of Stable-Baselines3's
 `predict`, so one gait may drive any number of robots:
 
     gait, state = scripted("pentagon"), None
     action, state = gait.predict(observation, state)
+
+Strokes begin once a second whatever the time between decisions. Lagged gaits, and the wave that turns the robot, need
+shorter ones than a second, and wires.
 """
 
 import re
 from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, choices, command_table
-from seastar_gym.gaits import pair_gait, pentagon_gait, straight_gait
+from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, action_space, command_table
+from seastar_gym.gaits import (
+    PERIOD,
+    in_time,
+    lagged_gait,
+    lagged_pentagon,
+    pair_gait,
+    pentagon_gait,
+    straight_gait,
+    thrifty_gait,
+    turning_wave,
+)
 
 Floats = NDArray[np.float64]
 PolicyState = tuple[NDArray[np.int64], ...] | None
@@ -22,9 +38,11 @@ PolicyState = tuple[NDArray[np.int64], ...] | None
 _PAIR = re.compile(r"\{?(\d+)([+-]),(\d+)([+-])\}?")
 
 
-def to_actions(commands: ArrayLike, actions: Actions, n_limbs: int) -> NDArray[np.int64]:
-    """Actions that mean commands of shape (..., n_limbs): the same shape for "limbs", otherwise (...)."""
+def to_actions(commands: ArrayLike, actions: Actions, n_limbs: int) -> NDArray[Any]:
+    """Actions that mean commands of shape (..., n_limbs): that shape for "limbs" and "continuous", otherwise (...)."""
     commands = np.asarray(commands, dtype=np.float64)
+    if actions == "continuous":
+        return commands.astype(np.float32)
     if actions == "limbs":
         means = commands[..., None] == LIMB_COMMANDS
     else:
@@ -35,17 +53,19 @@ def to_actions(commands: ArrayLike, actions: Actions, n_limbs: int) -> NDArray[n
 
 
 class OpenLoopPolicy:
-    """Policy that repeats a gait; its state counts the strokes.
+    """Policy that repeats a gait; its state counts the decisions.
 
-    commands: Commands of the gait, shape (n_strokes, n_limbs), values -1, 0, 1.
+    commands: Commands of the gait, shape (n_decisions, n_limbs), values -1, 0, 1, or between them for "continuous".
     actions: Action mode of the environment.
+    decision_period: Time between decisions [s] that the gait is made for. None means any.
     """
 
-    def __init__(self, commands: ArrayLike, actions: Actions = "limbs"):
+    def __init__(self, commands: ArrayLike, actions: Actions = "limbs", decision_period: float | None = None):
         commands = np.asarray(commands, dtype=np.float64)
         if commands.ndim != 2 or commands.size == 0:
             raise ValueError(f"A gait needs commands of shape (n_strokes, n_limbs), not {commands.shape}.")
         self.actions: Actions = actions
+        self.decision_period = decision_period
         self._gait = to_actions(commands, actions, commands.shape[1])
 
     def predict(
@@ -54,12 +74,12 @@ class OpenLoopPolicy:
         state: PolicyState = None,
         episode_start: NDArray[np.bool_] | None = None,
         deterministic: bool = False,
-    ) -> tuple[NDArray[np.int64], PolicyState]:
-        """Action of the next stroke, and the state for the call after it.
+    ) -> tuple[NDArray[Any], PolicyState]:
+        """Action of the next decision, and the state for the call after it.
 
         observation: Observation of one robot, shape (size,), or of a batch, shape (n, size); only its shape matters.
-        state: State that the last call returned, the strokes swum, shape (n,), in a tuple; None before the first call.
-        episode_start: Whether an episode begins with this stroke, so that the gait starts again, shape (n,).
+        state: State that the last call returned, the decisions made, shape (n,), in a tuple; None before the first.
+        episode_start: Whether an episode begins with this decision, so that the gait starts again, shape (n,).
         """
         alone = np.ndim(observation) == 1
         swum = np.zeros(1 if alone else len(observation), dtype=np.int64) if state is None else state[0]
@@ -75,8 +95,7 @@ class RandomPolicy:
     def __init__(self, rng: np.random.Generator, actions: Actions = "limbs", n_limbs: int = 5):
         self.actions: Actions = actions
         self._rng = rng
-        _, self._n_choices = choices(actions, n_limbs)
-        self._shape = (n_limbs,) if actions == "limbs" else ()
+        self._space = action_space(actions, n_limbs)
 
     def predict(
         self,
@@ -84,44 +103,63 @@ class RandomPolicy:
         state: PolicyState = None,
         episode_start: NDArray[np.bool_] | None = None,
         deterministic: bool = False,
-    ) -> tuple[NDArray[np.int64], PolicyState]:
+    ) -> tuple[NDArray[Any], PolicyState]:
         """Action of one robot for an observation of shape (size,), or of n robots for shape (n, size)."""
-        batch = np.shape(observation)[:-1]
-        return np.asarray(self._rng.integers(self._n_choices, size=batch + self._shape)), None
+        shape = (*np.shape(observation)[:-1], *(self._space.shape or ()))
+        if isinstance(self._space, spaces.Box):
+            return self._rng.uniform(-1.0, 1.0, shape).astype(np.float32), None
+        n_choices = self._space.n if isinstance(self._space, spaces.Discrete) else self._space.nvec[0]
+        return np.asarray(self._rng.integers(n_choices, size=shape)), None
 
 
-def _pentagon(n_limbs: int) -> Floats:
-    if n_limbs != 5:
-        raise ValueError(f"The pentagon gait (13.15) is for five limbs, not {n_limbs}.")
-    return pentagon_gait()
+def _of_five(gait: Callable[[float], Floats]) -> Callable[[int, float], Floats]:
+    def make(n_limbs: int, decision_period: float) -> Floats:
+        if n_limbs != 5:
+            raise ValueError(f"The pentagon gait (13.15), and others that turn, are for five limbs, not {n_limbs}.")
+        return gait(decision_period)
+
+    return make
 
 
-def _rest(n_limbs: int) -> Floats:
-    return np.zeros((1, n_limbs))
-
-
-GAITS: dict[str, Callable[[int], Floats]] = {"pentagon": _pentagon, "straight": straight_gait, "rest": _rest}
-"""Functions that make the commands of a gait, shape (n_strokes, n_limbs), for a number of limbs, by name."""
+GAITS: dict[str, Callable[[int, float], Floats]] = {
+    "pentagon": _of_five(partial(in_time, pentagon_gait())),
+    "straight": lambda n_limbs, decision_period: in_time(straight_gait(n_limbs), decision_period),
+    "rest": lambda n_limbs, decision_period: np.zeros((1, n_limbs)),
+    "lagged": lambda n_limbs, decision_period: lagged_gait(decision_period, n_limbs),
+    "thrifty": lambda n_limbs, decision_period: thrifty_gait(decision_period, n_limbs),
+    "wave": _of_five(turning_wave),
+    "lagged-pentagon": _of_five(lagged_pentagon),
+}
+"""Functions that make the commands of a gait, shape (n_decisions, n_limbs), for a number of limbs and a decision period
+[s], by name."""
 
 
 def scripted(
-    name: str, actions: Actions = "limbs", n_limbs: int = 5, rng: np.random.Generator | None = None
+    name: str,
+    actions: Actions | None = None,
+    n_limbs: int = 5,
+    rng: np.random.Generator | None = None,
+    decision_period: float | None = None,
 ) -> OpenLoopPolicy | RandomPolicy:
     """Policy with the name of a gait in `GAITS`, "random", or a pair such as "4+,1-".
 
-    actions: Action mode of the environment. rng: Generator of the random policy; by default one with seed 0.
+    actions: Action mode of the environment. None means "limbs", or "continuous" for gaits of partial pulses.
+    rng: Generator of the random policy; by default one with seed 0. decision_period: Of the environment [s]. None
+    means strokes, of any length.
     """
     if name == "random":
-        return RandomPolicy(np.random.default_rng(0) if rng is None else rng, actions, n_limbs)
-    return OpenLoopPolicy(_gait(name, n_limbs), actions)
+        return RandomPolicy(np.random.default_rng(0) if rng is None else rng, actions or "limbs", n_limbs)
+    commands = _gait(name, n_limbs, PERIOD if decision_period is None else decision_period)
+    is_whole = bool(np.isin(commands, LIMB_COMMANDS).all())
+    return OpenLoopPolicy(commands, actions or ("limbs" if is_whole else "continuous"), decision_period)
 
 
-def _gait(name: str, n_limbs: int) -> Floats:
+def _gait(name: str, n_limbs: int, decision_period: float) -> Floats:
     pair = _PAIR.fullmatch(name.replace(" ", ""))
     if pair is not None and pair[2] != pair[4]:
         limbs = {pair[2]: int(pair[1]), pair[4]: int(pair[3])}
-        return pair_gait(limbs["+"], limbs["-"], n_limbs)
+        return in_time(pair_gait(limbs["+"], limbs["-"], n_limbs), decision_period)
     if name in GAITS:
-        return GAITS[name](n_limbs)
+        return GAITS[name](n_limbs, decision_period)
     names = ", ".join((*GAITS, "random"))
     raise ValueError(f'Unknown scripted agent {name!r}: choose one of {names}, or a pair of a + and a - limb: "4+,1-".')

@@ -1,5 +1,6 @@
 """One agent swims one episode: `swim`, and what can be measured on it afterwards."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,6 +17,8 @@ from seastar_gym.envs.task import scene_observation_size
 from seastar_gym.scene import Scene
 
 Floats = NDArray[np.float64]
+TIME_LIMIT = 400.0
+"""Time after which a swim that is evaluated ends, unless another limit is given [s]."""
 
 
 class Policy(Protocol):
@@ -39,12 +42,25 @@ def actions_of(policy: Policy, n_limbs: int) -> Actions:
     raise ValueError(f"The policy acts in {space}, which is no action mode of a robot of {n_limbs} limbs.")
 
 
-def require_fit(policy: Policy, scene: Scene, actions: Actions) -> None:
-    """ValueError, with one sentence, where a policy cannot drive the robot of an environment, as far as it tells."""
+def require_fit(
+    policy: Policy,
+    scene: Scene,
+    actions: Actions,
+    decision_period: float | None = None,
+    observe_actuators: bool = True,
+) -> None:
+    """ValueError, with one sentence, where a policy cannot drive the robot of an environment, as far as it tells.
+
+    decision_period: Time between decisions of the environment [s]. None means a stroke.
+    """
     if isinstance(policy, LearnedPolicy):
         policy.require_fit(scene, actions)
+    ours = getattr(policy, "decision_period", None)
+    theirs = scene.actuator.period if decision_period is None else decision_period
+    if ours is not None and not math.isclose(ours, theirs):
+        raise ValueError(f"The policy decides every {ours:g} s, the environment every {theirs:g} s: make them equal.")
     sees: Any = getattr(policy, "observation_space", None)
-    seen = (scene_observation_size(scene),)
+    seen = (scene_observation_size(scene, observe_actuators),)
     if sees is not None and sees.shape != seen:
         raise ValueError(f"The policy sees observations of shape {sees.shape}, the environment's have {seen}.")
     acts = getattr(policy, "action_space", None)
@@ -56,7 +72,8 @@ def require_fit(policy: Policy, scene: Scene, actions: Actions) -> None:
 class Swim:
     """Record of one agent on one path.
 
-    hub, waypoint_index and time are those at the start and after every stroke, strokes + 1 of them.
+    hub, waypoint_index and time are those at the start and after every stroke, strokes + 1 of them. In a timed
+    environment, a stroke is a decision.
     """
 
     agent: str
@@ -69,7 +86,11 @@ class Swim:
     time: Floats
     """Simulated time [s], shape (strokes + 1,)."""
     limbs_heated: NDArray[np.int64]
-    """Shape (strokes,)."""
+    """Limbs whose heating began, shape (strokes,)."""
+    heating_time: Floats
+    """Time for which wires were heated, summed over limbs [s], shape (strokes,)."""
+    energy: Floats
+    """Electric energy of that heat [J], shape (strokes,)."""
     solver_message: str | None
     """Why the solver gave up, where it did."""
 
@@ -103,14 +124,38 @@ class Swim:
 
     @property
     def hub_path_length(self) -> float:
-        """Length [m] of the hub's way from the end of one stroke to the end of the next."""
-        return float(path_length(self.hub[0], self.hub))
+        """Length [m] of the hub's way from one second to the next, or from stroke to stroke if those are longer.
+
+        Within a stroke the hub swings to and fro, which is no way swum.
+        """
+        every = max(1, round(1.0 / (self.time[1] - self.time[0]))) if len(self.time) > 1 else 1
+        return float(path_length(self.hub[0], np.concatenate([self.hub[::every], self.hub[-1:]])))
 
     @property
     def heated_per_metre(self) -> float | None:
         """Limbs heated per metre of the hub's way [1/m]; None where the hub did not move."""
+        return self._per_metre(self.limbs_heated)
+
+    @property
+    def seconds_heated(self) -> float | None:
+        """Time for which wires were heated, summed over limbs [s]; None where the actuator does not say it."""
+        total = float(self.heating_time.sum())
+        return total if math.isfinite(total) else None
+
+    @property
+    def joules_per_metre(self) -> float | None:
+        """Electric energy per metre of the hub's way [J/m]; None where it is unknown or the hub did not move."""
+        found = self._per_metre(self.energy)
+        return found if found is not None and math.isfinite(found) else None
+
+    def _per_metre(self, of_strokes: NDArray[Any]) -> float | None:
         length = self.hub_path_length
-        return float(self.limbs_heated.sum() / length) if length > 0.0 else None
+        return float(of_strokes.sum() / length) if length > 0.0 else None
+
+
+def decisions_in(seconds: float, decision_period: float | None) -> int:
+    """Number of decisions in a time [s]. decision_period: Time between them [s]. None means strokes of a second."""
+    return max(1, round(seconds / (1.0 if decision_period is None else decision_period)))
 
 
 def swim(
@@ -128,7 +173,7 @@ def swim(
     ValueError, before it begins, where the policy was made for another robot.
     watch: Called with `env` after its reset and after every stroke, to film it for instance.
     """
-    require_fit(policy, env.scene, env.actions)
+    require_fit(policy, env.scene, env.actions, env.decision_period, env.observe_actuators)
     observation, info = env.reset(seed=seed, options=reset_options)
     infos = [info]
     state, over = None, False
@@ -148,5 +193,7 @@ def swim(
         waypoint_index=np.array([info["waypoint_index"] for info in infos]),
         time=np.array([info["time"] for info in infos]),
         limbs_heated=np.array([info["limbs_heated"] for info in infos[1:]], dtype=np.int64),
+        heating_time=np.array([info["heating_time"] for info in infos[1:]], dtype=np.float64),
+        energy=np.array([info["energy"] for info in infos[1:]], dtype=np.float64),
         solver_message=infos[-1]["solver_message"] or None,
     )

@@ -22,14 +22,14 @@ from scipy.stats import bootstrap
 
 from agents.disturbances import CURRENT_DIRECTIONS, DISTURBANCES, Disturbance, DisturbedTask
 from agents.roster import AgentNames, load_agents
-from agents.swim import Policy, Swim, actions_of, require_fit
+from agents.swim import TIME_LIMIT, Policy, Swim, actions_of, decisions_in, require_fit
 from seastar_gym.command import run_command
 from seastar_gym.envs.commands import to_commands
 from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.task import Outcome, SwimTask, make_scene
 from seastar_gym.envs.task import Path as SwimPath
-from seastar_gym.envs.task import SwimTask, make_scene
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import require_count
+from seastar_gym.scene.checks import require_count, require_number
 from seastar_gym.scene.numerics import Fidelity
 
 HELD_OUT_SEED = 1_000
@@ -37,6 +37,9 @@ HELD_OUT_SEED = 1_000
 MM = 1000.0
 RESAMPLES, CONFIDENCE = 2000, 0.95
 NOMINAL: tuple[str, ...] = ("pentagon", "square", "triangle", "figure-eight")
+
+HEAT = ("limbs_heated", "heating_time", "energy")
+"""Entries of info, and fields of a `Swim`, of every decision."""
 
 Interval = tuple[float, float, float]
 """Mean, and the ends of its confidence interval."""
@@ -54,26 +57,31 @@ def swim_many(
     waypoint_radius: float = 0.01,
     seed: int = 0,
     threads: int | None = None,
+    decision_period: float | None = None,
 ) -> list[Swim]:
-    """Swims of `n_swims` robots side by side, each to its last waypoint or for `max_strokes` strokes.
+    """Swims of `n_swims` robots side by side, each to its last waypoint or for `max_strokes` strokes, or decisions.
 
-    The path "random" has random headings. waypoint_radius: Radius of the waypoints [m].
+    The path "random" has random headings. waypoint_radius: Radius of the waypoints [m]. decision_period: Time between
+    decisions [s]. None means a stroke.
     """
     actions = actions_of(policy, scene.robot.n_limbs)
-    require_fit(policy, scene, actions)
+    require_fit(policy, scene, actions, decision_period)
     with_heading = isinstance(path, str) and path == "random"
-    inner = SwimTask(scene, n_swims, path, RewardWeights(), waypoint_radius, with_heading, threads)
+    inner = SwimTask(
+        scene, n_swims, path, RewardWeights(), waypoint_radius, with_heading, threads, actions=actions,
+        decision_period=decision_period,
+    )  # fmt: skip
     task = DisturbedTask(inner, disturbance, np.random.default_rng([seed, n_swims]))
     task.reset([np.random.default_rng([seed, swim]) for swim in range(n_swims)])
     waypoints, counts = inner.waypoints.copy(), inner.n_waypoints
     hubs, reached = [task.hub_position()], [inner.waypoint_index.copy()]
-    heated: list[NDArray[np.int64]] = []
+    outcomes: list[Outcome] = []
     state, begins, n_limbs = None, np.ones(n_swims, bool), scene.robot.n_limbs
-    while len(heated) < max_strokes and (inner.waypoint_index < counts).any():
+    while len(outcomes) < max_strokes and (inner.waypoint_index < counts).any():
         chosen, state = policy.predict(task.observe(), state=state, episode_start=begins, deterministic=True)
         commands = to_commands(actions, n_limbs, chosen, n_swims)
         commands[inner.waypoint_index == counts] = 0.0
-        heated.append(np.count_nonzero(task.step(commands), axis=1))
+        outcomes.append(task.step(commands))
         hubs.append(task.hub_position())
         reached.append(inner.waypoint_index.copy())
         begins[:] = False
@@ -84,8 +92,8 @@ def swim_many(
                 waypoints=waypoints[k, : counts[k]],
                 hub=np.array([hub[k] for hub in hubs]),
                 waypoint_index=np.array([index[k] for index in reached]),
-                time=scene.actuator.period * np.arange(len(hubs), dtype=np.float64),
-                limbs_heated=np.array([limbs[k] for limbs in heated]),
+                time=inner.decision_period * np.arange(len(hubs), dtype=np.float64),
+                **{name: np.array([one.info[name][k] for one in outcomes]) for name in HEAT},
                 solver_message=None,
             )
         )
@@ -96,7 +104,7 @@ def swim_many(
 def _up_to_the_last_waypoint(done: Swim) -> Swim:
     strokes = int(np.argmax(done.waypoint_index == len(done.waypoints))) if done.finished else done.strokes
     parts = {name: getattr(done, name)[: strokes + 1] for name in ("hub", "waypoint_index", "time")}
-    return replace(done, **parts, limbs_heated=done.limbs_heated[:strokes])
+    return replace(done, **parts, **{name: getattr(done, name)[:strokes] for name in HEAT})
 
 
 def mean_with_interval(values: NDArray[np.float64]) -> Interval:
@@ -113,16 +121,20 @@ def mean_with_interval(values: NDArray[np.float64]) -> Interval:
 
 
 def statistics(swims: Sequence[Swim]) -> dict[str, Interval]:
-    """Mean measures of a set of swims, by name, with their intervals; strokes are those of finished swims."""
+    """Mean measures of a set of swims, by name, with intervals; strokes and seconds are those of finished swims."""
     finished = np.array([done.finished for done in swims], dtype=np.float64)
     strokes = np.array([done.strokes for done in swims if done.finished], dtype=np.float64)
     errors = MM * np.array([done.cross_track_errors.mean() for done in swims])
+    seconds = np.array([done.time[-1] for done in swims if done.finished], dtype=np.float64)
     effort = np.array([done.heated_per_metre for done in swims if done.heated_per_metre is not None], dtype=np.float64)
+    joules = np.array([done.joules_per_metre for done in swims if done.joules_per_metre is not None], dtype=np.float64)
     measures = {
         "success_rate": finished,
         "strokes_to_finish": strokes,
         "mean_cross_track_error_mm": errors,
         "limbs_heated_per_metre": effort,
+        "simulated_time_s": seconds,
+        "energy_per_metre_J": joules,
     }
     return {name: mean_with_interval(values) for name, values in measures.items()}
 
@@ -130,12 +142,14 @@ def statistics(swims: Sequence[Swim]) -> dict[str, Interval]:
 def trials(agents: Mapping[str, Policy], fidelity: Fidelity, options: "Options") -> list[dict[str, str | int | float]]:
     """Rows of the results, one for every set of swims and agent."""
     rows = []
-    scene = make_scene(None, fidelity)
+    scene = make_scene(None, fidelity, options.decision_period)
     for path, label, n_swims in _sets(options):
         for agent, policy in agents.items():
             swims = swim_many(
-                agent, policy, path, n_swims, scene, DISTURBANCES[label], seed=options.seed, threads=options.num_threads
-            )
+                agent, policy, path, n_swims, scene, DISTURBANCES[label], seed=options.seed,
+                threads=options.num_threads, decision_period=options.decision_period,
+                max_strokes=decisions_in(TIME_LIMIT, options.decision_period),
+            )  # fmt: skip
             row: dict[str, str | int | float] = {
                 "path": path, "disturbance": label, "agent": agent, "fidelity": fidelity, "swims": n_swims
             }  # fmt: skip
@@ -173,6 +187,8 @@ class Options:
     """Accuracies of the simulation, each in turn."""
     seed: int = 0
     """Seed of paths, headings and disturbances, which are the same for every agent."""
+    decision_period: float | None = None
+    """Time between decisions [s]; by default a stroke of 1 s. With another, robots have wires."""
     num_threads: int | None = None
     """Number of threads of the simulator; by default one for every processor."""
     out: Path = Path("runs/trials.csv")
@@ -182,6 +198,8 @@ class Options:
         require_count("swims", self.swims, 1, 1_000_000)
         if not (self.agents and self.sets and self.fidelity):
             raise ValueError("There is nothing to swim: name at least one agent, one set and one fidelity.")
+        if self.decision_period is not None:
+            require_number("decision_period", self.decision_period, "s")
 
 
 def _print(rows: Sequence[dict[str, str | int | float]]) -> None:
@@ -216,7 +234,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     rows = []
     try:
         for fidelity in options.fidelity:
-            rows += trials(load_agents(options.agents, options.seed, fidelity), fidelity, options)
+            agents = load_agents(options.agents, options.seed, fidelity, options.decision_period)
+            rows += trials(agents, fidelity, options)
     except (ValueError, OSError) as bad_input:
         print(bad_input, file=sys.stderr)
         return 2

@@ -63,7 +63,7 @@ class BatchVecEnv(VecEnv):
         self.actions = actions
 
     def step_wait(self) -> VecEnvStepReturn:
-        """One stroke of every robot."""
+        """One decision of every robot."""
         began = time.perf_counter()
         observations, rewards, terminated, truncated, info = self.env.step(self.actions)
         self.seconds_in_steps += time.perf_counter() - began
@@ -131,9 +131,10 @@ class BatchVecEnv(VecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Call the batch's method, once; its result, once for every robot asked for."""
+        """Call the batch's method, once; its result, once for every robot asked for. Masks are robot by robot."""
         result = getattr(self._owner(method_name), method_name)(*method_args, **method_kwargs)
-        return [result] * len(list(self._get_indices(indices)))
+        robots = list(self._get_indices(indices))
+        return [result[robot] for robot in robots] if method_name == "action_masks" else [result] * len(robots)
 
     def env_is_wrapped(self, wrapper_class: type[Any], indices: VecEnvIndices = None) -> list[bool]:
         """Whether the batch is wrapped so; a Monitor counts as present, because its statistics are."""

@@ -1,11 +1,13 @@
 """A five-limb soft robot that learns to swim: planar discrete elastic rods behind a Gymnasium environment.
 
-Importing this package registers `SeastarSwim-v0`.
+Importing this package registers `SeastarSwim-v0`, and the timed environments that decide several times a second.
 """
+
+from typing import Any
 
 from gymnasium.envs.registration import register
 
-from seastar_gym.certify.measure import certify
+from seastar_gym.certification.measure import certify
 from seastar_gym.envs.randomization import DomainRandomization, LogUniform, Normal, Uniform
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
@@ -56,9 +58,21 @@ __all__ = [
     "relaxation_time",
 ]
 
-register(
-    id="SeastarSwim-v0",
-    entry_point="seastar_gym.envs.seastar_swim:SeastarSwimEnv",
-    vector_entry_point="seastar_gym.envs.vector:SeastarSwimVectorEnv",
-    max_episode_steps=400,
-)
+_ENTRY_POINTS: dict[str, Any] = {
+    "entry_point": "seastar_gym.envs.seastar_swim:SeastarSwimEnv",
+    "vector_entry_point": "seastar_gym.envs.vector:SeastarSwimVectorEnv",
+}
+register(id="SeastarSwim-v0", max_episode_steps=400, **_ENTRY_POINTS)
+
+TIMED = {"SeastarSwimTimed-v0": 0.5, "SeastarSwimTimedModerate-v0": 0.2, "SeastarSwimTimedHard-v0": 0.1}
+"""Times between decisions [s] of the timed environments, easy, moderate and hard, by id."""
+TIME_LIMIT = 200.0
+"""Time limit of the timed environments [s]."""
+
+for _id, _decision_period in TIMED.items():
+    register(
+        id=_id,
+        max_episode_steps=round(TIME_LIMIT / _decision_period),
+        kwargs={"decision_period": _decision_period, "actions": "pairs"},
+        **_ENTRY_POINTS,
+    )

@@ -1,7 +1,7 @@
-"""Gaits of the chapter as commands: the straight swim, the pairs of Fig. 13.8, the pentagon (13.15).
+"""Gaits of the chapter as commands: the straight swim, the pairs of Fig. 13.8, the pentagon (13.15); gaits in time.
 
 A gait is an array of commands, shape (n_strokes, n_limbs): per stroke and limb a share of the peak angle, + is
-anti-clockwise.
+anti-clockwise. In time, a stroke is a decision, and the share is that of a pulse.
 """
 
 import numpy as np
@@ -46,3 +46,74 @@ STRAIGHT = straight_gait()[0]
 """{2+, 5-}, the straight swim along limb 1, shape (5,)."""
 PAIRS = {f"{{1-,{k}+}}": pair_gait(k, 1)[0] for k in (2, 3, 4, 5)}
 """The pairs of Fig. 13.8, by name."""
+
+
+# --- gaits in time ---------------------------------------------------------------------------------------------------
+
+PERIOD = 1.0
+"""Period of the gaits [s]: that of the chapter's stroke."""
+LAG, THRIFTY_LAG = 0.6, 0.5
+"""Best time from one pair of the lagged gait to the other [s], for full pulses and for those of the thrifty gait."""
+THRIFTY_LEVEL = 0.6
+"""Share of a full pulse in the thrifty gait."""
+WAVE = (5, 4, 3, 2, 1)
+"""Limbs of the turning wave, in its order."""
+LAGGED_SIDES, LAGGED_REST = {0.5: 22, 0.6: 20}, 2
+"""Time of lagged swimming along a side of the pentagon [s], by lag [s], and of rest after it. Without rest, limbs that
+are still rotated turn the robot at every corner, by 4 degrees."""
+
+
+def in_time(strokes: Floats, decision_period: float) -> Floats:
+    """Strokes of a second each as decisions, shape (n_decisions, n_limbs): no commands between those of the strokes."""
+    every = decisions_per_second(decision_period)
+    decisions = np.zeros((len(strokes) * every, strokes.shape[1]))
+    decisions[::every] = strokes
+    return decisions
+
+
+def decisions_per_second(decision_period: float) -> int:
+    """Decisions in a second. ValueError if that is no whole number."""
+    every = max(1, round(PERIOD / decision_period))
+    if not np.isclose(every * decision_period, PERIOD, rtol=1e-9):
+        raise ValueError(f"Gaits need a whole number of decisions a second, not one every {decision_period:.4g} s.")
+    return every
+
+
+def lagged_gait(decision_period: float, n_limbs: int = 5, lag: float = LAG, level: float = 1.0) -> Floats:
+    """Second of {2+, 5-} at 0 s and {3+, 4-} after a lag, as decisions: the robot moves along +x.
+
+    The lag [s] is rounded to decisions, half up. level: Share of a full pulse.
+    """
+    every = decisions_per_second(decision_period)
+    late = int(lag / decision_period + 0.5)
+    if not 0 < late < every:
+        raise ValueError(f"A lagged gait needs two decisions a second or more, not one every {decision_period:.4g} s.")
+    decisions = np.zeros((every, n_limbs))
+    decisions[0] = level * straight_gait(n_limbs)[0]
+    decisions[late] = level * pair_gait(3, n_limbs - 1, n_limbs)[0]
+    return decisions
+
+
+def thrifty_gait(decision_period: float, n_limbs: int = 5) -> Floats:
+    """The lagged gait with 0.6 of its pulses: three quarters of the speed or more for half the heat per metre."""
+    return lagged_gait(decision_period, n_limbs, THRIFTY_LAG, THRIFTY_LEVEL)
+
+
+def turning_wave(decision_period: float) -> Floats:
+    """Second of 5+, 4+, 3+, 2+, 1+, every 0.2 s, as decisions: the robot turns clockwise on the spot."""
+    every = decisions_per_second(decision_period)
+    if every % len(WAVE):
+        raise ValueError(f"The turning wave needs decisions that divide 0.2 s, not one every {decision_period:.4g} s.")
+    decisions = np.zeros((every, len(WAVE)))
+    for place, limb in enumerate(WAVE):
+        decisions[place * every // len(WAVE), limb - 1] = 1.0
+    return decisions
+
+
+def lagged_pentagon(decision_period: float) -> Floats:
+    """The lagged gait along five sides, with rest after each, as decisions. Turns of 72 degrees shift limbs by one."""
+    side = lagged_gait(decision_period)
+    lag = decision_period * int(np.flatnonzero(side.any(axis=1))[-1])
+    swimming = np.tile(side, (LAGGED_SIDES[min(LAGGED_SIDES, key=lambda known: abs(known - lag))], 1))
+    resting = np.zeros((LAGGED_REST * len(side), 5))
+    return np.concatenate([part for turn in range(5) for part in (np.roll(swimming, turn, axis=1), resting)])

@@ -28,7 +28,7 @@ from agents.training.options import Options, read_options, saved_options
 
 REPOSITORY = Path(train.__file__).parent
 TINY = shlex.split(
-    "--fidelity fast --num-envs 16 --rollout 8 --batch-size 64 --epochs 2 --hidden 16 16 --max-episode-steps 20 "
+    "--fidelity fast --num-envs 16 --rollout 8 --batch-size 64 --epochs 2 --hidden 16 16 --max-episode-time 20 "
     "--save-freq 256 --no-video --num-threads 1"
 )
 
@@ -343,3 +343,23 @@ def test_the_short_form_of_the_training_command_goes_all_the_way(tmp_path):
         learned, script = csv.DictReader(file)
     assert int(learned["strokes_to_finish"]) < int(script["strokes_to_finish"])
     assert (tmp_path / "quick" / "evaluation" / "learned.mp4").stat().st_size > 10_000
+
+
+def test_a_timed_training_is_evaluated_and_kept_in_its_own_decisions(tmp_path, capsys):
+    """Its policy file says the decision period, and the script that it is compared with is the lagged one."""
+    folder = tmp_path / "timed"
+    arguments = [*TINY, "--strokes", "256", "--decision-period", "0.5", "--out", str(folder)]
+    assert train.main(arguments) == 0
+    policy = policies.load(folder / "policy.safetensors")
+    assert policy.decision_period == 0.5
+    with (folder / "evaluation" / "evaluation.csv").open() as stream:
+        rows = {row["agent"]: row for row in csv.DictReader(stream)}
+    assert float(rows["script"]["simulated_time_s"]) < 120 < 2 * int(rows["script"]["strokes_to_finish"])
+    assert float(rows["learned"]["simulated_time_s"]) <= 400.0
+    assert "--decision-period 0.5" in (folder / "evaluation" / "report.html").read_text()
+    assert saved_options(folder).ppo.decision_period == 0.5
+    assert shipping.why_not(policy, saved_options(folder)).startswith("it decides every 1 s, the new one every 0.5 s")
+
+
+def test_decisions_of_no_gait_are_evaluated_without_a_script():
+    assert train.script(0.3) == {} and train.script(None)["script"].decision_period is None

@@ -70,9 +70,8 @@ def write_report(
         sections.append(_section("Learning curves", _figure(figure, "wide")))
     if remarks.bound is not None:
         figure = to_html(speeds_figure(remarks.bound["directions_deg"], remarks.bound["mm_per_stroke"]), "speeds")
-        sections.append(
-            _section("Speed straight ahead [mm per stroke], by direction from limb 1", _figure(figure, "square"))
-        )
+        title = f'Speed straight ahead at "{remarks.bound["fidelity"]}" [mm per stroke], by direction from limb 1'
+        sections.append(_section(title, _figure(figure, "square")))
     if remarks.commands or remarks.sentences:
         sections.append(_section("How it was made", _remarks(remarks)))
     parts = {

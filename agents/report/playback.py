@@ -15,7 +15,7 @@ UNIT = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Playback:
-    """A recorded swim. frames: At the start and at equal times of every stroke. stroke_time: [s]."""
+    """A recorded swim. frames: At the start and at equal times of every decision. stroke_time: Of a decision [s]."""
 
     agent: str
     waypoints: NDArray[np.float64]
@@ -37,7 +37,7 @@ class Playback:
             "stroke": strokes,
             "waypoint": [frame.waypoint_index for frame in self.frames],
             "time": [round(frame.time, 3) for frame in self.frames],
-            "commands": [frame.command.astype(int).tolist() for frame in last_frames.values()],
+            "commands": [np.sign(frame.command).astype(int).tolist() for frame in last_frames.values()],
         }
 
 
@@ -61,4 +61,4 @@ class RecordingEnv(SeastarSwimEnv):
 
     def playback(self, agent: str) -> Playback:
         """Playback of the frames since the last reset."""
-        return Playback(agent, self.waypoints, self.simulator.stroke_time, tuple(self._recorded))
+        return Playback(agent, self.waypoints, self.decision_period, tuple(self._recorded))

@@ -9,7 +9,7 @@ from agents.policy import SHIPPED, LearnedPolicy
 from agents.policy import load as load_policy
 from agents.policy import save as save_policy
 from agents.training.folder import resume_command
-from agents.training.options import MAX_STROKES, Options
+from agents.training.options import Options
 from agents.trials import HELD_OUT_SEED, swim_many
 from seastar_gym.envs.task import make_scene
 
@@ -37,6 +37,8 @@ def why_not(policy: LearnedPolicy, options: Options) -> str | None:
         box = load_policy(SHIPPED)
     except (ValueError, FileNotFoundError) as unreadable:
         return f"there is nothing to compare with, {str(unreadable).rstrip('.')}"
+    if policy.decision_period != box.decision_period:
+        return f"it decides every {box.decision_period:g} s, the new one every {policy.decision_period:g} s"
     ours, theirs = (held_out_strokes(one, options) for one in (policy, box))
     if ours <= theirs:
         return None
@@ -45,9 +47,9 @@ def why_not(policy: LearnedPolicy, options: Options) -> str | None:
 
 def held_out_strokes(policy: LearnedPolicy, options: Options) -> float:
     """Mean strokes to the last waypoint of held-out random paths; a swim that does not arrive counts as the limit."""
-    scene, limit = make_scene(None, options.fidelity), MAX_STROKES
+    scene = make_scene(None, options.fidelity)
     swims = swim_many(
         "learned", policy, "random", HELD_OUT_PATHS, scene,
-        max_strokes=limit, seed=HELD_OUT_SEED, threads=options.num_threads,
+        max_strokes=options.limit, seed=HELD_OUT_SEED, threads=options.num_threads,
     )  # fmt: skip
     return float(np.mean([done.strokes for done in swims]))

@@ -10,12 +10,11 @@ import numpy as np
 import tyro
 
 from agents.hyperparameters import Hyperparameters
+from agents.swim import TIME_LIMIT, decisions_in
 from seastar_gym import RewardWeights
 from seastar_gym.envs.paths import PATHS, make_path
 from seastar_gym.scene.numerics import Fidelity
 
-MAX_STROKES = 400
-"""Time limit of an evaluated swim [strokes]; the scripted gait takes 241 round the pentagon."""
 PATH_HELP = (
     f"Name of the path to train on: {', '.join(PATHS)}. Random paths teach every direction and every turn, also those "
     "of the pentagon."
@@ -27,7 +26,7 @@ class Options:
     """Train a swimmer with PPO and compare it with the scripted pentagon gait."""
 
     strokes: int = 300_000
-    """Length of the training [strokes], all robots together."""
+    """Length of the training [strokes, or decisions], all robots together."""
     path: Annotated[str, tyro.conf.arg(help=PATH_HELP)] = "random"
     random_heading: bool = True
     """Turn every robot at random at the start of an episode."""
@@ -62,6 +61,11 @@ class Options:
         if self.strokes < 1 or self.save_freq < 1:
             raise ValueError("strokes and save_freq must be at least 1.")
         make_path(self.path, np.random.default_rng(0))
+
+    @property
+    def limit(self) -> int:
+        """Time limit of an evaluated swim [decisions]; the scripted gait takes 241 s round the pentagon."""
+        return decisions_in(TIME_LIMIT, self.ppo.decision_period)
 
 
 CHANGEABLE = {"strokes", "num_threads", "device", "save_freq", "video", "ship", "ship_anyway", "out", "resume", "quick"}

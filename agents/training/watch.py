@@ -15,7 +15,7 @@ from agents.learner_file import save
 from agents.ppo import policy_of
 from agents.swim import Swim, swim
 from agents.training.folder import recorded
-from agents.training.options import MAX_STROKES, Options
+from agents.training.options import Options
 from agents.vec_env import BatchVecEnv
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 
@@ -50,7 +50,12 @@ class Watch(BaseCallback):
         self.options, self.folder, self.learner, self.batch, self.stop = options, folder, learner, batch, stop
         self.strokes = 0  # of this process
         self.seconds = {"simulator": 0.0, "policy": 0.0, "update": 0.0}
-        self.pentagon = SeastarSwimEnv("pentagon", actions=options.ppo.actions, fidelity=options.fidelity)
+        self.pentagon = SeastarSwimEnv(
+            "pentagon",
+            actions=options.ppo.actions,
+            fidelity=options.fidelity,
+            decision_period=options.ppo.decision_period,
+        )
 
     def _on_training_start(self) -> None:
         # On a terminal only: elsewhere, a line at every checkpoint says how far it is.
@@ -107,7 +112,7 @@ class Watch(BaseCallback):
         strokes = self.learner.num_timesteps
         copy = self.folder / "checkpoints" / f"model_{strokes:09d}.zip"
         write_atomically(copy, (self.folder / "model.zip").read_bytes())
-        done = swim("learned", policy_of(self.learner), self.pentagon, max_strokes=MAX_STROKES)
+        done = swim("learned", policy_of(self.learner), self.pentagon, max_strokes=self.options.limit)
         self.learner.logger.record("eval/pentagon_strokes", done.strokes)
         self.learner.logger.record("eval/pentagon_waypoints", done.waypoints_reached)
         rows = [*recorded(self.folder), [strokes, done.strokes, done.waypoints_reached]]

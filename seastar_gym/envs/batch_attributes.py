@@ -6,7 +6,7 @@ import numpy as np
 
 from seastar_gym.envs.task_env import TaskEnv
 
-OF_EACH_ROBOT = ("np_random", "np_random_seed", "render", "waypoints")
+OF_EACH_ROBOT = ("action_masks", "np_random", "np_random_seed", "render", "waypoints")
 """Names of attributes and methods of the batch that give a tuple with a value for every robot."""
 
 
@@ -27,7 +27,7 @@ class BatchAttributes(TaskEnv):
         value = self._own_attributes[name] if name in self._own_attributes else getattr(self, name)
         value = value(*args, **kwargs) if callable(value) else value
         of_each = name in self._own_attributes or name in OF_EACH_ROBOT
-        return value if of_each and value is not None else (value,) * self.num_envs
+        return tuple(value) if of_each and value is not None else (value,) * self.num_envs
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
         """Attribute of every robot."""

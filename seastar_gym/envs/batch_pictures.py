@@ -54,7 +54,7 @@ class BatchPictures:
         commands: Commands of all robots in the last stroke, shape (n_robots, n_limbs).
         """
         task, simulator = self._task, self._task.simulator
-        positions, time = simulator.positions, simulator.time
+        positions, time, warmth = simulator.positions, simulator.time, task.warmth()
         return tuple(
             self._draw(
                 robot,
@@ -64,6 +64,7 @@ class BatchPictures:
                     trail=np.array(self._trails[robot]).reshape(-1, 2),
                     waypoint_index=int(task.waypoint_index[robot]),
                     time=float(time[robot]),
+                    warmth=None if warmth is None else warmth[robot],
                 ),
             )
             for robot in robots

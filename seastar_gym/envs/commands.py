@@ -1,4 +1,4 @@
-"""Actions and the commands they mean: which limbs are heated, and which way they turn."""
+"""Actions and the commands they mean: which limbs are heated, which way they turn, and for how long."""
 
 import functools
 import itertools
@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from seastar_gym.scene.checks import require_choice
 
-Actions: TypeAlias = Literal["limbs", "joint", "pairs"]
+Discrete: TypeAlias = Literal["limbs", "joint", "pairs"]
+"""Action modes with a finite number of actions."""
+Actions: TypeAlias = Literal[Discrete, "continuous"]
 
 MOST_LIMBS = 8
 """Largest number of limbs for actions="joint", which then has 6,561 actions."""
@@ -19,16 +21,26 @@ LIMB_COMMANDS = np.array([0.0, 1.0, -1.0])
 """Command of a limb for its action 0, 1, 2: leave it alone, actuate + (anti-clockwise), actuate -."""
 
 
-def action_space(actions: Actions, n_limbs: int) -> spaces.MultiDiscrete | spaces.Discrete:
+def action_space(actions: Actions, n_limbs: int) -> spaces.MultiDiscrete | spaces.Discrete | spaces.Box:
     """Space of one robot's actions."""
+    require_choice("actions", actions, get_args(Actions))
+    if actions == "continuous":
+        return spaces.Box(-1.0, 1.0, (n_limbs,), np.float32)
     numbers, n_choices = choices(actions, n_limbs)
     return spaces.MultiDiscrete([n_choices] * numbers) if actions == "limbs" else spaces.Discrete(n_choices)
 
 
 def choices(actions: Actions, n_limbs: int) -> tuple[int, int]:
     """Count of the numbers that one action consists of, and of the values that each can take (from 0 on)."""
-    require_choice("actions", actions, get_args(Actions))
+    require_discrete(actions)
     return (n_limbs, len(LIMB_COMMANDS)) if actions == "limbs" else (1, len(command_table(actions, n_limbs)))
+
+
+def require_discrete(actions: Actions) -> None:
+    """ValueError for an action mode that is unknown, or has no finite number of actions."""
+    require_choice("actions", actions, get_args(Actions))
+    if actions == "continuous":
+        raise ValueError(f'actions="continuous" has no finite number of actions: use one of {get_args(Discrete)}.')
 
 
 def command_table(actions: Actions, n_limbs: int) -> NDArray[np.float64]:
@@ -37,7 +49,7 @@ def command_table(actions: Actions, n_limbs: int) -> NDArray[np.float64]:
     "joint": every command, limb 1 varying slowest, each limb in the order 0, +, -. "pairs": no limb, then every pair
     of one + and one - limb. "limbs" has no table: it is one action per limb.
     """
-    require_choice("actions", actions, get_args(Actions))
+    require_discrete(actions)
     if actions == "limbs":
         raise ValueError('actions="limbs" has one action per limb, not a table of commands: use LIMB_COMMANDS.')
     if actions == "joint" and n_limbs > MOST_LIMBS:
@@ -71,6 +83,8 @@ def as_array(value: object) -> NDArray[Any]:
 def to_commands(actions: Actions, n_limbs: int, action: object, n_robots: int) -> NDArray[np.float64]:
     """Commands of `n_robots` robots, shape (n_robots, n_limbs), or ValueError for what is not an action of theirs."""
     array = as_array(action)
+    if actions == "continuous":
+        return _checked_shares(array, (n_robots, n_limbs))
     shape = (n_robots, n_limbs) if actions == "limbs" else (n_robots,)
     _, n_choices = choices(actions, n_limbs)
     if array.dtype.kind not in "iu" or array.shape != shape:
@@ -81,3 +95,15 @@ def to_commands(actions: Actions, n_limbs: int, action: object, n_robots: int) -
     if array.size and (array.min() < 0 or array.max() >= n_choices):
         raise ValueError(f'With actions="{actions}" an action is from 0 to {n_choices - 1}, not {array.tolist()}.')
     return (LIMB_COMMANDS if actions == "limbs" else command_table(actions, n_limbs))[array]
+
+
+def _checked_shares(array: NDArray[Any], shape: tuple[int, int]) -> NDArray[np.float64]:
+    """Numbers of actions="continuous" as commands, a fresh array."""
+    if array.dtype.kind not in "iuf" or array.shape != shape:
+        raise ValueError(
+            f'With actions="continuous" the actions of {shape[0]} robot(s) are numbers of shape {shape}, '
+            f"not {array.dtype} of shape {array.shape}."
+        )
+    if not (np.abs(array) <= 1.0).all():
+        raise ValueError(f'With actions="continuous" an action is numbers from -1 to 1, not {array.tolist()}.')
+    return array.astype(np.float64)

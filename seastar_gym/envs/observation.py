@@ -18,7 +18,8 @@ with m = 9 n_limbs stations in the order {1,1}..{1,9}, {2,1}.. (m = 45 for five 
 next waypoint is the current one. Distances of waypoints are not clipped.
 
 If actuators have a memory (a `StatefulActuator`), the numbers of its `observe` for limb 1, limb 2, .. stand before the
-waypoints, which are always the last four numbers. `Layout` names all these places.
+waypoints, which are always the last four numbers; an environment may leave the memory out. `Layout` names all these
+places.
 """
 
 from functools import cache
@@ -73,10 +74,11 @@ def layout(n_limbs: int, n_remembered: int = 0) -> Layout:
     return Layout(*map(slice, [0, *ends[:-1]], ends))
 
 
-def scene_layout(scene: Scene) -> Layout:
-    """Layout for the robot of a scene."""
+def scene_layout(scene: Scene, observe_actuators: bool = True) -> Layout:
+    """Layout for the robot of a scene, with the memory of its actuators or without."""
     actuator, n_limbs = scene.actuator, scene.robot.n_limbs
-    remembered = actuator.observe(actuator.rest).shape[-1] if isinstance(actuator, StatefulActuator) else 0
+    seen = observe_actuators and isinstance(actuator, StatefulActuator)
+    remembered = actuator.observe(actuator.rest).shape[-1] if seen else 0  # type: ignore[attr-defined]
     return layout(n_limbs, remembered * n_limbs)
 
 

@@ -39,6 +39,10 @@ REFIT_MARGIN = 0.5
 """Room [limb lengths] gained beyond a robot that left the view, so that the view moves in few steps."""
 
 
+ROOT = 0.34
+"""Share of a limb, from the hub on, whose colour shows how warm its wires are."""
+
+
 @dataclass(frozen=True, eq=False)
 class Frame:
     """State of a swim that one picture shows."""
@@ -46,13 +50,15 @@ class Frame:
     positions: FloatArray
     """Node positions [m], shape (n_nodes, 2)."""
     command: FloatArray
-    """Command of the current stroke in [-1, 1], shape (n_limbs,); + is anti-clockwise."""
+    """Command of the current decision in [-1, 1], shape (n_limbs,); + is anti-clockwise."""
     trail: FloatArray
     """Former positions of the hub [m], shape (k, 2), oldest first; k may be 0."""
     waypoint_index: int
     """The waypoint that the robot swims to; the number of waypoints once all are reached."""
     time: float
     """Simulated time [s]."""
+    warmth: FloatArray | None = None
+    """How warm wires + and - of every limb are, from 0 to 1, shape (n_limbs, 2); None without wires."""
 
 
 def limb_nodes(n_limbs: int, nodes_per_limb: int) -> NDArray[np.int_]:
@@ -187,6 +193,9 @@ class Renderer:
             zip(limbs, widths, frame.command, strict=True), key=lambda drawn: abs(drawn[2])
         ):
             self._canvas.stroke(limb, _limb_colour(command), limb_width)
+        if frame.warmth is not None:
+            for limb, limb_width, warmth in zip(limbs, widths, frame.warmth, strict=True):
+                self._canvas.stroke(limb[: 1 + round(ROOT * (len(limb) - 1))], _warm_colour(warmth), limb_width)
         self._canvas.dot(limbs[0, 0], LIMB, radius=1.3 * width)
 
     def _number_waypoints(self, waypoint_index: int) -> None:
@@ -284,6 +293,12 @@ def _limb_colour(command: float) -> Colour:
     if command == 0.0:
         return LIMB
     return HEATED_PLUS if command > 0.0 else HEATED_MINUS
+
+
+def _warm_colour(warmth: FloatArray) -> Colour:
+    """Colour of the warmer wire, the stronger the warmer; warmth: Of wires + and -, shape (2,)."""
+    plus, minus = warmth
+    return mixed(HEATED_PLUS if plus >= minus else HEATED_MINUS, LIMB, float(max(plus, minus)))
 
 
 def _sign(command: float) -> str:

@@ -9,6 +9,9 @@ from seastar_gym.envs.paths import shortest_way
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.serial import register_part
 
+PULSE = 0.1
+"""Heating time of one wire [s] that `RewardWeights.effort` is the price of."""
+
 
 @register_part
 @dataclass(frozen=True)
@@ -17,7 +20,7 @@ class RewardWeights:
 
     progress: Reward per metre by which the rewarded route to the last waypoint became shorter [1/m].
     waypoint: Reward per waypoint reached.
-    effort: Price of heating one limb in one stroke.
+    effort: Price of heating one wire for PULSE = 0.1 s.
     aim: Distance from a waypoint's centre, as a fraction of its radius, at which the rewarded route passes it, 0 to 1.
     """
 
@@ -27,7 +30,7 @@ class RewardWeights:
     waypoint: float = 1.0
     """Reward per waypoint reached."""
     effort: float = 0.01
-    """Price of heating one limb in one stroke."""
+    """Price of heating one wire for PULSE = 0.1 s, as a stroke of the chapter does; shorter heating costs its share."""
     aim: float = 0.7
     """Distance from a waypoint's centre, as a fraction of its radius, at which the rewarded route passes it, 0 to 1. A
     route at 1 only touches the circle, so that no stroke need ever end within it."""
@@ -53,14 +56,26 @@ def reward_terms(
     weights: RewardWeights,
     progress: NDArray[np.float64],
     waypoints_reached: NDArray[np.int64],
-    limbs_heated: NDArray[np.int64],
+    pulses: NDArray[np.float64],
 ) -> dict[str, NDArray[np.float64]]:
     """Terms of the reward by their names in `info`, each of shape (n_robots,).
 
-    progress: Decrease of the way to go [m]. waypoints_reached, limbs_heated: Counts of this stroke. Shapes (n_robots,).
+    progress: Decrease of the way to go [m]. waypoints_reached: Their number. pulses: Heat, see `pulses_of`. All are of
+    this decision, shapes (n_robots,).
     """
     return {
         "reward_progress": weights.progress * progress,
         "reward_waypoint": weights.waypoint * waypoints_reached.astype(np.float64),
-        "reward_effort": -weights.effort * limbs_heated.astype(np.float64),
+        "reward_effort": -weights.effort * pulses,
     }
+
+
+def pulses_of(heating_time: NDArray[np.float64], commands: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Heat as a number of pulses of 0.1 s, shape (n_robots,).
+
+    heating_time: Time for which wires were heated, summed over limbs [s], shape (n_robots,). NaN where the actuator
+        does not say it: a command then counts as its share of a pulse.
+    commands: Shape (n_robots, n_limbs).
+    """
+    whole = np.round(heating_time / PULSE, 12)  # sums of tenths of a second are whole pulses again
+    return np.where(np.isnan(heating_time), np.abs(commands).sum(axis=1), whole)

@@ -21,7 +21,10 @@ from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.checks import require_choice, require_count, require_seed
 from seastar_gym.scene.numerics import Fidelity
 
-FRAMES_PER_STROKE = 10
+FRAMES_PER_SECOND = 10
+"""Pictures per second of simulated time, unless another number is asked for."""
+ROUNDING = 1e-9
+"""Fraction of a time that is no time."""
 Observation = NDArray[np.float32]
 
 
@@ -32,16 +35,46 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     anti-clockwise; node {i,j} is node j of limb i, counted from the hub. n is the number of limbs.
 
     ## Action space
-    A step is one stroke of 1 s: commanded limbs are heated for 0.1 s and turn about the hub by up to 36 degrees, then
-    they cool for 0.9 s and turn back (Fig. 13.5b). `actions` chooses how a command is written:
+    A step is one decision. In `SeastarSwim-v0` it is a stroke of 1 s: commanded limbs are heated for 0.1 s and turn
+    about the hub by up to 36 degrees, then they cool for 0.9 s and turn back (Fig. 13.5b). `actions` chooses how a
+    command is written:
 
-    | `actions` | space                     | index  | range      | meaning                                       |
-    |-----------|---------------------------|--------|------------|-----------------------------------------------|
-    | `"limbs"` | `MultiDiscrete([3] * n)`  | 0..n-1 | 0..2       | limb: 0 rest, 1 anti-clockwise, 2 clockwise   |
-    | `"joint"` | `Discrete(3**n)`          | -      | 0..3**n-1  | number of a command: every combination        |
-    | `"pairs"` | `Discrete(1 + n*(n - 1))` | -      | 0..n*(n-1) | number of a command: none, or one + and one - |
+    | `actions`      | space                       | index  | range      | meaning                                     |
+    |----------------|-----------------------------|--------|------------|---------------------------------------------|
+    | `"limbs"`      | `MultiDiscrete([3] * n)`    | 0..n-1 | 0..2       | limb: 0 rest, 1 anti-clockwise, 2 clockwise |
+    | `"joint"`      | `Discrete(3**n)`            | -      | 0..3**n-1  | number of a command: every combination      |
+    | `"pairs"`      | `Discrete(1 + n*(n - 1))`   | -      | 0..n*(n-1) | number of a command: none, or a + and a -   |
+    | `"continuous"` | `Box(-1, 1, (n,), float32)` | 0..n-1 | -1..1      | limb: share of a full command, + or -       |
 
-    Actions have no unit. `env.command_table[number]` is the command of every limb: 0, 1 (+) or -1 (-).
+    Actions have no unit. `env.command_table[number]` is the command of every limb: 0, 1 (+) or -1 (-). A share is the
+    width of the heating pulse, of 0.1 s at most, for wires (`SmaWires`, `ThermalSma`), and scales the rotation of other
+    actuators.
+
+    ## Time between decisions
+    `decision_period` is the time of a step. Decisions within a stroke need actuators that remember what is under way:
+    wires, one for each direction of every limb, that cool while others are heated. The registered settings are
+
+    | id                            | decision period [s] | `actions` | time limit [s] | decisions | actuator   |
+    |-------------------------------|---------------------|-----------|----------------|-----------|------------|
+    | `SeastarSwim-v0`              | 1.0                 | `"limbs"` | 400            | 400       | `SmaPulse` |
+    | `SeastarSwimTimed-v0`         | 0.5                 | `"pairs"` | 200            | 400       | `SmaWires` |
+    | `SeastarSwimTimedModerate-v0` | 0.2                 | `"pairs"` | 200            | 1000      | `SmaWires` |
+    | `SeastarSwimTimedHard-v0`     | 0.1                 | `"pairs"` | 200            | 2000      | `SmaWires` |
+
+    The same physics and the same task, with a horizon that is 2, 5 or 10 times as long in decisions.
+
+    ## Masks
+    Some wires cannot be heated now: those of `SmaWires(deaf=True)` until their limb is cold, those of a `ThermalSma`
+    with a `largest_temperature` while they are that hot. A command to such a wire does nothing and costs nothing. With
+    these actuators, `info` has `action_mask` (int8, 1 for actions that are followed as a whole) and `masked_limbs`
+    (int, commands of this decision that were not followed). `env.action_masks()` is the mask as booleans, the form of
+    MaskablePPO in sb3-contrib, with any actuator:
+
+    | `actions`            | shape          | meaning                                            |
+    |----------------------|----------------|----------------------------------------------------|
+    | `"limbs"`            | `(3 * n,)`     | limb after limb, actions 0, 1 and 2                |
+    | `"joint"`, `"pairs"` | `(n_actions,)` | number of a command                                |
+    | `"continuous"`       | `(2 * n,)`     | limb after limb, its wires for + and for -         |
 
     ## Observation space
     `Box(-inf, inf, (186,), float32)` for five limbs. A limb is seen at nine stations, evenly spaced from hub to tip,
@@ -57,9 +90,17 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | 182..183 | current waypoint relative to the hub: x, y                           | 0.1 m     | (-inf, inf) |
     | 184..185 | next waypoint relative to the hub: x, y; on the last leg the current | 0.1 m     | (-inf, inf) |
 
-    A robot of other than five limbs has as many times nine stations. If a scene's actuators have a memory, such as the
-    temperatures of `ThermalSma`, it stands before the waypoints, limb after limb.
-    `seastar_gym.envs.observation.Layout` names all these places.
+    A robot of other than five limbs has as many times nine stations. If a scene's actuators have a memory, it stands
+    before the waypoints, limb after limb, unless `observe_actuators` is False:
+
+    | actuator     | numbers of a limb                                          | unit              | range      |
+    |--------------|------------------------------------------------------------|-------------------|------------|
+    | `SmaWires`   | contractions of wires +, -                                 | 1                 | 0..1       |
+    | `ThermalSma` | temperatures of wires +, - above the water, then austenite | A_f - T_water; 1  | 0..; 0..1  |
+    | `Limited`    | rotation                                                   | the largest one   | -1..1      |
+
+    So an observation has 196 numbers in the timed environments. Nothing else tells the future of the robot, unless
+    decisions are shorter than pulses. `seastar_gym.envs.observation.Layout` names all these places.
 
     ## Reward
     The sum of three terms, with the weights of `RewardWeights`; each term is in `info`, too:
@@ -67,8 +108,11 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | term              | meaning                                                      | default weight |
     |-------------------|--------------------------------------------------------------|----------------|
     | `reward_progress` | decrease of the length of the route to the last waypoint [m] | 200 per metre  |
-    | `reward_waypoint` | waypoints reached in the stroke                              | 1 per waypoint |
-    | `reward_effort`   | minus the limbs heated in the stroke                         | 0.01 per limb  |
+    | `reward_waypoint` | waypoints reached in the decision                            | 1 per waypoint |
+    | `reward_effort`   | minus the time for which wires were heated, in pulses        | 0.01 per pulse |
+
+    A pulse is 0.1 s of one wire, what a stroke takes of a limb. Where an actuator does not say how long it is heated, a
+    command counts as its share of a pulse.
 
     The route is the shortest one that passes the current waypoint within 0.7 of its radius (`RewardWeights.aim`) on the
     way to the next, and leads from centre to centre after that.
@@ -89,16 +133,22 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `error_estimate`         | float      | m    | estimate of the hub's error, only with `error_bars`              |
     | `real_time_factor`       | float      | 1    | measured simulated time per computing time, batch on one core    |
     | `is_success`             | bool       | -    | whether the last waypoint is reached                             |
-    | `limbs_heated`           | int        | 1    | number of limbs heated in the stroke                             |
-    | `newton_iterations`      | int        | 1    | Newton iterations of the stroke                                  |
-    | `solver_status`          | int        | -    | `SolverStatus` of the stroke, 0: converged                       |
+    | `limbs_heated`           | int        | 1    | number of limbs whose heating began in the decision              |
+    | `heating_time`           | float      | s    | time for which wires were heated in it, summed over limbs        |
+    | `energy`                 | float      | J    | electric energy of that heat                                     |
+    | `energy_per_metre`       | float      | J/m  | energy over the decrease of the route's length, since the reset  |
+    | `newton_iterations`      | int        | 1    | Newton iterations of the decision                                |
+    | `solver_status`          | int        | -    | `SolverStatus` of the decision, 0: converged                     |
     | `solver_message`         | str        | -    | what to do about a status other than 0; empty for 0              |
     | `smallest_opening_angle` | float      | rad  | smallest angle between neighbouring limbs; below 0: they crossed |
     | `reward_progress`        | float      | 1    | term of the reward                                               |
     | `reward_waypoint`        | float      | 1    | term of the reward                                               |
     | `reward_effort`          | float      | 1    | term of the reward                                               |
 
-    `path_error` is that over every sequence of the environment's actions, repeated ones included; `space_error` and
+    `energy_per_metre` is infinite where the route has not become shorter; heat and energy are NaN for actuators that do
+    not say it.
+    Measured errors and speed are there only where decisions are strokes.
+    `path_error` is that over every sequence of strokes by whole commands, repeated ones included; `space_error` and
     `time_error` are those of the usual swims, straight, round the pentagon, or of random commands. They belong to the
     robot's resolution and the numerics (see `seastar_gym.scene.fidelity`), and are NaN for other robots and scenes than
     the chapter's, unless a `certificate` has them, and for what was not measured. `error_estimate` is of the very swim,
@@ -111,13 +161,13 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
 
     ## Episode end
     `terminated`: the last waypoint is reached, or the solver failed, which has never been seen within a scene's limits;
-    the observation is then of the last good state. `truncated`: the time limit of `gym.make`, by default 400 strokes.
+    the observation is then of the last good state. `truncated`: the time limit of `gym.make`, see the table of ids.
 
     ## Arguments
     path: Name of a path - "pentagon", "square", "triangle", "line", "figure-eight", "random", or one that
         `seastar_gym.envs.paths.register_path` added - or waypoints [m], shape (n, 2), from the origin.
         `reset(options={"path": ...})` chooses another path for one episode.
-    actions: How commands are written: "limbs", "joint" or "pairs", see above.
+    actions: How commands are written: "limbs", "joint", "pairs" or "continuous", see above.
     fidelity: Accuracy of the simulation: "fast", "balanced" (default), "accurate", "reference" or "chapter". Without a
         `scene` it chooses nodes per limb, discretisation and numerics, as `Scene.preset` does, otherwise the numerics
         alone. If `scene` names its numerics, they are used, and another fidelity is refused.
@@ -125,21 +175,26 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     reward: Weights of the reward's terms.
     waypoint_radius: Distance of the hub [m] within which a waypoint is reached.
     random_heading: Whether the robot is turned at random at the start of every episode.
-    render_mode: "rgb_array": `render` returns a picture of the end of the stroke. "rgb_array_list": `render` returns
-        `frames_per_stroke` pictures of the stroke. "human": a window shows as many.
-    frames_per_stroke: Number of pictures of a stroke, at equal intervals; the last shows the end of the stroke.
+    render_mode: "rgb_array": `render` returns a picture of the end of the decision. "rgb_array_list": `render` returns
+        `frames_per_stroke` pictures of the decision. "human": a window shows as many.
+    frames_per_stroke: Number of pictures of a decision, at equal intervals; the last shows its end. None means ten per
+        second of simulated time, and one at least.
     randomization: Distributions of numbers of the scene that are drawn at the start of every episode.
     certificate: Measured errors of the scene for `info`: a `Certificate`, or the file of one that
         `python -m seastar_gym.certify` wrote. Refused where it is of another scene or version.
     error_bars: Whether `info` has `error_estimate`, by a twin of shorter edges and steps that swims along. No bit of a
         trajectory changes, and a step takes four to five times as long.
+    decision_period: Time between decisions [s]. None means a stroke, the period of the actuator. Other than 1 s, and
+        without a `scene`, the chapter's robot has `SmaWires`. A time in which limbs would not come to rest is refused
+        for actuators without memory.
+    observe_actuators: Whether observations have the memory of the actuators.
 
     `scene`, `reward` and `randomization` may be given as plain data, as `Scene.to_dict` and
     `seastar_gym.scene.serial.to_dict` write them. `env.spec` has them so:
     `gym.make(EnvSpec.from_json(env.spec.to_json()))` is the same environment.
     """
 
-    metadata = {"render_modes": ["human", "rgb_array", "rgb_array_list"], "render_fps": FRAMES_PER_STROKE}
+    metadata = {"render_modes": ["human", "rgb_array", "rgb_array_list"], "render_fps": FRAMES_PER_SECOND}
 
     def __init__(
         self,
@@ -151,23 +206,29 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         waypoint_radius: float = 0.01,
         random_heading: bool = False,
         render_mode: Literal["human", "rgb_array", "rgb_array_list"] | None = None,
-        frames_per_stroke: int = FRAMES_PER_STROKE,
+        frames_per_stroke: int | None = None,
         randomization: DomainRandomization | Plain | None = None,
         certificate: Certificate | str | PathLike[str] | None = None,
         error_bars: bool = False,
+        decision_period: float | None = None,
+        observe_actuators: bool = True,
     ):
         if render_mode is not None:
             require_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
-        require_count("frames_per_stroke", frames_per_stroke, 1, 1_000_000)
+        if frames_per_stroke is not None:
+            require_count("frames_per_stroke", frames_per_stroke, 1, 1_000_000)
         self.render_mode = render_mode
-        self.frames_per_stroke = frames_per_stroke
-        self.metadata = {**self.metadata, "render_fps": frames_per_stroke}
-        modelled = make_scene(scene, fidelity)
-        warn_uncertified(modelled, fidelity, certificate)
+        modelled = make_scene(scene, fidelity, decision_period)
+        if scene is not None:
+            warn_uncertified(modelled, fidelity, certificate)
         task = SwimTask(
-            modelled, 1, path, reward, waypoint_radius, random_heading, 1, randomization, certificate, error_bars
-        )
-        self.action_space, self.observation_space = self._set_task(task, actions)
+            modelled, 1, path, reward, waypoint_radius, random_heading, 1, randomization, certificate, error_bars,
+            actions, decision_period, observe_actuators,
+        )  # fmt: skip
+        self.action_space, self.observation_space = self._set_task(task)
+        of_a_decision = max(1, round(FRAMES_PER_SECOND * task.decision_period))
+        self.frames_per_stroke = of_a_decision if frames_per_stroke is None else frames_per_stroke
+        self.metadata = {**self.metadata, "render_fps": max(1, round(self.frames_per_stroke / task.decision_period))}
         self._running = False
         self._command = np.zeros(self.scene.robot.n_limbs)
         self._trail = np.zeros((0, 2))
@@ -201,13 +262,13 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         return self._task.observe()[0], _of_one_robot(self._task.first_info())
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Swim one stroke; returns observation, reward, terminated, truncated and info."""
+        """Swim for one decision; returns observation, reward, terminated, truncated and info."""
         if not self._running:
             raise gym.error.ResetNeeded(
                 "The episode has not begun, is over or was interrupted: call reset() before step()."
             )
         command = to_commands(self.actions, self.scene.robot.n_limbs, [action], 1)
-        self._command = command[0]
+        self._command = self._task.followed(command)[0]
         with self._until_whole():
             outcome = self._swim(command)
         terminated = bool(outcome.terminated[0])
@@ -233,14 +294,15 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
             return self._draw_while_swimming(parts)
 
     def _draw_while_swimming(self, parts: Generator[float, None, Outcome]) -> Outcome:
+        before_the_end = self.decision_period * (1.0 - ROUNDING)
         while True:
             try:
-                time_in_stroke = next(parts)
+                time_in_decision = next(parts)
             except StopIteration as finished:
                 self._draw_frame()  # now that it is known whether a waypoint was reached
                 return finished.value
             self._extend_trail()
-            if time_in_stroke < self.simulator.stroke_time:
+            if time_in_decision < before_the_end:
                 self._draw_frame()
 
     def _extend_trail(self) -> None:
@@ -248,17 +310,19 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
             self._trail = np.concatenate([self._trail, self.simulator.hub_position()])
 
     def _frame(self) -> Frame:
+        warmth = self._task.warmth()
         return Frame(
             positions=self.simulator.positions[0],
             command=self._command,
             trail=self._trail,
             waypoint_index=int(self._task.waypoint_index[0]),
             time=float(self.simulator.time[0]),
+            warmth=None if warmth is None else warmth[0],
         )
 
     def _draw_frame(self) -> None:
         if self.render_mode == "human":
-            self._get_renderer().show(self._frame(), fps=self.frames_per_stroke)
+            self._get_renderer().show(self._frame(), fps=self.metadata["render_fps"])
         elif self.render_mode == "rgb_array_list":
             self._frames.append(self._get_renderer().draw(self._frame()))
 
@@ -277,6 +341,10 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
             return self._get_renderer().draw(self._frame())
         frames, self._frames = self._frames, []
         return frames if self.render_mode == "rgb_array_list" else None
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Actions that the wires can follow now, shape (k,), see the table of masks."""
+        return self._task.action_masks()[0]
 
     def close(self) -> None:
         """Close the window, if there is one, and end the simulator's threads."""

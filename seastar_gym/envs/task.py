@@ -1,4 +1,4 @@
-"""The task behind both environments: a batch of robots, each on a path of its own, advanced by strokes."""
+"""The task behind both environments: a batch of robots, each on a path of its own, advanced by decisions."""
 
 from collections.abc import Generator
 from dataclasses import replace
@@ -8,6 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.envs.commands import Actions
+from seastar_gym.envs.decisions import checked_decision_period
+from seastar_gym.envs.masks import action_masks, can_be_masked, masked_limbs
 from seastar_gym.envs.observation import (
     VELOCITY_SCALE,
     observation_size,
@@ -19,9 +22,10 @@ from seastar_gym.envs.observation import (
 from seastar_gym.envs.paths import FARTHEST, cross_track_error, make_path
 from seastar_gym.envs.promises import promised, read_certificate
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, drawn_scene
-from seastar_gym.envs.reward import RewardWeights, reward_terms
+from seastar_gym.envs.reward import RewardWeights, pulses_of, reward_terms
 from seastar_gym.envs.stations import stations
-from seastar_gym.scene import Numerics, Scene
+from seastar_gym.scene import Numerics, Scene, SmaWires
+from seastar_gym.scene.actuators.actuator import Deaf
 from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.checks import require_flag, require_number, shown
 from seastar_gym.scene.numerics import Fidelity
@@ -39,21 +43,28 @@ DEFAULT_FIDELITY: Fidelity = "balanced"
 
 
 class Outcome(NamedTuple):
-    """Reward, end and info of a stroke; arrays over robots."""
+    """Reward, end and info of a decision, and the commands that were followed; arrays over robots."""
 
     reward: Floats
     terminated: NDArray[np.bool_]
     info: dict[str, NDArray[Any]]
+    commands: Floats
 
 
-def make_scene(scene: Scene | Plain | None, fidelity: Fidelity | None) -> Scene:
+def make_scene(
+    scene: Scene | Plain | None, fidelity: Fidelity | None, decision_period: float | None = None
+) -> Scene:
     """Scene with the numerics that it names, otherwise with those of `fidelity`, by default "balanced".
 
-    Without a scene, it is the fidelity's own, with its nodes per limb and its discretisation. ValueError where scene
-    and fidelity name different numerics.
+    Without a scene, it is the fidelity's own, with its nodes per limb and its discretisation, and with wires for
+    decisions that are not strokes. ValueError where scene and fidelity name different numerics.
+
+    decision_period: Time between decisions [s]. None means a stroke.
     """
     if scene is None:
-        return Scene.preset(DEFAULT_FIDELITY if fidelity is None else fidelity)
+        chapters = Scene.preset(DEFAULT_FIDELITY if fidelity is None else fidelity)
+        in_strokes = decision_period is None or decision_period == chapters.actuator.period
+        return chapters if in_strokes else replace(chapters, actuator=SmaWires())
     scene = read(scene, Scene)
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a Scene, not {shown(scene)}.")
@@ -73,9 +84,9 @@ def read(part: Part | Plain, kind: type[Any]) -> Part:
     return from_dict(part, kind) if isinstance(part, dict) else part
 
 
-def scene_observation_size(scene: Scene) -> int:
+def scene_observation_size(scene: Scene, observe_actuators: bool = True) -> int:
     """Length of the observation of a scene's robot."""
-    return scene_layout(scene).size
+    return scene_layout(scene, observe_actuators).size
 
 
 class SwimTask:
@@ -96,6 +107,9 @@ class SwimTask:
         randomization: DomainRandomization | Plain | None = None,
         certificate: Certificate | str | PathLike[str] | None = None,
         error_bars: bool = False,
+        actions: Actions = "limbs",
+        decision_period: float | None = None,
+        observe_actuators: bool = True,
     ):
         randomization, reward = read(randomization, DomainRandomization), read(reward, RewardWeights)
         if not isinstance(randomization, DomainRandomization | None):
@@ -106,6 +120,12 @@ class SwimTask:
         require_flag("random_heading", random_heading)
         if not isinstance(reward, RewardWeights):
             raise ValueError(f"reward must be RewardWeights, not {shown(reward)}.")
+        require_flag("observe_actuators", observe_actuators)
+        self.decision_period = checked_decision_period(decision_period, scene)
+        self._in_strokes = self.decision_period == scene.actuator.period
+        self.actions: Actions = actions
+        self.observe_actuators = observe_actuators
+        self._can_be_masked = can_be_masked(scene.actuator)
         waypoints = make_path(path, np.random.default_rng(0))  # refuses a bad path now, not at the first reset
         self.scene, self.randomization = scene, randomization
         self.drawn = {} if randomization is None else randomization.first_values(scene, n_robots)
@@ -127,11 +147,12 @@ class SwimTask:
         self.n_waypoints = np.ones(n_robots, np.int64)
         self.waypoint_index = np.zeros(n_robots, np.int64)
         self._way_to_go = np.zeros(n_robots)
+        self._way_at_reset, self._energy = np.zeros(n_robots), np.zeros(n_robots)  # [m]; since the reset [J]
 
     @property
     def observation_size(self) -> int:
         """Length of one robot's observation."""
-        return scene_observation_size(self.simulator.scene)
+        return scene_observation_size(self.simulator.scene, self.observe_actuators)
 
     def reset(self, robots: NDArray[np.bool_], generators: list[np.random.Generator], path: Path | None = None) -> None:
         """Begin a new episode of the robots in a mask, shape (n_robots,).
@@ -152,6 +173,7 @@ class SwimTask:
         self.simulator.reset(robots, headings)
         self.waypoint_index[robots] = 0
         self._way_to_go[robots] = self._measure_way_to_go(self.simulator.hub_position())[robots]
+        self._way_at_reset[robots], self._energy[robots] = self._way_to_go[robots], 0.0
 
     def _set_path(self, robot: np.intp, waypoints: Floats) -> None:
         missing = len(waypoints) - self.waypoints.shape[1]
@@ -195,51 +217,88 @@ class SwimTask:
         out = np.empty((len(target_rows), observation_size(robot.n_limbs), target_rows.shape[2]))
         places = stations(robot.nodes_per_limb)
         observe(own.rest, own.limb_length, simulator.q, simulator.v, places, target_rows, VELOCITY_SCALE, out)
-        return with_memory(to_float32(out, self.n_robots), simulator.observe_actuators(), robot.n_limbs)
+        seen = to_float32(out, self.n_robots)
+        return with_memory(seen, simulator.observe_actuators(), robot.n_limbs) if self.observe_actuators else seen
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Actions that wires can follow now, shape (n_robots, k), see masks.py."""
+        return action_masks(self.actions, self.simulator.deaf_wires())
+
+    def followed(self, commands: Floats) -> Floats:
+        """Commands with zeros for limbs whose wire cannot follow its command now, shape (n_robots, n_limbs)."""
+        if not self._can_be_masked:
+            return commands
+        return np.where(masked_limbs(commands, self.simulator.deaf_wires()), 0.0, commands)
 
     def step(self, commands: Floats) -> Outcome:
-        """One stroke of every robot."""
-        return self._judge(commands, self.simulator.stroke(commands))
+        """Advance every robot by one decision."""
+        followed = self.followed(commands)
+        report = self.simulator.advance(self.decision_period, followed)
+        return self._judge(followed, np.count_nonzero(followed != commands, axis=1), report)
 
     def step_in_parts(self, commands: Floats, parts: int) -> Generator[float, None, Outcome]:
-        """One stroke in `parts` parts; yields the time since it began [s] after each, and returns the Outcome."""
-        report = yield from self.simulator.stroke_in_parts(commands, parts)
-        return self._judge(commands, report)
+        """One decision in `parts` parts; yields the time since it began [s] after each, and returns the Outcome."""
+        followed = self.followed(commands)
+        report = yield from self.simulator.advance_in_parts(self.decision_period, followed, parts)
+        return self._judge(followed, np.count_nonzero(followed != commands, axis=1), report)
 
-    def _judge(self, commands: Floats, report: StrokeReport) -> Outcome:
+    def warmth(self) -> Floats | None:
+        """Contractions or temperatures of wires + and -, 0 to 1, shape (n_robots, n_limbs, 2); None without wires."""
+        if not isinstance(self.scene.actuator, Deaf):
+            return None
+        numbers = self.simulator.observe_actuators()
+        return np.clip(numbers.reshape(self.n_robots, self.scene.robot.n_limbs, -1)[..., :2], 0.0, 1.0)
+
+    def _judge(self, commands: Floats, masked: NDArray[np.int64], report: StrokeReport) -> Outcome:
+        """Outcome of a decision. commands: Those that were followed. masked: Number of limbs whose command was not."""
         hub = self.simulator.hub_position()
         reached = self._pass_waypoints(hub)
         before = self._way_to_go
         self._way_to_go = self._measure_way_to_go(hub)
         success = self.waypoint_index == self.n_waypoints
-        limbs_heated = np.count_nonzero(commands, axis=1)
-        terms = reward_terms(self.reward, before - self._way_to_go, reached, limbs_heated)
+        self._energy += report.energy
+        pulses = pulses_of(report.heating_time, commands)
+        terms = reward_terms(self.reward, before - self._way_to_go, reached, pulses)
         reward = terms["reward_progress"] + terms["reward_waypoint"] + terms["reward_effort"]
         info = {
             **self.facts(hub),
             "is_success": success,
-            "limbs_heated": limbs_heated,
+            "limbs_heated": np.count_nonzero(commands, axis=1),
+            "heating_time": report.heating_time,
+            "energy": report.energy,
+            "energy_per_metre": self._energy_per_metre(),
+            **({"masked_limbs": masked} if self._can_be_masked else {}),
             "newton_iterations": report.newton_iterations,
             "solver_status": report.status,
             "solver_message": _messages(report.status),
             "smallest_opening_angle": report.smallest_opening_angle,
             **terms,
         }
-        return Outcome(reward, success | (report.status != SolverStatus.CONVERGED), info)
+        return Outcome(reward, success | (report.status != SolverStatus.CONVERGED), info, commands)
 
     def first_info(self) -> dict[str, NDArray[Any]]:
-        """Info before the first stroke, with the names and types of a stroke's info."""
-        counts = np.zeros(self.n_robots, np.int64)
+        """Info before the first decision, with the names and types of a decision's info."""
+        counts, none = np.zeros(self.n_robots, np.int64), np.zeros(self.n_robots)
         return {
             **self.facts(),
             "is_success": np.zeros(self.n_robots, bool),
             "limbs_heated": counts,
+            "heating_time": none,
+            "energy": none.copy(),
+            "energy_per_metre": none.copy(),
+            **({"masked_limbs": counts.copy()} if self._can_be_masked else {}),
             "newton_iterations": counts.copy(),
             "solver_status": counts.copy(),
             "solver_message": _messages(counts),
             "smallest_opening_angle": np.full(self.n_robots, min(self.scene.robot.opening_angle, np.pi)),
-            **reward_terms(self.reward, np.zeros(self.n_robots), counts, counts),
+            **reward_terms(self.reward, none, counts, none),
         }
+
+    def _energy_per_metre(self) -> Floats:
+        """Energy over the decrease of the way to go, both since the reset [J/m]; infinite where it did not decrease."""
+        energy, progress = self._energy, self._way_at_reset - self._way_to_go
+        found = np.divide(energy, progress, out=np.full(self.n_robots, np.inf), where=progress > 0.0)
+        return np.where(np.isnan(energy) | (energy == 0.0), energy, found)
 
     def _pass_waypoints(self, hub: Floats) -> NDArray[np.int64]:
         """Move on while the current waypoint is within its radius; returns the number reached, shape (n_robots,)."""
@@ -263,7 +322,8 @@ class SwimTask:
             "waypoint_index": self.waypoint_index.copy(),
             "distance": _length(current - hub),
             "cross_track_error": cross_track_error(hub, self._waypoint(leg - 1), self._waypoint(leg)),
-            **self._promised(),
+            **({"action_mask": self.action_masks().astype(np.int8)} if self._can_be_masked else {}),
+            **(self._promised() if self._in_strokes else {}),
             **({"error_estimate": self.simulator.error_estimate} if self._error_bars else {}),
             **{name: values.copy() for name, values in self.drawn.items()},
         }

@@ -17,13 +17,26 @@ from seastar_gym.simulator import Simulator
 class TaskEnv(PlainSpec):
     """Base of the environments: their task, and the spaces of one robot."""
 
-    def _set_task(self, task: SwimTask, actions: Actions) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
-        """Take the task and the action mode; returns the spaces of one robot's actions and observations."""
+    actions: Actions
+
+    def _set_task(self, task: SwimTask) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
+        """Take the task; returns the spaces of one robot's actions and observations."""
         n_limbs = task.scene.robot.n_limbs
-        self._task, self.actions = task, actions
-        actions_of_one = action_space(actions, n_limbs)
-        self.command_table = None if actions == "limbs" else command_table(actions, n_limbs)
+        self._task, self.actions = task, task.actions
+        actions_of_one = action_space(task.actions, n_limbs)
+        has_table = isinstance(actions_of_one, spaces.Discrete)
+        self.command_table = command_table(task.actions, n_limbs) if has_table else None
         return actions_of_one, spaces.Box(-np.inf, np.inf, (task.observation_size,), np.float32)
+
+    @property
+    def decision_period(self) -> float:
+        """Time between decisions [s], which a step takes."""
+        return self._task.decision_period
+
+    @property
+    def observe_actuators(self) -> bool:
+        """Whether observations have the memory of the actuators."""
+        return self._task.observe_actuators
 
     @property
     def scene(self) -> Scene:

@@ -19,7 +19,7 @@ from seastar_gym.envs.commands import Actions, as_array, to_commands
 from seastar_gym.envs.promises import warn_uncertified
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.reward import RewardWeights
-from seastar_gym.envs.seastar_swim import FRAMES_PER_STROKE
+from seastar_gym.envs.seastar_swim import FRAMES_PER_SECOND
 from seastar_gym.envs.task import Path, Plain, SwimTask, make_scene
 from seastar_gym.envs.task_env import checked_options
 from seastar_gym.scene import Scene
@@ -41,7 +41,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
 
     ## Arguments besides those of `SeastarSwimEnv`
     num_envs: Number of robots.
-    max_episode_steps: Time limit [strokes], applied here; None for none.
+    max_episode_steps: Time limit [decisions], applied here; None for none.
     autoreset_mode: When an episode that is over is followed by the next one. NEXT_STEP (default): the next step ignores
         the robot's action and returns the first observation of its next episode with reward 0. SAME_STEP: the step that
         ends an episode returns the first observation of the next one, and puts the last observation and info into
@@ -56,7 +56,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
     """
 
     metadata = {
-        "render_modes": ["rgb_array"], "render_fps": FRAMES_PER_STROKE, "autoreset_mode": AutoresetMode.NEXT_STEP,
+        "render_modes": ["rgb_array"], "render_fps": FRAMES_PER_SECOND, "autoreset_mode": AutoresetMode.NEXT_STEP,
     }  # fmt: skip
 
     def __init__(
@@ -76,6 +76,8 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         randomization: DomainRandomization | Plain | None = None,
         certificate: Certificate | str | PathLike[str] | None = None,
         error_bars: bool = False,
+        decision_period: float | None = None,
+        observe_actuators: bool = True,
     ):
         if render_mode is not None and not (isinstance(render_mode, str) and render_mode == "rgb_array"):
             raise ValueError(
@@ -90,13 +92,14 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         self.autoreset_mode = _checked_mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
-        modelled = make_scene(scene, fidelity)
-        warn_uncertified(modelled, fidelity, certificate)
+        modelled = make_scene(scene, fidelity, decision_period)
+        if scene is not None:
+            warn_uncertified(modelled, fidelity, certificate)
         task = SwimTask(
             modelled, num_envs, path, reward, waypoint_radius, random_heading, threads, randomization, certificate,
-            error_bars,
+            error_bars, actions, decision_period, observe_actuators,
         )  # fmt: skip
-        self.single_action_space, self.single_observation_space = self._set_task(task, actions)
+        self.single_action_space, self.single_observation_space = self._set_task(task)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self._generators, self._seeds = map(list, zip(*(seeding.np_random(None) for _ in range(num_envs)), strict=True))
@@ -163,7 +166,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
             self._pictures.begin(mask)
 
     def step(self, actions: Any) -> tuple[Observations, NDArray[np.float64], Flags, Flags, Info]:
-        """Swim one stroke with every robot; returns observations, rewards, terminated, truncated and info."""
+        """Swim for one decision with every robot; returns observations, rewards, terminated, truncated and info."""
         if not self._has_begun:
             raise gym.error.ResetNeeded("The episodes have not begun or were interrupted: call reset() before step().")
         if self.autoreset_mode is AutoresetMode.DISABLED and self._needs_reset.any():
@@ -192,7 +195,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         self, commands: NDArray[np.float64], resting: Flags
     ) -> tuple[Observations, NDArray[np.float64], Flags, Flags, Info]:
         outcome = self._task.step(commands)
-        self._commands = commands
+        self._commands = outcome.commands
         if self.render_mode is not None:
             self._pictures.follow()
         self._elapsed += 1
@@ -207,6 +210,10 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._needs_reset.any():
             observations, info = self._begin_next_episodes(observations, outcome.info)
         return observations, reward, terminated, truncated, info
+
+    def action_masks(self) -> Flags:
+        """Actions that every robot's wires can follow now, shape (num_envs, k), see `seastar_gym.envs.masks`."""
+        return self._task.action_masks()
 
     def close_extras(self) -> None:
         """End the simulator's threads; a step after that starts them again."""
@@ -242,7 +249,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         }
 
     def _info(self, strokes: dict[str, NDArray[Any]], begun: Flags) -> Info:
-        """Info of the stroke, and of the reset for robots in the mask of those that have `begun` an episode."""
+        """Info of the decision, and of the reset for robots in the mask of those that have `begun` an episode."""
         info = {name: values.copy() for name, values in strokes.items()}
         if begun.any():
             for name, values in self._task.first_info().items():

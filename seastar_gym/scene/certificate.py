@@ -11,8 +11,10 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
+from seastar_gym.scene.certified import reads_certificates
 from seastar_gym.scene.checks import is_finite_number, shown
 from seastar_gym.scene.numerics import Numerics, SchemeName
+from seastar_gym.scene.robot import Seastar
 from seastar_gym.scene.scene import Scene
 from seastar_gym.version import __version__
 
@@ -28,7 +30,7 @@ class CertifiedSetting:
     sequences of a class. An error is the sum of that of space and that of time, sequence by sequence.
 
     nodes_per_limb, scheme, step [s], newton_tolerance: The setting, of the continuum's discretisation.
-    errors: Sum of the errors of space and time, by class of commands, see `seastar_gym.certify.commands`.
+    errors: Sum of the errors of space and time, by class of commands, see `seastar_gym.certification.commands`.
     space_error, time_error: Largest errors of all classes of full amplitude.
     speed: Simulated time over computing time, for a batch on one core.
     """
@@ -84,13 +86,17 @@ class Certificate:
         """Confidence that at most this share of all sequences of a class errs by more than the error of the class."""
         return 1.0 - (1.0 - share) ** self.samples
 
-    def require_valid(self, scene: Scene) -> None:
-        """ValueError where the certificate has lapsed: for another scene or version of the package."""
+    def require_version(self) -> None:
+        """ValueError where the certificate has lapsed with the version of the package."""
         if self.version != __version__:
             raise ValueError(
                 f"The certificate is of version {self.version} of seastar_gym, not of this one, {__version__}: certify "
                 "the scene again."
             )
+
+    def require_valid(self, scene: Scene) -> None:
+        """ValueError where the certificate has lapsed: for another scene or version of the package."""
+        self.require_version()
         if physics(scene) != physics(self.scene):
             raise ValueError(
                 "The certificate is of another scene, which differs in more than numerics and nodes per limb: certify "
@@ -103,6 +109,25 @@ class Certificate:
             return None
         wanted = scene.robot.nodes_per_limb, scene.numerics
         return next((each for each in self.settings if (each.nodes_per_limb, each.numerics) == wanted), None)
+
+    def kept_by(self, error: float, robot: Seastar | None = None) -> Scene:
+        """What `Scene.for_error` gives with this certificate; ValueError where it has lapsed.
+
+        robot: Robot that is to be the certificate's, and to keep its nodes per limb. None chooses them.
+        """
+        if robot is None:
+            self.require_version()
+            return self.for_error(error)
+        self.require_valid(replace(self.scene, robot=robot))
+        nodes = robot.nodes_per_limb
+        some = tuple(each for each in self.settings if each.nodes_per_limb == nodes)
+        if robot.discretisation != "continuum" or not some:
+            measured = ", ".join(str(n) for n in sorted({each.nodes_per_limb for each in self.settings}))
+            raise ValueError(
+                f"The certificate was measured with {measured} nodes per limb of the continuum's discretisation, not "
+                f"with {nodes} of the {robot.discretisation}'s."
+            )
+        return replace(self, settings=some).for_error(error)
 
     def for_error(self, error: float, classes: tuple[str, ...] | None = None) -> Scene:
         """The scene at the fastest setting whose error is at most `error`; ValueError if there is none.
@@ -154,6 +179,9 @@ class Certificate:
             return cls(Scene.from_dict(data.pop("scene")), settings, promised, actions, **data)
         except (AttributeError, KeyError, TypeError, ValueError) as damaged:
             raise ValueError(f"{file} is no certificate: {str(damaged).rstrip('.')}.") from damaged
+
+
+reads_certificates(Certificate.load)
 
 
 def _read_setting(data: dict[str, Any]) -> CertifiedSetting:

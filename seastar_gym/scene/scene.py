@@ -10,13 +10,22 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from operator import itemgetter
+from os import PathLike
 from typing import Any, cast, get_args
 
 import numpy as np
 
 from seastar_gym.scene.actuators.actuator import Actuator, StatefulActuator, check_actuator, is_actuator
 from seastar_gym.scene.actuators.pulse import SmaPulse
-from seastar_gym.scene.checks import is_finite_number, require_choice, require_count, require_numbers, shown
+from seastar_gym.scene.certified import Certified, as_certificate
+from seastar_gym.scene.checks import (
+    is_finite_number,
+    require_choice,
+    require_count,
+    require_flag,
+    require_numbers,
+    shown,
+)
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.fidelity import NOT_MEASURED, cheapest
 from seastar_gym.scene.fluid import Water
@@ -199,17 +208,29 @@ class Scene:
         return cls(Seastar(nodes_per_limb=nodes_per_limb, discretisation=discretisation), numerics=numerics)
 
     @classmethod
-    def for_error(cls, error: float, any_gait: bool = False, robot: Seastar | None = None) -> "Scene":
-        """The chapter's robot and water at the fastest measured setting whose path error is at most `error`.
+    def for_error(
+        cls,
+        error: float,
+        any_gait: bool = False,
+        robot: Seastar | None = None,
+        certificate: Certified | str | PathLike[str] | None = None,
+    ) -> "Scene":
+        """Scene at the fastest measured setting whose path error is at most `error`.
 
         The error is that of the hub's path against infinitely many nodes and infinitely short steps, as a fraction of
         the path's length. ValueError if no measured setting keeps it, or if the robot was not measured.
 
         any_gait: Require it for the repetition of any command, too, which is harder.
-        robot: The chapter's robot with the nodes per limb and the discretisation that it is to keep. None chooses them.
+        robot: The robot with the nodes per limb and the discretisation that it is to keep. None chooses them.
+        certificate: `Certificate` of the scene, or the file of one, whose errors are those of any gait. It lapses where
+            the robot or the version of the package differs. None means the package's table, which is of the chapter's
+            robot and water.
         """
         if not isinstance(robot, Seastar | None):
             raise ValueError(f"robot must be a Seastar or None, not {shown(robot)}.")
+        if certificate is not None:
+            require_flag("any_gait", any_gait)
+            return cast(Scene, as_certificate(certificate).kept_by(error, robot))
         if robot is not None and not _is_chapters(robot):
             raise ValueError(NOT_MEASURED.format(shown(robot)))
         best = cheapest(error, any_gait, *(() if robot is None else (robot.discretisation, robot.nodes_per_limb)))

@@ -1,10 +1,10 @@
 """Do the error bars of a running simulation cover, and are they sharp?
 
 The chapter's robot and six others swim ten strokes from rest with error bars, with sequences of every class of
-`seastar_gym.certify.commands`, drawn anew. The true error is the hub's distance, at the end of every stroke, from that
-of the same robot with 73 nodes per limb and the implicit midpoint rule at 0.25 ms. A stroke is covered where its true
-error is at most the estimate. From the calibration's seed comes the factor that would cover 95 % of the strokes of each
-robot; with the factors that the package has, the sequences of another seed tell the coverage, the class with the
+`seastar_gym.certification.commands`, drawn anew. The true error is the hub's distance, at the end of every stroke, from
+that of the same robot with 73 nodes per limb and the implicit midpoint rule at 0.25 ms. A stroke is covered where its
+true error is at most the estimate. From the calibration's seed comes the factor that would cover 95 % of the strokes of
+each robot; with the factors that the package has, the sequences of another seed tell the coverage, the class with the
 lowest, and the median of estimate over true error.
 
 Writes a page with the tables, and a picture.
@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from seastar_gym.certify.commands import CLASSES, draw_classes
-from seastar_gym.certify.measure import SHORT, machine, swim
+from seastar_gym.certification.commands import CLASSES, draw_classes
+from seastar_gym.certification.measure import SHORT, machine, swim
 from seastar_gym.command import run_command
 from seastar_gym.scene import Numerics, Scene, Seastar, Water, relaxation_time
 from seastar_gym.scene.numerics import PRESETS, Setting

@@ -13,7 +13,7 @@ from studies.accuracy.ringing import ringing
 from studies.accuracy.rows import Column, front
 from studies.accuracy.settings import presets
 from studies.accuracy.style import COLOURS, DPI, INK, MS, PERCENT, as_numbers, as_percent, subplots
-from studies.validation.published import PUBLISHED_FINALS
+from studies.verification.published import PUBLISHED_FINALS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

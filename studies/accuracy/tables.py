@@ -10,8 +10,9 @@ from typing import Any, get_args
 from rich.table import Table
 
 from seastar_gym.scene import fidelity
-from studies.accuracy.rows import Column, Figures, Row, Study, fronts, path_front
-from studies.accuracy.settings import presets
+from studies.accuracy.cases import STROKES, gaits
+from studies.accuracy.rows import UNSEEN, Column, Figures, Row, Study, fronts, path_front
+from studies.accuracy.settings import Plan, presets
 from studies.speed.timing import machine
 
 LARGEST_DOUBT = 3e-4
@@ -156,6 +157,24 @@ def as_promise(row: Row) -> dict[str, Any]:
     }
 
 
+def measured_over(plan: Plan) -> dict[str, Any]:
+    """Command sequences behind the package's table: how many of each kind, and with which confidence they bound."""
+    n = plan.n_random
+    sure = f"{1.0 - 0.95**n:.2f}"
+    return {
+        "strokes": STROKES,
+        "path_error": {"straight": 1, "pairs of Fig. 13.8": 4, "pentagon": 1, "random, ternary and continuous": n},
+        "gait_error": {
+            "repeated ternary, all that differ": len(gaits()), "repeated continuous": plan.n_gaits,
+            "alternating, ternary and continuous": plan.n_gaits, "factor for those not measured": UNSEEN,
+        },
+        "slow_error": {"random, a tenth": plan.n_slow, "repeated continuous, a tenth": plan.n_gaits,
+                       "factor for those not measured": UNSEEN},
+        "confidence": f"With {sure} confidence, at most 5 % of random sequences exceed the largest of {n}.",
+        "held_out": "Exceedances of sequences that no table used: python -m studies.accuracy.promises.",
+    }  # fmt: skip
+
+
 def store(found: Study, path: Path = fidelity.PRESETS) -> None:
     """Write the package's table; ValueError if the limit is in doubt."""
     for name, doubt in found.doubt.items():
@@ -168,6 +187,7 @@ def store(found: Study, path: Path = fidelity.PRESETS) -> None:
     table = {
         "about": "Written by python -m studies.accuracy --store; read by seastar_gym.scene.fidelity.",
         "machine": machine(),
+        "measured_over": measured_over(Plan()),
         "presets": {name: as_promise(by_setting[setting]) for name, setting in presets().items()},
         "settings": [as_promise(row) for row in fronts(found.rows)],
     }

@@ -243,7 +243,8 @@ def draw(results: dict[str, Any], file: Path) -> None:
         closed = np.append(order, order[0])
         axes.plot(angles[closed], np.tile(speeds, 10)[closed], style, label=label)
     axes.set(rlim=(0.0, 5.2))
-    axes.set_title("straight-line speed [mm per stroke] by direction from limb 1", fontsize=10)
+    title = f'straight-line speed [mm per stroke] at "{results["fidelity"]}"\nby direction from limb 1'
+    axes.set_title(title, fontsize=10)
     axes.legend(loc="lower left", bbox_to_anchor=(-0.15, -0.1), frameon=False, fontsize=8)
     figure.savefig(file, dpi=160)
 

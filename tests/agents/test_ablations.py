@@ -9,7 +9,7 @@ from seastar_gym.envs.task import SwimTask
 from studies.learning import ablations
 from studies.learning.ablations import VARIANTS, Options, Variant, final_strokes, learn, main, table
 
-TINY = {"num_envs": 8, "rollout": 8, "batch_size": 32, "epochs": 1, "hidden": (8,), "max_episode_steps": 10}
+TINY = {"num_envs": 8, "rollout": 8, "batch_size": 32, "epochs": 1, "hidden": (8,), "max_episode_time": 10.0}
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ import csv
 import io
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import imageio.v3 as imageio
@@ -37,6 +38,8 @@ def made_up_swim(hub, waypoint_index, waypoints=((0.1, 0.0), (0.1, 0.1)), limbs_
         waypoint_index=np.array(waypoint_index),
         time=np.arange(float(len(hub))),
         limbs_heated=np.full(len(hub) - 1, 2) if limbs_heated is None else np.array(limbs_heated),
+        heating_time=np.full(len(hub) - 1, 0.2),
+        energy=np.full(len(hub) - 1, 1.5),
         solver_message=None,
     )
 
@@ -66,7 +69,23 @@ def test_a_leg_that_is_yet_to_come_does_not_count_as_the_path():
 def test_heating_is_counted_per_metre_of_the_hubs_way():
     done = made_up_swim([(0.0, 0.0), (0.03, 0.0), (0.03, 0.04)], [0, 0, 0], limbs_heated=[2, 5])
     assert done.heated_per_metre == pytest.approx(7 / 0.07)
-    assert made_up_swim([(0.0, 0.0), (0.0, 0.0)], [0, 0]).heated_per_metre is None
+    assert done.joules_per_metre == pytest.approx(3.0 / 0.07) and done.seconds_heated == pytest.approx(0.4)
+    still = made_up_swim([(0.0, 0.0), (0.0, 0.0)], [0, 0])
+    assert still.heated_per_metre is None and still.joules_per_metre is None
+
+
+def test_the_way_of_a_timed_swim_is_that_from_second_to_second():
+    """To and fro within a second is no way."""
+    hub = [(0.0, 0.0), (0.02, 0.0), (0.01, 0.0), (0.03, 0.0), (0.02, 0.0), (0.04, 0.0)]
+    done = made_up_swim(hub, [0] * 6)
+    assert replace(done, time=0.5 * done.time).hub_path_length == pytest.approx(0.04)
+    assert done.hub_path_length == pytest.approx(0.08)
+
+
+def test_unknown_energy_is_no_number():
+    done = made_up_swim([(0.0, 0.0), (0.03, 0.0)], [0, 0])
+    unknown = replace(done, heating_time=np.full(1, np.nan), energy=np.full(1, np.nan))
+    assert unknown.joules_per_metre is None and unknown.seconds_heated is None
 
 
 class Recorder:

@@ -28,7 +28,7 @@ from seastar_gym.envs.task import scene_observation_size
 
 ROOT = Path(__file__).resolve().parents[2]
 FAST = Numerics.preset("fast")
-SMALL = Hyperparameters(num_envs=8, rollout=8, batch_size=32, epochs=2, hidden=(16, 8), max_episode_steps=10)
+SMALL = Hyperparameters(num_envs=8, rollout=8, batch_size=32, epochs=2, hidden=(16, 8), max_episode_time=10.0)
 FOUR_LIMBS = Scene(robot=Seastar(n_limbs=4, nodes_per_limb=4), numerics=FAST)
 
 

@@ -24,9 +24,9 @@ from seastar_gym import Numerics, Scene, Seastar, Water
 from seastar_gym.envs import symmetry
 
 FAST = Numerics.preset("fast")
-SMALL = Hyperparameters(num_envs=8, rollout=8, batch_size=32, epochs=2, hidden=(16, 8), max_episode_steps=10)
+SMALL = Hyperparameters(num_envs=8, rollout=8, batch_size=32, epochs=2, hidden=(16, 8), max_episode_time=10.0)
 OTHER = Hyperparameters(
-    actions="limbs", symmetry=False, num_envs=4, rollout=4, batch_size=16, epochs=1, hidden=(12,), max_episode_steps=5
+    actions="limbs", symmetry=False, num_envs=4, rollout=4, batch_size=16, epochs=1, hidden=(12,), max_episode_time=5.0
 )
 OTHER_SCENE = Scene(robot=Seastar(n_limbs=4, nodes_per_limb=4), fluid=Water(drag_coefficient=1.5), numerics=FAST)
 

@@ -51,7 +51,7 @@ def evaluated(tmp_path_factory):
             sentences=["It was <easy>."],
             commands=["python one", "python two"],
             curves=[Curve.of("straight", PROGRESS)],
-            bound={"directions_deg": [0, 18, 36], "mm_per_stroke": {"straight": [3.7, 3.0, 3.5]}},
+            bound={"fidelity": "fast", "directions_deg": [0, 18, 36], "mm_per_stroke": {"straight": [3.7, 3.0, 3.5]}},
         ),
         console=Console(quiet=True),
     )

@@ -12,7 +12,8 @@ from seastar_gym.envs.paths import PATHS
 def test_an_agent_of_one_line_is_made_for_the_scene_of_the_fidelity(monkeypatch):
     scenes = []
 
-    def mine(scene):
+    def mine(scene, decision_period):
+        assert decision_period is None
         scenes.append(scene)
         return scripted("rest")
 

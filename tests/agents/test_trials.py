@@ -32,7 +32,7 @@ def test_nothing_disturbed_is_the_task_itself():
     commands = np.tile([0.0, 1.0, 0.0, 0.0, -1.0], (N, 1))
     for _ in range(3):
         np.testing.assert_array_equal(task.observe(), plain.observe())
-        np.testing.assert_array_equal(task.step(commands), commands)
+        np.testing.assert_array_equal(task.step(commands).commands, commands)
         plain.step(commands)
     np.testing.assert_array_equal(task.hub_position(), plain.simulator.hub_position())
 
@@ -70,7 +70,7 @@ def test_a_current_is_seen_in_the_hubs_velocity_whatever_actuators_remember():
 def test_every_limb_is_the_weak_one_of_some_robot():
     commands = np.tile([1.0, -1.0, 1.0, -1.0, 1.0], (N, 1))
     weak = disturbed(weakness=0.5)
-    np.testing.assert_array_equal(weak.step(commands), commands)
+    np.testing.assert_array_equal(weak.step(commands).commands, commands)
     strengths = np.ones((N, 5))
     strengths[np.arange(N), np.arange(N) % 5] = 0.5
     np.testing.assert_array_equal(weak.task.simulator.limb_strengths, strengths)
@@ -91,7 +91,7 @@ def test_noise_is_on_positions_and_has_its_size():
 
 def test_lost_strokes_are_lost_whole_and_as_often_as_said():
     task, commands = disturbed(lost=0.25), np.tile([0.0, 1.0, 0.0, 0.0, -1.0], (N, 1))
-    carried_out = np.array([task.step(commands) for _ in range(30)])
+    carried_out = np.array([task.step(commands).commands for _ in range(30)])
     lost = (carried_out == 0.0).all(axis=2)
     assert lost.mean() == pytest.approx(0.25, abs=0.06)
     np.testing.assert_array_equal(carried_out[~lost], np.broadcast_to(commands, carried_out.shape)[~lost])

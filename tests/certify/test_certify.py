@@ -1,6 +1,7 @@
 """Certificates of scenes: what they measure, promise and refuse, and when they lapse."""
 
 import json
+import subprocess
 import sys
 import warnings
 from dataclasses import replace
@@ -12,7 +13,7 @@ import pytest
 import seastar_gym
 from refusals import assert_refused
 from seastar_gym import Certificate, Contact, Numerics, Scene, Seastar, Simulator, SmaPulse
-from seastar_gym.certify import command, commands, measure
+from seastar_gym.certification import command, commands, measure
 from seastar_gym.envs.spec import PlainSpec
 from seastar_gym.scene.certificate import resolved
 
@@ -72,6 +73,45 @@ def test_for_error_is_the_fastest_setting_that_keeps_it(certificate):
         certificate.for_error(-1.0)
     with assert_refused("Classes of commands are"):
         certificate.for_error(0.1, ("of yesterday",))
+
+
+def test_the_function_the_command_and_the_modules_have_names_of_their_own():
+    code = (
+        "import seastar_gym.certification.measure as measure, seastar_gym\n"
+        "try:\n    import seastar_gym.certify\n"
+        "except ImportError as refusal:\n    print(refusal)\n"
+        "assert seastar_gym.certify is measure.certify"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "modules are in seastar_gym.certification" in done.stdout
+    command = [sys.executable, "-m", "seastar_gym.certify", "-h"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("usage: python -m seastar_gym.certify [-h]")
+
+
+def test_a_scene_for_an_error_is_that_of_its_certificate(certificate, tmp_path):
+    certificate.save(tmp_path / "mine.json")
+    largest = max(each.error(certificate.promised) for each in certificate.settings)
+    for given in (certificate, tmp_path / "mine.json", str(tmp_path / "mine.json")):
+        assert Scene.for_error(largest, certificate=given) == certificate.for_error(largest)
+    kept = Scene.for_error(0.9, robot=Seastar(limb_length=0.08, nodes_per_limb=9), certificate=certificate)
+    assert kept.robot.nodes_per_limb == 9 and kept.robot.limb_length == 0.08
+    with assert_refused("measured with 5, 9 nodes per limb"):
+        Scene.for_error(0.9, robot=Seastar(limb_length=0.08), certificate=certificate)
+    with assert_refused("No measured setting keeps"):
+        Scene.for_error(1e-9, certificate=certificate)
+
+
+def test_a_scene_for_an_error_is_refused_where_the_certificate_has_lapsed(certificate):
+    with assert_refused("of another scene"):
+        Scene.for_error(0.9, robot=Seastar(limb_length=0.07, nodes_per_limb=9), certificate=certificate)
+    for robot in (None, SMALL_ROBOT):
+        with assert_refused("of version 0.0.1"):
+            Scene.for_error(0.9, robot=robot, certificate=replace(certificate, version="0.0.1"))
+    with assert_refused("certificate must be a Certificate"):
+        Scene.for_error(0.9, certificate=3)
+    with assert_refused("cannot be read"):
+        Scene.for_error(0.9, certificate="not there.json")
 
 
 def test_the_share_of_fresh_sequences_that_exceed_an_error_is_counted(certificate):

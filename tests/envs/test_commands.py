@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from seastar_gym.envs.commands import LIMB_COMMANDS, action_space, command_table, to_commands
+from seastar_gym.envs.commands import LIMB_COMMANDS, action_space, choices, command_table, to_commands
 
 
 def test_a_limb_is_left_alone_actuated_anticlockwise_or_actuated_clockwise():
@@ -60,7 +60,7 @@ def test_any_whole_number_type_is_an_action(dtype):
     assert to_commands("joint", 5, np.array([7], dtype), 1).shape == (1, 5)
 
 
-@pytest.mark.parametrize("actions", ["limbs", "joint", "pairs"])
+@pytest.mark.parametrize("actions", ["limbs", "joint", "pairs", "continuous"])
 def test_every_sampled_action_is_accepted(actions):
     space = action_space(actions, 4)
     space.seed(0)
@@ -106,6 +106,12 @@ def test_actions_beyond_the_last_are_refused_with_a_sentence(actions, largest):
 def test_unknown_kinds_of_actions_are_refused_with_the_known_ones(name):
     with pytest.raises(ValueError, match=r"'limbs', 'joint', 'pairs'.*\.$"):
         action_space(name, 5)
+
+
+def test_continuous_actions_have_neither_table_nor_choices():
+    for refused in (command_table, choices):
+        with pytest.raises(ValueError, match=r"^actions=\"continuous\" has no finite number .*\.$"):
+            refused("continuous", 5)
 
 
 def test_limbs_have_no_table():

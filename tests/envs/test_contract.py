@@ -1,13 +1,14 @@
 """The docstrings of the environments, which users read as the contract, say what the code does."""
 
 import inspect
+import itertools
 import re
 
 import gymnasium as gym
 import numpy as np
 import pytest
 
-from seastar_gym import RewardWeights, Scene
+from seastar_gym import Limited, RewardWeights, Scene, SmaPulse, SmaWires, ThermalSma
 from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout
 from seastar_gym.envs.paths import PATHS
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -24,7 +25,9 @@ def section(title: str, text: str = CONTRACT) -> str:
 
 def table(title: str) -> list[dict[str, str]]:
     """Rows of the section's table, by the titles of the columns."""
-    lines = [line for line in section(title).splitlines() if line.startswith("|")]
+    lines = section(title).splitlines()
+    first = next(number for number, line in enumerate(lines) if line.startswith("|"))
+    lines = list(itertools.takewhile(lambda line: line.startswith("|"), lines[first:]))
     head, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
     return [dict(zip(head, row, strict=True)) for row in rows]
 
@@ -36,8 +39,11 @@ def arguments(text: str) -> list[str]:
 @pytest.mark.parametrize("row", table("Action"), ids=lambda row: row["`actions`"])
 def test_the_actions_are_those_of_the_table(row):
     env = SeastarSwimEnv(actions=row["`actions`"].strip("`").strip('"'))
-    named = {"MultiDiscrete": gym.spaces.MultiDiscrete, "Discrete": gym.spaces.Discrete, "n": 5}
-    assert env.action_space == eval(row["space"].strip("`"), named)
+    named = {name: getattr(gym.spaces, name) for name in ("Box", "Discrete", "MultiDiscrete")} | {"n": 5}
+    assert env.action_space == eval(row["space"].strip("`"), named | {"float32": np.float32})
+    if row["index"] != "-" and isinstance(env.action_space, gym.spaces.Box):
+        assert row["range"] == "-1..1" and (env.action_space.low == -1.0).all() and (env.action_space.high == 1.0).all()
+        return
     highest = env.action_space.nvec.max() - 1 if row["index"] != "-" else env.action_space.n - 1
     assert eval(row["range"].split("..")[1], {"n": 5}) == highest
 
@@ -51,6 +57,14 @@ def test_the_observation_is_that_of_the_table():
     space = SeastarSwimEnv().observation_space
     assert f"`{space}`" in section("Observation") and space.shape == (documented[-1].stop,)
     assert {row["range"] for row in rows} == {f"({space.low.min()}, {space.high.max()})"}
+
+
+@pytest.mark.parametrize("actuator, n", [(SmaWires(), 2), (ThermalSma(), 4), (Limited(SmaPulse(), 0.3), 1)])
+def test_the_memory_of_actuators_is_that_of_the_table(actuator, n):
+    (row,) = [line for line in section("Observation").splitlines() if f"`{type(actuator).__name__}`" in line]
+    assert ("+, -" in row) == (n > 1)
+    at = scene_layout(Scene(actuator=actuator))
+    assert at.actuators == slice(182, 182 + 5 * n) and (n != 2 or f"has {at.size} numbers" in section("Observation"))
 
 
 def test_the_reward_has_the_terms_and_weights_of_the_table():

@@ -26,7 +26,8 @@ FACTS = {
     "space_error", "time_error", "real_time_factor",
 }  # fmt: skip
 OF_A_STROKE = {
-    "is_success", "limbs_heated", "newton_iterations", "solver_status", "solver_message", "smallest_opening_angle",
+    "is_success", "limbs_heated", "heating_time", "energy", "energy_per_metre", "newton_iterations", "solver_status",
+    "solver_message", "smallest_opening_angle",
     "reward_progress", "reward_waypoint", "reward_effort",
 }  # fmt: skip
 

@@ -40,6 +40,8 @@ ARGUMENTS = {
         "scene": SCENE,
     },
     "error_bars": {"error_bars": True, "scene": SCENE},
+    "decisions": {"decision_period": 0.2, "observe_actuators": False, "fidelity": "fast"},
+    "continuous": {"actions": "continuous", "decision_period": np.float64(0.3), "fidelity": "fast"},
     "plain": {
         "scene": SCENE.to_dict(),
         "reward": to_dict(RewardWeights(1.0)),

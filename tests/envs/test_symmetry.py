@@ -21,8 +21,10 @@ from seastar_gym import (
     Scene,
     Seastar,
     ShearCurrent,
+    Simulator,
     SmaPulse,
     SmaWires,
+    State,
     ThermalSma,
     Uniform,
     UniformCurrent,
@@ -31,13 +33,15 @@ from seastar_gym import (
 )
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.commands import command_table, to_commands
+from seastar_gym.envs.masks import action_masks
 from seastar_gym.envs.observation import observation_size
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.scene.actuators.actuator import mirrored
 
 N_LIMBS = (3, 4, 5, 7, 8)
-MODES = ("limbs", "joint", "pairs")
+MODES = ("limbs", "joint", "pairs", "continuous")
 ROUNDING = 2e-6  # of float32 observations of order one
 
 
@@ -57,6 +61,8 @@ def random_actions(mode, n_limbs, n, seed=1):
     rng = np.random.default_rng(seed)
     if mode == "limbs":
         return rng.integers(0, 3, (n, n_limbs))
+    if mode == "continuous":
+        return rng.uniform(-1.0, 1.0, (n, n_limbs))
     return rng.integers(0, len(command_table(mode, n_limbs)), n)
 
 
@@ -471,6 +477,10 @@ SYMMETRIC = {
     "curve": Scene(STAR, actuator=MeasuredCurve((0.0, 0.2, 1.0), (0.0, 0.5, 0.0))),
     "every term": EVERYTHING,
     "held hub": Scene(STAR, held_nodes=(0,)),
+    "wires": Scene(STAR, actuator=SmaWires(0.4)),
+    "deaf wires": Scene(STAR, actuator=SmaWires(0.4, deaf=True, period=0.5)),
+    "thermal": Scene(STAR, actuator=ThermalSma(0.4, cooling_time=0.4)),
+    "limited": Scene(STAR, actuator=Limited(SmaPulse(0.4), 0.35, 1.0)),
 }
 DRAWS = DomainRandomization({"robot.youngs_modulus": Uniform(5e5, 2e6), "fluid.density": Uniform(900.0, 1100.0)})
 WEAK_LIMBS = DomainRandomization({"limb_strengths": Uniform(0.2, 1.0)})
@@ -561,6 +571,115 @@ def test_actuators_that_remember_are_refused_unless_they_say_what_a_mirror_does(
     with assert_refused("symmetry of the regular polygon", "remember"):
         SymmetryReduction(SeastarSwimEnv(scene=Scene(actuator=Remembering())))
     SymmetryReduction(SeastarSwimEnv(scene=Scene(actuator=ThermalSma())))
+
+
+# Actuators with a memory
+
+REMEMBERING = {
+    "wires": SmaWires(),
+    "deaf wires": SmaWires(deaf=True),
+    "thermal": ThermalSma(),
+    "hot": ThermalSma(largest_temperature=60.0),
+    "limited": Limited(SmaPulse(), 0.5, 2.0),
+}
+
+
+@pytest.mark.parametrize("name", REMEMBERING)
+def test_a_carried_robot_swims_the_carried_way(name):
+    """State, commands and observations are carried; after a decision, both are the same again."""
+    scene = Scene(Seastar(5, 4), actuator=REMEMBERING[name], numerics=FAST)
+    mirror, rng = symmetry.memory_mirror(scene.actuator), np.random.default_rng(0)
+    assert len(mirror) == {"limited": 1, "thermal": 4, "hot": 4}.get(name, 2)
+    simulator, other = Simulator(scene, 10), Simulator(scene, 10)
+    elements = np.arange(10)
+    for _ in range(3):  # from rest to a state that no symmetry has
+        simulator.advance(0.2, np.repeat(rng.uniform(-1, 1, (1, 5)), 10, axis=0))
+    for duration in (0.2, 0.5):
+        state = simulator.get_state()
+        other.set_state(carried_state(state, scene))
+        commands = np.repeat(rng.uniform(-1, 1, (1, 5)), 10, axis=0)
+        np.testing.assert_array_equal(other.deaf_wires(), carried_wires(simulator.deaf_wires(), elements))
+        report = simulator.advance(duration, commands)
+        its_report = other.advance(duration, symmetry.transform_commands(commands, elements))
+        np.testing.assert_allclose(its_report.heating_time, report.heating_time, rtol=0.0, atol=1e-9)
+        expected, found = carried_state(simulator.get_state(), scene), other.get_state()
+        np.testing.assert_allclose(found.positions, expected.positions, rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(found.actuators, expected.actuators, rtol=0.0, atol=1e-9)
+        seen = np.concatenate([np.zeros((10, 182)), simulator.observe_actuators(), np.ones((10, 4))], axis=1)
+        carried = symmetry.transform_observations(seen, elements, 5, mirror)[:, 182:-4]
+        np.testing.assert_allclose(carried, other.observe_actuators(), rtol=0.0, atol=1e-9)
+
+
+def carried_state(state, scene):
+    """States of the robots carried by all elements in turn."""
+    n_limbs, elements = scene.robot.n_limbs, np.arange(2 * scene.robot.n_limbs)
+    order = symmetry.limb_order(n_limbs)
+
+    def carried(vectors):
+        turned = np.stack([one @ matrix(element, n_limbs).T for element, one in zip(elements, vectors, strict=True)])
+        of_limbs = turned[:, 1:].reshape(len(elements), n_limbs, -1, 2)
+        moved = np.stack([one[order[element]] for element, one in zip(elements, of_limbs, strict=True)])
+        return np.concatenate([turned[:, :1], moved.reshape(len(elements), -1, 2)], axis=1)
+
+    actuators = np.stack([one[order[element]] for element, one in zip(elements, state.actuators, strict=True)])
+    actuators[1::2] = mirrored(scene.actuator, actuators[1::2])
+    return State(carried(state.positions), carried(state.velocities), state.time, actuators)
+
+
+def carried_wires(wires, elements):
+    order = symmetry.limb_order(wires.shape[1])
+    moved = np.stack([one[order[element]] for element, one in zip(elements, wires, strict=True)])
+    moved[1::2] = moved[1::2, :, ::-1]
+    return moved
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_masks_are_carried_with_the_actions(mode):
+    """A mask of the carried robot is true for the carried actions of which that of the robot is true."""
+    deaf, elements = np.random.default_rng(2).random((10, 5, 2)) < 0.3, np.arange(10)
+    masks = symmetry.transform_masks(action_masks(mode, deaf), elements, mode, 5)
+    np.testing.assert_array_equal(masks, action_masks(mode, carried_wires(deaf, elements)))
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_the_wrappers_have_the_masks_of_the_reduced_robot(mode):
+    """A reduced action that the mask forbids is one that would not be followed."""
+    scene = Scene(STAR, actuator=SmaWires(0.4, deaf=True), numerics=FAST)
+    arguments = {"actions": mode, "scene": scene, "decision_period": 0.2, "path": [[-0.05, -0.02], [0.1, 0.1]]}
+    env = SymmetryReduction(SeastarSwimEnv(**arguments))
+    batch = VectorSymmetryReduction(SeastarSwimVectorEnv(2, **arguments))
+    env.reset(seed=0)
+    batch.reset(seed=0)
+    for action in random_actions(mode, 4, 6):
+        masks = env.action_masks()
+        np.testing.assert_array_equal(batch.action_masks(), [masks, masks])
+        *_, info = env.step(action)
+        *_, its_info = batch.step(np.array([action, action]))
+        assert (info["masked_limbs"] == 0) == followed_as_a_whole(action, masks, mode)
+        np.testing.assert_array_equal(its_info["action_mask"][0], info["action_mask"])
+        np.testing.assert_array_equal(info["action_mask"], env.action_masks())
+
+
+def followed_as_a_whole(action, mask, mode):
+    if mode == "limbs":
+        return all(mask.reshape(-1, 3)[limb, choice] for limb, choice in enumerate(action))
+    if mode == "continuous":
+        return all(mask.reshape(-1, 2)[limb, int(share < 0)] for limb, share in enumerate(action) if share)
+    return bool(mask[action])
+
+
+def test_observations_of_another_memory_are_refused():
+    seen = observations_of(5)
+    mirror = symmetry.memory_mirror(SmaWires())
+    with assert_refused("not that of a robot of 5 limbs"):
+        symmetry.reduce_observations(seen, 5, mirror)
+    assert symmetry.memory_mirror(SmaPulse()) == ()
+
+
+def test_unobserved_memory_is_not_carried():
+    """The environment without it is symmetric all the same."""
+    env = SymmetryReduction(SeastarSwimEnv(decision_period=0.5, observe_actuators=False))
+    assert env.reset(seed=0)[0].shape == (186,)
 
 
 def test_every_robot_of_a_batch_has_to_be_symmetric():

@@ -69,7 +69,7 @@ PARTS: Calls = {
                                 path_tolerance=0.01)),
     "Numerics.preset": (Numerics.preset, dict(fidelity="fast")),
     "Scene.preset": (Scene.preset, dict(fidelity="fast")),
-    "Scene.for_error": (Scene.for_error, dict(error=0.1, any_gait=True, robot=None)),
+    "Scene.for_error": (Scene.for_error, dict(error=0.1, any_gait=True, robot=None, certificate=None)),
     "promise": (promise, dict(setting="fast")),
     "relaxation_time": (relaxation_time, dict(loss_factor=0.1, frequency=10.0)),
     "Scene": (Scene, dict(robot=Seastar(), fluid=Water(), actuator=SmaPulse(), numerics=FAST, held_nodes=(0,),
@@ -83,7 +83,8 @@ PARTS: Calls = {
     "SeastarSwimEnv": (SeastarSwimEnv, dict(
         path="line", actions="limbs", fidelity="fast", scene=Scene(numerics=FAST), reward=RewardWeights(),
         waypoint_radius=0.01, random_heading=False, render_mode=None, frames_per_stroke=2,
-        randomization=DomainRandomization({"robot.density": Uniform(900.0, 1100.0)}))),
+        randomization=DomainRandomization({"robot.density": Uniform(900.0, 1100.0)}), decision_period=1.0,
+        observe_actuators=True)),
     "SeastarSwimVectorEnv": (SeastarSwimVectorEnv, dict(
         num_envs=2, max_episode_steps=3, path="line", actions="pairs", fidelity="fast", scene=Scene(numerics=FAST),
         reward=RewardWeights(), waypoint_radius=0.01, random_heading=True, render_mode=None,

@@ -11,7 +11,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from seastar_gym import Contact, Numerics, Scene, Seastar, SmaPulse, Water
+from seastar_gym import Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 from seastar_gym.scene import fidelity
 from seastar_gym.scene.fidelity import Promise, cheapest, promise, promises
 from seastar_gym.scene.numerics import PRESETS, Fidelity
@@ -27,6 +27,8 @@ from studies.accuracy.cases import (
     swim,
     swims,
 )
+from studies.accuracy.settings import Plan
+from studies.accuracy.tables import measured_over
 
 NAMES = get_args(Fidelity)
 UNSEEN = random_sequences(24, np.random.default_rng(20_261_121))
@@ -45,6 +47,12 @@ def test_table_comes_with_the_package_and_is_complete():
         assert 0.0 < row.path_error < 0.6 and 0.0 < row.straight_error < 0.6
         assert min(row.gait_error, row.slow_error, row.end_error, row.heading_error, row.time_error) > 0.0
         assert row.speed > 5.0
+
+
+def test_the_table_says_over_which_commands_it_was_measured_and_with_which_confidence():
+    stored = fidelity.measured_over()
+    assert stored == json.loads(json.dumps(measured_over(Plan())))
+    assert "0.93 confidence" in stored["confidence"] and stored["path_error"]["random, ternary and continuous"] == 51
 
 
 def test_a_path_error_is_the_sum_of_space_and_time():
@@ -278,3 +286,30 @@ def test_for_error_of_any_gait_keeps_it_whatever_command_is_repeated(error):
     exact = swim(gaits(), Scene.preset("reference"), threads=None)
     found = swim(gaits(), Scene.for_error(error, any_gait=True), threads=None)
     assert errors(found, exact).path.max() <= error + promise("reference").gait_error
+
+
+# Long swims
+
+
+def energy_gathered(scene: Scene, strokes: int = 200) -> float:
+    """Kinetic energy of the fastest gait at the end of so many strokes over that after 20."""
+    simulator = Simulator(scene, threads=1)
+    gait = np.array([[0.0, 0.0, 1.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0, -1.0]])
+    energies = []
+    for stroke in range(strokes):
+        simulator.stroke(gait[stroke % 2][None])
+        energies.append(simulator.kinetic_energy()[0])
+    return float(np.max(energies[-20:]) / np.max(energies[:20]))
+
+
+@pytest.mark.parametrize("name", ["fast", "balanced", pytest.param("accurate", marks=pytest.mark.slow), "chapter"])
+def test_presets_gather_no_energy_over_long_swims(name):
+    assert energy_gathered(Scene.preset(name)) < 1.5
+
+
+def test_nineteen_nodes_gather_energy_with_steps_of_5_ms_but_not_of_4():
+    """The midpoint rule damps nothing: some meshes resonate with some steps, long after a promise ends."""
+    scene = Scene.preset("balanced")
+    nineteen = replace(scene, robot=replace(scene.robot, nodes_per_limb=19))
+    assert energy_gathered(nineteen) > 10.0
+    assert energy_gathered(replace(nineteen, numerics=replace(scene.numerics, step=4e-3))) < 1.5

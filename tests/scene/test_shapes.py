@@ -10,11 +10,11 @@ from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import SymmetryReduction
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene.shape import rest_positions
-from studies.validation.frequencies import fitted_frequency
-from studies.validation.unactuated import let_pass, pause
+from studies.verification.frequencies import fitted_frequency
+from studies.verification.unactuated import let_pass, pause
 
 CLAMP = (0, 1)
-"""Held nodes: the limb is then clamped in the middle of its root edge, see studies/validation/unactuated.py."""
+"""Held nodes: the limb is then clamped in the middle of its root edge, see studies/verification/unactuated.py."""
 
 DIFFERENT = {
     "one limb": ([(0.0, 0.08, (2e-3, 1e-3), (1e6, 2e6), 5.0)], "opening"),

@@ -11,8 +11,8 @@ import pytest
 
 from refusals import assert_refused
 from seastar_gym import Contact, DomainRandomization, Numerics, Scene, Simulator, ThermalSma, Uniform
-from seastar_gym.certify.commands import STROKES, draw_classes
-from seastar_gym.certify.measure import SHORT, swim
+from seastar_gym.certification.commands import STROKES, draw_classes
+from seastar_gym.certification.measure import SHORT, swim
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.certificate import resolved

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seastar_gym.certify.commands import CLASSES, STROKES
+from seastar_gym.certification.commands import CLASSES, STROKES
 from studies.accuracy import error_bars as study
 
 N = 2 * len(CLASSES)

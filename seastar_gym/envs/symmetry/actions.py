@@ -12,11 +12,11 @@ from seastar_gym.envs.symmetry.group import Elements, inverse, is_mirror, limb_o
 
 def transform_commands(commands: NDArray[np.floating[Any]], elements: ArrayLike) -> NDArray[np.floating[Any]]:
     """Commands, shape (..., n_limbs), of the robots carried by the elements."""
-    moved = _move_limbs(np.asarray(commands), np.asarray(elements, dtype=np.intp))
+    moved = move_limbs(np.asarray(commands), np.asarray(elements, dtype=np.intp))
     return np.where(is_mirror(elements)[..., None], -moved, moved) + 0.0  # no -0.0
 
 
-def _move_limbs(values: NDArray[Any], elements: Elements) -> NDArray[Any]:
+def move_limbs(values: NDArray[Any], elements: Elements) -> NDArray[Any]:
     """Values of the limbs, shape (..., n_limbs), in the order of the robots carried by the elements."""
     order = limb_order(values.shape[-1])[elements]
     shape = np.broadcast_shapes(values.shape, order.shape)
@@ -37,26 +37,30 @@ _SWAPPED_LIMB_ACTIONS = np.argmax(-LIMB_COMMANDS[:, None] == LIMB_COMMANDS, axis
 
 
 def transform_actions(
-    actions: NDArray[np.integer[Any]], elements: ArrayLike, mode: Actions, n_limbs: int
-) -> NDArray[np.integer[Any]]:
-    """Actions of the robots carried by the elements, shape (..., n_limbs) for mode "limbs", otherwise (...)."""
+    actions: NDArray[Any], elements: ArrayLike, mode: Actions, n_limbs: int
+) -> NDArray[Any]:
+    """Actions of the robots carried by the elements: shape (..., n_limbs) for "limbs" and "continuous", or (...)."""
     actions, elements = as_array(actions), np.asarray(elements, dtype=np.intp)
-    _, n_choices = choices(mode, n_limbs)
     _check_shape(actions, elements, mode, n_limbs)
+    if mode == "continuous":
+        if actions.dtype.kind not in "iuf":
+            raise ValueError(f'With actions="continuous" an action is numbers, not {actions.dtype}.')
+        return transform_commands(actions, elements)
+    _, n_choices = choices(mode, n_limbs)
     if actions.dtype.kind not in "iu" or (actions.size and (actions.min() < 0 or actions.max() >= n_choices)):
         raise ValueError(f'With actions="{mode}" an action is a whole number from 0 to {n_choices - 1}.')
     if mode != "limbs":
         return action_table(mode, n_limbs)[elements, actions]
-    moved = _move_limbs(actions, elements)
+    moved = move_limbs(actions, elements)
     return np.where(is_mirror(elements)[..., None], _SWAPPED_LIMB_ACTIONS[moved], moved)
 
 
 def _check_shape(actions: NDArray[Any], elements: Elements, mode: Actions, n_limbs: int) -> None:
     """ValueError where there is not one action for every element, or one for all."""
-    of_one = (n_limbs,) if mode == "limbs" else ()
+    of_one = (n_limbs,) if mode in ("limbs", "continuous") else ()
     robots = actions.shape[: actions.ndim - len(of_one)]
     if actions.shape != (*robots, *of_one) or (robots != elements.shape and () not in (robots, elements.shape)):
-        one = f"{n_limbs} numbers" if mode == "limbs" else "a number"
+        one = f"{n_limbs} numbers" if of_one else "a number"
         raise ValueError(
             f'With actions="{mode}" an action is {one}, for each of {elements.size} robot(s), not an array of shape '
             f"{actions.shape}."
@@ -64,7 +68,7 @@ def _check_shape(actions: NDArray[Any], elements: Elements, mode: Actions, n_lim
 
 
 def restore_actions(
-    actions: NDArray[np.integer[Any]], elements: ArrayLike, mode: Actions, n_limbs: int
-) -> NDArray[np.integer[Any]]:
+    actions: NDArray[Any], elements: ArrayLike, mode: Actions, n_limbs: int
+) -> NDArray[Any]:
     """Actions of the robots as they are, from those chosen on observations reduced by the elements."""
     return transform_actions(actions, inverse(elements, n_limbs), mode, n_limbs)

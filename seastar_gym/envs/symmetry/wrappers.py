@@ -1,6 +1,6 @@
-"""Wrappers that reduce `SeastarSwim-v0` to one sector, for any learner."""
+"""Wrappers that reduce `SeastarSwim-v0` and the timed environments to one sector, for any learner."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry.actions import restore_actions
+from seastar_gym.envs.symmetry.group import Elements
+from seastar_gym.envs.symmetry.masks import transform_masks
 from seastar_gym.envs.symmetry.observations import reduce_observations
 from seastar_gym.envs.symmetry.scenes import memory_mirror, require_symmetry
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -20,69 +22,115 @@ else:
     _VectorWrapper = gym.vector.VectorWrapper  # not generic in gymnasium 1.2
 
 
-def _mode_limbs_and_mirror(env: Any) -> tuple[Actions, int, Mirror]:
-    """Action mode, number of limbs and `memory_mirror` of an environment or a batch; ValueError if not symmetric."""
+class _Kind(NamedTuple):
+    """What the symmetry has to know of an environment: action mode, limbs, and the mirror of observed memory."""
+
+    mode: Actions
+    n_limbs: int
+    mirror: Mirror
+
+    def reduce(self, observations: NDArray[Any]) -> tuple[NDArray[np.floating[Any]], Elements]:
+        """Reduced observations, and the elements that reduced them."""
+        return reduce_observations(observations, self.n_limbs, self.mirror)
+
+    def restore(self, actions: Any, elements: Elements) -> Any:
+        """Actions of the robots as they are."""
+        return restore_actions(actions, elements, self.mode, self.n_limbs)
+
+    def mask(self, masks: NDArray[Any], elements: Elements) -> NDArray[Any]:
+        """Masks of reduced robots."""
+        return transform_masks(masks, elements, self.mode, self.n_limbs)
+
+    def mask_info(self, info: dict[str, Any], elements: Elements) -> dict[str, Any]:
+        """Info with the masks of reduced robots, if it has any."""
+        return {**info, "action_mask": self.mask(info["action_mask"], elements)} if "action_mask" in info else info
+
+
+def _kind(env: Any) -> _Kind:
+    """Kind of an environment or a batch; ValueError if its scene is not symmetric."""
     inner = getattr(env, "unwrapped", env)
     if not isinstance(inner, SeastarSwimEnv | SeastarSwimVectorEnv):
-        raise ValueError(f"Symmetry is known of SeastarSwim-v0 alone, not of {inner!r}.")
+        raise ValueError(f"Symmetry is known of SeastarSwim-v0 and the timed environments alone, not of {inner!r}.")
     require_symmetry(inner.scene, inner.randomization)
-    return inner.actions, inner.scene.robot.n_limbs, memory_mirror(inner.scene.actuator)
+    mirror = memory_mirror(inner.scene.actuator) if inner.observe_actuators else ()
+    return _Kind(inner.actions, inner.scene.robot.n_limbs, mirror)
 
 
 class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorArgs):
-    """Wrapper that turns and mirrors observations so that the current waypoint lies in sector 0, and actions back."""
+    """Wrapper that turns and mirrors observations so that the current waypoint lies in sector 0, and actions back.
+
+    Masks of actions, in info and of `action_masks`, are those of the reduced robot.
+    """
 
     def __init__(self, env: gym.Env[Any, Any]):
         gym.utils.RecordConstructorArgs.__init__(self)
         gym.Wrapper.__init__(self, env)
-        self._mode, self._n_limbs, self._mirror = _mode_limbs_and_mirror(env)
+        self._kind = _kind(env)
         self._element = np.zeros((), np.intp)
 
     def _reduced(self, observation: NDArray[np.float32]) -> NDArray[np.floating[Any]]:
-        reduced, self._element = reduce_observations(observation, self._n_limbs, self._mirror)
+        reduced, self._element = self._kind.reduce(observation)
         return reduced
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Actions on the last reduced observation that the wires can follow, shape (k,)."""
+        inner: Any = self.unwrapped
+        return self._kind.mask(inner.action_masks(), self._element)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode; the observation is reduced."""
         observation, info = self.env.reset(seed=seed, options=options)
-        return self._reduced(observation), info
+        reduced = self._reduced(observation)
+        return reduced, self._kind.mask_info(info, self._element)
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """Swim one stroke by an action that was chosen on the last reduced observation."""
-        action = restore_actions(action, self._element, self._mode, self._n_limbs)
+        """Swim for one decision by an action that was chosen on the last reduced observation."""
+        action = self._kind.restore(action, self._element)
         observation, reward, terminated, truncated, info = self.env.step(action)
-        return self._reduced(observation), reward, terminated, truncated, info
+        reduced = self._reduced(observation)
+        return reduced, reward, terminated, truncated, self._kind.mask_info(info, self._element)
 
 
 class VectorSymmetryReduction(_VectorWrapper):
     """Wrapper of the native batch that does for every robot what `SymmetryReduction` does for one.
 
-    Observations in `info["final_obs"]` are turned and mirrored, too, each by its own element.
+    Observations in `info["final_obs"]` are turned and mirrored, too, each by its own element, and so are masks.
     """
 
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any]):
         super().__init__(env)
-        self._mode, self._n_limbs, self._mirror = _mode_limbs_and_mirror(env)
+        self._kind = _kind(env)
         self._elements = np.zeros(env.num_envs, np.intp)
 
     def _reduced(self, observations: NDArray[np.float32]) -> NDArray[np.floating[Any]]:
-        reduced, self._elements = reduce_observations(observations, self._n_limbs, self._mirror)
+        reduced, self._elements = self._kind.reduce(observations)
         return reduced
+
+    def action_masks(self) -> NDArray[np.bool_]:
+        """Actions on the last reduced observations that the wires can follow, shape (num_envs, k)."""
+        inner: Any = self.unwrapped
+        return self._kind.mask(inner.action_masks(), self._elements)
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Begin episodes; the observations are reduced."""
         observations, info = self.env.reset(seed=seed, options=options)  # type: ignore[arg-type]
-        return self._reduced(observations), info
+        reduced = self._reduced(observations)
+        return reduced, self._kind.mask_info(info, self._elements)
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
-        """Swim one stroke with every robot, by actions that were chosen on the last reduced observations."""
-        actions = restore_actions(actions, self._elements, self._mode, self._n_limbs)
+        """Swim for one decision with every robot, by actions that were chosen on the last reduced observations."""
+        actions = self._kind.restore(actions, self._elements)
         observations, rewards, terminated, truncated, info = self.env.step(actions)
         if "final_obs" in info:
-            final = info["final_obs"].copy()
-            for robot in np.flatnonzero(info["_final_obs"]):
-                final[robot], _ = reduce_observations(final[robot], self._n_limbs, self._mirror)
-            info = {**info, "final_obs": final}
-        return self._reduced(observations), rewards, terminated, truncated, info
+            info = {**info, **self._reduced_final(info)}
+        reduced = self._reduced(observations)
+        return reduced, rewards, terminated, truncated, self._kind.mask_info(info, self._elements)
+
+    def _reduced_final(self, info: dict[str, Any]) -> dict[str, Any]:
+        """Last observations and infos of episodes that are over, of reduced robots."""
+        final, elements = info["final_obs"].copy(), np.zeros(self.num_envs, np.intp)
+        for robot in np.flatnonzero(info["_final_obs"]):
+            final[robot], elements[robot] = self._kind.reduce(final[robot])
+        return {"final_obs": final, "final_info": self._kind.mask_info(info["final_info"], elements)}

@@ -89,10 +89,25 @@ class Mirrored(Protocol):
 
 @runtime_checkable
 class Deaf(Protocol):
-    """Actuator that says which wires cannot be heated now."""
+    """Actuator that says which wires cannot be heated now.
+
+    can_be_deaf: Whether there ever are such wires.
+    """
+
+    @property
+    def can_be_deaf(self) -> bool: ...
 
     def deaf_wires(self, state: Floats) -> NDArray[np.bool_]:
         """Whether commands to the wires for + and - would be ignored, shape (*S, 2). state: Shape (*S, n_state)."""
+        ...
+
+
+@runtime_checkable
+class Recalled(Protocol):
+    """Actuator whose state follows from the numbers of its `observe`."""
+
+    def recall(self, numbers: Floats) -> Floats:
+        """State of which these numbers, shape (..., k), are observed, shape (..., n_state). The rest is as at rest."""
         ...
 
 

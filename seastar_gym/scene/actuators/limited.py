@@ -101,6 +101,10 @@ class Limited:
         peak = np.asarray(column(self.peak_angle, 2))
         return state / np.where(peak > 0.0, peak, 1.0)
 
+    def recall(self, numbers: Floats) -> Floats:
+        """Rotation of which this share of the largest one is observed, shape of `numbers`."""
+        return numbers * np.asarray(column(self.peak_angle, 2))
+
     def seconds_heated(self, t: Floats, commands: Floats, state: Floats) -> Floats:
         """Time for which limbs are heated from t[0] to t[-1] [s], shape of `commands`: as of the followed actuator."""
         if not isinstance(self.actuator, Heated):

@@ -183,6 +183,17 @@ class ThermalSma(HeatingAndCooling):
         warm = (state[..., :2] - water) / (A_f - water)
         return np.concatenate([warm, state[..., 2:4]], axis=-1)
 
+    def recall(self, numbers: Floats) -> Floats:
+        """State of which these numbers are observed, with no pulse under way, shape (..., 6)."""
+        water, A_f = column(self.water_temperature, 2), column(self.austenite_finish, 2)
+        temperatures = water + numbers[..., :2] * (A_f - water)
+        return np.concatenate([temperatures, numbers[..., 2:], np.zeros_like(temperatures)], axis=-1)
+
+    @property
+    def can_be_deaf(self) -> bool:
+        """Whether there ever are wires that cannot be heated."""
+        return self.largest_temperature is not None
+
     def deaf_wires(self, state: Floats) -> NDArray[np.bool_]:
         """Wires that cannot be heated now, shape (..., 2): those at the largest temperature."""
         if self.largest_temperature is None:

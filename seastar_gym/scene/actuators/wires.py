@@ -116,6 +116,15 @@ class SmaWires:
         """Contractions of the two wires, shape (..., 2)."""
         return state[..., :2]
 
+    def recall(self, numbers: Floats) -> Floats:
+        """State of which these contractions are observed, with no pulse under way, shape (..., 4)."""
+        return np.concatenate([numbers, np.zeros_like(numbers)], axis=-1)
+
+    @property
+    def can_be_deaf(self) -> bool:
+        """Whether there ever are wires that cannot be heated."""
+        return self.deaf
+
     def deaf_wires(self, state: Floats) -> Mask:
         """Wires that cannot be heated now, shape (..., 2): both of a deaf limb until both are cold, otherwise none."""
         warm = (state[..., :2] > COLD).any(axis=-1) | (state[..., 2:] > 0.0).any(axis=-1)

@@ -13,23 +13,23 @@ from continuum_oracle import Continuum
 from oracle import Star, elastic_hessian, inertia_matrix
 from seastar_gym import Numerics, Scene, Seastar, Simulator, Water
 from seastar_gym.model.rods import make_rods
-from studies.validation import drag, exact, frequencies, published, waves
-from studies.validation import page as validation_page
-from studies.validation import study as validation
-from studies.validation.unactuated import IN_LINE, let_pass, pause
+from studies.verification import drag, exact, frequencies, published, waves
+from studies.verification import page as verification_page
+from studies.verification import study as verification
+from studies.verification.unactuated import IN_LINE, let_pass, pause
 
-PAGE = Path(__file__).parents[1] / "docs" / "validation.md"
+PAGE = Path(__file__).parents[1] / "docs" / "verification.md"
 
-section = functools.cache(lambda name: validation.SECTIONS[name]())
+section = functools.cache(lambda name: verification.SECTIONS[name]())
 
 
-@pytest.mark.parametrize("name", validation.SECTIONS)
+@pytest.mark.parametrize("name", verification.SECTIONS)
 def test_every_line_of_the_page_is_within_its_bound(name):
     outside = [row for row in section(name).rows if not row.holds]
     assert section(name).rows and not outside
 
 
-@pytest.mark.parametrize("name", validation.SECTIONS)
+@pytest.mark.parametrize("name", verification.SECTIONS)
 def test_bounds_are_not_generous(name):
     """Half of a section's lines would not hold if the simulator were off by a hundredth more than it is."""
     worse = [replace(row, ours=row.ours + 1e-2 * row.reference * np.sign(row.difference)) for row in section(name).rows]
@@ -70,7 +70,7 @@ def test_a_limb_held_by_hub_and_root_node_is_clamped_within_the_held_edge(discre
         let_pass(simulator)
         expected = exact.elastica_tip(load, EI, 0.1 - held, EA) + [held, 0.0]
         errors.append(np.hypot(*(simulator.positions[0, tip] - expected)))
-    order = validation_page.order_row("", [robot.edge_length for robot in robots], errors, 0.0).ours
+    order = verification_page.order_row("", [robot.edge_length for robot in robots], errors, 0.0).ours
     assert order == pytest.approx(2.0, abs=0.1)
 
 
@@ -171,18 +171,18 @@ def test_a_missing_file_of_published_figures_is_named(tmp_path):
 def test_the_page_in_the_repository_is_the_one_that_the_study_writes():
     """Except for the last digits of ours, which depend on the machine."""
     page = PAGE.read_text(encoding="utf-8")
-    assert page.startswith(validation_page.as_page([]))
-    for name in validation.SECTIONS:
+    assert page.startswith(verification_page.as_page([]))
+    for name in verification.SECTIONS:
         assert f"## {section(name).title}\n\n{section(name).method}\n" in page
         for row in section(name).rows:
-            what, reference, *_ = validation_page.as_cells(row)
+            what, reference, *_ = verification_page.as_cells(row)
             assert f"| {what} | {reference} |" in page
 
 
 def test_a_row_is_written_with_its_unit_and_difference():
-    row = validation_page.Row("speed", 2.0, 2.001, "m/s", allowed=1e-4)
-    assert validation_page.as_cells(row) == ("speed [m/s]", "2.00000", "2.00100", "+1.0e-03 (+5.0e-04)")
+    row = verification_page.Row("speed", 2.0, 2.001, "m/s", allowed=1e-4)
+    assert verification_page.as_cells(row) == ("speed [m/s]", "2.00000", "2.00100", "+1.0e-03 (+5.0e-04)")
     assert not row.holds
-    shown = validation_page.Section("Speeds", "How.", [row])
-    assert "| speed [m/s] | 2.00000 | 2.00100 | +1.0e-03 (+5.0e-04) |" in validation_page.as_page([shown])
-    assert validation_page.as_table(shown).row_count == 1
+    shown = verification_page.Section("Speeds", "How.", [row])
+    assert "| speed [m/s] | 2.00000 | 2.00100 | +1.0e-03 (+5.0e-04) |" in verification_page.as_page([shown])
+    assert verification_page.as_table(shown).row_count == 1

@@ -1,4 +1,4 @@
 from seastar_gym.command import run_command
-from studies.validation.study import main
+from studies.verification.study import main
 
 run_command(main)

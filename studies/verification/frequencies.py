@@ -9,9 +9,9 @@ from scipy.optimize import minimize_scalar
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.simulator import Simulator
-from studies.validation import exact
-from studies.validation.page import Row, Section, order_row
-from studies.validation.unactuated import HUB, IN_LINE, pause
+from studies.verification import exact
+from studies.verification.page import Row, Section, order_row
+from studies.verification.unactuated import HUB, IN_LINE, pause
 
 Floats = NDArray[np.float64]
 

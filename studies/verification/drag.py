@@ -7,9 +7,9 @@ from seastar_gym.model.rods import make_rods
 from seastar_gym.scene import Numerics, Scene, Seastar, Water
 from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simulator import Simulator, State
-from studies.validation import exact
-from studies.validation.page import Row, Section
-from studies.validation.unactuated import MM, let_pass, pause
+from studies.verification import exact
+from studies.verification.page import Row, Section
+from studies.verification.unactuated import MM, let_pass, pause
 
 Floats = NDArray[np.float64]
 

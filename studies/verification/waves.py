@@ -6,9 +6,9 @@ from numpy.typing import NDArray
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simulator import Simulator
-from studies.validation import exact
-from studies.validation.page import Row, Section, order_row
-from studies.validation.unactuated import let_pass, pause
+from studies.verification import exact
+from studies.verification.page import Row, Section, order_row
+from studies.verification.unactuated import let_pass, pause
 
 Floats = NDArray[np.float64]
 

@@ -62,7 +62,7 @@ def as_page(sections: Sequence[Section]) -> str:
     lines = [
         "# Verification against exact solutions and published codes",
         "",
-        "Written by `python -m studies.validation`. `tests/test_validation.py` checks each line against a bound.",
+        "Written by `python -m studies.verification`. `tests/test_verification.py` checks each line against a bound.",
         "Robot and fluid are the chapter's unless a section says otherwise, and l is the length of an edge. Continuum",
         "and chapter are the two discretisations of a `Seastar`. The difference is ours minus the reference; in",
         "brackets it is relative to the reference.",

@@ -1,4 +1,4 @@
-"""Verification of the simulator against exact solutions and published codes; writes `docs/validation.md`.
+"""Verification of the simulator against exact solutions and published codes; writes `docs/verification.md`.
 
 The exact solutions are the elastica, the vibrating beam, quadratic drag and bending waves, for either discretisation.
 Two published codes computed the chapter's straight swim. Validation would need measurements of a robot.
@@ -11,12 +11,12 @@ from rich.console import Console
 from tqdm import tqdm
 
 from studies.parser import study_parser
-from studies.validation.drag import quadratic_drag
-from studies.validation.elastica import elastica
-from studies.validation.frequencies import natural_frequencies
-from studies.validation.page import Section, as_page, as_table
-from studies.validation.published import published_codes
-from studies.validation.waves import bending_waves
+from studies.verification.drag import quadratic_drag
+from studies.verification.elastica import elastica
+from studies.verification.frequencies import natural_frequencies
+from studies.verification.page import Section, as_page, as_table
+from studies.verification.published import published_codes
+from studies.verification.waves import bending_waves
 
 SECTIONS: dict[str, Callable[[], Section]] = {
     "elastica": elastica,
@@ -30,9 +30,9 @@ SECTIONS: dict[str, Callable[[], Section]] = {
 
 def main() -> None:
     """Command line: compute all sections, write the page and print its tables."""
-    parser = study_parser("studies.validation", __doc__)
+    parser = study_parser("studies.verification", __doc__)
     parser.add_argument(
-        "--out", type=Path, default=Path("docs/validation.md"), help="page to write (default: %(default)s)"
+        "--out", type=Path, default=Path("docs/verification.md"), help="page to write (default: %(default)s)"
     )
     options = parser.parse_args()
     sections = [section() for section in tqdm(SECTIONS.values(), unit="section")]

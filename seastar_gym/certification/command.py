@@ -2,7 +2,7 @@
 
 The scene is a Python file that defines `scene`, a JSON file as `Scene.to_dict` writes it, or none for the chapter's. A
 file of Python is executed. Errors are those of the hub's path in space, in time and in sum, over classes of commands
-that are listed in seastar_gym/certify/commands.py, against swims with 37 nodes per limb and steps of 0.25 ms.
+that are listed in seastar_gym/certification/commands.py, against swims with 37 nodes per limb and steps of 0.25 ms.
 
 Writes a certificate (JSON), and a picture of error over speed where matplotlib is installed. `Certificate.load(file)`
 reads it, `certificate.for_error(0.01)` is the scene at the fastest setting that keeps 1 %, and
@@ -17,7 +17,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from seastar_gym.certify.measure import SAMPLES, certify
+from seastar_gym.certification.measure import SAMPLES, certify
 from seastar_gym.scene import Scene
 from seastar_gym.scene.certificate import Certificate
 

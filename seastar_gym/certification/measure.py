@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.certify.commands import ACTIONS, CLASSES, PROMISED, STROKES, VERSION, draw_classes
+from seastar_gym.certification.commands import ACTIONS, CLASSES, PROMISED, STROKES, VERSION, draw_classes
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.scene.certificate import Certificate, CertifiedSetting, physics, resolved
 from seastar_gym.scene.checks import require_count, require_seed, shown

@@ -1,0 +1,38 @@
+"""Masks: actions that wires can follow now, and commands to wires that cannot.
+
+A mask is true for actions that are followed as a whole, in the form that sb3-contrib's MaskablePPO takes:
+
+actions         shape of a robot's mask    true where
+"limbs"         (3 n_limbs,)               limb after limb, its actions 0, 1 (+), 2 (-) are followed
+"joint/pairs"   (n_actions,)               all wires of the action's command can be heated
+"continuous"    (2 n_limbs,)               limb after limb, its wires + and - can be heated
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.envs.commands import Actions, command_table
+from seastar_gym.scene.actuators.actuator import Actuator, Deaf
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+def can_be_masked(actuator: Actuator) -> bool:
+    """Whether an actuator ever has wires that cannot be heated."""
+    return isinstance(actuator, Deaf) and actuator.can_be_deaf
+
+
+def action_masks(actions: Actions, deaf: Mask) -> Mask:
+    """Masks of the robots' actions, shape (n_robots, k). deaf: As `Simulator.deaf_wires`, (n_robots, n_limbs, 2)."""
+    n_robots, n_limbs, _ = deaf.shape
+    if actions == "continuous":
+        return ~deaf.reshape(n_robots, -1)
+    if actions == "limbs":
+        return np.concatenate([np.ones((n_robots, n_limbs, 1), bool), ~deaf], axis=-1).reshape(n_robots, -1)
+    return np.asarray(~masked_limbs(command_table(actions, n_limbs), deaf[:, None]).any(axis=-1))
+
+
+def masked_limbs(commands: Floats, deaf: Mask) -> Mask:
+    """Limbs whose wire cannot follow its command, shape (..., n_limbs). deaf: Shape (..., n_limbs, 2)."""
+    return ((commands > 0.0) & deaf[..., 0]) | ((commands < 0.0) & deaf[..., 1])

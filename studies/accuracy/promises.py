@@ -1,0 +1,204 @@
+"""Do promised errors hold on sequences of commands that no table was made with?
+
+The chapter's robot and six others are certified (`seastar_gym.certify`), each for 60 sequences of every class of
+commands. Then each swims fresh sequences of every class, drawn from another seed, at a few of its certified settings,
+and those are counted whose error exceeds the certified error of their class. The chapter's robot swims them at its
+fidelities, too, where they are held against the table that comes with the package.
+
+The largest of 60 sequences bounds at least 95 % of a class with 95 % confidence. So a share of exceedances above 5 %
+may be found in 5 % of all classes, robots and settings together; more would break the promise.
+
+The error is the hub's largest distance from its path with 37 nodes per limb and the implicit midpoint rule at 0.25 ms,
+over the length of that path. Sequences whose error, against steps of 1 ms instead, is below half of every bound are not
+swum with the short steps. Results are written after every robot, and a robot whose result is in the file is not swum
+again.
+"""
+
+import json
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import beta
+
+from seastar_gym.certification import commands, measure
+from seastar_gym.certification.commands import CLASSES, draw_classes
+from seastar_gym.command import run_command
+from seastar_gym.scene import Numerics, Scene
+from seastar_gym.scene.certificate import Certificate, resolved
+from seastar_gym.scene.fidelity import promise
+from seastar_gym.scene.numerics import Fidelity
+from seastar_gym.version import __version__
+from studies.accuracy.error_bars import ROBOTS
+from studies.parser import study_parser
+
+Floats = NDArray[np.float64]
+
+SAMPLES, SEED = 1000, 2_026
+"""Fresh sequences per class, and their seed; certificates are made with seed 0."""
+SCREEN = Numerics("implicit-midpoint", 1e-3, 1e-7)
+CLOSE = 0.5
+"""Sequences are swum with short steps if their error against `SCREEN` is above this share of a bound."""
+SHARE, CONFIDENCE = 0.05, 0.95
+"""Share of a class that may exceed its promised error, and the confidence with which no more do."""
+PRESETS: tuple[Fidelity, ...] = tuple(name for name in get_args(Fidelity) if name not in ("reference", "chapter"))
+"""Fidelities that are held against the package's table: a dearer one has the limit's own error."""
+
+
+class Check(NamedTuple):
+    """A scene, and its promised error by class of commands."""
+
+    name: str
+    scene: Scene
+    errors: dict[str, float]
+
+    def bounds(self, samples: int) -> Floats:
+        """Promised errors of so many sequences of every class, shape (len(CLASSES) samples,)."""
+        return np.repeat([self.errors[name] for name in CLASSES], samples)
+
+
+def certified_checks(certificate: Certificate) -> list[Check]:
+    """Checks of one setting for each number of nodes: longer steps for fewer nodes, as a user would choose them."""
+    by_nodes: dict[int, list[Any]] = {}
+    for each in sorted(certificate.settings, key=lambda each: -each.step):
+        by_nodes.setdefault(each.nodes_per_limb, []).append(each)
+    chosen = [some[min(k, len(some) - 1)] for k, (_, some) in enumerate(sorted(by_nodes.items()))]
+    return [Check(str(each), certificate.at(each), dict(each.errors)) for each in chosen]
+
+
+def table_checks() -> list[Check]:
+    """Checks of fidelities of the chapter's robot: of random commands, of gaits, and of small ones, by the table."""
+    checks = []
+    for name in PRESETS:
+        row = promise(name)
+        path = dict.fromkeys(("random ternary", "random continuous"), row.path_error)
+        gaits = dict.fromkeys((each for each in CLASSES if each not in path), max(row.path_error, row.gait_error))
+        checks.append(Check(name, Scene.preset(name), gaits | path | {"small": row.slow_error}))
+    return checks
+
+
+def whole_errors(hub: Floats, limit: Floats, limb_length: float) -> Floats:
+    """Largest distances of hubs from those of the limit, as fractions of the limit's path, shape (n,)."""
+    distances = np.linalg.norm(hub - limit, axis=-1).max(axis=0)
+    return np.where(np.isnan(distances), np.inf, distances) / measure.path_lengths(limit, limb_length)
+
+
+def exceedances(scene: Scene, checks: Sequence[Check], samples: int, seed: int) -> dict[str, dict[str, int]]:
+    """Number of fresh sequences, by check and class, whose error exceeds the promised one."""
+    drawn, nodes = draw_classes(samples, scene.robot.n_limbs, seed), measure.MANY_NODES
+    limb_length = float(np.max(scene.robot.limb_length))
+    screen, *swum = measure.swim_all([resolved(scene, nodes, SCREEN), *(each.scene for each in checks)], drawn)
+    errors = np.array([whole_errors(hub, screen, limb_length) for hub in swum])
+    bounds = np.array([each.bounds(samples) for each in checks])
+    near = (errors > CLOSE * bounds).any(axis=0)
+    if near.any():
+        (limit,) = measure.swim_all([resolved(scene, nodes, measure.SHORT)], drawn[:, near])
+        errors[:, near] = [whole_errors(hub[:, near], limit, limb_length) for hub in swum]
+    beyond = (errors > bounds).reshape(len(checks), len(CLASSES), samples).sum(axis=2)
+    return {
+        check.name: dict(zip(CLASSES, row.tolist(), strict=True)) for check, row in zip(checks, beyond, strict=True)
+    }
+
+
+def largest_share(exceeded: int, samples: int) -> float:
+    """Upper end of the one-sided interval of 95 % (Clopper and Pearson) of the share of a class that exceeds."""
+    if exceeded == samples:
+        return 1.0
+    return float(beta.ppf(CONFIDENCE, exceeded + 1, samples - exceeded))
+
+
+def examine(name: str, folder: Path, samples: int) -> dict[str, Any]:
+    """Result of a robot; its certificate is read from the folder, or measured and written there."""
+    scene, begin = ROBOTS[name], time.perf_counter()
+    file = folder / f"{''.join(c if c.isalnum() else '_' for c in name)}.json"
+    if file.is_file():
+        certificate = Certificate.load(file)
+        certificate.require_valid(scene)
+    else:
+        certificate = measure.certify(scene)
+        folder.mkdir(parents=True, exist_ok=True)
+        certificate.save(file)
+    checks = certified_checks(certificate) + (table_checks() if scene.is_chapters else [])
+    found = exceedances(scene, checks, samples, SEED)
+    return {
+        "certified": certificate.samples, "seconds": round(time.perf_counter() - begin),
+        "promised": {each.name: each.errors for each in checks}, "exceeded": found,
+    }  # fmt: skip
+
+
+def summary(results: dict[str, Any]) -> str:
+    """Table and sentence of the results in Markdown."""
+    samples = results["samples"]
+    lines = [
+        "| robot | sequences that exceed | the most in a class at a setting | classes and settings above 5 % |",
+        "|---|---:|---|---:|",
+    ]
+    above, all_cells = 0, 0
+    for name, found in results["robots"].items():
+        for kind, cells in _cells(found):
+            shares = {key: count / samples for key, count in cells.items()}
+            worst = max(shares, key=lambda key: shares[key])
+            broken = sum(share > SHARE for share in shares.values())
+            if kind == "":
+                above, all_cells = above + broken, all_cells + len(shares)
+            most = f"{100 * shares[worst]:.1f} %: {worst[1]}, {worst[0]}" if shares[worst] else "none"
+            lines.append(
+                f"| {name}{kind} | {100 * np.mean(list(shares.values())):.2f} % | {most} | {broken} of {len(shares)} |"
+            )
+    lines += [
+        "",
+        f"{samples} fresh sequences per class; certificates of {len(results['robots'])} robots: {above} of {all_cells} "
+        f"classes and settings exceed in more than 5 % of sequences, where {SHARE * all_cells:.0f} may.",
+    ]
+    return "\n".join(lines)
+
+
+def _cells(found: dict[str, Any]) -> list[tuple[str, dict[tuple[str, str], int]]]:
+    """Exceedances by setting and class: of the certificate, and of the package's table where it was held."""
+    cells = {(check, name): count for check, row in found["exceeded"].items() for name, count in row.items()}
+    table = {key: count for key, count in cells.items() if key[0] in PRESETS}
+    kinds = [("", {key: count for key, count in cells.items() if key not in table}), (", the package's table", table)]
+    return [(kind, some) for kind, some in kinds if some]
+
+
+def read_results(file: Path, samples: int) -> dict[str, Any]:
+    """Results in the file, or empty ones; ValueError if it has those of other sequences or another version."""
+    wanted = {"samples": samples, "seed": SEED, "classes": commands.VERSION, "version": __version__}
+    if not file.is_file():
+        about = "Written by python -m studies.accuracy.promises; exceedances are numbers of sequences."
+        return {"about": about, "machine": measure.machine(), **wanted, "robots": {}}
+    results: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    if {key: results.get(key) for key in wanted} != wanted:
+        raise ValueError(f"{file} has results of other sequences or another version: give another --out.")
+    return results
+
+
+def main() -> None:
+    """Command line: examine the robots that are missing in the results, and print the table."""
+    parser = study_parser("studies.accuracy.promises", __doc__)
+    default = "(default: %(default)s)"
+    parser.add_argument("--samples", type=int, default=SAMPLES, help=f"fresh sequences per class {default}")
+    parser.add_argument("--robots", nargs="*", default=list(ROBOTS), choices=list(ROBOTS), metavar="ROBOT",
+                        help=f"robots: {', '.join(ROBOTS)} (default: all)")  # fmt: skip
+    parser.add_argument("--certificates", type=Path, default=Path("runs/certificates"),
+                        help=f"folder of certificates {default}")  # fmt: skip
+    parser.add_argument("--out", type=Path, default=Path("docs/promises.json"), help=f"file of the results {default}")
+    options = parser.parse_args()
+    try:
+        results = read_results(options.out, options.samples)
+    except ValueError as wrong:
+        raise SystemExit(str(wrong)) from wrong
+    for name in options.robots:
+        if name not in results["robots"]:
+            results["robots"][name] = examine(name, options.certificates, options.samples)
+            options.out.parent.mkdir(parents=True, exist_ok=True)
+            options.out.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+            print(f"{name}: {results['robots'][name]['seconds']} s", flush=True)
+    print(summary(results))
+
+
+if __name__ == "__main__":
+    run_command(main)

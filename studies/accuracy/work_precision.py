@@ -1,0 +1,162 @@
+"""Error of the hub's path over processor time per stroke, for six robots: which setting is worth its time.
+
+The chapter's robot, one of silicone, one with thermal actuators, one whose limbs touch, and ones of three and of twelve
+limbs swim ten strokes from rest, with sequences of every class of commands of full amplitude
+(`seastar_gym.certification.commands`). The error is the hub's largest distance, at the ends of strokes, from its path
+with 73 nodes per limb of the continuum's discretisation and the implicit midpoint rule at 0.125 ms, over the length of
+that path: the whole error, which is smaller than the promised sum of space and time where the two cancel. The straight
+swim of the chapter's robot stands beside, with four published codes.
+
+Times are processor times of one thread per robot and stroke, the best of several strokes of a batch. Writes a page, a
+picture and the numbers (JSON). A robot whose numbers are in the file is not swum again.
+"""
+
+import importlib.metadata
+import json
+import platform
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from seastar_gym.certification import measure
+from seastar_gym.certification.commands import CLASSES, PROMISED, draw_classes
+from seastar_gym.command import run_command
+from seastar_gym.gaits import STRAIGHT
+from seastar_gym.scene import Contact, Numerics, Scene, Seastar, SmaPulse
+from seastar_gym.scene.actuators.thermal import ThermalSma
+from seastar_gym.scene.numerics import PRESETS, Setting
+from seastar_gym.simulator import Simulator
+from seastar_gym.version import __version__
+from studies.accuracy.cases import scene_of
+from studies.accuracy.settings import MS
+from studies.accuracy.work_precision_page import as_page, draw
+from studies.parser import study_parser
+from studies.speed.terms import SILICONE
+from studies.speed.timing import machine
+
+Floats = NDArray[np.float64]
+
+PROBLEMS: dict[str, Scene] = {
+    "chapter's robot": Scene(),
+    "silicone": Scene(Seastar(relaxation_time=SILICONE)),
+    "thermal actuators": Scene(actuator=ThermalSma()),
+    "contact": Scene(contact=Contact()),
+    "three limbs": Scene(Seastar(3), actuator=SmaPulse(0.4)),
+    "twelve limbs": Scene(Seastar(12), actuator=SmaPulse(0.25)),
+}
+"""Scenes. Hub hinges of the chapter's discretisation allow three and twelve limbs no larger peak angles."""
+SETTINGS: tuple[Setting, ...] = (
+    *PRESETS.values(),
+    *(Setting("continuum", n, Numerics("sdirk2", 20 * MS, 1e-6)) for n in (7, 10)),
+    *(Setting("continuum", n, Numerics("implicit-midpoint", 5 * MS, 1e-5)) for n in (10, 19)),
+    *(Setting("continuum", n, Numerics("implicit-midpoint", 2 * MS, 1e-7)) for n in (10, 13)),
+    Setting("chapter", 10, Numerics("implicit-euler", 10 * MS)),
+    *(Setting("chapter", 10, Numerics("implicit-midpoint", h * MS, 1e-7)) for h in (5, 1)),
+    *(Setting("chapter", n, Numerics("implicit-midpoint", 1 * MS, 1e-7)) for n in (19, 37)),
+)
+"""Settings of both discretisations, the presets first."""
+LIMIT = Setting("continuum", 73, Numerics("implicit-midpoint", 0.125 * MS, 1e-9))
+HALF = Setting("continuum", 37, Numerics("implicit-midpoint", 0.25 * MS, 1e-9))
+"""What stands for the continuum, and twice its edges and steps: its own error is a third of their difference."""
+SAMPLES, SEED = 2, 7
+"""Sequences per class, and their seed."""
+BATCH, STROKES = 32, 4
+"""Robots and strokes of the timing."""
+
+
+def draw_sequences(n_limbs: int) -> Floats:
+    """Sequences of all classes of full amplitude, shape (strokes, n, n_limbs)."""
+    drawn = np.split(draw_classes(SAMPLES, n_limbs, SEED), len(CLASSES), axis=1)
+    return np.concatenate([each for name, each in zip(CLASSES, drawn, strict=True) if name in PROMISED], axis=1)
+
+
+def cost(scene: Scene) -> float:
+    """Processor time of a stroke [s] per robot of a batch, for random commands after one stroke from rest."""
+    simulator, rng = Simulator(scene, BATCH, threads=1), np.random.default_rng(0)
+    times = []
+    for _ in range(1 + STROKES):
+        commands = rng.integers(-1, 2, (BATCH, scene.robot.n_limbs)).astype(float)
+        begin = time.thread_time()
+        simulator.stroke(commands)
+        times.append(time.thread_time() - begin)
+    return min(times[1:]) / BATCH
+
+
+def errors(hub: Floats, limit: Floats, limb_length: float) -> Floats:
+    """Largest distances from the limit over the lengths of its paths; infinite where the solver failed."""
+    distances = np.linalg.norm(hub - limit, axis=-1).max(axis=0)
+    return np.where(np.isnan(distances), np.inf, distances) / measure.path_lengths(limit, limb_length)
+
+
+def finite(number: float) -> float | None:
+    """Number as JSON has it: none where the solver failed."""
+    return float(number) if np.isfinite(number) else None
+
+
+def examine(physics: Scene, straight: bool) -> dict[str, Any]:
+    """Numbers of a problem. straight: Whether the chapter's straight swim stands beside the sequences, as the last."""
+    commands = draw_sequences(physics.robot.n_limbs)
+    if straight:
+        commands = np.concatenate([commands, np.tile(STRAIGHT, (len(commands), 1, 1))], axis=1)
+    limb_length = float(np.max(physics.robot.limb_length))
+    limit, half = (measure.swim(scene_of(each, physics), commands) for each in (LIMIT, HALF))
+    rows = []
+    for setting in SETTINGS:
+        scene = scene_of(setting, physics)
+        found = errors(measure.swim(scene, commands), limit, limb_length)
+        own = found[:-1] if straight else found
+        rows.append({
+            "discretisation": setting.discretisation, "nodes_per_limb": setting.nodes_per_limb,
+            "scheme": setting.numerics.scheme, "step": setting.numerics.step,
+            "newton_tolerance": setting.numerics.newton_tolerance,
+            "preset": next((name for name, each in PRESETS.items() if each == setting), None),
+            "ms_per_stroke": 1e3 * cost(scene),
+            "largest_error": finite(own.max()), "median_error": finite(np.median(own)),
+            **({"straight_error": finite(found[-1])} if straight else {}),
+        })  # fmt: skip
+    return {
+        "sequences": commands.shape[1] - straight,
+        "limit_error": float((errors(half, limit, limb_length) / 3.0).max()),
+        **({"straight_distance": float(np.hypot(*limit[-1, -1]))} if straight else {}),
+        "settings": rows,
+    }  # fmt: skip
+
+
+def versions() -> dict[str, str]:
+    """Versions that the numbers were measured with."""
+    packages = {name: importlib.metadata.version(name) for name in ("numpy", "numba", "llvmlite")}
+    return {"python": platform.python_version(), "seastar-gym": __version__} | packages
+
+
+def main() -> None:
+    """Command line: examine the problems that are missing in the file, write page and picture."""
+    parser = study_parser("studies.accuracy.work_precision", __doc__)
+    parser.add_argument(
+        "--out", type=Path, default=Path("docs/work_precision.md"),
+        help="page to write; numbers and picture stand beside it (default: %(default)s)",
+    )  # fmt: skip
+    options = parser.parse_args()
+    file = options.out.with_suffix(".json")
+    about = {"about": "Written by python -m studies.accuracy.work_precision.", "machine": machine()} | versions()
+    results: dict[str, Any] = about | {"file": file.name, "problems": {}}
+    if file.is_file():
+        results = json.loads(file.read_text(encoding="utf-8"))
+        if {name: results.get(name) for name in about} != about:
+            raise SystemExit(f"{file} has numbers of another machine or version: give another --out.")
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    for name, physics in tqdm(PROBLEMS.items(), unit="problem"):
+        if name not in results["problems"]:
+            results["problems"][name] = examine(physics, straight=physics.is_chapters)
+            file.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+    picture = options.out.with_name(f"{options.out.stem}_problems.png")
+    draw(results, picture)
+    options.out.write_text(as_page(results, picture.name), encoding="utf-8")
+    print(f"Written: {options.out}, {file}, {picture}")
+
+
+if __name__ == "__main__":
+    run_command(main)

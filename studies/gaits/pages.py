@@ -1,0 +1,52 @@
+"""Tables of the study of gaits, in Markdown."""
+
+from typing import Any
+
+Table = dict[str, Any]
+
+
+def lines_of(head: list[str], rows: list[list[str]]) -> str:
+    """A table in Markdown; all columns but the first are numbers."""
+    rule = ["---", *["---:"] * (len(head) - 1)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in [head, rule, *rows]) + "\n"
+
+
+def numbers(fast: Table, finest: Table) -> list[str]:
+    """Speeds at both presets, turn, pulses and heat of a gait."""
+    return [
+        f"{fast['mm_per_s']:.2f}", f"{finest['mm_per_s']:.2f}", f"{round(fast['turn_deg_per_s'], 1) + 0.0:.1f}",
+        f"{fast['pulses_per_s']:.1f}", f"{fast['joules_per_m']:.0f}",
+    ]  # fmt: skip
+
+
+def tables(results: Table) -> str:
+    """All tables of the study."""
+    finest = results["finest"]
+    head = ["speed [mm/s], `fast`", f"speed, `{finest}`", "turn [deg/s]", "pulses per second", "energy [J/m]"]
+    named = [[each["what"], *numbers(each["fast"], each[finest])] for each in results["named"].values()]
+    rest = [[each["gait"], *numbers(each["fast"], each[finest])] for each in results["from rest"]["fastest"]]
+    turning = [[each["gait"], *numbers(each["fast"], each[finest])] for each in results["from rest"]["turning"]]
+    evolved = [
+        [
+            f"{each['actuator']}, {each['towards']}, {each['price_mm_per_joule']:g} mm/J",
+            *numbers(each["fast"], each[finest]),
+        ]
+        for each in results["evolved"]
+    ]
+    robust = results["robustness"]
+    columns = list(next(iter(robust.values())))
+    robust_rows = [[what, *(f"{each[name]['mm_per_s']:.2f}" for name in columns)] for what, each in robust.items()]
+    directions = [
+        [name, *(f"{speed:.2f}" for speed in speeds)] for name, speeds in results["mm_per_s_by_direction"].items()
+    ]
+    classes = f"{results['from rest']['classes']:,}"
+    return "\n".join([
+        "Named gaits:\n", lines_of(["gait", *head], named),
+        f"The fastest straight gaits of a second from rest, of {classes} classes:\n", lines_of(["gait", *head], rest),
+        "Those that turn most:\n", lines_of(["gait", *head], turning),
+        "Evolved, wires heated again before they are cold:\n",
+        lines_of(["actuator, direction, price of heat", *head], evolved),
+        "Speed by direction [mm/s], degrees from limb 1:\n",
+        lines_of(["gaits", *(f"{angle:.0f}" for angle in results["directions_deg"])], directions),
+        "Other robots and waters, speed [mm/s] at `fast`:\n", lines_of(["", *columns], robust_rows),
+    ])  # fmt: skip

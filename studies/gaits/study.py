@@ -1,0 +1,254 @@
+"""Gaits in time: what limbs that need not be heated together swim, and what speed costs in heat.
+
+Measures named gaits, every gait of a second from rest (40,890 classes), and gaits that evolve where wires may be heated
+before they are cold. Writes `gaits.json`, three pictures and the tables in Markdown.
+"""
+
+import argparse
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from agents.files import write_atomically
+from seastar_gym.envs.commands import command_table
+from seastar_gym.scene import Scene, SmaPulse, Water
+from seastar_gym.scene.actuators.thermal import ThermalSma
+from seastar_gym.scene.actuators.wires import SmaWires
+from studies.gaits.enumeration import SLOTS, distinct_codes, gaits_of
+from studies.gaits.evolution import evolve
+from studies.gaits.named import GAITS, SLOT, lagged, wave
+from studies.gaits.periodic import Swimming, events_of, joined, measure, timed
+from studies.learning.bound import all_directions, distinct_gaits, mixed_speed
+from studies.parser import study_parser
+from studies.speed.terms import SILICONE
+
+Floats = NDArray[np.float64]
+Table = dict[str, Any]
+
+MM = 1000.0
+WIRES = SmaWires()
+THERMAL = ThermalSma(largest_temperature=75.0)
+"""Wires that a heated one does not pass: about where all of it is austenite."""
+COARSE = 1.0 / SLOTS
+"""Slot of the searched gaits [s]."""
+LAGS = np.arange(0.0, 1.0, SLOT)
+"""Lags of the scan [s]."""
+DIRECTIONS = np.radians(np.arange(0.0, 37.0, 6.0))
+PRICES = (0.0, 0.5, 1.0, 1.5, 2.0)
+"""Prices of heat of the evolved gaits [mm/J]."""
+CLOUD = 4000
+"""Enumerated gaits that the picture of the front shows."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Size of the study.
+
+    codes: Every how manyth class of gaits is simulated. generations, population: Those of the evolution.
+    finest: Preset that ranks the gaits once more.
+    """
+
+    codes: int = 1
+    generations: int = 60
+    population: int = 96
+    finest: str = "reference"
+
+
+QUICK = Plan(codes=400, generations=2, population=8, finest="balanced")
+
+
+def scene_with(actuator: Any = WIRES, fidelity: str = "fast") -> Scene:
+    """The chapter's robot with this actuator at a preset."""
+    return replace(Scene.preset(fidelity), actuator=actuator)  # type: ignore[arg-type]
+
+
+def row(swimming: Swimming, k: int = 0) -> Table:
+    """Numbers of one gait, in the units of the tables."""
+    return {
+        "mm_per_s": round(MM * float(swimming.speed[k]), 3),
+        "direction_deg": round(float(np.degrees(np.arctan2(*swimming.velocity[k, ::-1]))), 1),
+        "turn_deg_per_s": round(float(np.degrees(swimming.turn[k])), 3),
+        "pulses_per_s": round(float(swimming.pulses[k]), 2),
+        "joules_per_m": round(float(swimming.energy_per_metre[k]), 1),
+    }
+
+
+def measured(scene: Scene, gait: Floats, slot: float) -> Table:
+    """Numbers of one gait in a scene."""
+    return row(measure(scene, gait[None], slot))
+
+
+def named_gaits(plan: Plan) -> dict[str, Table]:
+    """Every named gait at two presets."""
+    return {
+        name: {
+            "what": each.what,
+            "fast": measured(scene_with(), each.gait, SLOT),
+            plan.finest: measured(scene_with(fidelity=plan.finest), each.gait, SLOT),
+        }
+        for name, each in GAITS.items()
+    }
+
+
+def lag_scan() -> Table:
+    """Speed of the lagged pairs [mm/s] over the lag [s]."""
+    speeds = {
+        "full pulses": measure(scene_with(), np.array([lagged(lag) for lag in LAGS]), SLOT),
+        "pulses of 0.06 s": measure(scene_with(), np.array([lagged(lag, level=0.6) for lag in LAGS]), SLOT),
+        "thermal wires": measure(scene_with(THERMAL), np.array([lagged(lag) for lag in LAGS]), SLOT),
+    }
+    return {"lag_s": LAGS.tolist(), **{name: (MM * each.velocity[:, 0]).tolist() for name, each in speeds.items()}}
+
+
+def from_rest(plan: Plan, progress: Callable[[int], Any]) -> tuple[Table, Swimming]:
+    """The best of all gaits of a second from rest, and how all of them swim."""
+    gaits, scene = gaits_of(distinct_codes()[:: plan.codes]), scene_with()
+    parts = []
+    for part in np.array_split(gaits, max(1, len(gaits) // 1024)):
+        parts.append(measure(scene, part, COARSE))
+        progress(len(part))
+    swimming = joined(parts)
+    straight = np.flatnonzero(swimming.is_straight)
+    fastest = straight[np.argsort(-swimming.speed[straight])][:5]
+    turning = np.argsort(-np.abs(swimming.turn))[:3]
+
+    def best(chosen: NDArray[np.intp]) -> list[Table]:
+        again = measure(scene_with(fidelity=plan.finest), gaits[chosen], COARSE)
+        return [
+            {"gait": events_of(gaits[k], COARSE), "fast": row(swimming, k), plan.finest: row(again, place)}
+            for place, k in enumerate(chosen)
+        ]
+
+    return {"classes": len(gaits), "fastest": best(fastest), "turning": best(turning)}, swimming
+
+
+def synchronous_velocities(plan: Plan) -> Floats:
+    """Velocities [m/s] of the straight gaits of two of the chapter's strokes, shape (n, 2)."""
+    gaits = command_table("joint", 5)[distinct_gaits(2, "joint")[:: max(1, plan.codes // 20)]]
+    swimming = measure(scene_with(SmaPulse()), gaits, 1.0)
+    return swimming.velocity[swimming.is_straight]
+
+
+def by_direction(velocities: dict[str, Floats]) -> Table:
+    """Speeds [mm/s] along DIRECTIONS by straight gaits swum in turn, from velocities [m/s] by kind of gait."""
+    return {name: (MM * mixed_speed(all_directions(each), DIRECTIONS)).tolist() for name, each in velocities.items()}
+
+
+def velocity_of(each: Table) -> Floats:
+    """Velocity [m/s] of a row of numbers, shape (1, 2)."""
+    angle = np.radians(each["direction_deg"])
+    return each["mm_per_s"] / MM * np.array([[np.cos(angle), np.sin(angle)]])
+
+
+def evolved(plan: Plan, progress: Callable[[int], Any]) -> list[Table]:
+    """Gaits that evolve: both actuators, along limb 1 and away from it, at several prices of heat."""
+    found = []
+    ahead, away = timed({0.0: "2+,5-", 0.6: "3+,4-"}, 1.0, COARSE), timed({0.0: "2-,5+", 0.4: "3-,4+"}, 1.0, COARSE)
+    asked: list[tuple[Any, str, float, float]] = [(WIRES, "wires", 1.0, price) for price in PRICES]
+    asked += [(WIRES, "wires", -1.0, 0.0), (THERMAL, "thermal", 1.0, 0.0), (THERMAL, "thermal", -1.0, 0.0)]
+    for actuator, name, towards, price in asked:
+        start, scene = (ahead if towards > 0.0 else away), scene_with(actuator)
+        gait, tried = evolve(scene, start, COARSE, towards, price, plan.generations, plan.population, progress=progress)
+        found.append({
+            "actuator": name, "towards": "along limb 1" if towards > 0.0 else "away from limb 1",
+            "price_mm_per_joule": price, "tried": tried, "gait": events_of(gait, COARSE), "pulses": gait.tolist(),
+            "fast": measured(scene, gait, COARSE),
+            plan.finest: measured(scene_with(actuator, plan.finest), gait, COARSE),
+        })  # fmt: skip
+    return found
+
+
+def robustness(reheated: Floats) -> dict[str, Table]:
+    """Speeds [mm/s] of the main gaits by robots and waters other than the chapter's, at `fast`."""
+    plain = scene_with()
+    changed = {
+        "plain": plain,
+        "silicone": replace(plain, robot=replace(plain.robot, relaxation_time=SILICONE)),
+        "drag x 0.7": replace(plain, fluid=Water(drag_coefficient=0.7)),
+        "drag x 1.4": replace(plain, fluid=Water(drag_coefficient=1.4)),
+        "E x 0.5": replace(plain, robot=replace(plain.robot, youngs_modulus=0.5e6)),
+        "E x 2": replace(plain, robot=replace(plain.robot, youngs_modulus=2e6)),
+        "limb 2 at half": replace(plain, limb_strengths=(1.0, 0.5, 1.0, 1.0, 1.0)),
+        "cooling in 1.3 s": replace(plain, actuator=SmaWires(cooling_time=1.3, period=1.0)),
+        "cooling in 0.7 s": replace(plain, actuator=SmaWires(cooling_time=0.7, period=1.0)),
+        "heating in 0.15 s": replace(plain, actuator=SmaWires(heating_time=0.15, period=1.0)),
+    }
+    gaits = {name: (GAITS[name].gait, SLOT) for name in ("synchronous", "lag 0.6", "thrifty")}
+    gaits["re-heated"] = reheated, COARSE
+    return {what: {name: measured(scene, *gait) for name, gait in gaits.items()} for what, scene in changed.items()}
+
+
+def front(swimming: Swimming, more: list[Table]) -> Table:
+    """Speed over heat: a sample of the straight gaits, and those that no other beats in both."""
+    straight = swimming.of(swimming.is_straight & (swimming.speed > 1e-4))
+    points = np.stack([straight.energy_per_metre, MM * straight.speed], axis=1)
+    extra = np.array([[each["joules_per_m"], each["mm_per_s"]] for each in more]).reshape(-1, 2)
+    everything = np.concatenate([points, extra])
+    kept = np.random.default_rng(0).permutation(len(points))[:CLOUD]
+    return {"cloud": np.round(points[kept], 2).tolist(), "front": np.round(pareto(everything), 2).tolist()}
+
+
+def pareto(points: Floats) -> Floats:
+    """Points (cost, gain), shape (n, 2), that no other beats in both, by rising cost."""
+    in_order = points[np.lexsort((-points[:, 1], points[:, 0]))]
+    before = np.maximum.accumulate(np.append(-np.inf, in_order[:-1, 1]))
+    return in_order[in_order[:, 1] > before]
+
+
+def study(plan: Plan) -> Table:
+    """Run the study; returns its results as plain data."""
+    n_gaits = len(range(0, 40890, plan.codes)) + (len(PRICES) + 3) * plan.generations * plan.population
+    with tqdm(total=n_gaits, unit="gait", unit_scale=True) as bar:
+        rest, swimming = from_rest(plan, bar.update)
+        evolution = evolved(plan, bar.update)
+    named = named_gaits(plan)
+    turns = {
+        name: measured(scene_with(fidelity=plan.finest), wave(limbs), SLOT)
+        for name, limbs in (("wave", "54321"), ("wave back", "12345"))
+    }
+    synchronous = measure(scene_with(SmaPulse()), np.array([[[0, 1, 0, 0, -1.0]]]), 1.0)
+    wires = [each["fast"] for each in evolution if each["actuator"] == "wires"]
+    return {
+        "robot": "the chapter's, continuum's discretisation",
+        "finest": plan.finest,
+        "named": named,
+        "one pair, synchronous": row(synchronous),
+        "lag": lag_scan(),
+        "from rest": rest,
+        "evolved": evolution,
+        "turning": turns,
+        "directions_deg": np.degrees(DIRECTIONS).tolist(),
+        "mm_per_s_by_direction": by_direction(
+            {
+                "synchronous": synchronous_velocities(plan),
+                "from rest": swimming.velocity[swimming.is_straight],
+                "re-heated": np.concatenate([velocity_of(each) for each in wires]),
+            }
+        ),
+        "robustness": robustness(np.array(evolution[0]["pulses"])),
+        "front": front(swimming, wires + [each["fast"] for each in named.values()]),
+    }
+
+
+def main() -> None:
+    """Command line: run the study and write its files."""
+    from studies.gaits.pages import tables
+    from studies.gaits.pictures import draw_all
+
+    parser: argparse.ArgumentParser = study_parser("studies.gaits", __doc__)
+    parser.add_argument("--quick", action="store_true", help="simulate fewer gaits")
+    parser.add_argument("--out", type=Path, default=Path("runs/gaits"), help="folder (default: %(default)s)")
+    options = parser.parse_args()
+    results = study(QUICK if options.quick else Plan())
+    options.out.mkdir(parents=True, exist_ok=True)
+    write_atomically(options.out / "gaits.json", (json.dumps(results, indent=1) + "\n").encode())
+    draw_all(results, options.out)
+    (options.out / "gaits_tables.md").write_text(tables(results), encoding="utf-8")
+    print(tables(results))
+    print(f"Written to {options.out}: gaits.json, gaits_tables.md and three pictures.")

@@ -1,0 +1,375 @@
+"""Decisions within a stroke: the timed environments, their actions, masks, heat and pictures."""
+
+import copy
+import pickle
+import re
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+
+import seastar_gym
+from refusals import assert_refused
+from seastar_gym import Limited, MeasuredCurve, Numerics, RewardWeights, Scene, SmaPulse, SmaWires, ThermalSma
+from seastar_gym.envs.commands import to_commands
+from seastar_gym.envs.masks import action_masks
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
+
+IDS = {"SeastarSwimTimed-v0": 0.5, "SeastarSwimTimedModerate-v0": 0.2, "SeastarSwimTimedHard-v0": 0.1}
+FAST = Numerics.preset("fast")
+MODES = ("limbs", "joint", "pairs", "continuous")
+DEAF = Scene(actuator=SmaWires(deaf=True), numerics=FAST)
+HOT = Scene(actuator=ThermalSma(largest_temperature=240.0 - 220.0 * np.exp(-0.05 / 0.42)), numerics=FAST)
+"""Wires reach the largest temperature after 0.05 s."""
+STRAIGHT = np.array([0, 1, 0, 0, 2])
+
+
+def swum(env, n=6):
+    """Observations, rewards and infos of random actions."""
+    observation, info = env.reset(seed=3)
+    env.action_space.seed(4)
+    history = [observation, *info.values()]
+    for _ in range(n):
+        observation, *others, info = env.step(env.action_space.sample())
+        history += [observation, *others, *info.values()]
+    return history
+
+
+def assert_same(ours, theirs):
+    for one, other in zip(ours, theirs, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+# Registered environments
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_a_timed_environment_passes_gymnasiums_and_stable_baselines_checkers(id):
+    env = gym.make(id, fidelity="fast").unwrapped
+    check_env(env, skip_render_check=True)
+    pytest.importorskip("stable_baselines3.common.env_checker").check_env(env, warn=True, skip_render_check=True)
+
+
+@pytest.mark.parametrize("id", ["SeastarSwim-v0", *IDS])
+def test_ids_are_those_of_the_table(id):
+    row = re.search(rf"\| `{id}` +\|(.*)\|$", SeastarSwimEnv.__doc__, re.MULTILINE)[1]
+    period, actions, limit, decisions, actuator = (cell.strip().strip("`") for cell in row.split("|"))
+    env, inner = gym.make(id), gym.make(id).unwrapped
+    assert inner.decision_period == float(period) and f'"{inner.actions}"' == actions
+    assert env.spec.max_episode_steps == int(decisions) == round(float(limit) / float(period))
+    assert type(inner.scene.actuator).__name__ == actuator
+    assert gym.make_vec(id, 2).max_episode_steps == int(decisions)
+    assert gym.make_vec(id, 2).decision_period == float(period)
+    env.reset(seed=0)
+    assert env.step(env.action_space.sample())[4]["time"] == float(period)
+
+
+def test_the_table_has_all_timed_environments():
+    assert seastar_gym.TIMED == IDS
+
+
+@pytest.mark.parametrize("id", IDS)
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+def test_the_batch_has_the_bits_of_single_environments(id, mode):
+    arguments = {"fidelity": "fast", "path": "random", "random_heading": True, "max_episode_steps": 3}
+    batch = gym.make_vec(id, 3, "vector_entry_point", autoreset_mode=mode, **arguments)
+    singles = gym.make_vec(id, 3, "sync", vector_kwargs={"autoreset_mode": mode}, **arguments)
+    assert_same_steps(batch, singles, 8)
+
+
+@pytest.mark.parametrize("actions", MODES)
+@pytest.mark.parametrize("scene", [DEAF, HOT])
+def test_a_batch_with_masks_has_the_bits_of_single_environments(actions, scene):
+    arguments = {"scene": scene, "actions": actions, "decision_period": 0.2, "max_episode_steps": 4}
+    for mode in (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP):
+        batch = gym.make_vec("SeastarSwim-v0", 2, "vector_entry_point", autoreset_mode=mode, **arguments)
+        singles = gym.make_vec("SeastarSwim-v0", 2, "sync", vector_kwargs={"autoreset_mode": mode}, **arguments)
+        assert_same_steps(batch, singles, 7)
+
+
+def assert_same_steps(batch, singles, n):
+    np.testing.assert_array_equal(batch.reset(seed=1)[0], singles.reset(seed=1)[0])
+    singles.action_space.seed(0)
+    for _ in range(n):
+        actions = singles.action_space.sample()
+        *found, info = batch.step(actions)
+        *expected, its_info = singles.step(actions)
+        assert_same(found, expected)
+        for name in ("heating_time", "energy", "energy_per_metre", "action_mask", "masked_limbs", "time"):
+            if name in its_info:
+                np.testing.assert_array_equal(info[name], its_info[name], err_msg=name)
+        np.testing.assert_array_equal(batch.call("action_masks"), singles.call("action_masks"))
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_a_timed_environment_comes_back_from_its_spec_and_from_a_pickle(id):
+    env = gym.make(id, fidelity="fast")
+    spec = gym.envs.registration.EnvSpec.from_json(env.spec.to_json())
+    expected = swum(env)
+    for other in (gym.make(spec), pickle.loads(pickle.dumps(env)), copy.deepcopy(env)):
+        assert_same(swum(other), expected)
+
+
+def test_a_pickle_in_the_middle_of_an_episode_goes_on_to_the_same_bits():
+    env = SeastarSwimEnv(actions="pairs", fidelity="fast", decision_period=0.2)
+    env.reset(seed=0)
+    env.step(7)
+    twin = pickle.loads(pickle.dumps(env))
+    for action in (3, 0, 12):
+        np.testing.assert_array_equal(env.step(action)[0], twin.step(action)[0])
+
+
+def test_reset_forgets_the_heat():
+    env = SeastarSwimEnv(actions="pairs", fidelity="fast", decision_period=0.2)
+    first, info = env.reset(seed=0)
+    env.step(7)
+    again, its_info = env.reset(seed=0, options={"path": "pentagon"})
+    np.testing.assert_array_equal(again, first)
+    assert its_info["energy_per_metre"] == info["energy_per_metre"] == 0.0
+
+
+# Decision periods
+
+
+def test_a_decision_is_a_stroke_unless_another_period_is_asked_for():
+    for arguments in ({}, {"decision_period": 1.0}, {"decision_period": None}):
+        env = SeastarSwimEnv(fidelity="fast", **arguments)
+        assert env.decision_period == 1.0 and env.scene == Scene.preset("fast")
+    assert SeastarSwimEnv(scene=Scene(actuator=ThermalSma(cooling_time=0.4))).decision_period == 0.5
+    assert SeastarSwimEnv(scene=Scene(), decision_period=1.5).decision_period == 1.5
+
+
+CURVE = MeasuredCurve((0.0, 0.5, 1.0), (0.0, 0.3, 0.0))
+
+
+@pytest.mark.parametrize("actuator", [SmaPulse(), CURVE, Limited(SmaPulse(), 0.3)])
+def test_decisions_before_limbs_are_at_rest_are_refused(actuator):
+    scene = Scene(actuator=actuator, numerics=FAST)
+    for make in (SeastarSwimEnv, SeastarSwimVectorEnv):
+        with assert_refused("decision_period", type(actuator).__name__, "SmaWires"):
+            make(scene=scene, decision_period=0.5)
+        make(scene=scene, decision_period=1.0)
+
+
+@pytest.mark.parametrize("actuator", [SmaWires(), ThermalSma(), Limited(SmaPulse(), None, 3.0)])
+def test_actuators_that_go_on_from_where_they_are_take_any_period(actuator):
+    for period in (0.05, 0.3, 2.0):
+        env = SeastarSwimEnv(scene=Scene(actuator=actuator, numerics=FAST), decision_period=period)
+        env.reset(seed=0)
+        for k in range(1, 4):
+            assert env.step(STRAIGHT)[4]["time"] == pytest.approx(k * period, rel=1e-14)
+
+
+@pytest.mark.parametrize("period", [0.0, -0.5, np.nan, np.inf, 1e-30, 1e30, True, "0.5"])
+def test_what_is_no_decision_period_is_refused(period):
+    for make in (SeastarSwimEnv, SeastarSwimVectorEnv):
+        with assert_refused("decision_period"):
+            make(decision_period=period)
+
+
+def test_errors_that_were_measured_of_strokes_are_promised_of_strokes_only():
+    names = {"path_error", "space_error", "time_error", "real_time_factor"}
+    assert names <= set(SeastarSwimEnv(fidelity="fast").reset(seed=0)[1])
+    assert names <= set(SeastarSwimEnv(scene=Scene(actuator=SmaWires()), decision_period=1.0).reset(seed=0)[1])
+    assert not names & set(SeastarSwimEnv(fidelity="fast", decision_period=0.5).reset(seed=0)[1])
+
+
+# Heat
+
+
+def test_heat_of_whole_pulses_costs_what_it_always_did():
+    env = SeastarSwimEnv(fidelity="fast")
+    env.reset(seed=0)
+    for action, n in (([0, 0, 0, 0, 0], 0), (STRAIGHT, 2), ([1, 2, 1, 0, 0], 3), ([1] * 5, 5)):
+        info = env.step(action)[4]
+        assert info["reward_effort"] == -0.01 * n and info["limbs_heated"] == n
+        assert info["heating_time"] == pytest.approx(0.1 * n)
+        assert info["energy"] == pytest.approx(env.scene.actuator.heating_power * info["heating_time"])
+
+
+@pytest.mark.parametrize("actuator", [SmaPulse(), SmaWires(), ThermalSma()])
+def test_a_share_of_a_pulse_costs_its_share(actuator):
+    env = SeastarSwimEnv(scene=Scene(actuator=actuator, numerics=FAST), actions="continuous")
+    env.reset(seed=0)
+    info = env.step(np.array([0.0, 0.5, 0.0, 0.0, -0.25], np.float32))[4]
+    assert info["heating_time"] == pytest.approx(0.075)
+    assert info["reward_effort"] == pytest.approx(-0.0075) and info["limbs_heated"] == 2
+
+
+def test_heat_that_an_actuator_does_not_tell_is_unknown_and_priced_by_command():
+    class Plain:
+        """Actuator that says nothing of heat."""
+
+        peak_angle, period, corners = 0.3, 1.0, (0.0, 0.5, 1.0)
+
+        def delta_psi(self, t):
+            return CURVE.delta_psi(t)
+
+    env = SeastarSwimEnv(scene=Scene(actuator=Plain(), numerics=FAST))
+    env.reset(seed=0)
+    info = env.step(STRAIGHT)[4]
+    assert np.isnan([info["heating_time"], info["energy"], info["energy_per_metre"]]).all()
+    assert info["reward_effort"] == -0.02
+
+
+def test_energy_per_metre_is_that_since_the_reset():
+    env = SeastarSwimEnv(actions="pairs", fidelity="fast", decision_period=0.5)
+    straight = env.command_table.tolist().index([0.0, 1.0, 0.0, 0.0, -1.0])
+    for _ in range(2):
+        assert env.reset(seed=0)[1]["energy_per_metre"] == 0.0
+        energy, progress = 0.0, 0.0
+        for action in (straight, 0, straight):
+            info = env.step(action)[4]
+            energy, progress = energy + info["energy"], progress + info["reward_progress"] / 200.0
+            assert info["energy_per_metre"] == pytest.approx(energy / progress)
+    env.reset(seed=0, options={"path": [[-1.0, 0.0]]})
+    assert env.step(straight)[4]["energy_per_metre"] == np.inf
+
+
+def test_decisions_that_end_within_a_pulse_pay_for_it_all_the_same():
+    env = SeastarSwimEnv(fidelity="fast", decision_period=0.05, reward=RewardWeights(effort=1.0))
+    env.reset(seed=0)
+    terms = [env.step(action)[4]["reward_effort"] for action in (STRAIGHT, [0] * 5, [0] * 5)]
+    assert terms == pytest.approx([-1.0, -1.0, 0.0])
+
+
+# Observations
+
+
+def test_the_memory_of_wires_is_observed_or_not():
+    seen = SeastarSwimEnv(actions="pairs", fidelity="fast", decision_period=0.5)
+    blind = SeastarSwimEnv(actions="pairs", fidelity="fast", decision_period=0.5, observe_actuators=False)
+    for observation, other in ((seen.reset(seed=0)[0], blind.reset(seed=0)[0]), (seen.step(7)[0], blind.step(7)[0])):
+        assert observation.shape == seen.observation_space.shape == (196,)
+        assert other.shape == blind.observation_space.shape == (186,)
+        np.testing.assert_array_equal(np.delete(observation, np.s_[182:192]), other)
+    assert sorted(observation[182:192])[-2:] == pytest.approx([5 / 9, 5 / 9])
+    with assert_refused("observe_actuators"):
+        SeastarSwimEnv(observe_actuators=1)
+
+
+# Continuous actions
+
+
+@pytest.mark.parametrize(
+    "action, words",
+    [
+        ([0.0, 0.0, 0.0, 0.0, 1.1], "from -1 to 1"),
+        ([0.0, np.nan, 0.0, 0.0, 0.0], "from -1 to 1"),
+        ([0.0, np.inf, 0.0, 0.0, 0.0], "from -1 to 1"),
+        ([0.0, 0.0, 0.0, 0.0], "numbers of shape"),
+        ([True, False, True, True, True], "numbers of shape"),
+        (0.5, "numbers of shape"),
+        ("left", "numbers of shape"),
+        (None, "numbers of shape"),
+    ],
+)
+def test_what_is_no_continuous_action_is_refused_and_changes_nothing(action, words):
+    env, batch = (make(actions="continuous", fidelity="fast") for make in (SeastarSwimEnv, SeastarSwimVectorEnv))
+    for one, its_action in ((env, action), (batch, [action])):
+        one.reset(seed=0)
+        before = one.simulator.time.copy()
+        with assert_refused('With actions="continuous"', words):
+            one.step(its_action)
+        np.testing.assert_array_equal(one.simulator.time, before)
+
+
+def test_continuous_commands_are_a_fresh_array():
+    action = np.full((1, 5), 0.5)
+    assert not np.shares_memory(to_commands("continuous", 5, action, 1), action)
+
+
+# Masks
+
+
+@pytest.mark.parametrize("actions", MODES)
+def test_a_mask_is_true_for_actions_that_are_followed_as_a_whole(actions):
+    rng = np.random.default_rng(0)
+    deaf = rng.random((4, 5, 2)) < 0.3
+    masks = action_masks(actions, deaf)
+    if actions == "continuous":
+        np.testing.assert_array_equal(masks, ~deaf.reshape(4, 10))
+    elif actions == "limbs":
+        np.testing.assert_array_equal(masks.reshape(4, 5, 3)[..., 1:], ~deaf)
+        assert masks.reshape(4, 5, 3)[..., 0].all()
+    else:
+        for number in range(masks.shape[1]):
+            commands = to_commands(actions, 5, np.full(4, number), 4)
+            followed = ~((commands > 0) & deaf[..., 0] | (commands < 0) & deaf[..., 1]).any(axis=1)
+            np.testing.assert_array_equal(masks[:, number], followed)
+
+
+@pytest.mark.parametrize("scene", [DEAF, HOT])
+def test_a_masked_command_does_nothing_costs_nothing_and_is_counted(scene):
+    """After 0.05 s, wires of the last pulse are still heated, or as hot as they may be."""
+    env, other = (SeastarSwimEnv(scene=scene, decision_period=0.05) for _ in range(2))
+    for one in (env, other):
+        assert one.reset(seed=0)[1]["action_mask"].all()
+        info = one.step(STRAIGHT)[4]
+    masked = np.array([1, 1, 1, 1, 0, 0 if scene is DEAF else 1])
+    np.testing.assert_array_equal(info["action_mask"][:6], masked)
+    np.testing.assert_array_equal(env.action_masks(), info["action_mask"].astype(bool))
+    assert info["masked_limbs"] == 0 and info["action_mask"].dtype == np.int8
+    observation, reward, _, _, info = env.step([1, 1, 0, 0, 2])
+    expected, its_reward, _, _, its_info = other.step([1, 0, 0, 0, 0])
+    np.testing.assert_array_equal(observation, expected)
+    assert reward == its_reward and info["limbs_heated"] == its_info["limbs_heated"] == 1
+    assert info["masked_limbs"] == 2 and its_info["masked_limbs"] == 0
+
+
+def test_environments_whose_wires_always_follow_have_no_masks_in_info():
+    for arguments in ({}, {"decision_period": 0.5}, {"scene": Scene(actuator=ThermalSma())}):
+        env = SeastarSwimEnv(**arguments)
+        assert not {"action_mask", "masked_limbs"} & set(env.reset(seed=0)[1])
+        assert env.action_masks().shape == (15,) and env.action_masks().all()
+
+
+def test_a_masked_policy_never_loses_a_command():
+    """The mask of info is that of Gymnasium's `sample`."""
+    env = SeastarSwimEnv(actions="pairs", scene=DEAF, decision_period=0.2)
+    _, info = env.reset(seed=0)
+    env.action_space.seed(0)
+    for _ in range(20):
+        info = env.step(env.action_space.sample(mask=info["action_mask"]))[4]
+        assert info["masked_limbs"] == 0
+
+
+# Pictures
+
+
+@pytest.mark.parametrize("period, frames, fps", [(1.0, 10, 10), (0.5, 5, 10), (0.1, 1, 10), (0.02, 1, 50)])
+def test_a_second_has_ten_pictures(period, frames, fps):
+    env = SeastarSwimEnv(decision_period=period, fidelity="fast")
+    assert env.frames_per_stroke == frames and env.metadata["render_fps"] == fps
+
+
+def test_pictures_show_commands_and_warm_wires():
+    pytest.importorskip("pygame")
+    warm, cold = (
+        SeastarSwimEnv(actions="pairs", fidelity="fast", render_mode="rgb_array_list", decision_period=period)
+        for period in (0.5, 1.0)
+    )
+    for env, n in ((warm, 5), (cold, 10)):
+        env.reset(seed=0)
+        env.render()
+        env.step(7)
+        pictures = env.render()
+        assert len(pictures) == n and pictures[0].shape == (720, 960, 3)
+    frame = warm._frame()
+    assert frame.warmth.shape == (5, 2) and frame.warmth.max() == pytest.approx(5 / 9)
+    assert cold._frame().warmth is None
+    still = warm._get_renderer()
+    without = still.draw(type(frame)(**{**vars(frame), "warmth": None}))
+    assert (still.draw(frame) != without).any()
+
+
+def test_a_batch_is_drawn_with_its_wires():
+    pytest.importorskip("pygame")
+    batch = SeastarSwimVectorEnv(2, fidelity="fast", decision_period=0.2, render_mode="rgb_array")
+    batch.reset(seed=0)
+    batch.step(np.array([STRAIGHT, STRAIGHT]))
+    one, other = batch.render()
+    assert one.shape == other.shape and one.ndim == 3

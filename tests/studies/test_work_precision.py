@@ -1,0 +1,87 @@
+"""The work-precision study measures whole errors and says which setting is worth its time."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+
+from seastar_gym import Numerics, Scene, Seastar
+from seastar_gym.certification.commands import PROMISED
+from seastar_gym.scene.numerics import PRESETS, Setting
+from studies.accuracy import work_precision as study
+from studies.accuracy import work_precision_page as page
+
+
+def test_settings_are_all_presets_and_more_and_every_problem_can_swim_them():
+    assert set(PRESETS.values()) <= set(study.SETTINGS)
+    assert len(set(study.SETTINGS)) == len(study.SETTINGS)
+    for physics in study.PROBLEMS.values():
+        for setting in (*study.SETTINGS, study.LIMIT, study.HALF):
+            study.scene_of(setting, physics)
+
+
+def test_sequences_are_of_full_amplitude():
+    drawn = study.draw_sequences(3)
+    assert drawn.shape == (10, study.SAMPLES * len(PROMISED), 3)
+    assert (np.abs(drawn).max(axis=(0, 2)) > 0.1).all()
+
+
+def test_an_error_is_a_share_of_the_path_and_infinite_where_the_solver_failed():
+    limit = np.cumsum(np.full((10, 2, 2), [0.003, 0.004]), axis=0)
+    hub = limit + [0.0, 0.001]
+    hub[3, 1] = np.nan
+    np.testing.assert_allclose(study.errors(hub, limit, 0.1), [0.02, np.inf])
+
+
+def row(ms: float, error: float, discretisation: str = "continuum", preset: str | None = None) -> dict:
+    return {
+        "discretisation": discretisation, "nodes_per_limb": 10, "scheme": "sdirk2", "step": 0.02, "preset": preset,
+        "ms_per_stroke": ms, "largest_error": error, "median_error": error, "straight_error": error,
+    }  # fmt: skip
+
+
+def test_the_front_has_what_no_other_setting_beats():
+    rows = [row(1.0, 0.1), row(2.0, 0.2), row(3.0, 0.05), row(0.5, 0.4)]
+    assert [each["ms_per_stroke"] for each in page.front(rows, "largest_error")] == [0.5, 1.0, 3.0]
+
+
+def test_largest_errors_are_told_of_robots_whose_worst_sequences_have_a_limit():
+    rows = [row(1.0, 0.1, preset=name) for name in page.USES] + [row(2.0, 0.2, "chapter"), row(1.0, 0.05)]
+    problems = {"a": {"limit_error": 1e-4, "settings": rows}, "contact": {"limit_error": 0.3, "settings": rows}}
+    assert "Not so for contact, where 30 % are in doubt" in page._doubt(problems)
+    assert "2 to 2 times faster" in page._conclusion(problems)
+    rows[-1] |= {"largest_error": study.finite(np.inf)}
+    assert "fails, 5 %" in page._rows(problems)[-1]
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """One problem beside the chapter's, and settings of a moment."""
+    settings = (*PRESETS.values(), Setting("continuum", 5, Numerics("sdirk2", 2e-2, 1e-6)))
+    fast = {name: each._replace(nodes_per_limb=5, numerics=Numerics("sdirk2", 2e-2, 1e-6 * (k + 1)))
+            for k, (name, each) in enumerate(PRESETS.items())}  # fmt: skip
+    monkeypatch.setattr(study, "PRESETS", fast)
+    monkeypatch.setattr(study, "SETTINGS", (*fast.values(), settings[-1]))
+    monkeypatch.setattr(study, "LIMIT", Setting("continuum", 9, Numerics("implicit-midpoint", 5e-3, 1e-6)))
+    monkeypatch.setattr(study, "HALF", Setting("continuum", 5, Numerics("implicit-midpoint", 1e-2, 1e-6)))
+    monkeypatch.setattr(study, "SAMPLES", 1)
+    monkeypatch.setattr(study, "PROBLEMS", {"chapter's robot": Scene(), "short": Scene(Seastar(limb_length=0.05))})
+
+
+def test_page_and_picture_are_written_and_nothing_is_measured_twice(small, tmp_path, monkeypatch):
+    out = tmp_path / "page.md"
+    monkeypatch.setattr(sys, "argv", ["work_precision", "--out", str(out)])
+    study.main()
+    found = json.loads(out.with_suffix(".json").read_text())
+    assert set(found["problems"]) == {"chapter's robot", "short"}
+    assert found["machine"] in out.read_text() and found["numba"] in out.read_text()
+    for name in PRESETS:
+        assert f"| `{name}` |" in out.read_text()
+    assert (tmp_path / "page_problems.png").stat().st_size > 20_000
+    monkeypatch.setattr(study, "examine", None)
+    study.main()
+    found["numba"] = "0.1"
+    out.with_suffix(".json").write_text(json.dumps(found))
+    with pytest.raises(SystemExit, match="another machine or version"):
+        study.main()
