@@ -14,6 +14,7 @@ from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
 from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water, relaxation_time
 from seastar_gym.scene.actuators.limited import Limited
 from seastar_gym.scene.actuators.measured import MeasuredCurve
+from seastar_gym.scene.actuators.sma_limb import SmaLimb
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.scene.certificate import Certificate
@@ -40,6 +41,7 @@ __all__ = [
     "Seastar",
     "ShearCurrent",
     "Simulator",
+    "SmaLimb",
     "SmaPulse",
     "SmaWires",
     "SolverStatus",

@@ -23,6 +23,7 @@ from seastar_gym import (
     Seastar,
     ShearCurrent,
     Simulator,
+    SmaLimb,
     SmaPulse,
     SmaWires,
     ThermalSma,
@@ -79,7 +80,7 @@ def reset_batch(seed, options):
 
 TARGETS = [
     (Seastar, {}), (Limb, {}), (Water, {}), (Contact, {}), (SmaPulse, {}), (MeasuredCurve, CURVE), (ThermalSma, {}),
-    (SmaWires, {}), (AT_REST.advance, {"duration": 0.1, "commands": None}),
+    (SmaWires, {}), (SmaLimb, {}), (AT_REST.advance, {"duration": 0.1, "commands": None}),
     (Limited, {"actuator": SmaPulse()}), (Numerics, {}), (Numerics.preset, {"fidelity": "fast"}),
     (Scene.for_error, {"error": 0.05}), (Scene.preset, {"fidelity": "fast"}), (Scene, {}), (UniformCurrent, {}),
     (ShearCurrent, {"rate": 1.0}),

@@ -7,6 +7,7 @@ from robot to robot, `serial.py` writes scenes to plain data, and `fidelity.py` 
 from seastar_gym.scene.actuators.limited import Limited
 from seastar_gym.scene.actuators.measured import MeasuredCurve
 from seastar_gym.scene.actuators.pulse import SmaPulse
+from seastar_gym.scene.actuators.sma_limb import SmaLimb
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.scene.contact import Contact
@@ -27,6 +28,7 @@ __all__ = [
     "Scene",
     "Seastar",
     "ShearCurrent",
+    "SmaLimb",
     "SmaPulse",
     "SmaWires",
     "ThermalSma",

@@ -22,6 +22,7 @@ from seastar_gym import (
     Seastar,
     ShearCurrent,
     Simulator,
+    SmaLimb,
     SmaPulse,
     SmaWires,
     State,
@@ -325,6 +326,7 @@ MEMORIES = {
     "deaf": SmaWires(cooling_time=0.6, period=0.3, deaf=True),
     "thermal": ThermalSma(heating_time=0.1, cooling_time=0.4, largest_temperature=60.0),
     "limited": Limited(SmaPulse(), largest_rate=0.4),
+    "measured limb": SmaLimb(period=0.5),
 }
 
 

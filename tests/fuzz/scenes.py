@@ -27,6 +27,7 @@ from seastar_gym import (
     Seastar,
     ShearCurrent,
     Simulator,
+    SmaLimb,
     SmaPulse,
     SmaWires,
     State,
@@ -227,6 +228,10 @@ def draw_actuator(draw: Draw, terms: Terms, robot: Seastar, step: float) -> Actu
         cold = draw.each(lambda: draw.rng.uniform(0.0, 21.0))
         return ThermalSma(own.each(lambda: peak), heating, cooling, draw.each(lambda: draw.around(2.0 * heating, 0.9)),
                           draw.each(lambda: draw.around(220.0, 1.0)), cold)  # fmt: skip
+    if draw.maybe(0.4):
+        tau, rise = (draw.each(lambda middle=middle: draw.around(middle, 0.9)) for middle in (2.0 * heating, 9.0))
+        delay = draw.or_zero(draw.rng.uniform(0.1, 1.0) * heating)
+        return SmaLimb(own.each(lambda: peak), rise, 7.0, tau, heating, delay, heating + cooling)
     angle = own.each(lambda: (peak or 1.0) * draw.rng.uniform(0.1, 1.5)) if draw.maybe(0.5) else None
     rate = own.each(lambda: draw.around((peak or 1.0) / heating, 1.0)) if draw.maybe(0.7) else None
     return Limited(simple, angle, rate)

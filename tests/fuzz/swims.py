@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from seastar_gym import DomainRandomization, Limited, Scene, SmaPulse, SmaWires, ThermalSma, Uniform
+from seastar_gym import DomainRandomization, Limited, Scene, SmaLimb, SmaPulse, SmaWires, ThermalSma, Uniform
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.fidelity import promise
@@ -58,7 +58,8 @@ N_ENVS = 3
 def draw_arguments(rng: Random) -> dict[str, Any]:
     """Of an environment whose kernels are compiled anyway."""
     randomized = rng.random() < 0.4
-    actuator = rng.choice([SmaPulse(), SmaPulse(0.3), Limited(SmaPulse(), largest_rate=3.0), ThermalSma(), SmaWires()])
+    limited = Limited(SmaPulse(), largest_rate=3.0)
+    actuator = rng.choice([SmaPulse(), SmaPulse(0.3), limited, ThermalSma(), SmaWires(), SmaLimb()])
     names = rng.sample(["robot.youngs_modulus", "robot.density", "fluid.density"], rng.randint(1, 3))
     spread = DomainRandomization(
         {"limb_strengths": Uniform(0.3, 1.0)}

@@ -15,6 +15,7 @@ from seastar_gym import (
     Scene,
     Seastar,
     Simulator,
+    SmaLimb,
     SmaPulse,
     SmaWires,
     State,
@@ -31,6 +32,7 @@ MEMORY = {
     "thermal": ThermalSma(),
     "hot": ThermalSma(0.6, 0.1, 0.1, largest_temperature=60.0),
     "limited": Limited(SmaPulse(), largest_rate=2.0),
+    "measured limb": SmaLimb(heating_time=0.1, delay=0.02),
 }
 ALL = {"pulse": SmaPulse(), "curve": CURVE, **MEMORY}
 LEFT_RIGHT = np.array([[0.0, 1.0, 0.0, 0.0, -1.0]])

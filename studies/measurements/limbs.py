@@ -1,0 +1,163 @@
+"""Fits of 48 measured curves of shape memory alloy limbs, and predictions of frequencies that were left out.
+
+Every material is fitted at all its frequencies with the model of `SmaLimb`: its error per curve, as a fraction of the
+curve's peak, is printed beside that of the ramp of Fig. 13.5b. Then four frequencies predict the others, with 90 %
+intervals, once from spread frequencies and once from the four lowest ones. `--models` compares richer and poorer models
+in the same way. `--swims` swims the chapter's robot with the measured limbs.
+
+Prints tables and writes `limbs.json` and `limbs.png`. Takes about ten seconds on one core, with `--models` a minute.
+"""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from seastar_gym.command import run_command
+from seastar_gym.scene.actuators.pulse import pulse
+from studies.measurements.curves import PHASES, Curve, read_curves
+from studies.measurements.fit import Fit, fit, predict
+from studies.measurements.model import MODELS
+from studies.measurements.pictures import HEATING_SHARE, draw_curves
+from studies.measurements.swims import FIDELITY, GAITS, STROKES, actuators, distances
+from studies.parser import study_parser
+
+CHOSEN = "delay"
+"""The model of `SmaLimb`."""
+AIM = 0.04
+SHARE = 0.9
+"""Share of held-out samples that intervals should hold."""
+FITTED = 4
+"""Number of frequencies that predict the others."""
+
+
+def ramp_error(curve: Curve) -> float:
+    """Root mean square difference of a curve from the ramp of the same peak, over the peak."""
+    bend = (curve.curvature.max() - curve.curvature) / curve.peak
+    return float(np.sqrt(np.mean((bend - pulse(PHASES, HEATING_SHARE, 1.0 - HEATING_SHARE)) ** 2)))
+
+
+def held_out(model: str, curves: Sequence[Curve], chosen: Sequence[int]) -> dict[str, Any]:
+    """Error of predicted curves, share of their samples within the intervals, and the intervals' mean half width.
+
+    chosen: Indices of the curves that are fitted. The others are predicted.
+    """
+    others = [curve for k, curve in enumerate(curves) if k not in chosen]
+    predicted, width = predict(fit(model, [curves[k] for k in chosen]), others, SHARE)
+    peak = np.array([[curve.peak] for curve in others])
+    off = (np.array([curve.curvature for curve in others]) - predicted) / peak
+    return {
+        "fitted_hz": [curves[k].frequency for k in chosen],
+        "errors": np.round(np.sqrt(np.mean(off**2, axis=1)), 4).tolist(),
+        "error": float(np.sqrt(np.mean(off**2))),
+        "coverage": float(np.mean(np.abs(off) <= width / peak)),
+        "half_width": float(np.mean(width / peak)),
+        "samples": off.size,
+    }
+
+
+def splits(n_curves: int) -> dict[str, list[int]]:
+    """Curves that predict the others: spread over all frequencies, or those of the lowest ones."""
+    spread = np.linspace(0, n_curves - 1, FITTED).round().astype(int).tolist()
+    return {"between": spread, "beyond": list(range(FITTED))}
+
+
+def study_model(model: str, curves: dict[int, list[Curve]]) -> tuple[dict[int, Fit], dict[str, Any]]:
+    """Fits of a model to all materials, and its figures."""
+    fits = {liquid_metal: fit(model, of_one) for liquid_metal, of_one in curves.items()}
+    figures = {
+        str(liquid_metal): {
+            "numbers": {name: round(number, 5) for name, number in fits[liquid_metal].numbers.items()},
+            "frequencies_hz": [curve.frequency for curve in of_one],
+            "errors": np.round(fits[liquid_metal].errors, 4).tolist(),
+            "error": fits[liquid_metal].error,
+            "aic": fits[liquid_metal].aic,
+            **{name: held_out(model, of_one, chosen) for name, chosen in splits(len(of_one)).items()},
+        }
+        for liquid_metal, of_one in curves.items()
+    }
+    return fits, figures
+
+
+def summary(figures: dict[str, Any]) -> list[str]:
+    """Cells of a model: curves below the aim, error, AIC, held-out error and coverage between and beyond."""
+    materials = list(figures.values())
+    errors = np.concatenate([one["errors"] for one in materials])
+    cells = [f"{np.sum(errors < AIM)} of {errors.size}", f"{np.sqrt(np.mean(errors**2)):.3f}"]
+    cells.append(f"{sum(one['aic'] for one in materials):.0f}")
+    for name in ("between", "beyond"):
+        n = np.array([one[name]["samples"] for one in materials])
+        error = np.sqrt(np.sum(n * [one[name]["error"] ** 2 for one in materials]) / n.sum())
+        inside = np.sum(n * [one[name]["coverage"] for one in materials]) / n.sum()
+        cells.append(f"{error:.3f}, {100 * inside:.0f} %")
+    return cells
+
+
+def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    """Table of texts."""
+    made = Table(title=escape(title))
+    for k, column in enumerate(columns):
+        made.add_column(escape(column), no_wrap=k == 0)
+    for row in rows:
+        made.add_row(*row)
+    return made
+
+
+def print_fits(console: Console, figures: dict[str, Any], curves: dict[int, list[Curve]]) -> None:
+    """Tables of the errors of fits and of predictions."""
+    rows, predicted = [], []
+    for (liquid_metal, one), of_one in zip(figures.items(), curves.values(), strict=True):
+        for curve, error in zip(of_one, one["errors"], strict=True):
+            rows.append([f"{liquid_metal} %", f"{curve.frequency:g}", f"{error:.3f}", f"{ramp_error(curve):.3f}"])
+        for name in ("between", "beyond"):
+            there = one[name]
+            predicted.append(
+                [f"{liquid_metal} %", name, ", ".join(f"{f:g}" for f in there["fitted_hz"]), f"{there['error']:.3f}",
+                 f"{100 * there['coverage']:.0f} %", f"{there['half_width']:.3f}"]
+            )  # fmt: skip
+    console.print(table("Root mean square error over the peak", ("material", "Hz", "fit", "ramp"), rows))
+    columns = ("material", "held out", "fitted [Hz]", "error", f"within {100 * SHARE:.0f} %", "half width")
+    console.print(table("Predictions, over the peak", columns, predicted))
+
+
+def study_swims(console: Console) -> dict[str, Any]:
+    """Distances per stroke with every actuator; prints them."""
+    found = {name: (actuator.period, distances(actuator)) for name, actuator in actuators().items()}
+    rows = [[name, f"{period:.3f}", *(f"{mm:.2f}" for mm in far)] for name, (period, far) in found.items()]
+    title = f"Distance per stroke [mm], strokes {STROKES // 2 + 1} to {STROKES} from rest, {FIDELITY}"
+    console.print(table(title, ("limb", "period [s]", *GAITS), rows))
+    return {
+        name: {"period_s": period, "mm_per_stroke": np.round(far, 3).tolist()} for name, (period, far) in found.items()
+    }
+
+
+def main() -> None:
+    """Command line."""
+    parser = study_parser("studies.measurements.limbs", __doc__)
+    parser.add_argument("--out", type=Path, default=Path("docs"), metavar="FOLDER", help="folder of the results")
+    parser.add_argument("--models", action="store_true", help="also compare the other models")
+    parser.add_argument("--swims", action="store_true", help="also swim with the measured limbs (half a minute)")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    console, curves = Console(), read_curves()
+    fits, figures = study_model(CHOSEN, curves)
+    print_fits(console, figures, curves)
+    results: dict[str, Any] = {"model": CHOSEN, "fits": figures}
+    if options.models:
+        all_models = {name: summary(study_model(name, curves)[1]) for name in MODELS}
+        columns = ("model", f"curves below {AIM}", "error", "AIC", "between", "beyond")
+        console.print(table("Models", columns, [[name, *cells] for name, cells in all_models.items()]))
+        results["models"] = {name: dict(zip(columns[1:], cells, strict=True)) for name, cells in all_models.items()}
+    if options.swims:
+        results["gaits"], results["swims"] = list(GAITS), study_swims(console)
+    (options.out / "limbs.json").write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+    draw_curves(fits, options.out / "limbs.png")
+
+
+if __name__ == "__main__":
+    run_command(main)
