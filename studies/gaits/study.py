@@ -128,11 +128,10 @@ def from_rest(plan: Plan, progress: Callable[[int], Any]) -> tuple[Table, Swimmi
     return {"classes": len(gaits), "fastest": best(fastest), "turning": best(turning)}, swimming
 
 
-def synchronous_velocities(plan: Plan) -> Floats:
-    """Velocities [m/s] of the straight gaits of two of the chapter's strokes, shape (n, 2)."""
+def synchronous(plan: Plan) -> Swimming:
+    """How the gaits of two of the chapter's strokes swim."""
     gaits = command_table("joint", 5)[distinct_gaits(2, "joint")[:: max(1, plan.codes // 20)]]
-    swimming = measure(scene_with(SmaPulse()), gaits, 1.0)
-    return swimming.velocity[swimming.is_straight]
+    return measure(scene_with(SmaPulse()), gaits, 1.0)
 
 
 def by_direction(velocities: dict[str, Floats]) -> Table:
@@ -212,13 +211,15 @@ def study(plan: Plan) -> Table:
         name: measured(scene_with(fidelity=plan.finest), wave(limbs), SLOT)
         for name, limbs in (("wave", "54321"), ("wave back", "12345"))
     }
-    synchronous = measure(scene_with(SmaPulse()), np.array([[[0, 1, 0, 0, -1.0]]]), 1.0)
+    pair = measure(scene_with(SmaPulse()), np.array([[[0, 1, 0, 0, -1.0]]]), 1.0)
+    strokes = synchronous(plan)
     wires = [each["fast"] for each in evolution if each["actuator"] == "wires"]
     return {
         "robot": "the chapter's, continuum's discretisation",
         "finest": plan.finest,
         "named": named,
-        "one pair, synchronous": row(synchronous),
+        "one pair, synchronous": row(pair),
+        "two strokes, synchronous, turning most": row(strokes, int(np.argmax(np.abs(strokes.turn)))),
         "lag": lag_scan(),
         "from rest": rest,
         "evolved": evolution,
@@ -226,7 +227,7 @@ def study(plan: Plan) -> Table:
         "directions_deg": np.degrees(DIRECTIONS).tolist(),
         "mm_per_s_by_direction": by_direction(
             {
-                "synchronous": synchronous_velocities(plan),
+                "synchronous": strokes.velocity[strokes.is_straight],
                 "from rest": swimming.velocity[swimming.is_straight],
                 "re-heated": np.concatenate([velocity_of(each) for each in wires]),
             }
