@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from oracle import Star
-from seastar_gym import Scene, Seastar, SmaPulse, Water
+from seastar_gym import Limb, Scene, Seastar, SmaPulse, Water
 from seastar_gym.model.rods import make_rods
 
 
@@ -46,3 +46,32 @@ def test_coefficients_are_the_oracles(hub_hinge):
 def test_vacuum_has_no_drag(fluid):
     rods = make_rods(Scene(fluid=fluid))
     assert not rods.drag.any() and not rods.middle_drag.any()
+
+
+def mass_matrix(scene):
+    """Of one direction [kg], from lumped masses less what edges have less; shape (n_nodes, n_nodes)."""
+    rods = make_rods(scene)
+    matrix, edges = np.diag(rods.mass.copy()), scene.robot.nodes_per_limb - 1
+    for e, mu in enumerate(rods.edge_mass):
+        ends = np.ix_(*[[0 if e % edges == 0 else e, e + 1]] * 2)
+        matrix[ends] -= mu * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    return matrix
+
+
+@pytest.mark.parametrize("nodes", [2, 3, 5, 10])
+def test_kinetic_energy_is_positive_however_limbs_taper(nodes):
+    """Coarse limbs of very different radii once had a negative one."""
+    rng = np.random.default_rng(nodes)
+    for _ in range(50):
+        limbs = tuple(Limb(radius=tuple(10.0 ** rng.uniform(-4, -2, rng.integers(2, 6)))) for _ in range(3))
+        scene = Scene(Seastar(n_limbs=3, nodes_per_limb=nodes, limbs=limbs))
+        matrix = mass_matrix(scene)
+        assert matrix.sum() == pytest.approx(make_rods(scene).mass.sum())
+        assert np.linalg.eigvalsh(matrix).min() > 0.0
+
+
+def test_edges_of_one_radius_keep_a_sixth_of_their_mass():
+    scene = Scene()
+    rods, robot = make_rods(scene), scene.robot
+    a_sixth = robot.density * np.pi * robot.rod_radius**2 * robot.limb_length / (robot.nodes_per_limb - 1) / 6.0
+    np.testing.assert_allclose(rods.edge_mass, a_sixth, rtol=1e-12)

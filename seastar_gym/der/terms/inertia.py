@@ -24,9 +24,20 @@ def coefficients(mesh: Mesh, density: float, held_nodes: Sequence[int] = ()) -> 
 
 
 def edge_coefficients(mesh: Mesh, density: float) -> NDArray[np.float64]:
-    """mu = rho_m A l/6, per edge [kg]: with consistent masses an edge has mu |d_head - d_tail|^2/2 less inertia."""
+    """mu = rho_m A l/6, per edge [kg]: with consistent masses an edge has mu |d_head - d_tail|^2/2 less inertia.
+
+    An edge whose halves weigh a and b may have less than a b/(a + b) less, or its kinetic energy would not be positive.
+    Only limbs that taper by a lot from one node to the next come to that.
+    """
     area = np.array([np.pi * r**2 for r in mesh.radius_at_edges])
-    return density * area * mesh.l / 6.0
+    at_nodes = np.pi * np.square(mesh.radius_at_nodes)
+    tail, head = at_nodes[:, :-1].ravel(), at_nodes[:, 1:].ravel()
+    most = MOST_TAKEN * density * (0.5 * mesh.l) / (1.0 / tail + 1.0 / head)
+    return np.minimum(density * area * mesh.l / 6.0, most)
+
+
+MOST_TAKEN = 0.9
+"""Largest mu over a b/(a + b). In a limb of one radius it is 2/3."""
 
 
 @kernel
