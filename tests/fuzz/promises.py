@@ -233,7 +233,8 @@ def check_energy(case: Case) -> None:
     """Implicit Euler creates no energy in any step without commands, in vacuum or in water at rest.
 
     What contact and moving water store is not in the energies that a simulator tells of. Newton tolerances as loose as
-    a thousandth of a limb leave residual forces that do work, so they are at most the default here.
+    a thousandth of a limb leave residual forces that do work, so they are at most the default here. A robot that begins
+    with a hinge folded to pi has no energy to begin with: the least nudge makes another one of it.
     """
     scene, fluid = case.scene, case.scene.fluid
     if fluid is not None:
@@ -244,12 +245,17 @@ def check_energy(case: Case) -> None:
     simulator = make(case._replace(scene=scene))
     at_rest = np.zeros_like(case.commands[0])
     before = simulator.elastic_energy() + simulator.kinetic_energy()
+    robots, shortest = range(case.n_robots), numerics.step / FINEST
+    nudge = make(nudged(case._replace(scene=scene), 0)).elastic_energy()
+    rounding = np.array([energy_noise(simulator, robot, before[robot], shortest) for robot in robots])
+    is_folded = nudge > 10.0 * before + 1000.0 * rounding
     for _ in simulator.stroke_in_parts(at_rest, 100):
         after = simulator.elastic_energy() + simulator.kinetic_energy()
-        for robot in range(case.n_robots):
-            noise = energy_noise(simulator, robot, before[robot], numerics.step / FINEST)
+        for robot in robots:
+            noise = energy_noise(simulator, robot, before[robot], shortest)
             grown = after[robot] - before[robot] * (1.0 + ENERGY_ROUNDING)
-            assert not grown > noise, f"robot {robot}: from {before[robot]} to {after[robot]} J, noise {noise} J"
+            told = f"robot {robot}: from {before[robot]} to {after[robot]} J, noise {noise} J"
+            assert is_folded[robot] or not grown > noise, told
         before = after
 
 
