@@ -7,10 +7,8 @@ from seastar_gym.scene.actuators.actuator import Actuator, StatefulActuator
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.numerics import MAX_STEPS
 from seastar_gym.scene.per_robot import batch_size
+from seastar_gym.simulator.drive import JUMP
 from seastar_gym.simulator.schedule import SHORTEST
-
-JUMP = 1e-9
-"""Rotation over the peak angle. A limb that would turn by more at once would jump."""
 
 
 def checked_decision_period(seconds: float | None, scene: Scene) -> float:

@@ -22,7 +22,7 @@ from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.actuators.wires import SmaWires
 from studies.gaits.enumeration import SLOTS, distinct_codes, gaits_of
 from studies.gaits.evolution import evolve
-from studies.gaits.named import GAITS, SLOT, lagged, wave
+from studies.gaits.named import GAITS, SLOT, lagged
 from studies.gaits.periodic import Swimming, events_of, joined, measure, timed
 from studies.learning.bound import all_directions, distinct_gaits, mixed_speed
 from studies.parser import study_parser
@@ -207,10 +207,6 @@ def study(plan: Plan) -> Table:
         rest, swimming = from_rest(plan, bar.update)
         evolution = evolved(plan, bar.update)
     named = named_gaits(plan)
-    turns = {
-        name: measured(scene_with(fidelity=plan.finest), wave(limbs), SLOT)
-        for name, limbs in (("wave", "54321"), ("wave back", "12345"))
-    }
     pair = measure(scene_with(SmaPulse()), np.array([[[0, 1, 0, 0, -1.0]]]), 1.0)
     strokes = synchronous(plan)
     wires = [each["fast"] for each in evolution if each["actuator"] == "wires"]
@@ -223,7 +219,6 @@ def study(plan: Plan) -> Table:
         "lag": lag_scan(),
         "from rest": rest,
         "evolved": evolution,
-        "turning": turns,
         "directions_deg": np.degrees(DIRECTIONS).tolist(),
         "mm_per_s_by_direction": by_direction(
             {

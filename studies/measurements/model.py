@@ -46,7 +46,7 @@ def pulsed(t: Floats, period: float, width: float, rise: float, tau: float) -> F
 
 
 def lagging(t: Floats, period: float, width: float, rise: float, tau: float, lag: float) -> Floats:
-    """The same temperature behind a first-order lag [s]: a difference of two exponentials."""
+    """Temperature of a wire as `pulsed` has it, behind a first-order lag [s]: a difference of two exponentials."""
     steady = rise / -np.expm1(-width / tau)
     behind = pulsed(t, period, width, steady * -np.expm1(-width / lag), lag)
     return (tau * pulsed(t, period, width, rise, tau) - lag * behind) / (tau - lag)

@@ -4,7 +4,6 @@ Draws both side by side, at the same simulated time, until the faster one has ar
 """
 
 import argparse
-import itertools
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -34,7 +33,7 @@ COLOURS = 48
 
 
 def frames(policy: Policy, per_decision: int, **arguments: Any) -> Iterator[Picture]:
-    """Pictures of a swim round the pentagon every BETWEEN seconds; the last one is repeated for ever.
+    """Pictures of a swim round the pentagon every BETWEEN seconds, and that of its end.
 
     per_decision: Number of parts of BETWEEN/2 in a decision.
     """
@@ -90,14 +89,16 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=None, help="largest number of frames")
     parser.add_argument("--out", type=Path, default=Path("docs/swim.gif"), help="file (default: %(default)s)")
     options = parser.parse_args()
+    parts = round(2 * options.decision_period / BETWEEN)
+    if not np.isclose(parts * BETWEEN, 2 * options.decision_period) or parts == 0:
+        parser.error(f"decisions must take a whole number of {BETWEEN / 2:g} s, not {options.decision_period:g} s.")
     policy = load(in_the_box(options.decision_period))
     gait = scripted("pentagon", policy.actions)
-    parts = round(2 * policy.decision_period / BETWEEN)
     chapter = frames(gait, round(2 / BETWEEN), actions=gait.actions, fidelity="balanced")
     learned = frames(
         policy, parts, actions=policy.actions, scene=policy.scene, decision_period=policy.decision_period
     )
-    film = side_by_side(chapter, itertools.chain(learned), options.frames)
+    film = side_by_side(chapter, learned, options.frames)
     write_gif(film, options.out)
     print(f"Written: {options.out}, {len(film)} frames of {BETWEEN} s.")
 
