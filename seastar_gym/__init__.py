@@ -8,6 +8,7 @@ from typing import Any
 from gymnasium.envs.registration import register
 
 from seastar_gym.certification.measure import certify
+from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.randomization import DomainRandomization, LogUniform, Normal, Uniform
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
@@ -21,7 +22,7 @@ from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
 from seastar_gym.scene.limb import Limb
-from seastar_gym.scene.serial import register_part
+from seastar_gym.scene.serial import register_part, to_dict
 from seastar_gym.simulator import Simulator, SolverStatus, State, StrokeReport
 from seastar_gym.version import __version__
 
@@ -30,6 +31,7 @@ __all__ = [
     "Contact",
     "DomainRandomization",
     "GridCurrent",
+    "Headings",
     "Limb",
     "Limited",
     "LogUniform",
@@ -78,3 +80,10 @@ for _id, _decision_period in TIMED.items():
         kwargs={"decision_period": _decision_period, "actions": "pairs"},
         **_ENTRY_POINTS,
     )
+
+register(
+    id="SeastarSwimHeading-v0",
+    max_episode_steps=600,
+    kwargs={"decision_period": 0.5, "actions": "joint", "headings": to_dict(Headings())},
+    **_ENTRY_POINTS,
+)

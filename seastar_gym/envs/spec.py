@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
+from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.scene import Scene
@@ -54,7 +55,7 @@ def _as_plain(spec: EnvSpec) -> EnvSpec:
 def _plain(value: Any) -> Any:
     """An argument, or several, as JSON has them."""
     match value:
-        case Scene() | RewardWeights() | DomainRandomization():
+        case Scene() | RewardWeights() | DomainRandomization() | Headings():
             return to_dict(value)
         case Enum():
             return value.value

@@ -10,14 +10,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.decisions import checked_decision_period
+from seastar_gym.envs.headings import AskedHeadings, Headings
 from seastar_gym.envs.masks import action_masks, can_be_masked, masked_limbs
 from seastar_gym.envs.observation import (
     VELOCITY_SCALE,
+    body_axes,
     observation_size,
     observe,
     scene_layout,
     to_float32,
-    with_memory,
+    with_more,
 )
 from seastar_gym.envs.paths import FARTHEST, cross_track_error, make_path
 from seastar_gym.envs.promises import promised, read_certificate
@@ -84,9 +86,9 @@ def read(part: Part | Plain, kind: type[Any]) -> Part:
     return from_dict(part, kind) if isinstance(part, dict) else part
 
 
-def scene_observation_size(scene: Scene, observe_actuators: bool = True) -> int:
-    """Length of the observation of a scene's robot."""
-    return scene_layout(scene, observe_actuators).size
+def scene_observation_size(scene: Scene, observe_actuators: bool = True, with_headings: bool = False) -> int:
+    """Length of the observation of a scene's robot. with_headings: Whether headings are asked for."""
+    return scene_layout(scene, observe_actuators, with_headings).size
 
 
 class SwimTask:
@@ -110,8 +112,10 @@ class SwimTask:
         actions: Actions = "limbs",
         decision_period: float | None = None,
         observe_actuators: bool = True,
+        headings: Headings | Plain | None = None,
     ):
         randomization, reward = read(randomization, DomainRandomization), read(reward, RewardWeights)
+        headings = read(headings, Headings)
         if not isinstance(randomization, DomainRandomization | None):
             raise ValueError(f"randomization must be a DomainRandomization or None, not {shown(randomization)}.")
         require_number("waypoint_radius", waypoint_radius, "m")
@@ -120,6 +124,8 @@ class SwimTask:
         require_flag("random_heading", random_heading)
         if not isinstance(reward, RewardWeights):
             raise ValueError(f"reward must be RewardWeights, not {shown(reward)}.")
+        if not isinstance(headings, Headings | None):
+            raise ValueError(f"headings must be Headings or None, not {shown(headings)}.")
         require_flag("observe_actuators", observe_actuators)
         self.decision_period = checked_decision_period(decision_period, scene)
         self._in_strokes = self.decision_period == scene.actuator.period
@@ -127,6 +133,10 @@ class SwimTask:
         self.observe_actuators = observe_actuators
         self._can_be_masked = can_be_masked(scene.actuator)
         waypoints = make_path(path, np.random.default_rng(0))  # refuses a bad path now, not at the first reset
+        if headings is not None:
+            headings.of_path(waypoints, np.random.default_rng(0))  # likewise
+        self.headings = headings
+        self._asked = None if headings is None else AskedHeadings(headings, n_robots)
         self.scene, self.randomization = scene, randomization
         self.drawn = {} if randomization is None else randomization.first_values(scene, n_robots)
         self.simulator = Simulator(drawn_scene(scene, self.drawn), n_robots, threads, error_bars)
@@ -146,22 +156,26 @@ class SwimTask:
         self._way_after = np.zeros((n_robots, 1))  # from waypoint k to the last [m]
         self.n_waypoints = np.ones(n_robots, np.int64)
         self.waypoint_index = np.zeros(n_robots, np.int64)
-        self._way_to_go = np.zeros(n_robots)
+        self._way_to_go, self._turn_to_go = np.zeros(n_robots), np.zeros(n_robots)
         self._way_at_reset, self._energy = np.zeros(n_robots), np.zeros(n_robots)  # [m]; since the reset [J]
 
     @property
     def observation_size(self) -> int:
         """Length of one robot's observation."""
-        return scene_observation_size(self.simulator.scene, self.observe_actuators)
+        return scene_observation_size(self.simulator.scene, self.observe_actuators, self.headings is not None)
 
     def reset(self, robots: NDArray[np.bool_], generators: list[np.random.Generator], path: Path | None = None) -> None:
         """Begin a new episode of the robots in a mask, shape (n_robots,).
 
-        generators: Random generator of every robot, which draws its path, its heading, then numbers of its scene.
+        generators: Random generator of every robot, which draws its path, asked headings, its own heading, then
+            numbers of its scene.
         """
         headings = np.zeros(self.n_robots)
         for robot in np.flatnonzero(robots):
-            self._set_path(robot, make_path(self.path if path is None else path, generators[robot]))
+            waypoints = make_path(self.path if path is None else path, generators[robot])
+            if self._asked is not None:
+                self._asked.begin(int(robot), self._asked.headings.of_path(waypoints, generators[robot]))
+            self._set_path(robot, waypoints)
             if self.random_heading:
                 headings[robot] = generators[robot].uniform(-np.pi, np.pi)
             if self.randomization is not None:
@@ -174,6 +188,8 @@ class SwimTask:
         self.waypoint_index[robots] = 0
         self._way_to_go[robots] = self._measure_way_to_go(self.simulator.hub_position())[robots]
         self._way_at_reset[robots], self._energy[robots] = self._way_to_go[robots], 0.0
+        if self._asked is not None:
+            self._turn_to_go[robots] = self._asked.to_go(self.waypoint_index, self.heading())[robots]
 
     def _set_path(self, robot: np.intp, waypoints: Floats) -> None:
         missing = len(waypoints) - self.waypoints.shape[1]
@@ -191,6 +207,18 @@ class SwimTask:
     def waypoints_of(self, robot: int) -> Floats:
         """Waypoints of a robot's present episode [m], shape (n, 2), a copy."""
         return self.waypoints[robot, : self.n_waypoints[robot]].copy()
+
+    def headings_of(self, robot: int) -> Floats | None:
+        """Asked headings of a robot's present episode [rad], shape (n,), a copy; None if none are asked for."""
+        return None if self._asked is None else self._asked.of_robot(robot)
+
+    def heading(self) -> Floats:
+        """Direction of every robot's body frame [rad], shape (n_robots,): the same bits for one robot and for many."""
+        simulator = self.simulator
+        out = np.empty((len(simulator.q), 2, simulator.q.shape[2]))
+        body_axes(simulator.coefficients.rest, simulator.q, stations(simulator.scene.robot.nodes_per_limb), out)
+        c, s = out.transpose(1, 0, 2).reshape(2, -1)[:, : self.n_robots]
+        return np.asarray(np.arctan2(s, c))
 
     def _waypoint(self, k: NDArray[np.int64]) -> Floats:
         """Waypoint k of every robot [m], the last one beyond the end, the origin at -1; shape (n_robots, 2)."""
@@ -218,7 +246,10 @@ class SwimTask:
         places = stations(robot.nodes_per_limb)
         observe(own.rest, own.limb_length, simulator.q, simulator.v, places, target_rows, VELOCITY_SCALE, out)
         seen = to_float32(out, self.n_robots)
-        return with_memory(seen, simulator.observe_actuators(), robot.n_limbs) if self.observe_actuators else seen
+        more = [simulator.observe_actuators()] if self.observe_actuators else []
+        if self._asked is not None:
+            more.append(self._asked.seen(self.waypoint_index, self.heading()))
+        return with_more(seen, np.hstack(more), robot.n_limbs) if more else seen
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Actions that wires can follow now, shape (n_robots, k), see masks.py."""
@@ -258,8 +289,10 @@ class SwimTask:
         success = self.waypoint_index == self.n_waypoints
         self._energy += report.energy
         pulses = pulses_of(report.heating_time, commands)
-        terms = reward_terms(self.reward, before - self._way_to_go, reached, pulses)
+        terms = reward_terms(self.reward, before - self._way_to_go, reached, pulses, self._turned())
         reward = terms["reward_progress"] + terms["reward_waypoint"] + terms["reward_effort"]
+        if self._asked is not None:
+            reward = reward + terms["reward_heading"]
         info = {
             **self.facts(hub),
             "is_success": success,
@@ -291,8 +324,15 @@ class SwimTask:
             "solver_status": counts.copy(),
             "solver_message": _messages(counts),
             "smallest_opening_angle": np.full(self.n_robots, min(self.scene.robot.opening_angle, np.pi)),
-            **reward_terms(self.reward, none, counts, none),
+            **reward_terms(self.reward, none, counts, none, None if self._asked is None else none),
         }
+
+    def _turned(self) -> Floats | None:
+        """Decrease of what is left to turn since it was last measured [rad], shape (n_robots,)."""
+        if self._asked is None:
+            return None
+        before, self._turn_to_go = self._turn_to_go, self._asked.to_go(self.waypoint_index, self.heading())
+        return before - self._turn_to_go
 
     def _energy_per_metre(self) -> Floats:
         """Energy over the decrease of the way to go, both since the reset [J/m]; infinite where it did not decrease."""
@@ -301,11 +341,17 @@ class SwimTask:
         return np.where(np.isnan(energy) | (energy == 0.0), energy, found)
 
     def _pass_waypoints(self, hub: Floats) -> NDArray[np.int64]:
-        """Move on while the current waypoint is within its radius; returns the number reached, shape (n_robots,)."""
+        """Move on while the current waypoint is within its radius, and its heading met if one is asked for.
+
+        Returns the number of waypoints reached, shape (n_robots,).
+        """
+        heading = None if self._asked is None else self.heading()
         reached = np.zeros(self.n_robots, np.int64)
         while True:
             near = _length(self._waypoint(self.waypoint_index) - hub) <= self.waypoint_radius
             near &= self.waypoint_index < self.n_waypoints
+            if self._asked is not None and heading is not None:
+                near &= self._asked.is_met(self.waypoint_index, heading)
             if not near.any():
                 return reached
             self.waypoint_index += near
@@ -322,11 +368,19 @@ class SwimTask:
             "waypoint_index": self.waypoint_index.copy(),
             "distance": _length(current - hub),
             "cross_track_error": cross_track_error(hub, self._waypoint(leg - 1), self._waypoint(leg)),
+            **self._heading_facts(),
             **({"action_mask": self.action_masks().astype(np.int8)} if self._can_be_masked else {}),
             **(self._promised() if self._in_strokes else {}),
             **({"error_estimate": self.simulator.error_estimate} if self._error_bars else {}),
             **{name: values.copy() for name, values in self.drawn.items()},
         }
+
+    def _heading_facts(self) -> dict[str, Floats]:
+        """Heading, and the turn from it to the asked one [rad], where headings are asked for."""
+        if self._asked is None:
+            return {}
+        heading = self.heading()
+        return {"heading": heading, "heading_error": self._asked.turn(self.waypoint_index, heading)}
 
     def _promised(self) -> dict[str, Floats]:
         """Measured errors and speed, shape (n_robots,) each; NaN for robots with weak limbs."""

@@ -6,6 +6,7 @@ import numpy as np
 from gymnasium import spaces
 
 from seastar_gym.envs.commands import Actions, action_space, command_table
+from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.spec import PlainSpec
 from seastar_gym.envs.task import SwimTask
@@ -37,6 +38,11 @@ class TaskEnv(PlainSpec):
     def observe_actuators(self) -> bool:
         """Whether observations have the memory of the actuators."""
         return self._task.observe_actuators
+
+    @property
+    def headings(self) -> Headings | None:
+        """Headings that are asked for at the waypoints, None if none are."""
+        return self._task.headings
 
     @property
     def scene(self) -> Scene:

@@ -16,6 +16,7 @@ from seastar_gym.envs.batch_attributes import BatchAttributes
 from seastar_gym.envs.batch_info import Info, of_some, with_masks
 from seastar_gym.envs.batch_pictures import BatchPictures, Picture
 from seastar_gym.envs.commands import Actions, as_array, to_commands
+from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.promises import warn_uncertified
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.reward import RewardWeights
@@ -78,6 +79,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         error_bars: bool = False,
         decision_period: float | None = None,
         observe_actuators: bool = True,
+        headings: Headings | Plain | None = None,
     ):
         if render_mode is not None and not (isinstance(render_mode, str) and render_mode == "rgb_array"):
             raise ValueError(
@@ -97,7 +99,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
             warn_uncertified(modelled, fidelity, certificate)
         task = SwimTask(
             modelled, num_envs, path, reward, waypoint_radius, random_heading, threads, randomization, certificate,
-            error_bars, actions, decision_period, observe_actuators,
+            error_bars, actions, decision_period, observe_actuators, headings,
         )  # fmt: skip
         self.single_action_space, self.single_observation_space = self._set_task(task)
         self.action_space = batch_space(self.single_action_space, num_envs)
