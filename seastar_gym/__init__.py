@@ -84,6 +84,6 @@ for _id, _decision_period in TIMED.items():
 register(
     id="SeastarSwimHeading-v0",
     max_episode_steps=600,
-    kwargs={"decision_period": 0.5, "actions": "joint", "headings": to_dict(Headings())},
+    kwargs={"decision_period": 0.5, "actions": "pairs", "headings": to_dict(Headings())},
     **_ENTRY_POINTS,
 )

@@ -61,7 +61,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `SeastarSwimTimed-v0`         | 0.5                 | `"pairs"` | 200            | 400       | `SmaWires` |
     | `SeastarSwimTimedModerate-v0` | 0.2                 | `"pairs"` | 200            | 1000      | `SmaWires` |
     | `SeastarSwimTimedHard-v0`     | 0.1                 | `"pairs"` | 200            | 2000      | `SmaWires` |
-    | `SeastarSwimHeading-v0`       | 0.5                 | `"joint"` | 300            | 600       | `SmaWires` |
+    | `SeastarSwimHeading-v0`       | 0.5                 | `"pairs"` | 300            | 600       | `SmaWires` |
 
     The same physics and the same task, with a horizon that is 2, 5 or 10 times as long in decisions.
     `SeastarSwimHeading-v0` asks for headings, along the legs of the path.
