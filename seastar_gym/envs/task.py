@@ -142,7 +142,7 @@ class SwimTask:
         self.simulator = Simulator(drawn_scene(scene, self.drawn), n_robots, threads, error_bars)
         self._error_bars = error_bars
         self.certificate = read_certificate(certificate, scene)
-        self._promise = self.simulator.scene, promised(self.simulator.scene, self.certificate)
+        self._promise = self.simulator.scene, self._promise_of(self.simulator.scene)
         peak = np.max(self.simulator.scene.actuator.peak_angle)  # before the first draw the largest that may be drawn
         if scene.robot.hub_hinge == "turning" and 2 * peak >= scene.robot.opening_angle * (1 - 1e-9):
             raise ValueError(
@@ -370,7 +370,7 @@ class SwimTask:
             "cross_track_error": cross_track_error(hub, self._waypoint(leg - 1), self._waypoint(leg)),
             **self._heading_facts(),
             **({"action_mask": self.action_masks().astype(np.int8)} if self._can_be_masked else {}),
-            **(self._promised() if self._in_strokes else {}),
+            **self._promised(),
             **({"error_estimate": self.simulator.error_estimate} if self._error_bars else {}),
             **{name: values.copy() for name, values in self.drawn.items()},
         }
@@ -382,11 +382,14 @@ class SwimTask:
         heading = self.heading()
         return {"heading": heading, "heading_error": self._asked.turn(self.waypoint_index, heading)}
 
+    def _promise_of(self, scene: Scene) -> dict[str, float]:
+        return promised(scene, self.certificate, None if self._in_strokes else self.decision_period)
+
     def _promised(self) -> dict[str, Floats]:
         """Measured errors and speed, shape (n_robots,) each; NaN for robots with weak limbs."""
         simulator = self.simulator
         if simulator.scene is not self._promise[0]:
-            self._promise = simulator.scene, promised(simulator.scene, self.certificate)
+            self._promise = simulator.scene, self._promise_of(simulator.scene)
         strong = (simulator.limb_strengths == 1.0).all(axis=1)
         return {name: np.where(strong, value, np.nan) for name, value in self._promise[1].items()}
 
