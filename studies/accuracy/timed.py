@@ -91,7 +91,7 @@ def errors(period: float, plan: Plan, progress: Any) -> dict[str, dict[str, floa
     def distance(hub: Floats, other: Floats) -> float:
         return float((np.linalg.norm(hub - other, axis=-1).max(axis=0) / lengths).max())
 
-    found = {}
+    found: dict[str, dict[str, float]] = {}
     for name in plan.presets:
         preset = Scene.preset(name)
         fine = swim(scene_at(preset.robot.nodes_per_limb, plan.short, preset), commands, period)
