@@ -43,7 +43,8 @@ def as_text(certificate: Certificate) -> str:
             each.errors["small"],
         )  # fmt: skip
         shares = " ".join(f"{100 * error:>6.2g} %" for error in errors)
-        lines.append(f"{each!s:44} {shares} {each.speed:>12,.0f}")
+        gathers = "" if each.endures else "  gathers energy over long swims, not chosen"
+        lines.append(f"{each!s:44} {shares} {each.speed:>12,.0f}{gathers}")
     lines.append(
         f"With {100 * certificate.confidence():.0f} % confidence, at most 5 % of the sequences of a class exceed its "
         f"error ({certificate.samples} of each were measured). The limit errs by {100 * certificate.limit_error:.2g} %."
