@@ -21,18 +21,21 @@ import tyro
 from rich.console import Console
 from rich.text import Text
 
-from agents import policy as learned
+from agents.names import AgentNames
 from agents.report.charts import Curve, read_progress
 from agents.report.page import Remarks, ResultsTable, read_trials, write_report
-from agents.report.pictures import FRAMES_PER_STROKE, draw_traces, film
 from agents.report.playback import Playback, RecordingEnv
-from agents.results import COLUMNS, in_words, results_table, write_csv
-from agents.roster import AgentNames, load_agents
-from agents.swim import TIME_LIMIT, Policy, Swim, actions_of, decisions_in, require_fit, swim
+from agents.results import results_table
 from seastar_gym.command import run_command
+from seastar_gym.controllers import learned
+from seastar_gym.controllers.contract import Policy, actions_of, require_fit
+from seastar_gym.controllers.roster import load_agents
 from seastar_gym.envs.paths import PATHS, make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
+from seastar_gym.evaluation.pictures import FRAMES_PER_STROKE, draw_traces, film
+from seastar_gym.evaluation.results import COLUMNS, in_words, write_csv
+from seastar_gym.evaluation.swim import TIME_LIMIT, Swim, decisions_in, swim
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_number, shown
 from seastar_gym.scene.csv_rows import read_numbers

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.policy import in_the_box, load
-from agents.scripted import scripted
-from agents.swim import Policy
 from seastar_gym.command import run_command
+from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.learned import in_the_box, load
+from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from studies.parser import study_parser
 
@@ -95,9 +95,7 @@ def main() -> None:
     policy = load(in_the_box(options.decision_period))
     gait = scripted("pentagon", policy.actions)
     chapter = frames(gait, round(2 / BETWEEN), actions=gait.actions, fidelity="balanced")
-    learned = frames(
-        policy, parts, actions=policy.actions, scene=policy.scene, decision_period=policy.decision_period
-    )
+    learned = frames(policy, parts, actions=policy.actions, scene=policy.scene, decision_period=policy.decision_period)
     film = side_by_side(chapter, learned, options.frames)
     write_gif(film, options.out)
     print(f"Written: {options.out}, {len(film)} frames of {BETWEEN} s.")

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.swim import Swim
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.evaluation.swim import Swim
 
 Floats = NDArray[np.float64]
 

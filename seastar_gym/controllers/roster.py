@@ -6,17 +6,14 @@ the name of the function that makes it, "module:function".
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, TypeAlias
 
 import numpy as np
-import tyro
 
-from agents import foreign
-from agents import policy as learned
-from agents.greedy import GreedyPolicy
-from agents.planner import Planner
-from agents.scripted import GAITS, scripted
-from agents.swim import Policy
+from seastar_gym.controllers import foreign, learned, learner_zip
+from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.greedy import GreedyPolicy
+from seastar_gym.controllers.planner import Planner
+from seastar_gym.controllers.scripted import GAITS, scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
 from seastar_gym.scene import Scene
@@ -38,8 +35,6 @@ HELP = (
     "only files that you trust."
 )
 """Help of options that name agents."""
-
-AgentNames: TypeAlias = Annotated[tuple[str, ...], tyro.conf.arg(help=HELP)]
 
 
 def load_agents(
@@ -86,10 +81,11 @@ def _scripted(name: str, seed: int, decision_period: float | None) -> Policy:
 def _load_file(name: str) -> Policy:
     if not name.endswith(".zip"):
         return learned.load(name)
+    if not foreign.is_model(name):
+        return learner_zip.load(name)
     try:
-        if foreign.is_model(name):
-            return foreign.load_model(name)
-        from agents import learner_file
+        return foreign.load_model(name)
     except ModuleNotFoundError as missing:
-        raise ValueError(f'A model.zip needs {missing.name}: pip install "seastar-gym[train]".') from missing
-    return learner_file.load(name)
+        raise ValueError(
+            f'A model.zip of Stable-Baselines3 needs {missing.name}: pip install "seastar-gym[train]".'
+        ) from missing
