@@ -21,7 +21,8 @@ from seastar_gym.controllers.roster import load_agents
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.paths import PENTAGON_SIDE, make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.evaluation.pictures import CLOSING_SECONDS, COLOURS, FPS, FRAMES_PER_STROKE
+from seastar_gym.evaluation.films import CLOSING_SECONDS
+from seastar_gym.evaluation.pictures import COLOURS, FPS, FRAMES_PER_STROKE
 from seastar_gym.evaluation.swim import Swim, swim
 
 ROOT = Path(__file__).resolve().parents[2]
