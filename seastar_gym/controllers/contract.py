@@ -30,6 +30,12 @@ def actions_of(policy: Policy, n_limbs: int) -> Actions:
     raise ValueError(f"The policy acts in {space}, which is no action mode of a robot of {n_limbs} limbs.")
 
 
+def actions_in(policy: Policy, own: Actions, n_limbs: int) -> Actions:
+    """The action mode that a policy is for, see `actions_of`; an environment's own one if the policy says none."""
+    says = hasattr(policy, "actions") or getattr(policy, "action_space", None) is not None
+    return actions_of(policy, n_limbs) if says else own
+
+
 def require_fit(
     policy: Policy,
     scene: Scene,

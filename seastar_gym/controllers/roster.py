@@ -51,19 +51,33 @@ def load_agents(
         label = str(Path(name).with_suffix("")) if label in agents else label
         if label in agents:
             raise ValueError(f"The agent {name!r} is named twice.")
-        agents[label] = _load_agent(name, seed, fidelity, decision_period)
+        agents[label] = _load_agent(
+            name,
+            seed,
+            make_scene(None, fidelity, decision_period),
+            decision_period,
+            lambda: SeastarSwimEnv(fidelity=fidelity, decision_period=decision_period),
+        )
     return agents
+
+
+def load_agent(name: str, env: SeastarSwimEnv, seed: int = 0) -> Policy:
+    """Policy by a name as in `HELP`, for the robot and the decisions of an environment."""
+    in_strokes = env.decision_period == env.scene.actuator.period
+    return _load_agent(name, seed, env.scene, None if in_strokes else env.decision_period, lambda: env)
 
 
 def _is_file(name: str) -> bool:
     return name.endswith((".zip", ".safetensors", ".pth", ".pt", ".pkl")) or len(Path(name).parts) > 1
 
 
-def _load_agent(name: str, seed: int, fidelity: Fidelity, decision_period: float | None) -> Policy:
+def _load_agent(
+    name: str, seed: int, scene: Scene, decision_period: float | None, make_env: Callable[[], SeastarSwimEnv]
+) -> Policy:
     if name in AGENTS:
-        return AGENTS[name](make_scene(None, fidelity, decision_period), decision_period)
+        return AGENTS[name](scene, decision_period)
     if foreign.is_function(name):
-        return foreign.call_function(name, SeastarSwimEnv(fidelity=fidelity, decision_period=decision_period))
+        return foreign.call_function(name, make_env())
     return _load_file(name) if _is_file(name) else _scripted(name, seed, decision_period)
 
 

@@ -56,6 +56,22 @@ def write_csv(swims: Sequence[Swim], file: Path) -> None:
         writer.writerows(rows)
 
 
+def as_text(swims: Sequence[Swim]) -> str:
+    """Table of the results, for a terminal."""
+    rows = [[number(row[name]) for name in COLUMNS] for row in in_words(swims)]
+    return text_table(list(COLUMNS.values()), rows)
+
+
+def text_table(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Table whose first column stands on the left, the others on the right; titles may have several lines."""
+    heads = [title.split("\n") for title in titles]
+    height = max(map(len, heads))
+    lines = [*zip(*([""] * (height - len(head)) + head for head in heads), strict=True), *rows]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(titles))]
+    texts = [[cell.rjust(width) for cell, width in zip(line, widths, strict=True)] for line in lines]
+    return "\n".join("  ".join([line[0].strip().ljust(widths[0]), *line[1:]]).rstrip() for line in texts)
+
+
 def number(value: Any) -> str:
     """A number of a table as it is shown; a dash for none."""
     if value is None:
