@@ -21,7 +21,7 @@ from seastar_gym.envs.canvas import import_pygame
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.scene.checks import require_number
 
-AGAIN, HELP, END = "z", "h", "escape"
+AGAIN, HELP, END = "z", "f1", "escape"
 """Keys that begin anew, show or hide the help, and end the game."""
 
 Held = Callable[[], set[str] | None]

@@ -73,5 +73,5 @@ def keys_help(n_limbs: int) -> list[tuple[str, str]]:
         (spaced[1], f"limbs 1 to {n_limbs} turn \u2212, clockwise"),
         (spaced[2], f"swim along limb 1 to {n_limbs}"),
         ("arrows", "swim that way"),
-        ("Z  H  Esc", "begin anew, hide this, end"),
+        ("Z  F1  Esc", "begin anew, hide this, end"),
     ]

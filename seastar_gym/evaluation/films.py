@@ -20,7 +20,7 @@ SCALE = 2
 """Pixels of a picture that become one of a GIF, each way."""
 COLOURS = 48
 """Colours of a GIF."""
-SAMPLE = 9
+SAMPLE = 32
 """Number of pictures, at equal intervals, from which the colours of a GIF are taken."""
 
 
@@ -94,7 +94,7 @@ def write_gif(pictures: list[Picture], file: Path, fps: float) -> None:
 
     some = np.unique(np.linspace(0, len(pictures) - 1, SAMPLE).round().astype(int))
     sample = np.concatenate([pictures[k] for k in some], axis=0)
-    palette = Image.fromarray(sample).quantize(COLOURS, dither=Image.Dither.NONE)
+    palette = Image.fromarray(sample).quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
     images = [Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     duration = 10 * max(2, round(100.0 / fps))  # viewers slow down what is shown for less than two hundredths
     images[0].save(file, save_all=True, append_images=images[1:], duration=duration, loop=0, optimize=True)
