@@ -30,8 +30,9 @@ from seastar_gym.envs.observation import (
     with_memory,
 )
 from seastar_gym.envs.promises import promised
-from seastar_gym.envs.randomization import LIMB_STRENGTHS, drawn_scene
+from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, drawn_scene
 from seastar_gym.envs.reward import pulses_of
+from seastar_gym.envs.scenery import NOTHING, Scenery
 from seastar_gym.envs.stations import stations
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Deaf
@@ -82,8 +83,9 @@ class Swimming(ABC):
 
     TERMS: tuple[str, ...]
     """Names of the reward's terms."""
+    randomization: DomainRandomization | None = None
     waypoint_radius: float
-    """Radius of the rings that pictures show [m]."""
+    """Radius of waypoints [m]."""
     added_mirror: Mirror = ()
     """What a mirror does to the numbers that the task adds to a limb's in the observation, see `memory_mirror`."""
 
@@ -104,7 +106,7 @@ class Swimming(ABC):
         require_flag("random_heading", random_heading)
         require_flag("observe_actuators", observe_actuators)
         self.decision_period = checked_decision_period(decision_period, scene)
-        self._in_strokes = self.decision_period == scene.actuator.period
+        self._has_promises = self.decision_period == scene.actuator.period
         self.actions: Actions = actions
         self.observe_actuators = observe_actuators
         self._can_be_masked = can_be_masked(scene.actuator)
@@ -122,6 +124,8 @@ class Swimming(ABC):
                 'hub_hinge="opening" or a smaller peak angle.'
             )
         self.random_heading, self.n_robots = random_heading, n_robots
+        self.waypoint_index = np.zeros(n_robots, np.int64)  # the waypoint to swim to; 0 in tasks without
+        self.last_commands = np.zeros((n_robots, scene.robot.n_limbs))
         self._energy = np.zeros(n_robots)  # since the reset [J]
 
     @abstractmethod
@@ -148,6 +152,10 @@ class Swimming(ABC):
     def waypoints_of(self, robot: int) -> Floats:
         """Waypoints of a robot's present episode [m], shape (n, 2), a copy; n is 0 in tasks without."""
 
+    def scenery(self, robot: int) -> Scenery:
+        """What pictures of a robot show besides its waypoints."""
+        return NOTHING
+
     @property
     def observation_size(self) -> int:
         """Length of one robot's observation."""
@@ -172,7 +180,7 @@ class Swimming(ABC):
             strengths = np.asarray(self.scene.limb_strengths or 1.0) * self.drawn.get(LIMB_STRENGTHS, 1.0)
             self.simulator.set_limb_strengths(strengths)
         self.simulator.reset(robots, headings)
-        self._energy[robots] = 0.0
+        self._energy[robots], self.last_commands[robots] = 0.0, 0.0
         self._begin(robots)
 
     def observe(self) -> NDArray[np.float32]:
@@ -230,6 +238,7 @@ class Swimming(ABC):
         """Outcome of a decision. commands: Those that were followed. masked: Number of limbs whose command was not."""
         hub = self.simulator.hub_position()
         self._energy += report.energy
+        self.last_commands = commands
         score = self._score(hub, pulses_of(report.heating_time, commands))
         info = {
             **self.facts(hub),
@@ -272,7 +281,7 @@ class Swimming(ABC):
             "hub_position": hub.copy(),
             **self._goal_facts(hub),
             **({"action_mask": self.action_masks().astype(np.int8)} if self._can_be_masked else {}),
-            **(self._promised() if self._in_strokes else {}),
+            **(self._promised() if self._has_promises else {}),
             **({"error_estimate": self.simulator.error_estimate} if self._error_bars else {}),
             **{name: values.copy() for name, values in self.drawn.items()},
         }

@@ -112,7 +112,6 @@ class SwimTask(Swimming):
         self.waypoints = np.zeros((n_robots, 1, 2))
         self._way_after = np.zeros((n_robots, 1))  # from waypoint k to the last [m]
         self.n_waypoints = np.ones(n_robots, np.int64)
-        self.waypoint_index = np.zeros(n_robots, np.int64)
         self._way_to_go, self._way_at_reset = np.zeros(n_robots), np.zeros(n_robots)  # [m]
 
     def _draw(self, robot: int, rng: np.random.Generator, asked: Path | None) -> None:
