@@ -84,7 +84,7 @@ def game(env: PlayedEnv, show: Show, held: Held, seed: int) -> dict[str, Any]:
             _, info = env.reset(seed=seed)
             over = False
         elif not over:
-            command = steering.command(keys, env.headings())
+            command = steering.command(keys, env.limb_directions())
             _, _, over, _, info = env.step(np.where(command < 0, 2, command))
         elif not show(env.last_picture):
             break

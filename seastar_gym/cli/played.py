@@ -25,7 +25,7 @@ class PlayedEnv(SeastarSwimEnv):
         self.help = True
         super().__init__(render_mode="rgb_array_list", **arguments)
 
-    def headings(self) -> NDArray[np.float64]:
+    def limb_directions(self) -> NDArray[np.float64]:
         """Directions of the limbs in the world, from the hub to the tip [rad], shape (n_limbs,)."""
         positions = self.simulator.positions[0]
         x, y = (positions[self._limbs[:, -1]] - positions[0]).T
@@ -60,7 +60,7 @@ class PlayedEnv(SeastarSwimEnv):
     def _numbers(self) -> list[tuple[int, NDArray[np.float64]]]:
         """Limbs that are not heated, whose names the picture lacks, and the places of their numbers [px]."""
         positions, camera = self.simulator.positions[0], self._get_renderer().camera
-        tips, angles = camera.to_pixels(positions[self._limbs[:, -1]]), self.headings()
+        tips, angles = camera.to_pixels(positions[self._limbs[:, -1]]), self.limb_directions()
         outward = 18.0 * np.stack([np.cos(angles), -np.sin(angles)], axis=1)
         return [(limb, tips[limb] + outward[limb]) for limb in np.flatnonzero(self._command == 0.0).tolist()]
 
