@@ -17,6 +17,7 @@ from seastar_gym.scene.actuators.measured import MeasuredCurve
 from seastar_gym.scene.actuators.sma_limb import SmaLimb
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.actuators.wires import SmaWires
+from seastar_gym.scene.along import AlongLimb, Stiffening
 from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
@@ -26,6 +27,7 @@ from seastar_gym.simulator import Simulator, SolverStatus, State, StrokeReport
 from seastar_gym.version import __version__
 
 __all__ = [
+    "AlongLimb",
     "Certificate",
     "Contact",
     "DomainRandomization",
@@ -46,6 +48,7 @@ __all__ = [
     "SmaWires",
     "SolverStatus",
     "State",
+    "Stiffening",
     "StrokeReport",
     "SymmetryReduction",
     "ThermalSma",

@@ -2,6 +2,7 @@
 
 from seastar_gym.der.geometry import half_angle
 from seastar_gym.der.star import edge_of
+from seastar_gym.der.terms.along import natural_moment
 from seastar_gym.der.terms.bending import bending_energy, moment
 from seastar_gym.der.terms.clamp import clamp_energy
 from seastar_gym.der.terms.hub import set_natural_hub_angles
@@ -12,9 +13,9 @@ from seastar_gym.simd.lanes import borrow, load, splat, store
 
 
 @kernel
-def hinge_energy(rods, e, first, second, side, EI_kappa_bar):
+def hinge_energy(rods, work, e, first, second, side, EI_kappa_bar):
     """Energy of the hinge that ends with edge e, between two edges [J]."""
-    return bending_energy(rods, e, moment(rods, e, half_angle(first, second, side), EI_kappa_bar))
+    return bending_energy(rods, work, e, moment(rods, work, e, half_angle(first, second, side), EI_kappa_bar))
 
 
 @kernel
@@ -33,7 +34,7 @@ def hub_hinge_energy(clamp, rods, work, q, limb, edge):
     edges = rods.nodes_per_limb - 1
     root = limb * edges
     next_root = edge_of(rods, q, (root + edges) % (rods.n_limbs * edges))
-    return hinge_energy(rods, root, edge, next_root, rods.hub.side, load(work.hub_EI_kappa_bar, limb))
+    return hinge_energy(rods, work, root, edge, next_root, rods.hub.side, load(work.hub_EI_kappa_bar, limb))
 
 
 @kernel
@@ -48,7 +49,7 @@ def elastic_energy(rods, work, q):
         total += stretching_energy(rods, root, tension(rods, root, edge.length)) + hinge
         for e in range(root + 1, root + edges):
             before, edge = edge, edge_of(rods, q, e)
-            hinge = hinge_energy(rods, e, before, edge, 1.0, load(rods.bending.EI_kappa_bar, e))
+            hinge = hinge_energy(rods, work, e, before, edge, 1.0, natural_moment(rods.along, rods, work, e))
             total += stretching_energy(rods, e, tension(rods, e, edge.length)) + hinge
     return total
 

@@ -41,6 +41,7 @@ from seastar_gym.der.linear.star_matrix import (
 from seastar_gym.der.motion import Motion, node_motion
 from seastar_gym.der.star import load_root_edge
 from seastar_gym.der.terms.added_mass import add_fluid_inertia, less_edge_fluid_inertia
+from seastar_gym.der.terms.along import bending_compliance, bending_stiffness, natural_moment
 from seastar_gym.der.terms.bending import bending_energy, bending_slopes, moment
 from seastar_gym.der.terms.clamp import assemble_clamps
 from seastar_gym.der.terms.contact import add_contact, contact_force
@@ -112,13 +113,13 @@ def elastic_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex):
 @kernel
 def hinge_slopes(rods, work, stage, hinge, t, EI_kappa_bar, convex):
     """(E_b, slope, s): energy of a hinge and its first and second slope in phi, with damping."""
-    bend = moment(rods, hinge, t, EI_kappa_bar)
+    bend = moment(rods, work, hinge, t, EI_kappa_bar)
     tau, inverse_gamma = rods.damping, stage.inverse_gamma
     energy = damped_energy(
-        tau, work.bending, hinge, inverse_gamma, bend, EI_kappa_bar, load(rods.bending.dl_over_EI, hinge),
-        bending_energy(rods, hinge, bend),
+        tau, work.bending, hinge, inverse_gamma, bend, EI_kappa_bar, bending_compliance(rods.along, rods, work, hinge),
+        bending_energy(rods, work, hinge, bend),
     )  # fmt: skip
-    stiffness = damped_stiffness(tau, inverse_gamma, load(rods.bending.EI_over_dl, hinge))
+    stiffness = damped_stiffness(tau, inverse_gamma, bending_stiffness(rods.along, rods, work, hinge))
     damped = damped_stress(tau, work.bending, hinge, inverse_gamma, bend, EI_kappa_bar)
     slope, s = bending_slopes(stiffness, t, damped, convex)
     return energy, slope, s
@@ -239,7 +240,8 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
         e = node - 1
         before, motion_before = inner_edge(work, limb, first, i - 1), node_motion(work, stage, node - 1)
         t = half_angle(before, edge, 1.0)
-        E_b, slope_before, s_before = hinge_slopes(rods, work, stage, e, t, load(rods.bending.EI_kappa_bar, e), convex)
+        natural = natural_moment(rods.along, rods, work, e)
+        E_b, slope_before, s_before = hinge_slopes(rods, work, stage, e, t, natural, convex)
         net_moment, stiffness = slope_before - slope, s_before + s
         E_s, f, K = edge_slopes(
             rods, work, stage, e, edge, net_moment, stiffness, convex, motion_before, motion

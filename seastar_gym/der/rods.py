@@ -12,6 +12,7 @@ from seastar_gym.der.linear.star_matrix import NODE_ROWS, RING_ROWS, ROOT_ROWS
 from seastar_gym.der.stepping.foresight import Foresight
 from seastar_gym.der.stepping.scales import Scales
 from seastar_gym.der.terms import contact
+from seastar_gym.der.terms.along import ALONG_ROWS, Along
 from seastar_gym.der.terms.bending import Bending
 from seastar_gym.der.terms.clamp import Clamp
 from seastar_gym.der.terms.current import Current
@@ -29,6 +30,7 @@ class Rods(NamedTuple):
     clamp: Rigid hub; edge_mass, edge_added_mass: What consistent masses take from lumped ones [kg]; middle_drag,
         middle_cross_drag: Drag in the middle of edges, and that of flow across [kg/m]; per edge. All are those of the
         continuum's discretisation.
+    along: How actuators act on limbs along their length.
     mass: Lumped mass, per node [kg]. drag: 1/2 rho_f C_d D dl_i of (13.8), per node [kg/m].
     cross_drag, added_mass: Coefficients of flow across half edges [kg/m], [kg]; two rows per node.
     damping: Relaxation time tau [s], one row. current: How the fluid moves.
@@ -42,6 +44,7 @@ class Rods(NamedTuple):
     bending: Bending
     hub: Hub
     clamp: Clamp | None
+    along: Along | None
     mass: np.ndarray
     edge_mass: np.ndarray | None
     drag: np.ndarray
@@ -71,6 +74,8 @@ class Work(NamedTuple):
     hub_t: tan(phi/2) of the hub hinges, per limb.
     hub_direction, hub_turn, hub_hat: Natural directions of a rigid hub's clamps, what root edges are turned from them,
         and their directions where a stage began, (x, y) per limb; None with hub hinges, hub_hat without damping.
+    stiffening, EI_kappa_bar: Factor of a limb's bending stiffness with its reciprocal, and natural moments of hinges
+        [N m], or None where actuators act at the hub only.
     stage_v: Velocities of the stages of a time step [m/s].
     normals: Unit normals of the edges where a stage began, or None in scenes that need none; see fluid.py.
     current: Velocity of the fluid at every node there [m/s], or None.
@@ -97,6 +102,8 @@ class Work(NamedTuple):
     hub_direction: np.ndarray | None
     hub_turn: np.ndarray | None
     hub_hat: np.ndarray | None
+    stiffening: np.ndarray | None
+    EI_kappa_bar: np.ndarray | None
     stage_v: np.ndarray
     normals: np.ndarray | None
     current: np.ndarray | None
@@ -134,6 +141,8 @@ def make_work(rods: Rods, n_stages: int) -> Work:
         hub_direction=None if rods.clamp is None else rows(2 * n_limbs),
         hub_turn=None if rods.clamp is None else rows(2 * n_limbs),
         hub_hat=None if rods.clamp is None or rods.damping is None else rows(2 * n_limbs),
+        stiffening=None if rods.along is None else rows(ALONG_ROWS * n_limbs),
+        EI_kappa_bar=None if rods.along is None else rows(n_edges),
         stage_v=rows(2 * n_nodes * n_stages),
         normals=None if rods.cross_drag is None and rods.added_mass is None else rows(2 * n_nodes),
         current=None if rods.current is None else rows(2 * n_nodes),

@@ -6,6 +6,7 @@ from seastar_gym.der.rods import Rods
 from seastar_gym.der.stepping import foresight, scales
 from seastar_gym.der.terms import (
     added_mass,
+    along,
     bending,
     clamp,
     contact,
@@ -19,6 +20,7 @@ from seastar_gym.der.terms import (
 )
 from seastar_gym.model.currents import current_rows
 from seastar_gym.model.mesh import make_mesh
+from seastar_gym.scene.along import AlongLimb, Stiffening
 from seastar_gym.scene.fluid import Water
 from seastar_gym.scene.per_robot import chosen
 from seastar_gym.scene.scene import Scene
@@ -41,11 +43,11 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
     C_d, C_t, C_a = water.drag_coefficient, water.tangential_drag_coefficient, water.added_mass_coefficient
     mesh = make_mesh(limbs, robot.nodes_per_limb)
     continuum = robot.discretisation == "continuum"
-    along = C_d if C_t is None else C_t
-    at_nodes, in_middle = drag.coefficients(mesh, water.density, along), None
+    C_along = C_d if C_t is None else C_t
+    at_nodes, in_middle = drag.coefficients(mesh, water.density, C_along), None
     across, across_middle = drag.cross_coefficients(mesh, water.density, C_d, C_t), None
     if continuum:
-        at_nodes, in_middle = drag.simpson_coefficients(mesh, water.density, along)
+        at_nodes, in_middle = drag.simpson_coefficients(mesh, water.density, C_along)
         across, across_middle = drag.simpson_cross_coefficients(mesh, water.density, C_d, C_t)
     stretched = stretching.coefficients(mesh)
     seen_ahead = foresight.coefficients(mesh, stretched, robot.density)
@@ -57,6 +59,7 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         bending=bending.coefficients(mesh, gregory=continuum),
         hub=hub.coefficients(hub_angles, turning=robot.hub_hinge == "turning"),
         clamp=clamp.coefficients(mesh, [limb.direction for limb in limbs]) if continuum else None,
+        along=limb_actuation(scene, index, mesh.natural_turn),
         mass=mass,
         edge_mass=inertia.edge_coefficients(mesh, robot.density) if continuum else None,
         drag=at_nodes,
@@ -79,3 +82,13 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
             mesh, stretched, seen_ahead, robot.density, water.density, C_d, mass, scene.held_nodes
         ),
     )
+
+
+def limb_actuation(scene: Scene, index: int, natural_turn: list[float]) -> along.Along | None:
+    """How actuators act on limbs along their length; None where they act at the hub only."""
+    robot, actuator = chosen(scene.robot, itemgetter(index)), chosen(scene.actuator, itemgetter(index))
+    if robot.along is None and robot.stiffening is None:
+        return None
+    spread, hot = robot.along or AlongLimb(share=0.0), robot.stiffening or Stiffening(ratio=1.0)
+    shares = spread.hinge_shares(robot.nodes_per_limb)
+    return along.coefficients(natural_turn, shares, float(actuator.peak_angle), hot.ratio, hot.middle, hot.width)

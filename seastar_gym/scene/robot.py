@@ -9,6 +9,7 @@ from typing import ClassVar, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.scene.along import AlongLimb, Stiffening
 from seastar_gym.scene.checks import require_choice, require_count, require_number, shown
 from seastar_gym.scene.limb import Limb, LimbShape, as_tuple
 from seastar_gym.scene.per_robot import Numbers, batch_size, chosen, require_each
@@ -41,9 +42,11 @@ class Seastar:
         infinitely many.
         "chapter" joins neighbouring limbs by hinges at the hub, and lumps mass and drag at the nodes, as the chapter
         does: with ten nodes that robot is 12 to 26 % off. With infinitely many nodes the two are the same robot.
+    along: How an actuator's rotation is spread along its limb. None means that it turns the limb at the hub.
+    stiffening: How much stiffer a limb is while its actuator is hot. None means that heat does not stiffen it.
 
-    A single limb swings freely about the hub, and no actuator turns it. In the chapter's discretisation two limbs have
-    one hub hinge; straight limbs with hub_hinge="turning" then form a plain rod.
+    A single limb swings freely about the hub, and no actuator turns it there. In the chapter's discretisation two limbs
+    have one hub hinge; straight limbs with hub_hinge="turning" then form a plain rod.
     """
 
     PER_ROBOT: ClassVar = ("limb_length", "rod_radius", "youngs_modulus", "density", "relaxation_time")
@@ -57,6 +60,8 @@ class Seastar:
     limbs: tuple[Limb, ...] = ()
     relaxation_time: Numbers | None = None
     discretisation: Discretisation = "continuum"
+    along: AlongLimb | None = None
+    stiffening: Stiffening | None = None
 
     def __post_init__(self) -> None:
         require_count("n_limbs", self.n_limbs, 1, 12)
@@ -77,6 +82,17 @@ class Seastar:
         if self.n_limbs == 1 and self.hub_hinge != "opening":
             raise ValueError("One limb has no hub hinge that could be measured by its turning angle.")
         self._check_limbs()
+        self._check_along()
+
+    def _check_along(self) -> None:
+        for name, kind in (("along", AlongLimb), ("stiffening", Stiffening)):
+            value = getattr(self, name)
+            if not isinstance(value, kind | None):
+                raise ValueError(f"{name} must be {kind.__name__}(...) or None, not {shown(value)}.")
+            if value is not None and self.discretisation == "chapter":
+                raise ValueError(
+                    f'{name} acts on limbs along their length, which only discretisation="continuum" models.'
+                )
 
     def _check_limbs(self) -> None:
         if not isinstance(self.limbs, tuple) or not all(isinstance(limb, Limb) for limb in self.limbs):

@@ -25,8 +25,12 @@ the cut is of the order of the scheme's own error.
 
 Schemes of higher order take the energy in the middle of a step and promise no such balance. In a guarded step they are
 held to the larger of the energies that the robot standing still has at the step's ends, and what moving the
-natural hub angles alone can store. What limbs store that press each other, and may get back, counts at the start of all
-steps, and at the end of implicit Euler's: where others look ahead (contact.py), limbs that part get nothing back.
+natural hub angles, and natural curvature, alone can store. What limbs store that press each other, and may get back,
+counts at the start of all steps, and at the end of implicit Euler's: where others look ahead (contact.py), limbs that
+part get nothing back.
+
+U is that of the stiffness that limbs have at the time, see along.py. So what actuators put in or take out by stiffening
+a bent limb is in these balances as what they do by moving its natural state.
 
 At phi = pi a hinge would store infinite energy, but a Newton step may jump over that pole, and the robot then stays
 folded over itself. Such steps are refused, too, while they are not very short: an edge that collapses turns its hinges
@@ -38,6 +42,7 @@ from seastar_gym.der.geometry import edge_vector, half_angle, larger
 from seastar_gym.der.motion import node_motion
 from seastar_gym.der.star import edge_of, hinge_edges, is_clamped, n_nodes, tail_node
 from seastar_gym.der.terms.added_mass import add_fluid_energy, add_fluid_momentum, less_edge_fluid_energy
+from seastar_gym.der.terms.along import add_moved_energy, bending_stiffness
 from seastar_gym.der.terms.clamp import moved_clamp_energy
 from seastar_gym.der.terms.contact import add_contact_energy
 from seastar_gym.der.terms.fluid import fluid_velocity
@@ -113,7 +118,8 @@ def put_back(rods, work, scheme, q, v, robots):
 def moved_hub_energy(clamp, rods, work, actuation, start, end):
     """Energy of hub hinges at their natural angles, once those have moved from `start` to `end` of the interval [J]."""
     if clamp is not None:
-        return moved_clamp_energy(clamp, rods, work, actuation, start, end)
+        moved = moved_clamp_energy(clamp, rods, work, actuation, start, end)
+        return add_moved_energy(rods.along, rods, work, actuation, start, end, moved)
     set_natural_hub_angles(rods, work, actuation, start)
     for limb in range(rods.n_limbs):
         store(work.hub_moment, limb, load(work.hub_EI_kappa_bar, limb))
@@ -296,7 +302,7 @@ def through_poles(rods, work, q, robots):
 
 
 @kernel
-def energy_noise(rods, q, h, potential, kinetic):
+def energy_noise(rods, work, q, h, potential, kinetic):
     """Change of an energy that rounding of positions may make [J]: slope sqrt(2 m K) and curvature m, times a move.
 
     Velocities are differences of positions over h; stretching and bending are as stiff as `stiffness` [N/m] at most.
@@ -305,10 +311,10 @@ def energy_noise(rods, q, h, potential, kinetic):
     mass = load(rods.scales.free_mass, 0)
     edges = rods.n_limbs * (rods.nodes_per_limb - 1)
     length = load(rods.foresight.shortest_edge, 0)
-    stretching, bending = load(rods.stretching.EA_over_l, 0), load(rods.bending.EI_over_dl, 0)
+    stretching, bending = load(rods.stretching.EA_over_l, 0), bending_stiffness(rods.along, rods, work, 0)
     for e in range(1, edges):
         stretching = larger(load(rods.stretching.EA_over_l, e), stretching)
-        bending = larger(load(rods.bending.EI_over_dl, e), bending)
+        bending = larger(bending_stiffness(rods.along, rods, work, e), bending)
     stiffness = edges * (stretching + 4.0 * bending / (length * length))
     limb = (rods.nodes_per_limb - 1) * length
     move = UNITS * (absolute(load(q, 0)) + absolute(load(q, 1)) + limb)
@@ -351,7 +357,7 @@ def hold_to_energy(rods, work, scheme, q, v, h, frame, robots, allowed, largest_
     cut = grown & ~grown
     if any_lane(grown):
         motion = rigid_motion(rods, work, q, v, frame)
-        noise = energy_noise(rods, q, h, potential, kinetic)
+        noise = energy_noise(rods, work, q, h, potential, kinetic)
         grown = grown & (potential + kinetic > allowed + noise)
         rigid = motion[5]
         about = kinetic - rigid

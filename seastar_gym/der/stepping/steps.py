@@ -101,8 +101,8 @@ def solve_stages(rods, work, scheme, actuation, q, v, a, step, active, limits, r
         if any_lane(step.retrying):
             start_standing(rods, work, stage, frame_velocity(rods.current, rods, q, v), step.retrying)
         freeze_fluid(rods, work)
-        freeze_strains(rods.damping, rods, work, stage.q_hat)
         set_natural_hub_angles(rods, work, actuation, step.start + load_number(scheme.c, k) * step.size)
+        freeze_strains(rods.damping, rods, work, stage.q_hat)
         left = limits.most_iterations - load(report, NEWTON_ITERATIONS)
         most, good = select(left < step.iteration_limit, left, step.iteration_limit), good & (left > 0.0)
         good, phi, iterations, regularised, backtracks = minimise(rods, work, stage, good, tolerance, most)

@@ -27,6 +27,7 @@ import numpy as np
 from seastar_gym.der.geometry import edge_vector, tangent
 from seastar_gym.der.mesh import Mesh
 from seastar_gym.der.star import load_root_edge
+from seastar_gym.der.terms.along import bending_stiffness, turned, turned_at_hub
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, select, splat, sqrt, store, subtract_product
 
@@ -51,9 +52,9 @@ def coefficients(mesh: Mesh, directions: Sequence[float]) -> Clamp:
 
 
 @kernel
-def clamp_stiffness(rods, limb):
+def clamp_stiffness(rods, work, limb):
     """K_j [N m]."""
-    return load(rods.bending.EI_over_dl, limb * (rods.nodes_per_limb - 1))
+    return bending_stiffness(rods.along, rods, work, limb * (rods.nodes_per_limb - 1))
 
 
 @kernel
@@ -62,8 +63,7 @@ def set_natural_directions(clamp, rods, work, actuation, fraction):
     if clamp is None:
         return
     for limb in range(rods.n_limbs):
-        start, end = load(actuation.delta_psi_start, limb), load(actuation.delta_psi_end, limb)
-        t = tangent(0.5 * add_product(start, fraction, end - start))
+        t = tangent(0.5 * turned_at_hub(rods.along, rods, limb, turned(actuation, limb, fraction)))
         scale = 1.0 / add_product(1.0, t, t)
         c, s = subtract_product(1.0, t, t) * scale, 2.0 * t * scale
         x, y = load(clamp.direction, 2 * limb), load(clamp.direction, 2 * limb + 1)
@@ -106,16 +106,17 @@ def turned_energy(K, c, s, p_x, p_y):
 
 
 @kernel
-def energy_of_turns(rods, turns):
-    """E [J] of root edges turned by (c, s), two rows per limb, from their natural directions."""
+def energy_of_turns(rods, work):
+    """E [J] of root edges turned by (c, s) in work.hub_turn, two rows per limb, from their natural directions."""
     S_x, S_y, total = splat(0.0), splat(0.0), splat(0.0)
     for limb in range(rods.n_limbs):
-        K = clamp_stiffness(rods, limb)
-        S_x, S_y = add_product(S_x, K, load(turns, 2 * limb)), add_product(S_y, K, load(turns, 2 * limb + 1))
+        K = clamp_stiffness(rods, work, limb)
+        c, s = load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1)
+        S_x, S_y = add_product(S_x, K, c), add_product(S_y, K, s)
     p_x, p_y = orientation(S_x, S_y)
     for limb in range(rods.n_limbs):
-        c, s = load(turns, 2 * limb), load(turns, 2 * limb + 1)
-        total += turned_energy(clamp_stiffness(rods, limb), c, s, p_x, p_y)
+        c, s = load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1)
+        total += turned_energy(clamp_stiffness(rods, work, limb), c, s, p_x, p_y)
     return total
 
 
@@ -128,7 +129,7 @@ def clamp_energy(rods, work, q):
         c, s = turn_from(work.hub_direction, limb, ex * inverse, ey * inverse)
         store(work.hub_turn, 2 * limb, c)
         store(work.hub_turn, 2 * limb + 1, s)
-    return energy_of_turns(rods, work.hub_turn)
+    return energy_of_turns(rods, work)
 
 
 @kernel
@@ -142,7 +143,7 @@ def moved_clamp_energy(clamp, rods, work, actuation, start, end):
         c, s = turn_from(work.hub_direction, limb, load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1))
         store(work.hub_turn, 2 * limb, c)
         store(work.hub_turn, 2 * limb + 1, s)
-    return energy_of_turns(rods, work.hub_turn)
+    return energy_of_turns(rods, work)
 
 
 @kernel
@@ -172,7 +173,7 @@ def add_clamps(rods, work, directions, ratio, convex, column):
     """
     S_x, S_y = splat(0.0), splat(0.0)
     for limb in range(rods.n_limbs):
-        edge, K = load_root_edge(work, limb), ratio * clamp_stiffness(rods, limb)
+        edge, K = load_root_edge(work, limb), ratio * clamp_stiffness(rods, work, limb)
         inverse = edge.length * edge.inverse
         c, s = turn_from(directions, limb, edge.x * inverse, edge.y * inverse)
         S_x, S_y = add_product(S_x, K, c), add_product(S_y, K, s)
@@ -181,7 +182,7 @@ def add_clamps(rods, work, directions, ratio, convex, column):
     p_x, p_y = orientation(S_x, S_y)
     energy = splat(0.0)
     for limb in range(rods.n_limbs):
-        K = ratio * clamp_stiffness(rods, limb)
+        K = ratio * clamp_stiffness(rods, work, limb)
         c, s = load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1)
         energy += turned_energy(K, c, s, p_x, p_y)
         C = K * add_product(c * p_x, s, p_y)
