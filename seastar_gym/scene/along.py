@@ -77,8 +77,8 @@ class Stiffening:
     angle from 0 to 1 and a logistic S from S(0) = 0 to S(1) = 1. Two wires that pull against each other have the
     activation of their difference.
 
-    ratio: EI at full activation over EI at rest. The default is that of a limb in air by Huang's group, see
-        docs/robots.md.
+    ratio: EI at full activation over EI at rest. The default is that of a limb of nickel-titanium wires in an elastomer
+        in the repository `softmachineslab/horton_der_2d`.
     middle: Activation at which S rises most.
     width: Width of the rise, in activation: S is about 1/(1 + exp(-(a - middle)/width)).
     """

@@ -87,6 +87,18 @@ def test_commanding_the_next_limb_turns_the_swim_and_mirrored_commands_mirror_it
     np.testing.assert_allclose(swum(robot, -command[mirror]), moved(q, mirror) * [1.0, -1.0], atol=1e-9)
 
 
+def test_few_nodes_bend_and_swim_as_many_do():
+    """Errors fall with the second power of the edge length: 10, 19 and 37 nodes."""
+    ends = []
+    for nodes in (10, 19, 37):
+        along, hot = AlongLimb(0.8, (1.0, 0.5)), Stiffening()
+        robot = Seastar(nodes_per_limb=nodes, along=along, stiffening=hot, relaxation_time=5e-3)
+        ends.append(swum(robot, strokes=2, numerics=Numerics("implicit-midpoint", 0.004))[0, 0])
+    coarse, middle, fine = ends
+    assert abs(coarse - fine) < 0.01 * abs(fine)
+    assert abs(middle - fine) < 0.4 * abs(coarse - fine)
+
+
 # The oracle
 
 
