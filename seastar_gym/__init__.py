@@ -18,6 +18,7 @@ from seastar_gym.scene.actuators.sma_limb import SmaLimb
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.scene.certificate import Certificate
+from seastar_gym.scene.body import Attachment, Body
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
 from seastar_gym.scene.limb import Limb
@@ -26,6 +27,8 @@ from seastar_gym.simulator import Simulator, SolverStatus, State, StrokeReport
 from seastar_gym.version import __version__
 
 __all__ = [
+    "Attachment",
+    "Body",
     "Certificate",
     "Contact",
     "DomainRandomization",
