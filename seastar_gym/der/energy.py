@@ -4,6 +4,8 @@ from seastar_gym.der.geometry import half_angle
 from seastar_gym.der.star import edge_of
 from seastar_gym.der.terms.along import natural_moment
 from seastar_gym.der.terms.bending import bending_energy, moment
+from seastar_gym.der.terms.body import move_roots
+from seastar_gym.der.terms.body_forces import add_turning_energy
 from seastar_gym.der.terms.clamp import clamp_energy
 from seastar_gym.der.terms.hub import set_natural_hub_angles
 from seastar_gym.der.terms.inertia import kinetic_energy
@@ -58,6 +60,10 @@ def elastic_energy(rods, work, q):
 def energies(rods, work, actuation, q, v, elastic, kinetic):
     """Fill `elastic` (13.14) and `kinetic` [J], shape (1, N_LANES), at the rotations `actuation.delta_psi_end`."""
     rods, work, actuation = borrow(rods), borrow(work), borrow(actuation)
+    q, v = borrow(q), borrow(v)
+    move_roots(rods.body, rods, q, v)
     set_natural_hub_angles(rods, work, actuation, splat(1.0))
-    store(borrow(elastic), 0, elastic_energy(rods, work, borrow(q)))
-    store(borrow(kinetic), 0, kinetic_energy(rods, borrow(v), (splat(0.0), splat(0.0))))
+    store(borrow(elastic), 0, elastic_energy(rods, work, q))
+    still = (splat(0.0), splat(0.0))
+    total = kinetic_energy(rods, v, still)
+    store(borrow(kinetic), 0, add_turning_energy(rods.body, rods, q, v, still, total))

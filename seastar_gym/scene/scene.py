@@ -110,6 +110,8 @@ class Scene:
     def _check_contact(self) -> None:
         if self.contact is None:
             return
+        if self.robot.body is not None and not self.robot.body.is_point:
+            raise ValueError("Contact of limbs around a body is not modelled: use a robot without one, or contact=None.")
         robot, pairs = self.robot, self.robot.limbs_that_may_touch()
         if not pairs:
             raise ValueError("Contact is modelled between limbs less than half a turn apart, and this robot has none.")
@@ -174,7 +176,7 @@ class Scene:
         if robot.along is not None:
             self._check_along(robot.along, peak)
             return
-        if robot.discretisation == "continuum" and robot.n_limbs > 1:
+        if robot.discretisation == "continuum" and (robot.n_limbs > 1 or robot.body is not None):
             if peak >= math.pi:
                 raise ValueError(f"A peak angle must stay below pi, not {peak:.4g} rad.")
             return
