@@ -1,6 +1,7 @@
 """A five-limb soft robot that learns to swim: planar discrete elastic rods behind a Gymnasium environment.
 
-Importing this package registers `SeastarSwim-v0`, and the timed environments that decide several times a second.
+Importing this package registers `SeastarSwim-v0`, the same with continuous commands, the timed environments that decide
+several times a second, and the tasks of `seastar_gym.envs.tasks`.
 """
 
 from typing import Any
@@ -8,16 +9,22 @@ from typing import Any
 from gymnasium.envs.registration import register
 
 from seastar_gym.certification.measure import certify
+from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.randomization import DomainRandomization, LogUniform, Normal, Uniform
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
+from seastar_gym.envs.tasks.miswired import Miswired
+from seastar_gym.envs.tasks.prey import Prey
+from seastar_gym.envs.tasks.station import Station
 from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water, relaxation_time
 from seastar_gym.scene.actuators.limited import Limited
 from seastar_gym.scene.actuators.measured import MeasuredCurve
 from seastar_gym.scene.actuators.sma_limb import SmaLimb
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.actuators.wires import SmaWires
+from seastar_gym.scene.along import AlongLimb, Stiffening
+from seastar_gym.scene.body import Attachment, Body
 from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
@@ -27,6 +34,9 @@ from seastar_gym.simulator import Simulator, SolverStatus, State, StrokeReport
 from seastar_gym.version import __version__
 
 __all__ = [
+    "AlongLimb",
+    "Attachment",
+    "Body",
     "Certificate",
     "Contact",
     "DomainRandomization",
@@ -36,8 +46,10 @@ __all__ = [
     "Limited",
     "LogUniform",
     "MeasuredCurve",
+    "Miswired",
     "Normal",
     "Numerics",
+    "Prey",
     "RewardWeights",
     "Scene",
     "Seastar",
@@ -48,6 +60,8 @@ __all__ = [
     "SmaWires",
     "SolverStatus",
     "State",
+    "Station",
+    "Stiffening",
     "StrokeReport",
     "SymmetryReduction",
     "ThermalSma",
@@ -67,6 +81,9 @@ _ENTRY_POINTS: dict[str, Any] = {
     "vector_entry_point": "seastar_gym.envs.vector:SeastarSwimVectorEnv",
 }
 register(id="SeastarSwim-v0", max_episode_steps=400, **_ENTRY_POINTS)
+register(
+    id="SeastarSwimContinuous-v0", max_episode_steps=400, kwargs={"actions": "continuous"}, **_ENTRY_POINTS
+)
 
 TIMED = {"SeastarSwimTimed-v0": 0.5, "SeastarSwimTimedModerate-v0": 0.2, "SeastarSwimTimedHard-v0": 0.1}
 """Times between decisions [s] of the timed environments, easy, moderate and hard, by id."""
@@ -87,3 +104,22 @@ register(
     kwargs={"decision_period": 0.5, "actions": "pairs", "headings": to_dict(Headings())},
     **_ENTRY_POINTS,
 )
+
+TASKS: dict[str, tuple[str, Actions, float, float | None]] = {
+    "SeastarMiswired": ("miswired", "pairs", 400.0, None),
+    "SeastarPrey": ("prey", "pairs", 200.0, None),
+    "SeastarStation": ("station", "joint", 120.0, None),
+}
+"""Name of the challenge, actions, time limit [s] and return that counts as solved of the tasks, by id. Each is there
+for strokes of 1 s, as ..-v0, and for decisions every 0.5 s, as ..Timed-v0."""
+
+for _id, (_task, _actions, _limit, _threshold) in TASKS.items():
+    for _suffix, _seconds in (("", 1.0), ("Timed", 0.5)):
+        register(
+            id=f"{_id}{_suffix}-v0",
+            entry_point="seastar_gym.envs.tasks.envs:SeastarTaskEnv",
+            vector_entry_point="seastar_gym.envs.tasks.envs:SeastarTaskVectorEnv",
+            max_episode_steps=round(_limit / _seconds),
+            reward_threshold=_threshold,
+            kwargs={"task": _task, "actions": _actions, "decision_period": _seconds},
+        )

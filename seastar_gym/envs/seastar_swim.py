@@ -15,7 +15,8 @@ from seastar_gym.envs.promises import warn_uncertified
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.rendering import Frame, Renderer, renderer_of
 from seastar_gym.envs.reward import RewardWeights
-from seastar_gym.envs.task import Outcome, Path, Plain, SwimTask, make_scene
+from seastar_gym.envs.swimming import Outcome, Swimming
+from seastar_gym.envs.task import Path, Plain, SwimTask, make_scene
 from seastar_gym.envs.task_env import TaskEnv, checked_options
 from seastar_gym.scene import Scene
 from seastar_gym.scene.certificate import Certificate
@@ -27,6 +28,7 @@ FRAMES_PER_SECOND = 10
 ROUNDING = 1e-9
 """Fraction of a time that is no time."""
 Observation = NDArray[np.float32]
+RenderMode = Literal["human", "rgb_array", "rgb_array_list"]
 
 
 class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
@@ -228,7 +230,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         reward: RewardWeights | Plain = RewardWeights(),
         waypoint_radius: float = 0.01,
         random_heading: bool = False,
-        render_mode: Literal["human", "rgb_array", "rgb_array_list"] | None = None,
+        render_mode: RenderMode | None = None,
         frames_per_stroke: int | None = None,
         randomization: DomainRandomization | Plain | None = None,
         certificate: Certificate | str | PathLike[str] | None = None,
@@ -237,11 +239,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         observe_actuators: bool = True,
         headings: Headings | Plain | None = None,
     ):
-        if render_mode is not None:
-            require_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
-        if frames_per_stroke is not None:
-            require_count("frames_per_stroke", frames_per_stroke, 1, 1_000_000)
-        self.render_mode = render_mode
+        self._set_pictures(render_mode, frames_per_stroke)
         modelled = make_scene(scene, fidelity, decision_period)
         if scene is not None:
             warn_uncertified(modelled, fidelity, certificate)
@@ -249,6 +247,16 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
             modelled, 1, path, reward, waypoint_radius, random_heading, 1, randomization, certificate, error_bars,
             actions, decision_period, observe_actuators, headings,
         )  # fmt: skip
+        self._begin_with(task, frames_per_stroke)
+
+    def _set_pictures(self, render_mode: RenderMode | None, frames_per_stroke: int | None) -> None:
+        if render_mode is not None:
+            require_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
+        if frames_per_stroke is not None:
+            require_count("frames_per_stroke", frames_per_stroke, 1, 1_000_000)
+        self.render_mode = render_mode
+
+    def _begin_with(self, task: Swimming, frames_per_stroke: int | None) -> None:
         self.action_space, self.observation_space = self._set_task(task)
         of_a_decision = max(1, round(FRAMES_PER_SECOND * task.decision_period))
         self.frames_per_stroke = of_a_decision if frames_per_stroke is None else frames_per_stroke
@@ -274,7 +282,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         require_seed(seed)
         super().reset(seed=None if seed is None else int(seed))
         with self._until_whole():
-            self._task.reset(np.ones(1, bool), [self.np_random], checked_options(options, {"path"}).get("path"))
+            asked = checked_options(options, {self._option}).get(self._option)
+            self._task.reset(np.ones(1, bool), [self.np_random], asked)
         self._running = True
         self._command = np.zeros_like(self._command)
         self._trail = self.simulator.hub_position()
@@ -342,6 +351,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
             waypoint_index=int(self._task.waypoint_index[0]),
             time=float(self.simulator.time[0]),
             warmth=None if warmth is None else warmth[0],
+            scenery=self._task.scenery(0),
         )
 
     def _draw_frame(self) -> None:

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from agents.files import write_atomically
 from seastar_gym.envs.commands import command_table
+from seastar_gym.files import write_atomically
 from seastar_gym.scene import Numerics, Scene, SmaPulse, Water
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.actuators.wires import SmaWires

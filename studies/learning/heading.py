@@ -22,15 +22,14 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
 
-from agents import policy as learned
-from agents.files import write_atomically
 from agents.hyperparameters import Hyperparameters
-from agents.planner import Planner
 from agents.ppo import make_model
-from agents.swim import Policy, Swim, decisions_in, swim
-from agents.turning import TurnThenSwim
-from agents.vec_env import BatchVecEnv
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.command import run_command
+from seastar_gym.controllers import learned
+from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.planner import Planner
+from seastar_gym.controllers.turning import TurnThenSwim
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -41,6 +40,8 @@ from seastar_gym.envs.symmetry import (
     restore_actions,
 )
 from seastar_gym.envs.task import make_scene
+from seastar_gym.evaluation.swim import Swim, decisions_in, swim
+from seastar_gym.files import write_atomically
 from seastar_gym.gaits import turning_wave
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity

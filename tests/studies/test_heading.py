@@ -9,16 +9,16 @@ pytest.importorskip("stable_baselines3")
 pytest.importorskip("matplotlib")
 
 from agents.hyperparameters import Hyperparameters
-from agents.planner import Budget, Planner
 from agents.ppo import make_model
-from agents.swim import swim
-from agents.turning import TurnThenSwim
-from agents.vec_env import BatchVecEnv
 from seastar_gym import Headings, VectorSymmetryReduction
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
+from seastar_gym.controllers.planner import Budget, Planner
+from seastar_gym.controllers.turning import TurnThenSwim
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.evaluation.swim import swim
 from seastar_gym.gaits import turning_wave
 from studies.learning import heading
 

@@ -54,6 +54,7 @@ def _kind(env: Any) -> _Kind:
         raise ValueError(f"Symmetry is known of SeastarSwim-v0 and the timed environments alone, not of {inner!r}.")
     require_symmetry(inner.scene, inner.randomization)
     mirror = memory_mirror(inner.scene.actuator) if inner.observe_actuators else ()
+    mirror += tuple((len(mirror) + index, sign) for index, sign in inner.added_mirror)
     return _Kind(inner.actions, inner.scene.robot.n_limbs, mirror, inner.headings is not None)
 
 
