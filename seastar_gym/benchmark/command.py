@@ -62,7 +62,7 @@ def measured(agent: str, task: str, options: argparse.Namespace) -> Entry:
         policy = load_agent(name, env, own[0])
         swum = swim_episodes(task, policy, own, fidelity=options.fidelity, max_decisions=options.decisions)
         rows |= dict(zip(own, _rows(swum, measure.of(swum)), strict=True))
-    columns = {name: [rows[seed][name] for seed in seeds] for name in rows[seeds[0]]}
+    columns: dict[str, Any] = {name: [rows[seed][name] for seed in seeds] for name in rows[seeds[0]]}
     return Entry(
         task, label, options.fidelity or "", measure.name, measure.unit, measure.better, seeds=seeds, **columns
     )

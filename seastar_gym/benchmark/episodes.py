@@ -87,7 +87,7 @@ def swim_episodes(
     return episodes
 
 
-def _swim(env: gym.vector.VectorEnv[Any, Any, Any], policy: Policy, seeds: list[int], limit: float) -> Episodes:
+def _swim(env: Any, policy: Policy, seeds: list[int], limit: float) -> Episodes:
     n = len(seeds)
     found = Episodes({}, np.zeros(n, bool), np.zeros(n), np.zeros(n, np.int64), limit)
     observations, _ = env.reset(seed=seeds)
