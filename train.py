@@ -1,6 +1,6 @@
 """Trains a swimmer with PPO, then compares it with the scripted pentagon gait.
 
-    python train.py                        SECONDS on two cores
+    python train.py                        about half a minute on two cores
     python train.py --seeds 0 1 2          the same for several seeds, one after another
     python train.py --decision-period 0.5  the same for decisions twice a second, by wires
     python train.py --quick                a shorter training with everything that follows
