@@ -53,9 +53,9 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         `render_robots` draws some of them.
 
     ## Memory
-    Nothing is copied for safety: the arrays of a step are fresh, and the environment keeps none of them, so a learner may
-    keep them as they are. With `step(actions, out=Buffers(...))` observations, rewards and flags are written into arrays
-    that are given, such as rows of a learner's memory, see `seastar_gym.envs.buffers`.
+    Nothing is copied for safety: the arrays of a step are fresh, and the environment keeps none of them, so a learner
+    may keep them as they are. With `step(actions, out=Buffers(...))` observations, rewards and flags are written into
+    arrays that are given, such as rows of a learner's memory, see `seastar_gym.envs.buffers`.
 
     `call`, `get_attr` and `set_attr` are those of Gymnasium's `SyncVectorEnv`. What each robot has for itself
     (`waypoints`, `scene`, `np_random`, `render`, ..) they give robot by robot; everything else is common to all robots.
