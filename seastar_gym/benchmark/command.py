@@ -94,7 +94,7 @@ def benchmark(options: argparse.Namespace) -> list[Entry]:
             except (ValueError, FileNotFoundError) as unfit:
                 print(f"{agent} does not swim {task}: {unfit}", file=sys.stderr)
                 continue
-            print(f"{agent}, {task}: {entries[-1].estimate()} {entries[-1].unit}", flush=True)
+            print(f"{agent}, {task}: {entries[-1].measure} {entries[-1].estimate()} [{entries[-1].unit}]", flush=True)
     return entries
 
 

@@ -17,8 +17,8 @@ class Buffers(NamedTuple):
     terminated: NDArray[Any]
     truncated: NDArray[Any]
 
-    def take(self, *results: NDArray[Any]) -> None:
-        """Write the results of a step, in the order of the names."""
+    def take(self, results: "Buffers") -> None:
+        """Write the results of a step."""
         for buffer, result in zip(self, results, strict=True):
             buffer[...] = result
 

@@ -191,12 +191,11 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         commands[resting] = 0.0
         self.closed = False
         with self._until_whole():
-            *results, info = self._step(commands, resting)
-            if out is None:
-                out = Buffers(*results)
-            else:
-                out.take(*results)
-            return *out, info
+            results, info = self._step(commands, resting)
+        if out is None:
+            return *results, info
+        out.take(results)
+        return *out, info
 
     @contextlib.contextmanager
     def _until_whole(self) -> Iterator[None]:
@@ -211,7 +210,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
 
     def _step(
         self, commands: NDArray[np.float64], resting: Flags
-    ) -> tuple[Observations, NDArray[np.float64], Flags, Flags, Info]:
+    ) -> tuple[Buffers, Info]:
         outcome = self._task.step(commands)
         self._commands = outcome.commands
         if self.render_mode is not None:
@@ -227,7 +226,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         observations, info = self._task.observe(), self._info(outcome.info, resting)
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._needs_reset.any():
             observations, info = self._begin_next_episodes(observations, outcome.info)
-        return observations, reward, terminated, truncated, info
+        return Buffers(observations, reward, terminated, truncated), info
 
     def action_masks(self) -> Flags:
         """Actions that every robot's wires can follow now, shape (num_envs, k), see `seastar_gym.envs.masks`."""
