@@ -91,7 +91,7 @@ class Ahead:
     commands: Shape (n_commands, n_limbs). In time, robots swim on for COASTING before their place is told.
     """
 
-    def __init__(self, robots: Robots, commands: Floats, depth: int = 1, beam: int = 6):
+    def __init__(self, robots: Robots, commands: Floats, depth: int = 1, beam: int = 4):
         period = None if robots.in_strokes else robots.period
         self.commands, self._depth, self._beam = commands, depth, beam
         self.coasting = 0.0 if robots.in_strokes else COASTING

@@ -77,7 +77,7 @@ def route(ends: Floats, target: Floats, after: Floats) -> Floats:
 class GreedyOnRoute(Greedy):
     """Greedy agent along waypoints."""
 
-    cost = staticmethod(route)  # type: ignore[assignment]
+    cost = staticmethod(route)
 
 
 class WiringPlanner:

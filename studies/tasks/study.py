@@ -45,7 +45,7 @@ class Options:
     """Seeds of the trainings; agents that do not learn swim once."""
     decisions: int = 200_000
     """Length of every training [decisions]."""
-    episodes: int = 32
+    episodes: int = 16
     """Number of held-out episodes."""
     fidelity: Fidelity = "fast"
     """Fidelity of the simulated swims."""
