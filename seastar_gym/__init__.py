@@ -10,6 +10,7 @@ from gymnasium.envs.registration import register
 
 from seastar_gym.certification.measure import certify
 from seastar_gym.envs.commands import Actions
+from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.randomization import DomainRandomization, LogUniform, Normal, Uniform
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
@@ -26,7 +27,7 @@ from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
 from seastar_gym.scene.limb import Limb
-from seastar_gym.scene.serial import register_part
+from seastar_gym.scene.serial import register_part, to_dict
 from seastar_gym.simulator import Simulator, SolverStatus, State, StrokeReport
 from seastar_gym.version import __version__
 
@@ -35,6 +36,7 @@ __all__ = [
     "Contact",
     "DomainRandomization",
     "GridCurrent",
+    "Headings",
     "Limb",
     "Limited",
     "LogUniform",
@@ -90,6 +92,12 @@ for _id, _decision_period in TIMED.items():
         **_ENTRY_POINTS,
     )
 
+register(
+    id="SeastarSwimHeading-v0",
+    max_episode_steps=600,
+    kwargs={"decision_period": 0.5, "actions": "pairs", "headings": to_dict(Headings())},
+    **_ENTRY_POINTS,
+)
 
 TASKS: dict[str, tuple[str, Actions, float, float, float | None]] = {
     "SeastarMiswired-v0": ("miswired", "joint", 1.0, 400.0, None),

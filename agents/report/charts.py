@@ -10,8 +10,8 @@ import plotly.graph_objects as go
 import plotly.io
 from numpy.typing import NDArray
 
-from agents.report.pictures import COLOURS, FAINT_INK, INK, MM, PLANNED, STROKES_PER_DOT, view
-from agents.swim import Swim
+from seastar_gym.evaluation.pictures import COLOURS, FAINT_INK, INK, MM, PLANNED, STROKES_PER_DOT, view
+from seastar_gym.evaluation.swim import Swim
 from seastar_gym.scene.csv_rows import read_rows
 
 Floats = NDArray[np.float64]

@@ -16,7 +16,8 @@ import plotly.offline
 
 from agents.report.charts import Curve, curves_figure, paths_figure, speeds_figure, to_html
 from agents.report.playback import UNIT, Playback
-from agents.swim import Swim
+from seastar_gym.evaluation.results import number
+from seastar_gym.evaluation.swim import Swim
 from seastar_gym.scene.csv_rows import Row as CsvRow
 from seastar_gym.scene.csv_rows import read_rows
 
@@ -155,13 +156,6 @@ def _cell(row: Row, name: str) -> str:
     if value is not None and f"{name}_low" in row:
         text += f" <small>[{number(row[f'{name}_low'])}, {number(row[f'{name}_high'])}]</small>"
     return f'<td{_side(name)} data-name="{name}">{text}</td>'
-
-
-def number(value: Any) -> str:
-    """A number of a table as it is shown; a dash for none."""
-    if value is None:
-        return "\u2013"
-    return f"{value:.1f}" if isinstance(value, float) else str(value)
 
 
 def _remarks(remarks: Remarks) -> str:

@@ -13,11 +13,11 @@ import argparse
 import json
 import runpy
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
-from tqdm import tqdm
-
 from seastar_gym.certification.measure import SAMPLES, certify
+from seastar_gym.extras import require_extra
 from seastar_gym.scene import Scene
 from seastar_gym.scene.certificate import Certificate
 
@@ -43,7 +43,8 @@ def as_text(certificate: Certificate) -> str:
             each.errors["small"],
         )  # fmt: skip
         shares = " ".join(f"{100 * error:>6.2g} %" for error in errors)
-        lines.append(f"{each!s:44} {shares} {each.speed:>12,.0f}")
+        gathers = "" if each.endures else "  gathers energy over long swims, not chosen"
+        lines.append(f"{each!s:44} {shares} {each.speed:>12,.0f}{gathers}")
     lines.append(
         f"With {100 * certificate.confidence():.0f} % confidence, at most 5 % of the sequences of a class exceed its "
         f"error ({certificate.samples} of each were measured). The limit errs by {100 * certificate.limit_error:.2g} %."
@@ -67,10 +68,10 @@ def draw(certificate: Certificate, file: Path) -> None:
     plt.close(figure)
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     parser = argparse.ArgumentParser(
-        "python -m seastar_gym.certify", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        "seastar certify", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     default = "(default: %(default)s)"
     parser.add_argument("scene", nargs="?", type=Path, help="file of the scene, .py or .json (default: the chapter's)")
@@ -78,9 +79,12 @@ def main() -> int:
     parser.add_argument("--samples", type=int, default=SAMPLES, help=f"sequences per class {default}")
     parser.add_argument("--seed", type=int, default=0, help=f"seed of the sequences {default}")
     parser.add_argument("--out", type=Path, default=Path("certificate.json"), help=f"file to write {default}")
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
     try:
+        require_extra("Certificates", "studies", "tqdm")
         scene = load_scene(options.scene)
+        from tqdm import tqdm
+
         with tqdm(total=100, unit="%", bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as bar:
 
             def progress(share: float) -> None:

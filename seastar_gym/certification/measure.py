@@ -4,7 +4,8 @@ Sequences of all classes of commands (commands.py) are swum with every resolutio
 same nodes and very short steps, and with many nodes and very short steps: the last stand for the continuum. The error
 of space is that of few nodes with short steps against many nodes; that of time is that of a setting against short steps
 with the same nodes; both are largest distances of the hub at ends of strokes, as fractions of the length of the hub's
-path. The sum of the two bounds the whole error, also where they cancel.
+path. The sum of the two bounds the whole error, also where they cancel. Long swims tell which settings gather energy
+(endurance.py).
 """
 
 import os
@@ -18,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.certification.commands import ACTIONS, CLASSES, PROMISED, STROKES, VERSION, draw_classes
+from seastar_gym.certification.endurance import energy_growth
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.scene.certificate import Certificate, CertifiedSetting, physics, resolved
 from seastar_gym.scene.checks import require_count, require_seed, shown
@@ -93,6 +95,7 @@ def certify(scene: Scene, samples: int = SAMPLES, seed: int = 0, progress: Progr
                 space_error=_rounded(max(by_class(space, samples)[name] for name in PROMISED)),
                 time_error=_rounded(max(by_class(in_time, samples)[name] for name in PROMISED)),
                 speed=_rounded(speed(resolved(scene, nodes, numerics), commands)),
+                energy_growth=_rounded(energy_growth(resolved(scene, nodes, numerics))),
             )
         )  # fmt: skip
     return Certificate(

@@ -73,7 +73,8 @@ class BatchPictures:
 
     def _draw(self, robot: int, frame: Frame) -> Picture:
         renderer, body = self._get_renderer(), self._task.simulator.scene.of_robot(robot).robot
-        renderer.reset(self._task.waypoints_of(robot), body.limb_length, body.rod_radius)
+        waypoints, headings = self._task.waypoints_of(robot), self._task.headings_of(robot)
+        renderer.reset(waypoints, body.limb_length, body.rod_radius, headings)
         renderer.camera = self._cameras.get(robot, renderer.camera)
         picture = renderer.draw(frame)
         self._cameras[robot] = renderer.camera

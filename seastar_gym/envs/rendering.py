@@ -42,6 +42,8 @@ REFIT_MARGIN = 0.5
 """Room [limb lengths] gained beyond a robot that left the view, so that the view moves in few steps."""
 
 
+POINTER = 0.3
+"""Length of the arrow of an asked heading [limb lengths]."""
 ROOT = 0.34
 """Share of a limb, from the hub on, whose colour shows how warm its wires are."""
 
@@ -88,12 +90,14 @@ class Renderer:
         rod_radius: float,
         waypoint_radius: float,
         size: tuple[int, int] = LARGEST,
+        headings: ArrayLike | None = None,
     ) -> None:
         """
         limb_nodes: Numbers of the nodes of every limb from hub to tip, shape (n_limbs, nodes_per_limb).
         waypoints: Planned path from the origin [m], shape (n, 2).
         limb_length, rod_radius, waypoint_radius: Sizes of the robot and of the waypoints [m].
         size: Width and height of the picture [px].
+        headings: Asked headings at the waypoints [rad], shape (n,). None draws none.
         """
         if size[0] < SMALLEST[0] or size[1] < SMALLEST[1]:
             smallest = f"{SMALLEST[0]} x {SMALLEST[1]}"
@@ -104,12 +108,20 @@ class Renderer:
         self._text_height = max(12, round(0.027 * min(size)))
         self._canvas = Canvas(size, self._text_height)
         self._window = Window()
-        self.reset(waypoints)
+        self.reset(waypoints, headings=headings)
 
     def reset(
-        self, waypoints: ArrayLike, limb_length: float | None = None, rod_radius: float | None = None
+        self,
+        waypoints: ArrayLike,
+        limb_length: float | None = None,
+        rod_radius: float | None = None,
+        headings: ArrayLike | None = None,
     ) -> None:
-        """Take a new path [m], shape (n, 2), and fit the view to it; take new sizes of the robot [m], where given."""
+        """Take a new path [m], shape (n, 2), and fit the view to it; take new sizes of the robot [m], where given.
+
+        headings: Asked headings at the waypoints [rad], shape (n,). None draws none.
+        """
+        self._headings = None if headings is None else np.array(headings, dtype=np.float64)
         self._limb_length = self._limb_length if limb_length is None else limb_length
         self._rod_radius = self._rod_radius if rod_radius is None else rod_radius
         self._waypoints = np.array(waypoints, dtype=np.float64)
@@ -150,9 +162,11 @@ class Renderer:
         self._paint_scenery(frame.scenery)
         self._paint_planned_path()
         self._paint_waypoints(frame.waypoint_index)
+        self._paint_headings(frame.waypoint_index)
         self._paint_trail(frame.trail)
         self._number_waypoints(frame.waypoint_index)
         self._paint_robot(frame)
+        self._mark_limb_1(frame)
         self._name_heated_limbs(frame)
         self._write_header(frame)
         self._write_footer(frame.scenery.note)
@@ -205,6 +219,28 @@ class Renderer:
         # Where a path passes a point twice, the current waypoint is drawn over one to come, and that over one done.
         for state, index in sorted((_state(index, waypoint_index), index) for index in range(len(self._waypoints))):
             self._paint_ring(self.camera.to_pixels(self._waypoints[index]), radius, state)
+
+    def _paint_headings(self, waypoint_index: int) -> None:
+        """Arrows from the waypoints in the directions of their asked headings."""
+        if self._headings is None:
+            return
+        radius, length = self._ring_radius(), POINTER * self._limb_length * self.camera.scale
+        for state, index in sorted((_state(index, waypoint_index), index) for index in range(len(self._waypoints))):
+            towards = np.array([np.cos(self._headings[index]), -np.sin(self._headings[index])])
+            tip = self.camera.to_pixels(self._waypoints[index]) + (radius + length) * towards
+            barbs = tip - 0.35 * length * (towards + np.outer([0.6, -0.6], towards[::-1] * [-1.0, 1.0]))
+            line = 3.5 if state == CURRENT else 2.5
+            self._canvas.stroke(np.array([tip - length * towards, tip]), STATE_COLOURS[state], line)
+            self._canvas.stroke(np.array([barbs[0], tip, barbs[1]]), STATE_COLOURS[state], line)
+
+    def _mark_limb_1(self, frame: Frame) -> None:
+        """Mark on the tip of limb 1, which the heading is that of, where headings are asked for."""
+        if self._headings is None:
+            return
+        tip = self.camera.to_pixels(frame.positions[self._limb_nodes[0, -1]])
+        radius = max(3.5, 0.3 * self._text_height)
+        self._canvas.dot(tip, WATER, radius + 1.5)
+        self._canvas.dot(tip, STATE_COLOURS[CURRENT], radius)
 
     def _ring_radius(self) -> float:
         return max(4.0, self._waypoint_radius * self.camera.scale)
@@ -288,10 +324,18 @@ class Renderer:
         for x in (start, end):
             self._canvas.stroke(np.array([[x, middle - tick], [x, middle + tick]]), INK, width=2.0)
 
+
 def renderer_of(
-    robot: Seastar, waypoints: ArrayLike, waypoint_radius: float, size: tuple[int, int] = LARGEST
+    robot: Seastar,
+    waypoints: ArrayLike,
+    waypoint_radius: float,
+    size: tuple[int, int] = LARGEST,
+    headings: ArrayLike | None = None,
 ) -> Renderer:
-    """Renderer of a robot on a path through waypoints [m], shape (n, 2), of this radius [m]; size in [px]."""
+    """Renderer of a robot on a path through waypoints [m], shape (n, 2), of this radius [m]; size in [px].
+
+    headings: Asked headings at the waypoints [rad], shape (n,). None draws none.
+    """
     return Renderer(
         limb_nodes(robot.n_limbs, robot.nodes_per_limb),
         waypoints,
@@ -299,6 +343,7 @@ def renderer_of(
         rod_radius=robot.rod_radius,
         waypoint_radius=waypoint_radius,
         size=size,
+        headings=headings,
     )
 
 

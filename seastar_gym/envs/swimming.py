@@ -21,13 +21,14 @@ from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.decisions import checked_decision_period
+from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.masks import action_masks, can_be_masked, masked_limbs
 from seastar_gym.envs.observation import (
     VELOCITY_SCALE,
     observation_size,
     observe,
     to_float32,
-    with_memory,
+    with_more,
 )
 from seastar_gym.envs.promises import promised
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, drawn_scene
@@ -84,6 +85,8 @@ class Swimming(ABC):
     TERMS: tuple[str, ...]
     """Names of the reward's terms."""
     randomization: DomainRandomization | None = None
+    headings: Headings | None = None
+    """Headings that are asked for at the waypoints, None if none are."""
     waypoint_radius: float
     """Radius of waypoints [m]."""
     observes_commands = False
@@ -159,8 +162,7 @@ class Swimming(ABC):
     @property
     def observation_size(self) -> int:
         """Length of one robot's observation."""
-        n_limbs, own = self.scene.robot.n_limbs, self._remembered().shape[1]
-        return observation_size(n_limbs) + own
+        return observation_size(self.scene.robot.n_limbs) + self._remembered().shape[1] + self._wanted().shape[1]
 
     def reset(self, robots: Flags, generators: list[np.random.Generator], asked: Any = None) -> None:
         """Begin a new episode of the robots in a mask, shape (n_robots,).
@@ -191,7 +193,8 @@ class Swimming(ABC):
         out = np.empty((len(target_rows), observation_size(robot.n_limbs), target_rows.shape[2]))
         places = stations(robot.nodes_per_limb)
         observe(own.rest, own.limb_length, simulator.q, simulator.v, places, target_rows, VELOCITY_SCALE, out)
-        return with_memory(to_float32(out, self.n_robots), self._remembered(), robot.n_limbs)
+        more = np.hstack([self._remembered(), self._wanted()])
+        return with_more(to_float32(out, self.n_robots), more, robot.n_limbs)
 
     def _remembered(self) -> Floats:
         """Numbers of the limbs that stand before the targets, shape (n_robots, k), limb after limb."""
@@ -209,6 +212,14 @@ class Swimming(ABC):
     def _observed_wires(self) -> Floats:
         """Memory of the actuators in the names of the commands, shape (n_robots, k), limb after limb."""
         return self.simulator.observe_actuators()
+
+    def _wanted(self) -> Floats:
+        """Numbers of the robot that stand after those of the limbs, such as asked headings, shape (n_robots, k)."""
+        return np.zeros((self.n_robots, 0))
+
+    def headings_of(self, robot: int) -> Floats | None:
+        """Asked headings of a robot's present episode [rad], shape (n,), a copy; None if none are asked for."""
+        return None
 
     def action_masks(self) -> Flags:
         """Actions that wires can follow now, shape (n_robots, k), see masks.py."""

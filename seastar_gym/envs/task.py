@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.observation import scene_layout
+from seastar_gym.envs.headings import AskedHeadings, Headings
+from seastar_gym.envs.observation import body_axes, scene_layout
 from seastar_gym.envs.paths import FARTHEST, cross_track_error, make_path
 from seastar_gym.envs.promises import read_certificate
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.reward import RewardWeights, reward_terms
+from seastar_gym.envs.stations import stations
 from seastar_gym.envs.swimming import Flags, Floats, Outcome, Score, Swimming
 from seastar_gym.scene import Numerics, Scene, SmaWires
 from seastar_gym.scene.certificate import Certificate
@@ -63,9 +65,9 @@ def read(part: Part | Plain, kind: type[Any]) -> Part:
     return from_dict(part, kind) if isinstance(part, dict) else part
 
 
-def scene_observation_size(scene: Scene, observe_actuators: bool = True) -> int:
-    """Length of the observation of a scene's robot."""
-    return scene_layout(scene, observe_actuators).size
+def scene_observation_size(scene: Scene, observe_actuators: bool = True, with_headings: bool = False) -> int:
+    """Length of the observation of a scene's robot. with_headings: Whether headings are asked for."""
+    return scene_layout(scene, observe_actuators, with_headings).size
 
 
 class SwimTask(Swimming):
@@ -74,7 +76,7 @@ class SwimTask(Swimming):
     Every robot has its own path and its own generator, so a robot of a batch does what it would do alone.
     """
 
-    TERMS = ("reward_progress", "reward_waypoint", "reward_effort")
+    TERMS: tuple[str, ...] = ("reward_progress", "reward_waypoint", "reward_effort")
 
     def __init__(
         self,
@@ -91,8 +93,10 @@ class SwimTask(Swimming):
         actions: Actions = "limbs",
         decision_period: float | None = None,
         observe_actuators: bool = True,
+        headings: Headings | Plain | None = None,
     ):
         randomization, reward = read(randomization, DomainRandomization), read(reward, RewardWeights)
+        headings = read(headings, Headings)
         if not isinstance(randomization, DomainRandomization | None):
             raise ValueError(f"randomization must be a DomainRandomization or None, not {shown(randomization)}.")
         require_number("waypoint_radius", waypoint_radius, "m")
@@ -100,7 +104,14 @@ class SwimTask(Swimming):
             raise ValueError(f"waypoint_radius must be at most {FARTHEST:g} m, not {shown(waypoint_radius)}.")
         if not isinstance(reward, RewardWeights):
             raise ValueError(f"reward must be RewardWeights, not {shown(reward)}.")
+        if not isinstance(headings, Headings | None):
+            raise ValueError(f"headings must be Headings or None, not {shown(headings)}.")
         waypoints = make_path(path, np.random.default_rng(0))  # refuses a bad path now, not at the first reset
+        if headings is not None:
+            headings.of_path(waypoints, np.random.default_rng(0))  # likewise
+            self.TERMS = (*self.TERMS, "reward_heading")
+        self.headings = headings
+        self._asked = None if headings is None else AskedHeadings(headings, n_robots)
         super().__init__(
             scene, n_robots, threads, random_heading=random_heading, draws=randomization,
             certificate=read_certificate(certificate, scene), error_bars=error_bars, actions=actions,
@@ -113,14 +124,20 @@ class SwimTask(Swimming):
         self._way_after = np.zeros((n_robots, 1))  # from waypoint k to the last [m]
         self.n_waypoints = np.ones(n_robots, np.int64)
         self._way_to_go, self._way_at_reset = np.zeros(n_robots), np.zeros(n_robots)  # [m]
+        self._turn_to_go = np.zeros(n_robots)  # [rad]
 
     def _draw(self, robot: int, rng: np.random.Generator, asked: Path | None) -> None:
-        self._set_path(robot, make_path(self.path if asked is None else asked, rng))
+        waypoints = make_path(self.path if asked is None else asked, rng)
+        if self._asked is not None:
+            self._asked.begin(robot, self._asked.headings.of_path(waypoints, rng))
+        self._set_path(robot, waypoints)
 
     def _begin(self, robots: Flags) -> None:
         self.waypoint_index[robots] = 0
         self._way_to_go[robots] = self._measure_way_to_go(self.simulator.hub_position())[robots]
         self._way_at_reset[robots] = self._way_to_go[robots]
+        if self._asked is not None:
+            self._turn_to_go[robots] = self._asked.to_go(self.waypoint_index, self.heading())[robots]
 
     def _set_path(self, robot: int, waypoints: Floats) -> None:
         missing = len(waypoints) - self.waypoints.shape[1]
@@ -138,6 +155,18 @@ class SwimTask(Swimming):
     def waypoints_of(self, robot: int) -> Floats:
         """Waypoints of a robot's present episode [m], shape (n, 2), a copy."""
         return self.waypoints[robot, : self.n_waypoints[robot]].copy()
+
+    def headings_of(self, robot: int) -> Floats | None:
+        """Asked headings of a robot's present episode [rad], shape (n,), a copy; None if none are asked for."""
+        return None if self._asked is None else self._asked.of_robot(robot)
+
+    def heading(self) -> Floats:
+        """Direction of every robot's body frame [rad], shape (n_robots,): the same bits for one robot and for many."""
+        simulator = self.simulator
+        out = np.empty((len(simulator.q), 2, simulator.q.shape[2]))
+        body_axes(simulator.coefficients.rest, simulator.q, stations(simulator.scene.robot.nodes_per_limb), out)
+        c, s = out.transpose(1, 0, 2).reshape(2, -1)[:, : self.n_robots]
+        return np.asarray(np.arctan2(s, c))
 
     def _waypoint(self, k: NDArray[np.int64]) -> Floats:
         """Waypoint k of every robot [m], the last one beyond the end, the origin at -1; shape (n_robots, 2)."""
@@ -158,12 +187,25 @@ class SwimTask(Swimming):
     def _targets(self) -> Floats:
         return np.concatenate([self._waypoint(self.waypoint_index), self._waypoint(self.waypoint_index + 1)], axis=1)
 
+    def _wanted(self) -> Floats:
+        if self._asked is None:
+            return super()._wanted()
+        return self._asked.seen(self.waypoint_index, self.heading())
+
     def _score(self, hub: Floats, pulses: Floats) -> Score:
         reached = self._pass_waypoints(hub)
         before = self._way_to_go
         self._way_to_go = self._measure_way_to_go(hub)
         success = self.waypoint_index == self.n_waypoints
-        return Score(reward_terms(self.reward, before - self._way_to_go, reached, pulses), success, success)
+        terms = reward_terms(self.reward, before - self._way_to_go, reached, pulses, self._turned())
+        return Score(terms, success, success)
+
+    def _turned(self) -> Floats | None:
+        """Decrease of what is left to turn since it was last measured [rad], shape (n_robots,)."""
+        if self._asked is None:
+            return None
+        before, self._turn_to_go = self._turn_to_go, self._asked.to_go(self.waypoint_index, self.heading())
+        return before - self._turn_to_go
 
     def _energy_per_metre(self) -> Floats:
         """Energy over the decrease of the way to go, both since the reset [J/m]; infinite where it did not decrease."""
@@ -172,11 +214,17 @@ class SwimTask(Swimming):
         return np.where(np.isnan(energy) | (energy == 0.0), energy, found)
 
     def _pass_waypoints(self, hub: Floats) -> NDArray[np.int64]:
-        """Move on while the current waypoint is within its radius; returns the number reached, shape (n_robots,)."""
+        """Move on while the current waypoint is within its radius, and its heading met if one is asked for.
+
+        Returns the number of waypoints reached, shape (n_robots,).
+        """
+        heading = None if self._asked is None else self.heading()
         reached = np.zeros(self.n_robots, np.int64)
         while True:
             near = _length(self._waypoint(self.waypoint_index) - hub) <= self.waypoint_radius
             near &= self.waypoint_index < self.n_waypoints
+            if self._asked is not None and heading is not None:
+                near &= self._asked.is_met(self.waypoint_index, heading)
             if not near.any():
                 return reached
             self.waypoint_index += near
@@ -190,7 +238,15 @@ class SwimTask(Swimming):
             "distance": _length(current - hub),
             "cross_track_error": cross_track_error(hub, self._waypoint(leg - 1), self._waypoint(leg)),
             "energy_per_metre": self._energy_per_metre(),
+            **self._heading_facts(),
         }
+
+    def _heading_facts(self) -> dict[str, Floats]:
+        """Heading, and the turn from it to the asked one [rad], where headings are asked for."""
+        if self._asked is None:
+            return {}
+        heading = self.heading()
+        return {"heading": heading, "heading_error": self._asked.turn(self.waypoint_index, heading)}
 
 
 def _length(vectors: Floats) -> Floats:

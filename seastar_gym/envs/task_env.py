@@ -6,6 +6,7 @@ import numpy as np
 from gymnasium import spaces
 
 from seastar_gym.envs.commands import Actions, action_space, command_table
+from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.spec import PlainSpec
 from seastar_gym.envs.swimming import Swimming
@@ -45,6 +46,11 @@ class TaskEnv(PlainSpec):
     def added_mirror(self) -> Mirror:
         """What a mirror does to the numbers that the task adds to a limb's in the observation."""
         return self._task.added_mirror
+
+    @property
+    def headings(self) -> Headings | None:
+        """Headings that are asked for at the waypoints, None if none are."""
+        return self._task.headings
 
     @property
     def scene(self) -> Scene:

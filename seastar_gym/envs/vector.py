@@ -16,6 +16,7 @@ from seastar_gym.envs.batch_attributes import BatchAttributes
 from seastar_gym.envs.batch_info import Info, of_some, with_masks
 from seastar_gym.envs.batch_pictures import BatchPictures, Picture
 from seastar_gym.envs.commands import Actions, as_array, to_commands
+from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.promises import warn_uncertified
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.reward import RewardWeights
@@ -79,6 +80,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         error_bars: bool = False,
         decision_period: float | None = None,
         observe_actuators: bool = True,
+        headings: Headings | Plain | None = None,
     ):
         self._set_batch(num_envs, max_episode_steps, render_mode, autoreset_mode)
         modelled = make_scene(scene, fidelity, decision_period)
@@ -86,7 +88,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
             warn_uncertified(modelled, fidelity, certificate)
         task = SwimTask(
             modelled, num_envs, path, reward, waypoint_radius, random_heading, threads, randomization, certificate,
-            error_bars, actions, decision_period, observe_actuators,
+            error_bars, actions, decision_period, observe_actuators, headings,
         )  # fmt: skip
         self._begin_with(task)
 

@@ -18,8 +18,10 @@ from seastar_gym.scene.robot import Seastar
 from seastar_gym.scene.scene import Scene
 from seastar_gym.version import __version__
 
-FORMAT = 1
+FORMAT = 2
 """Version of the file's form."""
+LARGEST_GROWTH = 1.5
+"""Growth of the kinetic energy over a long swim above which `for_error` does not choose a setting."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,7 @@ class CertifiedSetting:
     errors: Sum of the errors of space and time, by class of commands, see `seastar_gym.certification.commands`.
     space_error, time_error: Largest errors of all classes of full amplitude.
     speed: Simulated time over computing time, for a batch on one core.
+    energy_growth: Kinetic energy late in swims of 200 strokes over that early in them, the largest of some gaits.
     """
 
     nodes_per_limb: int
@@ -43,6 +46,12 @@ class CertifiedSetting:
     space_error: float
     time_error: float
     speed: float
+    energy_growth: float
+
+    @property
+    def endures(self) -> bool:
+        """Whether long swims gather no energy: errors of ten strokes would not show it."""
+        return self.energy_growth <= LARGEST_GROWTH
 
     @property
     def numerics(self) -> Numerics:
@@ -132,6 +141,8 @@ class Certificate:
     def for_error(self, error: float, classes: tuple[str, ...] | None = None) -> Scene:
         """The scene at the fastest setting whose error is at most `error`; ValueError if there is none.
 
+        Settings that gather energy over long swims are left out.
+
         error: Of the hub's path, as a fraction of its length. classes: Classes of commands, `promised` if None.
         """
         if not is_finite_number(error) or error <= 0.0:
@@ -140,10 +151,13 @@ class Certificate:
         if unknown := sorted(set(asked) - set(self.settings[0].errors)):
             known = ", ".join(self.settings[0].errors)
             raise ValueError(f"Classes of commands are {known}, not {', '.join(map(str, unknown))}.")
-        for setting in sorted(self.settings, key=lambda each: -each.speed):
+        enduring = [each for each in self.settings if each.endures]
+        if not enduring:
+            raise ValueError("Every measured setting of this scene gathers energy over long swims.")
+        for setting in sorted(enduring, key=lambda each: -each.speed):
             if setting.error(asked) <= error:
                 return self.at(setting)
-        best = min(self.settings, key=lambda each: each.error(asked))
+        best = min(enduring, key=lambda each: each.error(asked))
         raise ValueError(
             f"No measured setting keeps the path error of this scene below {100 * error:g} %: the best, {best}, keeps "
             f"{100 * best.error(asked):.2g} %."
@@ -186,7 +200,7 @@ reads_certificates(Certificate.load)
 
 def _read_setting(data: dict[str, Any]) -> CertifiedSetting:
     setting = CertifiedSetting(**data)
-    numbers = (*setting.errors.values(), setting.space_error, setting.time_error, setting.speed)
+    numbers = (*setting.errors.values(), setting.space_error, setting.time_error, setting.speed, setting.energy_growth)
     if not all(isinstance(number, float | int) and not math.isnan(number) for number in numbers):
         raise ValueError("an error is no number")
     _ = setting.numerics

@@ -15,11 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from agents.files import write_atomically
 from seastar_gym.envs.commands import command_table
-from seastar_gym.scene import Scene, SmaPulse, Water
+from seastar_gym.files import write_atomically
+from seastar_gym.scene import Numerics, Scene, SmaPulse, Water
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.actuators.wires import SmaWires
+from seastar_gym.scene.numerics import SchemeName
+from studies.gaits.crossing import crossings
 from studies.gaits.enumeration import SLOTS, distinct_codes, gaits_of
 from studies.gaits.evolution import evolve
 from studies.gaits.named import GAITS, SLOT, lagged
@@ -40,6 +42,8 @@ COARSE = 1.0 / SLOTS
 LAGS = np.arange(0.0, 1.0, SLOT)
 """Lags of the scan [s]."""
 DIRECTIONS = np.radians(np.arange(0.0, 37.0, 6.0))
+FINE, FINE_PRICES, FINE_FACTOR = 0.05, (0.0, 0.5), 2
+"""Slot of finer evolved gaits [s], their prices of heat [mm/J], and how many times as many generations they have."""
 PRICES = (0.0, 0.5, 1.0, 1.5, 2.0)
 """Prices of heat of the evolved gaits [mm/J]."""
 CLOUD = 4000
@@ -149,21 +153,56 @@ def evolved(plan: Plan, progress: Callable[[int], Any]) -> list[Table]:
     """Gaits that evolve: both actuators, along limb 1 and away from it, at several prices of heat."""
     found = []
     ahead, away = timed({0.0: "2+,5-", 0.6: "3+,4-"}, 1.0, COARSE), timed({0.0: "2-,5+", 0.4: "3-,4+"}, 1.0, COARSE)
-    asked: list[tuple[Any, str, float, float]] = [(WIRES, "wires", 1.0, price) for price in PRICES]
-    asked += [(WIRES, "wires", -1.0, 0.0), (THERMAL, "thermal", 1.0, 0.0), (THERMAL, "thermal", -1.0, 0.0)]
-    for actuator, name, towards, price in asked:
-        start, scene = (ahead if towards > 0.0 else away), scene_with(actuator)
-        gait, tried = evolve(scene, start, COARSE, towards, price, plan.generations, plan.population, progress=progress)
+    asked: list[tuple[Any, str, float, float, float]] = [(WIRES, "wires", 1.0, price, COARSE) for price in PRICES]
+    asked += [(WIRES, "wires", 1.0, price, FINE) for price in FINE_PRICES]
+    asked += [(actuator, name, towards, 0.0, COARSE) for actuator, name, towards in (
+        (WIRES, "wires", -1.0), (THERMAL, "thermal", 1.0), (THERMAL, "thermal", -1.0))]  # fmt: skip
+    for actuator, name, towards, price, slot in asked:
+        start, scene = np.repeat(ahead if towards > 0.0 else away, round(COARSE / slot), axis=0), scene_with(actuator)
+        start[np.arange(len(start)) % round(COARSE / slot) > 0] = 0.0
+        generations = plan.generations * (1 if slot == COARSE else FINE_FACTOR)
+        gait, tried = evolve(scene, start, slot, towards, price, generations, plan.population, progress=progress)
         found.append({
-            "actuator": name, "towards": "along limb 1" if towards > 0.0 else "away from limb 1",
-            "price_mm_per_joule": price, "tried": tried, "gait": events_of(gait, COARSE), "pulses": gait.tolist(),
-            "fast": measured(scene, gait, COARSE),
-            plan.finest: measured(scene_with(actuator, plan.finest), gait, COARSE),
+            "actuator": name, "towards": "along limb 1" if towards > 0.0 else "away from limb 1", "slot_s": slot,
+            "price_mm_per_joule": price, "tried": tried, "gait": events_of(gait, slot), "pulses": gait.tolist(),
+            "fast": measured(scene, gait, slot),
+            plan.finest: measured(scene_with(actuator, plan.finest), gait, slot),
         })  # fmt: skip
     return found
 
 
-def robustness(reheated: Floats) -> dict[str, Table]:
+def main_gaits(reheated: Floats) -> dict[str, tuple[Floats, float]]:
+    """The gaits whose robustness is looked at, with their slots [s]."""
+    return {**{name: (GAITS[name].gait, SLOT) for name in ("synchronous", "lag 0.6", "thrifty")},
+            "re-heated": (reheated, COARSE)}  # fmt: skip
+
+
+def by_numerics(gaits: dict[str, tuple[Floats, float]]) -> dict[str, Table]:
+    """Speeds [mm/s] of the main gaits at other resolutions, schemes and steps."""
+    plain = scene_with()
+    midpoint: SchemeName = "implicit-midpoint"
+    fine = replace(plain, robot=replace(plain.robot, nodes_per_limb=37))
+    changed = {
+        "7 nodes, midpoint 5 ms: `fast`": plain,
+        "7 nodes, midpoint 1 ms": replace(plain, numerics=Numerics(midpoint, 1e-3, 1e-6)),
+        "7 nodes, SDIRK3 10 ms": replace(plain, numerics=Numerics("sdirk3", 1e-2, 1e-6)),
+        "7 nodes, Euler 1 ms": replace(plain, numerics=Numerics("implicit-euler", 1e-3, 1e-6)),
+        "37 nodes, midpoint 5 ms": fine,
+        "37 nodes, midpoint 1 ms": replace(fine, numerics=Numerics(midpoint, 1e-3, 1e-7)),
+        "37 nodes, SDIRK3 10 ms": replace(fine, numerics=Numerics("sdirk3", 1e-2, 1e-7)),
+        "`chapter`: 10 nodes, Euler 3 ms": scene_with(fidelity="chapter"),
+    }
+    return {what: {name: measured(scene, *gait) for name, gait in gaits.items()} for what, scene in changed.items()}
+
+
+def by_crossing(gaits: dict[str, tuple[Floats, float]]) -> dict[str, int]:
+    """Percent of snapshots, with 37 nodes per limb, in which limbs cross, of the main gaits."""
+    plain = scene_with()
+    fine = replace(plain, robot=replace(plain.robot, nodes_per_limb=37))
+    return {name: crossings(fine, *gait) for name, gait in gaits.items()}
+
+
+def robustness(gaits: dict[str, tuple[Floats, float]]) -> dict[str, Table]:
     """Speeds [mm/s] of the main gaits by robots and waters other than the chapter's, at `fast`."""
     plain = scene_with()
     changed = {
@@ -178,8 +217,6 @@ def robustness(reheated: Floats) -> dict[str, Table]:
         "cooling in 0.7 s": replace(plain, actuator=SmaWires(cooling_time=0.7, period=1.0)),
         "heating in 0.15 s": replace(plain, actuator=SmaWires(heating_time=0.15, period=1.0)),
     }
-    gaits = {name: (GAITS[name].gait, SLOT) for name in ("synchronous", "lag 0.6", "thrifty")}
-    gaits["re-heated"] = reheated, COARSE
     return {what: {name: measured(scene, *gait) for name, gait in gaits.items()} for what, scene in changed.items()}
 
 
@@ -202,13 +239,16 @@ def pareto(points: Floats) -> Floats:
 
 def study(plan: Plan) -> Table:
     """Run the study; returns its results as plain data."""
-    n_gaits = len(range(0, 40890, plan.codes)) + (len(PRICES) + 3) * plan.generations * plan.population
+    n_gaits = len(range(0, 40890, plan.codes)) + (
+        (len(PRICES) + 3 + FINE_FACTOR * len(FINE_PRICES)) * plan.generations * plan.population
+    )
     with tqdm(total=n_gaits, unit="gait", unit_scale=True) as bar:
         rest, swimming = from_rest(plan, bar.update)
         evolution = evolved(plan, bar.update)
     named = named_gaits(plan)
     pair = measure(scene_with(SmaPulse()), np.array([[[0, 1, 0, 0, -1.0]]]), 1.0)
     strokes = synchronous(plan)
+    main = main_gaits(np.array(evolution[0]["pulses"]))
     wires = [each["fast"] for each in evolution if each["actuator"] == "wires"]
     return {
         "robot": "the chapter's, continuum's discretisation",
@@ -227,7 +267,9 @@ def study(plan: Plan) -> Table:
                 "re-heated": np.concatenate([velocity_of(each) for each in wires]),
             }
         ),
-        "robustness": robustness(np.array(evolution[0]["pulses"])),
+        "robustness": robustness(main),
+        "numerics": by_numerics(main),
+        "percent of snapshots with crossing limbs": by_crossing(main),
         "front": front(swimming, wires + [each["fast"] for each in named.values()]),
     }
 

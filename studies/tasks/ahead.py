@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.greedy import Displacements, displacement_map, turned, waypoints_of
-from agents.planner import Branching, state_of
+from seastar_gym.controllers.greedy import Displacements, displacement_map, turned, waypoints_of
+from seastar_gym.controllers.planner import Branching, state_of
 from seastar_gym.envs.stations import body_heading
 from seastar_gym.simulator import State
 
@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 
 COASTING = 0.5
-"""Time for which robots in time swim on before they are compared [s], see `agents.planner.Budget`."""
+"""Time for which robots in time swim on before they are compared [s], see `seastar_gym.controllers.planner.Budget`."""
 
 
 class Robots:

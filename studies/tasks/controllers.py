@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.greedy import turned
+from seastar_gym.controllers.greedy import turned
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.tasks.course import Courses, Pursuit

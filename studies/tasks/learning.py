@@ -12,7 +12,7 @@ from stable_baselines3.common.utils import LinearSchedule
 
 from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_model
-from agents.vec_env import BatchVecEnv
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.envs.symmetry import VectorSymmetryReduction
 from seastar_gym.scene.numerics import Fidelity
 from studies.tasks.episodes import Episodes, make_batch, swim

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.files import write_atomically
-from agents.report.pictures import COLOURS, FAINT_INK
 from agents.trials import mean_with_interval
+from seastar_gym.evaluation.pictures import COLOURS, FAINT_INK
+from seastar_gym.files import write_atomically
 
 UNITS = {
     "miswired": "seconds to the last waypoint, 400 if it is not reached",

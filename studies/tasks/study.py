@@ -19,8 +19,8 @@ from typing import Any, cast
 import numpy as np
 import tyro
 
-from agents.files import write_atomically
 from seastar_gym import TASKS
+from seastar_gym.files import write_atomically
 from seastar_gym.scene.numerics import Fidelity
 from studies.tasks.controllers import CONTROLLERS, make_controller
 from studies.tasks.episodes import Episodes, measure, swim

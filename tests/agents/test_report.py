@@ -11,13 +11,13 @@ from rich.console import Console
 
 from agents.evaluate import evaluate, main
 from agents.report.charts import Curve, curves_figure, read_progress, speeds_figure, to_html
-from agents.report.page import MEASURED, Remarks, number, read_trials, table_html
+from agents.report.page import MEASURED, Remarks, read_trials, table_html
 from agents.report.playback import UNIT, RecordingEnv
-from agents.results import COLUMNS
-from agents.scripted import scripted
-from agents.swim import swim
 from refusals import assert_refused
+from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.evaluation.results import COLUMNS, number
+from seastar_gym.evaluation.swim import swim
 
 MM = 1000.0
 SHORT = [[0.02, 0.0], [0.02, 0.02]]

@@ -7,23 +7,24 @@ from gymnasium.vector import AutoresetMode
 from rich.console import Console
 
 from agents import learner_file
-from agents.description import Description
 from agents.evaluate import evaluate
-from agents.greedy import GreedyPolicy, displacement_map
 from agents.hyperparameters import Hyperparameters
-from agents.planner import Budget, Planner, budget_for, state_of
-from agents.policy import LearnedPolicy, load, save
 from agents.ppo import make_model, make_training_env, policy_of
-from agents.scripted import scripted
-from agents.swim import decisions_in, swim
-from agents.trials import swim_many
-from agents.vec_env import BatchVecEnv
 from refusals import assert_refused
 from seastar_gym import Limited, Numerics, Scene, Simulator, SmaPulse, SmaWires, ThermalSma
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
+from seastar_gym.controllers import learner_zip
+from seastar_gym.controllers.description import Description
+from seastar_gym.controllers.greedy import GreedyPolicy, displacement_map
+from seastar_gym.controllers.learned import LearnedPolicy, load, save
+from seastar_gym.controllers.planner import Budget, Planner, budget_for, state_of
+from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.evaluation.many import swim_many
+from seastar_gym.evaluation.swim import decisions_in, swim
 from seastar_gym.gaits import in_time, lagged_gait, straight_gait, thrifty_gait, turning_wave
 
 PERIODS = (0.5, 0.2, 0.1)
@@ -207,7 +208,7 @@ def test_a_timed_policy_survives_the_disk_with_its_decision_period(tmp_path):
     save(policy_of(model), tmp_path / "policy.safetensors")
     again = learner_file.resume(tmp_path / "model.zip", model.get_env())
     assert again.gamma == model.gamma
-    for policy in (load(tmp_path / "policy.safetensors"), learner_file.load(tmp_path / "model.zip")):
+    for policy in (load(tmp_path / "policy.safetensors"), learner_zip.load(tmp_path / "model.zip")):
         assert policy.decision_period == 0.5 and isinstance(policy.scene.actuator, SmaWires)
         env = gym.make(
             "SeastarSwim-v0", actions=policy.actions, scene=policy.scene, decision_period=policy.decision_period

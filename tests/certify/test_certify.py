@@ -5,6 +5,7 @@ import subprocess
 import sys
 import warnings
 from dataclasses import replace
+from types import SimpleNamespace
 
 import gymnasium as gym
 import numpy as np
@@ -13,7 +14,7 @@ import pytest
 import seastar_gym
 from refusals import assert_refused
 from seastar_gym import Certificate, Contact, Numerics, Scene, Seastar, Simulator, SmaPulse
-from seastar_gym.certification import command, commands, measure
+from seastar_gym.certification import command, commands, endurance, measure
 from seastar_gym.envs.spec import PlainSpec
 from seastar_gym.scene.certificate import resolved
 
@@ -73,6 +74,36 @@ def test_for_error_is_the_fastest_setting_that_keeps_it(certificate):
         certificate.for_error(-1.0)
     with assert_refused("Classes of commands are"):
         certificate.for_error(0.1, ("of yesterday",))
+
+
+def test_settings_that_gather_energy_over_long_swims_are_not_chosen(certificate):
+    assert all(each.energy_growth < 1.5 for each in certificate.settings)
+    largest = max(each.error(certificate.promised) for each in certificate.settings)
+    fastest = max(certificate.settings, key=lambda each: each.speed)
+
+    def growing(*some):
+        settings = (replace(each, energy_growth=60.0) if each in some else each for each in certificate.settings)
+        return replace(certificate, settings=tuple(settings))
+
+    chosen = growing(fastest).for_error(largest)
+    assert (chosen.robot.nodes_per_limb, chosen.numerics) != (fastest.nodes_per_limb, fastest.numerics)
+    assert "gathers energy" in command.as_text(growing(fastest))
+    with assert_refused("Every measured setting of this scene gathers energy"):
+        growing(*certificate.settings).for_error(largest)
+
+
+def test_the_energy_of_a_swim_that_fails_grows_without_bound(monkeypatch):
+    monkeypatch.setattr(Simulator, "stroke", lambda *_: SimpleNamespace(status=np.array([1] * 17)))
+    assert endurance.energy_growth(SCENE) == np.inf
+
+
+@pytest.mark.parametrize("n_limbs", [1, 2, 3, 5, 12])
+def test_long_swims_turn_mirrored_limbs_against_each_other(n_limbs):
+    commands = endurance.long_swims(n_limbs, samples=2, seed=0)
+    assert commands.shape == (10, 5, n_limbs) and np.abs(commands).max() == 1.0
+    pairs = endurance.mirrored_pairs(n_limbs)
+    if n_limbs > 2:
+        np.testing.assert_array_equal(pairs[:, 1:], -pairs[:, :0:-1])
 
 
 def test_the_function_the_command_and_the_modules_have_names_of_their_own():

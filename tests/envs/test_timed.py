@@ -53,7 +53,7 @@ def test_a_timed_environment_passes_gymnasiums_and_stable_baselines_checkers(id)
     pytest.importorskip("stable_baselines3.common.env_checker").check_env(env, warn=True, skip_render_check=True)
 
 
-@pytest.mark.parametrize("id", ["SeastarSwim-v0", *IDS])
+@pytest.mark.parametrize("id", ["SeastarSwim-v0", "SeastarSwimHeading-v0", *IDS])
 def test_ids_are_those_of_the_table(id):
     row = re.search(rf"\| `{id}` +\|(.*)\|$", SeastarSwimEnv.__doc__, re.MULTILINE)[1]
     period, actions, limit, decisions, actuator = (cell.strip().strip("`") for cell in row.split("|"))

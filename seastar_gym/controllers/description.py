@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any, NamedTuple, get_args
 
-import seastar_gym
 from seastar_gym.envs.commands import Actions, Discrete, choices
 from seastar_gym.envs.decisions import checked_decision_period
 from seastar_gym.envs.observation import OBSERVATION_LAYOUT
 from seastar_gym.envs.task import scene_observation_size
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count, shown
+from seastar_gym.version import __version__
 
 FORMAT = 2
 """Version of the entries of a description."""
@@ -38,7 +38,7 @@ class Description(NamedTuple):
         """Description as text; `more` adds entries for people to read."""
         facts = {
             "format": FORMAT,
-            "seastar_gym": seastar_gym.__version__,
+            "seastar_gym": __version__,
             "observation_layout": OBSERVATION_LAYOUT,
             "observation_size": scene_observation_size(self.scene),
             **self._asdict(),

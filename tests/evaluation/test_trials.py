@@ -6,15 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents.disturbances import Disturbance, DisturbedTask
-from agents.greedy import GreedyPolicy
-from agents.scripted import scripted
-from agents.swim import swim
-from agents.trials import Options, main, mean_with_interval, statistics, swim_many
+from agents.trials import Options, main
 from seastar_gym import RewardWeights, Scene, ThermalSma
+from seastar_gym.controllers.greedy import GreedyPolicy
+from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.observation import scene_layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import SwimTask
+from seastar_gym.evaluation.disturbances import Disturbance, DisturbedTask
+from seastar_gym.evaluation.many import mean_with_interval, statistics, swim_many
+from seastar_gym.evaluation.swim import swim
 
 FAST = Scene.preset("fast")
 N = 16

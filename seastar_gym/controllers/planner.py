@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.greedy import Searcher, waypoints_of
+from seastar_gym.controllers.greedy import Searcher, waypoints_of
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.decisions import checked_decision_period
 from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout

@@ -1,17 +1,18 @@
-"""Pictures and videos of swims. matplotlib and imageio are imported where something is drawn."""
+"""Pictures and videos of swims. matplotlib is imported where something is drawn."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.swim import Swim
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.evaluation import films
+from seastar_gym.evaluation.swim import Swim
 
 Floats = NDArray[np.float64]
 
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
 
 FRAMES_PER_STROKE, FPS = 3, 30
 """Frames of a video per stroke and per second: strokes of one second pass ten times as fast."""
-CLOSING_SECONDS = 1.5
-"""How long a video rests on its last picture."""
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8c6d1f", "#56b4e9", "#6a3d9a", "#e69f00")
 LINE_STYLES = ("-", "--", ":")
@@ -126,20 +125,10 @@ def film(file: Path) -> Generator[Callable[[SeastarSwimEnv], None], None, None]:
 
     The environment's render_mode is "rgb_array_list", its frames_per_stroke FRAMES_PER_STROKE.
     """
-    import imageio.v2 as imageio
+    with films.film(file, FPS) as add:
 
-    frames: list[Any] = []
-    fast = ["-preset", "veryfast"]
-    movie: Any = imageio.get_writer(
-        file, format="FFMPEG", mode="I", fps=FPS, codec="libx264", quality=7, output_params=fast
-    )
-    with movie:
+        def add_stroke(env: SeastarSwimEnv) -> None:
+            for frame in env.render() or ():
+                add(frame)
 
-        def add(env: SeastarSwimEnv) -> None:
-            frames[:] = env.render() or ()
-            for frame in frames:
-                movie.append_data(frame)
-
-        yield add
-        for closing in frames[-1:] * round(CLOSING_SECONDS * FPS):
-            movie.append_data(closing)
+        yield add_stroke

@@ -1,6 +1,6 @@
 """Greedy agent: it chooses commands by a map of the mean displacement that each of them makes.
 
-    python -m agents.evaluate --agents greedy planner pentagon
+    seastar evaluate --agents greedy planner pentagon
 
 The map has the displacement of the hub in the body frame and the turn of the robot, per stroke of every command, once
 the repeated command swims steadily. It is computed once for every scene and kept in the user's cache folder. In a timed
@@ -62,9 +62,7 @@ def measure_gaits(
     return Displacements(turned(simulator.hub_position() - hub, -heading) / measured, turn / measured)
 
 
-def displacement_map(
-    scene: Scene, actions: Actions = "joint", decision_period: float | None = None
-) -> Displacements:
+def displacement_map(scene: Scene, actions: Actions = "joint", decision_period: float | None = None) -> Displacements:
     """Map of a scene for the commands of an action mode, from the cache or measured now."""
     asked: tuple[Any, ...] = scene, actions, SETTLING_STROKES, MEASURED_STROKES, OBSERVATION_LAYOUT
     if decision_period is not None:

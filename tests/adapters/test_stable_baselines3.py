@@ -8,8 +8,8 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize, VecVideoRecorder
 
-from agents.scripted import scripted
-from agents.vec_env import BatchVecEnv
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
+from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
 

@@ -14,17 +14,17 @@ import pytest
 import safetensors.numpy
 import torch
 
-from agents.description import Description
 from agents.hyperparameters import Hyperparameters
-from agents.policy import SHIPPED, LearnedPolicy, load, save
 from agents.ppo import make_model, make_training_env, policy_of
-from agents.swim import swim
 from every_part import ACTUATORS, PARTS
 from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, SmaPulse, UniformCurrent, Water
+from seastar_gym.controllers.description import Description
+from seastar_gym.controllers.learned import SHIPPED, LearnedPolicy, load, save
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import scene_observation_size
+from seastar_gym.evaluation.swim import swim
 
 ROOT = Path(__file__).resolve().parents[2]
 FAST = Numerics.preset("fast")
@@ -421,6 +421,6 @@ def test_the_policy_in_the_box_swims_with_any_nodes_per_limb(nodes_per_limb):
 
 
 def test_it_needs_neither_torch_nor_stable_baselines():
-    code = "import sys; from agents.policy import load; load(); print(*sys.modules)"
+    code = "import sys; from seastar_gym.controllers.learned import load; load(); print(*sys.modules)"
     answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert set(answer.stdout.split()).isdisjoint({"torch", "stable_baselines3", "pickle5", "matplotlib"})

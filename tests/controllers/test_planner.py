@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from agents.greedy import waypoints_of
-from agents.planner import Budget, Planner, state_of
-from agents.swim import swim
 from seastar_gym import Numerics, Scene, Seastar, Simulator, ThermalSma
+from seastar_gym.controllers.greedy import waypoints_of
+from seastar_gym.controllers.planner import Budget, Planner, state_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.evaluation.swim import swim
 
 FAST = Scene(numerics=Numerics.preset("fast"))
 

@@ -1,6 +1,6 @@
 """Learned policies on disk: weights in a safetensors file, and a description in JSON beside it.
 
-    from agents.policy import load
+    from seastar_gym.controllers.learned import load
 
     policy = load()  # the one in the box; or load("runs/mine/policy.safetensors")
     env = gym.make(
@@ -23,11 +23,11 @@ import safetensors
 import safetensors.numpy
 from numpy.typing import NDArray
 
-from agents.description import Description, read_facts
-from agents.files import write_atomically
+from seastar_gym.controllers.description import Description, read_facts
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.symmetry import memory_mirror, reduce_observations, restore_actions
 from seastar_gym.envs.task import scene_observation_size
+from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import is_finite_number
 

@@ -3,9 +3,9 @@
 import pytest
 
 from agents import evaluate, trials
-from agents.roster import AGENTS, load_agents
-from agents.scripted import GAITS, scripted
 from seastar_gym import Scene
+from seastar_gym.controllers.roster import AGENTS, load_agents
+from seastar_gym.controllers.scripted import GAITS, scripted
 from seastar_gym.envs.paths import PATHS
 
 

@@ -6,17 +6,14 @@ the name of the function that makes it, "module:function".
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, TypeAlias
 
 import numpy as np
-import tyro
 
-from agents import foreign
-from agents import policy as learned
-from agents.greedy import GreedyPolicy
-from agents.planner import Planner
-from agents.scripted import GAITS, scripted
-from agents.swim import Policy
+from seastar_gym.controllers import foreign, learned, learner_zip
+from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.greedy import GreedyPolicy
+from seastar_gym.controllers.planner import Planner
+from seastar_gym.controllers.scripted import GAITS, scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
 from seastar_gym.scene import Scene
@@ -39,8 +36,6 @@ HELP = (
 )
 """Help of options that name agents."""
 
-AgentNames: TypeAlias = Annotated[tuple[str, ...], tyro.conf.arg(help=HELP)]
-
 
 def load_agents(
     names: Sequence[str], seed: int = 0, fidelity: Fidelity = "balanced", decision_period: float | None = None
@@ -56,19 +51,33 @@ def load_agents(
         label = str(Path(name).with_suffix("")) if label in agents else label
         if label in agents:
             raise ValueError(f"The agent {name!r} is named twice.")
-        agents[label] = _load_agent(name, seed, fidelity, decision_period)
+        agents[label] = _load_agent(
+            name,
+            seed,
+            make_scene(None, fidelity, decision_period),
+            decision_period,
+            lambda: SeastarSwimEnv(fidelity=fidelity, decision_period=decision_period),
+        )
     return agents
+
+
+def load_agent(name: str, env: SeastarSwimEnv, seed: int = 0) -> Policy:
+    """Policy by a name as in `HELP`, for the robot and the decisions of an environment."""
+    in_strokes = env.decision_period == env.scene.actuator.period
+    return _load_agent(name, seed, env.scene, None if in_strokes else env.decision_period, lambda: env)
 
 
 def _is_file(name: str) -> bool:
     return name.endswith((".zip", ".safetensors", ".pth", ".pt", ".pkl")) or len(Path(name).parts) > 1
 
 
-def _load_agent(name: str, seed: int, fidelity: Fidelity, decision_period: float | None) -> Policy:
+def _load_agent(
+    name: str, seed: int, scene: Scene, decision_period: float | None, make_env: Callable[[], SeastarSwimEnv]
+) -> Policy:
     if name in AGENTS:
-        return AGENTS[name](make_scene(None, fidelity, decision_period), decision_period)
+        return AGENTS[name](scene, decision_period)
     if foreign.is_function(name):
-        return foreign.call_function(name, SeastarSwimEnv(fidelity=fidelity, decision_period=decision_period))
+        return foreign.call_function(name, make_env())
     return _load_file(name) if _is_file(name) else _scripted(name, seed, decision_period)
 
 
@@ -86,10 +95,11 @@ def _scripted(name: str, seed: int, decision_period: float | None) -> Policy:
 def _load_file(name: str) -> Policy:
     if not name.endswith(".zip"):
         return learned.load(name)
+    if not foreign.is_model(name):
+        return learner_zip.load(name)
     try:
-        if foreign.is_model(name):
-            return foreign.load_model(name)
-        from agents import learner_file
+        return foreign.load_model(name)
     except ModuleNotFoundError as missing:
-        raise ValueError(f'A model.zip needs {missing.name}: pip install "seastar-gym[train]".') from missing
-    return learner_file.load(name)
+        raise ValueError(
+            f'A model.zip of Stable-Baselines3 needs {missing.name}: pip install "seastar-gym[train]".'
+        ) from missing

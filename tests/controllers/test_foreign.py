@@ -13,14 +13,15 @@ import pytest
 from stable_baselines3 import A2C, DQN, PPO
 
 from agents import evaluate, trials
-from agents.description import Description
-from agents.foreign import load_model
-from agents.roster import load_agents
-from agents.swim import actions_of, swim
-from agents.trials import swim_many
 from refusals import assert_refused
 from seastar_gym import Numerics, Scene, Seastar
+from seastar_gym.controllers.contract import actions_of
+from seastar_gym.controllers.description import Description
+from seastar_gym.controllers.foreign import load_model
+from seastar_gym.controllers.roster import load_agents
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.evaluation.many import swim_many
+from seastar_gym.evaluation.swim import swim
 
 FAST = Scene(numerics=Numerics.preset("fast"))
 LEARNERS = {

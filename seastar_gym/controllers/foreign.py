@@ -1,6 +1,6 @@
 """Agents that were made elsewhere: models of plain Stable-Baselines3, and functions that return a policy.
 
-    python -m agents.evaluate --agents runs/mine/model.zip my_agents:make pentagon
+    seastar evaluate --agents runs/mine/model.zip my_agents:make pentagon
 
 Both run the code of whoever made them: Stable-Baselines3's files are unpickled, which can execute anything. Load only
 files that you trust. The policies of this project (.safetensors, and the model.zip of train.py) are not unpickled.
@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from agents.policy import reason_of
-from agents.swim import Policy
+from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.learned import reason_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 
 _FUNCTION = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.greedy import turned
+from seastar_gym.controllers.greedy import turned
 from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout
 from seastar_gym.envs.stations import body_heading
 from seastar_gym.envs.task import Outcome, SwimTask

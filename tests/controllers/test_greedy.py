@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from agents import greedy
-from agents.greedy import GreedyPolicy, displacement_map, measure_gaits
-from agents.scripted import to_actions
-from agents.swim import swim
 from seastar_gym import Numerics, Scene
+from seastar_gym.controllers import greedy
+from seastar_gym.controllers.greedy import GreedyPolicy, displacement_map, measure_gaits
+from seastar_gym.controllers.scripted import to_actions
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import action_table
+from seastar_gym.evaluation.swim import swim
 from seastar_gym.gaits import pair_gait
 
 FAST = Scene(numerics=Numerics.preset("fast"))

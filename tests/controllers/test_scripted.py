@@ -6,8 +6,8 @@ import pytest
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 
-from agents.scripted import GAITS, OpenLoopPolicy, scripted, to_actions
 from seastar_gym import Numerics, Scene, Simulator
+from seastar_gym.controllers.scripted import GAITS, OpenLoopPolicy, scripted, to_actions
 from seastar_gym.envs.commands import action_space, to_commands
 from seastar_gym.gaits import pair_gait, pentagon_gait, straight_gait
 
