@@ -20,8 +20,13 @@ from studies.tasks.memory import VectorMemory, Wrap
 
 PAST = 8
 """Past observations that a learner with memory sees."""
-DISCOUNTS = {"miswired": 0.9, "prey": 0.98, "fast-prey": 0.98, "station": 0.9}
-"""Discounts per second, by the name of the challenge: the prey is met after many seconds."""
+OWN: dict[str, dict[str, Any]] = {
+    "miswired": {"discount": 0.9},
+    "prey": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
+    "fast-prey": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
+    "station": {"discount": 0.9},
+}
+"""Hyperparameters that differ from the project's, by challenge: the prey is met after many seconds."""
 WRAPS: dict[str, Wrap] = {
     "PPO": VectorSymmetryReduction,
     "PPO, memory": lambda batch: VectorMemory(batch, PAST),
@@ -47,8 +52,8 @@ class Trained:
 
 
 def hyperparameters(task: str, decision_period: float) -> Hyperparameters:
-    """Those of the project, with the discount of the task."""
-    return replace(Hyperparameters(), discount=DISCOUNTS[task], decision_period=decision_period)
+    """Those of the project, with the horizon of the task."""
+    return replace(Hyperparameters(), decision_period=decision_period, **OWN[task])
 
 
 def _model(learner: str, env: BatchVecEnv, chosen: Hyperparameters, seed: int) -> Any:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.trials import mean_with_interval
+from seastar_gym.evaluation.many import mean_with_interval
 from seastar_gym.evaluation.pictures import COLOURS, FAINT_INK
 from seastar_gym.files import write_atomically
 
@@ -39,7 +39,7 @@ left* is the share of the way from greedy to the bound that plain PPO does not g
 | planner | simulates a decision ahead what is observed, with the wires, the water or the prey that it believes in |
 | adaptive | remembers: believes in the wires, the drift or the turning of the prey that has explained the past best |
 | informed | is told what is hidden: the wires, the water, the course of the prey |
-| PPO | the project's hyperparameters, symmetric, no memory; discount per second 0.9, for prey 0.98 |
+| PPO | the project's hyperparameters, symmetric, no memory; but for the horizons of `studies.tasks.learning.OWN` |
 | PPO, memory | the same, and tips, last commands and targets of the last eight observations |
 
 The planner believes in its own wires, in still water and in a prey that swims straight on. Contracts of the tasks stand
