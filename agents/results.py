@@ -13,7 +13,9 @@ from seastar_gym.evaluation.swim import Swim
 def results_table(swims: Sequence[Swim]) -> Table:
     """Table for print."""
     table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False, pad_edge=False)
+    unit = {done.counted_in for done in swims}
     for name, title in COLUMNS.items():
+        title = title if unit == {"strokes"} else title.replace("strokes", "decisions")
         if name == "agent":
             table.add_column(title, vertical="bottom", overflow="fold")
         else:

@@ -16,6 +16,7 @@ import tyro
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from agents.names import AgentNames
 from seastar_gym.command import run_command
@@ -29,6 +30,12 @@ from seastar_gym.scene.checks import require_count, require_number
 from seastar_gym.scene.numerics import Fidelity
 
 NOMINAL: tuple[str, ...] = ("pentagon", "square", "triangle", "figure-eight")
+
+PRINTED = (
+    "strokes_to_finish", "simulated_time_s", "mean_cross_track_error_mm", "limbs_heated_per_metre",
+    "energy_per_metre_J",
+)  # fmt: skip
+"""Measures that are printed, besides the success rate."""
 
 
 def trials(agents: Mapping[str, Policy], fidelity: Fidelity, options: "Options") -> list[dict[str, str | int | float]]:
@@ -94,7 +101,7 @@ class Options:
             require_number("decision_period", self.decision_period, "s")
 
 
-def _print(rows: Sequence[dict[str, str | int | float]]) -> None:
+def _print(rows: Sequence[dict[str, str | int | float]], decision_period: float | None) -> None:
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
     for name in (
         "path",
@@ -103,21 +110,23 @@ def _print(rows: Sequence[dict[str, str | int | float]]) -> None:
         "fidelity",
         "swims",
         "success",
-        "strokes",
+        "strokes" if decision_period is None else f"decisions\nof {decision_period:g} s",
+        "time [s]",
         "cross-track\nerror [mm]",
         "heated\n[1/m]",
+        "energy\n[J/m]",
     ):
-        table.add_column(name)
+        table.add_column(Text(name))
     for row in rows:
         success = f"{row['success_rate']:.1%} [{row['success_rate_low']:.1%}, {row['success_rate_high']:.1%}]"
         others = (
             f"{row[name]:.1f} [{row[name + '_low']:.1f}, {row[name + '_high']:.1f}]"
-            for name in ("strokes_to_finish", "mean_cross_track_error_mm", "limbs_heated_per_metre")
+            for name in PRINTED
         )
         table.add_row(
             *(str(row[name]) for name in ("path", "disturbance", "agent", "fidelity", "swims")), success, *others
         )
-    Console(width=180).print(table)
+    Console(width=220).print(table)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -131,7 +140,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (ValueError, OSError) as bad_input:
         print(bad_input, file=sys.stderr)
         return 2
-    _print(rows)
+    _print(rows, options.decision_period)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     with options.out.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, fieldnames=list(rows[0]))

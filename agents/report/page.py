@@ -114,12 +114,17 @@ TRIALS = {
     "fidelity": "fidelity",
     "swims": "swims",
     "success_rate": "success [%]",
-    "strokes_to_finish": "strokes to finish",
+    "strokes_to_finish": "strokes or decisions to finish",
+    "simulated_time_s": "time to finish [s]",
     "mean_cross_track_error_mm": "mean cross-track error [mm]",
     "limbs_heated_per_metre": "limbs heated per metre [1/m]",
+    "energy_per_metre_J": "energy per metre [J/m]",
 }
 """Columns of the table of trials, as agents.trials names them."""
-MEASURED = ("success_rate", "strokes_to_finish", "mean_cross_track_error_mm", "limbs_heated_per_metre")
+MEASURED = (
+    "success_rate", "strokes_to_finish", "simulated_time_s", "mean_cross_track_error_mm", "limbs_heated_per_metre",
+    "energy_per_metre_J",
+)  # fmt: skip
 """Those with confidence intervals."""
 
 
@@ -176,7 +181,7 @@ PLAYER = """<div id="agents" role="radiogroup" aria-label="agent"></div>
 </div>
 <p id="readout"></p>
 </div>
-<div class="strokes"><h3>Strokes</h3><ol id="strokes"></ol></div>
+<div class="strokes"><h3>Commands</h3><ol id="strokes"></ol></div>
 </div>"""
 
 

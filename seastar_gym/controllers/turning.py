@@ -65,7 +65,7 @@ class TurnThenSwim:
     def _turn(self, left: float) -> Floats:
         """The gait that turns to the side where the asked heading lies."""
         mirror = 2 * self.scene.robot.n_limbs - 1
-        return self.clockwise if left < 0.0 else transform_commands(self.clockwise, mirror)
+        return self.clockwise if left < 0.0 else np.asarray(transform_commands(self.clockwise, mirror), np.float64)
 
     def _action(self, command: Floats) -> NDArray[Any]:
         return np.asarray(to_actions(command[None], self.actions, self.scene.robot.n_limbs)[0])

@@ -170,13 +170,14 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
 
     `energy_per_metre` is infinite where the route has not become shorter; heat and energy are NaN for actuators that do
     not say it.
-    Measured errors and speed are there only where decisions are strokes.
     `path_error` is that over every sequence of strokes by whole commands, repeated ones included; `space_error` and
     `time_error` are those of the usual swims, straight, round the pentagon, or of random commands. They belong to the
     robot's resolution and the numerics (see `seastar_gym.scene.fidelity`), and are NaN for other robots and scenes than
     the chapter's, unless a `certificate` has them, and for what was not measured. `error_estimate` is of the very swim,
     of any robot: the true error since the reset, of space and time, lies below it in about 95 % of strokes
-    (docs/error_bars.md); NaN after a failure.
+    (docs/error_bars.md); NaN after a failure. Where decisions are no strokes, errors are those of `SmaWires` at whole
+    seconds, by random commands and by random seconds that are repeated; they are NaN for decisions of less than 0.1 or
+    more than 0.5 s, and so is `real_time_factor`.
     With `randomization`, `info` has the drawn numbers by their names, too.
 
     ## Starting state

@@ -109,7 +109,8 @@ class Swimming(ABC):
         require_flag("random_heading", random_heading)
         require_flag("observe_actuators", observe_actuators)
         self.decision_period = checked_decision_period(decision_period, scene)
-        self._has_promises = self.decision_period == scene.actuator.period
+        self._has_promises = True
+        self._in_strokes = self.decision_period == scene.actuator.period
         self.actions: Actions = actions
         self.observe_actuators = observe_actuators
         self._can_be_masked = can_be_masked(scene.actuator)
@@ -119,7 +120,7 @@ class Swimming(ABC):
         self.simulator = Simulator(drawn_scene(scene, self.drawn), n_robots, threads, error_bars)
         self._error_bars = error_bars
         self.certificate = certificate
-        self._promise = self.simulator.scene, promised(self.simulator.scene, self.certificate)
+        self._promise = self.simulator.scene, self._promise_of(self.simulator.scene)
         peak = np.max(self.simulator.scene.actuator.peak_angle)  # before the first draw the largest that may be drawn
         if scene.robot.hub_hinge == "turning" and 2 * peak >= scene.robot.opening_angle * (1 - 1e-9):
             raise ValueError(
@@ -310,11 +311,14 @@ class Swimming(ABC):
             **{name: values.copy() for name, values in self.drawn.items()},
         }
 
+    def _promise_of(self, scene: Scene) -> dict[str, float]:
+        return promised(scene, self.certificate, None if self._in_strokes else self.decision_period)
+
     def _promised(self) -> dict[str, Floats]:
         """Measured errors and speed, shape (n_robots,) each; NaN for robots with weak limbs."""
         simulator = self.simulator
         if simulator.scene is not self._promise[0]:
-            self._promise = simulator.scene, promised(simulator.scene, self.certificate)
+            self._promise = simulator.scene, self._promise_of(simulator.scene)
         strong = (simulator.limb_strengths == 1.0).all(axis=1)
         return {name: np.where(strong, value, np.nan) for name, value in self._promise[1].items()}
 

@@ -46,7 +46,8 @@ def draw_traces(swims: Sequence[Swim], waypoint_radius: float, file: Path) -> No
     for number, swim in enumerate(swims):
         _draw_trace(axes, swim, number)
     axes.legend(
-        loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False, title=f"a dot every {STROKES_PER_DOT} strokes",
+        loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False,
+        title=f"a dot every {STROKES_PER_DOT} {swims[0].counted_in}",
         alignment="left",
     )  # fmt: skip
     figure.savefig(file, dpi=160, bbox_inches="tight", pad_inches=0.15)
@@ -109,10 +110,8 @@ def _draw_trace(axes: Axes, swim: Swim, number: int) -> None:
     colour = COLOURS[number % len(COLOURS)]
     style = LINE_STYLES[number // len(COLOURS) % len(LINE_STYLES)]
     width, level = 1.4 + 0.4 * min(number, 4), 4.0 - 0.01 * number
-    result = (
-        f"{swim.strokes} strokes" if swim.finished else f"{swim.waypoints_reached} of {len(swim.waypoints)} waypoints"
-    )
-    axes.plot(*hub.T, color=colour, linestyle=style, linewidth=width, zorder=level, label=f"{swim.agent}: {result}")
+    label = f"{swim.agent}: {swim.result}"
+    axes.plot(*hub.T, color=colour, linestyle=style, linewidth=width, zorder=level, label=label)
     dots = hub[STROKES_PER_DOT::STROKES_PER_DOT]
     axes.plot(*dots.T, color=colour, linestyle="", marker="o", markersize=width + 2.0, zorder=level)
     marker = "o" if swim.finished else "X"

@@ -50,6 +50,19 @@ class Swim:
         return len(self.limbs_heated)
 
     @property
+    def counted_in(self) -> str:
+        """What `strokes` are to be called: decisions, if they are not a second apart."""
+        in_strokes = len(self.time) < 2 or math.isclose(self.time[1] - self.time[0], 1.0)
+        return "strokes" if in_strokes else "decisions"
+
+    @property
+    def result(self) -> str:
+        """Strokes, or decisions, to the last waypoint, or how many waypoints were reached; a few words."""
+        if self.finished:
+            return f"{self.strokes} {self.counted_in}"
+        return f"{self.waypoints_reached} of {len(self.waypoints)} waypoints"
+
+    @property
     def waypoints_reached(self) -> int:
         """Waypoints reached at the end."""
         return int(self.waypoint_index[-1])

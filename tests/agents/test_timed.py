@@ -1,5 +1,7 @@
 """Agents that decide several times a second: gaits, evaluation, planner, training and policies."""
 
+from dataclasses import replace
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -10,6 +12,8 @@ from agents import learner_file
 from agents.evaluate import evaluate
 from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_model, make_training_env, policy_of
+from agents.results import results_table
+from agents.trials import main as trials_main
 from refusals import assert_refused
 from seastar_gym import Limited, Numerics, Scene, Simulator, SmaPulse, SmaWires, ThermalSma
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
@@ -257,3 +261,20 @@ def test_masks_are_handed_out_robot_by_robot():
         assert masks.shape == (3, 21) and masks.dtype == bool
         np.testing.assert_array_equal(masks, [info["action_mask"] for info in infos])
         assert masks[1].all() and not masks[0].all()
+
+
+def test_tables_of_timed_swims_count_decisions_and_seconds(tmp_path, capsys):
+    command = ["--agents", "rest", "--sets", "nominal", "--decision-period", "0.5", "--fidelity", "fast"]
+    assert trials_main([*command, "--num-threads", "1", "--out", str(tmp_path / "trials.csv")]) == 0
+    printed = capsys.readouterr().out
+    assert "decisions" in printed and "of 0.5 s" in printed and "time [s]" in printed and "strokes" not in printed
+
+
+def test_a_swim_is_counted_in_decisions_unless_they_take_a_second():
+    for period, word in ((1.0, "strokes"), (0.5, "decisions")):
+        env = SeastarSwimEnv([[0.02, 0.0]], decision_period=period, fidelity="fast")
+        done = swim("straight", scripted("straight", decision_period=period), env, max_strokes=30)
+        assert done.counted_in == word and done.result == f"{done.strokes} {word}"
+        printed = [column.header.plain for column in results_table([done]).columns[1:]]
+        assert printed[0].split()[0] == word
+        assert replace(done, waypoints=np.ones((7, 2))).result == "1 of 7 waypoints"

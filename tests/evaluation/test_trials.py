@@ -162,7 +162,7 @@ def test_named_paths_on_two_fidelities(tmp_path, capsys):
     assert [row["fidelity"] for row in rows] == ["fast"] * 4 + ["balanced"] * 4
     assert {float(row["success_rate"]) for row in rows} == {0.0}
     printed = capsys.readouterr().out
-    words = ("path", "fidelity", "success", "cross-track", "heated", "0.0% [0.0%, 0.0%]")
-    assert all(word in printed for word in words)
+    words = ("path", "fidelity", "success", "strokes", "time [s]", "cross-track", "error [mm]", "[J/m]")
+    assert all(word in printed for word in (*words, "0.0% [0.0%, 0.0%]")) and "decisions" not in printed
     with pytest.raises(ValueError, match="nothing to swim"):
         Options(sets=())
