@@ -321,10 +321,13 @@ def test_info_is_that_of_the_docstrings(id):
     env = made(id)
     kind, found = type(env.unwrapped.challenge), env.reset(seed=0)[1]
     own = {row[0].strip("`"): row[1] for row in rows(kind, "Info")}
-    common = {row[0].strip("`") for row in rows(SeastarSwimEnv, "Info")} - {"error_estimate"}
+    common = {row[0].strip("`") for row in rows(SeastarSwimEnv, "Info")} - {
+        "error_estimate",
+        "heading",
+        "heading_error",
+        "reward_heading",
+    }
     measured = {"path_error", "space_error", "time_error", "real_time_factor"}
-    if env.unwrapped.decision_period < 1.0:
-        common -= measured
     assert {*own} <= {*found} and {*found} <= common | {*own}
     without = re.search(r"without (.*?);", " ".join(inspect.getdoc(kind).split()))
     missing = set(re.findall(r"`(\w+)`", without[1])) if without else set()
