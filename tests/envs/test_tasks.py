@@ -171,7 +171,7 @@ def test_the_reward_is_the_sum_of_its_terms_in_info(id):
 def test_what_is_hidden_is_not_observed(id):
     """Two robots that differ in what is hidden, and in nothing else, begin with the same observation."""
     env, (name, *_) = made(id), HIDDEN[seastar_gym.TASKS[id][0]]
-    observation, info = env.reset(seed=0)
+    observation, _ = env.reset(seed=0)
     task = env.unwrapped._task
     if name == "wiring":
         task.wiring *= -1.0
