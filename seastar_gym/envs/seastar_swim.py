@@ -62,13 +62,14 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     `decision_period` is the time of a step. Decisions within a stroke need actuators that remember what is under way:
     wires, one for each direction of every limb, that cool while others are heated. The registered settings are
 
-    | id                            | decision period [s] | `actions` | time limit [s] | decisions | actuator   |
-    |-------------------------------|---------------------|-----------|----------------|-----------|------------|
-    | `SeastarSwim-v0`              | 1.0                 | `"limbs"` | 400            | 400       | `SmaPulse` |
-    | `SeastarSwimTimed-v0`         | 0.5                 | `"pairs"` | 200            | 400       | `SmaWires` |
-    | `SeastarSwimTimedModerate-v0` | 0.2                 | `"pairs"` | 200            | 1000      | `SmaWires` |
-    | `SeastarSwimTimedHard-v0`     | 0.1                 | `"pairs"` | 200            | 2000      | `SmaWires` |
-    | `SeastarSwimHeading-v0`       | 0.5                 | `"pairs"` | 300            | 600       | `SmaWires` |
+    | id                            | decision period [s] | `actions`      | time limit [s] | decisions | actuator   |
+    |-------------------------------|---------------------|----------------|----------------|-----------|------------|
+    | `SeastarSwim-v0`              | 1.0                 | `"limbs"`      | 400            | 400       | `SmaPulse` |
+    | `SeastarSwimContinuous-v0`    | 1.0                 | `"continuous"` | 400            | 400       | `SmaPulse` |
+    | `SeastarSwimTimed-v0`         | 0.5                 | `"pairs"`      | 200            | 400       | `SmaWires` |
+    | `SeastarSwimTimedModerate-v0` | 0.2                 | `"pairs"`      | 200            | 1000      | `SmaWires` |
+    | `SeastarSwimTimedHard-v0`     | 0.1                 | `"pairs"`      | 200            | 2000      | `SmaWires` |
+    | `SeastarSwimHeading-v0`       | 0.5                 | `"pairs"`      | 300            | 600       | `SmaWires` |
 
     The same physics and the same task, with a horizon that is 2, 5 or 10 times as long in decisions.
     `SeastarSwimHeading-v0` asks for headings, along the legs of the path.
