@@ -17,6 +17,8 @@ exclude_patterns = ["_*"]
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_heading_anchors = 4
 
+toc_object_entries_show_parents = "hide"
+
 html_theme = "furo"
 html_title = f"seastar-gym {release}"
 html_static_path = ["_static"]

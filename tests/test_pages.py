@@ -8,14 +8,15 @@ from types import ModuleType
 import gymnasium as gym
 import pytest
 
+import seastar_gym
+from seastar_gym import Numerics, Scene
+from seastar_gym.certification import endurance, measure
 from seastar_gym.envs import paths
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+FENCED = re.compile(r"^```(\S*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\]\((?!\w+:)([^)#\s]*)(#[^)\s]+)?\)")
-NEEDED = {"accuracy.md": "certificate.json"}
-"""Files that a page's blocks read, which a command of minutes writes: the blocks run where the file is."""
 LONGEST = 3  # steps of an episode
 
 
@@ -44,14 +45,24 @@ def short_form(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
 
 
+@pytest.fixture
+def certificate(short_form):
+    """File certificate.json of the chapter's robot, of one setting, in place of the minutes that all would take."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(measure, "NODES", (12,))
+        patch.setattr(measure, "MANY_NODES", 17)
+        patch.setattr(measure, "SHORT", Numerics("implicit-midpoint", 1e-3, 1e-8))
+        patch.setattr(measure, "NUMERICS", (Numerics("implicit-midpoint", 5e-3, 1e-6),))
+        patch.setattr(endurance, "LONG", 40)
+        seastar_gym.certify(Scene(), 2).save("certificate.json")
+
+
 @pytest.mark.filterwarnings("ignore:.*is not within the observation space:UserWarning")
 @pytest.mark.usefixtures("short_form")
 @pytest.mark.parametrize("page", RUN, ids=lambda page: page.stem)
-def test_every_block_of_python_runs(page, monkeypatch):
-    if page.name in NEEDED and not (ROOT / NEEDED[page.name]).is_file():
-        for block in blocks(page):
-            compile(block, page.name, "exec")
-        pytest.skip(f"{page.name} needs {NEEDED[page.name]}, which takes minutes: its blocks are parsed only")
+def test_every_block_of_python_runs(page, monkeypatch, request):
+    if "certificate.json" in "".join(blocks(page)):
+        request.getfixturevalue("certificate")
     module = ModuleType(page.stem)
     monkeypatch.setitem(sys.modules, module.__name__, module)  # where dataclasses look for their names
     for block in blocks(page):
@@ -60,7 +71,7 @@ def test_every_block_of_python_runs(page, monkeypatch):
 
 def test_no_block_hides_from_the_tests():
     """Python stands in blocks that say so; what they hold is counted, so that none is lost by a new spelling."""
-    known = {"python", "bash", "bibtex", "markdown"}
+    known = {"python", "bash", "bibtex", "markdown", "{toctree}"}
     kinds = [match[1] for page in PAGES for match in FENCED.finditer(page.read_text(encoding="utf-8"))]
     assert set(kinds) <= known, f"pages have blocks of {set(kinds) - known}"
     assert sum(len(blocks(page)) for page in RUN) == kinds.count("python") > 20

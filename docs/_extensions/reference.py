@@ -100,7 +100,8 @@ def member(node: ast.FunctionDef, fence: int) -> str:
     text = [markdown(ast.get_docstring(node) or "")]
     if any("property" in each for each in decorators):
         return directive("py:property", node.name, text, fence)
-    return directive("py:method", f"{node.name}{of_function(node, bound='staticmethod' not in decorators)}", text, fence)
+    arguments = of_function(node, bound="staticmethod" not in decorators)
+    return directive("py:method", f"{node.name}{arguments}", text, fence)
 
 
 def attributes(node: ast.ClassDef) -> list[str]:
