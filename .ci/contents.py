@@ -1,6 +1,6 @@
 """Lists what a wheel and an sdist hold, folder by folder, and fails where something is missing or a stranger.
 
-    python .ci/contents.py dist
+python .ci/contents.py dist
 """
 
 import sys
