@@ -146,7 +146,7 @@ def record(fidelity: Fidelity = "balanced", most: int | None = None) -> dict[str
         "seen": SEEN,
         "limbs": N_LIMBS,
         "rate": FRAMES_PER_SECOND,
-        "swims": [recorded(*each, most) for each in SWIMS],
+        "swims": [recorded(decision_period, name, most) for decision_period, name in SWIMS],
         "map": transitions(fidelity),
     }
 
