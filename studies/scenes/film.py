@@ -95,9 +95,7 @@ def main() -> None:
     policy = load(in_the_box(options.decision_period))
     gait = scripted("pentagon", policy.actions)
     chapter = frames(gait, round(2 / BETWEEN), actions=gait.actions, fidelity="balanced")
-    learned = frames(
-        policy, parts, actions=policy.actions, scene=policy.scene, decision_period=policy.decision_period
-    )
+    learned = frames(policy, parts, actions=policy.actions, scene=policy.scene, decision_period=policy.decision_period)
     film = side_by_side(chapter, learned, options.frames)
     write_gif(film, options.out)
     print(f"Written: {options.out}, {len(film)} frames of {BETWEEN} s.")
