@@ -30,17 +30,17 @@ try:
 
     from agents.evaluate import evaluate
     from agents.learner_file import resume
-    from agents.policy import load as load_policy
     from agents.ppo import make_model, make_training_env, require_device
     from agents.report.charts import Curve, read_progress
     from agents.report.page import Remarks
-    from agents.scripted import scripted
-    from agents.swim import Policy
     from agents.training.box import put_in_the_box
     from agents.training.folder import claim, export, is_unbegun, recorded, resume_command, write_config
     from agents.training.options import Options, read_options, require_consent
     from agents.training.watch import Interruption, Watch
     from seastar_gym.command import refused_by_disk
+    from seastar_gym.controllers.contract import Policy
+    from seastar_gym.controllers.learned import load as load_policy
+    from seastar_gym.controllers.scripted import scripted
 except ModuleNotFoundError as missing:
     sys.exit(f'train.py needs {missing.name}: pip install "seastar-gym[train]".')
 

@@ -9,6 +9,9 @@ from importlib.util import find_spec
 import gymnasium as gym
 import numpy as np
 
+from seastar_gym.controllers.learned import load
+from seastar_gym.evaluation.swim import swim
+
 for absent in ("agents", "studies", "train", "torch", "stable_baselines3", "matplotlib", "pygame"):
     assert find_spec(absent) is None, f"a bare environment holds {absent}"
 
@@ -32,4 +35,8 @@ assert observations.shape == (9, *observation.shape)
 assert np.isfinite(observations).all()
 assert np.isfinite(rewards).all()
 
-print(*(f"{name} {version(name)}" for name in ("gymnasium", "numba", "numpy", "scipy")), sep=", ")
+policy = load()
+lane = gym.make("SeastarSwim-v0", actions=policy.actions, scene=policy.scene, path=[[0.05, 0.0]]).unwrapped
+assert swim("learned", policy, lane, max_strokes=40, seed=0).finished
+
+print(*(f"{name} {version(name)}" for name in ("gymnasium", "numba", "numpy", "safetensors", "scipy")), sep=", ")

@@ -1,6 +1,9 @@
-"""Agents for SeastarSwim-v0: scripted gaits, PPO, and their evaluation."""
+"""Training and reports: PPO on the native batch, and the pages that compare agents for SeastarSwim-v0.
+
+Controllers, evaluation and the adapter of Stable-Baselines3 are in the package, in `seastar_gym`.
+"""
 
 from seastar_gym.extras import is_command, require_extra
 
-if is_command():  # agents.policy and the scripted gaits do without most of these, in other people's programs
-    require_extra("The agents", "train", "imageio", "matplotlib", "plotly", "rich", "safetensors", "tyro")
+if is_command():  # the learner does without most of these, in other people's programs
+    require_extra("The agents", "train", "imageio", "matplotlib", "plotly", "rich", "tyro")

@@ -16,26 +16,27 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import tyro
 from rich.console import Console
 from rich.text import Text
 
-from agents import policy as learned
+from agents.names import AgentNames
 from agents.report.charts import Curve, read_progress
 from agents.report.page import Remarks, ResultsTable, read_trials, write_report
-from agents.report.pictures import FRAMES_PER_STROKE, draw_traces, film
 from agents.report.playback import Playback, RecordingEnv
-from agents.results import COLUMNS, in_words, results_table, write_csv
-from agents.roster import AgentNames, load_agents
-from agents.swim import TIME_LIMIT, Policy, Swim, actions_of, decisions_in, require_fit, swim
+from agents.results import results_table
 from seastar_gym.command import run_command
-from seastar_gym.envs.paths import PATHS, make_path
+from seastar_gym.controllers import learned
+from seastar_gym.controllers.contract import Policy, actions_of, require_fit
+from seastar_gym.controllers.roster import load_agents
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
+from seastar_gym.evaluation.path_file import PATH_HELP, load_path
+from seastar_gym.evaluation.pictures import FRAMES_PER_STROKE, draw_traces, film
+from seastar_gym.evaluation.results import COLUMNS, in_words, write_csv
+from seastar_gym.evaluation.swim import TIME_LIMIT, Swim, decisions_in, swim
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_number, shown
-from seastar_gym.scene.csv_rows import read_numbers
 from seastar_gym.scene.numerics import Fidelity
 
 
@@ -151,9 +152,6 @@ def _write_report(
     )
 
 
-PATH_HELP = f"Name of a path ({', '.join(PATHS)}), or a text file with x and y [m] of one waypoint per line."
-
-
 @dataclass(frozen=True)
 class Options:
     """Compare agents on a path: print a table and write it as CSV, with a picture of the traces and a video of each."""
@@ -193,18 +191,6 @@ class Options:
         require_number("waypoint_radius", self.waypoint_radius, "m")
 
 
-def _load_path(name: str) -> Any:
-    """Name of a path, or waypoints [m], shape (n, 2), of a text file."""
-    if name in PATHS or not Path(name).is_file():
-        make_path(name, np.random.default_rng(0))
-        return name
-    waypoints = read_numbers(name, "x and y [m] of a waypoint", 2)
-    try:
-        return make_path(waypoints, np.random.default_rng(0))
-    except ValueError as bad:
-        raise ValueError(f"{name}: {bad}") from bad
-
-
 def _remarks(agents: Mapping[str, Policy], options: Options, arguments: Sequence[str]) -> Remarks:
     """Remarks of the report: how the agents were trained, and how the report was made."""
     trainings = {name: one.training for name, one in agents.items() if isinstance(one, learned.LearnedPolicy)}
@@ -228,7 +214,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = tyro.cli(Options, prog="python -m agents.evaluate", args=arguments)
     try:
         agents = load_agents(options.agents, options.seed, options.fidelity, options.decision_period)
-        path, scene = _load_path(options.path), make_scene(None, options.fidelity, options.decision_period)
+        path, scene = load_path(options.path), make_scene(None, options.fidelity, options.decision_period)
         for agent in agents.values():
             require_fit(agent, scene, actions_of(agent, scene.robot.n_limbs), options.decision_period)
         remarks = _remarks(agents, options, arguments) if options.report else None

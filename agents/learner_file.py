@@ -2,9 +2,10 @@
 
 A saved learner is Stable-Baselines3's own zip file with three more entries, which hold no pickles: `policy.json` is the
 description of the policy (observation layout, scene, action mode, symmetry), `learner.safetensors` has the network, the
-optimiser and the random generators, `learner.json` the settings and counters. `load` and `resume` read these three, and
-unpickle nothing. `PPO.load` of Stable-Baselines3 reads the file, too, and unpickles its own part: use it only on files
-of people whom you trust. Policies without their learner are in policy.py.
+optimiser and the random generators, `learner.json` the settings and counters. `resume` reads these three, the policy
+alone is read by `seastar_gym.controllers.learner_zip`, and neither unpickles anything. `PPO.load` of Stable-Baselines3
+reads the file, too, and unpickles its own part: use it only on files of people whom you trust. Policies without their
+learner are in `seastar_gym.controllers.learned`.
 """
 
 import io
@@ -12,10 +13,8 @@ import json
 import os
 import random
 import zipfile
-import zlib
 from collections import deque
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -24,16 +23,17 @@ import safetensors.torch
 import torch
 from stable_baselines3 import PPO
 
-from agents.description import Description
-from agents.files import write_atomically
 from agents.hyperparameters import Hyperparameters
-from agents.policy import LearnedPolicy, reason_of
 from agents.ppo import actor, describe, make_model, policy_of, require_device
-from agents.vec_env import BatchVecEnv
 from seastar_gym import RewardWeights
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
+from seastar_gym.controllers.description import Description
+from seastar_gym.controllers.learned import LearnedPolicy
+from seastar_gym.controllers.learner_zip import DESCRIPTION, LEARNER, one_sentence, opened
+from seastar_gym.files import write_atomically
 from seastar_gym.scene.checks import require_count
 
-DESCRIPTION, LEARNER, FACTS = "policy.json", "learner.safetensors", "learner.json"
+FACTS = "learner.json"
 FORMAT = 1
 """Version of the three entries."""
 
@@ -107,20 +107,12 @@ def _hyperparameters(model: PPO) -> Hyperparameters:
     )
 
 
-def load(path: str | os.PathLike[str]) -> LearnedPolicy:
-    """Policy in a file that `save` wrote. FileNotFoundError or ValueError, with one sentence, if there is none."""
-    with _opened(path) as archive:
-        description = Description.from_json(archive.read(DESCRIPTION).decode())
-        network = _part(safetensors.torch.load(archive.read(LEARNER)), "network")
-        return LearnedPolicy(description, actor(network))
-
-
 def resume(path: str | os.PathLike[str], env: BatchVecEnv, device: str = "cpu") -> PPO:
     """Learner in a file that `save` wrote, with its weights, optimiser, stroke count and random states.
 
     The environment's episodes begin anew, with seeds that were not used before. Nothing is unpickled.
     """
-    with _opened(path) as archive:
+    with opened(path) as archive:
         description = Description.from_json(archive.read(DESCRIPTION).decode())
         tensors = safetensors.torch.load(archive.read(LEARNER))
         facts = json.loads(archive.read(FACTS))
@@ -130,7 +122,7 @@ def resume(path: str | os.PathLike[str], env: BatchVecEnv, device: str = "cpu") 
     if description != ours:
         raise ValueError(f"{os.fspath(path)} was trained for {description}, not for {ours}.")
     require_device(device)
-    with _one_sentence(path):
+    with one_sentence(path):
         require_count("seed", facts["seed"], 0, 2**32 - 1)
         settings = facts["settings"] | {"hidden": description.hidden, "reward": RewardWeights()}
         model = make_model(env, Hyperparameters(**settings), facts["seed"], device)
@@ -180,23 +172,3 @@ def _restore_generators(model: PPO, words: Mapping[str, torch.Tensor], facts: Ma
     torch.set_rng_state(words["torch"])
     if model.device.type == "cuda" and "cuda" in words:
         torch.cuda.set_rng_state(words["cuda"], model.device)
-
-
-@contextmanager
-def _opened(path: str | os.PathLike[str]) -> Iterator[zipfile.ZipFile]:
-    if not os.path.isfile(path):
-        raise FileNotFoundError(f"There is no trained policy at {os.fspath(path)}.")
-    with _one_sentence(path), zipfile.ZipFile(path) as archive:
-        yield archive
-
-
-@contextmanager
-def _one_sentence(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Context in which any fault of the file's contents becomes a ValueError with one sentence."""
-    try:
-        yield
-    except (zipfile.BadZipFile, EOFError, zlib.error, KeyError, safetensors.SafetensorError) as damaged:
-        reason = str(damaged.args[0]).rstrip(".")
-        raise ValueError(f"{os.fspath(path)} is damaged, or no policy saved by this project: {reason}.") from damaged
-    except (AttributeError, IndexError, OverflowError, RuntimeError, TypeError, ValueError) as mismatch:
-        raise ValueError(f"{os.fspath(path)} does not fit: {reason_of(mismatch)}.") from mismatch

@@ -10,10 +10,11 @@ from gymnasium.vector import AutoresetMode
 from stable_baselines3 import PPO
 from stable_baselines3.common.utils import LinearSchedule
 
-from agents.description import Description
 from agents.hyperparameters import Hyperparameters
-from agents.policy import LearnedPolicy, Weights
-from agents.vec_env import BatchVecEnv
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
+from seastar_gym.controllers import learner_zip
+from seastar_gym.controllers.description import Description
+from seastar_gym.controllers.learned import LearnedPolicy, Weights
 from seastar_gym.envs.symmetry import VectorSymmetryReduction
 from seastar_gym.envs.task import Path as SwimPath
 from seastar_gym.scene import Scene
@@ -101,10 +102,4 @@ def policy_of(model: PPO) -> LearnedPolicy:
 
 def actor(weights: Mapping[str, torch.Tensor]) -> Weights:
     """Weights of the policy in Stable-Baselines3's network, under the names of `LearnedPolicy`."""
-    hidden = sorted({int(name.split(".")[2]) for name in weights if name.startswith("mlp_extractor.policy_net.")})
-    layers = [*(f"mlp_extractor.policy_net.{number}" for number in hidden), "action_net"]
-    return {
-        f"{layer}.{kind}": weights[f"{name}.{kind}"].detach().cpu().numpy().copy()
-        for layer, name in enumerate(layers)
-        for kind in ("weight", "bias")
-    }
+    return learner_zip.actor({name: tensor.detach().cpu().numpy().copy() for name, tensor in weights.items()})

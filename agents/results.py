@@ -1,55 +1,21 @@
-"""Results of an evaluation: a row of numbers for every swim, printed as a table and written as CSV."""
+"""Results of an evaluation as a table for print."""
 
-import csv
 from collections.abc import Sequence
-from pathlib import Path
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from agents.report.page import number
-from agents.swim import Swim
-
-MM = 1000.0
-"""Millimetres in a metre."""
-
-COLUMNS = {
-    "agent": "agent",
-    "strokes_to_finish": "strokes\nto\nfinish",
-    "simulated_time_s": "time\n[s]",
-    "waypoints_reached": "waypoints\nreached",
-    "mean_cross_track_error_mm": "mean\ncross-track\nerror [mm]",
-    "largest_cross_track_error_mm": "largest\ncross-track\nerror [mm]",
-    "limbs_heated_per_metre": "limbs\nheated\n[1/m]",
-    "energy_per_metre_J": "energy\n[J/m]",
-}
-"""Titles of the printed columns, by the names of the CSV's."""
-
-
-def results(swims: Sequence[Swim]) -> list[dict[str, str | int | float | None]]:
-    """Rows of the table, by the names of the CSV; None where there is no number, as for an unfinished swim."""
-    return [
-        {
-            "agent": done.agent,
-            "strokes_to_finish": done.strokes if done.finished else None,
-            "simulated_time_s": float(done.time[-1]),
-            "waypoints_reached": done.waypoints_reached,
-            "waypoints": len(done.waypoints),
-            "mean_cross_track_error_mm": MM * float(done.cross_track_errors.mean()),
-            "largest_cross_track_error_mm": MM * float(done.cross_track_errors.max()),
-            "limbs_heated_per_metre": done.heated_per_metre,
-            "heating_time_s": done.seconds_heated,
-            "energy_per_metre_J": done.joules_per_metre,
-        }
-        for done in swims
-    ]
+from seastar_gym.evaluation.results import COLUMNS, in_words, number
+from seastar_gym.evaluation.swim import Swim
 
 
 def results_table(swims: Sequence[Swim]) -> Table:
     """Table for print."""
     table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False, pad_edge=False)
+    unit = {done.counted_in for done in swims}
     for name, title in COLUMNS.items():
+        title = title if unit == {"strokes"} else title.replace("strokes", "decisions")
         if name == "agent":
             table.add_column(title, vertical="bottom", overflow="fold")
         else:
@@ -57,17 +23,3 @@ def results_table(swims: Sequence[Swim]) -> Table:
     for row in in_words(swims):
         table.add_row(*(Text(number(row[name])) for name in COLUMNS))
     return table
-
-
-def in_words(swims: Sequence[Swim]) -> list[dict[str, str | int | float | None]]:
-    """Rows of `results` with the waypoints reached in words."""
-    return [{**row, "waypoints_reached": f"{row['waypoints_reached']} of {row['waypoints']}"} for row in results(swims)]
-
-
-def write_csv(swims: Sequence[Swim], file: Path) -> None:
-    """Write the rows of `results` as CSV."""
-    rows = results(swims)
-    with file.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.DictWriter(stream, fieldnames=list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)

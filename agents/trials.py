@@ -8,135 +8,34 @@ Random paths have random headings. The disturbed pentagon is there for the scrip
 import csv
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
 import tyro
-from numpy.typing import NDArray
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
-from scipy.stats import bootstrap
+from rich.text import Text
 
-from agents.disturbances import CURRENT_DIRECTIONS, DISTURBANCES, Disturbance, DisturbedTask
-from agents.roster import AgentNames, load_agents
-from agents.swim import TIME_LIMIT, Policy, Swim, actions_of, decisions_in, require_fit
+from agents.names import AgentNames
 from seastar_gym.command import run_command
-from seastar_gym.envs.commands import to_commands
-from seastar_gym.envs.reward import RewardWeights
-from seastar_gym.envs.task import Outcome, SwimTask, make_scene
-from seastar_gym.envs.task import Path as SwimPath
-from seastar_gym.scene import Scene
+from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.roster import load_agents
+from seastar_gym.envs.task import make_scene
+from seastar_gym.evaluation.disturbances import CURRENT_DIRECTIONS, DISTURBANCES
+from seastar_gym.evaluation.many import statistics, swim_many
+from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in
 from seastar_gym.scene.checks import require_count, require_number
 from seastar_gym.scene.numerics import Fidelity
 
-HELD_OUT_SEED = 1_000
-"""Seed of the paths that policies are measured on; trainings draw theirs from small seeds."""
-MM = 1000.0
-RESAMPLES, CONFIDENCE = 2000, 0.95
 NOMINAL: tuple[str, ...] = ("pentagon", "square", "triangle", "figure-eight")
 
-HEAT = ("limbs_heated", "heating_time", "energy")
-"""Entries of info, and fields of a `Swim`, of every decision."""
-
-Interval = tuple[float, float, float]
-"""Mean, and the ends of its confidence interval."""
-
-
-def swim_many(
-    agent: str,
-    policy: Policy,
-    path: SwimPath,
-    n_swims: int,
-    scene: Scene,
-    disturbance: Disturbance = Disturbance(),
-    *,
-    max_strokes: int = 400,
-    waypoint_radius: float = 0.01,
-    seed: int = 0,
-    threads: int | None = None,
-    decision_period: float | None = None,
-) -> list[Swim]:
-    """Swims of `n_swims` robots side by side, each to its last waypoint or for `max_strokes` strokes, or decisions.
-
-    The path "random" has random headings. waypoint_radius: Radius of the waypoints [m]. decision_period: Time between
-    decisions [s]. None means a stroke.
-    """
-    actions = actions_of(policy, scene.robot.n_limbs)
-    require_fit(policy, scene, actions, decision_period)
-    with_heading = isinstance(path, str) and path == "random"
-    inner = SwimTask(
-        scene, n_swims, path, RewardWeights(), waypoint_radius, with_heading, threads, actions=actions,
-        decision_period=decision_period,
-    )  # fmt: skip
-    task = DisturbedTask(inner, disturbance, np.random.default_rng([seed, n_swims]))
-    task.reset([np.random.default_rng([seed, swim]) for swim in range(n_swims)])
-    waypoints, counts = inner.waypoints.copy(), inner.n_waypoints
-    hubs, reached = [task.hub_position()], [inner.waypoint_index.copy()]
-    outcomes: list[Outcome] = []
-    state, begins, n_limbs = None, np.ones(n_swims, bool), scene.robot.n_limbs
-    while len(outcomes) < max_strokes and (inner.waypoint_index < counts).any():
-        chosen, state = policy.predict(task.observe(), state=state, episode_start=begins, deterministic=True)
-        commands = to_commands(actions, n_limbs, chosen, n_swims)
-        commands[inner.waypoint_index == counts] = 0.0
-        outcomes.append(task.step(commands))
-        hubs.append(task.hub_position())
-        reached.append(inner.waypoint_index.copy())
-        begins[:] = False
-    return [
-        _up_to_the_last_waypoint(
-            Swim(
-                agent=agent,
-                waypoints=waypoints[k, : counts[k]],
-                hub=np.array([hub[k] for hub in hubs]),
-                waypoint_index=np.array([index[k] for index in reached]),
-                time=inner.decision_period * np.arange(len(hubs), dtype=np.float64),
-                **{name: np.array([one.info[name][k] for one in outcomes]) for name in HEAT},
-                solver_message=None,
-            )
-        )
-        for k in range(n_swims)
-    ]
-
-
-def _up_to_the_last_waypoint(done: Swim) -> Swim:
-    strokes = int(np.argmax(done.waypoint_index == len(done.waypoints))) if done.finished else done.strokes
-    parts = {name: getattr(done, name)[: strokes + 1] for name in ("hub", "waypoint_index", "time")}
-    return replace(done, **parts, **{name: getattr(done, name)[:strokes] for name in HEAT})
-
-
-def mean_with_interval(values: NDArray[np.float64]) -> Interval:
-    """Mean of values and the ends of its bootstrap confidence interval; NaN where there are no values."""
-    if len(values) == 0:
-        return np.nan, np.nan, np.nan
-    if np.ptp(values) == 0.0:
-        return values[0], values[0], values[0]
-    found = bootstrap(
-        (values,), np.mean, confidence_level=CONFIDENCE, n_resamples=RESAMPLES, method="percentile", batch=100,
-        rng=np.random.default_rng(0),
-    ).confidence_interval  # fmt: skip
-    return float(values.mean()), float(found.low), float(found.high)
-
-
-def statistics(swims: Sequence[Swim]) -> dict[str, Interval]:
-    """Mean measures of a set of swims, by name, with intervals; strokes and seconds are those of finished swims."""
-    finished = np.array([done.finished for done in swims], dtype=np.float64)
-    strokes = np.array([done.strokes for done in swims if done.finished], dtype=np.float64)
-    errors = MM * np.array([done.cross_track_errors.mean() for done in swims])
-    seconds = np.array([done.time[-1] for done in swims if done.finished], dtype=np.float64)
-    effort = np.array([done.heated_per_metre for done in swims if done.heated_per_metre is not None], dtype=np.float64)
-    joules = np.array([done.joules_per_metre for done in swims if done.joules_per_metre is not None], dtype=np.float64)
-    measures = {
-        "success_rate": finished,
-        "strokes_to_finish": strokes,
-        "mean_cross_track_error_mm": errors,
-        "limbs_heated_per_metre": effort,
-        "simulated_time_s": seconds,
-        "energy_per_metre_J": joules,
-    }
-    return {name: mean_with_interval(values) for name, values in measures.items()}
+PRINTED = (
+    "strokes_to_finish", "simulated_time_s", "mean_cross_track_error_mm", "limbs_heated_per_metre",
+    "energy_per_metre_J",
+)  # fmt: skip
+"""Measures that are printed, besides the success rate."""
 
 
 def trials(agents: Mapping[str, Policy], fidelity: Fidelity, options: "Options") -> list[dict[str, str | int | float]]:
@@ -202,7 +101,7 @@ class Options:
             require_number("decision_period", self.decision_period, "s")
 
 
-def _print(rows: Sequence[dict[str, str | int | float]]) -> None:
+def _print(rows: Sequence[dict[str, str | int | float]], decision_period: float | None) -> None:
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
     for name in (
         "path",
@@ -211,21 +110,23 @@ def _print(rows: Sequence[dict[str, str | int | float]]) -> None:
         "fidelity",
         "swims",
         "success",
-        "strokes",
+        "strokes" if decision_period is None else f"decisions\nof {decision_period:g} s",
+        "time [s]",
         "cross-track\nerror [mm]",
         "heated\n[1/m]",
+        "energy\n[J/m]",
     ):
-        table.add_column(name)
+        table.add_column(Text(name))
     for row in rows:
         success = f"{row['success_rate']:.1%} [{row['success_rate_low']:.1%}, {row['success_rate_high']:.1%}]"
         others = (
             f"{row[name]:.1f} [{row[name + '_low']:.1f}, {row[name + '_high']:.1f}]"
-            for name in ("strokes_to_finish", "mean_cross_track_error_mm", "limbs_heated_per_metre")
+            for name in PRINTED
         )
         table.add_row(
             *(str(row[name]) for name in ("path", "disturbance", "agent", "fidelity", "swims")), success, *others
         )
-    Console(width=180).print(table)
+    Console(width=220).print(table)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -239,7 +140,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (ValueError, OSError) as bad_input:
         print(bad_input, file=sys.stderr)
         return 2
-    _print(rows)
+    _print(rows, options.decision_period)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     with options.out.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, fieldnames=list(rows[0]))

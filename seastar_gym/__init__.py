@@ -1,6 +1,7 @@
 """A five-limb soft robot that learns to swim: planar discrete elastic rods behind a Gymnasium environment.
 
-Importing this package registers `SeastarSwim-v0`, and the timed environments that decide several times a second.
+Importing this package registers `SeastarSwim-v0`, the same with continuous commands, the timed environments that decide
+several times a second, and the tasks of `seastar_gym.envs.tasks`.
 """
 
 from typing import Any
@@ -8,9 +9,14 @@ from typing import Any
 from gymnasium.envs.registration import register
 
 from seastar_gym.certification.measure import certify
+from seastar_gym.envs.commands import Actions
+from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.randomization import DomainRandomization, LogUniform, Normal, Uniform
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
+from seastar_gym.envs.tasks.miswired import Miswired
+from seastar_gym.envs.tasks.prey import Prey
+from seastar_gym.envs.tasks.station import Station
 from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water, relaxation_time
 from seastar_gym.scene.actuators.limited import Limited
 from seastar_gym.scene.actuators.measured import MeasuredCurve
@@ -21,7 +27,7 @@ from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
 from seastar_gym.scene.limb import Limb
-from seastar_gym.scene.serial import register_part
+from seastar_gym.scene.serial import register_part, to_dict
 from seastar_gym.simulator import Simulator, SolverStatus, State, StrokeReport
 from seastar_gym.version import __version__
 
@@ -30,12 +36,15 @@ __all__ = [
     "Contact",
     "DomainRandomization",
     "GridCurrent",
+    "Headings",
     "Limb",
     "Limited",
     "LogUniform",
     "MeasuredCurve",
+    "Miswired",
     "Normal",
     "Numerics",
+    "Prey",
     "RewardWeights",
     "Scene",
     "Seastar",
@@ -46,6 +55,7 @@ __all__ = [
     "SmaWires",
     "SolverStatus",
     "State",
+    "Station",
     "StrokeReport",
     "SymmetryReduction",
     "ThermalSma",
@@ -65,6 +75,9 @@ _ENTRY_POINTS: dict[str, Any] = {
     "vector_entry_point": "seastar_gym.envs.vector:SeastarSwimVectorEnv",
 }
 register(id="SeastarSwim-v0", max_episode_steps=400, **_ENTRY_POINTS)
+register(
+    id="SeastarSwimContinuous-v0", max_episode_steps=400, kwargs={"actions": "continuous"}, **_ENTRY_POINTS
+)
 
 TIMED = {"SeastarSwimTimed-v0": 0.5, "SeastarSwimTimedModerate-v0": 0.2, "SeastarSwimTimedHard-v0": 0.1}
 """Times between decisions [s] of the timed environments, easy, moderate and hard, by id."""
@@ -78,3 +91,29 @@ for _id, _decision_period in TIMED.items():
         kwargs={"decision_period": _decision_period, "actions": "pairs"},
         **_ENTRY_POINTS,
     )
+
+register(
+    id="SeastarSwimHeading-v0",
+    max_episode_steps=600,
+    kwargs={"decision_period": 0.5, "actions": "pairs", "headings": to_dict(Headings())},
+    **_ENTRY_POINTS,
+)
+
+TASKS: dict[str, tuple[str, Actions, float, float | None]] = {
+    "SeastarMiswired": ("miswired", "pairs", 400.0, None),
+    "SeastarPrey": ("prey", "pairs", 200.0, None),
+    "SeastarStation": ("station", "joint", 120.0, None),
+}
+"""Name of the challenge, actions, time limit [s] and return that counts as solved of the tasks, by id. Each is there
+for strokes of 1 s, as ..-v0, and for decisions every 0.5 s, as ..Timed-v0."""
+
+for _id, (_task, _actions, _limit, _threshold) in TASKS.items():
+    for _suffix, _seconds in (("", 1.0), ("Timed", 0.5)):
+        register(
+            id=f"{_id}{_suffix}-v0",
+            entry_point="seastar_gym.envs.tasks.envs:SeastarTaskEnv",
+            vector_entry_point="seastar_gym.envs.tasks.envs:SeastarTaskVectorEnv",
+            max_episode_steps=round(_limit / _seconds),
+            reward_threshold=_threshold,
+            kwargs={"task": _task, "actions": _actions, "decision_period": _seconds},
+        )

@@ -1,8 +1,22 @@
-"""Command lines: how they end where the disk refuses."""
+"""Command lines: their parsers, and how they end where the disk refuses."""
 
+import argparse
+import shutil
 import sys
+import textwrap
 from collections.abc import Callable
 from typing import NoReturn
+
+
+def command_parser(prog: str, doc: str | None) -> argparse.ArgumentParser:
+    """Parser of a command; its help begins with a docstring, paragraph by paragraph."""
+    width = shutil.get_terminal_size().columns - 2
+    paragraphs = [textwrap.fill(" ".join(paragraph.split()), width) for paragraph in (doc or "").split("\n\n")]
+    return argparse.ArgumentParser(
+        prog=prog,
+        description="\n\n".join(paragraphs),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
 
 
 def refused_by_disk(failure: OSError) -> str:

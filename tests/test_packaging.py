@@ -98,7 +98,7 @@ def test_every_base_dependency_is_imported_by_the_package():
 @pytest.mark.parametrize(
     ("folders", "extras"),
     [
-        (["seastar_gym"], ["render", "studies"]),
+        (["seastar_gym"], ["render", "studies", "train"]),
         (["studies"], ["train"]),
         (["agents", "train.py"], ["train"]),
         (["tests"], ["test", "browser"]),

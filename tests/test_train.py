@@ -20,11 +20,11 @@ import pytest
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 import train
-from agents import policy as policies
-from agents.learner_file import load
 from agents.training import box as shipping
 from agents.training.folder import claim
 from agents.training.options import Options, read_options, saved_options
+from seastar_gym.controllers import learned as policies
+from seastar_gym.controllers.learner_zip import load
 
 REPOSITORY = Path(train.__file__).parent
 TINY = shlex.split(

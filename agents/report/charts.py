@@ -10,8 +10,8 @@ import plotly.graph_objects as go
 import plotly.io
 from numpy.typing import NDArray
 
-from agents.report.pictures import COLOURS, FAINT_INK, INK, MM, PLANNED, STROKES_PER_DOT, view
-from agents.swim import Swim
+from seastar_gym.evaluation.pictures import COLOURS, FAINT_INK, INK, MM, PLANNED, STROKES_PER_DOT, view
+from seastar_gym.evaluation.swim import Swim
 from seastar_gym.scene.csv_rows import read_rows
 
 Floats = NDArray[np.float64]
@@ -61,13 +61,12 @@ def paths_figure(swims: Sequence[Swim], waypoint_radius: float) -> go.Figure:
 
 def _trace(done: Swim, number: int) -> go.Scatter:
     hub = MM * done.hub
-    result = f"{done.strokes} strokes" if done.finished else f"{done.waypoints_reached} of {len(done.waypoints)}"
     dots = np.arange(len(hub)) % STROKES_PER_DOT == 0
     return go.Scatter(
-        x=_rounded(hub[:, 0]), y=_rounded(hub[:, 1]), mode="lines+markers", name=f"{done.agent} ({result})",
+        x=_rounded(hub[:, 0]), y=_rounded(hub[:, 1]), mode="lines+markers", name=f"{done.agent} ({done.result})",
         line={"color": COLOURS[number % len(COLOURS)], "dash": DASHES[number // len(COLOURS) % len(DASHES)]},
         marker={"size": np.where(dots, 6, 0).tolist()},
-        text=[f"stroke {stroke}" for stroke in range(len(hub))],
+        text=[f"{done.counted_in[:-1]} {stroke}, {time:g} s" for stroke, time in enumerate(done.time.round(6))],
         hovertemplate="%{text}: %{x:.0f}, %{y:.0f} mm",
     )  # fmt: skip
 

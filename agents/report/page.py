@@ -16,7 +16,8 @@ import plotly.offline
 
 from agents.report.charts import Curve, curves_figure, paths_figure, speeds_figure, to_html
 from agents.report.playback import UNIT, Playback
-from agents.swim import Swim
+from seastar_gym.evaluation.results import number
+from seastar_gym.evaluation.swim import Swim
 from seastar_gym.scene.csv_rows import Row as CsvRow
 from seastar_gym.scene.csv_rows import read_rows
 
@@ -113,12 +114,17 @@ TRIALS = {
     "fidelity": "fidelity",
     "swims": "swims",
     "success_rate": "success [%]",
-    "strokes_to_finish": "strokes to finish",
+    "strokes_to_finish": "strokes or decisions to finish",
+    "simulated_time_s": "time to finish [s]",
     "mean_cross_track_error_mm": "mean cross-track error [mm]",
     "limbs_heated_per_metre": "limbs heated per metre [1/m]",
+    "energy_per_metre_J": "energy per metre [J/m]",
 }
 """Columns of the table of trials, as agents.trials names them."""
-MEASURED = ("success_rate", "strokes_to_finish", "mean_cross_track_error_mm", "limbs_heated_per_metre")
+MEASURED = (
+    "success_rate", "strokes_to_finish", "simulated_time_s", "mean_cross_track_error_mm", "limbs_heated_per_metre",
+    "energy_per_metre_J",
+)  # fmt: skip
 """Those with confidence intervals."""
 
 
@@ -157,13 +163,6 @@ def _cell(row: Row, name: str) -> str:
     return f'<td{_side(name)} data-name="{name}">{text}</td>'
 
 
-def number(value: Any) -> str:
-    """A number of a table as it is shown; a dash for none."""
-    if value is None:
-        return "\u2013"
-    return f"{value:.1f}" if isinstance(value, float) else str(value)
-
-
 def _remarks(remarks: Remarks) -> str:
     sentences = "\n".join(f"<p>{html.escape(sentence)}</p>" for sentence in remarks.sentences)
     return f"{sentences}\n<pre>{html.escape(chr(10).join(remarks.commands))}</pre>"
@@ -182,7 +181,7 @@ PLAYER = """<div id="agents" role="radiogroup" aria-label="agent"></div>
 </div>
 <p id="readout"></p>
 </div>
-<div class="strokes"><h3>Strokes</h3><ol id="strokes"></ol></div>
+<div class="strokes"><h3>Commands</h3><ol id="strokes"></ol></div>
 </div>"""
 
 

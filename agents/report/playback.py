@@ -26,6 +26,7 @@ class Playback:
     def packed(self) -> dict[str, Any]:
         """Swim as plain lists of few digits, to be written as JSON: a swim has hundreds of frames.
 
+        `unit`: "stroke", or "decision" if strokes do not take a second.
         For every frame: `nodes`, x, y, x, y, ... [UNIT] from the hub on; `stroke`, 0 at the start; `waypoint`, how many
         are reached; `time` [s]. For every stroke: `commands`, a number per limb, zeros for stroke 0.
         """
@@ -34,6 +35,7 @@ class Playback:
         return {
             "agent": self.agent,
             "nodes": [np.rint(frame.positions.ravel() / UNIT).astype(int).tolist() for frame in self.frames],
+            "unit": "stroke" if np.isclose(self.stroke_time, 1.0) else "decision",
             "stroke": strokes,
             "waypoint": [frame.waypoint_index for frame in self.frames],
             "time": [round(frame.time, 3) for frame in self.frames],

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from agents.policy import SHIPPED, LearnedPolicy, in_the_box
-from agents.policy import load as load_policy
-from agents.policy import save as save_policy
 from agents.training.folder import resume_command
 from agents.training.options import Options
-from agents.trials import HELD_OUT_SEED, swim_many
+from seastar_gym.controllers.learned import SHIPPED, LearnedPolicy, in_the_box
+from seastar_gym.controllers.learned import load as load_policy
+from seastar_gym.controllers.learned import save as save_policy
 from seastar_gym.envs.task import make_scene
+from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
 
 HELD_OUT_PATHS = 64
 """Number of random paths on which a policy is compared with the one in the box; no training draws them."""

@@ -16,11 +16,11 @@ import torch
 from stable_baselines3 import PPO
 
 import seastar_gym
-from agents.files import write_atomically
-from agents.policy import save as save_policy
 from agents.ppo import policy_of
 from agents.report.charts import read_progress
 from agents.training.options import Options
+from seastar_gym.controllers.learned import save as save_policy
+from seastar_gym.files import write_atomically
 
 
 def write_config(options: Options, arguments: Sequence[str], folder: Path) -> None:

@@ -10,9 +10,9 @@ import numpy as np
 import tyro
 
 from agents.hyperparameters import Hyperparameters
-from agents.swim import TIME_LIMIT, decisions_in
 from seastar_gym import RewardWeights
 from seastar_gym.envs.paths import PATHS, make_path
+from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in
 from seastar_gym.scene.numerics import Fidelity
 
 PATH_HELP = (

@@ -10,14 +10,14 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from tqdm import tqdm
 
-from agents.files import write_atomically
 from agents.learner_file import save
 from agents.ppo import policy_of
-from agents.swim import Swim, swim
 from agents.training.folder import recorded
 from agents.training.options import Options
-from agents.vec_env import BatchVecEnv
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.evaluation.swim import Swim, swim
+from seastar_gym.files import write_atomically
 
 
 class Interruption:

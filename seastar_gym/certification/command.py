@@ -13,11 +13,11 @@ import argparse
 import json
 import runpy
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
-from tqdm import tqdm
-
 from seastar_gym.certification.measure import SAMPLES, certify
+from seastar_gym.extras import require_extra
 from seastar_gym.scene import Scene
 from seastar_gym.scene.certificate import Certificate
 
@@ -68,10 +68,10 @@ def draw(certificate: Certificate, file: Path) -> None:
     plt.close(figure)
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     parser = argparse.ArgumentParser(
-        "python -m seastar_gym.certify", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        "seastar certify", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     default = "(default: %(default)s)"
     parser.add_argument("scene", nargs="?", type=Path, help="file of the scene, .py or .json (default: the chapter's)")
@@ -79,9 +79,12 @@ def main() -> int:
     parser.add_argument("--samples", type=int, default=SAMPLES, help=f"sequences per class {default}")
     parser.add_argument("--seed", type=int, default=0, help=f"seed of the sequences {default}")
     parser.add_argument("--out", type=Path, default=Path("certificate.json"), help=f"file to write {default}")
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
     try:
+        require_extra("Certificates", "studies", "tqdm")
         scene = load_scene(options.scene)
+        from tqdm import tqdm
+
         with tqdm(total=100, unit="%", bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as bar:
 
             def progress(share: float) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.envs.camera import Camera
 from seastar_gym.envs.rendering import LARGEST, SMALLEST, Frame, Renderer, renderer_of
-from seastar_gym.envs.task import SwimTask
+from seastar_gym.envs.swimming import Swimming
 
 Picture = NDArray[np.uint8]
 
@@ -27,7 +27,7 @@ def picture_size(n_pictures: int) -> tuple[int, int]:
 class BatchPictures:
     """Trails and views of all robots of a task, drawn one after the other by one renderer when they are asked for."""
 
-    def __init__(self, task: SwimTask):
+    def __init__(self, task: Swimming):
         self._task = task
         self._trails: list[list[NDArray[np.float64]]] = [[] for _ in range(task.n_robots)]
         self._cameras: dict[int, Camera] = {}
@@ -65,6 +65,7 @@ class BatchPictures:
                     waypoint_index=int(task.waypoint_index[robot]),
                     time=float(time[robot]),
                     warmth=None if warmth is None else warmth[robot],
+                    scenery=task.scenery(robot),
                 ),
             )
             for robot in robots
@@ -72,7 +73,8 @@ class BatchPictures:
 
     def _draw(self, robot: int, frame: Frame) -> Picture:
         renderer, body = self._get_renderer(), self._task.simulator.scene.of_robot(robot).robot
-        renderer.reset(self._task.waypoints_of(robot), body.limb_length, body.rod_radius)
+        waypoints, headings = self._task.waypoints_of(robot), self._task.headings_of(robot)
+        renderer.reset(waypoints, body.limb_length, body.rod_radius, headings)
         renderer.camera = self._cameras.get(robot, renderer.camera)
         picture = renderer.draw(frame)
         self._cameras[robot] = renderer.camera

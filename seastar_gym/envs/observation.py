@@ -20,6 +20,9 @@ next waypoint is the current one. Distances of waypoints are not clipped.
 If actuators have a memory (a `StatefulActuator`), the numbers of its `observe` for limb 1, limb 2, .. stand before the
 waypoints, which are always the last four numbers; an environment may leave the memory out. `Layout` names all these
 places.
+
+If headings are asked for (`headings.py`), four numbers more stand before the waypoints, after the memory: cosine and
+sine of the turn to the heading at the current waypoint, and of that to the heading at the next.
 """
 
 from functools import cache
@@ -47,6 +50,7 @@ class Layout(NamedTuple):
     velocities: slice
     hub_velocity: slice
     actuators: slice
+    headings: slice
     current_waypoint: slice
     next_waypoint: slice
 
@@ -67,19 +71,22 @@ class Layout(NamedTuple):
 
 
 @cache
-def layout(n_limbs: int, n_remembered: int = 0) -> Layout:
-    """Layout for a robot of n_limbs limbs whose actuators remember n_remembered numbers in all."""
+def layout(n_limbs: int, n_remembered: int = 0, with_headings: bool = False) -> Layout:
+    """Layout for a robot of n_limbs limbs whose actuators remember n_remembered numbers in all.
+
+    with_headings: Whether headings are asked for.
+    """
     along_limbs = 2 * N_STATIONS * n_limbs
-    ends = np.cumsum([along_limbs, along_limbs, 2, n_remembered, 2, 2]).tolist()
+    ends = np.cumsum([along_limbs, along_limbs, 2, n_remembered, 4 if with_headings else 0, 2, 2]).tolist()
     return Layout(*map(slice, [0, *ends[:-1]], ends))
 
 
-def scene_layout(scene: Scene, observe_actuators: bool = True) -> Layout:
-    """Layout for the robot of a scene, with the memory of its actuators or without."""
+def scene_layout(scene: Scene, observe_actuators: bool = True, with_headings: bool = False) -> Layout:
+    """Layout for the robot of a scene, with the memory of its actuators or without, with asked headings or without."""
     actuator, n_limbs = scene.actuator, scene.robot.n_limbs
     seen = observe_actuators and isinstance(actuator, StatefulActuator)
     remembered = actuator.observe(actuator.rest).shape[-1] if seen else 0  # type: ignore[attr-defined]
-    return layout(n_limbs, remembered * n_limbs)
+    return layout(n_limbs, remembered * n_limbs, with_headings)
 
 
 def observation_size(n_limbs: int) -> int:
@@ -87,12 +94,15 @@ def observation_size(n_limbs: int) -> int:
     return layout(n_limbs).size
 
 
-def with_memory(observations: NDArray[Any], remembered: NDArray[Any], n_limbs: int) -> NDArray[Any]:
-    """Observations, shape (n, size), with the memory of actuators, shape (n, k), in its place; unchanged if k = 0."""
-    if remembered.shape[1] == 0:
+def with_more(observations: NDArray[Any], more: NDArray[Any], n_limbs: int) -> NDArray[Any]:
+    """Observations, shape (n, size), with more numbers, shape (n, k), before the waypoints; unchanged if k = 0.
+
+    more: Memory of actuators, then asked headings, as far as there are any.
+    """
+    if more.shape[1] == 0:
         return observations
     at = layout(n_limbs)
-    parts = observations[:, at.stations_and_hub], remembered.astype(observations.dtype), observations[:, at.waypoints]
+    parts = observations[:, at.stations_and_hub], more.astype(observations.dtype), observations[:, at.waypoints]
     return np.hstack(parts)
 
 
@@ -173,6 +183,17 @@ def observe(rest, limb_length, q, v, stations, targets, velocity_scale, out):
         for k in range(2):
             x, y = load(target, 2 * k) - hub_x, load(target, 2 * k + 1) - hub_y
             store_turned(rows, row + 2 + 2 * k, x * per_length, y * per_length, c, s)
+
+
+@entry_point
+def body_axes(rest, q, stations, out):
+    """Fill (cos, sin) of the headings of lane groups, shape (n_groups, 2, N_LANES); arguments as in `observe`."""
+    n_limbs = (rest.shape[1] // 2 - 1) // stations.n_nodes
+    for group in range(q.shape[0]):
+        rows = borrow(out[group])
+        c, s = body_axis(borrow(rest[group % rest.shape[0]]), borrow(q[group]), borrow(stations), n_limbs)
+        store(rows, 0, c)
+        store(rows, 1, s)
 
 
 def to_float32(rows: NDArray[np.float64], n_robots: int) -> NDArray[np.float32]:

@@ -2,26 +2,33 @@
 
 import math
 import warnings
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
+from typing import get_args
 
-from seastar_gym.scene import Scene
+from seastar_gym.scene import Scene, SmaWires
 from seastar_gym.scene.certificate import Certificate, physics
 from seastar_gym.scene.checks import shown
-from seastar_gym.scene.fidelity import measured
+from seastar_gym.scene.fidelity import measured, timed_promise
 from seastar_gym.scene.numerics import Fidelity
 
 NAMES = ("path_error", "space_error", "time_error", "real_time_factor")
 """Entries of `info`."""
 
 
-def promised(scene: Scene, certificate: Certificate | None = None) -> dict[str, float]:
+def promised(
+    scene: Scene, certificate: Certificate | None = None, decision_period: float | None = None
+) -> dict[str, float]:
     """Measured errors and speed of a scene by their names in `info`; NaN for scenes not measured.
 
     The path error is that over every sequence of an environment's actions, repeated ones included.
 
-    certificate: Where they stand, the package's own table of the chapter's robot if None.
+    certificate: Where they stand, the package's own table of the chapter's robot if None. decision_period: Time
+    between decisions [s]. None means strokes, which alone certificates are of.
     """
+    if decision_period is not None:
+        return _in_time(scene, decision_period)
     if certificate is None:
         return _by_the_table(scene)
     setting = certificate.of(scene) if physics(scene) == physics(certificate.scene) else None
@@ -37,6 +44,15 @@ def _by_the_table(scene: Scene) -> dict[str, float]:
         return dict.fromkeys(NAMES, math.nan)
     numbers = max(known.path_error, known.gait_error), known.space_error, known.time_error, known.speed
     return dict(zip(NAMES, numbers, strict=True))
+
+
+def _in_time(scene: Scene, decision_period: float) -> dict[str, float]:
+    """Errors of a preset with wires; speeds were measured of strokes only."""
+    wired = [name for name in get_args(Fidelity) if scene == replace(Scene.preset(name), actuator=SmaWires())]
+    known = timed_promise(wired[0], decision_period) if wired else None
+    if known is None:
+        return dict.fromkeys(NAMES, math.nan)
+    return dict(zip(NAMES, (known.path_error, known.space_error, known.time_error, math.nan), strict=True))
 
 
 def read_certificate(certificate: Certificate | str | PathLike[str] | None, scene: Scene) -> Certificate | None:

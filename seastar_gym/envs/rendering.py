@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.envs.camera import Camera
 from seastar_gym.envs.canvas import Canvas, Colour, mixed
+from seastar_gym.envs.scenery import NOTHING, Scenery
 from seastar_gym.envs.waypoint_labels import waypoint_labels
 from seastar_gym.envs.window import Window
 from seastar_gym.scene import Seastar
@@ -26,6 +27,8 @@ HEATED_PLUS: Colour = (23, 62, 196)
 HEATED_MINUS: Colour = (38, 148, 240)
 TRAIL: Colour = (212, 120, 130)
 PLANNED: Colour = (190, 198, 208)
+ROCK: Colour = (176, 168, 158)
+CURRENT_WATER: Colour = (96, 160, 186)
 
 DONE, TO_COME, CURRENT = range(3)
 """States of a waypoint."""
@@ -39,6 +42,8 @@ REFIT_MARGIN = 0.5
 """Room [limb lengths] gained beyond a robot that left the view, so that the view moves in few steps."""
 
 
+POINTER = 0.3
+"""Length of the arrow of an asked heading [limb lengths]."""
 ROOT = 0.34
 """Share of a limb, from the hub on, whose colour shows how warm its wires are."""
 
@@ -59,6 +64,8 @@ class Frame:
     """Simulated time [s]."""
     warmth: FloatArray | None = None
     """How warm wires + and - of every limb are, from 0 to 1, shape (n_limbs, 2); None without wires."""
+    scenery: Scenery = NOTHING
+    """What the task shows besides."""
 
 
 def limb_nodes(n_limbs: int, nodes_per_limb: int) -> NDArray[np.int_]:
@@ -83,12 +90,14 @@ class Renderer:
         rod_radius: float,
         waypoint_radius: float,
         size: tuple[int, int] = LARGEST,
+        headings: ArrayLike | None = None,
     ) -> None:
         """
         limb_nodes: Numbers of the nodes of every limb from hub to tip, shape (n_limbs, nodes_per_limb).
         waypoints: Planned path from the origin [m], shape (n, 2).
         limb_length, rod_radius, waypoint_radius: Sizes of the robot and of the waypoints [m].
         size: Width and height of the picture [px].
+        headings: Asked headings at the waypoints [rad], shape (n,). None draws none.
         """
         if size[0] < SMALLEST[0] or size[1] < SMALLEST[1]:
             smallest = f"{SMALLEST[0]} x {SMALLEST[1]}"
@@ -99,12 +108,20 @@ class Renderer:
         self._text_height = max(12, round(0.027 * min(size)))
         self._canvas = Canvas(size, self._text_height)
         self._window = Window()
-        self.reset(waypoints)
+        self.reset(waypoints, headings=headings)
 
     def reset(
-        self, waypoints: ArrayLike, limb_length: float | None = None, rod_radius: float | None = None
+        self,
+        waypoints: ArrayLike,
+        limb_length: float | None = None,
+        rod_radius: float | None = None,
+        headings: ArrayLike | None = None,
     ) -> None:
-        """Take a new path [m], shape (n, 2), and fit the view to it; take new sizes of the robot [m], where given."""
+        """Take a new path [m], shape (n, 2), and fit the view to it; take new sizes of the robot [m], where given.
+
+        headings: Asked headings at the waypoints [rad], shape (n,). None draws none.
+        """
+        self._headings = None if headings is None else np.array(headings, dtype=np.float64)
         self._limb_length = self._limb_length if limb_length is None else limb_length
         self._rod_radius = self._rod_radius if rod_radius is None else rod_radius
         self._waypoints = np.array(waypoints, dtype=np.float64)
@@ -138,17 +155,21 @@ class Renderer:
 
     def _paint(self, frame: Frame) -> None:
         self._check(frame)
-        if not self.camera.sees(frame.positions):
-            self.camera = self.camera.widened(frame.positions, REFIT_MARGIN * self._limb_length)
+        for points in (frame.positions, frame.scenery.points):
+            if not self.camera.sees(points):
+                self.camera = self.camera.widened(points, REFIT_MARGIN * self._limb_length)
         self._canvas.begin(WATER)
+        self._paint_scenery(frame.scenery)
         self._paint_planned_path()
         self._paint_waypoints(frame.waypoint_index)
+        self._paint_headings(frame.waypoint_index)
         self._paint_trail(frame.trail)
         self._number_waypoints(frame.waypoint_index)
         self._paint_robot(frame)
+        self._mark_limb_1(frame)
         self._name_heated_limbs(frame)
         self._write_header(frame)
-        self._write_footer()
+        self._write_footer(frame.scenery.note)
         self._canvas.finish()
 
     def _check(self, frame: Frame) -> None:
@@ -161,6 +182,32 @@ class Renderer:
         if frame.trail.ndim != 2 or frame.trail.shape[1] != 2 or not np.isfinite(frame.trail).all():
             raise ValueError("A trail to draw must be finite and of shape (k, 2).")
 
+    def _paint_scenery(self, scenery: Scenery) -> None:
+        for line in scenery.lines:
+            self._canvas.polyline(self.camera.to_pixels(line), PLANNED, width=2)
+        for obstacle in scenery.obstacles:
+            self._canvas.dot(self.camera.to_pixels(obstacle.centre), ROCK, obstacle.radius * self.camera.scale)
+        for ring in scenery.rings:
+            self._paint_ring(self.camera.to_pixels(ring.centre), max(4.0, ring.radius * self.camera.scale), CURRENT)
+        for arrow in scenery.arrows:
+            self._paint_arrow(self.camera.to_pixels(arrow))
+
+    def _paint_arrow(self, ends: FloatArray) -> None:
+        """Arrow from ends[0] to ends[1] [px]; as a dot where it is short."""
+        along = ends[1] - ends[0]
+        length, head = float(np.hypot(*along)), 0.6 * self._text_height
+        self._canvas.stroke(ends, CURRENT_WATER, width=3.0)
+        if length > 0.0:
+            for turn in np.radians([150.0, -150.0]):
+                c, s = np.cos(turn), np.sin(turn)
+                back = np.array([c * along[0] - s * along[1], s * along[0] + c * along[1]]) * (head / length)
+                self._canvas.stroke(np.array([ends[1], ends[1] + back]), CURRENT_WATER, width=3.0)
+
+    def _paint_ring(self, centre: FloatArray, radius: float, state: int) -> None:
+        line = 3.0 if state == CURRENT else 2.0
+        self._canvas.dot(centre, STATE_COLOURS[state], radius + line / 2)
+        self._canvas.dot(centre, mixed(STATE_COLOURS[state], WATER, 0.15), radius - line / 2)
+
     def _paint_planned_path(self) -> None:
         for start, end in zip(self._path[:-1], self._path[1:], strict=True):
             for dash in _dashes(self.camera.to_pixels([start, end]), 0.45 * self._text_height):
@@ -171,10 +218,29 @@ class Renderer:
         radius = self._ring_radius()
         # Where a path passes a point twice, the current waypoint is drawn over one to come, and that over one done.
         for state, index in sorted((_state(index, waypoint_index), index) for index in range(len(self._waypoints))):
-            centre = self.camera.to_pixels(self._waypoints[index])
-            line = 3.0 if state == CURRENT else 2.0
-            self._canvas.dot(centre, STATE_COLOURS[state], radius + line / 2)
-            self._canvas.dot(centre, mixed(STATE_COLOURS[state], WATER, 0.15), radius - line / 2)
+            self._paint_ring(self.camera.to_pixels(self._waypoints[index]), radius, state)
+
+    def _paint_headings(self, waypoint_index: int) -> None:
+        """Arrows from the waypoints in the directions of their asked headings."""
+        if self._headings is None:
+            return
+        radius, length = self._ring_radius(), POINTER * self._limb_length * self.camera.scale
+        for state, index in sorted((_state(index, waypoint_index), index) for index in range(len(self._waypoints))):
+            towards = np.array([np.cos(self._headings[index]), -np.sin(self._headings[index])])
+            tip = self.camera.to_pixels(self._waypoints[index]) + (radius + length) * towards
+            barbs = tip - 0.35 * length * (towards + np.outer([0.6, -0.6], towards[::-1] * [-1.0, 1.0]))
+            line = 3.5 if state == CURRENT else 2.5
+            self._canvas.stroke(np.array([tip - length * towards, tip]), STATE_COLOURS[state], line)
+            self._canvas.stroke(np.array([barbs[0], tip, barbs[1]]), STATE_COLOURS[state], line)
+
+    def _mark_limb_1(self, frame: Frame) -> None:
+        """Mark on the tip of limb 1, which the heading is that of, where headings are asked for."""
+        if self._headings is None:
+            return
+        tip = self.camera.to_pixels(frame.positions[self._limb_nodes[0, -1]])
+        radius = max(3.5, 0.3 * self._text_height)
+        self._canvas.dot(tip, WATER, radius + 1.5)
+        self._canvas.dot(tip, STATE_COLOURS[CURRENT], radius)
 
     def _ring_radius(self) -> float:
         return max(4.0, self._waypoint_radius * self.camera.scale)
@@ -220,7 +286,9 @@ class Renderer:
         width, _ = self.size
         middle = 1.1 * self._text_height
         self._canvas.write(f"t = {frame.time:.1f} s", (self._text_height, middle), INK, (0.0, 0.5))
-        self._canvas.write(self._progress(frame.waypoint_index), (width - self._text_height, middle), INK, (1.0, 0.5))
+        told = frame.scenery.progress
+        progress = self._progress(frame.waypoint_index) if told is None else told
+        self._canvas.write(progress, (width - self._text_height, middle), INK, (1.0, 0.5))
         heated = [(f" {limb + 1}{_sign(c)}", _limb_colour(c)) for limb, c in enumerate(frame.command) if c != 0.0]
         words = [("heated:", INK), *(heated or [(" none", FAINT_INK)])]
         x = 0.5 * (width - sum(self._canvas.text_size(text)[0] for text, _ in words))
@@ -233,13 +301,15 @@ class Renderer:
             return f"waypoint {waypoint_index + 1} of {n_waypoints}"
         return "path completed"
 
-    def _write_footer(self) -> None:
+    def _write_footer(self, note: str) -> None:
         width, height = self.size
         gap, middle = self._text_height, height - 1.1 * self._text_height
         length = _round_length(0.13 * width / self.camera.scale)
         end = gap + length * self.camera.scale
         self._scale_bar(gap, end, middle)
         end = self._canvas.write(f"{1000.0 * length:g} mm", (end + 0.5 * gap, middle), INK, (0.0, 0.5))
+        if note:
+            end = self._canvas.write(note, (end + 1.5 * gap, middle), FAINT_INK, (0.0, 0.5))
         words = [("+ anti-clockwise", HEATED_PLUS), ("\u2212 clockwise", HEATED_MINUS)]
         x = width - sum(self._canvas.text_size(text)[0] + 2.9 * gap for text, _ in words)
         if x < end + gap:
@@ -254,10 +324,18 @@ class Renderer:
         for x in (start, end):
             self._canvas.stroke(np.array([[x, middle - tick], [x, middle + tick]]), INK, width=2.0)
 
+
 def renderer_of(
-    robot: Seastar, waypoints: ArrayLike, waypoint_radius: float, size: tuple[int, int] = LARGEST
+    robot: Seastar,
+    waypoints: ArrayLike,
+    waypoint_radius: float,
+    size: tuple[int, int] = LARGEST,
+    headings: ArrayLike | None = None,
 ) -> Renderer:
-    """Renderer of a robot on a path through waypoints [m], shape (n, 2), of this radius [m]; size in [px]."""
+    """Renderer of a robot on a path through waypoints [m], shape (n, 2), of this radius [m]; size in [px].
+
+    headings: Asked headings at the waypoints [rad], shape (n,). None draws none.
+    """
     return Renderer(
         limb_nodes(robot.n_limbs, robot.nodes_per_limb),
         waypoints,
@@ -265,6 +343,7 @@ def renderer_of(
         rod_radius=robot.rod_radius,
         waypoint_radius=waypoint_radius,
         size=size,
+        headings=headings,
     )
 
 

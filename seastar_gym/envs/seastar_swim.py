@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions, to_commands
+from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.promises import warn_uncertified
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.rendering import Frame, Renderer, renderer_of
 from seastar_gym.envs.reward import RewardWeights
-from seastar_gym.envs.task import Outcome, Path, Plain, SwimTask, make_scene
+from seastar_gym.envs.swimming import Outcome, Swimming
+from seastar_gym.envs.task import Path, Plain, SwimTask, make_scene
 from seastar_gym.envs.task_env import TaskEnv, checked_options
 from seastar_gym.scene import Scene
 from seastar_gym.scene.certificate import Certificate
@@ -26,6 +28,7 @@ FRAMES_PER_SECOND = 10
 ROUNDING = 1e-9
 """Fraction of a time that is no time."""
 Observation = NDArray[np.float32]
+RenderMode = Literal["human", "rgb_array", "rgb_array_list"]
 
 
 class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
@@ -60,8 +63,15 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `SeastarSwimTimed-v0`         | 0.5                 | `"pairs"` | 200            | 400       | `SmaWires` |
     | `SeastarSwimTimedModerate-v0` | 0.2                 | `"pairs"` | 200            | 1000      | `SmaWires` |
     | `SeastarSwimTimedHard-v0`     | 0.1                 | `"pairs"` | 200            | 2000      | `SmaWires` |
+    | `SeastarSwimHeading-v0`       | 0.5                 | `"pairs"` | 300            | 600       | `SmaWires` |
 
     The same physics and the same task, with a horizon that is 2, 5 or 10 times as long in decisions.
+    `SeastarSwimHeading-v0` asks for headings, along the legs of the path.
+
+    ## Headings
+    With `headings`, a waypoint is reached when the hub is within its radius and the robot's heading is the asked one to
+    a tolerance, `Headings.tolerance`, by default 10 degrees. The heading is the direction of the body frame, that of
+    limb 1 at rest. It repeats after a whole turn: limb 1 is told from the others, as if it carried a camera.
 
     ## Masks
     Some wires cannot be heated now: those of `SmaWires(deaf=True)` until their limb is cold, those of a `ThermalSma`
@@ -99,23 +109,32 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `ThermalSma` | temperatures of wires +, - above the water, then austenite | A_f - T_water; 1  | 0..; 0..1  |
     | `Limited`    | rotation                                                   | the largest one   | -1..1      |
 
-    So an observation has 196 numbers in the timed environments. Nothing else tells the future of the robot, unless
-    decisions are shorter than pulses. `seastar_gym.envs.observation.Layout` names all these places.
+    If headings are asked for, the turns to them stand after the memory, before the waypoints, anti-clockwise positive:
+
+    | numbers                                                     | unit | range |
+    |-------------------------------------------------------------|------|-------|
+    | cosine, sine of the turn to the current waypoint's heading  | 1    | -1..1 |
+    | cosine, sine of the turn to the next waypoint's heading     | 1    | -1..1 |
+
+    So an observation has 196 numbers in the timed environments, 200 with headings. Nothing else tells the future of the
+    robot, unless decisions are shorter than pulses. `seastar_gym.envs.observation.Layout` names all these places.
 
     ## Reward
-    The sum of three terms, with the weights of `RewardWeights`; each term is in `info`, too:
+    The sum of these terms, with the weights of `RewardWeights`; each term is in `info`, too:
 
     | term              | meaning                                                      | default weight |
     |-------------------|--------------------------------------------------------------|----------------|
     | `reward_progress` | decrease of the length of the route to the last waypoint [m] | 200 per metre  |
     | `reward_waypoint` | waypoints reached in the decision                            | 1 per waypoint |
     | `reward_effort`   | minus the time for which wires were heated, in pulses        | 0.01 per pulse |
+    | `reward_heading`  | decrease of what is left to turn [rad], only with `headings` | 8 per radian   |
 
     A pulse is 0.1 s of one wire, what a stroke takes of a limb. Where an actuator does not say how long it is heated, a
     command counts as its share of a pulse.
 
     The route is the shortest one that passes the current waypoint within 0.7 of its radius (`RewardWeights.aim`) on the
-    way to the next, and leads from centre to centre after that.
+    way to the next, and leads from centre to centre after that. What is left to turn is, by the shortest way round each
+    time, the turn to the current waypoint's heading and those from one asked heading to the next.
 
     ## Info
     A reset gives the same entries as a step, with zeros for counts and an empty message.
@@ -132,6 +151,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `time_error`             | float      | 1    | part of it that shorter time steps would remove                  |
     | `error_estimate`         | float      | m    | estimate of the hub's error, only with `error_bars`              |
     | `real_time_factor`       | float      | 1    | measured simulated time per computing time, batch on one core    |
+    | `heading`                | float      | rad  | direction of the body frame in the world, only with `headings`   |
+    | `heading_error`          | float      | rad  | turn to the asked heading, -pi to pi, only with `headings`       |
     | `is_success`             | bool       | -    | whether the last waypoint is reached                             |
     | `limbs_heated`           | int        | 1    | number of limbs whose heating began in the decision              |
     | `heating_time`           | float      | s    | time for which wires were heated in it, summed over limbs        |
@@ -144,16 +165,18 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `reward_progress`        | float      | 1    | term of the reward                                               |
     | `reward_waypoint`        | float      | 1    | term of the reward                                               |
     | `reward_effort`          | float      | 1    | term of the reward                                               |
+    | `reward_heading`         | float      | 1    | term of the reward, only with `headings`                         |
 
     `energy_per_metre` is infinite where the route has not become shorter; heat and energy are NaN for actuators that do
     not say it.
-    Measured errors and speed are there only where decisions are strokes.
     `path_error` is that over every sequence of strokes by whole commands, repeated ones included; `space_error` and
     `time_error` are those of the usual swims, straight, round the pentagon, or of random commands. They belong to the
     robot's resolution and the numerics (see `seastar_gym.scene.fidelity`), and are NaN for other robots and scenes than
     the chapter's, unless a `certificate` has them, and for what was not measured. `error_estimate` is of the very swim,
     of any robot: the true error since the reset, of space and time, lies below it in about 95 % of strokes
-    (docs/error_bars.md); NaN after a failure.
+    (docs/error_bars.md); NaN after a failure. Where decisions are no strokes, errors are those of `SmaWires` at whole
+    seconds, by random commands and by random seconds that are repeated; they are NaN for decisions of less than 0.1 or
+    more than 0.5 s, and so is `real_time_factor`.
     With `randomization`, `info` has the drawn numbers by their names, too.
 
     ## Starting state
@@ -188,8 +211,10 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         without a `scene`, the chapter's robot has `SmaWires`. A time in which limbs would not come to rest is refused
         for actuators without memory.
     observe_actuators: Whether observations have the memory of the actuators.
+    headings: Headings that are asked for at the waypoints, a `Headings`: along the legs, at random, or given angles.
+        None asks for none.
 
-    `scene`, `reward` and `randomization` may be given as plain data, as `Scene.to_dict` and
+    `scene`, `reward`, `randomization` and `headings` may be given as plain data, as `Scene.to_dict` and
     `seastar_gym.scene.serial.to_dict` write them. `env.spec` has them so:
     `gym.make(EnvSpec.from_json(env.spec.to_json()))` is the same environment.
     """
@@ -205,26 +230,33 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         reward: RewardWeights | Plain = RewardWeights(),
         waypoint_radius: float = 0.01,
         random_heading: bool = False,
-        render_mode: Literal["human", "rgb_array", "rgb_array_list"] | None = None,
+        render_mode: RenderMode | None = None,
         frames_per_stroke: int | None = None,
         randomization: DomainRandomization | Plain | None = None,
         certificate: Certificate | str | PathLike[str] | None = None,
         error_bars: bool = False,
         decision_period: float | None = None,
         observe_actuators: bool = True,
+        headings: Headings | Plain | None = None,
     ):
-        if render_mode is not None:
-            require_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
-        if frames_per_stroke is not None:
-            require_count("frames_per_stroke", frames_per_stroke, 1, 1_000_000)
-        self.render_mode = render_mode
+        self._set_pictures(render_mode, frames_per_stroke)
         modelled = make_scene(scene, fidelity, decision_period)
         if scene is not None:
             warn_uncertified(modelled, fidelity, certificate)
         task = SwimTask(
             modelled, 1, path, reward, waypoint_radius, random_heading, 1, randomization, certificate, error_bars,
-            actions, decision_period, observe_actuators,
+            actions, decision_period, observe_actuators, headings,
         )  # fmt: skip
+        self._begin_with(task, frames_per_stroke)
+
+    def _set_pictures(self, render_mode: RenderMode | None, frames_per_stroke: int | None) -> None:
+        if render_mode is not None:
+            require_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
+        if frames_per_stroke is not None:
+            require_count("frames_per_stroke", frames_per_stroke, 1, 1_000_000)
+        self.render_mode = render_mode
+
+    def _begin_with(self, task: Swimming, frames_per_stroke: int | None) -> None:
         self.action_space, self.observation_space = self._set_task(task)
         of_a_decision = max(1, round(FRAMES_PER_SECOND * task.decision_period))
         self.frames_per_stroke = of_a_decision if frames_per_stroke is None else frames_per_stroke
@@ -250,14 +282,15 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         require_seed(seed)
         super().reset(seed=None if seed is None else int(seed))
         with self._until_whole():
-            self._task.reset(np.ones(1, bool), [self.np_random], checked_options(options, {"path"}).get("path"))
+            asked = checked_options(options, {self._option}).get(self._option)
+            self._task.reset(np.ones(1, bool), [self.np_random], asked)
         self._running = True
         self._command = np.zeros_like(self._command)
         self._trail = self.simulator.hub_position()
         self._frames = []
         if self._renderer is not None:
             robot = self.simulator.scene.of_robot(0).robot
-            self._renderer.reset(self.waypoints, robot.limb_length, robot.rod_radius)
+            self._renderer.reset(self.waypoints, robot.limb_length, robot.rod_radius, self._task.headings_of(0))
         self._draw_frame()
         return self._task.observe()[0], _of_one_robot(self._task.first_info())
 
@@ -318,6 +351,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
             waypoint_index=int(self._task.waypoint_index[0]),
             time=float(self.simulator.time[0]),
             warmth=None if warmth is None else warmth[0],
+            scenery=self._task.scenery(0),
         )
 
     def _draw_frame(self) -> None:
@@ -329,7 +363,9 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     def _get_renderer(self) -> Renderer:
         if self._renderer is None:
             robot = self.simulator.scene.of_robot(0).robot
-            self._renderer = renderer_of(robot, self.waypoints, self._task.waypoint_radius)
+            self._renderer = renderer_of(
+                robot, self.waypoints, self._task.waypoint_radius, headings=self._task.headings_of(0)
+            )
         return self._renderer
 
     def render(self) -> NDArray[np.uint8] | list[NDArray[np.uint8]] | None:  # type: ignore[override]

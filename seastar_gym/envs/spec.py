@@ -12,10 +12,7 @@ from typing import Any
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
-from seastar_gym.envs.randomization import DomainRandomization
-from seastar_gym.envs.reward import RewardWeights
-from seastar_gym.scene import Scene
-from seastar_gym.scene.serial import to_dict
+from seastar_gym.scene.serial import KINDS, to_dict
 
 
 class PlainSpec:
@@ -54,7 +51,7 @@ def _as_plain(spec: EnvSpec) -> EnvSpec:
 def _plain(value: Any) -> Any:
     """An argument, or several, as JSON has them."""
     match value:
-        case Scene() | RewardWeights() | DomainRandomization():
+        case _ if KINDS.get(type(value).__name__) is type(value):
             return to_dict(value)
         case Enum():
             return value.value

@@ -6,10 +6,12 @@ import numpy as np
 from gymnasium import spaces
 
 from seastar_gym.envs.commands import Actions, action_space, command_table
+from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.spec import PlainSpec
-from seastar_gym.envs.task import SwimTask
+from seastar_gym.envs.swimming import Swimming
 from seastar_gym.scene import Scene
+from seastar_gym.scene.actuators.heating import Mirror
 from seastar_gym.scene.checks import shown
 from seastar_gym.simulator import Simulator
 
@@ -18,8 +20,10 @@ class TaskEnv(PlainSpec):
     """Base of the environments: their task, and the spaces of one robot."""
 
     actions: Actions
+    _option = "path"
+    """Name of the option by which a reset asks for something of the task."""
 
-    def _set_task(self, task: SwimTask) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
+    def _set_task(self, task: Swimming) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
         """Take the task; returns the spaces of one robot's actions and observations."""
         n_limbs = task.scene.robot.n_limbs
         self._task, self.actions = task, task.actions
@@ -37,6 +41,16 @@ class TaskEnv(PlainSpec):
     def observe_actuators(self) -> bool:
         """Whether observations have the memory of the actuators."""
         return self._task.observe_actuators
+
+    @property
+    def added_mirror(self) -> Mirror:
+        """What a mirror does to the numbers that the task adds to a limb's in the observation."""
+        return self._task.added_mirror
+
+    @property
+    def headings(self) -> Headings | None:
+        """Headings that are asked for at the waypoints, None if none are."""
+        return self._task.headings
 
     @property
     def scene(self) -> Scene:

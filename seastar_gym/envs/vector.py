@@ -16,10 +16,12 @@ from seastar_gym.envs.batch_attributes import BatchAttributes
 from seastar_gym.envs.batch_info import Info, of_some, with_masks
 from seastar_gym.envs.batch_pictures import BatchPictures, Picture
 from seastar_gym.envs.commands import Actions, as_array, to_commands
+from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.promises import warn_uncertified
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.seastar_swim import FRAMES_PER_SECOND
+from seastar_gym.envs.swimming import Swimming
 from seastar_gym.envs.task import Path, Plain, SwimTask, make_scene
 from seastar_gym.envs.task_env import checked_options
 from seastar_gym.scene import Scene
@@ -78,7 +80,25 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         error_bars: bool = False,
         decision_period: float | None = None,
         observe_actuators: bool = True,
+        headings: Headings | Plain | None = None,
     ):
+        self._set_batch(num_envs, max_episode_steps, render_mode, autoreset_mode)
+        modelled = make_scene(scene, fidelity, decision_period)
+        if scene is not None:
+            warn_uncertified(modelled, fidelity, certificate)
+        task = SwimTask(
+            modelled, num_envs, path, reward, waypoint_radius, random_heading, threads, randomization, certificate,
+            error_bars, actions, decision_period, observe_actuators, headings,
+        )  # fmt: skip
+        self._begin_with(task)
+
+    def _set_batch(
+        self,
+        num_envs: int,
+        max_episode_steps: int | None,
+        render_mode: Literal["rgb_array"] | None,
+        autoreset_mode: AutoresetMode | str,
+    ) -> None:
         if render_mode is not None and not (isinstance(render_mode, str) and render_mode == "rgb_array"):
             raise ValueError(
                 f'The batch draws with render_mode="rgb_array" only, not {shown(render_mode)}: '
@@ -92,18 +112,14 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         self.autoreset_mode = _checked_mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
-        modelled = make_scene(scene, fidelity, decision_period)
-        if scene is not None:
-            warn_uncertified(modelled, fidelity, certificate)
-        task = SwimTask(
-            modelled, num_envs, path, reward, waypoint_radius, random_heading, threads, randomization, certificate,
-            error_bars, actions, decision_period, observe_actuators,
-        )  # fmt: skip
+
+    def _begin_with(self, task: Swimming) -> None:
+        num_envs = self.num_envs
         self.single_action_space, self.single_observation_space = self._set_task(task)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self._generators, self._seeds = map(list, zip(*(seeding.np_random(None) for _ in range(num_envs)), strict=True))
-        self._commands = np.zeros((num_envs, modelled.robot.n_limbs))
+        self._commands = np.zeros((num_envs, task.scene.robot.n_limbs))
         self._pictures = BatchPictures(self._task)
         self._own_attributes: dict[str, tuple[Any, ...]] = {}
         self._elapsed = np.zeros(num_envs, np.int64)
@@ -137,14 +153,14 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         seed: Seed of robot 0, followed by those of the others, or a list with a seed for every robot. options: "path"
         (name or waypoints [m]) and "reset_mask" (whether each robot begins an episode, shape (num_envs,)).
         """
-        chosen = checked_options(options, {"path", "reset_mask"})
+        chosen = checked_options(options, {self._option, "reset_mask"})
         mask = self._checked_mask(chosen.get("reset_mask"))
         seeds = checked_seeds(seed, self.num_envs)
         for robot in np.flatnonzero(mask):
             if seeds[robot] is not None:
                 self._generators[robot], self._seeds[robot] = seeding.np_random(seeds[robot])
         with self._until_whole():
-            self._begin_episodes(mask, chosen.get("path"))
+            self._begin_episodes(mask, chosen.get(self._option))
         return self._task.observe(), with_masks(self._task.first_info(), mask)
 
     def _checked_mask(self, mask: Any) -> Flags:
@@ -157,8 +173,8 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
             raise gym.error.ResetNeeded("The first reset must be of all robots: call reset() without a reset_mask.")
         return mask
 
-    def _begin_episodes(self, mask: Flags, path: Path | None = None) -> None:
-        self._task.reset(mask, self._generators, path)
+    def _begin_episodes(self, mask: Flags, asked: Any = None) -> None:
+        self._task.reset(mask, self._generators, asked)
         self._elapsed[mask] = 0
         self._needs_reset[mask] = False
         self._commands[mask] = 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING
 
 from seastar_gym.envs.canvas import import_pygame
@@ -48,9 +49,17 @@ class Window:
         try:
             self._pygame.display.init()
             self._pygame.display.set_caption("SeastarSwim")
+            self._require_display()
             surface: pygame.Surface = self._pygame.display.set_mode(size)
         except self._pygame.error as no_display:
             raise RuntimeError(
-                f'No window can be opened here ({no_display}): render with render_mode="rgb_array" instead.'
+                f'No window can be opened here ({no_display}): render with render_mode="rgb_array" instead, or write a '
+                "film, seastar swim --film swim.mp4."
             ) from no_display
         return surface
+
+    def _require_display(self) -> None:
+        """Without a display, SDL draws where nobody looks; a pygame.error says so, unless that was asked for."""
+        if self._pygame.display.get_driver() == "offscreen" and not os.environ.get("SDL_VIDEODRIVER"):
+            self._pygame.display.quit()
+            raise self._pygame.error("there is no display")

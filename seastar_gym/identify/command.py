@@ -15,6 +15,7 @@ With `--synthetic`, the data are simulated with known parameters and 1 mm of noi
 import argparse
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from seastar_gym.extras import require_extra
@@ -46,10 +47,10 @@ def draw(estimate: Estimate, measurement: Measurement, file: Path) -> None:
     plt.close(figure)
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     parser = argparse.ArgumentParser(
-        "python -m seastar_gym.identify", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        "seastar identify", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("trajectory", nargs="?", type=Path, help="CSV file with a first line time,x0,y0,..")
     parser.add_argument("commands", nargs="?", type=Path, help="CSV file with one line of commands per stroke")
@@ -58,7 +59,7 @@ def main() -> int:
     parser.add_argument("--step", type=float, default=5e-3, help="time step of the implicit midpoint rule [s]")
     parser.add_argument("--picture", type=Path, help="file for a picture of the fit")
     parser.add_argument("--synthetic", action="store_true", help="fit simulated data with known parameters")
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
     if not options.synthetic and options.commands is None:
         parser.error("give a trajectory and its commands, or --synthetic")
     try:

@@ -19,6 +19,8 @@ import numpy as np
 from seastar_gym.scene.checks import is_finite_number, require_choice, require_count, shown
 
 PRESETS = Path(__file__).with_name("presets.json")
+TIMED_PRESETS = Path(__file__).with_name("timed_presets.json")
+"""Errors of the presets where commands come several times a second, see `TimedPromise`."""
 NOT_MEASURED = (
     "Errors were measured for the chapter's robot in the chapter's water only, so nothing can be promised for {}: "
     "`python -m seastar_gym.certify` measures it."
@@ -69,6 +71,23 @@ class Promise:
     def __str__(self) -> str:
         adapted = "" if self.path_tolerance is None else f" adapted to {100 * self.path_tolerance:g} %"
         return f'"{self.scheme}" at {1e3 * self.step:g} ms{adapted} with {self.nodes_per_limb} nodes per limb'
+
+
+@dataclass(frozen=True)
+class TimedPromise:
+    """Measured errors of a preset where wires (`SmaWires`) are commanded several times a second.
+
+    Largest distances of the hub from its path at whole seconds, as fractions of the path's length, over random commands
+    and over random seconds that are repeated: `python -m studies.accuracy.timed --store` measures them.
+    """
+
+    space_error: float
+    time_error: float
+
+    @property
+    def path_error(self) -> float:
+        """The sum of the two."""
+        return self.space_error + self.time_error
 
 
 class Robot(Protocol):
@@ -149,6 +168,26 @@ def measured(scene: Measurable) -> Promise | None:
     known = (*_presets().values(), *promises())
     wanted = (_resolution(scene.robot), _setting(scene.numerics))
     return next((row for row in known if (_resolution(row), _setting(row)) == wanted), None)
+
+
+def timed_promise(preset: str, decision_period: float) -> TimedPromise | None:
+    """Errors of a preset for a time between decisions [s]: the larger ones of the measured times around it.
+
+    None outside of the measured times.
+    """
+    rows = {float(period): TimedPromise(**row) for period, row in _stored_in_time()[preset].items()}
+    shorter = [period for period in rows if period <= decision_period * (1.0 + 1e-9)]
+    longer = [period for period in rows if period >= decision_period * (1.0 - 1e-9)]
+    if not shorter or not longer:
+        return None
+    around = rows[max(shorter)], rows[min(longer)]
+    return TimedPromise(max(row.space_error for row in around), max(row.time_error for row in around))
+
+
+@cache
+def _stored_in_time() -> dict[str, Any]:
+    stored: dict[str, Any] = json.loads(TIMED_PRESETS.read_text(encoding="utf-8"))
+    return dict(stored["presets"])
 
 
 def _presets() -> dict[str, Promise]:

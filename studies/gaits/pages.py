@@ -28,7 +28,8 @@ def tables(results: Table) -> str:
     turning = [[each["gait"], *numbers(each["fast"], each[finest])] for each in results["from rest"]["turning"]]
     evolved = [
         [
-            f"{each['actuator']}, {each['towards']}, {each['price_mm_per_joule']:g} mm/J",
+            f"{each['actuator']}, {each['towards']}, {each['price_mm_per_joule']:g} mm/J"
+            + ("" if each["slot_s"] == 0.1 else f", slots of {each['slot_s']:g} s"),
             *numbers(each["fast"], each[finest]),
         ]
         for each in results["evolved"]
@@ -36,6 +37,11 @@ def tables(results: Table) -> str:
     robust = results["robustness"]
     columns = list(next(iter(robust.values())))
     robust_rows = [[what, *(f"{each[name]['mm_per_s']:.2f}" for name in columns)] for what, each in robust.items()]
+    of_numerics = [
+        [what, *(f"{each[name]['mm_per_s']:.2f}" for name in columns)] for what, each in results["numerics"].items()
+    ]
+    crossed = results["percent of snapshots with crossing limbs"]
+    of_numerics.append(["crossing limbs in 100 snapshots, 37 nodes", *(str(crossed[name]) for name in columns)])
     directions = [
         [name, *(f"{speed:.2f}" for speed in speeds)] for name, speeds in results["mm_per_s_by_direction"].items()
     ]
@@ -49,4 +55,5 @@ def tables(results: Table) -> str:
         "Speed by direction [mm/s], degrees from limb 1:\n",
         lines_of(["gaits", *(f"{angle:.0f}" for angle in results["directions_deg"])], directions),
         "Other robots and waters, speed [mm/s] at `fast`:\n", lines_of(["", *columns], robust_rows),
+        "Other resolutions, schemes and steps, speed [mm/s]:\n", lines_of(["", *columns], of_numerics),
     ])  # fmt: skip

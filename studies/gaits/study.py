@@ -9,17 +9,18 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from agents.files import write_atomically
 from seastar_gym.envs.commands import command_table
-from seastar_gym.scene import Scene, SmaPulse, Water
+from seastar_gym.files import write_atomically
+from seastar_gym.scene import Numerics, Scene, SmaPulse, Water
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.actuators.wires import SmaWires
+from studies.gaits.crossing import crossings
 from studies.gaits.enumeration import SLOTS, distinct_codes, gaits_of
 from studies.gaits.evolution import evolve
 from studies.gaits.named import GAITS, SLOT, lagged
@@ -40,6 +41,8 @@ COARSE = 1.0 / SLOTS
 LAGS = np.arange(0.0, 1.0, SLOT)
 """Lags of the scan [s]."""
 DIRECTIONS = np.radians(np.arange(0.0, 37.0, 6.0))
+FINE, FINE_PRICES = 0.05, (0.0, 0.5)
+"""Slot of finer evolved gaits [s], and their prices of heat [mm/J]."""
 PRICES = (0.0, 0.5, 1.0, 1.5, 2.0)
 """Prices of heat of the evolved gaits [mm/J]."""
 CLOUD = 4000
@@ -145,25 +148,79 @@ def velocity_of(each: Table) -> Floats:
     return each["mm_per_s"] / MM * np.array([[np.cos(angle), np.sin(angle)]])
 
 
-def evolved(plan: Plan, progress: Callable[[int], Any]) -> list[Table]:
-    """Gaits that evolve: both actuators, along limb 1 and away from it, at several prices of heat."""
-    found = []
-    ahead, away = timed({0.0: "2+,5-", 0.6: "3+,4-"}, 1.0, COARSE), timed({0.0: "2-,5+", 0.4: "3-,4+"}, 1.0, COARSE)
-    asked: list[tuple[Any, str, float, float]] = [(WIRES, "wires", 1.0, price) for price in PRICES]
-    asked += [(WIRES, "wires", -1.0, 0.0), (THERMAL, "thermal", 1.0, 0.0), (THERMAL, "thermal", -1.0, 0.0)]
-    for actuator, name, towards, price in asked:
-        start, scene = (ahead if towards > 0.0 else away), scene_with(actuator)
-        gait, tried = evolve(scene, start, COARSE, towards, price, plan.generations, plan.population, progress=progress)
-        found.append({
-            "actuator": name, "towards": "along limb 1" if towards > 0.0 else "away from limb 1",
-            "price_mm_per_joule": price, "tried": tried, "gait": events_of(gait, COARSE), "pulses": gait.tolist(),
-            "fast": measured(scene, gait, COARSE),
-            plan.finest: measured(scene_with(actuator, plan.finest), gait, COARSE),
-        })  # fmt: skip
-    return found
+class Wanted(NamedTuple):
+    """A gait that is to evolve. towards: 1 along limb 1, -1 away from it. price: Of heat [mm/J]. slot: [s]."""
+
+    actuator: Any
+    name: str
+    towards: float = 1.0
+    price: float = 0.0
+    slot: float = COARSE
+
+    @property
+    def start(self) -> Floats:
+        """Lagged pairs, shape (n_slots, 5)."""
+        events = {0.0: "2+,5-", 0.6: "3+,4-"} if self.towards > 0.0 else {0.0: "2-,5+", 0.4: "3-,4+"}
+        return timed(events, 1.0, self.slot)
+
+    def generations(self, plan: Plan) -> int:
+        """Generations of its evolution: twice as many where it has twice as many slots."""
+        return round(plan.generations * COARSE / self.slot)
 
 
-def robustness(reheated: Floats) -> dict[str, Table]:
+WANTED = [
+    *(Wanted(WIRES, "wires", price=price) for price in PRICES),
+    *(Wanted(WIRES, "wires", price=price, slot=FINE) for price in FINE_PRICES),
+    Wanted(WIRES, "wires", -1.0), Wanted(THERMAL, "thermal"), Wanted(THERMAL, "thermal", -1.0),
+]  # fmt: skip
+
+
+def evolved(wanted: Wanted, plan: Plan, progress: Callable[[int], Any] | None = None) -> Table:
+    """A gait that evolves, and how it swims."""
+    actuator, name, towards, price, slot = wanted
+    gait, tried = evolve(
+        scene_with(actuator), wanted.start, slot, towards, price, wanted.generations(plan), plan.population,
+        progress=progress,
+    )  # fmt: skip
+    return {
+        "actuator": name, "towards": "along limb 1" if towards > 0.0 else "away from limb 1", "slot_s": slot,
+        "price_mm_per_joule": price, "tried": tried, "gait": events_of(gait, slot), "pulses": gait.tolist(),
+        "fast": measured(scene_with(actuator), gait, slot),
+        plan.finest: measured(scene_with(actuator, plan.finest), gait, slot),
+    }  # fmt: skip
+
+
+def main_gaits(reheated: Floats) -> dict[str, tuple[Floats, float]]:
+    """The gaits whose robustness is looked at, with their slots [s]."""
+    return {**{name: (GAITS[name].gait, SLOT) for name in ("synchronous", "lag 0.6", "thrifty")},
+            "re-heated": (reheated, COARSE)}  # fmt: skip
+
+
+def by_numerics(gaits: dict[str, tuple[Floats, float]]) -> dict[str, Table]:
+    """Speeds [mm/s] of the main gaits at other resolutions, schemes and steps."""
+    plain = scene_with()
+    fine = replace(plain, robot=replace(plain.robot, nodes_per_limb=37))
+    changed = {
+        "7 nodes, midpoint 5 ms: `fast`": plain,
+        "7 nodes, midpoint 1 ms": replace(plain, numerics=Numerics("implicit-midpoint", 1e-3, 1e-6)),
+        "7 nodes, SDIRK3 10 ms": replace(plain, numerics=Numerics("sdirk3", 1e-2, 1e-6)),
+        "7 nodes, Euler 1 ms": replace(plain, numerics=Numerics("implicit-euler", 1e-3, 1e-6)),
+        "37 nodes, midpoint 5 ms": fine,
+        "37 nodes, midpoint 1 ms": replace(fine, numerics=Numerics("implicit-midpoint", 1e-3, 1e-7)),
+        "37 nodes, SDIRK3 10 ms": replace(fine, numerics=Numerics("sdirk3", 1e-2, 1e-7)),
+        "`chapter`: 10 nodes, Euler 3 ms": scene_with(fidelity="chapter"),
+    }
+    return {what: {name: measured(scene, *gait) for name, gait in gaits.items()} for what, scene in changed.items()}
+
+
+def by_crossing(gaits: dict[str, tuple[Floats, float]]) -> dict[str, int]:
+    """Percent of snapshots, with 37 nodes per limb, in which limbs cross, of the main gaits."""
+    plain = scene_with()
+    fine = replace(plain, robot=replace(plain.robot, nodes_per_limb=37))
+    return {name: crossings(fine, *gait) for name, gait in gaits.items()}
+
+
+def robustness(gaits: dict[str, tuple[Floats, float]]) -> dict[str, Table]:
     """Speeds [mm/s] of the main gaits by robots and waters other than the chapter's, at `fast`."""
     plain = scene_with()
     changed = {
@@ -178,8 +235,6 @@ def robustness(reheated: Floats) -> dict[str, Table]:
         "cooling in 0.7 s": replace(plain, actuator=SmaWires(cooling_time=0.7, period=1.0)),
         "heating in 0.15 s": replace(plain, actuator=SmaWires(heating_time=0.15, period=1.0)),
     }
-    gaits = {name: (GAITS[name].gait, SLOT) for name in ("synchronous", "lag 0.6", "thrifty")}
-    gaits["re-heated"] = reheated, COARSE
     return {what: {name: measured(scene, *gait) for name, gait in gaits.items()} for what, scene in changed.items()}
 
 
@@ -202,13 +257,14 @@ def pareto(points: Floats) -> Floats:
 
 def study(plan: Plan) -> Table:
     """Run the study; returns its results as plain data."""
-    n_gaits = len(range(0, 40890, plan.codes)) + (len(PRICES) + 3) * plan.generations * plan.population
+    n_gaits = len(range(0, 40890, plan.codes)) + sum(each.generations(plan) for each in WANTED) * plan.population
     with tqdm(total=n_gaits, unit="gait", unit_scale=True) as bar:
         rest, swimming = from_rest(plan, bar.update)
-        evolution = evolved(plan, bar.update)
+        evolution = [evolved(each, plan, bar.update) for each in WANTED]
     named = named_gaits(plan)
     pair = measure(scene_with(SmaPulse()), np.array([[[0, 1, 0, 0, -1.0]]]), 1.0)
     strokes = synchronous(plan)
+    main = main_gaits(np.array(evolution[0]["pulses"]))
     wires = [each["fast"] for each in evolution if each["actuator"] == "wires"]
     return {
         "robot": "the chapter's, continuum's discretisation",
@@ -227,7 +283,9 @@ def study(plan: Plan) -> Table:
                 "re-heated": np.concatenate([velocity_of(each) for each in wires]),
             }
         ),
-        "robustness": robustness(np.array(evolution[0]["pulses"])),
+        "robustness": robustness(main),
+        "numerics": by_numerics(main),
+        "percent of snapshots with crossing limbs": by_crossing(main),
         "front": front(swimming, wires + [each["fast"] for each in named.values()]),
     }
 

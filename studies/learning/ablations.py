@@ -23,15 +23,15 @@ import tyro
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
-from agents.files import write_atomically
 from agents.hyperparameters import Hyperparameters
-from agents.policy import LearnedPolicy
 from agents.ppo import make_model, make_training_env, policy_of
-from agents.swim import Policy
-from agents.trials import HELD_OUT_SEED, swim_many
 from seastar_gym.command import run_command
+from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.task import make_scene
+from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
+from seastar_gym.files import write_atomically
 from seastar_gym.scene.numerics import Fidelity
 from studies.style import CYCLE, FAINT, new_figure
 

@@ -23,18 +23,19 @@ import tyro
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from agents.files import write_atomically
-from agents.greedy import Displacements, measure_gaits
-from agents.planner import Branching
-from agents.roster import AgentNames, load_agents
-from agents.swim import Policy
-from agents.trials import swim_many
+from agents.names import AgentNames
 from seastar_gym.command import run_command
+from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.greedy import Displacements, measure_gaits
+from seastar_gym.controllers.planner import Branching
+from seastar_gym.controllers.roster import load_agents
 from seastar_gym.envs.commands import Actions, command_table
 from seastar_gym.envs.paths import LINE_LENGTH, make_path
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import action_table
 from seastar_gym.envs.task import make_scene
+from seastar_gym.evaluation.many import swim_many
+from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator, State

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.greedy import turned
+from seastar_gym.controllers.greedy import turned
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.stations import body_heading
 from seastar_gym.scene import Scene, Seastar

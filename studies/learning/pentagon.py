@@ -24,11 +24,11 @@ import numpy as np
 import tyro
 from numpy.typing import NDArray
 
-from agents.files import write_atomically
 from seastar_gym.command import run_command
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.paths import make_path
 from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.scene.numerics import Fidelity

@@ -9,16 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from agents.policy import in_the_box, load
-from agents.scripted import scripted
-from agents.swim import Policy
 from seastar_gym.command import run_command
+from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.learned import in_the_box, load
+from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.evaluation.films import Picture, shrunk, write_gif
 from studies.parser import study_parser
-
-Picture = NDArray[np.uint8]
 
 BETWEEN = 0.4
 """Simulated time between two frames [s]."""
@@ -26,10 +24,6 @@ FPS = 20
 """Frames per second of the film: eight times as fast as the robot."""
 REST = 20
 """Frames for which the film rests on its end."""
-SCALE = 2
-"""Pixels of a rendered picture that become one, each way."""
-COLOURS = 48
-"""Colours of the film."""
 
 
 def frames(policy: Policy, per_decision: int, **arguments: Any) -> Iterator[Picture]:
@@ -52,15 +46,6 @@ def frames(policy: Policy, per_decision: int, **arguments: Any) -> Iterator[Pict
     yield shrunk(picture)
 
 
-def shrunk(picture: Picture) -> Picture:
-    """Picture of fewer pixels, each the mean of SCALE times SCALE."""
-    height, width, colours = picture.shape
-    blocks = picture[: height - height % SCALE, : width - width % SCALE].reshape(
-        height // SCALE, SCALE, width // SCALE, SCALE, colours
-    )
-    return blocks.mean(axis=(1, 3)).astype(np.uint8)
-
-
 def side_by_side(left: Iterator[Picture], right: Iterator[Picture], most: int | None = None) -> list[Picture]:
     """Pictures beside each other, until the swim on the right is over."""
     film = []
@@ -69,17 +54,6 @@ def side_by_side(left: Iterator[Picture], right: Iterator[Picture], most: int | 
             break
         film.append(np.concatenate([one, other], axis=1))
     return film
-
-
-def write_gif(film: list[Picture], file: Path) -> None:
-    """Write an animated GIF whose frames share one palette, made of the first, the middle and the last of them."""
-    from PIL import Image
-
-    sample = np.concatenate([film[0], film[len(film) // 2], film[-1]], axis=0)
-    palette = Image.fromarray(sample).quantize(COLOURS, dither=Image.Dither.NONE)
-    images = [Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in film]
-    images += [images[-1]] * REST
-    images[0].save(file, save_all=True, append_images=images[1:], duration=1000 // FPS, loop=0, optimize=True)
 
 
 def main() -> None:
@@ -97,7 +71,7 @@ def main() -> None:
     chapter = frames(gait, round(2 / BETWEEN), actions=gait.actions, fidelity="balanced")
     learned = frames(policy, parts, actions=policy.actions, scene=policy.scene, decision_period=policy.decision_period)
     film = side_by_side(chapter, learned, options.frames)
-    write_gif(film, options.out)
+    write_gif(film + [film[-1]] * REST, options.out, FPS)
     print(f"Written: {options.out}, {len(film)} frames of {BETWEEN} s.")
 
 

@@ -6,8 +6,8 @@ import json
 import numpy as np
 import pytest
 
-from agents.scripted import to_actions
 from seastar_gym import Numerics, Scene
+from seastar_gym.controllers.scripted import to_actions
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.symmetry import action_table
 from seastar_gym.gaits import pair_gait

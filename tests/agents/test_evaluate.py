@@ -13,16 +13,17 @@ import pytest
 from matplotlib.colors import to_rgb
 from rich.console import Console
 
-from agents.description import Description
 from agents.evaluate import evaluate, main
-from agents.policy import LearnedPolicy, save
-from agents.report.pictures import CLOSING_SECONDS, COLOURS, FPS, FRAMES_PER_STROKE
-from agents.roster import load_agents
-from agents.scripted import scripted
-from agents.swim import Swim, swim
 from seastar_gym import Scene, Seastar
+from seastar_gym.controllers.description import Description
+from seastar_gym.controllers.learned import LearnedPolicy, save
+from seastar_gym.controllers.roster import load_agents
+from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.paths import PENTAGON_SIDE, make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.evaluation.films import CLOSING_SECONDS
+from seastar_gym.evaluation.pictures import COLOURS, FPS, FRAMES_PER_STROKE
+from seastar_gym.evaluation.swim import Swim, swim
 
 ROOT = Path(__file__).resolve().parents[2]
 SHORT = [[0.02, 0.0]]
@@ -280,7 +281,7 @@ def test_the_policy_in_the_box_and_scripted_agents_are_evaluated_without_torch()
     code = "import sys, agents.evaluate as e; e.load_agents(['pentagon', 'random', 'learned']); print(*sys.modules)"
     answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     loaded = set(answer.stdout.split())
-    assert "agents.scripted" in loaded
+    assert "seastar_gym.controllers.scripted" in loaded
     assert loaded.isdisjoint({"torch", "stable_baselines3", "matplotlib", "pygame"})
 
 
@@ -344,8 +345,8 @@ def test_models_go_by_the_names_of_their_files(monkeypatch, tmp_path):
     (tmp_path / "runs").mkdir()
     for file in files:
         Path(file).touch()
-    monkeypatch.setattr("agents.learner_file.load", lambda file: file)
-    monkeypatch.setattr("agents.policy.load", lambda file: file)
+    monkeypatch.setattr("seastar_gym.controllers.learner_zip.load", lambda file: file)
+    monkeypatch.setattr("seastar_gym.controllers.learned.load", lambda file: file)
     assert load_agents(files) == {"best": "best.zip", "last": "runs/last.safetensors", "runs/best": "runs/best.zip"}
 
 

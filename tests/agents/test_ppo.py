@@ -17,10 +17,12 @@ from stable_baselines3.common.evaluation import evaluate_policy
 
 from agents import learner_file
 from agents.hyperparameters import Hyperparameters
-from agents.learner_file import load, resume, save
+from agents.learner_file import resume, save
 from agents.ppo import make_model, make_training_env, policy_of
-from agents.vec_env import BatchVecEnv
 from seastar_gym import Numerics, Scene, Seastar, Water
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
+from seastar_gym.controllers import learner_zip
+from seastar_gym.controllers.learner_zip import load
 from seastar_gym.envs import symmetry
 
 FAST = Numerics.preset("fast")
@@ -150,7 +152,7 @@ def test_loading_unpickles_nothing(file, tmp_path):
     """Stable-Baselines3's pickles are not even looked at, neither to swim nor to learn on."""
     without = tmp_path / "without.zip"
     with zipfile.ZipFile(file) as old, zipfile.ZipFile(without, "w") as new:
-        for name in (learner_file.DESCRIPTION, learner_file.LEARNER, learner_file.FACTS):
+        for name in (learner_zip.DESCRIPTION, learner_zip.LEARNER, learner_file.FACTS):
             new.writestr(name, old.read(name))
         for name in set(old.namelist()) - set(new.namelist()):
             new.writestr(name, pickle.dumps(Bomb(tmp_path / "exploded")))
@@ -200,7 +202,7 @@ def test_saving_replaces_the_file_in_one_go(learner, file, monkeypatch):
 
 def test_the_description_says_what_the_policy_expects(learner, file):
     with zipfile.ZipFile(file) as archive:
-        facts = json.loads(archive.read(learner_file.DESCRIPTION))
+        facts = json.loads(archive.read(learner_zip.DESCRIPTION))
     assert facts["observation_layout"] == 2
     assert (facts["actions"], facts["symmetry"], facts["hidden"]) == (Hyperparameters().actions, True, [16, 8])
     assert facts["scene"]["numerics"]["scheme"] == FAST.scheme
@@ -214,15 +216,15 @@ def rewritten(file, **changes):
     """The file with other facts in its description, or without one of its entries (None)."""
     with zipfile.ZipFile(file) as archive:
         entries = {name: archive.read(name) for name in archive.namelist()}
-    facts = json.loads(entries[learner_file.DESCRIPTION])
+    facts = json.loads(entries[learner_zip.DESCRIPTION])
     for name, value in changes.items():
         entry = name.replace("__", ".")
         if entry in entries:
             del entries[entry]
         else:
             facts[name] = value
-    if learner_file.DESCRIPTION in entries:
-        entries[learner_file.DESCRIPTION] = json.dumps(facts).encode()
+    if learner_zip.DESCRIPTION in entries:
+        entries[learner_zip.DESCRIPTION] = json.dumps(facts).encode()
     with zipfile.ZipFile(file, "w") as archive:
         for name, data in entries.items():
             archive.writestr(name, data)
@@ -251,7 +253,7 @@ def test_a_cut_file_is_said_to_be_damaged(file, keep):
 def test_a_flipped_bit_is_found(file):
     data = bytearray(file.read_bytes())
     with zipfile.ZipFile(file) as archive:
-        data[archive.getinfo(learner_file.LEARNER).header_offset + 5000] ^= 1
+        data[archive.getinfo(learner_zip.LEARNER).header_offset + 5000] ^= 1
     file.write_bytes(bytes(data))
     with pytest.raises(ValueError, match=r"is damaged.*Bad CRC-32"):
         load(file)
@@ -284,9 +286,9 @@ def with_learner(file, change):
     """The file after a change of its learner's facts and tensors, in place."""
     with zipfile.ZipFile(file) as archive:
         entries = {name: archive.read(name) for name in archive.namelist()}
-    facts, tensors = json.loads(entries[learner_file.FACTS]), safetensors.torch.load(entries[learner_file.LEARNER])
+    facts, tensors = json.loads(entries[learner_file.FACTS]), safetensors.torch.load(entries[learner_zip.LEARNER])
     change(facts, tensors)
-    entries |= {learner_file.FACTS: json.dumps(facts).encode(), learner_file.LEARNER: safetensors.torch.save(tensors)}
+    entries |= {learner_file.FACTS: json.dumps(facts).encode(), learner_zip.LEARNER: safetensors.torch.save(tensors)}
     with zipfile.ZipFile(file, "w") as archive:
         for name, data in entries.items():
             archive.writestr(name, data)

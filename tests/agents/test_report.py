@@ -11,13 +11,13 @@ from rich.console import Console
 
 from agents.evaluate import evaluate, main
 from agents.report.charts import Curve, curves_figure, read_progress, speeds_figure, to_html
-from agents.report.page import MEASURED, Remarks, number, read_trials, table_html
+from agents.report.page import MEASURED, Remarks, read_trials, table_html
 from agents.report.playback import UNIT, RecordingEnv
-from agents.results import COLUMNS
-from agents.scripted import scripted
-from agents.swim import swim
 from refusals import assert_refused
+from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.evaluation.results import COLUMNS, number
+from seastar_gym.evaluation.swim import swim
 
 MM = 1000.0
 SHORT = [[0.02, 0.0], [0.02, 0.02]]
@@ -132,7 +132,8 @@ def test_trials_are_shown_with_their_confidence_intervals(tmp_path):
     measured = [name + end for name in MEASURED for end in ("", "_low", "_high")]
     header = ["path", "disturbance", "agent", "fidelity", "swims", *measured]
     row = ["random", "none", "a", "fast", 1000]
-    row += [0.9951, 0.9912, 0.9983, 160.04, 159, 161, "nan", "nan", "nan", 423, 400, 450]
+    row += [0.9951, 0.9912, 0.9983, 160.04, 159, 161, 80.02, 79.5, 80.5]
+    row += ["nan", "nan", "nan", 423, 400, 450, 300, 290, 310]
     (tmp_path / "trials.csv").write_text("\n".join(",".join(map(str, line)) for line in (header, row)) + "\n")
     table = read_trials(tmp_path / "trials.csv")
     cells = re.findall(r'data-name="(\w+)">(.*?)</td>', table_html(table))
@@ -141,11 +142,12 @@ def test_trials_are_shown_with_their_confidence_intervals(tmp_path):
         "success_rate": "99.5 [99.1, 99.8]",
         "strokes_to_finish": "160.0 [159.0, 161.0]", "mean_cross_track_error_mm": "\u2013",
         "limbs_heated_per_metre": "423.0 [400.0, 450.0]",
+        "simulated_time_s": "80.0 [79.5, 80.5]", "energy_per_metre_J": "300.0 [290.0, 310.0]",
     }  # fmt: skip
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")
     with pytest.raises(ValueError, match=r"other.csv is not what agents.trials writes"):
         read_trials(tmp_path / "other.csv")
-    for place, field, words in ((9, "x", "line 2: 'x' is no number"), (8, "9,9", "line 2: the line must have 17")):
+    for place, field, words in ((9, "x", "line 2: 'x' is no number"), (8, "9,9", "line 2: the line must have 23")):
         wrong = [*row[:place], field, *row[place + 1 :]]
         (tmp_path / "other.csv").write_text("\n".join(",".join(map(str, line)) for line in (header, wrong)) + "\n")
         with assert_refused(words):

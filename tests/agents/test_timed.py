@@ -1,5 +1,7 @@
 """Agents that decide several times a second: gaits, evaluation, planner, training and policies."""
 
+from dataclasses import replace
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -7,23 +9,26 @@ from gymnasium.vector import AutoresetMode
 from rich.console import Console
 
 from agents import learner_file
-from agents.description import Description
 from agents.evaluate import evaluate
-from agents.greedy import GreedyPolicy, displacement_map
 from agents.hyperparameters import Hyperparameters
-from agents.planner import Budget, Planner, budget_for, state_of
-from agents.policy import LearnedPolicy, load, save
 from agents.ppo import make_model, make_training_env, policy_of
-from agents.scripted import scripted
-from agents.swim import decisions_in, swim
-from agents.trials import swim_many
-from agents.vec_env import BatchVecEnv
+from agents.results import results_table
+from agents.trials import main as trials_main
 from refusals import assert_refused
 from seastar_gym import Limited, Numerics, Scene, Simulator, SmaPulse, SmaWires, ThermalSma
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
+from seastar_gym.controllers import learner_zip
+from seastar_gym.controllers.description import Description
+from seastar_gym.controllers.greedy import GreedyPolicy, displacement_map
+from seastar_gym.controllers.learned import LearnedPolicy, load, save
+from seastar_gym.controllers.planner import Budget, Planner, budget_for, state_of
+from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.evaluation.many import swim_many
+from seastar_gym.evaluation.swim import decisions_in, swim
 from seastar_gym.gaits import in_time, lagged_gait, straight_gait, thrifty_gait, turning_wave
 
 PERIODS = (0.5, 0.2, 0.1)
@@ -207,7 +212,7 @@ def test_a_timed_policy_survives_the_disk_with_its_decision_period(tmp_path):
     save(policy_of(model), tmp_path / "policy.safetensors")
     again = learner_file.resume(tmp_path / "model.zip", model.get_env())
     assert again.gamma == model.gamma
-    for policy in (load(tmp_path / "policy.safetensors"), learner_file.load(tmp_path / "model.zip")):
+    for policy in (load(tmp_path / "policy.safetensors"), learner_zip.load(tmp_path / "model.zip")):
         assert policy.decision_period == 0.5 and isinstance(policy.scene.actuator, SmaWires)
         env = gym.make(
             "SeastarSwim-v0", actions=policy.actions, scene=policy.scene, decision_period=policy.decision_period
@@ -256,3 +261,20 @@ def test_masks_are_handed_out_robot_by_robot():
         assert masks.shape == (3, 21) and masks.dtype == bool
         np.testing.assert_array_equal(masks, [info["action_mask"] for info in infos])
         assert masks[1].all() and not masks[0].all()
+
+
+def test_tables_of_timed_swims_count_decisions_and_seconds(tmp_path, capsys):
+    command = ["--agents", "rest", "--sets", "nominal", "--decision-period", "0.5", "--fidelity", "fast"]
+    assert trials_main([*command, "--num-threads", "1", "--out", str(tmp_path / "trials.csv")]) == 0
+    printed = capsys.readouterr().out
+    assert "decisions" in printed and "of 0.5 s" in printed and "time [s]" in printed and "strokes" not in printed
+
+
+def test_a_swim_is_counted_in_decisions_unless_they_take_a_second():
+    for period, word in ((1.0, "strokes"), (0.5, "decisions")):
+        env = SeastarSwimEnv([[0.02, 0.0]], decision_period=period, fidelity="fast")
+        done = swim("straight", scripted("straight", decision_period=period), env, max_strokes=30)
+        assert done.counted_in == word and done.result == f"{done.strokes} {word}"
+        printed = [column.header.plain for column in results_table([done]).columns[1:]]
+        assert printed[0].split()[0] == word
+        assert replace(done, waypoints=np.ones((7, 2))).result == "1 of 7 waypoints"

@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from seastar_gym import Limited, RewardWeights, Scene, SmaPulse, SmaWires, ThermalSma
+from seastar_gym import Headings, Limited, RewardWeights, Scene, SmaPulse, SmaWires, ThermalSma
 from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout
 from seastar_gym.envs.paths import PATHS
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -65,18 +65,21 @@ def test_the_memory_of_actuators_is_that_of_the_table(actuator, n):
     assert ("+, -" in row) == (n > 1)
     at = scene_layout(Scene(actuator=actuator))
     assert at.actuators == slice(182, 182 + 5 * n) and (n != 2 or f"has {at.size} numbers" in section("Observation"))
+    assert f"{scene_layout(Scene(actuator=SmaWires()), with_headings=True).size} with headings" in section(
+        "Observation"
+    )
 
 
 def test_the_reward_has_the_terms_and_weights_of_the_table():
     weights = RewardWeights()
     documented = {row["term"].strip("`"): float(row["default weight"].split()[0]) for row in table("Reward")}
-    expected = {"progress": weights.progress, "waypoint": weights.waypoint, "effort": weights.effort}
+    expected = {name: getattr(weights, name) for name in ("progress", "waypoint", "effort", "heading")}
     assert documented == {f"reward_{name}": weight for name, weight in expected.items()}
     assert f"within {weights.aim} of its radius" in section("Reward")
 
 
 def test_info_has_the_names_and_types_of_the_table():
-    env = SeastarSwimEnv(fidelity="fast", error_bars=True)
+    env = SeastarSwimEnv(fidelity="fast", error_bars=True, headings=Headings())
     for info in (env.reset(seed=0)[1], env.step([0, 1, 0, 0, 2])[4]):
         documented = {row["name"].strip("`"): row["type"] for row in table("Info")}
         assert set(info) == set(documented)

@@ -51,12 +51,13 @@ def test_scale_and_size_are_the_documented_ones():
     assert observation_size(5) == 186
 
 
+@pytest.mark.parametrize("with_headings", [False, True])
 @pytest.mark.parametrize("n_limbs, n_remembered", [(5, 0), (5, 20), (1, 3)])
-def test_a_layout_names_every_place_once_and_in_the_order_of_the_table(n_limbs, n_remembered):
-    at = layout(n_limbs, n_remembered)
+def test_a_layout_names_every_place_once_and_in_the_order_of_the_table(n_limbs, n_remembered, with_headings):
+    at = layout(n_limbs, n_remembered, with_headings)
     places = np.arange(at.size)
     np.testing.assert_array_equal(np.concatenate([places[place] for place in at]), places)
-    assert [len(places[place]) for place in at] == [2 * 9 * n_limbs] * 2 + [2, n_remembered, 2, 2]
+    assert [len(places[place]) for place in at] == [2 * 9 * n_limbs] * 2 + [2, n_remembered, 4 * with_headings, 2, 2]
     np.testing.assert_array_equal(places[at.waypoints], places[-4:])
     np.testing.assert_array_equal(places[at.stations_and_hub], places[: 4 * 9 * n_limbs + 2])
 

@@ -344,6 +344,18 @@ def test_frames_are_shown_no_faster_than_asked(dummy_window):
     renderer.close()
 
 
+def test_a_window_where_nobody_looks_is_refused(monkeypatch):
+    """SDL has a driver without a display, and takes it without being asked."""
+    pygame.display.quit()
+    for name in ("SDL_VIDEODRIVER", "DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(pygame.display, "get_driver", lambda: "offscreen")
+    monkeypatch.setattr(pygame.display, "init", lambda: None)
+    with pytest.raises(RuntimeError, match=r"there is no display.*seastar swim --film"):
+        renderer_of().show(frame_of())
+    pygame.display.quit()
+
+
 def test_no_display_for_a_window_is_one_sentence(monkeypatch):
     pygame.display.quit()
     monkeypatch.setenv("SDL_VIDEODRIVER", "no-such-driver")

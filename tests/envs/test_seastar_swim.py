@@ -62,8 +62,9 @@ def test_gymnasiums_checker_passes(actions, arguments):
         check_env(fast(actions=actions, **arguments), skip_render_check=True)
 
 
-def test_gymnasiums_checker_passes_with_pictures():
+def test_gymnasiums_checker_passes_with_pictures(monkeypatch):
     pytest.importorskip("pygame")
+    monkeypatch.setenv("SDL_VIDEODRIVER", "offscreen")
     check_env(gym.make("SeastarSwim-v0", render_mode="rgb_array", fidelity="fast").unwrapped)
 
 

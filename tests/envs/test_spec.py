@@ -12,6 +12,7 @@ from gymnasium.vector import AutoresetMode
 from refusals import assert_refused
 from seastar_gym import (
     DomainRandomization,
+    Headings,
     Limited,
     Normal,
     Numerics,
@@ -42,7 +43,9 @@ ARGUMENTS = {
     "error_bars": {"error_bars": True, "scene": SCENE},
     "decisions": {"decision_period": 0.2, "observe_actuators": False, "fidelity": "fast"},
     "continuous": {"actions": "continuous", "decision_period": np.float64(0.3), "fidelity": "fast"},
+    "headings": {"headings": Headings((0.1, 1 / 3, 0.0, 1.0, 2.0)), "fidelity": "fast"},
     "plain": {
+        "headings": to_dict(Headings("random")),
         "scene": SCENE.to_dict(),
         "reward": to_dict(RewardWeights(1.0)),
         "randomization": to_dict(DomainRandomization({"fluid.density": Uniform(900.0, 1000.0)})),

@@ -12,11 +12,12 @@ from gymnasium.vector import AutoresetMode
 
 import seastar_gym
 from refusals import assert_refused
-from seastar_gym import Limited, MeasuredCurve, Numerics, RewardWeights, Scene, SmaPulse, SmaWires, ThermalSma
+from seastar_gym import Limited, MeasuredCurve, Numerics, RewardWeights, Scene, Seastar, SmaPulse, SmaWires, ThermalSma
 from seastar_gym.envs.commands import to_commands
 from seastar_gym.envs.masks import action_masks
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.scene.fidelity import promise, timed_promise
 
 IDS = {"SeastarSwimTimed-v0": 0.5, "SeastarSwimTimedModerate-v0": 0.2, "SeastarSwimTimedHard-v0": 0.1}
 FAST = Numerics.preset("fast")
@@ -53,7 +54,7 @@ def test_a_timed_environment_passes_gymnasiums_and_stable_baselines_checkers(id)
     pytest.importorskip("stable_baselines3.common.env_checker").check_env(env, warn=True, skip_render_check=True)
 
 
-@pytest.mark.parametrize("id", ["SeastarSwim-v0", *IDS])
+@pytest.mark.parametrize("id", ["SeastarSwim-v0", "SeastarSwimHeading-v0", *IDS])
 def test_ids_are_those_of_the_table(id):
     row = re.search(rf"\| `{id}` +\|(.*)\|$", SeastarSwimEnv.__doc__, re.MULTILINE)[1]
     period, actions, limit, decisions, actuator = (cell.strip().strip("`") for cell in row.split("|"))
@@ -170,11 +171,37 @@ def test_what_is_no_decision_period_is_refused(period):
             make(decision_period=period)
 
 
-def test_errors_that_were_measured_of_strokes_are_promised_of_strokes_only():
-    names = {"path_error", "space_error", "time_error", "real_time_factor"}
-    assert names <= set(SeastarSwimEnv(fidelity="fast").reset(seed=0)[1])
-    assert names <= set(SeastarSwimEnv(scene=Scene(actuator=SmaWires()), decision_period=1.0).reset(seed=0)[1])
-    assert not names & set(SeastarSwimEnv(fidelity="fast", decision_period=0.5).reset(seed=0)[1])
+NAMES = ("path_error", "space_error", "time_error", "real_time_factor")
+
+
+@pytest.mark.parametrize("period", [0.5, 0.2, 0.1])
+@pytest.mark.parametrize("fidelity", ["fast", "reference"])
+def test_errors_of_timed_commands_are_promised_to_wires(fidelity, period):
+    env = SeastarSwimEnv(fidelity=fidelity, decision_period=period)
+    path, space, in_time, speed = (env.reset(seed=0)[1][name] for name in NAMES)
+    known = timed_promise(fidelity, period)
+    assert (space, in_time) == (known.space_error, known.time_error) and path == space + in_time > 0.0
+    assert np.isnan(speed)
+
+
+def test_between_measured_times_the_larger_error_is_promised_and_outside_none():
+    between, ends = timed_promise("fast", 0.3), [timed_promise("fast", period) for period in (0.2, 0.5)]
+    assert between.time_error == max(one.time_error for one in ends)
+    assert timed_promise("fast", 0.09) is None and timed_promise("fast", 0.6) is None
+    info = SeastarSwimEnv(fidelity="fast", decision_period=0.05).reset(seed=0)[1]
+    assert all(np.isnan(info[name]) for name in NAMES)
+
+
+@pytest.mark.parametrize("scene", [DEAF, HOT, Scene(Seastar(youngs_modulus=2e6), actuator=SmaWires(), numerics=FAST)])
+def test_other_robots_and_wires_are_promised_nothing_in_time(scene):
+    info = SeastarSwimEnv(scene=scene, decision_period=0.2).reset(seed=0)[1]
+    assert all(np.isnan(info[name]) for name in NAMES)
+
+
+def test_strokes_keep_their_promises():
+    assert SeastarSwimEnv(fidelity="fast").reset(seed=0)[1]["path_error"] == max(
+        promise("fast").path_error, promise("fast").gait_error
+    )
 
 
 # Heat

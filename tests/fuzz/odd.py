@@ -14,6 +14,7 @@ from seastar_gym import (
     Contact,
     DomainRandomization,
     GridCurrent,
+    Headings,
     Limb,
     Limited,
     LogUniform,
@@ -82,13 +83,14 @@ PARTS: Calls = {
     "LogUniform": (LogUniform, dict(low=0.1, high=1.0)),
     "Normal": (Normal, dict(mean=1.0, deviation=0.1)),
     "DomainRandomization": (DomainRandomization, dict(distributions={"robot.density": Uniform(900.0, 1100.0)})),
+    "Headings": (Headings, dict(asked=(0.1, 0.2), tolerance=0.1)),
     "RewardWeights": (RewardWeights, dict(progress=1.0, waypoint=1.0, effort=0.0)),
     "Simulator": (Simulator, dict(scene=Scene(numerics=FAST), n_robots=2, threads=1)),
     "SeastarSwimEnv": (SeastarSwimEnv, dict(
         path="line", actions="limbs", fidelity="fast", scene=Scene(numerics=FAST), reward=RewardWeights(),
         waypoint_radius=0.01, random_heading=False, render_mode=None, frames_per_stroke=2,
         randomization=DomainRandomization({"robot.density": Uniform(900.0, 1100.0)}), decision_period=1.0,
-        observe_actuators=True)),
+        observe_actuators=True, headings=Headings())),
     "SeastarSwimVectorEnv": (SeastarSwimVectorEnv, dict(
         num_envs=2, max_episode_steps=3, path="line", actions="pairs", fidelity="fast", scene=Scene(numerics=FAST),
         reward=RewardWeights(), waypoint_radius=0.01, random_heading=True, render_mode=None,

@@ -19,6 +19,7 @@ from seastar_gym import (
     Contact,
     DomainRandomization,
     GridCurrent,
+    Headings,
     Limb,
     Limited,
     LogUniform,
@@ -92,7 +93,7 @@ def test_every_part_of_the_package_is_in_the_table():
     """A new part is not forgotten: of every registered kind some scene of the tables has one."""
     scenes = [Scene(actuator=actuator) for actuator in ACTUATORS.values()] + [Scene(**part) for part in PARTS.values()]
     seen = {kind for scene in scenes for kind in KINDS if f'"kind": "{kind}"' in json.dumps(scene.to_dict())}
-    of_environments = {"RewardWeights", "DomainRandomization", "Uniform", "LogUniform", "Normal"}
+    of_environments = {"RewardWeights", "Headings", "DomainRandomization", "Uniform", "LogUniform", "Normal"}
     assert {name for name, kind in KINDS.items() if kind.__module__.startswith("seastar_gym")} == seen | of_environments
 
 
@@ -207,6 +208,8 @@ def test_numbers_of_numpy_become_pythons_and_do_not_compute_to_their_own_precisi
     "part",
     [
         RewardWeights(199.9, 0.0, 1 / 3),
+        Headings((0.1, 1 / 3), 0.2),
+        Headings("random"),
         DomainRandomization({"robot.density": Uniform(900, 1100.1), "actuator.peak_angle": Uniform(0, 0.5)}),
         DomainRandomization({"fluid.density": LogUniform(1.0, 1 / 0.3), "actuator.peak_angle": Normal(0.5, 0.01)}),
     ],
@@ -429,9 +432,7 @@ def test_a_scene_written_before_a_term_was_known_can_be_read():
     assert Scene.from_dict(data) == Scene()
 
 
-@pytest.mark.parametrize(
-    ("part", "name"), [("fluid", "current"), ("actuator", "actuator")]
-)
+@pytest.mark.parametrize(("part", "name"), [("fluid", "current"), ("actuator", "actuator")])
 def test_what_has_no_default_is_asked_for(part, name):
     scene = Scene(fluid=Water(current=Vortex(1e-3)), actuator=Limited(SmaPulse(), 0.5))
     data = scene.to_dict()

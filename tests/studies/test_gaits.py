@@ -8,11 +8,12 @@ import pytest
 
 from seastar_gym import Scene, SmaPulse, SmaWires
 from seastar_gym.envs.symmetry import limb_order
+from studies.gaits.crossing import crossings, limbs_cross
 from studies.gaits.enumeration import all_codes, distinct_codes, gaits_of
 from studies.gaits.evolution import evolve, free_numbers, mirrored_gaits, score
 from studies.gaits.named import GAITS, SLOT, lagged
 from studies.gaits.periodic import events_of, measure, timed
-from studies.gaits.study import front, pareto
+from studies.gaits.study import by_numerics, front, pareto
 
 FAST = replace(Scene.preset("fast"), actuator=SmaWires())
 
@@ -91,3 +92,20 @@ def test_nobody_beats_the_front_in_both(named):
     np.testing.assert_array_equal(pareto(points), [[0.5, 0.5], [1.0, 1.0], [2.0, 3.0]])
     best = np.array(front(named["lag 0.6"], [])["front"])
     assert best[0, 0] == pytest.approx(named["lag 0.6"].energy_per_metre[0], abs=0.01)
+
+
+def test_crossing_limbs_are_seen():
+    robot = Scene().robot
+    nodes = robot.nodes()
+    assert not limbs_cross(nodes, robot.n_limbs)
+    crossed = nodes.copy()
+    crossed[10:19] = nodes[1:10] + np.linspace([0.0, 0.01], [0.0, -0.012], 9)  # limb 2 along limb 1, from left to right
+    assert limbs_cross(crossed, robot.n_limbs)
+    assert crossings(FAST, lagged(0.6), SLOT) == 0
+
+
+def test_speed_does_not_depend_on_the_scheme_or_the_nodes():
+    gaits = {"lag 0.6": (lagged(0.6), SLOT)}
+    speeds = {what: each["lag 0.6"]["mm_per_s"] for what, each in by_numerics(gaits).items()}
+    chapters = speeds.pop("`chapter`: 10 nodes, Euler 3 ms")
+    assert max(speeds.values()) < 1.05 * min(speeds.values()) and chapters > 0.5 * min(speeds.values())

@@ -7,7 +7,8 @@ symmetry group is the turn (g even) or the turn and mirror (g odd) that brings s
     element 2k - 1:  turn by -2 pi k/n, then mirror at the x axis (y -> -y), for k = 1..n
 
 An element carries a robot with its waypoints onto another robot, whose limb j was limb `limb_order(n)[g, j]`; a mirror
-swaps the commands + and -, and does to the memory of actuators what they say (`memory_mirror`). A controller that sees
+swaps the commands + and -, and does to the memory of actuators what they say (`memory_mirror`). A turn leaves the turns
+that asked headings ask for as they are, a mirror reverses them. A controller that sees
 only waypoints in sector 0 and whose actions are carried back is equivariant: in a turned or mirrored world it swims the
 turned or mirrored way.
 

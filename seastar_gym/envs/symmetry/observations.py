@@ -15,15 +15,18 @@ BOUNDARY_WIDTH = 1e-6
 observations: not rounding, but the next waypoint chooses the sector of a robot that is aimed along a limb."""
 
 
-def sectors(observations: NDArray[np.floating[Any]], n_limbs: int, mirror: Mirror = ()) -> Elements:
+def sectors(
+    observations: NDArray[np.floating[Any]], n_limbs: int, mirror: Mirror = (), with_headings: bool = False
+) -> Elements:
     """Sectors of the current waypoints, 0 to 2 n_limbs - 1, shape (...), in observations of shape (..., size).
 
     A waypoint on a boundary belongs to the sector on the side of the next waypoint, and where that lies on the same
     line (or there is none) to the sector anti-clockwise of the boundary. A waypoint at the hub lies in sector 0.
 
     mirror: What a mirror does to the memory of a limb's actuator, see `memory_mirror`; () if actuators have none.
+    with_headings: Whether headings are asked for.
     """
-    at = _layout(observations, n_limbs, mirror)
+    at = _layout(observations, n_limbs, mirror, with_headings)
     current = np.asarray(observations[..., at.current_waypoint], np.float64)
     towards_next = np.asarray(observations[..., at.next_waypoint], np.float64)
     width = np.pi / n_limbs
@@ -37,9 +40,9 @@ def sectors(observations: NDArray[np.floating[Any]], n_limbs: int, mirror: Mirro
     return sector.astype(np.intp) % (2 * n_limbs)
 
 
-def _layout(observations: NDArray[np.floating[Any]], n_limbs: int, mirror: Mirror) -> Layout:
+def _layout(observations: NDArray[np.floating[Any]], n_limbs: int, mirror: Mirror, with_headings: bool) -> Layout:
     """Layout of observations, shape (..., size); ValueError if they are of a robot of other limbs."""
-    at, size = layout(n_limbs, len(mirror) * n_limbs), observations.shape[-1]
+    at, size = layout(n_limbs, len(mirror) * n_limbs, with_headings), observations.shape[-1]
     if size != at.size:
         raise ValueError(f"An observation of {size} numbers is not that of a robot of {n_limbs} limbs.")
     return at
@@ -56,27 +59,41 @@ def _vector_order(n_limbs: int) -> NDArray[np.intp]:
 
 
 def transform_observations(
-    observations: NDArray[np.floating[Any]], elements: ArrayLike, n_limbs: int, mirror: Mirror = ()
+    observations: NDArray[np.floating[Any]],
+    elements: ArrayLike,
+    n_limbs: int,
+    mirror: Mirror = (),
+    with_headings: bool = False,
 ) -> NDArray[np.floating[Any]]:
     """Observations of the robots carried by the elements: a fresh array of the same shape and type.
 
     mirror: What a mirror does to the memory of a limb's actuator, see `memory_mirror`; () if actuators have none.
+    with_headings: Whether headings are asked for.
     """
     observations, elements = np.asarray(observations), np.asarray(elements, dtype=np.intp)
-    at = _layout(observations, n_limbs, mirror)
-    if not mirror:
+    at = _layout(observations, n_limbs, mirror, with_headings)
+    if not mirror and not with_headings:
         return _transform_vectors(observations, elements, n_limbs)
     hub = at.hub_velocity.stop
     vectors = np.concatenate([observations[..., at.stations_and_hub], observations[..., at.waypoints]], axis=-1)
     vectors = _transform_vectors(vectors, elements, n_limbs)
     remembered = _transform_memory(observations[..., at.actuators], elements, n_limbs, mirror)
-    return np.concatenate([vectors[..., :hub], remembered, vectors[..., hub:]], axis=-1)
+    asked = _transform_headings(observations[..., at.headings], elements)
+    return np.concatenate([vectors[..., :hub], remembered, asked, vectors[..., hub:]], axis=-1)
+
+
+def _transform_headings(asked: NDArray[np.floating[Any]], elements: Elements) -> NDArray[np.floating[Any]]:
+    """Cosines and sines of turns that are asked for, shape (..., 4): the same for all limbs, reversed by a mirror."""
+    signs = np.where(is_mirror(elements)[..., None], np.tile([1, -1], asked.shape[-1] // 2), 1)
+    return asked * signs.astype(asked.dtype)
 
 
 def _transform_memory(
     remembered: NDArray[np.floating[Any]], elements: Elements, n_limbs: int, mirror: Mirror
 ) -> NDArray[np.floating[Any]]:
     """Memory of actuators, shape (..., n_limbs len(mirror)), moved with the limbs and mirrored where the robots are."""
+    if not mirror:
+        return remembered
     of_limbs = remembered.reshape(*remembered.shape[:-1], n_limbs, len(mirror))
     of_limbs = np.take_along_axis(of_limbs, limb_order(n_limbs)[elements][..., None], axis=-2)
     index, sign = np.array(mirror, dtype=int).T
@@ -97,11 +114,12 @@ def _transform_vectors(
 
 
 def reduce_observations(
-    observations: NDArray[np.floating[Any]], n_limbs: int, mirror: Mirror = ()
+    observations: NDArray[np.floating[Any]], n_limbs: int, mirror: Mirror = (), with_headings: bool = False
 ) -> tuple[NDArray[np.floating[Any]], Elements]:
     """Observations with the current waypoint brought into sector 0, and the elements that did it.
 
     mirror: What a mirror does to the memory of a limb's actuator, see `memory_mirror`; () if actuators have none.
+    with_headings: Whether headings are asked for.
     """
-    elements = sectors(observations, n_limbs, mirror)
-    return transform_observations(observations, elements, n_limbs, mirror), elements
+    elements = sectors(observations, n_limbs, mirror, with_headings)
+    return transform_observations(observations, elements, n_limbs, mirror, with_headings), elements

@@ -23,15 +23,16 @@ else:
 
 
 class _Kind(NamedTuple):
-    """What the symmetry has to know of an environment: action mode, limbs, and the mirror of observed memory."""
+    """What the symmetry has to know of an environment: mode, limbs, mirror of observed memory, asked headings."""
 
     mode: Actions
     n_limbs: int
     mirror: Mirror
+    with_headings: bool
 
     def reduce(self, observations: NDArray[Any]) -> tuple[NDArray[np.floating[Any]], Elements]:
         """Reduced observations, and the elements that reduced them."""
-        return reduce_observations(observations, self.n_limbs, self.mirror)
+        return reduce_observations(observations, self.n_limbs, self.mirror, self.with_headings)
 
     def restore(self, actions: Any, elements: Elements) -> Any:
         """Actions of the robots as they are."""
@@ -53,7 +54,8 @@ def _kind(env: Any) -> _Kind:
         raise ValueError(f"Symmetry is known of SeastarSwim-v0 and the timed environments alone, not of {inner!r}.")
     require_symmetry(inner.scene, inner.randomization)
     mirror = memory_mirror(inner.scene.actuator) if inner.observe_actuators else ()
-    return _Kind(inner.actions, inner.scene.robot.n_limbs, mirror)
+    mirror += tuple((len(mirror) + index, sign) for index, sign in inner.added_mirror)
+    return _Kind(inner.actions, inner.scene.robot.n_limbs, mirror, inner.headings is not None)
 
 
 class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorArgs):

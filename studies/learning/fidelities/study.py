@@ -22,10 +22,10 @@ from typing import Any, cast
 import torch
 import tyro
 
-from agents.files import write_atomically
 from agents.hyperparameters import Hyperparameters
-from agents.policy import LearnedPolicy
 from seastar_gym.certification.measure import machine
+from seastar_gym.controllers.learned import LearnedPolicy
+from seastar_gym.files import write_atomically
 from seastar_gym.scene.checks import require_count
 from seastar_gym.version import __version__
 from studies.learning.fidelities.pictures import draw

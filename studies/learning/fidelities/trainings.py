@@ -4,9 +4,9 @@ import time
 from typing import NamedTuple
 
 from agents.hyperparameters import Hyperparameters
-from agents.policy import LearnedPolicy
 from agents.ppo import make_model, make_training_env, policy_of
-from agents.trials import HELD_OUT_SEED, swim_many
+from seastar_gym.controllers.learned import LearnedPolicy
+from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
 from seastar_gym.scene import Scene
 
 MAX_STROKES = 400

@@ -1,0 +1,1 @@
+"""The command `seastar`: every subcommand is a module with `main(arguments)`, imported when it is asked for."""

@@ -1,0 +1,45 @@
+"""Swim, play and measure with the seastar robot. `seastar COMMAND --help` tells the options of a command."""
+
+import importlib
+import sys
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from seastar_gym.command import command_parser, run_command
+from seastar_gym.version import __version__
+
+
+class Command(NamedTuple):
+    """A subcommand. module: Has `main(arguments)`, which returns the exit code. help: What it does, in a line."""
+
+    module: str
+    help: str
+
+
+COMMANDS = {
+    "swim": Command("seastar_gym.cli.swim", "watch an agent on a path or a task, in a window or as a film"),
+    "play": Command("seastar_gym.cli.play", "steer the robot with the keyboard"),
+    "evaluate": Command("seastar_gym.cli.evaluate", "compare agents on a path: a table, a CSV file, a picture"),
+    "benchmark": Command("seastar_gym.benchmark.command", "measure agents on registered tasks over ten seeds"),
+    "train": Command("seastar_gym.cli.train", "train a policy, in a checkout of the repository"),
+    "certify": Command("seastar_gym.certification.command", "measure what speed costs a scene in accuracy"),
+    "identify": Command("seastar_gym.identify.command", "fit numbers of a scene to measured trajectories"),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line; returns the exit code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    parser = command_parser("seastar", __doc__)
+    parser.add_argument("--version", action="version", version=f"seastar-gym {__version__}")
+    commands = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND", required=True)
+    for name, command in COMMANDS.items():
+        commands.add_parser(name, help=command.help, add_help=False)
+    name = parser.parse_args(given[:1]).command
+    answer: int = importlib.import_module(COMMANDS[name].module).main(given[1:])
+    return answer
+
+
+def run() -> None:
+    """Entry point of the installed command."""
+    run_command(main)

@@ -1,0 +1,123 @@
+"""Steers the robot with the keyboard. The picture says which keys there are.
+
+Keys act at the next decision, and as long as they are held. Without a display, --keys "a a*5 1w up ." presses keys, one
+word per decision, and --film writes what is seen.
+"""
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from seastar_gym.cli.keys import Steering, known_keys, typed
+from seastar_gym.cli.played import PlayedEnv
+from seastar_gym.cli.screen import Show, rate, screen
+from seastar_gym.cli.swim import outcome, show_all
+from seastar_gym.command import command_parser
+from seastar_gym.envs.canvas import import_pygame
+from seastar_gym.evaluation.path_file import PATH_HELP, load_path
+from seastar_gym.scene.checks import require_number
+
+AGAIN, HELP, END = "z", "f1", "escape"
+"""Keys that begin anew, show or hide the help, and end the game."""
+
+Held = Callable[[], set[str] | None]
+"""Function that gives the keys for the next decision; None ends the game."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """Parser of the options."""
+    default = "(default: %(default)s)"
+    found = command_parser("seastar play", __doc__)
+    found.add_argument("--path", default="pentagon", help=f"{PATH_HELP} {default}")
+    found.add_argument("--decision-period", type=float, default=0.2, help=f"time between decisions [s] {default}")
+    found.add_argument("--speed", type=float, default=1.0, help=f"multiple of real time {default}")
+    found.add_argument("--keys", help="keys that are pressed, a word per decision, instead of the keyboard")
+    found.add_argument("--film", type=Path, help="file of a film, .mp4 or .gif, instead of a window; needs --keys")
+    found.add_argument("--seed", type=int, default=0, help=f"seed of a random path {default}")
+    return found
+
+
+class Keyboard:
+    """Keys that were down at any time since the last decision."""
+
+    def __init__(self, env: PlayedEnv):
+        self._pygame, self._env, self._held = import_pygame(), env, set[str]()
+        self._ended = False
+        names = {*known_keys(env.scene.robot.n_limbs), AGAIN, END}
+        self._codes = {name: self._pygame.key.key_code(name) for name in names}
+        self._help = self._pygame.key.key_code(HELP)
+
+    def watch(self, show: Show) -> Show:
+        """Function that shows a picture and looks at the keyboard after it."""
+
+        def look(picture: Any) -> bool:
+            self._ended = not show(picture) or self._ended
+            if not self._ended:
+                self._look()
+            return not self._ended
+
+        return look
+
+    def _look(self) -> None:
+        pressed = self._pygame.key.get_pressed()
+        self._held |= {name for name, code in self._codes.items() if pressed[code]}
+        self._env.help = self._env.help != bool(self._pygame.key.get_just_pressed()[self._help])
+        self._ended = END in self._held
+
+    def __call__(self) -> set[str] | None:
+        """Keys for the next decision; None once the game was ended."""
+        held, self._held = self._held, set()
+        return None if self._ended else held
+
+
+def game(env: PlayedEnv, show: Show, held: Held, seed: int) -> dict[str, Any]:
+    """Play until the keys end; returns the last info. A path that is completed begins anew with its key."""
+    _, info = env.reset(seed=seed)
+    over, steering = False, Steering(env.decision_period, env.scene.robot.n_limbs)
+    show_all(env, show)
+    while (keys := held()) is not None:
+        if AGAIN in keys:
+            _, info = env.reset(seed=seed)
+            over = False
+        elif not over:
+            command = steering.command(keys, env.limb_directions())
+            _, _, over, _, info = env.step(np.where(command < 0, 2, command))
+        elif not show(env.last_picture):
+            break
+        show_all(env, show)
+    return info
+
+
+def play(options: argparse.Namespace) -> str:
+    """Play as the options say; returns a sentence on how it went."""
+    for name in ("speed", "decision_period"):
+        require_number(f"--{name.replace('_', '-')}", getattr(options, name), "1")
+    if options.film is not None and options.keys is None:
+        raise ValueError('A film needs the keys that are pressed: --keys "a a*5 1w up .".')
+    number, fps = rate(options.film, options.decision_period, options.speed)
+    env = PlayedEnv(path=load_path(options.path), decision_period=options.decision_period, frames_per_stroke=number)
+    words = None if options.keys is None else iter(list(typed(options.keys, env.scene.robot.n_limbs)))
+    with screen(options.film, fps) as show:
+        if words is None:
+            keyboard = Keyboard(env)
+            info = game(env, keyboard.watch(show), keyboard, options.seed)
+        else:
+            info = game(env, show, lambda: next(words, None), options.seed)
+    said = outcome(env, info)
+    env.close()
+    return f"You reached {said}." if options.film is None else f"{said[0].upper()}{said[1:]}. Written: {options.film}."
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line; returns the exit code."""
+    options = parser().parse_args(arguments)
+    try:
+        print(play(options))
+    except (ValueError, ImportError, FileNotFoundError) as bad_input:
+        print(bad_input, file=sys.stderr)
+        return 2
+    return 0

@@ -1,0 +1,62 @@
+"""Where pictures go: into a window, or into the file of a film."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from seastar_gym.envs.canvas import import_pygame
+from seastar_gym.envs.window import Window
+from seastar_gym.evaluation.films import Picture, film, film_format
+
+SIZE = (960, 720)
+"""Width and height of a window [px]."""
+FPS, GIF_FPS = 30, 20
+"""Pictures per second of a window or an MP4, and of a GIF."""
+
+Show = Callable[[Picture], bool]
+"""Function that shows a picture; False once nobody looks any more."""
+
+
+def rate(file: Path | None, decision_period: float, speed: float) -> tuple[int, float]:
+    """Number of pictures of a decision, and pictures per second, at a speed in multiples of real time."""
+    wanted = FPS if file is None or film_format(file) == ".mp4" else GIF_FPS
+    number = max(1, round(wanted * decision_period / speed))
+    return number, number * speed / decision_period
+
+
+@contextmanager
+def screen(file: Path | None, fps: float) -> Iterator[Show]:
+    """Context that gives a function to show pictures with: in a film, or in a window if there is no file.
+
+    ValueError, with what to do instead, where no window can be opened.
+    """
+    if file is None:
+        with _window(fps) as show:
+            yield show
+        return
+    with film(file, fps) as add:
+
+        def keep(picture: Picture) -> bool:
+            add(picture)
+            return True
+
+        yield keep
+
+
+@contextmanager
+def _window(fps: float) -> Iterator[Show]:
+    pygame, window = import_pygame(), Window()
+    try:
+        window.is_wanted(SIZE)
+    except RuntimeError as no_display:
+        raise ValueError("No window can be opened here: write a film, --film swim.mp4 or swim.gif.") from no_display
+
+    def show(picture: Picture) -> bool:
+        if not window.is_wanted(SIZE):
+            return False
+        height, width, _ = picture.shape
+        window.show(pygame.image.frombuffer(picture.tobytes(), (width, height), "RGB"), fps)
+        return True
+
+    yield show
+    window.close()

@@ -1,0 +1,116 @@
+"""Lets an agent swim, in a window or into a film.
+
+The window needs a display; a film, --film swim.mp4 or swim.gif, does not. With --task the agent swims in a registered
+environment, as that has been made; otherwise it swims along --path.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, get_args
+
+import gymnasium as gym
+
+from seastar_gym.cli.screen import Show, rate, screen
+from seastar_gym.command import command_parser
+from seastar_gym.controllers.contract import Policy, actions_in
+from seastar_gym.controllers.roster import HELP, load_agent
+from seastar_gym.evaluation.path_file import PATH_HELP, load_path
+from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in
+from seastar_gym.evaluation.tasks import make_task
+from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.numerics import Fidelity
+
+
+def parser() -> argparse.ArgumentParser:
+    """Parser of the options."""
+    default = "(default: %(default)s)"
+    found = command_parser("seastar swim", __doc__)
+    found.add_argument("--agent", default="learned", help=f"{HELP} {default}")
+    found.add_argument("--path", help=f"{PATH_HELP} (default: pentagon)")
+    found.add_argument("--task", help="id of a registered environment (default: SeastarSwim-v0)")
+    found.add_argument("--speed", type=float, default=4.0, help=f"multiple of real time {default}")
+    found.add_argument("--film", type=Path, help="file of a film, .mp4 or .gif, instead of a window")
+    found.add_argument("--fidelity", choices=get_args(Fidelity), help="accuracy of the simulation")
+    found.add_argument("--decision-period", type=float, help="time between decisions [s] (default: a stroke of 1 s)")
+    found.add_argument("--seconds", type=float, help="simulated time after which the swim ends")
+    found.add_argument("--random-heading", action="store_true", help="turn the robot at random at the start")
+    found.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn at random {default}")
+    return found
+
+
+def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
+    """Arguments of the environment that the options ask for."""
+    for name in ("speed", "decision_period", "seconds"):
+        if getattr(options, name) is not None:
+            require_number(f"--{name.replace('_', '-')}", getattr(options, name), "1")
+    asked: dict[str, Any] = {"fidelity": options.fidelity, "decision_period": options.decision_period}
+    if options.path is not None:
+        asked["path"] = load_path(options.path)
+    if options.random_heading:
+        asked["random_heading"] = True
+    return {name: value for name, value in asked.items() if value is not None}
+
+
+def make(options: argparse.Namespace, **more: Any) -> gym.Env[Any, Any]:
+    """Environment that the options ask for."""
+    task = "SeastarSwim-v0" if options.task is None else options.task
+    arguments = {**arguments_of(options), **more}
+    if options.decision_period is not None:
+        arguments["max_episode_steps"] = decisions_in(TIME_LIMIT, options.decision_period)
+    return make_task(task, **arguments)
+
+
+def watch(options: argparse.Namespace) -> str:
+    """Let the agent swim and show it; returns a sentence on how it went."""
+    plain: Any = make(options).unwrapped
+    policy = load_agent(options.agent, plain, options.seed)
+    actions = actions_in(policy, plain.actions, plain.scene.robot.n_limbs)
+    period = plain.decision_period
+    number, fps = rate(options.film, period, options.speed)
+    env = make(options, actions=actions, render_mode="rgb_array_list", frames_per_stroke=number)
+    limit = None if options.seconds is None else decisions_in(options.seconds, period)
+    with screen(options.film, fps) as show:
+        info = show_episode(env, policy, show, options.seed, limit)
+    env.close()
+    written = "" if options.film is None else f" Written: {options.film}."
+    return f"{options.agent}: {outcome(env.unwrapped, info)}.{written}"
+
+
+def show_episode(
+    env: gym.Env[Any, Any], policy: Policy, show: Show, seed: int, limit: int | None = None
+) -> dict[str, Any]:
+    """Show one episode, for `limit` decisions at most; returns the last info."""
+    observation, info = env.reset(seed=seed)
+    state, begins, decisions = None, [True], 0
+    over = not show_all(env, show)
+    while not over and (limit is None or decisions < limit):
+        action, state = policy.predict(observation, state=state, episode_start=begins, deterministic=True)
+        observation, _, terminated, truncated, info = env.step(action)
+        begins, decisions = [False], decisions + 1
+        over = not show_all(env, show) or terminated or truncated
+    return info
+
+
+def show_all(env: gym.Env[Any, Any], show: Show) -> bool:
+    """Show the pictures since the last call; False once nobody looks any more."""
+    pictures: Any = env.render()
+    return all(show(picture) for picture in pictures or ())
+
+
+def outcome(env: Any, info: dict[str, Any]) -> str:
+    """How an episode went, in words."""
+    reached, total = info["waypoint_index"], len(env.waypoints)
+    return f"{reached} of {total} waypoints in {info['time']:.1f} s"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line; returns the exit code."""
+    options = parser().parse_args(arguments)
+    try:
+        print(watch(options))
+    except (ValueError, ImportError, FileNotFoundError) as bad_input:
+        print(bad_input, file=sys.stderr)
+        return 2
+    return 0

@@ -1,0 +1,62 @@
+"""What every controller has, `predict`, and whether a controller can drive the robot of an environment."""
+
+import math
+from typing import Any, Protocol, get_args
+
+from seastar_gym.controllers.learned import LearnedPolicy
+from seastar_gym.envs.commands import MOST_LIMBS, Actions, action_space
+from seastar_gym.envs.task import scene_observation_size
+from seastar_gym.scene import Scene
+
+
+class Policy(Protocol):
+    """Anything with Stable-Baselines3's `predict`; see `actions_of` for the action mode that it is made for."""
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
+    ) -> tuple[Any, Any]:
+        """Action for an observation, and the recurrent state for the next call."""
+
+
+def actions_of(policy: Policy, n_limbs: int) -> Actions:
+    """The action mode that a policy is for: its attribute `actions`, or the mode that has its `action_space`, as models
+    of Stable-Baselines3 say it; "limbs" if it says neither."""
+    space: Any = getattr(policy, "action_space", None)
+    if space is None or hasattr(policy, "actions"):
+        return getattr(policy, "actions", "limbs")
+    for mode in get_args(Actions):
+        if (mode != "joint" or n_limbs <= MOST_LIMBS) and action_space(mode, n_limbs) == space:
+            return mode
+    raise ValueError(f"The policy acts in {space}, which is no action mode of a robot of {n_limbs} limbs.")
+
+
+def actions_in(policy: Policy, own: Actions, n_limbs: int) -> Actions:
+    """The action mode that a policy is for, see `actions_of`; an environment's own one if the policy says none."""
+    says = hasattr(policy, "actions") or getattr(policy, "action_space", None) is not None
+    return actions_of(policy, n_limbs) if says else own
+
+
+def require_fit(
+    policy: Policy,
+    scene: Scene,
+    actions: Actions,
+    decision_period: float | None = None,
+    observe_actuators: bool = True,
+) -> None:
+    """ValueError, with one sentence, where a policy cannot drive the robot of an environment, as far as it tells.
+
+    decision_period: Time between decisions of the environment [s]. None means a stroke.
+    """
+    if isinstance(policy, LearnedPolicy):
+        policy.require_fit(scene, actions)
+    ours = getattr(policy, "decision_period", None)
+    theirs = scene.actuator.period if decision_period is None else decision_period
+    if ours is not None and not math.isclose(ours, theirs):
+        raise ValueError(f"The policy decides every {ours:g} s, the environment every {theirs:g} s: make them equal.")
+    sees: Any = getattr(policy, "observation_space", None)
+    seen = (scene_observation_size(scene, observe_actuators),)
+    if sees is not None and sees.shape != seen:
+        raise ValueError(f"The policy sees observations of shape {sees.shape}, the environment's have {seen}.")
+    acts = getattr(policy, "action_space", None)
+    if acts is not None and acts != action_space(actions, scene.robot.n_limbs):
+        raise ValueError(f'The policy acts in {acts}, which is not that of an environment with actions="{actions}".')

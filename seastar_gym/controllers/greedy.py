@@ -1,0 +1,146 @@
+"""Greedy agent: it chooses commands by a map of the mean displacement that each of them makes.
+
+    seastar evaluate --agents greedy planner pentagon
+
+The map has the displacement of the hub in the body frame and the turn of the robot, per stroke of every command, once
+the repeated command swims steadily. It is computed once for every scene and kept in the user's cache folder. In a timed
+environment, commands are repeated at every decision, which heats the same wires over and over: the map knows no lag.
+"""
+
+import hashlib
+import os
+from abc import ABC, abstractmethod
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.envs.commands import Actions, command_table
+from seastar_gym.envs.decisions import checked_decision_period
+from seastar_gym.envs.observation import OBSERVATION_LAYOUT, scene_layout
+from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.stations import body_heading
+from seastar_gym.scene import Scene
+from seastar_gym.simulator import Simulator
+
+Floats = NDArray[np.float64]
+
+SETTLING_STROKES, MEASURED_STROKES = 6, 4
+"""A repeated command swims steadily, to 1 %, after about six strokes."""
+
+
+class Displacements(NamedTuple):
+    """Mean displacements of the hub [m] in the body frame, shape (n, 2), and turns [rad], shape (n,), of n gaits."""
+
+    hub: Floats
+    turn: Floats
+
+
+def turned(vectors: Floats, angles: Floats) -> Floats:
+    """Vectors, shape (n, 2), turned by angles [rad], shape (n,)."""
+    c, s = np.cos(angles), np.sin(angles)
+    return np.stack([c * vectors[:, 0] - s * vectors[:, 1], s * vectors[:, 0] + c * vectors[:, 1]], axis=1)
+
+
+def measure_gaits(
+    scene: Scene, commands: Floats, settling: int, measured: int, decision_period: float | None = None
+) -> Displacements:
+    """Mean displacement and turn per stroke of periodic gaits, in the body frame when the measured strokes begin.
+
+    commands: Commands of every gait, shape (n, period, n_limbs). settling, measured: Numbers of strokes before and
+    during the measurement; `measured` is a multiple of the period. decision_period: Time between commands [s], called a
+    stroke here. None means a stroke of the actuator.
+    """
+    simulator, duration = Simulator(scene, len(commands)), checked_decision_period(decision_period, scene)
+    for stroke in range(settling + measured):
+        if stroke == settling:
+            hub, heading = simulator.hub_position(), body_heading(simulator.positions, scene.robot)
+        simulator.advance(duration, commands[:, stroke % commands.shape[1]])
+    turn = body_heading(simulator.positions, scene.robot) - heading
+    turn -= 2.0 * np.pi * np.rint(turn / (2.0 * np.pi))
+    return Displacements(turned(simulator.hub_position() - hub, -heading) / measured, turn / measured)
+
+
+def displacement_map(scene: Scene, actions: Actions = "joint", decision_period: float | None = None) -> Displacements:
+    """Map of a scene for the commands of an action mode, from the cache or measured now."""
+    asked: tuple[Any, ...] = scene, actions, SETTLING_STROKES, MEASURED_STROKES, OBSERVATION_LAYOUT
+    if decision_period is not None:
+        asked = *asked, decision_period
+    settling, measured_strokes = (_decisions(n, scene, decision_period) for n in (SETTLING_STROKES, MEASURED_STROKES))
+    key = hashlib.sha256(repr(asked).encode()).hexdigest()[:24]
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "seastar-gym"
+    file = cache / f"displacements-{key}.npz"
+    if file.is_file():
+        with np.load(file, allow_pickle=False) as known:
+            return Displacements(known["hub"], known["turn"])
+    commands = command_table(actions, scene.robot.n_limbs)[:, None]
+    measured = measure_gaits(scene, commands, settling, measured_strokes, decision_period)
+    cache.mkdir(parents=True, exist_ok=True)
+    part = file.with_name(f"{file.stem}.{os.getpid()}.npz")  # whoever looks finds the whole file or none
+    np.savez(part, hub=measured.hub, turn=measured.turn)
+    os.replace(part, file)
+    return measured
+
+
+def _decisions(strokes: int, scene: Scene, decision_period: float | None) -> int:
+    """Decisions in so many strokes, one at least."""
+    seconds = strokes * scene.actuator.period
+    return strokes if decision_period is None else max(1, round(seconds / decision_period))
+
+
+def waypoints_of(observations: NDArray[np.float32], scene: Scene) -> tuple[Floats, Floats]:
+    """Current and next waypoint [m] relative to the hub in the body frame, (n, 2) each."""
+    at, length = scene_layout(scene), scene.robot.limb_length
+    current, after = observations[:, at.current_waypoint], observations[:, at.next_waypoint]
+    return length * current.astype(np.float64), length * after.astype(np.float64)
+
+
+class Searcher(ABC):
+    """Base of policies that choose actions by observations alone, for one robot or for many."""
+
+    actions: Actions
+    decision_period: float | None = None
+    """Time between decisions [s]. None means a stroke."""
+
+    @abstractmethod
+    def choose(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
+        """Actions, shape (n,), for observations of shape (n, size)."""
+
+    def predict(
+        self,
+        observation: NDArray[np.float32],
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = False,
+    ) -> tuple[NDArray[np.int64], None]:
+        """Actions for observations of shape (size,) or (n, size), and None: there is no state."""
+        chosen = self.choose(np.atleast_2d(observation))
+        return (chosen[0] if np.ndim(observation) == 1 else chosen), None
+
+
+class GreedyPolicy(Searcher):
+    """Agent that chooses the command whose mean displacement leaves the shortest rewarded route.
+
+    scene: Scene in which displacements are measured; that of the environment, for a fair comparison.
+    waypoint_radius: Radius of the waypoints [m]. reward: Reward whose route is shortened. decision_period: Of the
+    environment [s]. None means a stroke.
+    """
+
+    actions = "joint"
+
+    def __init__(
+        self,
+        scene: Scene,
+        waypoint_radius: float = 0.01,
+        reward: RewardWeights = RewardWeights(),
+        decision_period: float | None = None,
+    ):
+        self.scene, self.waypoint_radius, self.reward = scene, waypoint_radius, reward
+        self.decision_period = decision_period
+        self._hub = displacement_map(scene, self.actions, decision_period).hub
+
+    def choose(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
+        """Actions, shape (n,), for observations of shape (n, size)."""
+        current, following = (waypoint[:, None] for waypoint in waypoints_of(observations, self.scene))
+        return np.argmin(self.reward.way_to_next(self._hub, current, following, self.waypoint_radius), axis=1)

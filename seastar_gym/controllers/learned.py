@@ -1,0 +1,217 @@
+"""Learned policies on disk: weights in a safetensors file, and a description in JSON beside it.
+
+    from seastar_gym.controllers.learned import load
+
+    policy = load()  # the one in the box; or load("runs/mine/policy.safetensors")
+    env = gym.make(
+        "SeastarSwim-v0", actions=policy.actions, scene=policy.scene, decision_period=policy.decision_period
+    )
+
+The network is plain numpy: layers `W x + b` with tanh between them (`0.weight`, `0.bias`, `1.weight`, ...), whose last
+outputs are the logits of the actions. Nothing is unpickled, and neither torch nor Stable-Baselines3 is needed.
+"""
+
+import hashlib
+import os
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import safetensors
+import safetensors.numpy
+from numpy.typing import NDArray
+
+from seastar_gym.controllers.description import Description, read_facts
+from seastar_gym.envs.commands import Actions
+from seastar_gym.envs.symmetry import memory_mirror, reduce_observations, restore_actions
+from seastar_gym.envs.task import scene_observation_size
+from seastar_gym.files import write_atomically
+from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import is_finite_number
+
+SHIPPED = Path(__file__).parent / "policies" / "seastar.safetensors"
+"""File of the policy in the box that decides stroke by stroke; `python train.py --ship` replaces it."""
+
+Weights = dict[str, NDArray[np.float32]]
+
+
+RESOLUTION = "robot.nodes_per_limb"
+"""Fact of a scene that a policy does not depend on."""
+
+
+class LearnedPolicy:
+    """Trained policy with the `predict` of Stable-Baselines3, from observations of the environment to its actions.
+
+    description: Environment and network that the weights are for.
+    weights: Arrays "0.weight" (outputs, inputs), "0.bias" (outputs,), "1.weight", ... of the layers.
+    training: Seed, commands, versions and progress of the training, as far as the policy's file has them.
+    rng: Random generator of actions that are not deterministic.
+
+    The environment is made with the policy's own attributes: `gym.make("SeastarSwim-v0", actions=policy.actions,
+    scene=policy.scene, decision_period=policy.decision_period)`.
+    """
+
+    def __init__(
+        self,
+        description: Description,
+        weights: Weights,
+        training: Mapping[str, Any] | None = None,
+        rng: np.random.Generator | None = None,
+    ):
+        shapes = {name: array.shape for name, array in weights.items()}
+        if shapes != description.shapes():
+            raise ValueError(f"its weights have the shapes {shapes}, not {description.shapes()}")
+        if not all(array.dtype == np.float32 and np.isfinite(array).all() for array in weights.values()):
+            raise ValueError("its weights are not all finite numbers of single precision")
+        self.description = description
+        self.weights = weights
+        self.actions = description.actions
+        self.scene = description.scene
+        self.decision_period = description.decision_period or description.scene.actuator.period
+        self.training = training or {}
+        self.rng = np.random.default_rng(0) if rng is None else rng
+
+    def predict(
+        self,
+        observation: NDArray[np.float32],
+        state: tuple[NDArray[Any], ...] | None = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = False,
+    ) -> tuple[NDArray[Any], tuple[NDArray[Any], ...] | None]:
+        """Actions for observations of shape (size,) or (n, size), and None: the policy has no state.
+
+        deterministic: Whether the most probable action is taken, rather than one drawn by its probability.
+        """
+        observation, n_limbs = np.asarray(observation), self.scene.robot.n_limbs
+        size = scene_observation_size(self.scene)
+        if observation.ndim not in (1, 2) or observation.shape[-1] != size:
+            raise ValueError(
+                f"This policy was trained on a robot of {n_limbs} limbs: it sees {size} numbers, not an observation of "
+                f"shape {observation.shape}."
+            )
+        if not self.description.symmetry:
+            return self._choose(observation, deterministic), None
+        reduced, elements = reduce_observations(observation, n_limbs, memory_mirror(self.scene.actuator))
+        chosen = self._choose(reduced, deterministic)
+        return restore_actions(chosen, elements, self.actions, n_limbs), None
+
+    def _choose(self, observation: NDArray[Any], deterministic: bool) -> NDArray[np.intp]:
+        logits = self.logits(observation)
+        if not deterministic:
+            noise = self.rng.gumbel(size=logits.shape).astype(np.float32)
+            logits = logits + noise  # the largest is then a draw from softmax(logits)
+        chosen = np.argmax(logits, axis=-1)
+        return chosen if self.actions == "limbs" else chosen[..., 0]
+
+    def logits(self, observation: NDArray[Any]) -> NDArray[np.float32]:
+        """Logits, shape (..., distributions, choices), for (reduced) observations of shape (..., size)."""
+        layers = len(self.weights) // 2
+        x = observation.astype(np.float32)
+        for layer in range(layers):
+            x = x @ self.weights[f"{layer}.weight"].T + self.weights[f"{layer}.bias"]
+            if layer < layers - 1:
+                x = np.tanh(x)
+        return x.reshape(*x.shape[:-1], *self.description.distributions)
+
+    def require_fit(self, scene: Scene, actions: Actions) -> None:
+        """ValueError, with one sentence, where this policy cannot drive the robot of an environment."""
+        ours, theirs = self.scene.robot.n_limbs, scene.robot.n_limbs
+        if ours != theirs:
+            raise ValueError(f"The policy was trained on a robot of {ours} limbs, the environment's has {theirs}.")
+        if actions != self.actions:
+            raise ValueError(
+                f'The policy answers with actions="{self.actions}", the environment takes actions="{actions}".'
+            )
+        ours, theirs = scene_observation_size(self.scene), scene_observation_size(scene)
+        if ours != theirs:
+            raise ValueError(
+                f"The policy sees {ours} numbers, the environment shows {theirs}: their actuators remember differently."
+            )
+
+    def differences(self, scene: Scene) -> str:
+        """Sentence on how a scene differs from the training's, but for resolution and numerics; empty if it does not.
+
+        A policy sees the same stations of any mesh.
+        """
+        ours, theirs = _flat(asdict(self.scene)), _flat(asdict(scene))
+        parts = [
+            f"{name} {ours.get(name)} (here {theirs.get(name)})"
+            for name in sorted(ours | theirs)
+            if ours.get(name) != theirs.get(name) and name.split(".")[0] != "numerics" and name != RESOLUTION
+        ]
+        return f"trained in another scene, with {', '.join(parts)}." if parts else ""
+
+
+def _flat(facts: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Nested entries with dotted names: {"robot": {"n_limbs": 5}} -> {"robot.n_limbs": 5}."""
+    flat: dict[str, Any] = {}
+    for name, value in facts.items():
+        flat |= _flat(value, f"{prefix}{name}.") if isinstance(value, Mapping) else {prefix + name: value}
+    return flat
+
+
+def save(policy: LearnedPolicy, path: str | os.PathLike[str], **training: Any) -> None:
+    """Write the weights of a policy to `path` (.safetensors) and its description beside it (.json).
+
+    training: Entries on how the policy was trained: commands, seed, versions of libraries, ...
+    """
+    path = _checked_suffix(path)
+    data = safetensors.numpy.save({name: np.ascontiguousarray(array) for name, array in policy.weights.items()})
+    text = policy.description.to_json(sha256=hashlib.sha256(data).hexdigest(), training={**policy.training, **training})
+    write_atomically(path, data)
+    write_atomically(path.with_suffix(".json"), f"{text}\n".encode())
+
+
+def in_the_box(decision_period: float | None, shipped: Path = SHIPPED) -> Path:
+    """File of the policy in the box for a time between decisions [s]. None means strokes."""
+    if decision_period is None:
+        return shipped
+    return shipped.with_name(f"{shipped.stem}-{decision_period:g}s{shipped.suffix}")
+
+
+def load(path: str | os.PathLike[str] = SHIPPED) -> LearnedPolicy:
+    """Policy that `save` wrote; by default the one in the box.
+
+    FileNotFoundError or ValueError, with one sentence, if there is none.
+    """
+    path = _checked_suffix(path)
+    for file in (path, path.with_suffix(".json")):
+        if not file.is_file():
+            raise FileNotFoundError(f"There is no trained policy at {path}: {file.name} is missing.")
+    data = path.read_bytes()
+    try:
+        facts = read_facts(path.with_suffix(".json").read_bytes())
+        if hashlib.sha256(data).hexdigest() != facts["sha256"]:
+            raise ValueError("the weights are not those that its .json file describes")
+        description, weights = Description.from_facts(facts), safetensors.numpy.load(data)
+        return LearnedPolicy(description, weights, checked_training(facts["training"]))
+    except (KeyError, TypeError, ValueError, safetensors.SafetensorError) as unfit:
+        raise ValueError(f"{path} is damaged, or no policy of this version: {reason_of(unfit)}.") from unfit
+
+
+def reason_of(unfit: Exception) -> str:
+    """First sentence of an exception, without its full stop, to end another sentence with."""
+    said = f"it does not say {unfit}" if isinstance(unfit, KeyError) else " ".join(str(unfit).split())
+    return said.split(". ")[0].rstrip(".")
+
+
+def checked_training(training: object) -> dict[str, Any]:
+    """Entries on the training of a policy; ValueError where reports could not read them."""
+    if not isinstance(training, dict):
+        raise ValueError(f"its training is a {type(training).__name__}, not an object with names")
+    progress, commands = training.get("progress", []), training.get("commands", [])
+    rows = progress if isinstance(progress, list) else [progress]
+    if not all(isinstance(row, list) and len(row) == 3 and all(map(is_finite_number, row)) for row in rows):
+        raise ValueError("the progress of its training must be rows of three numbers")
+    if not isinstance(commands, list) or not all(isinstance(command, str) for command in commands):
+        raise ValueError("the commands of its training must be texts")
+    return training
+
+
+def _checked_suffix(path: str | os.PathLike[str]) -> Path:
+    path = Path(path)
+    if path.suffix != ".safetensors":
+        raise ValueError(f"A policy is in a file named .safetensors, not in {path}.")
+    return path

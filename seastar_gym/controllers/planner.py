@@ -1,0 +1,181 @@
+"""Planner: a controller that tries sequences of commands on a batch of the simulator before every decision.
+
+It has the observations of any agent. An observation is the whole state of the robot and its wires, to single precision,
+so a beam search can begin from it: at each of a few decisions, all pairs of limbs are tried from the best few states so
+far. The planner then swims the first command of the sequence that leaves the shortest rewarded route. A robot of more
+than ten nodes per limb is taken to lie smoothly through the stations that are observed.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.controllers.greedy import Searcher, waypoints_of
+from seastar_gym.envs.commands import command_table
+from seastar_gym.envs.decisions import checked_decision_period
+from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout
+from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.stations import N_STATIONS, node_weights
+from seastar_gym.envs.task import make_scene
+from seastar_gym.scene import Scene
+from seastar_gym.scene.actuators.actuator import Recalled
+from seastar_gym.scene.checks import require_number
+from seastar_gym.simulator import Simulator, State
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Limits of the search: it simulates 21 + 21 beam (depth - 1) decisions or fewer for one of a five-limb robot."""
+
+    depth: int = 3
+    """Decisions looked ahead. Of strokes, one costs a stroke or so round the pentagon; more than three gain nothing."""
+    beam: int = 8
+    """States kept from one decision to the next."""
+    coasting: float = 0.0
+    """Time for which robots swim on without commands before they are compared [s]. Where decisions are shorter than the
+    wires' cooling, a comparison without it sees power strokes, but not what the limbs cost on their way back."""
+
+    def __post_init__(self) -> None:
+        if self.depth < 1 or self.beam < 1:
+            raise ValueError(f"depth and beam must be at least 1, not {self.depth} and {self.beam}.")
+        require_number("coasting", self.coasting, "s", zero_allowed=True)
+
+
+SHARE = 0.2
+"""Share of the time between decisions in which the planner is to answer, on two processors."""
+TIMED_BUDGETS = {0.5: Budget(3, 8, 0.5), 0.2: Budget(3, 4, 0.8), 0.1: Budget(2, 3, 0.9)}
+"""Budgets that keep SHARE, by time between decisions [s]."""
+
+
+def budget_for(decision_period: float | None) -> Budget:
+    """Budget for a time between decisions [s]. None means strokes."""
+    shorter = [seconds for seconds in TIMED_BUDGETS if decision_period is not None and seconds >= decision_period]
+    return TIMED_BUDGETS[min(shorter)] if shorter else Budget()
+
+
+def state_of(observations: NDArray[np.float32], scene: Scene) -> State:
+    """State that observations, shape (n, size), were made from, in the body frame with the hub at its origin.
+
+    Actuators have the state that they recall from what is observed, and are at rest if they recall none.
+    """
+    n, robot, at, actuator = len(observations), scene.robot, scene_layout(scene), scene.actuator
+    seen = observations[:, at.actuators].astype(np.float64).reshape(n, robot.n_limbs, -1)
+    at_stations = node_weights(robot.nodes_per_limb)
+    nodes, velocities = (
+        (at_stations @ observations[:, place].astype(np.float64).reshape(n, -1, N_STATIONS, 2)).reshape(n, -1, 2)
+        for place in (at.positions, at.velocities)
+    )
+    hub_velocity = observations[:, None, at.hub_velocity].astype(np.float64)
+    zero = np.zeros((n, 1, 2))
+    return State(
+        positions=robot.limb_length * np.concatenate([zero, nodes], axis=1),
+        velocities=VELOCITY_SCALE * (hub_velocity + np.concatenate([zero, velocities], axis=1)),
+        time=np.zeros(n),
+        actuators=actuator.recall(seen) if isinstance(actuator, Recalled) else None,
+    )
+
+
+class Branching:
+    """Simulation of every command from every state, the step of a tree search.
+
+    decision_period: Time between commands [s]. None means a stroke.
+    """
+
+    def __init__(
+        self, scene: Scene, commands: Floats, threads: int | None = None, decision_period: float | None = None
+    ):
+        self.scene, self.commands, self.threads = scene, commands, threads
+        self._duration = checked_decision_period(decision_period, scene)
+        self._simulators: dict[int, Simulator] = {}
+
+    def coasted(self, states: State, seconds: float) -> Floats:
+        """Positions of the hubs [m] once the states have swum on without commands, shape (states, 2)."""
+        simulator = self._simulator(len(states.time))
+        simulator.set_state(states)
+        simulator.advance(seconds)
+        return simulator.hub_position()
+
+    def _simulator(self, n: int) -> Simulator:
+        """Simulator of n robots."""
+        if n not in self._simulators:
+            self._simulators[n] = Simulator(self.scene, n, self.threads)
+        return self._simulators[n]
+
+    def __call__(self, states: State) -> State:
+        """States after one decision, shape (states * commands, ...), those of the same state side by side."""
+        n_states, n_commands = len(states.time), len(self.commands)
+        simulator = self._simulator(n_states * n_commands)
+        simulator.set_state(states.of_robots(np.repeat(np.arange(n_states), n_commands)))
+        simulator.advance(self._duration, np.tile(self.commands, (n_states, 1)))
+        return simulator.get_state()._replace(commands=None, phase=None)  # the next commands take their place
+
+
+class Planner(Searcher):
+    """Agent that runs a beam search over pairs of limbs before every decision.
+
+    scene: Scene of the search, by default the chapter's at fidelity "fast", with wires if decisions are not strokes.
+    waypoint_radius: Radius of the waypoints [m]. budget: Limits of the search, by default those of the decision period.
+    threads: Number of threads of the simulator, by default one for every processor. reward: Reward whose route is
+    shortened. decision_period: Of the environment [s]. None means a stroke.
+    """
+
+    actions = "pairs"
+
+    def __init__(
+        self,
+        scene: Scene | None = None,
+        waypoint_radius: float = 0.01,
+        budget: Budget | None = None,
+        threads: int | None = None,
+        reward: RewardWeights = RewardWeights(),
+        decision_period: float | None = None,
+    ):
+        self.scene = make_scene(None, "fast", decision_period) if scene is None else scene
+        self.waypoint_radius, self.reward, self.decision_period = waypoint_radius, reward, decision_period
+        self.budget = budget_for(decision_period) if budget is None else budget
+        self._commands = command_table(self.actions, self.scene.robot.n_limbs)
+        self._swim_all = Branching(self.scene, self._commands, threads, decision_period)
+
+    def choose(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
+        """Actions for observations of shape (n, size)."""
+        return self._search(state_of(observations, self.scene), *waypoints_of(observations, self.scene))
+
+    def _search(self, start: State, current: Floats, after: Floats) -> NDArray[np.int64]:
+        """First action of the best sequence for every robot, shape (n,)."""
+        robots, n_commands = np.arange(len(current))[:, None], len(self._commands)
+        states, width = start, 1
+        passed = np.zeros((len(current), 1), bool)
+        first = np.zeros((len(current), 1), np.int64)
+        chosen, arrived = np.zeros(len(current), np.int64), np.zeros(len(current), bool)
+        for stroke in range(self.budget.depth):
+            states = self._swim_all(states)
+            hub = states.positions[:, 0].reshape(len(current), -1, 2)
+            way, passed, there = self._judge(hub, np.repeat(passed, n_commands, axis=1), current, after)
+            if self.budget.coasting > 0.0:
+                hub = self._swim_all.coasted(states, self.budget.coasting).reshape(hub.shape)
+                way, *_ = self._judge(hub, passed, current, after)
+            first = (
+                np.tile(np.arange(n_commands), (len(current), 1)) if stroke == 0 else np.repeat(first, n_commands, 1)
+            )
+            best = np.argsort(way, axis=1)[:, : self.budget.beam]
+            # Who arrives within this decision cannot arrive sooner by a longer sequence.
+            chosen = np.where(arrived, chosen, first[robots[:, 0], best[:, 0]])
+            arrived |= there.any(axis=1)
+            first, passed = first[robots, best], passed[robots, best]
+            rows = (robots * width * n_commands + best).reshape(-1)
+            states, width = states.of_robots(rows), best.shape[1]
+        return chosen
+
+    def _judge(
+        self, hub: Floats, passed: NDArray[np.bool_], current: Floats, after: Floats
+    ) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+        """Way to go [m], whether the current waypoint is passed, and whether it was the last; shape (n, candidates)."""
+        current, after = current[:, None], after[:, None]
+        passed = passed | (np.hypot(*np.moveaxis(hub - current, -1, 0)) <= self.waypoint_radius)
+        way = self.reward.way_to_next(hub, current, after, self.waypoint_radius)
+        beyond = np.hypot(*np.moveaxis(hub - after, -1, 0))
+        last = (current == after).all(axis=-1)
+        return np.where(passed & ~last, beyond, way), passed, passed & last

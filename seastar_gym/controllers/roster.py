@@ -1,0 +1,105 @@
+"""Agents by the names that the command lines know.
+
+A new agent is a class with `predict` and one line in `AGENTS`. An agent of one's own needs no line: it is asked for by
+the name of the function that makes it, "module:function".
+"""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from seastar_gym.controllers import foreign, learned, learner_zip
+from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.greedy import GreedyPolicy
+from seastar_gym.controllers.planner import Planner
+from seastar_gym.controllers.scripted import GAITS, scripted
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.task import make_scene
+from seastar_gym.scene import Scene
+from seastar_gym.scene.numerics import Fidelity
+
+AGENTS: dict[str, Callable[[Scene, float | None], Policy]] = {
+    "learned": lambda scene, decision_period: learned.load(learned.in_the_box(decision_period)),
+    "greedy": lambda scene, decision_period: GreedyPolicy(scene, decision_period=decision_period),
+    "planner": lambda scene, decision_period: Planner(decision_period=decision_period),  # at fidelity "fast"
+}
+"""Functions that make the agents that are not scripted, by name, for the scene that they swim in and the time between
+decisions [s], None for strokes."""
+
+HELP = (
+    f"Agents: {', '.join(AGENTS)} (learned is the policy in the box for the time between decisions); scripted gaits, "
+    f"{', '.join(GAITS)}, random, or a pair of limbs such as 4+,1-; files of policies (.safetensors, or a model.zip of "
+    "train.py or of plain Stable-Baselines3); module:function, which gets an environment and returns anything with "
+    "predict. A model.zip of plain Stable-Baselines3 and module:function execute the code of whoever made them: load "
+    "only files that you trust."
+)
+"""Help of options that name agents."""
+
+
+def load_agents(
+    names: Sequence[str], seed: int = 0, fidelity: Fidelity = "balanced", decision_period: float | None = None
+) -> dict[str, Policy]:
+    """Policies by name; those of files have the file's name without its ending.
+
+    names: Names as in `HELP`. seed: Seed of the random agent. fidelity: Accuracy of the simulation that agents know.
+    decision_period: Time between decisions [s]. None means strokes.
+    """
+    agents: dict[str, Policy] = {}
+    for name in names:
+        label = Path(name).stem if _is_file(name) else name
+        label = str(Path(name).with_suffix("")) if label in agents else label
+        if label in agents:
+            raise ValueError(f"The agent {name!r} is named twice.")
+        agents[label] = _load_agent(
+            name,
+            seed,
+            make_scene(None, fidelity, decision_period),
+            decision_period,
+            lambda: SeastarSwimEnv(fidelity=fidelity, decision_period=decision_period),
+        )
+    return agents
+
+
+def load_agent(name: str, env: SeastarSwimEnv, seed: int = 0) -> Policy:
+    """Policy by a name as in `HELP`, for the robot and the decisions of an environment."""
+    in_strokes = env.decision_period == env.scene.actuator.period
+    return _load_agent(name, seed, env.scene, None if in_strokes else env.decision_period, lambda: env)
+
+
+def _is_file(name: str) -> bool:
+    return name.endswith((".zip", ".safetensors", ".pth", ".pt", ".pkl")) or len(Path(name).parts) > 1
+
+
+def _load_agent(
+    name: str, seed: int, scene: Scene, decision_period: float | None, make_env: Callable[[], SeastarSwimEnv]
+) -> Policy:
+    if name in AGENTS:
+        return AGENTS[name](scene, decision_period)
+    if foreign.is_function(name):
+        return foreign.call_function(name, make_env())
+    return _load_file(name) if _is_file(name) else _scripted(name, seed, decision_period)
+
+
+def _scripted(name: str, seed: int, decision_period: float | None) -> Policy:
+    known = (*GAITS, "random")
+    try:
+        return scripted(name, rng=np.random.default_rng(seed), decision_period=decision_period)
+    except ValueError as unknown:
+        if name in known:
+            raise  # a gait that does not fit the time between decisions
+        others = f"{', '.join(AGENTS)}, files of policies, and module:function"
+        raise ValueError(f"{unknown} Others are {others}.") from unknown
+
+
+def _load_file(name: str) -> Policy:
+    if not name.endswith(".zip"):
+        return learned.load(name)
+    if not foreign.is_model(name):
+        return learner_zip.load(name)
+    try:
+        return foreign.load_model(name)
+    except ModuleNotFoundError as missing:
+        raise ValueError(
+            f'A model.zip of Stable-Baselines3 needs {missing.name}: pip install "seastar-gym[train]".'
+        ) from missing

@@ -1,0 +1,123 @@
+"""Headings: which way robots are asked to look at their waypoints, and how far they still have to turn.
+
+The heading of a robot is the direction of the x axis of its body frame (`observation.py`): that of limb 1, by all
+stations. Limbs are told from each other, as by a camera on limb 1: a heading repeats after 360 degrees, not after 72.
+Angles are those of the world, anti-clockwise from +x.
+
+What is left to turn is known by the shortest way round, from one heading to the next: in [-pi, pi), anti-clockwise
+positive. It does not depend on which limb is called limb 1. A turn of the world leaves it, a mirror changes its sign.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.scene.checks import is_finite_number, require_number, shown
+from seastar_gym.scene.serial import register_part
+
+Floats = NDArray[np.float64]
+
+LARGEST = 1e6
+"""Largest angle that may be asked for [rad]: beyond it, rounding is seen."""
+
+
+@register_part
+@dataclass(frozen=True)
+class Headings:
+    """Headings at the waypoints, without which they are not reached.
+
+    asked: "along", the direction of the leg that ends at the waypoint; "random", drawn for every waypoint of every
+        episode; angles [rad], one for each waypoint; or one angle for all.
+    tolerance: Largest difference between heading and asked heading at which a waypoint is reached [rad], at most pi.
+    """
+
+    asked: Literal["along", "random"] | float | tuple[float, ...] = "along"
+    tolerance: float = math.radians(10.0)
+
+    def __post_init__(self) -> None:
+        angles = self.asked if isinstance(self.asked, tuple) else (self.asked,)
+        is_named = isinstance(self.asked, str) and self.asked in ("along", "random")
+        if not is_named and not (angles and all(map(_is_angle, angles))):
+            raise ValueError(
+                f"Headings.asked must be 'along', 'random', an angle or a tuple of angles [rad], at most {LARGEST:g}, "
+                f"not {shown(self.asked)}."
+            )
+        require_number("Headings.tolerance", self.tolerance, "rad")
+        if self.tolerance > math.pi:
+            raise ValueError(f"Headings.tolerance must be at most pi, not {shown(self.tolerance)} rad.")
+
+    def of_path(self, waypoints: Floats, rng: np.random.Generator) -> Floats:
+        """Asked headings [rad], shape (n,), at waypoints [m], shape (n, 2). rng: Generator of random ones.
+
+        ValueError: the waypoints are not as many as the angles, or a leg has no direction.
+        """
+        if self.asked == "random":
+            return rng.uniform(-np.pi, np.pi, len(waypoints))
+        if self.asked == "along":
+            return _along(waypoints)
+        angles = np.array(self.asked, dtype=np.float64)
+        if angles.ndim and len(angles) != len(waypoints):
+            raise ValueError(f"Headings.asked has {len(angles)} angles, but the path has {len(waypoints)} waypoint(s).")
+        return np.broadcast_to(angles, len(waypoints)).copy()
+
+
+def _is_angle(value: object) -> bool:
+    return is_finite_number(value) and abs(float(value)) <= LARGEST  # type: ignore[arg-type]
+
+
+def _along(waypoints: Floats) -> Floats:
+    """Directions [rad], shape (n,), of the legs that end at the waypoints [m], shape (n, 2)."""
+    legs = np.diff(waypoints, axis=0, prepend=np.zeros((1, 2)))
+    if not legs.any(axis=1).all():
+        k = int(np.argmin(legs.any(axis=1)))
+        raise ValueError(f"Headings along the path need legs with a direction: the leg to waypoint {k + 1} has none.")
+    return np.arctan2(legs[:, 1], legs[:, 0])
+
+
+def wrapped(angles: Floats) -> Floats:
+    """Angles [rad] by the shortest way round, in [-pi, pi)."""
+    return np.asarray(np.remainder(angles + np.pi, 2.0 * np.pi) - np.pi)
+
+
+class AskedHeadings:
+    """Asked headings of robots on their present paths, and the turns between them."""
+
+    def __init__(self, headings: Headings, n_robots: int):
+        self.headings = headings
+        self._asked = [np.zeros(1)] * n_robots
+        self._turn_after = [np.zeros(1)] * n_robots  # from the heading at waypoint k to that at the last one [rad]
+
+    def begin(self, robot: int, asked: Floats) -> None:
+        """Ask a robot for headings [rad], shape (n,), on a new path."""
+        turns = np.abs(wrapped(np.diff(asked)))
+        self._asked[robot] = asked
+        self._turn_after[robot] = np.append(np.cumsum(turns[::-1])[::-1], 0.0)
+
+    def of_robot(self, robot: int) -> Floats:
+        """Headings [rad], shape (n,), that a robot is asked for, a copy."""
+        return self._asked[robot].copy()
+
+    def turn(self, k: NDArray[np.int64], heading: Floats) -> Floats:
+        """Turns [rad], shape (n_robots,), from headings to those at waypoints k, the last one beyond the end."""
+        return wrapped(_at(self._asked, k) - heading)
+
+    def to_go(self, k: NDArray[np.int64], heading: Floats) -> Floats:
+        """All that is left to turn on the way through waypoints k to the last [rad], shape (n_robots,)."""
+        return np.abs(self.turn(k, heading)) + _at(self._turn_after, k)
+
+    def is_met(self, k: NDArray[np.int64], heading: Floats) -> NDArray[np.bool_]:
+        """Whether headings are those at waypoints k, to the tolerance, shape (n_robots,)."""
+        return np.abs(self.turn(k, heading)) <= self.headings.tolerance
+
+    def seen(self, k: NDArray[np.int64], heading: Floats) -> Floats:
+        """Cosine and sine of the turns to the headings at waypoints k and at those after them, shape (n_robots, 4)."""
+        turns = np.stack([self.turn(k, heading), self.turn(k + 1, heading)], axis=1)
+        return np.stack([np.cos(turns), np.sin(turns)], axis=2).reshape(len(heading), 4)
+
+
+def _at(rows: list[Floats], k: NDArray[np.int64]) -> Floats:
+    """Number k of every row, the last one beyond its end, shape (n_robots,)."""
+    return np.array([row[min(one, len(row) - 1)] for row, one in zip(rows, k.tolist(), strict=True)])

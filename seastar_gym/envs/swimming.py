@@ -1,0 +1,318 @@
+"""Robots that swim by decisions, whatever they are asked to do: the base of every task.
+
+A task is a subclass that says what is drawn for an episode, where the targets of an observation are, and how a decision
+is scored:
+
+    _draw(robot, rng, asked)    draw what an episode of a robot is about
+    _begin(robots)              the robots in a mask are at rest at the origin now
+    _targets()                  two points of every robot's observation [m], such as waypoints
+    _score(hub, pulses)         terms of the reward, success and end of a decision
+    _goal_facts(hub)            entries of info that belong to the task
+"""
+
+import functools
+import operator
+from abc import ABC, abstractmethod
+from collections.abc import Generator
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.envs.commands import Actions
+from seastar_gym.envs.decisions import checked_decision_period
+from seastar_gym.envs.headings import Headings
+from seastar_gym.envs.masks import action_masks, can_be_masked, masked_limbs
+from seastar_gym.envs.observation import (
+    VELOCITY_SCALE,
+    observation_size,
+    observe,
+    to_float32,
+    with_more,
+)
+from seastar_gym.envs.promises import promised
+from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, drawn_scene
+from seastar_gym.envs.reward import pulses_of
+from seastar_gym.envs.scenery import NOTHING, Scenery
+from seastar_gym.envs.stations import stations
+from seastar_gym.scene import Scene
+from seastar_gym.scene.actuators.actuator import Deaf
+from seastar_gym.scene.actuators.heating import Mirror
+from seastar_gym.scene.certificate import Certificate
+from seastar_gym.scene.checks import require_flag
+from seastar_gym.simd.rows import to_rows
+from seastar_gym.simulator import Simulator, SolverStatus, StrokeReport
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+class Outcome(NamedTuple):
+    """Reward, end and info of a decision, and the commands that were followed; arrays over robots."""
+
+    reward: Floats
+    terminated: Flags
+    info: dict[str, NDArray[Any]]
+    commands: Floats
+
+
+class Score(NamedTuple):
+    """What a task says of a decision; arrays over robots."""
+
+    terms: dict[str, Floats]
+    """Terms of the reward by their names in `info`."""
+    success: Flags
+    over: Flags
+    """Whether the episode ends, by success or failure."""
+
+
+class Draws(Protocol):
+    """Numbers of a scene that are drawn for every episode, such as a `DomainRandomization`."""
+
+    def first_values(self, scene: Scene, n_robots: int) -> dict[str, Floats]:
+        """Values before the first draw, by the numbers' names in the scene."""
+
+    def draw(self, values: dict[str, Floats], robot: int, rng: np.random.Generator) -> None:
+        """Draw all numbers of a robot, in place."""
+
+
+class Swimming(ABC):
+    """Task of `n_robots` robots, for the arguments see `SeastarSwimEnv`.
+
+    Every robot has an episode and a generator of its own, so a robot of a batch does what it would do alone.
+    """
+
+    TERMS: tuple[str, ...]
+    """Names of the reward's terms."""
+    randomization: DomainRandomization | None = None
+    headings: Headings | None = None
+    """Headings that are asked for at the waypoints, None if none are."""
+    waypoint_radius: float
+    """Radius of waypoints [m]."""
+    added_mirror: Mirror = ()
+    """What a mirror does to the numbers that the task adds to a limb's in the observation, see `memory_mirror`."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        n_robots: int,
+        threads: int | None,
+        *,
+        random_heading: bool = False,
+        draws: Draws | None = None,
+        certificate: Certificate | None = None,
+        error_bars: bool = False,
+        actions: Actions = "limbs",
+        decision_period: float | None = None,
+        observe_actuators: bool = True,
+    ):
+        require_flag("random_heading", random_heading)
+        require_flag("observe_actuators", observe_actuators)
+        self.decision_period = checked_decision_period(decision_period, scene)
+        self._has_promises = True
+        self._in_strokes = self.decision_period == scene.actuator.period
+        self.actions: Actions = actions
+        self.observe_actuators = observe_actuators
+        self._can_be_masked = can_be_masked(scene.actuator)
+        self.scene = self._drawn_from = scene
+        self._draws = draws
+        self.drawn = {} if draws is None else draws.first_values(scene, n_robots)
+        self.simulator = Simulator(drawn_scene(scene, self.drawn), n_robots, threads, error_bars)
+        self._error_bars = error_bars
+        self.certificate = certificate
+        self._promise = self.simulator.scene, self._promise_of(self.simulator.scene)
+        peak = np.max(self.simulator.scene.actuator.peak_angle)  # before the first draw the largest that may be drawn
+        if scene.robot.hub_hinge == "turning" and 2 * peak >= scene.robot.opening_angle * (1 - 1e-9):
+            raise ValueError(
+                'With hub_hinge="turning" some actions would close a hub hinge, where its curvature is infinite: use '
+                'hub_hinge="opening" or a smaller peak angle.'
+            )
+        self.random_heading, self.n_robots = random_heading, n_robots
+        self.waypoint_index = np.zeros(n_robots, np.int64)  # the waypoint to swim to; 0 in tasks without
+        self.last_commands = np.zeros((n_robots, scene.robot.n_limbs))
+        self._energy = np.zeros(n_robots)  # since the reset [J]
+
+    @abstractmethod
+    def _draw(self, robot: int, rng: np.random.Generator, asked: Any) -> None:
+        """Draw what an episode of a robot is about. asked: What the options of a reset ask for, None for nothing."""
+
+    @abstractmethod
+    def _begin(self, robots: Flags) -> None:
+        """Begin the episodes of the robots in a mask, which are at rest with their hubs at the origin."""
+
+    @abstractmethod
+    def _targets(self) -> Floats:
+        """Two points of every robot's observation in the world frame [m], shape (n_robots, 4)."""
+
+    @abstractmethod
+    def _score(self, hub: Floats, pulses: Floats) -> Score:
+        """Score of a decision that ended with the hubs at `hub` [m]. pulses: Heat, see `pulses_of`."""
+
+    @abstractmethod
+    def _goal_facts(self, hub: Floats) -> dict[str, NDArray[Any]]:
+        """Entries of info that belong to the task; arrays over robots."""
+
+    @abstractmethod
+    def waypoints_of(self, robot: int) -> Floats:
+        """Waypoints of a robot's present episode [m], shape (n, 2), a copy; n is 0 in tasks without."""
+
+    def scenery(self, robot: int) -> Scenery:
+        """What pictures of a robot show besides its waypoints."""
+        return NOTHING
+
+    @property
+    def observation_size(self) -> int:
+        """Length of one robot's observation."""
+        return observation_size(self.scene.robot.n_limbs) + self._remembered().shape[1] + self._wanted().shape[1]
+
+    def reset(self, robots: Flags, generators: list[np.random.Generator], asked: Any = None) -> None:
+        """Begin a new episode of the robots in a mask, shape (n_robots,).
+
+        generators: Random generator of every robot, which draws its task, its heading, then numbers of its scene.
+        asked: What the options of the reset ask for, such as a path.
+        """
+        headings = np.zeros(self.n_robots)
+        for robot in np.flatnonzero(robots):
+            self._draw(int(robot), generators[robot], asked)
+            if self.random_heading:
+                headings[robot] = generators[robot].uniform(-np.pi, np.pi)
+            if self._draws is not None:
+                self._draws.draw(self.drawn, int(robot), generators[robot])
+        if self.drawn:
+            self.simulator.set_scene(drawn_scene(self._drawn_from, self.drawn), robots)
+            strengths = np.asarray(self.scene.limb_strengths or 1.0) * self.drawn.get(LIMB_STRENGTHS, 1.0)
+            self.simulator.set_limb_strengths(strengths)
+        self.simulator.reset(robots, headings)
+        self._energy[robots], self.last_commands[robots] = 0.0, 0.0
+        self._begin(robots)
+
+    def observe(self) -> NDArray[np.float32]:
+        """Observations, shape (n_robots, size), a fresh array; see observation.py."""
+        simulator = self.simulator
+        target_rows = to_rows(self._targets())
+        own, robot = simulator.coefficients, simulator.scene.robot
+        out = np.empty((len(target_rows), observation_size(robot.n_limbs), target_rows.shape[2]))
+        places = stations(robot.nodes_per_limb)
+        observe(own.rest, own.limb_length, simulator.q, simulator.v, places, target_rows, VELOCITY_SCALE, out)
+        more = np.hstack([self._remembered(), self._wanted()])
+        return with_more(to_float32(out, self.n_robots), more, robot.n_limbs)
+
+    def _remembered(self) -> Floats:
+        """Numbers of the limbs that stand before the targets, shape (n_robots, k), limb after limb."""
+        return self.simulator.observe_actuators() if self.observe_actuators else np.zeros((self.n_robots, 0))
+
+    def _wanted(self) -> Floats:
+        """Numbers of the robot that stand after those of the limbs, such as asked headings, shape (n_robots, k)."""
+        return np.zeros((self.n_robots, 0))
+
+    def headings_of(self, robot: int) -> Floats | None:
+        """Asked headings of a robot's present episode [rad], shape (n,), a copy; None if none are asked for."""
+        return None
+
+    def action_masks(self) -> Flags:
+        """Actions that wires can follow now, shape (n_robots, k), see masks.py."""
+        return action_masks(self.actions, self._deaf_wires())
+
+    def _deaf_wires(self) -> Flags:
+        """Wires that cannot be heated now, by their names in commands, shape (n_robots, n_limbs, 2)."""
+        return self.simulator.deaf_wires()
+
+    def followed(self, commands: Floats) -> Floats:
+        """Commands with zeros for limbs whose wire cannot follow its command now, shape (n_robots, n_limbs)."""
+        if not self._can_be_masked:
+            return commands
+        return np.where(masked_limbs(commands, self._deaf_wires()), 0.0, commands)
+
+    def _wired(self, commands: Floats) -> Floats:
+        """Commands as they reach the limbs, shape (n_robots, n_limbs)."""
+        return commands
+
+    def step(self, commands: Floats) -> Outcome:
+        """Advance every robot by one decision."""
+        followed = self.followed(commands)
+        report = self.simulator.advance(self.decision_period, self._wired(followed))
+        return self._judge(followed, np.count_nonzero(followed != commands, axis=1), report)
+
+    def step_in_parts(self, commands: Floats, parts: int) -> Generator[float, None, Outcome]:
+        """One decision in `parts` parts; yields the time since it began [s] after each, and returns the Outcome."""
+        followed = self.followed(commands)
+        report = yield from self.simulator.advance_in_parts(self.decision_period, self._wired(followed), parts)
+        return self._judge(followed, np.count_nonzero(followed != commands, axis=1), report)
+
+    def warmth(self) -> Floats | None:
+        """Contractions or temperatures of wires + and -, 0 to 1, shape (n_robots, n_limbs, 2); None without wires."""
+        if not isinstance(self.scene.actuator, Deaf):
+            return None
+        numbers = self.simulator.observe_actuators()
+        return np.clip(numbers.reshape(self.n_robots, self.scene.robot.n_limbs, -1)[..., :2], 0.0, 1.0)
+
+    def _judge(self, commands: Floats, masked: NDArray[np.int64], report: StrokeReport) -> Outcome:
+        """Outcome of a decision. commands: Those that were followed. masked: Number of limbs whose command was not."""
+        hub = self.simulator.hub_position()
+        self._energy += report.energy
+        self.last_commands = commands
+        score = self._score(hub, pulses_of(report.heating_time, commands))
+        info = {
+            **self.facts(hub),
+            "is_success": score.success,
+            "limbs_heated": np.count_nonzero(commands, axis=1),
+            "heating_time": report.heating_time,
+            "energy": report.energy,
+            **({"masked_limbs": masked} if self._can_be_masked else {}),
+            "newton_iterations": report.newton_iterations,
+            "solver_status": report.status,
+            "solver_message": _messages(report.status),
+            "smallest_opening_angle": report.smallest_opening_angle,
+            **score.terms,
+        }
+        reward = functools.reduce(operator.add, score.terms.values())
+        return Outcome(reward, score.over | (report.status != SolverStatus.CONVERGED), info, commands)
+
+    def first_info(self) -> dict[str, NDArray[Any]]:
+        """Info before the first decision, with the names and types of a decision's info."""
+        counts, none = np.zeros(self.n_robots, np.int64), np.zeros(self.n_robots)
+        return {
+            **self.facts(),
+            "is_success": np.zeros(self.n_robots, bool),
+            "limbs_heated": counts,
+            "heating_time": none,
+            "energy": none.copy(),
+            **({"masked_limbs": counts.copy()} if self._can_be_masked else {}),
+            "newton_iterations": counts.copy(),
+            "solver_status": counts.copy(),
+            "solver_message": _messages(counts),
+            "smallest_opening_angle": np.full(self.n_robots, min(self.scene.robot.opening_angle, np.pi)),
+            **{name: none.copy() for name in self.TERMS},
+        }
+
+    def facts(self, hub: Floats | None = None) -> dict[str, NDArray[Any]]:
+        """What is known of every robot now; arrays over robots, units as in the environment's docstring."""
+        hub = self.simulator.hub_position() if hub is None else hub
+        return {
+            "time": self.simulator.time,
+            "hub_position": hub.copy(),
+            **self._goal_facts(hub),
+            **({"action_mask": self.action_masks().astype(np.int8)} if self._can_be_masked else {}),
+            **(self._promised() if self._has_promises else {}),
+            **({"error_estimate": self.simulator.error_estimate} if self._error_bars else {}),
+            **{name: values.copy() for name, values in self.drawn.items()},
+        }
+
+    def _promise_of(self, scene: Scene) -> dict[str, float]:
+        return promised(scene, self.certificate, None if self._in_strokes else self.decision_period)
+
+    def _promised(self) -> dict[str, Floats]:
+        """Measured errors and speed, shape (n_robots,) each; NaN for robots with weak limbs."""
+        simulator = self.simulator
+        if simulator.scene is not self._promise[0]:
+            self._promise = simulator.scene, self._promise_of(simulator.scene)
+        strong = (simulator.limb_strengths == 1.0).all(axis=1)
+        return {name: np.where(strong, value, np.nan) for name, value in self._promise[1].items()}
+
+
+def _messages(status: NDArray[np.int64]) -> NDArray[Any]:
+    """Sentences on what to do about each status, shape (n_robots,); empty where the solver converged."""
+    messages = np.full(len(status), "", dtype=object)
+    for robot in np.flatnonzero(status != SolverStatus.CONVERGED):
+        messages[robot] = SolverStatus(status[robot]).sentence
+    return messages

@@ -1,0 +1,123 @@
+"""Environments of the tasks of this folder: of one robot, and of a native batch."""
+
+from typing import Literal
+
+from gymnasium.vector import AutoresetMode
+
+from seastar_gym.envs.commands import Actions
+from seastar_gym.envs.seastar_swim import RenderMode, SeastarSwimEnv
+from seastar_gym.envs.swimming import Swimming
+from seastar_gym.envs.task import Plain, make_scene, read
+from seastar_gym.envs.tasks.challenge import Challenge
+from seastar_gym.envs.tasks.miswired import Miswired
+from seastar_gym.envs.tasks.numbered import Split
+from seastar_gym.envs.tasks.prey import Prey
+from seastar_gym.envs.tasks.station import Station
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.scene.checks import require_choice, shown
+from seastar_gym.scene.numerics import Fidelity
+
+CHALLENGES: dict[str, type[Challenge]] = {kind.NAME: kind for kind in (Miswired, Prey, Station)}
+"""Challenges by name."""
+
+
+def read_challenge(task: Challenge | Plain | str) -> Challenge:
+    """Challenge of a name, an object or its plain form."""
+    if isinstance(task, str):
+        require_choice("task", task, tuple(CHALLENGES))
+        return CHALLENGES[task]()
+    challenge = read(task, Challenge)
+    if not isinstance(challenge, Challenge):
+        raise ValueError(f"task must be a challenge such as Miswired(), or its name, not {shown(task)}.")
+    return challenge
+
+
+def make_task(
+    challenge: Challenge,
+    n_robots: int,
+    threads: int | None,
+    split: Split,
+    actions: Actions,
+    fidelity: Fidelity | None,
+    decision_period: float | None,
+) -> Swimming:
+    """The task of so many of the chapter's robots, for the arguments see `SeastarTaskEnv`."""
+    scene = make_scene(None, fidelity, decision_period)
+    return challenge.swimming(scene, n_robots, threads, split, actions=actions, decision_period=decision_period)
+
+
+class SeastarTaskEnv(SeastarSwimEnv):
+    """Environment of one of the tasks whose headroom is measured, for the chapter's robot.
+
+    | id                        | `task`       | decision period [s] | `actions` | time limit [s] |
+    |---------------------------|--------------|---------------------|-----------|----------------|
+    | `SeastarMiswired-v0`      | `"miswired"` | 1.0                 | `"pairs"` | 400            |
+    | `SeastarMiswiredTimed-v0` | `"miswired"` | 0.5                 | `"pairs"` | 400            |
+    | `SeastarPrey-v0`          | `"prey"`     | 1.0                 | `"pairs"` | 200            |
+    | `SeastarPreyTimed-v0`     | `"prey"`     | 0.5                 | `"pairs"` | 200            |
+    | `SeastarStation-v0`       | `"station"`  | 1.0                 | `"joint"` | 120            |
+    | `SeastarStationTimed-v0`  | `"station"`  | 0.5                 | `"joint"` | 120            |
+
+    What a task asks for, observes and rewards stands in the docstring of its challenge: `Miswired`, `Prey`, `Station`.
+    Actions, masks and everything else are those of `SeastarSwimEnv`.
+
+    ## Splits
+    An episode is a number, and what is drawn for it follows from its split and its number alone. A reset draws the
+    number, from two thousand million in the split "train", from a thousand in "test". `info["instance"]` tells it, and
+    `reset(options={"instance": number})` swims a certain one. The splits share no episode.
+
+    ## Arguments
+    task: Name of a challenge, or a challenge with numbers of your own, as an object or in plain form.
+    split: Which episodes are drawn: "train" or "test".
+    actions: How commands are written, see `SeastarSwimEnv`.
+    fidelity: Accuracy of the simulation, see `SeastarSwimEnv`.
+    decision_period: Time between decisions [s]. None means a stroke.
+    render_mode: See `SeastarSwimEnv`. Pictures show what the robot is not told.
+    frames_per_stroke: Number of pictures of a decision, see `SeastarSwimEnv`.
+    """
+
+    _option = "instance"
+
+    def __init__(
+        self,
+        task: Challenge | Plain | str = "miswired",
+        split: Split = "train",
+        actions: Actions = "pairs",
+        fidelity: Fidelity | None = None,
+        decision_period: float | None = None,
+        render_mode: RenderMode | None = None,
+        frames_per_stroke: int | None = None,
+    ):
+        self._set_pictures(render_mode, frames_per_stroke)
+        self.challenge = read_challenge(task)
+        self._begin_with(make_task(self.challenge, 1, 1, split, actions, fidelity, decision_period), frames_per_stroke)
+
+
+class SeastarTaskVectorEnv(SeastarSwimVectorEnv):
+    """Environment of `num_envs` robots side by side, with the bits of one `SeastarTaskEnv` each.
+
+    Batches are those of `SeastarSwimVectorEnv`, tasks those of `SeastarTaskEnv`. `reset(options={"instance": ...})`
+    takes one number for all robots, or one for each.
+
+    ## Arguments besides those of `SeastarTaskEnv`
+    num_envs, max_episode_steps, autoreset_mode, threads: See `SeastarSwimVectorEnv`.
+    """
+
+    _option = "instance"
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        max_episode_steps: int | None = None,
+        task: Challenge | Plain | str = "miswired",
+        split: Split = "train",
+        actions: Actions = "pairs",
+        fidelity: Fidelity | None = None,
+        decision_period: float | None = None,
+        render_mode: Literal["rgb_array"] | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        threads: int | None = None,
+    ):
+        self._set_batch(num_envs, max_episode_steps, render_mode, autoreset_mode)
+        self.challenge = read_challenge(task)
+        self._begin_with(make_task(self.challenge, num_envs, threads, split, actions, fidelity, decision_period))

@@ -1,0 +1,180 @@
+"""`SeastarPrey-v0`: a prey that swims faster than the robot, on a course that comes back."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.envs.scenery import Ring, Scenery
+from seastar_gym.envs.swimming import Flags, Floats, Score, Swimming
+from seastar_gym.envs.tasks.challenge import Challenge, Range, require_range
+from seastar_gym.envs.tasks.course import Courses, draw_course
+from seastar_gym.envs.tasks.numbered import Numbered, Split
+from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import require_count, require_number
+from seastar_gym.scene.serial import register_part
+
+LOOK_AHEAD = 10.0
+"""The second point of an observation is where the prey would be after this time [s] if it swam straight on."""
+MOST_PREY = 12
+"""Courses that are drawn for an episode; a robot that catches more meets the first one again."""
+
+
+@register_part
+@dataclass(frozen=True)
+class Prey(Challenge):
+    """A prey to catch, faster than the robot, on a closed course; then another one.
+
+    A robot that swims to where the prey is trails behind it for ever. One that remembers the course, or foresees it,
+    swims to where the prey will be.
+
+    ## Episode
+    The prey swims on a closed course, once round in 90 to 210 s: a circle whose radius is in `radius`, and on it a
+    second one of up to `epicycle` of that radius, twice as often round. Its root mean square speed is in `speed`. The
+    course passes near the robot, and does not begin there. The prey is caught where a decision ends within
+    `catch_radius` of it, and the next one begins on a course of its own around the robot. The task never ends by
+    itself. Every course can be solved: a point at 4 mm/s, slower than the robot, could meet the prey within 100 s.
+
+    ## Observation
+    That of `SeastarSwim-v0`, with the prey in the place of the current waypoint, and with the place where it would be
+    in 10 s if it swam straight on in that of the next: the difference tells its velocity.
+
+    ## Reward
+    | term              | meaning                                                | default weight |
+    |-------------------|--------------------------------------------------------|----------------|
+    | `reward_progress` | decrease of the distance from the prey [m]             | 50 per metre   |
+    | `reward_catch`    | prey caught in the decision                            | 10 per prey    |
+    | `reward_effort`   | minus the time for which wires were heated, in pulses  | 0.01 per pulse |
+
+    The task's measure is the number of prey caught in 200 s.
+
+    ## Info
+    That of `SeastarSwim-v0` without `waypoint_index`, `cross_track_error`, `energy_per_metre` and `reward_waypoint`;
+    `is_success` says whether `wanted` prey are caught. Besides,
+
+    | name           | type       | unit | meaning                                         |
+    |----------------|------------|------|-------------------------------------------------|
+    | `instance`     | int        | -    | number of the episode in its split              |
+    | `distance`     | float      | m    | distance of the hub from the prey               |
+    | `prey`         | array (2,) | m    | place of the prey in the world: x, y            |
+    | `course`       | array (8,) | -    | the course, see `seastar_gym.envs.tasks.course` |
+    | `catches`      | int        | 1    | prey caught so far                              |
+    | `reward_catch` | float      | 1    | term of the reward                              |
+
+    `course` is what the robot is not told.
+
+    ## Arguments
+    speed: Smallest and largest speed of prey [m/s].
+    radius: Smallest and largest radius of a course [m].
+    epicycle: Largest radius of the second circle, as a fraction of the first.
+    catch_radius: Distance [m] within which a prey is caught.
+    wanted: Number of prey that count as success.
+    progress, catch, effort: Weights of the reward's terms.
+    """
+
+    NAME: ClassVar = "prey"
+    speed: Range = (0.006, 0.008)
+    radius: Range = (0.12, 0.2)
+    epicycle: float = 0.2
+    catch_radius: float = 0.02
+    wanted: int = 3
+    progress: float = 50.0
+    catch: float = 10.0
+    effort: float = 0.01
+
+    def __post_init__(self) -> None:
+        require_range("Prey.speed", self.speed, "m/s")
+        require_range("Prey.radius", self.radius, "m")
+        require_number("Prey.epicycle", self.epicycle, "1", zero_allowed=True)
+        require_number("Prey.catch_radius", self.catch_radius, "m")
+        require_count("Prey.wanted", self.wanted, 1, 1_000_000)
+        for name in ("progress", "catch", "effort"):
+            require_number(f"Prey.{name}", getattr(self, name), "1", zero_allowed=True)
+
+    def swimming(self, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any) -> "PreyTask":
+        """The task of so many robots."""
+        return PreyTask(self, scene, n_robots, threads, split, **how)
+
+
+class PreyTask(Numbered, Swimming):
+    """Task of robots that catch prey."""
+
+    TERMS = ("reward_progress", "reward_catch", "reward_effort")
+
+    def __init__(self, about: Prey, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any):
+        Swimming.__init__(self, scene, n_robots, threads, random_heading=True, **how)
+        self.about, self.waypoint_radius = about, about.catch_radius
+        self.catches = np.zeros(n_robots, np.int64)
+        self._drawn_courses = np.zeros((n_robots, MOST_PREY, 8))  # around the robot, from time 0 on
+        self.courses = np.zeros((n_robots, 8))  # of the present prey
+        self._distance = np.zeros(n_robots)
+        self._number(split)
+
+    def _draw(self, robot: int, rng: np.random.Generator, asked: Any) -> None:
+        about = self.about
+        for k in range(MOST_PREY):
+            course = draw_course(rng, about.radius, about.speed, about.epicycle, about.catch_radius)
+            self._drawn_courses[robot, k] = course
+
+    def _begin(self, robots: Flags) -> None:
+        self.catches[robots] = 0
+        self._release(robots, self.simulator.hub_position())
+
+    def _release(self, robots: Flags, hub: Floats) -> None:
+        """Let the next prey go, around the robots in a mask."""
+        for robot in np.flatnonzero(robots):
+            course = self._drawn_courses[robot, self.catches[robot] % MOST_PREY].copy()
+            course[:2] += hub[robot]
+            course[2] = self.simulator.time[robot]
+            self.courses[robot] = course
+        self._distance[robots] = self._measure(hub)[robots]
+
+    def prey(self) -> tuple[Floats, Floats]:
+        """Places [m] and velocities [m/s] of the prey, shape (n_robots, 2) each."""
+        courses, time = Courses(self.courses), self.simulator.time
+        return courses.place(time), courses.velocity(time)
+
+    def _measure(self, hub: Floats) -> Floats:
+        """Distances of hubs from their prey [m]."""
+        away = self.prey()[0] - hub
+        return np.hypot(away[:, 0], away[:, 1])
+
+    def waypoints_of(self, robot: int) -> Floats:
+        """None."""
+        return np.zeros((0, 2))
+
+    def _targets(self) -> Floats:
+        place, velocity = self.prey()
+        return np.concatenate([place, place + LOOK_AHEAD * velocity], axis=1)
+
+    def _score(self, hub: Floats, pulses: Floats) -> Score:
+        before, self._distance = self._distance, self._measure(hub)
+        caught = self._distance <= self.about.catch_radius
+        terms = {
+            "reward_progress": self.about.progress * (before - self._distance),
+            "reward_catch": self.about.catch * caught.astype(np.float64),
+            "reward_effort": -self.about.effort * pulses,
+        }
+        self.catches += caught
+        self._release(caught, hub)
+        return Score(terms, self.catches >= self.about.wanted, np.zeros(self.n_robots, bool))
+
+    def _goal_facts(self, hub: Floats) -> dict[str, NDArray[Any]]:
+        return {
+            "distance": self._measure(hub),
+            "prey": self.prey()[0],
+            "course": self.courses.copy(),
+            "catches": self.catches.copy(),
+        }
+
+    def scenery(self, robot: int) -> Scenery:
+        """The prey, where it swims, and its course."""
+        place, velocity = (of_all[robot] for of_all in self.prey())
+        round_trip = Courses(self.courses[robot]).once_round()
+        return Scenery(
+            rings=(Ring(place, self.about.catch_radius),),
+            lines=(round_trip,),
+            arrows=(np.array([place, place + 5.0 * velocity]),),
+            progress=f"{self.catches[robot]} caught",
+        )

@@ -1,0 +1,169 @@
+"""`SeastarStation-v0`: a place to keep in a current that is not known."""
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.envs.scenery import Ring, Scenery
+from seastar_gym.envs.swimming import Flags, Floats, Score, Swimming
+from seastar_gym.envs.tasks.challenge import Challenge, Range, require_range
+from seastar_gym.envs.tasks.numbered import Numbered, Split
+from seastar_gym.scene import Scene, UniformCurrent, Water
+from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.serial import register_part
+
+ARROW = 20.0
+"""Length of an arrow in pictures over the speed it stands for [s]."""
+
+
+@register_part
+@dataclass(frozen=True)
+class Station(Challenge):
+    """A point to keep the hub at, in a uniform current that is not known.
+
+    The current would carry a resting robot by 0.1 to 0.3 m in an episode. A controller that remembers how far it
+    drifted off what it meant to do knows the current; one that thinks two decisions ahead, over all commands, places
+    the hub to fractions of a millimetre.
+
+    ## Episode
+    The robot rests over ground, with its hub at the origin and a random heading, and the station lies at a distance in
+    `distance`. The current has a speed of `current`, in any direction. The task never ends by itself. All
+    draws can be solved: the robot swims in any direction faster than the water.
+
+    ## Observation
+    That of `SeastarSwim-v0`, with the station in the places of the current and of the next waypoint. Velocities are
+    those over ground.
+
+    ## Reward
+    | term              | meaning                                                   | default weight    |
+    |-------------------|-----------------------------------------------------------|-------------------|
+    | `reward_progress` | decrease of the distance from the station [m]             | 200 per metre     |
+    | `reward_distance` | minus that distance, 20 mm at most, times the time [m s]  | 100 per metre and |
+    |                   |                                                           | second            |
+    | `reward_effort`   | minus the time for which wires were heated, in pulses     | 0.01 per pulse    |
+
+    The task's measure is the mean distance from the 31st second on.
+
+    ## Info
+    That of `SeastarSwim-v0` without `waypoint_index`, `cross_track_error`, `energy_per_metre`, `reward_waypoint` and
+    the measured errors, which are those of still water; `is_success` says whether the hub is within `tolerance` of the
+    station. Besides,
+
+    | name                | type       | unit | meaning                                        |
+    |---------------------|------------|------|------------------------------------------------|
+    | `instance`          | int        | -    | number of the episode in its split             |
+    | `distance`          | float      | m    | distance of the hub from the station           |
+    | `station`           | array (2,) | m    | station in the world: x, y                     |
+    | `fluid.current.u_x` | float      | m/s  | velocity of the water, which is not observed   |
+    | `fluid.current.u_y` | float      | m/s  | velocity of the water, which is not observed   |
+    | `reward_distance`   | float      | 1    | term of the reward                             |
+
+    ## Arguments
+    current: Smallest and largest speed of the current [m/s].
+    distance: Smallest and largest distance of the station from the start [m].
+    tolerance: Distance [m] within which the station is kept.
+    progress, nearness, effort: Weights of the reward's terms.
+    """
+
+    NAME: ClassVar = "station"
+    current: Range = (0.001, 0.0025)
+    distance: Range = (0.0, 0.05)
+    tolerance: float = 0.002
+    progress: float = 200.0
+    nearness: float = 100.0
+    effort: float = 0.01
+
+    def __post_init__(self) -> None:
+        require_range("Station.current", self.current, "m/s", zero_allowed=True)
+        require_range("Station.distance", self.distance, "m", zero_allowed=True)
+        require_number("Station.tolerance", self.tolerance, "m")
+        for name in ("progress", "nearness", "effort"):
+            require_number(f"Station.{name}", getattr(self, name), "1", zero_allowed=True)
+
+    def swimming(self, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any) -> "StationTask":
+        """The task of so many robots."""
+        return StationTask(self, scene, n_robots, threads, split, **how)
+
+
+FARTHEST_COUNTED = 0.02
+"""Distance from the station beyond which `reward_distance` grows no more [m]."""
+U_X, U_Y = "fluid.current.u_x", "fluid.current.u_y"
+
+
+@dataclass(frozen=True)
+class AnyDirection:
+    """Draws of a uniform current with a speed in a range [m/s] and any direction."""
+
+    speed: Range
+
+    def first_values(self, scene: Scene, n_robots: int) -> dict[str, Floats]:
+        """Still water."""
+        return {U_X: np.zeros(n_robots), U_Y: np.zeros(n_robots)}
+
+    def draw(self, values: dict[str, Floats], robot: int, rng: np.random.Generator) -> None:
+        """Draw a robot's current, in place."""
+        speed, direction = rng.uniform(*self.speed), rng.uniform(-np.pi, np.pi)
+        values[U_X][robot], values[U_Y][robot] = speed * np.cos(direction), speed * np.sin(direction)
+
+
+class StationTask(Numbered, Swimming):
+    """Task of robots that keep a station; `scene` is that of still water, which is what they know."""
+
+    TERMS = ("reward_progress", "reward_distance", "reward_effort")
+
+    def __init__(self, about: Station, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any):
+        water = Water() if scene.fluid is None else scene.fluid
+        flowing = replace(scene, fluid=replace(water, current=UniformCurrent()))
+        draws = AnyDirection(about.current)
+        Swimming.__init__(self, flowing, n_robots, threads, random_heading=True, draws=draws, **how)
+        self.about, self.scene, self.waypoint_radius = about, scene, about.tolerance
+        self.station = np.zeros((n_robots, 2))
+        self._distance = np.zeros(n_robots)
+        self._has_promises = False  # errors were measured in still water
+        self._number(split)
+
+    def _draw(self, robot: int, rng: np.random.Generator, asked: Any) -> None:
+        distance, direction = rng.uniform(*self.about.distance), rng.uniform(-np.pi, np.pi)
+        self.station[robot] = distance * np.cos(direction), distance * np.sin(direction)
+
+    def _begin(self, robots: Flags) -> None:
+        self._distance[robots] = self._measure(self.simulator.hub_position())[robots]
+
+    def _measure(self, hub: Floats) -> Floats:
+        """Distances of hubs from their stations [m]."""
+        away = hub - self.station
+        return np.hypot(away[:, 0], away[:, 1])
+
+    def waypoints_of(self, robot: int) -> Floats:
+        """None."""
+        return np.zeros((0, 2))
+
+    def _targets(self) -> Floats:
+        return np.concatenate([self.station, self.station], axis=1)
+
+    def _score(self, hub: Floats, pulses: Floats) -> Score:
+        before, self._distance = self._distance, self._measure(hub)
+        about, counted = self.about, np.minimum(self._distance, FARTHEST_COUNTED)
+        terms = {
+            "reward_progress": about.progress * (before - self._distance),
+            "reward_distance": -about.nearness * self.decision_period * counted,
+            "reward_effort": -about.effort * pulses,
+        }
+        return Score(terms, self._distance <= about.tolerance, np.zeros(self.n_robots, bool))
+
+    def _goal_facts(self, hub: Floats) -> dict[str, NDArray[Any]]:
+        return {"distance": self._measure(hub), "station": self.station.copy()}
+
+    def scenery(self, robot: int) -> Scenery:
+        """The station, and the current as far as it flows in 20 s, from the lower left of the station."""
+        place, flow = self.station[robot], np.array([self.drawn[U_X][robot], self.drawn[U_Y][robot]])
+        start = place - 0.12
+        speed = 1000.0 * float(np.hypot(*flow))
+        return Scenery(
+            rings=(Ring(place, self.about.tolerance),),
+            arrows=(np.array([start, start + ARROW * flow]),),
+            progress=f"{1000.0 * self._distance[robot]:.1f} mm off",
+            note=f"current of {speed:.1f} mm/s",
+        )

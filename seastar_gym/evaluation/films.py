@@ -1,0 +1,100 @@
+"""Films: pictures one after another into a file, MP4 by ffmpeg or animated GIF by Pillow."""
+
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.extras import require_extra
+
+Picture = NDArray[np.uint8]
+"""Red, green and blue, shape (height, width, 3)."""
+
+CLOSING_SECONDS = 1.5
+"""How long a film rests on its last picture."""
+SCALE = 2
+"""Pixels of a picture that become one of a GIF, each way."""
+COLOURS = 48
+"""Colours of a GIF."""
+SAMPLE = 32
+"""Number of pictures, at equal intervals, from which the colours of a GIF are taken."""
+
+
+def film_format(file: Path) -> str:
+    """Format that a file's ending asks for, ".mp4" or ".gif", once what writes it is known to be there."""
+    ending = file.suffix.lower()
+    if ending not in (".mp4", ".gif"):
+        raise ValueError(f"A film is an .mp4 or a .gif, not {file.name}.")
+    require_extra("Films", "render", *(("imageio", "imageio_ffmpeg") if ending == ".mp4" else ("PIL",)))
+    return ending
+
+
+@contextmanager
+def film(file: Path, fps: float) -> Iterator[Callable[[Picture], None]]:
+    """Context that gives a function to add pictures with; the film rests on its last one.
+
+    fps: Pictures per second. GIFs are shown for hundredths of a second, so theirs is rounded.
+    """
+    write = _mp4 if film_format(file) == ".mp4" else _gif
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with write(file, fps) as add:
+        last: list[Picture] = []
+
+        def keep(picture: Picture) -> None:
+            last[:] = [picture]
+            add(picture)
+
+        yield keep
+        for picture in last * round(CLOSING_SECONDS * fps):
+            add(picture)
+
+
+@contextmanager
+def _mp4(file: Path, fps: float) -> Iterator[Callable[[Picture], None]]:
+    import imageio.v2 as imageio
+
+    fast = ["-preset", "veryfast"]
+    movie: Any = imageio.get_writer(
+        file, format="FFMPEG", mode="I", fps=fps, codec="libx264", quality=7, output_params=fast
+    )
+    with movie:
+        yield movie.append_data
+
+
+@contextmanager
+def _gif(file: Path, fps: float) -> Iterator[Callable[[Picture], None]]:
+    """Pictures are kept, small and compressed, until the colours of the whole film are known."""
+    kept: list[tuple[bytes, tuple[int, ...]]] = []
+
+    def add(picture: Picture) -> None:
+        small = shrunk(picture)
+        kept.append((zlib.compress(small.tobytes(), 1), small.shape))
+
+    yield add
+    if kept:
+        write_gif([np.frombuffer(zlib.decompress(data), np.uint8).reshape(shape) for data, shape in kept], file, fps)
+
+
+def shrunk(picture: Picture) -> Picture:
+    """Picture of fewer pixels, each the mean of SCALE times SCALE."""
+    height, width, colours = picture.shape
+    blocks = picture[: height - height % SCALE, : width - width % SCALE].reshape(
+        height // SCALE, SCALE, width // SCALE, SCALE, colours
+    )
+    return blocks.mean(axis=(1, 3)).astype(np.uint8)
+
+
+def write_gif(pictures: list[Picture], file: Path, fps: float) -> None:
+    """Write an animated GIF whose pictures share one palette, made of some of them."""
+    from PIL import Image
+
+    some = np.unique(np.linspace(0, len(pictures) - 1, SAMPLE).round().astype(int))
+    sample = np.concatenate([pictures[k] for k in some], axis=0)
+    palette = Image.fromarray(sample).quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    images = [Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+    duration = 10 * max(2, round(100.0 / fps))  # viewers slow down what is shown for less than two hundredths
+    images[0].save(file, save_all=True, append_images=images[1:], duration=duration, loop=0, optimize=True)

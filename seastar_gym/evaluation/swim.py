@@ -1,0 +1,162 @@
+"""One agent swims one episode: `swim`, and what can be measured on it afterwards."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.controllers.contract import Policy, require_fit
+from seastar_gym.envs.paths import cross_track_error, path_length
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+
+Floats = NDArray[np.float64]
+TIME_LIMIT = 400.0
+"""Time after which a swim that is evaluated ends, unless another limit is given [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Swim:
+    """Record of one agent on one path.
+
+    hub, waypoint_index and time are those at the start and after every stroke, strokes + 1 of them. In a timed
+    environment, a stroke is a decision.
+    """
+
+    agent: str
+    waypoints: Floats
+    """[m], shape (n, 2)."""
+    hub: Floats
+    """Hub positions [m], shape (strokes + 1, 2)."""
+    waypoint_index: NDArray[np.int64]
+    """Waypoints reached, shape (strokes + 1,)."""
+    time: Floats
+    """Simulated time [s], shape (strokes + 1,)."""
+    limbs_heated: NDArray[np.int64]
+    """Limbs whose heating began, shape (strokes,)."""
+    heating_time: Floats
+    """Time for which wires were heated, summed over limbs [s], shape (strokes,)."""
+    energy: Floats
+    """Electric energy of that heat [J], shape (strokes,)."""
+    solver_message: str | None
+    """Why the solver gave up, where it did."""
+
+    @property
+    def strokes(self) -> int:
+        """Strokes swum."""
+        return len(self.limbs_heated)
+
+    @property
+    def counted_in(self) -> str:
+        """What `strokes` are to be called: decisions, if they are not a second apart."""
+        in_strokes = len(self.time) < 2 or math.isclose(self.time[1] - self.time[0], 1.0)
+        return "strokes" if in_strokes else "decisions"
+
+    @property
+    def result(self) -> str:
+        """Strokes, or decisions, to the last waypoint, or how many waypoints were reached; a few words."""
+        if self.finished:
+            return f"{self.strokes} {self.counted_in}"
+        return f"{self.waypoints_reached} of {len(self.waypoints)} waypoints"
+
+    @property
+    def waypoints_reached(self) -> int:
+        """Waypoints reached at the end."""
+        return int(self.waypoint_index[-1])
+
+    @property
+    def finished(self) -> bool:
+        """Whether the last waypoint was reached."""
+        return self.waypoints_reached == len(self.waypoints)
+
+    @cached_property
+    def cross_track_errors(self) -> Floats:
+        """Distance [m] of the hub from the path at the end of every stroke, shape (strokes,).
+
+        The path there is the leg that the hub is on and the one before: a waypoint counts as reached a waypoint radius
+        early, and a hub that then still follows the old leg into the corner does not stray.
+        """
+        corners = np.concatenate([np.zeros((1, 2)), self.waypoints])
+        leg = np.minimum(self.waypoint_index[1:], len(self.waypoints) - 1)
+        now = cross_track_error(self.hub[1:], corners[leg], corners[leg + 1])
+        leg = np.maximum(leg - 1, 0)
+        return np.minimum(now, cross_track_error(self.hub[1:], corners[leg], corners[leg + 1]))
+
+    @property
+    def hub_path_length(self) -> float:
+        """Length [m] of the hub's way from one second to the next, or from stroke to stroke if those are longer.
+
+        Within a stroke the hub swings to and fro, which is no way swum.
+        """
+        every = max(1, round(1.0 / (self.time[1] - self.time[0]))) if len(self.time) > 1 else 1
+        return float(path_length(self.hub[0], np.concatenate([self.hub[::every], self.hub[-1:]])))
+
+    @property
+    def heated_per_metre(self) -> float | None:
+        """Limbs heated per metre of the hub's way [1/m]; None where the hub did not move."""
+        return self._per_metre(self.limbs_heated)
+
+    @property
+    def seconds_heated(self) -> float | None:
+        """Time for which wires were heated, summed over limbs [s]; None where the actuator does not say it."""
+        total = float(self.heating_time.sum())
+        return total if math.isfinite(total) else None
+
+    @property
+    def joules_per_metre(self) -> float | None:
+        """Electric energy per metre of the hub's way [J/m]; None where it is unknown or the hub did not move."""
+        found = self._per_metre(self.energy)
+        return found if found is not None and math.isfinite(found) else None
+
+    def _per_metre(self, of_strokes: NDArray[Any]) -> float | None:
+        length = self.hub_path_length
+        return float(of_strokes.sum() / length) if length > 0.0 else None
+
+
+def decisions_in(seconds: float, decision_period: float | None) -> int:
+    """Number of decisions in a time [s]. decision_period: Time between them [s]. None means strokes of a second."""
+    return max(1, round(seconds / (1.0 if decision_period is None else decision_period)))
+
+
+def swim(
+    agent: str,
+    policy: Policy,
+    env: SeastarSwimEnv,
+    *,
+    max_strokes: int,
+    seed: int | None = None,
+    reset_options: dict[str, Any] | None = None,
+    watch: Callable[[SeastarSwimEnv], None] | None = None,
+) -> Swim:
+    """One episode, with deterministic actions, to the last waypoint or for `max_strokes` strokes.
+
+    ValueError, before it begins, where the policy was made for another robot.
+    watch: Called with `env` after its reset and after every stroke, to film it for instance.
+    """
+    require_fit(policy, env.scene, env.actions, env.decision_period, env.observe_actuators)
+    observation, info = env.reset(seed=seed, options=reset_options)
+    infos = [info]
+    state, over = None, False
+    if watch is not None:
+        watch(env)
+    while not over and len(infos) <= max_strokes:
+        begins = np.array([len(infos) == 1])
+        action, state = policy.predict(observation, state=state, episode_start=begins, deterministic=True)
+        observation, _, over, _, info = env.step(action)
+        infos.append(info)
+        if watch is not None:
+            watch(env)
+    return Swim(
+        agent=agent,
+        waypoints=env.waypoints,
+        hub=np.array([info["hub_position"] for info in infos]),
+        waypoint_index=np.array([info["waypoint_index"] for info in infos]),
+        time=np.array([info["time"] for info in infos]),
+        limbs_heated=np.array([info["limbs_heated"] for info in infos[1:]], dtype=np.int64),
+        heating_time=np.array([info["heating_time"] for info in infos[1:]], dtype=np.float64),
+        energy=np.array([info["energy"] for info in infos[1:]], dtype=np.float64),
+        solver_message=infos[-1]["solver_message"] or None,
+    )

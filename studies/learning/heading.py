@@ -1,0 +1,213 @@
+"""What turning is worth: one waypoint at 0.2 m, where the robot has to look another way than at the start.
+
+    python -m studies.learning.heading
+
+Three robots swim it for several demanded turns, to either side: by the chapter's strokes and by wires every 0.2 s,
+which turn by a gait and then swim by the policy in the box, and by a policy that was trained on random paths with
+random headings and decides every 0.5 s. Writes `heading.json`, `heading.png` and the table in Markdown.
+"""
+
+import json
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import gymnasium as gym
+import numpy as np
+import tyro
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+from stable_baselines3 import PPO
+
+from agents.hyperparameters import Hyperparameters
+from agents.ppo import make_model
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
+from seastar_gym.command import run_command
+from seastar_gym.controllers import learned
+from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.turning import TurnThenSwim
+from seastar_gym.envs.commands import Actions
+from seastar_gym.envs.headings import Headings
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.symmetry import (
+    VectorSymmetryReduction,
+    memory_mirror,
+    reduce_observations,
+    restore_actions,
+)
+from seastar_gym.envs.task import make_scene
+from seastar_gym.evaluation.swim import Swim, decisions_in, swim
+from seastar_gym.files import write_atomically
+from seastar_gym.gaits import turning_wave
+from seastar_gym.scene import Scene
+from seastar_gym.scene.numerics import Fidelity
+
+Floats = NDArray[np.float64]
+
+DISTANCE = 0.2
+"""Distance of the waypoint [m]."""
+TURNS = (0.0, 36.0, 72.0, 108.0, 144.0, 180.0)
+"""Demanded turns [deg]."""
+LIMIT = 600.0
+"""Time after which a swim ends [s]."""
+STROKES_THAT_TURN = np.array([[-1.0, 1.0, -1.0, -1.0, -1.0], [-1.0, -1.0, 1.0, -1.0, -1.0]])
+"""The chapter's strokes, two in turn, that turn the robot most: clockwise, by 1.7 degrees a second."""
+
+
+class Swimmer(NamedTuple):
+    """A robot with its controller. make: From the scene and the headings. decision_period: [s], None means strokes."""
+
+    what: str
+    decision_period: float | None
+    make: Callable[[Scene, Headings], Policy]
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """Learner that sees the reduced observations of a scene, as an agent with the observations of an environment."""
+
+    model: PPO
+    scene: Scene
+    decision_period: float
+    actions: Actions = "pairs"
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
+    ) -> tuple[Any, Any]:
+        """Action for an observation of one robot, and None."""
+        n_limbs, mirror = self.scene.robot.n_limbs, memory_mirror(self.scene.actuator)
+        reduced, element = reduce_observations(observation, n_limbs, mirror, with_headings=True)
+        action, _ = self.model.predict(reduced, deterministic=deterministic)
+        return restore_actions(action, element, self.actions, n_limbs), None
+
+
+@dataclass(frozen=True)
+class Options:
+    """Swim to a waypoint with a demanded turn, by strokes, by wires and by a policy that learned it."""
+
+    decisions: int = 400_000
+    """Length of the training [decisions]."""
+    seed: int = 0
+    """Seed of the training."""
+    fidelity: Fidelity = "balanced"
+    """Accuracy of the swims; trainings are at "fast"."""
+    turns: tuple[float, ...] = TURNS
+    """Demanded turns [deg]."""
+    out: Path = Path("runs/heading")
+    """Folder of heading.json, heading.png, heading.md and the learner."""
+
+
+def train(options: Options) -> PPO:
+    """Learner on random paths with random headings, decisions every 0.5 s by pairs of limbs."""
+    hyperparameters = Hyperparameters(decision_period=0.5)
+    env: Any = gym.make_vec(
+        "SeastarSwimHeading-v0", hyperparameters.num_envs, "vector_entry_point", path="random", fidelity="fast",
+        headings=Headings("random"), autoreset_mode=AutoresetMode.SAME_STEP, max_episode_steps=800,
+    )  # fmt: skip
+    model = make_model(BatchVecEnv(VectorSymmetryReduction(env)), hyperparameters, options.seed)
+    model.learn(options.decisions)
+    return model
+
+
+def swimmers(model: PPO | None) -> dict[str, Swimmer]:
+    """The robots by name; the learner is left out if there is none."""
+
+    def strokes(scene: Scene, headings: Headings) -> Policy:
+        return TurnThenSwim(STROKES_THAT_TURN, learned.load(), "pairs", scene, headings, None)
+
+    def wires(scene: Scene, headings: Headings) -> Policy:
+        swims = learned.load(learned.in_the_box(0.2))
+        return TurnThenSwim(turning_wave(0.2), swims, swims.actions, scene, headings, 0.2)
+
+    found = {
+        "strokes": Swimmer("the chapter's strokes: turn, then swim", None, strokes),
+        "wires": Swimmer("wires every 0.2 s: turning wave, then swim", 0.2, wires),
+    }
+    if model is not None:
+        found["learned"] = Swimmer("wires every 0.5 s: learned", 0.5, lambda scene, _: Reduced(model, scene, 0.5))
+    return found
+
+
+def swum(swimmer: Swimmer, turn: float, fidelity: Fidelity) -> Swim:
+    """Swim of a robot with a demanded turn [deg]."""
+    scene, headings = make_scene(None, fidelity, swimmer.decision_period), Headings(float(np.radians(turn)))
+    policy: Any = swimmer.make(scene, headings)
+    env = SeastarSwimEnv(
+        [[DISTANCE, 0.0]], policy.actions, fidelity, decision_period=swimmer.decision_period, headings=headings
+    )
+    return swim(swimmer.what, policy, env, max_strokes=decisions_in(LIMIT, swimmer.decision_period), seed=0)
+
+
+def measured(swimmer: Swimmer, options: Options) -> dict[str, Any]:
+    """Times [s] and energies [J] over demanded turns, means of turns to either side; NaN where one did not arrive."""
+    seconds, joules = [], []
+    for turn in options.turns:
+        both = [swum(swimmer, side * turn, options.fidelity) for side in ((1, -1) if turn else (1,))]
+        arrived = all(one.finished for one in both)
+        seconds.append(float(np.mean([one.time[-1] for one in both])) if arrived else None)
+        joules.append(float(np.mean([one.energy.sum() for one in both])) if arrived else None)
+    return {"what": swimmer.what, "seconds": seconds, "joules": joules}
+
+
+def study(options: Options) -> dict[str, Any]:
+    """Run the study; returns its results as plain data."""
+    options.out.mkdir(parents=True, exist_ok=True)
+    began = time.perf_counter()
+    model = train(options) if options.decisions else None
+    seconds = time.perf_counter() - began
+    if model is not None:
+        model.save(options.out / "model.zip")
+    return {
+        "distance_m": DISTANCE,
+        "fidelity": options.fidelity,
+        "tolerance_deg": round(float(np.degrees(Headings().tolerance)), 6),
+        "training": {"decisions": options.decisions, "seed": options.seed, "seconds": round(seconds)},
+        "turns_deg": list(options.turns),
+        "swims": {name: measured(swimmer, options) for name, swimmer in swimmers(model).items()},
+    }
+
+
+def table(results: dict[str, Any]) -> str:
+    """Table of the results in Markdown."""
+    turns = results["turns_deg"]
+    lines = [f"| | {' | '.join(f'{turn:g}°' for turn in turns)} |", f"| --- |{' ---: |' * len(turns)}"]
+    for each in results["swims"].values():
+        for what, unit in (("seconds", "s"), ("joules", "J")):
+            cells = ["-" if one is None else f"{one:.0f}" for one in each[what]]
+            lines.append(f"| {each['what']} [{unit}] | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+COLOURS = {"strokes": "0.55", "wires": "#3366aa", "learned": "#cc7a00"}
+
+
+def draw(results: dict[str, Any], file: Path) -> None:
+    """Time and energy over the demanded turn."""
+    from studies.accuracy.style import DPI, subplots
+
+    figure, panels = subplots(1, 2, figsize=(9.0, 3.8))
+    for axes, what, label in zip(panels, ("seconds", "joules"), ("time [s]", "energy [J]"), strict=True):
+        for name, each in results["swims"].items():
+            numbers = [np.nan if one is None else one for one in each[what]]
+            axes.plot(results["turns_deg"], numbers, "o-", color=COLOURS[name], label=each["what"])
+        axes.set(xlabel="demanded turn [deg]", ylabel=f"{label} to arrive", xticks=results["turns_deg"])
+        axes.set_ylim(bottom=0.0)
+    panels[0].legend(frameon=False, fontsize=9)
+    figure.savefig(file, dpi=DPI)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line; returns the exit code."""
+    options = tyro.cli(Options, prog="python -m studies.learning.heading", args=arguments)
+    results = study(options)
+    write_atomically(options.out / "heading.json", (json.dumps(results, indent=1) + "\n").encode())
+    draw(results, options.out / "heading.png")
+    (options.out / "heading.md").write_text(table(results), encoding="utf-8")
+    print(table(results))
+    return 0
+
+
+if __name__ == "__main__":
+    run_command(main)

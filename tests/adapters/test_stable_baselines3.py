@@ -1,0 +1,216 @@
+"""The adapter gives Stable-Baselines3 what its own DummyVecEnv of single environments gives it."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+from stable_baselines3.common.evaluation import evaluate_policy
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize, VecVideoRecorder
+
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
+from seastar_gym.controllers.scripted import scripted
+from seastar_gym.envs.commands import command_table
+from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
+
+N, LIMIT = 4, 6
+NEAR = np.array([[0.006, 0.0], [0.012, 0.0]])  # straight ahead: reached within the limit, by some actions
+SETTINGS = {"path": NEAR, "waypoint_radius": 0.004, "random_heading": True, "fidelity": "fast", "actions": "pairs"}
+
+
+def make_batch(symmetry=False, **changes):
+    settings = {"num_envs": N, "max_episode_steps": LIMIT, "autoreset_mode": AutoresetMode.SAME_STEP, **SETTINGS}
+    batch = gym.make_vec("SeastarSwim-v0", vectorization_mode="vector_entry_point", **{**settings, **changes})
+    return BatchVecEnv(VectorSymmetryReduction(batch) if symmetry else batch)
+
+
+def make_singles(symmetry=False):
+    def make():
+        env = gym.make("SeastarSwim-v0", max_episode_steps=LIMIT, **SETTINGS)
+        return Monitor(SymmetryReduction(env) if symmetry else env)
+
+    return DummyVecEnv([make] * N)
+
+
+def assert_infos_equal(ours, theirs):
+    assert len(ours) == len(theirs) == N
+    for one, other in zip(ours, theirs, strict=True):
+        assert one.keys() == other.keys()
+        for name in one.keys() - {"episode"}:
+            assert type(one[name]) is type(other[name]), name
+            np.testing.assert_array_equal(one[name], other[name], err_msg=name)
+        if "episode" in one:
+            assert one["episode"].keys() == other["episode"].keys() == {"r", "l", "t"}
+            assert (one["episode"]["r"], one["episode"]["l"]) == (other["episode"]["r"], other["episode"]["l"])
+            assert one["episode"]["t"] > 0.0
+
+
+@pytest.mark.parametrize("symmetry", [False, True])
+def test_it_is_the_dummy_vec_env_of_single_environments(symmetry):
+    """Observations, rewards, dones and infos, over episodes that end by truncation and by success."""
+    batch, singles = make_batch(symmetry), make_singles(symmetry)
+    rng = np.random.default_rng(0)
+    truncations = successes = 0
+    for seed in (3, 100):  # the second reset cuts episodes short
+        assert batch.seed(seed) == singles.seed(seed) == [seed + robot for robot in range(N)]
+        observations, expected = batch.reset(), singles.reset()
+        for _ in range(40):
+            np.testing.assert_array_equal(observations, expected)
+            assert observations.dtype == expected.dtype
+            assert_infos_equal(batch.reset_infos, singles.reset_infos)
+            # Mostly the pair that swims towards the waypoint, so that some episodes succeed.
+            actions = np.where(rng.random(N) < 0.7, towards_waypoint(observations), rng.integers(0, 21, N))
+            observations, rewards, dones, infos = batch.step(actions)
+            expected, expected_rewards, expected_dones, expected_infos = singles.step(actions)
+            np.testing.assert_array_equal(rewards, expected_rewards)
+            np.testing.assert_array_equal(dones, expected_dones)
+            assert (rewards.dtype, dones.dtype) == (expected_rewards.dtype, expected_dones.dtype)
+            assert_infos_equal(infos, expected_infos)
+            truncations += sum(info["TimeLimit.truncated"] for info in infos)
+            successes += sum(info["is_success"] for info in infos)
+    assert truncations >= 5
+    assert successes >= 5
+
+
+def towards_waypoint(observations):
+    """For every robot the pair whose pushes, roughly, add up towards the waypoint."""
+    angles = 2 * np.pi / 5 * np.arange(5)
+    pushes = -command_table("pairs", 5) @ np.column_stack([-np.sin(angles), np.cos(angles)])
+    return np.argmax(observations[:, -4:-2] @ pushes.T, axis=1)
+
+
+def test_arrays_are_fresh_every_step():
+    batch = make_batch()
+    seen = [batch.reset()]
+    for _ in range(LIMIT + 2):  # over the ends of episodes
+        observations, rewards, dones, infos = batch.step(np.ones(N, int))
+        seen += [observations, rewards, dones, *(info["hub_position"] for info in infos)]
+        seen += [info["terminal_observation"] for info in infos if "terminal_observation" in info]
+    kept = [array.copy() for array in seen]
+    batch.step(np.zeros(N, int))
+    for number, (array, copy) in enumerate(zip(seen, kept, strict=True)):
+        np.testing.assert_array_equal(array, copy)
+        assert not any(np.shares_memory(array, other) for other in seen[:number])
+
+
+def test_a_seed_counts_once_and_without_one_episodes_differ():
+    batch = make_batch(path="random")
+    batch.seed(5)
+    first = batch.reset()
+    assert batch._seeds == [None] * N
+    assert not np.array_equal(batch.reset(), first)
+    batch.seed(5)
+    np.testing.assert_array_equal(batch.reset(), first)
+
+
+def test_options_of_the_next_reset_reach_the_batch_once():
+    batch = make_batch()
+    batch.set_options({"path": "square"})
+    batch.reset()
+    np.testing.assert_allclose([info["distance"] for info in batch.reset_infos], 0.2, rtol=1e-12)
+    batch.reset()
+    np.testing.assert_allclose([info["distance"] for info in batch.reset_infos], 0.006, rtol=1e-12)
+
+
+def test_options_that_differ_between_robots_are_refused():
+    batch = make_batch()
+    batch.set_options([{}, *[{"path": "square"}] * (N - 1)])
+    with pytest.raises(ValueError, match="one dictionary for all"):
+        batch.reset()
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.DISABLED])
+def test_another_autoreset_mode_is_refused(mode):
+    with pytest.raises(ValueError, match=r"needs autoreset_mode=AutoresetMode\.SAME_STEP"):
+        make_batch(autoreset_mode=mode)
+
+
+@pytest.mark.parametrize("symmetry", [False, True])
+def test_attributes_and_methods_are_those_of_the_batch(symmetry):
+    batch = make_batch(symmetry)
+    assert batch.render_mode is None
+    assert batch.get_attr("actions") == ["pairs"] * N
+    assert batch.get_attr("actions", indices=[0, 2]) == ["pairs"] * 2
+    assert batch.has_attr("simulator") and not batch.has_attr("no_such_thing")
+    with pytest.raises(AttributeError, match="no_such_thing"):
+        batch.get_attr("no_such_thing")
+    batch.set_attr("max_episode_steps", 3)
+    assert batch.env.unwrapped.max_episode_steps == 3
+    with pytest.raises(ValueError, match="for all of them"):
+        batch.set_attr("max_episode_steps", 5, indices=0)
+    batch.reset()
+    assert len(batch.env_method("reset", seed=1)) == N
+    facts = batch.env_method("reset", seed=1, indices=[1])
+    assert len(facts) == 1 and facts[0][0].shape == (N, 186)
+    assert batch.env_is_wrapped(VectorSymmetryReduction) == [symmetry] * N
+    assert batch.env_is_wrapped(gym.vector.VectorObservationWrapper) == [False] * N
+
+
+def test_it_counts_as_monitored_so_that_evaluation_takes_its_statistics():
+    batch = make_batch(path="pentagon", waypoint_radius=0.01, actions="limbs")
+    assert batch.env_is_wrapped(Monitor, indices=0) == [True]
+    returns, lengths = evaluate_policy(scripted("straight"), batch, n_eval_episodes=N, return_episode_rewards=True)
+    assert lengths == [LIMIT] * N
+    assert np.ptp(returns) > 0.0  # random headings
+
+
+def test_normalisation_goes_on_top():
+    normalised = VecNormalize(make_batch(), training=False)
+    normalised.obs_rms.mean[:] = 1.0
+    plain = make_batch()
+    for env in (normalised, plain):
+        env.seed(0)
+        env.reset()
+    for _ in range(LIMIT):
+        observations, _, dones, infos = normalised.step(np.zeros(N, int))
+        raw_observations, _, _, raw_infos = plain.step(np.zeros(N, int))
+    assert dones.all()
+    np.testing.assert_allclose(observations, raw_observations - 1.0, rtol=1e-5, atol=1e-6)
+    for info, raw_info in zip(infos, raw_infos, strict=True):
+        last, raw_last = info["terminal_observation"], raw_info["terminal_observation"]
+        np.testing.assert_allclose(last, raw_last - 1.0, rtol=1e-5, atol=1e-6)
+
+
+def test_a_robots_own_attributes_are_its_own():
+    batch = make_batch(path="random")
+    batch.reset()
+    own = batch.env.unwrapped.waypoints
+    for found, expected in zip(batch.get_attr("waypoints", indices=[2, 0]), (own[2], own[0]), strict=True):
+        np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("symmetry", [False, True])
+def test_a_picture_of_the_batch_has_its_first_robots_side_by_side(symmetry):
+    pytest.importorskip("pygame")
+    batch = make_batch(symmetry, render_mode="rgb_array", num_envs=20)
+    batch.reset()
+    batch.step(np.zeros(20, int))
+    picture, tiles = batch.render(), batch.get_images()
+    assert len(tiles) == 16 and tiles[0].shape == (288, 384, 3)
+    assert picture.shape == (4 * 288, 4 * 384, 3)
+    np.testing.assert_array_equal(picture[:288, :384], tiles[0])
+
+
+def test_a_batch_that_draws_nothing_has_no_pictures():
+    assert make_batch().get_images() == [None] * N
+
+
+def test_stable_baselines_records_a_video(tmp_path):
+    pytest.importorskip("pygame")
+    pytest.importorskip("moviepy")
+    recorder = VecVideoRecorder(
+        make_batch(render_mode="rgb_array", num_envs=2), str(tmp_path), lambda step: step == 0, video_length=3
+    )
+    recorder.reset()
+    for _ in range(4):
+        recorder.step(np.ones(2, int))
+    recorder.close()
+    (video,) = tmp_path.glob("*.mp4")
+    assert video.stat().st_size > 1000 and recorder.frames_per_sec == 10
+
+
+def test_closing_closes_the_batch():
+    batch = make_batch()
+    batch.reset()
+    batch.close()
+    assert batch.env.closed

@@ -1,0 +1,221 @@
+"""The command `seastar`: what it shows, writes and refuses, in a sentence each."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from seastar_gym.cli import play, screen
+from seastar_gym.cli.main import COMMANDS, main
+
+ROOT = Path(__file__).resolve().parents[2]
+SHORT = "0.03, 0.0\n"
+
+
+@pytest.fixture
+def path(tmp_path):
+    file = tmp_path / "path.csv"
+    file.write_text(SHORT)
+    return str(file)
+
+
+@pytest.fixture
+def no_display(monkeypatch):
+    import pygame
+
+    pygame.display.quit()
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("SDL_VIDEODRIVER", "no-such-driver")
+
+
+@pytest.fixture
+def dummy_window(monkeypatch):
+    import pygame
+
+    pygame.display.quit()
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    yield
+    pygame.display.quit()
+
+
+def frames(file):
+    """Pictures of a GIF, shape (n, height, width, 3)."""
+    with Image.open(file) as film:
+        found = []
+        for number in range(film.n_frames):
+            film.seek(number)
+            found.append(np.asarray(film.convert("RGB"), dtype=np.int16))
+        return np.stack(found)
+
+
+def test_help_tells_every_command_and_loads_none(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["--help"])
+    text = capsys.readouterr().out
+    assert ended.value.code == 0 and all(name in text for name in COMMANDS)
+    code = (
+        "import sys; from seastar_gym.cli.main import main\n"
+        "try: main(['--help'])\n"
+        "finally: print(*sys.modules, file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert set(done.stderr.split()).isdisjoint({"torch", "pygame", "imageio", "matplotlib", "safetensors", "rich"})
+
+
+@pytest.mark.parametrize("command", sorted(set(COMMANDS) - {"train"}))
+def test_every_command_has_help_under_its_name(command, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main([command, "--help"])
+    assert ended.value.code == 0
+    assert capsys.readouterr().out.startswith(f"usage: seastar {command} ")
+
+
+def test_a_swim_is_filmed_without_a_display(path, tmp_path, no_display, capsys):
+    film = tmp_path / "films" / "swim.gif"
+    assert main(["swim", "--agent", "straight", "--path", path, "--fidelity", "fast", "--film", str(film)]) == 0
+    said = capsys.readouterr().out
+    assert "straight: 1 of 1 waypoints in" in said and str(film) in said
+    pictures = frames(film)
+    seconds = float(said.split(" in ")[1].split(" s")[0])
+    assert len(pictures) == 1 + seconds * screen.GIF_FPS / 4  # four times as fast; equal ones become one, longer
+    assert np.abs(pictures[-1] - pictures[0]).max() > 100
+
+
+def test_the_learned_policy_swims_in_a_registered_task(tmp_path, capsys):
+    film = tmp_path / "swim.mp4"
+    task = ["--task", "SeastarSwimTimedModerate-v0", "--fidelity", "fast", "--seconds", "1", "--speed", "8"]
+    assert main(["swim", *task, "--film", str(film)]) == 0
+    assert "0 of 5 waypoints in 1.0 s" in capsys.readouterr().out
+    assert film.stat().st_size > 1000
+
+
+def test_a_window_shows_a_swim_until_it_is_closed(path, dummy_window, monkeypatch, capsys):
+    arguments = ["swim", "--agent", "straight", "--path", path, "--fidelity", "fast", "--speed", "100"]
+    assert main(arguments) == 0
+    assert "1 of 1" in capsys.readouterr().out
+    monkeypatch.setattr(screen.Window, "show", lambda self, *arguments: self.close())
+    looks = iter([True, True, True, False])
+    monkeypatch.setattr(screen.Window, "is_wanted", lambda self, size: next(looks))
+    assert main(arguments) == 0
+    assert "0 of 1 waypoints in 2.0 s" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (["swim"], "No window can be opened here: write a film, --film swim.mp4 or swim.gif."),
+        (["play"], "No window can be opened here"),
+        (["play", "--film", "x.gif"], "A film needs the keys"),
+        (["play", "--keys", "9"], "There is no key '9'"),
+        (["play", "--speed", "0"], "--speed must be"),
+        (["swim", "--film", "swim.avi"], "A film is an .mp4 or a .gif, not swim.avi."),
+        (["swim", "--agent", "nobody"], "Unknown scripted agent 'nobody'"),
+        (["swim", "--task", "Nothing-v0"], "There is no task 'Nothing-v0': choose of SeastarSwim-v0, "),
+        (["swim", "--path", "nowhere"], "Unknown path 'nowhere'"),
+        (["swim", "--speed", "-1"], "--speed must be"),
+        (["evaluate", "--seconds", "0"], "--seconds must be"),
+        (["evaluate", "--agents", "rest", "rest"], "named twice"),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_a_sentence(arguments, words, no_display, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    printed = capsys.readouterr()
+    assert words in printed.err and printed.err.count("\n") == 1 and not printed.out
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_unknown_command_is_refused(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["fly"])
+    assert ended.value.code == 2 and "invalid choice: 'fly'" in capsys.readouterr().err
+
+
+# Playing
+
+
+def test_keys_swim_into_a_film(path, tmp_path, no_display, capsys):
+    """Straight on for four seconds: the robot arrives, and the film goes on to show it."""
+    film = tmp_path / "play.gif"
+    arguments = ["--path", path, "--keys", "a*20 .", "--film", str(film), "--speed", "2"]
+    assert main(["play", *arguments]) == 0
+    assert "1 of 1 waypoints in" in capsys.readouterr().out
+    pictures = frames(film)
+    assert np.abs(pictures[10] - pictures[0]).max() > 100
+    help_text = pictures[:, 22:76, 8:200]  # the keys are told all the time
+    assert np.ptp(help_text[0]) > 100 and np.abs(help_text[-1] - help_text[0]).max() < 60
+
+
+class Pressed:
+    """A keyboard whose keys are down for some pictures each."""
+
+    def __init__(self, *names):
+        import pygame
+
+        pygame.display.init()
+        self.held = [pygame.key.key_code(name) if name else None for name in names]
+        self.now = None
+
+    def __getitem__(self, code):
+        return code == self.now
+
+    def get_pressed(self):
+        self.now = self.held.pop(0)
+        return self
+
+
+def test_the_keyboard_plays_in_a_window(path, dummy_window, monkeypatch, capsys):
+    import pygame
+
+    keys = Pressed("a", "", "", "f1", "z", "escape")
+    monkeypatch.setattr(pygame.key, "get_pressed", keys.get_pressed)
+    monkeypatch.setattr(pygame.key, "get_just_pressed", lambda: keys)
+    seen = []
+    step = play.PlayedEnv.step
+    monkeypatch.setattr(play.PlayedEnv, "step", lambda env, action: seen.append(action.tolist()) or step(env, action))
+    assert main(["play", "--path", path, "--speed", "100", "--decision-period", "0.2"]) == 0
+    assert seen[0] == [0, 1, 0, 0, 2] and not keys.held
+    assert "You reached 0 of 1 waypoints" in capsys.readouterr().out
+
+
+# Evaluation and training
+
+
+def test_agents_are_compared_without_rich(path, tmp_path, capsys):
+    out = tmp_path / "out"
+    arguments = ["--agents", "straight", "2-,5+", "--path", path, "--fidelity", "fast", "--seconds", "5"]
+    assert main(["evaluate", *arguments, "--out", str(out)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines[:-1])) <= 80
+    assert [line.split()[0] for line in lines[3:5]] == ["straight", "2-,5+"]
+    assert {file.name for file in out.iterdir()} == {"evaluation.csv", "traces.png"}
+
+
+def test_training_without_the_repository_says_what_it_needs(tmp_path, monkeypatch, capsys):
+    from seastar_gym.cli import train
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(train, "__file__", str(tmp_path / "lib" / "seastar_gym" / "cli" / "train.py"))
+    assert main(["train"]) == 2
+    assert "Training needs a checkout" in capsys.readouterr().err
+
+
+def test_training_runs_the_checkout_s_own_script(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "agents").mkdir()
+    (tmp_path / "train.py").write_text("import sys\nprint(sys.argv[1:])\nsys.exit(3)\n")
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    monkeypatch.setattr(sys, "argv", list(sys.argv))
+    assert main(["train", "--quick"]) == 3
+    assert "['--quick']" in capsys.readouterr().out
+
+
+def test_pictures_of_a_decision_keep_the_speed():
+    assert screen.rate(None, 1.0, 4.0) == (8, 32.0)
+    number, fps = screen.rate(Path("a.gif"), 0.2, 2.0)
+    assert number == 2 and fps == pytest.approx(20.0)
+    assert screen.rate(None, 0.1, 30.0) == (1, 300.0)

@@ -1,0 +1,426 @@
+"""A policy in its two files swims as its learner did; what does not fit is refused with a sentence."""
+
+import hashlib
+import json
+import pickle
+import subprocess
+import sys
+from dataclasses import fields, replace
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import safetensors.numpy
+import torch
+
+from agents.hyperparameters import Hyperparameters
+from agents.ppo import make_model, make_training_env, policy_of
+from every_part import ACTUATORS, PARTS
+from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, SmaPulse, UniformCurrent, Water
+from seastar_gym.controllers.description import Description
+from seastar_gym.controllers.learned import SHIPPED, LearnedPolicy, load, save
+from seastar_gym.envs import symmetry
+from seastar_gym.envs.commands import command_table
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.task import scene_observation_size
+from seastar_gym.evaluation.swim import swim
+
+ROOT = Path(__file__).resolve().parents[2]
+FAST = Numerics.preset("fast")
+SMALL = Hyperparameters(num_envs=8, rollout=8, batch_size=32, epochs=2, hidden=(16, 8), max_episode_time=10.0)
+FOUR_LIMBS = Scene(robot=Seastar(n_limbs=4, nodes_per_limb=4), numerics=FAST)
+
+
+def random_policy(description, seed=0):
+    rng = np.random.default_rng(seed)
+    shapes = description.shapes().items()
+    return LearnedPolicy(description, {name: rng.normal(size=shape).astype(np.float32) for name, shape in shapes})
+
+
+@pytest.fixture
+def policy():
+    return random_policy(Description("joint", True, Scene(numerics=FAST), (16, 8)))
+
+
+@pytest.fixture
+def file(policy, tmp_path):
+    save(policy, tmp_path / "policy.safetensors", seed=7)
+    return tmp_path / "policy.safetensors"
+
+
+def observations(scene=Scene(), n=2000, seed=0):
+    size = scene_observation_size(scene)
+    return np.random.default_rng(seed).normal(size=(n, size)).astype(np.float32)
+
+
+# The network
+
+
+@pytest.mark.parametrize("actions", ["joint", "pairs", "limbs"])
+@pytest.mark.parametrize("reduced", [True, False])
+@pytest.mark.parametrize("scene", [Scene(numerics=FAST), FOUR_LIMBS])
+def test_a_saved_policy_acts_as_stable_baselines_does(actions, reduced, scene, tmp_path):
+    hyperparameters = replace(SMALL, actions=actions, symmetry=reduced)
+    learner = make_model(make_training_env(hyperparameters, "random", True, scene=scene), hyperparameters, seed=0)
+    learner.learn(64)
+    save(policy_of(learner), tmp_path / "policy.safetensors")
+    policy, n_limbs = load(tmp_path / "policy.safetensors"), scene.robot.n_limbs
+    seen = observations(scene)
+    shown, elements = symmetry.reduce_observations(seen, n_limbs) if reduced else (seen, np.zeros(len(seen), int))
+    chosen = learner.predict(shown, deterministic=True)[0]
+    actual, state = policy.predict(seen, deterministic=True)
+    best, second = np.moveaxis(np.sort(policy.logits(shown), axis=-1)[..., :-3:-1], -1, 0)
+    clear = (best - second > 1e-6).all(axis=-1)  # elsewhere rounding decides
+    assert clear.mean() > 0.95
+    np.testing.assert_array_equal(actual[clear], symmetry.restore_actions(chosen, elements, actions, n_limbs)[clear])
+    assert state is None
+
+
+def test_its_logits_are_those_of_torch(policy):
+    linear = [torch.nn.Linear(186, 16), torch.nn.Linear(16, 8), torch.nn.Linear(8, 243)]
+    network = torch.nn.Sequential(linear[0], torch.nn.Tanh(), linear[1], torch.nn.Tanh(), linear[2])
+    for number, layer in enumerate(linear):
+        layer.weight.data[:] = torch.from_numpy(policy.weights[f"{number}.weight"])
+        layer.bias.data[:] = torch.from_numpy(policy.weights[f"{number}.bias"])
+    seen = observations(n=10)
+    expected = network(torch.from_numpy(seen)).detach().numpy()
+    np.testing.assert_allclose(policy.logits(seen)[:, 0], expected, rtol=1e-4, atol=1e-4)
+
+
+def test_random_actions_follow_the_logits():
+    """Over many draws, as often as their probability says."""
+    description = Description("pairs", False, FOUR_LIMBS, (4,))
+    policy = random_policy(description)
+    seen = np.repeat(observations(FOUR_LIMBS, n=1), 20_000, axis=0) * np.float32(0.3)
+    logits = policy.logits(seen[0])[0]
+    probabilities = np.exp(logits - logits.max()) / np.exp(logits - logits.max()).sum()
+    drawn, _ = policy.predict(seen)
+    frequencies = np.bincount(drawn, minlength=len(command_table("pairs", 4))) / len(drawn)
+    np.testing.assert_allclose(frequencies, probabilities, atol=0.02)
+
+
+def test_any_network_behind_the_symmetry_is_equivariant(policy):
+    seen = observations(n=200)
+    actions, _ = policy.predict(seen, deterministic=True)
+    for element in range(10):
+        elements = np.full(len(seen), element)
+        carried, _ = policy.predict(symmetry.transform_observations(seen, elements, 5), deterministic=True)
+        np.testing.assert_array_equal(carried, symmetry.transform_actions(actions, elements, "joint", 5))
+
+
+# On disk
+
+
+def test_weights_and_description_survive_the_disk_to_the_last_bit(policy, file):
+    again = load(file)
+    assert again.description == policy.description
+    assert again.training == {"seed": 7}
+    for name, array in policy.weights.items():
+        np.testing.assert_array_equal(again.weights[name], array)
+
+
+def unlike_the_default() -> Scene:
+    """A scene of which every field is another than the default's."""
+    scene = Scene(
+        robot=Seastar(youngs_modulus=2e6, limbs=(Limb(radius=(2e-3, 1e-3)),) * 5),
+        fluid=Water(tangential_drag_coefficient=0.1, current=UniformCurrent(0.01, 0.0)),
+        actuator=SmaPulse(peak_angle=0.5),
+        numerics=Numerics.preset("fast"),
+        held_nodes=(3,),
+        loads=((9, 0.0, 1e-3),),
+        limb_strengths=(1.0, 1.0, 0.5, 1.0, 1.0),
+        contact=Contact(opening_angle=0.2),
+        gravity=(0.1, 0.0),
+    )
+    assert all(getattr(scene, field.name) != getattr(Scene(), field.name) for field in fields(Scene))
+    return scene
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [Scene(), FOUR_LIMBS, Scene(fluid=None), Scene(fluid=Water(drag_coefficient=1.5)), unlike_the_default()],
+)
+def test_a_description_survives_its_text(scene):
+    description = Description("pairs", False, scene, (3, 4, 5))
+    assert Description.from_json(description.to_json().encode()) == description
+
+
+@pytest.mark.parametrize(
+    "scene", [{"actuator": one} for one in ACTUATORS.values()] + [*PARTS.values()], ids=[*ACTUATORS, *PARTS]
+)
+def test_a_policy_of_any_scene_can_be_loaded_again(scene, tmp_path):
+    policy = random_policy(Description("pairs", False, Scene(**scene), (3,)))
+    save(policy, tmp_path / "policy.safetensors")
+    assert load(tmp_path / "policy.safetensors").description == policy.description
+
+
+def test_a_policy_that_could_not_be_loaded_again_is_refused_when_it_is_saved(tmp_path):
+    class Own(SmaPulse):
+        """Not the package's."""
+
+    policy = random_policy(Description("pairs", False, Scene(actuator=Own()), (3,)))
+    with pytest.raises(ValueError, match=r"Scene\.actuator is a Own, .*register_part"):
+        save(policy, tmp_path / "policy.safetensors")
+    assert not [*tmp_path.iterdir()]
+
+
+def test_the_weights_can_be_read_by_anyone(policy, file):
+    """The file is plain safetensors; there is nothing to unpickle in it."""
+    weights = safetensors.numpy.load_file(file)
+    assert {name: array.shape for name, array in weights.items()} == policy.description.shapes()
+    facts = json.loads(file.with_suffix(".json").read_text())
+    assert (facts["observation_size"], facts["actions"], facts["hidden"]) == (186, "joint", [16, 8])
+
+
+def assert_refused(file, sentence):
+    with pytest.raises((ValueError, FileNotFoundError), match=sentence) as error:
+        load(file)
+    text = str(error.value)
+    assert str(file) in text and "\n" not in text and text.endswith("."), text
+
+
+@pytest.mark.parametrize("missing", [".safetensors", ".json"])
+def test_a_missing_file_is_named(file, missing):
+    file.with_suffix(missing).unlink()
+    assert_refused(file, rf"There is no trained policy at .*policy\{missing} is missing")
+
+
+def test_another_kind_of_file_is_refused(tmp_path):
+    assert_refused(tmp_path / "model.pkl", "A policy is in a file named .safetensors")
+
+
+@pytest.mark.parametrize("keep", [0, 7, 0.5, 0.999])
+def test_cut_weights_are_said_to_be_damaged(file, keep):
+    data = file.read_bytes()
+    file.write_bytes(data[: keep if isinstance(keep, int) else int(keep * len(data))])
+    assert_refused(file, "is damaged, or no policy of this version: the weights are not those")
+
+
+def test_a_flipped_bit_is_found(file):
+    data = bytearray(file.read_bytes())
+    data[-100] ^= 1
+    file.write_bytes(bytes(data))
+    assert_refused(file, "is damaged.*the weights are not those that its .json file describes")
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "3", "{}", '{"sha256": null}', "\0"])
+def test_a_description_that_is_none_is_said_to_be_damaged(file, text):
+    file.with_suffix(".json").write_text(text)
+    assert_refused(file, "is damaged, or no policy of this version")
+
+
+NO_LIMBS = Scene().to_dict() | {"robot": Scene().to_dict()["robot"] | {"n_limbs": 0}}
+
+
+@pytest.mark.parametrize(
+    "change, sentence",
+    [
+        ({"observation_layout": 1}, "its observation_layout is 1, this version of seastar_gym knows 2"),
+        ({"format": 99}, "its format is 99"),
+        ({"actions": "waves"}, "actions must be one of"),
+        ({"hidden": [16, 9]}, r"its weights have the shapes .*\(16, 186\)"),
+        ({"hidden": "wide"}, "is damaged"),
+        ({"scene": NO_LIMBS}, "n_limbs must be a whole number from 1"),
+        ({"scene": {"robot": {"n_arms": 5}}}, "a dict with a version"),
+        ({"symmetry": "False"}, "symmetry must be true or false, not 'False'"),
+        ({"symmetry": None}, "symmetry must be true or false, not None"),
+        ({"actions": None}, "actions must be one of"),
+        ({"actions": ["joint"]}, r"actions must be one of .*, not \['joint'\]"),
+        ({"format": True}, "its format is True"),
+        ({"format": 2.5}, "its format is 2.5"),
+        ({"observation_layout": [1]}, r"its observation_layout is \[1\]"),
+        ({"hidden": None}, "hidden must be a list of widths, not None"),
+        ({"hidden": [16, "8"]}, "a width of its hidden layers must be a whole number"),
+        ({"hidden": [0]}, "a width of its hidden layers must be a whole number"),
+        ({"hidden": [10**300]}, "a width of its hidden layers must be a whole number"),
+        ({"hidden": []}, "its weights have the shapes"),
+        ({"scene": None}, "a dict with a version.*, not None"),
+        ({"training": None}, "its training is a NoneType"),
+        ({"training": {"progress": [[1, 2]]}}, "the progress of its training must be rows of three numbers"),
+        ({"training": {"progress": [[1, 2, 10**400]]}}, "the progress of its training must be rows of three numbers"),
+        ({"training": {"progress": {"a": 1}}}, "the progress of its training must be rows of three numbers"),
+        ({"training": {"commands": [3]}}, "the commands of its training must be texts"),
+        ({"sha256": 3}, "the weights are not those"),
+    ],
+)
+def test_what_does_not_fit_is_said_in_one_sentence(file, change, sentence):
+    facts = json.loads(file.with_suffix(".json").read_text())
+    file.with_suffix(".json").write_text(json.dumps(facts | change))
+    assert_refused(file, sentence)
+
+
+def test_bytes_that_are_no_safetensors_are_refused_even_if_described(file):
+    file.write_bytes(b"\x80\x04}\x94.")  # a pickle
+    facts = json.loads(file.with_suffix(".json").read_text())
+    facts["sha256"] = hashlib.sha256(file.read_bytes()).hexdigest()
+    file.with_suffix(".json").write_text(json.dumps(facts))
+    assert_refused(file, "is damaged")
+
+
+@pytest.mark.parametrize("weight", [np.nan, np.inf, -np.inf])
+def test_weights_that_are_not_finite_are_refused(policy, file, weight):
+    policy.weights["1.bias"][3] = weight
+    save(policy, file)
+    assert_refused(file, "its weights are not all finite numbers of single precision")
+
+
+def test_weights_of_another_precision_are_refused(policy, file):
+    weights = {name: array.astype(np.float64) for name, array in policy.weights.items()}
+    rewrite(file, safetensors.numpy.save(weights))
+    assert_refused(file, "its weights are not all finite numbers of single precision")
+
+
+def rewrite(file, data: bytes) -> None:
+    """Other weights, and a description that says that they are the ones."""
+    file.write_bytes(data)
+    facts = json.loads(file.with_suffix(".json").read_text())
+    file.with_suffix(".json").write_text(json.dumps(facts | {"sha256": hashlib.sha256(data).hexdigest()}))
+
+
+@pytest.mark.parametrize(
+    "text, sentence",
+    [
+        (b"null", "its description is a NoneType"),
+        (b"\xff\xfe{}", "'utf-8' codec can't decode"),
+        ("{}".encode("utf-16"), "'utf-8' codec can't decode"),
+        (b"[" * 100_000, "is damaged"),
+        (b'{"a":' * 100_000, "nested too deeply"),
+        (b'{"format": 1e999}', "says 1e999, which is no finite number"),
+        (b'{"format": NaN}', "says NaN, which is no finite number"),
+        (b'{"format": ' + b"9" * 5000 + b"}", "is damaged"),
+        (b'{"format": 2, "format": 1}', "does not say 'sha256'"),
+    ],
+)
+def test_json_that_no_description_can_be_is_refused(file, text, sentence):
+    file.with_suffix(".json").write_bytes(text)
+    assert_refused(file, sentence)
+
+
+def test_a_pickle_or_a_zip_that_is_named_like_a_policy_is_refused_unread(policy, file, tmp_path):
+    class Bomb:
+        def __reduce__(self):
+            return print, ("boom",)
+
+    torch.save({"0.weight": Bomb()}, tmp_path / "policy.pth")
+    with pytest.raises(ValueError, match=r"is in a file named \.safetensors, not in .*policy\.pth\.$"):
+        load(tmp_path / "policy.pth")
+    rewrite(file, (tmp_path / "policy.pth").read_bytes())  # a zip of pickles
+    assert_refused(file, "is damaged")
+    rewrite(file, pickle.dumps(Bomb()))
+    assert_refused(file, "is damaged")
+
+
+N_DAMAGED = 200
+
+
+@pytest.mark.parametrize("suffix", [".json", ".safetensors", "the weights of the description"])
+def test_damaged_files_of_the_policy_in_the_box_load_or_are_refused_in_a_sentence(suffix, tmp_path):
+    """Bytes flipped, cut out, doubled or cut off, with a fixed seed."""
+    rng, file = np.random.default_rng(0), tmp_path / "policy.safetensors"
+    shipped = {one: SHIPPED.with_suffix(one).read_bytes() for one in (".json", ".safetensors")}
+    refused = 0
+    for _ in range(N_DAMAGED):
+        for one, data in shipped.items():
+            file.with_suffix(one).write_bytes(data)
+        if suffix in shipped:
+            file.with_suffix(suffix).write_bytes(damaged(shipped[suffix], rng))
+        else:
+            rewrite(file, damaged(shipped[".safetensors"], rng, n_first=1000))  # its header, too
+        try:
+            loaded = load(file)
+        except ValueError as refusal:
+            text = str(refusal)
+            assert text.startswith(str(file)) and text.endswith(".") and "\n" not in text, text
+            refused += 1
+        else:
+            assert loaded.predict(np.zeros(186, np.float32), deterministic=True)[0] in range(21)
+    assert refused > N_DAMAGED // 4
+
+
+def damaged(data: bytes, rng: np.random.Generator, n_first: int | None = None) -> bytes:
+    """The bytes with a few changes, half of them among the first ones."""
+    out = bytearray(data)
+    for _ in range(rng.integers(1, 4)):
+        end = len(out) if n_first is None or rng.random() < 0.5 else n_first
+        place = int(rng.integers(max(1, min(end, len(out)))))
+        match rng.integers(5):
+            case 0:
+                out[place] ^= 1 << int(rng.integers(8))
+            case 1:
+                out[place] = int(rng.integers(256))
+            case 2:
+                del out[place : place + int(rng.integers(1, 20))]
+            case 3:
+                out[place:place] = out[place : place + int(rng.integers(1, 20))]
+            case 4 if rng.random() < 0.3:
+                del out[place:]
+    return bytes(out) or b"\0"
+
+
+# In an environment
+
+
+@pytest.mark.parametrize(
+    "robot, actions, sentence",
+    [
+        (Seastar(n_limbs=4), "joint", r"robot of 5 limbs, the environment's has 4\."),
+        (Seastar(n_limbs=9, nodes_per_limb=6), "pairs", r"environment's has 9\."),
+        (Seastar(), "limbs", r'answers with actions="joint", the environment takes actions="limbs"\.'),
+    ],
+)
+def test_an_environment_that_does_not_fit_is_refused_before_the_first_stroke(policy, robot, actions, sentence):
+    env = SeastarSwimEnv(actions=actions, scene=Scene(robot=robot, numerics=FAST))
+    with pytest.raises(ValueError, match=sentence):
+        swim("learned", policy, env, max_strokes=1)
+
+
+def test_an_observation_of_another_robot_is_refused(policy):
+    with pytest.raises(ValueError, match=r"robot of 5 limbs: it sees 186 numbers, not .* shape \(150,\)"):
+        policy.predict(np.zeros(150, np.float32))
+
+
+def test_another_scene_is_told_but_other_numerics_are_not(policy):
+    assert policy.differences(Scene(numerics=Numerics.preset("reference"))) == ""
+    other = Scene(robot=Seastar(youngs_modulus=2e6), fluid=Water(drag_coefficient=1.5))
+    assert policy.differences(other) == (
+        "trained in another scene, with fluid.drag_coefficient 1.0 (here 1.5), "
+        "robot.youngs_modulus 1000000.0 (here 2000000.0)."
+    )
+    assert "fluid.density 1000.0 (here None)" in policy.differences(Scene(fluid=None))
+
+
+# The policy in the box
+
+
+def test_the_policy_in_the_box_says_how_it_was_made():
+    shipped = load()
+    facts = json.loads(SHIPPED.with_suffix(".json").read_text(encoding="utf-8"))
+    assert Scene.from_dict(facts["scene"]) == shipped.scene
+    assert shipped.scene == Scene.preset("balanced")
+    assert shipped.training["strokes"] > 0 and isinstance(shipped.training["seed"], int)
+    assert shipped.training["commands"][0].startswith("python train.py")
+    assert {"seastar_gym", "numpy", "torch", "stable_baselines3"} <= set(shipped.training["versions"])
+    assert SHIPPED.stat().st_size < 1_000_000
+
+
+def test_the_policy_in_the_box_beats_the_script_round_the_pentagon():
+    shipped = load()
+    env = gym.make("SeastarSwim-v0", actions=shipped.actions, scene=shipped.scene).unwrapped
+    done = swim("learned", shipped, env, max_strokes=300)
+    assert done.finished
+    assert done.strokes < 200 < 241
+
+
+@pytest.mark.parametrize("nodes_per_limb", [7, 19])
+def test_the_policy_in_the_box_swims_with_any_nodes_per_limb(nodes_per_limb):
+    shipped = load()
+    scene = Scene(Seastar(nodes_per_limb=nodes_per_limb), numerics=FAST)
+    done = swim("learned", shipped, SeastarSwimEnv(actions=shipped.actions, scene=scene), max_strokes=300)
+    assert done.finished and done.strokes < 200
+
+
+def test_it_needs_neither_torch_nor_stable_baselines():
+    code = "import sys; from seastar_gym.controllers.learned import load; load(); print(*sys.modules)"
+    answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert set(answer.stdout.split()).isdisjoint({"torch", "stable_baselines3", "pickle5", "matplotlib"})

@@ -1,0 +1,89 @@
+"""The planner sees the whole state, and looks further than a stroke."""
+
+import numpy as np
+import pytest
+
+from seastar_gym import Numerics, Scene, Seastar, Simulator, ThermalSma
+from seastar_gym.controllers.greedy import waypoints_of
+from seastar_gym.controllers.planner import Budget, Planner, state_of
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.evaluation.swim import swim
+
+FAST = Scene(numerics=Numerics.preset("fast"))
+
+
+def swum(n_robots=3, strokes=4, scene=FAST):
+    """A batch on its way, with its observations."""
+    env = SeastarSwimVectorEnv(n_robots, path="random", random_heading=True, actions="pairs", scene=scene, threads=1)
+    observations, _ = env.reset(seed=3)
+    env.action_space.seed(4)
+    for _ in range(strokes):
+        observations, *_ = env.step(env.action_space.sample())
+    return env, observations
+
+
+@pytest.mark.parametrize("robot", [Seastar(), Seastar(4, 5), Seastar(nodes_per_limb=7), Seastar(nodes_per_limb=19)])
+def test_an_observation_is_the_whole_state(robot):
+    """From the state read off the observations, the same commands go the same way, as seen in the body frame.
+
+    More nodes than stations are interpolated, so undamped limbs ring otherwise: by some per mille of a stroke.
+    """
+    scene = Scene(robot, numerics=FAST.numerics)
+    env, observations = swum(scene=scene)
+    state = state_of(observations, scene)
+    twin = Simulator(scene, 3, threads=1)
+    twin.set_state(state)
+    np.testing.assert_allclose(
+        np.linalg.norm(twin.hub_velocity(), axis=1), np.linalg.norm(env.simulator.hub_velocity(), axis=1), rtol=1e-5
+    )
+    before = env.simulator.hub_position()
+    commands = np.zeros((3, scene.robot.n_limbs))
+    commands[:, :2] = 1.0, -1.0
+    twin.stroke(commands)
+    env.simulator.stroke(commands)
+    moved = np.linalg.norm(env.simulator.hub_position() - before, axis=1)
+    allowed = 1e-4 if robot.nodes_per_limb <= 10 else 1e-2
+    np.testing.assert_allclose(np.linalg.norm(twin.hub_position(), axis=1), moved, rtol=allowed)
+
+
+def test_the_state_of_the_rods_is_seen_beside_what_actuators_remember():
+    scene = Scene(actuator=ThermalSma(), numerics=FAST.numerics)
+    env, observations = swum(scene=scene)
+    twin = Simulator(scene, 3, threads=1)
+    twin.set_state(state_of(observations, scene))
+    np.testing.assert_allclose(twin.kinetic_energy(), env.simulator.kinetic_energy(), rtol=1e-4)
+    for found, waypoints, hub in zip(
+        waypoints_of(observations, scene)[0], env.waypoints, env.simulator.hub_position(), strict=True
+    ):
+        assert np.hypot(*found) == pytest.approx(np.hypot(*(waypoints[0] - hub)), rel=1e-5)
+
+
+def test_a_batch_gets_the_actions_of_single_robots():
+    _, observations = swum()
+    planner = Planner(FAST, budget=Budget(2, 4), threads=1)
+    together = planner.predict(observations)[0]
+    np.testing.assert_array_equal(together, [planner.predict(one)[0] for one in observations])
+
+
+def test_two_strokes_ahead_it_finds_what_an_exhaustive_search_finds():
+    _, observations = swum(n_robots=1)
+    wide = Planner(FAST, budget=Budget(2, 21), threads=1).predict(observations)[0]
+    states, planner = state_of(observations, FAST), Planner(FAST, threads=1)
+    ends = planner._swim_all(planner._swim_all(states))
+    waypoint = 0.1 * observations[0, -4:-2].astype(float)
+    way = np.linalg.norm(ends.positions[:, 0] - waypoint, axis=1)  # far away: the circle is a constant
+    chosen = wide[0] * 21
+    assert way[chosen : chosen + 21].min() == pytest.approx(way.min(), abs=2e-5)
+
+
+def test_it_swims_round_a_corner_faster_than_by_the_displacement_map():
+    env = SeastarSwimEnv(path=[[0.04, 0.0], [0.04, 0.04]], actions="pairs", fidelity="fast")
+    done = swim("planner", Planner(FAST, budget=Budget(2, 4), threads=1), env, max_strokes=40)
+    assert done.finished and done.strokes <= 15
+
+
+@pytest.mark.parametrize("arguments", [(0, 1), (1, 0)])
+def test_a_search_of_nothing_is_refused(arguments):
+    with pytest.raises(ValueError, match="at least 1"):
+        Budget(*arguments)

@@ -1,0 +1,32 @@
+"""Agents by name: one line adds one, and the command lines tell all names."""
+
+import pytest
+
+from agents import evaluate, trials
+from seastar_gym import Scene
+from seastar_gym.controllers.roster import AGENTS, load_agents
+from seastar_gym.controllers.scripted import GAITS, scripted
+from seastar_gym.envs.paths import PATHS
+
+
+def test_an_agent_of_one_line_is_made_for_the_scene_of_the_fidelity(monkeypatch):
+    scenes = []
+
+    def mine(scene, decision_period):
+        assert decision_period is None
+        scenes.append(scene)
+        return scripted("rest")
+
+    monkeypatch.setitem(AGENTS, "mine", mine)
+    assert list(load_agents(["mine", "rest"], fidelity="fast")) == ["mine", "rest"]
+    assert [type(scene) for scene in scenes] == [Scene] and scenes[0] == Scene.preset("fast")
+
+
+@pytest.mark.parametrize("command", [evaluate.main, trials.main])
+def test_help_tells_the_names_of_all_agents(command, capsys):
+    with pytest.raises(SystemExit):
+        command(["--help"])
+    text = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert ", ".join(AGENTS) in text and ", ".join(GAITS) in text
+    assert f"usage: python -m {command.__module__}" in text
+    assert command is trials.main or ", ".join(PATHS) in text

@@ -1,0 +1,187 @@
+"""The scripted gaits do what the chapter says, in every action mode, alone and in batches."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from stable_baselines3.common.evaluation import evaluate_policy
+from stable_baselines3.common.monitor import Monitor
+
+from seastar_gym import Numerics, Scene, Simulator
+from seastar_gym.controllers.scripted import GAITS, OpenLoopPolicy, scripted, to_actions
+from seastar_gym.envs.commands import action_space, to_commands
+from seastar_gym.gaits import pair_gait, pentagon_gait, straight_gait
+
+MODES = ["limbs", "joint", "pairs"]
+OBSERVATION = np.zeros(186, np.float32)
+SECOND_ORDER = Scene(numerics=Numerics(scheme="sdirk2", step=10e-3))
+
+
+def swim(commands, scene=SECOND_ORDER):
+    """Hub positions [m] at rest and after every stroke, shape (n_strokes + 1, 2)."""
+    simulator = Simulator(scene, threads=1)
+    simulator.reset()
+    hub = [simulator.hub_position()[0]]
+    for command in commands:
+        simulator.stroke(command[None])
+        hub.append(simulator.hub_position()[0])
+    return np.array(hub)
+
+
+def strokes_of(policy, n_strokes, observation=OBSERVATION):
+    """Actions of a number of strokes from the start."""
+    actions, state = [], None
+    for _ in range(n_strokes):
+        action, state = policy.predict(observation, state)
+        actions.append(action)
+    return np.array(actions)
+
+
+# The chapter's swims
+
+
+def test_pentagon_gait_is_the_sequence_of_13_15():
+    gait = pentagon_gait()
+    assert gait.shape == (250, 5)
+    assert np.all(gait.sum(axis=1) == 0.0)
+    sides = gait.reshape(5, 50, 5)
+    heated = [set((1 + np.flatnonzero(side[0])).tolist()) for side in sides]
+    assert heated == [{2, 5}, {1, 3}, {2, 4}, {3, 5}, {1, 4}]
+    assert np.all(sides[:, :45] == sides[:, :1])
+    assert np.all(sides[:, 45:] == 0.0)
+
+
+def test_pentagon_gait_traces_a_regular_pentagon_that_closes():
+    corners = swim(pentagon_gait())[::50]
+    sides = np.diff(corners, axis=0)
+    lengths = np.hypot(*sides.T)
+    turns = np.degrees(np.diff(np.unwrap(np.arctan2(sides[:, 1], sides[:, 0]))))
+    assert lengths.mean() == pytest.approx(0.1439, abs=2e-4)
+    np.testing.assert_allclose(lengths, lengths.mean(), rtol=5e-4)
+    np.testing.assert_allclose(turns, 72.0, atol=0.05)
+    assert np.hypot(*corners[-1]) < 0.2e-3
+
+
+def test_straight_gait_moves_along_x_and_not_sideways():
+    hub = swim(np.repeat(straight_gait(), 3, axis=0))
+    assert np.all(np.diff(hub[:, 0]) > 3e-3)
+    assert np.all(np.abs(hub[:, 1]) < 1e-10)
+
+
+@pytest.mark.parametrize(("name", "bisector"), [("1-,2+", 36.0), ("1-,3+", 72.0), ("1-,4+", 108.0), ("1-,5+", 144.0)])
+def test_pairs_of_fig_13_8_move_along_their_bisectors(name, bisector):
+    action, _ = scripted(name).predict(OBSERVATION)
+    end = swim(np.repeat(to_commands("limbs", 5, action[None], 1), 3, axis=0))[-1]
+    assert np.degrees(np.arctan2(end[1], end[0])) == pytest.approx(bisector, abs=0.01)
+    assert np.hypot(*end) > 1e-3
+
+
+# Policies
+
+
+@pytest.mark.parametrize("actions", MODES)
+def test_every_action_mode_means_the_same_commands(actions):
+    chosen = strokes_of(scripted("pentagon", actions), 251)
+    space = action_space(actions, 5)
+    assert all(action in space for action in chosen)
+    np.testing.assert_array_equal(
+        to_commands(actions, 5, chosen, 251), np.concatenate([pentagon_gait(), straight_gait()])
+    )
+
+
+@pytest.mark.parametrize("actions", MODES)
+def test_one_robot_and_a_batch_get_the_same_actions(actions):
+    gait = scripted("pentagon", actions)
+    alone = strokes_of(gait, 60)
+    batch = strokes_of(gait, 60, np.zeros((3, 186), np.float32))
+    assert batch.shape == (60, 3, *action_space(actions, 5).shape)
+    for robot in range(3):
+        np.testing.assert_array_equal(batch[:, robot], alone)
+
+
+def test_episode_start_begins_the_gait_anew_for_that_robot_alone():
+    gait, batch = scripted("pentagon", "pairs"), np.zeros((2, 186), np.float32)
+    _, state = gait.predict(batch, (np.array([48, 49]),))
+    action, state = gait.predict(batch, state, episode_start=np.array([False, True]))
+    rest, first_side = to_actions(np.zeros(5), "pairs", 5), to_actions(straight_gait()[0], "pairs", 5)
+    np.testing.assert_array_equal(action, [rest, first_side])
+    np.testing.assert_array_equal(state[0], [50, 1])
+
+
+def test_two_episodes_can_share_one_gait():
+    gait = scripted("pentagon")
+    first, second = strokes_of(gait, 60), strokes_of(gait, 60)
+    np.testing.assert_array_equal(first, second)
+
+
+def test_stable_baselines3_can_evaluate_a_gait():
+    env = Monitor(gym.make("SeastarSwim-v0", path=[[0.02, 0.0]], waypoint_radius=2e-3, fidelity="fast"))
+    rewards, lengths = evaluate_policy(scripted("straight"), env, n_eval_episodes=2, return_episode_rewards=True)
+    assert lengths[0] == lengths[1] < 10
+    assert rewards[0] == rewards[1] > 0.0
+
+
+@pytest.mark.parametrize("actions", MODES)
+def test_random_actions_follow_their_generator_and_reach_every_choice(actions):
+    batch = np.zeros((1000, 186), np.float32)
+    first, second = (scripted("random", actions, rng=np.random.default_rng(3)).predict(batch)[0] for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+    n_choices = {"limbs": 3, "joint": 243, "pairs": 21}[actions]
+    assert first.shape == (1000, *action_space(actions, 5).shape)
+    assert len(np.unique(first)) > 0.95 * n_choices
+    alone, state = scripted("random", actions).predict(OBSERVATION)
+    assert alone in action_space(actions, 5)
+    assert state is None
+
+
+def test_resting_heats_no_limb():
+    np.testing.assert_array_equal(strokes_of(scripted("rest"), 2), np.zeros((2, 5)))
+
+
+@pytest.mark.parametrize("name", ["4+,1-", "1-,4+", "{1-, 4+}"])
+def test_a_pair_may_be_written_as_in_the_chapter(name):
+    np.testing.assert_array_equal(strokes_of(scripted(name), 1), [[2, 0, 0, 1, 0]])
+
+
+def test_gaits_fit_robots_of_other_limbs():
+    action, _ = scripted("straight", n_limbs=6).predict(OBSERVATION)
+    np.testing.assert_array_equal(action, [0, 1, 0, 0, 0, 2])
+
+
+# Refusals
+
+
+@pytest.mark.parametrize("name", ["pentagram", "", "2+", "2+,5+", "2-,5-", "a+,b-", "1+,2-,3+"])
+def test_an_unknown_name_is_answered_with_the_known_ones(name):
+    with pytest.raises(ValueError, match="Unknown scripted agent") as refusal:
+        scripted(name)
+    assert all(known in str(refusal.value) for known in GAITS)
+
+
+@pytest.mark.parametrize("name", ["1+,1-", "1+,6-", "0+,1-"])
+def test_a_pair_needs_two_limbs_of_the_robot(name):
+    with pytest.raises(ValueError, match="two different limbs from 1 to 5"):
+        scripted(name)
+
+
+def test_the_pentagon_is_for_five_limbs():
+    with pytest.raises(ValueError, match="for five limbs, not 6"):
+        scripted("pentagon", n_limbs=6)
+
+
+@pytest.mark.parametrize("name", ["pentagon", "random"])
+def test_an_unknown_action_mode_is_refused(name):
+    with pytest.raises(ValueError, match="actions must be one of"):
+        scripted(name, "legs")
+
+
+def test_commands_without_an_action_are_refused():
+    with pytest.raises(ValueError, match='no action with actions="pairs"'):
+        OpenLoopPolicy(np.ones((1, 5)), "pairs")
+    with pytest.raises(ValueError, match='no action with actions="limbs"'):
+        OpenLoopPolicy(0.5 * pair_gait(2, 5), "limbs")
+
+
+@pytest.mark.parametrize("commands", [np.zeros(5), np.zeros((0, 5))])
+def test_a_gait_is_a_sequence_of_commands(commands):
+    with pytest.raises(ValueError, match="shape"):
+        OpenLoopPolicy(commands)

@@ -1,0 +1,326 @@
+"""Headings at waypoints: asked, met, seen, rewarded, carried by symmetry, drawn and refused."""
+
+import copy
+import math
+import pickle
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+
+from refusals import assert_refused
+from seastar_gym import Headings, RewardWeights, Scene, Seastar, SmaWires, SymmetryReduction
+from seastar_gym.envs import symmetry
+from seastar_gym.envs.headings import wrapped
+from seastar_gym.envs.observation import layout
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.stations import body_heading
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.gaits import turning_wave
+from seastar_gym.scene.numerics import Numerics
+
+ID = "SeastarSwimHeading-v0"
+AT = layout(5, 10, True)
+CORNERS = [[0.05, 0.0], [0.05, 0.05], [0.0, 0.0]]
+
+
+def turning(asked, **arguments):
+    """Environment whose only waypoint is already near, so that the heading alone is left; decisions of 0.2 s."""
+    return SeastarSwimEnv(
+        [[0.005, 0.0]], "continuous", "fast", waypoint_radius=0.05, decision_period=0.2, headings=Headings(asked, 0.1),
+        **arguments,
+    )  # fmt: skip
+
+
+def wave(env, n):
+    """Infos of decisions of the turning wave, clockwise, until the episode ends."""
+    infos, commands = [], turning_wave(0.2)
+    for k in range(n):
+        *_, over, _, info = env.step(commands[k % len(commands)].astype(np.float32))
+        infos.append(info)
+        if over:
+            break
+    return infos
+
+
+def test_a_waypoint_is_reached_only_with_its_heading():
+    env = turning(-0.4)
+    _, info = env.reset(seed=0)
+    assert info["distance"] < 0.05 and info["waypoint_index"] == 0
+    infos = wave(env, 60)
+    assert infos[-1]["is_success"] and abs(infos[-1]["heading_error"]) <= 0.1 and len(infos) > 5
+    assert not any(info["is_success"] for info in infos[:-1])
+    assert all(info["distance"] < 0.05 and abs(info["heading_error"]) > 0.1 for info in infos[:-1])
+
+
+def test_a_heading_that_is_met_is_no_obstacle():
+    env = turning((0.05,))
+    env.reset(seed=0)
+    assert env.step(np.zeros(5, np.float32))[2]
+
+
+def test_the_heading_is_that_of_the_body_frame():
+    env = turning("random")
+    env.reset(seed=0)
+    for info in wave(env, 7):
+        heading = info["heading"]
+    assert heading == pytest.approx(body_heading(env.simulator.positions, env.scene.robot)[0], abs=1e-12)
+    assert heading < -0.1
+
+
+def test_turns_are_seen():
+    env = SeastarSwimEnv(CORNERS, "pairs", "fast", decision_period=0.5, headings=Headings((0.3, -3.0, 2.0)))
+    observation, info = env.reset(seed=0)
+    expected = [math.cos(0.3), math.sin(0.3), math.cos(-3.0), math.sin(-3.0)]
+    np.testing.assert_allclose(observation[AT.headings], expected, atol=1e-6)
+    plain = SeastarSwimEnv(CORNERS, "pairs", "fast", decision_period=0.5)
+    np.testing.assert_array_equal(np.delete(observation, AT.headings), plain.reset(seed=0)[0])
+    observation, *_, info = env.step(7)
+    seen = np.arctan2(observation[AT.headings][1], observation[AT.headings][0])
+    assert seen == pytest.approx(info["heading_error"], abs=1e-6) == pytest.approx(0.3 - info["heading"], abs=1e-6)
+    np.testing.assert_array_equal(np.delete(observation, AT.headings), plain.step(7)[0])
+
+
+def test_on_the_last_leg_the_next_heading_is_the_current_one():
+    env = turning(1.0)
+    seen = env.reset(seed=0)[0][AT.headings]
+    np.testing.assert_array_equal(seen[:2], seen[2:])
+
+
+def test_the_reward_is_the_decrease_of_what_is_left_to_turn():
+    weights = RewardWeights(heading=3.0)
+    env = SeastarSwimEnv(
+        CORNERS, "pairs", "fast", decision_period=0.5, headings=Headings((0.3, -3.0, 2.0)), reward=weights
+    )
+    _, info = env.reset(seed=0)
+    assert info["reward_heading"] == 0.0
+    left = [0.3 + (2.0 * math.pi - 3.3) + (2.0 * math.pi - 5.0)]
+    env.action_space.seed(1)
+    for _ in range(5):
+        _, reward, *_, info = env.step(env.action_space.sample())
+        left.append(abs(info["heading_error"]) + left[0] - 0.3)
+        assert info["reward_heading"] == pytest.approx(3.0 * (left[-2] - left[-1]), abs=1e-9)
+        terms = [info[f"reward_{name}"] for name in ("progress", "waypoint", "effort", "heading")]
+        assert reward == pytest.approx(sum(terms), abs=1e-12)
+    assert len({round(one, 6) for one in left}) > 3
+
+
+def test_a_reached_waypoint_leaves_the_turns_after_it():
+    """Passing on costs or earns no more than the tolerance."""
+    env = SeastarSwimEnv(
+        [[0.001, 0.0], [0.3, 0.0]], "pairs", "fast", decision_period=0.5, headings=Headings((0.1, 1.1), 0.2)
+    )
+    env.reset(seed=0)
+    info = env.step(0)[4]
+    assert info["waypoint_index"] == 1 and info["heading_error"] == pytest.approx(1.1)
+    assert info["reward_heading"] == pytest.approx(8.0 * (0.1 + 1.0 - 1.1), abs=1e-9)
+
+
+def test_headings_are_along_the_legs_or_drawn():
+    env = SeastarSwimEnv(CORNERS, fidelity="fast", headings=Headings())
+    env.reset(seed=0)
+    np.testing.assert_allclose(env._task.headings_of(0), [0.0, np.pi / 2, -0.75 * np.pi])
+    env = SeastarSwimEnv(CORNERS, fidelity="fast", headings=Headings("random"))
+    drawn = []
+    for _ in range(2):
+        env.reset(seed=5)
+        drawn.append(env._task.headings_of(0))
+    env.reset()
+    np.testing.assert_array_equal(*drawn)
+    assert len(np.unique([*drawn[0], *env._task.headings_of(0)])) == 6
+    assert env._task.headings_of(0) is not None and SeastarSwimEnv()._task.headings_of(0) is None
+
+
+@pytest.mark.parametrize(
+    "angle, turn", [(0.0, 0.0), (np.pi, -np.pi), (3 * np.pi / 2, -np.pi / 2), (-7.0, 2 * np.pi - 7.0)]
+)
+def test_turns_go_the_shortest_way_round(angle, turn):
+    assert wrapped(np.array(angle)) == pytest.approx(turn, abs=1e-12)
+
+
+# Promises of every environment
+
+
+def test_the_registered_environment_passes_gymnasiums_and_stable_baselines_checkers():
+    env = gym.make(ID, fidelity="fast").unwrapped
+    check_env(env, skip_render_check=True)
+    pytest.importorskip("stable_baselines3.common.env_checker").check_env(env, warn=True, skip_render_check=True)
+
+
+def test_nothing_changes_without_headings():
+    env = SeastarSwimEnv(fidelity="fast")
+    assert env.headings is None and not {"heading", "heading_error", "reward_heading"} & set(env.reset(seed=0)[1])
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+@pytest.mark.parametrize("asked", ["along", "random", 0.5])
+def test_the_batch_has_the_bits_of_single_environments(mode, asked):
+    arguments = {
+        "fidelity": "fast", "path": "random", "random_heading": True, "max_episode_steps": 3,
+        "headings": Headings(asked, 1.0), "waypoint_radius": 0.15,
+    }  # fmt: skip
+    batch = gym.make_vec(ID, 3, "vector_entry_point", autoreset_mode=mode, **arguments)
+    singles = gym.make_vec(ID, 3, "sync", vector_kwargs={"autoreset_mode": mode}, **arguments)
+    np.testing.assert_array_equal(batch.reset(seed=1)[0], singles.reset(seed=1)[0])
+    singles.action_space.seed(0)
+    for _ in range(7):
+        actions = singles.action_space.sample()
+        *found, info = batch.step(actions)
+        *expected, its_info = singles.step(actions)
+        for one, other in zip(found, expected, strict=True):
+            np.testing.assert_array_equal(one, other)
+        for name in ("heading", "heading_error", "reward_heading", "waypoint_index"):
+            np.testing.assert_array_equal(info[name], its_info[name], err_msg=name)
+
+
+@pytest.mark.parametrize("asked", ["along", "random", 0.1, (1 / 3, 0.1, -2.0)])
+def test_it_comes_back_from_its_spec_and_from_a_pickle(asked):
+    env = gym.make(ID, fidelity="fast", path=CORNERS, headings=Headings(asked, 1 / 3))
+    again = gym.make(EnvSpec.from_json(env.spec.to_json()))
+    assert again.unwrapped.headings == env.unwrapped.headings == Headings(asked, 1 / 3)
+    first, _ = env.reset(seed=3)
+    for other in (again, pickle.loads(pickle.dumps(env)), copy.deepcopy(env)):
+        np.testing.assert_array_equal(other.reset(seed=3)[0], first)
+
+
+def test_numbers_stay_finite():
+    env = gym.make(ID, fidelity="fast", headings=Headings("random"), path="random")
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    for _ in range(20):
+        observation, reward, *_, info = env.step(env.action_space.sample())
+        assert np.isfinite([*observation, reward, info["heading"], info["heading_error"]]).all()
+        assert abs(info["heading_error"]) <= np.pi
+
+
+# Symmetry
+
+
+def matrix(element):
+    k, c, s = (element + 1) // 2, *(f(2 * np.pi * ((element + 1) // 2) / 5) for f in (np.cos, np.sin))
+    return (np.diag([1.0, -1.0]) if element % 2 else np.eye(2)) @ [[c, s], [-s, c]] if k else np.eye(2)
+
+
+def test_a_carried_robot_is_asked_for_the_carried_turns():
+    """The same reduced actions see and earn the same in a world that is turned or mirrored."""
+    path, asked = np.array([[0.02, 0.013], [-0.03, 0.02], [0.02, -0.03]]), np.array([0.1, -1.0, 3.0])
+    scene = Scene(Seastar(5, 4), actuator=SmaWires(), numerics=Numerics.preset("fast"))
+    actions = np.random.default_rng(0).integers(0, 21, 6)
+
+    def swum(element):
+        sign = -1.0 if element % 2 else 1.0
+        env = SymmetryReduction(SeastarSwimEnv(
+            path @ matrix(element).T, "pairs", scene=scene, decision_period=0.5, headings=Headings(tuple(sign * asked)),
+        ))  # fmt: skip
+        seen, rewards = [env.reset(seed=0)[0]], []
+        for action in actions:
+            observation, reward, *_ = env.step(action)
+            seen.append(observation)
+            rewards.append(reward)
+        return np.array(seen), np.array(rewards)
+
+    seen, rewards = swum(0)
+    assert np.ptp(seen[:, AT.headings], axis=0).min() > 1e-3
+    for element in range(1, 10):
+        its_seen, its_rewards = swum(element)
+        np.testing.assert_allclose(its_seen, seen, rtol=0.0, atol=2e-5)
+        np.testing.assert_allclose(its_rewards, rewards, rtol=0.0, atol=1e-6)
+
+
+def test_only_a_mirror_changes_a_turn():
+    seen = np.random.default_rng(0).normal(size=(10, AT.size))
+    mirror = symmetry.memory_mirror(SmaWires())
+    carried = symmetry.transform_observations(seen, np.arange(10), 5, mirror, True)
+    expected = seen[:, AT.headings].copy()
+    expected[1::2, 1::2] *= -1.0
+    np.testing.assert_array_equal(carried[:, AT.headings], expected)
+    plain = symmetry.transform_observations(np.delete(seen, AT.headings, axis=1), np.arange(10), 5, mirror)
+    np.testing.assert_array_equal(np.delete(carried, AT.headings, axis=1), plain)
+    back = symmetry.transform_observations(carried, symmetry.inverse(np.arange(10), 5), 5, mirror, True)
+    np.testing.assert_allclose(back, seen, atol=1e-13)
+
+
+def test_strokes_without_memory_are_carried_with_headings():
+    env = SymmetryReduction(SeastarSwimEnv(fidelity="fast", headings=Headings(1.0)))
+    observation, _ = env.reset(seed=0)
+    assert observation.shape == (190,)
+    np.testing.assert_allclose(observation[182:186], [math.cos(1.0), math.sin(1.0)] * 2, atol=1e-6)
+
+
+def test_observations_with_other_numbers_are_refused():
+    with assert_refused("not that of a robot of 5 limbs"):
+        symmetry.reduce_observations(np.zeros((1, AT.size)), 5, symmetry.memory_mirror(SmaWires()))
+
+
+# Pictures
+
+
+def test_pictures_show_the_asked_heading_and_limb_1():
+    pytest.importorskip("pygame")
+    pictures = []
+    for headings in (Headings(np.pi / 2), Headings(-np.pi / 2), None):
+        env = SeastarSwimEnv([[0.3, 0.0]], fidelity="fast", render_mode="rgb_array", headings=headings)
+        env.reset(seed=0)
+        pictures.append(env.render())
+        camera = env._get_renderer().camera
+    places = [camera.to_pixels(place) for place in ([0.3, 0.025], [0.3, -0.025], [0.1, 0.0])]
+    orange = [[is_orange(picture[int(y), int(x)]) for x, y in places] for picture in pictures]
+    assert orange == [[True, False, True], [False, True, True], [False, False, False]]
+
+
+def is_orange(colour):
+    red, green, blue = colour.astype(int)
+    return red > 200 and 80 < green < 160 and blue < 60
+
+
+def test_a_batch_draws_every_robots_headings():
+    pytest.importorskip("pygame")
+    batch = SeastarSwimVectorEnv(2, fidelity="fast", headings=Headings("random"), render_mode="rgb_array", path="line")
+    batch.reset(seed=0)
+    one, other = batch.render()
+    assert (one != other).any()
+
+
+# Refusals
+
+
+@pytest.mark.parametrize(
+    "asked", ["across", "", None, True, math.nan, math.inf, 1e7, (), (0.1, math.nan), [0.1], ("along",), (True,)]
+)
+def test_what_is_no_heading_is_refused(asked):
+    with assert_refused("Headings.asked", "along"):
+        Headings(asked)
+
+
+def test_arrays_are_refused():
+    with assert_refused("Headings.asked"):
+        Headings(np.array([0.1, 0.2]))
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -0.1, math.nan, math.inf, 4.0, True, "0.1", None])
+def test_what_is_no_tolerance_is_refused(tolerance):
+    with assert_refused("Headings.tolerance"):
+        Headings(0.0, tolerance)
+
+
+@pytest.mark.parametrize("make", [SeastarSwimEnv, SeastarSwimVectorEnv])
+def test_environments_refuse_headings_that_do_not_fit(make):
+    for headings in (0.5, "along", True, {"kind": "Headings"}):
+        with assert_refused("eadings"):
+            make(headings=headings)
+    with assert_refused("2 angles", "5 waypoint"):
+        make(headings=Headings((0.1, 0.2)))
+    with assert_refused("leg to waypoint 2"):
+        make(path=[[0.1, 0.0], [0.1, 0.0], [0.2, 0.0]], headings=Headings())
+
+
+@pytest.mark.parametrize("make", [SeastarSwimEnv, SeastarSwimVectorEnv])
+def test_a_path_with_other_waypoints_is_refused_at_reset_and_changes_nothing(make):
+    env = make(path=CORNERS, headings=Headings((0.1, 0.2, 0.3)), fidelity="fast")
+    first, _ = env.reset(seed=0)
+    with assert_refused("3 angles", "5 waypoint"):
+        env.reset(options={"path": "pentagon"})
+    np.testing.assert_array_equal(env._task.observe().reshape(first.shape), first)

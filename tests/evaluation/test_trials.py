@@ -1,0 +1,168 @@
+"""Disturbances are what they say, and many swims are measured as one is."""
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from agents.trials import Options, main
+from seastar_gym import RewardWeights, Scene, ThermalSma
+from seastar_gym.controllers.greedy import GreedyPolicy
+from seastar_gym.controllers.scripted import scripted
+from seastar_gym.envs.observation import scene_layout
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.task import SwimTask
+from seastar_gym.evaluation.disturbances import Disturbance, DisturbedTask
+from seastar_gym.evaluation.many import mean_with_interval, statistics, swim_many
+from seastar_gym.evaluation.swim import swim
+
+FAST = Scene.preset("fast")
+N = 16
+
+
+def disturbed(path="pentagon", scene=FAST, **disturbance):
+    inner = SwimTask(scene, N, path, RewardWeights(), 0.01, True, threads=1)
+    task = DisturbedTask(inner, Disturbance(**disturbance), np.random.default_rng(0))
+    task.reset([np.random.default_rng(swim) for swim in range(N)])
+    return task
+
+
+def test_nothing_disturbed_is_the_task_itself():
+    task, plain = disturbed(), disturbed().task
+    commands = np.tile([0.0, 1.0, 0.0, 0.0, -1.0], (N, 1))
+    for _ in range(3):
+        np.testing.assert_array_equal(task.observe(), plain.observe())
+        np.testing.assert_array_equal(task.step(commands).commands, commands)
+        plain.step(commands)
+    np.testing.assert_array_equal(task.hub_position(), plain.simulator.hub_position())
+
+
+def test_a_current_carries_the_robots_its_own_way_and_the_waypoints_stay():
+    task, speed = disturbed(current=1e-3), 1e-3
+    first, at = task.observe(), scene_layout(FAST)
+    np.testing.assert_allclose(first[:, at.hub_velocity], 0.0, atol=1e-6)  # at rest in the world
+    np.testing.assert_array_equal(first[:, at.waypoints], disturbed().observe()[:, at.waypoints])
+    waypoint, hubs = np.linalg.norm(first[:, at.current_waypoint], axis=1), []
+    for _ in range(40):
+        task.step(np.zeros((N, 5)))
+        hubs.append(task.hub_position())
+    angles = 2.0 * np.pi * np.arange(N) / 8
+    last_strokes = (hubs[-1] - hubs[-11]) / 10.0
+    np.testing.assert_allclose(
+        last_strokes, speed * np.stack([np.cos(angles), np.sin(angles)], axis=1), atol=0.2 * speed
+    )
+    seen = task.observe()
+    np.testing.assert_allclose(np.hypot(*seen[:, at.hub_velocity].T) * 0.025, speed, rtol=0.2)
+    to_waypoint = np.linalg.norm([0.1437, 0.0] - hubs[-1], axis=1)
+    np.testing.assert_allclose(np.linalg.norm(seen[:, at.current_waypoint], axis=1), to_waypoint / 0.1, rtol=1e-5)
+    assert waypoint == pytest.approx(1.437)
+
+
+def test_a_current_is_seen_in_the_hubs_velocity_whatever_actuators_remember():
+    """At rest in the world, beside wires that are cold: nothing but the waypoints is seen."""
+    scene = replace(FAST, actuator=ThermalSma())
+    seen, at = disturbed(scene=scene, current=1e-3).observe(), scene_layout(scene)
+    np.testing.assert_allclose(seen[:, at.hub_velocity], 0.0, atol=1e-6)
+    np.testing.assert_array_equal(seen[:, at.actuators], 0.0)
+    np.testing.assert_array_equal(seen[:, at.waypoints], disturbed().observe()[:, scene_layout(FAST).waypoints])
+
+
+def test_every_limb_is_the_weak_one_of_some_robot():
+    commands = np.tile([1.0, -1.0, 1.0, -1.0, 1.0], (N, 1))
+    weak = disturbed(weakness=0.5)
+    np.testing.assert_array_equal(weak.step(commands).commands, commands)
+    strengths = np.ones((N, 5))
+    strengths[np.arange(N), np.arange(N) % 5] = 0.5
+    np.testing.assert_array_equal(weak.task.simulator.limb_strengths, strengths)
+    hub = weak.hub_position()
+    told = disturbed()
+    told.step(strengths * commands)
+    np.testing.assert_array_equal(hub, told.hub_position())
+
+
+def test_noise_is_on_positions_and_has_its_size():
+    noisy, clean = disturbed(noise=1e-3).observe(), disturbed().observe()
+    error = 0.1 * (noisy - clean)
+    np.testing.assert_array_equal(error[:, 90:182], 0.0)  # velocities
+    assert error[:, :90].std() == pytest.approx(np.sqrt(2.0) * 1e-3, rel=0.15)  # a node's and the hub's
+    np.testing.assert_allclose(error[:, 182:184], error[:, 184:], atol=1e-7)
+    assert error[:, 182:].std() == pytest.approx(1e-3, rel=0.5)
+
+
+def test_lost_strokes_are_lost_whole_and_as_often_as_said():
+    task, commands = disturbed(lost=0.25), np.tile([0.0, 1.0, 0.0, 0.0, -1.0], (N, 1))
+    carried_out = np.array([task.step(commands).commands for _ in range(30)])
+    lost = (carried_out == 0.0).all(axis=2)
+    assert lost.mean() == pytest.approx(0.25, abs=0.06)
+    np.testing.assert_array_equal(carried_out[~lost], np.broadcast_to(commands, carried_out.shape)[~lost])
+
+
+@pytest.mark.parametrize("arguments", [{"lost": 1.5}, {"weakness": 2.0}, {"noise": -1.0}, {"current": np.nan}])
+def test_impossible_disturbances_are_refused(arguments):
+    with pytest.raises(ValueError, match=next(iter(arguments))):
+        Disturbance(**arguments)
+
+
+def test_a_batch_of_swims_is_measured_as_one_swim():
+    agent = GreedyPolicy(FAST)
+    one = swim("greedy", agent, SeastarSwimEnv("square", actions="joint", fidelity="fast"), max_strokes=30)
+    for done in swim_many("greedy", agent, "square", 3, FAST, max_strokes=30, threads=1):
+        np.testing.assert_allclose(done.hub, one.hub, atol=1e-12)
+        np.testing.assert_array_equal(done.waypoint_index, one.waypoint_index)
+        np.testing.assert_array_equal(done.limbs_heated, one.limbs_heated)
+        np.testing.assert_allclose(done.time, one.time)
+
+
+def test_a_swim_ends_at_its_last_waypoint():
+    swims = swim_many("script", scripted("straight"), "line", 2, FAST, max_strokes=100, threads=1)
+    numbers = statistics(swims)
+    assert numbers["success_rate"][0] == 1.0
+    assert all(done.strokes < 90 and done.waypoint_index[-2] == 0 for done in swims)
+    assert numbers["strokes_to_finish"][0] == pytest.approx(np.mean([done.strokes for done in swims]))
+    assert numbers["limbs_heated_per_metre"][0] == pytest.approx(np.mean([done.heated_per_metre for done in swims]))
+    errors = [1e3 * done.cross_track_errors.mean() for done in swims]
+    assert numbers["mean_cross_track_error_mm"][0] == pytest.approx(np.mean(errors))
+
+
+@pytest.mark.parametrize("draw", ["normal", "exponential"])
+def test_an_interval_covers_the_mean_as_often_as_it_says(draw):
+    """The mean of 40 draws, 500 times: 95 % of the intervals, 93 % for skewed draws; one too narrow by 40 %: 76 %."""
+    draws = getattr(np.random.default_rng(0), draw)(size=(500, 40))
+    _, low, high = np.array([mean_with_interval(values) for values in draws]).T
+    mean = {"normal": 0.0, "exponential": 1.0}[draw]
+    covered = np.mean((low <= mean) & (mean <= high))
+    assert 0.90 < covered < 0.97
+    assert np.mean(high - low) == pytest.approx(2.0 * 1.96 / np.sqrt(40), rel=0.08)
+
+
+def test_a_mean_lies_in_its_interval_and_a_constant_needs_none():
+    low, high = mean_with_interval(np.random.default_rng(0).normal(size=400))[1:]
+    assert low < 0.0 < high and high - low == pytest.approx(2 * 1.96 / 20, rel=0.15)
+    assert mean_with_interval(np.full(5, 3.0)) == (3.0, 3.0, 3.0)
+    assert np.isnan(mean_with_interval(np.zeros(0))).all()
+
+
+@pytest.mark.slow
+def test_the_command_line_writes_a_row_for_every_set_and_agent(tmp_path, capsys):
+    file = tmp_path / "trials.csv"
+    assert main(["--agents", "greedy", "pentagon", "--swims", "4", "--fidelity", "fast", "--out", str(file)]) == 0
+    with file.open(newline="", encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == 2 * (4 + 6 + 5)
+    assert "success" in capsys.readouterr().out
+
+
+def test_named_paths_on_two_fidelities(tmp_path, capsys):
+    file = tmp_path / "trials.csv"
+    command = ["--agents", "rest", "--sets", "nominal", "--fidelity", "fast", "balanced", "--out", str(file)]
+    assert main([*command, "--num-threads", "1"]) == 0
+    with file.open(newline="", encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["fidelity"] for row in rows] == ["fast"] * 4 + ["balanced"] * 4
+    assert {float(row["success_rate"]) for row in rows} == {0.0}
+    printed = capsys.readouterr().out
+    words = ("path", "fidelity", "success", "strokes", "time [s]", "cross-track", "error [mm]", "[J/m]")
+    assert all(word in printed for word in (*words, "0.0% [0.0%, 0.0%]")) and "decisions" not in printed
+    with pytest.raises(ValueError, match="nothing to swim"):
+        Options(sets=())

@@ -1,0 +1,87 @@
+"""Turn, then swim; and the study of what turning is worth."""
+
+import json
+
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3")
+pytest.importorskip("matplotlib")
+
+from agents.swim import swim
+from agents.turning import TurnThenSwim
+from agents.vec_env import BatchVecEnv
+
+from agents.hyperparameters import Hyperparameters
+from agents.ppo import make_model
+from seastar_gym import Headings, VectorSymmetryReduction
+from seastar_gym.envs import symmetry
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.task import make_scene
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.gaits import turning_wave
+from studies.learning import heading
+
+
+class Resting:
+    """Swimmer that rests; it sees observations without headings."""
+
+    actions = "pairs"
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        assert observation.shape == (196,)
+        return 0, None
+
+
+@pytest.mark.parametrize("asked", [0.5, -0.5])
+def test_it_turns_to_the_side_that_is_asked_for_and_then_swims(asked):
+    scene, headings = make_scene(None, "fast", 0.2), Headings(asked)
+    agent = TurnThenSwim(turning_wave(0.2), Resting(), "pairs", scene, headings, 0.2)
+    env = SeastarSwimEnv([[0.3, 0.0]], "joint", "fast", decision_period=0.2, headings=headings)
+    done = swim("turn", agent, env, max_strokes=40)
+    heated = done.limbs_heated > 0
+    last = int(np.flatnonzero(heated)[-1])
+    assert heated[:last].all() and 10 < last < 30 and not heated[last + 1 :].any()
+    assert env._task.facts()["heading"][0] == pytest.approx(asked, abs=headings.tolerance)
+
+
+def test_strokes_and_wires_arrive_and_wires_turn_faster(tmp_path):
+    options = ["--decisions", "0", "--turns", "0", "72", "--fidelity", "fast", "--out", str(tmp_path)]
+    assert heading.main(options) == 0
+    results = json.loads((tmp_path / "heading.json").read_text())
+    strokes, wires = (results["swims"][name] for name in ("strokes", "wires"))
+    for each in (strokes, wires):
+        assert each["seconds"][1] > each["seconds"][0] > 10.0 and each["joules"][1] > each["joules"][0]
+    assert wires["seconds"][1] - wires["seconds"][0] < 0.6 * (strokes["seconds"][1] - strokes["seconds"][0])
+    assert (tmp_path / "heading.png").stat().st_size > 10_000
+    assert heading.table(results) == (tmp_path / "heading.md").read_text()
+
+
+def test_a_learner_behind_the_reduction_does_the_carried_thing():
+    env = SeastarSwimVectorEnv(
+        2, actions="pairs", fidelity="fast", decision_period=0.5, headings=Headings(1.0), autoreset_mode="SameStep"
+    )
+    hyperparameters = Hyperparameters(num_envs=2, rollout=8, batch_size=16, hidden=(8,))
+    model = make_model(BatchVecEnv(VectorSymmetryReduction(env)), hyperparameters, 0)
+    agent, scene = heading.Reduced(model, env.scene, 0.5), env.scene
+    seen = np.repeat(np.random.default_rng(0).normal(size=(1, 200)), 10, axis=0).astype(np.float32)
+    elements = np.arange(10)
+    carried = symmetry.transform_observations(seen, elements, 5, symmetry.memory_mirror(scene.actuator), True)
+    actions = np.array([agent.predict(one, deterministic=True)[0] for one in carried])
+    np.testing.assert_array_equal(actions, symmetry.transform_actions(np.full(10, actions[0]), elements, "pairs", 5))
+
+
+def test_a_swim_that_does_not_arrive_has_no_time():
+    swimmer = heading.Swimmer("rest", 0.5, lambda scene, headings: Resting200())
+    found = heading.measured(swimmer, heading.Options(turns=(36.0,), fidelity="fast"))
+    assert found["seconds"] == found["joules"] == [None]
+    assert "| - |" in heading.table({"turns_deg": [36.0], "swims": {"rest": found}})
+
+
+class Resting200:
+    """Agent that rests."""
+
+    actions = "pairs"
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        return 0, None
