@@ -18,6 +18,7 @@ from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.results import COLUMNS, number
 from seastar_gym.evaluation.swim import swim
+from seastar_gym.scene import Scene
 
 MM = 1000.0
 SHORT = [[0.02, 0.0], [0.02, 0.02]]
@@ -293,8 +294,9 @@ def test_the_slider_moves_the_robot(opened, evaluated):
         _, trail, resting, minus, plus, hub, _ = opened.lines()
         np.testing.assert_allclose(hub[0], MM * straight.hub[stroke], atol=0.06)
         np.testing.assert_allclose(trail[::3], MM * straight.hub[: stroke + 1], atol=0.06)
-        heated = 0 if stroke == 0 else 10  # nodes of a limb
-        assert (len(resting), len(minus), len(plus)) == (50 - 2 * heated, heated, heated)
+        of_limb = Scene.preset("fast").robot.nodes_per_limb
+        heated = 0 if stroke == 0 else of_limb
+        assert (len(resting), len(minus), len(plus)) == (5 * of_limb - 2 * heated, heated, heated)
         assert f"stroke {stroke} of {straight.strokes}" in opened.page.inner_text("#readout")
     assert opened.complaints == []
 
