@@ -23,6 +23,8 @@ from seastar_gym.scene.actuators.measured import MeasuredCurve
 from seastar_gym.scene.actuators.sma_limb import SmaLimb
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.actuators.wires import SmaWires
+from seastar_gym.scene.along import AlongLimb, Stiffening
+from seastar_gym.scene.body import Attachment, Body
 from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
@@ -32,6 +34,9 @@ from seastar_gym.simulator import Simulator, SolverStatus, State, StrokeReport
 from seastar_gym.version import __version__
 
 __all__ = [
+    "AlongLimb",
+    "Attachment",
+    "Body",
     "Certificate",
     "Contact",
     "DomainRandomization",
@@ -56,6 +61,7 @@ __all__ = [
     "SolverStatus",
     "State",
     "Station",
+    "Stiffening",
     "StrokeReport",
     "SymmetryReduction",
     "ThermalSma",

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from seastar_gym import (
+    AlongLimb,
     Contact,
     GridCurrent,
     Limb,
@@ -17,6 +18,7 @@ from seastar_gym import (
     SmaLimb,
     SmaPulse,
     SmaWires,
+    Stiffening,
     ThermalSma,
     UniformCurrent,
     Vortex,
@@ -62,6 +64,8 @@ PARTS = {
     "limbs": {"robot": Seastar(limbs=(Limb(radius=(2e-3, 1e-3 / 3)), *(Limb(length=0.1 / 3),) * 4))},
     "limbs of each robot": {"robot": Seastar(limbs=(Limb(radius=1e-3 * EACH, natural_curvature=EACH),) * 5)},
     "directions": {"robot": Seastar(limbs=tuple(Limb(1.25 * k, youngs_modulus=(1e6, 2e6)) for k in range(5)))},
+    "bent along": {"robot": Seastar(along=AlongLimb(1 / 3, (1.0, 0.1 + 0.2)), stiffening=Stiffening(2.68, 1 / 3))},
+    "bent along, each": {"robot": Seastar(along=AlongLimb(0.1 * EACH), stiffening=Stiffening(1.5 * EACH))},
     "robots": {"robot": Seastar(n_limbs=4, nodes_per_limb=6, density=1000.0 * EACH, relaxation_time=1e-3)},
     "numerics": {"numerics": Numerics("implicit-midpoint", 5e-3 / 3, 1e-7 / 3, 30, 0.015)},
 }  # fmt: skip

@@ -3,7 +3,9 @@
 from typing import Any, NamedTuple
 
 from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.lanes import add_product, load, select, sqrt, subtract_product
+from seastar_gym.simd.lanes import add_product, floor, load, select, sqrt, subtract_product
+
+TWO_PI = 6.283185307179586
 
 
 class Edge(NamedTuple):
@@ -67,3 +69,13 @@ def tangent(x):
     q = (q * z + 2.50083801823357915839e7) * z - 5.38695755929454629881e7
     t = u + u * z * p / q
     return 2.0 * t / (1.0 - t * t)
+
+
+@kernel
+def rotation(angle):
+    """(cos, sin) of any angle [rad]."""
+    turns = floor(add_product(0.5, angle, 1.0 / TWO_PI))
+    t = tangent(0.25 * subtract_product(angle, TWO_PI, turns))
+    scale = 1.0 / add_product(1.0, t, t)
+    c, s = subtract_product(1.0, t, t) * scale, 2.0 * t * scale
+    return subtract_product(c * c, s, s), 2.0 * s * c

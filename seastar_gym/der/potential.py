@@ -39,9 +39,12 @@ from seastar_gym.der.linear.star_matrix import (
     store_root,
 )
 from seastar_gym.der.motion import Motion, node_motion
-from seastar_gym.der.star import load_root_edge
+from seastar_gym.der.star import load_root_edge, root_place, tail_node
 from seastar_gym.der.terms.added_mass import add_fluid_inertia, less_edge_fluid_inertia
+from seastar_gym.der.terms.along import bending_compliance, bending_stiffness, natural_moment
 from seastar_gym.der.terms.bending import bending_energy, bending_slopes, moment
+from seastar_gym.der.terms.body import begin_body, tail_motion
+from seastar_gym.der.terms.body_forces import add_body, pass_to_hub
 from seastar_gym.der.terms.clamp import assemble_clamps
 from seastar_gym.der.terms.contact import add_contact, contact_force
 from seastar_gym.der.terms.damping import damped_energy, damped_stiffness, damped_stress
@@ -112,13 +115,13 @@ def elastic_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex):
 @kernel
 def hinge_slopes(rods, work, stage, hinge, t, EI_kappa_bar, convex):
     """(E_b, slope, s): energy of a hinge and its first and second slope in phi, with damping."""
-    bend = moment(rods, hinge, t, EI_kappa_bar)
+    bend = moment(rods, work, hinge, t, EI_kappa_bar)
     tau, inverse_gamma = rods.damping, stage.inverse_gamma
     energy = damped_energy(
-        tau, work.bending, hinge, inverse_gamma, bend, EI_kappa_bar, load(rods.bending.dl_over_EI, hinge),
-        bending_energy(rods, hinge, bend),
+        tau, work.bending, hinge, inverse_gamma, bend, EI_kappa_bar, bending_compliance(rods.along, rods, work, hinge),
+        bending_energy(rods, work, hinge, bend),
     )  # fmt: skip
-    stiffness = damped_stiffness(tau, inverse_gamma, load(rods.bending.EI_over_dl, hinge))
+    stiffness = damped_stiffness(tau, inverse_gamma, bending_stiffness(rods.along, rods, work, hinge))
     damped = damped_stress(tau, work.bending, hinge, inverse_gamma, bend, EI_kappa_bar)
     slope, s = bending_slopes(stiffness, t, damped, convex)
     return energy, slope, s
@@ -166,9 +169,10 @@ def coupling(s, outer, inner):
 @kernel
 def assemble_hub(clamp, rods, work, stage, convex):
     """Root edges, the hub's moments on them, stiffnesses and couplings, into `work`; returns the hub's energy [J]."""
+    begin_body(rods.body, rods, work)
     n_limbs, edges = rods.n_limbs, rods.nodes_per_limb - 1
     for limb in range(n_limbs):
-        edge = edge_geometry(work.q, 0, limb * edges + 1)
+        edge = edge_geometry(work.q, tail_node(rods, limb * edges), limb * edges + 1)
         for k in range(EDGE_ROWS):
             store(work.root_edges, EDGE_ROWS * limb + k, edge[k])
         store(work.hub_moment, limb, 0.0)
@@ -211,11 +215,29 @@ def inner_edge(work, limb, first, i):
 
 
 @kernel
-def hub_motion(clamp, work, stage):
-    """Motion of the hub for the root edges, where a rigid hub's discretisation asks for it."""
+def hub_motion(clamp, rods, work, stage, e):
+    """Motion of the hub for the root edge e, where a rigid hub's discretisation asks for it, or of its root on a body."""
     if clamp is None:
         return Motion(splat(0.0), splat(0.0), splat(0.0), splat(0.0))
-    return node_motion(work, stage, 0)
+    return tail_motion(rods.body, rods, work, stage, e)
+
+
+@kernel
+def join_hub(body, rods, work, stage, limb, convex, motion, energy, hub, D, r, f_tail):
+    """Add a limb's block and right-hand side (D, r) where it starts, and its root edge's pull, to those of the hub.
+
+    motion: Motion of the limb's root. hub: (D, r) of the hub. A root on a body has drag and fluid of its own.
+
+    Returns the energy [J] and the hub's (D, r).
+    """
+    D_hub, r_hub = hub
+    if body is None:
+        return energy, add_symmetric(D_hub, D), (r_hub[0] + r[0] - f_tail[0], r_hub[1] + r[1] - f_tail[1])
+    E_r, g, drag = node_slopes(work.contact, rods, work, stage, root_place(rods, limb), motion)
+    pull = (g[0] - f_tail[0], g[1] - f_tail[1])
+    D, r = add_symmetric(D, drag), (r[0] + pull[0], r[1] + pull[1])
+    pass_to_hub(rods, work, limb, convex, D, r, pull)
+    return energy + E_r, add_symmetric(D_hub, D), (r_hub[0] + r[0], r_hub[1] + r[1])
 
 
 @inlined_kernel
@@ -239,7 +261,8 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
         e = node - 1
         before, motion_before = inner_edge(work, limb, first, i - 1), node_motion(work, stage, node - 1)
         t = half_angle(before, edge, 1.0)
-        E_b, slope_before, s_before = hinge_slopes(rods, work, stage, e, t, load(rods.bending.EI_kappa_bar, e), convex)
+        natural = natural_moment(rods.along, rods, work, e)
+        E_b, slope_before, s_before = hinge_slopes(rods, work, stage, e, t, natural, convex)
         net_moment, stiffness = slope_before - slope, s_before + s
         E_s, f, K = edge_slopes(
             rods, work, stage, e, edge, net_moment, stiffness, convex, motion_before, motion
@@ -270,7 +293,7 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
         pivot = smaller(pivot, node_pivot)
         slope, s, edge, motion = slope_before, s_before, before, motion_before
     net_moment, stiffness = load(work.hub_moment, limb) - slope, load(work.hub_stiffness, limb) + s
-    of_hub = hub_motion(rods.clamp, work, stage)
+    of_hub = hub_motion(rods.clamp, rods, work, stage, first)
     E_s, f, K = edge_slopes(rods, work, stage, first, edge, net_moment, stiffness, convex, of_hub, motion)
     E_n, g, inertia = node_slopes(work.contact, rods, work, stage, first + 1, motion)
     E_m, g_m, h_m = middle_slopes(rods.middle_drag, rods, work, stage, first, of_hub, motion)
@@ -284,13 +307,11 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
         (B[0] - K_B[0], B[1] - K_B[1], B[2] - K_B[1], B[3] - K_B[2]),
         (r[0] + (g[0] + f_head[0]), r[1] + (g[1] + f_head[1])),
     )
-    return (
-        add_symmetric(D_hub, add_symmetric(D_before, K)),
-        (r_hub[0] + r_before[0] - f_tail[0], r_hub[1] + r_before[1] - f_tail[1]),
-        energy + E_s + E_n,
-        decrement,
-        pivot,
-    )
+    energy, D_hub, r_hub = join_hub(
+        rods.body, rods, work, stage, limb, convex, of_hub, energy + E_s + E_n, (D_hub, r_hub),
+        add_symmetric(D_before, K), r_before, f_tail,
+    )  # fmt: skip
+    return D_hub, r_hub, energy, decrement, pivot
 
 
 @kernel
@@ -303,7 +324,9 @@ def factorise(rods, work, stage, convex):
     which is not positive (or NaN) where the Hessian is not positive definite.
     """
     energy = add_contact(rods.contact, rods, work, stage, assemble_hub(rods.clamp, rods, work, stage, convex))
-    E_n, r_hub, D_hub = node_slopes(work.contact, rods, work, stage, 0, node_motion(work, stage, 0))
+    of_hub = node_motion(work, stage, 0)
+    E_n, r_hub, D_hub = node_slopes(work.contact, rods, work, stage, 0, of_hub)
+    E_n, r_hub, D_hub = add_body(rods.body, rods, work, stage, convex, of_hub, E_n, r_hub, D_hub)
     energy += E_n
     decrement, pivot = splat(0.0), splat(np.inf)
     for limb in range(rods.n_limbs):

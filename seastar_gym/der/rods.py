@@ -11,8 +11,10 @@ from seastar_gym.der.geometry import EDGE_ROWS
 from seastar_gym.der.linear.star_matrix import NODE_ROWS, RING_ROWS, ROOT_ROWS
 from seastar_gym.der.stepping.foresight import Foresight
 from seastar_gym.der.stepping.scales import Scales
-from seastar_gym.der.terms import contact
+from seastar_gym.der.terms import body, contact
+from seastar_gym.der.terms.along import ALONG_ROWS, Along
 from seastar_gym.der.terms.bending import Bending
+from seastar_gym.der.terms.body import Body
 from seastar_gym.der.terms.clamp import Clamp
 from seastar_gym.der.terms.current import Current
 from seastar_gym.der.terms.hub import Hub
@@ -29,10 +31,12 @@ class Rods(NamedTuple):
     clamp: Rigid hub; edge_mass, edge_added_mass: What consistent masses take from lumped ones [kg]; middle_drag,
         middle_cross_drag: Drag in the middle of edges, and that of flow across [kg/m]; per edge. All are those of the
         continuum's discretisation.
+    along: How actuators act on limbs along their length.
     mass: Lumped mass, per node [kg]. drag: 1/2 rho_f C_d D dl_i of (13.8), per node [kg/m].
     cross_drag, added_mass: Coefficients of flow across half edges [kg/m], [kg]; two rows per node.
     damping: Relaxation time tau [s], one row. current: How the fluid moves.
     load: Constant force per coordinate [N]. contact: Who may touch whom.
+    body: A body between the limbs. With one, `mass`, `drag` and `load` have rows for all places, see star.py.
     foresight, scales: Scales of the robot that decide what Newton's method and the guard look at.
     """
 
@@ -42,6 +46,7 @@ class Rods(NamedTuple):
     bending: Bending
     hub: Hub
     clamp: Clamp | None
+    along: Along | None
     mass: np.ndarray
     edge_mass: np.ndarray | None
     drag: np.ndarray
@@ -56,6 +61,7 @@ class Rods(NamedTuple):
     contact: contact.Contact | None
     foresight: Foresight
     scales: Scales
+    body: Body | None
 
 
 class Work(NamedTuple):
@@ -71,6 +77,8 @@ class Work(NamedTuple):
     hub_t: tan(phi/2) of the hub hinges, per limb.
     hub_direction, hub_turn, hub_hat: Natural directions of a rigid hub's clamps, what root edges are turned from them,
         and their directions where a stage began, (x, y) per limb; None with hub hinges, hub_hat without damping.
+    stiffening, EI_kappa_bar: Factor of a limb's bending stiffness with its reciprocal, and natural moments of hinges
+        [N m], or None where actuators act at the hub only.
     stage_v: Velocities of the stages of a time step [m/s].
     normals: Unit normals of the edges where a stage began, or None in scenes that need none; see fluid.py.
     current: Velocity of the fluid at every node there [m/s], or None.
@@ -78,6 +86,7 @@ class Work(NamedTuple):
     pivots, root_pivots: For solutions of other right-hand sides, see star_solution.py, or None without contact.
     contact: Memory of contact, or None.
     tension, bending: EA eps [N] and EI kappa [N m] of edges and hinges where a stage began, or None without damping.
+    body: Memory of a body, or None.
     """
 
     q: np.ndarray
@@ -97,6 +106,8 @@ class Work(NamedTuple):
     hub_direction: np.ndarray | None
     hub_turn: np.ndarray | None
     hub_hat: np.ndarray | None
+    stiffening: np.ndarray | None
+    EI_kappa_bar: np.ndarray | None
     stage_v: np.ndarray
     normals: np.ndarray | None
     current: np.ndarray | None
@@ -106,25 +117,28 @@ class Work(NamedTuple):
     contact: contact.ContactWork | None
     tension: np.ndarray | None
     bending: np.ndarray | None
+    body: body.BodyWork | None
 
 
 def make_work(rods: Rods, n_stages: int) -> Work:
     """Zeroed memory for one lane group of such rods and a scheme of `n_stages` stages."""
     n_limbs, n_edges = rods.n_limbs, rods.n_limbs * (rods.nodes_per_limb - 1)
     n_nodes = n_edges + 1
+    n_places = n_nodes if rods.body is None else n_nodes + 1 + n_limbs
+    n_free = n_nodes if rods.body is None else n_nodes + 1
 
     def rows(count):
         return aligned_rows(count, N_LANES)
 
     return Work(
-        q=rows(2 * n_nodes),
-        q_hat=rows(2 * n_nodes),
-        v_hat=rows(2 * n_nodes),
-        step=rows(2 * n_nodes),
+        q=rows(2 * n_places),
+        q_hat=rows(2 * n_places),
+        v_hat=rows(2 * n_places),
+        step=rows(2 * n_places),
         factors=rows(NODE_ROWS * n_nodes),
         ring=rows(RING_ROWS * n_limbs),
         root_factors=rows(ROOT_ROWS * n_limbs),
-        root_solution=rows(2 * (n_limbs + 1)),
+        root_solution=rows(2 * (n_limbs + 2)),
         root_edges=rows(EDGE_ROWS * n_limbs),
         hub_moment=rows(n_limbs),
         hub_stiffness=rows(n_limbs),
@@ -134,13 +148,16 @@ def make_work(rods: Rods, n_stages: int) -> Work:
         hub_direction=None if rods.clamp is None else rows(2 * n_limbs),
         hub_turn=None if rods.clamp is None else rows(2 * n_limbs),
         hub_hat=None if rods.clamp is None or rods.damping is None else rows(2 * n_limbs),
-        stage_v=rows(2 * n_nodes * n_stages),
+        stiffening=None if rods.along is None else rows(ALONG_ROWS * n_limbs),
+        EI_kappa_bar=None if rods.along is None else rows(n_edges),
+        stage_v=rows(2 * n_free * n_stages),
         normals=None if rods.cross_drag is None and rods.added_mass is None else rows(2 * n_nodes),
-        current=None if rods.current is None else rows(2 * n_nodes),
-        added_mass=None if rods.added_mass is None else rows(3 * n_nodes),
+        current=None if rods.current is None else rows(2 * n_places),
+        added_mass=None if rods.added_mass is None else rows(3 * n_places),
         pivots=None if rods.contact is None else rows(2 * n_nodes),
         root_pivots=None if rods.contact is None else rows(2 * (n_limbs + 1)),
         contact=contact.memory(rods.contact, n_limbs, rods.nodes_per_limb),
         tension=None if rods.damping is None else rows(n_edges),
         bending=None if rods.damping is None else rows(n_edges),
+        body=body.memory(rods.body, n_limbs),
     )

@@ -5,6 +5,9 @@ j (nodes_per_limb - 1) + i. Edge e ends at node e + 1; it starts at the hub if i
 at node e. Hinge e ends with edge e: within a limb it sits at the tail of edge e, and for a root edge of limb j it is
 the hub hinge from limb j to limb j + 1, whose first edge is the root edge of limb j. Two limbs have one hub hinge, one
 limb has none: hinges that are not there have no stiffness. With a rigid hub, the hinge of a root edge is its clamp.
+
+Where the hub is a body with a size, root edges start at its rim. Behind the nodes then stand the place of the body's
+angle and, limb by limb, the places of the roots, which follow from hub and angle, see terms/body.py.
 """
 
 from seastar_gym.der.geometry import EDGE_ROWS, Edge, edge_geometry
@@ -19,9 +22,57 @@ def n_nodes(rods):
 
 
 @kernel
+def n_free(rods):
+    """Number of places whose coordinates are unknowns: nodes, and the body's angle where there is one."""
+    return n_free_with(rods.body, rods)
+
+
+@kernel
+def n_free_with(body, rods):
+    if body is None:
+        return n_nodes(rods)
+    return n_nodes(rods) + 1
+
+
+@kernel
+def n_places(rods):
+    """Number of places: nodes and, with a body, its angle and the roots of its limbs."""
+    return n_places_with(rods.body, rods)
+
+
+@kernel
+def n_places_with(body, rods):
+    if body is None:
+        return n_nodes(rods)
+    return n_nodes(rods) + 1 + rods.n_limbs
+
+
+@kernel
+def root_place(rods, limb):
+    """The place of a limb's root on a body."""
+    return n_nodes(rods) + 1 + limb
+
+
+@kernel
+def is_root(body, rods, place):
+    """Whether a place is a limb's root on a body."""
+    if body is None:
+        return False
+    return place > n_nodes(rods)
+
+
+@kernel
 def tail_node(rods, e):
-    """The node where edge e starts: the hub for a root edge."""
-    return 0 if e % (rods.nodes_per_limb - 1) == 0 else e
+    """The node where edge e starts: for a root edge the hub, or the limb's root on a body."""
+    return tail_node_with(rods.body, rods, e)
+
+
+@kernel
+def tail_node_with(body, rods, e):
+    edges = rods.nodes_per_limb - 1
+    if body is None:
+        return 0 if e % edges == 0 else e
+    return root_place(rods, e // edges) if e % edges == 0 else e
 
 
 @kernel

@@ -6,6 +6,7 @@ from seastar_gym.der.rods import Rods
 from seastar_gym.der.stepping import foresight, scales
 from seastar_gym.der.terms import (
     added_mass,
+    along,
     bending,
     clamp,
     contact,
@@ -17,8 +18,10 @@ from seastar_gym.der.terms import (
     load,
     stretching,
 )
+from seastar_gym.model.body import make_body
 from seastar_gym.model.currents import current_rows
 from seastar_gym.model.mesh import make_mesh
+from seastar_gym.scene.along import AlongLimb, Stiffening
 from seastar_gym.scene.fluid import Water
 from seastar_gym.scene.per_robot import chosen
 from seastar_gym.scene.scene import Scene
@@ -37,19 +40,29 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
     water = VACUUM if scene.fluid is None else chosen(scene.fluid, itemgetter(index))
     touch = None if scene.contact is None else chosen(scene.contact, itemgetter(index))
     limbs = robot.limb_shapes()
-    hub_angles = [natural_hub_angle(limb.gap, robot.hub_hinge) for limb in limbs]
+    has_body = robot.body is not None and not robot.body.is_point
+    # Limbs that begin apart have no opening angle that could close: negative angles are not noted.
+    hub_angles = [-1.0 if has_body else natural_hub_angle(limb.gap, robot.hub_hinge) for limb in limbs]
     C_d, C_t, C_a = water.drag_coefficient, water.tangential_drag_coefficient, water.added_mass_coefficient
     mesh = make_mesh(limbs, robot.nodes_per_limb)
     continuum = robot.discretisation == "continuum"
-    along = C_d if C_t is None else C_t
-    at_nodes, in_middle = drag.coefficients(mesh, water.density, along), None
+    C_along = C_d if C_t is None else C_t
+    at_nodes, in_middle = drag.coefficients(mesh, water.density, C_along), None
     across, across_middle = drag.cross_coefficients(mesh, water.density, C_d, C_t), None
     if continuum:
-        at_nodes, in_middle = drag.simpson_coefficients(mesh, water.density, along)
+        at_nodes, in_middle = drag.simpson_coefficients(mesh, water.density, C_along)
         across, across_middle = drag.simpson_cross_coefficients(mesh, water.density, C_d, C_t)
     stretched = stretching.coefficients(mesh)
     seen_ahead = foresight.coefficients(mesh, stretched, robot.density)
-    mass = inertia.coefficients(mesh, robot.density, scene.held_nodes)
+    mass = inertia.coefficients(mesh, robot.density)
+    weight = gravity.coefficients(mesh, robot.density, water.density, scene.gravity)
+    loads = load.total(load.coefficients(mesh, scene.loads), weight)
+    on_body = None
+    if has_body:
+        on_body = make_body(robot, mesh, water, scene.gravity)
+        mass, at_nodes = on_body.mass(mass), on_body.drag(mesh, at_nodes)
+        loads = on_body.loads(loads)
+    inertia.hold(mass, scene.held_nodes)
     return Rods(
         n_limbs=mesh.n_limbs,
         nodes_per_limb=mesh.nodes_per_limb,
@@ -57,6 +70,7 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         bending=bending.coefficients(mesh, gregory=continuum),
         hub=hub.coefficients(hub_angles, turning=robot.hub_hinge == "turning"),
         clamp=clamp.coefficients(mesh, [limb.direction for limb in limbs]) if continuum else None,
+        along=limb_actuation(scene, index, mesh.natural_turn),
         mass=mass,
         edge_mass=inertia.edge_coefficients(mesh, robot.density) if continuum else None,
         drag=at_nodes,
@@ -67,10 +81,7 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         edge_added_mass=added_mass.edge_coefficients(mesh, water.density, C_a) if continuum else None,
         damping=damping.coefficients(robot.relaxation_time),
         current=None if water.current is None else current_rows(water.current),
-        load=load.total(
-            load.coefficients(mesh, scene.loads),
-            gravity.coefficients(mesh, robot.density, water.density, scene.gravity),
-        ),
+        load=loads,
         contact=None
         if touch is None
         else contact.coefficients(mesh, scene.robot.limbs_that_may_touch(), touch.modulus, touch.opening_angle),
@@ -78,4 +89,15 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         scales=scales.coefficients(
             mesh, stretched, seen_ahead, robot.density, water.density, C_d, mass, scene.held_nodes
         ),
+        body=None if on_body is None else on_body.coefficients,
     )
+
+
+def limb_actuation(scene: Scene, index: int, natural_turn: list[float]) -> along.Along | None:
+    """How actuators act on limbs along their length; None where they act at the hub only."""
+    robot, actuator = chosen(scene.robot, itemgetter(index)), chosen(scene.actuator, itemgetter(index))
+    if robot.along is None and robot.stiffening is None:
+        return None
+    spread, hot = robot.along or AlongLimb(share=0.0), robot.stiffening or Stiffening(ratio=1.0)
+    shares = spread.hinge_shares(robot.nodes_per_limb)
+    return along.coefficients(natural_turn, shares, float(actuator.peak_angle), hot.ratio, hot.middle, hot.width)

@@ -10,6 +10,8 @@ from seastar_gym.scene.actuators.pulse import SmaPulse
 from seastar_gym.scene.actuators.sma_limb import SmaLimb
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.actuators.wires import SmaWires
+from seastar_gym.scene.along import AlongLimb, Stiffening
+from seastar_gym.scene.body import Attachment, Body
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
 from seastar_gym.scene.fluid import Water
@@ -19,6 +21,9 @@ from seastar_gym.scene.robot import Seastar, relaxation_time
 from seastar_gym.scene.scene import Scene
 
 __all__ = [
+    "AlongLimb",
+    "Attachment",
+    "Body",
     "Contact",
     "GridCurrent",
     "Limb",
@@ -31,6 +36,7 @@ __all__ = [
     "SmaLimb",
     "SmaPulse",
     "SmaWires",
+    "Stiffening",
     "ThermalSma",
     "UniformCurrent",
     "Vortex",

@@ -62,7 +62,10 @@ def _require_positive(name: str, value: float, unit: str) -> None:
 
 
 class LimbShape(NamedTuple):
-    """Limb with all values filled in, see Limb. gap: Angle to the next limb's root edge, anti-clockwise [rad]."""
+    """Limb with all values filled in, see Limb.
+
+    gap: Angle to the next limb's root edge, anti-clockwise [rad]. root: Where it begins, from the hub [m].
+    """
 
     direction: float
     gap: float
@@ -70,6 +73,7 @@ class LimbShape(NamedTuple):
     radius: tuple[float, ...]
     youngs_modulus: tuple[float, ...]
     natural_curvature: float
+    root: tuple[float, float] = (0.0, 0.0)
 
     def extreme_edges(self, nodes_per_limb: int) -> list[tuple[float, float, float, float]]:
         """Bounds of (l^2 [m^2], EA/l [N/m], EI/l [N m], volume [m^3]) over the edges: smallest and largest values."""

@@ -1,6 +1,7 @@
 """`Seastar`: a robot of limbs around a hub."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from operator import itemgetter
@@ -9,6 +10,8 @@ from typing import ClassVar, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.scene.along import AlongLimb, Stiffening
+from seastar_gym.scene.body import Body
 from seastar_gym.scene.checks import require_choice, require_count, require_number, shown
 from seastar_gym.scene.limb import Limb, LimbShape, as_tuple
 from seastar_gym.scene.per_robot import Numbers, batch_size, chosen, require_each
@@ -41,9 +44,12 @@ class Seastar:
         infinitely many.
         "chapter" joins neighbouring limbs by hinges at the hub, and lumps mass and drag at the nodes, as the chapter
         does: with ten nodes that robot is 12 to 26 % off. With infinitely many nodes the two are the same robot.
+    along: How an actuator's rotation is spread along its limb. None means that it turns the limb at the hub.
+    stiffening: How much stiffer a limb is while its actuator is hot. None means that heat does not stiffen it.
+    body: Body between the limbs, which are clamped to it, instead of the point hub. None means a point.
 
-    A single limb swings freely about the hub, and no actuator turns it. In the chapter's discretisation two limbs have
-    one hub hinge; straight limbs with hub_hinge="turning" then form a plain rod.
+    A single limb swings freely about the hub, and no actuator turns it there. In the chapter's discretisation two limbs
+    have one hub hinge; straight limbs with hub_hinge="turning" then form a plain rod.
     """
 
     PER_ROBOT: ClassVar = ("limb_length", "rod_radius", "youngs_modulus", "density", "relaxation_time")
@@ -57,6 +63,9 @@ class Seastar:
     limbs: tuple[Limb, ...] = ()
     relaxation_time: Numbers | None = None
     discretisation: Discretisation = "continuum"
+    along: AlongLimb | None = None
+    stiffening: Stiffening | None = None
+    body: Body | None = None
 
     def __post_init__(self) -> None:
         require_count("n_limbs", self.n_limbs, 1, 12)
@@ -77,6 +86,18 @@ class Seastar:
         if self.n_limbs == 1 and self.hub_hinge != "opening":
             raise ValueError("One limb has no hub hinge that could be measured by its turning angle.")
         self._check_limbs()
+        self._check_along()
+        self._check_body()
+
+    def _check_along(self) -> None:
+        for name, kind in (("along", AlongLimb), ("stiffening", Stiffening)):
+            value = getattr(self, name)
+            if not isinstance(value, kind | None):
+                raise ValueError(f"{name} must be {kind.__name__}(...) or None, not {shown(value)}.")
+            if value is not None and self.discretisation == "chapter":
+                raise ValueError(
+                    f'{name} acts on limbs along their length, which only discretisation="continuum" models.'
+                )
 
     def _check_limbs(self) -> None:
         if not isinstance(self.limbs, tuple) or not all(isinstance(limb, Limb) for limb in self.limbs):
@@ -96,23 +117,51 @@ class Seastar:
                 f"{self.nodes_per_limb} nodes per limb."
             )
 
+    def _check_body(self) -> None:
+        if not isinstance(self.body, Body | None):
+            raise ValueError(f"body must be a Body or None, not {shown(self.body)}.")
+        if self.body is None:
+            return
+        if self.discretisation != "continuum":
+            raise ValueError('discretisation="chapter" joins limbs by hinges in one point, so it has no room for a body.')
+        if len(self.body.attachments) not in (0, self.n_limbs):
+            raise ValueError(
+                f"attachments must be one Attachment for each of the {self.n_limbs} limbs, or none, not "
+                f"{len(self.body.attachments)}."
+            )
+        if self.body.attachments and any(limb.direction is not None for limb in self.limbs):
+            raise ValueError("Directions of limbs are named by their attachments to the body or by Limb, not by both.")
+
     def limb_shapes(self, index: int = 0) -> tuple[LimbShape, ...]:
         """Limbs with all values filled in, for robot `index` of a batch."""
         robot = chosen(self, itemgetter(index))
         limbs = robot.limbs or (Limb(),) * self.n_limbs
         directions = [limb.direction for limb in limbs if limb.direction is not None]
-        gaps = np.diff(directions, append=2.0 * math.pi).tolist() or [2.0 * math.pi / self.n_limbs] * self.n_limbs
+        directions = directions or [2.0 * math.pi * j / self.n_limbs for j in range(self.n_limbs)]
+        roots = [(0.0, 0.0)] * self.n_limbs
+        if robot.body is not None:
+            attached = robot.body.attached(directions)
+            directions, roots = [at.direction for at in attached], [(at.x, at.y) for at in attached]
         return tuple(
             LimbShape(
-                direction=2.0 * math.pi * j / self.n_limbs if limb.direction is None else limb.direction,
+                direction=direction,
                 gap=gap,
                 length=robot.limb_length if limb.length is None else limb.length,
                 radius=as_tuple(robot.rod_radius if limb.radius is None else limb.radius),
                 youngs_modulus=as_tuple(robot.youngs_modulus if limb.youngs_modulus is None else limb.youngs_modulus),
                 natural_curvature=limb.natural_curvature,
+                root=root,
             )
-            for j, (limb, gap) in enumerate(zip(limbs, gaps, strict=True))
+            for limb, direction, gap, root in zip(limbs, directions, self._gaps(limbs), roots, strict=True)
         )
+
+    def _gaps(self, limbs: Sequence[Limb]) -> list[float]:
+        """Angle from every limb to the next [rad]."""
+        if self.body is not None and self.body.attachments:
+            attached = np.array([at.direction for at in self.body.attachments])
+            return ((np.roll(attached, -1) - attached) % (2.0 * math.pi)).tolist()
+        directions = [limb.direction for limb in limbs if limb.direction is not None]
+        return np.diff(directions, append=2.0 * math.pi).tolist() or [2.0 * math.pi / self.n_limbs] * self.n_limbs
 
     def limbs_that_may_touch(self) -> list[tuple[int, int]]:
         """Pairs of limbs that may touch, (right, left), counted from 0."""

@@ -17,6 +17,7 @@ import numpy as np
 
 from seastar_gym.scene.actuators.actuator import Actuator, StatefulActuator, check_actuator, is_actuator
 from seastar_gym.scene.actuators.pulse import SmaPulse
+from seastar_gym.scene.along import AlongLimb
 from seastar_gym.scene.certified import Certified, as_certificate
 from seastar_gym.scene.checks import (
     is_finite_number,
@@ -33,7 +34,7 @@ from seastar_gym.scene.numerics import MAX_STEPS, PRESETS, Fidelity, Numerics, S
 from seastar_gym.scene.per_robot import batch_size, chosen
 from seastar_gym.scene.robot import Discretisation, Seastar
 from seastar_gym.scene.serial import from_dict, register_part, to_dict
-from seastar_gym.scene.shape import cross_at_rest, n_hub_hinges, natural_hub_angle
+from seastar_gym.scene.shape import cross_at_rest, n_hub_hinges, natural_hub_angle, turn_per_hinge
 
 
 @register_part
@@ -109,6 +110,8 @@ class Scene:
     def _check_contact(self) -> None:
         if self.contact is None:
             return
+        if self.robot.body is not None and not self.robot.body.is_point:
+            raise ValueError("Contact of limbs around a body is not modelled: use a robot without one, or contact=None.")
         robot, pairs = self.robot, self.robot.limbs_that_may_touch()
         if not pairs:
             raise ValueError("Contact is modelled between limbs less than half a turn apart, and this robot has none.")
@@ -170,7 +173,10 @@ class Scene:
         Neighbours that are turned apart turn the hinge between them by two peak angles.
         """
         robot, peak = self.robot, float(np.max(self.actuator.peak_angle))
-        if robot.discretisation == "continuum" and robot.n_limbs > 1:
+        if robot.along is not None:
+            self._check_along(robot.along, peak)
+            return
+        if robot.discretisation == "continuum" and (robot.n_limbs > 1 or robot.body is not None):
             if peak >= math.pi:
                 raise ValueError(f"A peak angle must stay below pi, not {peak:.4g} rad.")
             return
@@ -195,6 +201,19 @@ class Scene:
                 f"is infinite: for {robot.n_limbs} limbs so spread the peak angle must stay below {limit:.4g} rad"
                 + (', or use hub_hinge="turning".' if robot.n_limbs == 2 else ".")
             )
+
+    def _check_along(self, along: AlongLimb, peak: float) -> None:
+        """Refuse peak angles at which a hinge, or a clamp, reaches pi. Natural curvatures add to the turn of hinges."""
+        for choose in (min, max):
+            robot = chosen(self.robot, choose)
+            at_clamp, *within = peak * np.abs(chosen(along, choose).hinge_shares(robot.nodes_per_limb))
+            curved = max(abs(turn_per_hinge(limb, robot.nodes_per_limb)) for limb in robot.limb_shapes())
+            turn = max([at_clamp, *(turn + curved for turn in within)])
+            if turn >= math.pi:
+                raise ValueError(
+                    f"A peak angle of {peak:.4g} rad turns a hinge by {turn:.4g} rad, not below pi: use a smaller one, "
+                    "or more nodes per limb."
+                )
 
     @classmethod
     def preset(cls, fidelity: Fidelity) -> "Scene":

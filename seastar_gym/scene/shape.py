@@ -26,7 +26,8 @@ def rest_positions(limbs: Sequence[LimbShape], nodes_per_limb: int, tangent: boo
         chord = np.sin(i * half_turn) / (i * np.sin(half_turn)) if half_turn else 1.0
         distance = limb.length * i / (nodes_per_limb - 1) * chord
         angle = limb.direction + (i if tangent else i - 1) * half_turn
-        nodes.append(np.stack([distance * np.cos(angle), distance * np.sin(angle)], axis=1))
+        x, y = limb.root
+        nodes.append(np.stack([x + distance * np.cos(angle), y + distance * np.sin(angle)], axis=1))
     return np.concatenate(nodes)
 
 

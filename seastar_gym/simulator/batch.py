@@ -38,7 +38,8 @@ class Batch:
 
     coefficients: The scene's coefficients for the kernels.
     memory: Working memory of every thread, (Work, Actuation) of `der`.
-    q, v: Node positions [m] and velocities [m/s], k = 2 n_nodes.
+    q, v: Node positions [m] and velocities [m/s], k = 2 n_nodes = n_node_rows. With a body, its angle and the roots of
+        its limbs follow, see der/star.py.
     a: Accelerations at the stages of a step.
     peaks: Factors by which limbs follow `shape`, k = n_limbs.
     times: Ends of the time steps of the present interval [s], shape (n_times,).
@@ -55,10 +56,13 @@ class Batch:
         n_groups, n_limbs, n_rows = -(-n_robots // N_LANES), scene.robot.n_limbs, 2 * scene.robot.n_nodes
         self._scheme = SCHEMES[scene.numerics.scheme]
         self.make_coefficients(scene)
-        self.q = aligned_rows(n_groups, n_rows, N_LANES)
-        self.v = aligned_rows(n_groups, n_rows, N_LANES)
-        self.q[:] = self.coefficients.rest
-        self.a = aligned_rows(n_groups, (n_rows + 1) * self._scheme.n_stages + 2, N_LANES)
+        self.n_node_rows = n_rows
+        body = self.coefficients.rods(0).body
+        n_free_rows, n_place_rows = (n_rows, n_rows) if body is None else (n_rows + 2, n_rows + 2 + 2 * n_limbs)
+        self.q = aligned_rows(n_groups, n_place_rows, N_LANES)
+        self.v = aligned_rows(n_groups, n_place_rows, N_LANES)
+        self.q[:, :n_rows] = self.coefficients.rest
+        self.a = aligned_rows(n_groups, (n_free_rows + 1) * self._scheme.n_stages + 2, N_LANES)
         self.peaks = np.zeros((n_groups, n_limbs, N_LANES))
         self.times = self.shape = np.zeros(1)
         self.rotations = np.zeros((n_groups, n_limbs, N_LANES))
@@ -109,27 +113,56 @@ class Batch:
             write_rows(getattr(self, name), values)
         self.last_hub = self.hub_position()
 
-    def put_nodes(self, robot: int | np.intp, nodes: Floats) -> None:
-        """Put a robot's nodes at positions [m], shape (n_nodes, 2), without velocity."""
+    def put_nodes(self, robot: int | np.intp, nodes: Floats, angle: float = 0.0) -> None:
+        """Put a robot's nodes at positions [m], shape (n_nodes, 2), and its body at an angle [rad], without velocity."""
         group, lane = divmod(robot, N_LANES)
-        self.q[group, :, lane] = nodes.reshape(-1)
+        self.q[group, : self.n_node_rows, lane] = nodes.reshape(-1)
         self.v[group, :, lane] = 0.0
+        if self.has_body:
+            self.q[group, self.n_node_rows, lane] = angle * self._scales[group, lane]
+
+    @property
+    def has_body(self) -> bool:
+        """Whether robots have a body, with an orientation of its own."""
+        return self.coefficients.rods(0).body is not None
+
+    @property
+    def _scales(self) -> Floats:
+        """Arc over angle of every robot's body [m], shape (n_groups, N_LANES)."""
+        bodies = [self.coefficients.rods(group).body for group in range(len(self.q))]
+        return np.array([np.broadcast_to(body.scale.reshape(-1), N_LANES) for body in bodies if body is not None])
+
+    def angles(self, rows: Floats) -> Floats:
+        """Orientation of every body [rad] from q, or its rate [rad/s] from v, shape (n_robots,)."""
+        return self.read(rows[:, self.n_node_rows, None] / self._scales[:, None])[:, 0]
+
+    def nodes_of(self, rows: Floats) -> Floats:
+        """Node positions [m] from q, or velocities [m/s] from v, shape (n_robots, n_nodes, 2)."""
+        return self.read(rows[:, : self.n_node_rows]).reshape(self.n_robots, -1, 2)
 
     def put_at_rest(self, robot: np.intp, angle: float) -> None:
         """Put a robot at rest with the hub at the origin and limb 1 in the direction `angle` [rad]."""
         nodes = self.coefficients.nodes(robot)
         # At heading zero the nodes are exactly those of rest, so that symmetric scenes stay symmetric.
         c, s = np.cos(angle), np.sin(angle)
-        self.put_nodes(robot, np.stack([c * nodes[:, 0] - s * nodes[:, 1], s * nodes[:, 0] + c * nodes[:, 1]], axis=1))
+        x, y = c * nodes[:, 0] - s * nodes[:, 1], s * nodes[:, 0] + c * nodes[:, 1]
+        self.put_nodes(robot, np.stack([x, y], axis=1), angle)
         group, lane = divmod(robot, N_LANES)
         for rows in (self.peaks, self.rotations, self.status):
             rows[group, :, lane] = 0.0
         self.last_hub[robot] = 0.0
 
-    def put_state(self, positions: Floats, velocities: Floats) -> None:
-        """Put all robots at node positions [m] with velocities [m/s], each of shape (n_robots, n_nodes, 2)."""
-        write_rows(self.q, positions)
-        write_rows(self.v, velocities)
+    def put_state(self, positions: Floats, velocities: Floats, orientation: Floats, spin: Floats) -> None:
+        """Put all robots at node positions [m] with velocities [m/s], each of shape (n_robots, n_nodes, 2).
+
+        orientation, spin: Of bodies [rad], [rad/s], shape (n_robots,); ignored without.
+        """
+        write_rows(self.q[:, : self.n_node_rows], positions)
+        write_rows(self.v[:, : self.n_node_rows], velocities)
+        if self.has_body:
+            for rows, angle in ((self.q, orientation), (self.v, spin)):
+                write_rows(rows[:, self.n_node_rows, None], angle)
+                rows[:, self.n_node_rows] *= self._scales
         self.peaks[:] = 0.0
         self.status[:] = 0.0
         self.last_hub = self.hub_position()

@@ -1,7 +1,9 @@
-"""Heading of the body frame, by the rotation of the rest shape that fits the nodes best."""
+"""Heading of the body frame, by the rotation of the rest shape that fits the nodes best, and where limbs begin."""
 
 import numpy as np
 from numpy.typing import NDArray
+
+from seastar_gym.scene import Seastar
 
 Floats = NDArray[np.float64]
 
@@ -13,3 +15,10 @@ def best_fit_heading(positions: Floats, rest: Floats) -> Floats:
     """
     x, y = np.moveaxis(positions - positions[:, :1], -1, 0)
     return np.asarray(np.arctan2(y @ rest[:, 0] - x @ rest[:, 1], x @ rest[:, 0] + y @ rest[:, 1]))
+
+
+def root_places(robot: Seastar, hub: Floats, orientation: Floats) -> Floats:
+    """Places where limbs begin [m], shape (n_robots, n_limbs, 2), from hubs (n_robots, 2) and orientations [rad]."""
+    x, y = np.array([limb.root for limb in robot.limb_shapes()]).T
+    c, s = np.cos(orientation)[:, None], np.sin(orientation)[:, None]
+    return np.asarray(hub[:, None] + np.stack([c * x - s * y, s * x + c * y], axis=-1))

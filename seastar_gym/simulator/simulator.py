@@ -17,7 +17,7 @@ from seastar_gym.scene.numerics import MAX_STEPS
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import write_rows
 from seastar_gym.simulator.batch import Batch
-from seastar_gym.simulator.body_frame import best_fit_heading
+from seastar_gym.simulator.body_frame import best_fit_heading, root_places
 from seastar_gym.simulator.clock import Clock
 from seastar_gym.simulator.commands import checked_commands
 from seastar_gym.simulator.drive import Drive
@@ -90,12 +90,15 @@ class Simulator:
 
     @property
     def q(self) -> Floats:
-        """Node positions in the kernels' memory [m], shape (n_groups, 2 n_nodes, N_LANES), not a copy."""
+        """Node positions in the kernels' memory [m], shape (n_groups, 2 n_nodes, N_LANES), not a copy.
+
+        With a body, rows of its orientation and of its limbs' roots follow, see der/star.py.
+        """
         return self._batch.q
 
     @property
     def v(self) -> Floats:
-        """Node velocities in the kernels' memory [m/s], shape (n_groups, 2 n_nodes, N_LANES), not a copy."""
+        """Node velocities in the kernels' memory [m/s], likewise."""
         return self._batch.v
 
     def set_scene(self, scene: Scene, mask: ArrayLike | None = None) -> None:
@@ -177,18 +180,20 @@ class Simulator:
         self._lock.require_intact()
         drive = self._drive
         phase = np.full(self.n_robots, drive.phase)
-        return State(self.positions, self.velocities, self.time, drive.state.copy(), drive.commands.copy(), phase)
+        turning = (self._batch.angles(self.q), self._batch.angles(self.v)) if self._batch.has_body else (None, None)
+        actuators, commands = drive.state.copy(), drive.commands.copy()
+        return State(self.positions, self.velocities, self.time, actuators, commands, phase, *turning)
 
     def set_state(self, state: State) -> None:
         """Put all robots into a state. Robots that had failed swim again.
 
         Their errors are not estimated until they are reset: the state has no like on the mesh of the twin.
         """
-        arrays = checked_state(state, self.scene.robot.n_nodes, self._drive.at_rest, self._drive.longest)
-        positions, velocities, time, actuators, commands, phase = arrays
+        arrays = checked_state(state, self.scene.robot.nodes(), self._drive.at_rest, self._drive.longest)
+        positions, velocities, time, actuators, commands, phase, orientation, spin = arrays
         checked_commands(commands, self.scene, self._drive.strengths, "State.commands")
         with self._new_state(of_all=True):
-            self._batch.put_state(positions, velocities)
+            self._batch.put_state(positions, velocities, orientation, spin)
             self._clock.set(slice(None), time)
             self._drive.put(actuators, commands, phase)
             write_rows(self._batch.rotations, self._drive.rotations())
@@ -234,12 +239,12 @@ class Simulator:
     @property
     def positions(self) -> Floats:
         """Node positions [m], shape (n_robots, n_nodes, 2), a copy."""
-        return self._batch.read(self.q).reshape(self.n_robots, -1, 2)
+        return self._batch.nodes_of(self.q)
 
     @property
     def velocities(self) -> Floats:
         """Node velocities [m/s], shape (n_robots, n_nodes, 2), a copy."""
-        return self._batch.read(self.v).reshape(self.n_robots, -1, 2)
+        return self._batch.nodes_of(self.v)
 
     @property
     def time(self) -> Floats:
@@ -278,6 +283,18 @@ class Simulator:
         The rest shape is that of the batch's first robot.
         """
         return best_fit_heading(self.positions, self.scene.robot.nodes())
+
+    def orientation(self) -> Floats:
+        """Angle by which every robot's body has turned from rest [rad], shape (n_robots,), or without one its heading."""
+        return self._batch.angles(self.q) if self._batch.has_body else self.heading()
+
+    def spin(self) -> Floats:
+        """Angular velocity of every robot's body [rad/s], shape (n_robots,); NaN without a body."""
+        return self._batch.angles(self.v) if self._batch.has_body else np.full(self.n_robots, np.nan)
+
+    def root_positions(self) -> Floats:
+        """Places where limbs begin [m], world frame, shape (n_robots, n_limbs, 2): on the body, or at the hub."""
+        return root_places(self.scene.robot, self.hub_position(), self.orientation())
 
     def elastic_energy(self) -> Floats:
         """Stretching and bending energy (13.14) at the present actuation [J], shape (n_robots,)."""

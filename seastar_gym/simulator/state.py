@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.scene.checks import as_floats
+from seastar_gym.simulator.body_frame import best_fit_heading
 
 Floats = NDArray[np.float64]
 
@@ -21,6 +22,9 @@ class State(NamedTuple):
     commands: Commands under way, shape (n_robots, n_limbs). `None` means none.
     phase: Time since they were given [s], shape (n_robots,), 0 where none are under way. All robots that have commands
         under way share it. `None` means 0.
+    orientation: Angle by which every robot's body has turned from rest [rad], shape (n_robots,). `None` means that of the
+        rest shape that fits the nodes best; it is `None` without a body.
+    spin: Its angular velocity [rad/s], shape (n_robots,). `None` means 0.
     """
 
     positions: Floats
@@ -29,22 +33,25 @@ class State(NamedTuple):
     actuators: Floats | None = None
     commands: Floats | None = None
     phase: Floats | None = None
+    orientation: Floats | None = None
+    spin: Floats | None = None
 
     def of_robots(self, robots: NDArray[np.intp] | NDArray[np.bool_] | slice) -> "State":
         """State of the chosen robots, in their order."""
         return State(*(None if part is None else part[robots] for part in self))  # type: ignore[arg-type]
 
 
-def checked_state(state: object, n_nodes: int, actuators_at_rest: Floats, longest: float) -> list[Floats]:
+def checked_state(state: object, rest: Floats, actuators_at_rest: Floats, longest: float) -> list[Floats]:
     """Arrays of a state, at rest where it has None. ValueError if a shape or a number is wrong.
 
+    rest: Node positions at rest [m], shape (n_nodes, 2).
     actuators_at_rest: Shape (n_robots, n_limbs, n_state). longest: Time for which commands may be under way [s].
     """
     if not isinstance(state, tuple | list) or not 3 <= len(state) <= len(State._fields):
         raise ValueError(f"A State of {', '.join(State._fields)} is needed, not {type(state).__name__}.")
     n_robots, n_limbs, _ = actuators_at_rest.shape
-    nodes, each = (n_robots, n_nodes, 2), np.zeros(n_robots)
-    positions, velocities, time, actuators, commands, phase = State(*state)
+    nodes, each = (n_robots, *rest.shape), np.zeros(n_robots)
+    positions, velocities, time, actuators, commands, phase, orientation, spin = State(*state)
     arrays = [
         _checked_array("State.positions", positions, nodes),
         _checked_array("State.velocities", velocities, nodes),
@@ -54,7 +61,12 @@ def checked_state(state: object, n_nodes: int, actuators_at_rest: Floats, longes
         _checked_array("State.phase", phase, each.shape, each),
     ]
     _check_phase(arrays[-1], longest)
-    return arrays
+    fitting = best_fit_heading(arrays[0], rest)
+    return [
+        *arrays,
+        _checked_array("State.orientation", orientation, each.shape, fitting),
+        _checked_array("State.spin", spin, each.shape, each),
+    ]
 
 
 def _checked_array(name: str, value: object, wanted: tuple[int, ...], at_rest: Floats | None = None) -> Floats:

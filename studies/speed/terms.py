@@ -16,7 +16,7 @@ from rich.table import Table
 
 from seastar_gym.command import run_command
 from seastar_gym.gaits import STRAIGHT
-from seastar_gym.scene import Contact, Scene, Seastar, relaxation_time
+from seastar_gym.scene import AlongLimb, Contact, Scene, Seastar, Stiffening, relaxation_time
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
 from seastar_gym.scene.fluid import Water
 from seastar_gym.simd.lanes import N_LANES
@@ -59,6 +59,8 @@ def scenes() -> dict[str, Scene]:
         THE_CHAPTERS: Scene(),
         **{name: Scene(fluid=fluid) for name, fluid in fluids.items()},
         "material damping": Scene(damped),
+        "bent along the limbs": Scene(Seastar(along=AlongLimb())),
+        "bent along, stiff when hot": Scene(Seastar(along=AlongLimb(), stiffening=Stiffening())),
         "contact, limbs apart": Scene(contact=Contact()),
         "numbers of each robot": Scene(Seastar(youngs_modulus=np.full(n_robots, 1e6))),
         "all of these": Scene(replace(damped, youngs_modulus=np.full(n_robots, 1e6)), everything),

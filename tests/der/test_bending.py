@@ -18,9 +18,9 @@ ANGLES = np.linspace(-2.5, 2.5, 21)
 def parts(phi, kappa_bar: float, convex=None):
     """(energy, slope, second slope) of a hinge."""
     t = Lanes(np.tan(0.5 * phi))
-    bent = moment.plain(RODS, HINGE, t, Lanes(EI * kappa_bar))
+    bent = moment.plain(RODS, None, HINGE, t, Lanes(EI * kappa_bar))
     slopes = bending_slopes.plain(Lanes(RODS.bending.EI_over_dl[HINGE]), t, bent, convex)
-    return plain((bending_energy.plain(RODS, HINGE, bent), *slopes))
+    return plain((bending_energy.plain(RODS, None, HINGE, bent), *slopes))
 
 
 @pytest.mark.parametrize("kappa_bar", [0.0, 30.0, -50.0])

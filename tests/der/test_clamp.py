@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seastar_gym import Limb, Scene, Seastar, SmaPulse, Water
+from seastar_gym import AlongLimb, Limb, Scene, Seastar, SmaPulse, Stiffening, Water
 from seastar_gym.der.linear.star_solution import solve_again, substitute_star
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import Rods, Work, make_work
@@ -42,6 +42,10 @@ SCENES = {
     "curved limbs, everything": Scene(
         replace(ROBOT, limbs=(Limb(natural_curvature=5.0), Limb(length=0.08), Limb()), relaxation_time=1e-3),
         Water(tangential_drag_coefficient=0.1, added_mass_coefficient=0.7),
+    ),
+    "bent along, stiff when hot": Scene(
+        replace(ROBOT, along=AlongLimb(0.7, (1.0, 2.0, 0.5)), stiffening=Stiffening(2.0), relaxation_time=1e-3),
+        actuator=SmaPulse(0.5),
     ),
     "one limb": Scene(Seastar(1, 4, discretisation="continuum"), actuator=SmaPulse(0.0)),
     "two limbs": Scene(Seastar(2, 3, discretisation="continuum"), Water(added_mass_coefficient=0.7)),

@@ -10,7 +10,7 @@ import numba
 import numpy as np
 import pytest
 
-from seastar_gym import Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, Vortex, Water
+from seastar_gym import AlongLimb, Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, Stiffening, Vortex, Water
 from seastar_gym.der import motion
 from seastar_gym.der.terms import drag
 from seastar_gym.der.terms.drag import drag_slopes
@@ -48,6 +48,8 @@ def scenes():
     water = Water(950.0, 1.3, 0.1, Vortex(0.02, 0.1, -0.05, 0.06), 0.8)
     robot = Seastar(nodes_per_limb=3, relaxation_time=4e-3)
     yield "fluid", Scene(robot, water, pulse, Numerics("implicit-midpoint", 0.01))
+    bent = Seastar(nodes_per_limb=4, along=AlongLimb(0.7, (1.0, 2.0, 0.5)), stiffening=Stiffening(2.0))
+    yield "bent along", Scene(bent, None, pulse, Numerics("implicit-midpoint", 0.01))
     for name, contact in (("contact", Contact()), ("no contact", None)):
         yield name, Scene(Seastar(nodes_per_limb=4), None, MEETING, Numerics(step=0.02), contact=contact)
 

@@ -25,8 +25,12 @@ the cut is of the order of the scheme's own error.
 
 Schemes of higher order take the energy in the middle of a step and promise no such balance. In a guarded step they are
 held to the larger of the energies that the robot standing still has at the step's ends, and what moving the
-natural hub angles alone can store. What limbs store that press each other, and may get back, counts at the start of all
-steps, and at the end of implicit Euler's: where others look ahead (contact.py), limbs that part get nothing back.
+natural hub angles, and natural curvature, alone can store. What limbs store that press each other, and may get back,
+counts at the start of all steps, and at the end of implicit Euler's: where others look ahead (contact.py), limbs that
+part get nothing back.
+
+U is that of the stiffness that limbs have at the time, see along.py. So what actuators put in or take out by stiffening
+a bent limb is in these balances as what they do by moving its natural state.
 
 At phi = pi a hinge would store infinite energy, but a Newton step may jump over that pole, and the robot then stays
 folded over itself. Such steps are refused, too, while they are not very short: an edge that collapses turns its hinges
@@ -36,8 +40,18 @@ over at no such cost.
 from seastar_gym.der.energy import elastic_energy
 from seastar_gym.der.geometry import edge_vector, half_angle, larger
 from seastar_gym.der.motion import node_motion
-from seastar_gym.der.star import edge_of, hinge_edges, is_clamped, n_nodes, tail_node
+from seastar_gym.der.star import edge_of, hinge_edges, is_clamped, n_free, n_nodes, n_places, tail_node
 from seastar_gym.der.terms.added_mass import add_fluid_energy, add_fluid_momentum, less_edge_fluid_energy
+from seastar_gym.der.terms.along import add_moved_energy, bending_stiffness
+from seastar_gym.der.terms.body import move_roots, place_roots
+from seastar_gym.der.terms.body_forces import (
+    add_mass_moment,
+    add_spin,
+    add_turning_energy,
+    add_turning_momentum,
+    cut_spin,
+    spin_rate,
+)
 from seastar_gym.der.terms.clamp import moved_clamp_energy
 from seastar_gym.der.terms.contact import add_contact_energy
 from seastar_gym.der.terms.fluid import fluid_velocity
@@ -65,15 +79,17 @@ def frame_velocity(current, rods, q, v):
         m = load(rods.mass, node)
         mass += m
         v_x, v_y = add_product(v_x, m, load(v, 2 * node)), add_product(v_y, m, load(v, 2 * node + 1))
+    v_x, v_y = add_turning_momentum(rods.body, rods, q, v, (v_x, v_y))
     dragged = load(rods.scales.damped, 0) > 0.0
     u_x, u_y = fluid_velocity(current, load(q, 0), load(q, 1))
     return select(dragged, u_x, v_x / mass), select(dragged, u_y, v_y / mass)
 
 
 @kernel
-def moving_energy(rods, work, v, frame):
+def moving_energy(rods, work, q, v, frame):
     """Kinetic energy of the robot, and of fluid that moves along at the normals of the last stage [J]."""
-    energy = add_fluid_energy(work.added_mass, rods, v, frame, kinetic_energy(rods, v, frame))
+    energy = add_turning_energy(rods.body, rods, q, v, frame, kinetic_energy(rods, v, frame))
+    energy = add_fluid_energy(work.added_mass, rods, v, frame, energy)
     return less_edge_fluid_energy(rods.edge_added_mass, rods, work, v, energy)
 
 
@@ -92,28 +108,31 @@ def add_work_of_loads(loads, rods, work, q, h, frame, energy):
 @kernel
 def set_aside(rods, work, scheme, q, v):
     """Copy the state into memory that a step's last stage leaves unused."""
-    rows = 2 * n_nodes(rods)
+    rows = 2 * n_free(rods)
     unused = rows * (scheme.n_stages - 1)
     for row in range(rows):
         store(work.step, row, load(q, row))
         store(work.stage_v, unused + row, load(v, row))
+    place_roots(rods.body, rods, work.step)
 
 
 @kernel
 def put_back(rods, work, scheme, q, v, robots):
     """Undo a step of the robots in the mask."""
-    rows = 2 * n_nodes(rods)
+    rows = 2 * n_free(rods)
     unused = rows * (scheme.n_stages - 1)
     for row in range(rows):
         store(q, row, select(robots, load(work.step, row), load(q, row)))
         store(v, row, select(robots, load(work.stage_v, unused + row), load(v, row)))
+    move_roots(rods.body, rods, q, v)
 
 
 @kernel
 def moved_hub_energy(clamp, rods, work, actuation, start, end):
     """Energy of hub hinges at their natural angles, once those have moved from `start` to `end` of the interval [J]."""
     if clamp is not None:
-        return moved_clamp_energy(clamp, rods, work, actuation, start, end)
+        moved = moved_clamp_energy(clamp, rods, work, actuation, start, end)
+        return add_moved_energy(rods.along, rods, work, actuation, start, end, moved)
     set_natural_hub_angles(rods, work, actuation, start)
     for limb in range(rods.n_limbs):
         store(work.hub_moment, limb, load(work.hub_EI_kappa_bar, limb))
@@ -142,20 +161,20 @@ def allowed_energy(rods, work, scheme, actuation, start, end, q, v, frame):
     else:
         set_natural_hub_angles(rods, work, actuation, end)
         allowed = elastic_energy(rods, work, q)
-    return add_contact_energy(rods.contact, rods, work, q, allowed + moving_energy(rods, work, v, frame))
+    return add_contact_energy(rods.contact, rods, work, q, allowed + moving_energy(rods, work, q, v, frame))
 
 
 @kernel
-def may_gain(current, added_mass, rods, work, stage, phi, robots):
+def may_gain(current, added_mass, body, rods, work, stage, phi, robots):
     """Mask of those among `robots` whose step of implicit Euler might create energy, as far as Newton's method knows.
 
     phi: Phi before Newton's last step [J], which is not less than at its end. There Phi is |v_1 - v_0|^2_M / 2 + U(q_1)
         and what dissipation adds, less h F (v_1 - v_0) of loads F, so the energy ends at most
         Phi + v_0 M (v_1 - v_0) - h F v_0 - U(q_0) above the one allowed.
 
-    It is the whole of `robots` in scenes whose fluid gives energy or takes it up.
+    It is the whole of `robots` in scenes whose fluid gives energy or takes it up, or with a body.
     """
-    if current is None and added_mass is None:
+    if current is None and added_mass is None and body is None:
         gain = phi - elastic_energy(rods, work, stage.q_hat)
         for node in range(n_nodes(rods)):
             m = load(rods.mass, node)
@@ -237,11 +256,12 @@ def rigid_motion(rods, work, q, v, frame):
         m = load(rods.mass, node)
         mass += m
         x, y = add_product(x, m, load(q, 2 * node)), add_product(y, m, load(q, 2 * node + 1))
+    x, y = add_mass_moment(rods.body, rods, q, (x, y))
     x, y = x / mass, y / mass
     p_x, p_y, spin = zero, zero, zero
     # What the motions along x, along y and about the centre of mass have in common: the inertia of a rigid robot.
     xx, xy, yy, x_turn, y_turn, turn = zero, zero, zero, zero, zero, zero
-    for node in range(n_nodes(rods)):
+    for node in range(n_places(rods)):
         r_x, r_y = load(q, 2 * node) - x, load(q, 2 * node + 1) - y
         p = momentum_of(work.added_mass, rods, node, load(v, 2 * node) - frame[0], load(v, 2 * node + 1) - frame[1])
         along_x = momentum_of(work.added_mass, rods, node, one, zero)
@@ -250,6 +270,10 @@ def rigid_motion(rods, work, q, v, frame):
         p_x, p_y, spin = p_x + p[0], p_y + p[1], spin + (r_x * p[1] - r_y * p[0])
         xx, xy, yy = xx + along_x[0], xy + along_x[1], yy + along_y[1]
         x_turn, y_turn, turn = x_turn + about[0], y_turn + about[1], turn + (r_x * about[1] - r_y * about[0])
+    hub = (load(q, 0) - x, load(q, 1) - y)
+    v_hub, omega = (load(v, 0) - frame[0], load(v, 1) - frame[1]), spin_rate(rods.body, rods, v)
+    (p_x, p_y), spin = add_spin(rods.body, rods, q, v_hub, omega, hub, (p_x, p_y), spin)
+    (x_turn, y_turn), turn = add_spin(rods.body, rods, q, (-hub[1], hub[0]), one, hub, (x_turn, y_turn), turn)
     spin, turn = less_edge_turn(rods.edge_mass, rods, q, v, spin, turn)
     spin, turn = less_edge_fluid_turn(rods.edge_added_mass, rods, work, q, v, spin, turn)
     # Elimination of x, then y.
@@ -274,6 +298,8 @@ def cut_velocities(rods, q, v, frame, motion, share, robots):
         about_y = vy - frame[1] - (v_y + omega * (load(q, 2 * node) - x))
         store(v, 2 * node, select(robots, add_product(vx, less, about_x), vx))
         store(v, 2 * node + 1, select(robots, add_product(vy, less, about_y), vy))
+    cut_spin(rods.body, rods, v, omega, less, robots)
+    move_roots(rods.body, rods, q, v)
 
 
 @kernel
@@ -296,7 +322,7 @@ def through_poles(rods, work, q, robots):
 
 
 @kernel
-def energy_noise(rods, q, h, potential, kinetic):
+def energy_noise(rods, work, q, h, potential, kinetic):
     """Change of an energy that rounding of positions may make [J]: slope sqrt(2 m K) and curvature m, times a move.
 
     Velocities are differences of positions over h; stretching and bending are as stiff as `stiffness` [N/m] at most.
@@ -305,10 +331,10 @@ def energy_noise(rods, q, h, potential, kinetic):
     mass = load(rods.scales.free_mass, 0)
     edges = rods.n_limbs * (rods.nodes_per_limb - 1)
     length = load(rods.foresight.shortest_edge, 0)
-    stretching, bending = load(rods.stretching.EA_over_l, 0), load(rods.bending.EI_over_dl, 0)
+    stretching, bending = load(rods.stretching.EA_over_l, 0), bending_stiffness(rods.along, rods, work, 0)
     for e in range(1, edges):
         stretching = larger(load(rods.stretching.EA_over_l, e), stretching)
-        bending = larger(load(rods.bending.EI_over_dl, e), bending)
+        bending = larger(bending_stiffness(rods.along, rods, work, e), bending)
     stiffness = edges * (stretching + 4.0 * bending / (length * length))
     limb = (rods.nodes_per_limb - 1) * length
     move = UNITS * (absolute(load(q, 0)) + absolute(load(q, 1)) + limb)
@@ -345,13 +371,13 @@ def hold_to_energy(rods, work, scheme, q, v, h, frame, robots, allowed, largest_
 
     Returns (refused, cut): masks of the robots whose step has to be undone, and of those whose velocities were cut.
     """
-    potential, kinetic = elastic_energy(rods, work, q), moving_energy(rods, work, v, frame)
+    potential, kinetic = elastic_energy(rods, work, q), moving_energy(rods, work, q, v, frame)
     potential = add_held_energy(rods.contact, rods, work, scheme, q, potential)
     grown = robots & (potential + kinetic > add_product(allowed, ROUNDING, kinetic))
     cut = grown & ~grown
     if any_lane(grown):
         motion = rigid_motion(rods, work, q, v, frame)
-        noise = energy_noise(rods, q, h, potential, kinetic)
+        noise = energy_noise(rods, work, q, h, potential, kinetic)
         grown = grown & (potential + kinetic > allowed + noise)
         rigid = motion[5]
         about = kinetic - rigid

@@ -1,6 +1,7 @@
 """An interval between two corners of a time grid, covered by steps that every robot halves and doubles for itself."""
 
 from seastar_gym.der.geometry import edge_geometry, half_angle
+from seastar_gym.der.star import tail_node
 from seastar_gym.der.stepping.report import (
     COVERED,
     HALVINGS,
@@ -27,9 +28,9 @@ def note_hub_angles(rods, q, robots, report):
     smallest = load(report, SMALLEST_HUB_T)
     edges = rods.nodes_per_limb - 1
     last = rods.n_limbs - 1
-    first = edge_geometry(q, 0, last * edges + 1)
+    first = edge_geometry(q, tail_node(rods, last * edges), last * edges + 1)
     for limb in range(rods.n_limbs):
-        second = edge_geometry(q, 0, limb * edges + 1)
+        second = edge_geometry(q, tail_node(rods, limb * edges), limb * edges + 1)
         t = half_angle(first, second, rods.hub.side)
         narrow = rods.hub.side * load(rods.hub.angle, limb - 1 if limb > 0 else last) >= 0.0
         smallest = select(robots & narrow & (t < smallest), t, smallest)

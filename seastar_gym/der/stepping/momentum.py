@@ -11,7 +11,9 @@ of its own after the others: from the residual summed over the nodes, and its sl
 
 from seastar_gym.der.motion import node_motion
 from seastar_gym.der.potential import node_slopes
-from seastar_gym.der.star import n_nodes, tail_node
+from seastar_gym.der.star import n_nodes, root_place
+from seastar_gym.der.terms.body import place_roots, root_motion, tail_motion
+from seastar_gym.der.terms.body_forces import add_body
 from seastar_gym.der.terms.drag import middle_slopes
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import any_lane, load, select, splat, store
@@ -40,6 +42,7 @@ def move_as_a_whole(rods, work, stage, robots):
         _, gradient, hessian = node_slopes(None, rods, work, stage, node, node_motion(work, stage, node))
         fx, fy = fx + gradient[0], fy + gradient[1]
         xx, xy, yy = xx + hessian[0], xy + hessian[1], yy + hessian[2]
+    fx, fy, xx, xy, yy = add_roots(rods.body, rods, work, stage, fx, fy, xx, xy, yy)
     fx, fy, xx, xy, yy = add_middles(rods.middle_drag, rods, work, stage, fx, fy, xx, xy, yy)
     determinant = xx * yy - xy * xy
     dx, dy = (yy * fx - xy * fy) / determinant, (xx * fy - xy * fx) / determinant
@@ -47,6 +50,21 @@ def move_as_a_whole(rods, work, stage, robots):
         x, y = load(work.q, 2 * node), load(work.q, 2 * node + 1)
         store(work.q, 2 * node, select(robots, x - dx, x))
         store(work.q, 2 * node + 1, select(robots, y - dy, y))
+    place_roots(rods.body, rods, work.q)
+
+
+@kernel
+def add_roots(body, rods, work, stage, fx, fy, xx, xy, yy):
+    """Add a body, and the fluid at its limbs' roots, to the residual and slope of a move of the whole robot."""
+    if body is None:
+        return fx, fy, xx, xy, yy
+    of_hub, zero = node_motion(work, stage, 0), splat(0.0)
+    _, (fx, fy), (xx, xy, yy) = add_body(body, rods, work, stage, None, of_hub, zero, (fx, fy), (xx, xy, yy))
+    for limb in range(rods.n_limbs):
+        motion = root_motion(rods, work, stage, limb)
+        _, g, h = node_slopes(None, rods, work, stage, root_place(rods, limb), motion)
+        fx, fy, xx, xy, yy = fx + g[0], fy + g[1], xx + h[0], xy + h[1], yy + h[2]
+    return fx, fy, xx, xy, yy
 
 
 @kernel
@@ -55,7 +73,7 @@ def add_middles(middle_drag, rods, work, stage, fx, fy, xx, xy, yy):
     if middle_drag is None:
         return fx, fy, xx, xy, yy
     for e in range(n_nodes(rods) - 1):
-        tail, head = node_motion(work, stage, tail_node(rods, e)), node_motion(work, stage, e + 1)
+        tail, head = tail_motion(rods.body, rods, work, stage, e), node_motion(work, stage, e + 1)
         _, g, h = middle_slopes(middle_drag, rods, work, stage, e, tail, head)
         fx, fy = fx + 2.0 * g[0], fy + 2.0 * g[1]
         xx, xy, yy = xx + 4.0 * h[0], xy + 4.0 * h[1], yy + 4.0 * h[2]

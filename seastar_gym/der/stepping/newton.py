@@ -10,6 +10,7 @@ from seastar_gym.der.linear.star_matrix import load_pair, store_pair, substitute
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.star import n_nodes
 from seastar_gym.der.stepping.foresight import foreseeable_length, predictable
+from seastar_gym.der.terms.body import place_roots, tail_solution
 from seastar_gym.der.terms.contact import n_listed
 from seastar_gym.simd.compilation import inlined_kernel, kernel
 from seastar_gym.simd.lanes import absolute, add_product, any_lane, load, select, splat, sqrt
@@ -81,15 +82,26 @@ def take_step(rods, work, stepping, shortening, fraction):
     edges = rods.nodes_per_limb - 1
     scale = step_scale(stepping, shortening, fraction)
     hub = load_pair(work.root_solution, 2 * rods.n_limbs)
-    largest = move_node(work, 0, hub, shortening, scale)
+    largest = move_angle(rods.body, rods, work, shortening, scale, move_node(work, 0, hub, shortening, scale))
     for limb in range(rods.n_limbs):
         first = limb * edges
-        before, here = hub, load_pair(work.root_solution, 2 * limb)
+        before = tail_solution(rods.body, work, rods.n_limbs, limb, hub)
+        here = load_pair(work.root_solution, 2 * limb)
         largest = larger(largest, move_node(work, first + 1, here, shortening, scale))
         for i in range(2, edges + 1):
             before, here = here, substitute_node(work, first + i, here[0], here[1], before[0], before[1])
             largest = larger(largest, move_node(work, first + i, here, shortening, scale))
+    place_roots(rods.body, rods, work.q)
     return sqrt(largest)
+
+
+@kernel
+def move_angle(body, rods, work, shortening, scale, largest):
+    """Move a body's angle by `scale` times its step; returns the largest move squared; unchanged without a body."""
+    if body is None:
+        return largest
+    arc = load(body.scale, 0) * load(work.root_solution, 2 * rods.n_limbs + 2)
+    return larger(largest, move_node(work, n_nodes(rods), (arc, splat(0.0)), shortening, scale))
 
 
 @kernel

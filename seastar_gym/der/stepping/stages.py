@@ -2,7 +2,8 @@
 
 from typing import Any, NamedTuple
 
-from seastar_gym.der.star import n_nodes
+from seastar_gym.der.star import n_free, n_nodes
+from seastar_gym.der.terms.body import move_roots, place_roots
 from seastar_gym.simd.compilation import inlined_kernel, kernel
 from seastar_gym.simd.lanes import add_product, load, load_number, select, splat, sqrt, store
 
@@ -28,14 +29,14 @@ LAST_STEP, SIZE = 0, 1
 @kernel
 def memory_row(rods, scheme, which):
     """Row of `a` where a step leaves LAST_STEP or SIZE for the next."""
-    return (2 * n_nodes(rods) + 1) * scheme.n_stages + which
+    return (2 * n_free(rods) + 1) * scheme.n_stages + which
 
 
 @inlined_kernel
 def begin_stage(rods, work, scheme, k, q_0, v_0, a, h):
     """Stage k of a step; the iterate starts at (13.10) plus a share of what the last acceleration adds."""
     gamma = load_number(scheme.a, k * scheme.n_stages + k) * h
-    rows = 2 * n_nodes(rods)
+    rows = 2 * n_free(rods)
     share = gamma * load(a, scheme.n_stages * rows + k)
     for row in range(rows):
         q_hat, v_hat = load(q_0, row), load(v_0, row)
@@ -48,7 +49,9 @@ def begin_stage(rods, work, scheme, k, q_0, v_0, a, h):
             store(work.v_hat, row, v_hat)
         velocity = add_product(v_hat, share, load(a, k * rows + row))
         store(work.q, row, add_product(q_hat, gamma, velocity))
+    place_roots(rods.body, rods, work.q)
     if k > 0:
+        place_roots(rods.body, rods, work.q_hat)
         return Stage(work.q_hat, work.v_hat, gamma, 1.0 / gamma, not scheme.stiffly_accurate)
     return Stage(q_0, v_0, gamma, 1.0 / gamma, not scheme.stiffly_accurate)
 
@@ -73,7 +76,7 @@ def store_share(a, row, along, squared, robots):
 @kernel
 def end_stage(rods, work, scheme, k, stage, a, robots):
     """Keep velocity and acceleration of a solved stage that is not the last, for the robots in the mask `robots`."""
-    rows = 2 * n_nodes(rods)
+    rows = 2 * n_free(rods)
     along, squared = splat(0.0), splat(0.0)
     for row in range(rows):
         velocity, acceleration = stage_motion(work, stage, row)
@@ -88,7 +91,7 @@ def end_stage(rods, work, scheme, k, stage, a, robots):
 @inlined_kernel
 def end_step(rods, work, scheme, stage, q_0, v_0, a, h, accepted):
     """After the last stage: write the step's result over the state (q_0, v_0) of the robots in the mask `accepted`."""
-    rows, k = 2 * n_nodes(rods), scheme.n_stages - 1
+    rows, k = 2 * n_free(rods), scheme.n_stages - 1
     along, squared = splat(0.0), splat(0.0)
     for row in range(rows):
         velocity, acceleration = stage_motion(work, stage, row)
@@ -108,13 +111,14 @@ def end_step(rods, work, scheme, stage, q_0, v_0, a, h, accepted):
         store(a, k * rows + row, select(accepted, acceleration, last))
         store(q_0, row, select(accepted, q_1, q))
         store(v_0, row, select(accepted, v_1, v))
+    move_roots(rods.body, rods, q_0, v_0)
     store_share(a, scheme.n_stages * rows + k, along, squared, accepted)
 
 
 @kernel
 def forget_accelerations(rods, scheme, a, robots):
     """Robots whose step did not converge start the next one without a prediction, which may be far off or infinite."""
-    for row in range((2 * n_nodes(rods) + 1) * scheme.n_stages):
+    for row in range((2 * n_free(rods) + 1) * scheme.n_stages):
         store(a, row, select(robots, 0.0, load(a, row)))
 
 
@@ -126,7 +130,7 @@ def step_error(rods, work, stage, a, h, last_h):
     that is the difference to the last step's over the time between the two middles.
     """
     largest = splat(0.0)
-    for node in range(n_nodes(rods)):
+    for node in range(n_free(rods)):
         squared = splat(0.0)
         for row in range(2 * node, 2 * node + 2):
             _, acceleration = stage_motion(work, stage, row)
@@ -146,3 +150,14 @@ def start_standing(rods, work, stage, frame, robots):
         y = add_product(load(stage.q_hat, 2 * node + 1), stage.gamma, frame[1])
         store(work.q, 2 * node, select(robots, x, load(work.q, 2 * node)))
         store(work.q, 2 * node + 1, select(robots, y, load(work.q, 2 * node + 1)))
+    stop_turning(rods.body, rods, work, stage, robots)
+
+
+@kernel
+def stop_turning(body, rods, work, stage, robots):
+    """Start the angle of a body at q_hat, for the robots in the mask, and its roots with it; nothing without a body."""
+    if body is None:
+        return
+    row = 2 * n_nodes(rods)
+    store(work.q, row, select(robots, load(stage.q_hat, row), load(work.q, row)))
+    place_roots(body, rods, work.q)

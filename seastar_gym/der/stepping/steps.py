@@ -31,6 +31,8 @@ from seastar_gym.der.stepping.stages import (
     start_standing,
     step_error,
 )
+from seastar_gym.der.terms.body import freeze_body
+from seastar_gym.der.terms.body_forces import add_work_on_body
 from seastar_gym.der.terms.crossing import those_uncrossed
 from seastar_gym.der.terms.damping import freeze_strains
 from seastar_gym.der.terms.fluid import add_work_of_current, freeze_fluid
@@ -98,11 +100,12 @@ def solve_stages(rods, work, scheme, actuation, q, v, a, step, active, limits, r
     for k in range(scheme.n_stages):
         stage = begin_stage(rods, work, scheme, k, q, v, a, step.h)
         freeze_contact(rods.contact, rods, work, stage, q)
+        freeze_body(rods.body, rods, work, stage)
         if any_lane(step.retrying):
             start_standing(rods, work, stage, frame_velocity(rods.current, rods, q, v), step.retrying)
         freeze_fluid(rods, work)
-        freeze_strains(rods.damping, rods, work, stage.q_hat)
         set_natural_hub_angles(rods, work, actuation, step.start + load_number(scheme.c, k) * step.size)
+        freeze_strains(rods.damping, rods, work, stage.q_hat)
         left = limits.most_iterations - load(report, NEWTON_ITERATIONS)
         most, good = select(left < step.iteration_limit, left, step.iteration_limit), good & (left > 0.0)
         good, phi, iterations, regularised, backtracks = minimise(rods, work, stage, good, tolerance, most)
@@ -129,7 +132,7 @@ def those_that_may_gain(rods, work, stage, phi, robots):
     energetic = phi > load(rods.scales.damped, 0)
     predictable = robots & energetic & (phi <= load(rods.foresight.energy, 0))
     if any_lane(predictable):
-        gaining = may_gain(rods.current, rods.added_mass, rods, work, stage, phi, predictable)
+        gaining = may_gain(rods.current, rods.added_mass, rods.body, rods, work, stage, phi, predictable)
         energetic = (energetic & ~predictable) | gaining
     return energetic
 
@@ -147,6 +150,7 @@ def end_guarded_step(rods, work, scheme, actuation, q, v, a, step, stage, accept
     largest_cut = select(step.iteration_limit > MOST_HALVINGS * limits.max_iterations, splat(1.0), LARGEST_CUT)
     allowed = add_work_of_current(rods.current, rods, work, v, step.h, frame, allowed)
     allowed = add_work_of_loads(rods.load, rods, work, q, step.h, frame, allowed)
+    allowed = add_work_on_body(rods.body, rods, work, work.step, q, v, step.h, frame, allowed)
     refused, cut = hold_to_energy(rods, work, scheme, q, v, step.h, frame, guarded, allowed, largest_cut)
     turnable = guarded & (step.iteration_limit <= TURNABLE * limits.max_iterations)
     refused = refused | through_poles(rods, work, q, turnable)

@@ -3,6 +3,7 @@
 from seastar_gym.der.geometry import larger
 from seastar_gym.der.stepping.interval import cover_interval
 from seastar_gym.der.stepping.report import NEWTON_ITERATIONS
+from seastar_gym.der.terms.body import move_roots
 from seastar_gym.simd.compilation import entry_point, kernel
 from seastar_gym.simd.lanes import borrow, load, select, splat, store
 
@@ -38,6 +39,7 @@ def advance(rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shap
     for group in range(q.shape[0]):
         q_rows, v_rows, a_rows, peak_rows = borrow(q[group]), borrow(v[group]), borrow(a[group]), borrow(peaks[group])
         failed_rows, report_rows = borrow(failed[group]), borrow(report[group])
+        move_roots(rods_rows.body, rods_rows, q_rows, v_rows)
         status = load(failed_rows, 0)
         alive = status < 1.0
         for k in range(times.shape[0] - 1):

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from seastar_gym.der.geometry import edge_vector
 from seastar_gym.der.mesh import Mesh
-from seastar_gym.der.star import n_nodes, tail_node
+from seastar_gym.der.star import n_nodes, n_places, root_place, tail_node
+from seastar_gym.der.terms.body_forces import body_added_mass
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, splat, store, subtract_product
 
@@ -45,14 +46,29 @@ def freeze_added_mass(added_mass, rods, work):
     for node in range(n_nodes(rods)):
         xx, xy, yy = splat(0.0), splat(0.0), splat(0.0)
         if node == 0:
-            for e in range(0, rods.n_limbs * edges, edges):
-                xx, xy, yy = add_half_edge_mass(load(added_mass, 2 * e + 2), work.normals, e, xx, xy, yy)
+            xx, xy, yy = hub_mass(rods.body, added_mass, rods, work, xx, xy, yy)
         else:
             xx, xy, yy = add_half_edge_mass(load(added_mass, 2 * node), work.normals, node - 1, xx, xy, yy)
             xx, xy, yy = add_half_edge_mass(load(added_mass, 2 * node + 1), work.normals, node, xx, xy, yy)
         store(work.added_mass, 3 * node, xx)
         store(work.added_mass, 3 * node + 1, xy)
         store(work.added_mass, 3 * node + 2, yy)
+
+
+@kernel
+def hub_mass(body, added_mass, rods, work, xx, xy, yy):
+    """Added mass of the hub [kg]: of half of every root edge; that of a body is its own, and its roots have theirs."""
+    edges = rods.nodes_per_limb - 1
+    if body is None:
+        for e in range(0, rods.n_limbs * edges, edges):
+            xx, xy, yy = add_half_edge_mass(load(added_mass, 2 * e + 2), work.normals, e, xx, xy, yy)
+        return xx, xy, yy
+    for limb in range(rods.n_limbs):
+        e, place = limb * edges, root_place(rods, limb)
+        mass = add_half_edge_mass(load(added_mass, 2 * e + 2), work.normals, e, splat(0.0), splat(0.0), splat(0.0))
+        for k in range(3):
+            store(work.added_mass, 3 * place + k, mass[k])
+    return body_added_mass(body.added_mass, work)
 
 
 @kernel
@@ -139,7 +155,7 @@ def add_fluid_energy(added_mass, rods, v, frame, energy):
     if added_mass is None:
         return energy
     total = splat(0.0)
-    for node in range(n_nodes(rods)):
+    for node in range(n_places(rods)):
         vx, vy = load(v, 2 * node) - frame[0], load(v, 2 * node + 1) - frame[1]
         px, py = momentum(added_mass, node, vx, vy)
         total = add_product(total, 0.5, add_product(px * vx, py, vy))

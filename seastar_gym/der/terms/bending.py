@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.der.mesh import Mesh
+from seastar_gym.der.terms.along import bending_compliance, bending_stiffness
 from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.lanes import add_product, load, select
+from seastar_gym.simd.lanes import add_product, select
 
 Floats = NDArray[np.float64]
 
@@ -21,7 +22,7 @@ class Bending(NamedTuple):
     """Coefficients per hinge: EI over Voronoi length [N m], its reciprocal [1/(N m)], and the natural moment [N m].
 
     The natural moments of hub hinges come from the actuators instead, see hub.py. With a rigid hub the first hinge of
-    a limb is its clamp, see clamp.py.
+    a limb is its clamp, see clamp.py. Where actuators act along limbs, all of these are those at rest, see along.py.
     """
 
     EI_over_dl: np.ndarray
@@ -80,15 +81,15 @@ def n_hub_hinges(n_limbs: int) -> int:
 
 
 @kernel
-def moment(rods, hinge, t, EI_kappa_bar):
+def moment(rods, work, hinge, t, EI_kappa_bar):
     """Bending moment EI (kappa - kappa_bar) [N m] of a hinge whose half angle has the tangent t."""
-    return add_product(-EI_kappa_bar, 2.0 * load(rods.bending.EI_over_dl, hinge), t)
+    return add_product(-EI_kappa_bar, 2.0 * bending_stiffness(rods.along, rods, work, hinge), t)
 
 
 @kernel
-def bending_energy(rods, hinge, moment):
+def bending_energy(rods, work, hinge, moment):
     """Bending energy E_b [J] of a hinge under a moment [N m]."""
-    return 0.5 * load(rods.bending.dl_over_EI, hinge) * moment * moment
+    return 0.5 * bending_compliance(rods.along, rods, work, hinge) * moment * moment
 
 
 @kernel

@@ -17,6 +17,9 @@ trigonometry of the state, no coupling between limbs. C_j is replaced by max(C_j
 Damping (see damping.py) is the same function once more: K_j tau/gamma for K_j, and for n_j the direction t_j that the
 root edge had when the stage began. The hub turns by an angle of its own there, a fourth unknown: moments of both kinds
 add up to zero each, so nothing has to be remembered of the hub.
+
+On a body (body.py) Phi is the body's angle, and what turns root edges turns the body back: the residual of Phi is
+-sum_j M_j. Damping is about the directions that root edges had on the body, and has no angle of its own.
 """
 
 from collections.abc import Sequence
@@ -24,9 +27,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seastar_gym.der.geometry import edge_vector, tangent
+from seastar_gym.der.geometry import edge_vector, rotation, tangent
 from seastar_gym.der.mesh import Mesh
-from seastar_gym.der.star import load_root_edge
+from seastar_gym.der.star import load_root_edge, tail_node
+from seastar_gym.der.terms.along import bending_stiffness, turned, turned_at_hub
+from seastar_gym.der.terms.body import add_to_system, angle
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, select, splat, sqrt, store, subtract_product
 
@@ -51,9 +56,9 @@ def coefficients(mesh: Mesh, directions: Sequence[float]) -> Clamp:
 
 
 @kernel
-def clamp_stiffness(rods, limb):
+def clamp_stiffness(rods, work, limb):
     """K_j [N m]."""
-    return load(rods.bending.EI_over_dl, limb * (rods.nodes_per_limb - 1))
+    return bending_stiffness(rods.along, rods, work, limb * (rods.nodes_per_limb - 1))
 
 
 @kernel
@@ -62,8 +67,7 @@ def set_natural_directions(clamp, rods, work, actuation, fraction):
     if clamp is None:
         return
     for limb in range(rods.n_limbs):
-        start, end = load(actuation.delta_psi_start, limb), load(actuation.delta_psi_end, limb)
-        t = tangent(0.5 * add_product(start, fraction, end - start))
+        t = tangent(0.5 * turned_at_hub(rods.along, rods, limb, turned(actuation, limb, fraction)))
         scale = 1.0 / add_product(1.0, t, t)
         c, s = subtract_product(1.0, t, t) * scale, 2.0 * t * scale
         x, y = load(clamp.direction, 2 * limb), load(clamp.direction, 2 * limb + 1)
@@ -77,10 +81,21 @@ def freeze_directions(clamp, rods, work, q_hat):
     if clamp is None:
         return
     for limb in range(rods.n_limbs):
-        ex, ey = edge_vector(q_hat, 0, limb * (rods.nodes_per_limb - 1) + 1)
+        e = limb * (rods.nodes_per_limb - 1)
+        ex, ey = edge_vector(q_hat, tail_node(rods, e), e + 1)
         inverse = 1.0 / sqrt(add_product(ex * ex, ey, ey))
-        store(work.hub_hat, 2 * limb, ex * inverse)
-        store(work.hub_hat, 2 * limb + 1, ey * inverse)
+        tx, ty = on_body(rods.body, rods, q_hat, ex * inverse, ey * inverse)
+        store(work.hub_hat, 2 * limb, tx)
+        store(work.hub_hat, 2 * limb + 1, ty)
+
+
+@kernel
+def on_body(body, rods, q, x, y):
+    """A direction as it is seen from a body, which keeps it when it turns; unchanged without one."""
+    if body is None:
+        return x, y
+    c, s = rotation(angle(body, rods, q))
+    return add_product(c * x, s, y), subtract_product(c * y, s, x)
 
 
 @kernel
@@ -98,6 +113,14 @@ def orientation(S_x, S_y):
 
 
 @kernel
+def hub_orientation(body, rods, q, S_x, S_y):
+    """(cos Phi, sin Phi) of the hub: that of a body at q, or the one that makes the energy least."""
+    if body is None:
+        return orientation(S_x, S_y)
+    return rotation(angle(body, rods, q))
+
+
+@kernel
 def turned_energy(K, c, s, p_x, p_y):
     """K (1 - cos(turn)) [J] of a root edge that is turned by (c, s) from its natural direction on a hub turned by p."""
     along, across = add_product(c * p_x, s, p_y), subtract_product(s * p_x, c, p_y)
@@ -106,29 +129,49 @@ def turned_energy(K, c, s, p_x, p_y):
 
 
 @kernel
-def energy_of_turns(rods, turns):
-    """E [J] of root edges turned by (c, s), two rows per limb, from their natural directions."""
+def energy_of_turns(body, rods, work, q):
+    """E [J] of root edges turned by (c, s) in work.hub_turn, two rows per limb, from their natural directions.
+
+    q: Where a body's orientation is found, or None for a body that has not turned.
+    """
     S_x, S_y, total = splat(0.0), splat(0.0), splat(0.0)
     for limb in range(rods.n_limbs):
-        K = clamp_stiffness(rods, limb)
-        S_x, S_y = add_product(S_x, K, load(turns, 2 * limb)), add_product(S_y, K, load(turns, 2 * limb + 1))
-    p_x, p_y = orientation(S_x, S_y)
+        K = clamp_stiffness(rods, work, limb)
+        c, s = load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1)
+        S_x, S_y = add_product(S_x, K, c), add_product(S_y, K, s)
+    p_x, p_y = turn_of_hub(q, body, rods, S_x, S_y)
     for limb in range(rods.n_limbs):
-        c, s = load(turns, 2 * limb), load(turns, 2 * limb + 1)
-        total += turned_energy(clamp_stiffness(rods, limb), c, s, p_x, p_y)
+        c, s = load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1)
+        total += turned_energy(clamp_stiffness(rods, work, limb), c, s, p_x, p_y)
     return total
+
+
+@kernel
+def turn_of_hub(q, body, rods, S_x, S_y):
+    """hub_orientation, or (1, 0) for a body that has not turned (q is None)."""
+    if q is None:
+        return unturned(body, S_x, S_y)
+    return hub_orientation(body, rods, q, S_x, S_y)
+
+
+@kernel
+def unturned(body, S_x, S_y):
+    if body is None:
+        return orientation(S_x, S_y)
+    return splat(1.0), splat(0.0)
 
 
 @kernel
 def clamp_energy(rods, work, q):
     """E [J] at the natural directions in `work`."""
     for limb in range(rods.n_limbs):
-        ex, ey = edge_vector(q, 0, limb * (rods.nodes_per_limb - 1) + 1)
+        e = limb * (rods.nodes_per_limb - 1)
+        ex, ey = edge_vector(q, tail_node(rods, e), e + 1)
         inverse = 1.0 / sqrt(add_product(ex * ex, ey, ey))
         c, s = turn_from(work.hub_direction, limb, ex * inverse, ey * inverse)
         store(work.hub_turn, 2 * limb, c)
         store(work.hub_turn, 2 * limb + 1, s)
-    return energy_of_turns(rods, work.hub_turn)
+    return energy_of_turns(rods.body, rods, work, q)
 
 
 @kernel
@@ -142,7 +185,7 @@ def moved_clamp_energy(clamp, rods, work, actuation, start, end):
         c, s = turn_from(work.hub_direction, limb, load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1))
         store(work.hub_turn, 2 * limb, c)
         store(work.hub_turn, 2 * limb + 1, s)
-    return energy_of_turns(rods, work.hub_turn)
+    return energy_of_turns(rods.body, rods, work, None)
 
 
 @kernel
@@ -172,16 +215,16 @@ def add_clamps(rods, work, directions, ratio, convex, column):
     """
     S_x, S_y = splat(0.0), splat(0.0)
     for limb in range(rods.n_limbs):
-        edge, K = load_root_edge(work, limb), ratio * clamp_stiffness(rods, limb)
+        edge, K = load_root_edge(work, limb), ratio * clamp_stiffness(rods, work, limb)
         inverse = edge.length * edge.inverse
         c, s = turn_from(directions, limb, edge.x * inverse, edge.y * inverse)
         S_x, S_y = add_product(S_x, K, c), add_product(S_y, K, s)
         store(work.hub_turn, 2 * limb, c)
         store(work.hub_turn, 2 * limb + 1, s)
-    p_x, p_y = orientation(S_x, S_y)
+    p_x, p_y = assembled_orientation(rods.body, work, S_x, S_y)
     energy = splat(0.0)
     for limb in range(rods.n_limbs):
-        K = ratio * clamp_stiffness(rods, limb)
+        K = ratio * clamp_stiffness(rods, work, limb)
         c, s = load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1)
         energy += turned_energy(K, c, s, p_x, p_y)
         C = K * add_product(c * p_x, s, p_y)
@@ -190,4 +233,21 @@ def add_clamps(rods, work, directions, ratio, convex, column):
         store(work.hub_moment, limb, load(work.hub_moment, limb) + moment)
         store(work.hub_stiffness, limb, load(work.hub_stiffness, limb) + C)
         store(work.hub_coupling, CLAMP_ROWS * limb + column, C)
+        push_body(rods.body, work, moment)
     return energy
+
+
+@kernel
+def assembled_orientation(body, work, S_x, S_y):
+    """hub_orientation by the iterate."""
+    if body is None:
+        return orientation(S_x, S_y)
+    return load(work.body.turn, 0), load(work.body.turn, 1)
+
+
+@kernel
+def push_body(body, work, moment):
+    """Add what a root edge's moment leaves of a body's residual [N m]; nothing without a body, where they cancel."""
+    if body is None:
+        return
+    add_to_system(work, splat(0.0), splat(0.0), splat(0.0), -moment)

@@ -42,7 +42,7 @@ def freeze_strains(relaxation_time, rods, work, q_hat):
             continue
         a, b, side = hinge_edges(rods, e)
         t = half_angle(edge_of(rods, q_hat, a), edge_of(rods, q_hat, b), side)
-        store(work.bending, e, moment(rods, e, t, splat(0.0)))
+        store(work.bending, e, moment(rods, work, e, t, splat(0.0)))
 
 
 @kernel

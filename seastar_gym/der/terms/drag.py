@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.der.mesh import Mesh
+from seastar_gym.der.star import is_root, root_place
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import absolute, add_product, load, select, splat, sqrt
 
@@ -101,14 +102,25 @@ def add_cross_flow(cross_drag, rods, normals, node, wx, wy, gamma, inverse_gamma
     """
     if cross_drag is None:
         return slopes
-    if node == 0:
-        edges = rods.nodes_per_limb - 1
-        for e in range(0, rods.n_limbs * edges, edges):
-            slopes = add_half_edge(load(cross_drag, 2 * e + 2), normals, e, wx, wy, gamma, inverse_gamma, slopes)
-        return slopes
+    if node == 0 or is_root(rods.body, rods, node):
+        return add_hub_cross_flow(rods.body, cross_drag, rods, normals, node, wx, wy, gamma, inverse_gamma, slopes)
     inner, outer = load(cross_drag, 2 * node), load(cross_drag, 2 * node + 1)
     slopes = add_half_edge(inner, normals, node - 1, wx, wy, gamma, inverse_gamma, slopes)
     return add_half_edge(outer, normals, node, wx, wy, gamma, inverse_gamma, slopes)
+
+
+@kernel
+def add_hub_cross_flow(body, cross_drag, rods, normals, node, wx, wy, gamma, inverse_gamma, slopes):
+    """Add the drag of flow across half of all root edges at the hub, or across half of one at its root on a body."""
+    edges = rods.nodes_per_limb - 1
+    if body is None:
+        for e in range(0, rods.n_limbs * edges, edges):
+            slopes = add_half_edge(load(cross_drag, 2 * e + 2), normals, e, wx, wy, gamma, inverse_gamma, slopes)
+        return slopes
+    if node == 0:
+        return slopes
+    e = (node - root_place(rods, 0)) * edges
+    return add_half_edge(load(cross_drag, 2 * e + 2), normals, e, wx, wy, gamma, inverse_gamma, slopes)
 
 
 @kernel

@@ -6,8 +6,9 @@ the potential stays one that is minimised, with an exact Hessian.
 
 from seastar_gym.der.geometry import edge_vector
 from seastar_gym.der.motion import relative
-from seastar_gym.der.star import n_nodes, tail_node
+from seastar_gym.der.star import n_nodes, n_places, tail_node
 from seastar_gym.der.terms.added_mass import freeze_added_mass
+from seastar_gym.der.terms.body_forces import add_power_on_strips, freeze_turning_mass
 from seastar_gym.der.terms.current import current_velocity
 from seastar_gym.der.terms.drag import add_cross_flow, drag_slopes, middle_drag_slopes
 from seastar_gym.simd.compilation import kernel
@@ -20,6 +21,7 @@ def freeze_fluid(rods, work):
     freeze_normals(rods, work.normals, work.q)
     freeze_added_mass(rods.added_mass, rods, work)
     freeze_current(rods.current, rods, work)
+    freeze_turning_mass(rods.body, rods, work)
 
 
 @kernel
@@ -39,7 +41,7 @@ def freeze_current(current, rods, work):
     """Fill work.current with the velocity of the fluid at the nodes [m/s], in scenes with a current."""
     if current is None:
         return
-    for node in range(n_nodes(rods)):
+    for node in range(n_places(rods)):
         u_x, u_y = current_velocity(current, load(work.q, 2 * node), load(work.q, 2 * node + 1))
         store(work.current, 2 * node, u_x)
         store(work.current, 2 * node + 1, u_y)
@@ -62,13 +64,14 @@ def add_work_of_current(current, rods, work, v, h, frame, energy):
     if current is None:
         return energy
     power, zero = splat(0.0), splat(0.0)
-    for node in range(n_nodes(rods)):
+    for node in range(n_places(rods)):
         wx, wy = relative(work.current, node, load(v, 2 * node), load(v, 2 * node + 1))
         _, c_speed, _ = drag_slopes(load(rods.drag, node), wx, wy)
         slopes = (zero, (c_speed * wx, c_speed * wy), (zero, zero, zero))
         _, (fx, fy), _ = add_cross_flow(rods.cross_drag, rods, work.normals, node, wx, wy, 1.0, 1.0, slopes)
         power = subtract_product(power, fx, load(work.current, 2 * node) - frame[0])
         power = subtract_product(power, fy, load(work.current, 2 * node + 1) - frame[1])
+    power = add_power_on_strips(rods.body, rods, work, v, frame, power)
     power = add_power_in_middle(rods.middle_drag, rods, work, v, frame, power)
     return add_product(energy, h, power)
 

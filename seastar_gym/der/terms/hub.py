@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from seastar_gym.der.geometry import tangent
+from seastar_gym.der.terms.along import set_natural_curvature
 from seastar_gym.der.terms.clamp import set_natural_directions
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, store
@@ -36,7 +37,8 @@ def coefficients(angles: Sequence[float], turning: bool) -> Hub:
 
 @kernel
 def set_natural_hub_angles(rods, work, actuation, fraction):
-    """Natural state of the hub at `fraction` (lanes) of an interval: of its hinges, or of a rigid hub's clamps."""
+    """Natural state at `fraction` (lanes) of an interval: of the hub's hinges or clamps, and of limbs bent along."""
+    set_natural_curvature(rods.along, rods, work, actuation, fraction)
     set_natural_moments(rods.clamp, rods, work, actuation, fraction)
     set_natural_directions(rods.clamp, rods, work, actuation, fraction)
 

@@ -18,9 +18,14 @@ simulator takes back at its end, and the kernels need not know of it. With more,
 
 def coefficients(mesh: Mesh, density: float, held_nodes: Sequence[int] = ()) -> NDArray[np.float64]:
     """Lumped mass, per node [kg]."""
-    mass = density * mesh.per_node(lambda r: np.pi * r**2) * mesh.dl
-    mass[list(held_nodes)] *= HELD
+    mass: NDArray[np.float64] = density * mesh.per_node(lambda r: np.pi * r**2) * mesh.dl
+    hold(mass, held_nodes)
     return mass
+
+
+def hold(mass: NDArray[np.float64], nodes: Sequence[int]) -> None:
+    """Hold nodes by their masses, in place."""
+    mass[list(nodes)] *= HELD
 
 
 def edge_coefficients(mesh: Mesh, density: float) -> NDArray[np.float64]:

@@ -67,6 +67,26 @@ class MeasuredCurve:
         except ValueError as no_curve:
             raise ValueError(f"{file}: {no_curve}") from None
 
+    @classmethod
+    def from_curvatures(cls, file: str | Path, period: float, limb_length: float) -> "MeasuredCurve":
+        """Curve of limbs that are bent along their length, for `Seastar(along=AlongLimb())`.
+
+        The limb bends by its change of curvature since phase 0 times its length. A line at phase 1, which is phase 0 of
+        the next period, is left out.
+
+        file: CSV file with a phase, from 0 to 1, and a mean curvature [1/m] in every line. The first line may hold
+            names.
+        period: Length of a stroke [s]. limb_length: Length of the limb [m].
+        """
+        require_number("period", period, "s")
+        require_number("limb_length", limb_length, "m")
+        lines = read_numbers(file, "a phase [1] and a curvature [1/m]", 2)
+        phases, curvatures = np.array([line for line in lines if line[0] != 1.0] or lines).T
+        if phases[0] != 0.0 or phases[-1] >= 1.0 or (np.diff(phases) <= 0.0).any():
+            raise ValueError(f"{file}: phases must begin at 0 and increase to 1 at most, not {shown(phases.tolist())}.")
+        angles = limb_length * (curvatures - curvatures[0])
+        return cls(times=(*(period * phases).tolist(), float(period)), angles=(*angles.tolist(), 0.0))
+
     @property
     def peak_angle(self) -> Numbers:
         """Largest rotation to either side [rad]."""

@@ -83,7 +83,8 @@ class SmaLimb:
     heating_time: Pulse width of a full command [s]. Pulses of partial commands may end within a time step.
     delay: Time from a command until heat arrives [s].
     period: Length of a stroke [s].
-    rest_curvature: Curvature of the measured limb at rest [1/m]. It does not act on the robot.
+    rest_curvature: Curvature of the measured limb at rest [1/m]. It does not act on the robot: a limb with it is a
+        `Limb(natural_curvature=...)`.
     curvature_change: By how much a wire that has recovered its shape straightens the measured limb [1/m].
     heating_power: Electric power of a heated wire [W], an assumption, see `heating.WIRE_POWER`.
     """
@@ -120,12 +121,21 @@ class SmaLimb:
             )
 
     @classmethod
-    def preset(cls, liquid_metal: int, *, period: float | None = None, peak_angle: Numbers = math.pi / 5) -> "SmaLimb":
+    def preset(
+        cls,
+        liquid_metal: int,
+        *,
+        period: float | None = None,
+        peak_angle: Numbers = math.pi / 5,
+        limb_length: Numbers | None = None,
+    ) -> "SmaLimb":
         """Measured limb.
 
         liquid_metal: Volume fraction of liquid metal in its elastomer [%], one of MEASURED.
         period: Length of a stroke [s]. None means 1 s, or the longest measured period if that is shorter. Periods
             outside the measured FREQUENCIES are extrapolated, with two to three times the error.
+        limb_length: Length [m] of limbs that their wires bend all along by the measured change of curvature: the peak
+            angle is then that change times the length, for `Seastar(along=AlongLimb())`. None means `peak_angle`.
         """
         if not is_whole_number(liquid_metal) or liquid_metal not in MEASURED:
             raise ValueError(
@@ -133,6 +143,8 @@ class SmaLimb:
                 f"{shown(liquid_metal)}."
             )
         period = min(1.0, 1.0 / FREQUENCIES[liquid_metal][0]) if period is None else period
+        if limb_length is not None:
+            peak_angle = np.multiply(MEASURED[liquid_metal].curvature_change, limb_length)
         return replace(cls(peak_angle, period=period), **MEASURED[liquid_metal]._asdict())
 
     @property

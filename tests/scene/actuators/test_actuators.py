@@ -60,6 +60,23 @@ def test_a_curve_is_read_from_csv_with_a_line_of_names_or_without(tmp_path):
         assert MeasuredCurve.from_csv(file) == MeasuredCurve((0.0, 0.1, 1.0), (0.0, 0.6, 0.0))
 
 
+def test_measured_curvatures_bend_a_limb_by_their_change_times_its_length(tmp_path):
+    file = tmp_path / "curvature.csv"
+    for last in ("", "1.0,121.0\n"):
+        file.write_text("phase,curvature\n0.0,120.0\n0.25,40.0\n0.5,80.0\n" + last)
+        curve = MeasuredCurve.from_curvatures(file, period=2.0, limb_length=0.03)
+        assert curve.times == (0.0, 0.5, 1.0, 2.0)
+        np.testing.assert_allclose(curve.angles, (0.0, -2.4, -1.2, 0.0), rtol=1e-14)
+
+
+@pytest.mark.parametrize("text", ["0.1,1\n0.5,2\n", "0,1\n0.5,2\n0.4,3\n", "0,1\n1.5,2\n", "0,1,2\n"])
+def test_phases_that_do_not_go_once_round_are_refused(tmp_path, text):
+    file = tmp_path / "curvature.csv"
+    file.write_text(text)
+    with assert_refused(str(file)):
+        MeasuredCurve.from_curvatures(file, 1.0, 0.03)
+
+
 @pytest.mark.parametrize("text", ["0,0\n1,0,0\n", "0,0\n0.5\n", "time,angle\n", "0,O\n", ""])
 def test_lines_that_are_no_samples_are_refused(tmp_path, text):
     file = tmp_path / "curve.csv"

@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from refusals import assert_refused
-from seastar_gym import Numerics, Scene, Simulator, SmaLimb
+from seastar_gym import AlongLimb, Numerics, Scene, Seastar, Simulator, SmaLimb
 from seastar_gym.scene.actuators.actuator import check_actuator, mirrored
 from seastar_gym.scene.actuators.sma_limb import MEASURED
 from studies.measurements.model import curvature
@@ -23,6 +23,13 @@ def periodic(limb: SmaLimb, n: int = 60) -> np.ndarray:
     for _ in range(n):
         _, state = limb.respond(np.array([0.0, limb.period]), np.ones(()), state)
     return state
+
+
+def test_a_limb_of_some_length_bends_by_the_measured_change_of_curvature():
+    limb = SmaLimb.preset(20, limb_length=0.03)
+    assert limb.peak_angle == pytest.approx(MEASURED[20].curvature_change * 0.03, rel=1e-15)
+    scene = Scene(Seastar(along=AlongLimb()), actuator=SmaLimb.preset(20, limb_length=np.array([0.01, 0.03])))
+    assert scene.n_robots == 2
 
 
 @pytest.mark.parametrize("command", [1.0, 0.4, -0.7])

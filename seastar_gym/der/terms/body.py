@@ -1,0 +1,259 @@
+"""The body: a rigid hub with a size, an orientation of its own, mass and rotational inertia.
+
+Its unknowns are the hub's place x and its angle theta, which stands behind the nodes as the arc s theta, s a length of
+the robot's size, so that it has the unit of a coordinate. The root of limb k is at X_k = x + A_k, A_k = R(theta) a_k,
+a_k fixed in the body. The roots' places and velocities stand behind the angle, so that whatever asks for the ends of an
+edge finds them there; `place_roots` keeps them at what x and theta say. With J_k = dA_k/dtheta = (-A_ky, A_kx), the
+potential U has in theta
+
+    slope J_k . g_k,    second slope J_k . H_k J_k - g_k . A_k,    g_k, H_k its gradient and Hessian in X_k.
+
+The last term may be negative. A regularised matrix (see potential.py) has the positive part of it.
+
+What depends on velocities is linear in them with coefficients of the stage's first guess (marked *), as normals are:
+R* = R(theta*), omega* its angular velocity, both off by the square of the step. In a stage a root has the velocity
+U = (X - X_hat)/gamma, whose X_hat is such that U* = v_x* + omega* J*, and the acceleration (U - U_hat)/gamma, whose
+U_hat = v_hat + omega_hat J* + gamma omega*^2 A* makes it d(v_x)/dt + d(omega)/dt J* - omega*^2 A*.
+
+Body and halves of the root edges that sit on it are one rigid mass: M, at node 0, its moment S = sum m a and its
+inertia I = sum m |a|^2 about the hub, with d = v - v_hat as for nodes,
+
+    I d_theta^2/2 + d_theta d_x . J*_S - gamma d_x . omega*^2 A*_S,    the part of Phi that M d_x^2/2 leaves out.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.der.geometry import rotation
+from seastar_gym.der.mesh import Mesh
+from seastar_gym.der.motion import Motion, node_motion, relative
+from seastar_gym.der.star import n_nodes, root_place
+from seastar_gym.simd.compilation import kernel
+from seastar_gym.simd.lanes import N_LANES, add_product, load, store, subtract_product
+from seastar_gym.simd.rows import aligned_rows
+
+Floats = NDArray[np.float64]
+
+
+class Body(NamedTuple):
+    """Coefficients of a body, in its own frame.
+
+    scale, inverse_scale: s [m] and 1/s.
+    arm: a_k, (x, y) per limb [m].
+    inertia: I, with the fluid that turns along [kg m^2]. moment: S, (x, y) [kg m].
+    added_mass: Mass of fluid that moves along, xx, xy, yy [kg]; None without.
+    n_strips, strips: Drag of flow onto strips of the outline, see body_forces.py: n_x, n_y [1], m [m], c [kg/m] each.
+    weight: Acceleration of free fall (x, y) [m/s^2] and the moment of mass less that of the fluid displaced, (x, y)
+        [kg m]; None without gravity.
+    """
+
+    scale: Floats
+    inverse_scale: Floats
+    arm: Floats
+    inertia: Floats
+    moment: Floats
+    added_mass: Floats | None
+    n_strips: int
+    strips: Floats
+    weight: Floats | None
+
+
+class BodyWork(NamedTuple):
+    """Memory of a body.
+
+    turn: (cos, sin) of its angle, by the iterate. arm: A_k by the iterate, (x, y) per limb [m].
+    frozen: What a stage takes from its first guess, see FROZEN. hat: X_hat and U_hat, per limb [m], [m/s].
+    system: Coupling of hub and angle, (x, y) [N]; stiffness of the angle [N m] and its residual [N m].
+    """
+
+    turn: np.ndarray
+    arm: np.ndarray
+    frozen: np.ndarray
+    hat: np.ndarray
+    system: np.ndarray
+
+
+FROZEN = 12
+C, S, OMEGA, V_X, V_Y, J_X, J_Y, F_X, F_Y, G_X, G_Y, TORQUE = range(FROZEN)
+"""Rows of `frozen`: cos, sin of theta*; omega* [rad/s]; the hub's velocity [m/s]; J*_S [kg m]; omega*^2 A*_S [N]; force
+[N] and torque [N m] of the fluid that moves along, whose mass turns with the body.
+"""
+HAT = 4
+SYSTEM = 4
+
+
+def coefficients(
+    mesh: Mesh,
+    density: float,
+    arms: Sequence[tuple[float, float]],
+    mass: float,
+    centre: tuple[float, float],
+    inertia: float,
+    scale: float,
+    added_mass: Floats | None,
+    strips: Floats,
+    weight: Floats | None,
+) -> Body:
+    """Coefficients of a body with limbs of this density [kg/m^3] at `arms` [m].
+
+    mass, centre, inertia: Of the body alone [kg], [m], and about its centre of mass, with the fluid's [kg m^2].
+    weight: As in `Body`, of the body alone.
+    """
+    places, halves = np.array(arms), half_volumes(mesh)
+    own = mass * np.square(centre).sum() + inertia
+    of_roots = density * halves @ np.square(places).sum(axis=1)
+    return Body(
+        scale=np.array([scale]),
+        inverse_scale=np.array([1.0 / scale]),
+        arm=places.reshape(-1),
+        inertia=np.array([own + of_roots]),
+        moment=mass * np.array(centre) + density * halves @ places,
+        added_mass=added_mass,
+        n_strips=len(strips),
+        strips=strips.reshape(-1),
+        weight=weight,
+    )
+
+
+def half_volumes(mesh: Mesh) -> Floats:
+    """Volume of the inner halves of root edges, per limb [m^3]."""
+    area = np.array([np.pi * radii[0] ** 2 for radii in mesh.radius_at_nodes])
+    return area * 0.5 * mesh.root_edges
+
+
+def memory(body: Body | None, n_limbs: int) -> BodyWork | None:
+    """Zeroed memory for the body of one lane group."""
+    if body is None:
+        return None
+    counts = (2, 2 * n_limbs, FROZEN, HAT * n_limbs, SYSTEM)
+    return BodyWork(*(aligned_rows(count, N_LANES) for count in counts))
+
+
+@kernel
+def angle(body, rods, q):
+    """theta [rad], or its rate from rows of velocities."""
+    return load(q, 2 * n_nodes(rods)) * load(body.inverse_scale, 0)
+
+
+@kernel
+def turned(c, s, rows, k):
+    """The k-th (x, y) of rows, turned by (c, s)."""
+    x, y = load(rows, 2 * k), load(rows, 2 * k + 1)
+    return subtract_product(c * x, s, y), add_product(s * x, c, y)
+
+
+@kernel
+def place_roots(body, rods, q):
+    """Put the roots of the limbs where hub and angle say [m], in scenes with a body."""
+    if body is None:
+        return
+    c, s = rotation(angle(body, rods, q))
+    for limb in range(rods.n_limbs):
+        x, y = turned(c, s, body.arm, limb)
+        place = root_place(rods, limb)
+        store(q, 2 * place, load(q, 0) + x)
+        store(q, 2 * place + 1, load(q, 1) + y)
+
+
+@kernel
+def move_roots(body, rods, q, v):
+    """Put the roots of the limbs where hub and angle say [m], with the velocities of there [m/s]; with a body."""
+    if body is None:
+        return
+    c, s = rotation(angle(body, rods, q))
+    omega = angle(body, rods, v)
+    for limb in range(rods.n_limbs):
+        x, y = turned(c, s, body.arm, limb)
+        place = root_place(rods, limb)
+        store(q, 2 * place, load(q, 0) + x)
+        store(q, 2 * place + 1, load(q, 1) + y)
+        store(v, 2 * place, subtract_product(load(v, 0), omega, y))
+        store(v, 2 * place + 1, add_product(load(v, 1), omega, x))
+
+
+@kernel
+def tail_motion(body, rods, work, stage, e):
+    """Motion of the node where edge e starts, see star.tail_node."""
+    edges = rods.nodes_per_limb - 1
+    if body is None:
+        return node_motion(work, stage, 0 if e % edges == 0 else e)
+    if e % edges == 0:
+        return root_motion(rods, work, stage, e // edges)
+    return node_motion(work, stage, e)
+
+
+@kernel
+def root_motion(rods, work, stage, limb):
+    """Motion of a limb's root on a body."""
+    place, row = root_place(rods, limb), HAT * limb
+    vx = (load(work.q, 2 * place) - load(work.body.hat, row)) * stage.inverse_gamma
+    vy = (load(work.q, 2 * place + 1) - load(work.body.hat, row + 1)) * stage.inverse_gamma
+    wx, wy = relative(work.current, place, vx, vy)
+    return Motion(vx - load(work.body.hat, row + 2), vy - load(work.body.hat, row + 3), wx, wy)
+
+
+@kernel
+def freeze_body(body, rods, work, stage):
+    """What a stage takes from its first guess, into work.body.frozen and hat, in scenes with a body."""
+    if body is None:
+        return
+    row = 2 * n_nodes(rods)
+    c, s = rotation(angle(body, rods, work.q))
+    inverse = load(body.inverse_scale, 0)
+    omega = (load(work.q, row) - load(stage.q_hat, row)) * stage.inverse_gamma * inverse
+    omega_hat = load(stage.v_hat, row) * inverse
+    squared = omega * omega
+    vx = (load(work.q, 0) - load(stage.q_hat, 0)) * stage.inverse_gamma
+    vy = (load(work.q, 1) - load(stage.q_hat, 1)) * stage.inverse_gamma
+    sx, sy = turned(c, s, body.moment, 0)
+    frozen = (c, s, omega, vx, vy, -sy, sx, squared * sx, squared * sy)
+    for k in range(9):
+        store(work.body.frozen, k, frozen[k])
+    for limb in range(rods.n_limbs):
+        x, y = turned(c, s, body.arm, limb)
+        row = HAT * limb
+        store(work.body.hat, row, load(work.q, 0) + subtract_product(x, stage.gamma, subtract_product(vx, omega, y)))
+        store(work.body.hat, row + 1, load(work.q, 1) + subtract_product(y, stage.gamma, add_product(vy, omega, x)))
+        away = stage.gamma * squared
+        hat_x = subtract_product(load(stage.v_hat, 0), omega_hat, y)
+        hat_y = add_product(load(stage.v_hat, 1), omega_hat, x)
+        store(work.body.hat, row + 2, add_product(hat_x, away, x))
+        store(work.body.hat, row + 3, add_product(hat_y, away, y))
+
+
+@kernel
+def begin_body(body, rods, work):
+    """Turn the arms as the iterate has them, and begin the part of the system that belongs to the angle."""
+    if body is None:
+        return
+    c, s = rotation(angle(body, rods, work.q))
+    store(work.body.turn, 0, c)
+    store(work.body.turn, 1, s)
+    for limb in range(rods.n_limbs):
+        x, y = turned(c, s, body.arm, limb)
+        store(work.body.arm, 2 * limb, x)
+        store(work.body.arm, 2 * limb + 1, y)
+    for k in range(SYSTEM):
+        store(work.body.system, k, 0.0)
+
+
+@kernel
+def add_to_system(work, x, y, stiffness, residual):
+    """Add to the coupling of hub and angle, to the stiffness of the angle and to its residual."""
+    store(work.body.system, 0, load(work.body.system, 0) + x)
+    store(work.body.system, 1, load(work.body.system, 1) + y)
+    store(work.body.system, 2, load(work.body.system, 2) + stiffness)
+    store(work.body.system, 3, load(work.body.system, 3) + residual)
+
+
+@kernel
+def tail_solution(body, work, n_limbs, limb, hub):
+    """Solution of the node where a limb starts, from that of the hub (x, y) and that of the angle, if there is one."""
+    if body is None:
+        return hub
+    turn = load(work.root_solution, 2 * n_limbs + 2)
+    x, y = load(work.body.arm, 2 * limb), load(work.body.arm, 2 * limb + 1)
+    return subtract_product(hub[0], turn, y), add_product(hub[1], turn, x)

@@ -1,0 +1,269 @@
+"""Inertia, drag and weight of a body, and what the roots of its limbs pass on to it, see body.py.
+
+Drag is that of flow onto strips of the outline: a strip with the normal n, at b, feels the flow w_p = n . (w + omega x b)
+= n . w + m omega and has the dissipation potential c |w_p|^3/3, convex like that of a node. A coefficient of turning
+alone is a strip with n = 0. Drag that is the same in all directions is node 0's, see drag.py. w is the velocity relative
+to the fluid at the hub.
+
+Fluid that moves along has the mass P = R P_0 R^T, which turns with the body. Its rate omega P' takes the force
+-omega P' w and gives the torque w . P' w/2 (Munk's), P' = dP/dtheta: constants of a stage.
+"""
+
+from seastar_gym.der.geometry import rotation
+from seastar_gym.der.motion import relative
+from seastar_gym.der.star import n_nodes
+from seastar_gym.der.terms.body import (
+    F_X,
+    F_Y,
+    G_X,
+    G_Y,
+    J_X,
+    J_Y,
+    OMEGA,
+    TORQUE,
+    V_X,
+    V_Y,
+    C,
+    S,
+    add_to_system,
+    angle,
+    turned,
+)
+from seastar_gym.simd.compilation import kernel
+from seastar_gym.simd.lanes import absolute, add_product, load, select, splat, store, subtract_product
+
+STRIP_ROWS = 4
+
+
+@kernel
+def body_added_mass(added_mass, work):
+    """P (xx, xy, yy) [kg] where the stage's first guess has the body; zeros without."""
+    if added_mass is None:
+        return splat(0.0), splat(0.0), splat(0.0)
+    c, s = load(work.body.frozen, C), load(work.body.frozen, S)
+    xx, xy, yy = load(added_mass, 0), load(added_mass, 1), load(added_mass, 2)
+    # R P_0, then times R^T.
+    ax, ay = subtract_product(c * xx, s, xy), subtract_product(c * xy, s, yy)
+    bx, by = add_product(s * xx, c, xy), add_product(s * xy, c, yy)
+    return subtract_product(c * ax, s, ay), add_product(s * ax, c, ay), add_product(s * bx, c, by)
+
+
+@kernel
+def freeze_turning_mass(body, rods, work):
+    """Force and torque of fluid whose mass turns with the body, from work.added_mass, in scenes with a body."""
+    if body is None:
+        return
+    freeze_munk(body.added_mass, work)
+
+
+@kernel
+def freeze_munk(added_mass, work):
+    if added_mass is None:
+        return
+    xx, xy, yy = load(work.added_mass, 0), load(work.added_mass, 1), load(work.added_mass, 2)
+    wx, wy = relative(work.current, 0, load(work.body.frozen, V_X), load(work.body.frozen, V_Y))
+    # P' = [[-2 xy, xx - yy], [xx - yy, 2 xy]]
+    px = subtract_product((xx - yy) * wy, 2.0 * xy, wx)
+    py = add_product((xx - yy) * wx, 2.0 * xy, wy)
+    omega = load(work.body.frozen, OMEGA)
+    store(work.body.frozen, G_X, -omega * px)
+    store(work.body.frozen, G_Y, -omega * py)
+    store(work.body.frozen, TORQUE, 0.5 * add_product(px * wx, py, wy))
+
+
+@kernel
+def add_body(body, rods, work, stage, convex, motion, energy, gradient, hessian):
+    """Add what a body has beyond the inertia and drag of node 0 to that node's slopes, and to the angle's system.
+
+    motion: Motion of node 0.
+    """
+    if body is None:
+        return energy, gradient, hessian
+    row = 2 * n_nodes(rods)
+    inverse = load(body.inverse_scale, 0)
+    omega = (load(work.q, row) - load(stage.q_hat, row)) * stage.inverse_gamma * inverse
+    turn = omega - load(stage.v_hat, row) * inverse  # d_theta
+    inertia = load(body.inertia, 0)
+    jx, jy = load(work.body.frozen, J_X), load(work.body.frozen, J_Y)
+    fx = load(work.body.frozen, F_X) + load(work.body.frozen, G_X)
+    fy = load(work.body.frozen, F_Y) + load(work.body.frozen, G_Y)
+    torque = load(work.body.frozen, TORQUE)
+    offset = add_product(jx * motion.dx, jy, motion.dy)
+    work_of_forces = add_product(add_product(fx * motion.dx, fy, motion.dy), torque, turn)
+    energy += subtract_product(
+        add_product(0.5 * inertia * turn * turn, turn, offset), stage.gamma, work_of_forces
+    )
+    rate = stage.inverse_gamma * turn
+    gx, gy = add_product(gradient[0], rate, jx) - fx, add_product(gradient[1], rate, jy) - fy
+    squared = stage.inverse_gamma * stage.inverse_gamma
+    residual = add_product(offset, inertia, turn) * stage.inverse_gamma - torque
+    add_to_system(work, squared * jx, squared * jy, squared * inertia, residual)
+    energy = add_weight(body.weight, rods, work, stage, convex, energy)
+    return add_strips(body, work, stage, motion, omega, energy, (gx, gy), hessian)
+
+
+@kernel
+def strip_flow(body, work, strip, wx, wy, omega):
+    """(w_p, n_x, n_y, m, c): flow onto a strip [m/s], its normal and arm where the body is frozen, its coefficient."""
+    row = STRIP_ROWS * strip
+    c, s = load(work.body.frozen, C), load(work.body.frozen, S)
+    x, y, m = load(body.strips, row), load(body.strips, row + 1), load(body.strips, row + 2)
+    nx, ny = subtract_product(c * x, s, y), add_product(s * x, c, y)
+    return add_product(add_product(nx * wx, ny, wy), m, omega), nx, ny, m, load(body.strips, row + 3)
+
+
+@kernel
+def add_strips(body, work, stage, motion, omega, energy, gradient, hessian):
+    """Add the drag of flow onto strips to slopes and system."""
+    gx, gy = gradient
+    xx, xy, yy = hessian
+    potential = splat(0.0)
+    for strip in range(body.n_strips):
+        flow, nx, ny, m, c = strip_flow(body, work, strip, motion.wx, motion.wy, omega)
+        c_flow = c * absolute(flow)
+        force = c_flow * flow
+        slope = 2.0 * stage.inverse_gamma * c_flow
+        sx, sy = slope * nx, slope * ny
+        potential = add_product(potential, force, flow)
+        gx, gy = add_product(gx, force, nx), add_product(gy, force, ny)
+        xx, xy, yy = add_product(xx, sx, nx), add_product(xy, sx, ny), add_product(yy, sy, ny)
+        add_to_system(work, m * sx, m * sy, m * m * slope, m * force)
+    return add_product(energy, stage.gamma * (1.0 / 3.0), potential), (gx, gy), (xx, xy, yy)
+
+
+@kernel
+def add_weight(weight, rods, work, stage, convex, energy):
+    """Add the potential of the weight's moment to the energy [J], and its slopes to the system; unchanged without."""
+    if weight is None:
+        return energy
+    x, y = turned(load(work.body.turn, 0), load(work.body.turn, 1), weight, 1)
+    g_x, g_y = load(weight, 0), load(weight, 1)
+    fall = add_product(g_x * x, g_y, y)
+    stiffness = select(convex, select(fall > 0.0, fall, 0.0), fall)
+    add_to_system(work, splat(0.0), splat(0.0), stiffness, subtract_product(g_x * y, g_y, x))
+    return energy - (fall - fallen(weight, rods, stage.q_hat, load(rods.body.inverse_scale, 0)))
+
+
+@kernel
+def fallen(weight, rods, q, inverse_scale):
+    """Work that gravity has done on the weight's moment at q, from where it stands across gravity [J]."""
+    c, s = rotation(load(q, 2 * n_nodes(rods)) * inverse_scale)
+    x, y = turned(c, s, weight, 1)
+    return add_product(load(weight, 0) * x, load(weight, 1), y)
+
+
+@kernel
+def pass_to_hub(rods, work, limb, convex, D, r, pull):
+    """Turn a root's block D and right-hand side r, of elimination so far, into the angle's part of the system.
+
+    pull: Gradient of Phi in the root's place [N].
+    """
+    x, y = load(work.body.arm, 2 * limb), load(work.body.arm, 2 * limb + 1)
+    kx, ky = subtract_product(D[1] * x, D[0], y), subtract_product(D[2] * x, D[1], y)
+    curvature = -add_product(pull[0] * x, pull[1], y)
+    curvature = select(convex, select(curvature > 0.0, curvature, 0.0), curvature)
+    stiffness = add_product(curvature, ky, x) - kx * y
+    add_to_system(work, kx, ky, stiffness, subtract_product(r[1] * x, r[0], y))
+
+
+@kernel
+def add_turning_energy(body, rods, q, v, frame, energy):
+    """Add what the turning of a body has of kinetic energy [J], as seen from a frame; unchanged without a body."""
+    if body is None:
+        return energy
+    omega = angle(body, rods, v)
+    c, s = rotation(angle(body, rods, q))
+    x, y = turned(c, s, body.moment, 0)
+    vx, vy = load(v, 0) - frame[0], load(v, 1) - frame[1]
+    offset = subtract_product(vy * x, vx, y)
+    return energy + omega * add_product(offset, 0.5 * load(body.inertia, 0), omega)
+
+
+@kernel
+def add_turning_momentum(body, rods, q, v, p):
+    """Add the momentum that a body has because it turns about the hub [kg m/s]; unchanged without a body."""
+    if body is None:
+        return p
+    omega = angle(body, rods, v)
+    c, s = rotation(angle(body, rods, q))
+    x, y = turned(c, s, body.moment, 0)
+    return subtract_product(p[0], omega, y), add_product(p[1], omega, x)
+
+
+@kernel
+def add_mass_moment(body, rods, q, moment):
+    """Add the moment of mass about the hub [kg m]; unchanged without a body."""
+    if body is None:
+        return moment
+    c, s = rotation(angle(body, rods, q))
+    x, y = turned(c, s, body.moment, 0)
+    return moment[0] + x, moment[1] + y
+
+
+@kernel
+def add_spin(body, rods, q, velocity, omega, arm, p, spin):
+    """Add a body's momentum and spin about a point, beyond those of node 0's mass: (p, spin); unchanged without a body.
+
+    velocity: Of the hub [m/s]. omega: Angular velocity [rad/s]. arm: From the point to the hub [m].
+    """
+    if body is None:
+        return p, spin
+    c, s = rotation(angle(body, rods, q))
+    x, y = turned(c, s, body.moment, 0)
+    px, py = -omega * y, omega * x
+    own = load(body.inertia, 0) * omega + (x * velocity[1] - y * velocity[0])
+    return (p[0] + px, p[1] + py), spin + own + (arm[0] * py - arm[1] * px)
+
+
+@kernel
+def spin_rate(body, rods, v):
+    """Angular velocity of a body [rad/s]; zero, and not used, without."""
+    if body is None:
+        return splat(0.0)
+    return angle(body, rods, v)
+
+
+@kernel
+def cut_spin(body, rods, v, omega, less, robots):
+    """Add `less` (below zero) of a body's angular velocity about omega to it, for the robots in the mask."""
+    if body is None:
+        return
+    row = 2 * n_nodes(rods)
+    now = load(v, row)
+    about = subtract_product(now, omega, load(body.scale, 0))
+    store(v, row, select(robots, add_product(now, less, about), now))
+
+
+@kernel
+def add_work_on_body(body, rods, work, q_0, q, v, h, frame, energy):
+    """Add the work of gravity on a body's turning, and of fluid whose mass turns, in a step that ends with (q, v) [J]."""
+    if body is None:
+        return energy
+    px = load(work.body.frozen, G_X) * (load(v, 0) - frame[0])
+    power = add_product(px, load(work.body.frozen, G_Y), load(v, 1) - frame[1])
+    power = add_product(power, load(work.body.frozen, TORQUE), angle(body, rods, v))
+    return add_work_of_weight(body.weight, rods, q_0, q, add_product(energy, h, power))
+
+
+@kernel
+def add_work_of_weight(weight, rods, q_0, q, energy):
+    if weight is None:
+        return energy
+    inverse = load(rods.body.inverse_scale, 0)
+    return energy + (fallen(weight, rods, q, inverse) - fallen(weight, rods, q_0, inverse))
+
+
+@kernel
+def add_power_on_strips(body, rods, work, v, frame, power):
+    """Add the power that drag on a body's strips takes from the fluid's motion [W]; unchanged without a body."""
+    if body is None:
+        return power
+    wx, wy = relative(work.current, 0, load(v, 0), load(v, 1))
+    u_x, u_y = load(work.current, 0) - frame[0], load(work.current, 1) - frame[1]
+    omega = angle(body, rods, v)
+    for strip in range(body.n_strips):
+        flow, nx, ny, _, c = strip_flow(body, work, strip, wx, wy, omega)
+        force = c * absolute(flow) * flow
+        power = subtract_product(power, force * nx, u_x)
+        power = subtract_product(power, force * ny, u_y)
+    return power

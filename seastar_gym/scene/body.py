@@ -1,0 +1,174 @@
+"""`Body`: a rigid body between the limbs of a robot, and `Attachment`: where and how a limb is clamped to it."""
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.scene.checks import is_finite_number, require_finite, require_number, shown
+from seastar_gym.scene.outline import Outline, Points, is_convex
+from seastar_gym.scene.per_robot import Numbers, require_each
+from seastar_gym.scene.serial import register_part
+
+Floats = NDArray[np.float64]
+
+GIVEN_DRAG = ("drag_along", "drag_across", "drag_turning")
+GIVEN_FLUID = ("added_mass_along", "added_mass_across", "added_mass_turning")
+
+
+@register_part
+@dataclass(frozen=True)
+class Attachment:
+    """Clamp of a limb on a body at rest.
+
+    x, y: Place of the clamp, from the hub [m]. direction: Direction in which the limb leaves it [rad], anti-clockwise
+        from x.
+    """
+
+    x: float
+    y: float
+    direction: float
+
+    def __post_init__(self) -> None:
+        for name, unit in (("x", "m"), ("y", "m"), ("direction", "rad")):
+            require_finite(f"An attachment's {name}", getattr(self, name), unit)
+            object.__setattr__(self, name, float(getattr(self, name)))
+
+
+@register_part
+@dataclass(frozen=True)
+class Body:
+    """Rigid body between the limbs, whose reference point is the hub. Without a size and mass it is the point hub.
+
+    radius: Radius of a disc around the hub [m].
+    outline: Instead of a disc, corners of a convex polygon (x, y) [m], anti-clockwise, with the hub, the origin, inside.
+        `Body.rectangle` makes one.
+    height: Size out of the plane [m].
+    mass: [kg]. None means the limbs' density times area and height.
+    inertia: Moment of inertia about the centre of mass [kg m^2]. None means that of a uniform body of that mass.
+    centre_of_mass: (x, y) [m] from the hub. None means the centre of the area.
+    drag_along, drag_across: Drag coefficients [1] of flow along the body's x and y axis, with the frontal area (width
+        times height) of its outline.
+    drag_turning: Drag coefficient [1] of turning: the torque is that of a plate as long as the outline is wide at most,
+        a, which turns about its middle: 1/2 rho_f C h a^4/32 |omega| omega.
+    added_mass_along, added_mass_across, added_mass_turning: Added mass coefficients [1] of the same three motions, over
+        those of an ellipse of the outline's widths, rho_f pi h b^2/4, a^2/4 and (a^2 - b^2)^2/128. None means the
+        fluid's; they count in fluids with added mass only.
+    attachments: `Attachment` of every limb. () attaches limbs to the rim in their directions from the hub, pointing
+        away from it: a disc makes a star of that radius.
+
+    Without any of the three drag coefficients, a polygon has the drag of strips of its outline, each for the flow across
+    it, with the fluid's C_d, halved between the faces that flow meets and leaves; a disc that of its width, and none in
+    turning. Where one of the three is given, the others are the fluid's C_d, or 0 for the turning of a disc.
+
+    Flow at the body is that at the hub. Fluid that moves along with the body is that of an ellipse about the hub.
+    """
+
+    PER_ROBOT: ClassVar = ("height", "mass", "inertia", *GIVEN_DRAG, *GIVEN_FLUID)
+    radius: float = 0.0
+    outline: Points = ()
+    height: Numbers = 0.01
+    mass: Numbers | None = None
+    inertia: Numbers | None = None
+    centre_of_mass: tuple[float, float] | None = None
+    drag_along: Numbers | None = None
+    drag_across: Numbers | None = None
+    drag_turning: Numbers | None = None
+    added_mass_along: Numbers | None = None
+    added_mass_across: Numbers | None = None
+    added_mass_turning: Numbers | None = None
+    attachments: tuple[Attachment, ...] = ()
+
+    def __post_init__(self) -> None:
+        not_negative = partial(require_number, zero_allowed=True)
+        not_negative("A body's radius", self.radius, "m")
+        object.__setattr__(self, "radius", float(self.radius))
+        self._check_outline()
+        require_each(self, "height", partial(require_number, unit="m"))
+        for name, unit in (("mass", "kg"), ("inertia", "kg m^2"), *((name, "1") for name in GIVEN_DRAG + GIVEN_FLUID)):
+            if getattr(self, name) is not None:
+                require_each(self, name, partial(not_negative, unit=unit))
+        centre = self.centre_of_mass
+        if centre is not None and not _is_point(centre):
+            raise ValueError(f"centre_of_mass must be two finite numbers (x, y) [m], not {shown(centre)}.")
+        if not isinstance(self.attachments, tuple) or not all(isinstance(at, Attachment) for at in self.attachments):
+            raise ValueError(f"attachments must be a tuple of Attachment, not {shown(self.attachments)}.")
+        if not self.is_point and not self._has_inertia:
+            raise ValueError(
+                "A body without rotational inertia cannot turn by itself: give it an inertia, or a size and a mass."
+            )
+
+    def _check_outline(self) -> None:
+        if not self.outline:
+            return
+        if self.radius:
+            raise ValueError("A body has a radius or an outline, not both.")
+        if not isinstance(self.outline, tuple) or len(self.outline) < 3 or not all(map(_is_point, self.outline)):
+            raise ValueError(f"outline must be three or more points (x, y) [m], not {shown(self.outline)}.")
+        if not is_convex(self.outline):
+            raise ValueError("outline must go round a convex polygon once, anti-clockwise, with the hub (0, 0) inside.")
+
+    @classmethod
+    def rectangle(cls, length: float, width: float, **others: Any) -> "Body":
+        """Body with a rectangular outline around the hub, `length` along x and `width` along y [m]."""
+        require_number("length", length, "m")
+        require_number("width", width, "m")
+        x, y = 0.5 * length, 0.5 * width
+        return cls(outline=((x, -y), (x, y), (-x, y), (-x, -y)), **others)
+
+    @property
+    def shape(self) -> Outline:
+        """Outline with its area, centre and widths."""
+        return Outline(self.radius, self.outline)
+
+    @property
+    def is_point(self) -> bool:
+        """Whether it is nothing but the point hub: no size, no mass and no inertia."""
+        weightless = not np.any(self.mass or 0.0) and not np.any(self.inertia or 0.0)
+        return weightless and not self.radius and not self.outline and not self._has_arms
+
+    @property
+    def _has_arms(self) -> bool:
+        return any(at.x or at.y for at in self.attachments)
+
+    @property
+    def _has_inertia(self) -> bool:
+        if self.inertia is not None and np.all(self.inertia):
+            return True
+        massive = self.mass is None or bool(np.all(self.mass))
+        has_size = bool(self.radius or self.outline)
+        return self._has_arms or (has_size and (massive or not self.attachments))
+
+    def mass_at(self, density: float) -> float:
+        """Mass [kg] with limbs of a density [kg/m^3]; for the body of one robot."""
+        return density * self.volume if self.mass is None else float(self.mass)
+
+    def inertia_at(self, density: float) -> float:
+        """Moment of inertia about the centre of mass [kg m^2] with limbs of a density [kg/m^3], of one robot."""
+        if self.inertia is not None:
+            return float(self.inertia)
+        shape = self.shape
+        return self.mass_at(density) * shape.second_moment / shape.area if shape.area else 0.0
+
+    @property
+    def volume(self) -> float:
+        """Area times height [m^3], of one robot."""
+        return self.shape.area * float(self.height)
+
+    @property
+    def centre(self) -> tuple[float, float]:
+        """Centre of mass [m]."""
+        return self.shape.centre if self.centre_of_mass is None else self.centre_of_mass
+
+    def attached(self, directions: list[float]) -> tuple[Attachment, ...]:
+        """Attachments of limbs; of limbs in these directions [rad] at the rim, where the body names none."""
+        if self.attachments:
+            return self.attachments
+        return tuple(Attachment(*self.shape.rim(direction), direction) for direction in directions)
+
+
+def _is_point(value: object) -> bool:
+    return isinstance(value, tuple) and len(value) == 2 and all(map(is_finite_number, value))
+

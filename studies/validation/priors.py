@@ -1,0 +1,54 @@
+"""Unknowns of the swimmer, and what is believed of them before any of its speeds is known.
+
+Ranges are those of robots of this kind: palm-sized, with silicone limbs of some millimetres, electronics and a battery
+on a plastic frame. Nothing is taken from the measured speeds.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+Floats = NDArray[np.float64]
+
+
+class Unknown(NamedTuple):
+    """Number that is not known. Its logarithm is uniform between the ends of its range.
+
+    low, high: Ends of the range. reason: Where it comes from.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    reason: str
+
+
+UNKNOWNS = (
+    Unknown("limb length", "m", 0.02, 0.045, "limbs bend by 140 to 320 degrees at rest"),
+    Unknown("limb radius", "m", 2e-3, 5e-3, "strips of 2 to 4 mm by 8 to 15 mm, as round rods"),
+    Unknown("Young's modulus", "Pa", 2e5, 2e6, "silicones with wires"),
+    Unknown("body mass", "kg", 0.03, 0.15, "frame, battery, electronics"),
+    Unknown("body drag", "1", 0.2, 1.2, "streamlined to blunt"),
+    Unknown("limb drag across", "1", 1.0, 3.0, "cylinders and plates; more in unsteady flow"),
+    Unknown("limb drag along", "of across", 0.02, 0.3, "skin friction"),
+    Unknown("added mass", "1", 0.2, 2.0, "cylinder 1, plate more"),
+    Unknown("hot over cold EI", "1", 1.0, 4.0, "2.68 in a sister model"),
+)
+
+
+def samples(n: int, seed: int = 0) -> dict[str, Floats]:
+    """Values of every unknown in n robots, by name, from Sobol's sequence."""
+    spread = qmc.Sobol(len(UNKNOWNS), seed=seed).random(n)
+    return {
+        unknown.name: unknown.low * (unknown.high / unknown.low) ** column
+        for unknown, column in zip(UNKNOWNS, spread.T, strict=True)
+    }
+
+
+def place_in_range(values: dict[str, Floats]) -> Floats:
+    """Unknowns as places within their ranges, from 0 to 1, shape (n, n_unknowns)."""
+    columns = [np.log(values[u.name] / u.low) / np.log(u.high / u.low) for u in UNKNOWNS]
+    return np.stack(columns, axis=1)

@@ -1,0 +1,46 @@
+"""Speeds of all samples of the unknowns in all conditions: robots side by side in batches, kept in files."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.simulator import Simulator
+from studies.validation.speeds import Condition
+from studies.validation.swimmer import SIDES, Variant, scene
+
+Floats = NDArray[np.float64]
+
+STROKES, FIRST = 8, 4
+"""Strokes from rest, and those before the mean begins: speeds are those of strokes 5 to 8."""
+
+
+def speeds(condition: Condition, values: Mapping[str, Floats], variant: Variant) -> Floats:
+    """Mean forward speed of every sample [m/s], NaN where the solver gave up, shape (n_samples,)."""
+    n = len(values["limb length"])
+    simulator = Simulator(scene(condition.liquid_metal, condition.frequency, values, variant), n)
+    command, start = np.tile(SIDES, (n, 1)), np.zeros(n)
+    for stroke in range(STROKES):
+        if stroke == FIRST:
+            start = simulator.hub_position()[:, 0]
+        simulator.stroke(command)
+    way = simulator.hub_position()[:, 0] - start
+    return np.where(simulator.failed, np.nan, way * condition.frequency / (STROKES - FIRST))
+
+
+def all_speeds(
+    conditions: list[Condition], values: Mapping[str, Floats], variant: Variant, folder: Path
+) -> Iterator[tuple[Condition, Floats]]:
+    """Speeds of every condition in turn, from its file where there is one of as many samples."""
+    n = len(values["limb length"])
+    place = folder / f"{variant.replace(' ', '-')}-{n}"
+    place.mkdir(parents=True, exist_ok=True)
+    for condition in conditions:
+        file = place / f"{condition.name}.npy"
+        if not file.is_file():
+            found = speeds(condition, values, variant)
+            part = file.with_suffix(".part.npy")
+            np.save(part, found)
+            part.replace(file)
+        yield condition, np.load(file)

@@ -1,0 +1,144 @@
+"""Identify the unknowns of a measured swimmer from four of its 37 speeds, and predict the others with 90 % intervals.
+
+Robots with many samples of the unknowns swim in every condition, side by side in batches. The four speeds weigh the
+samples, and the weighted samples predict the other speeds. So no fit can end in the wrong minimum, and what the speeds
+do not tell of the unknowns is in the intervals. Then parts of the model are left out, one at a time.
+
+Speeds are kept in the folder RUNS, so the study goes on where it was interrupted. It prints its tables and writes
+`validation.json` and `validation.png`.
+"""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from studies.parser import study_parser
+from studies.validation.inference import MODEL, SCATTER, Score, effective, predict, score, weights
+from studies.validation.luck import other_fours, scores
+from studies.validation.pictures import draw_speeds
+from studies.validation.priors import UNKNOWNS, samples
+from studies.validation.separation import best_known, told
+from studies.validation.simulate import all_speeds
+from studies.validation.speeds import Condition, read_speeds, training
+from studies.validation.swimmer import Variant
+
+Floats = NDArray[np.float64]
+
+VARIANTS: tuple[Variant, ...] = get_args(Variant)
+SAMPLES, FOURS = 512, 200
+
+
+def simulate(conditions: list[Condition], variant: Variant, n: int, folder: Path, console: Console) -> Floats:
+    """Speeds of n samples [m/s], shape (n, n_conditions)."""
+    found = []
+    for condition, speeds in all_speeds(conditions, samples(n), variant, folder):
+        found.append(speeds)
+        console.print(f"{variant}: {condition.name}, median {1e3 * np.nanmedian(speeds):.1f} mm/s", style="dim")
+    return np.stack(found, axis=1)
+
+
+def analyse(simulated: Floats, conditions: list[Condition]) -> dict[str, Any]:
+    """Predictions from the four runs, their score, and the scores of other fours."""
+    measured, chosen = np.array([condition.speed for condition in conditions]), training(conditions)
+    weight = weights(simulated, measured, chosen)
+    prediction = predict(simulated, weight)
+    blind = predict(simulated, np.full(len(simulated), 1.0 / len(simulated)))
+    lucky = scores(simulated, measured, other_fours(conditions, FOURS))
+    return {
+        "weight": weight,
+        "prediction": prediction,
+        "chosen": chosen,
+        "score": score(prediction, measured, chosen),
+        "blind": score(blind, measured, chosen),
+        "effective": effective(weight),
+        "fours": {
+            name: np.percentile([getattr(one, name) for one in lucky], [5.0, 50.0, 95.0]).tolist()
+            for name in ("error", "covered", "width")
+        },
+    }
+
+
+def score_row(name: str, one: Score, fours: dict[str, list[float]]) -> list[str]:
+    low, middle, high = (100.0 * error for error in fours["error"])
+    return [
+        name, f"{100 * one.error:.1f} %", f"{100 * one.bias:+.1f} %", f"{100 * one.worst:.0f} %",
+        f"{100 * one.covered:.0f} %", f"{1 + one.width:.2f}", f"{middle:.1f} % ({low:.1f} to {high:.1f})",
+    ]  # fmt: skip
+
+
+def print_tables(console: Console, analyses: dict[str, dict[str, Any]], values: dict[str, Floats]) -> None:
+    table = Table(title="Predictions of the speeds that were not identified from")
+    for header in ("model", "error", "bias", "worst", "within 90 %", "high/low", "other fours: error"):
+        table.add_column(header)
+    full = analyses["full"]
+    table.add_row(*score_row("before any speed", full["blind"], full["fours"])[:-1], "")
+    for name, one in analyses.items():
+        table.add_row(*score_row(name, one["score"], one["fours"]))
+    console.print(table)
+    known = Table(title=f"Unknowns ({full['effective']:.0f} effective samples)")
+    for header in ("unknown", "unit", "before", "after", "narrower"):
+        known.add_column(header)
+    for unknown, after_all in zip(UNKNOWNS, told(values, full["weight"]), strict=True):
+        after = f"{after_all.middle:.3g} ({after_all.low:.3g} to {after_all.high:.3g})"
+        known.add_row(
+            after_all.name, unknown.unit, f"{unknown.low:g} to {unknown.high:g}", after, f"x {after_all.narrower:.2f}"
+        )
+    console.print(known)
+
+
+def as_json(
+    analyses: dict[str, dict[str, Any]], conditions: list[Condition], values: dict[str, Floats]
+) -> dict[str, Any]:
+    full = analyses["full"]
+    powers, narrower = best_known(values, full["weight"])
+    prediction = full["prediction"]
+    return {
+        "scatter": SCATTER,
+        "model_error": MODEL,
+        "samples": len(full["weight"]),
+        "models": {
+            name: {"score": asdict(one["score"]), "fours": one["fours"], "effective_samples": one["effective"]}
+            for name, one in analyses.items()
+        },
+        "before": asdict(full["blind"]),
+        "unknowns": [one._asdict() for one in told(values, full["weight"])],
+        "best_known": {"powers": powers, "narrower": narrower},
+        "speeds_mm_per_s": [
+            {
+                "liquid_metal": condition.liquid_metal, "frequency": condition.frequency,
+                "measured": round(1e3 * condition.speed, 2), "predicted": round(1e3 * prediction.middle[k], 2),
+                "low": round(1e3 * prediction.low[k], 2), "high": round(1e3 * prediction.high[k], 2),
+                "identified_from": k in full["chosen"],
+            }
+            for k, condition in enumerate(conditions)
+        ],
+    }  # fmt: skip
+
+
+def main() -> None:
+    """Command line: simulate, weigh, predict, and leave parts out."""
+    parser = study_parser("studies.validation", __doc__)
+    parser.add_argument("--samples", type=int, default=SAMPLES, help="samples of the unknowns (default: %(default)s)")
+    parser.add_argument("--variants", nargs="*", choices=VARIANTS, default=list(VARIANTS), help="models to simulate")
+    parser.add_argument("--runs", type=Path, default=Path("runs/validation"), help="folder of speeds")
+    parser.add_argument("--out", type=Path, default=Path("docs"), help="folder of results (default: %(default)s)")
+    arguments = parser.parse_args()
+    console, conditions, values = Console(), read_speeds(), samples(arguments.samples)
+    analyses = {}
+    for variant in dict.fromkeys(("full", *arguments.variants)):
+        simulated = simulate(conditions, variant, arguments.samples, arguments.runs, console)
+        analyses[variant] = analyse(simulated, conditions)
+    print_tables(console, analyses, values)
+    result = as_json(analyses, conditions, values)
+    console.print(f"Best known: {result['best_known']}")
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    (arguments.out / "validation.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    full, one = analyses["full"], analyses["full"]["score"]
+    title = f"{len(conditions) - len(full['chosen'])} predicted speeds: {100 * one.error:.0f} % off on average"
+    draw_speeds(conditions, full["prediction"], full["chosen"], title, arguments.out / "validation.png")

@@ -1,0 +1,107 @@
+"""The swimmer as a scene: a frame with four limbs that straighten when heated, for many samples of its unknowns.
+
+Limbs leave the frame's sides in two pairs, swept backwards by SWEEP. At rest they curl forward with the measured
+curvature. Heated, they straighten, and push water back. The curve is that of a limb that has been heated for ever.
+"""
+
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.scene import AlongLimb, Limb, MeasuredCurve, Numerics, Scene, Seastar, Stiffening, Water
+from seastar_gym.scene.actuators.sma_limb import MEASURED
+from seastar_gym.scene.body import Attachment, Body
+from studies.measurements.model import curvature
+
+Floats = NDArray[np.float64]
+Variant = Literal["full", "no added mass", "no stiffening", "ramp", "no drag along limbs"]
+
+FRAME = (0.08, 0.04, 0.015)
+"""Length, width and height of the frame [m]. Its drag and mass are unknown, so its size only places the limbs."""
+ROOTS = 0.025
+"""Distance of the pairs of limbs from the middle of the frame, forward and backward [m]."""
+SWEEP = np.radians(30.0)
+"""Angle by which limbs are swept backwards where they leave the frame [rad]."""
+NODES, STEP = 7, 0.01
+"""Nodes per limb and time step [s]."""
+ELASTOMER, LIQUID_METAL, WATER = 1000.0, 6250.0, 1000.0
+"""Densities [kg/m^3]."""
+RELAXATION = 2e-3
+"""Relaxation time of the limbs' damping [s]."""
+RAMP = 0.1
+"""Time in which the chapter's ramp rises [s]."""
+NONE_OF_IT = 1e-6
+"""Factor of a coefficient that is left out, so that the same code runs."""
+LOOSE = 1.0
+"""Largest distance of the samples' polygon from the curve [1/m]."""
+SIDES = (-1.0, -1.0, 1.0, 1.0)
+"""Sign of the curvature of every limb at rest, and its command: limbs on the left curl clockwise, forward."""
+
+
+def scene(liquid_metal: int, frequency: float, values: Mapping[str, Floats], variant: Variant = "full") -> Scene:
+    """Swimmers with values of their unknowns, heated at a frequency [Hz]."""
+    times, curvatures = bending(liquid_metal, frequency, ramp=variant == "ramp")
+    rest, length = float(curvatures[0]), values["limb length"]
+    change = (*(curvatures[:-1] - rest).tolist(), 0.0)
+    drag = values["limb drag across"]
+    along = values["limb drag along"] * (NONE_OF_IT if variant == "no drag along limbs" else 1.0)
+    added = values["added mass"] * (NONE_OF_IT if variant == "no added mass" else 1.0)
+    ratio = np.ones_like(length) if variant == "no stiffening" else values["hot over cold EI"]
+    robot = Seastar(
+        4,
+        NODES,
+        limb_length=length,
+        rod_radius=values["limb radius"],
+        youngs_modulus=values["Young's modulus"],
+        density=ELASTOMER + (LIQUID_METAL - ELASTOMER) * 0.01 * liquid_metal,
+        limbs=tuple(Limb(natural_curvature=side * rest) for side in SIDES),
+        relaxation_time=RELAXATION,
+        along=AlongLimb(),
+        stiffening=Stiffening(ratio),
+        body=frame(values["body mass"], values["body drag"]),
+    )
+    water = Water(WATER, drag, along * drag, added_mass_coefficient=added)
+    actuator = MeasuredCurve(times, change, scale=length)
+    return Scene(robot, water, actuator, Numerics("implicit-midpoint", STEP))
+
+
+def frame(mass: Floats, drag: Floats) -> Body:
+    """Frame with the roots of its limbs."""
+    length, width, height = FRAME
+    y, out = 0.5 * width, 0.5 * np.pi + SWEEP
+    roots = ((ROOTS, y, out), (-ROOTS, y, out), (-ROOTS, -y, -out), (ROOTS, -y, -out))
+    return Body.rectangle(
+        length, width, height=height, mass=mass, drag_along=drag, drag_across=1.0,
+        attachments=tuple(Attachment(*root) for root in roots),
+    )  # fmt: skip
+
+
+def bending(liquid_metal: int, frequency: float, ramp: bool = False) -> tuple[tuple[float, ...], Floats]:
+    """Times [s] and curvatures [1/m] of a limb over one period, as few as describe the curve.
+
+    ramp: The chapter's ramp between the same curvatures, instead of the fit of the measured curve.
+    """
+    numbers = MEASURED[liquid_metal]._asdict()
+    numbers["width"] = numbers.pop("heating_time")
+    t = np.linspace(0.0, 1.0 / frequency, 2001)
+    k = curvature(numbers, frequency, t)
+    k[-1] = k[0]
+    if ramp:
+        t, k = np.array([0.0, RAMP, t[-1]]), np.array([k[0], k.min(), k[0]])
+    kept = polygon(t, k)
+    return tuple(t[kept].tolist()), k[kept]
+
+
+def polygon(t: Floats, k: Floats) -> list[int]:
+    """Indices of the samples between which the curve is straight but for LOOSE (Douglas and Peucker)."""
+    kept, pieces = {0, len(t) - 1}, [(0, len(t) - 1)]
+    while pieces:
+        a, b = pieces.pop()
+        off = np.abs(k[a : b + 1] - np.interp(t[a : b + 1], t[[a, b]], k[[a, b]]))
+        if off.max() > LOOSE:
+            middle = a + int(off.argmax())
+            kept.add(middle)
+            pieces += [(a, middle), (middle, b)]
+    return sorted(kept)

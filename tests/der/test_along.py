@@ -1,0 +1,149 @@
+"""Actuators that act along limbs: natural curvature, stiffness, and the energy that moving them stores."""
+
+import numpy as np
+import pytest
+
+import oracle
+from along_oracle import Bent
+from seastar_gym import AlongLimb, Limb, Scene, Seastar, SmaPulse, Stiffening
+from seastar_gym.der.energy import elastic_energy
+from seastar_gym.der.rods import make_work
+from seastar_gym.der.stepping.guard import allowed_energy
+from seastar_gym.der.stepping.schemes import SCHEMES
+from seastar_gym.der.terms.along import add_moved_energy, hyperbolic_tangent, natural_tangent, stiffening
+from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
+from seastar_gym.model.rods import make_rods
+from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simd.numpy_lanes import Lanes
+from slopes import plain, rows, slope
+
+PEAK, RATIO, CURVATURES = 1.1, 2.5, (4.0, 0.0, -3.0)
+PROFILE = (1.0, 3.0, 0.5)
+ROBOT = Seastar(
+    3, 5, limbs=tuple(Limb(natural_curvature=k) for k in CURVATURES),
+    along=AlongLimb(0.8, PROFILE), stiffening=Stiffening(RATIO, 0.4, 0.1),
+)  # fmt: skip
+RODS = make_rods(Scene(ROBOT, actuator=SmaPulse(PEAK)))
+STAR = Bent(
+    3, 5, directions=(0.0, 2.0 * np.pi / 3.0, 4.0 * np.pi / 3.0), lengths=(0.1,) * 3, radii=((1.6e-3,) * 2,) * 3,
+    moduli=((1e6,) * 2,) * 3, curvatures=CURVATURES, share=0.8, ratio=RATIO, middle=0.4, width=0.1, peak=PEAK,
+    profile=lambda s: np.interp(s, (0.0, 0.5, 1.0), PROFILE),
+)  # fmt: skip
+RNG = np.random.default_rng(0)
+SHAPE = STAR.rest + 1e-4 * RNG.standard_normal(STAR.rest.shape)
+BEGIN, END = np.array([0.2, -1.0, 0.0]), np.array([0.9, -0.4, 0.5])
+
+
+def actuation(begin: np.ndarray, end: np.ndarray) -> Actuation:
+    return Actuation(*(np.tile(turns[:, None], N_LANES) for turns in (begin, end)))
+
+
+def memory(turns: np.ndarray):
+    work = make_work(RODS, 1)
+    set_natural_hub_angles.plain(RODS, work, actuation(0.0 * turns, turns), Lanes(1.0))
+    return work
+
+
+# Logistic stiffening
+
+
+def test_the_hyperbolic_tangent_is_numpys():
+    x = np.concatenate([np.linspace(-25.0, 25.0, 2001), [0.0, 1e-9, -1e-9]])
+    np.testing.assert_allclose(plain(hyperbolic_tangent.plain(Lanes(x))), np.tanh(x), rtol=2e-15, atol=0.0)
+
+
+def test_stiffening_goes_from_one_to_its_ratio_by_the_logistic_function():
+    assert plain(stiffening.plain(RODS.along, Lanes(0.0))) == 1.0
+    assert plain(stiffening.plain(RODS.along, Lanes(-PEAK))) == pytest.approx(RATIO, rel=1e-14)
+    for delta in np.linspace(-PEAK, PEAK, 9):
+        expected = STAR.at([delta, 0.0, 0.0]).factors[0]
+        assert plain(stiffening.plain(RODS.along, Lanes(delta))) == pytest.approx(expected, rel=1e-13)
+
+
+def test_without_a_ratio_nothing_is_stiffer_to_the_last_bit():
+    rods = make_rods(Scene(Seastar(3, 5, stiffening=Stiffening(1.0)), actuator=SmaPulse(PEAK)))
+    np.testing.assert_array_equal(plain(stiffening.plain(rods.along, Lanes(np.linspace(-PEAK, PEAK, 99)))), 1.0)
+
+
+# Profiles
+
+
+@pytest.mark.parametrize("profile", [1.0, (1.0, 0.0), PROFILE, (0.0, 1.0, 2.0, 1.0, 0.0, -0.2), (1.0, *(0.0,) * 9)])
+@pytest.mark.parametrize("nodes", [2, 5, 11])
+def test_hinges_turn_by_the_hat_functions_of_the_profile(profile, nodes):
+    points = profile if isinstance(profile, tuple) else (profile, profile)
+    star = Bent(1, nodes, share=0.6, profile=lambda s: np.interp(s, np.linspace(0.0, 1.0, len(points)), points))
+    found = AlongLimb(0.6, profile).hinge_shares(nodes)
+    np.testing.assert_allclose(found, star.shares, rtol=0.0, atol=1e-9)
+
+
+def test_a_uniform_limb_turns_all_its_hinges_alike_and_its_clamp_by_half():
+    np.testing.assert_allclose(AlongLimb().hinge_shares(5), [0.125, 0.25, 0.25, 0.25], rtol=1e-14)
+
+
+def test_a_profile_at_the_root_turns_the_limb_at_the_hub():
+    for points in (10, 100, 1000):
+        at_clamp, *within = AlongLimb(profile=(1.0, *(0.0,) * points)).hinge_shares(5)
+        assert 1.0 - at_clamp == pytest.approx(sum(within), abs=1e-12)
+        assert sum(within) == pytest.approx(4.0 / (3.0 * points), rel=1e-9)
+
+
+# Energy
+
+
+@pytest.mark.parametrize("turns", [BEGIN, END, 0.0 * END])
+def test_elastic_energy_is_that_of_a_robot_of_such_curvature_and_stiffness(turns):
+    found = plain(elastic_energy.plain(RODS, memory(turns), rows(SHAPE)))
+    expected = oracle.elastic_energy(STAR.at(turns), SHAPE, np.zeros(3))
+    np.testing.assert_allclose(found, expected, rtol=1e-10)
+
+
+def test_energy_changes_with_the_rotation_as_the_moments_and_the_stiffness_say():
+    """dU/d delta = -sum M dkappa_bar + 1/2 dEI (kappa - kappa_bar)^2: what the actuator puts in."""
+
+    def energy(delta: float) -> float:
+        return float(plain(elastic_energy.plain(RODS, memory(np.array([delta, -0.4, 0.5])), rows(SHAPE)))[0])
+
+    def expected(delta: float) -> float:
+        return oracle.elastic_energy(STAR.at([delta, -0.4, 0.5]), SHAPE, np.zeros(3))
+
+    for delta in (0.2, 0.45, 0.9):
+        assert slope(energy, delta, 1e-3) == pytest.approx(slope(expected, delta, 1e-3), rel=1e-6)
+
+
+def test_what_moving_natural_curvature_stores_is_the_energy_of_the_hinges_left_behind():
+    work = memory(0.0 * END)
+    moved = plain(add_moved_energy.plain(RODS.along, RODS, work, actuation(BEGIN, END), Lanes(0.0), Lanes(1.0), 0.0))
+    begin, end = STAR.at(BEGIN), STAR.at(END)
+    expected = sum(
+        0.5 * max(f) / f[1] * EI * dl * (oracle.curvature(b, dl) - oracle.curvature(a, dl)) ** 2
+        for a, b, EI, dl, f in zip(
+            begin.inner_angles, end.inner_angles, end.hinge_EI, end.hinge_dl,
+            np.repeat(np.stack([begin.factors, end.factors], axis=1), 3, axis=0), strict=True,
+        )
+    )  # fmt: skip
+    np.testing.assert_allclose(moved, expected, rtol=1e-9)
+    np.testing.assert_allclose(work.EI_kappa_bar, memory(END).EI_kappa_bar, rtol=1e-14)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_the_guard_allows_the_energy_that_stiffening_and_bending_put_in(scheme):
+    tableau, v = SCHEMES[scheme], 0.1 * RNG.standard_normal(SHAPE.shape)
+    work, frame = make_work(RODS, tableau.n_stages), (Lanes(0.0), Lanes(0.0))
+    turns, start, end = actuation(BEGIN, END), Lanes(0.25), Lanes(0.75)
+    found = plain(allowed_energy.plain(RODS, work, tableau, turns, start, end, rows(SHAPE), rows(v), frame))[0]
+    at_start, at_end = (
+        oracle.elastic_energy(STAR.at(BEGIN + share * (END - BEGIN)), SHAPE, np.zeros(3)) for share in (0.25, 0.75)
+    )
+    kinetic = oracle.kinetic_energy(STAR.at(END), v)
+    if tableau.dissipative:
+        assert found == pytest.approx(at_end + kinetic, rel=1e-10)
+    else:
+        assert found > max(at_start, at_end) + kinetic
+    np.testing.assert_allclose(work.EI_kappa_bar, memory(BEGIN + 0.75 * (END - BEGIN)).EI_kappa_bar, rtol=1e-14)
+
+
+def test_a_mirror_turns_the_natural_curvature_round():
+    for hinge in range(5, 8):  # limb 2 is straight
+        there, back = (plain(natural_tangent.plain(RODS.along, hinge, Lanes(delta))) for delta in (0.7, -0.7))
+        assert there == -back != 0.0
