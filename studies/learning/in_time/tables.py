@@ -20,9 +20,9 @@ JOULES = SmaWires().heating_power * PULSE
 def as_markdown(runs: Mapping[str, Runs]) -> str:
     """Seconds and heat round the pentagon and on held-out paths, for every training, in Markdown."""
     lines = [
-        "| training | seeds | pentagon, every seed [s] | mean [s] | `balanced` [s] | `reference` [s] | held-out paths [s] | "
-        "arrived | J/m | pulses per metre of the path | training [s] |",
-        "|---|---:|---|---:|---:|---:|---:|---:|---:|---:|---:|",
+        "| training | seeds | pentagon, every seed [s] | mean [s] | `balanced` [s] | `reference` [s] "
+        "| held-out paths [s] | arrived | J/m | pulses per metre of the path |",
+        "|---|---:|---|---:|---:|---:|---:|---:|---:|---:|",
     ]
     return "\n".join([*lines, *(_row(name, found) for name, found in runs.items() if found)])
 
@@ -38,7 +38,6 @@ def _row(name: str, runs: Runs) -> str:
         f"{sum(run['held_out']['arrived'] for run in runs.values()) / len(runs):.1f}",
         f"{np.mean(_all(runs, 'pentagon', 'fast', 'J_per_m')):.0f}",
         f"{pulses_per_metre(_all(runs, 'pentagon', 'fast', 'energy_J')):.0f}",
-        f"{np.mean(_all(runs, 'training_s')):.0f}",
     ]
     return f"| {' | '.join(cells)} |"
 

@@ -1,12 +1,10 @@
 """Trainings of the study: what differs between them, and how each is run."""
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-import torch
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
 
@@ -21,8 +19,8 @@ from studies.learning.in_time.shares import ChosenCommands, SharesPolicy, shares
 
 COMMON = Hyperparameters(discount=0.9, rollout=32, num_envs=64, gae_lambda=0.95)
 """Hyperparameters of the trainings, but for what differs."""
-COASTING = {"coasting": True, "discount": 0.5}
-"""Progress by where the hub would come to rest, and the shorter horizon that goes with it."""
+COASTING: dict[str, Any] = {"coasting": True, "discount": 0.3, "num_envs": 128, "rollout": 16}
+"""Progress by where the hub would come to rest, the shorter horizon that it allows, and shorter rollouts to fit."""
 SHARES = (1.0, 0.6)
 """Shares of a pulse among which "shares" chooses."""
 SAC_SETTINGS: dict[str, Any] = {
@@ -67,23 +65,32 @@ TRAININGS: dict[str, Training] = {
     "0.5 s, coasting": _every(0.5, 150_000, **COASTING),
     "0.2 s": _every(0.2),
     "0.2 s, coasting": _every(0.2, **COASTING),
+    "0.2 s, price 0.1": _every(0.2, learner="shares", **_priced(0.1)),
+    "0.2 s, price 0.2": _every(0.2, learner="shares", **_priced(0.2)),
+    "0.2 s, Gaussian": _every(0.2, learner="gaussian", **COASTING),
+    "0.2 s, SAC": _every(0.2, 150_000, learner="sac", **COASTING),
     "0.1 s": _every(0.1),
     "0.1 s, coasting": _every(0.1, **COASTING),
+    "0.1 s, after 0.2 s": _every(0.1, start="0.2 s, coasting", learning_rate=5e-4, **COASTING),
 }
 """Trainings by name."""
 
 
 class Learned(NamedTuple):
-    """What a training has learned. seconds: Processor time of the training [s]."""
+    """What a training has learned. seconds: Processor time of the training [s]; None where it was not run again."""
 
     policy: Policy
-    seconds: float
-    decisions: int
+    seconds: float | None
 
 
 def learn(name: str, seed: int, fidelity: Fidelity, folder: Path, decisions: int | None = None) -> Learned:
-    """Run a training, on one thread. folder: Of the networks that other trainings begin with."""
-    training = TRAININGS[name]
+    """Run a training, on one thread, unless its network is in the folder already.
+
+    folder: Of the learners over pairs of limbs, in files as `train.py` writes them (model.zip).
+    """
+    training, file = TRAININGS[name], network_file(folder, name, seed)
+    if training.learner == "pairs" and file.exists():
+        return Learned(learner_file.load(file), None)
     env = _make_env(training, fidelity)
     model = _make_model(training, env, seed)
     if training.start is not None:
@@ -92,12 +99,11 @@ def learn(name: str, seed: int, fidelity: Fidelity, folder: Path, decisions: int
     began = time.process_time()
     model.learn(training.decisions if decisions is None else decisions)
     seconds = time.process_time() - began
-    folder.mkdir(parents=True, exist_ok=True)
-    if training.learner == "pairs":
-        assert isinstance(model, PPO)
-        learner_file.save(model, network_file(folder, name, seed))
+    if isinstance(model, PPO) and training.learner == "pairs":
+        folder.mkdir(parents=True, exist_ok=True)
+        learner_file.save(model, file)
     env.close()
-    return Learned(_policy(training, model, env), seconds, model.num_timesteps)
+    return Learned(_policy(training, model, env), seconds)
 
 
 def network_file(folder: Path, name: str, seed: int) -> Path:
