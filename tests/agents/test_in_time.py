@@ -56,6 +56,7 @@ def test_every_learner_is_measured_and_none_twice(small, tmp_path, capsys):
         assert found["training_s"] > 0.0 and found["pentagon"].keys() == {"fast"}
         assert found["pentagon"]["fast"]["seconds"] == 2.0 and found["held_out"]["arrived"] == 0
         assert f"| {name} | 1 | 2.0 |" in as_markdown(first["runs"])
+    assert out.with_suffix(".png").is_file()
     capsys.readouterr()
     assert main([*command, "--seeds", "0", "1", "--trainings", "pairs"]) == 0
     assert "seed 0" not in capsys.readouterr().out
@@ -110,7 +111,7 @@ class Numbers:
     def __init__(self, size, discrete):
         self.weights, self.discrete = np.random.default_rng(0).normal(size=(size, 5)), discrete
 
-    def predict(self, observation, deterministic):
+    def predict(self, observation, state, episode_start, deterministic):
         found = np.tanh(observation @ self.weights)
         return (np.argmax(found, axis=-1) * 7 if self.discrete else found), None
 

@@ -5,8 +5,8 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
-from stable_baselines3.common.base_class import BaseAlgorithm
 
+from agents.swim import Policy
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.symmetry import memory_mirror, reduce_observations, restore_actions
 from seastar_gym.scene import Scene
@@ -37,14 +37,14 @@ class ChosenCommands(gym.vector.VectorWrapper):
 
 
 class SharesPolicy:
-    """Policy with actions="continuous" that a learner behind the symmetry reduction has learned.
+    """Policy with actions="continuous", from the model that a learner behind the symmetry reduction has learned.
 
     table: Commands that its actions are the numbers of. None means that its actions are commands.
     """
 
     actions = "continuous"
 
-    def __init__(self, model: BaseAlgorithm, scene: Scene, table: Floats | None = None):
+    def __init__(self, model: Policy, scene: Scene, table: Floats | None = None):
         self.model, self.scene, self.table = model, scene, table
 
     def predict(
@@ -53,6 +53,6 @@ class SharesPolicy:
         """Commands for observations of shape (size,) or (n, size), and None: the policy has no state."""
         n_limbs = self.scene.robot.n_limbs
         reduced, elements = reduce_observations(observation, n_limbs, memory_mirror(self.scene.actuator))
-        chosen, _ = self.model.predict(reduced.astype(np.float32), deterministic=deterministic)
+        chosen, _ = self.model.predict(reduced.astype(np.float32), None, None, deterministic)
         commands = chosen if self.table is None else self.table[chosen]
         return restore_actions(commands, elements, "continuous", n_limbs), None

@@ -5,7 +5,8 @@
 
 Every policy swims the pentagon at every fidelity asked for, and held-out random paths at the fidelity of the training.
 Results are written after every training. A training whose result is already in the file is not repeated, nor is one
-over pairs of limbs whose learner is among the networks: `train.py` with the same options leaves the same, model.zip.
+whose network is in the folder of networks. For pairs of limbs, `train.py` with the same options leaves the same file,
+its model.zip.
 """
 
 import itertools
@@ -28,6 +29,7 @@ from seastar_gym.command import run_command
 from seastar_gym.envs.task import make_scene
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
+from studies.learning.in_time.pictures import draw
 from studies.learning.in_time.tables import as_markdown
 from studies.learning.in_time.trainings import TRAININGS, learn
 
@@ -51,7 +53,7 @@ class Options:
     networks: Path = Path("runs/in_time")
     """Folder of the trained networks."""
     out: Path = Path("docs/in_time.json")
-    """File of the results."""
+    """File of the results. The picture has the same name with the suffix .png."""
 
     def __post_init__(self) -> None:
         if unknown := set(self.trainings) - set(TRAININGS):
@@ -131,6 +133,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (ValueError, OSError) as wrong:
         print(wrong, file=sys.stderr)
         return 2
+    draw(results["runs"], options.out.with_suffix(".png"))
     print(as_markdown(results["runs"]))
     return 0
 

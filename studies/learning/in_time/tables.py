@@ -15,13 +15,15 @@ Runs = Mapping[str, Any]
 
 JOULES = SmaWires().heating_power * PULSE
 """Heat of a pulse [J]."""
+PENTAGON = float(path_length(np.zeros(2), make_path("pentagon", np.random.default_rng(0))))
+"""Length of the pentagon [m], the side that leads to it included."""
 
 
 def as_markdown(runs: Mapping[str, Runs]) -> str:
     """Seconds and heat round the pentagon and on held-out paths, for every training, in Markdown."""
     lines = [
         "| training | seeds | pentagon, every seed [s] | mean [s] | `balanced` [s] | `reference` [s] "
-        "| held-out paths [s] | arrived | J/m | pulses per metre of the path |",
+        "| held-out paths [s] | arrived | J per metre of the path | pulses per metre |",
         "|---|---:|---|---:|---:|---:|---:|---:|---:|---:|",
     ]
     return "\n".join([*lines, *(_row(name, found) for name, found in runs.items() if found)])
@@ -36,7 +38,7 @@ def _row(name: str, runs: Runs) -> str:
         *(_interval(seconds) for seconds in pentagon.values()),
         _interval(_all(runs, "held_out", "seconds")),
         f"{sum(run['held_out']['arrived'] for run in runs.values()) / len(runs):.1f}",
-        f"{np.mean(_all(runs, 'pentagon', 'fast', 'J_per_m')):.0f}",
+        f"{np.mean(_all(runs, 'pentagon', 'fast', 'energy_J')) / PENTAGON:.0f}",
         f"{pulses_per_metre(_all(runs, 'pentagon', 'fast', 'energy_J')):.0f}",
     ]
     return f"| {' | '.join(cells)} |"
@@ -44,8 +46,7 @@ def _row(name: str, runs: Runs) -> str:
 
 def pulses_per_metre(joules: Iterable[float]) -> float:
     """Mean number of pulses per metre of the pentagon [1/m] of swims that took this heat [J]."""
-    length = float(path_length(np.zeros(2), make_path("pentagon", np.random.default_rng(0))))
-    return float(np.mean(list(joules))) / JOULES / length
+    return float(np.mean(list(joules))) / JOULES / PENTAGON
 
 
 def _all(runs: Runs, *names: str) -> list[float]:

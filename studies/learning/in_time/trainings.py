@@ -8,9 +8,9 @@ from typing import Any, Literal, NamedTuple
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from agents import learner_file
+from agents import foreign, learner_file
 from agents.hyperparameters import Hyperparameters
-from agents.ppo import make_model, make_training_env, policy_of
+from agents.ppo import make_model, make_training_env
 from agents.swim import Policy
 from agents.vec_env import BatchVecEnv
 from seastar_gym.envs.reward import RewardWeights
@@ -56,8 +56,8 @@ def _every(period: float, decisions: int = 300_000, learner: Any = "pairs", star
     return Training((("decision_period", period), *changes.items()), decisions, learner, start)
 
 
-def _priced(effort: float) -> dict[str, Any]:
-    return {**COASTING, "reward": RewardWeights(effort=effort)}
+def _priced(effort: float, aim: float = RewardWeights().aim) -> dict[str, Any]:
+    return {**COASTING, "discount": 0.8, "reward": RewardWeights(effort=effort, aim=aim)}
 
 
 TRAININGS: dict[str, Training] = {
@@ -65,6 +65,9 @@ TRAININGS: dict[str, Training] = {
     "0.5 s, coasting": _every(0.5, 150_000, **COASTING),
     "0.2 s": _every(0.2),
     "0.2 s, coasting": _every(0.2, **COASTING),
+    "0.5 s, price 0.05": _every(0.5, 150_000, "shares", **_priced(0.05)),
+    "0.5 s, price 0.15": _every(0.5, 150_000, "shares", **_priced(0.15)),
+    "0.5 s, price 0.15, nearer": _every(0.5, 300_000, "shares", **_priced(0.15, 0.9)),
     "0.2 s, price 0.1": _every(0.2, learner="shares", **_priced(0.1)),
     "0.2 s, price 0.2": _every(0.2, learner="shares", **_priced(0.2)),
     "0.2 s, Gaussian": _every(0.2, learner="gaussian", **COASTING),
@@ -86,12 +89,13 @@ class Learned(NamedTuple):
 def learn(name: str, seed: int, fidelity: Fidelity, folder: Path, decisions: int | None = None) -> Learned:
     """Run a training, on one thread, unless its network is in the folder already.
 
-    folder: Of the learners over pairs of limbs, in files as `train.py` writes them (model.zip).
+    folder: Of the networks, in files as `train.py` writes them (model.zip) for pairs of limbs. Those of others are
+        Stable-Baselines3's, which are unpickled: use no folder that you do not trust.
     """
     training, file = TRAININGS[name], network_file(folder, name, seed)
-    if training.learner == "pairs" and file.exists():
-        return Learned(learner_file.load(file), None)
     env = _make_env(training, fidelity)
+    if file.exists():
+        return Learned(_read(training, file, env), None)
     model = _make_model(training, env, seed)
     if training.start is not None:
         assert isinstance(model, PPO)
@@ -99,11 +103,23 @@ def learn(name: str, seed: int, fidelity: Fidelity, folder: Path, decisions: int
     began = time.process_time()
     model.learn(training.decisions if decisions is None else decisions)
     seconds = time.process_time() - began
-    if isinstance(model, PPO) and training.learner == "pairs":
-        folder.mkdir(parents=True, exist_ok=True)
+    _write(training, file, model)
+    return Learned(_read(training, file, env), seconds)
+
+
+def _write(training: Training, file: Path, model: BaseAlgorithm) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    if training.learner == "pairs":
+        assert isinstance(model, PPO)
         learner_file.save(model, file)
-    env.close()
-    return Learned(_policy(training, model, env), seconds)
+    else:
+        model.save(file)
+
+
+def _read(training: Training, file: Path, env: BatchVecEnv) -> Policy:
+    if training.learner == "pairs":
+        return learner_file.load(file)
+    return SharesPolicy(foreign.load_model(file), env.get_attr("scene")[0], getattr(env.env, "table", None))
 
 
 def network_file(folder: Path, name: str, seed: int) -> Path:
@@ -129,11 +145,3 @@ def _make_model(training: Training, env: BatchVecEnv, seed: int) -> BaseAlgorith
         "MlpPolicy", env, gamma=hyperparameters.discount_per_decision, seed=seed, device="cpu",
         policy_kwargs={"net_arch": list(hyperparameters.hidden)}, **SAC_SETTINGS,
     )  # fmt: skip
-
-
-def _policy(training: Training, model: BaseAlgorithm, env: BatchVecEnv) -> Policy:
-    if training.learner == "pairs":
-        assert isinstance(model, PPO)
-        return policy_of(model)
-    scene = env.get_attr("scene")[0]
-    return SharesPolicy(model, scene, getattr(env.env, "table", None))
