@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.accuracy.style import DPI, FAINT, INK, subplots
+from studies.style import DPI, FAINT, INK, subplots
 from studies.validation.inference import Prediction
 from studies.validation.speeds import Condition
 
