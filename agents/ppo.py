@@ -55,7 +55,8 @@ def make_training_env(
         threads=threads,
     )
     if hyperparameters.coasting:
-        coasting = fit_coasting(cast(SeastarSwimVectorEnv, env.unwrapped).scene, hyperparameters.decision_period, np.random.default_rng(0))
+        swum = cast(SeastarSwimVectorEnv, env.unwrapped).scene
+        coasting = fit_coasting(swum, hyperparameters.decision_period, np.random.default_rng(0))
         env = CoastingProgress(env, coasting, hyperparameters.reward)
     return BatchVecEnv(VectorSymmetryReduction(env) if hyperparameters.symmetry else env)
 
