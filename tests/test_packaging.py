@@ -75,8 +75,9 @@ def imports_of(*paths: Path) -> set[str]:
             modules |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.level == 0:
             modules.add(node.module)
-    tests = {path.stem for path in (ROOT / "tests").rglob("*")}
-    own = {"seastar_gym", "agents", "studies", "train", *tests}
+    beside = {path.stem for folder in ("tests", "docs") for path in (ROOT / folder).rglob("*.py")}
+    folders = {path.stem for path in (ROOT / "tests").rglob("*")}
+    own = {"seastar_gym", "agents", "studies", "train", *beside, *folders}
     packages = {module.partition(".")[0] for module in modules} - sys.stdlib_module_names - own
     return {canonicalize_name(DISTRIBUTION_OF.get(package, package)) for package in packages}
 
@@ -101,6 +102,7 @@ def test_every_base_dependency_is_imported_by_the_package():
         (["studies"], ["train"]),
         (["agents", "train.py"], ["train"]),
         (["tests"], ["test", "browser"]),
+        (["docs"], ["docs"]),
     ],
 )
 def test_every_import_has_its_requirement(folders, extras):
@@ -115,7 +117,9 @@ def test_importing_the_package_leaves_out_what_it_does_not_need():
     assert loaded.isdisjoint({"torch", "stable_baselines3", "matplotlib", "plotly", "pygame", "imageio", "rich"})
 
 
-@pytest.mark.parametrize("requirement", requirements("test", "browser"), ids=lambda requirement: requirement.name)
+@pytest.mark.parametrize(
+    "requirement", requirements("test", "browser", "docs", "release"), ids=lambda requirement: requirement.name
+)
 def test_tested_version_lies_in_the_declared_range(requirement):
     assert pins("constraints.txt")[canonicalize_name(requirement.name)] in requirement.specifier
 

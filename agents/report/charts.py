@@ -119,16 +119,30 @@ def curves_figure(curves: Sequence[Curve], baselines: Mapping[str, int]) -> go.F
             x=curve.trained.tolist(), y=_with_gaps(curve.pentagon), name=curve.name, mode="lines+markers",
             line={"color": COLOURS[number % len(COLOURS)], "width": 1 if len(curves) > 2 else 2}, marker={"size": 5},
         )  # fmt: skip
+    _add_unfinished(figure, curves)
     for name, strokes in baselines.items():
         figure.add_hline(
             y=strokes, line={"color": FAINT_INK, "dash": "dash"},
-            annotation_text=f"{html.escape(name)}: {strokes}", annotation_position="top left",
+            annotation_text=f"agent {html.escape(name)}: {strokes}", annotation_position="top left",
         )  # fmt: skip
     figure.update_layout(
         xaxis={"title": "strokes trained", "rangemode": "tozero"}, yaxis={"title": "strokes round the pentagon"},
         legend_y=1.01, margin=MARGIN,
     )  # fmt: skip
     return figure
+
+
+def _add_unfinished(figure: go.Figure, curves: Sequence[Curve]) -> None:
+    """Crosses above the curves where a policy did not finish the pentagon yet: a training shows from its begin."""
+    early = [trained for curve in curves for trained in curve.trained[np.isnan(curve.pentagon)].tolist()]
+    if not early:
+        return
+    finished = np.concatenate([curve.pentagon[np.isfinite(curve.pentagon)] for curve in curves])
+    above = 1.05 * float(finished.max()) if finished.size else 1.0
+    figure.add_scatter(
+        x=early, y=[above] * len(early), name="not finished", mode="markers", hoverinfo="x",
+        marker={"symbol": "x", "size": 8, "color": FAINT_INK},
+    )  # fmt: skip
 
 
 def _add_band(figure: go.Figure, curves: Sequence[Curve]) -> None:

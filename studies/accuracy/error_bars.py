@@ -27,8 +27,8 @@ from seastar_gym.scene import Numerics, Scene, Seastar, Water, relaxation_time
 from seastar_gym.scene.numerics import PRESETS, Setting
 from seastar_gym.simulator import Simulator
 from seastar_gym.simulator.error_bars import factor
-from studies.accuracy.style import FAINT, INK, PERCENT, subplots
 from studies.parser import study_parser
+from studies.style import FAINT, INK, PERCENT, subplots
 
 Floats = NDArray[np.float64]
 

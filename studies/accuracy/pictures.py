@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from studies.accuracy.ringing import ringing
 from studies.accuracy.rows import Column, front
 from studies.accuracy.settings import presets
-from studies.accuracy.style import COLOURS, DPI, INK, MS, PERCENT, as_numbers, as_percent, subplots
+from studies.style import COLOURS, DPI, INK, MS, PERCENT, as_numbers, as_percent, subplots
 from studies.verification.published import PUBLISHED_FINALS
 
 if TYPE_CHECKING:
@@ -51,17 +51,11 @@ PUBLISHED = (
 
 def draw_all(found: Study, folder: Path) -> list[Path]:
     """Write all pictures into a folder and return their paths."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
     paths = []
     for name, draw in (("work_precision", work_precision), ("convergence", convergence), ("ringing", ringing)):
         figure: Figure = draw(found)
         paths.append(folder / f"{name}.png")
         figure.savefig(paths[-1], dpi=DPI)
-        plt.close(figure)
     return paths
 
 

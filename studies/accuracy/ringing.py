@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from studies.accuracy.rows import Study
 
-from studies.accuracy.style import COLOURS, INK, MM, MS, PERCENT, as_percent, subplots
+from studies.style import COLOURS, INK, MM, MS, PERCENT, as_percent, subplots
 
 Floats = NDArray[np.float64]
 
@@ -140,9 +140,7 @@ def swum(numerics: Numerics, discretisation: Discretisation, freeze_lengths: boo
     return np.array(distances)
 
 
-def excess(
-    numerics: Numerics, discretisation: Discretisation, freeze_lengths: bool = False
-) -> tuple[Floats, Floats]:
+def excess(numerics: Numerics, discretisation: Discretisation, freeze_lengths: bool = False) -> tuple[Floats, Floats]:
     """Numbers of strokes, and relative excess of the distance from the start over the converged robot's [%].
 
     The converged robot has the same discretisation.

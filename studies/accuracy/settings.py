@@ -102,9 +102,7 @@ def _numerics(plan: Plan, resolution: Resolution) -> list[Numerics]:
         for tolerance in tolerances(step * MS)
         if step * MS >= shortest and (nodes <= plan.finest or tolerance == tolerances(step * MS)[-1])
     ]
-    adapted = [
-        Numerics("implicit-midpoint", LARGEST_ADAPTED, 1e-7, path_tolerance=tolerance) for tolerance in ADAPTED
-    ]
+    adapted = [Numerics("implicit-midpoint", LARGEST_ADAPTED, 1e-7, path_tolerance=tolerance) for tolerance in ADAPTED]
     return fixed + (adapted if nodes <= plan.finest else [])
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from studies.accuracy.pictures import CHAPTERS, OTHERS, OURS, PUBLISHED, published_error
-from studies.accuracy.style import DPI, INK, MS, PERCENT, as_numbers, as_percent, subplots
+from studies.style import DPI, INK, MS, PERCENT, as_numbers, as_percent, subplots
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,8 +64,6 @@ def front(rows: Sequence[Row], column: Column) -> list[Row]:
 
 def draw(results: Mapping[str, Any], file: Path) -> None:
     """Small multiples of error over time: all problems with the same axes, and the straight swim with other codes."""
-    import matplotlib.pyplot as plt
-
     problems = results["problems"]
     figure, axes = subplots(3, 3, figsize=(10.5, 10.0), sharey=True)
     grid = axes[0, 0].get_gridspec()
@@ -91,7 +89,6 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
     figure.legend(*wide.get_legend_handles_labels(), loc="outside upper center", ncols=4, frameon=False, fontsize=10)
     file.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(file, dpi=DPI)
-    plt.close(figure)
 
 
 def _draw_panel(axes: Axes, rows: Sequence[Row], title: str, column: Column) -> None:

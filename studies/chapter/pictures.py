@@ -22,6 +22,7 @@ from studies.chapter import ISSUES_FROM, REAL_TIME_FROM
 from studies.chapter.cost import Cost
 from studies.chapter.statements import stroke_motion
 from studies.chapter.swims import MM, MS, Swim
+from studies.style import new_figure
 
 Floats = NDArray[np.float64]
 
@@ -36,13 +37,6 @@ CHAPTER_PATH: dict[str, Any] = {"color": ORANGE, "linewidth": 1.1, "zorder": 3.6
 """Line of the chapter's paths. It is solid, because a robot swims back and forth and dashes would overlap."""
 PAIR_COLOURS = ("#0072b2", "#009e73", "#cc3d7a", "#8c6d1f")
 DPI = 150
-
-
-def new_figure(width: float, height: float) -> Figure:
-    """Empty figure; width, height: Size [inches]."""
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
 
 
 def style(axes: Axes, **labels: Any) -> None:

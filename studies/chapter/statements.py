@@ -13,9 +13,7 @@ from studies.chapter import REAL_TIME_FROM
 from studies.chapter.cost import Cost
 from studies.chapter.swims import MM, MS, Swim
 
-PAIRS = {
-    name.replace(",", ", ").replace("-", "⁻").replace("+", "⁺"): command for name, command in gaits.PAIRS.items()
-}
+PAIRS = {name.replace(",", ", ").replace("-", "⁻").replace("+", "⁺"): command for name, command in gaits.PAIRS.items()}
 SIDE = gaits.SWIMMING_STROKES + gaits.RESTING_STROKES
 """Strokes on a side of the pentagon, swimming and resting."""
 BISECTORS = (36.0, 72.0, 108.0, 144.0)
@@ -66,10 +64,10 @@ def straight_statements(swims: Sequence[Swim]) -> list[Statement]:
 
 def pentagon_statements(swims: Sequence[Swim]) -> list[Statement]:
     """Statements about Figs. 13.2 and 13.7, the pentagon."""
-    corners = [s.hub()[s.at_strokes()[:: SIDE]] for s in swims]
+    corners = [s.hub()[s.at_strokes()[::SIDE]] for s in swims]
     sides = [np.hypot(*np.diff(c, axis=0).T) for c in corners]
     stops = [s.at_strokes()[gaits.SWIMMING_STROKES :: SIDE] for s in swims]
-    rests = [s.at_strokes()[SIDE :: SIDE] for s in swims]
+    rests = [s.at_strokes()[SIDE::SIDE] for s in swims]
     coasts = [np.hypot(*(s.hub()[r] - s.hub()[b]).T) for s, r, b in zip(swims, rests, stops, strict=True)]
     rest = "left unactuated for 5 s to bring the robot to a complete stop"
     same = "the same initial conditions for each straight component"

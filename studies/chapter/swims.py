@@ -12,7 +12,6 @@ Floats = NDArray[np.float64]
 MM, MS = 1e3, 1e3
 
 
-
 @dataclass(frozen=True)
 class Setting:
     """Robot and numerics of a swim, and their name in legends and tables."""

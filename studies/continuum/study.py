@@ -20,9 +20,9 @@ from seastar_gym.gaits import PAIRS, STRAIGHT
 from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simulator import Simulator
 from studies.accuracy.cases import hub_path_lengths
-from studies.accuracy.style import INK, PERCENT, as_percent, subplots
 from studies.continuum.scenes import NAMES, scene
 from studies.parser import study_parser
+from studies.style import INK, PERCENT, as_percent, subplots
 
 Floats = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.accuracy.style import DPI, FAINT, INK, subplots
+from studies.style import DPI, FAINT, INK, new_figure, subplots
 
 COLOURS = {"synchronous": FAINT, "from rest": "#3366aa", "re-heated": "#cc7a00"}
 LABELS = {
@@ -26,9 +26,7 @@ def draw_all(results: dict[str, Any], folder: Path) -> None:
 
 def draw_directions(results: dict[str, Any], file: Path) -> None:
     """Speed by direction; the sector of 36 degrees is repeated by turns and mirror images."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(5.6, 5.4), layout="constrained")
+    figure = new_figure(5.6, 5.4)
     axes: Any = figure.add_subplot(projection="polar")
     sector = np.radians(results["directions_deg"])
     for name, speeds in results["mm_per_s_by_direction"].items():

@@ -31,9 +31,9 @@ from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.task import make_scene
 from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
-from seastar_gym.evaluation.pictures import COLOURS, FAINT_INK
 from seastar_gym.files import write_atomically
 from seastar_gym.scene.numerics import Fidelity
+from studies.style import CYCLE, FAINT, new_figure
 
 MAX_STROKES = 400
 """Largest number of strokes of an evaluated swim, which is also the score of a robot that does not arrive."""
@@ -207,18 +207,16 @@ def table(results: dict[str, Any]) -> str:
 
 def draw(results: dict[str, Any], file: Path) -> None:
     """Draw the learning curve of every variant beside the default one: mean and range over seeds."""
-    from matplotlib.figure import Figure
-
     others = [name for name in results["runs"] if name != DEFAULT] or [DEFAULT]
     columns = 4
     rows = -(-len(others) // columns)
-    figure = Figure(figsize=(9.0, 2.1 * rows), layout="constrained")
+    figure = new_figure(9.0, 2.1 * rows)
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for axes, name in itertools.zip_longest(panels.flat, others):
         if name is None:
             axes.set_axis_off()
             continue
-        for label, colour in ((DEFAULT, FAINT_INK), (name, COLOURS[0])):
+        for label, colour in ((DEFAULT, FAINT), (name, CYCLE[0])):
             curves = np.array([run["curve"] for run in results["runs"].get(label, {}).values()])
             if curves.size:
                 trained, strokes = 1e-3 * curves[0, :, 0], curves[:, :, 1]
@@ -227,12 +225,12 @@ def draw(results: dict[str, Any], file: Path) -> None:
         axes.set_title(name, fontsize=9)
         axes.set(ylim=(165.0, 210.0))
         axes.tick_params(labelsize=8, labelbottom=True)
-        axes.grid(alpha=0.3)
+        axes.grid(True)
     lines = panels.flat[0].get_lines()
-    figure.legend(handles=lines, loc="outside lower right", ncols=2, frameon=False, fontsize=9)
+    figure.legend(handles=lines, loc="outside lower right", ncols=2, fontsize=9)
     figure.supxlabel("strokes trained [thousands]", fontsize=9)
     figure.supylabel("strokes on held-out paths", fontsize=9)
-    figure.savefig(file, dpi=130)
+    figure.savefig(file)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -39,6 +39,7 @@ from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator, State
+from studies.style import subplots
 
 Floats = NDArray[np.float64]
 Gaits = NDArray[np.intp]
@@ -231,23 +232,27 @@ def study(options: Options) -> dict[str, Any]:
     }
 
 
-def draw(results: dict[str, Any], file: Path) -> None:
-    """Draw the speeds in polar axes; the measured sector of 36 degrees is repeated by turns and mirror images."""
-    from matplotlib.figure import Figure
+LABELS = {
+    "best periodic gaits, mixed": "straight gaits of up to four strokes, swum in turn as is best",
+    "beam search": "beam search: found, not proved",
+}
+"""What the picture calls the results that are no agents."""
 
-    figure = Figure(figsize=(5.2, 4.8), layout="constrained")
-    axes = figure.add_subplot(projection="polar")
-    sector = np.radians(results["directions_deg"])
-    for (label, speeds), style in zip(results["mm_per_stroke"].items(), itertools.cycle("-x.+"), strict=False):
-        angles = np.concatenate([k * 0.4 * np.pi + sign * sector for k in range(5) for sign in (1, -1)])
-        order = np.argsort(angles % (2.0 * np.pi))
-        closed = np.append(order, order[0])
-        axes.plot(angles[closed], np.tile(speeds, 10)[closed], style, label=label)
-    axes.set(rlim=(0.0, 5.2))
-    title = f'straight-line speed [mm per stroke] at "{results["fidelity"]}"\nby direction from limb 1'
-    axes.set_title(title, fontsize=10)
-    axes.legend(loc="lower left", bbox_to_anchor=(-0.15, -0.1), frameon=False, fontsize=8)
-    figure.savefig(file, dpi=160)
+
+def draw(results: dict[str, Any], file: Path) -> None:
+    """Draw the speeds by direction, in the sector of 36 degrees that turns and mirror images repeat."""
+    figure, axes = subplots(figsize=(6.4, 4.2))
+    lines = {"best periodic gaits, mixed": "-", "beam search": "x"}
+    for name, speeds in results["mm_per_stroke"].items():
+        axes.plot(results["directions_deg"], speeds, lines.get(name, "o"), label=LABELS.get(name, f"agent: {name}"))
+    axes.set(
+        xlabel="direction from limb 1 [degrees]; 36: between two limbs", xticks=results["directions_deg"],
+        ylabel="speed [mm per stroke]", title=f'straight-line speed at "{results["fidelity"]}"',
+    )  # fmt: skip
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.35 * (high - low))
+    axes.legend(loc="upper center")
+    figure.savefig(file)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

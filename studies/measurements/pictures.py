@@ -9,6 +9,7 @@ import numpy as np
 from seastar_gym.scene.actuators.pulse import pulse
 from studies.measurements.fit import Fit
 from studies.measurements.model import curvature
+from studies.style import subplots
 
 HEATING_SHARE = 0.1
 """Share of the stroke in which the ramp of Fig. 13.5b rises."""
@@ -16,11 +17,9 @@ HEATING_SHARE = 0.1
 
 def draw_curves(fits: dict[int, Fit], file: Path) -> None:
     """Measured curvatures (dots), fits (lines) and the chapter's ramp (dashed), with the error of every fit."""
-    import matplotlib.pyplot as plt
-
     columns = max(len(fit.curves) for fit in fits.values())
-    figure, axes = plt.subplots(
-        len(fits), columns, figsize=(1.45 * columns, 1.6 * len(fits)), sharey=True, layout="constrained", squeeze=False
+    figure, axes = subplots(
+        len(fits), columns, grid=False, figsize=(1.45 * columns, 1.6 * len(fits)), sharey=True, squeeze=False
     )
     for row, (liquid_metal, fit) in zip(axes, fits.items(), strict=True):
         for axis in row[len(fit.curves) :]:
@@ -37,5 +36,4 @@ def draw_curves(fits: dict[int, Fit], file: Path) -> None:
             axis.set(xlim=(0.0, 1.0 / curve.frequency), ylim=(0.0, 140.0))
         row[0].set_ylabel(f"{liquid_metal} % liquid metal\ncurvature [1/m]", fontsize=7)
     figure.supxlabel("time since a pulse was given [s]", fontsize=8)
-    figure.savefig(file, dpi=130)
-    plt.close(figure)
+    figure.savefig(file)

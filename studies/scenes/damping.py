@@ -170,13 +170,8 @@ def facts(found: Study) -> list[str]:
 
 def draw(found: Study, file: Path) -> None:
     """Draw the ringing, the distances of the pairs, and errors over the time step."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
     from studies.accuracy.ringing import record, smoothed
-    from studies.accuracy.style import (
+    from studies.style import (
         COLOURS,
         DPI,
         FAINT,
@@ -213,7 +208,6 @@ def draw(found: Study, file: Path) -> None:
     as_numbers(front.xaxis)
     front.legend(frameon=False, fontsize=8.5)
     figure.savefig(file, dpi=DPI)
-    plt.close(figure)
 
 
 def main() -> None:

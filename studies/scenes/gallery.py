@@ -24,6 +24,7 @@ from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.limb import Limb
 from seastar_gym.simulator import Simulator
 from studies.parser import study_parser
+from studies.style import INK, subplots
 
 Floats = NDArray[np.float64]
 
@@ -126,8 +127,6 @@ def outline(centre: Floats, radius: Floats) -> Floats:
 
 def draw(exhibit: Exhibit, file: Path, strokes: int = STROKES) -> None:
     """Draw the robot at rest and at the end of the first heating, and its hub's path over some strokes."""
-    import matplotlib.pyplot as plt
-
     simulator, robot = Simulator(exhibit.scene, threads=1), exhibit.scene.robot
     shapes, hub = [simulator.positions[0]], [np.zeros(2)]
     for _ in range(strokes):
@@ -135,7 +134,7 @@ def draw(exhibit: Exhibit, file: Path, strokes: int = STROKES) -> None:
             hub.append(simulator.hub_position()[0])
             if len(shapes) == 1 and since >= exhibit.scene.actuator.corners[1] - 1e-9:
                 shapes.append(simulator.positions[0])
-    figure, axes = plt.subplots(figsize=(2.6, 2.6))
+    figure, axes = subplots(figsize=(2.6, 2.6), layout=None)
     share = np.linspace(0.0, 1.0, robot.nodes_per_limb)
     for nodes, colour in zip(shapes, (REST, HEATED), strict=True):
         limbs = nodes[1:].reshape(robot.n_limbs, -1, 2)
@@ -143,12 +142,13 @@ def draw(exhibit: Exhibit, file: Path, strokes: int = STROKES) -> None:
             radius = np.interp(share, np.linspace(0.0, 1.0, len(shape.radius)), shape.radius)
             axes.fill(*1e3 * outline(np.concatenate([nodes[:1], limb]), radius).T, color=colour, linewidth=0.5)
     axes.plot(*1e3 * np.array(hub).T, color=PATH, linewidth=1.2)
+    axes.plot([-120.0, -70.0], [-116.0, -116.0], color=INK, linewidth=1.5)
+    axes.text(-95.0, -112.0, "50 mm", color=INK, fontsize=8, ha="center")
     axes.set_aspect("equal")
     axes.set_xlim(-128, 128)
     axes.set_ylim(-128, 128)
     axes.axis("off")
     figure.savefig(file, dpi=80, bbox_inches="tight", pad_inches=0.02)
-    plt.close(figure)
 
 
 def page(shown: Sequence[Exhibit], costs: Floats, per_step: Floats, machine: str) -> str:
@@ -157,7 +157,7 @@ def page(shown: Sequence[Exhibit], costs: Floats, per_step: Floats, machine: str
         "# Gallery",
         "",
         "Scenes that differ from the default. The robot is grey at rest and blue at the end of the first heating, and",
-        f"its hub's path over {STROKES} strokes is red. Pictures are 256 mm wide. The cost is the processor time of a",
+        f"its hub's path over {STROKES} strokes is red. The bar is 50 mm long. The cost is the processor time of a",
         "stroke of random commands relative to the default scene in the same run, to within a few per cent",
         f"(`python -m studies.scenes.gallery`; {machine}; {ROBOTS} robots, one thread, fidelity `balanced`). Thin tips",
         "take more Newton iterations, and some of these a regularised matrix.",

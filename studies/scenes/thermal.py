@@ -19,6 +19,7 @@ from seastar_gym.command import run_command
 from seastar_gym.scene.actuators.pulse import SmaPulse
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from studies.parser import study_parser
+from studies.style import subplots
 
 Floats = NDArray[np.float64]
 
@@ -78,10 +79,8 @@ def describe(name: str, actuator: ThermalSma) -> str:
 
 def draw(actuator: ThermalSma, file: Path) -> None:
     """Draw the strokes beside the pulse, and the hysteresis loop."""
-    import matplotlib.pyplot as plt
-
     turned, temperature = strokes(actuator)
-    figure, (angles, loop) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+    figure, (angles, loop) = subplots(1, 2, figsize=(9, 3.6))
     angles.plot(TIMES, SmaPulse().delta_psi(TIMES) / SmaPulse().peak_angle, "k--", label="pulse of Fig. 13.5b")
     for k, label in ((0, "first stroke"), (STROKES - 1, "third stroke")):
         angles.plot(TIMES, turned[k], label=label)
@@ -90,8 +89,7 @@ def draw(actuator: ThermalSma, file: Path) -> None:
     loop.set(xlabel="temperature [deg C]", ylabel="share of austenite")
     angles.legend()
     loop.legend()
-    figure.savefig(file, dpi=120)
-    plt.close(figure)
+    figure.savefig(file)
 
 
 def main() -> None:

@@ -25,6 +25,7 @@ from studies.speed.peak import peak_gigaflops, peak_speedup
 from studies.speed.process import FIRST_STROKE, TIMED, environment_share, memory_per_robot, process_seconds
 from studies.speed.strokes import cost_over_nodes, exponent, iteration_seconds, real_time_factors, threads_speedup
 from studies.speed.timing import machine
+from studies.style import subplots
 
 CHAPTER = 1.0
 """The chapter's real-time factor at h = 3 ms: one robot, one thread of an AMD Ryzen 1950X (Fig. 13.9)."""
@@ -152,12 +153,7 @@ def write_csv(figures: list[Figure], curves: dict[str, list[tuple[int, float]]],
 
 def draw(curves: dict[str, list[tuple[int, float]]], path: Path) -> None:
     """Draw the real-time factor over the batch size, and the cost over the nodes per limb."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained")
+    figure, (left, right) = subplots(1, 2, figsize=(10, 4.2))
     for threads, colour in ((1, "#4477aa"), (2, "#ee6677")):
         x, y = np.array(curves[f"batch, {threads} thread{'s' * (threads > 1)}"]).T
         left.loglog(x, y, "o-", color=colour, label=f"{threads} thread{'s' * (threads > 1)}")
@@ -166,7 +162,7 @@ def draw(curves: dict[str, list[tuple[int, float]]], path: Path) -> None:
     left.set(
         xlabel="robots in the batch", ylabel="simulated over computing seconds", title="Real-time factor, h = 3 ms"
     )
-    left.legend(frameon=False)
+    left.legend()
     n, cost = np.array(curves["us per step over N"]).T
     right.loglog(n, cost, "o-", color="#4477aa", label="measured")
     nodes: NDArray[np.float64] = 5 * n - 4
@@ -174,12 +170,8 @@ def draw(curves: dict[str, list[tuple[int, float]]], path: Path) -> None:
     right.set(xlabel="nodes per limb N", ylabel="time per robot and iteration [µs]", title="Cost over resolution")
     right.set_xticks(n, [f"{int(k)}" for k in n])
     right.minorticks_off()
-    right.legend(frameon=False)
-    for axes in (left, right):
-        axes.grid(True, which="major", color="0.9")
-        axes.spines[["top", "right"]].set_visible(False)
-    figure.savefig(path, dpi=150)
-    plt.close(figure)
+    right.legend()
+    figure.savefig(path)
 
 
 def main() -> None:

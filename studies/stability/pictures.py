@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from studies.chapter import ISSUES_FROM
 from studies.stability.cases import Sweep, format_step, format_value
+from studies.style import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -110,11 +111,9 @@ def _draw_numbers(
 
 def _panels(sweeps: Sequence[Sweep], title: str) -> tuple[Figure, list[Axes], Axes]:
     """Figure, axes of every sweep, and axes below them for legends."""
-    from matplotlib.figure import Figure
-
     columns = min(4, len(sweeps))
     rows = math.ceil(len(sweeps) / columns)
-    figure = Figure(figsize=(3.1 * columns + 0.3, 2.75 * rows + 1.2), layout="constrained")
+    figure = new_figure(3.1 * columns + 0.3, 2.75 * rows + 1.2)
     figure.suptitle(title, x=0.01, ha="left", color=INK, fontsize=13)
     note = "Strokes with steps below 1 ms are cut short after 2000 steps."
     figure.text(0.99, 0.975, note, ha="right", fontsize=8.5, color=FAINT_INK)

@@ -9,6 +9,7 @@ from seastar_gym.scene import Seastar, Water
 
 Floats = NDArray[np.float64]
 
+
 def bending_stiffness(robot: Seastar) -> float:
     """Bending stiffness EI [N m^2] of a limb, with I = pi r_0^4 / 4."""
     return robot.youngs_modulus * np.pi * robot.rod_radius**4 / 4.0

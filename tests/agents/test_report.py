@@ -18,6 +18,7 @@ from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.results import COLUMNS, number
 from seastar_gym.evaluation.swim import swim
+from seastar_gym.scene import Scene
 
 MM = 1000.0
 SHORT = [[0.02, 0.0], [0.02, 0.02]]
@@ -162,8 +163,9 @@ def test_a_curve_has_a_gap_where_the_pentagon_was_not_finished(tmp_path):
     curve = Curve.of("a", read_progress(tmp_path))
     np.testing.assert_array_equal(curve.trained, [1000, 2000, 3000])
     np.testing.assert_array_equal(curve.pentagon, [np.nan, 200, 170])
-    (trace,) = curves_figure([curve], {}).data
+    trace, unfinished = curves_figure([curve], {}).data
     assert list(trace.y) == [None, 200, 170]
+    assert unfinished.name == "not finished" and list(unfinished.x) == [1000] and unfinished.y[0] > 200
 
 
 @pytest.mark.parametrize(
@@ -179,9 +181,9 @@ def test_a_damaged_curve_is_refused_with_its_line(tmp_path, text, words):
 def test_several_curves_have_their_median_and_range():
     finished = {"a": 170, "b": 160, "c": 180}
     curves = [Curve.of(name, [[1, 9, 4], [2, strokes, 5]]) for name, strokes in finished.items()]
-    lowest, highest, median, *each = curves_figure(curves, {"script": 241}).data
+    lowest, highest, median, *each, unfinished = curves_figure(curves, {"script": 241}).data
     assert [list(one.y) for one in (lowest, highest, median)] == [[160], [180], [170]]  # common and finished: at 2
-    assert [one.name for one in each] == ["a", "b", "c"]
+    assert [one.name for one in each] == ["a", "b", "c"] and list(unfinished.x) == [1, 1, 1]
 
 
 def test_speeds_of_one_sector_are_turned_and_mirrored_round():
@@ -292,8 +294,9 @@ def test_the_slider_moves_the_robot(opened, evaluated):
         _, trail, resting, minus, plus, hub, _ = opened.lines()
         np.testing.assert_allclose(hub[0], MM * straight.hub[stroke], atol=0.06)
         np.testing.assert_allclose(trail[::3], MM * straight.hub[: stroke + 1], atol=0.06)
-        heated = 0 if stroke == 0 else 10  # nodes of a limb
-        assert (len(resting), len(minus), len(plus)) == (50 - 2 * heated, heated, heated)
+        of_limb = Scene.preset("fast").robot.nodes_per_limb
+        heated = 0 if stroke == 0 else of_limb
+        assert (len(resting), len(minus), len(plus)) == (5 * of_limb - 2 * heated, heated, heated)
         assert f"stroke {stroke} of {straight.strokes}" in opened.page.inner_text("#readout")
     assert opened.complaints == []
 
@@ -332,6 +335,17 @@ def test_it_plays_to_the_end_and_begins_again(opened, evaluated):
     assert play.inner_text() == "Pause"
     play.click()
     assert int(opened.page.locator("#time").input_value()) < 3 * straight.strokes
+
+
+def test_a_phone_sees_every_column(browser, evaluated):
+    watched = Watched(browser, evaluated[0] / "report.html", 390, 844)
+    cells = watched.page.locator("tbody tr").first.locator("td")
+    assert cells.count() == len(COLUMNS)
+    for place in range(cells.count()):
+        box = cells.nth(place).bounding_box()
+        assert box["x"] >= 0 and box["x"] + box["width"] <= 390
+        assert cells.nth(place).get_attribute("data-title")
+    watched.page.context.close()
 
 
 @pytest.mark.parametrize("size", [(1366, 768), (390, 844)], ids=["laptop", "phone"])

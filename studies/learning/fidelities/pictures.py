@@ -8,19 +8,17 @@ import numpy as np
 
 from studies.learning.fidelities.scenes import FIDELITIES, PHYSICS, SWUM
 from studies.learning.fidelities.tables import matrix, trained
+from studies.style import INK, new_figure
 
-INK = "#1b1f26"
 MOST = 10.0
 """Excess [%] that is drawn darkest."""
 
 
 def draw(results: Mapping[str, Any], file: Path) -> None:
     """Draw the interquartile means of all policies' strokes, coloured by their excess over the lowest of the column."""
-    from matplotlib.figure import Figure
-
     rows, found = list(trained(results)), matrix(results)
     values = np.array([[found[row, column].mean for column in SWUM] for row in rows])
-    figure = Figure(figsize=(10.5, 2.2 + 0.36 * len(rows)), layout="constrained")
+    figure = new_figure(10.5, 2.2 + 0.36 * len(rows))
     axes = figure.subplots()
     excess = 100.0 * (values / values.min(axis=0) - 1.0)
     shown = axes.imshow(excess, cmap="Blues", aspect="auto", vmin=0.0, vmax=MOST)
@@ -48,4 +46,4 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
         f"numbers: strokes to finish, interquartile mean\nof {seeds} seeds and {results['settings']['paths']} paths",
         fontsize=9,
     )
-    figure.savefig(file, dpi=130)
+    figure.savefig(file)

@@ -1,0 +1,60 @@
+"""Lists what a wheel and an sdist hold, folder by folder, and fails where something is missing or a stranger.
+
+python .ci/contents.py dist
+"""
+
+import sys
+import tarfile
+import zipfile
+from collections import Counter
+from pathlib import Path, PurePosixPath
+
+ROOT = Path(__file__).resolve().parent.parent
+IN_SDIST = ("pyproject.toml", "README.md", "LICENSE", "CHANGELOG.md", "train.py", "docs/index.md", "tests/conftest.py")
+MOST_MEGABYTES = 30
+
+
+def files_of(archive: Path) -> list[PurePosixPath]:
+    """Paths in a wheel, or in an sdist below its one folder."""
+    if archive.suffix == ".whl":
+        return [PurePosixPath(name) for name in zipfile.ZipFile(archive).namelist()]
+    with tarfile.open(archive) as opened:
+        return [PurePosixPath(*PurePosixPath(each.name).parts[1:]) for each in opened if each.isfile()]
+
+
+def shown(archive: Path, files: list[PurePosixPath]) -> str:
+    """Number of files in every folder, and the archive's size."""
+    folders = Counter(file.parts[0] if len(file.parts) > 1 else "." for file in files)
+    parts = ", ".join(f"{name} {count}" for name, count in sorted(folders.items()))
+    return f"{archive.name}: {archive.stat().st_size / 1e6:.1f} MB, {len(files)} files ({parts})"
+
+
+def complaints(archive: Path, files: list[PurePosixPath]) -> list[str]:
+    """Sentences on what is wrong with an archive."""
+    package = sorted(file.relative_to(ROOT).as_posix() for file in (ROOT / "seastar_gym").rglob("*.py"))
+    names = {file.as_posix() for file in files}
+    wanted = package if archive.suffix == ".whl" else [*package, *IN_SDIST]
+    wrong = [f"{archive.name} lacks {name}." for name in wanted if name not in names]
+    if archive.suffix == ".whl":
+        strangers = [name for name in names if not name.startswith(("seastar_gym/", "seastar_gym-"))]
+        wrong += [f"{archive.name} installs {name}." for name in strangers]
+    wrong += [f"{archive.name} holds {name}." for name in names if "__pycache__" in name or name.startswith("runs/")]
+    if archive.stat().st_size > 1e6 * MOST_MEGABYTES:
+        wrong.append(f"{archive.name} has more than {MOST_MEGABYTES} MB.")
+    return wrong
+
+
+def main() -> None:
+    archives = sorted(Path(sys.argv[1]).glob("seastar_gym-*"))
+    if {archive.suffix for archive in archives} != {".whl", ".gz"}:
+        sys.exit(f"{sys.argv[1]} must have a wheel and an sdist, not {[archive.name for archive in archives]}.")
+    wrong = []
+    for archive in archives:
+        files = files_of(archive)
+        print(shown(archive, files))
+        wrong += complaints(archive, files)
+    sys.exit("\n".join(wrong) or 0)
+
+
+if __name__ == "__main__":
+    main()

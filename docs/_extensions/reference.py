@@ -1,0 +1,179 @@
+"""The reference: signatures and docstrings, read from the source without importing it."""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+Definition = ast.ClassDef | ast.FunctionDef
+FIELD = re.compile(r"^([*\w]+(?:, [*\w]+)*): (?=\S)", re.MULTILINE)
+HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
+
+
+def public(package: str) -> str:
+    """Reference of the names that a package exports, in its order."""
+    return "\n\n".join(
+        described(node, package, 6) for _, node in (defined(module, name) for module, name in exported(package)) if node
+    )
+
+
+def modules(*arguments: str) -> str:
+    """Reference of the modules of packages, but for what the first of them exports and for packages named with "-"."""
+    left_out = tuple(name[1:] for name in arguments if name.startswith("-"))
+    packages = [name for name in arguments if not name.startswith("-") and (ROOT / name).is_dir()]
+    known = set(exported(packages[0]))
+    found = [name for package in packages for name in names_of_modules(package) if not is_within(name, left_out)]
+    return "\n\n".join(filter(None, (section(name, known) for name in found)))
+
+
+def is_within(module: str, packages: tuple[str, ...]) -> bool:
+    return any(module == package or module.startswith(f"{package}.") for package in packages)
+
+
+def names_of_modules(package: str) -> Iterator[str]:
+    for file in sorted((ROOT / package).rglob("*.py")):
+        name = ".".join(file.relative_to(ROOT).with_suffix("").parts)
+        if file.stem not in ("__main__",):
+            yield name.removesuffix(".__init__")
+
+
+def parsed(module: str) -> ast.Module:
+    place = ROOT.joinpath(*module.split("."))
+    file = place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
+    return ast.parse(file.read_text(encoding="utf-8"))
+
+
+def exported(package: str) -> list[tuple[str, str]]:
+    """(module, name) of every name in `__all__`, from where it is imported."""
+    body = parsed(package).body
+    origin = {
+        alias.asname or alias.name: node.module or ""
+        for node in body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    (names,) = (
+        ast.literal_eval(node.value)
+        for node in body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
+    )
+    return [defined(origin.get(name, package), name)[:1] + (name,) for name in names]
+
+
+def defined(module: str, name: str) -> tuple[str, Definition | None]:
+    """The module in which a class or function is defined, and its definition; None for anything else."""
+    for node in parsed(module).body:
+        if isinstance(node, Definition) and node.name == name:
+            return module, node
+        if isinstance(node, ast.ImportFrom) and node.module and any(alias.name == name for alias in node.names):
+            return defined(node.module, name)
+    return module, None
+
+
+def section(module: str, known: set[tuple[str, str]]) -> str:
+    """Docstring of a module, and of its public classes and functions that are not described elsewhere."""
+    tree = parsed(module)
+    nodes = [node for node in tree.body if isinstance(node, Definition) and (module, node.name) not in known]
+    found = [described(node, module, 6) for node in nodes if not node.name.startswith("_") and ast.get_docstring(node)]
+    if not found:
+        return ""
+    return "\n\n".join([f"## {module}", markdown(ast.get_docstring(tree) or ""), *found])
+
+
+def described(node: Definition, module: str, fence: int) -> str:
+    """Directive that describes a class with its public methods, or a function."""
+    kind = "class" if isinstance(node, ast.ClassDef) else "function"
+    parts = [markdown(ast.get_docstring(node) or "")]
+    if isinstance(node, ast.ClassDef):
+        parts += [member(each, fence - 1) for each in node.body if isinstance(each, ast.FunctionDef) and is_told(each)]
+        parts += attributes(node)
+    return directive(f"py:{kind}", f"{module}.{node.name}{signature(node)}", parts, fence)
+
+
+def is_told(method: ast.FunctionDef) -> bool:
+    return not method.name.startswith("_") and ast.get_docstring(method) is not None
+
+
+def member(node: ast.FunctionDef, fence: int) -> str:
+    decorators = [ast.unparse(each) for each in node.decorator_list]
+    text = [markdown(ast.get_docstring(node) or "")]
+    if any("property" in each for each in decorators):
+        return directive("py:property", node.name, text, fence)
+    arguments = of_function(node, bound="staticmethod" not in decorators)
+    return directive("py:method", f"{node.name}{arguments}", text, fence)
+
+
+def attributes(node: ast.ClassDef) -> list[str]:
+    """Fields that have a docstring of their own, as a list."""
+    pairs = zip(node.body, node.body[1:], strict=False)
+    told = [
+        f"- **{field.target.id}**: {' '.join(text.value.value.split())}"
+        for field, text in pairs
+        if isinstance(field, ast.AnnAssign)
+        and isinstance(field.target, ast.Name)
+        and isinstance(text, ast.Expr)
+        and isinstance(text.value, ast.Constant)
+        and isinstance(text.value.value, str)
+    ]
+    return ["\n".join(told)] if told else []
+
+
+def directive(name: str, argument: str, parts: list[str], fence: int) -> str:
+    marks = ":" * fence
+    return "\n".join([f"{marks}{{{name}}} {argument}", "", "\n\n".join(filter(None, parts)), marks])
+
+
+def signature(node: Definition) -> str:
+    if isinstance(node, ast.FunctionDef):
+        return of_function(node, bound=False)
+    for each in node.body:
+        if isinstance(each, ast.FunctionDef) and each.name == "__init__":
+            return of_function(each, bound=True)
+    return of_fields(node)
+
+
+def of_function(node: ast.FunctionDef, bound: bool) -> str:
+    """Arguments without annotations, which docstrings explain; `bound`: without the first."""
+    arguments = node.args
+    plain = ast.arguments(
+        posonlyargs=[ast.arg(each.arg) for each in arguments.posonlyargs],
+        args=[ast.arg(each.arg) for each in arguments.args][1 if bound else 0 :],
+        vararg=arguments.vararg and ast.arg(arguments.vararg.arg),
+        kwonlyargs=[ast.arg(each.arg) for each in arguments.kwonlyargs],
+        kw_defaults=arguments.kw_defaults,
+        kwarg=arguments.kwarg and ast.arg(arguments.kwarg.arg),
+        defaults=arguments.defaults,
+    )
+    return f"({ast.unparse(plain)})"
+
+
+def of_fields(node: ast.ClassDef) -> str:
+    """Fields of a dataclass or a named tuple, with their defaults."""
+    fields = [
+        field.target.id + (f"={default(field.value)}" if field.value else "")
+        for field in node.body
+        if isinstance(field, ast.AnnAssign)
+        and isinstance(field.target, ast.Name)
+        and "ClassVar" not in ast.unparse(field.annotation)
+        and not field.target.id.startswith("_")
+    ]
+    return f"({', '.join(fields)})" if fields else ""
+
+
+def default(value: ast.expr) -> str:
+    """A field's default; of a `field(...)`, what its factory makes."""
+    if not (isinstance(value, ast.Call) and ast.unparse(value.func) == "field"):
+        return ast.unparse(value)
+    chosen = {word.arg: word.value for word in value.keywords}
+    if "default" in chosen:
+        return ast.unparse(chosen["default"])
+    factory = chosen.get("default_factory")
+    if isinstance(factory, ast.Call):
+        return f"{ast.unparse(factory.args[0])}({', '.join(ast.unparse(word) for word in factory.keywords)})"
+    return f"{ast.unparse(factory)}()" if factory else "..."
+
+
+def markdown(text: str) -> str:
+    """Docstring with its arguments as a list, and its headings as words."""
+    return HEADING.sub(r"**\1**", FIELD.sub(r"- **\1**: ", text))

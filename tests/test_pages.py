@@ -1,0 +1,100 @@
+"""Every block of Python on README and the pages of the guide runs, in short form, and their links lead somewhere."""
+
+import re
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import gymnasium as gym
+import pytest
+
+import seastar_gym
+from seastar_gym import Numerics, Scene
+from seastar_gym.certification import endurance, measure
+from seastar_gym.envs import paths
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+FENCED = re.compile(r"^```(\S*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+LINK = re.compile(r"\]\((?!\w+:)([^)#\s]*)(#[^)\s]+)?\)")
+LONGEST = 3  # steps of an episode
+
+
+def blocks(page: Path) -> list[str]:
+    """The page's blocks of Python, each at the line where it stands, so that a traceback names it."""
+    text = page.read_text(encoding="utf-8")
+    found = [match for match in FENCED.finditer(text) if match[1] == "python"]
+    return ["\n" * text.count("\n", 0, match.start(2)) + match[2] for match in found]
+
+
+RUN = [page for page in PAGES if blocks(page)]
+
+
+@pytest.fixture
+def short_form(monkeypatch, tmp_path):
+    """Episodes of LONGEST steps, no window, a folder of one's own, and no path that outlives the page."""
+    make = gym.make
+
+    def make_short(name, **arguments):
+        if arguments.get("render_mode") == "human":
+            arguments["render_mode"] = "rgb_array"
+        return make(name, max_episode_steps=LONGEST, **arguments)
+
+    monkeypatch.setattr(gym, "make", make_short)
+    monkeypatch.setattr(paths, "PATHS", dict(paths.PATHS))
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def certificate(short_form):
+    """File certificate.json of the chapter's robot, of one setting, in place of the minutes that all would take."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(measure, "NODES", (12,))
+        patch.setattr(measure, "MANY_NODES", 17)
+        patch.setattr(measure, "SHORT", Numerics("implicit-midpoint", 1e-3, 1e-8))
+        patch.setattr(measure, "NUMERICS", (Numerics("implicit-midpoint", 5e-3, 1e-6),))
+        patch.setattr(endurance, "LONG", 40)
+        seastar_gym.certify(Scene(), 2).save("certificate.json")
+
+
+@pytest.mark.filterwarnings("ignore:.*is not within the observation space:UserWarning")
+@pytest.mark.usefixtures("short_form")
+@pytest.mark.parametrize("page", RUN, ids=lambda page: page.stem)
+def test_every_block_of_python_runs(page, monkeypatch, request):
+    if "certificate.json" in "".join(blocks(page)):
+        request.getfixturevalue("certificate")
+    module = ModuleType(page.stem)
+    monkeypatch.setitem(sys.modules, module.__name__, module)  # where dataclasses look for their names
+    for block in blocks(page):
+        exec(compile(block, page.name, "exec"), vars(module))
+
+
+def test_no_block_hides_from_the_tests():
+    """Python stands in blocks that say so; what they hold is counted, so that none is lost by a new spelling."""
+    known = {"python", "bash", "bibtex", "markdown", "{toctree}"}
+    kinds = [match[1] for page in PAGES for match in FENCED.finditer(page.read_text(encoding="utf-8"))]
+    assert set(kinds) <= known, f"pages have blocks of {set(kinds) - known}"
+    assert sum(len(blocks(page)) for page in RUN) == kinds.count("python") > 20
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_links_lead_to_files(page):
+    text = FENCED.sub("", page.read_text(encoding="utf-8"))
+    missing = [target for target, _ in LINK.findall(text) if target and not (page.parent / target).exists()]
+    assert not missing
+
+
+def test_the_files_that_the_page_on_extending_names_are_there():
+    page = ROOT / "docs" / "extending.md"
+    named = re.findall(r"`((?:seastar_gym|tests|der|model)/[\w/]+\.py)`", page.read_text(encoding="utf-8"))
+    assert len(named) > 8
+    missing = [name for name in named if not any((base / name).is_file() for base in (ROOT, ROOT / "seastar_gym"))]
+    assert not missing
+
+
+def test_every_page_is_named_once_in_the_contents():
+    """A page that is not named comes in under "More"."""
+    contents = re.findall(r"```\{toctree\}\n(.*?)```", (ROOT / "docs" / "index.md").read_text("utf-8"), re.DOTALL)
+    named = [line for part in contents for line in part.splitlines() if line and not line.startswith(":")]
+    assert len(named) == len(set(named)) > 20
+    assert all((ROOT / "docs" / f"{name}.md").is_file() for name in named)
