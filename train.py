@@ -1,8 +1,9 @@
 """Trains a swimmer with PPO, then compares it with the scripted pentagon gait.
 
-    python train.py                        about three minutes on two cores
+    python train.py                        about half a minute on two cores
+    python train.py --seeds 0 1 2          the same for several seeds, one after another
     python train.py --decision-period 0.5  the same for decisions twice a second, by wires
-    python train.py --quick                a short training with everything that follows, in under a minute
+    python train.py --quick                a shorter training with everything that follows
     python train.py --resume runs/FOLDER   continues a run that was stopped (by Ctrl-C or killed), or trains it for more
                                            --strokes
 
@@ -20,6 +21,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 
 try:
@@ -33,6 +35,7 @@ try:
     from agents.ppo import make_model, make_training_env, require_device
     from agents.report.charts import Curve, read_progress
     from agents.report.page import Remarks
+    from agents.training import efficiency
     from agents.training.box import put_in_the_box
     from agents.training.folder import claim, export, is_unbegun, recorded, resume_command, write_config
     from agents.training.options import Options, read_options, require_consent
@@ -59,7 +62,7 @@ def train(options: Options, folder: Path, stop: Callable[[], bool]) -> tuple[PPO
     watch = Watch(options, folder, model, env, stop)
     if not new and model.num_timesteps not in (strokes for strokes, *_ in recorded(folder)):
         watch.keep()  # a kill came between the two
-    left = options.strokes - model.num_timesteps
+    left = options.length - model.num_timesteps
     if left > 0:
         model.learn(left, watch, log_interval=1, reset_num_timesteps=new)
         watch.checkpoint()
@@ -118,7 +121,23 @@ def describe(options: Options, folder: Path, trained: int, watch: Watch) -> Rema
             f"{resume_command(folder)} --strokes {2 * trained}",
         ],
         curves=[Curve.of("learned", read_progress(folder))],
+        tables=[watch.efficiency.table()],
     )
+
+
+def run_seeds(options: Options, arguments: Sequence[str]) -> int:
+    """Run the training of every seed; returns the exit code of the first that fails."""
+    folder = options.out or Path("runs") / time.strftime("%Y-%m-%d_%H-%M-%S")
+    for seed in options.seeds:
+        code = run(replace(options, seed=seed, seeds=(), out=folder / f"seed_{seed}"), arguments)
+        if code != 0:
+            return code
+    print("seed, strokes round the pentagon, strokes and seconds of training until they were 170")
+    for seed in options.seeds:
+        its_own = folder / f"seed_{seed}"
+        found, (_, pentagon, _) = efficiency.read(its_own), recorded(its_own)[-1]
+        print(f"{seed}, {pentagon}, {found.strokes_to_target}, {found.seconds_to_target}")
+    return 0
 
 
 def run(options: Options, arguments: Sequence[str]) -> int:
@@ -143,7 +162,7 @@ def run(options: Options, arguments: Sequence[str]) -> int:
         return 130
     compare(options, folder, describe(options, folder, model.num_timesteps, watch))
     print(f"Report:  {folder / 'evaluation' / 'report.html'}\nPolicy:  {folder / 'policy.safetensors'}")
-    print(f"Logs:    tensorboard --logdir {folder}")
+    print(f"Logs:    tensorboard --logdir {folder}\n{watch.efficiency}")
     return put_in_the_box(options, folder) if options.ship else 0
 
 
@@ -167,7 +186,8 @@ def main(arguments: Sequence[str]) -> int:
     """The command line; returns the exit code."""
     try:
         with quiet_writers():
-            return run(read_options(arguments), arguments)
+            options = read_options(arguments)
+            return run_seeds(options, arguments) if options.seeds else run(options, arguments)
     except OSError as failure:
         print(refused_by_disk(failure), file=sys.stderr)
         return 2 if failure.errno is None else 1

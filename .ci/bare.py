@@ -3,8 +3,11 @@
 `.ci/run` starts this as `python -I`, so that the checkout is out of sight and only the wheel can answer.
 """
 
+import subprocess
+import sys
 from importlib.metadata import distribution, version
 from importlib.util import find_spec
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -18,7 +21,16 @@ for absent in ("agents", "studies", "train", "torch", "stable_baselines3", "matp
 files = distribution("seastar-gym").files or []
 strangers = [str(file) for file in files if not str(file).startswith(("seastar_gym/", "seastar_gym-"))]
 assert files
-assert not strangers, f"the wheel installs {strangers}"
+assert [Path(file).stem for file in strangers] == ["seastar"], f"the wheel installs {strangers}"
+
+command = Path(sys.executable).parent / "seastar"
+told = subprocess.run([command, "--help"], capture_output=True, text=True, check=True).stdout
+assert all(name in told for name in ("swim", "play", "evaluate", "benchmark", "train", "certify", "identify"))
+for arguments, missing in (("swim --film swim.mp4", "[render]"), ("train", "checkout"), ("certify", "[studies]")):
+    done = subprocess.run([command, *arguments.split()], capture_output=True, text=True, cwd=command.parent)
+    assert done.returncode == 2, (arguments, done)
+    assert missing in done.stderr, done.stderr
+    assert done.stderr.count("\n") == 1, done.stderr
 
 env = gym.make("seastar_gym:SeastarSwim-v0")
 observation, _ = env.reset(seed=0)

@@ -105,21 +105,22 @@ register(
     **_ENTRY_POINTS,
 )
 
-TASKS: dict[str, tuple[str, Actions, float, float | None]] = {
-    "SeastarMiswired": ("miswired", "pairs", 400.0, None),
-    "SeastarPrey": ("prey", "pairs", 200.0, None),
-    "SeastarStation": ("station", "joint", 120.0, None),
+TASKS: dict[str, tuple[str, Actions, float, float, float | None]] = {
+    "SeastarMiswired-v0": ("miswired", "joint", 1.0, 400.0, None),
+    "SeastarMiswiredTimed-v0": ("miswired", "joint", 0.5, 400.0, None),
+    "SeastarPrey-v0": ("prey", "pairs", 1.0, 200.0, None),
+    "SeastarPreyTimed-v0": ("fast-prey", "pairs", 0.5, 200.0, None),
+    "SeastarStation-v0": ("station", "joint", 1.0, 120.0, None),
+    "SeastarStationTimed-v0": ("station", "joint", 0.5, 120.0, None),
 }
-"""Name of the challenge, actions, time limit [s] and return that counts as solved of the tasks, by id. Each is there
-for strokes of 1 s, as ..-v0, and for decisions every 0.5 s, as ..Timed-v0."""
+"""Name of the challenge, actions, time between decisions [s], time limit [s] and reward threshold of tasks, by id."""
 
-for _id, (_task, _actions, _limit, _threshold) in TASKS.items():
-    for _suffix, _seconds in (("", 1.0), ("Timed", 0.5)):
-        register(
-            id=f"{_id}{_suffix}-v0",
-            entry_point="seastar_gym.envs.tasks.envs:SeastarTaskEnv",
-            vector_entry_point="seastar_gym.envs.tasks.envs:SeastarTaskVectorEnv",
-            max_episode_steps=round(_limit / _seconds),
-            reward_threshold=_threshold,
-            kwargs={"task": _task, "actions": _actions, "decision_period": _seconds},
-        )
+for _id, (_task, _actions, _decision_period, _limit, _threshold) in TASKS.items():
+    register(
+        id=_id,
+        entry_point="seastar_gym.envs.tasks.envs:SeastarTaskEnv",
+        vector_entry_point="seastar_gym.envs.tasks.envs:SeastarTaskVectorEnv",
+        max_episode_steps=round(_limit / _decision_period),
+        reward_threshold=_threshold,
+        kwargs={"task": _task, "actions": _actions, "decision_period": _decision_period},
+    )

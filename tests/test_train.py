@@ -21,10 +21,13 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 
 import train
 from agents.training import box as shipping
-from agents.training.folder import claim
+from agents.training import efficiency
+from agents.training.efficiency import Efficiency
+from agents.training.folder import claim, recorded
 from agents.training.options import Options, read_options, saved_options
 from seastar_gym.controllers import learned as policies
 from seastar_gym.controllers.learner_zip import load
+from seastar_gym.evaluation.swim import Swim
 
 REPOSITORY = Path(train.__file__).parent
 TINY = shlex.split(
@@ -50,7 +53,7 @@ def scalars(folder):
 def test_a_run_leaves_everything_in_its_folder(finished):
     files = {str(file.relative_to(finished)) for file in finished.rglob("*") if file.is_file()}
     expected = {
-        "config.json", "model.zip", "progress.csv", "policy.json", "policy.safetensors",
+        "config.json", "model.zip", "progress.csv", "efficiency.json", "policy.json", "policy.safetensors",
         "checkpoints/model_000000256.zip", "checkpoints/model_000000512.zip",
         "evaluation/evaluation.csv", "evaluation/traces.png", "evaluation/report.html",
     }  # fmt: skip
@@ -330,8 +333,61 @@ def test_a_folder_in_use_is_not_written_over(finished, capsys):
 
 def test_quick_is_short_and_fast():
     options = read_options(["--quick"])
-    assert options.strokes < 100_000 < Options().strokes
+    assert options.length < Options().length / 2
     assert options.fidelity == "fast"
+
+
+def test_a_training_in_time_is_longer_than_one_in_strokes_unless_its_length_is_told():
+    in_time = ["--decision-period", "0.5"]
+    assert read_options([]).length < read_options(in_time).length
+    assert read_options([*in_time, "--strokes", "7"]).length == 7
+
+
+def test_a_run_says_how_long_it_took_to_round_the_pentagon_in_time(finished):
+    found = efficiency.read(finished)
+    assert found.strokes == 512 and found.seconds > 0.0
+    pentagon, waypoints = recorded(finished)[-1][1:]
+    assert (found.strokes_to_target is not None) == (waypoints == 5 and pentagon <= 170)
+    report = (finished / "evaluation" / "report.html").read_text(encoding="utf-8")
+    assert "Sample efficiency" in report and "strokes until the pentagon takes 170 s" in report
+
+
+def test_the_first_swim_in_time_counts():
+    slow, fast = (swim_of(seconds, reached) for seconds, reached in ((171, 5), (170, 5)))
+    lost = swim_of(100, 4)
+    found = Efficiency()
+    for strokes, pentagon in ((1, lost), (2, slow), (3, fast), (4, slow), (5, fast)):
+        found = found.after(strokes, 0.5 * strokes, pentagon)
+    assert found == Efficiency(5, 2.5, 3, 1.5)
+    assert str(found) == "The pentagon took 170 s or less after 3 strokes and 1.5 s of training."
+    assert str(Efficiency().after(2, 1.0, slow)) == "The pentagon was not rounded in 170 s yet."
+
+
+def swim_of(seconds, reached):
+    """A swim of the pentagon that ends after so many seconds."""
+    return Swim(
+        "learned", np.zeros((5, 2)), np.zeros((2, 2)), np.array([0, reached]), np.array([0.0, seconds]), np.zeros(1),
+        np.zeros(1), np.zeros(1), None,
+    )  # fmt: skip
+
+
+def test_efficiency_that_is_damaged_is_refused(tmp_path):
+    (tmp_path / efficiency.FILE).write_text('{"hours": 3}')
+    with pytest.raises(ValueError, match=r"efficiency\.json is damaged"):
+        efficiency.read(tmp_path)
+
+
+def test_several_seeds_are_runs_of_their_own(tmp_path, capsys):
+    assert train.main([*TINY, "--strokes", "128", "--seeds", "3", "4", "--out", str(tmp_path)]) == 0
+    assert {file.name for file in tmp_path.iterdir()} == {"seed_3", "seed_4"}
+    trained = [policies.load(tmp_path / f"seed_{seed}" / "policy.safetensors").training["seed"] for seed in (3, 4)]
+    assert trained == [3, 4]
+    table = capsys.readouterr().out.splitlines()[-3:]
+    assert table[0].startswith("seed, strokes round the pentagon") and [line[0] for line in table[1:]] == ["3", "4"]
+    assert train.main(["--resume", str(tmp_path / "seed_3"), "--strokes", "256"]) == 0
+    for wrong in (["--seeds", "1", "1"], ["--seeds", "1", "--ship"]):
+        with pytest.raises(SystemExit):
+            train.main([*TINY, *wrong])
 
 
 @pytest.mark.slow

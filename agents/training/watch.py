@@ -12,6 +12,7 @@ from tqdm import tqdm
 
 from agents.learner_file import save
 from agents.ppo import policy_of
+from agents.training import efficiency
 from agents.training.folder import recorded
 from agents.training.options import Options
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
@@ -50,6 +51,7 @@ class Watch(BaseCallback):
         self.options, self.folder, self.learner, self.batch, self.stop = options, folder, learner, batch, stop
         self.strokes = 0  # of this process
         self.seconds = {"simulator": 0.0, "policy": 0.0, "update": 0.0}
+        self.efficiency = self._before = efficiency.read(folder)
         self.pentagon = SeastarSwimEnv(
             "pentagon",
             actions=options.ppo.actions,
@@ -59,7 +61,7 @@ class Watch(BaseCallback):
 
     def _on_training_start(self) -> None:
         # On a terminal only: elsewhere, a line at every checkpoint says how far it is.
-        total, done = self.options.strokes, self.learner.num_timesteps
+        total, done = self.options.length, self.learner.num_timesteps
         self.bar = tqdm(total=total, initial=done, unit=" strokes", unit_scale=True, disable=None, smoothing=0.1)
         self.next_save = done + self.options.save_freq
         self.clock = time.perf_counter()
@@ -118,4 +120,7 @@ class Watch(BaseCallback):
         rows = [*recorded(self.folder), [strokes, done.strokes, done.waypoints_reached]]
         text = "".join(",".join(map(str, row)) + "\n" for row in rows)
         write_atomically(self.folder / "progress.csv", text.encode())
+        seconds = self._before.seconds + sum(self.seconds.values())
+        self.efficiency = self.efficiency.after(strokes, seconds, done)
+        efficiency.write(self.efficiency, self.folder)
         return done

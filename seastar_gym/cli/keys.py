@@ -43,7 +43,7 @@ class Steering:
     def command(self, keys: Iterable[str], headings: Floats) -> NDArray[np.int64]:
         """Command, -1, 0 or 1 for every limb. headings: Directions of the limbs [rad], shape (n_limbs,)."""
         keys = sorted(keys)
-        limbs = {self._along(key, headings) for key in keys} - {None}
+        limbs = {limb for key in keys if (limb := self._along(key, headings)) is not None}
         stroke = self._gait[self._swum % len(self._gait)]
         self._swum = self._swum + 1 if limbs else 0
         command = np.zeros(self._n_limbs)

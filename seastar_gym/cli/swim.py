@@ -100,9 +100,12 @@ def show_all(env: gym.Env[Any, Any], show: Show) -> bool:
 
 
 def outcome(env: Any, info: dict[str, Any]) -> str:
-    """How an episode went, in words."""
-    reached, total = info["waypoint_index"], len(env.waypoints)
-    return f"{reached} of {total} waypoints in {info['time']:.1f} s"
+    """How an episode went, in words: waypoints, or whether a task without them was done."""
+    if "waypoint_index" in info:
+        how = f"{info['waypoint_index']} of {len(env.waypoints)} waypoints"
+    else:
+        how = "done" if info["is_success"] else "not done"
+    return f"{how} in {info['time']:.1f} s"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

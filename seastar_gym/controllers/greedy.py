@@ -89,9 +89,14 @@ def _decisions(strokes: int, scene: Scene, decision_period: float | None) -> int
     return strokes if decision_period is None else max(1, round(seconds / decision_period))
 
 
-def waypoints_of(observations: NDArray[np.float32], scene: Scene) -> tuple[Floats, Floats]:
-    """Current and next waypoint [m] relative to the hub in the body frame, (n, 2) each."""
-    at, length = scene_layout(scene), scene.robot.limb_length
+def waypoints_of(
+    observations: NDArray[np.float32], scene: Scene, with_headings: bool = False
+) -> tuple[Floats, Floats]:
+    """Current and next waypoint [m] relative to the hub in the body frame, (n, 2) each.
+
+    with_headings: Whether headings are asked for.
+    """
+    at, length = scene_layout(scene, with_headings=with_headings), scene.robot.limb_length
     current, after = observations[:, at.current_waypoint], observations[:, at.next_waypoint]
     return length * current.astype(np.float64), length * after.astype(np.float64)
 

@@ -7,6 +7,7 @@ than ten nodes per limb is taken to lie smoothly through the stations that are o
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +15,10 @@ from numpy.typing import NDArray
 from seastar_gym.controllers.greedy import Searcher, waypoints_of
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.decisions import checked_decision_period
+from seastar_gym.envs.headings import Headings, wrapped
 from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout
 from seastar_gym.envs.reward import RewardWeights
-from seastar_gym.envs.stations import N_STATIONS, node_weights
+from seastar_gym.envs.stations import N_STATIONS, body_heading, node_weights
 from seastar_gym.envs.task import make_scene
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Recalled
@@ -92,11 +94,11 @@ class Branching:
         self._simulators: dict[int, Simulator] = {}
 
     def coasted(self, states: State, seconds: float) -> Floats:
-        """Positions of the hubs [m] once the states have swum on without commands, shape (states, 2)."""
+        """Positions of nodes [m] once the states have swum on without commands, shape (states, n_nodes, 2)."""
         simulator = self._simulator(len(states.time))
         simulator.set_state(states)
         simulator.advance(seconds)
-        return simulator.hub_position()
+        return simulator.positions
 
     def _simulator(self, n: int) -> Simulator:
         """Simulator of n robots."""
@@ -113,13 +115,26 @@ class Branching:
         return simulator.get_state()._replace(commands=None, phase=None)  # the next commands take their place
 
 
+class Targets(NamedTuple):
+    """Where robots are to go: current and next waypoint [m], shape (n, 2), and the turns to their headings [rad], (n,).
+
+    All are seen from the robot as it is now. Turns are None where no headings are asked for.
+    """
+
+    current: Floats
+    after: Floats
+    turn: Floats | None = None
+    turn_after: Floats | None = None
+
+
 class Planner(Searcher):
     """Agent that runs a beam search over pairs of limbs before every decision.
 
     scene: Scene of the search, by default the chapter's at fidelity "fast", with wires if decisions are not strokes.
     waypoint_radius: Radius of the waypoints [m]. budget: Limits of the search, by default those of the decision period.
     threads: Number of threads of the simulator, by default one for every processor. reward: Reward whose route is
-    shortened. decision_period: Of the environment [s]. None means a stroke.
+    shortened. decision_period: Of the environment [s]. None means a stroke. headings: Those of the environment; what is
+    left to turn is then added to the route, at the price that it has in the reward.
     """
 
     actions = "pairs"
@@ -132,7 +147,9 @@ class Planner(Searcher):
         threads: int | None = None,
         reward: RewardWeights = RewardWeights(),
         decision_period: float | None = None,
+        headings: Headings | None = None,
     ):
+        self.headings = headings
         self.scene = make_scene(None, "fast", decision_period) if scene is None else scene
         self.waypoint_radius, self.reward, self.decision_period = waypoint_radius, reward, decision_period
         self.budget = budget_for(decision_period) if budget is None else budget
@@ -141,10 +158,19 @@ class Planner(Searcher):
 
     def choose(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
         """Actions for observations of shape (n, size)."""
-        return self._search(state_of(observations, self.scene), *waypoints_of(observations, self.scene))
+        return self._search(state_of(observations, self.scene), self._targets(observations))
 
-    def _search(self, start: State, current: Floats, after: Floats) -> NDArray[np.int64]:
+    def _targets(self, observations: NDArray[np.float32]) -> Targets:
+        """Targets that observations, shape (n, size), tell of."""
+        if self.headings is None:
+            return Targets(*waypoints_of(observations, self.scene))
+        seen = observations[:, scene_layout(self.scene, with_headings=True).headings].astype(np.float64)
+        turns = np.arctan2(seen[:, 1::2], seen[:, ::2])
+        return Targets(*waypoints_of(observations, self.scene, True), turns[:, 0], turns[:, 1])
+
+    def _search(self, start: State, targets: Targets) -> NDArray[np.int64]:
         """First action of the best sequence for every robot, shape (n,)."""
+        current = targets.current
         robots, n_commands = np.arange(len(current))[:, None], len(self._commands)
         states, width = start, 1
         passed = np.zeros((len(current), 1), bool)
@@ -152,11 +178,9 @@ class Planner(Searcher):
         chosen, arrived = np.zeros(len(current), np.int64), np.zeros(len(current), bool)
         for stroke in range(self.budget.depth):
             states = self._swim_all(states)
-            hub = states.positions[:, 0].reshape(len(current), -1, 2)
-            way, passed, there = self._judge(hub, np.repeat(passed, n_commands, axis=1), current, after)
+            way, passed, there = self._judge(states.positions, np.repeat(passed, n_commands, axis=1), targets)
             if self.budget.coasting > 0.0:
-                hub = self._swim_all.coasted(states, self.budget.coasting).reshape(hub.shape)
-                way, *_ = self._judge(hub, passed, current, after)
+                way, *_ = self._judge(self._swim_all.coasted(states, self.budget.coasting), passed, targets)
             first = (
                 np.tile(np.arange(n_commands), (len(current), 1)) if stroke == 0 else np.repeat(first, n_commands, 1)
             )
@@ -170,12 +194,24 @@ class Planner(Searcher):
         return chosen
 
     def _judge(
-        self, hub: Floats, passed: NDArray[np.bool_], current: Floats, after: Floats
+        self, positions: Floats, passed: NDArray[np.bool_], targets: Targets
     ) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
-        """Way to go [m], whether the current waypoint is passed, and whether it was the last; shape (n, candidates)."""
-        current, after = current[:, None], after[:, None]
-        passed = passed | (np.hypot(*np.moveaxis(hub - current, -1, 0)) <= self.waypoint_radius)
+        """Way to go [m], whether the current waypoint is passed, and whether it was the last; shape (n, candidates).
+
+        positions: Positions of nodes [m], shape (n candidates, n_nodes, 2). passed: Shape (n, candidates).
+        """
+        current, after = targets.current[:, None], targets.after[:, None]
+        hub = positions[:, 0].reshape(*passed.shape, 2)
+        near = np.hypot(*np.moveaxis(hub - current, -1, 0)) <= self.waypoint_radius
         way = self.reward.way_to_next(hub, current, after, self.waypoint_radius)
         beyond = np.hypot(*np.moveaxis(hub - after, -1, 0))
+        if self.headings is not None and targets.turn is not None and targets.turn_after is not None:
+            turned = body_heading(positions, self.scene.robot).reshape(passed.shape)
+            left, left_after = (np.abs(wrapped(turn[:, None] - turned)) for turn in (targets.turn, targets.turn_after))
+            between = np.abs(wrapped(targets.turn_after - targets.turn))[:, None]
+            price = self.reward.heading / self.reward.progress
+            near &= left <= self.headings.tolerance
+            way, beyond = way + price * (left + between), beyond + price * left_after
+        passed = passed | near
         last = (current == after).all(axis=-1)
         return np.where(passed & ~last, beyond, way), passed, passed & last

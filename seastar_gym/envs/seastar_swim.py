@@ -49,6 +49,11 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `"pairs"`      | `Discrete(1 + n*(n - 1))`   | -      | 0..n*(n-1) | number of a command: none, or a + and a -   |
     | `"continuous"` | `Box(-1, 1, (n,), float32)` | 0..n-1 | -1..1      | limb: share of a full command, + or -       |
 
+    `"pairs"` learns best: with the same training its policies take 172.6 strokes on held-out paths, those of `"limbs"`
+    196.8, since limbs that are drawn one by one do not find gaits that alternate between two pairs (docs/results.md).
+    `"limbs"` is the default because it is the plainest form, for any robot, and results of `SeastarSwim-v0` are
+    comparable only with it; the timed environments, which came later, have `"pairs"`.
+
     Actions have no unit. `env.command_table[number]` is the command of every limb: 0, 1 (+) or -1 (-). A share is the
     width of the heating pulse, of 0.1 s at most, for wires (`SmaWires`, `ThermalSma`), and scales the rotation of other
     actuators.
@@ -57,13 +62,14 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     `decision_period` is the time of a step. Decisions within a stroke need actuators that remember what is under way:
     wires, one for each direction of every limb, that cool while others are heated. The registered settings are
 
-    | id                            | decision period [s] | `actions` | time limit [s] | decisions | actuator   |
-    |-------------------------------|---------------------|-----------|----------------|-----------|------------|
-    | `SeastarSwim-v0`              | 1.0                 | `"limbs"` | 400            | 400       | `SmaPulse` |
-    | `SeastarSwimTimed-v0`         | 0.5                 | `"pairs"` | 200            | 400       | `SmaWires` |
-    | `SeastarSwimTimedModerate-v0` | 0.2                 | `"pairs"` | 200            | 1000      | `SmaWires` |
-    | `SeastarSwimTimedHard-v0`     | 0.1                 | `"pairs"` | 200            | 2000      | `SmaWires` |
-    | `SeastarSwimHeading-v0`       | 0.5                 | `"pairs"` | 300            | 600       | `SmaWires` |
+    | id                            | decision period [s] | `actions`      | time limit [s] | decisions | actuator   |
+    |-------------------------------|---------------------|----------------|----------------|-----------|------------|
+    | `SeastarSwim-v0`              | 1.0                 | `"limbs"`      | 400            | 400       | `SmaPulse` |
+    | `SeastarSwimContinuous-v0`    | 1.0                 | `"continuous"` | 400            | 400       | `SmaPulse` |
+    | `SeastarSwimTimed-v0`         | 0.5                 | `"pairs"`      | 200            | 400       | `SmaWires` |
+    | `SeastarSwimTimedModerate-v0` | 0.2                 | `"pairs"`      | 200            | 1000      | `SmaWires` |
+    | `SeastarSwimTimedHard-v0`     | 0.1                 | `"pairs"`      | 200            | 2000      | `SmaWires` |
+    | `SeastarSwimHeading-v0`       | 0.5                 | `"pairs"`      | 300            | 600       | `SmaWires` |
 
     The same physics and the same task, with a horizon that is 2, 5 or 10 times as long in decisions.
     `SeastarSwimHeading-v0` asks for headings, along the legs of the path.

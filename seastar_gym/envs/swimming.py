@@ -89,8 +89,8 @@ class Swimming(ABC):
     """Headings that are asked for at the waypoints, None if none are."""
     waypoint_radius: float
     """Radius of waypoints [m]."""
-    added_mirror: Mirror = ()
-    """What a mirror does to the numbers that the task adds to a limb's in the observation, see `memory_mirror`."""
+    observes_commands = False
+    """Whether the last command of every limb is observed, after the memory of its actuator."""
 
     def __init__(
         self,
@@ -199,7 +199,20 @@ class Swimming(ABC):
 
     def _remembered(self) -> Floats:
         """Numbers of the limbs that stand before the targets, shape (n_robots, k), limb after limb."""
-        return self.simulator.observe_actuators() if self.observe_actuators else np.zeros((self.n_robots, 0))
+        wires = self._observed_wires() if self.observe_actuators else np.zeros((self.n_robots, 0))
+        if not self.observes_commands:
+            return wires
+        of_limbs = [wires.reshape(*self.last_commands.shape, -1), self.last_commands[..., None]]
+        return np.concatenate(of_limbs, axis=-1).reshape(self.n_robots, -1)
+
+    @property
+    def added_mirror(self) -> Mirror:
+        """What a mirror does to the numbers that the task adds to a limb's in the observation, see `memory_mirror`."""
+        return ((0, -1),) if self.observes_commands else ()
+
+    def _observed_wires(self) -> Floats:
+        """Memory of the actuators in the names of the commands, shape (n_robots, k), limb after limb."""
+        return self.simulator.observe_actuators()
 
     def _wanted(self) -> Floats:
         """Numbers of the robot that stand after those of the limbs, such as asked headings, shape (n_robots, k)."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from seastar_gym.envs.batch_attributes import BatchAttributes
 from seastar_gym.envs.batch_info import Info, of_some, with_masks
 from seastar_gym.envs.batch_pictures import BatchPictures, Picture
+from seastar_gym.envs.buffers import Buffers, require_buffers
 from seastar_gym.envs.commands import Actions, as_array, to_commands
 from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.promises import warn_uncertified
@@ -52,6 +53,11 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
     threads: Number of threads of the simulator; by default one for every processor.
     render_mode: "rgb_array": `render` returns a picture of every robot, the smaller the more there are;
         `render_robots` draws some of them.
+
+    ## Memory
+    Nothing is copied for safety: the arrays of a step are fresh, and the environment keeps none of them, so a learner
+    may keep them as they are. With `step(actions, out=Buffers(...))` observations, rewards and flags are written into
+    arrays that are given, such as rows of a learner's memory, see `seastar_gym.envs.buffers`.
 
     `call`, `get_attr` and `set_attr` are those of Gymnasium's `SyncVectorEnv`. What each robot has for itself
     (`waypoints`, `scene`, `np_random`, `render`, ..) they give robot by robot; everything else is common to all robots.
@@ -181,8 +187,15 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         if self.render_mode is not None:
             self._pictures.begin(mask)
 
-    def step(self, actions: Any) -> tuple[Observations, NDArray[np.float64], Flags, Flags, Info]:
-        """Swim for one decision with every robot; returns observations, rewards, terminated, truncated and info."""
+    def step(
+        self, actions: Any, out: Buffers | None = None
+    ) -> tuple[Observations, NDArray[np.float64], Flags, Flags, Info]:
+        """Swim for one decision with every robot; returns observations, rewards, terminated, truncated and info.
+
+        out: Arrays that the results are written into, and that are returned then; by default fresh ones.
+        """
+        if out is not None:
+            require_buffers(out, self.num_envs, self._task.observation_size)
         if not self._has_begun:
             raise gym.error.ResetNeeded("The episodes have not begun or were interrupted: call reset() before step().")
         if self.autoreset_mode is AutoresetMode.DISABLED and self._needs_reset.any():
@@ -194,7 +207,11 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         commands[resting] = 0.0
         self.closed = False
         with self._until_whole():
-            return self._step(commands, resting)
+            results, info = self._step(commands, resting)
+        if out is None:
+            return *results, info
+        out.take(results)
+        return *out, info
 
     @contextlib.contextmanager
     def _until_whole(self) -> Iterator[None]:
@@ -209,7 +226,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
 
     def _step(
         self, commands: NDArray[np.float64], resting: Flags
-    ) -> tuple[Observations, NDArray[np.float64], Flags, Flags, Info]:
+    ) -> tuple[Buffers, Info]:
         outcome = self._task.step(commands)
         self._commands = outcome.commands
         if self.render_mode is not None:
@@ -225,7 +242,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         observations, info = self._task.observe(), self._info(outcome.info, resting)
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._needs_reset.any():
             observations, info = self._begin_next_episodes(observations, outcome.info)
-        return observations, reward, terminated, truncated, info
+        return Buffers(observations, reward, terminated, truncated), info
 
     def action_masks(self) -> Flags:
         """Actions that every robot's wires can follow now, shape (num_envs, k), see `seastar_gym.envs.masks`."""

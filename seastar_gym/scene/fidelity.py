@@ -173,9 +173,9 @@ def measured(scene: Measurable) -> Promise | None:
 def timed_promise(preset: str, decision_period: float) -> TimedPromise | None:
     """Errors of a preset for a time between decisions [s]: the larger ones of the measured times around it.
 
-    None outside of the measured times.
+    None outside of the measured times, and for presets that were not measured.
     """
-    rows = {float(period): TimedPromise(**row) for period, row in _stored_in_time()[preset].items()}
+    rows = {float(period): TimedPromise(**row) for period, row in _stored_in_time().get(preset, {}).items()}
     shorter = [period for period in rows if period <= decision_period * (1.0 + 1e-9)]
     longer = [period for period in rows if period >= decision_period * (1.0 - 1e-9)]
     if not shorter or not longer:

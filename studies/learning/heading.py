@@ -2,9 +2,10 @@
 
     python -m studies.learning.heading
 
-Three robots swim it for several demanded turns, to either side: by the chapter's strokes and by wires every 0.2 s,
-which turn by a gait and then swim by the policy in the box, and by a policy that was trained on random paths with
-random headings and decides every 0.5 s. Writes `heading.json`, `heading.png` and the table in Markdown.
+Robots swim it for several demanded turns: by the chapter's strokes and by wires every 0.2 s, which turn by a gait and
+then swim by the policy in the box, and by wires every 0.5 s with the planner, or with a policy that was trained on
+random paths with random headings. All do the mirror image of it to the other side. Writes `heading.json`, `heading.png`
+and the table in Markdown.
 """
 
 import json
@@ -27,6 +28,7 @@ from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.command import run_command
 from seastar_gym.controllers import learned
 from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.planner import Planner
 from seastar_gym.controllers.turning import TurnThenSwim
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.headings import Headings
@@ -91,8 +93,10 @@ class Options:
     """Length of the training [decisions]."""
     seed: int = 0
     """Seed of the training."""
-    fidelity: Fidelity = "balanced"
+    fidelity: Fidelity = "fast"
     """Accuracy of the swims; trainings are at "fast"."""
+    swimmers: tuple[str, ...] = ("strokes", "wires", "planner", "learned")
+    """Who swims; "learned" only after a training."""
     turns: tuple[float, ...] = TURNS
     """Demanded turns [deg]."""
     out: Path = Path("runs/heading")
@@ -124,7 +128,9 @@ def swimmers(model: PPO | None) -> dict[str, Swimmer]:
     found = {
         "strokes": Swimmer("the chapter's strokes: turn, then swim", None, strokes),
         "wires": Swimmer("wires every 0.2 s: turning wave, then swim", 0.2, wires),
-    }
+        "planner": Swimmer("wires every 0.5 s: planner", 0.5, lambda _, headings: Planner(
+            decision_period=0.5, headings=headings)),
+    }  # fmt: skip
     if model is not None:
         found["learned"] = Swimmer("wires every 0.5 s: learned", 0.5, lambda scene, _: Reduced(model, scene, 0.5))
     return found
@@ -141,14 +147,13 @@ def swum(swimmer: Swimmer, turn: float, fidelity: Fidelity) -> Swim:
 
 
 def measured(swimmer: Swimmer, options: Options) -> dict[str, Any]:
-    """Times [s] and energies [J] over demanded turns, means of turns to either side; NaN where one did not arrive."""
-    seconds, joules = [], []
-    for turn in options.turns:
-        both = [swum(swimmer, side * turn, options.fidelity) for side in ((1, -1) if turn else (1,))]
-        arrived = all(one.finished for one in both)
-        seconds.append(float(np.mean([one.time[-1] for one in both])) if arrived else None)
-        joules.append(float(np.mean([one.energy.sum() for one in both])) if arrived else None)
-    return {"what": swimmer.what, "seconds": seconds, "joules": joules}
+    """Times [s] and energies [J] over demanded turns, None where it did not arrive."""
+    swims = [swum(swimmer, turn, options.fidelity) for turn in options.turns]
+    return {
+        "what": swimmer.what,
+        "seconds": [round(float(one.time[-1]), 6) if one.finished else None for one in swims],
+        "joules": [round(float(one.energy.sum()), 3) if one.finished else None for one in swims],
+    }
 
 
 def study(options: Options) -> dict[str, Any]:
@@ -165,7 +170,9 @@ def study(options: Options) -> dict[str, Any]:
         "tolerance_deg": round(float(np.degrees(Headings().tolerance)), 6),
         "training": {"decisions": options.decisions, "seed": options.seed, "seconds": round(seconds)},
         "turns_deg": list(options.turns),
-        "swims": {name: measured(swimmer, options) for name, swimmer in swimmers(model).items()},
+        "swims": {
+            name: measured(swimmer, options) for name, swimmer in swimmers(model).items() if name in options.swimmers
+        },
     }
 
 
@@ -180,12 +187,12 @@ def table(results: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-COLOURS = {"strokes": "0.55", "wires": "#3366aa", "learned": "#cc7a00"}
+COLOURS = {"strokes": "0.55", "wires": "#3366aa", "planner": "#118855", "learned": "#cc7a00"}
 
 
 def draw(results: dict[str, Any], file: Path) -> None:
     """Time and energy over the demanded turn."""
-    from studies.accuracy.style import DPI, subplots
+    from studies.style import DPI, subplots
 
     figure, panels = subplots(1, 2, figsize=(9.0, 3.8))
     for axes, what, label in zip(panels, ("seconds", "joules"), ("time [s]", "energy [J]"), strict=True):

@@ -4,10 +4,9 @@ import json
 
 import numpy as np
 import pytest
-from scipy.stats import trim_mean
 
 from agents.hyperparameters import Hyperparameters
-from studies.learning.fidelities import scenes, statistics, study, tables, trainings
+from studies.learning.fidelities import scenes, study, tables, trainings
 from studies.learning.fidelities.pictures import draw
 from studies.learning.fidelities.scenes import CHEAP, DEAR, FIDELITIES, PHYSICS, SWUM
 from studies.learning.fidelities.study import CONTESTANTS, Options, main, stages
@@ -31,23 +30,6 @@ def test_contestants_have_equal_processor_time():
         spent = sum(RATES[name] * strokes for name, strokes in stages(contestant, 40.0, RATES))
         assert spent == pytest.approx(40.0, rel=0.15)
     assert [name for name, _ in stages("cheap, then dear", 40.0, RATES)] == [CHEAP, DEAR]
-
-
-def test_an_interval_is_of_other_seeds_on_the_same_paths():
-    paths = np.linspace(150.0, 200.0, 16)
-    shifted = paths + np.array([[-1.0], [0.0], [1.0], [0.5]])
-    found = statistics.estimate(shifted)
-    assert found.mean == pytest.approx(trim_mean(shifted.ravel(), 0.25))
-    assert found.low < found.mean < found.high
-    assert found.high - found.low < 1.5  # the paths differ by 50
-    assert statistics.estimate(np.tile(paths, (3, 1))) == (found := statistics.interquartile_mean(paths), found, found)
-    assert np.isnan(statistics.estimate(paths[None]).low)
-
-
-def test_policies_that_keep_their_order_have_rank_correlation_1():
-    assert statistics.rank_correlation([1.0, 2.0, 3.0], [10.0, 11.0, 30.0]) == pytest.approx(1.0)
-    assert statistics.rank_correlation([1.0, 2.0, 3.0], [5.0, 4.0, 1.0]) == pytest.approx(-1.0)
-    assert np.isnan(statistics.rank_correlation([1.0, 2.0], [5.0, 5.0]))
 
 
 def results(**strokes: float) -> dict:

@@ -117,7 +117,7 @@ def test_the_function_the_command_and_the_modules_have_names_of_their_own():
     assert "modules are in seastar_gym.certification" in done.stdout
     command = [sys.executable, "-m", "seastar_gym.certify", "-h"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert done.stdout.startswith("usage: python -m seastar_gym.certify [-h]")
+    assert done.stdout.startswith("usage: seastar certify [-h]")
 
 
 def test_a_scene_for_an_error_is_that_of_its_certificate(certificate, tmp_path):

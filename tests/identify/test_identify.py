@@ -108,7 +108,7 @@ def test_help_names_the_command_and_its_defaults(monkeypatch, capsys):
     with pytest.raises(SystemExit):
         main()
     text = " ".join(capsys.readouterr().out.split())
-    assert text.startswith("usage: python -m seastar_gym.identify ")
+    assert text.startswith("usage: seastar identify ")
     assert f"default: {' '.join(TRUTH)})" in text
 
 

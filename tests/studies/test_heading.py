@@ -8,17 +8,17 @@ import pytest
 pytest.importorskip("stable_baselines3")
 pytest.importorskip("matplotlib")
 
-from agents.swim import swim
-from agents.turning import TurnThenSwim
-from agents.vec_env import BatchVecEnv
-
 from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_model
 from seastar_gym import Headings, VectorSymmetryReduction
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
+from seastar_gym.controllers.planner import Budget, Planner
+from seastar_gym.controllers.turning import TurnThenSwim
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.evaluation.swim import swim
 from seastar_gym.gaits import turning_wave
 from studies.learning import heading
 
@@ -45,9 +45,21 @@ def test_it_turns_to_the_side_that_is_asked_for_and_then_swims(asked):
     assert env._task.facts()["heading"][0] == pytest.approx(asked, abs=headings.tolerance)
 
 
+def test_the_planner_turns_to_either_side_and_keeps_a_heading_that_is_met():
+    ends = []
+    for asked in (0.6, -0.6, 0.0):
+        headings = Headings(asked)
+        env = SeastarSwimEnv([[0.005, 0.0]], "pairs", "fast", decision_period=0.5, headings=headings)
+        planner = Planner(decision_period=0.5, headings=headings, budget=Budget(2, 4, 0.5), threads=1)
+        done = swim("planner", planner, env, max_strokes=30)
+        assert done.finished
+        ends.append(done.time[-1])
+    assert ends[0] > 2.0 and ends[1] > 2.0 and ends[2] == 0.5
+
+
 def test_strokes_and_wires_arrive_and_wires_turn_faster(tmp_path):
-    options = ["--decisions", "0", "--turns", "0", "72", "--fidelity", "fast", "--out", str(tmp_path)]
-    assert heading.main(options) == 0
+    options = ["--decisions", "0", "--turns", "0", "72", "--swimmers", "strokes", "wires"]
+    assert heading.main([*options, "--out", str(tmp_path)]) == 0
     results = json.loads((tmp_path / "heading.json").read_text())
     strokes, wires = (results["swims"][name] for name in ("strokes", "wires"))
     for each in (strokes, wires):
@@ -71,7 +83,8 @@ def test_a_learner_behind_the_reduction_does_the_carried_thing():
     np.testing.assert_array_equal(actions, symmetry.transform_actions(np.full(10, actions[0]), elements, "pairs", 5))
 
 
-def test_a_swim_that_does_not_arrive_has_no_time():
+def test_a_swim_that_does_not_arrive_has_no_time(monkeypatch):
+    monkeypatch.setattr(heading, "LIMIT", 3.0)
     swimmer = heading.Swimmer("rest", 0.5, lambda scene, headings: Resting200())
     found = heading.measured(swimmer, heading.Options(turns=(36.0,), fidelity="fast"))
     assert found["seconds"] == found["joules"] == [None]

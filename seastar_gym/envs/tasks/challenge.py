@@ -1,8 +1,8 @@
 """Challenges: what a task asks for and draws, as frozen numbers. Their docstrings are the contracts that users read."""
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 from seastar_gym.envs.swimming import Swimming
 from seastar_gym.envs.tasks.numbered import Split
@@ -14,11 +14,8 @@ Range = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Challenge:
+class Challenge(ABC):
     """Base of all challenges."""
-
-    NAME: ClassVar[str]
-    """Name by which `SeastarTaskEnv(task=...)` knows the challenge with its default numbers."""
 
     @abstractmethod
     def swimming(self, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any) -> Swimming:

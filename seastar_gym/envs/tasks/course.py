@@ -19,10 +19,10 @@ Floats = NDArray[np.float64]
 
 TWICE = 2.0
 """Rounds of the second circle in one of the first."""
-ROBOT_SPEED, LONGEST_CHASE = 0.004, 100.0
-"""A point of this speed [m/s] can meet a prey that is drawn, within this time [s]."""
-NEAREST_CENTRE, FARTHEST_CENTRE = 0.0, 0.12
-"""Distance of a course's centre from the robot [m]."""
+CHASE = np.arange(101.0)
+"""Times [s] at which a prey may be met: what is drawn can be, by then."""
+FARTHEST_CENTRE = 0.12
+"""Largest distance of a course's centre from the robot [m]."""
 MOST_DRAWS = 1000
 HEAD_START = 0.08
 """Least distance of a prey from the robot when it begins [m]."""
@@ -61,24 +61,33 @@ class Courses(NamedTuple):
         return Courses(self.numbers[None]).place(self.numbers[2] + period * np.arange(n + 1) / n)
 
 
-def meeting_time(numbers: Floats, start: Floats, time: ArrayLike, speed: float, reach: float, longest: float) -> Floats:
-    """Time [s] after which a point that swims straight can first be within `reach` [m] of the prey; inf if never.
+class Pursuit(NamedTuple):
+    """A point that swims straight to meet a prey."""
 
-    numbers: Courses, shape (..., 8). start: Where the point is at `time` [s], shape (..., 2) [m]. speed: [m/s].
-    longest: Time after which nobody looks any more [s].
-    """
-    since = np.linspace(0.0, longest, 1 + round(longest))
-    later = np.asarray(time, np.float64)[..., None] + since
-    places = Courses(numbers[..., None, :]).place(later)
-    away = places - start[..., None, :]
-    gap = np.hypot(away[..., 0], away[..., 1]) - reach - speed * since
-    met = gap <= 0.0
-    first = np.argmax(met, axis=-1)
-    before = np.maximum(first - 1, 0)
-    g0, g1 = (np.take_along_axis(gap, k[..., None], -1)[..., 0] for k in (before, first))
-    share = np.divide(g0, g0 - g1, out=np.zeros_like(g0), where=g0 - g1 > 0.0)
-    found = since[before] + share * (since[first] - since[before])
-    return np.where(met.any(axis=-1), np.where(first == 0, 0.0, found), np.inf)
+    speed: float
+    """[m/s]"""
+    reach: float
+    """Distance at which the prey is met [m]."""
+
+    def meeting_time(self, start: Floats, prey: Floats, since: Floats) -> Floats:
+        """Time [s] until the prey can be met, linear between the given times; inf if it cannot, shape (...).
+
+        start: Where the point is, shape (..., 2) [m]. prey: Where the prey is, shape (..., n, 2) [m], after times
+        `since` [s], shape (n,), which begin with 0.
+        """
+        gap = self.gaps(start, prey, since)
+        met = gap <= 0.0
+        first = np.argmax(met, axis=-1)
+        before = np.maximum(first - 1, 0)
+        wide, none = (np.take_along_axis(gap, k[..., None], -1)[..., 0] for k in (before, first))
+        share = np.divide(wide, wide - none, out=np.zeros_like(wide), where=wide - none > 0.0)
+        found = since[before] + share * (since[first] - since[before])
+        return np.where(met.any(axis=-1), np.where(first == 0, 0.0, found), np.inf)
+
+    def gaps(self, start: Floats, prey: Floats, since: Floats) -> Floats:
+        """Way that the point lacks at each of the times [m], shape (..., n); for the arguments see `meeting_time`."""
+        away = prey - start[..., None, :]
+        return np.asarray(np.hypot(away[..., 0], away[..., 1]) - self.reach - self.speed * since)
 
 
 def draw_course(
@@ -86,22 +95,21 @@ def draw_course(
     radius: tuple[float, float],
     speed: tuple[float, float],
     epicycle: float,
-    reach: float,
+    pursuit: Pursuit,
 ) -> Floats:
-    """Course around a robot at the origin, from time 0 on, that a slow swimmer can meet.
+    """Course around a robot at the origin, from time 0 on, on which a pursuer that swims straight can meet the prey.
 
     ValueError: none was found.
     """
     for _ in range(MOST_DRAWS):
         big = rng.uniform(*radius)
         small = big * rng.uniform(0.0, epicycle)
-        away, direction = rng.uniform(NEAREST_CENTRE, FARTHEST_CENTRE), rng.uniform(-np.pi, np.pi)
+        away, direction = rng.uniform(0.0, FARTHEST_CENTRE), rng.uniform(-np.pi, np.pi)
         turn = rng.choice([-1.0, 1.0]) * rng.uniform(*speed) / np.hypot(big, TWICE * small)
         angles = rng.uniform(-np.pi, np.pi, 2)
         course = np.array([away * np.cos(direction), away * np.sin(direction), 0.0, big, small, *angles, turn])
-        far = np.hypot(*Courses(course).place(0.0)) >= HEAD_START
-        if far and meeting_time(course, np.zeros(2), 0.0, ROBOT_SPEED, reach, LONGEST_CHASE) < np.inf:
+        prey = Courses(course).place(CHASE)
+        far = np.hypot(*prey[0]) >= HEAD_START
+        if far and pursuit.meeting_time(np.zeros(2), prey, CHASE) < np.inf:
             return course
-    raise ValueError(
-        f"No prey that a robot could meet was found in {MOST_DRAWS} draws: make courses smaller or slower."
-    )
+    raise ValueError(f"Of {MOST_DRAWS} prey, a robot could meet none: make their courses smaller, or slow them down.")

@@ -17,7 +17,12 @@ from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.checks import require_choice, shown
 from seastar_gym.scene.numerics import Fidelity
 
-CHALLENGES: dict[str, type[Challenge]] = {kind.NAME: kind for kind in (Miswired, Prey, Station)}
+CHALLENGES: dict[str, Challenge] = {
+    "miswired": Miswired(),
+    "prey": Prey(),
+    "fast-prey": Prey(speed=(0.0105, 0.0135), robot_speed=0.007),
+    "station": Station(),
+}
 """Challenges by name."""
 
 
@@ -25,7 +30,7 @@ def read_challenge(task: Challenge | Plain | str) -> Challenge:
     """Challenge of a name, an object or its plain form."""
     if isinstance(task, str):
         require_choice("task", task, tuple(CHALLENGES))
-        return CHALLENGES[task]()
+        return CHALLENGES[task]
     challenge = read(task, Challenge)
     if not isinstance(challenge, Challenge):
         raise ValueError(f"task must be a challenge such as Miswired(), or its name, not {shown(task)}.")
@@ -49,14 +54,14 @@ def make_task(
 class SeastarTaskEnv(SeastarSwimEnv):
     """Environment of one of the tasks whose headroom is measured, for the chapter's robot.
 
-    | id                        | `task`       | decision period [s] | `actions` | time limit [s] |
-    |---------------------------|--------------|---------------------|-----------|----------------|
-    | `SeastarMiswired-v0`      | `"miswired"` | 1.0                 | `"pairs"` | 400            |
-    | `SeastarMiswiredTimed-v0` | `"miswired"` | 0.5                 | `"pairs"` | 400            |
-    | `SeastarPrey-v0`          | `"prey"`     | 1.0                 | `"pairs"` | 200            |
-    | `SeastarPreyTimed-v0`     | `"prey"`     | 0.5                 | `"pairs"` | 200            |
-    | `SeastarStation-v0`       | `"station"`  | 1.0                 | `"joint"` | 120            |
-    | `SeastarStationTimed-v0`  | `"station"`  | 0.5                 | `"joint"` | 120            |
+    | id                        | `task`        | decision period [s] | `actions` | time limit [s] |
+    |---------------------------|---------------|---------------------|-----------|----------------|
+    | `SeastarMiswired-v0`      | `"miswired"`  | 1.0                 | `"joint"` | 400            |
+    | `SeastarMiswiredTimed-v0` | `"miswired"`  | 0.5                 | `"joint"` | 400            |
+    | `SeastarPrey-v0`          | `"prey"`      | 1.0                 | `"pairs"` | 200            |
+    | `SeastarPreyTimed-v0`     | `"fast-prey"` | 0.5                 | `"pairs"` | 200            |
+    | `SeastarStation-v0`       | `"station"`   | 1.0                 | `"joint"` | 120            |
+    | `SeastarStationTimed-v0`  | `"station"`   | 0.5                 | `"joint"` | 120            |
 
     What a task asks for, observes and rewards stands in the docstring of its challenge: `Miswired`, `Prey`, `Station`.
     Actions, masks and everything else are those of `SeastarSwimEnv`.

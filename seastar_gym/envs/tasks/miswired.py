@@ -1,7 +1,7 @@
 """`SeastarMiswired-v0`: limbs whose two wires may have been swapped."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +66,6 @@ class Miswired(Challenge):
     reward: Weights of the reward's terms.
     """
 
-    NAME: ClassVar = "miswired"
     swap_probability: float = 0.5
     reward: RewardWeights = RewardWeights()
 
@@ -83,7 +82,7 @@ class Miswired(Challenge):
 class MiswiredTask(Numbered, SwimTask):
     """Task of robots whose wires may be swapped."""
 
-    added_mirror = ((0, -1),)
+    observes_commands = True
 
     def __init__(self, about: Miswired, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any):
         self.about = about
@@ -106,11 +105,9 @@ class MiswiredTask(Numbered, SwimTask):
         """Values of wires + and -, shape (n_robots, n_limbs, 2), in the names that commands have for them."""
         return np.where(self.wiring[..., None] < 0.0, of_wires[..., ::-1], of_wires)
 
-    def _remembered(self) -> Floats:
-        wires = super()._remembered().reshape(*self.wiring.shape, -1)
-        return np.concatenate([self._by_command(wires), self.last_commands[..., None]], axis=-1).reshape(
-            self.n_robots, -1
-        )
+    def _observed_wires(self) -> Floats:
+        wires = super()._observed_wires().reshape(*self.wiring.shape, -1)
+        return self._by_command(wires).reshape(self.n_robots, -1)
 
     def _goal_facts(self, hub: Floats) -> dict[str, NDArray[Any]]:
         return {**super()._goal_facts(hub), "wiring": self.wiring.copy()}

@@ -1,7 +1,7 @@
 """`SeastarPrey-v0`: a prey that swims faster than the robot, on a course that comes back."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from seastar_gym.envs.scenery import Ring, Scenery
 from seastar_gym.envs.swimming import Flags, Floats, Score, Swimming
 from seastar_gym.envs.tasks.challenge import Challenge, Range, require_range
-from seastar_gym.envs.tasks.course import Courses, draw_course
+from seastar_gym.envs.tasks.course import Courses, Pursuit, draw_course
 from seastar_gym.envs.tasks.numbered import Numbered, Split
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count, require_number
@@ -30,11 +30,14 @@ class Prey(Challenge):
     swims to where the prey will be.
 
     ## Episode
-    The prey swims on a closed course, once round in 90 to 210 s: a circle whose radius is in `radius`, and on it a
+    The prey swims on a closed course, a circle whose radius is in `radius`, and on it a
     second one of up to `epicycle` of that radius, twice as often round. Its root mean square speed is in `speed`. The
     course passes near the robot, and does not begin there. The prey is caught where a decision ends within
     `catch_radius` of it, and the next one begins on a course of its own around the robot. The task never ends by
-    itself. Every course can be solved: a point at 4 mm/s, slower than the robot, could meet the prey within 100 s.
+    itself. Every course can be solved: a point that swims straight at `robot_speed`, which the robot exceeds, could
+    meet the prey within 100 s.
+
+    In time, the robot swims faster, and so do the prey of `"fast-prey"`: 10.5 to 13.5 mm/s, and 7 mm/s for the robot.
 
     ## Observation
     That of `SeastarSwim-v0`, with the prey in the place of the current waypoint, and with the place where it would be
@@ -68,15 +71,16 @@ class Prey(Challenge):
     speed: Smallest and largest speed of prey [m/s].
     radius: Smallest and largest radius of a course [m].
     epicycle: Largest radius of the second circle, as a fraction of the first.
+    robot_speed: Speed of a point that could meet every prey in time [m/s].
     catch_radius: Distance [m] within which a prey is caught.
     wanted: Number of prey that count as success.
     progress, catch, effort: Weights of the reward's terms.
     """
 
-    NAME: ClassVar = "prey"
     speed: Range = (0.006, 0.008)
     radius: Range = (0.12, 0.2)
     epicycle: float = 0.2
+    robot_speed: float = 0.004
     catch_radius: float = 0.02
     wanted: int = 3
     progress: float = 50.0
@@ -88,6 +92,7 @@ class Prey(Challenge):
         require_range("Prey.radius", self.radius, "m")
         require_number("Prey.epicycle", self.epicycle, "1", zero_allowed=True)
         require_number("Prey.catch_radius", self.catch_radius, "m")
+        require_number("Prey.robot_speed", self.robot_speed, "m/s")
         require_count("Prey.wanted", self.wanted, 1, 1_000_000)
         for name in ("progress", "catch", "effort"):
             require_number(f"Prey.{name}", getattr(self, name), "1", zero_allowed=True)
@@ -114,8 +119,8 @@ class PreyTask(Numbered, Swimming):
     def _draw(self, robot: int, rng: np.random.Generator, asked: Any) -> None:
         about = self.about
         for k in range(MOST_PREY):
-            course = draw_course(rng, about.radius, about.speed, about.epicycle, about.catch_radius)
-            self._drawn_courses[robot, k] = course
+            can_be_met = Pursuit(about.robot_speed, about.catch_radius)
+            self._drawn_courses[robot, k] = draw_course(rng, about.radius, about.speed, about.epicycle, can_be_met)
 
     def _begin(self, robots: Flags) -> None:
         self.catches[robots] = 0

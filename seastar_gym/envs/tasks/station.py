@@ -1,7 +1,7 @@
 """`SeastarStation-v0`: a place to keep in a current that is not known."""
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +33,16 @@ class Station(Challenge):
     draws can be solved: the robot swims in any direction faster than the water.
 
     ## Observation
-    That of `SeastarSwim-v0`, with the station in the places of the current and of the next waypoint. Velocities are
-    those over ground.
+    That of `SeastarSwim-v0`, with the station in the places of the current and of the next waypoint, and with the
+    command of the last decision among the numbers of every limb; places for strokes, and for decisions every 0.5 s:
+
+    | strokes  | timed    | meaning                                                    | unit | range |
+    |----------|----------|------------------------------------------------------------|------|-------|
+    | 0..181   | 0..181   | stations of limbs and the hub, as in `SeastarSwim-v0`;     | -    | -     |
+    |          |          | velocities are those over ground                           |      |       |
+    | 182..186 | 182..196 | limb after limb: contractions of its wires, if timed; its  | 1    | -1..1 |
+    |          |          | last command                                               |      |       |
+    | 187..190 | 197..200 | the station relative to the hub: x, y, and once more       | 0.1m | -     |
 
     ## Reward
     | term              | meaning                                                   | default weight    |
@@ -67,7 +75,6 @@ class Station(Challenge):
     progress, nearness, effort: Weights of the reward's terms.
     """
 
-    NAME: ClassVar = "station"
     current: Range = (0.001, 0.0025)
     distance: Range = (0.0, 0.05)
     tolerance: float = 0.002
@@ -112,6 +119,7 @@ class StationTask(Numbered, Swimming):
     """Task of robots that keep a station; `scene` is that of still water, which is what they know."""
 
     TERMS = ("reward_progress", "reward_distance", "reward_effort")
+    observes_commands = True
 
     def __init__(self, about: Station, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any):
         water = Water() if scene.fluid is None else scene.fluid

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.evaluation.statistics import Estimate, estimate, rank_correlation
 from studies.learning.fidelities.scenes import CHEAP, DEAR, FIDELITIES, PHYSICS, SWUM
-from studies.learning.fidelities.statistics import Estimate, estimate, rank_correlation
 
 Floats = NDArray[np.float64]
 Runs = Mapping[str, Any]

@@ -57,3 +57,18 @@ def rank_correlation(one: Sequence[float], other: Sequence[float]) -> float:
     if np.ptp(one) == 0.0 or np.ptp(other) == 0.0:
         return float("nan")
     return float(spearmanr(one, other).statistic)
+
+
+def profile(scores: ArrayLike, levels: ArrayLike) -> tuple[Floats, Floats, Floats]:
+    """Performance profile: share of the scores, shape (seeds, tasks), that reach each level; every task counts alike.
+
+    Returns the shares and the ends of their stratified bootstrap intervals of 95 %, as in rliable.
+    """
+    scores, levels = np.asarray(scores, float), np.asarray(levels, float)
+    rng, (n_seeds, n_tasks) = np.random.default_rng(0), scores.shape
+    shares = (scores[..., None] >= levels).mean(axis=(0, 1))
+    drawn = rng.integers(n_seeds, size=(RESAMPLES, n_seeds, n_tasks))
+    reached = np.take_along_axis(scores[None], drawn, axis=1)[..., None] >= levels
+    tail = 50.0 * (1.0 - CONFIDENCE)
+    low, high = np.percentile(reached.mean(axis=(1, 2)), [tail, 100.0 - tail], axis=0)
+    return shares, low, high

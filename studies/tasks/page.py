@@ -1,0 +1,147 @@
+"""Page and picture of the headroom of the tasks."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.evaluation.many import mean_with_interval
+from seastar_gym.evaluation.pictures import COLOURS, FAINT_INK
+from seastar_gym.files import write_atomically
+from studies.style import new_figure
+
+UNITS = {
+    "miswired": "seconds to the last waypoint, 400 if it is not reached",
+    "prey": "prey caught in 200 s",
+    "fast-prey": "prey caught in 200 s",
+    "station": "mean distance from the station after 30 s [mm]",
+}
+"""Measures in words, by challenge."""
+MORE_IS_BETTER = ("prey", "fast-prey")
+HEADROOM, LEFT = 0.2, 1.0 / 3.0
+"""A task is kept where the bound is so much better than greedy, and plain PPO leaves so much of that."""
+
+INTRODUCTION = """# Tasks with headroom
+
+{command} writes this page. Every agent swims the same {episodes} held-out episodes, numbers 0 to {last} of the
+split "test", at fidelity "{fidelity}"; learners are trained for {decisions:,} decisions on the split "train". Numbers
+are means with 95 % bootstrap intervals over episodes. Where a learner has several seeds, each is given.
+
+A task is kept if the best that was found is at least 20 % better than greedy, and if plain PPO leaves at least a third
+of that. *Bound* is the best mean of all agents of a row: what can be reached, not a proof that nothing is better. *Gap
+left* is the share of the way from greedy to the bound that plain PPO does not go.
+
+| agent | what it is |
+|---|---|
+| rest | no limb is ever heated |
+| greedy | the action whose mean displacement, by a map, ends nearest |
+| planner | simulates a decision ahead what is observed, with the wires, the water or the prey that it believes in |
+| adaptive | remembers: believes in the wires, the drift or the turning of the prey that has explained the past best |
+| informed | is told what is hidden: the wires, the water, the course of the prey |
+| PPO | the project's hyperparameters, symmetric, no memory; but for the horizons of `studies.tasks.learning.OWN` |
+| PPO, memory | the same, and tips, last commands and targets of the last eight observations |
+
+The planner believes in its own wires, in still water and in a prey that swims straight on. Contracts of the tasks stand
+in the docstrings of `Miswired`, `Prey` and `Station`.
+"""
+
+
+class Row(NamedTuple):
+    """Results of a task."""
+
+    id: str
+    challenge: str
+    agents: dict[str, list[NDArray[np.float64]]]
+    """Measures of all episodes, one array for every seed."""
+
+    def mean(self, agent: str) -> float:
+        """Mean measure of an agent over seeds and episodes."""
+        return float(np.mean(self.agents[agent]))
+
+    @property
+    def bound(self) -> str:
+        """The agent with the best mean."""
+        best = max if self.challenge in MORE_IS_BETTER else min
+        return best(self.agents, key=self.mean)
+
+    @property
+    def headroom(self) -> float:
+        """By how much of greedy's measure the bound is better; infinite where greedy catches nothing."""
+        greedy, bound = self.mean("greedy"), self.mean(self.bound)
+        return abs(bound - greedy) / greedy if greedy > 0.0 else np.inf
+
+    @property
+    def left(self) -> float:
+        """Share of the headroom that plain PPO leaves."""
+        greedy, bound = self.mean("greedy"), self.mean(self.bound)
+        return (bound - self.mean("PPO")) / (bound - greedy)
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether the task has headroom that plain PPO does not take."""
+        return self.headroom >= HEADROOM and self.left >= LEFT
+
+
+def rows_of(results: Mapping[str, Any], ids: Mapping[str, str]) -> list[Row]:
+    """Results by task."""
+    rows = {id: Row(id, challenge, {}) for id, challenge in ids.items()}
+    for name, found in results["cells"].items():
+        id, _, rest = name.partition(", ")
+        agent, _, _ = rest.rpartition(", ")
+        rows[id].agents.setdefault(agent, []).append(np.array(found["measure"]))
+    return [row for row in rows.values() if row.agents]
+
+
+def table(row: Row) -> str:
+    """Table in Markdown of a task."""
+    lines = [f"## {row.id}", "", f"{UNITS[row.challenge].capitalize()}.", ""]
+    lines += ["| agent | mean | 95 % interval | seeds |", "|---|---:|---|---|"]
+    for agent, seeds in row.agents.items():
+        mean, low, high = mean_with_interval(np.concatenate(seeds))
+        each = ", ".join(f"{values.mean():.3g}" for values in seeds) if len(seeds) > 1 else ""
+        lines.append(f"| {agent} | {mean:.3g} | {low:.3g} to {high:.3g} | {each} |")
+    if {"greedy", "PPO"} <= row.agents.keys():
+        verdict = "kept" if row.is_kept else "not kept"
+        better = f"{100.0 * row.headroom:.0f} % better than greedy" if row.headroom < np.inf else "greedy gets nothing"
+        lines += ["", f"Bound: {row.bound}, {better}. Gap left by PPO: {100.0 * row.left:.0f} %. By this, {verdict}."]
+    return "\n".join(lines)
+
+
+def draw(rows: Sequence[Row], file: Path) -> None:
+    """Draw means and intervals of all agents, a panel for every task."""
+    columns = min(3, len(rows))
+    lines = -(-len(rows) // columns)
+    figure = new_figure(3.4 * columns, 2.2 * lines + 0.3)
+    panels = figure.subplots(lines, columns, squeeze=False).flat
+    for axes, row in zip(panels, rows, strict=False):
+        for place, (agent, seeds) in enumerate(row.agents.items()):
+            mean, low, high = mean_with_interval(np.concatenate(seeds))
+            colour = COLOURS[0] if agent.startswith(("PPO", "Rec")) else FAINT_INK
+            axes.plot([low, high], [place, place], color=colour, lw=2.5, solid_capstyle="butt")
+            axes.plot(mean, place, "o", color=colour, ms=5)
+            axes.plot([values.mean() for values in seeds], [place] * len(seeds), "|", color=colour, ms=8)
+        axes.set_yticks(range(len(row.agents)), list(row.agents), fontsize=8)
+        axes.set_title(row.id, fontsize=9)
+        axes.set_xlabel(UNITS[row.challenge].split(",")[0], fontsize=8)
+        axes.tick_params(labelsize=8)
+        axes.set_xlim(left=0.0)
+        if row.challenge == "station":
+            axes.set_xscale("log")
+            axes.set_xlim(0.3, 200.0)
+        axes.invert_yaxis()
+        axes.grid(axis="x", alpha=0.3)
+    for axes in list(panels):
+        axes.set_axis_off()
+    figure.savefig(file, dpi=150)
+
+
+def write_page(results: Mapping[str, Any], ids: Mapping[str, str], out: Path) -> None:
+    """Write the page and the picture beside the results."""
+    rows, settings = rows_of(results, ids), results["settings"]
+    text = INTRODUCTION.format(command="`python -m studies.tasks`", last=settings["episodes"] - 1, **settings)
+    picture = out.with_suffix(".png")
+    draw(rows, picture)
+    tables = "\n\n".join(map(table, rows))
+    write_atomically(out.with_suffix(".md"), f"{text}\n![Means and intervals]({picture.name})\n\n{tables}\n".encode())

@@ -1,0 +1,63 @@
+"""Learners of Stable-Baselines3 learn for an iteration each, on the batch and on one robot."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import torch
+from stable_baselines3 import A2C, DQN, PPO, SAC, TD3, HerReplayBuffer
+
+import seastar_gym  # noqa: F401
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
+from seastar_gym.envs.goal import GoalForm
+
+REPLAY = {"learning_starts": 4, "buffer_size": 100, "batch_size": 4}
+LEARNERS = {
+    "PPO": (PPO, "limbs", {"n_steps": 8, "batch_size": 8, "n_epochs": 1}),
+    "A2C": (A2C, "joint", {"n_steps": 4}),
+    "DQN": (DQN, "pairs", REPLAY),
+    "SAC": (SAC, "continuous", REPLAY),
+    "TD3": (TD3, "continuous", REPLAY),
+}
+ARGUMENTS = {"fidelity": "fast", "max_episode_steps": 5}
+
+
+def batch(actions):
+    return BatchVecEnv(
+        gym.make_vec(
+            "SeastarSwim-v0", 4, vectorization_mode="vector_entry_point", actions=actions, autoreset_mode="SameStep",
+            **ARGUMENTS,
+        )
+    )  # fmt: skip
+
+
+def single(actions):
+    return gym.make("SeastarSwim-v0", actions=actions, **ARGUMENTS)
+
+
+@pytest.mark.parametrize("make", [batch, single])
+@pytest.mark.parametrize("name", LEARNERS)
+def test_a_learner_learns_for_an_iteration(name, make):
+    kind, actions, arguments = LEARNERS[name]
+    learner = kind("MlpPolicy", make(actions), policy_kwargs={"net_arch": [8]}, seed=0, device="cpu", **arguments)
+    before = [weight.detach().clone() for weight in learner.policy.parameters()]
+    learner.learn(16)
+    assert learner.num_timesteps >= 16
+    assert any(not torch.equal(one, other) for one, other in zip(before, learner.policy.parameters(), strict=True))
+    observation = np.zeros(learner.observation_space.shape, np.float32)
+    assert learner.action_space.contains(np.asarray(learner.predict(observation)[0]))
+
+
+def test_hindsight_changes_goals_and_learns():
+    env = GoalForm(single("continuous"))
+    learner = SAC(
+        "MultiInputPolicy", env, replay_buffer_class=HerReplayBuffer, policy_kwargs={"net_arch": [8]}, seed=0,
+        device="cpu", learning_starts=8, buffer_size=100, batch_size=4,
+    )  # fmt: skip
+    learner.learn(16)
+    drawn = learner.replay_buffer.sample(64)
+    episode_goals = learner.replay_buffer.observations["desired_goal"][:16, 0]
+    goals = drawn.observations["desired_goal"].numpy()
+    changed = ~np.isclose(goals[:, None], episode_goals[None], atol=1e-6).all(axis=2).any(axis=1)
+    assert changed.any() and not changed.all()
+    distance = np.linalg.norm(drawn.next_observations["achieved_goal"].numpy() - goals, axis=1)
+    np.testing.assert_array_equal(drawn.rewards.numpy()[:, 0] == 0.0, distance <= 0.1)

@@ -1,0 +1,222 @@
+"""The benchmark measures any agent on any registered task, and its results can be merged."""
+
+import json
+from dataclasses import replace
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from refusals import assert_refused
+from seastar_gym import Scene, __version__
+from seastar_gym.benchmark import page
+from seastar_gym.benchmark.command import main
+from seastar_gym.benchmark.episodes import require_seen, swim_episodes
+from seastar_gym.benchmark.measures import MEASURES, SECONDS, measure_of
+from seastar_gym.benchmark.results import MOST, Entry, best_means, merged, read, relative, write
+from seastar_gym.controllers import GreedyPolicy, load, load_agent, scripted
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.evaluation.swim import swim
+from seastar_gym.evaluation.tasks import task_ids
+
+SWIM, SHORT, OTHER = "SeastarSwim-v0", "SeastarShort-v0", "SeastarDrift-v0"
+
+
+class Challenge:
+    NAME = "station"
+
+
+class DriftEnv(SeastarSwimEnv):
+    """A task of another measure, with a split."""
+
+    challenge = Challenge()
+
+    def __init__(self, split="train", **arguments):
+        assert split == "test"
+        super().__init__(**arguments)
+
+
+@pytest.fixture
+def tasks():
+    """Two tasks that a user's package might register in this one's name: a short path, and one without a batch."""
+    entry = {"entry_point": "seastar_gym.envs.seastar_swim:SeastarSwimEnv"}
+    batch = {"vector_entry_point": "seastar_gym.envs.vector:SeastarSwimVectorEnv"}
+    short = {"path": [[0.03, 0.0]], "random_heading": True, "fidelity": "fast"}
+    gym.register(SHORT, **entry, **batch, max_episode_steps=30, kwargs=short)
+    gym.register(OTHER, DriftEnv, max_episode_steps=33, kwargs={"fidelity": "fast"})
+    yield
+    for task in (SHORT, OTHER):
+        del gym.registry[task]
+
+
+def entry(agent="a", scores=(2.0, 2.0, 4.0, 4.0), **more):
+    n = len(scores)
+    facts = {
+        "task": SWIM, "agent": agent, "fidelity": "", "measure": "time", "unit": "s", "better": "less",
+        "seeds": list(range(n)), "scores": list(scores), "success": [True] * n, "returns": [0.0] * n,
+        "decisions": [1] * n,
+    }  # fmt: skip
+    return Entry(**facts | more)
+
+
+# Episodes
+
+
+def test_tasks_are_the_registered_ids_of_this_package(tasks):
+    assert {SWIM, "SeastarSwimTimed-v0", SHORT} <= set(task_ids())
+    assert not any(id.startswith("CartPole") for id in task_ids())
+
+
+def test_an_episode_of_a_batch_is_that_of_one_robot(tasks):
+    swum = swim_episodes(SHORT, scripted("straight"), [3, 4])
+    alone = gym.make(SHORT).unwrapped
+    done = swim("straight", scripted("straight"), alone, max_strokes=30, seed=4)
+    assert swum.decisions[1] == done.strokes and bool(swum.success[1]) == done.finished
+    assert swum.last("time")[1] == pytest.approx(done.time[-1])
+    assert SECONDS.of(swum)[1] == (done.time[-1] if done.finished else 30.0)
+
+
+def test_returns_are_sums_of_rewards(tasks):
+    swum = swim_episodes(SHORT, scripted("4+,1-"), [7])
+    env, total = gym.make(SHORT), 0.0
+    env.reset(seed=7)
+    for _ in range(swum.decisions[0]):
+        total += env.step(np.array([2, 0, 0, 1, 0]))[1]
+    assert swum.returns[0] == pytest.approx(total)
+
+
+def test_who_does_not_arrive_has_the_time_limit_whatever_ended_the_episode(tasks):
+    swum = swim_episodes(SHORT, scripted("rest"), [0, 1], max_decisions=4)
+    np.testing.assert_array_equal(SECONDS.of(swum), [4.0, 4.0])
+    np.testing.assert_array_equal(swum.decisions, 4)
+    assert not swum.success.any()
+
+
+def test_a_task_of_another_measure_without_a_batch_is_swum_on_its_held_out_split(tasks, monkeypatch):
+    monkeypatch.setattr("seastar_gym.evaluation.tasks.task_ids", lambda: [OTHER])
+    env = DriftEnv("test", fidelity="fast")
+    assert measure_of(env) is MEASURES["station"] and measure_of(SeastarSwimEnv()) is SECONDS
+    swum = swim_episodes(OTHER, scripted("rest"), [0, 1])
+    side = np.hypot(*env.reset(seed=0)[0][182:184]) * 100.0
+    np.testing.assert_allclose(MEASURES["station"].of(swum), side, rtol=1e-3)
+
+
+def test_an_agent_that_cannot_see_is_refused_before_the_first_decision():
+    env = SeastarSwimEnv(decision_period=0.5, observe_actuators=False)
+    greedy = GreedyPolicy.__new__(GreedyPolicy)
+    greedy.actions, greedy.decision_period = "joint", 0.5
+    with assert_refused("It reads observations of 196 numbers, the task shows 186."):
+        require_seen(greedy, env)
+    with assert_refused("The policy decides every 1 s, the environment every 2 s"):
+        require_seen(load(), SeastarSwimEnv(decision_period=2.0, scene=Scene()))
+
+
+def test_agents_are_made_for_the_environment_they_swim_in():
+    env = SeastarSwimEnv(decision_period=0.5, fidelity="fast")
+    assert load_agent("learned", env).decision_period == 0.5
+    assert load_agent("learned", SeastarSwimEnv()).decision_period == 1.0
+    assert load_agent("greedy", env).scene == env.scene
+
+
+# Results
+
+
+def test_relative_scores_are_one_for_the_best():
+    assert relative(entry(), 2.0).tolist() == [1.0, 1.0, 0.5, 0.5]
+    assert relative(entry(better="more"), 4.0).tolist() == [0.5, 0.5, 1.0, 1.0]
+    assert relative(entry(scores=(0.0, 1.0)), 1.0).tolist() == [MOST, 1.0]
+    assert relative(entry(scores=(0.0, 1.0), better="more"), 0.0).tolist() == [1.0, MOST]
+    fast, slow = entry(scores=(1.0, 1.0)), entry("b", (3.0, 3.0))
+    assert best_means([slow, fast]) == {SWIM: 1.0}
+    assert best_means([replace(one, better="more") for one in (slow, fast)]) == {SWIM: 3.0}
+
+
+def test_results_come_back_from_their_file_and_the_later_of_two_counts(tmp_path):
+    write([entry(), entry("b")], tmp_path / "results.json")
+    found = read(tmp_path / "results.json")
+    assert found == [entry(), entry("b")] and found[0].version == __version__
+    later = merged(found, [entry(scores=(9.0,)), entry("c")])
+    assert [one.agent for one in later] == ["a", "b", "c"] and later[0].scores == [9.0]
+    with assert_refused("is measured by luck and by time"):
+        merged(found, [entry("d", measure="luck")])
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{}", '{"format": 2, "entries": []}', '{"format": 1, "entries": [{"task": "x"}]}']
+)
+def test_other_files_are_refused(tmp_path, text):
+    (tmp_path / "results.json").write_text(text)
+    with assert_refused("is no result of a benchmark"):
+        read(tmp_path / "results.json")
+
+
+@pytest.mark.parametrize("wrong", [{"success": [True]}, {"scores": [np.nan] * 4}, {"better": "other"}, {"seeds": []}])
+def test_entries_that_are_not_whole_are_refused(wrong):
+    with pytest.raises(ValueError, match="of a on"):
+        entry(**wrong)
+
+
+def test_only_tasks_that_all_agents_swam_are_added_up():
+    entries = [entry(), entry("b", (4.0, 4.0)), entry(task="other"), entry(task="third"), entry("b", task="third")]
+    tasks, scores = page.common(entries)
+    assert tasks == [SWIM, "third"] and scores["a"].shape == scores["b"].shape == (2, 2)
+    assert page.common([entry(), entry("b", task="other")]) == ([], {})
+
+
+# The command
+
+
+def test_the_command_measures_merges_and_writes_a_page(tasks, tmp_path, capsys):
+    out = tmp_path / "one"
+    first = ["--agents", "straight", "greedy", "--tasks", SHORT, "--seeds", "4", "--out", str(out)]
+    assert main([*first, "--decisions", "12"]) == 0
+    assert {file.name for file in out.iterdir()} == {"results.json", "benchmark.md", "profiles.png"}
+    printed = capsys.readouterr().out
+    assert "| SeastarShort-v0 | time until done [s], less is better |" in printed
+    written = (out / "benchmark.md").read_text()
+    assert "over 4 seeds" in written and "profiles.png" in written and f"--tasks {SHORT}" in written
+    facts = json.loads((out / "results.json").read_text())["entries"]
+    assert [one["agent"] for one in facts] == ["straight", "greedy"] and facts[0]["seeds"] == [1000, 1001, 1002, 1003]
+
+    both = tmp_path / "both"
+    family = "pair=straight,4+,1-,rest".replace("4+,1-", "lagged-no")  # a policy that is not there
+    arguments = ["--tasks", SHORT, "--seeds", "2", "--decisions", "3", "--out", str(both)]
+    assert main(["--agents", family, *arguments]) == 2
+    assert "pair does not swim SeastarShort-v0" in capsys.readouterr().err.replace(family, "pair")
+    assert main(["--agents", "two=straight,rest", *arguments, "--merge", str(out / "results.json")]) == 0
+    merged_entries = read(both / "results.json")
+    assert [one.agent for one in merged_entries] == ["straight", "greedy", "two"]
+    assert "2 to 4 seeds" in (both / "benchmark.md").read_text()
+
+
+def test_an_agent_that_does_not_fit_is_left_out_with_a_sentence(tasks, tmp_path, capsys):
+    arguments = ["--agents", "lagged", "rest", "--tasks", SHORT, "--seeds", "1", "--decisions", "2"]
+    assert main([*arguments, "--out", str(tmp_path)]) == 0
+    assert "lagged does not swim SeastarShort-v0: A lagged gait needs two decisions" in capsys.readouterr().err
+    assert [one.agent for one in read(tmp_path / "results.json")] == ["rest"]
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (["--tasks", "CartPole-v1"], "There is no task 'CartPole-v1': choose of SeastarSwim-v0, "),
+        (["--seeds", "0"], "--seeds must be"),
+        (["--agents", "rest", "rest"], "Two agents are called rest: name them with LABEL=AGENT."),
+        (["--agents"], "There is nothing to show"),
+        (["--merge", "nowhere.json", "--agents"], "nowhere.json"),
+    ],
+)
+def test_what_cannot_be_measured_is_said_in_a_sentence(arguments, words, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    printed = capsys.readouterr()
+    assert words in printed.err and printed.err.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_native_batch_is_taken_where_there_is_one(tasks):
+    from seastar_gym.benchmark.episodes import make_batch
+
+    assert isinstance(make_batch(SHORT, 2), SeastarSwimVectorEnv)
+    assert isinstance(make_batch(OTHER, 2, split="test"), gym.vector.SyncVectorEnv)

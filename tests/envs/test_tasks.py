@@ -1,0 +1,534 @@
+"""Every registered task keeps the same promises, and each of them is what its docstring says."""
+
+import copy
+import inspect
+import json
+import pickle
+import re
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+
+import seastar_gym
+from refusals import assert_refused
+from seastar_gym import Miswired, Prey, RewardWeights, Station, SymmetryReduction, VectorSymmetryReduction
+from seastar_gym.envs.observation import layout
+from seastar_gym.envs.reward import pulses_of
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.symmetry import sectors, transform_commands
+from seastar_gym.envs.tasks.course import CHASE, Courses, Pursuit, draw_course
+from seastar_gym.envs.tasks.envs import CHALLENGES, SeastarTaskEnv, SeastarTaskVectorEnv
+from seastar_gym.scene.per_robot import with_numbers
+
+IDS = tuple(seastar_gym.TASKS)
+CONTINUOUS = "SeastarSwimContinuous-v0"
+KINDS = (Miswired, Prey, Station)
+HIDDEN = {
+    "miswired": ["wiring"],
+    "prey": ["course"],
+    "fast-prey": ["course"],
+    "station": ["fluid.current.u_x", "fluid.current.u_y"],
+}
+"""Entries of info that the robot is not told, by challenge."""
+
+
+def made(id: str, **arguments):
+    return gym.make(id, fidelity="fast", **arguments)
+
+
+def swum(env, n: int = 5, **reset) -> list:
+    """Observations, rewards, ends and infos of random actions."""
+    observation, info = env.reset(**{"seed": 3, **reset})
+    env.action_space.seed(4)
+    history = [observation, *info.values()]
+    for _ in range(n):
+        observation, *others, info = env.step(env.action_space.sample())
+        history += [observation, *others, *info.values()]
+    return history
+
+
+def assert_same(ours, theirs):
+    for one, other in zip(ours, theirs, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+# Promises of every id
+
+
+@pytest.mark.parametrize("id", [CONTINUOUS, *IDS])
+def test_a_task_passes_gymnasiums_and_stable_baselines_checkers(id):
+    env = made(id).unwrapped
+    check_env(env, skip_render_check=True)
+    pytest.importorskip("stable_baselines3.common.env_checker").check_env(env, warn=True, skip_render_check=True)
+
+
+@pytest.mark.parametrize("id", IDS)
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+def test_the_batch_has_the_bits_of_single_environments(id, mode):
+    arguments = {"fidelity": "fast", "max_episode_steps": 3}
+    batch = gym.make_vec(id, 3, "vector_entry_point", autoreset_mode=mode, **arguments)
+    singles = gym.make_vec(id, 3, "sync", vector_kwargs={"autoreset_mode": mode}, **arguments)
+    (first, info), (its_first, its_info) = batch.reset(seed=1), singles.reset(seed=1)
+    assert_same([first, *(info[name] for name in its_info)], [its_first, *its_info.values()])
+    singles.action_space.seed(0)
+    for _ in range(8):
+        actions = singles.action_space.sample()
+        *found, info = batch.step(actions)
+        *expected, its_info = singles.step(actions)
+        assert_same(found, expected)
+        for name in its_info:
+            if name not in ("final_obs", "final_info"):
+                np.testing.assert_array_equal(info[name], its_info[name], err_msg=name)
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_an_episode_follows_from_its_split_and_its_number(id):
+    env = made(id, split="test")
+    *_, info = env.reset(seed=0)[1], env.reset(seed=0)[1]
+    chosen = env.reset(seed=5, options={"instance": info["instance"]})[1]
+    assert all(np.array_equal(chosen[name], info[name]) for name in info)
+    other = made(id, split="train").reset(options={"instance": info["instance"]})[1]
+    hidden = HIDDEN[seastar_gym.TASKS[id][0]]
+    drawn = ["distance", *(name for name in hidden if name != "wiring")]
+    assert all(not np.array_equal(other[name], info[name]) for name in drawn)
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_numbers_are_drawn_from_all_of_the_split_and_told(id):
+    batch = gym.make_vec(id, 64, "vector_entry_point", fidelity="fast", split="test")
+    numbers = batch.reset(seed=0)[1]["instance"]
+    assert numbers.min() < 100 and 900 < numbers.max() < 1000
+    training = gym.make_vec(id, 8, "vector_entry_point", fidelity="fast")
+    assert training.reset(seed=0)[1]["instance"].min() >= 1000
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_a_batch_takes_one_number_or_one_for_each_robot(id):
+    batch = gym.make_vec(id, 2, "vector_entry_point", fidelity="fast")
+    one, _ = batch.reset(options={"instance": 7})
+    np.testing.assert_array_equal(one[0], one[1])
+    each, info = batch.reset(options={"instance": np.array([3, 7])})
+    np.testing.assert_array_equal(each[1], one[1])
+    assert info["instance"].tolist() == [3, 7] and not np.array_equal(each[0], each[1])
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_a_task_comes_back_from_its_spec_a_pickle_and_a_copy(id):
+    env = made(id, split="test")
+    spec = EnvSpec.from_json(json.dumps(json.loads(env.spec.to_json()), sort_keys=True))
+    expected = swum(env)
+    for other in (gym.make(spec), pickle.loads(pickle.dumps(env)), copy.deepcopy(env)):
+        assert_same(swum(other), expected)
+
+
+@pytest.mark.parametrize(
+    "task", [Miswired(0.1, RewardWeights(100.0)), Prey(speed=(0.005, 1 / 180), wanted=1), Station(current=(0.0, 1e-3))]
+)
+def test_numbers_of_ones_own_are_in_the_spec(task):
+    env = gym.make(IDS[0], fidelity="fast", task=task)
+    other = gym.make(EnvSpec.from_json(env.spec.to_json()))
+    assert other.unwrapped.challenge == task
+    assert_same(swum(other, 2), swum(env, 2))
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_the_middle_of_an_episode_goes_on_to_the_same_bits_in_a_pickle(id):
+    env = made(id)
+    env.reset(seed=0)
+    env.step(7)
+    twin = pickle.loads(pickle.dumps(env))
+    for action in (3, 0, 12):
+        assert_same(list(env.step(action)[4].values()), list(twin.step(action)[4].values()))
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_observations_share_no_memory_and_no_number_of_theirs_is_constant(id):
+    batch = gym.make_vec(id, 8, "vector_entry_point", fidelity="fast")
+    seen = [batch.reset(seed=0)[0]]
+    batch.action_space.seed(0)
+    seen += [batch.step(batch.action_space.sample())[0] for _ in range(12)]
+    assert not np.shares_memory(seen[-1], seen[-2])
+    assert (np.ptp(np.concatenate(seen), axis=0) > 0.0).all()
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_the_reward_is_the_sum_of_its_terms_in_info(id):
+    env = made(id)
+    names = [name for name in env.reset(seed=0)[1] if name.startswith("reward_")]
+    for action in (3, 9, 14):
+        _, reward, _, _, info = env.step(action)
+        assert [name for name in info if name.startswith("reward_")] == names
+        assert reward == pytest.approx(sum(info[name] for name in names), abs=1e-12)
+        pulses = pulses_of(np.array([info["heating_time"]]), env.unwrapped.command_table[[action]])[0]
+        assert info["reward_effort"] == -0.01 * pulses < 0.0
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_what_is_hidden_is_not_observed(id):
+    """Two robots that differ in what is hidden, and in nothing else, begin with the same observation."""
+    env, (name, *_) = made(id), HIDDEN[seastar_gym.TASKS[id][0]]
+    observation, _ = env.reset(seed=0)
+    task = env.unwrapped._task
+    if name == "wiring":
+        task.wiring *= -1.0
+    elif name == "course":
+        place, velocity = task.prey()
+        mirrored = _course_that_turns_the_other_way(task.courses[0], place[0], velocity[0])
+        task.courses[0] = mirrored
+    else:
+        task.drawn[name] = task.drawn[name] + 0.001
+        task.simulator.set_scene(with_numbers(task.simulator.scene, task.drawn))
+    np.testing.assert_allclose(task.observe()[0], observation, atol=1e-6)
+
+
+def _course_that_turns_the_other_way(course, place, velocity):
+    """A circle through the same place, with the same velocity."""
+    radius, speed = course[3], np.hypot(*velocity)
+    rate = -np.sign(course[7]) * speed / radius
+    outwards = np.sign(rate) * np.array([velocity[1], -velocity[0]]) / speed
+    centre = place - radius * outwards
+    return np.array([*centre, course[2], radius, 0.0, np.arctan2(outwards[1], outwards[0]), 0.0, rate])
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_symmetry_reduction_turns_last_commands_with_the_limbs(id):
+    batch = gym.make_vec(id, 16, "vector_entry_point", fidelity="fast")
+    reduced = VectorSymmetryReduction(gym.make_vec(id, 16, "vector_entry_point", fidelity="fast"))
+    batch.reset(seed=0), reduced.reset(seed=0)
+    inner = reduced.unwrapped
+    for action in (5, 11):
+        actions = np.full(16, action)
+        seen = reduced.step(actions)[0]
+        mirror = reduced._kind.mirror
+        elements = sectors(seen, 5, mirror)
+        assert (elements == 0).all()  # targets lie in sector 0
+        if inner.added_mirror:
+            at = layout(5, 5 * len(mirror))
+            told = seen[:, at.actuators].reshape(16, 5, -1)[..., -1]
+            np.testing.assert_array_equal(
+                told, transform_commands(inner._task.last_commands, reduced._elements).astype(np.float32)
+            )
+            assert (reduced._elements % 2 == 1).any() and told.any()
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_one_robot_can_be_reduced_too(id):
+    env = SymmetryReduction(made(id))
+    observation, _ = env.reset(seed=0)
+    assert observation.shape == env.observation_space.shape and env.step(2)[0].shape == observation.shape
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_the_time_limit_is_that_of_the_table(id):
+    row = re.search(rf"\| `{id}` +\|(.*)\|$", SeastarTaskEnv.__doc__, re.MULTILINE)[1]
+    task, period, actions, limit = (cell.strip().strip("`") for cell in row.split("|"))
+    env, inner = made(id), made(id).unwrapped
+    assert CHALLENGES[task.strip('"')] == inner.challenge and f'"{inner.actions}"' == actions
+    assert inner.decision_period == float(period)
+    assert env.spec.max_episode_steps == round(float(limit) / float(period))
+    assert gym.make_vec(id, 2, "vector_entry_point").max_episode_steps == env.spec.max_episode_steps
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_pictures_show_what_is_hidden(id):
+    pytest.importorskip("pygame")
+    env = made(id, render_mode="rgb_array")
+    env.reset(options={"instance": 1})
+    env.step(3)
+    first = env.render()
+    assert first.shape == (720, 960, 3)
+    task = env.unwrapped._task
+    if "Miswired" in id:
+        task.wiring *= -1.0
+    elif "Prey" in id:
+        task.courses[:, 4] += 0.03
+    else:
+        task.drawn["fluid.current.u_x"] = task.drawn["fluid.current.u_x"] + 0.002
+    assert not np.array_equal(env.render(), first)
+    batch = gym.make_vec(id, 2, "vector_entry_point", fidelity="fast", render_mode="rgb_array")
+    batch.reset(seed=0)
+    assert len(batch.render()) == 2
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        ({"task": "swim"}, "task must be one of 'miswired', 'prey', 'fast-prey', 'station'"),
+        ({"task": 3}, "task must be a challenge"),
+        ({"task": {"kind": "Prey"}}, "a dict with a version"),
+        ({"split": "validation"}, "split must be one of 'train', 'test'"),
+        ({"actions": "all"}, "actions must be one of"),
+        ({"render_mode": "film"}, "render_mode"),
+    ],
+)
+@pytest.mark.parametrize("make", [gym.make, gym.make_vec])
+def test_arguments_that_mean_nothing_are_refused(make, arguments, words):
+    more = {"vectorization_mode": "vector_entry_point"} if make is gym.make_vec else {}
+    if "render_mode" in arguments and make is gym.make:
+        make = SeastarTaskEnv  # Gymnasium itself knows the modes
+        with assert_refused(words):
+            make(**arguments)
+        return
+    with assert_refused("The batch draws" if "render_mode" in arguments else words):
+        make(IDS[0], **more, **arguments)
+
+
+@pytest.mark.parametrize("number", [-1, 1000, 1.0, True, [1, 2, 3], "one"])
+def test_numbers_of_no_episode_are_refused(number):
+    env = made(IDS[0], split="test")
+    with assert_refused("instance must be a whole number from 0 to 999"):
+        env.reset(options={"instance": number})
+    with assert_refused("Unknown reset option"):
+        env.reset(options={"path": "line"})
+
+
+@pytest.mark.parametrize(
+    "make, words",
+    [
+        (lambda: Miswired(1.1), "swap_probability must be at most 1"),
+        (lambda: Prey(speed=(0.0, 1.0)), "Prey.speed must be the smallest and the largest number"),
+        (lambda: Prey(radius=(0.2, 0.1)), "Prey.radius"),
+        (lambda: Prey(wanted=0), "Prey.wanted"),
+        (lambda: Station(current=0.002), "Station.current must be the smallest and the largest"),
+        (lambda: Station(tolerance=0.0), "Station.tolerance"),
+    ],
+)
+def test_numbers_that_mean_nothing_are_refused(make, words):
+    with assert_refused(words):
+        make()
+
+
+def test_prey_that_no_robot_could_meet_are_refused():
+    with assert_refused("a robot could meet none"):
+        draw_course(np.random.default_rng(0), (9.0, 10.0), (0.5, 1.0), 0.1, Pursuit(1e-3, 1e-3))
+
+
+# Contracts
+
+
+def rows(kind: type, title: str) -> list[list[str]]:
+    """Cells of the table of a section of a docstring."""
+    text = re.split(rf"^## {title}$", inspect.getdoc(kind), flags=re.MULTILINE)[1]
+    lines = [line for line in re.split(r"^## ", text, flags=re.MULTILINE)[0].splitlines() if line.startswith("|")]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_info_is_that_of_the_docstrings(id):
+    env = made(id)
+    kind, found = type(env.unwrapped.challenge), env.reset(seed=0)[1]
+    own = {row[0].strip("`"): row[1] for row in rows(kind, "Info")}
+    common = {row[0].strip("`") for row in rows(SeastarSwimEnv, "Info")} - {
+        "error_estimate",
+        "heading",
+        "heading_error",
+        "reward_heading",
+    }
+    measured = {"path_error", "space_error", "time_error", "real_time_factor"}
+    assert {*own} <= {*found} and {*found} <= common | {*own}
+    without = re.search(r"without (.*?);", " ".join(inspect.getdoc(kind).split()))
+    missing = set(re.findall(r"`(\w+)`", without[1])) if without else set()
+    if without and "measured errors" in without[1]:
+        missing |= measured & common
+    assert common - {*found} == missing
+    for name, type_ in own.items():
+        assert type_.startswith({np.ndarray: "array", int: "int", float: "float"}[type(found[name])]), name
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_rewards_are_those_of_the_table(kind):
+    env = SeastarTaskEnv(task=kind(), fidelity="fast")
+    named = {row[0].strip("`") for row in rows(kind, "Reward") if row[0]}
+    assert named == {name for name in env.reset(seed=0)[1] if name.startswith("reward_")}
+
+
+@pytest.mark.parametrize("kind", [Miswired, Station])
+@pytest.mark.parametrize("column, period", [(0, 1.0), (1, 0.5)])
+def test_the_observation_is_that_of_the_table(kind, column, period):
+    env = SeastarTaskEnv(task=kind(), fidelity="fast", decision_period=period)
+    at = layout(5, 5 * (1 if period == 1.0 else 3))
+    documented = [tuple(map(int, row[column].split(".."))) for row in rows(kind, "Observation") if row[column]]
+    places = at.stations_and_hub, at.actuators, at.waypoints
+    assert documented == [(place.start, place.stop - 1) for place in places]
+    assert env.observation_space.shape == (at.size,)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_arguments_are_those_of_the_docstring(kind):
+    text = re.split(r"^## Arguments$", inspect.getdoc(kind), flags=re.MULTILINE)[1]
+    named = [name for line in re.findall(r"^([\w, ]+): ", text, flags=re.MULTILINE) for name in line.split(", ")]
+    assert named == list(inspect.signature(kind).parameters)
+
+
+def test_arguments_of_the_environments_are_those_of_their_docstrings():
+    def named(text):
+        return [name for line in re.findall(r"^([\w, ]+): ", text, flags=re.MULTILINE) for name in line.split(", ")]
+
+    of_one = inspect.getdoc(SeastarTaskEnv).split("## Arguments")[1]
+    assert named(of_one) == list(inspect.signature(SeastarTaskEnv).parameters)
+    of_batch = named(inspect.getdoc(SeastarTaskVectorEnv).split("## Arguments")[1])
+    assert {*named(of_one), *of_batch} - {"frames_per_stroke"} == set(
+        inspect.signature(SeastarTaskVectorEnv).parameters
+    )
+
+
+# Miswired
+
+
+@pytest.mark.parametrize("period", [1.0, 0.5])
+def test_a_miswired_limb_does_the_opposite_and_tells_of_wires_by_the_names_of_commands(period):
+    env = SeastarTaskEnv(task="miswired", fidelity="fast", actions="continuous", decision_period=period)
+    env.reset(options={"instance": 4})
+    wiring, plain = env._task.wiring[0].copy(), copy.deepcopy(env)
+    assert set(wiring) == {-1.0, 1.0}
+    plain._task.wiring[:] = 1.0
+    wires = slice(182, 192) if period < 1.0 else slice(182, 182)
+    for command in np.array([[1, -1, 0, 0.5, 0], [-1, 0, 1, 0, 1], [0, 0, 0, 0, 0]], np.float32):
+        ours, *_, info = env.step(command)
+        theirs, *_, its_info = plain.step((command * wiring).astype(np.float32))
+        np.testing.assert_array_equal(info["hub_position"], its_info["hub_position"])
+        np.testing.assert_array_equal(env.simulator.positions, plain.simulator.positions)
+        by_limb = (slice(182, -4), (5, -1))
+        seen, told = (one[by_limb[0]].reshape(by_limb[1]) for one in (ours, theirs))
+        np.testing.assert_array_equal(seen[:, -1], command)
+        expected = np.where(wiring[:, None] < 0, told[:, :-1][:, ::-1], told[:, :-1])
+        np.testing.assert_array_equal(seen[:, :-1], expected)
+    assert wires.stop - wires.start == 5 * (seen.shape[1] - 1)
+
+
+def test_wires_are_swapped_as_often_as_asked():
+    batch = SeastarTaskVectorEnv(400, task=Miswired(0.2), fidelity="fast")
+    share = (batch.reset(seed=0)[1]["wiring"] < 0.0).mean()
+    assert abs(share - 0.2) < 0.04
+    assert (SeastarTaskVectorEnv(9, task=Miswired(0.0), fidelity="fast").reset(seed=0)[1]["wiring"] == 1.0).all()
+
+
+# Station
+
+
+def test_a_resting_robot_is_carried_by_the_current():
+    env = SeastarTaskEnv(task="station", fidelity="fast", actions="joint")
+    _, first = env.reset(seed=1)
+    flow = np.array([first["fluid.current.u_x"], first["fluid.current.u_y"]])
+    assert 0.001 <= np.hypot(*flow) <= 0.0025
+    for _ in range(30):
+        *_, info = env.step(0)
+    later = info["hub_position"]
+    for _ in range(10):
+        *_, info = env.step(0)
+    drift = (info["hub_position"] - later) / 10.0  # drag is quadratic: the last tenth of the speed takes long
+    assert 0.9 < drift @ flow / (flow @ flow) < 1.0 and abs(drift[0] * flow[1] - drift[1] * flow[0]) < 1e-9
+
+
+def test_the_station_is_near_and_rewards_count_its_distance():
+    task = Station(distance=(0.01, 0.03))
+    env = SeastarTaskEnv(task=task, fidelity="fast", actions="joint")
+    _, before = env.reset(seed=2)
+    assert 0.01 <= before["distance"] <= 0.03
+    *_, info = env.step(17)
+    assert info["distance"] == pytest.approx(np.hypot(*(info["hub_position"] - info["station"])), abs=1e-15)
+    assert info["reward_progress"] == pytest.approx(200.0 * (before["distance"] - info["distance"]))
+    assert info["reward_distance"] == pytest.approx(-100.0 * min(info["distance"], 0.02))
+    assert info["is_success"] == (info["distance"] <= 0.002)
+
+
+def test_a_robot_knows_still_water_only():
+    env = SeastarTaskEnv(task="station", fidelity="fast", actions="joint")
+    assert env.scene.fluid.current is None and env.simulator.scene.fluid.current is not None
+
+
+# Prey
+
+
+def test_the_velocity_of_a_prey_is_the_derivative_of_its_place():
+    rng = np.random.default_rng(0)
+    courses = np.array([draw_course(rng, (0.1, 0.2), (0.006, 0.008), 0.2, Pursuit(0.004, 0.02)) for _ in range(5)])
+    h, time = 1e-4, np.full(5, 12.3)
+    slope = (Courses(courses).place(time + h) - Courses(courses).place(time - h)) / (2.0 * h)
+    np.testing.assert_allclose(Courses(courses).velocity(time), slope, rtol=1e-6, atol=1e-9)
+    speeds = np.array([np.hypot(*Courses(courses).velocity(t * np.ones(5)).T) for t in np.linspace(0.0, 400.0, 4001)])
+    assert (speeds > 0.0035).all() and (np.sqrt((speeds**2).mean(axis=0)) < 0.0085).all()
+
+
+def test_a_course_comes_back():
+    course = draw_course(np.random.default_rng(3), (0.1, 0.2), (0.006, 0.008), 0.2, Pursuit(0.004, 0.02))
+    around = Courses(course).once_round()
+    np.testing.assert_allclose(around[0], around[-1], atol=1e-12)
+    assert np.hypot(*around[0]) >= 0.08
+
+
+def test_every_prey_that_is_drawn_can_be_met_and_most_only_ahead_of_it():
+    rng, pursuit, straight = np.random.default_rng(1), Pursuit(0.004, 0.02), 0
+    for _ in range(40):
+        course = draw_course(rng, (0.12, 0.2), (0.006, 0.008), 0.2, pursuit)
+        places = Courses(course).place(CHASE)
+        found = pursuit.meeting_time(np.zeros(2), places, CHASE)
+        assert 0.0 < found < 100.0
+        there = Courses(course).place(found)
+        assert abs(np.hypot(*there) - 0.02 - 0.004 * found) < 2e-4  # linear between whole seconds
+        straight += bool(np.hypot(*(there - places[0])) < 0.02)
+    assert straight < 4
+
+
+def test_a_pursuer_meets_a_prey_that_rests_at_its_distance():
+    rests = np.tile([0.1, 0.0], (101, 1))
+    assert Pursuit(0.004, 0.02).meeting_time(np.zeros(2), rests, CHASE) == pytest.approx(0.08 / 0.004)
+    assert Pursuit(0.0005, 0.02).meeting_time(np.zeros(2), rests, CHASE) == np.inf
+    assert Pursuit(0.004, 0.11).meeting_time(np.zeros(2), rests, CHASE) == 0.0
+
+
+def test_a_prey_within_reach_is_caught_and_the_next_one_begins_around_the_robot():
+    env = SeastarTaskEnv(task=Prey(wanted=2), fidelity="fast")
+    env.reset(seed=0)
+    task, hub = env._task, env.simulator.hub_position()[0]
+    for catches in (1, 2):
+        task.courses[0] = [*hub, task.simulator.time[0], 1e-3, 0.0, 0.0, 0.0, 0.1]
+        _, _, over, _, info = env.step(0)
+        assert info["catches"] == catches and info["reward_catch"] == 10.0 and not over
+        assert info["is_success"] == (catches == 2)
+        np.testing.assert_array_equal(info["course"][:2], task._drawn_courses[0, catches, :2] + info["hub_position"])
+        assert info["course"][2] == info["time"] and info["distance"] >= 0.08
+    *_, info = env.step(0)
+    assert info["catches"] == 2 and info["reward_catch"] == 0.0
+
+
+def test_progress_counts_against_the_prey_that_was_hunted():
+    env = SeastarTaskEnv(task="prey", fidelity="fast")
+    _, before = env.reset(seed=0)
+    *_, info = env.step(6)
+    assert info["reward_progress"] == pytest.approx(50.0 * (before["distance"] - info["distance"]))
+
+
+def test_the_second_target_tells_the_velocity():
+    env = SeastarTaskEnv(task="prey", fidelity="fast")
+    observation, _ = env.reset(seed=0)
+    ahead = 0.1 * (observation[-2:] - observation[-4:-2]) / 10.0
+    assert np.hypot(*ahead) == pytest.approx(np.hypot(*env._task.prey()[1][0]), rel=1e-5)
+
+
+# Continuous commands
+
+
+def test_continuous_commands_are_shares_of_whole_ones():
+    env, whole = made(CONTINUOUS), gym.make("SeastarSwim-v0", fidelity="fast", actions="joint")
+    assert env.action_space == gym.spaces.Box(-1.0, 1.0, (5,), np.float32)
+    env.reset(seed=0), whole.reset(seed=0)
+    np.testing.assert_array_equal(
+        env.step(whole.unwrapped.command_table[100].astype(np.float32))[0], whole.step(100)[0]
+    )
+    less, full = (made(CONTINUOUS).unwrapped for _ in range(2))
+    less.reset(seed=0), full.reset(seed=0)
+    command = np.array([0, 1, 0, 0, -1], np.float32)
+    short, far = less.step(0.5 * command)[4]["hub_position"], full.step(command)[4]["hub_position"]
+    assert 0.0 < short[0] < far[0]
+    assert less.action_masks().shape == (10,) and less.action_masks().all()
+
+
+def test_the_continuous_environment_is_that_of_the_table():
+    env = made(CONTINUOUS)
+    assert f"| `{CONTINUOUS}` " in SeastarSwimEnv.__doc__ and env.spec.max_episode_steps == 400
+    assert gym.make_vec(CONTINUOUS, 2, fidelity="fast").action_space.shape == (2, 5)

@@ -1,0 +1,236 @@
+"""The study of the tasks: memory is kept right, controllers believe what they should, verdicts follow from numbers."""
+
+import json
+
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+
+from refusals import assert_refused
+from seastar_gym.envs.symmetry import VectorSymmetryReduction, transform_observations
+from seastar_gym.envs.tasks.envs import SeastarTaskVectorEnv
+from seastar_gym.envs.tasks.prey import Prey
+from studies.tasks import study as module
+from studies.tasks.ahead import Ahead, Odometer, Robots, few_commands
+from studies.tasks.controllers import (
+    CONTROLLERS,
+    SINCE,
+    Interceptor,
+    WiringGuess,
+    make_controller,
+    on_a_circle,
+    on_its_course,
+    straight_on,
+)
+from studies.tasks.episodes import Episodes, measure, swim
+from studies.tasks.memory import VectorMemory
+from studies.tasks.page import Row, rows_of, table
+from studies.tasks.study import Options, main, study
+
+
+def batch(task, n=6, **arguments):
+    return SeastarTaskVectorEnv(n, 400, task, fidelity="fast", threads=1, **arguments)
+
+
+# Memory
+
+
+@pytest.mark.parametrize("task, period", [("miswired", 1.0), ("station", 0.5), ("prey", 1.0)])
+def test_memory_shows_the_reduced_observation_and_the_past_in_the_same_limbs(task, period):
+    def new():
+        return batch(task, actions="joint", decision_period=period)
+
+    memory, reduced = VectorMemory(new(), 2), VectorSymmetryReduction(new())
+    (shown, _), (ours, _) = memory.reset(seed=1), reduced.reset(seed=1)
+    assert shown.shape == memory.observation_space.shape
+    rng, size = np.random.default_rng(0), ours.shape[1]
+    for _ in range(4):
+        np.testing.assert_array_equal(shown[:, :size], ours)
+        before, actions = memory._latest, rng.integers(0, 243, 6)
+        shown, ours = memory.step(actions)[0], reduced.step(actions)[0]
+        carried = transform_observations(before, memory._elements, 5, memory._mirror)
+        np.testing.assert_array_equal(shown[:, size:].reshape(6, 2, -1)[:, 0], carried[:, memory._told])
+
+
+def test_memory_ends_with_the_episode_and_the_last_observation_still_has_it():
+    inner = SeastarTaskVectorEnv(2, 2, "prey", fidelity="fast", threads=1, autoreset_mode=AutoresetMode.SAME_STEP)
+    memory = VectorMemory(inner, 3)
+    memory.reset(seed=0)
+    memory.step(np.array([3, 4]))
+    shown, _, _, truncated, info = memory.step(np.array([5, 6]))
+    assert truncated.all() and info["final_obs"][0].shape == shown[0].shape
+    now = shown[:, :186][:, memory._told]
+    np.testing.assert_array_equal(shown[:, 186:].reshape(2, 3, -1), np.repeat(now[:, None], 3, axis=1))
+    last = info["final_obs"][1]
+    assert not np.array_equal(last[186:].reshape(3, -1)[0], last[:186][memory._told])
+
+
+# Controllers
+
+
+@pytest.mark.parametrize("id", ["SeastarMiswired-v0", "SeastarPreyTimed-v0", "SeastarStation-v0"])
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_every_controller_swims_every_kind_of_task(id, name, monkeypatch):
+    monkeypatch.setattr("studies.tasks.episodes.SETTLED", 0.0)
+    robots = []
+
+    def make(env):
+        env.unwrapped.max_episode_steps = 3
+        robots.append(env.unwrapped)
+        return make_controller(name, env)
+
+    done = swim(id, make, 2, "fast", 1)
+    assert done.time.shape == (3, 2) and np.isfinite(done.returns).all()
+    assert np.isfinite(measure(module.IDS[id], done)).all()
+    assert robots[0]._task.instance.tolist() == [0, 1] and robots[0]._task.split == "test"
+
+
+def test_the_wiring_is_found_by_what_limbs_do():
+    env = batch("miswired", actions="joint")
+    agent = WiringGuess(Robots(env))
+    observations, info = env.reset(seed=0)
+    heated = np.zeros((6, 5))
+    for _ in range(30):
+        actions = agent.act(observations, info)
+        heated += np.abs(env.command_table[actions])
+        observations, *_, info = env.step(actions)
+    believed = agent._wirings[np.argmin(agent._surprise, axis=1)]
+    well_known = heated > 8  # of limbs that were hardly heated nothing is known
+    assert well_known.sum() > 12 and (believed == info["wiring"])[well_known].mean() > 0.9
+
+
+def test_an_odometer_reads_the_way_in_the_body_frame():
+    env = batch("prey", 3)
+    env.reset(seed=0)
+    robots = Robots(env)
+    odometer = Odometer(robots)
+    assert odometer.read() is None
+    heading, before = robots.heading(), env.simulator.hub_position()
+    env.step(np.array([1, 5, 9]))
+    way, turn = odometer.read()
+    world = env.simulator.hub_position() - before
+    assert np.hypot(*way.T) == pytest.approx(np.hypot(*world.T))
+    along = np.cos(heading) * way[:, 0] - np.sin(heading) * way[:, 1]
+    np.testing.assert_allclose(along, world[:, 0], atol=1e-12)
+    np.testing.assert_allclose(np.sin(turn), np.sin(robots.heading() - heading), atol=1e-12)
+
+
+def test_the_prey_is_foreseen_as_well_as_each_can():
+    env = batch(Prey(epicycle=0.0), 3)
+    observations, info = env.reset(seed=0)
+    agents = {kind: Interceptor(Robots(env), kind) for kind in (straight_on, on_a_circle, on_its_course)}
+    on_a_circle(agents[on_a_circle], observations, info)
+    observations, *_, info = env.step(np.zeros(3, int))
+    found = {kind: kind(agent, observations, info) for kind, agent in agents.items()}
+    assert found[on_its_course].shape == (3, len(SINCE), 2)
+    np.testing.assert_allclose(found[on_a_circle], found[on_its_course], atol=1e-5)
+    error = np.abs(found[straight_on] - found[on_its_course]).max(axis=2)
+    assert (error[:, 0] < 5e-4).all() and (error[:, 60] > 0.02).all()
+
+
+def test_what_is_simulated_ahead_is_what_happens():
+    env = batch("prey", 4)
+    observations, _ = env.reset(seed=2)
+    robots = Robots(env)
+    ahead = Ahead(robots, robots.table)
+    seen = []
+    best = ahead.best(robots.states(observations), lambda hub, _: seen.append(hub) or hub[..., 0])
+    odometer = Odometer(robots)
+    odometer.read()
+    env.step(best)
+    way, _ = odometer.read()
+    np.testing.assert_allclose(seen[0][np.arange(4), best], way, atol=1e-6)
+    assert (best == np.argmin(seen[0][..., 0], axis=1)).all()
+
+
+def test_two_decisions_ahead_are_no_worse_than_one():
+    env = batch("prey", 2)
+    observations, _ = env.reset(seed=2)
+    robots = Robots(env)
+    costs = {}
+    for depth in (1, 2):
+        reached = []
+        Ahead(robots, robots.table, depth, beam=21).best(
+            robots.states(observations), lambda hub, k, to=reached: to.append(hub[..., 0]) or hub[..., 0] * (k == 2)
+        )
+        costs[depth] = reached[-1].min(axis=1)
+    assert (costs[2] < costs[1]).all()
+
+
+def test_few_commands_heat_two_limbs_at_most():
+    commands = few_commands(5)
+    assert commands.shape == (51, 5) and np.count_nonzero(commands, axis=1).max() == 2
+    assert len(np.unique(commands, axis=0)) == 51
+
+
+# Measures and verdicts
+
+
+def episodes(**changes):
+    time = np.array([[10.0, 10.0], [20.0, np.nan], [40.0, np.nan]])
+    success = np.array([False, True])
+    done = Episodes(time, 0.001 * time, time / 10.0, success, returns=np.zeros(2), limit=400.0)
+    return done._replace(**changes)
+
+
+def test_measures_are_those_of_finished_and_unfinished_episodes():
+    assert measure("miswired", episodes()).tolist() == [400.0, 10.0]
+    assert measure("prey", episodes()).tolist() == [4.0, 1.0]
+    assert measure("station", episodes(distance=0.001 * np.array([[9.0, 1], [8, 1], [2, 3]]), time=np.array(
+        [[10.0, 10], [20, 20], [40, 40]]))).tolist() == pytest.approx([2.0, 3.0])  # fmt: skip
+
+
+def row(challenge, **means):
+    return Row("id", challenge, {name.replace("_", ", "): [np.full(4, mean)] for name, mean in means.items()})
+
+
+def test_a_task_is_kept_where_ppo_leaves_a_third_of_what_the_bound_gains_over_greedy():
+    kept = row("miswired", greedy=400.0, informed=200.0, PPO=300.0)
+    assert kept.is_kept and kept.headroom == 0.5 and kept.left == 0.5
+    assert not row("miswired", greedy=400.0, informed=200.0, PPO=260.0).is_kept
+    assert not row("miswired", greedy=200.0, informed=170.0, PPO=200.0).is_kept
+    assert row("prey", greedy=0.0, informed=5.0, PPO=1.0).is_kept
+    assert row("prey", greedy=1.0, informed=5.0, PPO=3.0).left == 0.5
+
+
+def test_no_bound_is_below_a_learner():
+    found = row("prey", greedy=1.0, informed=2.0, PPO=1.5, PPO_memory=4.0)
+    assert found.bound == "PPO, memory" and found.left == pytest.approx(2.5 / 3.0)
+
+
+def test_a_table_has_every_agent_and_the_verdict():
+    text = table(row("miswired", greedy=400.0, informed=200.0, PPO=300.0))
+    assert "| greedy | 400 | 400 to 400 |" in text
+    assert text.endswith("Bound: informed, 50 % better than greedy. Gap left by PPO: 50 %. By this, kept.")
+
+
+def test_the_study_goes_on_where_it_was_broken_off(tmp_path, monkeypatch):
+    swum = []
+
+    def cell(id, agent, seed, options):
+        swum.append((id, agent, seed))
+        return {"measure": [float(len(swum))], "return": [0.0], "success": [True], "processor_seconds": 0}
+
+    monkeypatch.setattr(module, "cell", cell)
+    some = Options(ids=("SeastarPrey-v0",), agents=("rest", "greedy", "PPO"), seeds=(0,), out=tmp_path / "tasks.json")
+    study(some)
+    assert [agent for _, agent, _ in swum] == ["rest", "greedy", "PPO"]
+    arguments = ["--ids", "SeastarPrey-v0", "--agents", "greedy", "PPO", "--seeds", "0", "1", "--out", str(some.out)]
+    assert main(arguments) == 0
+    assert swum[3:] == [("SeastarPrey-v0", "PPO", 1)]  # who does not learn swims once
+    cells = json.loads(some.out.read_text())["cells"]
+    assert list(cells) == [f"SeastarPrey-v0, {name}" for name in ("rest, 0", "greedy, 0", "PPO, 0", "PPO, 1")]
+    page = some.out.with_suffix(".md").read_text()
+    assert "## SeastarPrey-v0" in page and some.out.with_suffix(".png").is_file()
+    (found,) = rows_of(json.loads(some.out.read_text()), module.IDS)
+    assert [values.tolist() for values in found.agents["PPO"]] == [[3.0], [4.0]]
+
+
+def test_other_settings_and_unknown_names_are_refused(tmp_path, capsys):
+    out = tmp_path / "tasks.json"
+    out.write_text(json.dumps({"settings": {"decisions": 1}, "cells": {}}))
+    assert main(["--out", str(out)]) == 2 and "has results of" in capsys.readouterr().err
+    with assert_refused("Unknown agent 'nobody'"):
+        Options(agents=("nobody",))
+    with assert_refused("Unknown task 'SeastarSwim-v0'"):
+        Options(ids=("SeastarSwim-v0",))
