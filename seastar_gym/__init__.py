@@ -17,8 +17,8 @@ from seastar_gym.scene.actuators.measured import MeasuredCurve
 from seastar_gym.scene.actuators.sma_limb import SmaLimb
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.actuators.wires import SmaWires
-from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.body import Attachment, Body
+from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
 from seastar_gym.scene.limb import Limb

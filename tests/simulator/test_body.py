@@ -10,9 +10,9 @@ from seastar_gym import Attachment, Body, Numerics, Scene, Seastar, Simulator, S
 from seastar_gym.simulator.body_frame import root_places
 
 MIDPOINT = Numerics("implicit-midpoint", 1e-3, newton_tolerance=1e-10)
-SPECK = {"n_limbs": 1, "nodes_per_limb": 2, "limb_length": 1e-3, "rod_radius": 1e-4, "density": 1.0}
-"""A limb without weight, for bodies by themselves."""
-AT_HUB = (Attachment(0.0, 0.0, 0.0),)
+SPECK = {"n_limbs": 2, "nodes_per_limb": 2, "limb_length": 1e-3, "rod_radius": 1e-4, "density": 1.0}
+"""Limbs without weight, for bodies by themselves."""
+AT_HUB = (Attachment(0.0, 0.0, 0.0), Attachment(0.0, 0.0, math.pi))
 FRAME = tuple(Attachment(x, y, math.copysign(1.2, y) if x > 0 else math.copysign(1.9, y))
               for x, y in ((0.03, -0.015), (0.03, 0.015), (-0.03, 0.015), (-0.03, -0.015)))  # fmt: skip
 """Four limbs at the corners of a rectangle, two at each long side."""
@@ -77,7 +77,7 @@ def test_a_free_robot_of_stiff_limbs_turns_and_moves_on_as_a_rigid_one(scheme):
     simulator.advance(0.2, np.zeros((1, 5)))
     p_1, spin_1 = momenta(simulator)
     np.testing.assert_allclose(p_1, p, rtol=1e-9)
-    loss = {"implicit-euler": 1e-3, "sdirk2": 1e-5}.get(scheme, 1e-5)
+    loss = {"implicit-euler": 1e-3, "implicit-midpoint": 1e-5}.get(scheme, 3e-4)
     assert spin_1 == pytest.approx(spin, rel=loss)
     assert simulator.orientation()[0] == pytest.approx(0.4, rel=2e-3)
     np.testing.assert_allclose(simulator.hub_position()[0], [0.02, -0.01], rtol=1e-9)
@@ -97,7 +97,7 @@ def test_a_robot_with_a_lopsided_body_turns_about_its_centre_of_mass():
         body = Body(radius=0.02, mass=0.01, centre_of_mass=(0.01, 0.0), attachments=AT_HUB)
         simulator = alone(body, None, Numerics("implicit-midpoint", h, 1e-11))
         set_moving(simulator, (0.0, 0.0), 5.0)
-        simulator.advance(0.4, [[0.0]])
+        simulator.advance(0.4, [[0.0, 0.0]])
         # Centre at (0.01, 0) with the velocity (0, 0.05).
         exact = np.array([0.01, 0.02]) - 0.01 * np.array([math.cos(2.0), math.sin(2.0)])
         errors.append(np.abs(simulator.hub_position()[0] - exact).max())
@@ -122,7 +122,7 @@ def test_a_body_held_at_its_hub_swings_with_the_period_of_a_pendulum():
         simulator = alone(body, None, numerics, held_nodes=(0,), gravity=(0.0, -9.81))
         simulator.reset(heading=swing - 0.5 * math.pi)
         energy = -mass * 9.81 * away * math.cos(swing)
-        simulator.advance(0.25 * period, [[0.0]])
+        simulator.advance(0.25 * period, [[0.0, 0.0]])
         hanging = simulator.orientation()[0] + 0.5 * math.pi
         now = simulator.kinetic_energy()[0] - mass * 9.81 * away * math.cos(hanging)
         assert now == pytest.approx(energy, abs=1e-3 * mass * 9.81 * away)
@@ -135,11 +135,11 @@ def test_a_heavy_body_sinks_with_the_terminal_speed_of_its_side(heading):
     body = Body.rectangle(0.06, 0.02, mass=0.03, drag_along=0.7, drag_across=1.9, attachments=AT_HUB)
     simulator = alone(body, Water(), Numerics("sdirk2", 0.01), gravity=(0.0, -9.81))
     simulator.reset(heading=heading)
-    simulator.advance(5.0, [[0.0]])
+    simulator.advance(5.0, [[0.0, 0.0]])
     area, C = (0.06, 1.9) if heading == 0.0 else (0.02, 0.7)
-    weight = (0.03 - 1000.0 * 0.06 * 0.02 * 0.01 - 999.0 * math.pi * 1e-4**2 * 1e-3) * 9.81
-    limb = 1e-3 * 2e-4 if heading == 0.0 else 1e-3 * 2e-4  # drag of limbs is alike in all directions
-    speed = math.sqrt(weight / (0.5 * 1000.0 * (C * area * 0.01 + limb)))
+    weight = (0.03 - 1000.0 * 0.06 * 0.02 * 0.01 - 2.0 * 999.0 * math.pi * 1e-4**2 * 1e-3) * 9.81
+    limbs = 2.0 * 1e-3 * 2e-4  # their drag is alike in all directions
+    speed = math.sqrt(weight / (0.5 * 1000.0 * (C * area * 0.01 + limbs)))
     np.testing.assert_allclose(simulator.velocities[0, 0], [0.0, -speed], rtol=1e-6, atol=1e-9)
     assert simulator.orientation()[0] == pytest.approx(heading, abs=1e-6)
 
@@ -149,7 +149,7 @@ def test_a_turning_plate_slows_down_as_strips_of_it_say():
     body = Body.rectangle(0.06, 0.01, mass=0.01, attachments=AT_HUB)
     simulator = alone(body, Water())
     set_moving(simulator, (0.0, 0.0), 8.0)
-    simulator.advance(0.5, [[0.0]])
+    simulator.advance(0.5, [[0.0, 0.0]])
     k = 0.5 * 1000.0 * 0.01 * (0.06**4 + 0.01**4) / 32.0
     inertia = 0.01 * (0.06**2 + 0.01**2) / 12.0
     assert simulator.spin()[0] == pytest.approx(8.0 / (1.0 + k * 8.0 * 0.5 / inertia), rel=0.01)
@@ -158,7 +158,8 @@ def test_a_turning_plate_slows_down_as_strips_of_it_say():
 def test_an_ellipse_in_an_ideal_fluid_keeps_impulse_and_energy():
     """Kirchhoff's equations: the mass of the fluid turns with the body."""
     body = Body.rectangle(0.08, 0.02, mass=0.01, attachments=AT_HUB)
-    simulator = alone(body, Water(drag_coefficient=0.0, added_mass_coefficient=1.0))
+    numerics = Numerics("sdirk2", 1e-3, 1e-10)  # without ringing of the limbs, which spoils first guesses
+    simulator = alone(body, Water(drag_coefficient=0.0, added_mass_coefficient=1.0), numerics)
     set_moving(simulator, (0.05, 0.02), 1.0)
     rods = simulator.coefficients.rods(0)
     own = np.diag(rods.mass[0] + rods.body.added_mass[[0, 2]])
@@ -171,7 +172,7 @@ def test_an_ellipse_in_an_ideal_fluid_keeps_impulse_and_energy():
         return np.array([*impulse, spin, v @ impulse + rods.body.inertia[0] * omega**2])
 
     before = kept()
-    simulator.advance(1.0, [[0.0]])
+    simulator.advance(1.0, [[0.0, 0.0]])
     assert abs(simulator.orientation()[0]) > 0.3
     np.testing.assert_allclose(kept(), before, rtol=2e-4)
 
@@ -205,7 +206,7 @@ def test_a_turned_robot_swims_the_turned_path():
 
 
 def test_a_state_with_orientation_continues_to_the_same_bits():
-    simulator, other = Simulator(Scene(FOUR_LIMBS, numerics=MIDPOINT), 3), Simulator(Scene(FOUR_LIMBS, numerics=MIDPOINT), 3)
+    simulator, other = (Simulator(Scene(FOUR_LIMBS, numerics=MIDPOINT), 3) for _ in range(2))
     simulator.reset(heading=[0.0, 4.0, -2.0])
     simulator.stroke(np.eye(3, 4))
     other.set_state(simulator.get_state())
