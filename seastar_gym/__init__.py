@@ -19,7 +19,6 @@ from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.scene.along import AlongLimb, Stiffening
 from seastar_gym.scene.body import Attachment, Body
-from seastar_gym.scene.body import Attachment, Body
 from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
