@@ -49,7 +49,7 @@ class Options:
     """Fidelity of the trainings, and of the held-out paths."""
     again: tuple[Fidelity, ...] = ("fast", "balanced", "reference")
     """Fidelities at which every policy swims the pentagon."""
-    paths: int = 64
+    paths: int = 24
     """Number of held-out random paths."""
     networks: Path = Path("runs/in_time")
     """Folder of the trained networks."""

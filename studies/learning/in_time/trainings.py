@@ -59,25 +59,24 @@ def _every(
     return Training((("decision_period", period), *changes.items()), decisions, learner, start)
 
 
-def _priced(effort: float, aim: float = RewardWeights().aim) -> dict[str, Any]:
-    return {**COASTING, "discount": 0.8, "reward": RewardWeights(effort=effort, aim=aim)}
+def _priced(effort: float, discount: float = 0.8, aim: float = RewardWeights().aim) -> dict[str, Any]:
+    return {**COASTING, "discount": discount, "reward": RewardWeights(effort=effort, aim=aim)}
 
 
 TRAININGS: dict[str, Training] = {
     "0.5 s": _every(0.5, 150_000),
     "0.5 s, coasting": _every(0.5, 150_000, **COASTING),
-    "0.2 s": _every(0.2),
-    "0.2 s, coasting": _every(0.2, **COASTING),
     "0.5 s, price 0.05": _every(0.5, 150_000, "shares", **_priced(0.05)),
     "0.5 s, price 0.15": _every(0.5, 150_000, "shares", **_priced(0.15)),
-    "0.5 s, price 0.15, nearer": _every(0.5, 300_000, "shares", **_priced(0.15, 0.9)),
-    "0.2 s, price 0.1": _every(0.2, learner="shares", **_priced(0.1)),
-    "0.2 s, price 0.2": _every(0.2, learner="shares", **_priced(0.2)),
+    "0.5 s, price 0.15, nearer": _every(0.5, 300_000, "shares", **_priced(0.15, aim=0.9)),
+    "0.2 s": _every(0.2),
+    "0.2 s, coasting": _every(0.2, **COASTING),
+    "0.2 s, price 0.1": _every(0.2, learner="shares", **_priced(0.1, discount=0.3)),
     "0.2 s, Gaussian": _every(0.2, learner="gaussian", **COASTING),
     "0.2 s, SAC": _every(0.2, 150_000, learner="sac", **COASTING),
     "0.1 s": _every(0.1),
     "0.1 s, coasting": _every(0.1, **COASTING),
-    "0.1 s, after 0.2 s": _every(0.1, start="0.2 s, coasting", learning_rate=5e-4, **COASTING),
+    "0.1 s, after 0.2 s": _every(0.1, 200_000, start="0.2 s, coasting", learning_rate=5e-4, **COASTING),
 }
 """Trainings by name."""
 
