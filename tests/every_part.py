@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from seastar_gym import (
+    Attachment,
+    Body,
     Contact,
     GridCurrent,
     Limb,
@@ -63,5 +65,8 @@ PARTS = {
     "limbs of each robot": {"robot": Seastar(limbs=(Limb(radius=1e-3 * EACH, natural_curvature=EACH),) * 5)},
     "directions": {"robot": Seastar(limbs=tuple(Limb(1.25 * k, youngs_modulus=(1e6, 2e6)) for k in range(5)))},
     "robots": {"robot": Seastar(n_limbs=4, nodes_per_limb=6, density=1000.0 * EACH, relaxation_time=1e-3)},
+    "body": {"robot": Seastar(body=Body(radius=0.02, mass=0.01 * EACH, centre_of_mass=(1e-3, 1 / 3e3)))},
+    "attachments": {"robot": Seastar(2, body=Body.rectangle(0.06, 0.02, attachments=(Attachment(0, 0.01, 0.3),) * 2))},
+    "joints": {"robot": Seastar(limbs=(Limb(joint_stiffness=1e-4 * EACH),) * 5)},
     "numerics": {"numerics": Numerics("implicit-midpoint", 5e-3 / 3, 1e-7 / 3, 30, 0.015)},
 }  # fmt: skip
