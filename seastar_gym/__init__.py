@@ -105,7 +105,7 @@ TASKS: dict[str, tuple[str, Actions, float, float, float]] = {
     "SeastarPrey-v0": ("prey", "pairs", 1.0, 200.0, 80.0),
     "SeastarPreyTimed-v0": ("fast-prey", "pairs", 0.5, 200.0, 130.0),
     "SeastarStation-v0": ("station", "joint", 1.0, 120.0, -20.0),
-    "SeastarStationTimed-v0": ("station", "joint", 0.5, 120.0, -20.0),
+    "SeastarStationTimed-v0": ("station", "joint", 0.5, 120.0, -70.0),
 }
 """Name of the challenge, actions, time between decisions [s], time limit [s] and reward threshold of tasks, by id."""
 
