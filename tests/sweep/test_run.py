@@ -128,6 +128,13 @@ def test_cells_are_taken_as_there_is_room_for_them(sweep):
     outcomes.close()
 
 
+@pytest.mark.parametrize("workers", [1, 2])
+def test_there_are_no_more_processes_than_workers(workers, sweep):
+    cells = list(sweep.cells()) * 3
+    found = {outcome.part for outcome in Processes(workers).run(works.numbered, iter(cells))}
+    assert len(found) <= workers
+
+
 def test_progress_counts_cells_and_strokes(tmp_path, sweep):
     seen = []
     run(sweep.cells(), tmp_path, Here(), lambda tally: seen.append((tally.done, tally.intervals)), works.named)
