@@ -92,7 +92,7 @@ class CoastingProgress(gym.vector.VectorWrapper):
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any], coasting: Coasting, weights: RewardWeights):
         super().__init__(env)
         self.coasting, self.weights = coasting, weights
-        self._gain = np.zeros(env.num_envs)
+        self._gain: Floats = np.zeros(env.num_envs)
 
     def reset(self, **arguments: Any) -> tuple[Any, dict[str, Any]]:
         """Begin episodes."""

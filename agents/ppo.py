@@ -53,7 +53,8 @@ def make_training_env(
         threads=threads,
     )
     if hyperparameters.coasting:
-        coasting = fit_coasting(env.unwrapped.scene, hyperparameters.decision_period, np.random.default_rng(0))
+        batch: Any = env.unwrapped
+        coasting = fit_coasting(batch.scene, hyperparameters.decision_period, np.random.default_rng(0))
         env = CoastingProgress(env, coasting, hyperparameters.reward)
     return BatchVecEnv(VectorSymmetryReduction(env) if hyperparameters.symmetry else env)
 

@@ -33,7 +33,7 @@ class ChosenCommands(gym.vector.VectorWrapper):
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """One decision of every robot."""
-        return self.env.step(self.table[actions])  # type: ignore[no-any-return]
+        return self.env.step(self.table[actions])
 
 
 class SharesPolicy:

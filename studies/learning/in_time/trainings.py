@@ -52,7 +52,9 @@ class Training:
         return replace(COMMON, **dict(self.changes))
 
 
-def _every(period: float, decisions: int = 300_000, learner: Any = "pairs", start: str | None = None, **changes: Any):
+def _every(
+    period: float, decisions: int = 300_000, learner: Any = "pairs", start: str | None = None, **changes: Any
+) -> Training:
     return Training((("decision_period", period), *changes.items()), decisions, learner, start)
 
 
