@@ -51,7 +51,8 @@ def apply_style() -> None:
     import matplotlib
     from cycler import cycler
 
-    matplotlib.rcParams.update(SETTINGS, **{"axes.prop_cycle": cycler(color=CYCLE)})
+    settings: Any = {**SETTINGS, "axes.prop_cycle": cycler(color=CYCLE)}
+    matplotlib.rcParams.update(settings)
 
 
 def new_figure(width: float, height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:

@@ -34,6 +34,15 @@ DONE, TO_COME, CURRENT = range(3)
 """States of a waypoint."""
 STATE_COLOURS: tuple[Colour, Colour, Colour] = ((46, 157, 98), (150, 158, 170), (232, 119, 10))
 
+LEGEND = (
+    ("\u2212 clockwise", HEATED_MINUS),
+    ("+ anti-clockwise", HEATED_PLUS),
+    ("next", STATE_COLOURS[CURRENT]),
+    ("reached", STATE_COLOURS[DONE]),
+    ("way", TRAIL),
+)
+"""Words and colours of the legend from right to left: the heated limbs, the waypoints, the way of the hub."""
+
 LARGEST, SMALLEST = (960, 720), (320, 240)
 """Width and height of a picture [px]: of one robot alone, and the smallest that can be read."""
 VIEW_MARGIN = 1.1
@@ -310,13 +319,13 @@ class Renderer:
         end = self._canvas.write(f"{1000.0 * length:g} mm", (end + 0.5 * gap, middle), INK, (0.0, 0.5))
         if note:
             end = self._canvas.write(note, (end + 1.5 * gap, middle), FAINT_INK, (0.0, 0.5))
-        words = [("+ anti-clockwise", HEATED_PLUS), ("\u2212 clockwise", HEATED_MINUS)]
-        x = width - sum(self._canvas.text_size(text)[0] + 2.9 * gap for text, _ in words)
-        if x < end + gap:
-            return  # a picture too narrow for the legend
-        for text, colour in words:
+        room, x = width - end - gap, float(width)
+        for text, colour in LEGEND:
+            x -= self._canvas.text_size(text)[0] + 2.9 * gap
+            if width - x > room:
+                return  # the picture is too narrow for more of the legend
             self._canvas.stroke(np.array([[x, middle], [x + 1.2 * gap, middle]]), colour, width=0.4 * gap)
-            x = self._canvas.write(text, (x + 1.9 * gap, middle), INK, (0.0, 0.5)) + gap
+            self._canvas.write(text, (x + 1.9 * gap, middle), INK, (0.0, 0.5))
 
     def _scale_bar(self, start: float, end: float, middle: float) -> None:
         tick = 0.3 * self._text_height

@@ -123,7 +123,7 @@ class Seastar:
         if self.body is None:
             return
         if self.discretisation != "continuum":
-            raise ValueError('discretisation="chapter" joins limbs by hinges in one point, so it has no room for a body.')
+            raise ValueError('discretisation="chapter" joins limbs in one point, so it has no room for a body.')
         if len(self.body.attachments) not in (0, self.n_limbs):
             raise ValueError(
                 f"attachments must be one Attachment for each of the {self.n_limbs} limbs, or none, not "

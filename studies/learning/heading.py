@@ -189,7 +189,7 @@ COLOURS = {"strokes": "0.55", "wires": "#3366aa", "planner": "#118855", "learned
 
 def draw(results: dict[str, Any], file: Path) -> None:
     """Time and energy over the demanded turn."""
-    from studies.accuracy.style import DPI, subplots
+    from studies.style import DPI, subplots
 
     figure, panels = subplots(1, 2, figsize=(9.0, 3.8))
     for axes, what, label in zip(panels, ("seconds", "joules"), ("time [s]", "energy [J]"), strict=True):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from seastar_gym.evaluation.many import mean_with_interval
 from seastar_gym.evaluation.pictures import COLOURS, FAINT_INK
 from seastar_gym.files import write_atomically
+from studies.style import new_figure
 
 UNITS = {
     "miswired": "seconds to the last waypoint, 400 if it is not reached",
@@ -110,11 +111,9 @@ def table(row: Row) -> str:
 
 def draw(rows: Sequence[Row], file: Path) -> None:
     """Draw means and intervals of all agents, a panel for every task."""
-    from matplotlib.figure import Figure
-
     columns = min(3, len(rows))
     lines = -(-len(rows) // columns)
-    figure = Figure(figsize=(3.4 * columns, 2.2 * lines + 0.3), layout="constrained")
+    figure = new_figure(3.4 * columns, 2.2 * lines + 0.3)
     panels = figure.subplots(lines, columns, squeeze=False).flat
     for axes, row in zip(panels, rows, strict=False):
         for place, (agent, seeds) in enumerate(row.agents.items()):

@@ -1,8 +1,8 @@
 """Importance weights of samples from a few measured speeds, and predictions of others with intervals.
 
 A measured speed is the simulated one times an error whose logarithm is normal. Its standard deviation has two parts:
-the scatter of single runs, and what a model of this kind is off. Both are set beforehand, see SCATTER and MODEL. A sample
-has the weight of its likelihood; predictions are quantiles of the weighted samples with such an error.
+the scatter of single runs, and what a model of this kind is off. Both are set beforehand, see SCATTER and MODEL. A
+sample has the weight of its likelihood; predictions are quantiles of the weighted samples with such an error.
 """
 
 from dataclasses import dataclass

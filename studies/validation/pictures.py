@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.accuracy.style import DPI, FAINT, INK, subplots
+from studies.style import DPI, FAINT, INK, subplots
 from studies.validation.inference import Prediction
 from studies.validation.speeds import Condition
 
@@ -18,8 +18,6 @@ AUTHORS = 0.19
 
 def draw_speeds(conditions: list[Condition], prediction: Prediction, chosen: list[int], title: str, file: Path) -> None:
     """Scatter plot: measured speed over prediction, 90 % intervals, and speeds that were identified from as rings."""
-    import matplotlib.pyplot as plt
-
     figure, axis = subplots(figsize=(6.2, 6.0))
     top = 100.0
     line = np.array([0.0, top])
@@ -41,4 +39,3 @@ def draw_speeds(conditions: list[Condition], prediction: Prediction, chosen: lis
     )  # fmt: skip
     axis.legend(fontsize=8, loc="upper left")
     figure.savefig(file, dpi=DPI)
-    plt.close(figure)

@@ -12,6 +12,10 @@ from scipy.stats import qmc
 
 Floats = NDArray[np.float64]
 
+SWEEPS = tuple(np.radians([0.0, 25.0, 50.0, 75.0]).tolist())
+"""Angles by which limbs may be swept backwards where they leave the frame [rad], equally likely; sample k has number
+k mod 4. A scene has one, since attachments are the same for all robots of a batch."""
+
 
 class Unknown(NamedTuple):
     """Number that is not known. Its logarithm is uniform between the ends of its range.
@@ -37,6 +41,11 @@ UNKNOWNS = (
     Unknown("added mass", "1", 0.2, 2.0, "cylinder 1, plate more"),
     Unknown("hot over cold EI", "1", 1.0, 4.0, "2.68 in a sister model"),
 )
+
+
+def of_sweep(values: dict[str, Floats], number: int) -> dict[str, Floats]:
+    """Samples with this sweep."""
+    return {name: column[number :: len(SWEEPS)] for name, column in values.items()}
 
 
 def samples(n: int, seed: int = 0) -> dict[str, Floats]:

@@ -23,7 +23,7 @@ from studies.validation.inference import MODEL, SCATTER, Score, effective, predi
 from studies.validation.luck import other_fours, scores
 from studies.validation.pictures import draw_speeds
 from studies.validation.priors import UNKNOWNS, samples
-from studies.validation.separation import best_known, told
+from studies.validation.separation import best_known, sweeps_told, told
 from studies.validation.simulate import all_speeds
 from studies.validation.speeds import Condition, read_speeds, training
 from studies.validation.swimmer import Variant
@@ -108,6 +108,7 @@ def as_json(
         },
         "before": asdict(full["blind"]),
         "unknowns": [one._asdict() for one in told(values, full["weight"])],
+        "sweeps": dict(zip(("0", "25", "50", "75"), sweeps_told(full["weight"]), strict=True)),
         "best_known": {"powers": powers, "narrower": narrower},
         "speeds_mm_per_s": [
             {
@@ -136,7 +137,7 @@ def main() -> None:
         analyses[variant] = analyse(simulated, conditions)
     print_tables(console, analyses, values)
     result = as_json(analyses, conditions, values)
-    console.print(f"Best known: {result['best_known']}")
+    console.print(f"Best known: {result['best_known']}, sweeps: {result['sweeps']}")
     arguments.out.mkdir(parents=True, exist_ok=True)
     (arguments.out / "validation.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     full, one = analyses["full"], analyses["full"]["score"]

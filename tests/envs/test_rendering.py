@@ -13,6 +13,9 @@ from seastar_gym.envs.rendering import (
     CURRENT,
     HEATED_MINUS,
     HEATED_PLUS,
+    LARGEST,
+    LEGEND,
+    SMALLEST,
     STATE_COLOURS,
     Frame,
     Renderer,
@@ -47,6 +50,15 @@ def colour_at(picture, renderer, point):
 
 def mid_limb(limb):
     return resting_robot()[LIMB_NODES[limb - 1, 5]]
+
+
+@pytest.mark.parametrize("size, most", [(LARGEST, 5), (SMALLEST, 4)])
+def test_the_legend_names_as_many_colours_as_there_is_room_for(size, most):
+    """Heated limbs come first: a colour is named only if those before it are."""
+    strip = renderer_of(size=size).draw(frame_of())[-(size[1] // 14) :].astype(int)
+    named = [bool((np.abs(strip - np.array(colour)) < 8).all(axis=-1).any()) for _, colour in LEGEND]
+    assert named == sorted(named, reverse=True) and 1 <= sum(named) <= most
+    assert all(named) == (size == LARGEST)
 
 
 def test_the_scale_bar_has_a_tick_at_either_end(monkeypatch):
