@@ -9,6 +9,7 @@ import gymnasium as gym
 from gymnasium.envs.registration import EnvSpec
 
 import seastar_gym
+from seastar_gym.envs.tasks.envs import CHALLENGES
 
 DEEPER = re.compile(r"^#", re.MULTILINE)
 
@@ -35,14 +36,14 @@ def registered() -> str:
 
 
 def contracts() -> str:
-    """Docstring of every class of environments, once, in a section of its own."""
+    """Docstring of every class of environments and of every challenge, once, in a section of its own."""
     points = [str(point) for spec in specs() for point in (spec.entry_point, spec.vector_entry_point) if point]
-    classes = dict.fromkeys(environment(point) for point in points)
+    classes = dict.fromkeys([*map(environment, points), *map(type, CHALLENGES.values())])
     return "\n\n".join(f"## {each.__name__}\n\n{contract(each)}" for each in classes)
 
 
-def contract(environment: type[Any]) -> str:
+def contract(documented: type[Any]) -> str:
     """Docstring one level of headings deeper; arguments as a list."""
-    head, title, arguments = (inspect.getdoc(environment) or "").partition("## Arguments\n")
+    head, title, arguments = (inspect.getdoc(documented) or "").partition("## Arguments\n")
     text = head + title + re.sub(r"^(\w+): ", r"- **\1**: ", arguments, flags=re.MULTILINE)
     return DEEPER.sub("##", text)

@@ -18,8 +18,8 @@ MARKER = re.compile(r"^<!-- site: (\w+) ?(.*?) -->$", re.MULTILINE)
 
 
 def changelog() -> str:
-    """CHANGELOG.md without its title."""
-    return (DOCS.parent / "CHANGELOG.md").read_text(encoding="utf-8").partition("\n")[2]
+    """CHANGELOG.md without its title, its links from here."""
+    return (DOCS.parent / "CHANGELOG.md").read_text(encoding="utf-8").partition("\n")[2].replace("](docs/", "](")
 
 
 def more_pages() -> str:
@@ -44,7 +44,13 @@ def generate(app: Sphinx, page: str, source: list[str]) -> None:
     source[0] = MARKER.sub(lambda marker: GENERATORS[marker[1]](*marker[2].split()), source[0])
 
 
+def pages_with_markers(app: Sphinx, *known: object) -> list[str]:
+    """Pages that are always read anew: what they show stands in other files."""
+    return [page.stem for page in DOCS.glob("*.md") if MARKER.search(page.read_text(encoding="utf-8"))]
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
     """Fill every page when it is read."""
     app.connect("source-read", generate)
+    app.connect("env-get-outdated", pages_with_markers)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

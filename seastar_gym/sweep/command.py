@@ -26,12 +26,13 @@ from tqdm import tqdm
 from seastar_gym.extras import require_extra
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import shown
-from seastar_gym.sweep.axes import Axis
+from seastar_gym.sweep.axes import Axis, Range
 from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.executors import Executor
 from seastar_gym.sweep.executors.here import Here
 from seastar_gym.sweep.executors.processes import Processes
 from seastar_gym.sweep.run import Tally, run
+from seastar_gym.sweep.swimming import UNITS
 from seastar_gym.sweep.text import axis_of
 
 INTERRUPTED = 130
@@ -51,6 +52,14 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--settling", type=int, default=2, help=f"strokes before the measurement {default}")
     parser.add_argument("--measured", type=int, default=8, help=f"strokes of the measurement {default}")
     parser.add_argument("--latin", type=int, default=0, metavar="N", help="designs of every combination of choices")
+    parser.add_argument("--optuna", type=int, default=0, metavar="N", help="search with Optuna, N designs in all")
+    parser.add_argument("--objective", default="speed", help=f"column of results that is searched for {default}")
+    parser.add_argument("--minimize", action="store_true", help="search for the smallest, not the largest")
+    parser.add_argument("--storage", help="Optuna: database (default: sqlite:///OUT/study.db)")
+    parser.add_argument(
+        "--stale-after", type=float, default=600.0, metavar="SECONDS",
+        help=f"Optuna: proposals without result for so long are put back {default}",
+    )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn {default}")
     parser.add_argument("--robots", type=int, default=256, help=f"designs of a cell at most {default}")
     parser.add_argument(
@@ -122,9 +131,37 @@ def as_text(tally: Tally, out: Path) -> str:
 def sweep_of(options: argparse.Namespace, axes: tuple[Axis, ...]) -> Sweep:
     """Sweep that the options describe."""
     return Sweep(
-        scene_of_file(options.scene), axes, options.gait, options.settling, options.measured, options.latin,
+        scene_of_file(options.scene), axes, options.gait, options.settling, options.measured,
+        1 if options.optuna and any(isinstance(axis, Range) for axis in axes) else options.latin,
         options.seed, options.robots,
     )  # fmt: skip
+
+
+def run_sweep(sweep: Sweep, options: argparse.Namespace) -> int:
+    """Run the cells of a grid or a Latin hypercube; returns the exit code."""
+    print(f"{sweep.n_designs:,} designs in {sweep.n_cells:,} cells.")
+    if options.count:
+        return 0
+    with tqdm(total=sweep.n_cells, unit="cell") as bar:
+        tally = run(sweep.cells(), options.out, executor_of(options), bar_of(sweep.n_cells, bar))
+    print(as_text(tally, options.out))
+    return 1 if tally.problems else 0
+
+
+def search(sweep: Sweep, options: argparse.Namespace) -> int:
+    """Search with Optuna; returns the exit code."""
+    require_extra("Searches", "sweep", "optuna")
+    from seastar_gym.sweep.proposals import Search, explore
+
+    options.out.mkdir(parents=True, exist_ok=True)
+    storage = options.storage or f"sqlite:///{options.out}/study.db"
+    wanted = Search(options.objective, not options.minimize, options.seed, options.stale_after)
+    with tqdm(total=options.optuna, unit="design") as bar:
+        study = explore(sweep, wanted, storage, options.optuna, options.out, executor_of(options),
+                        lambda tally: bar.update(tally.designs - bar.n))  # fmt: skip
+    best = study.best_trial
+    print(f"Best {options.objective}: {best.value:.6g} {UNITS[options.objective]}, {best.params}.")
+    return 0
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -132,11 +169,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = make_parser().parse_args(arguments)
     try:
         sweep = sweep_of(options, tuple(map(axis_of, options.axes)))
-        print(f"{sweep.n_designs:,} designs in {sweep.n_cells:,} cells.")
-        if options.count:
-            return 0
-        with tqdm(total=sweep.n_cells, unit="cell") as bar:
-            tally = run(sweep.cells(), options.out, executor_of(options), bar_of(sweep.n_cells, bar))
+        return search(sweep, options) if options.optuna else run_sweep(sweep, options)
     except (ValueError, ModuleNotFoundError) as bad_input:
         print(bad_input, file=sys.stderr)
         return 2
@@ -144,5 +177,3 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"Interrupted: all finished cells are in {shown(str(options.out))}, and the same command goes on.",
               file=sys.stderr)  # fmt: skip
         return INTERRUPTED
-    print(as_text(tally, options.out))
-    return 1 if tally.problems else 0

@@ -15,6 +15,7 @@ import optuna
 import pyarrow as pa
 import pyarrow.parquet
 from optuna.trial import TrialState
+from sqlalchemy.exc import SQLAlchemyError
 
 from seastar_gym.scene.checks import require_choice, require_count, require_number
 from seastar_gym.sweep.axes import Range
@@ -54,7 +55,7 @@ def study_of(sweep: Sweep, search: Search, storage: str) -> optuna.Study:
             sampler=optuna.samplers.TPESampler(seed=search.seed),
             direction="maximize" if search.is_largest_best else "minimize",
         )  # fmt: skip
-    except (optuna.exceptions.StorageInternalError, ImportError) as refused:
+    except (SQLAlchemyError, optuna.exceptions.StorageInternalError, ImportError) as refused:
         raise ValueError(f"The storage {storage} cannot be used: {sentence_of(refused)[:200]}.") from None
 
 

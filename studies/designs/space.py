@@ -3,6 +3,8 @@
 import itertools
 from typing import NamedTuple
 
+import numpy as np
+
 from seastar_gym.scene import Scene, Seastar
 from seastar_gym.scene.limb import Limb
 from seastar_gym.sweep.axes import Choices, Range
@@ -72,3 +74,40 @@ def at_the_chapters(samples: int = 64) -> Sweep:
     """Sweep over body and modulus, with the chapter's limb length and peak angle."""
     modulus = Range("robot.youngs_modulus", *MODULI, is_log=True)
     return Sweep(Scene.preset("fast"), (bodies(BODIES), modulus), settling=SETTLING, measured=MEASURED, samples=samples)
+
+
+SPREADS = (0.25, 0.5, 1.0, 2.0, 4.0)
+"""Radius of the tip over that of the root, for limbs of equal mass: below 1 the mass is near the hub."""
+DENSITIES = (100.0, 10_000.0)
+"""Densities of the limbs [kg/m^3]."""
+
+
+def spread(taper: float, points: int = 7) -> Limb:
+    """Limb whose mass is the chapter's, spread by a taper, and whose bending stiffness is the chapter's all along.
+
+    points: Points of the profile of Young's modulus.
+    """
+    chapter = Seastar()
+    root = chapter.rod_radius * np.sqrt(3.0 / (1.0 + taper + taper**2))  # of a cone's volume
+    radius = np.linspace(root, taper * root, points)
+    moduli = chapter.youngs_modulus * (chapter.rod_radius / radius) ** 4
+    return Limb(radius=tuple(radius.tolist()), youngs_modulus=tuple(moduli.tolist()))
+
+
+def inner_half(taper: float) -> float:
+    """Share of a tapered limb's mass that lies in the half at the hub."""
+    middle = 0.5 * (1.0 + taper)
+    return float(0.5 * (1.0 + middle + middle**2) / (1.0 + taper + taper**2))
+
+
+def masses() -> Sweep:
+    """Sweep over where the mass of a limb lies and over its density; all else is the chapter's."""
+    preset = Scene.preset("fast").robot
+    robots = tuple(
+        Seastar(nodes_per_limb=preset.nodes_per_limb, limbs=(spread(taper),) * 5) for taper in SPREADS
+    )  # fmt: skip
+    axes = (
+        Choices("robot", robots, tuple(map(str, SPREADS))),
+        Range("robot.density", *DENSITIES, is_log=True).spaced(21),
+    )
+    return Sweep(Scene.preset("fast"), axes, settling=SETTLING, measured=MEASURED)

@@ -30,8 +30,10 @@ from studies.validation.swimmer import Variant
 
 Floats = NDArray[np.float64]
 
-VARIANTS: tuple[Variant, ...] = get_args(Variant)
-SAMPLES, FOURS = 512, 200
+VARIANTS: tuple[Variant, ...] = get_args(Variant)[1:]
+SAMPLES, OF_VARIANTS, FOURS = 512, 256, 100
+"""Samples of the full model, and of models with a part left out: the first of the same sequence. Other fours."""
+SAME_SAMPLES = "full, as many samples"
 
 
 def simulate(conditions: list[Condition], variant: Variant, n: int, folder: Path, console: Console) -> Floats:
@@ -126,15 +128,19 @@ def main() -> None:
     """Command line: simulate, weigh, predict, and leave parts out."""
     parser = study_parser("studies.validation", __doc__)
     parser.add_argument("--samples", type=int, default=SAMPLES, help="samples of the unknowns (default: %(default)s)")
-    parser.add_argument("--variants", nargs="*", choices=VARIANTS, default=list(VARIANTS), help="models to simulate")
+    parser.add_argument("--variants", nargs="*", choices=VARIANTS, default=list(VARIANTS), help="parts to leave out")
     parser.add_argument("--runs", type=Path, default=Path("runs/validation"), help="folder of speeds")
     parser.add_argument("--out", type=Path, default=Path("docs"), help="folder of results (default: %(default)s)")
     arguments = parser.parse_args()
     console, conditions, values = Console(), read_speeds(), samples(arguments.samples)
-    analyses = {}
-    for variant in dict.fromkeys(("full", *arguments.variants)):
-        simulated = simulate(conditions, variant, arguments.samples, arguments.runs, console)
-        analyses[variant] = analyse(simulated, conditions)
+    simulated = simulate(conditions, "full", arguments.samples, arguments.runs, console)
+    analyses = {"full": analyse(simulated, conditions)}
+    fewer = min(OF_VARIANTS, arguments.samples)
+    if arguments.variants:
+        analyses[SAME_SAMPLES] = analyse(simulated[:fewer], conditions)
+    for variant in arguments.variants:
+        of_variant = simulate(conditions, variant, fewer, arguments.runs, console)
+        analyses[variant] = analyse(of_variant, conditions)
     print_tables(console, analyses, values)
     result = as_json(analyses, conditions, values)
     console.print(f"Best known: {result['best_known']}, sweeps: {result['sweeps']}")

@@ -6,7 +6,7 @@ most samples would swim backwards.
 """
 
 from collections.abc import Mapping
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,16 +51,16 @@ def scene(
     times, curvatures = bending(condition.liquid_metal, condition.frequency, ramp=variant == "ramp")
     rest, length = float(curvatures[0]), values["limb length"]
     change = (*(curvatures[:-1] - rest).tolist(), 0.0)
-    drag = values["limb drag across"]
+    strip = round_limb(values)
     along = values["limb drag along"] * (NONE_OF_IT if variant == "no drag along limbs" else 1.0)
-    added = values["added mass"] * (NONE_OF_IT if variant == "no added mass" else 1.0)
+    added = strip.added_mass * (NONE_OF_IT if variant == "no added mass" else 1.0)
     ratio = np.ones_like(length) if variant == "no stiffening" else values["hot over cold EI"]
     robot = Seastar(
         4,
         finer * (NODES - 1) + 1,
         limb_length=length,
-        rod_radius=values["limb radius"],
-        youngs_modulus=values["Young's modulus"],
+        rod_radius=strip.radius,
+        youngs_modulus=strip.youngs_modulus,
         density=ELASTOMER + (LIQUID_METAL - ELASTOMER) * 0.01 * condition.liquid_metal,
         limbs=tuple(Limb(natural_curvature=side * rest) for side in SIDES),
         relaxation_time=RELAXATION,
@@ -68,9 +68,37 @@ def scene(
         stiffening=Stiffening(ratio),
         body=frame(values["body mass"], values["body drag"], sweep),
     )
-    water = Water(WATER, drag, along * drag, added_mass_coefficient=added)
+    water = Water(WATER, strip.drag, along * strip.drag, added_mass_coefficient=added)
     actuator = MeasuredCurve(times, change, scale=length)
     return Scene(robot, water, actuator, Numerics("implicit-midpoint", STEP / finer))
+
+
+class RoundLimb(NamedTuple):
+    """Round limb with the section, bending stiffness, drag and added mass of a strip.
+
+    radius: [m]. youngs_modulus: [Pa]. drag, added_mass: Coefficients [1] of flow across, over those of a round limb.
+    """
+
+    radius: Floats
+    youngs_modulus: Floats
+    drag: Floats
+    added_mass: Floats
+
+
+def round_limb(values: Mapping[str, Floats]) -> RoundLimb:
+    """A strip's width is out of the plane, so flow across meets it; it bends about its thickness.
+
+    A plate of width w carries along the fluid of a cylinder of that diameter.
+    """
+    width, thickness = values["limb width"], values["limb thickness"]
+    radius = np.sqrt(width * thickness / np.pi)
+    EI = values["Young's modulus"] * width * thickness**3 / 12.0
+    return RoundLimb(
+        radius=radius,
+        youngs_modulus=4.0 * EI / (np.pi * radius**4),
+        drag=values["limb drag across"] * 0.5 * width / radius,
+        added_mass=values["added mass"] * (0.5 * width / radius) ** 2,
+    )
 
 
 def frame(mass: Floats, drag: Floats, sweep: float) -> Body:

@@ -7,12 +7,12 @@ import pytest
 from scipy.stats import norm
 
 from studies.validation import simulate, study
-from studies.validation.inference import LEVEL, SPREAD, effective, predict, quantile, score, weights
+from studies.validation.inference import LEVEL, SPREAD, effective, predict, quantiles, score, weights
 from studies.validation.luck import other_fours
 from studies.validation.priors import SWEEPS, UNKNOWNS, place_in_range, samples
 from studies.validation.separation import best_known, told
 from studies.validation.speeds import read_speeds, training
-from studies.validation.swimmer import LOOSE, bending, scene
+from studies.validation.swimmer import LOOSE, bending, round_limb, scene
 
 CONDITIONS = read_speeds()
 MEASURED = np.array([condition.speed for condition in CONDITIONS])
@@ -49,7 +49,7 @@ def test_samples_fill_the_ranges_and_fewer_are_the_first_of_more():
 # Scenes
 
 
-@pytest.mark.parametrize("variant", study.VARIANTS)
+@pytest.mark.parametrize("variant", ["full", *study.VARIANTS])
 def test_swimmers_curl_at_rest_and_straighten_when_heated(variant):
     values = samples(8)
     made = scene(CONDITIONS[CHOSEN[1]], values, SWEEPS[1], variant)
@@ -59,6 +59,16 @@ def test_swimmers_curl_at_rest_and_straighten_when_heated(variant):
     heated = -made.of_robot(0).actuator.peak_angle / values["limb length"][0]
     assert 29.0 < shapes[0].natural_curvature + heated < 54.0  # the smallest measured curvatures
     assert made.actuator.period == pytest.approx(1.25)
+
+
+def test_a_round_limb_has_the_weight_stiffness_drag_and_fluid_of_the_strip():
+    values = samples(8)
+    limb, width, thickness = round_limb(values), values["limb width"], values["limb thickness"]
+    np.testing.assert_allclose(np.pi * limb.radius**2, width * thickness)
+    EI = limb.youngs_modulus * np.pi * limb.radius**4 / 4.0
+    np.testing.assert_allclose(EI, values["Young's modulus"] * width * thickness**3 / 12.0)
+    np.testing.assert_allclose(limb.drag * 2.0 * limb.radius, values["limb drag across"] * width)
+    np.testing.assert_allclose(limb.added_mass * limb.radius**2, values["added mass"] * width**2 / 4.0)
 
 
 @pytest.mark.parametrize("material, frequency", [(0, 0.4), (10, 1.2), (50, 2.3)])
@@ -96,8 +106,9 @@ def test_the_swimmer_swims_forward():
 
 
 def test_quantiles_of_a_mixture_are_those_of_normal_distributions():
-    assert quantile(np.array([0.3]), np.ones(1), 0.95) == pytest.approx(0.3 + SPREAD * norm.ppf(0.95), abs=1e-9)
-    assert quantile(np.array([-1.0, 1.0]), np.array([0.5, 0.5]), 0.5) == pytest.approx(0.0, abs=1e-9)
+    one, two = np.array([[0.3]]), np.array([[-1.0], [1.0]])
+    assert quantiles(one, np.ones(1), 0.95) == pytest.approx(0.3 + SPREAD * norm.ppf(0.95), abs=1e-7)
+    assert quantiles(two, np.array([0.5, 0.5]), 0.5) == pytest.approx(0.0, abs=1e-7)
 
 
 def test_a_sample_that_explains_the_speeds_has_the_weight():
@@ -141,5 +152,5 @@ def test_the_command_writes_its_page(tmp_path, monkeypatch):
     monkeypatch.setattr("sys.argv", arguments)
     study.main()
     found = json.loads((tmp_path / "validation.json").read_text(encoding="utf-8"))
-    assert set(found["models"]) == {"full", "ramp"} and len(found["speeds_mm_per_s"]) == 37
+    assert set(found["models"]) == {"full", study.SAME_SAMPLES, "ramp"} and len(found["speeds_mm_per_s"]) == 37
     assert (tmp_path / "validation.png").stat().st_size > 10_000

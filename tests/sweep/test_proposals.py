@@ -9,14 +9,11 @@ import tempfile
 import time
 from pathlib import Path
 
+import optuna
 import pytest
-
-from refusals import assert_refused
-
-optuna = pytest.importorskip("optuna")
-
 from optuna.trial import TrialState
 
+from refusals import assert_refused
 from seastar_gym.scene import Scene
 from seastar_gym.sweep.axes import Choices, Range
 from seastar_gym.sweep.designs import Sweep

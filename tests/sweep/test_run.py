@@ -1,6 +1,8 @@
 """Runs of a sweep: resumed, interrupted, with lost workers, on a full disk; the same bits on every executor."""
 
 import itertools
+import os
+from pathlib import Path
 
 import pytest
 
@@ -10,6 +12,8 @@ from seastar_gym.sweep.executors.here import Here
 from seastar_gym.sweep.executors.processes import Processes
 from seastar_gym.sweep.parts import Parts
 from seastar_gym.sweep.run import ATTEMPTS, run
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def ray_tasks(tmp_path):
@@ -33,6 +37,12 @@ EXECUTORS = {
     "ray": ray_tasks,
     "slurm": jobs,
 }
+
+
+@pytest.fixture(autouse=True)
+def path_of_workers(monkeypatch):
+    """What Ray and submitit start finds this package and `works` as this process does."""
+    monkeypatch.setenv("PYTHONPATH", f"{ROOT}{os.pathsep}{ROOT / 'tests'}")
 
 
 def bits(folder):
@@ -90,13 +100,12 @@ def test_a_full_disk_of_a_worker_is_the_cell_s_problem(tmp_path, sweep):
 def test_a_lost_worker_costs_its_cell_alone(name, tmp_path, sweep, monkeypatch):
     executor = EXECUTORS[name](tmp_path)
     monkeypatch.setenv("DEADLY", str(tmp_path))
-    monkeypatch.setattr("seastar_gym.sweep.executors.slurm.ARRAY", 8, raising=False) if name == "slurm" else None
     cells = list(sweep.cells())
     (tmp_path / cells[1].name).touch()
     outcomes = list(executor.run(works.deadly_once, iter(cells)))
     lost = {outcome.cell.name for outcome in outcomes if outcome.part is None}
     job = {cells[0].name, cells[1].name} if name == "slurm" else {cells[1].name}  # a job has two cells there
-    assert lost == job and len(outcomes) == len(cells)
+    assert lost == job and len(outcomes) == len(cells), outcomes
     tally = run(sweep.cells(), tmp_path / "out", executor, work=works.deadly_once)
     assert tally.done == len(cells) and not tally.problems
 
@@ -126,6 +135,13 @@ def test_cells_are_taken_as_there_is_room_for_them(sweep):
     assert isinstance(next(outcomes), Outcome)
     assert len(taken) <= 4
     outcomes.close()
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_there_are_no_more_processes_than_workers(workers, sweep):
+    cells = list(sweep.cells()) * 3
+    found = {outcome.part for outcome in Processes(workers).run(works.numbered, iter(cells))}
+    assert len(found) <= workers
 
 
 def test_progress_counts_cells_and_strokes(tmp_path, sweep):

@@ -35,7 +35,7 @@ class Processes:
         try:
             for cell in cells:
                 _begin(busy, work, cell)
-                if len(busy) == self.workers:
+                while len(busy) >= self.workers:
                     yield from self._swept(busy, work, cells)
             while busy:
                 yield from self._swept(busy, work, cells)
@@ -90,5 +90,5 @@ def serve(connection: Connection, work: Work) -> None:
         try:
             outcome = outcome_of(work, connection.recv())
             connection.send((outcome.part, outcome.problem))
-        except (EOFError, BrokenPipeError):
+        except (EOFError, BrokenPipeError, ConnectionResetError):
             return
