@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.envs.camera import Camera
-from seastar_gym.envs.rendering import LARGEST, SMALLEST, Frame, Renderer, renderer_of
+from seastar_gym.envs.rendering import LARGEST, SMALLEST, Frame, Renderer, body_of, renderer_of
 from seastar_gym.envs.task import SwimTask
 
 Picture = NDArray[np.uint8]
@@ -55,6 +55,7 @@ class BatchPictures:
         """
         task, simulator = self._task, self._task.simulator
         positions, time, warmth = simulator.positions, simulator.time, task.warmth()
+        roots, outlines = body_of(simulator)
         return tuple(
             self._draw(
                 robot,
@@ -65,6 +66,8 @@ class BatchPictures:
                     waypoint_index=int(task.waypoint_index[robot]),
                     time=float(time[robot]),
                     warmth=None if warmth is None else warmth[robot],
+                    roots=None if roots is None else roots[robot],
+                    outline=None if outlines is None else outlines[robot],
                 ),
             )
             for robot in robots

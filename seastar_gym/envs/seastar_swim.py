@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from seastar_gym.envs.commands import Actions, to_commands
 from seastar_gym.envs.promises import warn_uncertified
 from seastar_gym.envs.randomization import DomainRandomization
-from seastar_gym.envs.rendering import Frame, Renderer, renderer_of
+from seastar_gym.envs.rendering import Frame, Renderer, body_of, renderer_of
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.task import Outcome, Path, Plain, SwimTask, make_scene
 from seastar_gym.envs.task_env import TaskEnv, checked_options
@@ -311,6 +311,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
 
     def _frame(self) -> Frame:
         warmth = self._task.warmth()
+        roots, outline = body_of(self.simulator)
         return Frame(
             positions=self.simulator.positions[0],
             command=self._command,
@@ -318,6 +319,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
             waypoint_index=int(self._task.waypoint_index[0]),
             time=float(self.simulator.time[0]),
             warmth=None if warmth is None else warmth[0],
+            roots=None if roots is None else roots[0],
+            outline=None if outline is None else outline[0],
         )
 
     def _draw_frame(self) -> None:

@@ -14,6 +14,8 @@ from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
 
+SAME = 1e-9
+"""Distance of places that are taken for one [m]."""
 GIVEN_DRAG = ("drag_along", "drag_across", "drag_turning")
 GIVEN_FLUID = ("added_mass_along", "added_mass_across", "added_mass_turning")
 
@@ -119,6 +121,17 @@ class Body:
         x, y = 0.5 * length, 0.5 * width
         return cls(outline=((x, -y), (x, y), (-x, y), (-x, -y)), **others)
 
+    def is_symmetric(self, n_limbs: int) -> bool:
+        """Whether a turn by a limb of n_limbs and a mirror at the x axis leave the body itself unchanged."""
+        directed = any(getattr(self, name) is not None for name in GIVEN_FLUID + GIVEN_DRAG[:2])
+        if directed or np.hypot(*self.centre) > SAME:
+            return False
+        if not self.outline:
+            return True
+        points = np.array(self.outline)
+        z = points[:, 0] + 1j * points[:, 1]
+        return all(_same_points(z, image) for image in (z * np.exp(2j * np.pi / n_limbs), z.conj()))
+
     @property
     def shape(self) -> Outline:
         """Outline with its area, centre and widths."""
@@ -168,6 +181,12 @@ class Body:
         if self.attachments:
             return self.attachments
         return tuple(Attachment(*self.shape.rim(direction), direction) for direction in directions)
+
+
+def _same_points(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> bool:
+    """Whether two sets of points are one, in whatever order."""
+    nearest = np.abs(one[:, None] - other[None, :]).min(axis=1)
+    return bool((nearest < SAME).all())
 
 
 def _is_point(value: object) -> bool:
