@@ -31,7 +31,7 @@ from studies.validation.swimmer import Variant
 Floats = NDArray[np.float64]
 
 VARIANTS: tuple[Variant, ...] = get_args(Variant)[1:]
-SAMPLES, OF_VARIANTS, FOURS = 512, 256, 100
+SAMPLES, OF_VARIANTS, FOURS = 512, 128, 100
 """Samples of the full model, and of models with a part left out: the first of the same sequence. Other fours."""
 SAME_SAMPLES = "full, as many samples"
 CHECKED, SLOW = 64, 0.01
