@@ -97,10 +97,10 @@ def test_every_base_dependency_is_imported_by_the_package():
 @pytest.mark.parametrize(
     ("folders", "extras"),
     [
-        (["seastar_gym"], ["render", "studies"]),
-        (["studies"], ["train"]),
+        (["seastar_gym"], ["render", "studies", "ray", "slurm"]),
+        (["studies"], ["train", "sweep"]),
         (["agents", "train.py"], ["train"]),
-        (["tests"], ["test", "browser"]),
+        (["tests"], ["test", "browser", "ray"]),
     ],
 )
 def test_every_import_has_its_requirement(folders, extras):
