@@ -2,21 +2,25 @@
 
 import os
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 import gymnasium as gym
+import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode
 from stable_baselines3 import PPO
 from stable_baselines3.common.utils import LinearSchedule
 
+from agents.coasting import WAYPOINT_RADIUS, CoastingProgress, fit_coasting
 from agents.hyperparameters import Hyperparameters
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers import learner_zip
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, Weights
+from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.symmetry import VectorSymmetryReduction
 from seastar_gym.envs.task import Path as SwimPath
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 
@@ -28,8 +32,12 @@ def make_training_env(
     fidelity: Fidelity | None = None,
     scene: Scene | None = None,
     threads: int | None = None,
+    actions: Actions | None = None,
 ) -> BatchVecEnv:
-    """Native batch for Stable-Baselines3, with symmetry reduction if the hyperparameters ask for it."""
+    """Native batch for Stable-Baselines3, with symmetry reduction if the hyperparameters ask for it.
+
+    actions: Action mode. None means that of the hyperparameters.
+    """
     env: gym.vector.VectorEnv[Any, Any, Any] = gym.make_vec(
         "SeastarSwim-v0",
         num_envs=hyperparameters.num_envs,
@@ -38,13 +46,18 @@ def make_training_env(
         decision_period=hyperparameters.decision_period,
         path=path,
         random_heading=random_heading,
-        actions=hyperparameters.actions,
+        actions=hyperparameters.actions if actions is None else actions,
         fidelity=fidelity,
         scene=scene,
         reward=hyperparameters.reward,
+        waypoint_radius=WAYPOINT_RADIUS,
         autoreset_mode=AutoresetMode.SAME_STEP,
         threads=threads,
     )
+    if hyperparameters.coasting:
+        swum = cast(SeastarSwimVectorEnv, env.unwrapped).scene
+        coasting = fit_coasting(swum, hyperparameters.decision_period, np.random.default_rng(0))
+        env = CoastingProgress(env, coasting, hyperparameters.reward)
     return BatchVecEnv(VectorSymmetryReduction(env) if hyperparameters.symmetry else env)
 
 

@@ -105,13 +105,13 @@ register(
     **_ENTRY_POINTS,
 )
 
-TASKS: dict[str, tuple[str, Actions, float, float, float | None]] = {
-    "SeastarMiswired-v0": ("miswired", "joint", 1.0, 400.0, None),
-    "SeastarMiswiredTimed-v0": ("miswired", "joint", 0.5, 400.0, None),
-    "SeastarPrey-v0": ("prey", "pairs", 1.0, 200.0, None),
-    "SeastarPreyTimed-v0": ("fast-prey", "pairs", 0.5, 200.0, None),
-    "SeastarStation-v0": ("station", "joint", 1.0, 120.0, None),
-    "SeastarStationTimed-v0": ("station", "joint", 0.5, 120.0, None),
+TASKS: dict[str, tuple[str, Actions, float, float, float]] = {
+    "SeastarMiswired-v0": ("miswired", "joint", 1.0, 400.0, 150.0),
+    "SeastarMiswiredTimed-v0": ("miswired", "joint", 0.5, 400.0, 145.0),
+    "SeastarPrey-v0": ("prey", "pairs", 1.0, 200.0, 80.0),
+    "SeastarPreyTimed-v0": ("fast-prey", "pairs", 0.5, 200.0, 130.0),
+    "SeastarStation-v0": ("station", "joint", 1.0, 120.0, -20.0),
+    "SeastarStationTimed-v0": ("station", "joint", 0.5, 120.0, -70.0),
 }
 """Name of the challenge, actions, time between decisions [s], time limit [s] and reward threshold of tasks, by id."""
 

@@ -1,7 +1,7 @@
 """The oracle of robots with a body: the stars of oracle.py, whose limbs begin at nodes of their own.
 
-Nodes are those of the star, then one per limb, its root on the body. Unknowns are the star's nodes, flat, and the body's
-angle [rad]. Roots follow from hub and angle; clamps, the rigid mass and the drag of strips are added here.
+Nodes are those of the star, then one per limb, its root on the body. Unknowns are the star's nodes, flat, and the
+body's angle [rad]. Roots follow from hub and angle; clamps, the rigid mass and the drag of strips are added here.
 """
 
 from dataclasses import dataclass
@@ -84,7 +84,7 @@ class Rigid:
 
     def phi(self, u: Array, u_hat: Array, v_hat: Array, gamma: float, delta_psi: Array, first: Array) -> float:
         """Phi(u) [J] of a stage whose first guess is `first`."""
-        star, rate = self.star, (u - u_hat) / gamma
+        star = self.star
         guess = (first - u_hat) / gamma
         omega = guess[-1]
         arms, frozen = turned(first[-1], self.arms), self.places(first)

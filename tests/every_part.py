@@ -7,6 +7,8 @@ import numpy as np
 
 from seastar_gym import (
     AlongLimb,
+    Attachment,
+    Body,
     Contact,
     GridCurrent,
     Limb,
@@ -67,5 +69,8 @@ PARTS = {
     "bent along": {"robot": Seastar(along=AlongLimb(1 / 3, (1.0, 0.1 + 0.2)), stiffening=Stiffening(2.68, 1 / 3))},
     "bent along, each": {"robot": Seastar(along=AlongLimb(0.1 * EACH), stiffening=Stiffening(1.5 * EACH))},
     "robots": {"robot": Seastar(n_limbs=4, nodes_per_limb=6, density=1000.0 * EACH, relaxation_time=1e-3)},
+    "body": {"robot": Seastar(body=Body(radius=0.02, mass=0.01 * EACH, centre_of_mass=(1e-3, 1 / 3e3)))},
+    "attachments": {"robot": Seastar(2, body=Body.rectangle(0.06, 0.02, attachments=(Attachment(0, 0.01, 0.3),) * 2))},
+    "joints": {"robot": Seastar(limbs=(Limb(joint_stiffness=1e-4 * EACH),) * 5)},
     "numerics": {"numerics": Numerics("implicit-midpoint", 5e-3 / 3, 1e-7 / 3, 30, 0.015)},
 }  # fmt: skip

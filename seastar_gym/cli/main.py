@@ -23,6 +23,7 @@ COMMANDS = {
     "benchmark": Command("seastar_gym.benchmark.command", "measure agents on registered tasks over ten seeds"),
     "train": Command("seastar_gym.cli.train", "train a policy, in a checkout of the repository"),
     "certify": Command("seastar_gym.certification.command", "measure what speed costs a scene in accuracy"),
+    "sweep": Command("seastar_gym.sweep.command", "simulate thousands of designs, here or on a cluster"),
     "identify": Command("seastar_gym.identify.command", "fit numbers of a scene to measured trajectories"),
 }
 

@@ -216,7 +216,7 @@ def inner_edge(work, limb, first, i):
 
 @kernel
 def hub_motion(clamp, rods, work, stage, e):
-    """Motion of the hub for the root edge e, where a rigid hub's discretisation asks for it, or of its root on a body."""
+    """Motion of the hub for root edge e, where a rigid hub's discretisation asks for it, or of its root on a body."""
     if clamp is None:
         return Motion(splat(0.0), splat(0.0), splat(0.0), splat(0.0))
     return tail_motion(rods.body, rods, work, stage, e)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.envs.camera import Camera
-from seastar_gym.envs.rendering import LARGEST, SMALLEST, Frame, Renderer, renderer_of
+from seastar_gym.envs.rendering import LARGEST, SMALLEST, Frame, Renderer, body_of, renderer_of
 from seastar_gym.envs.swimming import Swimming
 
 Picture = NDArray[np.uint8]
@@ -55,6 +55,7 @@ class BatchPictures:
         """
         task, simulator = self._task, self._task.simulator
         positions, time, warmth = simulator.positions, simulator.time, task.warmth()
+        roots, outlines = body_of(simulator)
         return tuple(
             self._draw(
                 robot,
@@ -66,6 +67,8 @@ class BatchPictures:
                     time=float(time[robot]),
                     warmth=None if warmth is None else warmth[robot],
                     scenery=task.scenery(robot),
+                    roots=None if roots is None else roots[robot],
+                    outline=None if outlines is None else outlines[robot],
                 ),
             )
             for robot in robots

@@ -63,6 +63,10 @@ class Canvas:
         for centre in np.rint(SUPERSAMPLING * _along(points, 2.0 / SUPERSAMPLING)).tolist():
             self._pygame.draw.circle(self._large, colour, centre, radius)
 
+    def area(self, corners: FloatArray, colour: Colour) -> None:
+        """Filled polygon of corners [px], shape (n, 2)."""
+        self._pygame.draw.polygon(self._large, colour, np.rint(SUPERSAMPLING * corners).tolist())
+
     def dot(self, centre: FloatArray, colour: Colour, radius: float) -> None:
         """Disc around a centre [px], shape (2,); radius [px]."""
         x, y = np.rint(SUPERSAMPLING * centre).tolist()

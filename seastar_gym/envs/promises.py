@@ -20,7 +20,7 @@ NAMES = ("path_error", "space_error", "time_error", "real_time_factor")
 def promised(
     scene: Scene, certificate: Certificate | None = None, decision_period: float | None = None
 ) -> dict[str, float]:
-    """Measured errors and speed of a scene by their names in `info`; NaN for scenes not measured.
+    """Measured errors and speed of a scene by their names in `info`; NaN for scenes not measured, nothing in time.
 
     The path error is that over every sequence of an environment's actions, repeated ones included.
 
@@ -47,12 +47,12 @@ def _by_the_table(scene: Scene) -> dict[str, float]:
 
 
 def _in_time(scene: Scene, decision_period: float) -> dict[str, float]:
-    """Errors of a preset with wires; speeds were measured of strokes only."""
+    """Errors of a preset with wires, nothing for other scenes; speeds were measured of strokes only."""
     wired = [name for name in get_args(Fidelity) if scene == replace(Scene.preset(name), actuator=SmaWires())]
     known = timed_promise(wired[0], decision_period) if wired else None
     if known is None:
-        return dict.fromkeys(NAMES, math.nan)
-    return dict(zip(NAMES, (known.path_error, known.space_error, known.time_error, math.nan), strict=True))
+        return {}
+    return {"path_error": known.path_error, "space_error": known.space_error, "time_error": known.time_error}
 
 
 def read_certificate(certificate: Certificate | str | PathLike[str] | None, scene: Scene) -> Certificate | None:

@@ -16,6 +16,7 @@ from seastar_gym.envs.scenery import NOTHING, Scenery
 from seastar_gym.envs.waypoint_labels import waypoint_labels
 from seastar_gym.envs.window import Window
 from seastar_gym.scene import Seastar
+from seastar_gym.simulator import Simulator
 
 FloatArray = NDArray[np.float64]
 
@@ -23,6 +24,7 @@ WATER: Colour = (250, 252, 254)
 INK: Colour = (58, 64, 74)
 FAINT_INK: Colour = (128, 136, 148)
 LIMB: Colour = (70, 77, 88)
+BODY: Colour = (205, 210, 217)
 HEATED_PLUS: Colour = (23, 62, 196)
 HEATED_MINUS: Colour = (38, 148, 240)
 TRAIL: Colour = (212, 120, 130)
@@ -75,6 +77,22 @@ class Frame:
     """How warm wires + and - of every limb are, from 0 to 1, shape (n_limbs, 2); None without wires."""
     scenery: Scenery = NOTHING
     """What the task shows besides."""
+    roots: FloatArray | None = None
+    """Places where limbs begin on a body [m], shape (n_limbs, 2); None where they begin at the hub."""
+    outline: FloatArray | None = None
+    """Outline of the body [m], shape (n, 2); None without one."""
+
+
+def body_of(simulator: Simulator) -> tuple[FloatArray | None, FloatArray | None]:
+    """Roots of limbs, shape (n_robots, n_limbs, 2), and outlines, shape (n_robots, n, 2) [m]; None without a body."""
+    body = simulator.scene.robot.body
+    if body is None or body.is_point:
+        return None, None
+    x, y = body.shape.drawn().T if body.shape.area else np.zeros((2, 0))
+    angles = simulator.orientation()[:, None]
+    c, s = np.cos(angles), np.sin(angles)
+    outline = np.stack([c * x - s * y, s * x + c * y], axis=-1)
+    return simulator.root_positions(), simulator.hub_position()[:, None] + outline
 
 
 def limb_nodes(n_limbs: int, nodes_per_limb: int) -> NDArray[np.int_]:
@@ -259,9 +277,13 @@ class Renderer:
             self._canvas.polyline(self.camera.to_pixels(trail), TRAIL, width=2)
 
     def _paint_robot(self, frame: Frame) -> None:
-        limbs = self.camera.to_pixels(frame.positions[self._limb_nodes])
+        nodes = frame.positions[self._limb_nodes]
+        if frame.roots is not None:
+            nodes[:, 0] = frame.roots
+        limbs = self.camera.to_pixels(nodes)
         width = max(0.16 * self._text_height, 2 * self._rod_radius * self.camera.scale)
         widths = width * np.where(frame.command == 0.0, 1.0, 1.6)
+        self._paint_body(frame, width)
         for limb, limb_width in zip(limbs, widths, strict=True):
             self._canvas.stroke(limb, WATER, limb_width + 3.0)  # a rim that lifts the robot off its trail
         for limb, limb_width, command in sorted(
@@ -271,7 +293,15 @@ class Renderer:
         if frame.warmth is not None:
             for limb, limb_width, warmth in zip(limbs, widths, frame.warmth, strict=True):
                 self._canvas.stroke(limb[: 1 + round(ROOT * (len(limb) - 1))], _warm_colour(warmth), limb_width)
-        self._canvas.dot(limbs[0, 0], LIMB, radius=1.3 * width)
+        self._canvas.dot(self.camera.to_pixels(frame.positions[0]), LIMB, radius=1.3 * width)
+
+    def _paint_body(self, frame: Frame, width: float) -> None:
+        if frame.outline is not None and len(frame.outline):
+            corners = self.camera.to_pixels(frame.outline)
+            rim = np.concatenate([corners, corners[:1]])
+            self._canvas.stroke(rim, WATER, width + 3.0)
+            self._canvas.area(corners, BODY)
+            self._canvas.stroke(rim, LIMB, 0.5 * width)
 
     def _number_waypoints(self, waypoint_index: int) -> None:
         for label in self._labels:

@@ -13,7 +13,7 @@ from seastar_gym.envs.commands import Actions, to_commands
 from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.promises import warn_uncertified
 from seastar_gym.envs.randomization import DomainRandomization
-from seastar_gym.envs.rendering import Frame, Renderer, renderer_of
+from seastar_gym.envs.rendering import Frame, Renderer, body_of, renderer_of
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.swimming import Outcome, Swimming
 from seastar_gym.envs.task import Path, Plain, SwimTask, make_scene
@@ -181,8 +181,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     the chapter's, unless a `certificate` has them, and for what was not measured. `error_estimate` is of the very swim,
     of any robot: the true error since the reset, of space and time, lies below it in about 95 % of strokes
     (docs/error_bars.md); NaN after a failure. Where decisions are no strokes, errors are those of `SmaWires` at whole
-    seconds, by random commands and by random seconds that are repeated; they are NaN for decisions of less than 0.1 or
-    more than 0.5 s, and so is `real_time_factor`.
+    seconds, over random commands and random seconds that are repeated. There `info` has them for the chapter's robot alone,
+    at a fidelity and with decisions of 0.1 to 0.5 s, and it has no `real_time_factor`.
     With `randomization`, `info` has the drawn numbers by their names, too.
 
     ## Starting state
@@ -350,6 +350,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
 
     def _frame(self) -> Frame:
         warmth = self._task.warmth()
+        roots, outline = body_of(self.simulator)
         return Frame(
             positions=self.simulator.positions[0],
             command=self._command,
@@ -358,6 +359,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
             time=float(self.simulator.time[0]),
             warmth=None if warmth is None else warmth[0],
             scenery=self._task.scenery(0),
+            roots=None if roots is None else roots[0],
+            outline=None if outline is None else outline[0],
         )
 
     def _draw_frame(self) -> None:

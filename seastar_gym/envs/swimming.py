@@ -121,6 +121,7 @@ class Swimming(ABC):
         self._error_bars = error_bars
         self.certificate = certificate
         self._promise = self.simulator.scene, self._promise_of(self.simulator.scene)
+        self._promised_names = tuple(self._promise[1])
         peak = np.max(self.simulator.scene.actuator.peak_angle)  # before the first draw the largest that may be drawn
         if scene.robot.hub_hinge == "turning" and 2 * peak >= scene.robot.opening_angle * (1 - 1e-9):
             raise ValueError(
@@ -320,7 +321,8 @@ class Swimming(ABC):
         if simulator.scene is not self._promise[0]:
             self._promise = simulator.scene, self._promise_of(simulator.scene)
         strong = (simulator.limb_strengths == 1.0).all(axis=1)
-        return {name: np.where(strong, value, np.nan) for name, value in self._promise[1].items()}
+        known = self._promise[1]
+        return {name: np.where(strong, known.get(name, np.nan), np.nan) for name in self._promised_names}
 
 
 def _messages(status: NDArray[np.int64]) -> NDArray[Any]:

@@ -74,13 +74,18 @@ def make_body(robot: Seastar, mesh: Mesh, water: Water, gravity: tuple[float, fl
         mass=mass,
         centre=body.centre,
         inertia=body.inertia_at(robot.density) + turning,
-        scale=max(robot.limb_length, body.shape.reach, *(float(np.hypot(*arm)) for arm in arms)),
+        scale=power_of_two(max(robot.limb_length, body.shape.reach, *(float(np.hypot(*arm)) for arm in arms))),
         added_mass=fluid,
         strips=drag.strips,
         weight=None if gravity is None else weight_moment(robot, mesh, water, gravity, np.array(arms)),
     )
     weight = None if gravity is None else (mass - water.density * body.volume) * np.array(gravity)
     return OnBody(coefficients, mass, drag.isotropic, weight, mesh.n_limbs)
+
+
+def power_of_two(length: float) -> float:
+    """The power of two above a length [m]: arcs over it are angles to the last bit."""
+    return float(2.0 ** np.ceil(np.log2(length)))
 
 
 def weight_moment(

@@ -20,6 +20,7 @@ from seastar_gym.der.terms import (
 )
 from seastar_gym.model.body import make_body
 from seastar_gym.model.currents import current_rows
+from seastar_gym.model.joints import with_joints
 from seastar_gym.model.mesh import make_mesh
 from seastar_gym.scene.along import AlongLimb, Stiffening
 from seastar_gym.scene.fluid import Water
@@ -67,7 +68,9 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         n_limbs=mesh.n_limbs,
         nodes_per_limb=mesh.nodes_per_limb,
         stretching=stretched,
-        bending=bending.coefficients(mesh, gregory=continuum),
+        bending=with_joints(
+            bending.coefficients(mesh, gregory=continuum), [limb.joint_stiffness for limb in limbs]
+        ),
         hub=hub.coefficients(hub_angles, turning=robot.hub_hinge == "turning"),
         clamp=clamp.coefficients(mesh, [limb.direction for limb in limbs]) if continuum else None,
         along=limb_actuation(scene, index, mesh.natural_turn),

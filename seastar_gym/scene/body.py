@@ -14,6 +14,8 @@ from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
 
+SAME = 1e-9
+"""Distance of places that are taken for one [m]."""
 GIVEN_DRAG = ("drag_along", "drag_across", "drag_turning")
 GIVEN_FLUID = ("added_mass_along", "added_mass_across", "added_mass_turning")
 
@@ -43,7 +45,7 @@ class Body:
     """Rigid body between the limbs, whose reference point is the hub. Without a size and mass it is the point hub.
 
     radius: Radius of a disc around the hub [m].
-    outline: Instead of a disc, corners of a convex polygon (x, y) [m], anti-clockwise, with the hub, the origin, inside.
+    outline: Instead of a disc, corners of a convex polygon (x, y) [m], anti-clockwise, with the hub (0, 0) inside.
         `Body.rectangle` makes one.
     height: Size out of the plane [m].
     mass: [kg]. None means the limbs' density times area and height.
@@ -54,14 +56,14 @@ class Body:
     drag_turning: Drag coefficient [1] of turning: the torque is that of a plate as long as the outline is wide at most,
         a, which turns about its middle: 1/2 rho_f C h a^4/32 |omega| omega.
     added_mass_along, added_mass_across, added_mass_turning: Added mass coefficients [1] of the same three motions, over
-        those of an ellipse of the outline's widths, rho_f pi h b^2/4, a^2/4 and (a^2 - b^2)^2/128. None means the
-        fluid's; they count in fluids with added mass only.
+        the added masses of an ellipse of the outline's widths a (along) and b (across): rho_f pi h times b^2/4, a^2/4
+        and (a^2 - b^2)^2/128. None means the fluid's. They count in fluids with added mass only.
     attachments: `Attachment` of every limb. () attaches limbs to the rim in their directions from the hub, pointing
         away from it: a disc makes a star of that radius.
 
-    Without any of the three drag coefficients, a polygon has the drag of strips of its outline, each for the flow across
-    it, with the fluid's C_d, halved between the faces that flow meets and leaves; a disc that of its width, and none in
-    turning. Where one of the three is given, the others are the fluid's C_d, or 0 for the turning of a disc.
+    Without any of the three drag coefficients, a polygon has the drag of strips of its outline, each for the flow
+    across it, with the fluid's C_d, halved between the faces that flow meets and leaves; a disc has that of its width,
+    and none in turning. Where one of the three is given, the others are the fluid's C_d, or 0 for a disc that turns.
 
     Flow at the body is that at the hub. Fluid that moves along with the body is that of an ellipse about the hub.
     """
@@ -87,7 +89,8 @@ class Body:
         object.__setattr__(self, "radius", float(self.radius))
         self._check_outline()
         require_each(self, "height", partial(require_number, unit="m"))
-        for name, unit in (("mass", "kg"), ("inertia", "kg m^2"), *((name, "1") for name in GIVEN_DRAG + GIVEN_FLUID)):
+        dimensionless = dict.fromkeys(GIVEN_DRAG + GIVEN_FLUID, "1")
+        for name, unit in {"mass": "kg", "inertia": "kg m^2", **dimensionless}.items():
             if getattr(self, name) is not None:
                 require_each(self, name, partial(not_negative, unit=unit))
         centre = self.centre_of_mass
@@ -117,6 +120,17 @@ class Body:
         require_number("width", width, "m")
         x, y = 0.5 * length, 0.5 * width
         return cls(outline=((x, -y), (x, y), (-x, y), (-x, -y)), **others)
+
+    def is_symmetric(self, n_limbs: int) -> bool:
+        """Whether a turn by a limb of n_limbs and a mirror at the x axis leave the body itself unchanged."""
+        directed = any(getattr(self, name) is not None for name in GIVEN_FLUID + GIVEN_DRAG[:2])
+        if directed or np.hypot(*self.centre) > SAME:
+            return False
+        if not self.outline:
+            return True
+        points = np.array(self.outline)
+        z = points[:, 0] + 1j * points[:, 1]
+        return all(_same_points(z, image) for image in (z * np.exp(2j * np.pi / n_limbs), z.conj()))
 
     @property
     def shape(self) -> Outline:
@@ -167,6 +181,12 @@ class Body:
         if self.attachments:
             return self.attachments
         return tuple(Attachment(*self.shape.rim(direction), direction) for direction in directions)
+
+
+def _same_points(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> bool:
+    """Whether two sets of points are one, in whatever order."""
+    nearest = np.abs(one[:, None] - other[None, :]).min(axis=1)
+    return bool((nearest < SAME).all())
 
 
 def _is_point(value: object) -> bool:

@@ -27,16 +27,18 @@ class Limb:
     radius: Radius [m], a number or a profile along the limb. For example, radius=(root, tip) is a taper.
     youngs_modulus: Young's modulus [Pa], a number or a profile along the limb.
     natural_curvature: Curvature of the limb at rest [1/m]. Positive values bend it anti-clockwise towards its tip.
+    joint_stiffness: Stiffness of a joint that turns between hub and limb [N m/rad]. None means a rigid clamp.
 
     Numbers that differ from robot to robot must be numpy arrays of shape (n_robots,), since a tuple is a profile.
     """
 
-    PER_ROBOT: ClassVar = ("length", "radius", "youngs_modulus", "natural_curvature")
+    PER_ROBOT: ClassVar = ("length", "radius", "youngs_modulus", "natural_curvature", "joint_stiffness")
     direction: float | None = None
     length: Numbers | None = None
     radius: Profile | Numbers | None = None
     youngs_modulus: Profile | Numbers | None = None
     natural_curvature: Numbers = 0.0
+    joint_stiffness: Numbers | None = None
 
     def __post_init__(self) -> None:
         if self.direction is not None and not (is_finite_number(self.direction) and 0 <= self.direction < 2 * math.pi):
@@ -46,6 +48,8 @@ class Limb:
         if self.length is not None:
             require_each(self, "length", partial(_require_positive, unit="m"))
         require_each(self, "natural_curvature", partial(require_finite, unit="1/m"))
+        if self.joint_stiffness is not None:
+            require_each(self, "joint_stiffness", partial(_require_positive, unit="N m/rad"))
         for name, profile, unit in (("radius", self.radius, "m"), ("youngs_modulus", self.youngs_modulus, "Pa")):
             if profile is None:
                 continue
@@ -74,6 +78,7 @@ class LimbShape(NamedTuple):
     youngs_modulus: tuple[float, ...]
     natural_curvature: float
     root: tuple[float, float] = (0.0, 0.0)
+    joint_stiffness: float | None = None
 
     def extreme_edges(self, nodes_per_limb: int) -> list[tuple[float, float, float, float]]:
         """Bounds of (l^2 [m^2], EA/l [N/m], EI/l [N m], volume [m^3]) over the edges: smallest and largest values."""

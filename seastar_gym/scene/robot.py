@@ -87,7 +87,6 @@ class Seastar:
             raise ValueError("One limb has no hub hinge that could be measured by its turning angle.")
         self._check_limbs()
         self._check_along()
-        self._check_body()
 
     def _check_along(self) -> None:
         for name, kind in (("along", AlongLimb), ("stiffening", Stiffening)):
@@ -109,6 +108,7 @@ class Seastar:
             raise ValueError("Either every limb has a direction or none has.")
         if directions and (directions[0] != 0.0 or (np.diff(directions) <= 0.0).any()):
             raise ValueError(f"Directions of limbs must begin at 0 and increase [rad], not {shown(directions)}.")
+        self._check_body()
         most = chosen(self, partial(max, key=abs))
         turn = max(abs(turn_per_hinge(shape, self.nodes_per_limb)) for shape in most.limb_shapes())
         if turn >= math.pi:
@@ -118,12 +118,14 @@ class Seastar:
             )
 
     def _check_body(self) -> None:
+        if self.discretisation != "continuum" and any(limb.joint_stiffness is not None for limb in self.limbs):
+            raise ValueError('discretisation="chapter" joins limbs to each other, so they have no joint_stiffness.')
         if not isinstance(self.body, Body | None):
             raise ValueError(f"body must be a Body or None, not {shown(self.body)}.")
         if self.body is None:
             return
         if self.discretisation != "continuum":
-            raise ValueError('discretisation="chapter" joins limbs by hinges in one point, so it has no room for a body.')
+            raise ValueError('discretisation="chapter" joins limbs in one point, so it has no room for a body.')
         if len(self.body.attachments) not in (0, self.n_limbs):
             raise ValueError(
                 f"attachments must be one Attachment for each of the {self.n_limbs} limbs, or none, not "
@@ -151,6 +153,7 @@ class Seastar:
                 youngs_modulus=as_tuple(robot.youngs_modulus if limb.youngs_modulus is None else limb.youngs_modulus),
                 natural_curvature=limb.natural_curvature,
                 root=root,
+                joint_stiffness=limb.joint_stiffness,
             )
             for limb, direction, gap, root in zip(limbs, directions, self._gaps(limbs), roots, strict=True)
         )
@@ -172,9 +175,25 @@ class Seastar:
     def is_symmetric(self) -> bool:
         """Whether rotation by one limb and reflection at limb 1 leave the robot unchanged; in a batch, every robot."""
         robots = [self.limb_shapes(index) for index in range(batch_size(self) or 1)]
-        alike = all(len({shape._replace(direction=0.0, gap=0.0) for shape in shapes}) == 1 for shapes in robots)
+        alike = all(
+            len({shape._replace(direction=0.0, gap=0.0, root=(0.0, 0.0)) for shape in shapes}) == 1 for shapes in robots
+        )
         straight = not any(shape.natural_curvature for shapes in robots for shape in shapes)
-        return alike and straight and float(np.ptp([shape.gap for shape in robots[0]])) < 1e-12
+        evenly = float(np.ptp([shape.gap for shape in robots[0]])) < 1e-12
+        return alike and straight and evenly and (self.body is None or self._has_symmetric_body)
+
+    @property
+    def _has_symmetric_body(self) -> bool:
+        """Whether rotation by one limb and reflection at limb 1 leave the body unchanged, with its attachments."""
+        assert self.body is not None
+        roots = np.array([shape.root for shape in self.limb_shapes()])
+        angles = np.array([shape.direction for shape in self.limb_shapes()])
+        outward = np.hypot(*roots[0]) * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        in_order = np.allclose(angles, 2.0 * np.pi / self.n_limbs * np.arange(self.n_limbs), atol=1e-9)
+        radial = np.allclose(np.abs(roots), np.abs(outward), rtol=0.0, atol=1e-9) and (
+            np.allclose(roots, outward, rtol=0.0, atol=1e-9) or np.allclose(roots, -outward, rtol=0.0, atol=1e-9)
+        )
+        return bool(in_order and radial and self.body.is_symmetric(self.n_limbs))
 
     @property
     def n_nodes(self) -> int:

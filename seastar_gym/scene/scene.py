@@ -111,7 +111,7 @@ class Scene:
         if self.contact is None:
             return
         if self.robot.body is not None and not self.robot.body.is_point:
-            raise ValueError("Contact of limbs around a body is not modelled: use a robot without one, or contact=None.")
+            raise ValueError("Contact of limbs around a body is not modelled: use contact=None, or no body.")
         robot, pairs = self.robot, self.robot.limbs_that_may_touch()
         if not pairs:
             raise ValueError("Contact is modelled between limbs less than half a turn apart, and this robot has none.")

@@ -62,7 +62,8 @@ class Batch:
         self.q = aligned_rows(n_groups, n_place_rows, N_LANES)
         self.v = aligned_rows(n_groups, n_place_rows, N_LANES)
         self.q[:, :n_rows] = self.coefficients.rest
-        self.a = aligned_rows(n_groups, (n_free_rows + 1) * self._scheme.n_stages + 2, N_LANES)
+        n_shares = 0 if body is None else self._scheme.n_stages
+        self.a = aligned_rows(n_groups, (n_free_rows + 1) * self._scheme.n_stages + 2 + n_shares, N_LANES)
         self.peaks = np.zeros((n_groups, n_limbs, N_LANES))
         self.times = self.shape = np.zeros(1)
         self.rotations = np.zeros((n_groups, n_limbs, N_LANES))
@@ -114,7 +115,7 @@ class Batch:
         self.last_hub = self.hub_position()
 
     def put_nodes(self, robot: int | np.intp, nodes: Floats, angle: float = 0.0) -> None:
-        """Put a robot's nodes at positions [m], shape (n_nodes, 2), and its body at an angle [rad], without velocity."""
+        """Put a robot's nodes at positions [m], shape (n_nodes, 2), and its body at an angle [rad], at rest."""
         group, lane = divmod(robot, N_LANES)
         self.q[group, : self.n_node_rows, lane] = nodes.reshape(-1)
         self.v[group, :, lane] = 0.0

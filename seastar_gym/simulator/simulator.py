@@ -285,7 +285,7 @@ class Simulator:
         return best_fit_heading(self.positions, self.scene.robot.nodes())
 
     def orientation(self) -> Floats:
-        """Angle by which every robot's body has turned from rest [rad], shape (n_robots,), or without one its heading."""
+        """Angle by which every robot's body has turned from rest [rad], shape (n_robots,); without one, its heading."""
         return self._batch.angles(self.q) if self._batch.has_body else self.heading()
 
     def spin(self) -> Floats:

@@ -22,8 +22,8 @@ class State(NamedTuple):
     commands: Commands under way, shape (n_robots, n_limbs). `None` means none.
     phase: Time since they were given [s], shape (n_robots,), 0 where none are under way. All robots that have commands
         under way share it. `None` means 0.
-    orientation: Angle by which every robot's body has turned from rest [rad], shape (n_robots,). `None` means that of the
-        rest shape that fits the nodes best; it is `None` without a body.
+    orientation: Angle by which every robot's body has turned from rest [rad], shape (n_robots,). `None` means that of
+        the rest shape that fits the nodes best; it is `None` without a body.
     spin: Its angular velocity [rad/s], shape (n_robots,). `None` means 0.
     """
 

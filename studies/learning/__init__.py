@@ -4,5 +4,6 @@ import sys
 
 from seastar_gym.extras import is_command, require_extra
 
-if is_command() and {"studies.learning.ablations", "studies.learning.fidelities"} & set(sys.orig_argv):
+TRAININGS = {f"studies.learning.{name}" for name in ("ablations", "fidelities", "in_time")}
+if is_command() and TRAININGS & set(sys.orig_argv):
     require_extra("Trainings", "train", "safetensors", "stable_baselines3", "torch")

@@ -9,7 +9,6 @@ and the table in Markdown.
 """
 
 import json
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -159,16 +158,14 @@ def measured(swimmer: Swimmer, options: Options) -> dict[str, Any]:
 def study(options: Options) -> dict[str, Any]:
     """Run the study; returns its results as plain data."""
     options.out.mkdir(parents=True, exist_ok=True)
-    began = time.perf_counter()
     model = train(options) if options.decisions else None
-    seconds = time.perf_counter() - began
     if model is not None:
         model.save(options.out / "model.zip")
     return {
         "distance_m": DISTANCE,
         "fidelity": options.fidelity,
         "tolerance_deg": round(float(np.degrees(Headings().tolerance)), 6),
-        "training": {"decisions": options.decisions, "seed": options.seed, "seconds": round(seconds)},
+        "training": {"decisions": options.decisions, "seed": options.seed},
         "turns_deg": list(options.turns),
         "swims": {
             name: measured(swimmer, options) for name, swimmer in swimmers(model).items() if name in options.swimmers

@@ -16,7 +16,7 @@ from rich.table import Table
 
 from seastar_gym.command import run_command
 from seastar_gym.gaits import STRAIGHT
-from seastar_gym.scene import AlongLimb, Contact, Scene, Seastar, Stiffening, relaxation_time
+from seastar_gym.scene import AlongLimb, Body, Contact, Scene, Seastar, Stiffening, relaxation_time
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
 from seastar_gym.scene.fluid import Water
 from seastar_gym.simd.lanes import N_LANES
@@ -61,6 +61,8 @@ def scenes() -> dict[str, Scene]:
         "material damping": Scene(damped),
         "bent along the limbs": Scene(Seastar(along=AlongLimb())),
         "bent along, stiff when hot": Scene(Seastar(along=AlongLimb(), stiffening=Stiffening())),
+        "a disc for a body": Scene(Seastar(body=Body(radius=0.02))),
+        "a rectangle for a body": Scene(Seastar(body=Body.rectangle(0.06, 0.03))),
         "contact, limbs apart": Scene(contact=Contact()),
         "numbers of each robot": Scene(Seastar(youngs_modulus=np.full(n_robots, 1e6))),
         "all of these": Scene(replace(damped, youngs_modulus=np.full(n_robots, 1e6)), everything),

@@ -20,6 +20,8 @@ UNITS = {
 }
 """Measures in words, by challenge."""
 MORE_IS_BETTER = ("prey", "fast-prey")
+ORDER = ("rest", "greedy", "planner", "adaptive", "informed", "PPO", "PPO, memory", "RecurrentPPO")
+"""Agents from top to bottom."""
 HEADROOM, LEFT = 0.2, 1.0 / 3.0
 """A task is kept where the bound is so much better than greedy, and plain PPO leaves so much of that."""
 
@@ -27,7 +29,8 @@ INTRODUCTION = """# Tasks with headroom
 
 {command} writes this page. Every agent swims the same {episodes} held-out episodes, numbers 0 to {last} of the
 split "test", at fidelity "{fidelity}"; learners are trained for {decisions:,} decisions on the split "train". Numbers
-are means with 95 % bootstrap intervals over episodes. Where a learner has several seeds, each is given.
+are means with 95 % bootstrap intervals over episodes. Where a learner has several seeds, each is given. What is missing
+is swum by the same command, which goes on where it was broken off; `--seeds 0 1 2` adds seeds.
 
 A task is kept if the best that was found is at least 20 % better than greedy, and if plain PPO leaves at least a third
 of that. *Bound* is the best mean of all agents of a row: what can be reached, not a proof that nothing is better. *Gap
@@ -55,6 +58,11 @@ class Row(NamedTuple):
     challenge: str
     agents: dict[str, list[NDArray[np.float64]]]
     """Measures of all episodes, one array for every seed."""
+
+    @property
+    def in_order(self) -> list[tuple[str, list[NDArray[np.float64]]]]:
+        """Agents and their measures, from top to bottom."""
+        return sorted(self.agents.items(), key=lambda one: ORDER.index(one[0]))
 
     def mean(self, agent: str) -> float:
         """Mean measure of an agent over seeds and episodes."""
@@ -98,11 +106,14 @@ def table(row: Row) -> str:
     """Table in Markdown of a task."""
     lines = [f"## {row.id}", "", f"{UNITS[row.challenge].capitalize()}.", ""]
     lines += ["| agent | mean | 95 % interval | seeds |", "|---|---:|---|---|"]
-    for agent, seeds in row.agents.items():
+    for agent, seeds in row.in_order:
         mean, low, high = mean_with_interval(np.concatenate(seeds))
         each = ", ".join(f"{values.mean():.3g}" for values in seeds) if len(seeds) > 1 else ""
         lines.append(f"| {agent} | {mean:.3g} | {low:.3g} to {high:.3g} | {each} |")
-    if {"greedy", "PPO"} <= row.agents.keys():
+    missing = [agent for agent in ORDER[:-1] if agent not in row.agents]
+    if missing:
+        lines += ["", f"Not swum yet: {'; '.join(missing)}."]
+    if {"greedy", "PPO", "informed"} <= row.agents.keys():
         verdict = "kept" if row.is_kept else "not kept"
         better = f"{100.0 * row.headroom:.0f} % better than greedy" if row.headroom < np.inf else "greedy gets nothing"
         lines += ["", f"Bound: {row.bound}, {better}. Gap left by PPO: {100.0 * row.left:.0f} %. By this, {verdict}."]
@@ -115,18 +126,20 @@ def draw(rows: Sequence[Row], file: Path) -> None:
     lines = -(-len(rows) // columns)
     figure = new_figure(3.4 * columns, 2.2 * lines + 0.3)
     panels = figure.subplots(lines, columns, squeeze=False).flat
+    shown = [agent for agent in ORDER if any(agent in row.agents for row in rows)]
     for axes, row in zip(panels, rows, strict=False):
-        for place, (agent, seeds) in enumerate(row.agents.items()):
+        for agent, seeds in row.in_order:
+            place = shown.index(agent)
             mean, low, high = mean_with_interval(np.concatenate(seeds))
             colour = COLOURS[0] if agent.startswith(("PPO", "Rec")) else FAINT_INK
             axes.plot([low, high], [place, place], color=colour, lw=2.5, solid_capstyle="butt")
             axes.plot(mean, place, "o", color=colour, ms=5)
-            axes.plot([values.mean() for values in seeds], [place] * len(seeds), "|", color=colour, ms=8)
-        axes.set_yticks(range(len(row.agents)), list(row.agents), fontsize=8)
+        axes.set_yticks(range(len(shown)), shown, fontsize=8)
+        axes.set_ylim(-0.5, len(shown) - 0.5)
         axes.set_title(row.id, fontsize=9)
         axes.set_xlabel(UNITS[row.challenge].split(",")[0], fontsize=8)
         axes.tick_params(labelsize=8)
-        axes.set_xlim(left=0.0)
+        axes.set_xlim(left=-0.02 * axes.get_xlim()[1])
         if row.challenge == "station":
             axes.set_xscale("log")
             axes.set_xlim(0.3, 200.0)

@@ -1,15 +1,15 @@
 """Importance weights of samples from a few measured speeds, and predictions of others with intervals.
 
 A measured speed is the simulated one times an error whose logarithm is normal. Its standard deviation has two parts:
-the scatter of single runs, and what a model of this kind is off. Both are set beforehand, see SCATTER and MODEL. A sample
-has the weight of its likelihood; predictions are quantiles of the weighted samples with such an error.
+the scatter of single runs, and what a model of this kind is off. Both are set beforehand, see SCATTER and MODEL. A
+sample has the weight of its likelihood; predictions are quantiles of the weighted samples with such an error.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtr
 
 Floats = NDArray[np.float64]
 
@@ -20,6 +20,8 @@ MODEL = 0.18
 SPREAD = float(np.hypot(SCATTER, MODEL))
 LEVEL = 0.9
 """Share of speeds that intervals should hold."""
+BISECTIONS = 30
+"""A logarithm is then found to 1e-8."""
 
 
 @dataclass(frozen=True)
@@ -65,21 +67,22 @@ def log_speeds(simulated: Floats) -> Floats:
 def predict(simulated: Floats, weight: Floats) -> Prediction:
     """Quantiles of the mixture of the samples' log-normal errors."""
     logs = log_speeds(simulated)
-    ends = (0.5, 0.5 * (1.0 - LEVEL), 0.5 * (1.0 + LEVEL))
-    middle, low, high = (np.exp([quantile(column, weight, end) for column in logs.T]) for end in ends)
-    return Prediction(middle, low, high)
+    return Prediction(
+        *(np.exp(quantiles(logs, weight, share)) for share in (0.5, 0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL))
+    )
 
 
-def quantile(centres: Floats, weight: Floats, share: float) -> float:
-    """Number below which `share` of a mixture of normal distributions with the standard deviation SPREAD lies."""
-    low, high = centres.min() - 6.0 * SPREAD, centres.max() + 6.0 * SPREAD
-    for _ in range(50):
+def quantiles(centres: Floats, weight: Floats, share: float) -> Floats:
+    """Numbers below which `share` of mixtures of normal distributions with the standard deviation SPREAD lies.
+
+    centres: Shape (n_samples, k). Returns shape (k,).
+    """
+    low, high = centres.min(axis=0) - 6.0 * SPREAD, centres.max(axis=0) + 6.0 * SPREAD
+    for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        if weight @ norm.cdf((middle - centres) / SPREAD) < share:
-            low = middle
-        else:
-            high = middle
-    return float(0.5 * (low + high))
+        below = weight @ ndtr((middle - centres) / SPREAD) < share
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return np.asarray(0.5 * (low + high))
 
 
 def score(prediction: Prediction, measured: Floats, chosen: list[int]) -> Score:

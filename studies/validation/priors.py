@@ -12,6 +12,10 @@ from scipy.stats import qmc
 
 Floats = NDArray[np.float64]
 
+SWEEPS = tuple(np.radians([0.0, 25.0, 50.0, 75.0]).tolist())
+"""Angles by which limbs may be swept backwards where they leave the frame [rad], equally likely; sample k has number
+k mod 4. A scene has one, since attachments are the same for all robots of a batch."""
+
 
 class Unknown(NamedTuple):
     """Number that is not known. Its logarithm is uniform between the ends of its range.
@@ -27,16 +31,22 @@ class Unknown(NamedTuple):
 
 
 UNKNOWNS = (
-    Unknown("limb length", "m", 0.02, 0.045, "limbs bend by 140 to 320 degrees at rest"),
-    Unknown("limb radius", "m", 2e-3, 5e-3, "strips of 2 to 4 mm by 8 to 15 mm, as round rods"),
+    Unknown("limb length", "m", 0.015, 0.045, "limbs bend by 105 to 320 degrees at rest"),
+    Unknown("limb width", "m", 5e-3, 12e-3, "strips, out of the plane"),
+    Unknown("limb thickness", "m", 1.5e-3, 4e-3, "strips, in the plane"),
     Unknown("Young's modulus", "Pa", 2e5, 2e6, "silicones with wires"),
     Unknown("body mass", "kg", 0.03, 0.15, "frame, battery, electronics"),
     Unknown("body drag", "1", 0.2, 1.2, "streamlined to blunt"),
-    Unknown("limb drag across", "1", 1.0, 3.0, "cylinders and plates; more in unsteady flow"),
+    Unknown("limb drag across", "1", 1.0, 3.0, "plates; more in unsteady flow"),
     Unknown("limb drag along", "of across", 0.02, 0.3, "skin friction"),
-    Unknown("added mass", "1", 0.2, 2.0, "cylinder 1, plate more"),
+    Unknown("added mass", "of a plate", 0.3, 1.2, "less for short plates"),
     Unknown("hot over cold EI", "1", 1.0, 4.0, "2.68 in a sister model"),
 )
+
+
+def of_sweep(values: dict[str, Floats], number: int) -> dict[str, Floats]:
+    """Samples with this sweep."""
+    return {name: column[number :: len(SWEEPS)] for name, column in values.items()}
 
 
 def samples(n: int, seed: int = 0) -> dict[str, Floats]:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.validation.priors import UNKNOWNS, place_in_range
+from studies.validation.priors import SWEEPS, UNKNOWNS, place_in_range
 
 Floats = NDArray[np.float64]
 
@@ -35,6 +35,11 @@ def told(values: dict[str, Floats], weight: Floats) -> list[Told]:
         narrower = np.sqrt(weight @ (logs - mean) ** 2) / logs.std()
         found.append(Told(unknown.name, float(low), float(middle), float(high), float(narrower)))
     return found
+
+
+def sweeps_told(weight: Floats) -> list[float]:
+    """Probability of every sweep of the limbs, in the order of SWEEPS."""
+    return [float(weight[number :: len(SWEEPS)].sum()) for number in range(len(SWEEPS))]
 
 
 def best_known(values: dict[str, Floats], weight: Floats) -> tuple[dict[str, float], float]:

@@ -1,12 +1,13 @@
 """Speeds of all samples of the unknowns in all conditions: robots side by side in batches, kept in files."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.simulator import Simulator
+from studies.validation.priors import SWEEPS, of_sweep
 from studies.validation.speeds import Condition
 from studies.validation.swimmer import SIDES, Variant, scene
 
@@ -16,10 +17,19 @@ STROKES, FIRST = 8, 4
 """Strokes from rest, and those before the mean begins: speeds are those of strokes 5 to 8."""
 
 
-def speeds(condition: Condition, values: Mapping[str, Floats], variant: Variant) -> Floats:
+def speeds(condition: Condition, values: dict[str, Floats], variant: Variant, finer: int = 1) -> Floats:
     """Mean forward speed of every sample [m/s], NaN where the solver gave up, shape (n_samples,)."""
+    found = np.empty(len(values["limb length"]))
+    for number, sweep in enumerate(SWEEPS):
+        swimmers = of_sweep(values, number)
+        found[number :: len(SWEEPS)] = swum(condition, swimmers, sweep, variant, finer)
+    return found
+
+
+def swum(condition: Condition, values: dict[str, Floats], sweep: float, variant: Variant, finer: int) -> Floats:
+    """Speeds of samples with one sweep [m/s]."""
     n = len(values["limb length"])
-    simulator = Simulator(scene(condition.liquid_metal, condition.frequency, values, variant), n)
+    simulator = Simulator(scene(condition, values, sweep, variant, finer), n)
     command, start = np.tile(SIDES, (n, 1)), np.zeros(n)
     for stroke in range(STROKES):
         if stroke == FIRST:
@@ -30,7 +40,7 @@ def speeds(condition: Condition, values: Mapping[str, Floats], variant: Variant)
 
 
 def all_speeds(
-    conditions: list[Condition], values: Mapping[str, Floats], variant: Variant, folder: Path
+    conditions: list[Condition], values: dict[str, Floats], variant: Variant, folder: Path
 ) -> Iterator[tuple[Condition, Floats]]:
     """Speeds of every condition in turn, from its file where there is one of as many samples."""
     n = len(values["limb length"])

@@ -23,15 +23,17 @@ from studies.validation.inference import MODEL, SCATTER, Score, effective, predi
 from studies.validation.luck import other_fours, scores
 from studies.validation.pictures import draw_speeds
 from studies.validation.priors import UNKNOWNS, samples
-from studies.validation.separation import best_known, told
+from studies.validation.separation import best_known, sweeps_told, told
 from studies.validation.simulate import all_speeds
 from studies.validation.speeds import Condition, read_speeds, training
 from studies.validation.swimmer import Variant
 
 Floats = NDArray[np.float64]
 
-VARIANTS: tuple[Variant, ...] = get_args(Variant)
-SAMPLES, FOURS = 512, 200
+VARIANTS: tuple[Variant, ...] = get_args(Variant)[1:]
+SAMPLES, OF_VARIANTS, FOURS = 512, 256, 100
+"""Samples of the full model, and of models with a part left out: the first of the same sequence. Other fours."""
+SAME_SAMPLES = "full, as many samples"
 
 
 def simulate(conditions: list[Condition], variant: Variant, n: int, folder: Path, console: Console) -> Floats:
@@ -108,6 +110,7 @@ def as_json(
         },
         "before": asdict(full["blind"]),
         "unknowns": [one._asdict() for one in told(values, full["weight"])],
+        "sweeps": dict(zip(("0", "25", "50", "75"), sweeps_told(full["weight"]), strict=True)),
         "best_known": {"powers": powers, "narrower": narrower},
         "speeds_mm_per_s": [
             {
@@ -125,18 +128,22 @@ def main() -> None:
     """Command line: simulate, weigh, predict, and leave parts out."""
     parser = study_parser("studies.validation", __doc__)
     parser.add_argument("--samples", type=int, default=SAMPLES, help="samples of the unknowns (default: %(default)s)")
-    parser.add_argument("--variants", nargs="*", choices=VARIANTS, default=list(VARIANTS), help="models to simulate")
+    parser.add_argument("--variants", nargs="*", choices=VARIANTS, default=list(VARIANTS), help="parts to leave out")
     parser.add_argument("--runs", type=Path, default=Path("runs/validation"), help="folder of speeds")
     parser.add_argument("--out", type=Path, default=Path("docs"), help="folder of results (default: %(default)s)")
     arguments = parser.parse_args()
     console, conditions, values = Console(), read_speeds(), samples(arguments.samples)
-    analyses = {}
-    for variant in dict.fromkeys(("full", *arguments.variants)):
-        simulated = simulate(conditions, variant, arguments.samples, arguments.runs, console)
-        analyses[variant] = analyse(simulated, conditions)
+    simulated = simulate(conditions, "full", arguments.samples, arguments.runs, console)
+    analyses = {"full": analyse(simulated, conditions)}
+    fewer = min(OF_VARIANTS, arguments.samples)
+    if arguments.variants:
+        analyses[SAME_SAMPLES] = analyse(simulated[:fewer], conditions)
+    for variant in arguments.variants:
+        of_variant = simulate(conditions, variant, fewer, arguments.runs, console)
+        analyses[variant] = analyse(of_variant, conditions)
     print_tables(console, analyses, values)
     result = as_json(analyses, conditions, values)
-    console.print(f"Best known: {result['best_known']}")
+    console.print(f"Best known: {result['best_known']}, sweeps: {result['sweeps']}")
     arguments.out.mkdir(parents=True, exist_ok=True)
     (arguments.out / "validation.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     full, one = analyses["full"], analyses["full"]["score"]

@@ -1,12 +1,16 @@
-"""Learners of Stable-Baselines3 learn for an iteration each, on the batch and on one robot."""
+"""Learners of Stable-Baselines3 and sb3-contrib learn for an iteration each, on the batch and on one robot."""
+
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
 import pytest
 import torch
+from sb3_contrib import QRDQN, TRPO, MaskablePPO, RecurrentPPO
+from sb3_contrib.common.maskable.utils import get_action_masks
 from stable_baselines3 import A2C, DQN, PPO, SAC, TD3, HerReplayBuffer
 
-import seastar_gym  # noqa: F401
+from seastar_gym import Scene, SmaWires
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.envs.goal import GoalForm
 
@@ -17,6 +21,10 @@ LEARNERS = {
     "DQN": (DQN, "pairs", REPLAY),
     "SAC": (SAC, "continuous", REPLAY),
     "TD3": (TD3, "continuous", REPLAY),
+    "TRPO": (TRPO, "pairs", {"n_steps": 8, "batch_size": 8}),
+    "QRDQN": (QRDQN, "pairs", REPLAY),
+    "MaskablePPO": (MaskablePPO, "limbs", {"n_steps": 8, "batch_size": 8, "n_epochs": 1}),
+    "RecurrentPPO": (RecurrentPPO, "pairs", {"n_steps": 8, "batch_size": 8, "n_epochs": 1}),
 }
 ARGUMENTS = {"fidelity": "fast", "max_episode_steps": 5}
 
@@ -38,7 +46,8 @@ def single(actions):
 @pytest.mark.parametrize("name", LEARNERS)
 def test_a_learner_learns_for_an_iteration(name, make):
     kind, actions, arguments = LEARNERS[name]
-    learner = kind("MlpPolicy", make(actions), policy_kwargs={"net_arch": [8]}, seed=0, device="cpu", **arguments)
+    policy = "MlpLstmPolicy" if kind is RecurrentPPO else "MlpPolicy"
+    learner = kind(policy, make(actions), policy_kwargs={"net_arch": [8]}, seed=0, device="cpu", **arguments)
     before = [weight.detach().clone() for weight in learner.policy.parameters()]
     learner.learn(16)
     assert learner.num_timesteps >= 16
@@ -61,3 +70,25 @@ def test_hindsight_changes_goals_and_learns():
     assert changed.any() and not changed.all()
     distance = np.linalg.norm(drawn.next_observations["achieved_goal"].numpy() - goals, axis=1)
     np.testing.assert_array_equal(drawn.rewards.numpy()[:, 0] == 0.0, distance <= 0.1)
+
+
+def test_a_masked_learner_never_asks_for_what_wires_cannot_follow():
+    """Deaf wires that are warm: a command to them would be refused, and counts in info."""
+    scene = replace(Scene.preset("fast"), actuator=SmaWires(deaf=True))
+    env = BatchVecEnv(
+        gym.make_vec(
+            "SeastarSwim-v0", 4, vectorization_mode="vector_entry_point", actions="joint", autoreset_mode="SameStep",
+            scene=scene, decision_period=0.2, max_episode_steps=10,
+        )
+    )  # fmt: skip
+    learner = MaskablePPO(
+        "MlpPolicy", env, n_steps=8, batch_size=8, n_epochs=1, policy_kwargs={"net_arch": [8]}, seed=0, device="cpu"
+    )
+    learner.learn(32)
+    seen, refused, closed = env.reset(), 0, 0
+    for _ in range(8):
+        masks = get_action_masks(env)
+        closed += (~masks).sum()
+        seen, _, _, infos = env.step(learner.predict(seen, action_masks=masks)[0])
+        refused += sum(info["masked_limbs"] for info in infos)
+    assert closed > 0 and refused == 0

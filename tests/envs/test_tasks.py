@@ -225,10 +225,10 @@ def test_one_robot_can_be_reduced_too(id):
 @pytest.mark.parametrize("id", IDS)
 def test_the_time_limit_is_that_of_the_table(id):
     row = re.search(rf"\| `{id}` +\|(.*)\|$", SeastarTaskEnv.__doc__, re.MULTILINE)[1]
-    task, period, actions, limit = (cell.strip().strip("`") for cell in row.split("|"))
+    task, period, actions, limit, threshold = (cell.strip().strip("`") for cell in row.split("|"))
     env, inner = made(id), made(id).unwrapped
     assert CHALLENGES[task.strip('"')] == inner.challenge and f'"{inner.actions}"' == actions
-    assert inner.decision_period == float(period)
+    assert inner.decision_period == float(period) and env.spec.reward_threshold == float(threshold)
     assert env.spec.max_episode_steps == round(float(limit) / float(period))
     assert gym.make_vec(id, 2, "vector_entry_point").max_episode_steps == env.spec.max_episode_steps
 

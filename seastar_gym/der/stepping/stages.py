@@ -22,8 +22,8 @@ class Stage(NamedTuple):
 
 
 # Rows of `a` behind the accelerations and their shares, where steps are adapted: the length of the last step [s], and
-# the next step's share of its interval.
-LAST_STEP, SIZE = 0, 1
+# the next step's share of its interval; then, with a body, the shares of its own accelerations, stage by stage.
+LAST_STEP, SIZE, OF_BODY = 0, 1, 2
 
 
 @kernel
@@ -74,9 +74,40 @@ def store_share(a, row, along, squared, robots):
 
 
 @kernel
+def guessed_motion(body, rods, scheme, k, stage, a):
+    """(v_x, v_y, omega): first guess of the hub's velocity [m/s] and of a body's angular velocity [rad/s] in a stage.
+
+    As begin_stage guesses it, but with a share that the ringing of limbs does not spoil; zeros without a body.
+    """
+    if body is None:
+        return splat(0.0), splat(0.0), splat(0.0)
+    rows, row = 2 * n_free(rods), 2 * n_nodes(rods)
+    change = stage.gamma * load(a, memory_row(rods, scheme, OF_BODY + k))
+    vx = add_product(load(stage.v_hat, 0), change, load(a, k * rows))
+    vy = add_product(load(stage.v_hat, 1), change, load(a, k * rows + 1))
+    arc = add_product(load(stage.v_hat, row), change, load(a, k * rows + row))
+    return vx, vy, arc * load(body.inverse_scale, 0)
+
+
+@kernel
+def keep_share_of_body(body, rods, work, scheme, k, stage, a, robots):
+    """Keep the share of a body's last accelerations that would have fit its new ones, before they are kept."""
+    if body is None:
+        return
+    rows, angle = 2 * n_free(rods), 2 * n_nodes(rods)
+    along, squared = splat(0.0), splat(0.0)
+    for row in (0, 1, angle):
+        _, acceleration = stage_motion(work, stage, row)
+        last = load(a, k * rows + row)
+        along, squared = add_product(along, last, acceleration), add_product(squared, last, last)
+    store_share(a, memory_row(rods, scheme, OF_BODY + k), along, squared, robots)
+
+
+@kernel
 def end_stage(rods, work, scheme, k, stage, a, robots):
     """Keep velocity and acceleration of a solved stage that is not the last, for the robots in the mask `robots`."""
     rows = 2 * n_free(rods)
+    keep_share_of_body(rods.body, rods, work, scheme, k, stage, a, robots)
     along, squared = splat(0.0), splat(0.0)
     for row in range(rows):
         velocity, acceleration = stage_motion(work, stage, row)
@@ -92,6 +123,7 @@ def end_stage(rods, work, scheme, k, stage, a, robots):
 def end_step(rods, work, scheme, stage, q_0, v_0, a, h, accepted):
     """After the last stage: write the step's result over the state (q_0, v_0) of the robots in the mask `accepted`."""
     rows, k = 2 * n_free(rods), scheme.n_stages - 1
+    keep_share_of_body(rods.body, rods, work, scheme, k, stage, a, accepted)
     along, squared = splat(0.0), splat(0.0)
     for row in range(rows):
         velocity, acceleration = stage_motion(work, stage, row)

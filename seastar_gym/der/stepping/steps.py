@@ -27,6 +27,7 @@ from seastar_gym.der.stepping.stages import (
     begin_stage,
     end_stage,
     end_step,
+    guessed_motion,
     memory_row,
     start_standing,
     step_error,
@@ -100,7 +101,7 @@ def solve_stages(rods, work, scheme, actuation, q, v, a, step, active, limits, r
     for k in range(scheme.n_stages):
         stage = begin_stage(rods, work, scheme, k, q, v, a, step.h)
         freeze_contact(rods.contact, rods, work, stage, q)
-        freeze_body(rods.body, rods, work, stage)
+        freeze_body(rods.body, rods, work, stage, guessed_motion(rods.body, rods, scheme, k, stage, a))
         if any_lane(step.retrying):
             start_standing(rods, work, stage, frame_velocity(rods.current, rods, q, v), step.retrying)
         freeze_fluid(rods, work)

@@ -25,7 +25,7 @@ def advance(rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shap
     scheme, fallback: Tableaux of the time steps, and of the steps of robots that had to retry often (one stage).
     q, v: Positions and velocities [m, m/s], shape (n_groups, 2 n_nodes, N_LANES).
     a: Memory from one time step to the next: accelerations of its stages [m/s^2], their shares in the next guess, its
-        length and size, shape (n_groups, n_stages (2 n_nodes + 1) + 2, N_LANES).
+        length and size, shape (n_groups, n_stages (2 n_nodes + 1) + 2, N_LANES); more with a body, see stages.py.
     peaks: Share of `shape` that every limb follows, shape (n_groups, n_limbs, N_LANES).
     times: Ends of the intervals [s], shape (n_intervals + 1,).
     shape: Rotation of the limbs at those times [rad], shape (n_intervals + 1,) if all limbs turn alike, else

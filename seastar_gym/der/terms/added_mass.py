@@ -42,7 +42,6 @@ def freeze_added_mass(added_mass, rods, work):
     """Fill work.added_mass, (xx, xy, yy) of every node [kg], from work.normals, in scenes that have it."""
     if added_mass is None:
         return
-    edges = rods.nodes_per_limb - 1
     for node in range(n_nodes(rods)):
         xx, xy, yy = splat(0.0), splat(0.0), splat(0.0)
         if node == 0:

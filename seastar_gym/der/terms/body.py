@@ -196,18 +196,17 @@ def root_motion(rods, work, stage, limb):
 
 
 @kernel
-def freeze_body(body, rods, work, stage):
-    """What a stage takes from its first guess, into work.body.frozen and hat, in scenes with a body."""
+def freeze_body(body, rods, work, stage, guess):
+    """What a stage takes from its first guess, into work.body.frozen and hat, in scenes with a body.
+
+    guess: Velocity of the hub [m/s] and angular velocity [rad/s]; the place is that of the iterate.
+    """
     if body is None:
         return
-    row = 2 * n_nodes(rods)
+    vx, vy, omega = guess
     c, s = rotation(angle(body, rods, work.q))
-    inverse = load(body.inverse_scale, 0)
-    omega = (load(work.q, row) - load(stage.q_hat, row)) * stage.inverse_gamma * inverse
-    omega_hat = load(stage.v_hat, row) * inverse
+    omega_hat = angle(body, rods, stage.v_hat)
     squared = omega * omega
-    vx = (load(work.q, 0) - load(stage.q_hat, 0)) * stage.inverse_gamma
-    vy = (load(work.q, 1) - load(stage.q_hat, 1)) * stage.inverse_gamma
     sx, sy = turned(c, s, body.moment, 0)
     frozen = (c, s, omega, vx, vy, -sy, sx, squared * sx, squared * sy)
     for k in range(9):

@@ -1,9 +1,9 @@
 """Inertia, drag and weight of a body, and what the roots of its limbs pass on to it, see body.py.
 
-Drag is that of flow onto strips of the outline: a strip with the normal n, at b, feels the flow w_p = n . (w + omega x b)
-= n . w + m omega and has the dissipation potential c |w_p|^3/3, convex like that of a node. A coefficient of turning
-alone is a strip with n = 0. Drag that is the same in all directions is node 0's, see drag.py. w is the velocity relative
-to the fluid at the hub.
+Drag is that of flow onto strips of the outline: a strip with the normal n, at b, feels the flow
+w_p = n . (w + omega x b) = n . w + m omega and has the dissipation potential c |w_p|^3/3, convex like that of a node. A
+coefficient of turning alone is a strip with n = 0. Drag that is the same in all directions is node 0's, see drag.py. w
+is the velocity relative to the fluid at the hub.
 
 Fluid that moves along has the mass P = R P_0 R^T, which turns with the body. Its rate omega P' takes the force
 -omega P' w and gives the torque w . P' w/2 (Munk's), P' = dP/dtheta: constants of a stage.
@@ -236,7 +236,7 @@ def cut_spin(body, rods, v, omega, less, robots):
 
 @kernel
 def add_work_on_body(body, rods, work, q_0, q, v, h, frame, energy):
-    """Add the work of gravity on a body's turning, and of fluid whose mass turns, in a step that ends with (q, v) [J]."""
+    """Add the work of gravity on a body's turning, and of fluid whose mass turns, in a step to (q, v) [J]."""
     if body is None:
         return energy
     px = load(work.body.frozen, G_X) * (load(v, 0) - frame[0])

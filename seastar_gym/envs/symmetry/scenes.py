@@ -25,7 +25,9 @@ def memory_mirror(actuator: Actuator) -> Mirror:
 def _asymmetries(scene: Scene, drawn: Iterable[str]) -> Iterator[str]:
     """Reasons why a scene, some of whose numbers are drawn, is not symmetric."""
     if not scene.robot.is_symmetric:
-        yield "its limbs are not alike, straight and evenly spread"
+        yield "its limbs are not alike, straight and evenly spread" + (
+            "" if scene.robot.body is None else " around a body of their symmetry"
+        )
     if len(set(scene.limb_strengths)) > 1:
         yield "its limbs are not equally strong"
     if isinstance(scene.actuator, StatefulActuator) and not isinstance(scene.actuator, Mirrored):
@@ -41,3 +43,5 @@ def _asymmetries(scene: Scene, drawn: Iterable[str]) -> Iterator[str]:
     for name in drawn:
         if name == LIMB_STRENGTHS or name.startswith("robot.limbs."):
             yield f"{name} is drawn for every limb by itself"
+        if name.startswith(("robot.body.drag_a", "robot.body.added_mass_a")):
+            yield f"{name} is drawn for one direction by itself"

@@ -1,0 +1,10 @@
+"""Sweeps: many designs, simulated cell by cell on processes, Ray or SLURM. `python -m seastar_gym.sweep --help`.
+
+sweep = Sweep(Scene.preset("fast"), (Range("robot.limb_length", 0.05, 0.15), Choices("robot.n_limbs", (3, 5))), samples=1000)
+run(sweep.cells(), "runs/limbs", Processes(2))
+table = read_parts("runs/limbs").to_pandas()
+"""  # noqa: E501
+
+from seastar_gym.extras import require_extra
+
+require_extra("Sweeps", "sweep", "pyarrow", "tqdm")

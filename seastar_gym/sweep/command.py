@@ -1,0 +1,179 @@
+"""Simulates many designs and writes how they swim: `python -m seastar_gym.sweep robot.n_limbs=3,5 --out runs/limbs`.
+
+Axes are NAME=VALUES. The name is that of a number of the scene, such as robot.limb_length, actuator.peak_angle or
+numerics.step, of a whole part (robot, fluid, actuator, numerics, contact), fidelity, or gait. The values are
+
+    3,4,5               a list of numbers or names; parts are named by their class, SmaPulse,SmaWires, or by a JSON file
+                        of a part, @robot.json. Gaits are straight, lagged, thrifty or a pair: between gaits stands a
+                        slash, straight/1+,4-
+    0.05:0.15:11        eleven numbers, evenly spaced, 0.05:0.15:11:log in their logarithm
+    0.05:0.15           a range, 0.05:0.15:log in the logarithm, for --latin or --optuna
+
+Without ranges, the sweep is the grid of all combinations. Numbers that robots may have of their own are simulated side
+by side. Every cell, of some hundred designs, has one file of results, OUT/parts/*/*.parquet. The same command goes on
+with the cells that have none.
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from seastar_gym.extras import require_extra
+from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import shown
+from seastar_gym.sweep.axes import Axis, Range
+from seastar_gym.sweep.designs import Sweep
+from seastar_gym.sweep.executors import Executor
+from seastar_gym.sweep.executors.here import Here
+from seastar_gym.sweep.executors.processes import Processes
+from seastar_gym.sweep.run import Tally, run
+from seastar_gym.sweep.swimming import UNITS
+from seastar_gym.sweep.text import axis_of
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C."""
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """Parser of the command line."""
+    parser = argparse.ArgumentParser(
+        "python -m seastar_gym.sweep", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    default = "(default: %(default)s)"
+    parser.add_argument("axes", nargs="*", metavar="NAME=VALUES", help="what differs from design to design")
+    parser.add_argument("--out", type=Path, default=Path("runs/sweep"), help=f"folder of the results {default}")
+    parser.add_argument("--scene", type=Path, help="JSON file of the scene (default: the chapter's at `fast`)")
+    parser.add_argument("--gait", default="straight", help=f"what robots do, unless an axis says it {default}")
+    parser.add_argument("--settling", type=int, default=2, help=f"strokes before the measurement {default}")
+    parser.add_argument("--measured", type=int, default=8, help=f"strokes of the measurement {default}")
+    parser.add_argument("--latin", type=int, default=0, metavar="N", help="designs of every combination of choices")
+    parser.add_argument("--optuna", type=int, default=0, metavar="N", help="search with Optuna, N designs in all")
+    parser.add_argument("--objective", default="speed", help=f"column of results that is searched for {default}")
+    parser.add_argument("--minimize", action="store_true", help="search for the smallest, not the largest")
+    parser.add_argument("--storage", help="Optuna: database (default: sqlite:///OUT/study.db)")
+    parser.add_argument(
+        "--stale-after", type=float, default=600.0, metavar="SECONDS",
+        help=f"Optuna: proposals without result for so long are put back {default}",
+    )  # fmt: skip
+    parser.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn {default}")
+    parser.add_argument("--robots", type=int, default=256, help=f"designs of a cell at most {default}")
+    parser.add_argument(
+        "--executor", choices=("processes", "here", "ray", "slurm", "local"), default="processes",
+        help="where cells run: processes of this machine, this process, Ray, SLURM arrays, or submitit's stand-in for "
+        "SLURM on this machine (default: %(default)s)",
+    )  # fmt: skip
+    parser.add_argument("--workers", type=int, help="cells at a time (default: one per processor)")
+    parser.add_argument("--address", help="Ray: address of the head, HOST:6379 (default: a cluster of this machine)")
+    parser.add_argument("--partition", help="SLURM: partition")
+    parser.add_argument("--count", action="store_true", help="say how many designs and cells there are, and stop")
+    return parser
+
+
+def scene_of_file(file: Path | None) -> Scene:
+    """Scene of a JSON file, the chapter's at `fast` for none."""
+    if file is None:
+        return Scene.preset("fast")
+    try:
+        return Scene.from_dict(json.loads(file.read_text(encoding="utf-8")))
+    except (json.JSONDecodeError, UnicodeDecodeError) as unfit:
+        raise ValueError(f"{file} is no JSON: {unfit}.") from None
+
+
+def executor_of(options: argparse.Namespace) -> Executor:
+    """Executor that the options name. It says at once what is missing."""
+    match options.executor:
+        case "here":
+            return Here()
+        case "ray":
+            require_extra("Sweeps on Ray", "ray", "ray")
+            from seastar_gym.sweep.executors.on_ray import RayTasks
+
+            return RayTasks(options.address, options.workers)
+        case "slurm" | "local":
+            require_extra("Sweeps on SLURM", "slurm", "submitit")
+            from seastar_gym.sweep.executors.slurm import SlurmArrays
+
+            cluster = options.executor
+            return SlurmArrays(options.out / "slurm", cluster, options.workers, partition=options.partition)
+    return Processes(options.workers)
+
+
+def bar_of(total: int, bar: Any) -> Callable[[Tally], None]:
+    """Progress that shows cells, designs and strokes per second and the estimate of the rest."""
+
+    def show(tally: Tally) -> None:
+        seconds = max(bar.format_dict["elapsed"], 1e-9)
+        bar.total = total - tally.kept
+        bar.set_postfix_str(
+            f"{tally.designs / seconds:.0f} designs/s, {tally.intervals / seconds:.0f} strokes/s"
+            + (f", {tally.losses} lost" if tally.losses else ""),
+            refresh=False,
+        )
+        bar.update(tally.done - bar.n)
+
+    return show
+
+
+def as_text(tally: Tally, out: Path) -> str:
+    """What was done, in a sentence or two."""
+    text = f"New in {out}: {tally.designs:,} designs, cells: {tally.done}; there before, cells: {tally.kept}."
+    if tally.problems:
+        name, problem = next(iter(tally.problems.items()))
+        text += f" Without result, cells: {len(tally.problems)}, such as {name[:8]}: {problem}"
+    return text
+
+
+def sweep_of(options: argparse.Namespace, axes: tuple[Axis, ...]) -> Sweep:
+    """Sweep that the options describe."""
+    return Sweep(
+        scene_of_file(options.scene), axes, options.gait, options.settling, options.measured,
+        1 if options.optuna and any(isinstance(axis, Range) for axis in axes) else options.latin,
+        options.seed, options.robots,
+    )  # fmt: skip
+
+
+def run_sweep(sweep: Sweep, options: argparse.Namespace) -> int:
+    """Run the cells of a grid or a Latin hypercube; returns the exit code."""
+    print(f"{sweep.n_designs:,} designs in {sweep.n_cells:,} cells.")
+    if options.count:
+        return 0
+    with tqdm(total=sweep.n_cells, unit="cell") as bar:
+        tally = run(sweep.cells(), options.out, executor_of(options), bar_of(sweep.n_cells, bar))
+    print(as_text(tally, options.out))
+    return 1 if tally.problems else 0
+
+
+def search(sweep: Sweep, options: argparse.Namespace) -> int:
+    """Search with Optuna; returns the exit code."""
+    require_extra("Searches", "sweep", "optuna")
+    from seastar_gym.sweep.proposals import Search, explore
+
+    options.out.mkdir(parents=True, exist_ok=True)
+    storage = options.storage or f"sqlite:///{options.out}/study.db"
+    wanted = Search(options.objective, not options.minimize, options.seed, options.stale_after)
+    with tqdm(total=options.optuna, unit="design") as bar:
+        study = explore(sweep, wanted, storage, options.optuna, options.out, executor_of(options),
+                        lambda tally: bar.update(tally.designs - bar.n))  # fmt: skip
+    best = study.best_trial
+    print(f"Best {options.objective}: {best.value:.6g} {UNITS[options.objective]}, {best.params}.")
+    return 0
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Command line; returns the exit code."""
+    options = make_parser().parse_args(arguments)
+    try:
+        sweep = sweep_of(options, tuple(map(axis_of, options.axes)))
+        return search(sweep, options) if options.optuna else run_sweep(sweep, options)
+    except (ValueError, ModuleNotFoundError) as bad_input:
+        print(bad_input, file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print(f"Interrupted: all finished cells are in {shown(str(options.out))}, and the same command goes on.",
+              file=sys.stderr)  # fmt: skip
+        return INTERRUPTED

@@ -1,0 +1,83 @@
+"""`RayTasks`: cells as tasks of Ray Core, on a running cluster or one of this machine."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import ray
+from ray.exceptions import RayError, RayTaskError
+
+from seastar_gym.sweep.cells import Cell
+from seastar_gym.sweep.executors import Outcome, Work, sentence_of
+from seastar_gym.sweep.executors.here import outcome_of
+
+AHEAD = 2
+"""Tasks under way for every processor of the cluster, so that none waits for the next."""
+PATIENCE = 10.0
+"""Time after which the size of the cluster is asked for again while no cell is done [s]."""
+
+
+class RayTasks:
+    """Runs cells as tasks of Ray, one processor each.
+
+    Nodes need this package and its extras; results come back to this process, which alone writes files.
+
+    address: Address of a cluster's head, "HOST:6379". None starts a cluster of this machine and stops it in the end.
+    workers: Cells at a time at most; as many as the cluster has processors if None.
+    """
+
+    def __init__(self, address: str | None = None, workers: int | None = None):
+        self.address, self.workers = address, workers
+
+    def run(self, work: Work, cells: Iterator[Cell]) -> Iterator[Outcome]:
+        """Run all cells. Tasks that are lost with their worker or node are not repeated by Ray."""
+        began = self._connect()
+        task = ray.remote(num_cpus=1, max_retries=0)(_outcome)
+        pending: dict[Any, Cell] = {}
+        try:
+            while self._fill(pending, task, work, cells):
+                done, _ = ray.wait(list(pending), timeout=PATIENCE)
+                for reference in done:
+                    yield _outcome_of(pending.pop(reference), reference)
+        finally:
+            for reference in pending:
+                ray.cancel(reference, force=True)
+            if began:
+                ray.shutdown()
+
+    def _connect(self) -> bool:
+        """Whether a connection was made now."""
+        if ray.is_initialized():
+            return False
+        try:
+            ray.init(
+                self.address or "local", num_cpus=None if self.address else self.workers, include_dashboard=None
+                if self.address else False, log_to_driver=False, logging_level="error",
+            )  # fmt: skip
+        except (ConnectionError, RuntimeError) as refused:
+            raise ValueError(f"There is no Ray cluster at {self.address}: {sentence_of(refused)}") from None
+        return True
+
+    def _fill(self, pending: dict[Any, Cell], task: Any, work: Work, cells: Iterator[Cell]) -> bool:
+        """Give tasks while there is room for them; whether any are under way."""
+        room = self.workers or AHEAD * max(1, int(ray.cluster_resources().get("CPU", 1)))
+        while len(pending) < room:
+            cell = next(cells, None)
+            if cell is None:
+                break
+            pending[task.remote(work, cell)] = cell
+        return bool(pending)
+
+
+def _outcome(work: Work, cell: Cell) -> tuple[bytes | None, str]:
+    """What a task returns."""
+    outcome = outcome_of(work, cell)
+    return outcome.part, outcome.problem
+
+
+def _outcome_of(cell: Cell, reference: Any) -> Outcome:
+    try:
+        return Outcome(cell, *ray.get(reference))
+    except RayTaskError as failure:
+        return Outcome(cell, None, sentence_of(failure.cause or failure))
+    except RayError as failure:
+        return Outcome(cell, None, f"Its worker was lost: {type(failure).__name__}.")

@@ -1,0 +1,173 @@
+"""Designs that an Optuna study proposes, by ask and tell, from any number of processes that share its storage.
+
+Proposals whose process was lost stay "running" in the storage: Optuna's heartbeats are of `study.optimize` only. So
+proposals that have been running for too long are put back here: they count as failed, and are proposed once more.
+"""
+
+import hashlib
+import os
+from collections.abc import Iterator
+from datetime import datetime
+from typing import Any, NamedTuple
+
+import numpy as np
+import optuna
+import pyarrow as pa
+import pyarrow.parquet
+from optuna.trial import TrialState
+from sqlalchemy.exc import SQLAlchemyError
+
+from seastar_gym.scene.checks import require_choice, require_count, require_number
+from seastar_gym.sweep.axes import Range
+from seastar_gym.sweep.cells import Cell
+from seastar_gym.sweep.designs import Sweep
+from seastar_gym.sweep.executors import Executor, Outcome, sentence_of
+from seastar_gym.sweep.parts import Parts, part_of
+from seastar_gym.sweep.run import Progress, Tally
+from seastar_gym.sweep.swimming import UNITS
+
+
+class Search(NamedTuple):
+    """What is searched. objective: Column of results. is_largest_best: Whether it is to be large. seed: Of proposals.
+
+    stale_after: Time after which a proposal without result is put back [s]: longer than a cell waits and takes.
+    """
+
+    objective: str = "speed"
+    is_largest_best: bool = True
+    seed: int = 0
+    stale_after: float = 600.0
+
+
+def study_of(sweep: Sweep, search: Search, storage: str) -> optuna.Study:
+    """Study of a sweep in a storage, such as "sqlite:///study.db"; the one that is there if there is one."""
+    require_choice("objective", search.objective, tuple(name for name in UNITS if name != "status"))
+    require_number("stale_after", search.stale_after, "s")
+    if not sweep.axes:
+        raise ValueError("A search needs something to vary, such as robot.limb_length=0.05:0.15.")
+    first = next(sweep.frames())
+    told = first.text + repr([(axis.name, axis if isinstance(axis, Range) else axis.labels) for axis in sweep.axes])
+    name = hashlib.sha256(f"{told}{search.objective}{search.is_largest_best}".encode()).hexdigest()[:16]
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    try:
+        return optuna.create_study(
+            storage=storage, study_name=name, load_if_exists=True,
+            sampler=optuna.samplers.TPESampler(seed=search.seed),
+            direction="maximize" if search.is_largest_best else "minimize",
+        )  # fmt: skip
+    except (SQLAlchemyError, optuna.exceptions.StorageInternalError, ImportError) as refused:
+        raise ValueError(f"The storage {storage} cannot be used: {sentence_of(refused)[:200]}.") from None
+
+
+def explore(
+    sweep: Sweep, search: Search, storage: str, designs: int, folder: str | os.PathLike[str], executor: Executor,
+    progress: Progress | None = None,
+) -> optuna.Study:  # fmt: skip
+    """Propose and simulate until a study has results of so many designs. Every cell has `sweep.robots` at most."""
+    require_count("designs", designs, 1, 10_000_000)
+    proposals = Proposals(sweep, study_of(sweep, search, storage), search, designs)
+    parts, tally = Parts(folder), Tally()
+    for outcome in executor.run(part_of, proposals.cells()):
+        if outcome.part is None:
+            tally.losses += 1
+        else:
+            parts.write(outcome.cell.name, outcome.part)
+            tally.count(outcome.cell)
+        proposals.tell(outcome)
+        if progress is not None:
+            progress(tally)
+    return proposals.study
+
+
+class Proposals:
+    """Proposals of a study as cells, and their results. designs: Results that the study is to have."""
+
+    def __init__(self, sweep: Sweep, study: optuna.Study, search: Search, designs: int):
+        self.study, self._sweep, self._search, self._designs = study, sweep, search, designs
+        self._waiting: dict[str, list[optuna.Trial]] = {}
+
+    def cells(self) -> Iterator[Cell]:
+        """Cells of proposals, made as they are asked for, while results are missing."""
+        while True:
+            put_back_stale(self.study, self._search.stale_after, {trial.number for trial in self._ours()})
+            missing = self._designs - _count(self.study, TrialState.COMPLETE) - len(self._ours())
+            if missing <= 0:
+                return
+            yield from self._asked(min(missing, self._sweep.robots))
+
+    def _ours(self) -> list[optuna.Trial]:
+        return [trial for trials in self._waiting.values() for trial in trials]
+
+    def _asked(self, n: int) -> list[Cell]:
+        """Cells of n proposals, one for every frame among them."""
+        groups: dict[tuple[int, ...], list[tuple[optuna.Trial, dict[str, float]]]] = {}
+        for _ in range(n):
+            trial = self.study.ask()
+            places, numbers = self._suggested(trial)
+            groups.setdefault(places, []).append((trial, numbers))
+        cells = []
+        for places, group in groups.items():
+            columns = {name: np.array([numbers[name] for _, numbers in group]) for name in group[0][1]}
+            cell = Cell(self._sweep.frame(places), columns, len(group))
+            self._waiting.setdefault(cell.name, []).extend(trial for trial, _ in group)
+            cells.append(cell)
+        return cells
+
+    def _suggested(self, trial: optuna.Trial) -> tuple[tuple[int, ...], dict[str, float]]:
+        """Which values the frame has, and the numbers of the robot."""
+        sweep = self._sweep
+        numbers = {axis.name: trial.suggest_float(axis.name, axis.low, axis.high, log=axis.is_log) for axis in
+                   sweep.ranges}  # fmt: skip
+        places = {axis.name: axis.labels.index(trial.suggest_categorical(axis.name, axis.labels)) for axis in
+                  (*sweep.of_robots, *sweep.of_frames)}  # fmt: skip
+        numbers |= {axis.name: float(axis.values[places[axis.name]]) for axis in sweep.of_robots}
+        return tuple(places[axis.name] for axis in sweep.of_frames), numbers
+
+    def tell(self, outcome: Outcome) -> None:
+        """Tell the study what came of a cell. Proposals of a lost one are put back."""
+        trials = self._waiting.pop(outcome.cell.name)
+        values = [None] * len(trials) if outcome.part is None else _column(outcome.part, self._search.objective)
+        for trial, value in zip(trials, values, strict=True):
+            if outcome.part is None:
+                put_back(self.study, trial.number)
+            else:
+                _tell(self.study, trial.number, value)
+
+
+def _column(part: bytes, name: str) -> list[float]:
+    values: list[float] = pa.parquet.read_table(pa.BufferReader(part), columns=[name]).column(name).to_pylist()
+    return values
+
+
+def _count(study: optuna.Study, state: TrialState) -> int:
+    return len(study.get_trials(deepcopy=False, states=(state,)))
+
+
+def _tell(study: optuna.Study, number: int, value: float | None) -> bool:
+    """Tell a result, or a failure for None and NaN; whether the proposal still waited for it."""
+    failed = value is None or not np.isfinite(value)
+    state = TrialState.FAIL if failed else TrialState.COMPLETE
+    try:
+        study.tell(number, None if failed else value, state)
+    except (ValueError, optuna.exceptions.UpdateFinishedTrialError):  # another process was faster
+        return False
+    return True
+
+
+def put_back(study: optuna.Study, number: int) -> bool:
+    """Count a proposal as failed and propose it once more; whether it was still running."""
+    if not _tell(study, number, None):
+        return False
+    params: dict[str, Any] = study.get_trials(deepcopy=False)[number].params
+    study.enqueue_trial(params, user_attrs={"put back": number})
+    return True
+
+
+def put_back_stale(study: optuna.Study, stale_after: float, ours: set[int] | None = None) -> int:
+    """Put back proposals that have been running for so long [s], except ours; returns how many."""
+    found, now = 0, datetime.now()
+    for trial in study.get_trials(deepcopy=False, states=(TrialState.RUNNING,)):
+        started = trial.datetime_start or now
+        if trial.number not in (ours or set()) and (now - started).total_seconds() > stale_after:
+            found += put_back(study, trial.number)
+    return found

@@ -1,0 +1,88 @@
+"""How the designs of a cell swim, one number per design and column."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.scene import Scene
+from seastar_gym.scene.per_robot import with_numbers
+from seastar_gym.simulator import Simulator
+from seastar_gym.sweep.cells import Cell
+
+Floats = NDArray[np.float64]
+
+REFUSED = -1
+"""Status of a design that a scene refuses; others have that of the solver, see `SolverStatus`."""
+UNITS = {
+    "speed": "m/s", "strokes_per_metre": "1/m", "ahead": "m", "aside": "m", "turn": "rad", "energy": "J",
+    "smallest_opening_angle": "rad", "newton_iterations": "1", "status": "1",
+}  # fmt: skip
+"""Columns of results and their units.
+
+speed: Distance between the places of the hub at the beginning and at the end of the measurement, over its time.
+strokes_per_metre: Periods of the actuator that a metre takes at that speed.
+ahead, aside: That distance along limb 1 as it stood at the beginning, and to the left of it.
+turn: Rotation of the robot during the measurement.
+energy: Electric energy of the measured intervals.
+smallest_opening_angle: Between neighbouring limbs at the hub, at any time. Below zero, limbs have crossed.
+newton_iterations: Of all intervals.
+status: SolverStatus, the largest of all intervals, or REFUSED. All else is NaN unless it is zero.
+"""
+
+
+def swim(cell: Cell) -> dict[str, NDArray[Any]]:
+    """Columns of results of a cell's designs, shape (n_robots,) each."""
+    sound = np.ones(cell.n_robots, bool)
+    try:
+        scene = scene_of(cell, sound)
+    except ValueError:
+        sound = np.array([_is_sound(cell, k) for k in range(cell.n_robots)])
+        scene = scene_of(cell, sound) if sound.any() else cell.frame.scene
+    found = measure(scene, cell, int(sound.sum())) if sound.any() else {}
+    columns: dict[str, NDArray[Any]] = {}
+    for name in UNITS:
+        columns[name] = np.full(cell.n_robots, np.nan)
+        columns[name][sound] = found.get(name, np.nan)
+    columns["status"] = np.where(sound, columns["status"], REFUSED).astype(np.int64)
+    return columns
+
+
+def scene_of(cell: Cell, chosen: NDArray[np.bool_] | int) -> Scene:
+    """Scene of some robots of a cell side by side, or of one."""
+    return with_numbers(cell.frame.scene, {name: values[chosen] for name, values in cell.numbers.items()})
+
+
+def _is_sound(cell: Cell, robot: int) -> bool:
+    try:
+        scene_of(cell, robot)
+    except ValueError:
+        return False
+    return True
+
+
+def measure(scene: Scene, cell: Cell, n_robots: int) -> dict[str, NDArray[Any]]:
+    """Columns of results of robots side by side."""
+    simulator, gait, swum = Simulator(scene, n_robots, threads=1), cell.frame.gait, cell.frame.swim
+    interval = scene.actuator.period if gait.interval is None else gait.interval
+    status, iterations, energy = np.zeros((3, n_robots))
+    angle = np.full(n_robots, np.inf)
+    hub, heading = simulator.hub_position(), simulator.heading()
+    for k in range(swum.settling + swum.measured):
+        if k == swum.settling:
+            hub, heading, energy[:] = simulator.hub_position(), simulator.heading(), 0.0
+        report = simulator.advance(interval, np.tile(gait.commands[k % len(gait.commands)], (n_robots, 1)))
+        status, angle = np.maximum(status, report.status), np.fmin(angle, report.smallest_opening_angle)
+        iterations, energy = iterations + report.newton_iterations, energy + report.energy
+    way = (simulator.hub_position() - hub) @ [1.0, 1.0j] * np.exp(-1j * heading)
+    turn = simulator.heading() - heading
+    speed = np.abs(way) / (swum.measured * interval)
+    with np.errstate(divide="ignore"):
+        strokes = 1.0 / (speed * scene.actuator.period)
+    columns = {
+        "speed": speed, "strokes_per_metre": strokes, "ahead": way.real, "aside": way.imag,
+        "turn": turn - 2.0 * np.pi * np.rint(turn / (2.0 * np.pi)), "energy": energy,
+        "smallest_opening_angle": angle, "newton_iterations": iterations,
+    }  # fmt: skip
+    swam = status == 0.0
+    return {**{name: np.where(swam, column, np.nan) for name, column in columns.items()}, "status": status}

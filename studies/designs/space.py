@@ -1,0 +1,113 @@
+"""The designs: robots of several numbers of limbs, radii and tapers, with lengths, moduli and peak angles drawn."""
+
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+
+from seastar_gym.scene import Scene, Seastar
+from seastar_gym.scene.limb import Limb
+from seastar_gym.sweep.axes import Choices, Range
+from seastar_gym.sweep.designs import Sweep
+
+LIMBS = (3, 4, 5, 6, 7)
+RADII = (0.8e-3, 1.2e-3, 1.6e-3, 2.0e-3, 2.4e-3, 2.8e-3)
+"""Mean radii [m]."""
+TAPERS = (1.0, 0.75, 0.5, 0.25)
+"""Radius of the tip over that of the root."""
+LENGTHS, MODULI, ANGLES = (0.05, 0.15), (0.2e6, 5e6), (0.2, 1.2)
+"""Limb lengths [m], Young's moduli [Pa] and peak angles [rad]."""
+SAMPLES = 854
+"""Designs of every combination of limbs, radius and taper: 102,480 in all."""
+SETTLING, MEASURED = 3, 5
+"""Strokes before and during the measurement."""
+
+
+class Body(NamedTuple):
+    """What all designs of a lane batch have in common. radius: Mean of a limb's [m]. taper: Tip's over root's."""
+
+    n_limbs: int
+    radius: float
+    taper: float
+
+    @property
+    def label(self) -> str:
+        """Text that stands for it in results."""
+        return f"{self.n_limbs} limbs, {1e3 * self.radius:g} mm, taper {self.taper:g}"
+
+    @property
+    def profile(self) -> tuple[float, float]:
+        """Radius of root and tip [m]."""
+        root = 2.0 * self.radius / (1.0 + self.taper)
+        return root, self.taper * root
+
+    def robot(self) -> Seastar:
+        """The robot, with the chapter's length and modulus, at the resolution of `fast`."""
+        limb = Limb(radius=self.radius if self.taper == 1.0 else self.profile)
+        preset = Scene.preset("fast").robot
+        return Seastar(
+            self.n_limbs, preset.nodes_per_limb, limbs=(limb,) * self.n_limbs, discretisation=preset.discretisation
+        )
+
+
+BODIES = {body.label: body for body in itertools.starmap(Body, itertools.product(LIMBS, RADII, TAPERS))}
+
+
+def bodies(some: dict[str, Body]) -> Choices:
+    """Axis of bodies."""
+    return Choices("robot", tuple(body.robot() for body in some.values()), tuple(some))
+
+
+def all_designs(samples: int = SAMPLES) -> Sweep:
+    """Sweep over everything."""
+    ranges = (
+        Range("robot.limb_length", *LENGTHS), Range("robot.youngs_modulus", *MODULI, is_log=True),
+        Range("actuator.peak_angle", *ANGLES),
+    )  # fmt: skip
+    return Sweep(
+        Scene.preset("fast"), (bodies(BODIES), *ranges), settling=SETTLING, measured=MEASURED, samples=samples,
+        robots=427,
+    )  # fmt: skip
+
+
+def at_the_chapters(samples: int = 64) -> Sweep:
+    """Sweep over body and modulus, with the chapter's limb length and peak angle."""
+    modulus = Range("robot.youngs_modulus", *MODULI, is_log=True)
+    return Sweep(Scene.preset("fast"), (bodies(BODIES), modulus), settling=SETTLING, measured=MEASURED, samples=samples)
+
+
+SPREADS = (0.25, 0.5, 1.0, 2.0, 4.0)
+"""Radius of the tip over that of the root, for limbs of equal mass: below 1 the mass is near the hub."""
+DENSITIES = (100.0, 10_000.0)
+"""Densities of the limbs [kg/m^3]."""
+
+
+def spread(taper: float, points: int = 7) -> Limb:
+    """Limb whose mass is the chapter's, spread by a taper, and whose bending stiffness is the chapter's all along.
+
+    points: Points of the profile of Young's modulus.
+    """
+    chapter = Seastar()
+    root = chapter.rod_radius * np.sqrt(3.0 / (1.0 + taper + taper**2))  # of a cone's volume
+    radius = np.linspace(root, taper * root, points)
+    moduli = chapter.youngs_modulus * (chapter.rod_radius / radius) ** 4
+    return Limb(radius=tuple(radius.tolist()), youngs_modulus=tuple(moduli.tolist()))
+
+
+def inner_half(taper: float) -> float:
+    """Share of a tapered limb's mass that lies in the half at the hub."""
+    middle = 0.5 * (1.0 + taper)
+    return float(0.5 * (1.0 + middle + middle**2) / (1.0 + taper + taper**2))
+
+
+def masses() -> Sweep:
+    """Sweep over where the mass of a limb lies and over its density; all else is the chapter's."""
+    preset = Scene.preset("fast").robot
+    robots = tuple(
+        Seastar(nodes_per_limb=preset.nodes_per_limb, limbs=(spread(taper),) * 5) for taper in SPREADS
+    )  # fmt: skip
+    axes = (
+        Choices("robot", robots, tuple(map(str, SPREADS))),
+        Range("robot.density", *DENSITIES, is_log=True).spaced(21),
+    )
+    return Sweep(Scene.preset("fast"), axes, settling=SETTLING, measured=MEASURED)

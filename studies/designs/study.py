@@ -1,0 +1,157 @@
+"""Simulates 102,480 robots, swims the fastest again at finer settings, and writes designs.json and designs.png.
+
+Limb length, radius, stiffness, taper, number of limbs and peak angle vary; all swim {2+, n-}, eight strokes from rest,
+of which the last five count, at `fast`. It takes ten minutes on an idle core. Results are kept in OUT/parts, so that
+the command goes on after an interrupt.
+"""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from seastar_gym.scene import Scene, SmaPulse
+from seastar_gym.sweep.axes import Choices
+from seastar_gym.sweep.designs import Sweep
+from seastar_gym.sweep.executors import Executor
+from seastar_gym.sweep.executors.here import Here
+from seastar_gym.sweep.executors.processes import Processes
+from seastar_gym.sweep.parts import Parts, read_parts
+from seastar_gym.sweep.run import Tally, run
+from studies.designs.space import (
+    BODIES,
+    MEASURED,
+    SETTLING,
+    SPREADS,
+    Body,
+    all_designs,
+    at_the_chapters,
+    inner_half,
+    masses,
+)
+from studies.parser import study_parser
+
+Table = dict[str, Any]
+CLEARANCE = 0.1
+"""Smallest opening angle at the hub of robots that count [rad]: the limbs of others cross, or nearly do."""
+CHECKS = ("fast", "balanced", "reference")
+"""Fidelities at which the winners swim."""
+MM = 1e3
+
+
+def results(sweep: Sweep, folder: Path, executor: Executor) -> Any:
+    """Results of a sweep as a pandas.DataFrame; what is missing in the folder is simulated."""
+    with tqdm(total=sweep.n_cells, unit="cell") as bar:
+
+        def progress(tally: Tally) -> None:
+            bar.update(tally.done + tally.kept - bar.n)
+
+        tally = run(sweep.cells(), folder, executor, progress)
+    if tally.problems:
+        raise ValueError(f"{len(tally.problems)} cells have no results: run the command again.")
+    table = read_parts(folder).to_pandas()
+    if "robot" in table and table.robot.isin(BODIES).all():
+        for name in Body._fields:
+            table[name] = [getattr(BODIES[label], name) for label in table.robot]
+    return table
+
+
+def scene_of(row: Any) -> Scene:
+    """Scene of a design."""
+    numbers: dict[str, Any] = {
+        name: float(row[f"robot.{name}"]) for name in ("limb_length", "youngs_modulus") if f"robot.{name}" in row
+    }
+    peak = float(row.get("actuator.peak_angle", SmaPulse().peak_angle))
+    return replace(
+        Scene.preset("fast"), robot=replace(BODIES[row["robot"]].robot(), **numbers), actuator=SmaPulse(peak)
+    )  # fmt: skip
+
+
+def at_all_fidelities(scene: Scene, folder: Path) -> Table:
+    """Speeds of a robot [mm/s] at CHECKS."""
+    sweep = Sweep(scene, (Choices("fidelity", CHECKS),), settling=SETTLING, measured=MEASURED)
+    run(sweep.cells(), folder, Here())
+    names = [cell.name for cell in sweep.cells()]
+    import pyarrow.parquet
+
+    return {
+        fidelity: round(MM * pyarrow.parquet.read_table(Parts(folder).file(name)).column("speed").to_pylist()[0], 3)
+        for fidelity, name in zip(CHECKS, names, strict=True)
+    }
+
+
+def winner(row: Any, folder: Path) -> Table:
+    """A design in numbers, and its speeds."""
+    scene = scene_of(row)
+    body, speeds = BODIES[row["robot"]], at_all_fidelities(scene, folder)
+    length = scene.robot.limb_length
+    return {
+        "n_limbs": body.n_limbs, "mean_radius_mm": MM * body.radius, "taper": body.taper,
+        "root_radius_mm": round(MM * body.profile[0], 2), "limb_length_mm": round(MM * length, 1),
+        "youngs_modulus_MPa": round(1e-6 * scene.robot.youngs_modulus, 3),
+        "peak_angle_rad": round(float(scene.actuator.peak_angle), 3),
+        "smallest_opening_angle_rad": round(float(row["smallest_opening_angle"]), 2),
+        "mm_per_s": speeds, "limb_lengths_per_stroke": round(speeds["reference"] / MM / length, 3),
+        "strokes_per_metre": round(MM / speeds["reference"], 1),
+    }  # fmt: skip
+
+
+def quantiles(table: Any, name: str) -> Table:
+    """Median, 99th percentile and largest speed [mm/s] for the values of a column."""
+    groups = table.groupby(name).speed
+    return {
+        str(value): [round(MM * float(number), 2) for number in (each.median(), each.quantile(0.99), each.max())]
+        for value, each in groups
+    }
+
+
+def study(folder: Path, executor: Executor) -> tuple[Table, Any]:
+    """Run the study; returns its results as plain data, and the table of all designs."""
+    designs = results(all_designs(), folder / "designs", executor)
+    sound = designs[designs.status == 0]
+    table = sound[sound.smallest_opening_angle > CLEARANCE]
+    same = results(at_the_chapters(), folder / "chapter", executor)
+    same = same[(same.status == 0) & (same.smallest_opening_angle > CLEARANCE)]
+    mass = results(masses(), folder / "masses", executor)
+    checks = folder / "checks"
+    relative = table.speed / table["robot.limb_length"]
+    uniform = same[same.taper == 1.0]
+    return {
+        "designs": len(designs), "failed": len(designs) - len(sound), "count": len(table),
+        "the chapter's": {"mm_per_s": at_all_fidelities(Scene.preset("fast"), checks)},
+        "fastest": winner(table.loc[table.speed.idxmax()], checks),
+        "fastest in its lengths": winner(table.loc[relative.idxmax()], checks),
+        "fastest at the chapter's length and angle": winner(same.loc[same.speed.idxmax()], checks),
+        "fastest of them without taper": winner(uniform.loc[uniform.speed.idxmax()], checks),
+        "speeds_mm_per_s": {name: quantiles(table, name) for name in ("n_limbs", "radius", "taper")},
+        "masses": masses_by_taper(mass),
+    }, table  # fmt: skip
+
+
+def masses_by_taper(mass: Any) -> Table:
+    """Speed [mm/s] over density [kg/m^3], by the share of mass in the half at the hub."""
+    return {
+        f"{inner_half(taper):.2f}": [
+            [round(float(density), 1), round(MM * float(speed), 3)]
+            for density, speed in sorted(zip(each["robot.density"], each.speed, strict=True))
+        ]
+        for taper in SPREADS
+        for each in [mass[mass.robot == str(taper)]]
+    }
+
+
+def main() -> None:
+    """Command line: run the study and write its files."""
+    from studies.designs.pictures import draw
+
+    parser = study_parser("studies.designs", __doc__)
+    parser.add_argument("--out", type=Path, default=Path("runs/designs"), help="folder (default: %(default)s)")
+    parser.add_argument("--workers", type=int, help="processes (default: one per processor)")
+    options = parser.parse_args()
+    found, table = study(options.out, Processes(options.workers))
+    (options.out / "designs.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    draw(found, table, options.out / "designs.png")
+    print(json.dumps(found, indent=1))
+    print(f"Written to {options.out}: designs.json and designs.png.")

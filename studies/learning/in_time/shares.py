@@ -1,0 +1,58 @@
+"""Pulse widths: environments in which a learner heats wires for shares of a pulse, and the policies that it learns."""
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.controllers.contract import Policy
+from seastar_gym.envs.commands import command_table
+from seastar_gym.envs.symmetry import memory_mirror, reduce_observations, restore_actions
+from seastar_gym.scene import Scene
+
+Floats = NDArray[np.float64]
+
+
+def shares_of_pairs(n_limbs: int, shares: tuple[float, ...]) -> Floats:
+    """Commands that heat no limb, or a pair of limbs for a share of a pulse, shape (n_actions, n_limbs)."""
+    rest, pairs = np.split(command_table("pairs", n_limbs), [1])
+    return np.concatenate([rest, *(share * pairs for share in shares)])
+
+
+class ChosenCommands(gym.vector.VectorWrapper):
+    """Batch with actions="continuous" whose action is the number of a row in a table of commands."""
+
+    env: Any
+
+    def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any], table: Floats):
+        super().__init__(env)
+        self.table = table
+        self.single_action_space = gym.spaces.Discrete(len(table))
+        self.action_space = gym.vector.utils.batch_space(self.single_action_space, env.num_envs)
+
+    def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+        """One decision of every robot."""
+        return self.env.step(self.table[actions])
+
+
+class SharesPolicy:
+    """Policy with actions="continuous", from the model that a learner behind the symmetry reduction has learned.
+
+    table: Commands that its actions are the numbers of. None means that its actions are commands.
+    """
+
+    actions = "continuous"
+
+    def __init__(self, model: Policy, scene: Scene, table: Floats | None = None):
+        self.model, self.scene, self.table = model, scene, table
+
+    def predict(
+        self, observation: NDArray[Any], state: Any = None, episode_start: Any = None, deterministic: bool = False
+    ) -> tuple[NDArray[Any], None]:
+        """Commands for observations of shape (size,) or (n, size), and None: the policy has no state."""
+        n_limbs = self.scene.robot.n_limbs
+        reduced, elements = reduce_observations(observation, n_limbs, memory_mirror(self.scene.actuator))
+        chosen, _ = self.model.predict(reduced.astype(np.float32), None, None, deterministic)
+        commands = chosen if self.table is None else self.table[chosen]
+        return restore_actions(commands, elements, "continuous", n_limbs), None

@@ -1,0 +1,175 @@
+"""What a body is: outlines, masses, drag and added mass from them, attachments, symmetry, and what is refused."""
+
+import math
+
+import numpy as np
+import pytest
+
+from refusals import assert_refused
+from seastar_gym import Attachment, Body, Contact, DomainRandomization, Limb, Scene, Seastar, Uniform, Water
+from seastar_gym.identify.parameters import get_parameter
+from seastar_gym.model.rods import make_rods
+from seastar_gym.scene.outline import Outline
+
+TRIANGLE = ((0.03, -0.01), (-0.01, 0.02), (-0.02, -0.02))
+HEXAGON = tuple((0.02 * math.cos(a), 0.02 * math.sin(a)) for a in np.arange(6) * math.pi / 3.0)
+CORNERS = tuple(Attachment(x, y, d) for x, y, d in
+                ((0.03, 0.015, 1.0), (-0.03, 0.015, 2.0), (-0.03, -0.015, -2.0), (0.03, -0.015, -1.0)))  # fmt: skip
+
+
+@pytest.mark.parametrize("points", [TRIANGLE, HEXAGON, Body.rectangle(0.06, 0.03).outline])
+def test_moments_of_an_outline_are_those_of_points_in_it(points):
+    outline, grid = Outline(0.0, points), np.linspace(-0.04, 0.04, 1601)
+    x, y = np.meshgrid(grid, grid)
+    normals, _, places = outline.sides()
+    inside = np.all([(x - a) * n + (y - b) * m < 0.0 for (n, m), (a, b) in zip(normals, places, strict=True)], axis=0)
+    cell = (grid[1] - grid[0]) ** 2
+    assert outline.area == pytest.approx(inside.sum() * cell, rel=3e-3)
+    np.testing.assert_allclose(outline.centre, [x[inside].mean(), y[inside].mean()], atol=3e-5)
+    cx, cy = outline.centre
+    about = ((x - cx) ** 2 + (y - cy) ** 2)[inside].sum() * cell
+    assert outline.second_moment == pytest.approx(about, rel=5e-3)
+
+
+def test_a_disc_and_a_rectangle_have_the_mass_and_inertia_of_textbooks():
+    disc, plate = Body(radius=0.02, height=0.01), Body.rectangle(0.06, 0.03, mass=0.02)
+    assert disc.mass_at(1200.0) == pytest.approx(1200.0 * math.pi * 0.02**2 * 0.01)
+    assert disc.inertia_at(1200.0) == pytest.approx(0.5 * disc.mass_at(1200.0) * 0.02**2)
+    assert plate.inertia_at(1200.0) == pytest.approx(0.02 * (0.06**2 + 0.03**2) / 12.0)
+
+
+def on_body(body: Body, n_limbs: int = 4, **water):
+    scene = Scene(Seastar(n_limbs, 5, body=body), Water(**water))
+    return make_rods(scene), scene
+
+
+@pytest.mark.parametrize("attachments", [CORNERS, (Attachment(0.02, 0.01, 0.0),) * 4])
+def test_mass_moment_and_inertia_are_those_of_body_and_roots(attachments):
+    body = Body.rectangle(0.06, 0.03, mass=0.02, centre_of_mass=(2e-3, -1e-3), attachments=attachments)
+    rods, _ = on_body(body)
+    root = 1000.0 * math.pi * 1.6e-3**2 * 0.1 / 4 / 2
+    places = np.array([[at.x, at.y] for at in attachments])
+    assert rods.mass[0] == pytest.approx(0.02 + 4 * root)
+    np.testing.assert_allclose(rods.body.moment, 0.02 * np.array([2e-3, -1e-3]) + root * places.sum(axis=0), atol=1e-18)
+    inertia = 0.02 * ((0.06**2 + 0.03**2) / 12.0 + 5e-6) + root * (places**2).sum()
+    assert rods.body.inertia[0] == pytest.approx(inertia)
+
+
+def force_and_torque(rods, velocity, omega) -> np.ndarray:
+    """Drag of a body that is not turned [N], [N m], from its coefficients."""
+    c, strips = rods.drag[0], rods.body.strips.reshape(-1, 4)
+    w = np.array(velocity)
+    flows = strips[:, :2] @ w + strips[:, 2] * omega
+    pushed = -(strips[:, 3] * np.abs(flows) * flows) @ strips[:, :3]
+    return pushed - np.append(c * np.linalg.norm(w) * w, 0.0)
+
+
+def test_drag_of_outlines_is_that_of_their_frontal_area():
+    plate, _ = on_body(Body.rectangle(0.06, 0.03), drag_coefficient=1.2)
+    disc, _ = on_body(Body(radius=0.02), drag_coefficient=1.2)
+    per_area = 0.5 * 1000.0 * 1.2 * 0.01
+    np.testing.assert_allclose(force_and_torque(plate, (0.2, 0.0), 0.0), [-per_area * 0.03 * 0.04, 0, 0], atol=1e-15)
+    np.testing.assert_allclose(force_and_torque(plate, (0.0, 0.2), 0.0), [0, -per_area * 0.06 * 0.04, 0], atol=1e-15)
+    turning = per_area * (0.06**4 + 0.03**4) / 32.0 * 9.0
+    np.testing.assert_allclose(force_and_torque(plate, (0.0, 0.0), 3.0), [0, 0, -turning], rtol=0.01, atol=1e-15)
+    pushed = -per_area * 0.04 * 0.2 * np.array([0.12, 0.16, 0.0])
+    np.testing.assert_allclose(force_and_torque(disc, (0.12, 0.16), 5.0), pushed)
+
+
+def test_given_coefficients_stand_for_the_outlines():
+    body = Body.rectangle(0.06, 0.03, drag_along=0.3, drag_turning=2.0)
+    rods, _ = on_body(body, drag_coefficient=1.2)
+    along, across, turning = (force_and_torque(rods, *motion) for motion in (((1, 0), 0), ((0, 1), 0), ((0, 0), 1)))
+    assert along[0] == pytest.approx(-5.0 * 0.3 * 0.03) and across[1] == pytest.approx(-5.0 * 1.2 * 0.06)
+    assert turning[2] == pytest.approx(-5.0 * 2.0 * 0.06**4 / 32.0)
+
+
+def test_added_mass_is_that_of_an_ellipse():
+    rods, _ = on_body(Body.rectangle(0.06, 0.03, mass=0.02, attachments=(Attachment(0, 0, 0),) * 4),
+                      added_mass_coefficient=0.9)  # fmt: skip
+    per_area = 1000.0 * math.pi * 0.01 * 0.9
+    np.testing.assert_allclose(rods.body.added_mass, per_area / 4.0 * np.array([0.03**2, 0.0, 0.06**2]))
+    fluid = per_area * (0.06**2 - 0.03**2) ** 2 / 128.0
+    assert rods.body.inertia[0] == pytest.approx(0.02 * (0.06**2 + 0.03**2) / 12.0 + fluid)
+
+
+def test_limbs_begin_where_and_as_they_are_attached():
+    star = Seastar(5, 6, body=Body(radius=0.02))
+    frame = Seastar(4, 6, body=Body.rectangle(0.06, 0.03, attachments=CORNERS))
+    np.testing.assert_allclose(np.hypot(*star.nodes()[1:].reshape(5, 5, 2)[:, -1].T), 0.12)
+    firsts = frame.nodes()[1::5]
+    for first, at in zip(firsts, CORNERS, strict=True):
+        step = 0.02 * np.array([math.cos(at.direction), math.sin(at.direction)])
+        np.testing.assert_allclose(first, [at.x, at.y] + step, atol=1e-15)
+
+
+def test_the_rim_of_a_polygon_is_met_in_the_direction_of_a_limb():
+    roots = [limb.root for limb in Seastar(4, 5, body=Body.rectangle(0.06, 0.03)).limb_shapes()]
+    np.testing.assert_allclose(roots, [(0.03, 0.0), (0.0, 0.015), (-0.03, 0.0), (0.0, -0.015)], atol=1e-15)
+
+
+def test_scenes_with_a_body_are_written_and_read_back():
+    scene = Scene(Seastar(4, 5, body=Body.rectangle(0.06, 0.03, mass=np.array([0.1, 0.2]), attachments=CORNERS)))
+    assert Scene.from_dict(scene.to_dict()) == scene
+
+
+def test_a_disc_with_a_star_is_symmetric_and_others_are_not():
+    assert Seastar(body=Body(radius=0.02)).is_symmetric
+    assert Seastar(6, body=Body(outline=HEXAGON)).is_symmetric
+    assert not Seastar(5, body=Body(outline=HEXAGON)).is_symmetric
+    assert not Seastar(4, body=Body.rectangle(0.06, 0.03)).is_symmetric
+    assert not Seastar(4, body=Body.rectangle(0.06, 0.03, attachments=CORNERS)).is_symmetric
+    assert not Seastar(body=Body(radius=0.02, centre_of_mass=(1e-3, 0.0))).is_symmetric
+    assert not Seastar(body=Body(radius=0.02, drag_along=0.5)).is_symmetric
+
+
+def test_numbers_of_a_body_can_be_drawn_and_identified():
+    scene = Scene(Seastar(body=Body(radius=0.02, mass=0.03, drag_turning=0.4)))
+    draws = DomainRandomization({"robot.body.mass": Uniform(0.02, 0.04), "robot.body.drag_turning": Uniform(0.1, 1.0)})
+    assert draws.first_values(scene, 3)["robot.body.mass"].tolist() == [0.04] * 3
+    assert get_parameter(scene, "robot.body.drag_turning") == 0.4
+
+
+def test_a_joint_is_a_spring_in_a_row_with_the_clamp():
+    stiff, joint = Scene(), Scene(Seastar(limbs=(Limb(joint_stiffness=2e-5), *(Limb(),) * 4)))
+    K, with_joint = (make_rods(scene).bending for scene in (stiff, joint))
+    assert with_joint.EI_over_dl[0] == pytest.approx(1.0 / (1.0 / K.EI_over_dl[0] + 1.0 / 2e-5))
+    assert with_joint.dl_over_EI[0] == pytest.approx(1.0 / with_joint.EI_over_dl[0])
+    np.testing.assert_array_equal(with_joint.EI_over_dl[1:], K.EI_over_dl[1:])
+
+
+@pytest.mark.parametrize(
+    "words, body",
+    [
+        (("radius", "outline"), {"radius": 0.01, "outline": TRIANGLE}),
+        (("outline", "anti-clockwise"), {"outline": TRIANGLE[::-1]}),
+        (("outline", "hub (0, 0)"), {"outline": tuple((x + 1.0, y) for x, y in TRIANGLE)}),
+        (("outline", "points"), {"outline": TRIANGLE[:2]}),
+        (("mass", "kg"), {"radius": 0.02, "mass": -1.0}),
+        (("inertia",), {"mass": 0.1}),
+        (("centre_of_mass",), {"radius": 0.02, "centre_of_mass": (1.0,)}),
+        (("Attachment",), {"radius": 0.02, "attachments": (1.0,)}),
+        (("radius",), {"radius": math.nan}),
+    ],
+)
+def test_bodies_that_cannot_be_are_refused(words, body):
+    with assert_refused(*words):
+        Body(**body)
+
+
+def test_robots_that_cannot_have_a_body_or_a_joint_are_refused():
+    disc = Body(radius=0.02)
+    with assert_refused("chapter", "body"):
+        Seastar(body=disc, discretisation="chapter")
+    with assert_refused("chapter", "joint_stiffness"):
+        Seastar(limbs=(Limb(joint_stiffness=1.0),) * 5, discretisation="chapter")
+    with assert_refused("attachments", "5"):
+        Seastar(body=Body(radius=0.02, attachments=CORNERS))
+    with assert_refused("Directions", "both"):
+        Seastar(4, body=Body(radius=0.02, attachments=CORNERS), limbs=tuple(Limb(k) for k in range(4)))
+    with assert_refused("Contact", "body"):
+        Scene(Seastar(body=disc), contact=Contact())
+    with assert_refused("body"):
+        Seastar(body=0.02)
+    with assert_refused("direction"):
+        Attachment(0.0, 0.0, math.inf)

@@ -1,0 +1,247 @@
+"""Robots with a body: conservation, closed forms, limits and symmetry."""
+
+import math
+
+import numpy as np
+import pytest
+
+from momenta import cross
+from seastar_gym import Attachment, Body, Numerics, Scene, Seastar, Simulator, SmaPulse, State, UniformCurrent, Water
+from seastar_gym.simulator.body_frame import root_places
+
+MIDPOINT = Numerics("implicit-midpoint", 1e-3, newton_tolerance=1e-10)
+SPECK = {"n_limbs": 2, "nodes_per_limb": 2, "limb_length": 1e-3, "rod_radius": 1e-4, "density": 1.0}
+"""Limbs without weight, for bodies by themselves."""
+AT_HUB = (Attachment(0.0, 0.0, 0.0), Attachment(0.0, 0.0, math.pi))
+FRAME = tuple(Attachment(x, y, math.copysign(1.2, y) if x > 0 else math.copysign(1.9, y))
+              for x, y in ((0.03, -0.015), (0.03, 0.015), (-0.03, 0.015), (-0.03, -0.015)))  # fmt: skip
+"""Four limbs at the corners of a rectangle, two at each long side."""
+FOUR_LIMBS = Seastar(n_limbs=4, nodes_per_limb=5, body=Body.rectangle(0.06, 0.03, attachments=FRAME))
+
+
+def alone(body: Body, fluid: Water | None, numerics: Numerics = MIDPOINT, **parts) -> Simulator:
+    """A body with a limb that is next to nothing, in a scene without actuation."""
+    return Simulator(Scene(Seastar(**SPECK, body=body), fluid, SmaPulse(0.0), numerics, **parts))
+
+
+def set_moving(simulator: Simulator, velocity: tuple[float, float], spin: float) -> None:
+    """Rigid motion from rest."""
+    q = simulator.positions
+    v = np.array(velocity) + spin * np.stack([-q[..., 1], q[..., 0]], axis=-1)
+    simulator.set_state(simulator.get_state()._replace(velocities=v, spin=np.full(len(q), spin)))
+
+
+def momenta(simulator: Simulator) -> tuple[np.ndarray, float]:
+    """Momentum [kg m/s] and angular momentum about the origin [kg m^2/s] of a robot whose roots balance each other."""
+    rods, q, v = simulator.coefficients.rods(0), simulator.positions[0], simulator.velocities[0]
+    mass, omega, n = rods.mass[: len(q)], simulator.spin()[0], rods.nodes_per_limb - 1
+    roots = root_places(simulator.scene.robot, q[None, 0], simulator.orientation())[0]
+    arms = roots - q[0]
+    moving_roots = v[0] + omega * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
+    tails_q = np.concatenate([np.vstack([roots[k], q[1 + k * n : (k + 1) * n]]) for k in range(rods.n_limbs)])
+    tails_v = np.concatenate([np.vstack([moving_roots[k], v[1 + k * n : (k + 1) * n]]) for k in range(rods.n_limbs)])
+    spin = cross(q, v) @ mass + rods.body.inertia[0] * omega
+    return mass @ v, spin - cross(q[1:] - tails_q, v[1:] - tails_v) @ rods.edge_mass
+
+
+def test_a_body_without_size_is_the_point_hub_to_the_last_bit():
+    for body in (Body(), Body(mass=0.0, inertia=0.0, height=1.0)):
+        one, other = (Simulator(Scene(Seastar(nodes_per_limb=5, body=body)), 2) for body in (None, body))
+        for simulator in (one, other):
+            simulator.advance(0.1, [[0, 1, 0, 0, -1], [1, 0, -1, 1, 0]])
+        np.testing.assert_array_equal(one.q, other.q)
+        np.testing.assert_array_equal(one.v, other.v)
+
+
+def test_a_small_light_body_swims_as_the_point_hub_does():
+    """The difference goes down with its size."""
+    paths = []
+    for body in (None, Body(radius=2e-4), Body(radius=1e-4)):
+        simulator = Simulator(Scene(Seastar(nodes_per_limb=5, body=body), numerics=MIDPOINT))
+        simulator.advance(0.3, [[0, 1, 0, 0, -1]])
+        paths.append(simulator.positions[0])
+    far, near = (np.abs(path - paths[0]).max() for path in paths[1:])
+    assert near < 2e-4 and near == pytest.approx(0.5 * far, rel=0.2)
+
+
+@pytest.mark.parametrize("scheme", ["implicit-midpoint", "implicit-euler", "sdirk2", "sdirk3"])
+def test_a_free_robot_of_stiff_limbs_turns_and_moves_on_as_a_rigid_one(scheme):
+    robot = Seastar(nodes_per_limb=4, youngs_modulus=1e8, body=Body(radius=0.02, mass=0.02))
+    simulator = Simulator(Scene(robot, None, numerics=Numerics(scheme, 1e-3, 1e-10)))
+    set_moving(simulator, (0.1, -0.05), 2.0)
+    (p, spin), energy = momenta(simulator), simulator.kinetic_energy()[0]
+    mass, inertia = rigid_numbers(robot)
+    assert spin == pytest.approx(2.0 * inertia, rel=0.01)
+    np.testing.assert_allclose(p, mass * np.array([0.1, -0.05]), rtol=1e-12)
+    assert energy == pytest.approx(0.5 * (0.1**2 + 0.05**2) * mass + 0.5 * spin * 2.0, rel=1e-9)
+    simulator.advance(0.2, np.zeros((1, 5)))
+    p_1, spin_1 = momenta(simulator)
+    np.testing.assert_allclose(p_1, p, rtol=1e-9)
+    loss = {"implicit-euler": 1e-3, "implicit-midpoint": 1e-5}.get(scheme, 3e-4)
+    assert spin_1 == pytest.approx(spin, rel=loss)
+    assert simulator.orientation()[0] == pytest.approx(0.4, rel=2e-3)
+    np.testing.assert_allclose(simulator.hub_position()[0], [0.02, -0.01], rtol=1e-9)
+
+
+def rigid_numbers(robot: Seastar) -> tuple[float, float]:
+    """Mass [kg] and moment of inertia [kg m^2] of a disc with thin rods around it."""
+    a, L, m = robot.body.radius, robot.limb_length, robot.density * math.pi * robot.rod_radius**2 * robot.limb_length
+    of_rods = robot.n_limbs * m * (a**2 + a * L + L**2 / 3.0)
+    return robot.body.mass + robot.n_limbs * m, 0.5 * robot.body.mass * a**2 + of_rods
+
+
+def test_a_robot_with_a_lopsided_body_turns_about_its_centre_of_mass():
+    """Its hub goes round the centre, which moves on uniformly: off by the square of the step."""
+    errors = []
+    for h in (4e-3, 2e-3):
+        body = Body(radius=0.02, mass=0.01, centre_of_mass=(0.01, 0.0), attachments=AT_HUB)
+        simulator = alone(body, None, Numerics("implicit-midpoint", h, 1e-11))
+        set_moving(simulator, (0.0, 0.0), 5.0)
+        simulator.advance(0.4, [[0.0, 0.0]])
+        # Centre at (0.01, 0) with the velocity (0, 0.05).
+        exact = np.array([0.01, 0.02]) - 0.01 * np.array([math.cos(2.0), math.sin(2.0)])
+        errors.append(np.abs(simulator.hub_position()[0] - exact).max())
+    assert errors[1] < 2e-5 and errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
+
+
+def complete_elliptic(k: float) -> float:
+    a, b = 1.0, math.sqrt(1.0 - k * k)
+    while abs(a - b) > 1e-15:
+        a, b = 0.5 * (a + b), math.sqrt(a * b)
+    return math.pi / (2.0 * a)
+
+
+def test_a_body_held_at_its_hub_swings_with_the_period_of_a_pendulum():
+    mass, away, inertia, swing = 5e-3, 0.01, 1e-6, 1.0
+    body = Body(radius=0.02, mass=mass, inertia=inertia, centre_of_mass=(away, 0.0), attachments=AT_HUB)
+    rate = math.sqrt(mass * 9.81 * away / (inertia + mass * away**2))
+    period = 4.0 * complete_elliptic(math.sin(0.5 * swing)) / rate
+    angles = []
+    for h in (2e-3, 1e-3):
+        numerics = Numerics("implicit-midpoint", h, newton_tolerance=1e-11)
+        simulator = alone(body, None, numerics, held_nodes=(0,), gravity=(0.0, -9.81))
+        simulator.reset(heading=swing - 0.5 * math.pi)
+        energy = -mass * 9.81 * away * math.cos(swing)
+        simulator.advance(0.25 * period, [[0.0, 0.0]])
+        hanging = simulator.orientation()[0] + 0.5 * math.pi
+        now = simulator.kinetic_energy()[0] - mass * 9.81 * away * math.cos(hanging)
+        assert now == pytest.approx(energy, abs=1e-3 * mass * 9.81 * away)
+        angles.append(abs(hanging))
+    assert angles[1] < 1e-3 and angles[0] / angles[1] == pytest.approx(4.0, rel=0.1)
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.5 * math.pi])
+def test_a_heavy_body_sinks_with_the_terminal_speed_of_its_side(heading):
+    body = Body.rectangle(0.06, 0.02, mass=0.03, drag_along=0.7, drag_across=1.9, attachments=AT_HUB)
+    simulator = alone(body, Water(), Numerics("sdirk2", 0.01), gravity=(0.0, -9.81))
+    simulator.reset(heading=heading)
+    simulator.advance(5.0, [[0.0, 0.0]])
+    area, C = (0.06, 1.9) if heading == 0.0 else (0.02, 0.7)
+    weight = (0.03 - 1000.0 * 0.06 * 0.02 * 0.01 - 2.0 * 999.0 * math.pi * 1e-4**2 * 1e-3) * 9.81
+    limbs = 2.0 * 1e-3 * 2e-4  # their drag is alike in all directions
+    speed = math.sqrt(weight / (0.5 * 1000.0 * (C * area * 0.01 + limbs)))
+    np.testing.assert_allclose(simulator.velocities[0, 0], [0.0, -speed], rtol=1e-6, atol=1e-9)
+    assert simulator.orientation()[0] == pytest.approx(heading, abs=1e-6)
+
+
+def test_a_turning_plate_slows_down_as_strips_of_it_say():
+    """d(omega)/dt = -k omega^2/I, k = rho C h a^4/64 for the long sides, and of the short ones likewise."""
+    body = Body.rectangle(0.06, 0.01, mass=0.01, attachments=AT_HUB)
+    simulator = alone(body, Water())
+    set_moving(simulator, (0.0, 0.0), 8.0)
+    simulator.advance(0.5, [[0.0, 0.0]])
+    k = 0.5 * 1000.0 * 0.01 * (0.06**4 + 0.01**4) / 32.0
+    inertia = 0.01 * (0.06**2 + 0.01**2) / 12.0
+    assert simulator.spin()[0] == pytest.approx(8.0 / (1.0 + k * 8.0 * 0.5 / inertia), rel=0.01)
+
+
+def test_an_ellipse_in_an_ideal_fluid_keeps_impulse_and_energy():
+    """Kirchhoff's equations: the mass of the fluid turns with the body."""
+    body = Body.rectangle(0.08, 0.02, mass=0.01, attachments=AT_HUB)
+    numerics = Numerics("sdirk2", 1e-3, 1e-10)  # without ringing of the limbs, which spoils first guesses
+    simulator = alone(body, Water(drag_coefficient=0.0, added_mass_coefficient=1.0), numerics)
+    set_moving(simulator, (0.05, 0.02), 1.0)
+    rods = simulator.coefficients.rods(0)
+    own = np.diag(rods.mass[0] + rods.body.added_mass[[0, 2]])
+
+    def kept():
+        c, s = math.cos(simulator.orientation()[0]), math.sin(simulator.orientation()[0])
+        R, v, omega = np.array([[c, -s], [s, c]]), simulator.velocities[0, 0], simulator.spin()[0]
+        impulse = R @ own @ R.T @ v
+        spin = rods.body.inertia[0] * omega + cross(simulator.positions[0, 0], impulse)
+        return np.array([*impulse, spin, v @ impulse + rods.body.inertia[0] * omega**2])
+
+    before = kept()
+    simulator.advance(1.0, [[0.0, 0.0]])
+    assert abs(simulator.orientation()[0]) > 0.3
+    np.testing.assert_allclose(kept(), before, rtol=2e-4)
+
+
+def test_a_robot_with_two_alike_sides_swims_straight():
+    simulator = Simulator(Scene(FOUR_LIMBS, numerics=MIDPOINT))
+    simulator.stroke([[-1, 1, 1, -1]])
+    assert abs(simulator.hub_position()[0, 0]) > 1e-3
+    assert abs(simulator.hub_position()[0, 1]) < 1e-9 and abs(simulator.orientation()[0]) < 1e-7
+
+
+def test_a_uniform_current_carries_a_robot_along():
+    still = Simulator(Scene(FOUR_LIMBS, Water(), numerics=MIDPOINT))
+    carried = Simulator(Scene(FOUR_LIMBS, Water(current=UniformCurrent(0.02, -0.01)), numerics=MIDPOINT))
+    set_moving(carried, (0.02, -0.01), 0.0)
+    for simulator in (still, carried):
+        simulator.advance(0.3, [[1, 0, 0.5, -1]])
+    drift = 0.3 * np.array([0.02, -0.01])
+    np.testing.assert_allclose(carried.positions - drift, still.positions, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(carried.orientation(), still.orientation(), atol=1e-8)
+
+
+def test_a_turned_robot_swims_the_turned_path():
+    one, turned = Simulator(Scene(FOUR_LIMBS, numerics=MIDPOINT)), Simulator(Scene(FOUR_LIMBS, numerics=MIDPOINT))
+    turned.reset(heading=2.5)
+    for simulator in (one, turned):
+        simulator.advance(0.3, [[1, 0, 0.5, -1]])
+    c, s = math.cos(2.5), math.sin(2.5)
+    np.testing.assert_allclose(turned.positions[0], one.positions[0] @ [[c, s], [-s, c]], rtol=0.0, atol=1e-9)
+    assert turned.orientation()[0] == pytest.approx(one.orientation()[0] + 2.5, abs=1e-7)
+
+
+def test_a_state_with_orientation_continues_to_the_same_bits():
+    simulator, other = (Simulator(Scene(FOUR_LIMBS, numerics=MIDPOINT), 3) for _ in range(2))
+    simulator.reset(heading=[0.0, 4.0, -2.0])
+    simulator.stroke(np.eye(3, 4))
+    other.set_state(simulator.get_state())
+    for each in (simulator, other):
+        each.advance(0.1, -np.eye(3, 4))
+    np.testing.assert_array_equal(simulator.q, other.q)
+    np.testing.assert_array_equal(simulator.orientation(), other.orientation())
+
+
+def test_a_state_without_orientation_has_that_of_its_shape():
+    simulator = Simulator(Scene(FOUR_LIMBS))
+    simulator.reset(heading=1.25)
+    state = simulator.get_state()
+    simulator.set_state(State(*state[:3]))
+    assert simulator.orientation()[0] == pytest.approx(1.25, abs=1e-12)
+    assert simulator.spin()[0] == 0.0
+
+
+def test_bodies_differ_from_robot_to_robot():
+    masses = np.array([5e-3, 0.05])
+    both = Simulator(Scene(Seastar(4, 5, body=Body.rectangle(0.06, 0.03, mass=masses, attachments=FRAME))), 2)
+    both.advance(0.2, np.tile([1, 0, 0, -1], (2, 1)))
+    for robot, mass in enumerate(masses):
+        own = Seastar(4, 5, body=Body.rectangle(0.06, 0.03, mass=float(mass), attachments=FRAME))
+        simulator = Simulator(Scene(own))
+        simulator.advance(0.2, [[1, 0, 0, -1]])
+        np.testing.assert_array_equal(simulator.positions[0], both.positions[robot])
+        np.testing.assert_array_equal(simulator.orientation()[0], both.orientation()[robot])
+
+
+def test_long_steps_of_violent_commands_end_well():
+    """Retried and regularised steps, the guard and its cuts."""
+    simulator = Simulator(Scene(FOUR_LIMBS, None, SmaPulse(1.5, 0.02, 0.1), Numerics("implicit-midpoint", 0.02)), 8)
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        report = simulator.stroke(rng.choice([-1.0, 1.0], (8, 4)))
+        assert (report.status == 0).all()
+    assert np.isfinite(simulator.positions).all() and report.halvings.sum() + report.regularised.sum() > 0

@@ -1,0 +1,19 @@
+"""Small sweeps. Without the extra `sweep`, there is nothing to test here."""
+
+from importlib.util import find_spec
+
+import pytest
+
+from seastar_gym.scene import Scene
+
+collect_ignore_glob = [] if all(map(find_spec, ("optuna", "pyarrow"))) else ["test_*.py"]
+
+
+@pytest.fixture
+def sweep():
+    """Four cells of four designs and one stroke."""
+    from seastar_gym.sweep.axes import Choices, Range
+    from seastar_gym.sweep.designs import Sweep
+
+    axes = Range("robot.limb_length", 0.05, 0.15), Choices("robot.n_limbs", (3, 5))
+    return Sweep(Scene.preset("fast"), axes, settling=0, measured=1, samples=8, robots=4)

@@ -1,0 +1,167 @@
+"""The command line of sweeps, from its words to its results."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from seastar_gym.scene import Scene, Seastar
+from seastar_gym.scene.actuators.wires import SmaWires
+from seastar_gym.sweep.axes import Choices, Range
+from seastar_gym.sweep.command import main
+from seastar_gym.sweep.parts import Parts, read_parts
+from seastar_gym.sweep.text import axis_of
+
+ROOT = Path(__file__).resolve().parents[2]
+QUICK = ("--settling", "0", "--measured", "1", "--executor", "here")
+
+
+@pytest.mark.parametrize(
+    "text, axis",
+    [
+        ("robot.n_limbs=3,4", Choices("robot.n_limbs", (3, 4))),
+        ("robot.limb_length=0.05:0.15", Range("robot.limb_length", 0.05, 0.15)),
+        ("robot.youngs_modulus=1e5:1e7:log", Range("robot.youngs_modulus", 1e5, 1e7, is_log=True)),
+        ("robot.limb_length=0.1:0.2:3", Range("robot.limb_length", 0.1, 0.2).spaced(3)),
+        ("gait=straight/1+,3-", Choices("gait", ("straight", "1+,3-"))),
+        ("fidelity=fast,chapter", Choices("fidelity", ("fast", "chapter"))),
+        ("actuator=SmaWires,SmaPulse", Choices("actuator", (SmaWires(), Scene().actuator), ("SmaWires", "SmaPulse"))),
+        ("fluid=Water,None", Choices("fluid", (Scene().fluid, None), ("Water", "None"))),
+        ("numerics.path_tolerance=None,0.01", Choices("numerics.path_tolerance", (None, 0.01), ("None", 0.01))),
+    ],
+)
+def test_axes_are_words(text, axis):
+    assert axis_of(text) == axis
+
+
+def test_logarithms_are_evenly_spaced():
+    values = axis_of("robot.youngs_modulus=1e5:1e7:3:log").values
+    assert values == pytest.approx((1e5, 1e6, 1e7))
+
+
+def test_a_part_comes_from_a_file(tmp_path):
+    from seastar_gym.scene.serial import to_dict
+
+    robot = Seastar(n_limbs=7)
+    (tmp_path / "seven.json").write_text(json.dumps(to_dict(robot)))
+    assert axis_of(f"robot=@{tmp_path}/seven.json,Seastar") == Choices(
+        "robot", (robot, Seastar()), ("seven", "Seastar")
+    )
+
+
+def test_a_sweep_from_words_to_a_table(tmp_path, capsys):
+    words = "robot.limb_length=0.05:0.15", "robot.n_limbs=3,5", "--latin", "3", "--out", str(tmp_path)
+    assert main([*words, *QUICK]) == 0
+    assert "6 designs in 2 cells" in capsys.readouterr().out
+    assert read_parts(tmp_path).num_rows == 6
+    assert main([*words, *QUICK]) == 0
+    assert "cells: 0; there before, cells: 2" in capsys.readouterr().out
+
+
+def test_counting_simulates_nothing(tmp_path, capsys):
+    words = (
+        "robot.limb_length=0.05:0.15:100",
+        "robot.n_limbs=3,5",
+        "robot.density=500:2000:100",
+        "actuator.peak_angle=0.1:0.6:50",
+    )
+    assert main([*words, "--robots", "1", "--count", "--out", str(tmp_path)]) == 0
+    assert "1,000,000 designs in 1,000,000 cells." in capsys.readouterr().out
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_search_from_words_to_its_best(tmp_path, capsys):
+    words = "robot.limb_length=0.05:0.15", "--optuna", "4", "--robots", "2", "--out", str(tmp_path)
+    assert main([*words, *QUICK]) == 0
+    assert "Best speed: 0.0" in capsys.readouterr().out
+    assert (tmp_path / "study.db").exists() and read_parts(tmp_path).num_rows == 4
+
+
+def test_a_scene_comes_from_a_file(tmp_path):
+    file = tmp_path / "scene.json"
+    file.write_text(json.dumps(Scene.preset("fast").to_dict()))
+    assert main(["--scene", str(file), "--out", str(tmp_path), *QUICK]) == 0
+    assert read_parts(tmp_path).num_rows == 1
+
+
+@pytest.mark.parametrize(
+    "words, sentence",
+    [
+        (["robot.colour=1,2"], "nothing that a sweep can vary"),
+        (["robot.n_limbs"], "NAME=VALUES"),
+        (["robot.n_limbs="], "NAME=VALUES"),
+        (["robot.limb_length=0.1:0.2"], "samples must be"),
+        (["robot.limb_length=0.1:x"], "LOW:HIGH"),
+        (["robot.limb_length=0.1:0.2:0.3"], "count"),
+        (["robot.limb_length=0.1:0.2:3:4"], "LOW:HIGH"),
+        (["actuator=Muscle"], "Muscle"),
+        (["robot=@nowhere.json"], "nowhere.json"),
+        (["--scene", "nowhere.json"], "nowhere.json"),
+        (["--gait", "gallop"], "gallop"),
+        (["--workers", "0"], "workers"),
+        (["--optuna", "5"], "something to vary"),
+        (["robot.limb_length=0.1:0.2", "--optuna", "5", "--objective", "beauty"], "beauty"),
+    ],
+)
+def test_bad_input_is_one_sentence(words, sentence, tmp_path, capsys):
+    try:
+        code = main([*words, "--out", str(tmp_path / "out"), "--settling", "0", "--measured", "1"])
+        told = capsys.readouterr().err
+    except OSError as refused:  # of which `run_command` makes a sentence
+        code, told = 2, str(refused)
+    assert code == 2
+    last = told.strip().splitlines()[-1]
+    assert sentence in last
+    assert not list((tmp_path / "out").glob("parts/*/*"))
+
+
+def test_no_json_is_one_sentence(tmp_path, capsys):
+    (tmp_path / "scene.json").write_text("{")
+    assert main(["--scene", str(tmp_path / "scene.json")]) == 2
+    assert "is no JSON" in capsys.readouterr().err
+
+
+def command(tmp_path, *words):
+    arguments = [sys.executable, "-m", "seastar_gym.sweep", *words, "--out", str(tmp_path)]
+    return subprocess.Popen(
+        arguments, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )  # fmt: skip
+
+
+def finished(tmp_path, n_cells, process):
+    """Wait until so many cells are finished."""
+    end = time.monotonic() + 120
+    while len(list(Parts(tmp_path).names())) < n_cells:
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGKILL])
+def test_a_stopped_sweep_goes_on_where_it_was(stop, tmp_path):
+    """Ctrl-C goes to all processes of a terminal, a kill to one."""
+    words = "robot.limb_length=0.05:0.15:400", "--robots", "1", "--measured", "1", "--settling", "0", "--workers", "1"
+    process = command(tmp_path, *words)
+    finished(tmp_path, 3, process)
+    if stop == signal.SIGINT:
+        os.killpg(process.pid, stop)
+    else:
+        process.kill()
+    told = process.communicate(timeout=60)[1]
+    if stop == signal.SIGINT:
+        assert process.returncode == 130
+        assert told.strip().splitlines()[-1].startswith("Interrupted: all finished cells are in")
+        assert "Traceback" not in told
+    names = set(Parts(tmp_path).names())
+    assert len(names) >= 3
+    assert all(Parts(tmp_path).file(name).read_bytes()[-4:] == b"PAR1" for name in names)
+    again = command(tmp_path, *words)
+    finished(tmp_path, len(names) + 3, again)
+    again.send_signal(signal.SIGINT)
+    again.communicate(timeout=60)
+    assert names < set(Parts(tmp_path).names())

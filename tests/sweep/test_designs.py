@@ -1,0 +1,183 @@
+"""Designs of a sweep, and the cells that they are simulated in."""
+
+import itertools
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from refusals import assert_refused
+from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse
+from seastar_gym.scene.actuators.wires import SmaWires
+from seastar_gym.sweep.axes import Choices, Range
+from seastar_gym.sweep.cells import Cell
+from seastar_gym.sweep.designs import Sweep
+from seastar_gym.sweep.swimming import scene_of
+
+FAST = Scene.preset("fast")
+LENGTH = Range("robot.limb_length", 0.05, 0.15)
+
+
+def values_of(sweep, *names):
+    """Values of axes, design after design."""
+    found = []
+    for cell in sweep.cells():
+        labels = dict(cell.frame.labels)
+        columns = [cell.numbers.get(name, [labels.get(name)] * cell.n_robots) for name in names]
+        found += zip(*columns, strict=True)
+    return found
+
+
+def test_a_grid_has_every_combination_once():
+    axes = (
+        Choices("robot.n_limbs", (3, 5)), Range("robot.limb_length", 0.05, 0.15).spaced(3),
+        Choices("actuator.peak_angle", (0.2, 0.4, 0.6)), Choices("gait", ("straight", "1+,3-")),
+    )  # fmt: skip
+    for robots in (1, 2, 4, 100):
+        sweep = Sweep(FAST, axes, robots=robots)
+        found = values_of(sweep, *(axis.name for axis in axes))
+        assert len(found) == sweep.n_designs == 36
+        assert set(found) == set(itertools.product(*(axis.values for axis in axes)))
+        assert len(list(sweep.cells())) == sweep.n_cells
+
+
+def test_numbers_of_robots_are_simulated_side_by_side():
+    axes = Choices("robot.limb_length", (0.05, 0.1)), Choices("numerics.step", (2e-3, 5e-3))
+    cells = list(Sweep(FAST, axes).cells())
+    assert [cell.n_robots for cell in cells] == [2, 2]
+    assert [cell.frame.scene.numerics.step for cell in cells] == [2e-3, 5e-3]
+    scene = scene_of(cells[0], np.ones(2, bool))
+    assert scene.n_robots == 2 and scene.of_robot(1).robot.limb_length == 0.1
+
+
+def test_every_row_and_column_of_a_latin_hypercube_has_one_design():
+    sweep = Sweep(FAST, (LENGTH, Range("robot.youngs_modulus", 1e5, 1e7, is_log=True)), samples=50, robots=16)
+    found = np.array(values_of(sweep, "robot.limb_length", "robot.youngs_modulus"))
+    strata = np.stack([(found[:, 0] - 0.05) / 0.1, (np.log10(found[:, 1]) - 5.0) / 2.0], axis=1) * 50
+    assert (np.sort(strata.astype(int), axis=0) == np.arange(50)[:, None]).all()
+
+
+def test_each_combination_has_a_hypercube_of_its_own_and_a_seed_repeats_all():
+    def lengths(seed):
+        return values_of(Sweep(FAST, (LENGTH, Choices("robot.n_limbs", (3, 5))), samples=8, seed=seed), LENGTH.name)
+
+    assert lengths(3) == lengths(3) != lengths(4)
+    assert lengths(3)[:8] != lengths(3)[8:]
+
+
+def test_parts_fidelities_and_gaits_are_choices_of_frames():
+    axes = (
+        Choices("actuator", (SmaPulse(0.3), SmaWires(period=1.0))),
+        Choices("robot", (Seastar(), Seastar(n_limbs=4)), ("five", "four")),
+        Choices("fidelity", ("fast", "balanced")),
+    )
+    frames = list(Sweep(Scene(), axes).frames())
+    assert len(frames) == 8
+    assert dict(frames[0].labels) == {"actuator": "SmaPulse", "robot": "five", "fidelity": "fast"}
+    assert {frame.scene.robot.nodes_per_limb for frame in frames} == {7, 12}
+    assert frames[-1].scene.numerics == Numerics.preset("balanced")
+    assert frames[-1].gait.commands == ((0.0, 1.0, 0.0, -1.0),)
+
+
+def test_a_cell_is_named_by_all_that_its_results_depend_on():
+    def names(scene=FAST, axes=(LENGTH,), **options):
+        return [cell.name for cell in Sweep(scene, axes, **{"samples": 4, **options}).cells()]
+
+    first = names()
+    assert first == names()
+    others = [
+        names(Scene.preset("balanced")), names(seed=1), names(gait="2-,5+"), names(settling=3), names(measured=9),
+        names(axes=(Range("robot.limb_length", 0.05, 0.16),)), names(axes=(LENGTH, Choices("robot.n_limbs", (5,)))),
+        names(gait=np.full((2, 5), 0.5)),
+    ]  # fmt: skip
+    assert len({name for each in (first, *others) for name in each}) == 9
+
+
+def test_a_new_version_of_the_package_is_another_cell(monkeypatch):
+    before = next(Sweep(FAST, (LENGTH,), samples=1).cells()).name
+    monkeypatch.setattr("seastar_gym.sweep.frames.__version__", "99.0")
+    assert next(Sweep(FAST, (LENGTH,), samples=1).cells()).name != before
+
+
+def test_numbers_of_a_robot_belong_to_their_names():
+    frame = next(Sweep(FAST, (LENGTH,), samples=1).frames())
+    one, other = np.array([0.1]), np.array([0.2])
+    names = {
+        Cell(frame, numbers, 1).name
+        for numbers in ({"a": one, "b": other}, {"a": other, "b": one}, {"ab": one, "": other})
+    }
+    assert len(names) == 3
+
+
+def test_memory_does_not_grow_with_the_number_of_cells():
+    """Ten thousand cells of one robot are made and named one by one."""
+    axes = Range("robot.limb_length", 0.05, 0.15).spaced(100), Range("robot.density", 500.0, 2000.0).spaced(100)
+
+    def peak(n_cells):
+        tracemalloc.start()
+        for cell in itertools.islice(Sweep(FAST, axes, robots=1).cells(), n_cells):
+            assert cell.name
+        size = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return size
+
+    peak(10)
+    assert peak(10_000) < peak(100) + 50_000
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (((LENGTH, LENGTH),), ("once",)),
+        (((LENGTH,),), ("samples", "from 1 to")),
+        (((LENGTH,), "straight", 2, 8, 10**8), ("samples",)),
+        ((LENGTH,), ("tuple of Range and Choices",)),
+        (((Choices("robot.n_limbs", (0, 3)),),), ("n_limbs", "not 0")),
+        (((Choices("robot.colour", (1, 2)),),), ("robot.colour", "nothing that a sweep can vary")),
+        (((Choices("robot.limbs.0.length", (1, 2)),),), ("robot.limbs.0.length",)),
+        (((Range("numerics.step", 1e-3, 2e-3),), "straight", 2, 8, 5), ("numerics.step", "within a batch")),
+        (((Choices("actuator.heating_time", (0.1, 0.2)),), "straight", 2, 8, 5), ("needs a range",)),
+        (((Choices("robot.limb_length", (-1.0, -2.0)),),), ("limb_length",)),
+        (((Choices("gait", ("straight", "6+")),),), ("gait", "6+")),
+        (((Choices("actuator", (SmaPulse(), "pulse")),),), ("actuator", "pulse")),
+        (((Choices("fidelity", ("fast", "quick")),),), ("fidelity", "quick")),
+        (((), "lagged"), ("lagged", "SmaWires")),
+        (((), np.zeros((2, 4))), ("rows of commands of 5 limbs",)),
+        (((), "straight", -1), ("settling",)),
+        (((), "straight", 1, 0), ("measured",)),
+        (((), "straight", 1, 1, 0, -1), ("seed",)),
+        (((), "straight", 1, 1, 0, 0, 0), ("robots",)),
+    ],
+)  # fmt: skip
+def test_bad_sweeps_are_refused(arguments, words):
+    with assert_refused(*words):
+        Sweep(FAST, *arguments)
+
+
+def test_a_scene_of_several_robots_is_refused():
+    with assert_refused("one robot"):
+        Sweep(Scene(Seastar(limb_length=np.array([0.1, 0.2]))), ())
+
+
+def test_a_number_that_not_all_choices_have_is_refused():
+    axes = Choices("fluid", (FAST.fluid, None), ("water", "vacuum")), Range("fluid.density", 900.0, 1100.0)
+    with assert_refused("vacuum", "fluid.density"):
+        Sweep(FAST, axes, samples=2)
+
+
+@pytest.mark.parametrize(
+    "make, words",
+    [
+        (lambda: Range("x", 2.0, 1.0), ("larger",)),
+        (lambda: Range("x", 0.0, float("inf")), ("finite",)),
+        (lambda: Range("x", 0.0, 1.0, is_log=True), ("positive",)),
+        (lambda: Range("x", 0.0, 1.0, is_log=1), ("is_log",)),
+        (lambda: Choices("x", ()), ("tuple of values",)),
+        (lambda: Choices("x", [1]), ("tuple of values",)),
+        (lambda: Choices("x", (1, 2), ("a",)), ("labels",)),
+        (lambda: Choices("x", (SmaPulse(0.1), SmaPulse(0.2))), ("labels that differ",)),
+    ],
+)
+def test_bad_axes_are_refused(make, words):
+    with assert_refused(*words):
+        make()

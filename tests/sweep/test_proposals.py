@@ -1,0 +1,173 @@
+"""Designs that Optuna proposes: told once, put back when they were lost, in SQLite and in PostgreSQL."""
+
+import os
+import pwd
+import shutil
+import socket
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+import optuna
+import pytest
+from optuna.trial import TrialState
+
+from refusals import assert_refused
+from seastar_gym.scene import Scene
+from seastar_gym.sweep.axes import Choices, Range
+from seastar_gym.sweep.designs import Sweep
+from seastar_gym.sweep.executors import Outcome
+from seastar_gym.sweep.executors.here import Here
+from seastar_gym.sweep.parts import Parts, part_of, read_parts
+from seastar_gym.sweep.proposals import Proposals, Search, explore, put_back_stale, study_of
+from seastar_gym.sweep.run import run
+
+AXES = (
+    Range("robot.limb_length", 0.05, 0.15),
+    Choices("robot.n_limbs", (3, 5)),
+    Choices("actuator.peak_angle", (0.2, 0.6)),
+)
+SWEEP = Sweep(Scene.preset("fast"), AXES, settling=0, measured=1, samples=1, robots=4)
+
+
+@pytest.fixture
+def sqlite(tmp_path):
+    return f"sqlite:///{tmp_path}/study.db"
+
+
+@pytest.fixture(scope="module")
+def postgresql():
+    """A PostgreSQL server of our own, which does not run as root."""
+    pytest.importorskip("psycopg2")
+    programs = shutil.which("initdb"), shutil.which("pg_ctl")
+    if None in programs:
+        pytest.skip("no PostgreSQL here")
+    initdb, pg_ctl = (Path(program).resolve() for program in programs)
+    user = {}
+    if os.geteuid() == 0:
+        if "postgres" not in {entry.pw_name for entry in pwd.getpwall()}:
+            pytest.skip("PostgreSQL does not run as root")
+        user = {"user": "postgres", "group": "postgres", "extra_groups": []}
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    folder = Path(tempfile.mkdtemp(prefix="pg"))
+    if user:
+        shutil.chown(folder, "postgres", "postgres")
+    quiet = {"stdout": subprocess.DEVNULL, "check": True, "cwd": folder, **user}
+    try:
+        subprocess.run([initdb, "-D", folder / "data", "-A", "trust", "-U", "sweep", "--no-sync"], **quiet)
+        options = f"-p {port} -h 127.0.0.1 -k {folder}"
+        subprocess.run([pg_ctl, "-D", folder / "data", "-o", options, "-l", folder / "log", "-w", "start"], **quiet)
+        yield f"postgresql+psycopg2://sweep@127.0.0.1:{port}/postgres"
+        subprocess.run([pg_ctl, "-D", folder / "data", "-m", "immediate", "-w", "stop"], **quiet)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def storage(request):
+    return request.getfixturevalue(request.param)
+
+
+def states(study):
+    return [trial.state for trial in study.get_trials(deepcopy=False)]
+
+
+class Losing:
+    """An executor that loses the first cell."""
+
+    def run(self, work, cells):
+        for k, cell in enumerate(cells):
+            yield Outcome(cell, None, "Lost.") if k == 0 else Outcome(cell, work(cell))
+
+
+def test_proposals_are_simulated_and_told(storage, tmp_path):
+    study = explore(SWEEP, Search(), storage, 10, tmp_path, Here())
+    assert states(study) == [TrialState.COMPLETE] * 10
+    cells = list(Parts(tmp_path).names())
+    assert len(cells) >= 3
+    best = study.best_trial
+    scene = Scene.preset("fast")
+    again = Sweep(
+        scene, tuple(Choices(name, (value,)) for name, value in best.params.items()), settling=0, measured=1
+    )  # fmt: skip
+    folder = tmp_path / "again"
+    run(again.cells(), folder, Here())
+    assert read_parts(folder).column("speed").to_pylist() == [best.value]
+    assert best.value == max(trial.value for trial in study.trials)
+
+
+def test_a_search_goes_on_where_it_was_and_keeps_to_its_number(sqlite, tmp_path):
+    explore(SWEEP, Search(), sqlite, 5, tmp_path, Here())
+    study = explore(SWEEP, Search(), sqlite, 8, tmp_path, Here())
+    assert len(study.trials) == 8
+    assert len(explore(SWEEP, Search(), sqlite, 8, tmp_path, Here()).trials) == 8
+
+
+def test_another_sweep_is_another_study(sqlite):
+    other = Sweep(SWEEP.scene, AXES[:2], settling=0, measured=1, samples=1)
+    names = {study_of(*each, sqlite).study_name for each in ((SWEEP, Search()), (other, Search()),
+             (SWEEP, Search("turn")), (SWEEP, Search("speed", False)))}  # fmt: skip
+    assert len(names) == 4
+
+
+def test_proposals_of_a_lost_cell_are_proposed_again(sqlite, tmp_path):
+    study = explore(SWEEP, Search(), sqlite, 6, tmp_path, Losing())
+    lost = [trial for trial in study.trials if trial.state == TrialState.FAIL]
+    again = {trial.user_attrs["put back"]: trial for trial in study.trials if "put back" in trial.user_attrs}
+    assert lost and set(again) == {trial.number for trial in lost}
+    assert all(again[trial.number].params == trial.params for trial in lost)
+    assert states(study).count(TrialState.COMPLETE) == 6
+
+
+def test_heartbeats_do_not_cover_ask_and_tell(sqlite):
+    """So proposals are put back by us. If this fails, Optuna does it now."""
+    with pytest.warns(optuna.exceptions.ExperimentalWarning):
+        beating = optuna.storages.RDBStorage(sqlite, heartbeat_interval=1, grace_period=1)
+    study = optuna.create_study(storage=beating)
+    with pytest.warns(UserWarning, match="supposed to be used with Study.optimize"):
+        study.ask()
+    time.sleep(2.1)
+    with pytest.warns(optuna.exceptions.ExperimentalWarning):
+        optuna.storages.fail_stale_trials(study)
+    assert states(study) == [TrialState.RUNNING]
+    assert put_back_stale(study, 1.0) == 1
+
+
+def test_stale_proposals_are_put_back_once(storage, tmp_path):
+    search = Search(stale_after=1e-3)
+    study = study_of(SWEEP, Search("ahead"), storage)
+    lost = Proposals(SWEEP, study, Search("ahead"), 4)
+    n_cells = len(lost._asked(4))  # and the process is gone
+    assert states(study) == [TrialState.RUNNING] * 4 and n_cells
+    assert put_back_stale(study, 3600.0) == 0
+    assert put_back_stale(study, 0.0, {0, 1, 2, 3}) == 0
+    assert put_back_stale(study, search.stale_after) == 4
+    assert put_back_stale(study, search.stale_after) == 0
+    assert states(study) == [TrialState.FAIL] * 4 + [TrialState.WAITING] * 4
+    found = explore(SWEEP, Search("ahead"), storage, 4, tmp_path, Here())
+    assert states(found) == [TrialState.FAIL] * 4 + [TrialState.COMPLETE] * 4
+    assert [trial.params for trial in found.trials[:4]] == [trial.params for trial in found.trials[4:]]
+
+
+def test_a_result_that_comes_too_late_changes_nothing(sqlite):
+    study = study_of(SWEEP, Search(), sqlite)
+    slow = Proposals(SWEEP, study, Search(), 2)
+    cells = slow._asked(2)
+    assert put_back_stale(study, 0.0) == 2
+    for cell in cells:
+        slow.tell(Outcome(cell, part_of(cell)))
+    assert states(study) == [TrialState.FAIL] * 2 + [TrialState.WAITING] * 2
+
+
+def test_bad_searches_are_refused(sqlite):
+    with assert_refused("objective", "beauty"):
+        study_of(SWEEP, Search("beauty"), sqlite)
+    with assert_refused("stale_after"):
+        study_of(SWEEP, Search(stale_after=-1.0), sqlite)
+    with assert_refused("something to vary"):
+        study_of(Sweep(SWEEP.scene, ()), Search(), sqlite)
+    with assert_refused("nowhere"):
+        study_of(SWEEP, Search(), "sqlite:////nowhere/study.db")

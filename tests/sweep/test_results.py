@@ -1,0 +1,111 @@
+"""What a cell's part says."""
+
+import json
+
+import numpy as np
+import pyarrow.parquet
+import pytest
+
+from seastar_gym.gaits import STRAIGHT
+from seastar_gym.scene import Scene, Seastar, SmaPulse
+from seastar_gym.simulator import Simulator
+from seastar_gym.sweep.axes import Choices
+from seastar_gym.sweep.designs import Sweep
+from seastar_gym.sweep.parts import Parts, part_of, read_parts
+from seastar_gym.sweep.swimming import REFUSED, UNITS, swim
+
+FAST = Scene.preset("fast")
+
+
+def one_cell(*axes, **options):
+    (cell,) = Sweep(FAST, axes, **{"settling": 1, "measured": 2, **options}).cells()
+    return cell
+
+
+def test_results_are_those_of_the_simulator():
+    found = swim(one_cell(Choices("robot.limb_length", (0.08, 0.1))))
+    simulator = Simulator(FAST)
+    simulator.stroke([STRAIGHT])
+    begin = simulator.hub_position()[0]
+    energy = sum(simulator.stroke([STRAIGHT]).energy[0] for _ in range(2))
+    way = simulator.hub_position()[0] - begin
+    assert found["ahead"][1] == pytest.approx(way[0], rel=1e-12) and abs(found["aside"][1]) < 1e-12
+    assert found["speed"][1] == pytest.approx(way[0] / 2.0, rel=1e-12)
+    assert found["strokes_per_metre"][1] == pytest.approx(2.0 / way[0], rel=1e-12)
+    assert found["energy"][1] == pytest.approx(energy, rel=1e-12)
+    assert abs(found["turn"][1]) < 1e-9
+    assert found["status"].tolist() == [0, 0]
+
+
+def test_a_turned_gait_swims_aside_and_turns_nothing():
+    gait = np.roll([STRAIGHT], 1, axis=1)
+    found = swim(one_cell(gait=gait))
+    assert np.arctan2(found["aside"][0], found["ahead"][0]) == pytest.approx(2.0 * np.pi / 5.0, abs=1e-6)
+
+
+def test_a_design_that_a_scene_refuses_costs_no_other():
+    found = swim(one_cell(Choices("robot.limb_length", (-1.0, 0.1))))
+    assert found["status"].tolist() == [REFUSED, 0]
+    assert np.isnan(found["speed"][0])
+    alone = swim(one_cell(Choices("robot.limb_length", (0.1,))))
+    assert all(found[name][1] == alone[name][0] for name in UNITS)
+
+
+def test_a_cell_of_refused_designs_is_a_result():
+    chapter = Scene(Seastar(n_limbs=3, discretisation="chapter", nodes_per_limb=5), actuator=SmaPulse(0.1))
+    axes = Choices("robot.n_limbs", (5, 3)), Choices("actuator.peak_angle", (0.8, 0.9))
+    five, three = Sweep(chapter, axes, settling=0, measured=1).cells()
+    assert (swim(three)["status"] == REFUSED).all() and (swim(five)["status"] == 0).all()
+
+
+def test_a_design_has_the_same_bits_in_every_cell():
+    lengths = Choices("robot.limb_length", tuple(np.linspace(0.05, 0.15, 12).tolist()))
+
+    def speeds(robots):
+        cells = Sweep(FAST, (lengths,), settling=0, measured=1, robots=robots).cells()
+        return np.concatenate([swim(cell)["speed"] for cell in cells]).tolist()
+
+    assert speeds(12) == speeds(5) == speeds(1)
+
+
+def test_a_part_has_units_scene_and_choices(tmp_path):
+    axes = Choices("robot.n_limbs", (3, 4)), Choices("robot.limb_length", (0.05, 0.1)), Choices("gait", ("1+,2-",))
+    cells = list(Sweep(FAST, axes, settling=0, measured=1).cells())
+    for cell in cells:
+        Parts(tmp_path).write(cell.name, part_of(cell))
+    table = pyarrow.parquet.read_table(Parts(tmp_path).file(cells[0].name))
+    assert table.schema.field("speed").metadata == {b"unit": b"m/s"}
+    assert table.schema.field("robot.limb_length").metadata == {b"unit": b"m"}
+    assert table.column("gait").to_pylist() == ["1+,2-", "1+,2-"]
+    told = json.loads(table.schema.metadata[b"seastar_gym"])
+    assert Scene.from_dict(told["scene"]) == cells[0].frame.scene and told["measured"] == 1
+    everything = read_parts(tmp_path)
+    assert sorted(everything.column("robot.n_limbs").to_pylist()) == [3, 3, 4, 4]
+
+
+def test_pandas_and_polars_read_the_parts(tmp_path):
+    pandas, polars = pytest.importorskip("pandas"), pytest.importorskip("polars")
+    cell = one_cell(Choices("robot.limb_length", (0.05, 0.1)))
+    Parts(tmp_path).write(cell.name, part_of(cell))
+    speeds = swim(cell)["speed"].tolist()
+    file = Parts(tmp_path).file(cell.name)
+    assert pandas.read_parquet(file)["speed"].tolist() == speeds
+    assert polars.read_parquet(file)["speed"].to_list() == speeds
+    assert polars.read_parquet(tmp_path / "parts" / "*" / "*.parquet")["speed"].to_list() == speeds
+
+
+def test_an_empty_folder_has_no_results(tmp_path):
+    with pytest.raises(ValueError, match="no results"):
+        read_parts(tmp_path)
+
+
+def test_a_part_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
+    def full(descriptor):
+        raise OSError(28, "No space left on device")
+
+    parts = Parts(tmp_path)
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match="No space"):
+        parts.write("ab" * 20, b"part")
+    assert not parts.has("ab" * 20)
+    assert not [file for file in tmp_path.rglob("*") if file.is_file()]

@@ -1,0 +1,167 @@
+"""Runs of a sweep: resumed, interrupted, with lost workers, on a full disk; the same bits on every executor."""
+
+import itertools
+import os
+from pathlib import Path
+
+import pytest
+
+import works
+from seastar_gym.sweep.executors import Outcome
+from seastar_gym.sweep.executors.here import Here
+from seastar_gym.sweep.executors.processes import Processes
+from seastar_gym.sweep.parts import Parts
+from seastar_gym.sweep.run import ATTEMPTS, run
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def ray_tasks(tmp_path):
+    pytest.importorskip("ray")
+    from seastar_gym.sweep.executors.on_ray import RayTasks
+
+    return RayTasks(workers=2)
+
+
+def jobs(tmp_path):
+    pytest.importorskip("submitit")
+    from seastar_gym.sweep.executors.slurm import SlurmArrays
+
+    return SlurmArrays(tmp_path / "jobs", "local", 2, cells_per_job=2)
+
+
+EXECUTORS = {
+    "here": lambda tmp_path: Here(),
+    "one process": lambda tmp_path: Processes(1),
+    "three processes": lambda tmp_path: Processes(3),
+    "ray": ray_tasks,
+    "slurm": jobs,
+}
+
+
+@pytest.fixture(autouse=True)
+def path_of_workers(monkeypatch):
+    """What Ray and submitit start finds this package and `works` as this process does."""
+    monkeypatch.setenv("PYTHONPATH", f"{ROOT}{os.pathsep}{ROOT / 'tests'}")
+
+
+def bits(folder):
+    return {name: Parts(folder).file(name).read_bytes() for name in Parts(folder).names()}
+
+
+class Interrupted:
+    """An executor that is interrupted after some cells."""
+
+    def __init__(self, after):
+        self.after = after
+
+    def run(self, work, cells):
+        yield from itertools.islice(Here().run(work, cells), self.after)
+        raise KeyboardInterrupt
+
+
+def test_only_cells_without_parts_are_run(tmp_path, sweep):
+    first = run(itertools.islice(sweep.cells(), 3), tmp_path, Here(), work=works.named)
+    assert (first.done, first.kept, first.designs, first.intervals) == (3, 0, 12, 12)
+    again = run(sweep.cells(), tmp_path, Here(), work=works.named)
+    assert (again.done, again.kept) == (1, 3)
+    assert set(Parts(tmp_path).names()) == {cell.name for cell in sweep.cells()}
+
+
+def test_an_interrupt_leaves_all_finished_cells(tmp_path, sweep):
+    with pytest.raises(KeyboardInterrupt):
+        run(sweep.cells(), tmp_path, Interrupted(2), work=works.named)
+    assert len(list(Parts(tmp_path).names())) == 2
+    assert run(sweep.cells(), tmp_path, Here(), work=works.named).kept == 2
+
+
+def test_a_full_disk_ends_the_run_and_keeps_what_is_there(tmp_path, sweep, monkeypatch):
+    write = Parts.write
+
+    def full(self, name, part):
+        if len(list(self.names())) == 1:
+            raise OSError(28, "No space left on device", "parts")
+        write(self, name, part)
+
+    monkeypatch.setattr(Parts, "write", full)
+    with pytest.raises(OSError, match="No space left"):
+        run(sweep.cells(), tmp_path, Processes(2), work=works.named)
+    assert len(list(Parts(tmp_path).names())) == 1
+
+
+def test_a_full_disk_of_a_worker_is_the_cell_s_problem(tmp_path, sweep):
+    tally = run(sweep.cells(), tmp_path, Here(), work=works.refusing)
+    assert tally.done == 0 and tally.losses == 4 * ATTEMPTS
+    assert set(tally.problems) == {cell.name for cell in sweep.cells()}
+    assert "No space left" in next(iter(tally.problems.values()))
+
+
+@pytest.mark.parametrize("name", [name for name in EXECUTORS if name != "here"])
+def test_a_lost_worker_costs_its_cell_alone(name, tmp_path, sweep, monkeypatch):
+    executor = EXECUTORS[name](tmp_path)
+    monkeypatch.setenv("DEADLY", str(tmp_path))
+    cells = list(sweep.cells())
+    (tmp_path / cells[1].name).touch()
+    outcomes = list(executor.run(works.deadly_once, iter(cells)))
+    lost = {outcome.cell.name for outcome in outcomes if outcome.part is None}
+    job = {cells[0].name, cells[1].name} if name == "slurm" else {cells[1].name}  # a job has two cells there
+    assert lost == job and len(outcomes) == len(cells), outcomes
+    tally = run(sweep.cells(), tmp_path / "out", executor, work=works.deadly_once)
+    assert tally.done == len(cells) and not tally.problems
+
+
+def test_a_cell_that_kills_every_worker_is_given_up(tmp_path, sweep):
+    tally = run(itertools.islice(sweep.cells(), 1), tmp_path, Processes(1), work=works.always_deadly)
+    assert tally.losses == ATTEMPTS
+    assert "exit code -9" in next(iter(tally.problems.values()))
+
+
+def test_a_sweep_whose_cells_all_fail_is_ended(tmp_path, sweep, monkeypatch):
+    monkeypatch.setattr("seastar_gym.sweep.run.MOST_LOST", 2)
+    with pytest.raises(ValueError, match="More than 2 cells failed"):
+        run(sweep.cells(), tmp_path, Here(), work=works.refusing)
+
+
+def test_cells_are_taken_as_there_is_room_for_them(sweep):
+    """An executor that read all cells at once would hold a million."""
+    taken = []
+
+    def cells():
+        for cell in itertools.cycle(list(sweep.cells())):
+            taken.append(cell)
+            yield cell
+
+    outcomes = Processes(2).run(works.named, cells())
+    assert isinstance(next(outcomes), Outcome)
+    assert len(taken) <= 4
+    outcomes.close()
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_there_are_no_more_processes_than_workers(workers, sweep):
+    cells = list(sweep.cells()) * 3
+    found = {outcome.part for outcome in Processes(workers).run(works.numbered, iter(cells))}
+    assert len(found) <= workers
+
+
+def test_progress_counts_cells_and_strokes(tmp_path, sweep):
+    seen = []
+    run(sweep.cells(), tmp_path, Here(), lambda tally: seen.append((tally.done, tally.intervals)), works.named)
+    assert seen == [(1, 4), (2, 8), (3, 12), (4, 16)]
+
+
+def test_results_are_the_same_bits_on_every_executor(tmp_path, sweep):
+    run(sweep.cells(), tmp_path / "here", Here())
+    expected = bits(tmp_path / "here")
+    assert len(expected) == 4
+    for name in ("one process", "three processes"):
+        run(sweep.cells(), tmp_path / name, EXECUTORS[name](tmp_path))
+        assert bits(tmp_path / name) == expected, name
+
+
+@pytest.mark.parametrize("name", ["ray", "slurm"])
+def test_results_are_the_same_bits_on_a_cluster(name, tmp_path, sweep):
+    executor = EXECUTORS[name](tmp_path)
+    run(sweep.cells(), tmp_path / "here", Here())
+    run(sweep.cells(), tmp_path / name, executor)
+    assert bits(tmp_path / name) == bits(tmp_path / "here")

@@ -1,0 +1,34 @@
+"""What executors do with cells in tests: functions that other processes can import."""
+
+import os
+import signal
+from pathlib import Path
+
+
+def named(cell):
+    """A file with the cell's name."""
+    return cell.name.encode()
+
+
+def numbered(cell):
+    """The number of the process."""
+    return str(os.getpid()).encode()
+
+
+def deadly_once(cell):
+    """Kills its worker at the first attempt at every cell named in DEADLY; a file tells later attempts."""
+    folder = Path(os.environ["DEADLY"])
+    if (folder / cell.name).exists() and not (folder / f"{cell.name}.died").exists():
+        (folder / f"{cell.name}.died").touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return cell.name.encode()
+
+
+def always_deadly(cell):
+    """Kills its worker."""
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def refusing(cell):
+    """A disk that is full where the cell is run."""
+    raise OSError(28, "No space left on device")
