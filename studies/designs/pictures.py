@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.accuracy.style import DPI, FAINT, INK, subplots
+from studies.style import DPI, FAINT, INK, subplots
 
 MM = 1e3
 COLOURS = {1.0: "#999999", 0.75: "#88aacc", 0.5: "#3366aa", 0.25: "#cc7a00"}
