@@ -25,3 +25,4 @@ html_static_path = ["_static"]
 html_css_files = ["guide.css"]
 html_extra_path = ["swim.html"]
 html_copy_source = False
+html_show_search_summary = False  # it would fetch pages, which browsers refuse from disk

@@ -5,15 +5,14 @@ from pathlib import Path
 
 from seastar_gym.evaluation.pictures import COLOURS, FAINT_INK, INK
 from studies.learning.in_time.tables import PENTAGON, Runs
+from studies.style import new_figure
 
 MARKERS = "osD^vP*Xhp<>"
 
 
 def draw(runs: Mapping[str, Runs], file: Path) -> None:
     """Draw every policy that swims round the pentagon at `fast`, one colour and marker for each training."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(8.4, 4.6), layout="constrained")
+    figure = new_figure(8.4, 4.6)
     axes = figure.subplots()
     for number, (name, found) in enumerate(runs.items()):
         swims = [run["pentagon"]["fast"] for run in found.values() if run["pentagon"].get("fast", {}).get("arrived")]
