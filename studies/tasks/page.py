@@ -137,7 +137,7 @@ def draw(rows: Sequence[Row], file: Path) -> None:
         axes.set_yticks(range(len(shown)), shown, fontsize=8)
         axes.set_ylim(-0.5, len(shown) - 0.5)
         axes.set_title(row.id, fontsize=9)
-        axes.set_xlabel(UNITS[row.challenge].split(",")[0], fontsize=8)
+        axes.set_xlabel(UNITS[row.challenge].split(",")[0], fontsize=7)
         axes.tick_params(labelsize=8)
         axes.set_xlim(left=-0.02 * axes.get_xlim()[1])
         if row.challenge == "station":
