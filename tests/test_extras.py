@@ -49,7 +49,7 @@ def test_there_are_commands_to_test():
     assert len(STUDIES) > 8 and set(AGENTS) == {"agents.evaluate", "agents.trials"}
 
 
-@pytest.mark.parametrize("command", [*STUDIES, *AGENTS, "seastar_gym.identify"])
+@pytest.mark.parametrize("command", [*STUDIES, *AGENTS, "seastar_gym.identify", "seastar_gym.sweep"])
 def test_every_command_says_in_a_sentence_what_the_disk_refuses(command):
     place = ROOT.joinpath(*command.split("."))
     file = place / "__main__.py" if place.is_dir() else place.with_suffix(".py")
@@ -84,6 +84,19 @@ def test_a_command_keeps_its_exit_code():
 @pytest.mark.parametrize("command", STUDIES)
 def test_a_study_without_its_extra_says_how_to_get_it(command, tmp_path):
     assert_says(python(tmp_path, OF_STUDIES, "-m", command, "--help"), "studies", OF_STUDIES)
+
+
+def test_a_sweep_without_its_extra_says_how_to_get_it(tmp_path):
+    assert_says(python(tmp_path, ("pyarrow",), "-m", "seastar_gym.sweep", "--help"), "sweep", ("pyarrow",))
+
+
+@pytest.mark.parametrize("extra, module", [("ray", "ray"), ("slurm", "submitit")])
+def test_an_executor_without_its_extra_says_how_to_get_it(extra, module, tmp_path):
+    pytest.importorskip("pyarrow")
+    words = "-m", "seastar_gym.sweep", "--executor", extra, "--out", str(tmp_path / "out")
+    done = python(tmp_path, (module,), *words)
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1].endswith(f'need {module}: pip install "seastar-gym[{extra}]".')
 
 
 @pytest.mark.parametrize("command", AGENTS)

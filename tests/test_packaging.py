@@ -98,10 +98,10 @@ def test_every_base_dependency_is_imported_by_the_package():
 @pytest.mark.parametrize(
     ("folders", "extras"),
     [
-        (["seastar_gym"], ["render", "studies", "train"]),
-        (["studies"], ["train"]),
+        (["seastar_gym"], ["render", "studies", "train", "ray", "slurm"]),
+        (["studies"], ["train", "sweep"]),
         (["agents", "train.py"], ["train"]),
-        (["tests"], ["test", "browser"]),
+        (["tests"], ["test", "browser", "ray"]),
         (["docs"], ["docs"]),
     ],
 )

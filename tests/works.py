@@ -2,6 +2,7 @@
 
 import os
 import signal
+import time
 from pathlib import Path
 
 
@@ -32,3 +33,9 @@ def always_deadly(cell):
 def refusing(cell):
     """A disk that is full where the cell is run."""
     raise OSError(28, "No space left on device")
+
+
+def slow(cell):
+    """Takes half a second; says on which node of a cluster it was."""
+    time.sleep(0.5)
+    return os.environ.get("RAY_NODE_ID", "").encode() or str(os.getppid()).encode()

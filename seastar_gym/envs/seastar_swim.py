@@ -181,8 +181,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     the chapter's, unless a `certificate` has them, and for what was not measured. `error_estimate` is of the very swim,
     of any robot: the true error since the reset, of space and time, lies below it in about 95 % of strokes
     (docs/error_bars.md); NaN after a failure. Where decisions are no strokes, errors are those of `SmaWires` at whole
-    seconds, over random commands and random seconds that are repeated. There `info` has them for the chapter's robot alone,
-    at a fidelity and with decisions of 0.1 to 0.5 s, and it has no `real_time_factor`.
+    seconds, over random commands and random seconds that are repeated. There `info` has them for the chapter's robot
+    alone, at a fidelity and with decisions of 0.1 to 0.5 s, and it has no `real_time_factor`.
     With `randomization`, `info` has the drawn numbers by their names, too.
 
     ## Starting state

@@ -97,6 +97,8 @@ class Seastar:
                 raise ValueError(
                     f'{name} acts on limbs along their length, which only discretisation="continuum" models.'
                 )
+        if self.stiffening is not None and any(limb.joint_stiffness is not None for limb in self.limbs):
+            raise ValueError("Heat would stiffen the joints of limbs, too, which is not modelled: leave one out.")
 
     def _check_limbs(self) -> None:
         if not isinstance(self.limbs, tuple) or not all(isinstance(limb, Limb) for limb in self.limbs):

@@ -10,6 +10,8 @@ from studies.style import DPI, FAINT, INK, subplots
 MM = 1e3
 COLOURS = {1.0: "#999999", 0.75: "#88aacc", 0.5: "#3366aa", 0.25: "#cc7a00"}
 BINS = 24
+TOP = 22.0
+"""Largest speed of the axes [mm/s]."""
 
 
 def draw(found: dict[str, Any], table: Any, file: Path) -> None:
@@ -23,12 +25,20 @@ def draw(found: dict[str, Any], table: Any, file: Path) -> None:
     for ax, (name, unit, label, is_log) in zip(axes[0], ranges, strict=True):
         for taper, colour in COLOURS.items():
             some = table[table.taper == taper]
-            envelope(ax, unit * some[name].to_numpy(), MM * some.speed.to_numpy(), is_log, colour, f"taper {taper:g}")
+            envelope(ax, unit * some[name].to_numpy(), MM * some.speed.to_numpy(), is_log, colour, f"{taper:g}")
         ax.axhline(chapter, color=FAINT, ls="--", lw=1)
-        ax.set(xlabel=label, ylabel="speed [mm/s]", ylim=(0.0, 19.5))
-    axes[0, 0].text(52, chapter + 0.3, "the chapter's robot", fontsize=8, color=FAINT)
+        ax.set(xlabel=label, ylabel="speed [mm/s]", ylim=(0.0, TOP))
+        if is_log:
+            ax.set_xticks([0.2, 0.5, 1.0, 2.0, 5.0], ["0.2", "0.5", "1", "2", "5"])
+            ax.set_xticks([], minor=True)
+    axes[0, 2].text(0.21, chapter - 1.0, "the chapter's robot", fontsize=8, color=FAINT)
     axes[0, 0].legend(
-        frameon=False, fontsize=8, title="median, and best 1 % (dotted)", title_fontsize=8, loc="upper left", ncols=2
+        frameon=False,
+        fontsize=8,
+        title="tip over root: median, and 99th percentile (dotted)",
+        title_fontsize=8,
+        loc="upper left",
+        ncols=4,
     )
     for ax, name, unit, label in (
         (axes[1, 0], "n_limbs", 1.0, "number of limbs"), (axes[1, 1], "radius", MM, "mean radius [mm]"),
@@ -40,7 +50,7 @@ def draw(found: dict[str, Any], table: Any, file: Path) -> None:
         )  # fmt: skip
         ax.axhline(chapter, color=FAINT, ls="--", lw=1)
         ax.set_xticks(np.arange(len(values)), [f"{unit * value:g}" for value in values])
-        ax.set(xlabel=label, ylabel="speed [mm/s]", ylim=(0.0, 19.5))
+        ax.set(xlabel=label, ylabel="speed [mm/s]", ylim=(0.0, TOP))
     masses(axes[1, 2], found["masses"])
     figure.savefig(file, dpi=DPI)
 

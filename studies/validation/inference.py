@@ -38,14 +38,14 @@ class Score:
     """How good predictions are.
 
     error, worst: Mean and largest |predicted - measured|/measured. bias: Mean of (predicted - measured)/measured.
-    covered: Share of measured speeds within their intervals. width: Mean of high/low - 1.
+    covered: Share of measured speeds within their intervals. ratio: Median of high/low.
     """
 
     error: float
     bias: float
     worst: float
     covered: float
-    width: float
+    ratio: float
 
 
 def weights(simulated: Floats, measured: Floats, chosen: list[int]) -> Floats:
@@ -95,8 +95,15 @@ def score(prediction: Prediction, measured: Floats, chosen: list[int]) -> Score:
         bias=float(off.mean()),
         worst=float(np.abs(off).max()),
         covered=float(held.mean()),
-        width=float((prediction.high[others] / prediction.low[others] - 1.0).mean()),
+        ratio=float(np.median(prediction.high[others] / prediction.low[others])),
     )
+
+
+def hindsight(simulated: Floats, measured: Floats, chosen: list[int]) -> float:
+    """Smallest error of any one sample on the conditions that were not chosen: what the model could do, if told all."""
+    others = np.setdiff1d(np.arange(len(measured)), chosen)
+    off = np.abs(np.exp(log_speeds(simulated)) - measured)[:, others] / measured[others]
+    return float(off.mean(axis=1).min())
 
 
 def effective(weight: Floats) -> float:

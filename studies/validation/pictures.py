@@ -23,7 +23,7 @@ def draw_speeds(conditions: list[Condition], prediction: Prediction, chosen: lis
     line = np.array([0.0, top])
     axis.plot(line, line, color=INK, lw=1.0)
     axis.fill_between(line, (1.0 - AUTHORS) * line, (1.0 + AUTHORS) * line, color="0.93", zorder=0)
-    axis.text(96.0, 81.0, "±19 %, the authors'\nmean error", color=FAINT, fontsize=8, ha="right", va="top")
+    axis.text(99.0, 60.0, "grey: ±19 %,\nthe authors' mean error", color=FAINT, fontsize=8, ha="right", va="top")
     for k, condition in enumerate(conditions):
         x, y = 1e3 * prediction.middle[k], 1e3 * condition.speed
         colour, used = COLOURS[condition.liquid_metal], k in chosen

@@ -19,29 +19,31 @@ from rich.console import Console
 from rich.table import Table
 
 from studies.parser import study_parser
-from studies.validation.inference import MODEL, SCATTER, Score, effective, predict, score, weights
+from studies.validation.inference import MODEL, SCATTER, Score, effective, hindsight, predict, score, weights
 from studies.validation.luck import other_fours, scores
 from studies.validation.pictures import draw_speeds
 from studies.validation.priors import UNKNOWNS, samples
 from studies.validation.separation import best_known, sweeps_told, told
-from studies.validation.simulate import all_speeds
+from studies.validation.simulate import all_speeds, speeds
 from studies.validation.speeds import Condition, read_speeds, training
 from studies.validation.swimmer import Variant
 
 Floats = NDArray[np.float64]
 
 VARIANTS: tuple[Variant, ...] = get_args(Variant)[1:]
-SAMPLES, OF_VARIANTS, FOURS = 512, 256, 100
+SAMPLES, OF_VARIANTS, FOURS = 512, 128, 100
 """Samples of the full model, and of models with a part left out: the first of the same sequence. Other fours."""
 SAME_SAMPLES = "full, as many samples"
+CHECKED, SLOW = 64, 0.01
+"""Samples that swim on a finer mesh, too, and the speed [m/s] below which a difference says nothing."""
 
 
 def simulate(conditions: list[Condition], variant: Variant, n: int, folder: Path, console: Console) -> Floats:
     """Speeds of n samples [m/s], shape (n, n_conditions)."""
     found = []
-    for condition, speeds in all_speeds(conditions, samples(n), variant, folder):
-        found.append(speeds)
-        console.print(f"{variant}: {condition.name}, median {1e3 * np.nanmedian(speeds):.1f} mm/s", style="dim")
+    for condition, swum in all_speeds(conditions, samples(n), variant, folder):
+        found.append(swum)
+        console.print(f"{variant}: {condition.name}, median {1e3 * np.nanmedian(swum):.1f} mm/s", style="dim")
     return np.stack(found, axis=1)
 
 
@@ -59,18 +61,32 @@ def analyse(simulated: Floats, conditions: list[Condition]) -> dict[str, Any]:
         "score": score(prediction, measured, chosen),
         "blind": score(blind, measured, chosen),
         "effective": effective(weight),
+        "hindsight": hindsight(simulated, measured, chosen),
         "fours": {
             name: np.percentile([getattr(one, name) for one in lucky], [5.0, 50.0, 95.0]).tolist()
-            for name in ("error", "covered", "width")
+            for name in ("error", "covered", "ratio")
         },
     }
+
+
+def discretisation(simulated: Floats, conditions: list[Condition], folder: Path) -> float:
+    """Mean difference of speeds with twice as many edges and steps, over the speed, of samples that swim forward."""
+    few, off = samples(CHECKED), []
+    for k in training(conditions):
+        file = folder / f"finer-{CHECKED}-{conditions[k].name}.npy"
+        if not file.is_file():
+            np.save(file, speeds(conditions[k], few, "full", finer=2))
+        finer, coarse = np.load(file), simulated[:CHECKED, k]
+        forward = finer > SLOW
+        off.append(np.abs(coarse[forward] / finer[forward] - 1.0))
+    return float(np.concatenate(off).mean())
 
 
 def score_row(name: str, one: Score, fours: dict[str, list[float]]) -> list[str]:
     low, middle, high = (100.0 * error for error in fours["error"])
     return [
         name, f"{100 * one.error:.1f} %", f"{100 * one.bias:+.1f} %", f"{100 * one.worst:.0f} %",
-        f"{100 * one.covered:.0f} %", f"{1 + one.width:.2f}", f"{middle:.1f} % ({low:.1f} to {high:.1f})",
+        f"{100 * one.covered:.0f} %", f"{one.ratio:.2f}", f"{middle:.1f} % ({low:.1f} to {high:.1f})",
     ]  # fmt: skip
 
 
@@ -105,7 +121,8 @@ def as_json(
         "model_error": MODEL,
         "samples": len(full["weight"]),
         "models": {
-            name: {"score": asdict(one["score"]), "fours": one["fours"], "effective_samples": one["effective"]}
+            name: {"score": asdict(one["score"]), "fours": one["fours"], "effective_samples": one["effective"],
+                   "hindsight": one["hindsight"]}
             for name, one in analyses.items()
         },
         "before": asdict(full["blind"]),
@@ -143,6 +160,9 @@ def main() -> None:
         analyses[variant] = analyse(of_variant, conditions)
     print_tables(console, analyses, values)
     result = as_json(analyses, conditions, values)
+    result["discretisation"] = discretisation(simulated, conditions, arguments.runs)
+    console.print(f"Twice as many edges and steps change speeds by {100 * result['discretisation']:.1f} % on average.")
+    console.print(f"Best of all samples, if told all speeds: {100 * analyses['full']['hindsight']:.1f} % off.")
     console.print(f"Best known: {result['best_known']}, sweeps: {result['sweeps']}")
     arguments.out.mkdir(parents=True, exist_ok=True)
     (arguments.out / "validation.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")

@@ -9,7 +9,10 @@ import oracle
 from along_oracle import Bent
 from refusals import assert_refused
 from seastar_gym import AlongLimb, MeasuredCurve, Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires, Stiffening
+from seastar_gym.envs.symmetry.scenes import require_symmetry
 from seastar_gym.gaits import STRAIGHT
+from seastar_gym.identify.parameters import get_parameter, with_parameters
+from seastar_gym.scene.per_robot import numbers_of
 
 CURVE = 1.3
 """Peak angle of a limb [rad]."""
@@ -204,3 +207,13 @@ def test_what_cannot_be_modelled_is_refused():
     with assert_refused("width"):
         Stiffening(width=0.01)
     assert Scene(Seastar(along=AlongLimb()), actuator=SmaPulse(7.0)).actuator.peak_angle == 7.0
+
+
+def test_numbers_of_bent_limbs_can_be_drawn_identified_and_written():
+    scene = Scene(Seastar(along=AlongLimb(0.5, (1.0, 0.5)), stiffening=Stiffening(2.0)))
+    assert {"robot.along.share", "robot.stiffening.ratio"} <= set(numbers_of(scene))
+    assert get_parameter(scene, "robot.stiffening.ratio") == 2.0
+    changed = with_parameters(scene, ["robot.along.share"], [0.7])
+    assert changed.robot.along == AlongLimb(0.7, (1.0, 0.5))
+    assert Scene.from_dict(changed.to_dict()) == changed
+    require_symmetry(changed)

@@ -4,7 +4,7 @@ import importlib
 
 import pytest
 
-ROOMS = ("accuracy", "stability", "chapter", "verification")
+ROOMS = ("accuracy", "stability", "chapter", "validation", "verification")
 MODULES = ("speed.throughput", "speed.terms", "speed.foresight", "scenes.gallery", "scenes.damping", "scenes.thermal")
 
 

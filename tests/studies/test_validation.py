@@ -144,13 +144,15 @@ def test_what_speeds_do_not_depend_on_stays_as_unknown_as_it_was():
 
 
 def test_the_command_writes_its_page(tmp_path, monkeypatch):
-    def invented(condition, values, variant):
+    def invented(condition, values, variant, finer=1):
         return made_up(values)[:, CONDITIONS.index(condition)]
 
-    monkeypatch.setattr(simulate, "speeds", invented)
+    for module in (simulate, study):
+        monkeypatch.setattr(module, "speeds", invented)
     arguments = ["validation", "--samples", "64", "--variants", "ramp", "--runs", str(tmp_path), "--out", str(tmp_path)]
     monkeypatch.setattr("sys.argv", arguments)
     study.main()
     found = json.loads((tmp_path / "validation.json").read_text(encoding="utf-8"))
+    assert found["discretisation"] == 0.0
     assert set(found["models"]) == {"full", study.SAME_SAMPLES, "ramp"} and len(found["speeds_mm_per_s"]) == 37
     assert (tmp_path / "validation.png").stat().st_size > 10_000

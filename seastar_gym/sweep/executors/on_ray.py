@@ -1,11 +1,13 @@
 """`RayTasks`: cells as tasks of Ray Core, on a running cluster or one of this machine."""
 
+import socket
 from collections.abc import Iterator
 from typing import Any
 
 import ray
 from ray.exceptions import RayError, RayTaskError
 
+from seastar_gym.scene.checks import shown
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.executors import Outcome, Work, sentence_of
 from seastar_gym.sweep.executors.here import outcome_of
@@ -13,7 +15,7 @@ from seastar_gym.sweep.executors.here import outcome_of
 AHEAD = 2
 """Tasks under way for every processor of the cluster, so that none waits for the next."""
 PATIENCE = 10.0
-"""Time after which the size of the cluster is asked for again while no cell is done [s]."""
+"""Time after which the size of the cluster is asked for again while no cell is done, or for its head to answer [s]."""
 
 
 class RayTasks:
@@ -48,6 +50,8 @@ class RayTasks:
         """Whether a connection was made now."""
         if ray.is_initialized():
             return False
+        if self.address:
+            require_reachable(self.address)
         try:
             ray.init(
                 self.address or "local", num_cpus=None if self.address else self.workers, include_dashboard=None
@@ -66,6 +70,17 @@ class RayTasks:
                 break
             pending[task.remote(work, cell)] = cell
         return bool(pending)
+
+
+def require_reachable(address: str) -> None:
+    """ValueError unless something listens at "HOST:PORT": Ray itself would try for minutes."""
+    host, _, port = address.rpartition(":")
+    if not host or not port.isdecimal():
+        raise ValueError(f"The address of a Ray cluster is HOST:PORT, such as head:6379, not {shown(address)}.")
+    try:
+        socket.create_connection((host, int(port)), timeout=PATIENCE).close()
+    except (OSError, OverflowError) as refused:
+        raise ValueError(f"There is no Ray cluster at {address}: {sentence_of(refused)}.") from None
 
 
 def _outcome(work: Work, cell: Cell) -> tuple[bytes | None, str]:

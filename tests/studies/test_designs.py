@@ -1,0 +1,65 @@
+"""The study of designs: its space, and what becomes of a small part of it."""
+
+import json
+import math
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+if find_spec("pyarrow") is None or find_spec("pandas") is None:
+    pytest.skip("the extra sweep is not installed", allow_module_level=True)
+
+from seastar_gym.scene import Seastar
+from seastar_gym.sweep.executors.here import Here
+from seastar_gym.sweep.parts import read_parts
+from seastar_gym.sweep.run import run
+from studies.designs.space import BODIES, SPREADS, Body, all_designs, inner_half, masses, spread
+from studies.designs.study import scene_of
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+
+
+def test_there_are_more_than_a_hundred_thousand_designs():
+    sweep = all_designs()
+    assert sweep.n_designs == 102_480 and sweep.n_cells == 240 and len(BODIES) == 120
+
+
+@pytest.mark.parametrize("taper", SPREADS)
+def test_spread_limbs_have_the_chapter_s_mass_and_bending_stiffness(taper):
+    limb, chapter = spread(taper, 400), Seastar()
+    radius, moduli = np.array(limb.radius), np.array(limb.youngs_modulus)
+    assert np.mean(radius**2) == pytest.approx(chapter.rod_radius**2, rel=3e-3)
+    assert moduli * radius**4 == pytest.approx(chapter.youngs_modulus * chapter.rod_radius**4)
+    inner = np.sum(radius[:200] ** 2) / np.sum(radius**2)
+    assert inner_half(taper) == pytest.approx(inner, abs=3e-3)
+
+
+def test_a_tapered_body_keeps_its_mean_radius():
+    root, tip = Body(5, 2e-3, 0.25).profile
+    assert 0.5 * (root + tip) == pytest.approx(2e-3) and tip / root == pytest.approx(0.25)
+
+
+def test_a_row_of_results_is_a_scene_again(tmp_path):
+    cell = next(all_designs(2).cells())
+    run([cell], tmp_path, Here())
+    row = read_parts(tmp_path).to_pandas().iloc[0]
+    scene = scene_of(row)
+    assert scene.robot.n_limbs == 3 and scene.robot.limb_length == row["robot.limb_length"]
+    assert scene.actuator.peak_angle == row["actuator.peak_angle"]
+
+
+def test_density_is_simulated_side_by_side():
+    assert masses().n_cells == len(SPREADS) and masses().designs_per_frame == 21
+
+
+def test_the_page_tells_what_was_measured():
+    found = json.loads((DOCS / "designs.json").read_text(encoding="utf-8"))
+    page = (DOCS / "designs.md").read_text(encoding="utf-8")
+    assert f"{found['designs'] - found['count']:,} robots do not count" in page and found["failed"] == 0
+    for name in ("the chapter's", "fastest", "fastest at the chapter's length and angle"):
+        for speed in found[name]["mm_per_s"].values():
+            assert f"{speed:.2f}" in page
+    gain = found["fastest"]["mm_per_s"]["reference"] / found["the chapter's"]["mm_per_s"]["reference"]
+    assert math.isclose(gain, 5.4, abs_tol=0.06)
