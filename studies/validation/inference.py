@@ -37,11 +37,13 @@ class Prediction:
 class Score:
     """How good predictions are.
 
-    error, worst: Mean and largest |predicted - measured|/measured. bias: Mean of (predicted - measured)/measured.
+    error, median, worst: Mean, median and largest |predicted - measured|/measured.
+    bias: Mean of (predicted - measured)/measured.
     covered: Share of measured speeds within their intervals. ratio: Median of high/low.
     """
 
     error: float
+    median: float
     bias: float
     worst: float
     covered: float
@@ -92,11 +94,18 @@ def score(prediction: Prediction, measured: Floats, chosen: list[int]) -> Score:
     held = (prediction.low[others] <= measured[others]) & (measured[others] <= prediction.high[others])
     return Score(
         error=float(np.abs(off).mean()),
+        median=float(np.median(np.abs(off))),
         bias=float(off.mean()),
         worst=float(np.abs(off).max()),
         covered=float(held.mean()),
         ratio=float(np.median(prediction.high[others] / prediction.low[others])),
     )
+
+
+def one_speed(measured: Floats, chosen: list[int]) -> float:
+    """Error of the simplest prediction: the mean of the chosen speeds, for all others."""
+    others = np.setdiff1d(np.arange(len(measured)), chosen)
+    return float(np.abs(measured[chosen].mean() / measured[others] - 1.0).mean())
 
 
 def hindsight(simulated: Floats, measured: Floats, chosen: list[int]) -> float:

@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.table import Table
 
 from studies.parser import study_parser
-from studies.validation.inference import MODEL, SCATTER, Score, effective, hindsight, predict, score, weights
+from studies.validation.inference import MODEL, SCATTER, Score, effective, hindsight, one_speed, predict, score, weights
 from studies.validation.luck import other_fours, scores
 from studies.validation.pictures import draw_speeds
 from studies.validation.priors import UNKNOWNS, samples
@@ -62,6 +62,7 @@ def analyse(simulated: Floats, conditions: list[Condition]) -> dict[str, Any]:
         "blind": score(blind, measured, chosen),
         "effective": effective(weight),
         "hindsight": hindsight(simulated, measured, chosen),
+        "one speed": one_speed(measured, chosen),
         "fours": {
             name: np.percentile([getattr(one, name) for one in lucky], [5.0, 50.0, 95.0]).tolist()
             for name in ("error", "covered", "ratio")
@@ -126,6 +127,7 @@ def as_json(
             for name, one in analyses.items()
         },
         "before": asdict(full["blind"]),
+        "one_speed_for_all": full["one speed"],
         "unknowns": [one._asdict() for one in told(values, full["weight"])],
         "sweeps": dict(zip(("0", "25", "50", "75"), sweeps_told(full["weight"]), strict=True)),
         "best_known": {"powers": powers, "narrower": narrower},
@@ -162,6 +164,8 @@ def main() -> None:
     result = as_json(analyses, conditions, values)
     result["discretisation"] = discretisation(simulated, conditions, arguments.runs)
     console.print(f"Twice as many edges and steps change speeds by {100 * result['discretisation']:.1f} % on average.")
+    console.print(f"Half the predictions are within {100 * analyses['full']['score'].median:.1f} %.")
+    console.print(f"The mean of the four speeds is {100 * analyses['full']['one speed']:.1f} % off.")
     console.print(f"Best of all samples, if told all speeds: {100 * analyses['full']['hindsight']:.1f} % off.")
     console.print(f"Best known: {result['best_known']}, sweeps: {result['sweeps']}")
     arguments.out.mkdir(parents=True, exist_ok=True)

@@ -8,7 +8,18 @@ import pytest
 import oracle
 from along_oracle import Bent
 from refusals import assert_refused
-from seastar_gym import AlongLimb, MeasuredCurve, Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires, Stiffening
+from seastar_gym import (
+    AlongLimb,
+    Limb,
+    MeasuredCurve,
+    Numerics,
+    Scene,
+    Seastar,
+    Simulator,
+    SmaPulse,
+    SmaWires,
+    Stiffening,
+)
 from seastar_gym.envs.symmetry.scenes import require_symmetry
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.identify.parameters import get_parameter, with_parameters
@@ -202,6 +213,8 @@ def test_what_cannot_be_modelled_is_refused():
         AlongLimb(profile=(1.0, float("nan")))
     with assert_refused("more nodes per limb"):
         Scene(Seastar(nodes_per_limb=3, along=AlongLimb()), actuator=SmaPulse(7.0))
+    with assert_refused("joints"):
+        Seastar(2, limbs=(Limb(joint_stiffness=1e-4),) * 2, stiffening=Stiffening())
     with assert_refused("ratio"):
         Stiffening(1e4)
     with assert_refused("width"):
