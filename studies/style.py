@@ -49,7 +49,7 @@ SETTINGS: dict[str, Any] = {
 def apply_style() -> None:
     """Let matplotlib draw in this style from now on."""
     import matplotlib
-    from matplotlib import cycler
+    from matplotlib.rcsetup import cycler
 
     settings: Any = {**SETTINGS, "axes.prop_cycle": cycler(color=CYCLE)}
     matplotlib.rcParams.update(settings)
