@@ -124,14 +124,15 @@ def test_a_step_may_gain_energy_where_what_newton_knows_does_not_rule_it_out(loa
     stage = Stage(rows(Q), rows(v_0), Lanes(h), Lanes(1.0 / h), False)
     above = np.arange(N_LANES) % 2 == 0
     phi = Lanes(least + np.where(above, 1e-9, -1e-9) * abs(least))
-    found = plain(may_gain.plain(None, None, rods, work, stage, phi, EVERYONE))
+    found = plain(may_gain.plain(None, None, None, rods, work, stage, phi, EVERYONE))
     np.testing.assert_array_equal(found, above)
-    assert not plain(may_gain.plain(None, None, rods, work, stage, phi, ~EVERYONE)).any()
+    assert not plain(may_gain.plain(None, None, None, rods, work, stage, phi, ~EVERYONE)).any()
 
 
-def test_in_fluid_that_moves_or_moves_along_any_step_may_gain():
-    assert may_gain.plain(object(), None, None, None, None, None, EVERYONE) is EVERYONE
-    assert may_gain.plain(None, object(), None, None, None, None, EVERYONE) is EVERYONE
+def test_with_a_body_or_in_fluid_that_moves_or_moves_along_any_step_may_gain():
+    assert may_gain.plain(object(), None, None, None, None, None, None, EVERYONE) is EVERYONE
+    assert may_gain.plain(None, object(), None, None, None, None, None, EVERYONE) is EVERYONE
+    assert may_gain.plain(None, None, object(), None, None, None, None, EVERYONE) is EVERYONE
 
 
 def test_what_limbs_that_press_each_other_store_counts_where_the_scheme_gives_it_back():
