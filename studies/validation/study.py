@@ -147,7 +147,10 @@ def main() -> None:
     """Command line: simulate, weigh, predict, and leave parts out."""
     parser = study_parser("studies.validation", __doc__)
     parser.add_argument("--samples", type=int, default=SAMPLES, help="samples of the unknowns (default: %(default)s)")
-    parser.add_argument("--variants", nargs="*", choices=VARIANTS, default=list(VARIANTS), help="parts to leave out")
+    parser.add_argument(
+        "--variants", nargs="*", metavar="PART", choices=VARIANTS, default=list(VARIANTS),
+        help="parts to leave out (default: all)",
+    )  # fmt: skip
     parser.add_argument("--runs", type=Path, default=Path("runs/validation"), help="folder of speeds")
     parser.add_argument("--out", type=Path, default=Path("docs"), help="folder of results (default: %(default)s)")
     arguments = parser.parse_args()

@@ -69,7 +69,7 @@ def test_held_nodes_make_no_noise_in_a_robots_energy():
     """Their mass is huge: with it, what a robot may have would depend on where it is."""
     held = make_rods(Scene(ROBOT, None, held_nodes=(0, 3)))
     energy, h = Lanes(1e-5), Lanes(1e-3)
-    noise, of_held = (energy_noise.plain(rods, rows(Q), h, energy, energy).numbers for rods in (RODS, held))
+    noise, of_held = (energy_noise.plain(rods, None, rows(Q), h, energy, energy).numbers for rods in (RODS, held))
     assert np.all((of_held > 0.5 * noise) & (of_held < noise))
 
 
@@ -101,7 +101,7 @@ def test_noise_is_that_of_positions_that_are_all_rounded_the_same_way():
     """By one unit in the last place, in their difference over a step, a kilometre away; several units are allowed."""
     h, far, v = 1e-3, ROBOT.nodes() + 1e3, np.ones((ROBOT.n_nodes, 2))
     before, after = (oracle.kinetic_energy(STAR, each) for each in (v, v + np.spacing(far) / h))
-    noise = plain(energy_noise.plain(RODS, rows(far), Lanes(h), Lanes(0.0), Lanes(before)))
+    noise = plain(energy_noise.plain(RODS, None, rows(far), Lanes(h), Lanes(0.0), Lanes(before)))
     assert np.all((0.05 * noise < after - before) & (after - before < 0.5 * noise))
 
 
