@@ -45,6 +45,8 @@ SAMPLES = 60
 """Sequences per class: with the confidence 95 %, at most 5 % of all sequences of a class exceed the largest error."""
 GROUP = 32
 """Robots that are swum together."""
+SHARE_OF_SWIMS = 0.8
+"""Part of the work that swims of sequences are, about; the rest are long swims and speeds."""
 SHORTEST_PATH = 1e-3
 """Errors of paths that are shorter than this many limb lengths are fractions of that."""
 
@@ -77,7 +79,8 @@ def certify(scene: Scene, samples: int = SAMPLES, seed: int = 0, progress: Progr
     exact = [resolved(scene, nodes, SHORT) for nodes in (MANY_NODES, *NODES)]
     settings = [(nodes, numerics) for nodes in NODES for numerics in NUMERICS]
     scenes = [*exact, *(resolved(scene, *setting) for setting in settings)]
-    limit, *swum = swim_all(scenes, commands, progress)
+    report = (lambda share: None) if progress is None else progress
+    limit, *swum = swim_all(scenes, commands, lambda share: report(SHARE_OF_SWIMS * share))
     lengths = path_lengths(limit, float(np.max(scene.robot.limb_length)))
 
     def distance(hub: Floats, other: Floats) -> Floats:
@@ -86,7 +89,7 @@ def certify(scene: Scene, samples: int = SAMPLES, seed: int = 0, progress: Progr
     fine = dict(zip(NODES, swum, strict=False))
     of_limit = distance(fine[NODES[-1]], limit) / 3.0  # of second order in the edges, which are half as long there
     found = []
-    for (nodes, numerics), hub in zip(settings, swum[len(NODES) :], strict=True):
+    for k, ((nodes, numerics), hub) in enumerate(zip(settings, swum[len(NODES) :], strict=True), start=1):
         space, in_time = distance(fine[nodes], limit) + of_limit, distance(hub, fine[nodes])
         found.append(
             CertifiedSetting(
@@ -98,6 +101,7 @@ def certify(scene: Scene, samples: int = SAMPLES, seed: int = 0, progress: Progr
                 energy_growth=_rounded(energy_growth(resolved(scene, nodes, numerics))),
             )
         )  # fmt: skip
+        report(SHARE_OF_SWIMS + (1.0 - SHARE_OF_SWIMS) * k / len(settings))
     return Certificate(
         physics(scene), tuple(found), PROMISED, ACTIONS, samples,
         limit_error=max(by_class(of_limit, samples)[name] for name in PROMISED),
