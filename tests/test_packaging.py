@@ -99,7 +99,7 @@ def test_every_base_dependency_is_imported_by_the_package():
     ("folders", "extras"),
     [
         (["seastar_gym"], ["render", "studies", "train", "ray", "slurm"]),
-        (["studies"], ["train", "sweep"]),
+        (["studies"], ["train", "sweep", "test"]),
         (["agents", "train.py"], ["train"]),
         (["tests"], ["test", "browser", "ray"]),
         (["docs"], ["docs"]),

@@ -55,7 +55,8 @@ class StrokeReport(NamedTuple):
     energy_cuts: Steps after which velocities were reduced because the energy had grown a little, see
         der/stepping/guard.py.
     covered: Time covered [s].
-    smallest_opening_angle: Smallest angle between neighbouring limbs at the hub [rad]. Below zero, limbs crossed.
+    smallest_opening_angle: Smallest angle between neighbouring limbs at the hub [rad]. Below zero, limbs crossed. With
+        a body it is pi.
     error_estimate: Estimate of the hub's error, of space and time [m]: a bound that holds in about 95 % of strokes, see
         error_bars.py. NaN without `error_bars`.
     heating_time: Time for which wires were heated, summed over limbs [s]; NaN if the actuator does not say it.

@@ -1,5 +1,6 @@
 """`State`: positions, velocities, time and actuators of all robots of a simulator."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -39,6 +40,12 @@ class State(NamedTuple):
     def of_robots(self, robots: NDArray[np.intp] | NDArray[np.bool_] | slice) -> "State":
         """State of the chosen robots, in their order."""
         return State(*(None if part is None else part[robots] for part in self))  # type: ignore[arg-type]
+
+    @classmethod
+    def joined(cls, states: "Sequence[State]") -> "State":
+        """States of the same kind of robots as one, in their order. A part that is `None` in one is `None` in all."""
+        parts = zip(*states, strict=True)
+        return cls(*(None if any(part is None for part in each) else np.concatenate(each) for each in parts))  # type: ignore[arg-type]
 
 
 def checked_state(state: object, rest: Floats, actuators_at_rest: Floats, longest: float) -> list[Floats]:

@@ -17,7 +17,7 @@ with the cells that have none.
 import argparse
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +42,7 @@ INTERRUPTED = 130
 def make_parser() -> argparse.ArgumentParser:
     """Parser of the command line."""
     parser = argparse.ArgumentParser(
-        "python -m seastar_gym.sweep", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        "seastar sweep", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     default = "(default: %(default)s)"
     parser.add_argument("axes", nargs="*", metavar="NAME=VALUES", help="what differs from design to design")
@@ -164,7 +164,7 @@ def search(sweep: Sweep, options: argparse.Namespace) -> int:
     return 0
 
 
-def main(arguments: list[str] | None = None) -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     options = make_parser().parse_args(arguments)
     try:

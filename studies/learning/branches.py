@@ -48,8 +48,7 @@ class Branches:
         """One interval with commands, shape (n_robots, n_limbs)."""
         parts = [self._swim(states, commands, begin) for begin in range(0, len(commands), CHUNK)]
         swum, heated = zip(*parts, strict=True)
-        together = State(*(np.concatenate(each) for each in zip(*swum, strict=True)))
-        return Interval(together, np.concatenate(heated))
+        return Interval(State.joined(swum), np.concatenate(heated))
 
     def _swim(self, states: State, commands: Floats, begin: int) -> Interval:
         n = len(commands) - begin

@@ -110,7 +110,7 @@ class Ahead:
             states = self._swim_all(states)
             hub = states.positions[:, 0]
             if self.coasting > 0.0:
-                hub = self._swim_all.coasted(states, self.coasting)
+                hub = self._swim_all.coasted(states, self.coasting)[:, 0]
             total = total + cost(hub.reshape(n, -1, 2), decision)
             if decision == self._depth:
                 break

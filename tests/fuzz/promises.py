@@ -59,8 +59,9 @@ def swim(case: Case, robots: Iterable[int] | None = None, threads: int = 1) -> t
     seen, names = [], []
     for k, commands in enumerate(case.commands):
         report = simulator.stroke(commands[chosen])
-        seen += [*simulator.get_state(), simulator.elastic_energy(), simulator.kinetic_energy(), *report]
-        fields = (*State._fields, "elastic energy", "kinetic energy", *StrokeReport._fields)
+        state = {name: part for name, part in simulator.get_state()._asdict().items() if part is not None}
+        seen += [*state.values(), simulator.elastic_energy(), simulator.kinetic_energy(), *report]
+        fields = (*state, "elastic energy", "kinetic energy", *StrokeReport._fields)
         names += [f"{name} after stroke {k + 1}" for name in fields]
     return seen, names
 

@@ -21,7 +21,9 @@ FIDELITIES = ("fast", "balanced", "accurate", "reference", "chapter")
 
 def test_defaults_are_the_chapters_values_in_the_continuums_discretisation():
     robot, water, actuator = Seastar(), Water(), SmaPulse()
-    assert dataclasses.astuple(robot) == (5, 10, 0.1, 1.6e-3, 1e6, 1000.0, "opening", (), None, "continuum")
+    assert dataclasses.astuple(robot) == (
+        *(5, 10, 0.1, 1.6e-3, 1e6, 1000.0, "opening", (), None, "continuum"), *(None, None, None),
+    )  # fmt: skip
     assert dataclasses.astuple(water) == (1000.0, 1.0, None, None, None)
     assert dataclasses.astuple(actuator)[:3] == (math.pi / 5, 0.1, 0.9)
     assert Numerics().scheme == "implicit-euler"
