@@ -66,8 +66,8 @@ class Body:
     and none in turning. Where one of the three is given, the others are the fluid's C_d, or 0 for a disc that turns.
 
     Flow at the body is that at the hub. Fluid that moves along with the body is that of an ellipse about the hub.
-    Environments observe limbs by a spline that begins at the hub (`envs/stations.py`): with ten nodes per limb these are
-    the nodes themselves, with others places that are off near the root of a limb on a body.
+    Environments observe limbs by a spline that begins at the hub (`envs/stations.py`): with ten nodes per limb these
+    are the nodes themselves, with others places that are off near the root of a limb on a body.
     """
 
     PER_ROBOT: ClassVar = ("height", "mass", "inertia", *GIVEN_DRAG, *GIVEN_FLUID)
