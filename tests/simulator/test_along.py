@@ -80,7 +80,7 @@ def test_a_profile_at_the_root_is_the_rotation_at_the_hub_in_the_limit():
     assert off[1] == pytest.approx(0.1 * off[0], rel=0.05)
 
 
-@pytest.mark.parametrize("relaxation_time", [None, 1e-3])
+@pytest.mark.parametrize("relaxation_time", [None, pytest.param(1e-3, marks=pytest.mark.slow)])
 def test_no_share_along_the_limb_and_no_stiffening_change_no_bit(relaxation_time):
     robot = Seastar(nodes_per_limb=6, relaxation_time=relaxation_time)
     for along, stiffening in ((AlongLimb(0.0), None), (None, Stiffening(1.0)), (AlongLimb(0.0), Stiffening(1.0))):
@@ -181,6 +181,7 @@ def test_a_robot_that_stiffens_violently_gains_no_energy_but_the_actuators():
 # Batches, actuators, refusals
 
 
+@pytest.mark.slow
 def test_robots_of_a_batch_have_shares_and_ratios_of_their_own():
     shares, ratios = np.array([0.2, 0.5, 1.0]), np.array([1.0, 2.0, 3.0])
     scene = Scene(Seastar(3, 5, along=AlongLimb(shares), stiffening=Stiffening(ratios)), actuator=SmaPulse(0.6))

@@ -111,6 +111,7 @@ def complete_elliptic(k: float) -> float:
     return math.pi / (2.0 * a)
 
 
+@pytest.mark.slow
 def test_a_body_held_at_its_hub_swings_with_the_period_of_a_pendulum():
     mass, away, inertia, swing = 5e-3, 0.01, 1e-6, 1.0
     body = Body(radius=0.02, mass=mass, inertia=inertia, centre_of_mass=(away, 0.0), attachments=AT_HUB)
@@ -155,6 +156,7 @@ def test_a_turning_plate_slows_down_as_strips_of_it_say():
     assert simulator.spin()[0] == pytest.approx(8.0 / (1.0 + k * 8.0 * 0.5 / inertia), rel=0.01)
 
 
+@pytest.mark.slow
 def test_an_ellipse_in_an_ideal_fluid_keeps_impulse_and_energy():
     """Kirchhoff's equations: the mass of the fluid turns with the body."""
     body = Body.rectangle(0.08, 0.02, mass=0.01, attachments=AT_HUB)
@@ -184,6 +186,7 @@ def test_a_robot_with_two_alike_sides_swims_straight():
     assert abs(simulator.hub_position()[0, 1]) < 1e-9 and abs(simulator.orientation()[0]) < 1e-7
 
 
+@pytest.mark.slow
 def test_a_uniform_current_carries_a_robot_along():
     still = Simulator(Scene(FOUR_LIMBS, Water(), numerics=MIDPOINT))
     carried = Simulator(Scene(FOUR_LIMBS, Water(current=UniformCurrent(0.02, -0.01)), numerics=MIDPOINT))
@@ -226,6 +229,7 @@ def test_a_state_without_orientation_has_that_of_its_shape():
     assert simulator.spin()[0] == 0.0
 
 
+@pytest.mark.slow
 def test_bodies_differ_from_robot_to_robot():
     masses = np.array([5e-3, 0.05])
     both = Simulator(Scene(Seastar(4, 5, body=Body.rectangle(0.06, 0.03, mass=masses, attachments=FRAME))), 2)
