@@ -1,6 +1,8 @@
 """Files that are written all at once."""
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 
@@ -21,3 +23,17 @@ def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
     except OSError:
         part.unlink(missing_ok=True)
         raise
+
+
+@contextmanager
+def beside(path: Path) -> Iterator[Path]:
+    """A place of this process beside a file, to write to. It takes the file's place at the end.
+
+    Whatever goes wrong before, an interrupt too, leaves the file as it was and nothing beside it.
+    """
+    part = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        yield part
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)

@@ -36,7 +36,8 @@ def energy_growth(scene: Scene, samples: int = 8, seed: int = 0) -> float:
             return float(np.inf)
         energies[stroke] = simulator.kinetic_energy()
         if stroke == WINDOW - 1:
-            early = np.where(energies[:WINDOW].max(axis=0) > 0.0, energies[:WINDOW].max(axis=0), np.inf)
+            first = energies[:WINDOW].max(axis=0)
+            early = np.where(first > 0.0, first, np.inf)
         if (growth := float(np.max(energies[stroke] / early))) >= ENOUGH:
             return growth
     return float(np.max(energies[-WINDOW:].max(axis=0) / early))

@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.dataset
 import pyarrow.parquet
 
+from seastar_gym.files import beside
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.swimming import UNITS, swim
 
@@ -64,16 +65,10 @@ class Parts:
         """Write a part beside its place and rename it: whoever looks finds all of it or nothing."""
         file = self.file(name)
         file.parent.mkdir(parents=True, exist_ok=True)
-        beside = file.with_name(f".{name}.{os.getpid()}")
-        try:
-            with beside.open("wb") as stream:
-                stream.write(part)
-                stream.flush()
-                os.fsync(stream.fileno())
-            os.replace(beside, file)
-        except BaseException:
-            beside.unlink(missing_ok=True)
-            raise
+        with beside(file) as place, place.open("wb") as stream:
+            stream.write(part)
+            stream.flush()
+            os.fsync(stream.fileno())
 
     def names(self) -> Iterator[str]:
         """Names of the finished cells."""

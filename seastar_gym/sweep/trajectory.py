@@ -12,6 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet
 from numpy.typing import ArrayLike
 
+from seastar_gym.files import beside
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_floats, require_count
 from seastar_gym.simulator import Simulator
@@ -42,18 +43,12 @@ def write_trajectory(
             f"{scene.robot.n_limbs}), not {np.shape(commands)}."
         )
     schema = schema_of(scene)
-    beside = Path(file).with_name(f".{Path(file).name}.{os.getpid()}")
-    try:
-        with pa.parquet.ParquetWriter(beside, schema, compression="zstd") as writer:
-            writer.write_table(_rows(simulator, simulator.time, schema))
-            for stroke in strokes:
-                begin = simulator.time
-                for since in simulator.stroke_in_parts(stroke, frames_per_stroke):
-                    writer.write_table(_rows(simulator, begin + since, schema))
-        os.replace(beside, file)
-    except BaseException:
-        beside.unlink(missing_ok=True)
-        raise
+    with beside(Path(file)) as place, pa.parquet.ParquetWriter(place, schema, compression="zstd") as writer:
+        writer.write_table(_rows(simulator, simulator.time, schema))
+        for stroke in strokes:
+            begin = simulator.time
+            for since in simulator.stroke_in_parts(stroke, frames_per_stroke):
+                writer.write_table(_rows(simulator, begin + since, schema))
 
 
 def schema_of(scene: Scene) -> pa.Schema:
