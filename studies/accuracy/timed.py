@@ -32,9 +32,9 @@ Floats = NDArray[np.float64]
 PERIODS = (0.5, 0.2, 0.1)
 """Times between decisions [s]."""
 SECONDS = 10
-SAMPLES, SEED = 20, 0
-"""Sequences of either kind for each time between decisions. With the confidence 64 %, at most 5 % of all others exceed
-the largest error of 20; with 95 %, at most 14 %."""
+SAMPLES, SEED = 60, 0
+"""Sequences of either kind for each time between decisions. With the confidence 95 %, at most 5 % of all others exceed
+the largest error of 60."""
 LIMIT_NODES = 73
 SHORT = Numerics("implicit-midpoint", 0.2e-3, 1e-9)
 """Nodes per limb and numerics that stand for the continuum."""
