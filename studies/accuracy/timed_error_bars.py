@@ -1,8 +1,8 @@
 """Do error bars cover where wires are commanded several times a second, too?
 
 The factors of error bars were found with strokes (studies/accuracy/error_bars.py). Here robots with `SmaWires` swim ten
-seconds from rest by the sequences of studies/accuracy/timed.py, drawn anew. A decision is covered where
-the hub's distance from that with 73 nodes per limb and steps of 0.25 ms is at most the estimate.
+seconds from rest by the sequences of studies/accuracy/timed.py, drawn anew. A decision is covered where the hub's
+distance from that with 73 nodes per limb and steps of 0.25 ms is at most the estimate.
 
 Prints a table: the share of decisions that are covered, and the median of estimate over true error.
 """
