@@ -15,11 +15,12 @@ from tqdm import tqdm
 
 from seastar_gym.command import run_command
 from seastar_gym.scene import Scene, SmaWires
-from seastar_gym.scene.numerics import PRESETS, Setting
+from seastar_gym.scene.numerics import Setting
 from seastar_gym.simulator import Simulator
 from studies.accuracy import timed
-from studies.accuracy.error_bars import FIDELITIES, PERCENT, SMALLEST, TRUE, at
+from studies.accuracy.error_bars import FIDELITIES, SETTINGS, SMALLEST, TRUE, at
 from studies.parser import study_parser
+from studies.style import PERCENT
 
 Floats = NDArray[np.float64]
 
@@ -44,7 +45,7 @@ def measure(period: float, plan: timed.Plan, true: Setting = TRUE, seed: int = S
     exact, _ = swim(true, commands, period, error_bars=False)
     found = {}
     for name in FIDELITIES:
-        hub, estimate = swim(PRESETS[name], commands, period, error_bars=True)
+        hub, estimate = swim(SETTINGS[name], commands, period, error_bars=True)
         error = np.fmax(np.linalg.norm(hub - exact, axis=-1), SMALLEST)
         found[name] = float(np.mean(error <= estimate)), float(np.median(estimate / error))
     return found
