@@ -20,6 +20,7 @@ from seastar_gym.certification.measure import SAMPLES, certify
 from seastar_gym.extras import require_extra
 from seastar_gym.scene import Scene
 from seastar_gym.scene.certificate import Certificate
+from seastar_gym.scene.checks import require_error
 
 
 def load_scene(file: Path | None) -> Scene:
@@ -83,6 +84,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         require_extra("Certificates", "studies", "tqdm")
         scene = load_scene(options.scene)
+        scene.to_dict()  # now, not after minutes, refuses what a certificate could not hold
+        if options.error is not None:
+            require_error(options.error)
+        if options.out.is_dir():
+            raise ValueError(f"{options.out} is a folder: give --out a file.")
+        options.out.parent.mkdir(parents=True, exist_ok=True)
         from tqdm import tqdm
 
         with tqdm(total=100, unit="%", bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as bar:
