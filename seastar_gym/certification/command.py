@@ -27,9 +27,14 @@ def load_scene(file: Path | None) -> Scene:
     """Scene of a file of Python or JSON, the chapter's for none."""
     if file is None:
         return Scene()
+    if not file.is_file():
+        raise ValueError(f"{file} is no file.")
     if file.suffix == ".json":
         return Scene.from_dict(json.loads(file.read_text(encoding="utf-8")))
-    found = runpy.run_path(str(file)).get("scene")
+    try:
+        found = runpy.run_path(str(file)).get("scene")
+    except SyntaxError as wrong:
+        raise ValueError(f"{file}, line {wrong.lineno}, is not Python: {wrong.msg}.") from wrong
     if not isinstance(found, Scene):
         raise ValueError(f"{file} must define `scene`, a Scene.")
     return found

@@ -324,6 +324,11 @@ def test_the_command_writes_certificate_and_picture(few_settings, tmp_path, monk
     file_of_scene.write_text(json.dumps(SCENE.to_dict()), encoding="utf-8")
     assert command.load_scene(file_of_scene) == SCENE
     assert command.load_scene(None) == Scene()
+    with pytest.raises(ValueError, match=r"is no file\.$"):
+        command.load_scene(tmp_path)
+    (tmp_path / "own.py").write_text("scene = Scene(\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"own\.py, line 1, is not Python: .* never closed\.$"):
+        command.load_scene(tmp_path / "own.py")
 
 
 def test_swims_of_many_groups_are_those_of_one_batch(monkeypatch):
