@@ -192,7 +192,8 @@ def evolved(wanted: Wanted, plan: Plan, progress: Callable[[int], Any] | None = 
     )  # fmt: skip
     return {
         "actuator": name, "towards": "along limb 1" if towards > 0.0 else "away from limb 1", "slot_s": slot,
-        "strokes": strokes, "price_mm_per_joule": price, "tried": tried, "gait": events_of(gait, slot), "pulses": gait.tolist(),
+        "strokes": strokes, "price_mm_per_joule": price, "tried": tried, "gait": events_of(gait, slot),
+        "pulses": gait.tolist(),
         "fast": measured(scene_with(actuator), gait, slot),
         plan.finest: measured(scene_with(actuator, plan.finest), gait, slot),
     }  # fmt: skip
