@@ -32,6 +32,7 @@ from studies.designs.space import (
     masses,
 )
 from studies.parser import study_parser
+from studies.provenance import provenance
 
 Table = dict[str, Any]
 CLEARANCE = 0.1
@@ -151,6 +152,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int, help="processes (default: one per processor)")
     options = parser.parse_args()
     found, table = study(options.out, Processes(options.workers))
+    found = {**provenance("python -m studies.designs", "pandas", "pyarrow"), **found}
     (options.out / "designs.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     fastest = scene_of(table.loc[table.speed.idxmax()])
     (options.out / "fastest.json").write_text(json.dumps(fastest.to_dict()) + "\n", encoding="utf-8")
