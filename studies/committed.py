@@ -189,9 +189,11 @@ def whole_pages(docs: Path) -> dict[str, str]:
     """Pages that are made as a whole."""
     from seastar_gym import TASKS
     from studies.accuracy.work_precision_page import as_page
+    from studies.scenes import gallery
     from studies.tasks.page import page
 
     return {
+        "gallery.md": gallery.page(read(docs, "gallery.json")),
         "tasks.md": page(read(docs, "tasks.json"), {id: about[0] for id, about in TASKS.items()}, "tasks.png"),
         "work_precision.md": as_page(read(docs, "work_precision.json"), "work_precision_problems.png"),
     }
