@@ -1,8 +1,9 @@
 """What a package index shows: README with absolute links, and the addresses of the project.
 
 README's links are relative, so that they lead somewhere in a checkout. A package index has no files beside it. So the
-description of a wheel gets absolute ones, once `repository` in pyproject.toml (`[tool.hatch.metadata.hooks.custom]`) is the
-address on GitHub. Until then it is empty, links stay as they are, and `python .ci/contents.py dist --release` says so.
+description of a wheel gets absolute ones, once `repository` in pyproject.toml (`[tool.hatch.metadata.hooks.custom]`) is
+the address on GitHub. Until then it is empty, links stay as they are, and `python .ci/contents.py dist --release` says
+so.
 """
 
 import re
@@ -15,7 +16,7 @@ RELATIVE = re.compile(r"(!?)(\[[^\]]*\])\((?!\w+:|#)([^)\s]+)\)")
 
 
 def with_absolute_links(text: str, repository: str, version: str) -> str:
-    """Markdown whose relative links and pictures lead to the files of a version on GitHub; unchanged without address."""
+    """Markdown whose relative links and pictures lead to files of a version on GitHub; unchanged without address."""
     if not repository:
         return text
 

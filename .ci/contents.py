@@ -12,7 +12,10 @@ from collections import Counter
 from pathlib import Path, PurePosixPath
 
 ROOT = Path(__file__).resolve().parent.parent
-IN_SDIST = ("pyproject.toml", "README.md", "LICENSE", "CHANGELOG.md", "train.py", "hatch_build.py", "docs/index.md", "tests/conftest.py")
+IN_SDIST = (
+    "pyproject.toml", "hatch_build.py", "README.md", "LICENSE", "CHANGELOG.md", "train.py", "docs/index.md",
+    "tests/conftest.py",
+)  # fmt: skip
 MOST_MEGABYTES = 30
 
 
@@ -52,8 +55,8 @@ def placeholders(root: Path = ROOT) -> list[str]:
     wrong = []
     if not project["tool"]["hatch"]["metadata"]["hooks"]["custom"]["repository"]:
         wrong.append(
-            "The address of the repository is not known: fill in repository under [tool.hatch.metadata.hooks.custom] in "
-            "pyproject.toml. README's links are relative without it, and lead nowhere on a package index."
+            "The address of the repository is not known: fill in repository under [tool.hatch.metadata.hooks.custom] "
+            "in pyproject.toml. README's links are relative without it, and lead nowhere on a package index."
         )
     if "OWNER" in (root / "docs" / "third_party.md").read_text(encoding="utf-8"):
         wrong.append("docs/third_party.md still says OWNER: write whose repository it is.")
