@@ -173,6 +173,11 @@ def table(docs: Path, name: str) -> str:
             from studies.learning.in_time.tables import as_markdown
 
             return as_markdown(read(docs, "in_time.json")["runs"])
+        case ["leaderboard"]:
+            from seastar_gym.benchmark.page import table as made
+            from seastar_gym.benchmark.results import read as entries
+
+            return made(entries(docs / "leaderboard" / "results.json"))
         case ["promises"]:
             from studies.accuracy.promises import table as made
 
