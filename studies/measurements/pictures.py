@@ -25,7 +25,8 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
     """Measured curvatures (dots), fits (lines) and the chapter's ramp (dashed), and the error of every fit."""
     curves, fits = read_curves(), results["fits"]
     figure = new_figure(7.0, 1.35 * len(fits) + 3.2)
-    above, below = figure.subfigures(2, 1, height_ratios=[1.35 * len(fits), 2.9])
+    parts: Any = figure.subfigures(2, 1, height_ratios=[1.35 * len(fits), 2.9])
+    above, below = parts
     panels = above.subplots(len(fits), COLUMNS, sharey=True, squeeze=False)
     for row, (liquid_metal, fit) in zip(panels, fits.items(), strict=True):
         _draw_material(row, curves[int(liquid_metal)], fit)
