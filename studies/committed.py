@@ -154,34 +154,33 @@ def table(docs: Path, name: str) -> str:
         case ["footer", file]:
             return footer(read(docs, file), file)
         case ["ablations"]:
-            from studies.learning.ablations_page import table as made
+            from studies.learning import ablations_page
 
-            return made(read(docs, "ablations.json"))
+            return ablations_page.table(read(docs, "ablations.json"))
         case ["fidelities", part]:
             from studies.learning.fidelities import tables
 
             return str(getattr(tables, f"{part}_table")(read(docs, "fidelities.json")))
         case ["gaits", *part]:
-            from studies.gaits.pages import parts
+            from studies.gaits import pages
 
-            return parts(read(docs, "gaits.json"))[" ".join(part)]
+            return pages.parts(read(docs, "gaits.json"))[" ".join(part)]
         case ["heading"]:
-            from studies.learning.heading_page import table as made
+            from studies.learning import heading_page
 
-            return made(read(docs, "heading.json"))
+            return heading_page.table(read(docs, "heading.json"))
         case ["in_time"]:
             from studies.learning.in_time.tables import as_markdown
 
             return as_markdown(read(docs, "in_time.json")["runs"])
         case ["leaderboard"]:
-            from seastar_gym.benchmark.page import table as made
-            from seastar_gym.benchmark.results import read as entries
+            from seastar_gym.benchmark import page, results
 
-            return made(entries(docs / "leaderboard" / "results.json"))
+            return page.table(results.read(docs / "leaderboard" / "results.json"))
         case ["promises"]:
-            from studies.accuracy.promises import table as made
+            from studies.accuracy import promises
 
-            return made(read(docs, "promises.json"))
+            return promises.table(read(docs, "promises.json"))
     raise ValueError(f"No table is called {name!r}.")
 
 

@@ -6,6 +6,7 @@ the robot's time and shows FPS of them a second.
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +34,7 @@ def file_name(id: str) -> str:
 
 def pictures(id: str, agent_name: str, longest: float = LONGEST, instance: int = 0) -> Iterator[Picture]:
     """Pictures of an episode; longest: Simulated time [s]."""
-    batch = make_batch(id, 1, "test", "fast", 1, render_mode="rgb_array")
+    batch: Any = make_batch(id, 1, "test", "fast", 1, render_mode="rgb_array")
     decision_period = TASKS[id][2]
     every = round(BETWEEN / decision_period)
     agent = make_controller(agent_name, batch)
