@@ -1,16 +1,21 @@
 """Lists what a wheel and an sdist hold, folder by folder, and fails where something is missing or a stranger.
 
 python .ci/contents.py dist
+python .ci/contents.py dist --release    # fails, too, where a published package would have no address or a placeholder
 """
 
 import sys
 import tarfile
+import tomllib
 import zipfile
 from collections import Counter
 from pathlib import Path, PurePosixPath
 
 ROOT = Path(__file__).resolve().parent.parent
-IN_SDIST = ("pyproject.toml", "README.md", "LICENSE", "CHANGELOG.md", "train.py", "docs/index.md", "tests/conftest.py")
+IN_SDIST = (
+    "pyproject.toml", "hatch_build.py", "README.md", "LICENSE", "CHANGELOG.md", "train.py", "docs/index.md",
+    "tests/conftest.py",
+)  # fmt: skip
 MOST_MEGABYTES = 30
 
 
@@ -44,11 +49,27 @@ def complaints(archive: Path, files: list[PurePosixPath]) -> list[str]:
     return wrong
 
 
+def placeholders(root: Path = ROOT) -> list[str]:
+    """Sentences on what has to be filled in before anything is published."""
+    project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))
+    wrong = []
+    if not project["tool"]["hatch"]["metadata"]["hooks"]["custom"]["repository"]:
+        wrong.append(
+            "The address of the repository is not known: fill in repository under [tool.hatch.metadata.hooks.custom] "
+            "in pyproject.toml. README's links are relative without it, and lead nowhere on a package index."
+        )
+    if "OWNER" in (root / "docs" / "third_party.md").read_text(encoding="utf-8"):
+        wrong.append("docs/third_party.md still says OWNER: write whose repository it is.")
+    if "repository-code:" not in (root / "CITATION.cff").read_text(encoding="utf-8"):
+        wrong.append("CITATION.cff has no repository-code: add the address of the repository.")
+    return wrong
+
+
 def main() -> None:
     archives = sorted(Path(sys.argv[1]).glob("seastar_gym-*"))
     if {archive.suffix for archive in archives} != {".whl", ".gz"}:
         sys.exit(f"{sys.argv[1]} must have a wheel and an sdist, not {[archive.name for archive in archives]}.")
-    wrong = []
+    wrong = placeholders() if "--release" in sys.argv[2:] else []
     for archive in archives:
         files = files_of(archive)
         print(shown(archive, files))

@@ -35,6 +35,7 @@ SETTINGS: dict[str, Any] = {
     "xtick.labelcolor": INK,
     "ytick.labelcolor": INK,
     "axes.titlesize": "medium",
+    "figure.labelsize": "medium",
     "axes.axisbelow": True,
     "axes.spines.top": False,
     "axes.spines.right": False,

@@ -22,6 +22,8 @@ DISTRIBUTION_OF = {"PIL": "pillow", "pygame": "pygame-ce"}  # where the import n
 # Torch's wheels for CUDA name these; its wheels for the CPU do not.
 ONLY_WITH_CUDA = re.compile(r"(nvidia|cuda|triton)\b")
 
+contents = runpy.run_path(str(ROOT / ".ci" / "contents.py"))
+hatch_build = runpy.run_path(str(ROOT / "hatch_build.py"))
 quick_start_commands = runpy.run_path(str(ROOT / ".ci" / "quick_start.py"))["quick_start_commands"]
 
 
@@ -185,3 +187,52 @@ def test_version_is_the_same_everywhere(file, pattern):
     match = re.search(pattern, (ROOT / file).read_text(encoding="utf-8"), re.MULTILINE)
     assert match is not None
     assert match[1] == PROJECT["version"]
+
+
+ADDRESS = "https://github.com/someone/seastar-gym"
+
+
+def test_links_of_the_readme_are_absolute_on_a_package_index():
+    text = hatch_build["with_absolute_links"]((ROOT / "README.md").read_text(encoding="utf-8"), ADDRESS, "1.2.3")
+    links = re.findall(r"\]\(([^)]+)\)", text)
+    assert len(links) > 20 and all(link.startswith("https://") for link in links)
+    assert f"({ADDRESS}/raw/v1.2.3/docs/swim.gif)" in text and f"({ADDRESS}/blob/v1.2.3/docs/start.md)" in text
+
+
+def test_links_stay_as_they_are_while_there_is_no_address():
+    assert hatch_build["with_absolute_links"]("[a](b.md)", "", "1.2.3") == "[a](b.md)"
+    assert hatch_build["addresses"]("", "1.2.3") == {}
+    kept = "[a](https://b.c) [d](#e) ![f](mailto:g@h)"
+    assert hatch_build["with_absolute_links"](kept, ADDRESS, "1.2.3") == kept
+
+
+def test_a_wheel_has_the_addresses(tmp_path, monkeypatch):
+    """A copy of what the metadata needs, with an address filled in."""
+    for name in ("pyproject.toml", "README.md", "LICENSE", "hatch_build.py", "seastar_gym/__init__.py"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes((ROOT / name).read_bytes())
+    project = tmp_path / "pyproject.toml"
+    project.write_text(project.read_text("utf-8").replace('repository = ""', f'repository = "{ADDRESS}/"'), "utf-8")
+    monkeypatch.chdir(tmp_path)
+    wheel = zipfile.ZipFile(tmp_path / hatchling.build.build_wheel(str(tmp_path)))
+    (metadata,) = (wheel.read(name).decode() for name in wheel.namelist() if name.endswith("/METADATA"))
+    assert f"Project-URL: Repository, {ADDRESS}\n" in metadata
+    assert f"]({ADDRESS}/blob/v{PROJECT['version']}/docs/start.md)" in metadata
+
+
+def test_a_release_without_an_address_is_refused_with_sentences(tmp_path):
+    (tmp_path / "docs").mkdir()
+    for name, without, filled in (
+        ("pyproject.toml", 'repository = ""', f'repository = "{ADDRESS}"'),
+        ("docs/third_party.md", "OWNER", "someone"),
+        ("CITATION.cff", "license: MIT\n", f"license: MIT\nrepository-code: {ADDRESS}\n"),
+    ):
+        text = (ROOT / name).read_text(encoding="utf-8")
+        (tmp_path / name).write_text(text.replace(without, filled), encoding="utf-8")
+    assert contents["placeholders"](tmp_path) == []
+    project = (tmp_path / "pyproject.toml").read_text(encoding="utf-8")
+    (tmp_path / "pyproject.toml").write_text(project.replace(ADDRESS, ""), encoding="utf-8")
+    (tmp_path / "docs" / "third_party.md").write_text("https://github.com/OWNER/seastar-gym", encoding="utf-8")
+    (tmp_path / "CITATION.cff").write_text("title: seastar-gym", encoding="utf-8")
+    address, owner, citation = contents["placeholders"](tmp_path)
+    assert "fill in repository" in address and "OWNER" in owner and "repository-code" in citation

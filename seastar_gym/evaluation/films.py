@@ -18,8 +18,8 @@ CLOSING_SECONDS = 1.5
 """How long a film rests on its last picture."""
 SCALE = 2
 """Pixels of a picture that become one of a GIF, each way."""
-COLOURS = 48
-"""Colours of a GIF."""
+COLOURS = 64
+"""Colours of a GIF. Half of them are the most frequent ones: flat areas, small ones too, keep their colour."""
 SAMPLE = 32
 """Number of pictures, at equal intervals, from which the colours of a GIF are taken."""
 
@@ -88,13 +88,23 @@ def shrunk(picture: Picture) -> Picture:
     return blocks.mean(axis=(1, 3)).astype(np.uint8)
 
 
+def frequent_colours(picture: Picture, n: int) -> Picture:
+    """The n most frequent colours of a picture, or as many as it has, shape (n, 3)."""
+    numbers = picture.astype(np.uint32) @ np.array([1 << 16, 1 << 8, 1], np.uint32)
+    colours, counts = np.unique(numbers, return_counts=True)
+    most = colours[np.argsort(-counts, kind="stable")[:n]]
+    return np.stack([most >> 16, most >> 8 & 255, most & 255], axis=1).astype(np.uint8)
+
+
 def write_gif(pictures: list[Picture], file: Path, fps: float) -> None:
     """Write an animated GIF whose pictures share one palette, made of some of them."""
     from PIL import Image
 
     some = np.unique(np.linspace(0, len(pictures) - 1, SAMPLE).round().astype(int))
     sample = np.concatenate([pictures[k] for k in some], axis=0)
-    palette = Image.fromarray(sample).quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    blends = Image.fromarray(sample).quantize(COLOURS // 2, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(frequent_colours(sample, COLOURS // 2).tobytes() + bytes(blends.getpalette() or ()))
     images = [Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     duration = 10 * max(2, round(100.0 / fps))  # viewers slow down what is shown for less than two hundredths
     images[0].save(file, save_all=True, append_images=images[1:], duration=duration, loop=0, optimize=True)

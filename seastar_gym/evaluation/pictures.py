@@ -46,9 +46,8 @@ def draw_traces(swims: Sequence[Swim], waypoint_radius: float, file: Path) -> No
     for number, swim in enumerate(swims):
         _draw_trace(axes, swim, number)
     axes.legend(
-        loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False,
-        title=f"a dot every {STROKES_PER_DOT} {swims[0].counted_in}",
-        alignment="left",
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False, ncols=2, alignment="left",
+        title=f"agents, with a dot every {STROKES_PER_DOT} {swims[0].counted_in}",
     )  # fmt: skip
     figure.savefig(file, dpi=160, bbox_inches="tight", pad_inches=0.15)
 

@@ -34,6 +34,7 @@ from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__
 from studies.accuracy.error_bars import ROBOTS
 from studies.parser import study_parser
+from studies.provenance import provenance
 
 Floats = NDArray[np.float64]
 
@@ -129,6 +130,11 @@ def examine(name: str, folder: Path, samples: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def table(results: dict[str, Any]) -> str:
+    """Table of the results in Markdown."""
+    return summary(results).partition("\n\n")[0]
+
+
 def summary(results: dict[str, Any]) -> str:
     """Table and sentence of the results in Markdown."""
     samples = results["samples"]
@@ -169,7 +175,8 @@ def read_results(file: Path, samples: int) -> dict[str, Any]:
     wanted = {"samples": samples, "seed": SEED, "classes": commands.VERSION, "version": __version__}
     if not file.is_file():
         about = "Written by python -m studies.accuracy.promises; exceedances are numbers of sequences."
-        return {"about": about, "machine": measure.machine(), **wanted, "robots": {}}
+        command = f"python -m studies.accuracy.promises --samples {samples}"
+        return {"about": about, **provenance(command), **wanted, "robots": {}}
     results: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
     if {key: results.get(key) for key in wanted} != wanted:
         raise ValueError(f"{file} has results of other sequences or another version: give another --out.")

@@ -11,9 +11,7 @@ Times are processor times of one thread per robot and stroke, the best of severa
 picture and the numbers (JSON). A robot whose numbers are in the file is not swum again.
 """
 
-import importlib.metadata
 import json
-import platform
 import time
 from pathlib import Path
 from typing import Any
@@ -30,13 +28,12 @@ from seastar_gym.scene import Contact, Numerics, Scene, Seastar, SmaPulse
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.numerics import PRESETS, Setting
 from seastar_gym.simulator import Simulator
-from seastar_gym.version import __version__
 from studies.accuracy.cases import scene_of
 from studies.accuracy.settings import MS
 from studies.accuracy.work_precision_page import as_page, draw
 from studies.parser import study_parser
+from studies.provenance import provenance
 from studies.speed.terms import SILICONE
-from studies.speed.timing import machine
 
 Floats = NDArray[np.float64]
 
@@ -126,12 +123,6 @@ def examine(physics: Scene, straight: bool) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def versions() -> dict[str, str]:
-    """Versions that the numbers were measured with."""
-    packages = {name: importlib.metadata.version(name) for name in ("numpy", "numba", "llvmlite")}
-    return {"python": platform.python_version(), "seastar-gym": __version__} | packages
-
-
 def main() -> None:
     """Command line: examine the problems that are missing in the file, write page and picture."""
     parser = study_parser("studies.accuracy.work_precision", __doc__)
@@ -141,7 +132,7 @@ def main() -> None:
     )  # fmt: skip
     options = parser.parse_args()
     file = options.out.with_suffix(".json")
-    about = {"about": "Written by python -m studies.accuracy.work_precision.", "machine": machine()} | versions()
+    about = provenance("python -m studies.accuracy.work_precision")
     results: dict[str, Any] = about | {"file": file.name, "problems": {}}
     if file.is_file():
         results = json.loads(file.read_text(encoding="utf-8"))

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from studies.accuracy.pictures import CHAPTERS, OTHERS, OURS, PUBLISHED, published_error
+from studies.provenance import footer
 from studies.style import DPI, INK, MS, PERCENT, as_numbers, as_percent, subplots
 
 if TYPE_CHECKING:
@@ -129,12 +130,11 @@ def _draw_published(axes: Axes, limit: float) -> None:
 
 def as_page(results: Mapping[str, Any], picture: str) -> str:
     """Page in Markdown."""
-    problems, versions = results["problems"], ("python", "seastar-gym", "numpy", "numba", "llvmlite")
+    problems = results["problems"]
     lines = [
         "# Work and precision on six robots", "",
         "Written by `python -m studies.accuracy.work_precision`; its docstring (`--help`) tells what is measured. "
-        f"Machine: {results['machine']}, beside other work. "
-        f"Versions: {', '.join(f'{name} {results[name]}' for name in versions)}.", "",
+        "Times are measured beside other work of the machine.", "",
         f"![Error over processor time per stroke]({picture})", "",
         "A line is what no other measured setting of its discretisation beats. Letters are the presets. Errors are "
         "whole ones, not the promised sums of space and time ([accuracy.md](accuracy.md)): they are smaller where "
@@ -150,7 +150,7 @@ def as_page(results: Mapping[str, Any], picture: str) -> str:
         f"Error of the worst and of the median sequence, and processor time per stroke [ms] "
         f"([data]({results['file']})).", "",
         f"| N | scheme and step | {' | '.join(problems)} |", "|---|---|" + "---:|" * len(problems),
-        *_rows(problems), "",
+        *_rows(problems), "", "---", "", footer(results, results["file"]), "",
     ]  # fmt: skip
     return "\n".join(lines)
 

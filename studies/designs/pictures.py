@@ -5,73 +5,93 @@ from typing import Any
 
 import numpy as np
 
-from studies.style import DPI, FAINT, INK, subplots
+from studies.style import CYCLE, DPI, FAINT, INK, subplots
 
 MM = 1e3
-COLOURS = {1.0: "#999999", 0.75: "#88aacc", 0.5: "#3366aa", 0.25: "#cc7a00"}
+COLOURS = {1.0: FAINT, 0.75: CYCLE[5], 0.5: CYCLE[0], 0.25: CYCLE[1]}
+"""Colours of the tapers."""
+RANGES = (
+    ("robot.limb_length", MM, "limb length [mm]", False), ("actuator.peak_angle", 1.0, "peak angle [rad]", False),
+    ("robot.youngs_modulus", 1e-6, "Young's modulus [MPa]", True),
+)  # fmt: skip
+"""What is drawn at random: its column, unit and name, and whether in the logarithm."""
+GRIDS = (("n_limbs", 1.0, "number of limbs"), ("radius", MM, "mean radius of a limb [mm]"))
 BINS = 24
 TOP = 22.0
 """Largest speed of the axes [mm/s]."""
+SHARES = (0, 1, 10, 25, 50, 75, 90, 99, 100)
+"""Percentiles that tell of a distribution."""
 
 
-def draw(found: dict[str, Any], table: Any, file: Path) -> None:
+def summary(table: Any) -> dict[str, Any]:
+    """What the picture shows of all designs, as plain data: medians and 99th percentiles [mm/s], and distributions."""
+    curves = {
+        name: {str(taper): _envelope(table[table.taper == taper], name, unit, is_log) for taper in COLOURS}
+        for name, unit, _, is_log in RANGES
+    }
+    spreads = {
+        name: {
+            str(round(unit * float(value), 6)): np.percentile(MM * each.speed.to_numpy(), SHARES).round(3).tolist()
+            for value, each in table.groupby(name)
+        }
+        for name, unit, _ in GRIDS
+    }
+    return {"curves": curves, "percentiles": list(SHARES), "spreads": spreads}
+
+
+def _envelope(some: Any, name: str, unit: float, is_log: bool) -> dict[str, list[float]]:
+    """Median and 99th percentile of the speed [mm/s] in bins of a column."""
+    x, y = unit * some[name].to_numpy(), MM * some.speed.to_numpy()
+    edges = np.geomspace(x.min(), x.max(), BINS + 1) if is_log else np.linspace(x.min(), x.max(), BINS + 1)
+    place = np.clip(np.digitize(x, edges) - 1, 0, BINS - 1)
+    filled = [k for k in range(BINS) if (place == k).any()]
+    return {
+        "x": (0.5 * (edges[1:] + edges[:-1]))[filled].round(6).tolist(),
+        **{f"{share}": [round(float(np.percentile(y[place == k], share)), 3) for k in filled] for share in (50, 99)},
+    }
+
+
+def draw(found: dict[str, Any], file: Path) -> None:
     """Write the picture."""
-    figure, axes = subplots(2, 3, figsize=(11.0, 6.6))
-    chapter = found["the chapter's"]["mm_per_s"]["fast"]
-    ranges = (
-        ("robot.limb_length", MM, "limb length [mm]", False), ("actuator.peak_angle", 1.0, "peak angle [rad]", False),
-        ("robot.youngs_modulus", 1e-6, "Young's modulus [MPa]", True),
-    )  # fmt: skip
-    for ax, (name, unit, label, is_log) in zip(axes[0], ranges, strict=True):
+    figure, axes = subplots(2, 3, figsize=(9.6, 6.8))
+    chapter, shown = found["the chapter's"]["mm_per_s"]["fast"], found["picture"]
+    for ax, (name, _, label, is_log) in zip(axes[0], RANGES, strict=True):
         for taper, colour in COLOURS.items():
-            some = table[table.taper == taper]
-            envelope(ax, unit * some[name].to_numpy(), MM * some.speed.to_numpy(), is_log, colour, f"{taper:g}")
-        ax.axhline(chapter, color=FAINT, ls="--", lw=1)
-        ax.set(xlabel=label, ylabel="speed [mm/s]", ylim=(0.0, TOP))
+            curve = shown["curves"][name][str(taper)]
+            ax.plot(curve["x"], curve["50"], color=colour, label=f"taper {taper:g}: median, and dotted 99th percentile")
+            ax.plot(curve["x"], curve["99"], ":", color=colour)
+        ax.axhline(chapter, color=INK, ls="--", lw=1, label="the chapter's robot")
+        ax.set(xlabel=label, ylim=(0.0, TOP))
         if is_log:
+            ax.set_xscale("log")
             ax.set_xticks([0.2, 0.5, 1.0, 2.0, 5.0], ["0.2", "0.5", "1", "2", "5"])
             ax.set_xticks([], minor=True)
-    axes[0, 2].text(0.21, chapter - 1.0, "the chapter's robot", fontsize=8, color=FAINT)
-    axes[0, 0].legend(
-        frameon=False,
-        fontsize=8,
-        title="tip over root: median, and 99th percentile (dotted)",
-        title_fontsize=8,
-        loc="upper left",
-        ncols=4,
-    )
-    for ax, name, unit, label in (
-        (axes[1, 0], "n_limbs", 1.0, "number of limbs"), (axes[1, 1], "radius", MM, "mean radius [mm]"),
-    ):  # fmt: skip
-        values = sorted(table[name].unique())
-        ax.violinplot(
-            [MM * table[table[name] == value].speed.to_numpy() for value in values],
-            np.arange(len(values)), showmedians=True, widths=0.8,
-        )  # fmt: skip
-        ax.axhline(chapter, color=FAINT, ls="--", lw=1)
-        ax.set_xticks(np.arange(len(values)), [f"{unit * value:g}" for value in values])
-        ax.set(xlabel=label, ylabel="speed [mm/s]", ylim=(0.0, TOP))
+    for ax, (name, _, label) in zip(axes[1], GRIDS, strict=False):
+        _boxes(ax, shown["spreads"][name])
+        ax.axhline(chapter, color=INK, ls="--", lw=1)
+        ax.set(xlabel=label, ylim=(0.0, TOP))
     masses(axes[1, 2], found["masses"])
+    for ax in axes[:, 0]:
+        ax.set_ylabel("speed [mm/s]")
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper left", ncols=2)
     figure.savefig(file, dpi=DPI)
 
 
-def envelope(ax: Any, x: Any, y: Any, is_log: bool, colour: str, label: str) -> None:
-    """Median and 99th percentile of y in bins of x."""
-    edges = np.geomspace(x.min(), x.max(), BINS + 1) if is_log else np.linspace(x.min(), x.max(), BINS + 1)
-    place = np.clip(np.digitize(x, edges) - 1, 0, BINS - 1)
-    middle = 0.5 * (edges[1:] + edges[:-1])
-    for share, style in ((50, "-"), (99, ":")):
-        ax.plot(middle, [np.percentile(y[place == k], share) for k in range(BINS)], style, color=colour,
-                label=label if share == 50 else None)  # fmt: skip
-    if is_log:
-        ax.set_xscale("log")
+def _boxes(ax: Any, spreads: dict[str, list[float]]) -> None:
+    """A line from the slowest design to the fastest, a box of the middle half and a mark at the median."""
+    for place, values in enumerate(spreads.values()):
+        low, _, _, quarter, middle, three_quarters, _, _, high = values
+        ax.plot([place, place], [low, high], color=CYCLE[0], lw=1.2)
+        ax.bar(place, three_quarters - quarter, 0.5, bottom=quarter, color=CYCLE[5], zorder=2)
+        ax.plot(place, middle, "_", color=INK, ms=14, zorder=3)
+    ax.set_xticks(range(len(spreads)), [f"{float(value):g}" for value in spreads])
 
 
 def masses(ax: Any, found: dict[str, Any]) -> None:
     """Speed over density, by the share of mass in the half at the hub."""
-    shades = np.linspace(0.1, 0.85, len(found))
-    for (share, points), shade in zip(found.items(), shades, strict=True):
-        ax.semilogx(*np.array(points).T, color=(shade, 0.4, 1.0 - shade), label=f"{100 * float(share):.0f} %")
-    ax.axvline(1000.0, color=INK, lw=0.6, ls=":")
-    ax.set(xlabel="density of the limbs [kg/m³]", ylabel="speed [mm/s]")
-    ax.legend(frameon=False, fontsize=8, title="limb's mass in the half\nat the hub", title_fontsize=8)
+    for (share, points), colour in zip(found.items(), CYCLE, strict=False):
+        ax.semilogx(*np.array(points).T, color=colour, label=f"{100 * float(share):.0f} %")
+    ax.axvline(1000.0, color=FAINT, lw=1.0, ls=":")
+    ax.text(950.0, ax.get_ylim()[1], "water", color=INK, rotation=90, ha="right", va="top", fontsize="small")
+    ax.set(xlabel="density of the limbs [kg/m³]", ylim=(0.0, None))
+    ax.legend(title="mass in the half\nat the hub", fontsize="small", title_fontsize="small", loc="upper left")

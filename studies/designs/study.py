@@ -32,6 +32,7 @@ from studies.designs.space import (
     masses,
 )
 from studies.parser import study_parser
+from studies.provenance import provenance
 
 Table = dict[str, Any]
 CLEARANCE = 0.1
@@ -144,16 +145,17 @@ def masses_by_taper(mass: Any) -> Table:
 
 def main() -> None:
     """Command line: run the study and write its files."""
-    from studies.designs.pictures import draw
+    from studies.designs.pictures import draw, summary
 
     parser = study_parser("studies.designs", __doc__)
     parser.add_argument("--out", type=Path, default=Path("runs/designs"), help="folder (default: %(default)s)")
     parser.add_argument("--workers", type=int, help="processes (default: one per processor)")
     options = parser.parse_args()
     found, table = study(options.out, Processes(options.workers))
+    found = {**provenance("python -m studies.designs", "pandas", "pyarrow"), **found, "picture": summary(table)}
     (options.out / "designs.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     fastest = scene_of(table.loc[table.speed.idxmax()])
     (options.out / "fastest.json").write_text(json.dumps(fastest.to_dict()) + "\n", encoding="utf-8")
-    draw(found, table, options.out / "designs.png")
-    print(json.dumps(found, indent=1))
+    draw(found, options.out / "designs.png")
+    print(json.dumps({name: what for name, what in found.items() if name != "picture"}, indent=1))
     print(f"Written to {options.out}: designs.json, designs.png and fastest.json, the scene of the fastest.")

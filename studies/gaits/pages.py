@@ -27,8 +27,26 @@ def what_evolved(each: Table) -> str:
     return f"{each['actuator']}, {each['towards']}, {each['price_mm_per_joule']:g} mm/J{slots}"
 
 
+TITLES = {
+    "named": "Named gaits",
+    "thermal": "Named gaits with thermal wires",
+    "fastest": "The fastest straight gaits of a second from rest",
+    "turning": "Those that turn most",
+    "evolved": "Evolved, wires heated again before they are cold",
+    "directions": "Speed by direction [mm/s], degrees from limb 1",
+    "robustness": "Other robots and waters, speed [mm/s] at `fast`",
+    "numerics": "Other resolutions, schemes and steps, speed [mm/s]",
+}
+"""What the tables show, by their names."""
+
+
 def tables(results: Table) -> str:
-    """All tables of the study."""
+    """All tables of the study, with their titles."""
+    return "\n".join(f"{TITLES[name]}:\n\n{table}" for name, table in parts(results).items())
+
+
+def parts(results: Table) -> dict[str, str]:
+    """All tables of the study, by name."""
     finest = results["finest"]
     head = ["speed [mm/s], `fast`", f"speed, `{finest}`", "turn [deg/s]", "pulses per second", "energy [J/m]"]
     named = [[each["what"], *numbers(each["fast"], each[finest])] for each in results["named"].values()]
@@ -56,16 +74,13 @@ def tables(results: Table) -> str:
         [results["named"][name]["what"], *numbers(each["fast"], each[finest])]
         for name, each in results["thermal wires"].items()
     ]
-    classes = f"{results['from rest']['classes']:,}"
-    return "\n".join([
-        "Named gaits:\n", lines_of(["gait", *head], named),
-        "Named gaits with thermal wires:\n", lines_of(["gait", *head], thermal),
-        f"The fastest straight gaits of a second from rest, of {classes} classes:\n", lines_of(["gait", *head], rest),
-        "Those that turn most:\n", lines_of(["gait", *head], turning),
-        "Evolved, wires heated again before they are cold:\n",
-        lines_of(["actuator, direction, price of heat", *head], evolved),
-        "Speed by direction [mm/s], degrees from limb 1:\n",
-        lines_of(["gaits", *(f"{angle:.0f}" for angle in results["directions_deg"])], directions),
-        "Other robots and waters, speed [mm/s] at `fast`:\n", lines_of(["", *columns], robust_rows),
-        "Other resolutions, schemes and steps, speed [mm/s]:\n", lines_of(["", *columns], of_numerics),
-    ])  # fmt: skip
+    return {
+        "named": lines_of(["gait", *head], named),
+        "thermal": lines_of(["gait", *head], thermal),
+        "fastest": lines_of(["gait", *head], rest),
+        "turning": lines_of(["gait", *head], turning),
+        "evolved": lines_of(["actuator, direction, price of heat", *head], evolved),
+        "directions": lines_of(["gaits", *(f"{angle:.0f}" for angle in results["directions_deg"])], directions),
+        "robustness": lines_of(["", *columns], robust_rows),
+        "numerics": lines_of(["", *columns], of_numerics),
+    }

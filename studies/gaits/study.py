@@ -27,6 +27,7 @@ from studies.gaits.named import BEHIND, FORWARD, GAITS, SLOT, lagged
 from studies.gaits.periodic import Swimming, events_of, joined, measure, timed
 from studies.learning.bound import all_directions, distinct_gaits, mixed_speed
 from studies.parser import study_parser
+from studies.provenance import provenance
 from studies.speed.terms import SILICONE
 
 Floats = NDArray[np.float64]
@@ -312,7 +313,8 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="simulate fewer gaits")
     parser.add_argument("--out", type=Path, default=Path("runs/gaits"), help="folder (default: %(default)s)")
     options = parser.parse_args()
-    results = study(QUICK if options.quick else Plan())
+    command = "python -m studies.gaits" + " --quick" * options.quick
+    results = {**provenance(command, "cma"), **study(QUICK if options.quick else Plan())}
     options.out.mkdir(parents=True, exist_ok=True)
     write_atomically(options.out / "gaits.json", (json.dumps(results, indent=1) + "\n").encode())
     draw_all(results, options.out)

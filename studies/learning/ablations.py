@@ -12,7 +12,7 @@ import json
 import shlex
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
@@ -33,7 +33,8 @@ from seastar_gym.envs.task import make_scene
 from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
 from seastar_gym.files import write_atomically
 from seastar_gym.scene.numerics import Fidelity
-from studies.style import CYCLE, FAINT, new_figure
+from studies.learning.ablations_page import DEFAULT, draw, table
+from studies.provenance import provenance
 
 MAX_STROKES = 400
 """Largest number of strokes of an evaluated swim, which is also the score of a robot that does not arrive."""
@@ -65,8 +66,6 @@ def _with(**changes: Any) -> Variant:
 
 COMMON = Hyperparameters(actions="joint")
 """Hyperparameters of the study: policies choose from all 243 commands, not only from the pairs of limbs."""
-DEFAULT = "whole commands"
-"""Name of the variant without changes."""
 VARIANTS: dict[str, Variant] = {
     DEFAULT: Variant(),
     "no symmetry": _with(symmetry=False),
@@ -181,56 +180,13 @@ def read_results(options: Options, command: str) -> dict[str, Any]:
     """Results in the output file, or empty ones if there is none; ValueError if the file has other settings."""
     settings = {name: getattr(options, name) for name in ("strokes", "every", "paths", "fidelity")}
     if not options.out.is_file():
-        return {"command": command, "settings": settings, "runs": {}}
+        return {**provenance(command, "torch", "stable_baselines3"), "settings": settings, "runs": {}}
     results: Any = json.loads(options.out.read_text(encoding="utf-8"))
     found = results.get("settings") if isinstance(results, dict) else None
     if found != settings:
         of = "something else" if found is None else found
         raise ValueError(f"{options.out} has results of {of}, not of {settings}: give another --out.")
     return cast(dict[str, Any], results)
-
-
-def final_strokes(runs: Mapping[str, Any]) -> list[float]:
-    """Mean strokes on the held-out paths at the end of the training, for every seed."""
-    return [run["curve"][-1][1] for run in runs.values()]
-
-
-def table(results: dict[str, Any]) -> str:
-    """Table in Markdown: mean, best and worst strokes over seeds of every variant, and strokes round the pentagon."""
-    lines = ["| training | held-out paths: mean strokes | pentagon, every seed |", "|---|---:|---|"]
-    for name, runs in results["runs"].items():
-        ends, pentagon = final_strokes(runs), ", ".join(str(run["pentagon"]) for run in runs.values())
-        over_seeds = f" ({min(ends):.1f} to {max(ends):.1f})" if len(ends) > 1 else ""
-        lines.append(f"| {name} | {np.mean(ends):.1f}{over_seeds} | {pentagon} |")
-    return "\n".join(lines)
-
-
-def draw(results: dict[str, Any], file: Path) -> None:
-    """Draw the learning curve of every variant beside the default one: mean and range over seeds."""
-    others = [name for name in results["runs"] if name != DEFAULT] or [DEFAULT]
-    columns = 4
-    rows = -(-len(others) // columns)
-    figure = new_figure(9.0, 2.1 * rows)
-    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    for axes, name in itertools.zip_longest(panels.flat, others):
-        if name is None:
-            axes.set_axis_off()
-            continue
-        for label, colour in ((DEFAULT, FAINT), (name, CYCLE[0])):
-            curves = np.array([run["curve"] for run in results["runs"].get(label, {}).values()])
-            if curves.size:
-                trained, strokes = 1e-3 * curves[0, :, 0], curves[:, :, 1]
-                axes.fill_between(trained, strokes.min(axis=0), strokes.max(axis=0), color=colour, alpha=0.25, lw=0)
-                axes.plot(trained, strokes.mean(axis=0), color=colour, label=label if label == DEFAULT else "this one")
-        axes.set_title(name, fontsize=9)
-        axes.set(ylim=(165.0, 210.0))
-        axes.tick_params(labelsize=8, labelbottom=True)
-        axes.grid(True)
-    lines = panels.flat[0].get_lines()
-    figure.legend(handles=lines, loc="outside lower right", ncols=2, fontsize=9)
-    figure.supxlabel("strokes trained [thousands]", fontsize=9)
-    figure.supylabel("strokes on held-out paths", fontsize=9)
-    figure.savefig(file)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

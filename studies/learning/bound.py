@@ -4,8 +4,8 @@
 
 The study simulates all periodic gaits of one and two strokes over all commands, and of three and four strokes over
 pairs of limbs, once for every class under the symmetry of the robot. Swimming several gaits in turn reaches every
-velocity in their convex hull. Longer sequences are found by a wide beam search along straight lines, and by one round
-the pentagon. The results are what searches without a time limit find; they do not prove that nothing is faster.
+velocity in their convex hull. The fastest pentagon is looked for by a wide beam search. The results are what searches
+without a time limit find; they do not prove that nothing is faster.
 """
 
 import itertools
@@ -39,7 +39,8 @@ from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator, State
-from studies.style import subplots
+from studies.learning.bound_page import MIXED, draw
+from studies.provenance import provenance
 
 Floats = NDArray[np.float64]
 Gaits = NDArray[np.intp]
@@ -51,8 +52,6 @@ CHUNK = 4096
 """Gaits that are simulated in one batch."""
 STRAIGHT = np.radians(0.3)
 """Largest turn per stroke [rad] of a straight gait, which its mirror image or a rare other stroke can correct."""
-LINE_STROKES, LINE_FROM = 36, 12
-"""Strokes of a searched straight swim, and the stroke from which its speed is measured."""
 WAYPOINT_RADIUS = 0.01
 """Distance of the hub from a waypoint at which it is reached [m]."""
 
@@ -95,21 +94,6 @@ def mixed_speed(displacements: Floats, directions: Floats) -> Floats:
     return np.asarray(1.0 / (along @ (normals[:, :2] / -normals[:, 2:]).T).max(axis=1))
 
 
-def search_line(scene: Scene, direction: float, actions: Actions, beam: int) -> tuple[float, Gaits]:
-    """Speed [m per stroke] and actions of the best swim found from rest along a direction [rad]."""
-    along, aside = np.array([[np.cos(direction), np.sin(direction)], [-np.sin(direction), np.cos(direction)]])
-    swim_all = Branching(scene, command_table(actions, scene.robot.n_limbs))
-    states, actions_so_far = _at_rest(scene), np.zeros((1, 0), np.intp)
-    way = [0.0]
-    for _ in range(LINE_STROKES):
-        states = swim_all(states)
-        hub = states.positions[:, 0]
-        best = np.argsort(np.abs(hub @ aside) - hub @ along)[:beam]  # a robot beside the line still has to return to it
-        states, actions_so_far = _keep(states, actions_so_far, best, len(swim_all.commands))
-        way.append(float(hub[best[0]] @ along))
-    return (way[-1] - way[LINE_FROM]) / (LINE_STROKES - LINE_FROM), actions_so_far[0]
-
-
 def search_path(scene: Scene, waypoints: Floats, actions: Actions, beam: int, max_strokes: int = 400) -> Gaits:
     """Actions of the shortest swim found from rest through all waypoints [m]; empty if none ends within max_strokes."""
     swim_all = Branching(scene, command_table(actions, scene.robot.n_limbs))
@@ -147,8 +131,6 @@ class Options:
 
     fidelity: Fidelity = "fast"
     """Fidelity of the simulated swims."""
-    line_beam: int = 12
-    """Width of the beam searches along lines, over all commands [states]."""
     pentagon_beam: int = 300
     """Width of the beam search round the pentagon, over pairs of limbs [states]."""
     only_pentagon: bool = False
@@ -209,7 +191,6 @@ def study(options: Options) -> dict[str, Any]:
     fastest, displacements = study_gaits(scene)
     directions = np.radians(np.arange(0.0, 37.0, 6.0))
     mixed = mixed_speed(displacements, directions)
-    lines = [search_line(scene, direction, "joint", options.line_beam)[0] for direction in directions]
     agents = {
         agent: MM * agent_speeds(agent, policy, scene, directions)
         for agent, policy in load_agents(options.agents, fidelity=options.fidelity).items()
@@ -220,8 +201,7 @@ def study(options: Options) -> dict[str, Any]:
         "fastest_gaits": fastest,
         "directions_deg": np.degrees(directions).tolist(),
         "mm_per_stroke": {
-            "best periodic gaits, mixed": (MM * mixed).tolist(),
-            "beam search": (MM * np.array(lines)).tolist(),
+            MIXED: (MM * mixed).tolist(),
             **{agent: speeds.tolist() for agent, speeds in agents.items()},
         },
         "pentagon": {
@@ -230,29 +210,6 @@ def study(options: Options) -> dict[str, Any]:
             "gait": [name(command) for command in command_table("pairs", scene.robot.n_limbs)[pentagon]],
         },
     }
-
-
-LABELS = {
-    "best periodic gaits, mixed": "straight gaits of up to four strokes, swum in turn as is best",
-    "beam search": "beam search: found, not proved",
-}
-"""What the picture calls the results that are no agents."""
-
-
-def draw(results: dict[str, Any], file: Path) -> None:
-    """Draw the speeds by direction, in the sector of 36 degrees that turns and mirror images repeat."""
-    figure, axes = subplots(figsize=(6.4, 4.2))
-    lines = {"best periodic gaits, mixed": "-", "beam search": "x"}
-    for name, speeds in results["mm_per_stroke"].items():
-        axes.plot(results["directions_deg"], speeds, lines.get(name, "o"), label=LABELS.get(name, f"agent: {name}"))
-    axes.set(
-        xlabel="direction from limb 1 [degrees]; 36: between two limbs", xticks=results["directions_deg"],
-        ylabel="speed [mm per stroke]", title=f'straight-line speed at "{results["fidelity"]}"',
-    )  # fmt: skip
-    low, high = axes.get_ylim()
-    axes.set_ylim(low, high + 0.35 * (high - low))
-    axes.legend(loc="upper center")
-    figure.savefig(file)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -264,7 +221,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     results = study(options)
     given = sys.argv[1:] if arguments is None else arguments
-    results |= {"command": shlex.join(["python", "-m", "studies.learning.bound", *given])}
+    results |= provenance(shlex.join(["python", "-m", "studies.learning.bound", *given]))
     write_atomically(options.out, (json.dumps(results, indent=1) + "\n").encode())
     draw(results, options.out.with_suffix(".png"))
     print(json.dumps({key: value for key, value in results.items() if key != "pentagon"}, indent=1))

@@ -9,6 +9,8 @@ and the table in Markdown.
 """
 
 import json
+import shlex
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,6 +46,8 @@ from seastar_gym.files import write_atomically
 from seastar_gym.gaits import turning_wave
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
+from studies.learning.heading_page import draw, table
+from studies.provenance import provenance
 
 Floats = NDArray[np.float64]
 
@@ -173,39 +177,12 @@ def study(options: Options) -> dict[str, Any]:
     }
 
 
-def table(results: dict[str, Any]) -> str:
-    """Table of the results in Markdown."""
-    turns = results["turns_deg"]
-    lines = [f"| | {' | '.join(f'{turn:g}°' for turn in turns)} |", f"| --- |{' ---: |' * len(turns)}"]
-    for each in results["swims"].values():
-        for what, unit in (("seconds", "s"), ("joules", "J")):
-            cells = ["-" if one is None else f"{one:.0f}" for one in each[what]]
-            lines.append(f"| {each['what']} [{unit}] | {' | '.join(cells)} |")
-    return "\n".join(lines) + "\n"
-
-
-COLOURS = {"strokes": "0.55", "wires": "#3366aa", "planner": "#118855", "learned": "#cc7a00"}
-
-
-def draw(results: dict[str, Any], file: Path) -> None:
-    """Time and energy over the demanded turn."""
-    from studies.style import DPI, subplots
-
-    figure, panels = subplots(1, 2, figsize=(9.0, 3.8))
-    for axes, what, label in zip(panels, ("seconds", "joules"), ("time [s]", "energy [J]"), strict=True):
-        for name, each in results["swims"].items():
-            numbers = [np.nan if one is None else one for one in each[what]]
-            axes.plot(results["turns_deg"], numbers, "o-", color=COLOURS[name], label=each["what"])
-        axes.set(xlabel="demanded turn [deg]", ylabel=f"{label} to arrive", xticks=results["turns_deg"])
-        axes.set_ylim(bottom=0.0)
-    panels[0].legend(frameon=False, fontsize=9)
-    figure.savefig(file, dpi=DPI)
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
     options = tyro.cli(Options, prog="python -m studies.learning.heading", args=arguments)
-    results = study(options)
+    given = sys.argv[1:] if arguments is None else arguments
+    made = provenance(shlex.join(["python", "-m", "studies.learning.heading", *given]), "torch", "stable_baselines3")
+    results = {**made, **study(options)}
     write_atomically(options.out / "heading.json", (json.dumps(results, indent=1) + "\n").encode())
     draw(results, options.out / "heading.png")
     (options.out / "heading.md").write_text(table(results), encoding="utf-8")

@@ -36,6 +36,7 @@ from seastar_gym.simulator import State
 from studies.learning.bound import WAYPOINT_RADIUS, name
 from studies.learning.branches import Branches, Interval
 from studies.learning.coasting import Coasting, fit_coasting
+from studies.provenance import provenance
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -215,7 +216,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = tyro.cli(Options, prog="python -m studies.learning.pentagon", args=arguments)
     results = study(options)
     given = sys.argv[1:] if arguments is None else arguments
-    results |= {"command": shlex.join(["python", "-m", "studies.learning.pentagon", *given])}
+    results |= provenance(shlex.join(["python", "-m", "studies.learning.pentagon", *given]))
     if options.out is not None:
         write_atomically(options.out, (json.dumps(results, indent=1) + "\n").encode())
     if not results["decisions"]:

@@ -23,9 +23,10 @@ from seastar_gym.scene.actuators.pulse import pulse
 from studies.measurements.curves import PHASES, Curve, read_curves
 from studies.measurements.fit import Fit, fit, predict
 from studies.measurements.model import MODELS
-from studies.measurements.pictures import HEATING_SHARE, draw_curves
+from studies.measurements.pictures import HEATING_SHARE, draw
 from studies.measurements.swims import FIDELITY, GAITS, STROKES, actuators, distances
 from studies.parser import study_parser
+from studies.provenance import provenance
 
 CHOSEN = "delay"
 """The model of `SmaLimb`."""
@@ -145,9 +146,10 @@ def main() -> None:
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     console, curves = Console(), read_curves()
-    fits, figures = study_model(CHOSEN, curves)
+    _, figures = study_model(CHOSEN, curves)
     print_fits(console, figures, curves)
-    results: dict[str, Any] = {"model": CHOSEN, "fits": figures}
+    command = "python -m studies.measurements.limbs" + " --models" * options.models + " --swims" * options.swims
+    results: dict[str, Any] = {**provenance(command, "scipy"), "model": CHOSEN, "fits": figures}
     if options.models:
         all_models = {name: summary(study_model(name, curves)[1]) for name in MODELS}
         columns = ("model", f"curves below {AIM}", "error", "AIC", "between", "beyond")
@@ -156,7 +158,7 @@ def main() -> None:
     if options.swims:
         results["gaits"], results["swims"] = list(GAITS), study_swims(console)
     (options.out / "limbs.json").write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
-    draw_curves(fits, options.out / "limbs.png")
+    draw(results, options.out / "limbs.png")
 
 
 if __name__ == "__main__":

@@ -1,16 +1,16 @@
-"""Pictures and costs of scenes that differ from the default; writes `gallery.md`.
+"""Pictures and costs of scenes that differ from the default; writes `gallery.md` and `gallery.json`.
 
 A picture shows the robot at rest (grey), at the end of heating (blue) and its hub's path. The cost is the processor
 time of a stroke of random commands relative to that of the default scene. Scenes take turns, stroke by stroke, so that
 other work of the machine affects all of them alike, and the median over strokes counts.
 """
 
-import os
-import platform
+import json
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.limb import Limb
 from seastar_gym.simulator import Simulator
 from studies.parser import study_parser
+from studies.provenance import footer, provenance
 from studies.style import INK, subplots
 
 Floats = NDArray[np.float64]
@@ -148,10 +149,10 @@ def draw(exhibit: Exhibit, file: Path, strokes: int = STROKES) -> None:
     axes.set_xlim(-128, 128)
     axes.set_ylim(-128, 128)
     axes.axis("off")
-    figure.savefig(file, dpi=80, bbox_inches="tight", pad_inches=0.02)
+    figure.savefig(file, dpi=160, bbox_inches="tight", pad_inches=0.02)
 
 
-def page(shown: Sequence[Exhibit], costs: Floats, per_step: Floats, machine: str) -> str:
+def page(results: Mapping[str, Any]) -> str:
     """Page of the gallery in Markdown."""
     lines = [
         "# Gallery",
@@ -159,40 +160,51 @@ def page(shown: Sequence[Exhibit], costs: Floats, per_step: Floats, machine: str
         "Scenes that differ from the default. The robot is grey at rest and blue at the end of the first heating, and",
         f"its hub's path over {STROKES} strokes is red. The bar is 50 mm long. The cost is the processor time of a",
         "stroke of random commands relative to the default scene in the same run, to within a few per cent",
-        f"(`python -m studies.scenes.gallery`; {machine}; {ROBOTS} robots, one thread, fidelity `balanced`). Thin tips",
-        "take more Newton iterations, and some of these a regularised matrix.",
+        f"({ROBOTS} robots, one thread, fidelity `balanced`). Thin tips take more Newton iterations, and some of these",
+        "a regularised matrix. [Films of the tasks](environments.md#films-of-the-tasks) are with the environments.",
         "",
         "| | scene | cost | Newton iterations per step |",
         "|---|---|---:|---:|",
     ]
-    for exhibit, cost, iterations in zip(shown, costs, per_step, strict=True):
-        picture = f"![{exhibit.name}](gallery/{_file_name(exhibit)})"
-        lines.append(f"| {picture} | **{exhibit.name}**<br>`{exhibit.code}` | {cost:.2f} | {iterations:.2f} |")
-    return "\n".join(lines) + "\n"
+    for exhibit in exhibits():
+        picture, found = f"![{exhibit.name}](gallery/{_file_name(exhibit)})", results["scenes"][exhibit.name]
+        numbers = f"{found['cost']:.2f} | {found['iterations_per_step']:.2f}"
+        lines.append(f"| {picture} | **{exhibit.name}**<br>`{exhibit.code}` | {numbers} |")
+    return "\n".join([*lines, "", "---", "", footer(results, "gallery.json"), ""])
 
 
 def _file_name(exhibit: Exhibit) -> str:
     return exhibit.name.replace(" ", "_") + ".png"
 
 
-def make_gallery(out: Path, machine: str, rounds: int = ROUNDS, n_robots: int = ROBOTS, strokes: int = STROKES) -> None:
-    """Write the page and its pictures into a folder; machine: Text about the machine for the page."""
+def draw_all(out: Path, strokes: int = STROKES) -> None:
+    """Write the pictures into a folder."""
     (out / "gallery").mkdir(parents=True, exist_ok=True)
-    shown = exhibits()
-    for exhibit in shown:
+    for exhibit in exhibits():
         draw(exhibit, out / "gallery" / _file_name(exhibit), strokes)
-    (out / "gallery.md").write_text(page(shown, *measure_costs(shown, rounds, n_robots), machine), encoding="utf-8")
+
+
+def measured(rounds: int = ROUNDS, n_robots: int = ROBOTS) -> dict[str, Any]:
+    """Costs of all scenes as plain data."""
+    shown = exhibits()
+    found = zip(shown, *measure_costs(shown, rounds, n_robots), strict=True)
+    scenes = {one.name: {"cost": round(cost, 3), "iterations_per_step": round(each, 3)} for one, cost, each in found}
+    return {**provenance("python -m studies.scenes.gallery"), "scenes": scenes}
 
 
 def main() -> None:
     """Command line: write the gallery and print its page."""
     parser = study_parser("studies.scenes.gallery", __doc__)
     parser.add_argument("--out", type=Path, default=Path("docs"), help="folder of the page (default: %(default)s)")
-    named = f"{os.cpu_count()} cores, {platform.machine()}"
-    parser.add_argument("--machine", default=named, help="name of the machine on the page (default: %(default)s)")
+    parser.add_argument("--draw-only", action="store_true", help="draw the pictures, measure nothing")
     options = parser.parse_args()
-    make_gallery(options.out, options.machine)
-    print((options.out / "gallery.md").read_text(encoding="utf-8"))
+    draw_all(options.out)
+    if options.draw_only:
+        return
+    results = measured()
+    (options.out / "gallery.json").write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+    (options.out / "gallery.md").write_text(page(results), encoding="utf-8")
+    print(page(results))
 
 
 if __name__ == "__main__":

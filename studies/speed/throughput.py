@@ -25,7 +25,7 @@ from studies.speed.peak import peak_gigaflops, peak_speedup
 from studies.speed.process import FIRST_STROKE, TIMED, environment_share, memory_per_robot, process_seconds
 from studies.speed.strokes import cost_over_nodes, exponent, iteration_seconds, real_time_factors, threads_speedup
 from studies.speed.timing import machine
-from studies.style import subplots
+from studies.style import CYCLE, FAINT, INK, subplots
 
 CHAPTER = 1.0
 """The chapter's real-time factor at h = 3 ms: one robot, one thread of an AMD Ryzen 1950X (Fig. 13.9)."""
@@ -154,20 +154,18 @@ def write_csv(figures: list[Figure], curves: dict[str, list[tuple[int, float]]],
 def draw(curves: dict[str, list[tuple[int, float]]], path: Path) -> None:
     """Draw the real-time factor over the batch size, and the cost over the nodes per limb."""
     figure, (left, right) = subplots(1, 2, figsize=(10, 4.2))
-    for threads, colour in ((1, "#4477aa"), (2, "#ee6677")):
+    for threads, colour in ((1, CYCLE[0]), (2, CYCLE[1])):
         x, y = np.array(curves[f"batch, {threads} thread{'s' * (threads > 1)}"]).T
         left.loglog(x, y, "o-", color=colour, label=f"{threads} thread{'s' * (threads > 1)}")
-    left.axhline(CHAPTER, color="0.4", ls="--", lw=1)
-    left.text(BATCHES[-1], CHAPTER * 1.15, "the chapter", ha="right", color="0.3")
-    left.set(
-        xlabel="robots in the batch", ylabel="simulated over computing seconds", title="Real-time factor, h = 3 ms"
-    )
+    left.axhline(CHAPTER, color=FAINT, ls="--", lw=1)
+    left.text(BATCHES[-1], CHAPTER * 1.15, "the chapter's code", ha="right", color=INK)
+    left.set(xlabel="robots in the batch", ylabel="simulated over computing time", title="Speed (implicit Euler, 3 ms)")
     left.legend()
     n, cost = np.array(curves["us per step over N"]).T
-    right.loglog(n, cost, "o-", color="#4477aa", label="measured")
+    right.loglog(n, cost, "o-", label="measured")
     nodes: NDArray[np.float64] = 5 * n - 4
-    right.loglog(n, cost[1] * nodes / nodes[1], "--", color="0.4", lw=1, label="proportional to the number of nodes")
-    right.set(xlabel="nodes per limb N", ylabel="time per robot and iteration [µs]", title="Cost over resolution")
+    right.loglog(n, cost[1] * nodes / nodes[1], "--", color=FAINT, lw=1, label="proportional to the number of nodes")
+    right.set(xlabel="nodes per limb N", ylabel="time per robot and iteration [µs]", title="Cost of a Newton iteration")
     right.set_xticks(n, [f"{int(k)}" for k in n])
     right.minorticks_off()
     right.legend()

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.evaluation.many import mean_with_interval
-from seastar_gym.evaluation.pictures import COLOURS, FAINT_INK
 from seastar_gym.files import write_atomically
-from studies.style import new_figure
+from studies.provenance import footer
+from studies.style import CYCLE, FAINT, as_numbers, subplots
 
 UNITS = {
     "miswired": "seconds to the last waypoint, 400 if it is not reached",
@@ -19,6 +19,8 @@ UNITS = {
     "station": "mean distance from the station after 30 s [mm]",
 }
 """Measures in words, by challenge."""
+SHORT = {"miswired": "seconds to the last waypoint", "station": "mean distance from the station [mm]"}
+"""What the picture says in their place."""
 MORE_IS_BETTER = ("prey", "fast-prey")
 ORDER = ("rest", "greedy", "planner", "adaptive", "informed", "PPO", "PPO, memory", "RecurrentPPO")
 """Agents from top to bottom."""
@@ -121,40 +123,50 @@ def table(row: Row) -> str:
 
 
 def draw(rows: Sequence[Row], file: Path) -> None:
-    """Draw means and intervals of all agents, a panel for every task."""
-    columns = min(3, len(rows))
+    """Draw means and intervals of all agents, a panel for every task with the agents that have swum it."""
+    columns = min(2, len(rows))
     lines = -(-len(rows) // columns)
-    figure = new_figure(3.4 * columns, 2.2 * lines + 0.3)
-    panels = figure.subplots(lines, columns, squeeze=False).flat
-    shown = [agent for agent in ORDER if any(agent in row.agents for row in rows)]
+    figure, grid = subplots(lines, columns, figsize=(3.6 * columns, 2.5 * lines + 0.4), squeeze=False)
+    panels = iter(grid.flat)
     for axes, row in zip(panels, rows, strict=False):
-        for agent, seeds in row.in_order:
-            place = shown.index(agent)
-            mean, low, high = mean_with_interval(np.concatenate(seeds))
-            colour = COLOURS[0] if agent.startswith(("PPO", "Rec")) else FAINT_INK
-            axes.plot([low, high], [place, place], color=colour, lw=2.5, solid_capstyle="butt")
-            axes.plot(mean, place, "o", color=colour, ms=5)
-        axes.set_yticks(range(len(shown)), shown, fontsize=8)
-        axes.set_ylim(-0.5, len(shown) - 0.5)
-        axes.set_title(row.id, fontsize=9)
-        axes.set_xlabel(UNITS[row.challenge].split(",")[0], fontsize=7)
-        axes.tick_params(labelsize=8)
-        axes.set_xlim(left=-0.02 * axes.get_xlim()[1])
-        if row.challenge == "station":
-            axes.set_xscale("log")
-            axes.set_xlim(0.3, 200.0)
-        axes.invert_yaxis()
-        axes.grid(axis="x", alpha=0.3)
-    for axes in list(panels):
+        _draw_row(axes, row)
+    for axes in panels:
         axes.set_axis_off()
-    figure.savefig(file, dpi=150)
+    handles = [grid[0, 0].plot([], [], "o-", color=colour, lw=2.5)[0] for colour in (FAINT, CYCLE[0])]
+    figure.legend(handles, ["rule or planner", "learned"], title="mean over episodes and its 95 % interval",
+                  loc="outside upper center", ncols=2)  # fmt: skip
+    figure.savefig(file)
+
+
+def _draw_row(axes: Any, row: Row) -> None:
+    names = [agent for agent, _ in row.in_order]
+    for place, (agent, seeds) in enumerate(row.in_order):
+        mean, low, high = mean_with_interval(np.concatenate(seeds))
+        colour = CYCLE[0] if agent.startswith(("PPO", "Rec")) else FAINT
+        axes.plot([low, high], [place, place], color=colour, lw=2.5, solid_capstyle="butt")
+        axes.plot(mean, place, "o", color=colour, ms=5)
+    axes.set_yticks(range(len(names)), names)
+    axes.set_ylim(len(names) - 0.5, -0.5)
+    better = "more is better" if row.challenge in MORE_IS_BETTER else "less is better"
+    axes.set_title(row.id)
+    axes.set_xlabel(f"{SHORT.get(row.challenge, UNITS[row.challenge])}\n({better})", fontsize="small")
+    axes.set_xlim(left=-0.02 * axes.get_xlim()[1])
+    if row.challenge == "station":
+        axes.set_xscale("log")
+        axes.set_xlim(0.3, 200.0)
+        as_numbers(axes.xaxis)
+
+
+def page(results: Mapping[str, Any], ids: Mapping[str, str], picture: str) -> str:
+    """The page in Markdown. picture: Its name."""
+    rows, settings = rows_of(results, ids), results["settings"]
+    text = INTRODUCTION.format(command="`python -m studies.tasks`", last=settings["episodes"] - 1, **settings)
+    tables = "\n\n".join(map(table, rows))
+    return f"{text}\n![Means and intervals]({picture})\n\n{tables}\n\n{footer(results, 'tasks.json')}\n"
 
 
 def write_page(results: Mapping[str, Any], ids: Mapping[str, str], out: Path) -> None:
     """Write the page and the picture beside the results."""
-    rows, settings = rows_of(results, ids), results["settings"]
-    text = INTRODUCTION.format(command="`python -m studies.tasks`", last=settings["episodes"] - 1, **settings)
     picture = out.with_suffix(".png")
-    draw(rows, picture)
-    tables = "\n\n".join(map(table, rows))
-    write_atomically(out.with_suffix(".md"), f"{text}\n![Means and intervals]({picture.name})\n\n{tables}\n".encode())
+    draw(rows_of(results, ids), picture)
+    write_atomically(out.with_suffix(".md"), page(results, ids, picture.name).encode())

@@ -22,6 +22,7 @@ import tyro
 from seastar_gym import TASKS
 from seastar_gym.files import write_atomically
 from seastar_gym.scene.numerics import Fidelity
+from studies.provenance import provenance
 from studies.tasks.controllers import CONTROLLERS, make_controller
 from studies.tasks.episodes import Episodes, measure, swim
 from studies.tasks.learning import WRAPS, evaluate, train
@@ -89,7 +90,8 @@ def cell(id: str, agent: str, seed: int, options: Options) -> dict[str, Any]:
 def read_cells(options: Options) -> dict[str, Any]:
     """Results in the output file, or empty ones; ValueError if they were made with other settings."""
     if not options.out.is_file():
-        return {"settings": options.settings, "cells": {}}
+        made = provenance("python -m studies.tasks", "torch", "stable_baselines3")
+        return {**made, "settings": options.settings, "cells": {}}
     results: Any = json.loads(options.out.read_text(encoding="utf-8"))
     if results.get("settings") != options.settings:
         raise ValueError(f"{options.out} has results of {results.get('settings')}, not of {options.settings}.")

@@ -1,41 +1,42 @@
 """Measured over predicted speeds, with intervals."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from studies.style import DPI, FAINT, INK, subplots
-from studies.validation.inference import Prediction
-from studies.validation.speeds import Condition
+from studies.style import CYCLE, DPI, INK, subplots
 
-Floats = NDArray[np.float64]
-
-COLOURS = {0: "#3366aa", 10: "#118855", 30: "#cc7a00", 40: "#cc3355", 50: "#8844aa"}
+COLOURS = {0: CYCLE[0], 10: CYCLE[2], 30: CYCLE[1], 40: CYCLE[3], 50: CYCLE[4]}
 AUTHORS = 0.19
 """Mean error of the authors' own simulation."""
+TOP = 100.0
+"""Largest predicted speed of the axes [mm/s]."""
 
 
-def draw_speeds(conditions: list[Condition], prediction: Prediction, chosen: list[int], title: str, file: Path) -> None:
+def draw(results: Mapping[str, Any], file: Path) -> None:
     """Scatter plot: measured speed over prediction, 90 % intervals, and speeds that were identified from as rings."""
-    figure, axis = subplots(figsize=(6.2, 6.0))
-    top = 100.0
-    line = np.array([0.0, top])
-    axis.plot(line, line, color=INK, lw=1.0)
-    axis.fill_between(line, (1.0 - AUTHORS) * line, (1.0 + AUTHORS) * line, color="0.93", zorder=0)
-    axis.text(99.0, 60.0, "grey: ±19 %,\nthe authors' mean error", color=FAINT, fontsize=8, ha="right", va="top")
-    for k, condition in enumerate(conditions):
-        x, y = 1e3 * prediction.middle[k], 1e3 * condition.speed
-        colour, used = COLOURS[condition.liquid_metal], k in chosen
-        ends = [[x - 1e3 * prediction.low[k]], [1e3 * prediction.high[k] - x]]
-        axis.errorbar(x, y, xerr=ends, color=colour, lw=0.7, alpha=0.35)
-        axis.plot(x, y, "o", ms=8 if used else 5, mfc="white" if used else colour, color=colour, mew=1.6)
+    figure, axes = subplots(figsize=(6.4, 6.4))
+    line = np.array([0.0, TOP])
+    axes.plot(line, line, color=INK, lw=1.0, label="predicted as measured")
+    axes.fill_between(line, (1.0 - AUTHORS) * line, (1.0 + AUTHORS) * line, color="0.93", zorder=0,
+                      label=f"±{100 * AUTHORS:.0f} %: mean error of the\nauthors' own simulation")  # fmt: skip
+    for one in results["speeds_mm_per_s"]:
+        x, y = one["predicted"], one["measured"]
+        colour, used = COLOURS[one["liquid_metal"]], one["identified_from"]
+        axes.errorbar(x, y, xerr=[[x - one["low"]], [one["high"] - x]], color=colour, lw=0.7, alpha=0.35)
+        axes.plot(x, y, "o", ms=8 if used else 5, mfc="white" if used else colour, color=colour, mew=1.6)
     for material, colour in COLOURS.items():
-        axis.plot([], [], "o", ms=5, color=colour, label=f"{material} % liquid metal")
-    axis.plot([], [], "o", ms=8, mfc="white", mew=1.6, color=INK, label="identified from")
-    axis.set(
-        xlim=(0.0, top), ylim=(0.0, 70.0), xlabel="predicted speed and 90 % interval [mm/s]",
-        ylabel="measured speed [mm/s]", title=title,
+        axes.plot([], [], "o", ms=5, color=colour, label=f"{material} % liquid metal in the limbs")
+    axes.plot(
+        [], [], "o", ms=8, mfc="white", mew=1.6, color=INK, label="one of the four speeds that\nidentify the model"
+    )
+    off = 100.0 * results["models"]["full"]["score"]["error"]
+    predicted = sum(not one["identified_from"] for one in results["speeds_mm_per_s"])
+    axes.set(
+        xlim=(0.0, TOP), ylim=(0.0, 92.0), xlabel="predicted speed and its 90 % interval [mm/s]",
+        ylabel="measured speed [mm/s]", title=f"{predicted} predicted speeds, {off:.0f} % off on average",
     )  # fmt: skip
-    axis.legend(fontsize=8, loc="upper left")
+    axes.legend(fontsize="small", loc="upper left", ncols=2)
     figure.savefig(file, dpi=DPI)

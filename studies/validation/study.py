@@ -19,9 +19,10 @@ from rich.console import Console
 from rich.table import Table
 
 from studies.parser import study_parser
+from studies.provenance import provenance
 from studies.validation.inference import MODEL, SCATTER, Score, effective, hindsight, one_speed, predict, score, weights
 from studies.validation.luck import other_fours, scores
-from studies.validation.pictures import draw_speeds
+from studies.validation.pictures import draw
 from studies.validation.priors import UNKNOWNS, samples
 from studies.validation.separation import best_known, sweeps_told, told
 from studies.validation.simulate import all_speeds, speeds
@@ -172,7 +173,6 @@ def main() -> None:
     console.print(f"Best of all samples, if told all speeds: {100 * analyses['full']['hindsight']:.1f} % off.")
     console.print(f"Best known: {result['best_known']}, sweeps: {result['sweeps']}")
     arguments.out.mkdir(parents=True, exist_ok=True)
+    result = {**provenance("python -m studies.validation", "scipy"), **result}
     (arguments.out / "validation.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    full, one = analyses["full"], analyses["full"]["score"]
-    title = f"{len(conditions) - len(full['chosen'])} predicted speeds: {100 * one.error:.0f} % off on average"
-    draw_speeds(conditions, full["prediction"], full["chosen"], title, arguments.out / "validation.png")
+    draw(result, arguments.out / "validation.png")

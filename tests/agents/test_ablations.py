@@ -7,7 +7,8 @@ import pytest
 from seastar_gym import RewardWeights
 from seastar_gym.envs.task import SwimTask
 from studies.learning import ablations
-from studies.learning.ablations import VARIANTS, Options, Variant, final_strokes, learn, main, table
+from studies.learning.ablations import VARIANTS, Options, Variant, learn, main
+from studies.learning.ablations_page import final_strokes, table
 
 TINY = {"num_envs": 8, "rollout": 8, "batch_size": 32, "epochs": 1, "hidden": (8,), "max_episode_time": 10.0}
 

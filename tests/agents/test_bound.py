@@ -18,8 +18,6 @@ from studies.learning.bound import (
     main,
     measure,
     mixed_speed,
-    name,
-    search_line,
     search_path,
 )
 
@@ -58,12 +56,6 @@ def test_directions_are_turned_and_mirrored():
     np.testing.assert_allclose(angles, expected, atol=1e-12)
 
 
-def test_the_line_search_finds_the_alternation():
-    speed, actions = search_line(FAST, 0.0, "pairs", beam=4)
-    assert speed > 4.4e-3
-    assert {name(command) for command in command_table("pairs", 5)[actions[-6:]]} == {"{3+,4-}", "{2+,5-}"}
-
-
 def test_the_path_search_visits_all_waypoints_or_says_that_it_did_not():
     corner = np.array([[0.03, 0.0], [0.03, 0.03]])
     assert 8 <= len(search_path(FAST, corner, "pairs", beam=4)) <= 12
@@ -80,7 +72,7 @@ def test_the_pentagon_alone_can_be_searched_at_any_fidelity_and_nothing_is_writt
 @pytest.mark.slow
 def test_the_study_writes_numbers_and_a_picture(tmp_path):
     file = tmp_path / "bound.json"
-    assert main(["--line-beam", "1", "--pentagon-beam", "1", "--agents", "greedy", "--out", str(file)]) == 0
+    assert main(["--pentagon-beam", "1", "--agents", "greedy", "--out", str(file)]) == 0
     results = json.loads(file.read_text(encoding="utf-8"))
     assert results["fastest_gaits"][0]["searched"] == 30
     assert len(results["pentagon"]["gait"]) == results["pentagon"]["strokes"] > 150

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from refusals import assert_refused
-from seastar_gym import Scene, __version__
+from seastar_gym import TASKS, Scene, __version__
 from seastar_gym.benchmark import page
 from seastar_gym.benchmark.command import main
 from seastar_gym.benchmark.episodes import require_seen, swim_episodes
@@ -100,6 +100,14 @@ def test_a_task_of_another_measure_without_a_batch_is_swum_on_its_held_out_split
     swum = swim_episodes(OTHER, scripted("rest"), [0, 1])
     side = np.hypot(*env.reset(seed=0)[0][182:184]) * 100.0
     np.testing.assert_allclose(MEASURES["station"].of(swum), side, rtol=1e-3)
+
+
+@pytest.mark.parametrize("id", TASKS)
+def test_every_task_is_measured_by_what_it_asks_for(id):
+    """Prey that is caught, the distance from the station, otherwise the time until the last waypoint."""
+    challenge = TASKS[id][0]
+    wanted = MEASURES["prey"] if "prey" in challenge else MEASURES.get(challenge, SECONDS)
+    assert measure_of(gym.make(id, fidelity="fast").unwrapped) is wanted
 
 
 def test_an_agent_that_cannot_see_is_refused_before_the_first_decision():

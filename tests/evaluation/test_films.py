@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from refusals import assert_refused
-from seastar_gym.evaluation.films import CLOSING_SECONDS, film, film_format, shrunk
+from seastar_gym.evaluation.films import CLOSING_SECONDS, film, film_format, frequent_colours, shrunk, write_gif
 
 BLUE, RED = np.array([20, 60, 200], np.uint8), np.array([200, 30, 30], np.uint8)
 
@@ -34,6 +34,18 @@ def test_a_gif_shows_every_picture_and_rests_on_the_last(tmp_path, fps):
                 np.testing.assert_allclose(np.asarray(shown.convert("RGB")), shrunk(pictures[number]), atol=12)
     assert times[:2] == [round(1000 / fps)] * 2
     assert sum(times[2:]) == pytest.approx(1000 * (1 / fps + CLOSING_SECONDS), rel=0.1)
+
+
+def test_a_small_flat_area_keeps_its_colour_among_many_others(tmp_path):
+    """As a waypoint does, whose pale fill is near the paper's colour, beside lines that are blended."""
+    many = np.full((120, 160, 3), 250, np.uint8)
+    many[20:100, 20:140] = np.random.default_rng(0).integers(0, 255, (80, 120, 3))
+    pale = np.array([219, 231, 245], np.uint8)
+    many[4:12, 4:12] = pale
+    assert frequent_colours(many, 2).tolist() == [[250] * 3, pale.tolist()]
+    write_gif([many], tmp_path / "film.gif", 10.0)
+    with Image.open(tmp_path / "film.gif") as shown:
+        np.testing.assert_array_equal(np.asarray(shown.convert("RGB"))[8, 8], pale)
 
 
 def test_a_small_picture_is_the_mean_of_blocks():

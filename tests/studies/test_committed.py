@@ -1,10 +1,8 @@
 """Figures and tables that are committed are those of the code of today, where that is cheap to know."""
 
-import functools
-import importlib
 import json
-import operator
 import re
+import shutil
 from pathlib import Path
 from typing import get_args
 
@@ -16,9 +14,12 @@ from seastar_gym.envs.task import make_scene
 from seastar_gym.scene.fidelity import TIMED_PRESETS, promise
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__
+from studies import committed
 from studies.accuracy import timed
 from studies.accuracy.tables import two_digits
+from studies.committed import BLOCK, PICTURES, UNCOVERED, filled, is_drawn_so, main, pages, table
 from studies.learning.bound import MEASURED, MM, SETTLING
+from studies.provenance import footer, machine, provenance
 from studies.scenes.page import UNIT, transitions
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -46,32 +47,73 @@ def test_the_fastest_gaits_swim_as_fast_as_bound_json_says(period):
     np.testing.assert_allclose(speeds, [gait["mm_per_stroke"] for gait in gaits], rtol=1e-3)
 
 
-def test_the_table_of_ablations_is_that_of_its_numbers():
-    ablations = pytest.importorskip("studies.learning.ablations")
+@pytest.mark.parametrize("name", PICTURES)
+def test_pictures_are_those_of_their_numbers(name):
+    """`python -m studies.committed` draws them again. fidelities.png and others are written by studies, too."""
+    pytest.importorskip("matplotlib")
+    assert is_drawn_so(DOCS, name)
+
+
+def test_another_number_makes_another_picture(tmp_path):
+    """The comparison tells a curve that moved by one per cent."""
+    pytest.importorskip("matplotlib")
+    shutil.copy(DOCS / "bound.png", tmp_path)
+    results = read("bound.json")
+    results["mm_per_stroke"]["learned"] = [1.01 * speed for speed in results["mm_per_stroke"]["learned"]]
+    (tmp_path / "bound.json").write_text(json.dumps(results), encoding="utf-8")
+    assert not is_drawn_so(tmp_path, "bound.png")
+
+
+def test_pages_say_what_their_numbers_say():
+    """`python -m studies.committed` fills them again."""
+    assert [file.name for file, text in pages(DOCS) if file.read_text(encoding="utf-8") != text] == []
+
+
+def test_a_number_that_was_changed_by_hand_is_noticed():
     page = (DOCS / "results.md").read_text(encoding="utf-8")
-    missing = [line for line in ablations.table(read("ablations.json")).splitlines() if line not in page]
-    assert not missing
+    assert "| discount 0.95 | 181.3 " in page
+    changed = page.replace("| discount 0.95 | 181.3 ", "| discount 0.95 | 161.3 ")
+    assert filled(DOCS, changed) == page
 
 
-TABLES = {
-    "promises.json": ("accuracy.md", "studies.accuracy.promises", "summary", ()),
-    "heading.json": ("gaits.md", "studies.learning.heading", "table", ()),
-    "fidelities.json": ("fidelities.md", "studies.learning.fidelities.tables", "as_markdown", ()),
-    "in_time.json": ("in_time.md", "studies.learning.in_time.tables", "as_markdown", ("runs",)),
-    "gaits.json": ("gaits.md", "studies.gaits.pages", "tables", ()),
-}
-"""Pages with tables of committed numbers: page, module and function that writes them, keys of their part."""
+def test_every_picture_is_covered_or_has_a_command():
+    pictures = {file.name for file in DOCS.glob("*.png")}
+    assert pictures == PICTURES.keys() | UNCOVERED.keys()
+    assert not PICTURES.keys() & UNCOVERED.keys()
 
 
-@pytest.mark.parametrize("name", TABLES)
-def test_tables_of_pages_are_those_of_their_numbers(name):
-    page, module, function, keys = TABLES[name]
-    pytest.importorskip("stable_baselines3")
-    results = functools.reduce(operator.getitem, keys, read(name))
-    written = getattr(importlib.import_module(module), function)(results)
-    text = (DOCS / page).read_text(encoding="utf-8")
-    lines = [line for line in written.splitlines() if line.startswith("| ")]
-    assert len(lines) > 3 and not [line for line in lines if line not in text]
+def test_every_file_of_numbers_has_a_footer():
+    text = "".join(file.read_text(encoding="utf-8") for file in DOCS.glob("*.md"))
+    assert [file.name for file in DOCS.glob("*.json") if f"*Numbers: [{file.name}]" not in text] == []
+
+
+def test_a_table_of_no_study_is_refused():
+    with pytest.raises(ValueError, match="No table is called 'luck'"):
+        table(DOCS, "luck")
+
+
+def test_the_command_fills_pages_and_names_what_is_stale(tmp_path, monkeypatch, capsys):
+    """A page with an empty block is stale, and is not after the command."""
+    for file in [*DOCS.glob("*.json"), DOCS / "results.md"]:
+        shutil.copy(file, tmp_path)
+    page = tmp_path / "results.md"
+    page.write_text(BLOCK.sub(r"\1\4", page.read_text(encoding="utf-8")), encoding="utf-8")
+    monkeypatch.setattr(committed, "PICTURES", {})
+    monkeypatch.setattr(committed, "whole_pages", lambda docs: {})
+    monkeypatch.setattr("sys.argv", ["committed", "--docs", str(tmp_path), "--check"])
+    assert main() == 1 and capsys.readouterr().out == "results.md\n"
+    monkeypatch.setattr("sys.argv", ["committed", "--docs", str(tmp_path)])
+    assert main() == 0
+    assert page.read_text(encoding="utf-8") == (DOCS / "results.md").read_text(encoding="utf-8")
+
+
+def test_footers_say_command_versions_and_machine_and_what_is_not_known():
+    made = provenance("python -m studies.luck", "scipy")
+    line = footer(made, "luck.json")
+    assert "made by `python -m studies.luck`" in line and f"seastar-gym {__version__}, python 3." in line
+    assert f"numpy {np.__version__}" in line and "scipy " in line and f"on {machine()}" in line
+    assert "Not recorded" not in line
+    assert footer({"command": "x", "machine": "y"}, "luck.json").endswith("Not recorded by that run: versions.*")
 
 
 def test_the_tables_of_presets_are_those_that_come_with_the_package():
@@ -94,4 +136,4 @@ def test_the_page_that_swims_has_the_strokes_of_the_simulator():
 @pytest.mark.parametrize("name", ["work_precision.json", "promises.json"])
 def test_measured_errors_are_of_this_version(name):
     results = read(name)
-    assert results.get("seastar-gym", results.get("version")) == __version__
+    assert results.get("version", results.get("versions", {}).get("seastar-gym")) == __version__

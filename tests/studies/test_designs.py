@@ -11,10 +11,13 @@ import pytest
 if find_spec("pyarrow") is None or find_spec("pandas") is None:
     pytest.skip("the extra sweep is not installed", allow_module_level=True)
 
+import pandas
+
 from seastar_gym.scene import Seastar
 from seastar_gym.sweep.executors.here import Here
 from seastar_gym.sweep.parts import read_parts
 from seastar_gym.sweep.run import run
+from studies.designs.pictures import COLOURS, draw, summary
 from studies.designs.space import BODIES, SPREADS, Body, all_designs, inner_half, masses, spread
 from studies.designs.study import scene_of
 
@@ -63,3 +66,23 @@ def test_the_page_tells_what_was_measured():
             assert f"{speed:.2f}" in page
     gain = found["fastest"]["mm_per_s"]["reference"] / found["the chapter's"]["mm_per_s"]["reference"]
     assert math.isclose(gain, 5.4, abs_tol=0.06)
+
+
+def test_the_picture_is_drawn_from_what_is_written(tmp_path):
+    """Medians and percentiles go to the file, so that the picture can be drawn again without the designs."""
+    rng = np.random.default_rng(0)
+    rows = 4000
+    table = pandas.DataFrame({
+        "robot.limb_length": rng.uniform(0.05, 0.15, rows), "actuator.peak_angle": rng.uniform(0.2, 1.2, rows),
+        "robot.youngs_modulus": 1e6 * np.exp(rng.uniform(np.log(0.2), np.log(5.0), rows)),
+        "taper": rng.choice(list(COLOURS), rows), "n_limbs": rng.integers(3, 8, rows),
+        "radius": rng.choice([0.8e-3, 2e-3], rows), "speed": 5e-3 * rng.gamma(4.0, 0.3, rows),
+    })  # fmt: skip
+    found = json.loads((DOCS / "designs.json").read_text(encoding="utf-8"))
+    found["picture"] = json.loads(json.dumps(summary(table)))
+    some = table[(table.taper == 0.5) & (table["actuator.peak_angle"] < 0.2 + 1.0 / 24.0)]
+    expected = 1e3 * float(np.median(some.speed))
+    assert found["picture"]["curves"]["actuator.peak_angle"]["0.5"]["50"][0] == pytest.approx(expected, rel=0.03)
+    assert found["picture"]["spreads"]["radius"].keys() == {"0.8", "2.0"}
+    draw(found, tmp_path / "designs.png")
+    assert (tmp_path / "designs.png").stat().st_size > 50_000

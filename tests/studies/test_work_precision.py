@@ -75,13 +75,13 @@ def test_page_and_picture_are_written_and_nothing_is_measured_twice(small, tmp_p
     study.main()
     found = json.loads(out.with_suffix(".json").read_text())
     assert set(found["problems"]) == {"chapter's robot", "short"}
-    assert found["machine"] in out.read_text() and found["numba"] in out.read_text()
+    assert found["machine"] in out.read_text() and found["versions"]["numba"] in out.read_text()
     for name in PRESETS:
         assert f"| `{name}` |" in out.read_text()
     assert (tmp_path / "page_problems.png").stat().st_size > 20_000
     monkeypatch.setattr(study, "examine", None)
     study.main()
-    found["numba"] = "0.1"
+    found["versions"]["numba"] = "0.1"
     out.with_suffix(".json").write_text(json.dumps(found))
     with pytest.raises(SystemExit, match="another machine or version"):
         study.main()

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from seastar_gym.envs.swimming import Swimming
 from seastar_gym.envs.tasks.numbered import Split
@@ -16,6 +16,9 @@ Range = tuple[float, float]
 @dataclass(frozen=True)
 class Challenge(ABC):
     """Base of all challenges."""
+
+    NAME: ClassVar[str] = ""
+    """Name of what it is measured by in `seastar_gym.benchmark.measures`; "": the time until success."""
 
     @abstractmethod
     def swimming(self, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any) -> Swimming:

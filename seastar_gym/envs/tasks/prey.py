@@ -1,7 +1,7 @@
 """`SeastarPrey-v0`: a prey that swims faster than the robot, on a course that comes back."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +76,8 @@ class Prey(Challenge):
     wanted: Number of prey that count as success.
     progress, catch, effort: Weights of the reward's terms.
     """
+
+    NAME: ClassVar[str] = "prey"
 
     speed: Range = (0.006, 0.008)
     radius: Range = (0.12, 0.2)

@@ -1,7 +1,7 @@
 """`SeastarStation-v0`: a place to keep in a current that is not known."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +74,8 @@ class Station(Challenge):
     tolerance: Distance [m] within which the station is kept.
     progress, nearness, effort: Weights of the reward's terms.
     """
+
+    NAME: ClassVar[str] = "station"
 
     current: Range = (0.001, 0.0025)
     distance: Range = (0.0, 0.05)

@@ -23,7 +23,6 @@ import torch
 import tyro
 
 from agents.hyperparameters import Hyperparameters
-from seastar_gym.certification.measure import machine
 from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.files import write_atomically
 from seastar_gym.scene.checks import require_count
@@ -32,6 +31,7 @@ from studies.learning.fidelities.pictures import draw
 from studies.learning.fidelities.scenes import CHEAP, DEAR, FIDELITIES, SWUM
 from studies.learning.fidelities.tables import as_markdown
 from studies.learning.fidelities.trainings import rounded, strokes_to_finish, train
+from studies.provenance import provenance
 
 LEARNER = Hyperparameters()
 """Hyperparameters of all trainings."""
@@ -135,7 +135,7 @@ def read_results(options: Options, command: str) -> dict[str, Any]:
     """Results in the output file, or empty ones if there is none; ValueError if the file has other settings."""
     settings = {"strokes": options.strokes, "paths": options.paths, "version": __version__}
     if not options.out.is_file():
-        facts = {"command": command, "machine": machine(), "settings": settings}
+        facts = {**provenance(command, "torch", "stable_baselines3"), "settings": settings}
         return facts | {"runs": {}, "finishing": {}}
     results: Any = json.loads(options.out.read_text(encoding="utf-8"))
     found = results.get("settings") if isinstance(results, dict) else None

@@ -67,6 +67,11 @@ def advice(results: Mapping[str, Any]) -> str:
 
 def as_markdown(results: Mapping[str, Any]) -> str:
     """All tables in Markdown."""
+    return f"{matrix_table(results)}\n\n{finishing_table(results)}\n"
+
+
+def matrix_table(results: Mapping[str, Any]) -> str:
+    """Table of the trainings and the sentences that follow from it."""
     found = trained(results)
     lines = [
         f"| trained at | seeds | training [s] | swum there | on {DEAR} | {' | '.join(PHYSICS)} | pentagon, {DEAR} |",
@@ -88,13 +93,14 @@ def as_markdown(results: Mapping[str, Any]) -> str:
             f"fidelities, {ranks.get((CHEAP, DEAR), np.nan):.2f} between {CHEAP} and {DEAR}; the lowest of all, "
             f"{ranks[lowest]:.2f}, is between {lowest[0]} and {lowest[1]}.",
         ]
-    return "\n".join([*lines, *_finishing(results), ""])
+    return "\n".join(lines)
 
 
-def _finishing(results: Mapping[str, Any]) -> list[str]:
+def finishing_table(results: Mapping[str, Any]) -> str:
+    """Table of the trainings that take the same time; empty if there is none."""
     if not results["finishing"]:
-        return []
-    lines = ["", f"| processor time | training | strokes trained | seeds | strokes on {DEAR} | pentagon |"]
+        return ""
+    lines = [f"| processor time | training | strokes trained | seeds | strokes on {DEAR} | pentagon |"]
     lines.append("|---:|---|---|---:|---:|---|")
     for budget, contestants in results["finishing"].items():
         for contestant, runs in contestants.items():
@@ -105,4 +111,4 @@ def _finishing(results: Mapping[str, Any]) -> list[str]:
                 f"| {budget} s (took {seconds(runs):.0f} s) | {contestant} | {stages} | {len(runs)} | "
                 f"{estimate(strokes_on(runs, DEAR))} | {pentagon} |"
             )
-    return lines
+    return "\n".join(lines)

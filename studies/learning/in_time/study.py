@@ -33,6 +33,7 @@ from seastar_gym.scene.numerics import Fidelity
 from studies.learning.in_time.pictures import draw
 from studies.learning.in_time.tables import as_markdown
 from studies.learning.in_time.trainings import TRAININGS, learn
+from studies.provenance import provenance
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,7 @@ def read_results(options: Options, command: str) -> dict[str, Any]:
     """Results in the output file, or empty ones if there is none; ValueError if the file has other settings."""
     settings = {name: getattr(options, name) for name in ("decisions", "fidelity", "paths")}
     if not options.out.is_file():
-        return {"command": command, "settings": settings, "runs": {}}
+        return {**provenance(command, "torch", "stable_baselines3"), "settings": settings, "runs": {}}
     results: Any = json.loads(options.out.read_text(encoding="utf-8"))
     found = results.get("settings") if isinstance(results, dict) else None
     if found != settings:

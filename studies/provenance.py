@@ -1,0 +1,66 @@
+"""Where numbers come from: the command, the versions and the machine, which a study writes beside its results.
+
+A page has them below its numbers: `footer` makes the line from the file of the results, so nobody writes it by hand.
+"""
+
+import importlib.metadata
+import os
+import platform
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from seastar_gym.version import __version__
+
+PACKAGES = ("numpy", "numba", "llvmlite")
+"""Packages that every result depends on."""
+
+
+def provenance(command: str, *packages: str) -> dict[str, Any]:
+    """Command, machine and versions, for the file of a study's results.
+
+    command: What is typed to run the study. packages: Further packages whose versions count, such as "torch".
+    """
+    versions = {"seastar-gym": __version__, "python": platform.python_version()}
+    versions |= {name: importlib.metadata.version(name) for name in (*PACKAGES, *packages)}
+    return {"command": command, "machine": machine(), "versions": versions}
+
+
+def machine() -> str:
+    """Processors of this machine in words."""
+    return f"{os.cpu_count()} cores of {_processor()}"
+
+
+def _processor() -> str:
+    """Name of the processor where Linux tells it, otherwise its architecture."""
+    facts = Path("/proc/cpuinfo")
+    lines = facts.read_text(encoding="utf-8").splitlines() if facts.is_file() else []
+    named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(named, platform.machine())
+
+
+COMMANDS = {
+    "designs.json": "python -m studies.designs",
+    "gaits.json": "python -m studies.gaits",
+    "heading.json": "python -m studies.learning.heading",
+    "limbs.json": "python -m studies.measurements.limbs --models --swims",
+    "promises.json": "python -m studies.accuracy.promises",
+    "tasks.json": "python -m studies.tasks",
+    "validation.json": "python -m studies.validation",
+}
+"""Commands of files that were written before studies recorded them."""
+
+
+def footer(results: Mapping[str, Any], file: str) -> str:
+    """Line in Markdown that says how the results in a file were made, and what the run did not record.
+
+    file: Name of the file beside the page.
+    """
+    said = f"*Numbers: [{file}]({file}), made by `{results.get('command', COMMANDS.get(file))}`"
+    versions = results.get("versions", {})
+    if versions:
+        said += f", with {', '.join(f'{name} {version}' for name, version in versions.items())}"
+    if "machine" in results:
+        said += f", on {results['machine']}"
+    missing = " and ".join(name for name in ("versions", "machine") if name not in results)
+    return f"{said}.{f' Not recorded by that run: {missing}.' if missing else ''}*"

@@ -1,0 +1,70 @@
+"""Small films of every task, for the page of the environments.
+
+The agent "adaptive", which remembers, swims the first held-out episode. A film has a picture every BETWEEN seconds of
+the robot's time and shows FPS of them a second.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from seastar_gym import TASKS
+from seastar_gym.command import run_command
+from seastar_gym.evaluation.films import Picture, shrunk, write_gif
+from studies.parser import study_parser
+from studies.tasks.controllers import CONTROLLERS, make_controller
+from studies.tasks.episodes import make_batch
+
+BETWEEN = 2.0
+"""Simulated time between two pictures [s]."""
+FPS = 10
+REST = 10
+"""Pictures for which a film rests on its end."""
+LONGEST = 120.0
+"""Simulated time after which a film ends [s]."""
+
+
+def file_name(id: str) -> str:
+    """Name of the film of a task, such as miswired_timed.gif for SeastarMiswiredTimed-v0."""
+    short = id.removeprefix("Seastar").removesuffix("-v0")
+    return f"{short.removesuffix('Timed').lower()}{'_timed' if short.endswith('Timed') else ''}.gif"
+
+
+def pictures(id: str, agent_name: str, longest: float = LONGEST, instance: int = 0) -> Iterator[Picture]:
+    """Pictures of an episode; longest: Simulated time [s]."""
+    batch: Any = make_batch(id, 1, "test", "fast", 1, render_mode="rgb_array")
+    decision_period = TASKS[id][2]
+    every = round(BETWEEN / decision_period)
+    agent = make_controller(agent_name, batch)
+    observations, info = batch.reset(seed=0, options={"instance": np.array([instance])})
+    yield shrunk(batch.render()[0])
+    for decision in range(1, round(longest / decision_period) + 1):
+        observations, _, terminated, truncated, info = batch.step(agent.act(observations, info))
+        is_over = bool(terminated[0] | truncated[0])
+        if decision % every == 0 or is_over:
+            yield shrunk(batch.render()[0])
+        if is_over:
+            break
+    batch.close()
+
+
+def main() -> None:
+    """Command line: write the films."""
+    parser = study_parser("studies.tasks.films", __doc__)
+    parser.add_argument("--ids", nargs="*", default=list(TASKS), choices=list(TASKS), metavar="ID", help="environments")
+    parser.add_argument("--agent", default="adaptive", choices=CONTROLLERS, help="who swims (default: %(default)s)")
+    parser.add_argument("--seconds", type=float, default=LONGEST, help="longest film, simulated (default: %(default)s)")
+    parser.add_argument("--instance", type=int, default=0, help="number of the episode (default: %(default)s)")
+    parser.add_argument("--out", type=Path, default=Path("docs/gallery"), help="folder (default: %(default)s)")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    for id in options.ids:
+        film = list(pictures(id, options.agent, options.seconds, options.instance))
+        write_gif(film + film[-1:] * REST, options.out / file_name(id), FPS)
+        print(f"Written: {options.out / file_name(id)}, {len(film)} pictures.", flush=True)
+
+
+if __name__ == "__main__":
+    run_command(main)
