@@ -87,8 +87,8 @@ A policy that swims the five-limb robot of the chapter along waypoints. It decid
 
 ## How it swims
 
-`python -m agents.cards` measures this. Round the pentagon, waypoints of 10 mm, and on {HELD_OUT_PATHS} random paths that no
-training draws; a swim ends after {TIME_LIMIT:g} s.
+`python -m agents.cards` measures this, round the pentagon, with waypoints of 10 mm, and on {HELD_OUT_PATHS} random paths
+that no training draws. A swim ends after {TIME_LIMIT:g} s.
 
 | fidelity | pentagon | energy [J/m] | held-out paths: mean time [s] | arrived |
 |---|---:|---:|---:|---:|

@@ -1,8 +1,8 @@
 """train.py goes all the way, stops in good order, and continues where it stopped."""
 
 import csv
-import hashlib
 import errno
+import hashlib
 import html
 import itertools
 import json

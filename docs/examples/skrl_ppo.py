@@ -74,9 +74,7 @@ class Value(DeterministicMixin, Model):
 
 def mlp(inputs: int, outputs: int) -> nn.Sequential:
     """Network with two hidden layers."""
-    return nn.Sequential(
-        nn.Linear(inputs, 128), nn.Tanh(), nn.Linear(128, 128), nn.Tanh(), nn.Linear(128, outputs)
-    )
+    return nn.Sequential(nn.Linear(inputs, 128), nn.Tanh(), nn.Linear(128, 128), nn.Tanh(), nn.Linear(128, outputs))
 
 
 def train(options: Options) -> tuple[PPO, list[float]]:

@@ -105,7 +105,7 @@ def timed(folder):
 
 @pytest.mark.parametrize("learner", ["cloning", "cql"])
 def test_offline_learners_do_what_was_recorded(timed, learner):
-    """From a few hundred decisions of one policy, either learner takes most of them again; by chance it would be 5 %."""
+    """From a few hundred decisions of one policy, either learner takes most of them again; chance would take 5 %."""
     options = OFFLINE["Options"]("", learner, updates=300, batch_size=64)
     data = OFFLINE["decisions_of"](timed)
     network, losses = OFFLINE["learn"](data, 21, options)

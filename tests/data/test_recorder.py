@@ -43,14 +43,15 @@ def test_recorded_episodes_are_those_of_one_environment():
 
 
 def test_a_learner_s_wrapper_outside_leaves_what_is_kept_as_the_environment_has_it():
-    inner = recorder()
+    anywhere = {"path": "random", "random_heading": True}
+    inner = recorder(**anywhere)
     batch = VectorSymmetryReduction(inner)
     seen, _ = batch.reset(seed=[3, 4])
     for _ in range(3):
         seen, *_ = batch.step(np.array([7, 11]))
     assert not np.array_equal(inner.episodes()[0].observations[-1], seen[0])
     for one in inner.episodes():
-        assert_swum_again(one, gym.make(TASK, **SHORT))
+        assert_swum_again(one, gym.make(TASK, **SHORT, **anywhere))
 
 
 def test_episodes_follow_each_other_and_only_the_first_have_seeds():
