@@ -65,21 +65,20 @@ def card(policy: LearnedPolicy, file: Path, sha256: str, swims: Mapping[Fidelity
     layers = ", ".join(map(str, about.hidden))
     many, choices = about.distributions
     choice = f"one of {choices} commands" if many == 1 else f"one of {choices} commands for each limb"
-    symmetric = "It is symmetric: in a turned or mirrored world it swims the turned or mirrored way. " * about.symmetry
+    symmetric = "In a turned or mirrored world it swims the turned or mirrored way. " * about.symmetry
     return f"""# Model card: {file.stem}
 
-A policy that swims the five-limb robot of the chapter along waypoints. It decides {decides}, and takes {choice}
-(`actions="{about.actions}"`).
+A policy that swims the chapter's robot along waypoints. It decides {decides}, and takes {choice}.
+{symmetric}It was trained in simulation, on random paths, and no real robot has swum by it.
 
 | | |
 |---|---|
-| file | `{file.name}`, weights with sha256 `{sha256}` |
-| input | {inputs} numbers: the shape and velocity of the limbs, {_memory(scene)}the current and the next waypoint |
-| network | layers of {layers} neurons with tanh; plain numpy runs it |
-| robot | {type(scene.robot).__name__} with {scene.robot.n_limbs} limbs, {type(scene.actuator).__name__} |
+| file | `{file.name}`, sha256 `{sha256}` |
+| input | {inputs} numbers: shape and velocity of the limbs, {_memory(scene)}two waypoints |
+| network | layers of {layers} neurons with tanh, which numpy runs |
+| environment | `actions="{about.actions}"`; {type(scene.robot).__name__} with {scene.robot.n_limbs} limbs, \
+{type(scene.actuator).__name__} |
 | licence | MIT, as the package |
-
-{symmetric}It was trained in simulation, on random paths, and no real robot has swum by it.
 
 ## Training
 
@@ -87,20 +86,20 @@ A policy that swims the five-limb robot of the chapter along waypoints. It decid
 
 ## How it swims
 
-`python -m agents.cards` measures this, round the pentagon, with waypoints of 10 mm, and on {HELD_OUT_PATHS} random paths
-that no training draws. A swim ends after {TIME_LIMIT:g} s.
+`python -m agents.cards` measures this: round the pentagon, with waypoints of 10 mm, and on {HELD_OUT_PATHS} random
+paths that no training draws. A swim ends after {TIME_LIMIT:g} s. Energy is per metre of the hub's way.
 
-| fidelity | pentagon | energy [J/m] | held-out paths: mean time [s] | arrived |
+| fidelity | pentagon | energy there [J/m] | held-out paths: mean time [s] | arrived |
 |---|---:|---:|---:|---:|
 {chr(10).join(_row(fidelity, one) for fidelity, one in swims.items())}
 
 ## Limits
 
-* It knows the chapter's robot with its drag, mass and actuators alone. How far a score carries to other physics is
-  measured in docs/fidelities.md: little.
-* It sees the whole state, and two waypoints of 0.1 to 0.2 m ahead; it was not trained on noise, currents or weak limbs.
-  docs/results.md has swims with them.
-* It does not plan: what comes after the next waypoint, it does not know.
+* It knows the chapter's robot, with its drag, its mass and its actuators. In other physics the order of policies can be
+  another one (docs/fidelities.md).
+* It sees the whole state, without noise. It was not trained on noise, currents or weak limbs; docs/results.md has swims
+  with them.
+* It sees two waypoints, 0.1 to 0.2 m apart in its training, and does not plan beyond them.
 """
 
 
@@ -116,14 +115,15 @@ def _training(training: Mapping[str, Any]) -> str:
     versions = training.get("versions", {})
     on = UNKNOWN if machine is None else f"{machine['system']}, {machine['processors']} processors"
     facts = {
-        "commands": "; ".join(f"`{command}`" for command in commands) or UNKNOWN,
+        "commands, in the version of then": "".join(f"\n  * `{command}`" for command in commands) or UNKNOWN,
         "strokes, or decisions": f"{training['strokes']:,}" if "strokes" in training else UNKNOWN,
         "seed": training.get("seed", UNKNOWN),
+        "fidelity": training.get("options", {}).get("fidelity", UNKNOWN),
         "time in simulator, policy and updates": UNKNOWN if seconds is None else f"{seconds:.0f} s",
         "machine": on,
         "versions": ", ".join(f"{name} {version}" for name, version in versions.items()) or UNKNOWN,
     }
-    return "\n".join(f"* {name}: {value}" for name, value in facts.items())
+    return "\n".join(f"* {name}: {value}" for name, value in facts.items()).replace(": \n", ":\n")
 
 
 def _row(fidelity: Fidelity, swims: Swims) -> str:

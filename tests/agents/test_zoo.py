@@ -49,7 +49,7 @@ def test_the_file_has_the_project_s_hyperparameters(id):
     assert told["policy_kwargs"] == f"dict(net_arch={list(known.hidden)})"
 
 
-@pytest.mark.parametrize("id", ["SeastarSwim-v0", "SeastarStationTimed-v0"])
+@pytest.mark.parametrize("id", ["SeastarSwim-v0", "SeastarPrey-v0"])
 def test_a_learner_is_made_of_it_and_learns(id):
     told = dict(SETTINGS[id])
     wrapper = getattr(seastar_gym, told.pop("env_wrapper").removeprefix("seastar_gym."))

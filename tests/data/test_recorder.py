@@ -49,7 +49,7 @@ def test_a_learner_s_wrapper_outside_leaves_what_is_kept_as_the_environment_has_
     seen, _ = batch.reset(seed=[3, 4])
     for _ in range(3):
         seen, *_ = batch.step(np.array([7, 11]))
-    assert not np.array_equal(inner.episodes()[0].observations[-1], seen[0])
+    assert not np.array_equal([one.observations[-1] for one in inner.episodes()], seen)
     for one in inner.episodes():
         assert_swum_again(one, gym.make(TASK, **SHORT, **anywhere))
 
@@ -63,7 +63,7 @@ def test_episodes_follow_each_other_and_only_the_first_have_seeds():
     assert [len(one.rewards) for one in kept] == [3] * 4
     np.testing.assert_array_equal(kept[2].rewards, [reward[0] for reward in rewards[4:7]])
     assert kept[2].infos["time"].tolist() == [0.0, 1.0, 2.0, 3.0]
-    assert batch.episodes(only_first=True) == kept[:2]
+    assert [one.seed for one in batch.episodes(only_first=True)] == [0, 1]
 
 
 def test_what_a_reset_broke_off_is_not_kept():
