@@ -5,6 +5,7 @@ A dataset is called TASK/LABEL-v0. Episodes have the seeds 0, 1, ... of the spli
 """
 
 import argparse
+import inspect
 import os
 import shlex
 import sys
@@ -14,13 +15,14 @@ from typing import Any, get_args
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.envs.registration import load_env_creator
 
 from seastar_gym.benchmark.episodes import require_seen
 from seastar_gym.command import command_parser
 from seastar_gym.controllers.contract import Policy, actions_in
 from seastar_gym.controllers.roster import HELP, load_agent
 from seastar_gym.controllers.scripted import RandomPolicy
-from seastar_gym.data.dataset import record, summary, write
+from seastar_gym.data.dataset import record, require_new, summary, write
 from seastar_gym.evaluation.tasks import require_task
 from seastar_gym.extras import require_extra
 from seastar_gym.scene.checks import require_count
@@ -56,20 +58,30 @@ def name_of(task: str, label: str) -> str:
 def recorded(task: str, agent: str, options: argparse.Namespace, command: str) -> str:
     """Record and write a dataset; returns a line on it.
 
-    ValueError, with one sentence, where agent and task do not fit.
+    ValueError, with one sentence, where agent and task do not fit, or where there is such a dataset.
     """
     label, _, name = agent.rpartition("=")
+    dataset_id = name_of(task, label or Path(name).stem)
+    require_new(dataset_id)
     arguments: dict[str, Any] = {} if options.fidelity is None else {"fidelity": options.fidelity}
     if options.random_paths:
-        arguments |= {"path": "random", "random_heading": True}
+        arguments |= _random_paths(task)
     env: Any = gym.make(task, disable_env_checker=True, **arguments).unwrapped
     policy = _load(name, env, options.seed)
     require_seen(policy, env)
     arguments["actions"] = actions_in(policy, env.actions, env.scene.robot.n_limbs)
     episodes = record(task, policy, options.episodes, options.seed, **arguments)
-    dataset_id = name_of(task, label or Path(name).stem)
     write(episodes, dataset_id, task, agent, f"Written by: {command}", **arguments)
     return f"{dataset_id}: {summary(episodes)}"
+
+
+def _random_paths(task: str) -> dict[str, Any]:
+    """Arguments for random paths and headings."""
+    entry: Any = gym.spec(task).entry_point
+    creator: Any = load_env_creator(entry) if isinstance(entry, str) else entry
+    if "path" not in inspect.signature(creator).parameters:
+        raise ValueError(f"{task} has no paths: leave --random-paths out.")
+    return {"path": "random", "random_heading": True}
 
 
 def _load(name: str, env: Any, seed: int) -> Policy:
@@ -95,7 +107,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 try:
                     line = recorded(task, agent, options, shlex.join(["seastar", "data", *given]))
                 except (ValueError, FileNotFoundError) as unfit:
-                    print(f"{agent} does not swim {task}: {unfit}", file=sys.stderr)
+                    print(f"{agent} is not recorded on {task}: {unfit}", file=sys.stderr)
                     continue
                 print(line, flush=True)
                 done += 1

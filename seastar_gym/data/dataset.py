@@ -64,6 +64,14 @@ def record(task: str, policy: Policy, n_episodes: int, seed: int = 0, **argument
     return found
 
 
+def require_new(dataset_id: str) -> None:
+    """ValueError where there is such a dataset."""
+    import minari
+
+    if dataset_id in minari.list_local_datasets():
+        raise ValueError(f"There is a dataset {dataset_id} already: delete it (minari delete), or write elsewhere.")
+
+
 def write(
     episodes: Sequence[Episode], dataset_id: str, task: str, algorithm: str, description: str = "", **arguments: Any
 ) -> Any:
@@ -75,8 +83,7 @@ def write(
     import minari
     from minari.data_collector import EpisodeBuffer
 
-    if dataset_id in minari.list_local_datasets():
-        raise ValueError(f"There is a dataset {dataset_id} already: delete it (minari delete), or write elsewhere.")
+    require_new(dataset_id)
     if not episodes:
         raise ValueError(f"There are no episodes for {dataset_id}.")
     env = gym.make(task, disable_env_checker=True, **arguments)

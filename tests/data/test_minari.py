@@ -80,8 +80,12 @@ def test_a_dataset_is_not_written_over(folder, capsys):
     [
         (["--episodes", "0"], "--episodes must be"),
         (["--tasks", "Nothing-v0"], "There is no task 'Nothing-v0'"),
+        (["--tasks", "SeastarPrey-v0", "--agents", "random", "--random-paths"], "SeastarPrey-v0 has no paths"),
         (["--agents", "nobody"], "Unknown scripted agent 'nobody'"),
-        (["--tasks", "SeastarMiswired-v0", "--agents", "greedy"], "greedy does not swim SeastarMiswired-v0: It reads"),
+        (
+            ["--tasks", "SeastarMiswired-v0", "--agents", "greedy"],
+            "greedy is not recorded on SeastarMiswired-v0: It reads",
+        ),
     ],
 )
 def test_what_cannot_be_recorded_is_said_in_a_sentence(folder, arguments, words, capsys):
