@@ -77,7 +77,7 @@ class Recorder(_VectorWrapper):
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """One decision of every robot."""
         observations, rewards, terminated, truncated, info = self.env.step(actions)
-        for robot in np.flatnonzero(self._begins_next):
+        for robot in np.flatnonzero(self._begins_next).tolist():
             self._begin[robot], self._seeds[robot] = len(self._rows), None
         self._keep((observations, np.array(actions), rewards, terminated, truncated), info)
         self._begins_next = terminated | truncated
