@@ -56,7 +56,8 @@ def measure(rounds: int, updates: int) -> dict[str, Any]:
     """Strokes per second of processor time of both, medians over rounds, and the ratio with its range."""
     torch.set_num_threads(1)
     alone = single_file()
-    alone(ROLLOUT), stable_baselines3(ROLLOUT)  # compiled and loaded
+    for run in (alone, stable_baselines3):
+        run(ROLLOUT)  # compiled and loaded
     pairs = [(processor_seconds(alone, updates), processor_seconds(stable_baselines3, updates)) for _ in range(rounds)]
     ratios = [other / own for own, other in pairs]
     own, other = np.median(pairs, axis=0)
