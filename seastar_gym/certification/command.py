@@ -20,15 +20,21 @@ from seastar_gym.certification.measure import SAMPLES, certify
 from seastar_gym.extras import require_extra
 from seastar_gym.scene import Scene
 from seastar_gym.scene.certificate import Certificate
+from seastar_gym.scene.checks import require_error
 
 
 def load_scene(file: Path | None) -> Scene:
     """Scene of a file of Python or JSON, the chapter's for none."""
     if file is None:
         return Scene()
+    if not file.is_file():
+        raise ValueError(f"{file} is no file.")
     if file.suffix == ".json":
         return Scene.from_dict(json.loads(file.read_text(encoding="utf-8")))
-    found = runpy.run_path(str(file)).get("scene")
+    try:
+        found = runpy.run_path(str(file)).get("scene")
+    except SyntaxError as wrong:
+        raise ValueError(f"{file}, line {wrong.lineno}, is not Python: {wrong.msg}.") from wrong
     if not isinstance(found, Scene):
         raise ValueError(f"{file} must define `scene`, a Scene.")
     return found
@@ -83,6 +89,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         require_extra("Certificates", "studies", "tqdm")
         scene = load_scene(options.scene)
+        scene.to_dict()  # now, not after minutes, refuses what a certificate could not hold
+        if options.error is not None:
+            require_error(options.error)
+        if options.out.is_dir():
+            raise ValueError(f"{options.out} is a folder: give --out a file.")
+        options.out.parent.mkdir(parents=True, exist_ok=True)
         from tqdm import tqdm
 
         with tqdm(total=100, unit="%", bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as bar:

@@ -55,8 +55,13 @@ def _in_time(scene: Scene, decision_period: float) -> dict[str, float]:
     return {"path_error": known.path_error, "space_error": known.space_error, "time_error": known.time_error}
 
 
-def read_certificate(certificate: Certificate | str | PathLike[str] | None, scene: Scene) -> Certificate | None:
-    """Certificate of an object or a file; ValueError where it has lapsed for the scene."""
+def read_certificate(
+    certificate: Certificate | str | PathLike[str] | None, scene: Scene, decision_period: float
+) -> Certificate | None:
+    """Certificate of an object or a file; ValueError where it has lapsed for the scene, or decisions are no strokes.
+
+    decision_period: Time between decisions [s].
+    """
     if certificate is None:
         return None
     if isinstance(certificate, str | PathLike):
@@ -64,14 +69,45 @@ def read_certificate(certificate: Certificate | str | PathLike[str] | None, scen
     if not isinstance(certificate, Certificate):
         raise ValueError(f"certificate must be a Certificate or a file of one, not {shown(certificate)}.")
     certificate.require_valid(scene)
+    if not in_strokes(scene, decision_period):
+        raise ValueError(
+            f"A certificate has errors of strokes of {scene.actuator.period:g} s, none of decisions every "
+            f"{decision_period:g} s: leave it out, and use error_bars=True, which estimates errors of any swim."
+        )
     return certificate
 
 
-def warn_uncertified(scene: Scene, fidelity: Fidelity | None, certificate: object) -> None:
-    """Warn where a fidelity is asked of a scene for which nothing was measured."""
-    if fidelity is not None and certificate is None and measured(scene) is None:
+def in_strokes(scene: Scene, decision_period: float | None) -> bool:
+    """Whether decisions are strokes of the scene's actuator. decision_period: [s]. None means strokes."""
+    return decision_period is None or decision_period == scene.actuator.period
+
+
+def warn_uncertified(
+    scene: Scene, fidelity: Fidelity | None, certificate: Certificate | None, decision_period: float | None
+) -> None:
+    """Warn where a certificate or a fidelity is given, but no errors of the scene were measured.
+
+    fidelity: None asks for none. decision_period: Time between decisions [s]. None means strokes.
+    """
+    if certificate is not None:
+        if certificate.of(scene) is None:
+            warnings.warn(
+                f"The certificate has no errors of {scene.robot.nodes_per_limb} nodes per limb with "
+                f"{shown(scene.numerics)}, so errors in info are NaN: Certificate.for_error chooses what it has.",
+                stacklevel=3,
+            )
+    elif fidelity is not None and not _has_promise(scene, decision_period):
+        remedy = "info has no errors: error_bars=True estimates them as the robot swims"
+        if in_strokes(scene, decision_period):
+            remedy = "errors in info are NaN: python -m seastar_gym.certify measures them"
         warnings.warn(
-            f'Errors of this scene were not measured, so fidelity="{fidelity}" promises nothing for it, and errors in '
-            "info are NaN: python -m seastar_gym.certify measures them.",
+            f'Errors of this scene were not measured, so fidelity="{fidelity}" promises nothing for it, and {remedy}.',
             stacklevel=3,
         )
+
+
+def _has_promise(scene: Scene, decision_period: float | None) -> bool:
+    """Whether the package's own tables have errors of a scene."""
+    if in_strokes(scene, decision_period):
+        return measured(scene) is not None
+    return bool(promised(scene, None, decision_period))

@@ -210,7 +210,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         second of simulated time, and one at least.
     randomization: Distributions of numbers of the scene that are drawn at the start of every episode.
     certificate: Measured errors of the scene for `info`: a `Certificate`, or the file of one that
-        `python -m seastar_gym.certify` wrote. Refused where it is of another scene or version.
+        `python -m seastar_gym.certify` wrote. Refused where it is of another scene or version, or decisions are no
+        strokes, of which its errors are.
     error_bars: Whether `info` has `error_estimate`, by a twin of shorter edges and steps that swims along. No bit of a
         trajectory changes, and a step takes four to five times as long.
     decision_period: Time between decisions [s]. None means a stroke, the period of the actuator. Other than 1 s, and
@@ -247,12 +248,11 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     ):
         self._set_pictures(render_mode, frames_per_stroke)
         modelled = make_scene(scene, fidelity, decision_period)
-        if scene is not None:
-            warn_uncertified(modelled, fidelity, certificate)
         task = SwimTask(
             modelled, 1, path, reward, waypoint_radius, random_heading, 1, randomization, certificate, error_bars,
             actions, decision_period, observe_actuators, headings,
         )  # fmt: skip
+        warn_uncertified(modelled, None if scene is None else fidelity, task.certificate, decision_period)
         self._begin_with(task, frames_per_stroke)
 
     def _set_pictures(self, render_mode: RenderMode | None, frames_per_stroke: int | None) -> None:

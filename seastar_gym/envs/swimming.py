@@ -30,7 +30,7 @@ from seastar_gym.envs.observation import (
     to_float32,
     with_more,
 )
-from seastar_gym.envs.promises import promised
+from seastar_gym.envs.promises import in_strokes, promised
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, drawn_scene
 from seastar_gym.envs.reward import pulses_of
 from seastar_gym.envs.scenery import NOTHING, Scenery
@@ -110,7 +110,7 @@ class Swimming(ABC):
         require_flag("observe_actuators", observe_actuators)
         self.decision_period = checked_decision_period(decision_period, scene)
         self._has_promises = True
-        self._in_strokes = self.decision_period == scene.actuator.period
+        self._in_strokes = in_strokes(scene, self.decision_period)
         self.actions: Actions = actions
         self.observe_actuators = observe_actuators
         self._can_be_masked = can_be_masked(scene.actuator)

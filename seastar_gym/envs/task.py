@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.envs.commands import Actions
+from seastar_gym.envs.decisions import checked_decision_period
 from seastar_gym.envs.headings import AskedHeadings, Headings
 from seastar_gym.envs.observation import body_axes, scene_layout
 from seastar_gym.envs.paths import FARTHEST, cross_track_error, make_path
@@ -112,9 +113,10 @@ class SwimTask(Swimming):
             self.TERMS = (*self.TERMS, "reward_heading")
         self.headings = headings
         self._asked = None if headings is None else AskedHeadings(headings, n_robots)
+        known = read_certificate(certificate, scene, checked_decision_period(decision_period, scene))
         super().__init__(
             scene, n_robots, threads, random_heading=random_heading, draws=randomization,
-            certificate=read_certificate(certificate, scene), error_bars=error_bars, actions=actions,
+            certificate=known, error_bars=error_bars, actions=actions,
             decision_period=decision_period, observe_actuators=observe_actuators,
         )  # fmt: skip
         self.randomization = randomization

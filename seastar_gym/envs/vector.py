@@ -90,12 +90,11 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
     ):
         self._set_batch(num_envs, max_episode_steps, render_mode, autoreset_mode)
         modelled = make_scene(scene, fidelity, decision_period)
-        if scene is not None:
-            warn_uncertified(modelled, fidelity, certificate)
         task = SwimTask(
             modelled, num_envs, path, reward, waypoint_radius, random_heading, threads, randomization, certificate,
             error_bars, actions, decision_period, observe_actuators, headings,
         )  # fmt: skip
+        warn_uncertified(modelled, None if scene is None else fidelity, task.certificate, decision_period)
         self._begin_with(task)
 
     def _set_batch(

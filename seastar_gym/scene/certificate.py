@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from seastar_gym.scene.certified import reads_certificates
-from seastar_gym.scene.checks import is_finite_number, shown
+from seastar_gym.scene.checks import require_error, shown
 from seastar_gym.scene.numerics import Numerics, SchemeName
 from seastar_gym.scene.robot import Seastar
 from seastar_gym.scene.scene import Scene
@@ -20,6 +20,8 @@ from seastar_gym.version import __version__
 
 FORMAT = 2
 """Version of the file's form."""
+CLASSES_VERSION = 1
+"""Version of the classes of commands, see seastar_gym/certification/commands.py. Errors of another are of others."""
 LARGEST_GROWTH = 1.5
 """Growth of the kinetic energy over a long swim above which `for_error` does not choose a setting."""
 
@@ -96,11 +98,16 @@ class Certificate:
         return 1.0 - (1.0 - share) ** self.samples
 
     def require_version(self) -> None:
-        """ValueError where the certificate has lapsed with the version of the package."""
+        """ValueError where the certificate has lapsed with the version of the package or of the classes of commands."""
         if self.version != __version__:
             raise ValueError(
                 f"The certificate is of version {self.version} of seastar_gym, not of this one, {__version__}: certify "
                 "the scene again."
+            )
+        if self.classes != CLASSES_VERSION:
+            raise ValueError(
+                f"The certificate is of version {self.classes} of the classes of commands, not of this one, "
+                f"{CLASSES_VERSION}: certify the scene again."
             )
 
     def require_valid(self, scene: Scene) -> None:
@@ -125,7 +132,6 @@ class Certificate:
         robot: Robot that is to be the certificate's, and to keep its nodes per limb. None chooses them.
         """
         if robot is None:
-            self.require_version()
             return self.for_error(error)
         self.require_valid(replace(self.scene, robot=robot))
         nodes = robot.nodes_per_limb
@@ -139,14 +145,14 @@ class Certificate:
         return replace(self, settings=some).for_error(error)
 
     def for_error(self, error: float, classes: tuple[str, ...] | None = None) -> Scene:
-        """The scene at the fastest setting whose error is at most `error`; ValueError if there is none.
+        """The scene at the fastest setting whose error is at most `error`; ValueError for none, and if it has lapsed.
 
         Settings that gather energy over long swims are left out.
 
         error: Of the hub's path, as a fraction of its length. classes: Classes of commands, `promised` if None.
         """
-        if not is_finite_number(error) or error <= 0.0:
-            raise ValueError(f"error must be a positive, finite share of the path's length, not {shown(error)}.")
+        self.require_version()
+        require_error(error)
         asked = self.promised if classes is None else classes
         if unknown := sorted(set(asked) - set(self.settings[0].errors)):
             known = ", ".join(self.settings[0].errors)

@@ -56,6 +56,12 @@ def require_finite(name: str, value: float, unit: str) -> None:
         raise ValueError(f"{name} must be a finite number [{unit}], not {shown(value)}.")
 
 
+def require_error(error: object) -> None:
+    """Refuse what is no error that can be asked for."""
+    if not is_finite_number(error) or error <= 0.0:  # type: ignore[operator]
+        raise ValueError(f"error must be a positive, finite share of the path's length, not {shown(error)}.")
+
+
 def require_count(name: str, value: int, smallest: int, largest: int) -> None:
     """Refuse what is no whole number from `smallest` to `largest`."""
     if not is_whole_number(value) or not smallest <= value <= largest:

@@ -16,7 +16,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from seastar_gym.scene.checks import is_finite_number, require_choice, require_count, shown
+from seastar_gym.scene.checks import require_choice, require_count, require_error, shown
 
 PRESETS = Path(__file__).with_name("presets.json")
 TIMED_PRESETS = Path(__file__).with_name("timed_presets.json")
@@ -210,8 +210,7 @@ def cheapest(
     any_gait: Require it for gait_error, too.
     discretisation, nodes_per_limb: Resolution to keep. None chooses it.
     """
-    if not is_finite_number(error) or error <= 0.0:
-        raise ValueError(f"error must be a positive, finite share of the path's length, not {shown(error)}.")
+    require_error(error)
     if not isinstance(any_gait, bool | np.bool_):
         raise ValueError(f"any_gait must be True or False, not {shown(any_gait)}.")
     if discretisation is not None:

@@ -41,7 +41,8 @@ def as_cells(name: str, row: Row) -> tuple[str, ...]:
     total = [entry[f"{kind}_error"] for kind in ("path", "gait", "slow", "straight")]
     return (
         name, nodes_of(row), row.label, f"{row.setting.numerics.newton_tolerance:.0e}",
-        *(f"{100 * error:.2g} %" if error else "-" for error in (space, time, *total)), f"{two_digits(row.speed):,.0f}",
+        *(f"{two_digits(100 * error):g} %" if error else "-" for error in (space, time, *total)),
+        f"{two_digits(row.speed):,.0f}",
     )  # fmt: skip
 
 

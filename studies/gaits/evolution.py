@@ -4,7 +4,6 @@ A gait along limb 1 that is its own mirror image keeps its heading: limb 5 does 
 limb 3, and limb 1 nothing. So two numbers per slot are free. Wires may be heated again before they are cold.
 """
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -61,7 +60,7 @@ def evolve(
     strategy = cma.CMAEvolutionStrategy(
         free_numbers(start), 0.35, {"popsize": population, "bounds": [-1.0, 1.0], "seed": seed, "verbose": -9}
     )
-    best, best_score, tried = start, -math.inf, 0
+    best, best_score, tried = start, float(score(measure(scene, start[None], slot, 2, 2), towards, price)[0]), 0
     for _ in range(generations):
         asked = strategy.ask()
         gaits = mirrored_gaits(np.array(asked), slots)

@@ -19,6 +19,14 @@ def numbers(fast: Table, finest: Table) -> list[str]:
     ]  # fmt: skip
 
 
+def what_evolved(each: Table) -> str:
+    """Name of an evolved gait: its actuator, direction, price of heat and slots."""
+    if each["strokes"]:
+        return f"{each['actuator']}, amplitudes of {each['strokes']} in turn"
+    slots = "" if each["slot_s"] == 0.1 else f", slots of {each['slot_s']:g} s"
+    return f"{each['actuator']}, {each['towards']}, {each['price_mm_per_joule']:g} mm/J{slots}"
+
+
 def tables(results: Table) -> str:
     """All tables of the study."""
     finest = results["finest"]
@@ -28,8 +36,7 @@ def tables(results: Table) -> str:
     turning = [[each["gait"], *numbers(each["fast"], each[finest])] for each in results["from rest"]["turning"]]
     evolved = [
         [
-            f"{each['actuator']}, {each['towards']}, {each['price_mm_per_joule']:g} mm/J"
-            + ("" if each["slot_s"] == 0.1 else f", slots of {each['slot_s']:g} s"),
+            what_evolved(each),
             *numbers(each["fast"], each[finest]),
         ]
         for each in results["evolved"]
@@ -45,9 +52,14 @@ def tables(results: Table) -> str:
     directions = [
         [name, *(f"{speed:.2f}" for speed in speeds)] for name, speeds in results["mm_per_s_by_direction"].items()
     ]
+    thermal = [
+        [results["named"][name]["what"], *numbers(each["fast"], each[finest])]
+        for name, each in results["thermal wires"].items()
+    ]
     classes = f"{results['from rest']['classes']:,}"
     return "\n".join([
         "Named gaits:\n", lines_of(["gait", *head], named),
+        "Named gaits with thermal wires:\n", lines_of(["gait", *head], thermal),
         f"The fastest straight gaits of a second from rest, of {classes} classes:\n", lines_of(["gait", *head], rest),
         "Those that turn most:\n", lines_of(["gait", *head], turning),
         "Evolved, wires heated again before they are cold:\n",

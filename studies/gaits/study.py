@@ -23,7 +23,7 @@ from seastar_gym.scene.actuators.wires import SmaWires
 from studies.gaits.crossing import crossings
 from studies.gaits.enumeration import SLOTS, distinct_codes, gaits_of
 from studies.gaits.evolution import evolve
-from studies.gaits.named import GAITS, SLOT, lagged
+from studies.gaits.named import BEHIND, FORWARD, GAITS, SLOT, lagged
 from studies.gaits.periodic import Swimming, events_of, joined, measure, timed
 from studies.learning.bound import all_directions, distinct_gaits, mixed_speed
 from studies.parser import study_parser
@@ -149,42 +149,51 @@ def velocity_of(each: Table) -> Floats:
 
 
 class Wanted(NamedTuple):
-    """A gait that is to evolve. towards: 1 along limb 1, -1 away from it. price: Of heat [mm/J]. slot: [s]."""
+    """A gait that is to evolve.
+
+    towards: 1 along limb 1, -1 away from it. price: Of heat [mm/J]. slot: [s]. strokes: Slots of the chapter's strokes,
+    one a second, that evolve instead; 0 for a second of slots.
+    """
 
     actuator: Any
     name: str
     towards: float = 1.0
     price: float = 0.0
     slot: float = COARSE
+    strokes: int = 0
 
     @property
     def start(self) -> Floats:
-        """Lagged pairs, shape (n_slots, 5)."""
+        """Lagged pairs, or the pairs of the fastest strokes in turn, shape (n_slots, 5)."""
+        if self.strokes:
+            return timed({float(k): (BEHIND, FORWARD)[k % 2] for k in range(self.strokes)}, float(self.strokes), 1.0)
         events = {0.0: "2+,5-", 0.6: "3+,4-"} if self.towards > 0.0 else {0.0: "2-,5+", 0.4: "3-,4+"}
         return timed(events, 1.0, self.slot)
 
     def generations(self, plan: Plan) -> int:
         """Generations of its evolution: twice as many where it has twice as many slots."""
-        return round(plan.generations * COARSE / self.slot)
+        return plan.generations if self.strokes else round(plan.generations * COARSE / self.slot)
 
 
 WANTED = [
     *(Wanted(WIRES, "wires", price=price) for price in PRICES),
     *(Wanted(WIRES, "wires", price=price, slot=FINE) for price in FINE_PRICES),
     Wanted(WIRES, "wires", -1.0), Wanted(THERMAL, "thermal"), Wanted(THERMAL, "thermal", -1.0),
+    *(Wanted(SmaPulse(), "the chapter's strokes", slot=1.0, strokes=strokes) for strokes in (2, 4)),
 ]  # fmt: skip
 
 
 def evolved(wanted: Wanted, plan: Plan, progress: Callable[[int], Any] | None = None) -> Table:
     """A gait that evolves, and how it swims."""
-    actuator, name, towards, price, slot = wanted
+    actuator, name, towards, price, slot, strokes = wanted
     gait, tried = evolve(
         scene_with(actuator), wanted.start, slot, towards, price, wanted.generations(plan), plan.population,
         progress=progress,
     )  # fmt: skip
     return {
         "actuator": name, "towards": "along limb 1" if towards > 0.0 else "away from limb 1", "slot_s": slot,
-        "price_mm_per_joule": price, "tried": tried, "gait": events_of(gait, slot), "pulses": gait.tolist(),
+        "strokes": strokes, "price_mm_per_joule": price, "tried": tried, "gait": events_of(gait, slot),
+        "pulses": gait.tolist(),
         "fast": measured(scene_with(actuator), gait, slot),
         plan.finest: measured(scene_with(actuator, plan.finest), gait, slot),
     }  # fmt: skip
@@ -271,6 +280,10 @@ def study(plan: Plan) -> Table:
         "finest": plan.finest,
         "named": named,
         "one pair, synchronous": row(pair),
+        "thermal wires": {
+            name: {each: measured(scene_with(THERMAL, each), GAITS[name].gait, SLOT) for each in ("fast", plan.finest)}
+            for name in ("synchronous", "lag 0.6", "thrifty")
+        },
         "two strokes, synchronous, turning most": row(strokes, int(np.argmax(np.abs(strokes.turn)))),
         "lag": lag_scan(),
         "from rest": rest,

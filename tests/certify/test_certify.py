@@ -5,6 +5,7 @@ import subprocess
 import sys
 import warnings
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import gymnasium as gym
@@ -13,9 +14,10 @@ import pytest
 
 import seastar_gym
 from refusals import assert_refused
-from seastar_gym import Certificate, Contact, Numerics, Scene, Seastar, Simulator, SmaPulse
+from seastar_gym import Certificate, Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires
 from seastar_gym.certification import command, commands, endurance, measure
 from seastar_gym.envs.spec import PlainSpec
+from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.certificate import resolved
 
 SMALL_ROBOT = Seastar(limb_length=0.08)
@@ -139,6 +141,9 @@ def test_a_scene_for_an_error_is_refused_where_the_certificate_has_lapsed(certif
     for robot in (None, SMALL_ROBOT):
         with assert_refused("of version 0.0.1"):
             Scene.for_error(0.9, robot=robot, certificate=replace(certificate, version="0.0.1"))
+    for lapsed in ({"version": "0.0.1"}, {"classes": 7}):
+        with assert_refused("certify the scene again"):
+            replace(certificate, **lapsed).for_error(0.9)
     with assert_refused("certificate must be a Certificate"):
         Scene.for_error(0.9, certificate=3)
     with assert_refused("cannot be read"):
@@ -193,10 +198,14 @@ def test_the_environment_tells_the_errors_of_a_certified_scene(certificate, tmp_
     assert (envs.reset(seed=0)[1]["path_error"] == setting.error(certificate.actions)).all()
     assert isinstance(env.unwrapped, PlainSpec)
     assert json.loads(env.spec.to_json())["kwargs"]["certificate"] == str(tmp_path / "mine.json")
-    unmeasured = gym.make(
-        "SeastarSwim-v0", scene=replace(certificate.at(setting), numerics=Numerics()), certificate=certificate
-    )
-    assert np.isnan(unmeasured.reset(seed=0)[1]["path_error"])
+
+
+def test_a_setting_that_a_certificate_has_not_is_promised_nothing_and_a_warning_says_so(certificate):
+    scene = replace(certificate.at(certificate.settings[2]), numerics=Numerics())
+    for made in (partial(gym.make, "SeastarSwim-v0"), partial(SeastarSwimVectorEnv, 2)):
+        with pytest.warns(UserWarning, match=r"no errors of 9 nodes per limb.*for_error"):
+            env = made(scene=scene, certificate=certificate)
+        assert np.isnan(env.reset(seed=0)[1]["path_error"]).all()
 
 
 @pytest.mark.parametrize("other", [Scene(), replace(SCENE, contact=Contact()), replace(SCENE, actuator=SmaPulse(0.5))])
@@ -223,6 +232,28 @@ def test_a_fidelity_for_an_uncertified_scene_warns_with_the_command_that_measure
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         gym.make("SeastarSwim-v0", fidelity="fast")
+
+
+def test_a_certificate_is_of_strokes(certificate):
+    wired = replace(certificate, scene=replace(certificate.scene, actuator=SmaWires()))
+    scene = wired.at(wired.settings[0])
+    for made in (partial(gym.make, "SeastarSwim-v0"), partial(SeastarSwimVectorEnv, 2)):
+        with assert_refused("strokes of 1 s", "every 0.5 s", "error_bars=True"):
+            made(scene=scene, certificate=wired, decision_period=0.5)
+        with assert_refused("decision_period must be"):
+            made(scene=scene, certificate=wired, decision_period="0.5")
+        for period in (None, 1.0):
+            info = made(scene=scene, certificate=wired, decision_period=period).reset(seed=0)[1]
+            assert np.all(info["path_error"] == wired.settings[0].error(wired.actions))
+
+
+def test_wires_of_the_chapters_robot_need_no_certificate_in_time_and_others_are_told_of_error_bars():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        scene = replace(Scene.preset("fast"), actuator=SmaWires())
+        gym.make("SeastarSwim-v0", scene=scene, fidelity="fast", decision_period=0.2)
+    with pytest.warns(UserWarning, match=r"info has no errors: error_bars=True"):
+        gym.make("SeastarSwim-v0", scene=replace(SCENE, actuator=SmaWires()), fidelity="fast", decision_period=0.2)
 
 
 def test_scenes_without_one_answer_are_refused():
@@ -277,10 +308,27 @@ def test_the_command_writes_certificate_and_picture(few_settings, tmp_path, monk
     (tmp_path / "mine.py").write_text("scene = 3\n", encoding="utf-8")
     assert command.main() == 2
     assert "must define `scene`" in capsys.readouterr().err
+    monkeypatch.setattr(command, "certify", None)  # what follows is refused before anything is measured
+    for more, words in ((["--error", "0"], "positive, finite share"), (["--out", str(tmp_path)], "is a folder")):
+        assert command.main(more) == 2
+        assert words in capsys.readouterr().err
+    own = (
+        "from seastar_gym import Scene, SmaPulse\n"
+        "class Own(SmaPulse):\n    pass\n"
+        "scene = Scene(actuator=Own())\n"
+    )
+    (tmp_path / "own.py").write_text(own, encoding="utf-8")
+    assert command.main([str(tmp_path / "own.py")]) == 2
+    assert "register_part" in capsys.readouterr().err
     file_of_scene = tmp_path / "mine.json"
     file_of_scene.write_text(json.dumps(SCENE.to_dict()), encoding="utf-8")
     assert command.load_scene(file_of_scene) == SCENE
     assert command.load_scene(None) == Scene()
+    with pytest.raises(ValueError, match=r"is no file\.$"):
+        command.load_scene(tmp_path)
+    (tmp_path / "own.py").write_text("scene = Scene(\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"own\.py, line 1, is not Python: .* never closed\.$"):
+        command.load_scene(tmp_path / "own.py")
 
 
 def test_swims_of_many_groups_are_those_of_one_batch(monkeypatch):

@@ -12,7 +12,10 @@ import numpy as np
 import pytest
 
 from seastar_gym import Contact, Numerics, Scene, Seastar, SmaPulse, Water
+from seastar_gym.certification.commands import draw_classes
 from seastar_gym.certification.endurance import energy_growth
+from seastar_gym.certification.measure import path_lengths
+from seastar_gym.certification.measure import swim as certified_swim
 from seastar_gym.scene import fidelity
 from seastar_gym.scene.fidelity import Promise, cheapest, promise, promises
 from seastar_gym.scene.numerics import PRESETS, Fidelity
@@ -287,6 +290,17 @@ def test_for_error_of_any_gait_keeps_it_whatever_command_is_repeated(error):
     exact = swim(gaits(), Scene.preset("reference"), threads=None)
     found = swim(gaits(), Scene.for_error(error, any_gait=True), threads=None)
     assert errors(found, exact).path.max() <= error + promise("reference").gait_error
+
+
+@pytest.mark.parametrize("name", ["fast", "balanced"])
+def test_newtons_tolerance_does_not_drown_slow_swims(name):
+    """Its displacements are absolute, and a tenth of the amplitude swims a hundredth of the way."""
+    scene, commands = Scene.preset(name), draw_classes(8, 5, 77)
+    slow = np.concatenate([commands[:, -8:], 0.1 * commands[:, 24:32], 0.1 * np.tile(np.eye(5), (10, 1, 1))], axis=1)
+    exact = certified_swim(replace(scene, numerics=replace(scene.numerics, newton_tolerance=1e-10)), slow)
+    hub = certified_swim(scene, slow)
+    errors_of_tolerance = np.linalg.norm(hub - exact, axis=-1).max(axis=0) / path_lengths(exact, 0.1)
+    assert 1e-4 < errors_of_tolerance.max() < 0.05 < promise(name).slow_error / 4.0
 
 
 # Long swims

@@ -12,8 +12,9 @@ from studies.gaits.crossing import crossings, limbs_cross
 from studies.gaits.enumeration import all_codes, distinct_codes, gaits_of
 from studies.gaits.evolution import evolve, free_numbers, mirrored_gaits, score
 from studies.gaits.named import GAITS, SLOT, lagged
+from studies.gaits.pages import what_evolved
 from studies.gaits.periodic import events_of, measure, timed
-from studies.gaits.study import by_numerics, front, pareto
+from studies.gaits.study import QUICK, WANTED, by_numerics, evolved, front, pareto
 
 FAST = replace(Scene.preset("fast"), actuator=SmaWires())
 
@@ -85,6 +86,15 @@ def test_evolution_does_not_lose_what_it_found():
     scores = score(measure(FAST, np.concatenate([gait[None], worst]), 0.1, 2, 2), 1.0, 0.0)
     assert tried == 36
     assert scores[0] > scores[1]
+    assert scores[0] >= score(measure(FAST, start[None], 0.1, 2, 2), 1.0, 0.0)[0]
+
+
+def test_the_chapters_strokes_evolve_in_their_amplitudes():
+    wanted = next(each for each in WANTED if each.strokes == 2)
+    np.testing.assert_array_equal(wanted.start, [[0, 0, 1, -1, 0], [0, 1, 0, 0, -1]])
+    found = evolved(wanted, QUICK)
+    assert found["fast"]["mm_per_s"] > 3.0 and len(found["pulses"]) == 2
+    assert what_evolved(found) == "the chapter's strokes, amplitudes of 2 in turn"
 
 
 def test_nobody_beats_the_front_in_both(named):

@@ -37,7 +37,7 @@ def test_the_table_is_that_of_the_whole_study():
         assert set(rows) == {f"{period:g}" for period in PERIODS}
         for period in PERIODS:
             known = timed_promise(name, period)
-            cell = f"{100 * known.path_error:.2g}"
+            cell = f"{float(f'{100 * known.path_error:.2g}'):g}"
             assert f" {cell} |" in next(line for line in table(stored).splitlines() if f"`{name}`" in line)
 
 

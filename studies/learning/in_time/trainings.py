@@ -64,6 +64,7 @@ def _priced(effort: float, discount: float = 0.8, aim: float = RewardWeights().a
 
 
 TRAININGS: dict[str, Training] = {
+    "1 s": _every(1.0, 98_304, discount=0.8, rollout=16, num_envs=128, gae_lambda=0.9),
     "0.5 s": _every(0.5, 150_000),
     "0.5 s, coasting": _every(0.5, 150_000, **COASTING),
     "0.5 s, price 0.05": _every(0.5, 150_000, "shares", **_priced(0.05)),
@@ -71,11 +72,15 @@ TRAININGS: dict[str, Training] = {
     "0.5 s, price 0.15, nearer": _every(0.5, 300_000, "shares", **_priced(0.15, aim=0.9)),
     "0.2 s": _every(0.2),
     "0.2 s, coasting": _every(0.2, **COASTING),
+    "0.2 s, coasting, twice as long": _every(0.2, 600_000, **COASTING),
     "0.2 s, price 0.1": _every(0.2, learner="shares", **_priced(0.1, discount=0.3)),
     "0.2 s, Gaussian": _every(0.2, learner="gaussian", **COASTING),
     "0.2 s, SAC": _every(0.2, 150_000, learner="sac", **COASTING),
+    "0.2 s, SAC, price 0.1": _every(0.2, 150_000, "sac", **_priced(0.1, discount=0.3)),
     "0.1 s": _every(0.1),
     "0.1 s, coasting": _every(0.1, **COASTING),
+    "0.1 s, coasting, n-step": _every(0.1, **(COASTING | {"rollout": 64, "gae_lambda": 0.99, "num_envs": 32})),
+    "0.1 s, coasting, large rollouts": _every(0.1, **(COASTING | {"rollout": 64})),
     "0.1 s, after 0.2 s": _every(0.1, 200_000, start="0.2 s, coasting", learning_rate=5e-4, **COASTING),
 }
 """Trainings by name."""
