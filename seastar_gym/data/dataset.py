@@ -9,6 +9,7 @@
 Minari keeps datasets below MINARI_DATASETS_PATH, or ~/.minari/datasets.
 """
 
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -100,15 +101,17 @@ def write(
         )
         for number, one in enumerate(episodes)
     ]
-    dataset = minari.create_dataset_from_buffers(
-        dataset_id,
-        buffers,
-        env=env,
-        algorithm_name=algorithm,
-        author="The seastar-gym authors",
-        description=description or None,
-        requirements=[f"seastar-gym=={__version__}"],
-    )
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", module="minari")  # it asks for addresses that there are not
+        dataset = minari.create_dataset_from_buffers(
+            dataset_id,
+            buffers,
+            env=env,
+            algorithm_name=algorithm,
+            author="The seastar-gym authors",
+            description=description or None,
+            requirements=[f"seastar-gym=={__version__}"],
+        )
     env.close()
     return dataset
 
