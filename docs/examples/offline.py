@@ -123,7 +123,7 @@ def learn(data: Decisions, n_actions: int, options: Options) -> tuple[nn.Module,
         with torch.no_grad():
             for slow, fast in zip(target.parameters(), network.parameters(), strict=True):
                 slow.lerp_(fast, 0.005)
-        losses.append(float(loss))
+        losses.append(float(loss.detach()))
     return network, losses
 
 
