@@ -25,8 +25,13 @@ assert [Path(file).stem for file in strangers] == ["seastar"], f"the wheel insta
 
 command = Path(sys.executable).parent / "seastar"
 told = subprocess.run([command, "--help"], capture_output=True, text=True, check=True).stdout
-assert all(name in told for name in ("swim", "play", "evaluate", "benchmark", "train", "certify", "identify"))
-for arguments, missing in (("swim --film swim.mp4", "[render]"), ("train", "checkout"), ("certify", "[studies]")):
+assert all(name in told for name in ("swim", "play", "evaluate", "benchmark", "data", "train", "certify", "identify"))
+for arguments, missing in (
+    ("swim --film swim.mp4", "[render]"),
+    ("data", "[data]"),
+    ("train", "checkout"),
+    ("certify", "[studies]"),
+):
     done = subprocess.run([command, *arguments.split()], capture_output=True, text=True, cwd=command.parent)
     assert done.returncode == 2, (arguments, done)
     assert missing in done.stderr, done.stderr

@@ -38,7 +38,9 @@ def complaints(archive: Path, files: list[PurePosixPath]) -> list[str]:
     """Sentences on what is wrong with an archive."""
     package = sorted(file.relative_to(ROOT).as_posix() for file in (ROOT / "seastar_gym").rglob("*.py"))
     names = {file.as_posix() for file in files}
-    wanted = package if archive.suffix == ".whl" else [*package, *IN_SDIST]
+    wanted = [*package] if archive.suffix == ".whl" else [*package, *IN_SDIST]
+    policies = [name.removesuffix(".safetensors") for name in names if name.endswith(".safetensors")]
+    wanted += [f"{policy}{suffix}" for policy in policies for suffix in (".json", ".md")]
     wrong = [f"{archive.name} lacks {name}." for name in wanted if name not in names]
     if archive.suffix == ".whl":
         strangers = [name for name in names if not name.startswith(("seastar_gym/", "seastar_gym-"))]

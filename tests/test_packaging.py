@@ -18,7 +18,7 @@ from packaging.version import Version
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-DISTRIBUTION_OF = {"PIL": "pillow", "pygame": "pygame-ce"}  # where the import name does not say it
+DISTRIBUTION_OF = {"PIL": "pillow", "pygame": "pygame-ce", "yaml": "pyyaml"}  # where the import name does not say it
 # Torch's wheels for CUDA name these; its wheels for the CPU do not.
 ONLY_WITH_CUDA = re.compile(r"(nvidia|cuda|triton)\b")
 
@@ -91,6 +91,9 @@ def test_wheel_holds_the_package_and_nothing_else(tmp_path, monkeypatch):
     assert {file.partition("/")[0] for file in files} == {"seastar_gym", f"seastar_gym-{PROJECT['version']}.dist-info"}
     assert "seastar_gym/__init__.py" in files
     assert "seastar_gym/py.typed" in files  # the annotations are for its users too
+    policies = {file.removesuffix(".safetensors") for file in files if file.endswith(".safetensors")}
+    assert len(policies) >= 3
+    assert {f"{policy}{suffix}" for policy in policies for suffix in (".json", ".md")} <= set(files)
 
 
 def test_every_base_dependency_is_imported_by_the_package():
@@ -100,11 +103,11 @@ def test_every_base_dependency_is_imported_by_the_package():
 @pytest.mark.parametrize(
     ("folders", "extras"),
     [
-        (["seastar_gym"], ["render", "studies", "train", "ray", "slurm"]),
-        (["studies"], ["train", "sweep", "test"]),
+        (["seastar_gym"], ["render", "studies", "train", "ray", "slurm", "data"]),
+        (["studies"], ["train", "sweep", "test", "data"]),
         (["agents", "train.py"], ["train"]),
-        (["tests"], ["test", "browser", "ray"]),
-        (["docs"], ["docs"]),
+        (["tests"], ["test", "browser", "ray", "learners"]),
+        (["docs"], ["docs", "learners"]),
     ],
 )
 def test_every_import_has_its_requirement(folders, extras):

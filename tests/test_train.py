@@ -2,6 +2,7 @@
 
 import csv
 import errno
+import hashlib
 import html
 import itertools
 import json
@@ -303,6 +304,9 @@ def test_a_worse_policy_goes_into_the_box_only_when_asked_twice(finished, tmp_pa
     assert train.main(["--resume", str(folder)]) == 0 and box.read_bytes() == before
     assert train.main(["--resume", str(folder), "--ship", "--ship-anyway"]) == 0
     assert policies.load(box).training["seed"] == 4
+    card = box.with_suffix(".md").read_text(encoding="utf-8")
+    assert hashlib.sha256(box.read_bytes()).hexdigest() in card and "seed: 4" in card and "processors" in card
+    assert "not recorded" not in card
 
 
 def test_a_policy_no_worse_than_that_in_the_box_needs_no_second_word(finished, box):

@@ -1,10 +1,11 @@
-"""Policy in the box: replaced by a trained one if that is no worse."""
+"""Policy in the box, with its card: replaced by a trained one if that is no worse."""
 
 import sys
 from pathlib import Path
 
 import numpy as np
 
+from agents.cards import HELD_OUT_PATHS, write_card
 from agents.training.folder import resume_command
 from agents.training.options import Options
 from seastar_gym.controllers.learned import SHIPPED, LearnedPolicy, in_the_box
@@ -12,9 +13,6 @@ from seastar_gym.controllers.learned import load as load_policy
 from seastar_gym.controllers.learned import save as save_policy
 from seastar_gym.envs.task import make_scene
 from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
-
-HELD_OUT_PATHS = 64
-"""Number of random paths on which a policy is compared with the one in the box; no training draws them."""
 
 
 def put_in_the_box(options: Options, folder: Path) -> int:
@@ -26,7 +24,7 @@ def put_in_the_box(options: Options, folder: Path) -> int:
         return 1
     file = in_the_box(options.ppo.decision_period, SHIPPED)
     save_policy(policy, file)
-    print(f"In the box: {file}")
+    print(f"In the box: {file}, with its card {write_card(file, options.num_threads).name}")
     return 0
 
 

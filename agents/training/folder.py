@@ -18,6 +18,7 @@ from stable_baselines3 import PPO
 import seastar_gym
 from agents.ppo import policy_of
 from agents.report.charts import read_progress
+from agents.training import efficiency
 from agents.training.options import Options
 from seastar_gym.controllers.learned import save as save_policy
 from seastar_gym.files import write_atomically
@@ -57,7 +58,8 @@ def export(model: PPO, folder: Path) -> None:
         strokes=model.num_timesteps,
         seed=model.seed,
         progress=read_progress(folder),
-        **{name: config[name] for name in ("commands", "options", "versions")},
+        seconds=round(efficiency.read(folder).seconds, 1),
+        **{name: config[name] for name in ("commands", "options", "versions", "machine")},
     )
 
 

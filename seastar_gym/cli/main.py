@@ -21,6 +21,7 @@ COMMANDS = {
     "play": Command("seastar_gym.cli.play", "steer the robot with the keyboard"),
     "evaluate": Command("seastar_gym.cli.evaluate", "compare agents on a path: a table, a CSV file, a picture"),
     "benchmark": Command("seastar_gym.benchmark.command", "measure agents on registered tasks over ten seeds"),
+    "data": Command("seastar_gym.data.command", "write Minari datasets of agents on registered tasks"),
     "train": Command("seastar_gym.cli.train", "train a policy, in a checkout of the repository"),
     "certify": Command("seastar_gym.certification.command", "measure what speed costs a scene in accuracy"),
     "sweep": Command("seastar_gym.sweep.command", "simulate thousands of designs, here or on a cluster"),

@@ -1,0 +1,170 @@
+"""Model cards: what a policy in the box is, how it was trained and how it swims, as Markdown beside its file.
+
+    python -m agents.cards
+
+measures every policy in the box and writes its card anew; `python train.py --ship` does so for the one that it ships.
+"""
+
+import hashlib
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import tyro
+
+from seastar_gym.command import run_command
+from seastar_gym.controllers.learned import SHIPPED, LearnedPolicy, load
+from seastar_gym.envs.task import make_scene
+from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
+from seastar_gym.evaluation.swim import TIME_LIMIT, Swim, decisions_in
+from seastar_gym.files import write_atomically
+from seastar_gym.scene.numerics import Fidelity
+
+HELD_OUT_PATHS = 64
+"""Number of random paths that a card counts, those on which `train.py --ship` compares policies."""
+FIDELITIES: tuple[Fidelity, ...] = ("fast", "balanced", "reference")
+CHEAP: tuple[Fidelity, ...] = ("fast", "balanced")
+"""Fidelities at which held-out paths are swum."""
+UNKNOWN = "not recorded"
+
+
+class Swims(NamedTuple):
+    """Swims of a policy at a fidelity: round the pentagon, and on held-out random paths, none where that is dear."""
+
+    pentagon: Swim
+    held_out: list[Swim]
+
+
+def measure(policy: LearnedPolicy, threads: int | None = None) -> dict[Fidelity, Swims]:
+    """Swims of a policy at every fidelity, with its own time between decisions."""
+    period = policy.description.decision_period
+    limit = decisions_in(TIME_LIMIT, period)
+    found = {}
+    for fidelity in FIDELITIES:
+        scene = make_scene(None, fidelity, period)
+        (pentagon,) = swim_many(
+            "learned", policy, "pentagon", 1, scene, max_strokes=limit, threads=threads, decision_period=period
+        )
+        paths = HELD_OUT_PATHS if fidelity in CHEAP else 0
+        held_out = [] if not paths else swim_many(
+            "learned", policy, "random", paths, scene, max_strokes=limit, seed=HELD_OUT_SEED, threads=threads,
+            decision_period=period,
+        )  # fmt: skip
+        found[fidelity] = Swims(pentagon, held_out)
+    return found
+
+
+def card(policy: LearnedPolicy, file: Path, sha256: str, swims: Mapping[Fidelity, Swims]) -> str:
+    """The card, as Markdown. sha256: Of the weights, which tells what the card is about."""
+    about, scene = policy.description, policy.scene
+    decides = "stroke by stroke, every 1 s" if about.decision_period is None else f"every {about.decision_period:g} s"
+    _, inputs = about.shapes()["0.weight"]
+    layers = ", ".join(map(str, about.hidden))
+    many, choices = about.distributions
+    choice = f"one of {choices} commands" if many == 1 else f"one of {choices} commands for each limb"
+    symmetric = "In a turned or mirrored world it swims the turned or mirrored way. " * about.symmetry
+    return f"""# Model card: {file.stem}
+
+A policy that swims the chapter's robot along waypoints. It decides {decides}, and takes {choice}.
+{symmetric}It was trained in simulation, on random paths, and no real robot has swum by it.
+
+| | |
+|---|---|
+| file | `{file.name}`, sha256 `{sha256}` |
+| input | {inputs} numbers: shape and velocity of the limbs, {_memory(scene)}two waypoints |
+| network | layers of {layers} neurons with tanh, which numpy runs |
+| environment | `actions="{about.actions}"`; {type(scene.robot).__name__} with {scene.robot.n_limbs} limbs, \
+{type(scene.actuator).__name__} |
+| licence | MIT, as the package |
+
+## Training
+
+{_training(policy.training)}
+
+## How it swims
+
+`python -m agents.cards` measures this: round the pentagon, with waypoints of 10 mm, and on {HELD_OUT_PATHS} random
+paths that no training draws. A swim ends after {TIME_LIMIT:g} s. Energy is per metre of the hub's way.
+
+| fidelity | pentagon | energy there [J/m] | held-out paths: mean time [s] | arrived |
+|---|---:|---:|---:|---:|
+{chr(10).join(_row(fidelity, one) for fidelity, one in swims.items())}
+
+## Limits
+
+* It knows the chapter's robot, with its drag, its mass and its actuators. In other physics the order of policies can be
+  another one (docs/fidelities.md).
+* It sees the whole state, without noise. It was not trained on noise, currents or weak limbs; docs/results.md has swims
+  with them.
+* It sees two waypoints, 0.1 to 0.2 m apart in its training, and does not plan beyond them.
+"""
+
+
+def _memory(scene: Any) -> str:
+    """What is observed of actuators."""
+    return "" if type(scene.actuator).__name__ == "SmaPulse" else "the contraction of the wires, "
+
+
+def _training(training: Mapping[str, Any]) -> str:
+    """Facts of a training as a list."""
+    commands = training.get("commands", [])
+    seconds, machine = training.get("seconds"), training.get("machine")
+    versions = training.get("versions", {})
+    on = UNKNOWN if machine is None else f"{machine['system']}, {machine['processors']} processors"
+    facts = {
+        "commands, in the version of then": "".join(f"\n  * `{command}`" for command in commands) or UNKNOWN,
+        "strokes, or decisions": f"{training['strokes']:,}" if "strokes" in training else UNKNOWN,
+        "seed": training.get("seed", UNKNOWN),
+        "fidelity": training.get("options", {}).get("fidelity", UNKNOWN),
+        "time in simulator, policy and updates": UNKNOWN if seconds is None else f"{seconds:.0f} s",
+        "machine": on,
+        "versions": ", ".join(f"{name} {version}" for name, version in versions.items()) or UNKNOWN,
+    }
+    return "\n".join(f"* {name}: {value}" for name, value in facts.items()).replace(": \n", ":\n")
+
+
+def _row(fidelity: Fidelity, swims: Swims) -> str:
+    done = swims.pentagon
+    pentagon = f"{done.time[-1]:.1f} s, {done.strokes} {done.counted_in}" if done.finished else done.result
+    energy = "" if done.joules_per_metre is None else f"{done.joules_per_metre:.0f}"
+    arrived = [one for one in swims.held_out if one.finished]
+    mean = f"{np.mean([one.time[-1] for one in arrived]):.1f}" if arrived else ""
+    share = f"{len(arrived)} of {len(swims.held_out)}" if swims.held_out else ""
+    return f"| `{fidelity}` | {pentagon} | {energy} | {mean} | {share} |"
+
+
+def write_card(file: Path, threads: int | None = None) -> Path:
+    """Measure the policy in a file, and write its card beside it; returns the card's file."""
+    policy, place = load(file), file.with_suffix(".md")
+    text = card(policy, file, hashlib.sha256(file.read_bytes()).hexdigest(), measure(policy, threads))
+    write_atomically(place, text.encode())
+    return place
+
+
+@dataclass(frozen=True)
+class Options:
+    """Measure policies and write their cards beside them."""
+
+    policies: tuple[Path, ...] = ()
+    """Files of policies (.safetensors); by default all in the box."""
+    num_threads: int | None = None
+    """Threads of the simulator; by default one for every processor."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line; returns the exit code."""
+    options = tyro.cli(Options, prog="python -m agents.cards", args=arguments)
+    try:
+        for file in options.policies or sorted(SHIPPED.parent.glob("*.safetensors")):
+            print(write_card(file, options.num_threads), flush=True)
+    except (ValueError, FileNotFoundError) as bad_input:
+        print(bad_input, file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    run_command(main)

@@ -1,0 +1,53 @@
+"""Model cards say what the policies in the box are and how they swim, and are those of the weights beside them."""
+
+import hashlib
+import re
+import shutil
+
+import pytest
+
+from agents.cards import CHEAP, FIDELITIES, HELD_OUT_PATHS, card, main, measure
+from seastar_gym.controllers.learned import SHIPPED, load
+
+POLICIES = sorted(SHIPPED.parent.glob("*.safetensors"))
+
+
+def row(text, fidelity):
+    """Cells of a card's row."""
+    (found,) = re.findall(rf"^\| `{fidelity}` \|(.*)\|$", text, re.MULTILINE)
+    return [cell.strip() for cell in found.split("|")]
+
+
+@pytest.mark.parametrize("file", POLICIES, ids=lambda file: file.stem)
+def test_every_policy_in_the_box_has_its_card(file):
+    text = file.with_suffix(".md").read_text(encoding="utf-8")
+    assert hashlib.sha256(file.read_bytes()).hexdigest() in text
+    training = load(file).training
+    assert all(f"`{command}`" in text for command in training["commands"])
+    assert f"{training['strokes']:,}" in text and f"seed: {training['seed']}" in text
+    assert "MIT" in text and "no real robot has swum by it" in text
+    for fidelity in FIDELITIES:
+        pentagon, _, _, arrived = row(text, fidelity)
+        assert re.match(r"[\d.]+ s, \d+ (strokes|decisions)$", pentagon)
+        assert arrived == (f"{HELD_OUT_PATHS} of {HELD_OUT_PATHS}" if fidelity in CHEAP else "")
+
+
+def test_a_card_tells_what_is_measured_now(monkeypatch):
+    """The shipped card of the policy for strokes, at the cheapest fidelity."""
+    monkeypatch.setattr("agents.cards.FIDELITIES", ("fast",))
+    policy, text = load(), SHIPPED.with_suffix(".md").read_text(encoding="utf-8")
+    now = card(policy, SHIPPED, "", measure(policy, threads=1))
+    assert row(now, "fast") == row(text, "fast")
+
+
+def test_the_command_writes_cards_and_says_what_is_wrong(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("agents.cards.FIDELITIES", ("fast",))
+    monkeypatch.setattr("agents.cards.HELD_OUT_PATHS", 1)
+    for suffix in (".safetensors", ".json"):
+        shutil.copy(SHIPPED.with_suffix(suffix), tmp_path / f"mine{suffix}")
+    file = tmp_path / "mine.safetensors"
+    assert main(["--policies", str(file)]) == 0
+    text = file.with_suffix(".md").read_text(encoding="utf-8")
+    assert text.startswith("# Model card: mine\n") and row(text, "fast")[3] == "1 of 1"
+    assert main(["--policies", str(tmp_path / "other.safetensors")]) == 2
+    assert "There is no trained policy at" in capsys.readouterr().err
