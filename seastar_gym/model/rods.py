@@ -18,7 +18,7 @@ from seastar_gym.der.terms import (
     load,
     stretching,
 )
-from seastar_gym.model.body import make_body
+from seastar_gym.model.body import body_rim, make_body
 from seastar_gym.model.currents import current_rows
 from seastar_gym.model.joints import with_joints
 from seastar_gym.model.mesh import make_mesh
@@ -58,9 +58,12 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
     mass = inertia.coefficients(mesh, robot.density)
     weight = gravity.coefficients(mesh, robot.density, water.density, scene.gravity)
     loads = load.total(load.coefficients(mesh, scene.loads), weight)
-    on_body = None
+    on_body, rim = None, None
     if has_body:
         on_body = make_body(robot, mesh, water, scene.gravity)
+        if touch is not None:
+            rim = body_rim(robot)
+            on_body = on_body.with_corners(rim)
         mass, at_nodes = on_body.mass(mass), on_body.drag(mesh, at_nodes)
         loads = on_body.loads(loads)
     inertia.hold(mass, scene.held_nodes)
@@ -87,7 +90,7 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         load=loads,
         contact=None
         if touch is None
-        else contact.coefficients(mesh, scene.robot.limbs_that_may_touch(), touch.modulus, touch.opening_angle),
+        else contact.coefficients(mesh, robot.limbs_that_may_touch(), touch.modulus, touch.opening_angle, rim),
         foresight=seen_ahead,
         scales=scales.coefficients(
             mesh, stretched, seen_ahead, robot.density, water.density, C_d, mass, scene.held_nodes

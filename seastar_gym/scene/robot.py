@@ -16,7 +16,7 @@ from seastar_gym.scene.checks import require_choice, require_count, require_numb
 from seastar_gym.scene.limb import Limb, LimbShape, as_tuple
 from seastar_gym.scene.per_robot import Numbers, batch_size, chosen, require_each
 from seastar_gym.scene.serial import register_part
-from seastar_gym.scene.shape import limbs_that_may_touch, rest_positions, turn_per_hinge
+from seastar_gym.scene.shape import around_body, limbs_that_may_touch, rest_positions, turn_per_hinge
 
 HubHinge = Literal["opening", "turning"]
 Discretisation = Literal["chapter", "continuum"]
@@ -170,8 +170,12 @@ class Seastar:
 
     def limbs_that_may_touch(self) -> list[tuple[int, int]]:
         """Pairs of limbs that may touch, (right, left), counted from 0."""
-        alike = all(limb.length is None for limb in self.limbs)
-        return limbs_that_may_touch([shape.gap for shape in self.limb_shapes()], alike)
+        alike, shapes = all(limb.length is None for limb in self.limbs), self.limb_shapes()
+        if self.body is None or self.body.is_point:
+            return limbs_that_may_touch([shape.gap for shape in shapes], alike)
+        order, turns = around_body(shapes)
+        pairs = limbs_that_may_touch(turns, alike and not self.body.attachments and not self.body.outline)
+        return [(order[right], order[left]) for right, left in pairs]
 
     @property
     def is_symmetric(self) -> bool:

@@ -58,7 +58,7 @@ class Batch:
         self.make_coefficients(scene)
         self.n_node_rows = n_rows
         body = self.coefficients.rods(0).body
-        n_free_rows, n_place_rows = (n_rows, n_rows) if body is None else (n_rows + 2, n_rows + 2 + 2 * n_limbs)
+        n_free_rows, n_place_rows = (n_rows, n_rows) if body is None else (n_rows + 2, n_rows + 2 + 2 * body.n_arms)
         self.q = aligned_rows(n_groups, n_place_rows, N_LANES)
         self.v = aligned_rows(n_groups, n_place_rows, N_LANES)
         self.q[:, :n_rows] = self.coefficients.rest

@@ -167,8 +167,6 @@ def test_robots_that_cannot_have_a_body_or_a_joint_are_refused():
         Seastar(body=Body(radius=0.02, attachments=CORNERS))
     with assert_refused("Directions", "both"):
         Seastar(4, body=Body(radius=0.02, attachments=CORNERS), limbs=tuple(Limb(k) for k in range(4)))
-    with assert_refused("Contact", "body"):
-        Scene(Seastar(body=disc), contact=Contact())
     with assert_refused("body"):
         Seastar(body=0.02)
     with assert_refused("direction"):
