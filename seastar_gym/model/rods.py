@@ -41,9 +41,8 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
     water = VACUUM if scene.fluid is None else chosen(scene.fluid, itemgetter(index))
     touch = None if scene.contact is None else chosen(scene.contact, itemgetter(index))
     limbs = robot.limb_shapes()
-    has_body = robot.body is not None and not robot.body.is_point
     # Limbs that begin apart have no opening angle that could close: negative angles are not noted.
-    hub_angles = [-1.0 if has_body else natural_hub_angle(limb.gap, robot.hub_hinge) for limb in limbs]
+    hub_angles = [-1.0 if robot.has_body else natural_hub_angle(limb.gap, robot.hub_hinge) for limb in limbs]
     C_d, C_t, C_a = water.drag_coefficient, water.tangential_drag_coefficient, water.added_mass_coefficient
     mesh = make_mesh(limbs, robot.nodes_per_limb)
     continuum = robot.discretisation == "continuum"
@@ -59,7 +58,7 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
     weight = gravity.coefficients(mesh, robot.density, water.density, scene.gravity)
     loads = load.total(load.coefficients(mesh, scene.loads), weight)
     on_body, rim = None, None
-    if has_body:
+    if robot.has_body:
         on_body = make_body(robot, mesh, water, scene.gravity)
         if touch is not None:
             rim = body_rim(robot)

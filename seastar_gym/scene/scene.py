@@ -112,7 +112,7 @@ class Scene:
     def _check_contact(self) -> None:
         if self.contact is None:
             return
-        if self.robot.body is not None and not self.robot.body.is_point:
+        if self.robot.body is not None and self.robot.has_body:
             self._check_contact_with_body(self.robot.body, self.contact)
             return
         robot, pairs = self.robot, self.robot.limbs_that_may_touch()

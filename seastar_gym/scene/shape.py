@@ -56,8 +56,8 @@ def limbs_that_may_touch(gaps: Sequence[float], alike: bool) -> list[tuple[int, 
 
     Limbs that begin apart may lean towards each other, by up to a quarter of a turn.
 
-    gaps: Angle from every limb to the next [rad], negative where they lean so. alike: Whether limbs have equal lengths, so that none can reach over
-        another.
+    gaps: Angle from every limb to the next [rad], negative where they lean so. alike: Whether limbs have equal lengths,
+        so that none can reach over another.
     """
     n_limbs = len(gaps)
     turns = {

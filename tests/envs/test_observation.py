@@ -14,7 +14,7 @@ from seastar_gym.envs.observation import (
     to_float32,
 )
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.stations import at_stations, stations
+from seastar_gym.envs.stations import at_stations, stations, stations_of
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import to_rows
@@ -31,7 +31,7 @@ def observations_of(simulator: Simulator, targets: np.ndarray) -> np.ndarray:
     """float64 observations, shape (n_robots, size), for targets of shape (n_robots, 4) [m]."""
     rows, robot = to_rows(targets), simulator.scene.robot
     out = np.full((len(rows), observation_size(robot.n_limbs), N_LANES), np.nan)
-    own, places = simulator.coefficients, stations(robot.nodes_per_limb)
+    own, places = simulator.coefficients, stations_of(robot)
     observe(own.rest, own.limb_length, simulator.q, simulator.v, places, rows, VELOCITY_SCALE, out)
     return out.transpose(0, 2, 1).reshape(-1, out.shape[1])[: simulator.n_robots]
 

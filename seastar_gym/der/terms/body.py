@@ -167,7 +167,7 @@ def place_roots(body, rods, q):
 
 @kernel
 def move_roots(body, rods, q, v):
-    """Put the roots of the limbs, and corners, where hub and angle say [m], with the velocities of there [m/s]; with a body."""
+    """Put roots and corners where hub and angle say [m], with the velocities of there [m/s], in scenes with a body."""
     if body is None:
         return
     c, s = rotation(angle(body, rods, q))
@@ -280,7 +280,7 @@ def carry_roots(body, rods, work, p):
 
 @kernel
 def gather_roots(body, rods, work, rows):
-    """Move what rows have at roots and corners to the hub and, as a torque, to the angle; the transpose of the above."""
+    """Move what rows have at roots and corners to the hub and, as a torque, to the angle: the transpose of carry."""
     if body is None:
         return
     angle_row = 2 * n_nodes(rods)

@@ -5,12 +5,15 @@ on which the node's limb belongs. Where g is below d, their thicknesses' sum, el
 
     V = k (d - g)^2 / 2,    k the contact modulus times half the node's Voronoi length,
 
-half, because the nodes of either limb meet the edges of the other. A body's outline is a polygon with sides in place of
-edges, whose corners meet the edges of limbs; a node that meets it has k of its whole length, as nobody meets it in turn,
-and an edge that meets a corner that of half the length at its outer node. A disc is one corner with the disc's radius
-for its thickness. Corners move with the body as roots of limbs do, see body.py. Who is near whom, n and s are taken from the first
+half, because the nodes of either limb meet the edges of the other. Who is near whom, n and s are taken from the first
 guess of a stage, see fluid.py: g is linear in the places, V convex in them, k c c^T its Hessian, c the gradient of g,
-and the forces on node and edge cancel. What a body's turn adds to that, as at the roots, is in the star's matrix. That Hessian couples limbs, so it is not in the star's matrix, see coupled.py.
+and the forces on node and edge cancel. That Hessian couples limbs, so it is not in the star's matrix, see coupled.py.
+
+A body's outline is a polygon with sides in place of edges, whose corners meet the edges of limbs. A node that meets it
+has k of its whole length, since nobody meets it in turn, and an edge that meets a corner that of half the length at its
+outer node. A disc is one corner, as thick as its radius. Outside, n points from the nearest point of the outline. Root
+edges, which begin at the body, do not meet it. Corners move with the body as roots do, see body.py, and what that is
+curved by, in its angle alone, is in the star's matrix.
 
 A step does not resolve the bounce of stiff limbs. Schemes whose stages end a step damp it, whatever k is. The implicit
 midpoint rule would keep it, and limbs that hinges press together would ring with the period of two steps, ever more: it
@@ -69,7 +72,7 @@ class Contact(NamedTuple):
 
 
 class Rim(NamedTuple):
-    """Outline of a body: its corners [m], shape (n, 2), and their thickness [m]: the radius of a disc, which has one."""
+    """Outline of a body: its corners [m], shape (n, 2), and their thickness [m]. A disc has one, as thick as it is."""
 
     corners: np.ndarray
     radius: float
