@@ -12,7 +12,7 @@ from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.newton import move_along
 from seastar_gym.der.stepping.stages import Stage
-from seastar_gym.der.terms.body import freeze_body, move_roots, place_roots
+from seastar_gym.der.terms.body import begin_body, freeze_body, move_roots, place_roots
 from seastar_gym.der.terms.contact import add_contact, n_listed
 from seastar_gym.der.terms.crossing import those_uncrossed
 from seastar_gym.der.terms.damping import freeze_strains
@@ -173,3 +173,65 @@ def test_potential_and_newton_direction_are_those_of_the_oracle(name, ahead, kin
     along = slope(lambda share: gradient(phi, stage.u + share * direction / size, 1e-6), 0.0, 1e-6)
     np.testing.assert_allclose(size * along, slopes, rtol=0.0, atol=1e-4 * np.abs(slopes).max())
     assert plain(decrement)[0] == pytest.approx(slopes @ direction, rel=1e-4)
+
+
+@pytest.mark.parametrize("kind", ["side", "corner"])
+@pytest.mark.parametrize("name", BODIES)
+def test_forces_neither_push_nor_turn_robot_and_body_together(name, kind):
+    """What limbs feel is what the body gets, in the hub's force and in the residual of its angle."""
+    rods, oracle = make(name)
+    stage = random_stage(oracle, 2e-3, 3, kind)
+    stage.first = stage.u
+    work, kernel_stage = begun(rods, oracle, stage)
+    begin_body.plain(rods.body, rods, work)
+    energy = add_contact.plain(rods.contact, rods, work, kernel_stage, None, Lanes(0.0))
+    n = 2 * oracle.star.n_nodes - 2 * N_LIMBS
+    force, q = (rows[:n, 0].reshape(-1, 2) for rows in (work.contact.force, work.q))
+    assert plain(energy)[0] > 0.0 and not work.contact.force[n:].any() and n_listed.plain(work) > 0
+    size = np.abs(force).max()
+    np.testing.assert_allclose(force.sum(axis=0), 0.0, atol=1e-12 * size)
+    torque = -work.body.system[3, 0]
+    arms = q - q[0]
+    assert torque == pytest.approx(-(arms[:, 0] * force[:, 1] - arms[:, 1] * force[:, 0]).sum(), abs=1e-9 * size)
+    assert (name == "disc") == (abs(torque) < 1e-9 * size)
+
+
+def test_nodes_that_entered_a_body_belong_to_the_side_that_they_came_from():
+    """However deep the first guess has carried them."""
+    rods, oracle = make("polygon")
+    stage = random_stage(oracle, 2e-3, 1, "limb")
+    node = oracle.star.node(0, N - 1)
+    top = 0.5 * (oracle.corners[1] + oracle.corners[2])
+    out = np.array([0.005, 0.04]) / np.hypot(0.005, 0.04)
+    for at, place in (("u_hat", top + 1e-3 * out), ("first", top - 0.012 * out)):
+        nodes = turned(-stage.u[-1], stage.u[:-1].reshape(-1, 2) - stage.u[:2])
+        nodes[node] = place
+        moved = turned(stage.u[-1], nodes) + stage.u[:2]
+        setattr(stage, at, np.append(moved.ravel(), stage.u[-1]))
+    stage.u = stage.first
+    work, kernel_stage = begun(rods, oracle, stage)
+    begin_body.plain(rods.body, rods, work)
+    add_contact.plain(rods.contact, rods, work, kernel_stage, None, Lanes(0.0))
+    force = turned(-stage.u[-1], work.contact.force[2 * node : 2 * node + 2, 0])
+    np.testing.assert_allclose(force / np.linalg.norm(force), [-0.005 / 0.0403112887, 0.04 / 0.0403112887], atol=1e-3)
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_steps_whose_ends_are_in_the_body_are_seen_in_their_own_robot(name):
+    rods, oracle = make(name)
+    outside = random_stage(oracle, 2e-3, 1, "side").u
+    inside = outside.copy()
+    node = oracle.star.node(1, N - 1)
+    inside[2 * node : 2 * node + 2] = outside[:2] + 1e-3
+    through = outside.copy()
+    across = turned(outside[-1], np.array([[0.0, -0.025], [0.0, 0.024]]))
+    through[2 * node - 2 : 2 * node + 2] = (outside[:2] + across).ravel()
+    for end, start, good in ((outside, outside, True), (inside, outside, False), (through, outside, False),
+                             (inside, inside, True), (outside, inside, True)):  # fmt: skip
+        work = make_work(rods, 1)
+        work.q[:], q_0 = rows_of(rods, end), rows_of(rods, start)
+        for rows in (work.q, q_0):
+            place_roots.plain(rods.body, rods, rows)
+        stage = Stage(q_0, q_0, Lanes(1.0), Lanes(1.0), False)
+        found = plain(those_uncrossed.plain(rods.contact, rods, work, stage, q_0, EVERYONE))
+        assert found.all() == good and found.any() == good

@@ -794,7 +794,8 @@ def test_unobserved_memory_is_not_carried():
 def test_every_robot_of_a_batch_has_to_be_symmetric():
     bent = Limb(natural_curvature=np.array([0.0, 0.0, 9.0]))
     with assert_refused("symmetry of the regular polygon", "straight"):
-        VectorSymmetryReduction(SeastarSwimVectorEnv(3, scene=Scene(replace(STAR, limbs=(bent, Limb(), Limb(), Limb())))))
+        one_bent = Scene(replace(STAR, limbs=(bent, Limb(), Limb(), Limb())))
+        VectorSymmetryReduction(SeastarSwimVectorEnv(3, scene=one_bent))
     alike = Seastar(4, 4, limb_length=np.array([0.1, 0.11, 0.12]))
     VectorSymmetryReduction(SeastarSwimVectorEnv(3, scene=Scene(alike)))
 

@@ -94,7 +94,7 @@ def view_roots(body, rods, work, stage, q_0, carried_x, carried_y, moved):
 
 @kernel
 def view_limbs(rods, work, q_0, right, left):
-    """Look at two limbs and their beginnings along the gap between them, and across it; keep it in work.contact.seen."""
+    """Look at two limbs and their roots along the gap between them, and across it; keep it in work.contact.seen."""
     edges = rods.nodes_per_limb - 1
     wx, wy = across_gap(rods, q_0, right, left)
     for limb in (right, left):
