@@ -60,16 +60,18 @@ def test_errors_bound_those_of_the_sequences_they_were_measured_on(certificate):
 
 
 @pytest.mark.slow
-def test_a_robot_with_a_body_has_a_certificate_of_its_own(few_settings):
+def test_a_robot_with_a_body_has_a_certificate_of_its_own(few_settings, tmp_path):
     robot = replace(SMALL_ROBOT, body=Body(radius=0.02, mass=0.02))
     certificate = seastar_gym.certify(Scene(robot), SAMPLES)
     coarse, fine = certificate.settings[0], certificate.settings[2]
-    assert 0.0 < fine.space_error < 0.6 * coarse.space_error and all(0.0 < each.speed for each in certificate.settings)
-    read = Certificate.from_json(certificate.to_json())
+    assert 0.0 < fine.space_error < 0.6 * coarse.space_error and all(each.speed > 0.0 for each in certificate.settings)
+    certificate.save(tmp_path / "mine.json")
+    read = Certificate.load(tmp_path / "mine.json")
     best = read.for_error(max(each.error(certificate.promised) for each in certificate.settings))
-    assert best.robot.body == robot.body
-    assert certificate.of(best) is not None
-    assert certificate.of(replace(best, robot=replace(best.robot, body=Body(radius=0.02, mass=0.03)))) is None
+    assert best.robot.body == robot.body and read.of(best) is not None
+    read.require_valid(best)
+    with assert_refused("another scene"):
+        read.require_valid(replace(best, robot=replace(best.robot, body=Body(radius=0.02, mass=0.03))))
 
 
 def test_for_error_is_the_fastest_setting_that_keeps_it(certificate):
