@@ -53,7 +53,7 @@ class Scene:
     loads: Constant forces on nodes, (node, F_x, F_y) [N] each.
     limb_strengths: Factors by which the rotations of the limbs are reduced, from 0 (no rotation) to 1 (full), one per
         limb. () means full rotation.
-    contact: Contact between limbs. None lets limbs pass through each other, as in the chapter.
+    contact: Contact between limbs, and with a body. None lets limbs pass through each other, as in the chapter.
     gravity: Gravitational acceleration in the plane (g_x, g_y) [m/s^2]. Limbs feel their weight minus the buoyancy of
         the fluid that they displace. None means no gravity in the plane.
     """

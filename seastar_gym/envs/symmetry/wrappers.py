@@ -1,4 +1,7 @@
-"""Wrappers that reduce `SeastarSwim-v0` and the timed environments to one sector, for any learner."""
+"""Wrappers that reduce `SeastarSwim-v0` and the timed environments to one sector, for any learner.
+
+A robot has the sectors of its own symmetry, see the package's docstring.
+"""
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
