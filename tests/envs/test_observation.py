@@ -93,7 +93,7 @@ def test_every_index_holds_what_the_table_says(scene):
 
 @pytest.mark.parametrize("nodes_per_limb", [5, 10])
 def test_limbs_on_a_body_are_seen_from_their_roots(nodes_per_limb):
-    """Positions and velocities of stations are those of the splines through root and nodes, in the frame of best fit."""
+    """Positions and velocities of stations are those of splines through root and nodes, in the frame of best fit."""
     places = ((0.03, 0.015), (-0.03, 0.015), (-0.03, -0.015))
     body = Body.rectangle(0.06, 0.03, attachments=tuple(Attachment(x, y, np.arctan2(y, x)) for x, y in places))
     scene = Scene(Seastar(3, nodes_per_limb, body=body), numerics=Numerics.preset("fast"))

@@ -5,7 +5,15 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from seastar_gym import Attachment, Body, Seastar
-from seastar_gym.envs.stations import at_stations, body_heading, node_weights, of_beginning, stations, stations_of, weights
+from seastar_gym.envs.stations import (
+    at_stations,
+    body_heading,
+    node_weights,
+    of_beginning,
+    stations,
+    stations_of,
+    weights,
+)
 
 MESHES = (2, 3, 4, 5, 7, 9, 10, 11, 19, 37, 10_000)
 PLACES = np.arange(1, 10) / 9
