@@ -29,12 +29,15 @@ def scene(name: str, scheme: SchemeName, step: float, fluid: Water | None) -> Sc
 
 
 def heights(simulator: Simulator) -> np.ndarray:
-    """Smallest distance of a node from the rim of every robot's body [m], negative inside."""
-    angle, q = simulator.orientation(), simulator.positions
+    """Smallest distance of edges, but for root edges, from the rim of every robot's body [m], negative inside."""
+    angle, q, robot = simulator.orientation(), simulator.positions, simulator.scene.robot
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
     x, y = np.moveaxis(q[:, 1:] - q[:, :1], -1, 0)
-    seen = np.stack([c * x + s * y, c * y - s * x], axis=-1)
-    return np.array([simulator.scene.robot.body.shape.height_over(nodes).min() for nodes in seen])
+    limbs = np.stack([c * x + s * y, c * y - s * x], axis=-1).reshape(len(q), robot.n_limbs, -1, 2)
+    share = np.linspace(0.0, 1.0, 9)[:, None, None, None, None]
+    places = (1.0 - share) * limbs[:, :, :-1] + share * limbs[:, :, 1:]
+    of_robots = np.moveaxis(places, 1, 0).reshape(len(q), -1, 2)
+    return np.array([robot.body.shape.height_over(each).min() for each in of_robots])
 
 
 def swum(simulator: Simulator, commands: np.ndarray, parts: int = 50) -> tuple[np.ndarray, np.ndarray]:
