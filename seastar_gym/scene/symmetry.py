@@ -101,7 +101,7 @@ def _limbs(robots: Sequence[Sequence[LimbShape]]) -> _Limbs:
         np.array([complex(*limb.root) for limb in robots[0]]),
         np.exp(1j * np.array([limb.direction for limb in robots[0]])),
         [tuple(limb.natural_curvature for limb in limbs) for limbs in alike],
-        [tuple(limb._replace(**nowhere) for limb in limbs) for limbs in alike],  # type: ignore[arg-type]
+        [tuple(limb._replace(**nowhere) for limb in limbs) for limbs in alike],
     )
 
 
