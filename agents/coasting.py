@@ -15,7 +15,7 @@ from seastar_gym.controllers.greedy import turned
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.observation import Layout, scene_layout
 from seastar_gym.envs.reward import RewardWeights
-from seastar_gym.envs.stations import body_heading
+from seastar_gym.envs.stations import heading_of
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene import Scene
 from seastar_gym.simulator import Simulator
@@ -62,7 +62,7 @@ def fit_coasting(scene: Scene, decision_period: float | None, rng: np.random.Gen
         simulator = env.simulator
         twins.set_state(simulator.get_state())
         twins.advance(SECONDS)
-        heading = body_heading(simulator.positions, scene.robot)
+        heading = heading_of(simulator)
         seen.append(observations[:, : layout.waypoints.start].astype(np.float64))
         ways.append(turned(twins.hub_position() - simulator.hub_position(), -heading) / scene.robot.limb_length)
     env.close()

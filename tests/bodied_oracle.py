@@ -128,3 +128,127 @@ class Rigid:
         total += gamma * (self.isotropic * np.linalg.norm(w) ** 3 + self.strips[:, 3] @ np.abs(flows) ** 3) / 3.0
         fallen = turned(u[-1], self.weight_moment) - turned(u_hat[-1], self.weight_moment)
         return float(total - self.fall @ fallen - gamma * self.weight * self.fall @ d)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Point i near the place (1 - share) j + share k, with the normal to it; thickness [m], stiffness [N/m]."""
+
+    i: int
+    j: int
+    k: int
+    share: float
+    normal: Array
+    thickness: float
+    stiffness: float
+
+    def depth(self, points: Array) -> float:
+        y = (1.0 - self.share) * points[self.j] + self.share * points[self.k]
+        return max(0.0, self.thickness - float(self.normal @ (points[self.i] - y)))
+
+
+@dataclass(frozen=True)
+class Touching(Rigid):
+    """A body whose outline limbs meet: corners (n, 2) [m], anti-clockwise, and their radius [m]; one for a disc.
+
+    limbs: (right, left) limbs that may touch. ahead: Whether contact is looked for half a step after a step's end.
+    """
+
+    corners: Array
+    radius: float
+    limbs: tuple[tuple[int, int], ...]
+    opening_angle: float
+    ahead: bool
+
+    def points(self, u: Array) -> Array:
+        """Places, then corners [m]."""
+        return np.concatenate([self.places(u), u[:2] + turned(u[-1], self.corners)])
+
+    def looked_at(self, u: Array, u_hat: Array, v_hat: Array, gamma: float) -> Array:
+        if not self.ahead:
+            return self.points(u)
+        rates = v_hat[-1] * crossed(turned(u_hat[-1], np.concatenate([self.arms, self.corners])))
+        velocities = np.concatenate([v_hat[:-1].reshape(-1, 2), v_hat[:2] + rates])
+        return self.points(u_hat) + 4.0 * (self.points(u) - self.points(u_hat)) - gamma * velocities
+
+    @cached_property
+    def thickness(self) -> Array:
+        star, thick = self.star, np.zeros(self.star.n_nodes + len(self.corners))
+        for limb in range(star.n_limbs):
+            for i in range(1, star.nodes_per_limb):
+                thick[star.node(limb, i)] = min(star.rod_radius, 0.5 * self.opening_angle * star.edge_length * i)
+        thick[star.n_nodes :] = self.radius
+        return thick
+
+    def stiffness(self, node: int, share: float) -> float:
+        """Share of the contact modulus times the node's Voronoi length [N/m]."""
+        star = self.star
+        is_tip = (node - 1) % (star.nodes_per_limb - 1) == star.nodes_per_limb - 2
+        return np.pi / 6.0 * star.youngs_modulus * share * star.edge_length * (0.5 if is_tip else 1.0)
+
+    def pairs(self, ends: Array, start: Array) -> list[Pair]:
+        """Who is near whom at `ends`, in a step that began at `start`; nobody may be within the body there."""
+        star = self.star
+        found = [self.node_at_body(ends, node) for node in range(1, 1 + star.n_limbs * (star.nodes_per_limb - 1))]
+        for limb in range(star.n_limbs):
+            for edge in range(2, star.nodes_per_limb):
+                tail, head = star.node(limb, edge - 1), star.node(limb, edge)
+                for corner in range(star.n_nodes, len(ends)):
+                    side = 1.0 if height(start, corner, tail, head) > 0.0 else -1.0
+                    share = along(ends, corner, tail, head)
+                    if 0.0 < share < 1.0:
+                        found.append(self.pair(ends, corner, tail, head, share, side, self.stiffness(head, 0.5)))
+        for right, left in self.limbs:
+            for limb, other, side in ((right, left, -1.0), (left, right, 1.0)):
+                found += self.limb_at_limb(ends, start, limb, other, side)
+        return found
+
+    def pair(self, ends: Array, i: int, j: int, k: int, share: float, side: float, stiffness: float) -> Pair:
+        e = ends[k] - ends[j]
+        normal, t, share = side * np.array([-e[1], e[0]]) / np.linalg.norm(e), self.thickness, min(max(share, 0.0), 1.0)
+        return Pair(i, j, k, share, normal, t[i] + (1.0 - share) * t[j] + share * t[k], stiffness)
+
+    def limb_at_limb(self, ends: Array, start: Array, limb: int, other: int, side: float) -> list[Pair]:
+        star, found = self.star, []
+        for edge in range(1, star.nodes_per_limb):
+            tail, head = star.node(other, edge - 1), star.node(other, edge)
+            for i in range(1, star.nodes_per_limb):
+                node = star.node(limb, i)
+                share = along(ends, node, tail, head)
+                pair = self.pair(ends, node, tail, head, share, side, self.stiffness(node, 0.5))
+                if -0.05 < share < 1.05 and side * height(start, node, tail, head) > -pair.thickness:
+                    found.append(pair)
+        return found
+
+    def node_at_body(self, ends: Array, node: int) -> Pair:
+        """A node and the point of the outline that is nearest to it."""
+        m, best = self.star.n_nodes, None
+        for c in range(len(self.corners)):
+            j, k = m + c, m + (c + 1) % len(self.corners)
+            share = min(max(along(ends, node, j, k), 0.0), 1.0) if j != k else 0.0
+            way = ends[node] - (1.0 - share) * ends[j] - share * ends[k]
+            if best is None or np.linalg.norm(way) < best[0]:
+                best = np.linalg.norm(way), Pair(
+                    node, j, k, share, way / np.linalg.norm(way), self.thickness[node] + self.radius,
+                    self.stiffness(node, 1.0),
+                )  # fmt: skip
+        assert best is not None
+        return best[1]
+
+    def phi(self, u: Array, u_hat: Array, v_hat: Array, gamma: float, delta_psi: Array, first: Array) -> float:
+        found = self.pairs(self.looked_at(first, u_hat, v_hat, gamma), self.points(u_hat))
+        looked = self.looked_at(u, u_hat, v_hat, gamma)
+        stored = sum(0.5 * pair.stiffness * pair.depth(looked) ** 2 for pair in found)
+        return super().phi(u, u_hat, v_hat, gamma, delta_psi, first) + stored / (4.0 if self.ahead else 1.0)
+
+
+def along(points: Array, i: int, j: int, k: int) -> float:
+    """Share of the way from j to k of the foot of i."""
+    e = points[k] - points[j]
+    return float((points[i] - points[j]) @ e / (e @ e))
+
+
+def height(points: Array, i: int, j: int, k: int) -> float:
+    """Distance of i from the line from j to k, on its left [m]."""
+    e, d = points[k] - points[j], points[i] - points[j]
+    return float((e[0] * d[1] - e[1] * d[0]) / np.linalg.norm(e))

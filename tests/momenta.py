@@ -2,7 +2,9 @@
 
 import numpy as np
 
+from seastar_gym import Simulator
 from seastar_gym.der.rods import Rods
+from seastar_gym.simulator.body_frame import root_places
 
 
 def momenta(rods: Rods, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -21,3 +23,16 @@ def momenta(rods: Rods, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.nd
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def bodied_momenta(simulator: Simulator) -> tuple[np.ndarray, float]:
+    """Momentum [kg m/s] and angular momentum about the origin [kg m^2/s] of a robot whose roots balance each other."""
+    rods, q, v = simulator.coefficients.rods(0), simulator.positions[0], simulator.velocities[0]
+    mass, omega, n = rods.mass[: len(q)], simulator.spin()[0], rods.nodes_per_limb - 1
+    roots = root_places(simulator.scene.robot, q[None, 0], simulator.orientation())[0]
+    arms = roots - q[0]
+    moving_roots = v[0] + omega * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
+    tails_q = np.concatenate([np.vstack([roots[k], q[1 + k * n : (k + 1) * n]]) for k in range(rods.n_limbs)])
+    tails_v = np.concatenate([np.vstack([moving_roots[k], v[1 + k * n : (k + 1) * n]]) for k in range(rods.n_limbs)])
+    spin = cross(q, v) @ mass + rods.body.inertia[0] * omega
+    return mass @ v, spin - cross(q[1:] - tails_q, v[1:] - tails_v) @ rods.edge_mass

@@ -20,7 +20,7 @@ from seastar_gym.envs.commands import Actions, command_table
 from seastar_gym.envs.decisions import checked_decision_period
 from seastar_gym.envs.observation import OBSERVATION_LAYOUT, scene_layout
 from seastar_gym.envs.reward import RewardWeights
-from seastar_gym.envs.stations import body_heading
+from seastar_gym.envs.stations import heading_of
 from seastar_gym.scene import Scene
 from seastar_gym.simulator import Simulator
 
@@ -55,9 +55,9 @@ def measure_gaits(
     simulator, duration = Simulator(scene, len(commands)), checked_decision_period(decision_period, scene)
     for stroke in range(settling + measured):
         if stroke == settling:
-            hub, heading = simulator.hub_position(), body_heading(simulator.positions, scene.robot)
+            hub, heading = simulator.hub_position(), heading_of(simulator)
         simulator.advance(duration, commands[:, stroke % commands.shape[1]])
-    turn = body_heading(simulator.positions, scene.robot) - heading
+    turn = heading_of(simulator) - heading
     turn -= 2.0 * np.pi * np.rint(turn / (2.0 * np.pi))
     return Displacements(turned(simulator.hub_position() - hub, -heading) / measured, turn / measured)
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.controllers.description import Description, read_facts
 from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.symmetry import memory_mirror, reduce_observations, restore_actions
+from seastar_gym.envs.symmetry import memory_mirror, reduce_observations, restore_actions, symmetry_of
 from seastar_gym.envs.task import scene_observation_size
 from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
@@ -69,6 +69,7 @@ class LearnedPolicy:
         self.weights = weights
         self.actions = description.actions
         self.scene = description.scene
+        self.group = symmetry_of(description.scene) if description.symmetry else None
         self.decision_period = description.decision_period or description.scene.actuator.period
         self.training = training or {}
         self.rng = np.random.default_rng(0) if rng is None else rng
@@ -91,11 +92,11 @@ class LearnedPolicy:
                 f"This policy was trained on a robot of {n_limbs} limbs: it sees {size} numbers, not an observation of "
                 f"shape {observation.shape}."
             )
-        if not self.description.symmetry:
+        if self.group is None:
             return self._choose(observation, deterministic), None
-        reduced, elements = reduce_observations(observation, n_limbs, memory_mirror(self.scene.actuator))
+        reduced, elements = reduce_observations(observation, self.group, memory_mirror(self.scene.actuator))
         chosen = self._choose(reduced, deterministic)
-        return restore_actions(chosen, elements, self.actions, n_limbs), None
+        return restore_actions(chosen, elements, self.actions, self.group), None
 
     def _choose(self, observation: NDArray[Any], deterministic: bool) -> NDArray[np.intp]:
         logits = self.logits(observation)

@@ -18,7 +18,7 @@ from seastar_gym.envs.decisions import checked_decision_period
 from seastar_gym.envs.headings import Headings, wrapped
 from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout
 from seastar_gym.envs.reward import RewardWeights
-from seastar_gym.envs.stations import N_STATIONS, body_heading, node_weights
+from seastar_gym.envs.stations import N_STATIONS, body_heading, node_weights, of_beginning
 from seastar_gym.envs.task import make_scene
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Recalled
@@ -61,15 +61,20 @@ def budget_for(decision_period: float | None) -> Budget:
 def state_of(observations: NDArray[np.float32], scene: Scene) -> State:
     """State that observations, shape (n, size), were made from, in the body frame with the hub at its origin.
 
-    Actuators have the state that they recall from what is observed, and are at rest if they recall none.
+    Actuators have the state that they recall from what is observed, and are at rest if they recall none. Bodies point
+    along the frame and do not turn.
     """
     n, robot, at, actuator = len(observations), scene.robot, scene_layout(scene), scene.actuator
     seen = observations[:, at.actuators].astype(np.float64).reshape(n, robot.n_limbs, -1)
     at_stations = node_weights(robot.nodes_per_limb)
     nodes, velocities = (
-        (at_stations @ observations[:, place].astype(np.float64).reshape(n, -1, N_STATIONS, 2)).reshape(n, -1, 2)
+        at_stations @ observations[:, place].astype(np.float64).reshape(n, -1, N_STATIONS, 2)
         for place in (at.positions, at.velocities)
     )
+    if robot.has_body:
+        roots = np.array([limb.root for limb in robot.limb_shapes()]) / robot.limb_length
+        nodes = nodes + of_beginning(at_stations)[:, None] * roots[:, None]
+    nodes, velocities = nodes.reshape(n, -1, 2), velocities.reshape(n, -1, 2)
     hub_velocity = observations[:, None, at.hub_velocity].astype(np.float64)
     zero = np.zeros((n, 1, 2))
     return State(

@@ -323,7 +323,8 @@ def factorise(rods, work, stage, convex):
     Returns (Phi, decrement, pivot): the potential [J], gradient^T Hessian^-1 gradient [J], and the smallest pivot,
     which is not positive (or NaN) where the Hessian is not positive definite.
     """
-    energy = add_contact(rods.contact, rods, work, stage, assemble_hub(rods.clamp, rods, work, stage, convex))
+    energy = assemble_hub(rods.clamp, rods, work, stage, convex)
+    energy = add_contact(rods.contact, rods, work, stage, convex, energy)
     of_hub = node_motion(work, stage, 0)
     E_n, r_hub, D_hub = node_slopes(work.contact, rods, work, stage, 0, of_hub)
     E_n, r_hub, D_hub = add_body(rods.body, rods, work, stage, convex, of_hub, E_n, r_hub, D_hub)

@@ -125,16 +125,16 @@ def make_work(rods: Rods, n_stages: int) -> Work:
     n_limbs, n_edges = rods.n_limbs, rods.n_limbs * (rods.nodes_per_limb - 1)
     n_nodes = n_edges + 1
     n_places = n_nodes if rods.body is None else n_nodes + 1 + n_limbs
-    n_free = n_nodes if rods.body is None else n_nodes + 1
+    n_free, n_points = (n_nodes, n_nodes) if rods.body is None else (n_nodes + 1, n_nodes + 1 + rods.body.n_arms)
 
     def rows(count):
         return aligned_rows(count, N_LANES)
 
     return Work(
-        q=rows(2 * n_places),
-        q_hat=rows(2 * n_places),
-        v_hat=rows(2 * n_places),
-        step=rows(2 * n_places),
+        q=rows(2 * n_points),
+        q_hat=rows(2 * n_points),
+        v_hat=rows(2 * n_points),
+        step=rows(2 * n_points),
         factors=rows(NODE_ROWS * n_nodes),
         ring=rows(RING_ROWS * n_limbs),
         root_factors=rows(ROOT_ROWS * n_limbs),
@@ -156,7 +156,7 @@ def make_work(rods: Rods, n_stages: int) -> Work:
         added_mass=None if rods.added_mass is None else rows(3 * n_places),
         pivots=None if rods.contact is None else rows(2 * n_nodes),
         root_pivots=None if rods.contact is None else rows(2 * (n_limbs + 1)),
-        contact=contact.memory(rods.contact, n_limbs, rods.nodes_per_limb),
+        contact=contact.memory(rods.contact, n_limbs, rods.nodes_per_limb, n_points),
         tension=None if rods.damping is None else rows(n_edges),
         bending=None if rods.damping is None else rows(n_edges),
         body=body.memory(rods.body, n_limbs),

@@ -7,7 +7,8 @@ the hub hinge from limb j to limb j + 1, whose first edge is the root edge of li
 limb has none: hinges that are not there have no stiffness. With a rigid hub, the hinge of a root edge is its clamp.
 
 Where the hub is a body with a size, root edges start at its rim. Behind the nodes then stand the place of the body's
-angle and, limb by limb, the places of the roots, which follow from hub and angle, see terms/body.py.
+angle and, limb by limb, the places of the roots, which follow from hub and angle, see terms/body.py. In scenes with
+contact, the corners of its outline follow, which move as the roots do and have no numbers of their own.
 """
 
 from seastar_gym.der.geometry import EDGE_ROWS, Edge, edge_geometry
@@ -45,6 +46,25 @@ def n_places_with(body, rods):
     if body is None:
         return n_nodes(rods)
     return n_nodes(rods) + 1 + rods.n_limbs
+
+
+@kernel
+def n_points(rods):
+    """Number of places, and of the corners of a body's outline."""
+    return n_points_with(rods.body, rods)
+
+
+@kernel
+def n_points_with(body, rods):
+    if body is None:
+        return n_nodes(rods)
+    return n_nodes(rods) + 1 + body.n_arms
+
+
+@kernel
+def corner_place(rods, corner):
+    """The place of a corner of a body's outline, in scenes with contact."""
+    return n_nodes(rods) + 1 + rods.n_limbs + corner
 
 
 @kernel

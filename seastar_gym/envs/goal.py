@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.envs.observation import scene_layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.stations import body_heading
+from seastar_gym.envs.stations import heading_of
 
 GoalObservation = dict[str, NDArray[np.float64]]
 
@@ -68,7 +68,7 @@ class GoalForm(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     def _observed(self, seen: NDArray[np.float32], info: dict[str, Any]) -> GoalObservation:
         waypoints = self._swim.waypoints
         self._goal = waypoints[min(info["waypoint_index"], len(waypoints) - 1)] / self._length
-        heading = body_heading(self._swim.simulator.positions, self._swim.scene.robot)[0]
+        heading = heading_of(self._swim.simulator)[0]
         rest = seen[self._without_waypoints].astype(np.float64)
         return {
             "observation": np.append(rest, [np.cos(heading), np.sin(heading)]),

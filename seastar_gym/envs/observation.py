@@ -108,7 +108,7 @@ def with_more(observations: NDArray[Any], more: NDArray[Any], n_limbs: int) -> N
 
 @kernel
 def at_station(rows, stations, limb, station):
-    """(x, y) at a station of a limb relative to the hub, of rows that have x and y of every node.
+    """(x, y) at a station of a limb relative to the hub, of rows that have x and y of every node, or place (star.py).
 
     At a station that is a node, no bit differs from the node's.
     """
@@ -121,7 +121,25 @@ def at_station(rows, stations, limb, station):
         weight, row = load_number(stations.weights, to_weight + node), 2 * (to_node + node)
         x = add_product(x, weight, load(rows, row) - hub_x)
         y = add_product(y, weight, load(rows, row + 1) - hub_y)
-    return x, y
+    return with_root(stations.root_weights, rows, stations, limb, station, x, y)
+
+
+@kernel
+def with_root(root_weights, rows, stations, limb, station, x, y):
+    """(x, y) with the part of a limb's root on a body; unchanged where limbs begin at the hub."""
+    if root_weights is None:
+        return x, y
+    weight, row = load_number(root_weights, station), stations.first_root + 2 * limb
+    x = add_product(x, weight, load(rows, row) - load(rows, 0))
+    return x, add_product(y, weight, load(rows, row + 1) - load(rows, 1))
+
+
+@kernel
+def n_limbs_of(root_weights, stations, n_rows):
+    """Number of limbs of a robot with so many rows of places."""
+    if root_weights is None:
+        return (n_rows // 2 - 1) // stations.n_nodes
+    return (n_rows // 2 - 2) // (stations.n_nodes + 1)
 
 
 @kernel
@@ -150,14 +168,14 @@ def store_turned(out, row, x, y, c, s):
 def observe(rest, limb_length, q, v, stations, targets, velocity_scale, out):
     """Fill the observations of lane groups.
 
-    rest: Rest positions [m], shape (n_groups, 2 n_nodes, N_LANES), or (1, ..) for all groups. limb_length: Unit of
-        lengths [m], shape (n_groups, 1, N_LANES), likewise. q, v: [m], [m/s], shape (n_groups, 2 n_nodes, N_LANES).
+    rest: Rest positions [m], shape (n_groups, 2 n_nodes, N_LANES), or (1, ..) for all groups; of all places with a
+        body. limb_length: Unit of lengths [m], shape (n_groups, 1, N_LANES), likewise. q, v: [m], [m/s], as `rest`.
     stations: `Stations` of the robot. targets: Current and next waypoint in the world frame [m], shape
         (n_groups, 4, N_LANES).
     out: Observations, shape (n_groups, observation size, N_LANES).
     """
-    n_limbs, per_velocity = (rest.shape[1] // 2 - 1) // stations.n_nodes, 1.0 / velocity_scale
-    places = borrow(stations)
+    places, per_velocity = borrow(stations), 1.0 / velocity_scale
+    n_limbs = n_limbs_of(places.root_weights, places, rest.shape[1])
     velocities = 2 * n_limbs * stations.n_stations
     for group in range(q.shape[0]):
         rest_rows = borrow(rest[group % rest.shape[0]])
@@ -188,10 +206,11 @@ def observe(rest, limb_length, q, v, stations, targets, velocity_scale, out):
 @entry_point
 def body_axes(rest, q, stations, out):
     """Fill (cos, sin) of the headings of lane groups, shape (n_groups, 2, N_LANES); arguments as in `observe`."""
-    n_limbs = (rest.shape[1] // 2 - 1) // stations.n_nodes
+    places = borrow(stations)
+    n_limbs = n_limbs_of(places.root_weights, places, rest.shape[1])
     for group in range(q.shape[0]):
         rows = borrow(out[group])
-        c, s = body_axis(borrow(rest[group % rest.shape[0]]), borrow(q[group]), borrow(stations), n_limbs)
+        c, s = body_axis(borrow(rest[group % rest.shape[0]]), borrow(q[group]), places, n_limbs)
         store(rows, 0, c)
         store(rows, 1, s)
 

@@ -1,9 +1,9 @@
 """Stations: the places along the limbs where a robot is observed, the same ones whatever its nodes.
 
 Station k of a limb lies at k/9 of its length, k = 1..9. Between nodes, the limb is the cubic spline through its nodes
-and the hub, in arc length and with not-a-knot ends; with fewer than four nodes it is the polynomial through them. So
-the stations of a robot of ten nodes per limb are its nodes, and its observation converges with the fourth power of the
-edge length.
+and the hub, or its root on a body, in arc length and with not-a-knot ends; with fewer than four nodes it is the
+polynomial through them. So the stations of a robot of ten nodes per limb are its nodes, and its observation converges
+with the fourth power of the edge length.
 """
 
 from functools import cache
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.scene import Seastar
+from seastar_gym.simulator import Simulator
 from seastar_gym.simulator.body_frame import best_fit_heading
 
 Floats = NDArray[np.float64]
@@ -26,7 +27,8 @@ class Stations(NamedTuple):
 
     n_stations, n_nodes: Numbers of stations and nodes of a limb, without the hub. weights: Row after row, shape
     (n_stations n_nodes,). first, last: Nodes of every station whose weights are not zero, the last excluded, shape
-    (n_stations,) each; whole numbers.
+    (n_stations,) each; whole numbers. root_weights: Weights of the root of a limb on a body, shape (n_stations,), or
+    None where limbs begin at the hub. first_root: Row of the first root's x, among those of places (der/star.py).
     """
 
     n_stations: int
@@ -34,15 +36,30 @@ class Stations(NamedTuple):
     weights: Floats
     first: Floats
     last: Floats
+    root_weights: Floats | None
+    first_root: int
+
+
+def stations_of(robot: Seastar) -> Stations:
+    """Stations of a robot's limbs."""
+    return stations(robot.nodes_per_limb, robot.n_limbs if robot.has_body else 0)
 
 
 @cache
-def stations(nodes_per_limb: int) -> Stations:
-    """Stations of limbs of nodes_per_limb nodes with the hub."""
+def stations(nodes_per_limb: int, limbs_on_body: int = 0) -> Stations:
+    """Stations of limbs of nodes_per_limb nodes with the hub, or with the root of so many limbs on a body."""
     rows = weights(nodes_per_limb, N_STATIONS + 1)
     used = rows != 0.0
     first, last = np.argmax(used, axis=1), rows.shape[1] - np.argmax(used[:, ::-1], axis=1)
-    return Stations(N_STATIONS, nodes_per_limb - 1, rows.ravel(), first.astype(np.float64), last.astype(np.float64))
+    first, last = first.astype(np.float64), last.astype(np.float64)
+    of_root = of_beginning(rows) if limbs_on_body else None
+    first_root = 2 * (2 + limbs_on_body * (nodes_per_limb - 1)) if limbs_on_body else 0
+    return Stations(N_STATIONS, nodes_per_limb - 1, rows.ravel(), first, last, of_root, first_root)
+
+
+def of_beginning(rows: Floats) -> Floats:
+    """What rows of weights leave for the point where a limb begins, if vectors are measured from elsewhere."""
+    return 1.0 - rows.sum(axis=1)
 
 
 @cache
@@ -82,20 +99,45 @@ def node_weights(nodes_per_limb: int) -> Floats:
     return np.asarray(np.linalg.pinv(weights(nodes_per_limb, N_STATIONS + 1)), np.float64)
 
 
-def at_stations(positions: Floats, robot: Seastar) -> Floats:
+def roots_from_hub(positions: Floats, robot: Seastar, orientation: Floats | None = None) -> Floats:
+    """Places where limbs begin, from the hub [m], shape (..., n_limbs, 2).
+
+    positions: Node positions [m], shape (..., n_nodes, 2). orientation: Of the body [rad], shape (...); None means that
+    of the rest shape that fits the nodes best.
+    """
+    if orientation is None:
+        each = positions.reshape(-1, *positions.shape[-2:])
+        orientation = best_fit_heading(each, robot.nodes()).reshape(positions.shape[:-2])
+    c, s = np.cos(orientation)[..., None], np.sin(orientation)[..., None]
+    x, y = np.array([limb.root for limb in robot.limb_shapes()]).T
+    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
+
+
+def at_stations(positions: Floats, robot: Seastar, orientation: Floats | None = None) -> Floats:
     """Hub and stations relative to the hub [m], shape (..., 9 n_limbs + 1, 2).
 
-    positions: Node positions [m], shape (..., n_nodes, 2).
+    positions, orientation: As in `roots_from_hub`.
     """
     from_hub = positions - positions[..., :1, :]
     limbs = from_hub[..., 1:, :].reshape(*positions.shape[:-2], robot.n_limbs, -1, 2)
-    along = weights(robot.nodes_per_limb, N_STATIONS + 1) @ limbs
+    rows = weights(robot.nodes_per_limb, N_STATIONS + 1)
+    along = rows @ limbs
+    if robot.has_body:
+        roots = roots_from_hub(positions, robot, orientation)
+        along += of_beginning(rows)[:, None] * roots[..., None, :]
     return np.concatenate([from_hub[..., :1, :], along.reshape(*positions.shape[:-2], -1, 2)], axis=-2)
 
 
-def body_heading(positions: Floats, robot: Seastar) -> Floats:
+def body_heading(positions: Floats, robot: Seastar, orientation: Floats | None = None) -> Floats:
     """Direction of the body frame's x axis [rad], shape (n_robots,), see `observation.py`.
 
-    positions: Node positions [m], shape (n_robots, n_nodes, 2).
+    positions: Node positions [m], shape (n_robots, n_nodes, 2). orientation: As in `roots_from_hub`.
     """
-    return best_fit_heading(at_stations(positions, robot), at_stations(robot.nodes(), robot))
+    rest = at_stations(robot.nodes(), robot, np.zeros(()))
+    return best_fit_heading(at_stations(positions, robot, orientation), rest)
+
+
+def heading_of(simulator: Simulator) -> Floats:
+    """`body_heading` of the robots of a simulator [rad], shape (n_robots,)."""
+    robot = simulator.scene.robot
+    return body_heading(simulator.positions, robot, simulator.orientation() if robot.has_body else None)

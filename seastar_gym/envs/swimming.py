@@ -34,7 +34,7 @@ from seastar_gym.envs.promises import in_strokes, promised
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, drawn_scene
 from seastar_gym.envs.reward import pulses_of
 from seastar_gym.envs.scenery import NOTHING, Scenery
-from seastar_gym.envs.stations import stations
+from seastar_gym.envs.stations import stations_of
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Deaf
 from seastar_gym.scene.actuators.heating import Mirror
@@ -193,7 +193,7 @@ class Swimming(ABC):
         target_rows = to_rows(self._targets())
         own, robot = simulator.coefficients, simulator.scene.robot
         out = np.empty((len(target_rows), observation_size(robot.n_limbs), target_rows.shape[2]))
-        places = stations(robot.nodes_per_limb)
+        places = stations_of(robot)
         observe(own.rest, own.limb_length, simulator.q, simulator.v, places, target_rows, VELOCITY_SCALE, out)
         more = np.hstack([self._remembered(), self._wanted()])
         return with_more(to_float32(out, self.n_robots), more, robot.n_limbs)

@@ -15,7 +15,7 @@ from seastar_gym.envs.paths import FARTHEST, cross_track_error, make_path
 from seastar_gym.envs.promises import read_certificate
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.reward import RewardWeights, reward_terms
-from seastar_gym.envs.stations import stations
+from seastar_gym.envs.stations import stations_of
 from seastar_gym.envs.swimming import Flags, Floats, Outcome, Score, Swimming
 from seastar_gym.scene import Numerics, Scene, SmaWires
 from seastar_gym.scene.certificate import Certificate
@@ -166,7 +166,7 @@ class SwimTask(Swimming):
         """Direction of every robot's body frame [rad], shape (n_robots,): the same bits for one robot and for many."""
         simulator = self.simulator
         out = np.empty((len(simulator.q), 2, simulator.q.shape[2]))
-        body_axes(simulator.coefficients.rest, simulator.q, stations(simulator.scene.robot.nodes_per_limb), out)
+        body_axes(simulator.coefficients.rest, simulator.q, stations_of(simulator.scene.robot), out)
         c, s = out.transpose(1, 0, 2).reshape(2, -1)[:, : self.n_robots]
         return np.asarray(np.arctan2(s, c))
 

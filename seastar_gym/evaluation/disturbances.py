@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.controllers.greedy import turned
 from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout
-from seastar_gym.envs.stations import body_heading
+from seastar_gym.envs.stations import heading_of
 from seastar_gym.envs.task import Outcome, SwimTask
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.per_robot import column
@@ -81,7 +81,7 @@ class DisturbedTask:
         seen, scene = self.task.observe(), self.task.simulator.scene
         at = scene_layout(scene)
         if self.disturbance.current > 0.0:
-            axes = body_heading(self.task.simulator.positions, scene.robot)
+            axes = heading_of(self.task.simulator)
             seen[:, at.hub_velocity] += turned(self._current, -axes) / VELOCITY_SCALE
         if self.disturbance.noise > 0.0:
             n_places = 1 + seen[:, at.positions].shape[1] // 2

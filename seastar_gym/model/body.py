@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.der.mesh import Mesh
 from seastar_gym.der.terms import body as term
+from seastar_gym.der.terms.contact import Rim
 from seastar_gym.scene.body import GIVEN_DRAG, Body
 from seastar_gym.scene.fluid import Water
 from seastar_gym.scene.outline import Outline
@@ -36,6 +37,10 @@ class OnBody(NamedTuple):
     isotropic_drag: float
     weight: Floats | None
     n_limbs: int
+
+    def with_corners(self, rim: Rim) -> "OnBody":
+        """The same with the corners of its outline, for contact."""
+        return self._replace(coefficients=term.with_corners(self.coefficients, rim.corners))
 
     def mass(self, per_node: Floats) -> Floats:
         """Masses [kg]: the hub's with the body's."""
@@ -81,6 +86,15 @@ def make_body(robot: Seastar, mesh: Mesh, water: Water, gravity: tuple[float, fl
     )
     weight = None if gravity is None else (mass - water.density * body.volume) * np.array(gravity)
     return OnBody(coefficients, mass, drag.isotropic, weight, mesh.n_limbs)
+
+
+def body_rim(robot: Seastar) -> Rim:
+    """Outline of a robot's body for contact; none for a body without a size."""
+    assert robot.body is not None
+    shape = robot.body.shape
+    if shape.points:
+        return Rim(np.array(shape.points), 0.0)
+    return Rim(np.zeros((1 if shape.radius else 0, 2)), shape.radius)
 
 
 def power_of_two(length: float) -> float:

@@ -24,7 +24,8 @@ class Coefficients:
     per lane.
 
     are_shared: Whether all lane groups share one set.
-    rest: Node positions at rest [m], shape (n_sets, 2 n_nodes, N_LANES).
+    rest: Node positions at rest [m], shape (n_sets, 2 n_nodes, N_LANES). With a body, its angle and the roots of its
+        limbs follow, see der/star.py: 2 + 2 n_limbs rows more.
     limb_length: Limb length L of the robot [m], shape (n_sets, 1, N_LANES).
     """
 
@@ -44,7 +45,10 @@ class Coefficients:
             robots = np.minimum(np.arange(n_sets * N_LANES), self.n_robots - 1).reshape(n_sets, N_LANES).tolist()
             self._rods = [side_by_side([make_rods(scene, robot) for robot in group]) for group in robots]
             self._limits = [side_by_side([make_limits(scene, robot) for robot in group]) for group in robots]
-        self.rest = np.zeros((n_sets, 2 * scene.robot.n_nodes, N_LANES))
+        robot, n_rows = scene.robot, 2 * scene.robot.n_nodes
+        self.rest = np.zeros((n_sets, n_rows + (2 + 2 * robot.n_limbs if robot.has_body else 0), N_LANES))
+        if robot.has_body:
+            self.rest[:, n_rows + 2 :] = np.reshape([limb.root for limb in robot.limb_shapes()], (-1, 1))
         self.limb_length = np.zeros((n_sets, 1, N_LANES))
         self._put_lengths(range(n_sets * N_LANES))
 
@@ -56,7 +60,8 @@ class Coefficients:
             lengths = tuple(of_robot(numbers, robot) for numbers in self._scene.robot.lengths)
             if lengths not in shapes:
                 shapes[lengths] = self._scene.robot.nodes(robot).reshape(-1)
-            self.rest[group, :, lane], self.limb_length[group, 0, lane] = shapes[lengths], lengths[0]
+            self.rest[group, : len(shapes[lengths]), lane] = shapes[lengths]
+            self.limb_length[group, 0, lane] = lengths[0]
 
     def set_scene(self, scene: Scene, chosen: NDArray[np.bool_]) -> None:
         """Continue with a scene that differs only in numbers that may differ from robot to robot.
@@ -87,4 +92,4 @@ class Coefficients:
     def nodes(self, robot: int | np.intp) -> Floats:
         """Node positions of a robot at rest [m], shape (n_nodes, 2)."""
         group, lane = divmod(int(robot), N_LANES)
-        return self.rest[group % len(self.rest), :, lane].reshape(-1, 2)
+        return self.rest[group % len(self.rest), : 2 * self._scene.robot.n_nodes, lane].reshape(-1, 2)

@@ -18,7 +18,7 @@ from seastar_gym.der.terms import (
     load,
     stretching,
 )
-from seastar_gym.model.body import make_body
+from seastar_gym.model.body import body_rim, make_body
 from seastar_gym.model.currents import current_rows
 from seastar_gym.model.joints import with_joints
 from seastar_gym.model.mesh import make_mesh
@@ -41,9 +41,8 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
     water = VACUUM if scene.fluid is None else chosen(scene.fluid, itemgetter(index))
     touch = None if scene.contact is None else chosen(scene.contact, itemgetter(index))
     limbs = robot.limb_shapes()
-    has_body = robot.body is not None and not robot.body.is_point
     # Limbs that begin apart have no opening angle that could close: negative angles are not noted.
-    hub_angles = [-1.0 if has_body else natural_hub_angle(limb.gap, robot.hub_hinge) for limb in limbs]
+    hub_angles = [-1.0 if robot.has_body else natural_hub_angle(limb.gap, robot.hub_hinge) for limb in limbs]
     C_d, C_t, C_a = water.drag_coefficient, water.tangential_drag_coefficient, water.added_mass_coefficient
     mesh = make_mesh(limbs, robot.nodes_per_limb)
     continuum = robot.discretisation == "continuum"
@@ -58,9 +57,12 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
     mass = inertia.coefficients(mesh, robot.density)
     weight = gravity.coefficients(mesh, robot.density, water.density, scene.gravity)
     loads = load.total(load.coefficients(mesh, scene.loads), weight)
-    on_body = None
-    if has_body:
+    on_body, rim = None, None
+    if robot.has_body:
         on_body = make_body(robot, mesh, water, scene.gravity)
+        if touch is not None:
+            rim = body_rim(robot)
+            on_body = on_body.with_corners(rim)
         mass, at_nodes = on_body.mass(mass), on_body.drag(mesh, at_nodes)
         loads = on_body.loads(loads)
     inertia.hold(mass, scene.held_nodes)
@@ -87,7 +89,7 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         load=loads,
         contact=None
         if touch is None
-        else contact.coefficients(mesh, scene.robot.limbs_that_may_touch(), touch.modulus, touch.opening_angle),
+        else contact.coefficients(mesh, robot.limbs_that_may_touch(), touch.modulus, touch.opening_angle, rim),
         foresight=seen_ahead,
         scales=scales.coefficients(
             mesh, stretched, seen_ahead, robot.density, water.density, C_d, mass, scene.held_nodes

@@ -5,17 +5,12 @@ from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.scene.checks import is_finite_number, require_finite, require_number, shown
 from seastar_gym.scene.outline import Outline, Points, is_convex
 from seastar_gym.scene.per_robot import Numbers, require_each
 from seastar_gym.scene.serial import register_part
 
-Floats = NDArray[np.float64]
-
-SAME = 1e-9
-"""Distance of places that are taken for one [m]."""
 GIVEN_DRAG = ("drag_along", "drag_across", "drag_turning")
 GIVEN_FLUID = ("added_mass_along", "added_mass_across", "added_mass_turning")
 
@@ -66,8 +61,6 @@ class Body:
     and none in turning. Where one of the three is given, the others are the fluid's C_d, or 0 for a disc that turns.
 
     Flow at the body is that at the hub. Fluid that moves along with the body is that of an ellipse about the hub.
-    Environments observe limbs by a spline that begins at the hub (`envs/stations.py`): with ten nodes per limb these
-    are the nodes themselves, with others places that are off near the root of a limb on a body.
     """
 
     PER_ROBOT: ClassVar = ("height", "mass", "inertia", *GIVEN_DRAG, *GIVEN_FLUID)
@@ -123,17 +116,6 @@ class Body:
         x, y = 0.5 * length, 0.5 * width
         return cls(outline=((x, -y), (x, y), (-x, y), (-x, -y)), **others)
 
-    def is_symmetric(self, n_limbs: int) -> bool:
-        """Whether a turn by a limb of n_limbs and a mirror at the x axis leave the body itself unchanged."""
-        directed = any(getattr(self, name) is not None for name in GIVEN_FLUID + GIVEN_DRAG[:2])
-        if directed or np.hypot(*self.centre) > SAME:
-            return False
-        if not self.outline:
-            return True
-        points = np.array(self.outline)
-        z = points[:, 0] + 1j * points[:, 1]
-        return all(_same_points(z, image) for image in (z * np.exp(2j * np.pi / n_limbs), z.conj()))
-
     @property
     def shape(self) -> Outline:
         """Outline with its area, centre and widths."""
@@ -183,12 +165,6 @@ class Body:
         if self.attachments:
             return self.attachments
         return tuple(Attachment(*self.shape.rim(direction), direction) for direction in directions)
-
-
-def _same_points(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> bool:
-    """Whether two sets of points are one, in whatever order."""
-    nearest = np.abs(one[:, None] - other[None, :]).min(axis=1)
-    return bool((nearest < SAME).all())
 
 
 def _is_point(value: object) -> bool:

@@ -1,4 +1,4 @@
-"""`Contact`: forces between limbs that touch."""
+"""`Contact`: forces between limbs that touch each other or a body."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -12,13 +12,16 @@ from seastar_gym.scene.serial import register_part
 @register_part
 @dataclass(frozen=True)
 class Contact:
-    """Contact between limbs: limbs that touch push each other apart, without friction. See der/terms/contact.py.
+    """Contact: limbs that touch push each other apart, without friction, and so do limbs and a body.
+
+    See der/terms/contact.py. A body is as hard as a limb that touches it. Limbs do not meet it by their root edges.
 
     modulus: Force per length of limb and per depth of overlap [Pa]. None means pi/6 of Young's modulus, the value of
         incompressible elastic cylinders side by side: pi/4 E*, 1/E* = 2 (1 - 0.5^2)/E (Popov, Contact Mechanics and
         Friction).
     opening_angle: Angle between neighbouring limbs at the hub at which they touch [rad]. Since all limbs begin at one
-        point, they taper to cones near the hub, which fit into this angle.
+        point, they taper to cones near the hub, which fit into this angle. On a body they taper likewise from their
+        roots, and must leave its rim at more than half the angle.
     """
 
     PER_ROBOT: ClassVar = ("modulus",)

@@ -84,6 +84,19 @@ class Outline(NamedTuple):
         lengths = np.hypot(edges[:, 0], edges[:, 1])
         return np.stack([edges[:, 1], -edges[:, 0]], axis=1) / lengths[:, None], lengths, points + 0.5 * edges
 
+    def height_over(self, places: Floats) -> Floats:
+        """Distance of places, shape (n, 2), from the rim [m], negative inside."""
+        if not self.points:
+            return np.asarray(np.hypot(*places.T) - self.radius)
+        normals, _, middles = self.sides()
+        inside = ((places[:, None] - middles) * normals).sum(axis=-1).max(axis=1)
+        corners = np.array(self.points)
+        sides = np.roll(corners, -1, axis=0) - corners
+        from_corners = places[:, None] - corners
+        share = np.clip((from_corners * sides).sum(axis=-1) / (sides * sides).sum(axis=-1), 0.0, 1.0)
+        outside = np.linalg.norm(from_corners - share[..., None] * sides, axis=-1).min(axis=1)
+        return np.where(inside < 0.0, inside, outside)
+
     def _moments(self) -> tuple[float, Floats, float]:
         """Area, first moment and polar second moment about the hub, triangle by triangle."""
         a = np.array(self.points)

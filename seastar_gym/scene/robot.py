@@ -16,7 +16,8 @@ from seastar_gym.scene.checks import require_choice, require_count, require_numb
 from seastar_gym.scene.limb import Limb, LimbShape, as_tuple
 from seastar_gym.scene.per_robot import Numbers, batch_size, chosen, require_each
 from seastar_gym.scene.serial import register_part
-from seastar_gym.scene.shape import limbs_that_may_touch, rest_positions, turn_per_hinge
+from seastar_gym.scene.shape import around_body, limbs_that_may_touch, rest_positions, turn_per_hinge
+from seastar_gym.scene.symmetry import PointGroup, point_group
 
 HubHinge = Literal["opening", "turning"]
 Discretisation = Literal["chapter", "continuum"]
@@ -170,32 +171,32 @@ class Seastar:
 
     def limbs_that_may_touch(self) -> list[tuple[int, int]]:
         """Pairs of limbs that may touch, (right, left), counted from 0."""
-        alike = all(limb.length is None for limb in self.limbs)
-        return limbs_that_may_touch([shape.gap for shape in self.limb_shapes()], alike)
+        alike, shapes = all(limb.length is None for limb in self.limbs), self.limb_shapes()
+        if self.body is None or not self.has_body:
+            return limbs_that_may_touch([shape.gap for shape in shapes], alike)
+        order, turns = around_body(shapes)
+        pairs = limbs_that_may_touch(turns, alike and not self.body.attachments and not self.body.outline)
+        return [(order[right], order[left]) for right, left in pairs]
 
     @property
     def is_symmetric(self) -> bool:
         """Whether rotation by one limb and reflection at limb 1 leave the robot unchanged; in a batch, every robot."""
+        group, n = self.point_group(), self.n_limbs
+        in_order = tuple((j - 1) % n for j in range(n)), tuple(-j % n for j in range(n))
+        return group.n_turns == n and group.axis == 0.0 and group.orders[-2:] == in_order
+
+    def point_group(self, directed: bool = False) -> PointGroup:
+        """Turns and mirrors that leave the robot unchanged; in a batch, every robot.
+
+        directed: Whether the body feels flow along x and along y differently, whatever its outline is.
+        """
         robots = [self.limb_shapes(index) for index in range(batch_size(self) or 1)]
-        alike = all(
-            len({shape._replace(direction=0.0, gap=0.0, root=(0.0, 0.0)) for shape in shapes}) == 1 for shapes in robots
-        )
-        straight = not any(shape.natural_curvature for shapes in robots for shape in shapes)
-        evenly = float(np.ptp([shape.gap for shape in robots[0]])) < 1e-12
-        return alike and straight and evenly and (self.body is None or self._has_symmetric_body)
+        return point_group(robots, self.body, directed)
 
     @property
-    def _has_symmetric_body(self) -> bool:
-        """Whether rotation by one limb and reflection at limb 1 leave the body unchanged, with its attachments."""
-        assert self.body is not None
-        roots = np.array([shape.root for shape in self.limb_shapes()])
-        angles = np.array([shape.direction for shape in self.limb_shapes()])
-        outward = np.hypot(*roots[0]) * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        in_order = np.allclose(angles, 2.0 * np.pi / self.n_limbs * np.arange(self.n_limbs), atol=1e-9)
-        radial = np.allclose(np.abs(roots), np.abs(outward), rtol=0.0, atol=1e-9) and (
-            np.allclose(roots, outward, rtol=0.0, atol=1e-9) or np.allclose(roots, -outward, rtol=0.0, atol=1e-9)
-        )
-        return bool(in_order and radial and self.body.is_symmetric(self.n_limbs))
+    def has_body(self) -> bool:
+        """Whether there is a body that is more than the point hub."""
+        return self.body is not None and not self.body.is_point
 
     @property
     def n_nodes(self) -> int:

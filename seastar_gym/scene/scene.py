@@ -18,6 +18,8 @@ import numpy as np
 from seastar_gym.scene.actuators.actuator import Actuator, StatefulActuator, check_actuator, is_actuator
 from seastar_gym.scene.actuators.pulse import SmaPulse
 from seastar_gym.scene.along import AlongLimb
+from seastar_gym.scene.at_rest import touching_at_rest
+from seastar_gym.scene.body import Body
 from seastar_gym.scene.certified import Certified, as_certificate
 from seastar_gym.scene.checks import (
     is_finite_number,
@@ -51,7 +53,7 @@ class Scene:
     loads: Constant forces on nodes, (node, F_x, F_y) [N] each.
     limb_strengths: Factors by which the rotations of the limbs are reduced, from 0 (no rotation) to 1 (full), one per
         limb. () means full rotation.
-    contact: Contact between limbs. None lets limbs pass through each other, as in the chapter.
+    contact: Contact between limbs, and with a body. None lets limbs pass through each other, as in the chapter.
     gravity: Gravitational acceleration in the plane (g_x, g_y) [m/s^2]. Limbs feel their weight minus the buoyancy of
         the fluid that they displace. None means no gravity in the plane.
     """
@@ -110,8 +112,9 @@ class Scene:
     def _check_contact(self) -> None:
         if self.contact is None:
             return
-        if self.robot.body is not None and not self.robot.body.is_point:
-            raise ValueError("Contact of limbs around a body is not modelled: use contact=None, or no body.")
+        if self.robot.body is not None and self.robot.has_body:
+            self._check_contact_with_body(self.robot.body, self.contact)
+            return
         robot, pairs = self.robot, self.robot.limbs_that_may_touch()
         if not pairs:
             raise ValueError("Contact is modelled between limbs less than half a turn apart, and this robot has none.")
@@ -125,6 +128,17 @@ class Scene:
             if cross_at_rest(robot.nodes(index), robot.n_limbs, pairs):
                 raise ValueError(
                     "Limbs of this robot cross at rest, so contact cannot keep them apart: bend them less."
+                )
+
+    def _check_contact_with_body(self, body: Body, contact: Contact) -> None:
+        robot, pairs = self.robot, self.robot.limbs_that_may_touch()
+        for index in range(batch_size(robot) or 1):
+            limbs = robot.limb_shapes(index)
+            touching = touching_at_rest(limbs, robot.nodes_per_limb, pairs, body.shape, contact.opening_angle)
+            if touching is not None:
+                raise ValueError(
+                    f"At rest {touching}, so contact cannot keep them apart: attach limbs at the rim, farther from "
+                    "each other, or use a smaller Contact.opening_angle."
                 )
 
     def _check_coefficients(self) -> None:

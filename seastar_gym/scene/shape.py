@@ -54,15 +54,34 @@ def n_hub_hinges(n_limbs: int) -> int:
 def limbs_that_may_touch(gaps: Sequence[float], alike: bool) -> list[tuple[int, int]]:
     """Pairs of limbs (right, left) less than half a turn apart: neighbours, or all such pairs if lengths differ.
 
-    gaps: Angle from every limb to the next [rad]. alike: Whether limbs have equal lengths, so that none can reach over
-        another.
+    Limbs that begin apart may lean towards each other, by up to a quarter of a turn.
+
+    gaps: Angle from every limb to the next [rad], negative where they lean so. alike: Whether limbs have equal lengths,
+        so that none can reach over another.
     """
     n_limbs = len(gaps)
     turns = {
         (first, (first + steps) % n_limbs): sum(gaps[(first + k) % n_limbs] for k in range(steps))
         for first, steps in itertools.product(range(n_limbs), range(1, 2 if alike else n_limbs))
     }
-    return [pair for pair, turn in turns.items() if pair[0] != pair[1] and turn < np.pi * (1.0 - 1e-9)]
+    return [pair for pair, turn in turns.items() if pair[0] != pair[1] and -0.5 * np.pi < turn < np.pi * (1.0 - 1e-9)]
+
+
+def around_body(limbs: Sequence[LimbShape]) -> tuple[list[int], list[float]]:
+    """Limbs in the order in which they begin around a body, anti-clockwise, and the angle from each to the next [rad].
+
+    The angles are those between their directions, which add up to a turn.
+    """
+    directions = np.array([limb.direction for limb in limbs])
+    roots = np.array([limb.root for limb in limbs])
+    at_hub = np.hypot(*roots.T) == 0.0
+    places = np.where(at_hub, directions, np.arctan2(roots[:, 1], roots[:, 0])) % (2.0 * np.pi)
+    leans = (directions - places + np.pi) % (2.0 * np.pi) - np.pi
+    order = np.lexsort([leans, places])
+    first = order[0]
+    turned = (places + leans)[order]
+    turns = np.diff(turned, append=places[first] + leans[first] + 2.0 * np.pi)
+    return order.tolist(), turns.tolist()
 
 
 def cross_at_rest(nodes: NDArray[np.float64], n_limbs: int, pairs: Sequence[tuple[int, int]]) -> bool:

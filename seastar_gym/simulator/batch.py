@@ -58,10 +58,10 @@ class Batch:
         self.make_coefficients(scene)
         self.n_node_rows = n_rows
         body = self.coefficients.rods(0).body
-        n_free_rows, n_place_rows = (n_rows, n_rows) if body is None else (n_rows + 2, n_rows + 2 + 2 * n_limbs)
+        n_free_rows, n_place_rows = (n_rows, n_rows) if body is None else (n_rows + 2, n_rows + 2 + 2 * body.n_arms)
         self.q = aligned_rows(n_groups, n_place_rows, N_LANES)
         self.v = aligned_rows(n_groups, n_place_rows, N_LANES)
-        self.q[:, :n_rows] = self.coefficients.rest
+        self.q[:, : self.coefficients.rest.shape[1]] = self.coefficients.rest
         n_shares = 0 if body is None else self._scheme.n_stages
         self.a = aligned_rows(n_groups, (n_free_rows + 1) * self._scheme.n_stages + 2 + n_shares, N_LANES)
         self.peaks = np.zeros((n_groups, n_limbs, N_LANES))
@@ -121,6 +121,7 @@ class Batch:
         self.v[group, :, lane] = 0.0
         if self.has_body:
             self.q[group, self.n_node_rows, lane] = angle * self._scales[group, lane]
+            self._place_roots()
 
     @property
     def has_body(self) -> bool:
@@ -153,6 +154,17 @@ class Batch:
             rows[group, :, lane] = 0.0
         self.last_hub[robot] = 0.0
 
+    def _place_roots(self) -> None:
+        """Put the roots of limbs where hub and angle say, with the velocities of there: kernels do so as they begin."""
+        n, scales = self.n_node_rows, self._scales
+        arms = np.array([limb.root for limb in self._scene.robot.limb_shapes()])[:, :, None]
+        angle, spin = (rows[:, None, n] / scales[:, None] for rows in (self.q, self.v))
+        c, s = np.cos(angle), np.sin(angle)
+        x, y = c * arms[:, 0] - s * arms[:, 1], s * arms[:, 0] + c * arms[:, 1]
+        for rows, away in ((self.q, (x, y)), (self.v, (-spin * y, spin * x))):
+            for axis in (0, 1):
+                rows[:, n + 2 + axis : n + 2 + 2 * len(arms) : 2] = rows[:, axis, None] + away[axis]
+
     def put_state(self, positions: Floats, velocities: Floats, orientation: Floats, spin: Floats) -> None:
         """Put all robots at node positions [m] with velocities [m/s], each of shape (n_robots, n_nodes, 2).
 
@@ -164,6 +176,7 @@ class Batch:
             for rows, angle in ((self.q, orientation), (self.v, spin)):
                 write_rows(rows[:, self.n_node_rows, None], angle)
                 rows[:, self.n_node_rows] *= self._scales
+            self._place_roots()
         self.peaks[:] = 0.0
         self.status[:] = 0.0
         self.last_hub = self.hub_position()

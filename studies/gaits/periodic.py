@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.envs.stations import body_heading
+from seastar_gym.envs.stations import heading_of
 from seastar_gym.scene import Scene
 from seastar_gym.simulator import Simulator
 
@@ -76,14 +76,14 @@ def _measure(scene: Scene, gaits: Floats, slot: float, settling: int, measured: 
     heated, energy = np.zeros((2, len(gaits)))
     for period in range(settling + measured):
         if period == settling:
-            hub, heading = simulator.hub_position(), body_heading(simulator.positions, scene.robot)
+            hub, heading = simulator.hub_position(), heading_of(simulator)
             heated[:], energy[:] = 0.0, 0.0
         for k in range(n_slots):
             report = simulator.advance(slot, gaits[:, k])
             heated += report.heating_time
             energy += report.energy
     seconds = measured * n_slots * slot
-    turn = body_heading(simulator.positions, scene.robot) - heading
+    turn = heading_of(simulator) - heading
     turn -= 2.0 * np.pi * np.rint(turn / (2.0 * np.pi))
     way = (simulator.hub_position() - hub) @ [1.0, 1.0j] * np.exp(-1j * heading)
     return Swimming(

@@ -19,7 +19,7 @@ from agents.report.playback import RecordingEnv
 from seastar_gym.command import run_command
 from seastar_gym.controllers.learned import in_the_box, load
 from seastar_gym.envs.rendering import limb_nodes
-from seastar_gym.envs.stations import body_heading
+from seastar_gym.envs.stations import heading_of
 from seastar_gym.evaluation.swim import swim
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Scene
@@ -84,12 +84,12 @@ def transitions(fidelity: Fidelity) -> dict[str, Any]:
     robot = simulator.scene.robot
     for stroke in range(SETTLING):
         simulator.stroke(np.repeat(pasts[:, stroke % CYCLE], n_next, axis=0))
-    heading, hub = body_heading(simulator.positions, robot), simulator.hub_position()
+    heading, hub = heading_of(simulator), simulator.hub_position()
     frames = [simulator.positions]
     for stroke in range(CYCLE):
         for _ in simulator.stroke_in_parts(np.tile(gaits[:, stroke], (n_past, 1)), FRAMES_PER_SECOND):
             frames.append(simulator.positions)
-    turn = body_heading(simulator.positions, robot) - heading
+    turn = heading_of(simulator) - heading
     moved = in_frame(np.stack(frames, axis=1)[:, :, seen_nodes(robot.nodes_per_limb)], hub, heading)
     shape = n_past, n_next
     return {

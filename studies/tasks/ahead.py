@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.controllers.greedy import Displacements, displacement_map, turned, waypoints_of
 from seastar_gym.controllers.planner import Branching, state_of
-from seastar_gym.envs.stations import body_heading
+from seastar_gym.envs.stations import heading_of
 from seastar_gym.simulator import State
 
 Floats = NDArray[np.float64]
@@ -59,7 +59,7 @@ class Robots:
 
     def heading(self) -> Floats:
         """Directions of the body frames in the world [rad]."""
-        return body_heading(self.inner.simulator.positions, self.inner.simulator.scene.robot)
+        return heading_of(self.inner.simulator)
 
 
 class Odometer:

@@ -14,7 +14,7 @@ import pytest
 
 import seastar_gym
 from refusals import assert_refused
-from seastar_gym import Certificate, Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires
+from seastar_gym import Body, Certificate, Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires
 from seastar_gym.certification import command, commands, endurance, measure
 from seastar_gym.envs.spec import PlainSpec
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -59,6 +59,21 @@ def test_errors_bound_those_of_the_sequences_they_were_measured_on(certificate):
         errors = np.linalg.norm(hub - limit, axis=-1).max(axis=0) / lengths
         for name, found in zip(commands.CLASSES, errors.reshape(-1, SAMPLES), strict=True):
             assert found.max() <= each.errors[name] * 1.05, (str(each), name)
+
+
+@pytest.mark.slow
+def test_a_robot_with_a_body_has_a_certificate_of_its_own(few_settings, tmp_path):
+    robot = replace(SMALL_ROBOT, body=Body(radius=0.02, mass=0.02))
+    certificate = seastar_gym.certify(Scene(robot), SAMPLES)
+    coarse, fine = certificate.settings[0], certificate.settings[2]
+    assert 0.0 < fine.space_error < 0.6 * coarse.space_error and all(each.speed > 0.0 for each in certificate.settings)
+    certificate.save(tmp_path / "mine.json")
+    read = Certificate.load(tmp_path / "mine.json")
+    best = read.for_error(max(each.error(certificate.promised) for each in certificate.settings))
+    assert best.robot.body == robot.body and read.of(best) is not None
+    read.require_valid(best)
+    with assert_refused("another scene"):
+        read.require_valid(replace(best, robot=replace(best.robot, body=Body(radius=0.02, mass=0.03))))
 
 
 def test_for_error_is_the_fastest_setting_that_keeps_it(certificate):

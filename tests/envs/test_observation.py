@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
-from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, ThermalSma
+from seastar_gym import Attachment, Body, Numerics, Scene, Seastar, Simulator, SmaPulse, ThermalSma
 from seastar_gym.envs.observation import (
     VELOCITY_SCALE,
     at_station,
@@ -14,7 +15,7 @@ from seastar_gym.envs.observation import (
     to_float32,
 )
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.stations import at_stations, stations
+from seastar_gym.envs.stations import at_stations, stations, stations_of
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import to_rows
@@ -31,7 +32,7 @@ def observations_of(simulator: Simulator, targets: np.ndarray) -> np.ndarray:
     """float64 observations, shape (n_robots, size), for targets of shape (n_robots, 4) [m]."""
     rows, robot = to_rows(targets), simulator.scene.robot
     out = np.full((len(rows), observation_size(robot.n_limbs), N_LANES), np.nan)
-    own, places = simulator.coefficients, stations(robot.nodes_per_limb)
+    own, places = simulator.coefficients, stations_of(robot)
     observe(own.rest, own.limb_length, simulator.q, simulator.v, places, rows, VELOCITY_SCALE, out)
     return out.transpose(0, 2, 1).reshape(-1, out.shape[1])[: simulator.n_robots]
 
@@ -88,6 +89,37 @@ def test_every_index_holds_what_the_table_says(scene):
             scene.robot, simulator.positions[robot], simulator.velocities[robot], targets[robot, :2], targets[robot, 2:]
         )
         np.testing.assert_allclose(found[robot], expected, rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("nodes_per_limb", [5, 10])
+def test_limbs_on_a_body_are_seen_from_their_roots(nodes_per_limb):
+    """Positions and velocities of stations are those of splines through root and nodes, in the frame of best fit."""
+    places = ((0.03, 0.015), (-0.03, 0.015), (-0.03, -0.015))
+    body = Body.rectangle(0.06, 0.03, attachments=tuple(Attachment(x, y, np.arctan2(y, x)) for x, y in places))
+    scene = Scene(Seastar(3, nodes_per_limb, body=body), numerics=Numerics.preset("fast"))
+    simulator, rng = Simulator(scene, 3), np.random.default_rng(0)
+    simulator.reset(heading=rng.uniform(-np.pi, np.pi, 3))
+    for swum in range(2):
+        found = observations_of(simulator, np.zeros((3, 4)))
+        q, v, roots = simulator.positions, simulator.velocities, simulator.root_positions()
+        arms = roots - q[:, :1]
+        moving = v[:, :1] + simulator.spin()[:, None, None] * np.stack([-arms[..., 1], arms[..., 0]], axis=-1)
+        seen = [along_limbs(nodes, begin) @ [1.0, 1j] for nodes, begin in ((q, roots), (v, moving))]
+        rest = along_limbs(scene.robot.nodes()[None], np.array([places])) @ [1.0, 1j]
+        axis = np.exp(-1j * np.angle((np.conj(rest) * seen[0]).sum(axis=1)))[:, None]
+        expected = np.concatenate([seen[0] * axis / 0.1, seen[1] * axis / 0.025], axis=1)
+        expected = np.stack([expected.real, expected.imag], axis=-1).reshape(3, -1)
+        np.testing.assert_allclose(found[:, : expected.shape[1]], expected, rtol=0.0, atol=1e-11)
+        assert swum == 0 or np.abs(simulator.spin()).max() > 1e-3
+        simulator.advance(0.1, rng.uniform(-1.0, 1.0, (3, 3)))
+
+
+def along_limbs(nodes: np.ndarray, roots: np.ndarray) -> np.ndarray:
+    """Stations from the hub, shape (n_robots, 27, 2), of nodes, or velocities, of three limbs and their roots."""
+    limbs = nodes[:, 1:].reshape(len(nodes), 3, -1, 2)
+    limbs = np.concatenate([roots[:, :, None], limbs], axis=2) - nodes[:, None, :1]
+    curve = CubicSpline(np.linspace(0.0, 1.0, limbs.shape[2]), limbs, axis=2)
+    return curve(np.arange(1, 10) / 9).reshape(len(nodes), 27, 2)
 
 
 def test_at_rest_the_body_frame_is_that_of_limb_1():

@@ -4,8 +4,16 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from seastar_gym import Seastar
-from seastar_gym.envs.stations import at_stations, body_heading, node_weights, stations, weights
+from seastar_gym import Attachment, Body, Seastar
+from seastar_gym.envs.stations import (
+    at_stations,
+    body_heading,
+    node_weights,
+    of_beginning,
+    stations,
+    stations_of,
+    weights,
+)
 
 MESHES = (2, 3, 4, 5, 7, 9, 10, 11, 19, 37, 10_000)
 PLACES = np.arange(1, 10) / 9
@@ -63,6 +71,41 @@ def test_a_straight_robot_has_its_stations_on_its_limbs_and_its_heading_turns_wi
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     turned = robot.nodes() @ turn + [3.0, -1.0]
     np.testing.assert_allclose(body_heading(turned[None], robot), angle, atol=1e-13)
+
+
+FRAME = Body.rectangle(0.06, 0.03, attachments=tuple(
+    Attachment(x, y, np.arctan2(y, x)) for x, y in ((0.03, 0.015), (-0.03, 0.015), (-0.03, -0.015), (0.03, -0.01))
+))  # fmt: skip
+
+
+@pytest.mark.parametrize("n", [2, 4, 7, 10, 19])
+def test_stations_on_a_body_begin_at_the_roots_and_its_heading_turns_with_it(n):
+    robot, angle = Seastar(4, n, body=FRAME), 2.5
+    rest = at_stations(robot.nodes(), robot, np.zeros(()))
+    np.testing.assert_allclose(rest, Seastar(4, body=FRAME).nodes(), rtol=0.0, atol=1e-15)
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    turned = robot.nodes() @ turn + [3.0, -1.0]
+    for orientation in (None, np.array([angle])):
+        np.testing.assert_allclose(body_heading(turned[None], robot, orientation), angle, atol=1e-13)
+
+
+@pytest.mark.parametrize("n", [4, 7, 12])
+def test_stations_on_a_body_lie_on_the_spline_from_the_root(n):
+    robot, rng = Seastar(4, n, body=FRAME), np.random.default_rng(n)
+    positions, orientation = rng.normal(size=(2, robot.n_nodes, 2)), np.array([0.7, -2.0])
+    found = at_stations(positions, robot, orientation)[:, 1:].reshape(2, 4, 9, 2)
+    for k, limb in np.ndindex(2, 4):
+        c, s = np.cos(orientation[k]), np.sin(orientation[k])
+        root = np.array([[c, -s], [s, c]]) @ robot.limb_shapes()[limb].root
+        nodes = positions[k, 1:].reshape(4, n - 1, 2)[limb] - positions[k, 0]
+        curve = CubicSpline(np.arange(n) / (n - 1), np.concatenate([[root], nodes]))
+        np.testing.assert_allclose(found[k, limb], curve(PLACES), rtol=0.0, atol=1e-11)
+
+
+def test_with_ten_nodes_and_without_a_body_roots_have_no_part():
+    assert not of_beginning(weights(10, 10)).any() and not stations_of(Seastar(4, body=FRAME)).root_weights.any()
+    assert stations_of(Seastar(4, 7)).root_weights is None
+    assert stations_of(Seastar(4, 7, body=Body())).root_weights is None
 
 
 def test_cached_weights_cannot_be_changed():

@@ -1,5 +1,6 @@
 """A robot turned by a sector or mirrored is the same robot: observations, commands and actions say so."""
 
+import math
 import pickle
 from dataclasses import replace
 
@@ -12,6 +13,8 @@ from hypothesis import strategies as st
 
 from refusals import assert_refused
 from seastar_gym import (
+    Attachment,
+    Body,
     Contact,
     DomainRandomization,
     Limb,
@@ -488,9 +491,9 @@ DRAWS = DomainRandomization({"robot.youngs_modulus": Uniform(5e5, 2e6), "fluid.d
 WEAK_LIMBS = DomainRandomization({"limb_strengths": Uniform(0.2, 1.0)})
 OWN_LENGTHS = DomainRandomization({"robot.limbs.1.length": Uniform(0.05, 0.06)})
 ASYMMETRIC = {
-    "lengths": (Scene(replace(STAR, limbs=(Limb(), Limb(length=0.07), Limb(), Limb()))), None, "not alike"),
+    "lengths": (Scene(replace(STAR, limbs=(Limb(length=0.08), Limb(length=0.07), Limb(), Limb()))), None, "not alike"),
     "spread": (Scene(replace(STAR, limbs=tuple(Limb(direction=d) for d in (0.0, 1.5, 3.1, 4.7)))), None, "not alike"),
-    "bent": (Scene(replace(STAR, limbs=(Limb(natural_curvature=9.0),) * 4)), None, "straight"),
+    "bent": (Scene(replace(STAR, limbs=(Limb(natural_curvature=9.0), Limb(), Limb(), Limb()))), None, "straight"),
     "strengths": (Scene(STAR, limb_strengths=(1.0, 0.5, 1.0, 1.0)), None, "equally strong"),
     "held": (Scene(STAR, held_nodes=(6,)), None, "held"),
     "loads": (Scene(STAR, loads=((0, 1e-4, 0.0),)), None, "loaded"),
@@ -552,6 +555,110 @@ def test_a_refusal_has_its_reason_in_the_swim(name, monkeypatch):
     monkeypatch.setattr(symmetry.wrappers, "require_symmetry", lambda *_: None)
     swims = [reduced_swim(scene, randomization, element, actions)[0] for element in range(8)]
     assert np.ptp(swims, axis=0).max() > 1e-3
+
+
+# Lesser groups
+
+WIDE = tuple(Attachment(x, y, math.atan2(y, 0.3 * x)) for x, y in ((0.03, -0.015), (0.03, 0.015), (-0.03, 0.015),
+                                                                   (-0.03, -0.015)))  # fmt: skip
+SWIRL = tuple(Attachment(0.02 * math.cos(a), 0.02 * math.sin(a), a + 0.5) for a in np.arange(4) * math.pi / 2.0)
+LESSER = {
+    "all bent": (Scene(replace(STAR, limbs=(Limb(natural_curvature=9.0),) * 4)), 4, None),
+    "one longer": (Scene(replace(STAR, limbs=(Limb(), Limb(length=0.07), Limb(), Limb()))), 1, 0.5 * math.pi),
+    "two bent": (Scene(replace(STAR, limbs=(Limb(natural_curvature=9.0), Limb(natural_curvature=-9.0)) * 2)), 2,
+                 0.25 * math.pi),
+    "rectangle": (Scene(replace(STAR, body=Body.rectangle(0.06, 0.03, attachments=WIDE))), 2, 0.0),
+    "swirl": (Scene(replace(STAR, body=Body(radius=0.02, attachments=SWIRL))), 4, None),
+    "lopsided": (Scene(replace(STAR, body=Body(radius=0.02, centre_of_mass=(4e-3, 0.0)))), 1, 0.0),
+    "plate in water": (Scene(replace(STAR, body=Body.rectangle(0.04, 0.04, drag_along=0.3))), 2, 0.0),
+}  # fmt: skip
+"""Scene, its number of turns, and the direction of its mirror's line."""
+
+
+def matrix_in(group, element):
+    """Of an element of a group, from its definition."""
+    k = (element + 1) // 2
+    c, s = np.cos(2 * np.pi * k / group.n_turns), np.sin(2 * np.pi * k / group.n_turns)
+    turn = np.array([[c, s], [-s, c]])
+    if element % 2 == 0:
+        return turn
+    c, s = np.cos(2 * group.axis), np.sin(2 * group.axis)
+    return np.array([[c, s], [s, -c]]) @ turn
+
+
+def elements_of(group):
+    return range(0, 2 * group.n_turns, 2 if group.axis is None else 1)
+
+
+@pytest.mark.parametrize("name", LESSER)
+def test_the_group_is_found_from_limbs_body_and_attachments(name):
+    """Its elements carry the rest shape onto itself with its limbs in their order, and multiply as their matrices."""
+    scene, n_turns, axis = LESSER[name]
+    group = symmetry.symmetry_of(scene)
+    assert group.n_turns == n_turns and group.axis == (None if axis is None else pytest.approx(axis, abs=1e-12))
+    nodes = scene.robot.nodes()[1:].reshape(4, -1, 2)
+    for element in elements_of(group):
+        carried = nodes @ matrix_in(group, element).T
+        np.testing.assert_allclose(carried[symmetry.limb_order(group)[element]], nodes, atol=1e-12)
+        assert symmetry.compose(element, symmetry.inverse(element, group), group) == 0
+        for other in elements_of(group):
+            product = matrix_in(group, symmetry.compose(other, element, group))
+            np.testing.assert_allclose(product, matrix_in(group, other) @ matrix_in(group, element), atol=1e-12)
+
+
+@pytest.mark.parametrize("name", LESSER)
+def test_lesser_groups_bring_waypoints_into_their_sector_and_do_not_tell_carried_robots_apart(name):
+    group, observations = symmetry.symmetry_of(LESSER[name][0]), observations_of(4, 300)
+    reduced, elements = symmetry.reduce_observations(observations, group)
+    assert set(elements) == set(elements_of(group))
+    width = (2.0 if group.axis is None else 1.0) * np.pi / group.n_turns
+    assert ((direction(reduced) - (group.axis or 0.0)) % (2.0 * np.pi)).max() <= width + 1e-12
+    for element in elements_of(group):
+        carried = symmetry.transform_observations(observations, np.full(300, element), group)
+        tips, its_tips = (one[:, :72].reshape(300, 4, 9, 2)[:, :, -1] for one in (observations, carried))
+        order = symmetry.limb_order(group)[element]
+        np.testing.assert_allclose(its_tips, (tips @ matrix_in(group, element).T)[:, order], atol=1e-12)
+        np.testing.assert_allclose(symmetry.reduce_observations(carried, group)[0], reduced, atol=1e-12)
+    for mode in MODES:
+        actions = random_actions(mode, 4, 300)
+        carried = symmetry.transform_actions(actions, elements, mode, group)
+        back = symmetry.restore_actions(carried, elements, mode, group)
+        np.testing.assert_array_equal(back, actions)
+
+
+@pytest.mark.parametrize(
+    "name", ["all bent", "one longer", *(pytest.param(name, marks=pytest.mark.slow) for name in ("rectangle", "swirl"))]
+)
+def test_a_lesser_group_leaves_the_swim_as_it_is(name):
+    """The same reduced actions earn the same in a world that is turned and mirrored by an element."""
+    scene, actions = LESSER[name][0], pairs_for(LESSER[name][0], 4)
+    group, path = symmetry.symmetry_of(scene), np.array([[0.02, 0.013], [-0.03, 0.02], [0.02, -0.03]])
+
+    def swim_in(element):
+        env = SeastarSwimEnv(path @ matrix_in(group, element).T, "pairs", scene=replace(scene, numerics=FAST))
+        env = SymmetryReduction(env)
+        seen, rewards = [env.reset(seed=0)[0]], []
+        for action in actions:
+            observation, reward, *_ = env.step(action)
+            seen.append(observation)
+            rewards.append(reward)
+        return np.array(rewards), np.array(seen)
+
+    rewards, seen = swim_in(0)
+    assert np.ptp(rewards) > 0.01
+    for element in elements_of(group)[1:]:
+        its_rewards, its_seen = swim_in(element)
+        np.testing.assert_allclose(its_rewards, rewards, rtol=0.0, atol=1e-6)
+        np.testing.assert_allclose(its_seen, seen, rtol=0.0, atol=2e-5)
+
+
+def test_an_ellipse_of_fluid_leaves_a_polygon_what_suits_its_axes():
+    """Water that moves along with a hexagon is that of an ellipse: half a turn and mirrors are left of six."""
+    corners = tuple((0.02 * math.cos(a), 0.02 * math.sin(a)) for a in np.arange(6) * math.pi / 3.0)
+    robot = Seastar(6, 4, body=Body(outline=corners))
+    assert symmetry.symmetry_of(Scene(robot)) == 6
+    group = symmetry.symmetry_of(Scene(robot, Water(added_mass_coefficient=1.0)))
+    assert (group.n_turns, group.axis) == (2, 0.0)
 
 
 class Remembering:
@@ -687,7 +794,8 @@ def test_unobserved_memory_is_not_carried():
 def test_every_robot_of_a_batch_has_to_be_symmetric():
     bent = Limb(natural_curvature=np.array([0.0, 0.0, 9.0]))
     with assert_refused("symmetry of the regular polygon", "straight"):
-        VectorSymmetryReduction(SeastarSwimVectorEnv(3, scene=Scene(replace(STAR, limbs=(bent,) * 4))))
+        one_bent = Scene(replace(STAR, limbs=(bent, Limb(), Limb(), Limb())))
+        VectorSymmetryReduction(SeastarSwimVectorEnv(3, scene=one_bent))
     alike = Seastar(4, 4, limb_length=np.array([0.1, 0.11, 0.12]))
     VectorSymmetryReduction(SeastarSwimVectorEnv(3, scene=Scene(alike)))
 

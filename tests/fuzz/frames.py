@@ -9,6 +9,8 @@ import numpy as np
 
 from fuzz.scenes import Case
 from seastar_gym import (
+    Attachment,
+    Body,
     GridCurrent,
     Limb,
     Scene,
@@ -31,7 +33,7 @@ def same(thing: Any, *_: Any) -> Any:
 class Frame:
     """What becomes of places [m], velocities [m/s] and other vectors, of currents, and whether limbs swap sides.
 
-    drift: Velocity at which robots are seen to move along [m/s].
+    drift: Velocity at which robots are seen to move along [m/s]. angle: By which all is turned [rad].
     """
 
     name: str
@@ -41,6 +43,7 @@ class Frame:
     current: Callable[[Any], Any] = same
     mirrored: bool = False
     drift: tuple[float, float] = (0.0, 0.0)
+    angle: float = 0.0
 
     def scene(self, scene: Scene) -> Scene:
         loads = tuple(
@@ -71,7 +74,12 @@ class Frame:
         if self.mirrored and commands is not None:
             commands = -commands[:, swapped(scene.robot.n_limbs)]
         moved = self.places(q) + np.multiply.outer(state.time, self.drift)[:, None]
-        return State(moved, self.velocities(v), state.time, actuators, commands, state.phase)
+        sign = -1.0 if self.mirrored else 1.0
+        orientation = None if state.orientation is None else sign * state.orientation + self.angle
+        spin = None if state.spin is None else sign * state.spin
+        return State(
+            moved, self.velocities(v), state.time, actuators, commands, state.phase, orientation, spin
+        )
 
     def case(self, case: Case) -> Case:
         commands = -case.commands[..., swapped(case.scene.robot.n_limbs)] if self.mirrored else case.commands
@@ -87,7 +95,19 @@ def mirrored_limbs(scene: Scene) -> Scene:
     order, robot = swapped(scene.robot.n_limbs), scene.robot
     limbs = tuple(mirrored_limb(robot.limbs[limb]) for limb in order) if robot.limbs else ()
     strengths = tuple(scene.limb_strengths[limb] for limb in order) if scene.limb_strengths else ()
-    return replace(scene, robot=replace(robot, limbs=limbs), limb_strengths=strengths)
+    body = None if robot.body is None else mirrored_body(robot.body)
+    return replace(scene, robot=replace(robot, limbs=limbs, body=body), limb_strengths=strengths)
+
+
+def mirrored_body(body: Body) -> Body:
+    centre, at = body.centre_of_mass, body.attachments
+    order = swapped(len(at)) if at else []
+    return replace(
+        body,
+        outline=tuple((x, -y) for x, y in reversed(body.outline)),
+        centre_of_mass=None if centre is None else (centre[0], -centre[1]),
+        attachments=tuple(Attachment(at[limb].x, -at[limb].y, -at[limb].direction) for limb in order),
+    )
 
 
 def mirrored_limb(limb: Limb) -> Limb:
@@ -147,7 +167,8 @@ def turn(angle: float) -> Frame:
     def carried(vectors: Floats) -> Floats:
         return vectors @ matrix
 
-    return Frame(f"turned by {angle} rad", carried, carried, carried, lambda current: turned_current(current, angle))
+    return Frame(f"turned by {angle} rad", carried, carried, carried,
+                 lambda current: turned_current(current, angle), angle=angle)  # fmt: skip
 
 
 def shift(way: Floats) -> Frame:

@@ -14,13 +14,30 @@ from typing import NamedTuple
 
 from fuzz import odd, swims
 from fuzz.promises import PROMISES, TAME_PROMISES, WITHOUT
-from fuzz.scenes import COMPILED, CONTACT, EVERYTHING, N_ROBOTS, N_STROKES, OWN, TERMS, Terms, draw_case
+from fuzz.scenes import (
+    BENT,
+    CHAPTER,
+    COMPILED,
+    CONTACT,
+    EVERYTHING,
+    N_ROBOTS,
+    N_STROKES,
+    OWN,
+    RARE,
+    TERMS,
+    TOUCHED_BODY,
+    Terms,
+    draw_case,
+)
 
 LIMIT = 120.0
 """Seconds for a trial, and for machine code that it may have to compile."""
 
 BLOCK = 8
 """Cases of a set of terms, which has to be compiled, before the next."""
+
+EVERY = 4
+"""Sets of terms, one of which may have rare ones."""
 
 OF_SWIMS: dict[str, Callable[[int], None]] = {
     "odd arguments": lambda seed: odd.check_odd_arguments(Random(seed)),
@@ -58,12 +75,15 @@ def attempt(trial: Trial) -> None:
 
 
 def sets_of_terms(rng: Random) -> Iterator[Terms]:
-    """Those with contact and with everything first, then those that tests compile, then any."""
+    """Those with contact and with everything first, then those that tests compile, then any, some with rare terms."""
     yield from (CONTACT, EVERYTHING, frozenset(TERMS), frozenset({OWN, "contact"}))
+    yield from (TOUCHED_BODY, BENT)
     yield from (terms for terms in COMPILED if terms not in (CONTACT, frozenset({OWN, "contact"})))
     sets = [frozenset(chosen) for size in range(1, 9) for chosen in itertools.combinations(TERMS, size)]
     rng.shuffle(sets)
-    yield from itertools.cycle(sets)
+    for k, terms in enumerate(itertools.cycle(sets)):
+        is_rare = k % EVERY == 0 and CHAPTER not in terms
+        yield terms | set(rng.sample(RARE, rng.randint(1, len(RARE)))) if is_rare else terms
 
 
 def trials(seed: int) -> Iterator[Trial]:

@@ -11,6 +11,9 @@ import numpy as np
 from fuzz.sentences import assert_one_sentence
 from odd_values import ODD
 from seastar_gym import (
+    AlongLimb,
+    Attachment,
+    Body,
     Contact,
     DomainRandomization,
     GridCurrent,
@@ -29,6 +32,7 @@ from seastar_gym import (
     SmaLimb,
     SmaPulse,
     SmaWires,
+    Stiffening,
     ThermalSma,
     Uniform,
     UniformCurrent,
@@ -50,6 +54,15 @@ PARTS: Calls = {
     "Seastar": (Seastar, dict(n_limbs=5, nodes_per_limb=4, limb_length=0.1, rod_radius=1e-3, youngs_modulus=1e6,
                               density=1e3, hub_hinge="opening", limbs=(), relaxation_time=1e-3)),
     "Limb": (Limb, dict(direction=0.0, length=0.1, radius=(1e-3, 2e-3), youngs_modulus=1e6, natural_curvature=1.0)),
+    "Body": (Body, dict(radius=0.0, outline=((0.02, -0.01), (0.0, 0.02), (-0.02, -0.01)), height=0.01, mass=0.01,
+                        inertia=1e-6, centre_of_mass=(0.0, 1e-3), drag_along=1.0, drag_across=1.0, drag_turning=1.0,
+                        added_mass_along=1.0, added_mass_across=1.0, added_mass_turning=1.0, attachments=())),
+    "Body.rectangle": (Body.rectangle, dict(length=0.06, width=0.03, mass=0.01)),
+    "Attachment": (Attachment, dict(x=0.01, y=0.0, direction=0.1)),
+    "AlongLimb": (AlongLimb, dict(share=0.5, profile=(1.0, 0.5))),
+    "Stiffening": (Stiffening, dict(ratio=2.0, middle=0.4, width=0.1)),
+    "Robot with a body": (Seastar, dict(body=Body(radius=0.02), along=AlongLimb(), stiffening=Stiffening(2.0),
+                                        discretisation="continuum")),
     "Water": (Water, dict(density=1e3, drag_coefficient=1.0, tangential_drag_coefficient=0.1,
                           current=UniformCurrent(), added_mass_coefficient=1.0)),
     "UniformCurrent": (UniformCurrent, dict(u_x=0.0, u_y=0.1)),

@@ -17,6 +17,9 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from seastar_gym import (
+    AlongLimb,
+    Attachment,
+    Body,
     Contact,
     GridCurrent,
     Limb,
@@ -31,6 +34,7 @@ from seastar_gym import (
     SmaPulse,
     SmaWires,
     State,
+    Stiffening,
     ThermalSma,
     UniformCurrent,
     Vortex,
@@ -41,6 +45,7 @@ from seastar_gym.scene.currents import AnyCurrent
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.robot import Discretisation, HubHinge
 from seastar_gym.scene.shape import n_hub_hinges, natural_hub_angle
+from seastar_gym.simulator.body_frame import best_fit_heading
 
 Terms = frozenset[str]
 
@@ -51,10 +56,15 @@ IN_WATER = ("drag along limbs", "added mass", "current")
 TERMS = (*IN_WATER, "damping", "loads", "contact", OWN, ROTATIONS, CHAPTER)
 """What a scene has or has not: every set of them is machine code of its own, 20 to 40 s to compile."""
 
+BODY, ALONG, STIFFENING = RARE = ("body", "bent along", "stiffening")
+"""Terms that are drawn rarely: each doubles the sets of terms. The last two have machine code in common."""
+
 PLAIN: Terms = frozenset()
 CONTACT: Terms = frozenset({"contact"})
 FLUID: Terms = frozenset({*IN_WATER, "damping"})
 EVERYTHING: Terms = frozenset(TERMS) - {OWN, CHAPTER}
+TOUCHED_BODY: Terms = frozenset({BODY, "contact"})
+BENT: Terms = frozenset({ALONG, STIFFENING})
 COMPILED: tuple[Terms, ...] = (
     PLAIN, CONTACT, frozenset({ROTATIONS}), frozenset({OWN}), frozenset({OWN, ROTATIONS}), frozenset({OWN, "contact"}),
     FLUID, frozenset({"loads"}), frozenset({CHAPTER}), frozenset({CHAPTER, "contact"}),
@@ -120,6 +130,50 @@ class Draw:
 
 
 def draw_robot(draw: Draw, terms: Terms) -> Seastar:
+    robot = draw_star(draw, terms)
+    if CHAPTER in terms:
+        return robot
+    if ALONG in terms:
+        robot = replace(robot, along=draw_along(draw))
+    if STIFFENING in terms:
+        ratio, rng = draw.each(lambda: draw.around(2.0, 1.0)), draw.rng
+        robot = replace(robot, stiffening=Stiffening(ratio, rng.uniform(0.1, 0.9), rng.uniform(0.03, 0.5)))
+    return replace(robot, body=draw_body(draw, robot)) if BODY in terms else robot
+
+
+def draw_along(draw: Draw) -> AlongLimb:
+    profile = tuple(draw.rng.uniform(0.1, 1.0) for _ in range(draw.rng.randint(2, 4))) if draw.maybe(0.5) else 1.0
+    return AlongLimb(draw.each(lambda: draw.rng.choice([1.0, draw.rng.random()])), profile)
+
+
+def draw_body(draw: Draw, robot: Seastar) -> Body:
+    """A disc, a rectangle or a polygon with corners on a circle; limbs at its rim, somewhat across it."""
+    rng, size = draw.rng, draw.around(0.02, 1.0)
+    named = any(limb.direction is not None for limb in robot.limbs)
+    given: dict[str, Any] = {"height": draw.each(lambda: draw.around(0.01, 1.0))}
+    if draw.maybe(0.5):
+        given["mass"] = draw.each(lambda: draw.around(0.02, 1.5))
+    if draw.maybe(0.3):
+        given["centre_of_mass"] = (rng.uniform(-0.3, 0.3) * size, rng.uniform(-0.3, 0.3) * size)
+    if draw.maybe(0.3):
+        given[rng.choice(["drag_along", "drag_across", "drag_turning"])] = draw.each(lambda: draw.around(1.0, 1.0))
+    corners = sorted(rng.uniform(0.0, 2.0 * math.pi) for _ in range(rng.randint(3, 8)))
+    match rng.choice(["disc", "rectangle", "polygon"]):
+        case "disc":
+            body = Body(radius=size, **given)
+        case "rectangle":
+            body = Body.rectangle(size, size * rng.uniform(0.2, 1.0), **given)
+        case _:
+            body = Body(outline=tuple((size * math.cos(a), size * math.sin(a)) for a in corners), **given)
+    if named or draw.maybe(0.5):
+        return body
+    places = [2.0 * math.pi * (limb + rng.uniform(-0.3, 0.3)) / robot.n_limbs for limb in range(robot.n_limbs)]
+    leans = [rng.uniform(-0.5, 0.5) for _ in places]
+    at_rim = zip(map(body.shape.rim, places), places, leans, strict=True)
+    return replace(body, attachments=tuple(Attachment(*rim, place + lean) for rim, place, lean in at_rim))
+
+
+def draw_star(draw: Draw, terms: Terms) -> Seastar:
     rng = draw.rng
     discretisation: Discretisation = "chapter" if CHAPTER in terms else "continuum"
     if not draw.wild and draw.n_robots is None and draw.maybe(0.3):
@@ -347,7 +401,9 @@ def draw_state(rng: Random, simulator: Simulator, kinds: tuple[str, ...]) -> Sta
         edge = min(limb.length for limb in scene.robot.limb_shapes(robot % (scene.n_robots or 1)))
         disturb(rng.choice(kinds), edge / (scene.robot.nodes_per_limb - 1), q, v, numbers)
         v[list(scene.held_nodes)] = 0.0
-    return state
+    if state.orientation is None:
+        return state
+    return state._replace(orientation=best_fit_heading(state.positions, scene.robot.nodes()))
 
 
 def draw_commands(rng: Random, n_strokes: int, n_robots: int, n_limbs: int) -> np.ndarray:

@@ -8,6 +8,7 @@ import pytest
 
 from fuzz import promises
 from fuzz.scenes import (
+    BENT,
     COMPILED,
     CONTACT,
     EVERYTHING,
@@ -15,6 +16,7 @@ from fuzz.scenes import (
     OWN,
     PLAIN,
     TERMS,
+    TOUCHED_BODY,
     Case,
     Draw,
     draw_case,
@@ -25,7 +27,7 @@ from fuzz.sentences import assert_one_sentence
 from seastar_gym import Limited, SmaPulse, Water
 
 
-@drawn(200)
+@drawn(200, [*COMPILED, TOUCHED_BODY, BENT])
 def test_a_scene_is_accepted_or_refused_in_one_sentence(terms, seed):
     draw = Draw(Random(seed), 4 if OWN in terms else None)
     try:
@@ -139,3 +141,15 @@ def test_all_terms_with_limited_actuators(terms, seed):
 @drawn(20, [frozenset(TERMS)])
 def test_all_terms_with_numbers_of_each_robot(terms, seed):
     check_everything(draw_case(Random(seed), terms))
+
+
+@pytest.mark.slow
+@drawn(15, [TOUCHED_BODY, BENT])
+def test_limbs_on_a_body_and_limbs_that_bend_along_their_length(terms, seed):
+    check_everything(draw_case(Random(seed), terms))
+
+
+@pytest.mark.slow
+@drawn(10, [TOUCHED_BODY, BENT])
+def test_they_swim_alike_turned_mirrored_and_elsewhere(terms, seed):
+    promises.check_frames(draw_case(Random(seed), terms, wild=False))

@@ -1,5 +1,6 @@
 """Parameters are found in data that a known robot made, and what the data cannot tell is said."""
 
+import math
 import sys
 from dataclasses import replace
 
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 
 from refusals import assert_refused
-from seastar_gym import Contact, Limited, MeasuredCurve, Numerics, Scene, Seastar, Simulator, SmaPulse
+from seastar_gym import Attachment, Body, Contact, Limited, MeasuredCurve, Numerics, Scene, Seastar, Simulator, SmaPulse
 from seastar_gym.identify import Measurement, get_parameter, identify, synthetic, trajectory, with_parameters
 from seastar_gym.identify.command import TRUTH, draw, main
 from seastar_gym.identify.trajectories import trajectories
@@ -45,6 +46,19 @@ def test_intervals_are_as_wide_as_estimates_scatter():
     half = np.mean([0.5 * (fit.upper[0] - fit.lower[0]) for fit in fits])
     assert half / (1.96 * scatter) == pytest.approx(1.0, abs=0.3)
     assert np.mean([fit.lower[0] < 0.5 < fit.upper[0] for fit in fits]) >= 0.84
+
+
+@pytest.mark.slow
+def test_numbers_of_a_body_are_recovered():
+    """Its mass, how hard it turns, and the place of a limb, which is no number of each robot."""
+    places = tuple(Attachment(x, y, math.atan2(y, x)) for x, y in ((0.03, 0.015), (-0.03, 0.015), (-0.03, -0.015)))
+    body = Body.rectangle(0.06, 0.03, mass=0.03, drag_turning=1.0, attachments=places)
+    scene = Scene(Seastar(3, 5, body=body), numerics=Numerics("implicit-midpoint", 0.01))
+    truth = {"robot.body.mass": 0.05, "robot.body.drag_turning": 1.5, "robot.body.attachments.0.x": 0.027}
+    estimate = identify(scene, list(truth), synthetic(scene, truth, n_strokes=3, noise=2e-4))
+    assert ((estimate.lower < list(truth.values())) & (estimate.upper > list(truth.values()))).all()
+    assert estimate.root_mean_square == pytest.approx(2e-4, rel=0.1)
+    assert estimate.scene.robot.body.mass == estimate.values[0]
 
 
 def test_without_noise_the_truth_itself_is_found():

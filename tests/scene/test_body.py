@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from refusals import assert_refused
-from seastar_gym import Attachment, Body, Contact, DomainRandomization, Limb, Scene, Seastar, Uniform, Water
+from seastar_gym import Attachment, Body, DomainRandomization, Limb, Scene, Seastar, Uniform, Water
 from seastar_gym.identify.parameters import get_parameter
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene.outline import Outline
@@ -121,6 +121,9 @@ def test_a_disc_with_a_star_is_symmetric_and_others_are_not():
     assert not Seastar(4, body=Body.rectangle(0.06, 0.03, attachments=CORNERS)).is_symmetric
     assert not Seastar(body=Body(radius=0.02, centre_of_mass=(1e-3, 0.0))).is_symmetric
     assert not Seastar(body=Body(radius=0.02, drag_along=0.5)).is_symmetric
+    turned = tuple(Attachment(0.02 * math.cos(a), 0.02 * math.sin(a), a) for a in 0.1 + np.arange(5) * 0.4 * math.pi)
+    assert not Seastar(body=Body(radius=0.02, attachments=turned)).is_symmetric
+    assert Seastar(body=Body(radius=0.02, attachments=turned)).point_group().axis == pytest.approx(0.1)
 
 
 def test_numbers_of_a_body_can_be_drawn_and_identified():
@@ -167,8 +170,6 @@ def test_robots_that_cannot_have_a_body_or_a_joint_are_refused():
         Seastar(body=Body(radius=0.02, attachments=CORNERS))
     with assert_refused("Directions", "both"):
         Seastar(4, body=Body(radius=0.02, attachments=CORNERS), limbs=tuple(Limb(k) for k in range(4)))
-    with assert_refused("Contact", "body"):
-        Scene(Seastar(body=disc), contact=Contact())
     with assert_refused("body"):
         Seastar(body=0.02)
     with assert_refused("direction"):

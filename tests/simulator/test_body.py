@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from momenta import bodied_momenta as momenta
 from momenta import cross
 from seastar_gym import Attachment, Body, Numerics, Scene, Seastar, Simulator, SmaPulse, State, UniformCurrent, Water
-from seastar_gym.simulator.body_frame import root_places
 
 MIDPOINT = Numerics("implicit-midpoint", 1e-3, newton_tolerance=1e-10)
 SPECK = {"n_limbs": 2, "nodes_per_limb": 2, "limb_length": 1e-3, "rod_radius": 1e-4, "density": 1.0}
@@ -29,19 +29,6 @@ def set_moving(simulator: Simulator, velocity: tuple[float, float], spin: float)
     q = simulator.positions
     v = np.array(velocity) + spin * np.stack([-q[..., 1], q[..., 0]], axis=-1)
     simulator.set_state(simulator.get_state()._replace(velocities=v, spin=np.full(len(q), spin)))
-
-
-def momenta(simulator: Simulator) -> tuple[np.ndarray, float]:
-    """Momentum [kg m/s] and angular momentum about the origin [kg m^2/s] of a robot whose roots balance each other."""
-    rods, q, v = simulator.coefficients.rods(0), simulator.positions[0], simulator.velocities[0]
-    mass, omega, n = rods.mass[: len(q)], simulator.spin()[0], rods.nodes_per_limb - 1
-    roots = root_places(simulator.scene.robot, q[None, 0], simulator.orientation())[0]
-    arms = roots - q[0]
-    moving_roots = v[0] + omega * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
-    tails_q = np.concatenate([np.vstack([roots[k], q[1 + k * n : (k + 1) * n]]) for k in range(rods.n_limbs)])
-    tails_v = np.concatenate([np.vstack([moving_roots[k], v[1 + k * n : (k + 1) * n]]) for k in range(rods.n_limbs)])
-    spin = cross(q, v) @ mass + rods.body.inertia[0] * omega
-    return mass @ v, spin - cross(q[1:] - tails_q, v[1:] - tails_v) @ rods.edge_mass
 
 
 def test_a_body_without_size_is_the_point_hub_to_the_last_bit():

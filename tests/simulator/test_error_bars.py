@@ -1,6 +1,7 @@
 """Error bars: a twin tells how far the hub may be from the truth, and changes nothing else."""
 
 import _thread
+import math
 import pickle
 import time
 from dataclasses import replace
@@ -10,7 +11,18 @@ import numpy as np
 import pytest
 
 from refusals import assert_refused
-from seastar_gym import Contact, DomainRandomization, Numerics, Scene, Simulator, ThermalSma, Uniform
+from seastar_gym import (
+    Attachment,
+    Body,
+    Contact,
+    DomainRandomization,
+    Numerics,
+    Scene,
+    Seastar,
+    Simulator,
+    ThermalSma,
+    Uniform,
+)
 from seastar_gym.certification.commands import STROKES, draw_classes
 from seastar_gym.certification.measure import SHORT, swim
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -53,6 +65,26 @@ def test_error_bars_change_no_bit_of_the_trajectory_and_of_other_reports(scene):
         np.testing.assert_array_equal(with_bars.error_estimate, barred.error_estimate)
     for one, wanted in zip(barred.get_state(), plain.get_state(), strict=True):
         np.testing.assert_array_equal(one, wanted)
+
+
+@pytest.mark.slow
+def test_robots_with_a_body_have_error_bars_that_cover_their_error():
+    corners = tuple(Attachment(x, y, math.atan2(y, x)) for x, y in ((0.03, 0.015), (-0.03, 0.015), (-0.03, -0.015),
+                                                                    (0.03, -0.015)))  # fmt: skip
+    robot = Seastar(4, 7, body=Body.rectangle(0.06, 0.03, attachments=corners))
+    scene = Scene(robot, numerics=FAST.numerics)
+    simulator, fine = Simulator(scene, error_bars=True), Simulator(resolved(scene, 25, replace(SHORT, step=1e-3)))
+    plain = Simulator(scene)
+    for command in ([[1.0, 0.0, 0.0, -1.0]], [[0.0, 1.0, -1.0, 0.5]]):
+        estimate = simulator.stroke(command).error_estimate[0]
+        fine.stroke(command)
+        plain.stroke(command)
+        error = float(np.linalg.norm(simulator.hub_position() - fine.hub_position()))
+        assert 0.0 < error < estimate < 50.0 * error
+        np.testing.assert_array_equal(simulator.get_state().orientation, plain.get_state().orientation)
+    with pytest.raises(ValueError, match="shape"):
+        simulator.stroke([[1.0, 0.0]])
+    assert simulator.error_estimate[0] == estimate
 
 
 @pytest.mark.parametrize("wanted", [False, True])

@@ -11,7 +11,8 @@ H of the star's step.
 """
 
 from seastar_gym.der.linear.star_solution import solve_again, substitute_star
-from seastar_gym.der.star import n_nodes
+from seastar_gym.der.star import n_free
+from seastar_gym.der.terms.body import carry_roots, gather_roots
 from seastar_gym.der.terms.contact import SLOT_ROWS, STIFFNESS, add_gap_gradient, gap, n_listed
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, any_lane, load, select, splat, store, subtract_product
@@ -22,16 +23,18 @@ MOST_ITERATIONS = 200  # two limbs that touch need some 3 to 8; beyond, the robo
 
 @kernel
 def add_contact_product(rods, work, p, sign, rows):
-    """rows += sign C K C^T p."""
+    """rows += sign C K C^T p. Both have the nodes' coordinates and, with a body, its angle; roots follow."""
+    carry_roots(rods.body, rods, work, p)
     for slot in range(n_listed(work)):
         k = load(work.contact.slots, SLOT_ROWS * slot + STIFFNESS)
         add_gap_gradient(rods, work, slot, sign * k * gap(rods, work, slot, p), rows)
+    gather_roots(rods.body, rods, work, rows)
 
 
 @kernel
 def dot(rods, a, b):
     total = splat(0.0)
-    for row in range(2 * n_nodes(rods)):
+    for row in range(2 * n_free(rods)):
         total = add_product(total, load(a, row), load(b, row))
     return total
 
@@ -39,6 +42,8 @@ def dot(rods, a, b):
 @kernel
 def solve_coupled(contact, rods, work, robots, decrement):
     """The Newton step of the robots in the mask, node by node into work.contact.x [m], where pairs are listed.
+
+    With a body the step of its angle follows [rad].
 
     Returns its decrement [J].
     """
@@ -49,7 +54,7 @@ def solve_coupled(contact, rods, work, robots, decrement):
     x, r, z, p, Hp, w = (
         work.contact.x, work.contact.r, work.contact.z, work.contact.p, work.contact.Hp, work.contact.w,
     )  # fmt: skip
-    rows = 2 * n_nodes(rods)
+    rows = 2 * n_free(rods)
     zero = splat(0.0)
     substitute_star(rods, work, x)
     running = robots & (load(work.contact.touching, 0) > 0.0)

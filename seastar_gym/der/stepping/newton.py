@@ -82,7 +82,8 @@ def take_step(rods, work, stepping, shortening, fraction):
     edges = rods.nodes_per_limb - 1
     scale = step_scale(stepping, shortening, fraction)
     hub = load_pair(work.root_solution, 2 * rods.n_limbs)
-    largest = move_angle(rods.body, rods, work, shortening, scale, move_node(work, 0, hub, shortening, scale))
+    largest = move_node(work, 0, hub, shortening, scale)
+    largest = move_angle(rods.body, rods, work, work.root_solution, 2 * rods.n_limbs + 2, shortening, scale, largest)
     for limb in range(rods.n_limbs):
         first = limb * edges
         before = tail_solution(rods.body, work, rods.n_limbs, limb, hub)
@@ -96,11 +97,14 @@ def take_step(rods, work, stepping, shortening, fraction):
 
 
 @kernel
-def move_angle(body, rods, work, shortening, scale, largest):
-    """Move a body's angle by `scale` times its step; returns the largest move squared; unchanged without a body."""
+def move_angle(body, rods, work, solution, row, shortening, scale, largest):
+    """Move a body's angle by `scale` times its step, from a row of solutions [rad].
+
+    Returns the largest move squared; unchanged without a body.
+    """
     if body is None:
         return largest
-    arc = load(body.scale, 0) * load(work.root_solution, 2 * rods.n_limbs + 2)
+    arc = load(body.scale, 0) * load(solution, row)
     return larger(largest, move_node(work, n_nodes(rods), (arc, splat(0.0)), shortening, scale))
 
 
@@ -114,6 +118,8 @@ def move_along(contact, rods, work, stepping, shortening, fraction):
     scale, largest = step_scale(stepping, shortening, fraction), splat(0.0)
     for node in range(n_nodes(rods)):
         largest = larger(largest, move_node(work, node, load_pair(contact.x, 2 * node), shortening, scale))
+    largest = move_angle(rods.body, rods, work, contact.x, 2 * n_nodes(rods), shortening, scale, largest)
+    place_roots(rods.body, rods, work.q)
     return sqrt(largest)
 
 

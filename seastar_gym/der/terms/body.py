@@ -32,7 +32,7 @@ from seastar_gym.der.mesh import Mesh
 from seastar_gym.der.motion import Motion, node_motion, relative
 from seastar_gym.der.star import n_nodes, root_place
 from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.lanes import N_LANES, add_product, load, store, subtract_product
+from seastar_gym.simd.lanes import N_LANES, add_product, load, select, splat, store, subtract_product
 from seastar_gym.simd.rows import aligned_rows
 
 Floats = NDArray[np.float64]
@@ -42,7 +42,7 @@ class Body(NamedTuple):
     """Coefficients of a body, in its own frame.
 
     scale, inverse_scale: s [m] and 1/s.
-    arm: a_k, (x, y) per limb [m].
+    n_arms, arm: a_k, (x, y) per limb and, in scenes with contact, per corner of the outline [m]; how many there are.
     inertia: I, with the fluid that turns along [kg m^2]. moment: S, (x, y) [kg m].
     added_mass: Mass of fluid that moves along, xx, xy, yy [kg]; None without.
     n_strips, strips: Drag of flow onto strips of the outline, see body_forces.py: n_x, n_y [1], m [m], c [kg/m] each.
@@ -52,6 +52,7 @@ class Body(NamedTuple):
 
     scale: Floats
     inverse_scale: Floats
+    n_arms: int
     arm: Floats
     inertia: Floats
     moment: Floats
@@ -64,7 +65,7 @@ class Body(NamedTuple):
 class BodyWork(NamedTuple):
     """Memory of a body.
 
-    turn: (cos, sin) of its angle, by the iterate. arm: A_k by the iterate, (x, y) per limb [m].
+    turn: (cos, sin) of its angle, by the iterate. arm: A_k by the iterate, (x, y) per limb and corner [m].
     frozen: What a stage takes from its first guess, see FROZEN. hat: X_hat and U_hat, per limb [m], [m/s].
     system: Coupling of hub and angle, (x, y) [N]; stiffness of the angle [N m] and its residual [N m].
     """
@@ -108,6 +109,7 @@ def coefficients(
     return Body(
         scale=np.array([scale]),
         inverse_scale=np.array([1.0 / scale]),
+        n_arms=len(places),
         arm=places.reshape(-1),
         inertia=np.array([own + of_roots]),
         moment=mass * np.array(centre) + density * halves @ places,
@@ -124,11 +126,16 @@ def half_volumes(mesh: Mesh) -> Floats:
     return area * 0.5 * mesh.root_edges
 
 
+def with_corners(body: Body, corners: Floats) -> Body:
+    """A body with the corners of its outline [m], shape (n, 2), for contact."""
+    return body._replace(n_arms=body.n_arms + len(corners), arm=np.concatenate([body.arm, corners.reshape(-1)]))
+
+
 def memory(body: Body | None, n_limbs: int) -> BodyWork | None:
     """Zeroed memory for the body of one lane group."""
     if body is None:
         return None
-    counts = (2, 2 * n_limbs, FROZEN, HAT * n_limbs, SYSTEM)
+    counts = (2, 2 * body.n_arms, FROZEN, HAT * n_limbs, SYSTEM)
     return BodyWork(*(aligned_rows(count, N_LANES) for count in counts))
 
 
@@ -147,27 +154,27 @@ def turned(c, s, rows, k):
 
 @kernel
 def place_roots(body, rods, q):
-    """Put the roots of the limbs where hub and angle say [m], in scenes with a body."""
+    """Put the roots of the limbs, and corners, where hub and angle say [m], in scenes with a body."""
     if body is None:
         return
     c, s = rotation(angle(body, rods, q))
-    for limb in range(rods.n_limbs):
-        x, y = turned(c, s, body.arm, limb)
-        place = root_place(rods, limb)
+    for k in range(body.n_arms):
+        x, y = turned(c, s, body.arm, k)
+        place = root_place(rods, 0) + k
         store(q, 2 * place, load(q, 0) + x)
         store(q, 2 * place + 1, load(q, 1) + y)
 
 
 @kernel
 def move_roots(body, rods, q, v):
-    """Put the roots of the limbs where hub and angle say [m], with the velocities of there [m/s]; with a body."""
+    """Put roots and corners where hub and angle say [m], with the velocities of there [m/s], in scenes with a body."""
     if body is None:
         return
     c, s = rotation(angle(body, rods, q))
     omega = angle(body, rods, v)
-    for limb in range(rods.n_limbs):
-        x, y = turned(c, s, body.arm, limb)
-        place = root_place(rods, limb)
+    for k in range(body.n_arms):
+        x, y = turned(c, s, body.arm, k)
+        place = root_place(rods, 0) + k
         store(q, 2 * place, load(q, 0) + x)
         store(q, 2 * place + 1, load(q, 1) + y)
         store(v, 2 * place, subtract_product(load(v, 0), omega, y))
@@ -231,12 +238,12 @@ def begin_body(body, rods, work):
     c, s = rotation(angle(body, rods, work.q))
     store(work.body.turn, 0, c)
     store(work.body.turn, 1, s)
-    for limb in range(rods.n_limbs):
-        x, y = turned(c, s, body.arm, limb)
-        store(work.body.arm, 2 * limb, x)
-        store(work.body.arm, 2 * limb + 1, y)
-    for k in range(SYSTEM):
-        store(work.body.system, k, 0.0)
+    for k in range(body.n_arms):
+        x, y = turned(c, s, body.arm, k)
+        store(work.body.arm, 2 * k, x)
+        store(work.body.arm, 2 * k + 1, y)
+    for row in range(SYSTEM):
+        store(work.body.system, row, 0.0)
 
 
 @kernel
@@ -256,3 +263,50 @@ def tail_solution(body, work, n_limbs, limb, hub):
     turn = load(work.root_solution, 2 * n_limbs + 2)
     x, y = load(work.body.arm, 2 * limb), load(work.body.arm, 2 * limb + 1)
     return subtract_product(hub[0], turn, y), add_product(hub[1], turn, x)
+
+
+@kernel
+def carry_roots(body, rods, work, p):
+    """Extend rows of a direction of the unknowns, the angle [rad], to roots and corners, which it carries along."""
+    if body is None:
+        return
+    turn = load(p, 2 * n_nodes(rods))
+    for k in range(body.n_arms):
+        place = root_place(rods, 0) + k
+        x, y = load(work.body.arm, 2 * k), load(work.body.arm, 2 * k + 1)
+        store(p, 2 * place, subtract_product(load(p, 0), turn, y))
+        store(p, 2 * place + 1, add_product(load(p, 1), turn, x))
+
+
+@kernel
+def gather_roots(body, rods, work, rows):
+    """Move what rows have at roots and corners to the hub and, as a torque, to the angle: the transpose of carry."""
+    if body is None:
+        return
+    angle_row = 2 * n_nodes(rods)
+    for k in range(body.n_arms):
+        x, y = load(work.body.arm, 2 * k), load(work.body.arm, 2 * k + 1)
+        row = 2 * (root_place(rods, 0) + k)
+        f_x, f_y = load(rows, row), load(rows, row + 1)
+        store(rows, 0, load(rows, 0) + f_x)
+        store(rows, 1, load(rows, 1) + f_y)
+        store(rows, angle_row, subtract_product(add_product(load(rows, angle_row), x, f_y), y, f_x))
+        store(rows, row, 0.0)
+        store(rows, row + 1, 0.0)
+
+
+@kernel
+def push_body_at_roots(body, rods, work, convex, force):
+    """Move forces at roots and corners [N] to the hub, and their torque into the angle's part of the system."""
+    if body is None:
+        return
+    curvature = splat(0.0)
+    for k in range(body.n_arms):
+        row = 2 * (root_place(rods, 0) + k)
+        x, y = load(work.body.arm, 2 * k), load(work.body.arm, 2 * k + 1)
+        curvature = add_product(add_product(curvature, load(force, row), x), load(force, row + 1), y)
+    curvature = select(convex, select(curvature > 0.0, curvature, 0.0), curvature)
+    angle_row = 2 * n_nodes(rods)
+    store(force, angle_row, 0.0)
+    gather_roots(body, rods, work, force)
+    add_to_system(work, splat(0.0), splat(0.0), curvature, -load(force, angle_row))

@@ -1,4 +1,4 @@
-"""Contact between limbs: a penalty on how deep nodes of one limb lie in edges of another.
+"""Contact of limbs with each other and with a body: a penalty on how deep nodes of one lie in edges of another.
 
 A node at x and the point y = (1 - s) x_j + s x_k of an edge have the gap g = n (x - y), n the edge's normal to the side
 on which the node's limb belongs. Where g is below d, their thicknesses' sum, elastic cylinders side by side store
@@ -6,8 +6,14 @@ on which the node's limb belongs. Where g is below d, their thicknesses' sum, el
     V = k (d - g)^2 / 2,    k the contact modulus times half the node's Voronoi length,
 
 half, because the nodes of either limb meet the edges of the other. Who is near whom, n and s are taken from the first
-guess of a stage, see fluid.py: g is linear in the coordinates, V convex, k c c^T its Hessian, c the gradient of g,
+guess of a stage, see fluid.py: g is linear in the places, V convex in them, k c c^T its Hessian, c the gradient of g,
 and the forces on node and edge cancel. That Hessian couples limbs, so it is not in the star's matrix, see coupled.py.
+
+A body's outline is a polygon with sides in place of edges, whose corners meet the edges of limbs. A node that meets it
+has k of its whole length, since nobody meets it in turn, and an edge that meets a corner that of half the length at its
+outer node. A disc is one corner, as thick as its radius. Outside, n points from the nearest point of the outline. Root
+edges, which begin at the body, do not meet it. Corners move with the body as roots do, see body.py, and what that is
+curved by, in its angle alone, is in the star's matrix.
 
 A step does not resolve the bounce of stiff limbs. Schemes whose stages end a step damp it, whatever k is. The implicit
 midpoint rule would keep it, and limbs that hinges press together would ring with the period of two steps, ever more: it
@@ -25,7 +31,8 @@ import numpy as np
 
 from seastar_gym.der.geometry import edge_vector
 from seastar_gym.der.mesh import Mesh
-from seastar_gym.der.star import n_nodes, tail_node
+from seastar_gym.der.star import corner_place, n_nodes, n_points, tail_node
+from seastar_gym.der.terms.body import push_body_at_roots
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import N_LANES, add_product, load, load_number, select, splat, store, subtract_product
 from seastar_gym.simd.rows import aligned_rows
@@ -37,7 +44,9 @@ N_X, N_Y, SHARE, OFFSET, THICKNESS, STIFFNESS = range(SLOT_ROWS)
 
 MOST_NEAR_EDGES, SHORT_CHAIN = 3, 24
 """Edges of another limb that a node can be near to, in the mean over the nodes: all, in chains of SHORT_CHAIN edges or
-fewer. In longer ones a node that is not crumpled is near to one or two."""
+fewer. In longer ones a node that is not crumpled is near to one or two, and a corner to as many of every limb."""
+NEAR_SIDES = 2
+"""Sides of a body that a node can be near to, in the mean over the nodes of chains that are not short."""
 
 
 class Contact(NamedTuple):
@@ -46,6 +55,10 @@ class Contact(NamedTuple):
     n_pairs, pairs: Limbs that may touch, (right, left) each, counted from 0, shape (2 n_pairs,), for all robots.
     thickness: Distance from the centre line at which a node is touched [m]. widest: Twice the largest [m].
     stiffness: Stiffness of a touched node [N/m].
+    n_corners, rim: Corners of a body's outline, and their thickness [m]. reach: Largest distance from the hub of the
+        outline, and the length of an edge farther [m].
+
+    With a body, thickness and stiffness have rows for all points, see star.py; 0 where they are no nodes.
     """
 
     n_pairs: int
@@ -53,13 +66,24 @@ class Contact(NamedTuple):
     thickness: np.ndarray
     widest: np.ndarray
     stiffness: np.ndarray
+    n_corners: int
+    rim: np.ndarray
+    reach: np.ndarray
+
+
+class Rim(NamedTuple):
+    """Outline of a body: its corners [m], shape (n, 2), and their thickness [m]. A disc has one, as thick as it is."""
+
+    corners: np.ndarray
+    radius: float
 
 
 class ContactWork(NamedTuple):
-    """Memory of contact; rows per coordinate but for `listed`, `slots`, `own`, `missed` and `touching`.
+    """Memory of contact; rows per coordinate of points but for `listed`, `slots`, `own`, `missed` and `touching`.
 
     share: Largest number of pairs of node and edge that one robot can list. own: Number that it has listed.
-    listed: Number of pairs that all robots together have listed, then node and edge of each. slots: SLOT_ROWS of each.
+    listed: Number of pairs that all robots together have listed, then node and edge of each; sides of a body follow the
+        limbs' edges. slots: SLOT_ROWS of each.
     missed: 1 for robots whose pairs did not all fit into their share, or whose step was not found.
     touching: 1 for robots that touch.
     ends: Positions at which contact is looked for [m]. seen: These positions along the gap between two limbs and
@@ -90,40 +114,55 @@ OF_CYLINDERS = np.pi / 6.0
 
 
 def coefficients(
-    mesh: Mesh, pairs: Sequence[tuple[int, int]], modulus: float | None, opening_angle: float
+    mesh: Mesh,
+    pairs: Sequence[tuple[int, int]],
+    modulus: float | None,
+    opening_angle: float,
+    rim: Rim | None = None,
 ) -> Contact:
     """Thickness and stiffness of every node; half of the latter, because nodes of both limbs push.
 
     pairs: (right, left) limbs that may touch, counted from 0. modulus: Force per length and depth [Pa]; None for that
-    of elastic cylinders. opening_angle: Angle at which the cones near the hub touch [rad].
+    of elastic cylinders. opening_angle: Angle at which the cones near the hub touch [rad]. rim: Of a body, or None.
     """
     share = np.arange(mesh.nodes_per_limb) / (mesh.nodes_per_limb - 1)
     thickness, stiffness = [0.0], [0.0]
     for length, radii, moduli in zip(mesh.limb_lengths, mesh.radius_at_nodes, mesh.modulus_at_nodes, strict=True):
         thickness += [min(r, 0.5 * opening_angle * length * s) for r, s in zip(radii, share, strict=True)][1:]
         stiffness += [OF_CYLINDERS * E if modulus is None else modulus for E in moduli][1:]
+    corners, radius = Rim(np.zeros((0, 2)), 0.0) if rim is None else rim
+    beyond = [] if rim is None else [0.0] * (1 + mesh.n_limbs)
+    reach = radius + np.hypot(*corners.T).max(initial=0.0) + max(mesh.limb_lengths) / (mesh.nodes_per_limb - 1)
     return Contact(
         n_pairs=len(pairs),
         pairs=np.array(pairs, dtype=float).ravel(),
-        thickness=np.array(thickness),
+        thickness=np.array(thickness + beyond + [radius] * len(corners)),
         widest=np.array([2.0 * max(thickness)]),
-        stiffness=0.5 * np.array(stiffness) * mesh.dl,
+        stiffness=np.concatenate([0.5 * np.array(stiffness) * mesh.dl, beyond, np.zeros(len(corners))]),
+        n_corners=len(corners),
+        rim=np.array([radius]),
+        reach=np.array([reach]),
     )
 
 
-def memory(contact: Contact | None, n_limbs: int, nodes_per_limb: int) -> ContactWork | None:
+def memory(contact: Contact | None, n_limbs: int, nodes_per_limb: int, n_points: int) -> ContactWork | None:
     """Zeroed memory for the contact of one lane group, where robots list the pairs they have in common once."""
     if contact is None:
         return None
     edges = nodes_per_limb - 1
-    near_edges = edges if edges <= SHORT_CHAIN else MOST_NEAR_EDGES
+    short = edges <= SHORT_CHAIN
+    near_edges = edges if short else MOST_NEAR_EDGES
+    share = 2 * contact.n_pairs * edges * near_edges
     capacity = 2 * contact.n_pairs * edges * min(edges, near_edges * N_LANES)
+    at_body = (2 * edges - 1) * n_limbs * contact.n_corners
+    share_at_body = at_body if short else n_limbs * (NEAR_SIDES * edges + MOST_NEAR_EDGES * contact.n_corners)
+    capacity += min(at_body, share_at_body * N_LANES)
 
-    def rows(count: int = 2 * (n_limbs * edges + 1)) -> np.ndarray:
+    def rows(count: int = 2 * n_points) -> np.ndarray:
         return aligned_rows(count, N_LANES)
 
     return ContactWork(
-        share=float(2 * contact.n_pairs * edges * near_edges),
+        share=float(share + share_at_body),
         listed=aligned_rows(2 * capacity + 1),
         slots=rows(SLOT_ROWS * capacity),
         own=rows(1),
@@ -161,7 +200,34 @@ def looked_at(work, stage, row):
 def members(rods, work, slot):
     """(i, j, k) of a listed pair: its node, and the ends of its edge."""
     i, e = int(load_number(work.contact.listed, 2 * slot + 1)), int(load_number(work.contact.listed, 2 * slot + 2))
-    return i, tail_node(rods, e), e + 1
+    j, k = edge_ends(rods.body, rods, e)
+    return i, j, k
+
+
+@kernel
+def edge_ends(body, rods, e):
+    """The places where an edge starts and ends, or a side of a body, which has the number of its corner behind those.
+
+    The one corner of a disc is both ends of its side.
+    """
+    if body is None:
+        return tail_node(rods, e), e + 1
+    corner = e - (n_nodes(rods) - 1)
+    if corner < 0:
+        return tail_node(rods, e), e + 1
+    return corner_place(rods, corner), corner_place(rods, (corner + 1) % (body.n_arms - rods.n_limbs))
+
+
+@kernel
+def stiffness_at(body, contact, rods, i, k):
+    """Stiffness of a pair of node i and an edge that ends at k [N/m], in the robots' rows."""
+    if body is None:
+        return load(contact.stiffness, i)
+    if i >= n_nodes(rods):
+        return load(contact.stiffness, k)
+    if k >= n_nodes(rods):
+        return 2.0 * load(contact.stiffness, i)
+    return load(contact.stiffness, i)
 
 
 @kernel
@@ -204,14 +270,17 @@ def add_gap_gradient(rods, work, slot, amount, rows):
 
 
 @kernel
-def add_contact(contact, rods, work, stage, energy):
-    """Add contact to the energy of a stage's Phi [J], and leave its forces in work.contact.force [N]."""
+def add_contact(contact, rods, work, stage, convex, energy):
+    """Add contact to the energy of a stage's Phi [J], and leave its forces in work.contact.force [N].
+
+    What pushes a body is in the forces on the hub, and in the angle's part of the system.
+    """
     if contact is None:
         return energy
     if n_listed(work) == 0:
         return energy
     lead = lead_of(stage)
-    for row in range(2 * n_nodes(rods)):
+    for row in range(2 * n_points(rods)):
         store(work.contact.force, row, 0.0)
     touching, twice = splat(0.0), splat(0.0)
     for slot in range(n_listed(work)):
@@ -219,13 +288,14 @@ def add_contact(contact, rods, work, stage, energy):
         g = add_product(load(work.contact.slots, row + OFFSET), lead, gap(rods, work, slot, work.q))
         depth = load(work.contact.slots, row + THICKNESS) - g
         depth = select(depth > 0.0, depth, 0.0)
-        i, _, _ = members(rods, work, slot)
-        k = select(depth > 0.0, load(contact.stiffness, i), 0.0)
+        i, _, head = members(rods, work, slot)
+        k = select(depth > 0.0, stiffness_at(rods.body, contact, rods, i, head), 0.0)
         twice = add_product(twice, k * depth, depth)
         store(work.contact.slots, row + STIFFNESS, lead * k)
         touching = select(depth > 0.0, 1.0, touching)
         add_gap_gradient(rods, work, slot, k * depth, work.contact.force)
     store(work.contact.touching, 0, touching)
+    push_body_at_roots(rods.body, rods, work, convex, work.contact.force)
     return add_product(energy, 0.5 / lead, twice)
 
 
@@ -251,8 +321,8 @@ def add_contact_energy(contact, rods, work, q, energy):
     if contact is None:
         return energy
     for slot in range(n_listed(work)):
-        i, _, _ = members(rods, work, slot)
+        i, _, head = members(rods, work, slot)
         depth = load(work.contact.slots, SLOT_ROWS * slot + THICKNESS) - gap(rods, work, slot, q)
         depth = select(depth > 0.0, depth, 0.0)
-        energy = add_product(energy, 0.5 * load(contact.stiffness, i) * depth, depth)
+        energy = add_product(energy, 0.5 * stiffness_at(rods.body, contact, rods, i, head) * depth, depth)
     return energy

@@ -1,17 +1,18 @@
-"""Limbs that came to cross in a step: such a step is refused, so that limbs do not pass through each other."""
+"""Limbs that came to cross in a step, or to enter a body: such a step is refused, so that none passes through."""
 
 import numpy as np
 
 from seastar_gym.der.geometry import edge_vector
-from seastar_gym.der.star import n_nodes, tail_node
-from seastar_gym.der.terms.near_pairs import across_gap
+from seastar_gym.der.star import corner_place, n_nodes, n_points, tail_node
+from seastar_gym.der.terms.contact import edge_ends
+from seastar_gym.der.terms.near_pairs import across_gap, height_over_body
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, any_lane, load, load_number, select, splat, store, subtract_product
 
 
 @kernel
 def those_uncrossed(contact, rods, work, stage, q_0, robots):
-    """Mask of those among `robots` without edges of different limbs that cross now and did not when the step began.
+    """Mask of those among `robots` without edges that cross now, or enter a body, and did not when the step began.
 
     Robots whose near pairs did not all fit into the list, or whose Newton step was not found, are left out.
     """
@@ -25,15 +26,18 @@ def those_uncrossed(contact, rods, work, stage, q_0, robots):
         doubtful = robots & ~on_their_sides(rods, work.contact.ends, q_0, right, left)
         if any_lane(doubtful):
             robots = robots & ~(doubtful & come_to_cross(rods, work.contact.ends, q_0, right, left))
-    return robots
+    return those_outside(rods.body, contact, rods, work.contact.ends, q_0, robots)
 
 
 @kernel
 def on_their_sides(rods, q_1, q_0, right, left):
-    """Mask of the robots whose limbs lie on either side of a line through the hub at q_1, so that they cannot cross."""
+    """Mask of the robots whose limbs lie on either side of a line at q_1, so that they cannot cross.
+
+    The line goes through the hub; with a body, anywhere between the limbs and their roots.
+    """
     edges = rods.nodes_per_limb - 1
     wx, wy = across_gap(rods, q_0, right, left)
-    high, low = splat(-np.inf), splat(np.inf)
+    high, low = beginnings(rods.body, rods, q_1, right, left, wx, wy)
     for i in range(1, edges + 1):
         dx, dy = edge_vector(q_1, 0, right * edges + i)
         x = add_product(dx * wx, dy, wy)
@@ -41,13 +45,32 @@ def on_their_sides(rods, q_1, q_0, right, left):
         y = add_product(dx * wx, dy, wy)
         high = select(high > x, high, x)
         low = select(low < y, low, y)
-    return (high < 0.0) & (low > 0.0)
+    return apart(rods.body, high, low)
+
+
+@kernel
+def beginnings(body, rods, q_1, right, left, wx, wy):
+    """Places of two limbs' roots on a body from the hub, along w [m]; without a body nothing to look at."""
+    if body is None:
+        return splat(-np.inf), splat(np.inf)
+    edges = rods.nodes_per_limb - 1
+    dx, dy = edge_vector(q_1, 0, tail_node(rods, right * edges))
+    hx, hy = edge_vector(q_1, 0, tail_node(rods, left * edges))
+    return add_product(dx * wx, dy, wy), add_product(hx * wx, hy, wy)
+
+
+@kernel
+def apart(body, high, low):
+    """Mask of the robots whose limbs end before the hub and begin behind it; with a body, before each other."""
+    if body is None:
+        return (high < 0.0) & (low > 0.0)
+    return high < low
 
 
 @kernel
 def store_step_end(rods, work, stage):
     """Fill work.contact.ends with the positions at the end of the step [m]."""
-    for row in range(2 * n_nodes(rods)):
+    for row in range(2 * n_points(rods)):
         q = load(work.q, row)
         store(work.contact.ends, row, 2.0 * q - load(stage.q_hat, row) if stage.ahead else q)
 
@@ -68,12 +91,70 @@ def come_to_cross(rods, q_1, q_0, right, left):
 @kernel
 def edges_cross(rods, q, e, f):
     """Mask of the robots whose edges e and f cross: each at a share of itself between 0 and 1, without divisions."""
-    i, j = tail_node(rods, e), tail_node(rods, f)
-    ex, ey = edge_vector(q, i, e + 1)
-    fx, fy = edge_vector(q, j, f + 1)
+    i, head = edge_ends(rods.body, rods, e)
+    j, other_head = edge_ends(rods.body, rods, f)
+    ex, ey = edge_vector(q, i, head)
+    fx, fy = edge_vector(q, j, other_head)
     dx, dy = edge_vector(q, i, j)
     cross = subtract_product(ex * fy, ey, fx)
     of_e = cross * subtract_product(dx * fy, dy, fx)
     of_f = cross * subtract_product(dx * ey, dy, ex)
     squared = cross * cross
     return (of_e > 0.0) & (of_e < squared) & (of_f > 0.0) & (of_f < squared)
+
+
+@kernel
+def those_outside(body, contact, rods, q_1, q_0, robots):
+    """Mask of those among `robots` without nodes in a body at q_1, nor edges through it, that were not so at q_0.
+
+    Root edges are left out, which begin at the body. The robots themselves without a body.
+    """
+    if body is None:
+        return robots
+    if contact.n_corners == 0:
+        return robots
+    edges, farthest = rods.nodes_per_limb - 1, load(contact.reach, 0)
+    for i in range(1, n_nodes(rods)):
+        dx, dy = edge_vector(q_1, 0, i)
+        doubtful = robots & (add_product(dx * dx, dy, dy) < farthest * farthest)
+        if any_lane(doubtful):
+            entered = is_within(contact, rods, q_1, i) & ~is_within(contact, rods, q_0, i)
+            if i % edges != 1 and edges > 1:
+                entered = entered | come_through(contact, rods, q_1, q_0, i - 1)
+            robots = robots & ~(doubtful & entered)
+    return robots
+
+
+@kernel
+def is_within(contact, rods, q, i):
+    """Mask of the robots with a node in the body."""
+    if contact.n_corners > 1:
+        return height_over_body(contact, rods, q, i) < 0.0
+    dx, dy = edge_vector(q, corner_place(rods, 0), i)
+    rim = load(contact.rim, 0)
+    return add_product(dx * dx, dy, dy) < rim * rim
+
+
+@kernel
+def come_through(contact, rods, q_1, q_0, e):
+    """Mask of the robots with an edge through the body at q_1 that was not so at q_0."""
+    if contact.n_corners == 1:
+        return reaches_disc(contact, rods, q_1, e) & ~reaches_disc(contact, rods, q_0, e)
+    through = splat(1.0) < 0.0
+    for side in range(contact.n_corners):
+        f = n_nodes(rods) - 1 + side
+        now = edges_cross(rods, q_1, e, f)
+        if any_lane(now):
+            through = through | (now & ~edges_cross(rods, q_0, e, f))
+    return through
+
+
+@kernel
+def reaches_disc(contact, rods, q, e):
+    """Mask of the robots with an edge whose point nearest to the middle of a disc lies between its ends, and in it."""
+    i, rim = corner_place(rods, 0), load(contact.rim, 0)
+    ex, ey = edge_vector(q, e, e + 1)
+    dx, dy = edge_vector(q, e, i)
+    squared, along = add_product(ex * ex, ey, ey), add_product(dx * ex, dy, ey)
+    across = subtract_product(dx * ey, dy, ex)
+    return (along > 0.0) & (along < squared) & (across * across < rim * rim * squared)

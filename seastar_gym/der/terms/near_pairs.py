@@ -1,9 +1,9 @@
-"""Which nodes and edges of different limbs may touch in a stage: listed from its first guess, robot by robot."""
+"""Which nodes and edges may touch in a stage, of limbs and of a body: listed from its first guess, robot by robot."""
 
 import numpy as np
 
 from seastar_gym.der.geometry import edge_vector
-from seastar_gym.der.star import n_nodes, tail_node
+from seastar_gym.der.star import corner_place, n_nodes, n_points, root_place, tail_node
 from seastar_gym.der.terms.contact import (
     N_X,
     N_Y,
@@ -53,6 +53,7 @@ def freeze_contact(contact, rods, work, stage, q_0):
         dx, dy = dx - carried_x, dy - carried_y
         squared = add_product(dx * dx, dy, dy)
         moved = select(squared > moved, squared, moved)
+    moved = view_roots(rods.body, rods, work, stage, q_0, carried_x, carried_y, moved)
     # Whoever is farther apart than that could not have come near on the way.
     reach = add_product(MARGIN * load(contact.widest, 0), 2.0, sqrt(moved))
     store_number(work.contact.listed, 0, 0.0)
@@ -68,19 +69,36 @@ def freeze_contact(contact, rods, work, stage, q_0):
         near, end = may_touch(rods, work, reach, left, right, 1.0)
         if any_lane(near):
             list_pairs(contact, rods, work, stage, q_0, reach, left, right, 1.0, end, near)
+    list_at_body(rods.body, contact, rods, work, stage, q_0, reach)
     if n_listed(work) == 0:
         store(work.contact.touching, 0, 0.0)
-        for row in range(2 * n_nodes(rods)):
+        for row in range(2 * n_points(rods)):
             store(work.contact.force, row, 0.0)
 
 
 @kernel
+def view_roots(body, rods, work, stage, q_0, carried_x, carried_y, moved):
+    """Look at roots and corners of a body, as freeze_contact does at nodes; returns the largest move squared [m^2]."""
+    if body is None:
+        return moved
+    for k in range(body.n_arms):
+        place = root_place(rods, 0) + k
+        x, y = looked_at(work, stage, 2 * place), looked_at(work, stage, 2 * place + 1)
+        store(work.contact.ends, 2 * place, x)
+        store(work.contact.ends, 2 * place + 1, y)
+        dx, dy = x - load(q_0, 2 * place) - carried_x, y - load(q_0, 2 * place + 1) - carried_y
+        squared = add_product(dx * dx, dy, dy)
+        moved = select(squared > moved, squared, moved)
+    return moved
+
+
+@kernel
 def view_limbs(rods, work, q_0, right, left):
-    """Look at two limbs and the hub along the gap between them, and across it; keep it in work.contact.seen."""
+    """Look at two limbs and their roots along the gap between them, and across it; keep it in work.contact.seen."""
     edges = rods.nodes_per_limb - 1
     wx, wy = across_gap(rods, q_0, right, left)
-    view_node(work, 0, wx, wy)
     for limb in (right, left):
+        view_node(work, tail_node(rods, limb * edges), wx, wy)
         for node in range(limb * edges + 1, limb * edges + edges + 1):
             view_node(work, node, wx, wy)
 
@@ -89,8 +107,8 @@ def view_limbs(rods, work, q_0, right, left):
 def across_gap(rods, q, right, left):
     """Unit vector from the right limb to the left: along the difference of their directions and across their sum."""
     edges = rods.nodes_per_limb - 1
-    ax, ay = edge_vector(q, 0, right * edges + 1)
-    bx, by = edge_vector(q, 0, left * edges + 1)
+    ax, ay = edge_vector(q, tail_node(rods, right * edges), right * edges + 1)
+    bx, by = edge_vector(q, tail_node(rods, left * edges), left * edges + 1)
     a, b = 1.0 / sqrt(add_product(ax * ax, ay, ay)), 1.0 / sqrt(add_product(bx * bx, by, by))
     ax, ay, bx, by = a * ax, a * ay, b * bx, b * by
     wx, wy = bx - ax - (ay + by), by - ay + (ax + bx)
@@ -101,10 +119,10 @@ def across_gap(rods, q, right, left):
 @kernel
 def may_touch(rods, work, reach, limb, other, side):
     """(near, end): the mask of the robots with no strip of width `reach` between the nodes of a limb and the edges of
-    another, which begin at the hub, and how far the limb comes towards the other.
+    another, which begin at the hub or a body, and how far the limb comes towards the other.
     """
     edges = rods.nodes_per_limb - 1
-    end, begin = splat(-np.inf), -side * load(work.contact.seen, 0)
+    end, begin = splat(-np.inf), -side * load(work.contact.seen, 2 * tail_node(rods, other * edges))
     for i in range(1, edges + 1):
         own = -side * load(work.contact.seen, 2 * (limb * edges + i))
         others = -side * load(work.contact.seen, 2 * (other * edges + i))
@@ -165,8 +183,13 @@ def list_pair(contact, rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing)
     tail = load(contact.thickness, j)
     d = load(contact.thickness, i) + add_product(tail, s, load(contact.thickness, k) - tail)
     near = facing & (g_0 > -d) & (g < MARGIN * d + absolute(g - g_0))
-    if not any_lane(near):
-        return
+    if any_lane(near):
+        put_on_list(contact, rods, work, stage, i, e, nx, ny, s, d, near)
+
+
+@kernel
+def put_on_list(contact, rods, work, stage, i, e, nx, ny, s, d, near):
+    """List node i and edge e for the robots in the mask: normal (nx, ny), share s of the edge, thickness d [m]."""
     # Every robot has a share of the list of its own, so that nobody takes another's place.
     own = load(work.contact.own, 0)
     full = near & (own >= work.contact.share)
@@ -187,3 +210,116 @@ def list_pair(contact, rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing)
     store(work.contact.slots, row + THICKNESS, select(near, d, -OUT_OF_TOUCH))
     store(work.contact.slots, row + OFFSET, select(near, gap_at_rest(rods, work, stage, slot), 0.0))
     store(work.contact.slots, row + STIFFNESS, 0.0)
+
+
+@kernel
+def list_at_body(body, contact, rods, work, stage, q_0, reach):
+    """List the nodes of limbs that are near a body, and the edges that are near its corners, in scenes with a body.
+
+    Root edges are left out, which begin at the body.
+    """
+    if body is None:
+        return
+    if contact.n_corners == 0:
+        return
+    ends, edges = work.contact.ends, rods.nodes_per_limb - 1
+    farthest = load(contact.reach, 0) + reach
+    for i in range(1, n_nodes(rods)):
+        dx, dy = edge_vector(ends, 0, i)
+        robots = add_product(dx * dx, dy, dy) < farthest * farthest
+        if any_lane(robots):
+            if contact.n_corners == 1:
+                list_node_at_disc(contact, rods, work, stage, q_0, i, robots)
+            else:
+                list_node_at_sides(contact, rods, work, stage, q_0, i, robots)
+            if i % edges != 1 and edges > 1:
+                for corner in range(contact.n_corners):
+                    list_corner(contact, rods, work, stage, q_0, corner, i - 1, robots)
+
+
+@kernel
+def list_node_at_disc(contact, rods, work, stage, q_0, i, robots):
+    """List a node at the rim of a disc, in the direction in which it stands from the middle."""
+    j, rim, d = corner_place(rods, 0), load(contact.rim, 0), load(contact.thickness, i)
+    dx, dy = edge_vector(work.contact.ends, j, i)
+    size = sqrt(add_product(dx * dx, dy, dy))
+    nx, ny = dx / size, dy / size
+    dx, dy = edge_vector(q_0, j, i)
+    g, g_0 = size - rim, sqrt(add_product(dx * dx, dy, dy)) - rim
+    near = robots & (size > 0.0) & (g_0 > -d) & (g < MARGIN * d + absolute(g - g_0))
+    if any_lane(near):
+        put_on_list(contact, rods, work, stage, i, n_nodes(rods) - 1, nx, ny, splat(0.0), d + rim, near)
+
+
+@kernel
+def height_over_side(contact, rods, q, i, side):
+    """Distance of a node from the line through a side of a polygon [m], positive outside."""
+    j = corner_place(rods, side)
+    ex, ey = edge_vector(q, j, corner_place(rods, (side + 1) % contact.n_corners))
+    dx, dy = edge_vector(q, j, i)
+    return subtract_product(ey * dx, ex, dy) / sqrt(add_product(ex * ex, ey, ey))
+
+
+@kernel
+def height_over_body(contact, rods, q, i):
+    """Largest of the heights of a node over the sides of a polygon [m]: negative inside."""
+    height = splat(-np.inf)
+    for side in range(contact.n_corners):
+        here = height_over_side(contact, rods, q, i, side)
+        height = select(here > height, here, height)
+    return height
+
+
+@kernel
+def list_node_at_sides(contact, rods, work, stage, q_0, i, robots):
+    """List a node at the side of a polygon beside which it stands, or at the corner at the side's end.
+
+    Inside, it belongs to the sides outside of which it was when the step began, or to the one that it was nearest to.
+    """
+    ends, d = work.contact.ends, load(contact.thickness, i)
+    height = height_over_body(contact, rods, q_0, i)
+    for side in range(contact.n_corners):
+        j, k = corner_place(rods, side), corner_place(rods, (side + 1) % contact.n_corners)
+        ex, ey = edge_vector(ends, j, k)
+        dx, dy = edge_vector(ends, j, i)
+        inverse = 1.0 / add_product(ex * ex, ey, ey)
+        s = add_product(dx * ex, dy, ey) * inverse
+        # The next side begins at the corner k; who is before it and beyond this one stands at the corner.
+        fx, fy = edge_vector(ends, k, corner_place(rods, (side + 2) % contact.n_corners))
+        hx, hy = edge_vector(ends, k, i)
+        beyond = (s > 1.0) & (add_product(hx * fx, hy, fy) < 0.0)
+        beside = robots & (beyond | ((s >= 0.0) & (s <= 1.0))) & (height > -d)
+        if any_lane(beside):
+            size, scale = sqrt(add_product(hx * hx, hy, hy)), sqrt(inverse)
+            nx, ny = select(beyond, hx / size, ey * scale), select(beyond, hy / size, -ex * scale)
+            g, g_0 = add_product(hx * nx, hy, ny), height_over_side(contact, rods, q_0, i, side)
+            near = beside & (beyond | (g_0 > 0.0) | (g_0 >= height)) & (g < MARGIN * d + absolute(g - g_0))
+            if any_lane(near):
+                s = select(s < 1.0, s, 1.0)
+                put_on_list(contact, rods, work, stage, i, n_nodes(rods) - 1 + side, nx, ny, s, d, near)
+
+
+@kernel
+def list_corner(contact, rods, work, stage, q_0, corner, e, robots):
+    """List a corner of a body at an edge of a limb beside which it stands, on the side on which the step began."""
+    i, j, k = corner_place(rods, corner), e, e + 1
+    ex, ey = edge_vector(work.contact.ends, j, k)
+    dx, dy = edge_vector(work.contact.ends, j, i)
+    squared = add_product(ex * ex, ey, ey)
+    along = add_product(dx * ex, dy, ey)
+    facing = robots & (along > 0.0) & (along < squared)
+    if not any_lane(facing):
+        return
+    inverse = 1.0 / squared
+    s, scale = along * inverse, sqrt(inverse)
+    fx, fy = edge_vector(q_0, j, k)
+    hx, hy = edge_vector(q_0, j, i)
+    g_0 = subtract_product(fx * hy, fy, hx) / sqrt(add_product(fx * fx, fy, fy))
+    side = select(g_0 > 0.0, scale, -scale)
+    nx, ny = -ey * side, ex * side
+    g, rim = add_product(dx * nx, dy, ny), load(contact.rim, 0)
+    tail = load(contact.thickness, j)
+    d = add_product(tail, s, load(contact.thickness, k) - tail)
+    near = facing & (g - rim < MARGIN * d + absolute(g - absolute(g_0)))
+    if any_lane(near):
+        put_on_list(contact, rods, work, stage, i, e, nx, ny, s, d + rim, near)

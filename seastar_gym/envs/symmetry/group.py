@@ -1,4 +1,7 @@
-"""Symmetry group of the regular n-gon: its elements, their products, and how they turn vectors and order limbs."""
+"""Symmetry groups: their elements, their products, and how they turn vectors and order limbs.
+
+A group is the number of limbs, which stands for all turns and mirrors of the regular polygon, or a `PointGroup`.
+"""
 
 from functools import cache
 from typing import Any
@@ -6,7 +9,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.scene.symmetry import PointGroup
+
 Elements = NDArray[np.intp]
+Group = int | PointGroup
+
+
+def n_limbs_of(group: Group) -> int:
+    """Number of limbs of a robot with this group."""
+    return len(group.orders[0]) if isinstance(group, PointGroup) else group
+
+
+def n_turns_of(group: Group) -> int:
+    """Number of turns, with that by nothing."""
+    return group.n_turns if isinstance(group, PointGroup) else group
+
+
+def axis_of(group: Group) -> float | None:
+    """Direction of the mirror's line [rad]; None for a group of turns alone."""
+    return group.axis if isinstance(group, PointGroup) else 0.0
 
 
 def is_mirror(elements: ArrayLike) -> NDArray[np.bool_]:
@@ -14,32 +35,35 @@ def is_mirror(elements: ArrayLike) -> NDArray[np.bool_]:
     return np.asarray(elements) % 2 == 1
 
 
-def inverse(elements: ArrayLike, n_limbs: int) -> Elements:
+def inverse(elements: ArrayLike, group: Group) -> Elements:
     """Elements, shape (...), that undo these; a mirror undoes itself."""
     elements = np.asarray(elements)
-    return np.where(is_mirror(elements), elements, -elements % (2 * n_limbs))
+    return np.where(is_mirror(elements), elements, -elements % (2 * n_turns_of(group)))
 
 
-def compose(second: ArrayLike, first: ArrayLike, n_limbs: int) -> Elements:
+def compose(second: ArrayLike, first: ArrayLike, group: Group) -> Elements:
     """Elements, shape (...), of doing `first` and then `second`."""
     second, first = np.asarray(second), np.asarray(first)
     k_first, k_second = (first + 1) // 2, (second + 1) // 2
     k = k_first + np.where(is_mirror(first), -k_second, k_second)
-    return (2 * k - (first + second) % 2) % (2 * n_limbs)
+    return (2 * k - (first + second) % 2) % (2 * n_turns_of(group))
 
 
 @cache
-def turns(n_limbs: int) -> NDArray[np.complex128]:
-    """Factors exp(-2 pi i k/n) by which elements turn a vector x + iy, shape (2 n_limbs,); exactly 1 for element 0."""
-    k = (np.arange(2 * n_limbs) + 1) // 2 % n_limbs
-    return read_only(np.exp(-2j * np.pi / n_limbs * k))
+def turns(group: Group) -> NDArray[np.complex128]:
+    """Factors by which elements turn a vector x + iy, shape (2 n_turns,); exactly 1 for element 0."""
+    n = n_turns_of(group)
+    k = (np.arange(2 * n) + 1) // 2 % n
+    return read_only(np.exp(-2j * np.pi / n * k))
 
 
 @cache
-def limb_order(n_limbs: int) -> NDArray[np.intp]:
-    """Order of limbs, shape (2 n_limbs, n_limbs): limb j of a robot carried by element g was limb order[g, j]."""
-    elements, limbs = np.arange(2 * n_limbs)[:, None], np.arange(n_limbs)
-    return read_only(((elements + 1) // 2 + np.where(is_mirror(elements), -limbs, limbs)) % n_limbs)
+def limb_order(group: Group) -> NDArray[np.intp]:
+    """Order of limbs, shape (2 n_turns, n_limbs): limb j of a robot carried by element g was limb order[g, j]."""
+    if isinstance(group, PointGroup):
+        return read_only(np.array(group.orders, dtype=np.intp))
+    elements, limbs = np.arange(2 * group)[:, None], np.arange(group)
+    return read_only(((elements + 1) // 2 + np.where(is_mirror(elements), -limbs, limbs)) % group)
 
 
 def read_only(table: NDArray[Any]) -> NDArray[Any]:

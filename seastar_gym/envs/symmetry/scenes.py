@@ -1,18 +1,42 @@
-"""Scenes that have the symmetry of the regular polygon, and the reasons why others have not."""
+"""Scenes that have the symmetry of the regular polygon, or a lesser one, and the reasons why others have none."""
 
 from collections.abc import Iterable, Iterator
 
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization
+from seastar_gym.envs.symmetry.group import Group
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Actuator, Mirrored, StatefulActuator
 from seastar_gym.scene.actuators.heating import Mirror
+from seastar_gym.scene.symmetry import SAME, PointGroup
 
 
 def require_symmetry(scene: Scene, randomization: DomainRandomization | None = None) -> None:
-    """ValueError for scenes, and draws of their numbers, that a turn or a mirror would change."""
+    """ValueError for scenes, and draws of their numbers, that every turn and mirror would change."""
     why = next(_asymmetries(scene, () if randomization is None else randomization.distributions), None)
     if why is not None:
-        raise ValueError(f"This scene has not the symmetry of the regular polygon: {why}.")
+        raise ValueError(f"This scene has neither the symmetry of the regular polygon nor a lesser one: {why}.")
+
+
+def symmetry_of(scene: Scene) -> Group:
+    """Turns and mirrors that leave the robot of a scene unchanged: all of its polygon, or those that there are.
+
+    Robots of the chapter's discretisation have all or none.
+    """
+    robot, nothing = scene.robot, tuple(range(scene.robot.n_limbs))
+    if robot.discretisation == "chapter":
+        return robot.n_limbs if robot.is_symmetric else PointGroup(1, None, (nothing, nothing))
+    group = robot.point_group(_feels_directions(scene))
+    is_whole = robot.is_symmetric and group.n_turns == robot.n_limbs and group.axis == 0.0
+    return robot.n_limbs if is_whole else group
+
+
+def _feels_directions(scene: Scene) -> bool:
+    """Whether fluid that moves along with a body is that of an ellipse along its axes."""
+    body, fluid = scene.robot.body, scene.fluid
+    if body is None or fluid is None or fluid.added_mass_coefficient is None:
+        return False
+    along, across = body.shape.widths
+    return abs(along - across) > SAME
 
 
 def memory_mirror(actuator: Actuator) -> Mirror:
@@ -24,7 +48,8 @@ def memory_mirror(actuator: Actuator) -> Mirror:
 
 def _asymmetries(scene: Scene, drawn: Iterable[str]) -> Iterator[str]:
     """Reasons why a scene, some of whose numbers are drawn, is not symmetric."""
-    if not scene.robot.is_symmetric:
+    group = symmetry_of(scene)
+    if isinstance(group, PointGroup) and group.is_trivial:
         yield "its limbs are not alike, straight and evenly spread" + (
             "" if scene.robot.body is None else " around a body of their symmetry"
         )
@@ -43,5 +68,3 @@ def _asymmetries(scene: Scene, drawn: Iterable[str]) -> Iterator[str]:
     for name in drawn:
         if name == LIMB_STRENGTHS or name.startswith("robot.limbs."):
             yield f"{name} is drawn for every limb by itself"
-        if name.startswith(("robot.body.drag_a", "robot.body.added_mass_a")):
-            yield f"{name} is drawn for one direction by itself"

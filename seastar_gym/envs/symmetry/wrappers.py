@@ -1,4 +1,7 @@
-"""Wrappers that reduce `SeastarSwim-v0` and the timed environments to one sector, for any learner."""
+"""Wrappers that reduce `SeastarSwim-v0` and the timed environments to one sector, for any learner.
+
+A robot has the sectors of its own symmetry, see the package's docstring.
+"""
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -9,10 +12,10 @@ from numpy.typing import NDArray
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry.actions import restore_actions
-from seastar_gym.envs.symmetry.group import Elements
+from seastar_gym.envs.symmetry.group import Elements, Group
 from seastar_gym.envs.symmetry.masks import transform_masks
 from seastar_gym.envs.symmetry.observations import reduce_observations
-from seastar_gym.envs.symmetry.scenes import memory_mirror, require_symmetry
+from seastar_gym.envs.symmetry.scenes import memory_mirror, require_symmetry, symmetry_of
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.actuators.heating import Mirror
 
@@ -23,24 +26,24 @@ else:
 
 
 class _Kind(NamedTuple):
-    """What the symmetry has to know of an environment: mode, limbs, mirror of observed memory, asked headings."""
+    """What the symmetry has to know of an environment: mode, group, mirror of observed memory, asked headings."""
 
     mode: Actions
-    n_limbs: int
+    group: Group
     mirror: Mirror
     with_headings: bool
 
     def reduce(self, observations: NDArray[Any]) -> tuple[NDArray[np.floating[Any]], Elements]:
         """Reduced observations, and the elements that reduced them."""
-        return reduce_observations(observations, self.n_limbs, self.mirror, self.with_headings)
+        return reduce_observations(observations, self.group, self.mirror, self.with_headings)
 
     def restore(self, actions: Any, elements: Elements) -> Any:
         """Actions of the robots as they are."""
-        return restore_actions(actions, elements, self.mode, self.n_limbs)
+        return restore_actions(actions, elements, self.mode, self.group)
 
     def mask(self, masks: NDArray[Any], elements: Elements) -> NDArray[Any]:
         """Masks of reduced robots."""
-        return transform_masks(masks, elements, self.mode, self.n_limbs)
+        return transform_masks(masks, elements, self.mode, self.group)
 
     def mask_info(self, info: dict[str, Any], elements: Elements) -> dict[str, Any]:
         """Info with the masks of reduced robots, if it has any."""
@@ -55,7 +58,7 @@ def _kind(env: Any) -> _Kind:
     require_symmetry(inner.scene, inner.randomization)
     mirror = memory_mirror(inner.scene.actuator) if inner.observe_actuators else ()
     mirror += tuple((len(mirror) + index, sign) for index, sign in inner.added_mirror)
-    return _Kind(inner.actions, inner.scene.robot.n_limbs, mirror, inner.headings is not None)
+    return _Kind(inner.actions, symmetry_of(inner.scene), mirror, inner.headings is not None)
 
 
 class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorArgs):

@@ -1,0 +1,52 @@
+"""What touches at rest, of limbs around a body: contact would push it apart for ever."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.scene.limb import LimbShape, along
+from seastar_gym.scene.outline import Outline
+from seastar_gym.scene.shape import rest_positions
+
+Floats = NDArray[np.float64]
+
+FEW, MANY = 12, 60
+"""Nodes of a limb that are looked at: limbs at rest are arcs."""
+
+
+def touching_at_rest(
+    limbs: Sequence[LimbShape],
+    nodes_per_limb: int,
+    pairs: Sequence[tuple[int, int]],
+    outline: Outline,
+    opening_angle: float,
+) -> str | None:
+    """What touches at rest, in words, or None.
+
+    limbs: Limbs on a body. pairs: Those that may touch each other. outline: Of the body. opening_angle: Of the cones as
+    which limbs begin, see `Contact` [rad].
+    """
+    n = min(max(nodes_per_limb, FEW), MANY)
+    share = np.arange(n) / (n - 1)
+    nodes = rest_positions(limbs, n, tangent=True)[1:].reshape(len(limbs), n - 1, 2)
+    places = [np.concatenate([[limb.root], own]) for limb, own in zip(limbs, nodes, strict=True)]
+    thickness = [
+        np.minimum(along(limb.radius, share), 0.5 * opening_angle * limb.length * share) for limb in limbs
+    ]
+    for limb, (own, thick) in enumerate(zip(places, thickness, strict=True)):
+        if outline.reach and (outline.height_over(own[1:]) < thick[1:]).any():
+            return f"limb {limb + 1} touches the body"
+    for one, other in [*pairs, *((left, right) for right, left in pairs)]:
+        if _too_near(places[one][1:], thickness[one][1:], places[other], thickness[other]):
+            return f"limbs {one + 1} and {other + 1} touch each other"
+    return None
+
+
+def _too_near(points: Floats, thick: Floats, line: Floats, line_thick: Floats) -> bool:
+    """Whether points are nearer to a line of edges than both are thick."""
+    edges = np.diff(line, axis=0)
+    from_tails = points[:, None] - line[:-1]
+    s = np.clip((from_tails * edges).sum(axis=-1) / (edges * edges).sum(axis=-1), 0.0, 1.0)
+    distance = np.linalg.norm(from_tails - s[..., None] * edges, axis=-1)
+    return bool((distance < thick[:, None] + (1.0 - s) * line_thick[:-1] + s * line_thick[1:]).any())
