@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.envs.observation import Layout, layout
+from seastar_gym.envs.observation import layout
+from seastar_gym.envs.own_numbers import HEADINGS, NO_MORE, OwnNumbers, Places, places_of
 from seastar_gym.envs.symmetry.group import Elements, is_mirror, limb_order, read_only, turns
 from seastar_gym.scene.actuators.heating import Mirror
 
@@ -16,7 +17,11 @@ observations: not rounding, but the next waypoint chooses the sector of a robot 
 
 
 def sectors(
-    observations: NDArray[np.floating[Any]], n_limbs: int, mirror: Mirror = (), with_headings: bool = False
+    observations: NDArray[np.floating[Any]],
+    n_limbs: int,
+    mirror: Mirror = (),
+    with_headings: bool = False,
+    own: OwnNumbers = NO_MORE,
 ) -> Elements:
     """Sectors of the current waypoints, 0 to 2 n_limbs - 1, shape (...), in observations of shape (..., size).
 
@@ -24,11 +29,11 @@ def sectors(
     line (or there is none) to the sector anti-clockwise of the boundary. A waypoint at the hub lies in sector 0.
 
     mirror: What a mirror does to the memory of a limb's actuator, see `memory_mirror`; () if actuators have none.
-    with_headings: Whether headings are asked for.
+    with_headings: Whether headings are asked for. own: What the task shows of its own.
     """
-    at = _layout(observations, n_limbs, mirror, with_headings)
-    current = np.asarray(observations[..., at.current_waypoint], np.float64)
-    towards_next = np.asarray(observations[..., at.next_waypoint], np.float64)
+    at = _places(observations, n_limbs, mirror, with_headings, own)
+    waypoints = np.asarray(observations[..., at.waypoints], np.float64)
+    current, towards_next = waypoints[..., :2], waypoints[..., 2:]
     width = np.pi / n_limbs
     angle = np.arctan2(current[..., 1], current[..., 0])
     boundary = np.rint(angle / width)  # the nearest one
@@ -40,21 +45,29 @@ def sectors(
     return sector.astype(np.intp) % (2 * n_limbs)
 
 
-def _layout(observations: NDArray[np.floating[Any]], n_limbs: int, mirror: Mirror, with_headings: bool) -> Layout:
-    """Layout of observations, shape (..., size); ValueError if they are of a robot of other limbs."""
-    at, size = layout(n_limbs, len(mirror) * n_limbs, with_headings), observations.shape[-1]
+def _places(
+    observations: NDArray[np.floating[Any]], n_limbs: int, mirror: Mirror, with_headings: bool, own: OwnNumbers
+) -> Places:
+    """Places in observations, shape (..., size); ValueError if they are of a robot of other limbs."""
+    at, size = places_of(n_limbs, len(mirror) * n_limbs, _all_own(with_headings, own)), observations.shape[-1]
     if size != at.size:
         raise ValueError(f"An observation of {size} numbers is not that of a robot of {n_limbs} limbs.")
     return at
 
 
+def _all_own(with_headings: bool, own: OwnNumbers) -> OwnNumbers:
+    """What a task shows of its own, asked headings first."""
+    return own._replace(kinds=HEADINGS + own.kinds) if with_headings else own
+
+
 @cache
-def _vector_order(n_limbs: int) -> NDArray[np.intp]:
+def _vector_order(n_limbs: int, with_stations: bool) -> NDArray[np.intp]:
     """Order of vectors, shape (2 n_limbs, size/2): vector i after element g was vector order[g, i] before."""
     at = layout(n_limbs)
-    n_stations = at.velocities.start // 2
-    stations = np.arange(n_stations).reshape(n_limbs, -1)[limb_order(n_limbs)].reshape(-1, n_stations)
-    others = np.tile(np.arange(at.hub_velocity.start // 2, at.size // 2), (2 * n_limbs, 1))
+    n_others = (at.size - (at.hub_velocity.start if with_stations else at.waypoints.start)) // 2
+    n_stations = at.velocities.start // 2 if with_stations else 0
+    stations = np.arange(n_stations).reshape(n_limbs, -1)[limb_order(n_limbs)].reshape(2 * n_limbs, n_stations)
+    others = np.tile(2 * n_stations + np.arange(n_others), (2 * n_limbs, 1))
     return read_only(np.concatenate([stations, n_stations + stations, others], axis=1))
 
 
@@ -64,28 +77,40 @@ def transform_observations(
     n_limbs: int,
     mirror: Mirror = (),
     with_headings: bool = False,
+    own: OwnNumbers = NO_MORE,
 ) -> NDArray[np.floating[Any]]:
     """Observations of the robots carried by the elements: a fresh array of the same shape and type.
 
     mirror: What a mirror does to the memory of a limb's actuator, see `memory_mirror`; () if actuators have none.
-    with_headings: Whether headings are asked for.
+    with_headings: Whether headings are asked for. own: What the task shows of its own.
     """
     observations, elements = np.asarray(observations), np.asarray(elements, dtype=np.intp)
-    at = _layout(observations, n_limbs, mirror, with_headings)
-    if not mirror and not with_headings:
-        return _transform_vectors(observations, elements, n_limbs)
-    hub = at.hub_velocity.stop
+    at = _places(observations, n_limbs, mirror, with_headings, own)
+    own = _all_own(with_headings, own)
+    order = _vector_order(n_limbs, own.with_stations)
+    if not mirror and not own.kinds:
+        return _transform_vectors(observations, elements, n_limbs, order)
+    hub = at.stations_and_hub.stop
     vectors = np.concatenate([observations[..., at.stations_and_hub], observations[..., at.waypoints]], axis=-1)
-    vectors = _transform_vectors(vectors, elements, n_limbs)
+    vectors = _transform_vectors(vectors, elements, n_limbs, order)
     remembered = _transform_memory(observations[..., at.actuators], elements, n_limbs, mirror)
-    asked = _transform_headings(observations[..., at.headings], elements)
-    return np.concatenate([vectors[..., :hub], remembered, asked, vectors[..., hub:]], axis=-1)
+    shown = _transform_own(observations[..., at.own], elements, n_limbs, own)
+    return np.concatenate([vectors[..., :hub], remembered, shown, vectors[..., hub:]], axis=-1)
 
 
-def _transform_headings(asked: NDArray[np.floating[Any]], elements: Elements) -> NDArray[np.floating[Any]]:
-    """Cosines and sines of turns that are asked for, shape (..., 4): the same for all limbs, reversed by a mirror."""
-    signs = np.where(is_mirror(elements)[..., None], np.tile([1, -1], asked.shape[-1] // 2), 1)
-    return asked * signs.astype(asked.dtype)
+def _transform_own(
+    numbers: NDArray[np.floating[Any]], elements: Elements, n_limbs: int, own: OwnNumbers
+) -> NDArray[np.floating[Any]]:
+    """Numbers that the task shows of its own, shape (..., own.size)."""
+    carried = numbers.copy()
+    turns_at, at = own.places("turn"), np.array(own.places("vector"), np.intp)
+    carried[..., turns_at] *= np.where(is_mirror(elements)[..., None], -1, 1).astype(numbers.dtype)
+    if len(at):
+        pairs = np.stack([numbers[..., at], numbers[..., at + 1]], axis=-1).reshape(*numbers.shape[:-1], -1)
+        unmoved = np.tile(np.arange(len(at)), (2 * n_limbs, 1))
+        pairs = _transform_vectors(pairs, elements, n_limbs, unmoved)
+        carried[..., at], carried[..., at + 1] = pairs[..., ::2], pairs[..., 1::2]
+    return carried
 
 
 def _transform_memory(
@@ -102,24 +127,28 @@ def _transform_memory(
 
 
 def _transform_vectors(
-    observations: NDArray[np.floating[Any]], elements: Elements, n_limbs: int
+    observations: NDArray[np.floating[Any]], elements: Elements, n_limbs: int, order: NDArray[np.intp]
 ) -> NDArray[np.floating[Any]]:
-    """Pairs of numbers of observations without memory, turned, mirrored and moved with their limbs."""
+    """Pairs of numbers, turned, mirrored and moved with their limbs by an `order` like that of `_vector_order`."""
     as_vectors = np.result_type(observations, np.complex64)  # pairs of numbers as x + iy
     vectors = np.ascontiguousarray(observations).view(as_vectors)
-    vectors = np.take_along_axis(vectors, _vector_order(n_limbs)[elements], axis=-1)
+    vectors = np.take_along_axis(vectors, order[elements], axis=-1)
     vectors *= turns(n_limbs)[elements][..., None].astype(as_vectors)
     np.conjugate(vectors, out=vectors, where=is_mirror(elements)[..., None])
     return vectors.view(observations.dtype)
 
 
 def reduce_observations(
-    observations: NDArray[np.floating[Any]], n_limbs: int, mirror: Mirror = (), with_headings: bool = False
+    observations: NDArray[np.floating[Any]],
+    n_limbs: int,
+    mirror: Mirror = (),
+    with_headings: bool = False,
+    own: OwnNumbers = NO_MORE,
 ) -> tuple[NDArray[np.floating[Any]], Elements]:
     """Observations with the current waypoint brought into sector 0, and the elements that did it.
 
     mirror: What a mirror does to the memory of a limb's actuator, see `memory_mirror`; () if actuators have none.
-    with_headings: Whether headings are asked for.
+    with_headings: Whether headings are asked for. own: What the task shows of its own.
     """
-    elements = sectors(observations, n_limbs, mirror, with_headings)
-    return transform_observations(observations, elements, n_limbs, mirror, with_headings), elements
+    elements = sectors(observations, n_limbs, mirror, with_headings, own)
+    return transform_observations(observations, elements, n_limbs, mirror, with_headings, own), elements
