@@ -1,6 +1,6 @@
 """Page and picture of the headroom of the tasks."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,10 +17,14 @@ UNITS = {
     "prey": "prey caught in 200 s",
     "fast-prey": "prey caught in 200 s",
     "station": "mean distance from the station after 30 s [mm]",
+    "fail-blind": "seconds to the last waypoint, the time limit if it is not reached",
+    "obst-trap": "seconds to the goal, the time limit if it is not reached",
+    "prizes": "worth of the prizes taken in 200 s",
+    "fast-prizes": "worth of the prizes taken in 115 s",
 }
 """Measures in words, by challenge."""
-MORE_IS_BETTER = ("prey", "fast-prey")
-ORDER = ("rest", "greedy", "planner", "adaptive", "informed", "PPO", "PPO, memory", "RecurrentPPO")
+MORE_IS_BETTER = ("prey", "fast-prey", "prizes", "fast-prizes")
+ORDER = ("rest", "greedy", "planner", "adaptive", "informed", "PPO", "PPO, memory", "PPO, told the way", "RecurrentPPO")
 """Agents from top to bottom."""
 HEADROOM, LEFT = 0.2, 1.0 / 3.0
 """A task is kept where the bound is so much better than greedy, and plain PPO leaves so much of that."""
@@ -40,14 +44,21 @@ left* is the share of the way from greedy to the bound that plain PPO does not g
 |---|---|
 | rest | no limb is ever heated |
 | greedy | the action whose mean displacement, by a map, ends nearest |
-| planner | simulates a decision ahead what is observed, with the wires, the water or the prey that it believes in |
-| adaptive | remembers: believes in the wires, the drift or the turning of the prey that has explained the past best |
-| informed | is told what is hidden: the wires, the water, the course of the prey |
+| planner | simulates a decision ahead what is observed, with the wires, the water, .. that it believes in |
+| adaptive | remembers: believes in the wires, the drift, .. that has explained the past best; keeps a map of discs |
+| informed | is told what is hidden: the wires, the water, the course of the prey, the dead limbs, all discs |
 | PPO | the project's hyperparameters, symmetric, no memory; but for the horizons of `studies.tasks.learning.OWN` |
 | PPO, memory | the same, and tips, last commands and targets of the last eight observations |
+| PPO, told the way | plain PPO of `ObstTrap`, by a reward that measures the way around all discs |
 
-The planner believes in its own wires, in still water and in a prey that swims straight on. Contracts of the tasks stand
-in the docstrings of `Miswired`, `Prey` and `Station`.
+The planner believes in its own wires, in still water, in a prey that swims straight on, in limbs that are all alive,
+and in the straight way between the discs that it sees. Of prizes nothing is hidden: there, the planner swims to the
+prize of most worth per metre as greedy does, and *informed* is the best round through those that are left, planned
+before every decision. Contracts of the tasks stand in the docstrings of `Miswired`, `Prey`, `Station`, `FailBlind`,
+`ObstTrap` and `Prizes`.
+
+In `ObstTrap`, the reward's way to the goal is the straight one, which leads into the horseshoe. That a learner does not
+arrive by this reward says little about other rewards: *told the way* is one.
 """
 
 
@@ -102,22 +113,26 @@ def rows_of(results: Mapping[str, Any], ids: Mapping[str, str]) -> list[Row]:
     return [row for row in rows.values() if row.agents]
 
 
-def table(row: Row) -> str:
-    """Table in Markdown of a task."""
+def table(row: Row, has_cell: Callable[[str, str], bool] = lambda id, agent: True) -> str:
+    """Table in Markdown of a task. has_cell: Whether an agent can swim a task, by its id."""
     lines = [f"## {row.id}", "", f"{UNITS[row.challenge].capitalize()}.", ""]
     lines += ["| agent | mean | 95 % interval | seeds |", "|---|---:|---|---|"]
     for agent, seeds in row.in_order:
         mean, low, high = mean_with_interval(np.concatenate(seeds))
         each = ", ".join(f"{values.mean():.3g}" for values in seeds) if len(seeds) > 1 else ""
         lines.append(f"| {agent} | {mean:.3g} | {low:.3g} to {high:.3g} | {each} |")
-    missing = [agent for agent in ORDER[:-1] if agent not in row.agents]
+    missing = [agent for agent in ORDER[:-1] if agent not in row.agents and has_cell(row.id, agent)]
     if missing:
         lines += ["", f"Not swum yet: {'; '.join(missing)}."]
-    if {"greedy", "PPO", "informed"} <= row.agents.keys():
-        verdict = "kept" if row.is_kept else "not kept"
+    if {"greedy", "informed"} <= row.agents.keys():
         better = f"{100.0 * row.headroom:.0f} % better than greedy" if row.headroom < np.inf else "greedy gets nothing"
-        lines += ["", f"Bound: {row.bound}, {better}. Gap left by PPO: {100.0 * row.left:.0f} %. By this, {verdict}."]
+        lines += ["", f"Bound: {row.bound}, {better}." + (_verdict(row) if "PPO" in row.agents else "")]
     return "\n".join(lines)
+
+
+def _verdict(row: Row) -> str:
+    """What plain PPO leaves, and whether the task is kept for that."""
+    return f" Gap left by PPO: {100.0 * row.left:.0f} %. By this, {'kept' if row.is_kept else 'not kept'}."
 
 
 def draw(rows: Sequence[Row], file: Path) -> None:
@@ -150,11 +165,13 @@ def draw(rows: Sequence[Row], file: Path) -> None:
     figure.savefig(file, dpi=150)
 
 
-def write_page(results: Mapping[str, Any], ids: Mapping[str, str], out: Path) -> None:
-    """Write the page and the picture beside the results."""
+def write_page(
+    results: Mapping[str, Any], ids: Mapping[str, str], out: Path, has_cell: Callable[[str, str], bool]
+) -> None:
+    """Write the page and the picture beside the results. has_cell: See `table`."""
     rows, settings = rows_of(results, ids), results["settings"]
     text = INTRODUCTION.format(command="`python -m studies.tasks`", last=settings["episodes"] - 1, **settings)
     picture = out.with_suffix(".png")
     draw(rows, picture)
-    tables = "\n\n".join(map(table, rows))
+    tables = "\n\n".join(table(row, has_cell) for row in rows)
     write_atomically(out.with_suffix(".md"), f"{text}\n![Means and intervals]({picture.name})\n\n{tables}\n".encode())

@@ -202,7 +202,7 @@ def test_a_table_has_every_agent_and_the_verdict():
     text = table(row("miswired", greedy=400.0, informed=200.0, PPO=300.0))
     assert "| greedy | 400 | 400 to 400 |" in text
     assert text.endswith("Bound: informed, 50 % better than greedy. Gap left by PPO: 50 %. By this, kept.")
-    assert "Not swum yet: rest; planner; adaptive; PPO, memory." in text
+    assert "Not swum yet: rest; planner; adaptive; PPO, memory; PPO, told the way." in text
     assert "Bound" not in table(row("prey", greedy=1.0, PPO=3.0))  # a learner alone is no bound
 
 

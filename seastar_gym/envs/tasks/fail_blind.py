@@ -26,24 +26,22 @@ class FailBlind(Challenge):
     """Waypoints for a robot of which some limbs are dead, and which sees its way, but not its limbs.
 
     `dead` limbs never move in an episode, whatever they are commanded. Nothing tells the robot which. Where its best
-    command is one of dead limbs, a controller without memory stays for ever. One that compares what happened with what
-    it meant knows the dead limbs after a few decisions, and swims with the others.
+    command is one of dead limbs, a controller that remembers nothing stays for ever. One that compares what happened
+    with what it meant knows the dead limbs after a few decisions, and swims with the others.
 
     ## Episode
     A random path of five legs of 0.1 to 0.2 m, as `path="random"` of `SeastarSwim-v0`, from a random heading. It ends
     when the last waypoint is reached. Every draw can be solved: three live limbs swim any way.
 
     ## Observation
-    No stations and no velocity of the hub. Odometry instead, and the waypoints; places for strokes, and for decisions
-    every 0.5 s:
+    No stations, no velocity of the hub and no wires, which would tell. Odometry instead, and the waypoints:
 
-    | strokes | timed  | meaning                                                       | unit      | range |
-    |---------|--------|---------------------------------------------------------------|-----------|-------|
-    | 0..4    | 0..14  | limb after limb: contractions of its wires, if timed, as of   | 1         | -1..1 |
-    |         |        | wires that are not dead; its last command                     |           |       |
-    | 5..7    | 15..17 | mean velocity of the hub over the last decision, x and y in   | 0.025 m/s | -     |
-    |         |        | the body frame in which it began; turn in it                  | rad       |       |
-    | 8..11   | 18..21 | current and next waypoint, as in `SeastarSwim-v0`             | 0.1 m     | -     |
+    | index | meaning                                                                     | unit      | range |
+    |-------|-----------------------------------------------------------------------------|-----------|-------|
+    | 0..4  | last command of limbs 1 to 5                                                | 1         | -1..1 |
+    | 5..7  | mean velocity of the hub over the last decision, x and y in the body frame  | 0.025 m/s | -     |
+    |       | in which it began; turn in it                                               | rad       | -     |
+    | 8..11 | current and next waypoint, as in `SeastarSwim-v0`                           | 0.1 m     | -     |
 
     ## Reward
     | term              | meaning                                                      | default weight |
@@ -111,6 +109,7 @@ class FailBlindTask(Numbered, SwimTask):
         self.about = about
         self._hub, self._before = np.zeros((n_robots, 2)), np.zeros(n_robots)  # hub and heading at the last look
         self._way, self._turn = np.zeros((n_robots, 2)), np.zeros(n_robots)  # of the last decision
+        how["observe_actuators"] = False  # wires of dead limbs stay cold
         SwimTask.__init__(self, scene, n_robots, "random", about.reward, 0.01, True, threads, **how)
         self._draws = AnyLimbs(about.dead)
         self.drawn = self._draws.first_values(scene, n_robots)

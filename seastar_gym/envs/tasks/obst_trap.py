@@ -184,7 +184,7 @@ class ObstTrapTask(Numbered, SwimTask):
     def _score(self, hub: Floats, pulses: Floats) -> Score:
         score = super()._score(hub, pulses)
         touches = self.clearance(hub) < 0.0
-        terms = {**score.terms, "reward_touch": -self.about.touch * touches}
+        terms = {**score.terms, "reward_touch": -self.about.touch * touches.astype(np.float64)}
         return Score(terms, score.success & ~touches, score.over | touches)
 
     def _wanted(self) -> Floats:
