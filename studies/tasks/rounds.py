@@ -72,7 +72,7 @@ class BestRound(MostPerMetre):
         return self._ahead.best(self.robots.states(observations), cost).astype(np.int64)
 
     def _round(self, observations: Floats32) -> tuple[Floats, Floats]:
-        """First and second prizes of the rounds in the body frames [m], (n, 2) each; the nearest where there is none."""
+        """First and second prizes of the rounds in the body frames [m], (n, 2) each; else the nearest."""
         places, worth, ways = self.prizes(observations)
         chosen = np.repeat(places[:, :1], 2, axis=1)
         for robot in range(self.robots.n):

@@ -53,15 +53,14 @@ class FailBlind(Challenge):
     Robots that arrive are compared by their time, the task's measure.
 
     ## Info
-    That of `SeastarSwim-v0`, and
+    That of `SeastarSwim-v0` without the measured errors, which are those of whole robots; besides,
 
     | name             | type       | unit | meaning                                       |
     |------------------|------------|------|-----------------------------------------------|
     | `instance`       | int        | -    | number of the episode in its split            |
     | `limb_strengths` | array (5,) | 1    | limb by limb: 1, or 0 where the limb is dead  |
 
-    `limb_strengths` is what the robot is not told. The measured errors are those of robots whose limbs are whole, so
-    they are NaN.
+    `limb_strengths` is what the robot is not told.
 
     ## Arguments
     dead: Number of dead limbs, 0 to 2.
@@ -111,6 +110,7 @@ class FailBlindTask(Numbered, SwimTask):
         self._way, self._turn = np.zeros((n_robots, 2)), np.zeros(n_robots)  # of the last decision
         how["observe_actuators"] = False  # wires of dead limbs stay cold
         SwimTask.__init__(self, scene, n_robots, "random", about.reward, 0.01, True, threads, **how)
+        self._has_promises = False  # errors were measured of whole robots
         self._draws = AnyLimbs(about.dead)
         self.drawn = self._draws.first_values(scene, n_robots)
         self._number(split)
