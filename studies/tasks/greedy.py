@@ -1,6 +1,5 @@
 """Controllers that simulate nothing: at rest, and greedy by a map of mean displacements."""
 
-
 import numpy as np
 from numpy.typing import NDArray
 
