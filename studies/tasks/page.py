@@ -1,6 +1,6 @@
 """Page and picture of the headroom of the tasks."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -165,6 +165,19 @@ def draw(rows: Sequence[Row], file: Path) -> None:
     figure.savefig(file, dpi=150)
 
 
+def _pictures(folder: Path, challenges: Iterable[str]) -> str:
+    """Table in Markdown of the pictures of tasks that there are, two in a row; empty without any."""
+    shown = [f"![{name}]({folder.name}/{name}.png)" for name in challenges if (folder / f"{name}.png").is_file()]
+    if not shown:
+        return ""
+    pairs = [shown[k : k + 2] for k in range(0, len(shown), 2)]
+    rows = ["| " + " | ".join([*pair, ""][:2]) + " |" for pair in pairs]
+    return (
+        "\n".join(["\n`python -m studies.tasks.pictures` draws an episode of each:\n", "| | |", "|---|---|", *rows])
+        + "\n"
+    )
+
+
 def write_page(
     results: Mapping[str, Any], ids: Mapping[str, str], out: Path, has_cell: Callable[[str, str], bool]
 ) -> None:
@@ -174,4 +187,5 @@ def write_page(
     picture = out.with_suffix(".png")
     draw(rows, picture)
     tables = "\n\n".join(table(row, has_cell) for row in rows)
+    text += _pictures(out.parent / "tasks", dict.fromkeys(row.challenge for row in rows))
     write_atomically(out.with_suffix(".md"), f"{text}\n![Means and intervals]({picture.name})\n\n{tables}\n".encode())

@@ -6,11 +6,13 @@ import json
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
+from PIL import Image
 
 from refusals import assert_refused
 from seastar_gym.envs.symmetry import VectorSymmetryReduction, transform_observations
 from seastar_gym.envs.tasks.envs import SeastarTaskVectorEnv
 from seastar_gym.envs.tasks.prey import Prey
+from studies.tasks import pictures
 from studies.tasks import study as module
 from studies.tasks.ahead import Ahead, Odometer, Robots, few_commands
 from studies.tasks.blind import FailureGuess, live_commands
@@ -27,7 +29,7 @@ from studies.tasks.controllers import (
 from studies.tasks.episodes import Episodes, measure, swim
 from studies.tasks.learning import TOLD_THE_WAY
 from studies.tasks.memory import VectorMemory
-from studies.tasks.page import Row, rows_of, table
+from studies.tasks.page import Row, rows_of, table, write_page
 from studies.tasks.rounds import BestRound, MostPerMetre
 from studies.tasks.study import Options, has_cell, main, study
 from studies.tasks.trap import all_discs, discs_so_far, with_clearance
@@ -324,6 +326,25 @@ def test_the_study_goes_on_where_it_was_broken_off(tmp_path, monkeypatch):
     assert "## SeastarPrey-v0" in page and some.out.with_suffix(".png").is_file()
     (found,) = rows_of(json.loads(some.out.read_text()), module.IDS)
     assert [values.tolist() for values in found.agents["PPO"]] == [[3.0], [4.0]]
+
+
+def test_the_page_shows_the_pictures_that_there_are(tmp_path):
+    results = {"settings": {"decisions": 1, "episodes": 4, "fidelity": "fast"}, "cells": {}}
+    for id in ("SeastarPrey-v0", "SeastarPreyTimed-v0", "SeastarStation-v0"):
+        results["cells"][f"{id}, greedy, 0"] = {"measure": [1.0, 2.0]}
+    (tmp_path / "tasks").mkdir()
+    out = tmp_path / "page.json"
+    write_page(results, module.IDS, out, has_cell)
+    assert "studies.tasks.pictures" not in out.with_suffix(".md").read_text()
+    Image.fromarray(np.zeros((2, 2, 3), np.uint8)).save(tmp_path / "tasks" / "prey.png")
+    write_page(results, module.IDS, out, has_cell)
+    assert "| ![prey](tasks/prey.png) |  |" in out.with_suffix(".md").read_text()
+
+
+def test_a_picture_shows_an_episode_of_every_task(tmp_path, monkeypatch):
+    monkeypatch.setattr(pictures, "SHOWN", {"prizes": ("SeastarPrizes-v0", "greedy", 2)})
+    assert pictures.main(["--out", str(tmp_path)]) == 0
+    assert Image.open(tmp_path / "prizes.png").size == (960, 720)
 
 
 def test_other_settings_and_unknown_names_are_refused(tmp_path, capsys):
