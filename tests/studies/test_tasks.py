@@ -344,7 +344,8 @@ def test_the_page_shows_the_pictures_that_there_are(tmp_path):
 def test_a_picture_shows_an_episode_of_every_task(tmp_path, monkeypatch):
     monkeypatch.setattr(pictures, "SHOWN", {"prizes": ("SeastarPrizes-v0", "greedy", 2)})
     assert pictures.main(["--out", str(tmp_path)]) == 0
-    assert Image.open(tmp_path / "prizes.png").size == (960, 720)
+    with Image.open(tmp_path / "prizes.png") as drawn:
+        assert drawn.size == (960, 720)
 
 
 def test_other_settings_and_unknown_names_are_refused(tmp_path, capsys):
