@@ -69,12 +69,12 @@ class SeastarTaskEnv(SeastarSwimEnv):
     | `SeastarPreyTimed-v0`      | `"fast-prey"`   | 0.5                 | `"pairs"` | 200            | 130       |
     | `SeastarStation-v0`        | `"station"`     | 1.0                 | `"joint"` | 120            | -20       |
     | `SeastarStationTimed-v0`   | `"station"`     | 0.5                 | `"joint"` | 120            | -70       |
-    | `SeastarFailBlind-v0`      | `"fail-blind"`  | 1.0                 | `"joint"` | 500            | 100       |
-    | `SeastarFailBlindTimed-v0` | `"fail-blind"`  | 0.5                 | `"joint"` | 400            | 100       |
-    | `SeastarObstTrap-v0`       | `"obst-trap"`   | 1.0                 | `"pairs"` | 300            | 90        |
+    | `SeastarFailBlind-v0`      | `"fail-blind"`  | 1.0                 | `"joint"` | 500            | 150       |
+    | `SeastarFailBlindTimed-v0` | `"fail-blind"`  | 0.5                 | `"joint"` | 400            | 140       |
+    | `SeastarObstTrap-v0`       | `"obst-trap"`   | 1.0                 | `"pairs"` | 300            | 95        |
     | `SeastarObstTrapTimed-v0`  | `"obst-trap"`   | 0.5                 | `"pairs"` | 200            | 90        |
-    | `SeastarPrizes-v0`         | `"prizes"`      | 1.0                 | `"pairs"` | 200            | 50        |
-    | `SeastarPrizesTimed-v0`    | `"fast-prizes"` | 0.5                 | `"pairs"` | 115            | 50        |
+    | `SeastarPrizes-v0`         | `"prizes"`      | 1.0                 | `"pairs"` | 200            | 80        |
+    | `SeastarPrizesTimed-v0`    | `"fast-prizes"` | 0.5                 | `"pairs"` | 115            | 70        |
 
     The threshold is `reward_threshold` of the spec: about the mean return of the best controllers that remember and are
     told nothing, in docs/tasks.md; for `Station`, a little more.
