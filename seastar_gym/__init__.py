@@ -14,8 +14,11 @@ from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.randomization import DomainRandomization, LogUniform, Normal, Uniform
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
+from seastar_gym.envs.tasks.fail_blind import FailBlind
 from seastar_gym.envs.tasks.miswired import Miswired
+from seastar_gym.envs.tasks.obst_trap import ObstTrap
 from seastar_gym.envs.tasks.prey import Prey
+from seastar_gym.envs.tasks.prizes import Prizes
 from seastar_gym.envs.tasks.station import Station
 from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water, relaxation_time
 from seastar_gym.scene.actuators.limited import Limited
@@ -40,6 +43,7 @@ __all__ = [
     "Certificate",
     "Contact",
     "DomainRandomization",
+    "FailBlind",
     "GridCurrent",
     "Headings",
     "Limb",
@@ -49,7 +53,9 @@ __all__ = [
     "Miswired",
     "Normal",
     "Numerics",
+    "ObstTrap",
     "Prey",
+    "Prizes",
     "RewardWeights",
     "Scene",
     "Seastar",
@@ -112,6 +118,12 @@ TASKS: dict[str, tuple[str, Actions, float, float, float]] = {
     "SeastarPreyTimed-v0": ("fast-prey", "pairs", 0.5, 200.0, 130.0),
     "SeastarStation-v0": ("station", "joint", 1.0, 120.0, -20.0),
     "SeastarStationTimed-v0": ("station", "joint", 0.5, 120.0, -70.0),
+    "SeastarFailBlind-v0": ("fail-blind", "joint", 1.0, 500.0, 150.0),
+    "SeastarFailBlindTimed-v0": ("fail-blind", "joint", 0.5, 400.0, 140.0),
+    "SeastarObstTrap-v0": ("obst-trap", "pairs", 1.0, 300.0, 95.0),
+    "SeastarObstTrapTimed-v0": ("obst-trap", "pairs", 0.5, 200.0, 90.0),
+    "SeastarPrizes-v0": ("prizes", "pairs", 1.0, 200.0, 80.0),
+    "SeastarPrizesTimed-v0": ("fast-prizes", "pairs", 0.5, 115.0, 70.0),
 }
 """Name of the challenge, actions, time between decisions [s], time limit [s] and reward threshold of tasks, by id."""
 

@@ -111,10 +111,10 @@ def limbs(docs: Path, file: Path) -> None:
 
 def tasks(docs: Path, file: Path) -> None:
     """Means and intervals of all agents on the tasks."""
-    from seastar_gym import TASKS
     from studies.tasks.page import draw, rows_of
+    from studies.tasks.study import IDS
 
-    draw(rows_of(read(docs, "tasks.json"), {id: about[0] for id, about in TASKS.items()}), file)
+    draw(rows_of(read(docs, "tasks.json"), IDS), file)
 
 
 def validation(docs: Path, file: Path) -> None:
@@ -191,14 +191,14 @@ def filled(docs: Path, text: str) -> str:
 
 def whole_pages(docs: Path) -> dict[str, str]:
     """Pages that are made as a whole."""
-    from seastar_gym import TASKS
     from studies.accuracy.work_precision_page import as_page
     from studies.scenes import gallery
     from studies.tasks.page import page
+    from studies.tasks.study import IDS, has_cell
 
     return {
         "gallery.md": gallery.page(read(docs, "gallery.json")),
-        "tasks.md": page(read(docs, "tasks.json"), {id: about[0] for id, about in TASKS.items()}, "tasks.png"),
+        "tasks.md": page(read(docs, "tasks.json"), IDS, docs / "tasks.png", has_cell),
         "work_precision.md": as_page(read(docs, "work_precision.json"), "work_precision_problems.png"),
     }
 

@@ -14,7 +14,7 @@ from seastar_gym.envs.task import scene_observation_size
 from seastar_gym.scene.numerics import Fidelity
 
 Floats = NDArray[np.float64]
-KEPT = ("time", "distance", "catches")
+KEPT = ("time", "distance", "catches", "taken")
 """Entries of info that measures need, where a task has them."""
 
 

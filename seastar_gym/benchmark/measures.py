@@ -6,6 +6,9 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from seastar_gym.benchmark.episodes import Episodes, Floats
+from seastar_gym.envs.tasks.prey import Prey
+from seastar_gym.envs.tasks.prizes import Prizes
+from seastar_gym.envs.tasks.station import Station
 
 
 class Measure(NamedTuple):
@@ -36,15 +39,20 @@ def mean_distance(episodes: Episodes) -> Floats:
     return np.asarray(1000.0 * np.nanmean(settled, axis=0))
 
 
+def prizes(episodes: Episodes) -> Floats:
+    """Worth of the prizes taken."""
+    return episodes.last("taken")
+
+
 SECONDS = Measure("time until done", "s", "less", seconds_to_success)
-MEASURES = {
-    "prey": Measure("prey caught", "1", "more", catches),
-    "station": Measure("mean distance", "mm", "less", mean_distance),
+MEASURES: dict[type[Any], Measure] = {
+    Prey: Measure("prey caught", "1", "more", catches),
+    Station: Measure("mean distance", "mm", "less", mean_distance),
+    Prizes: Measure("worth of prizes", "1", "more", prizes),
 }
-"""Measures of challenges that are not done at some time, by name."""
+"""Measures of challenges that are not done at some time."""
 
 
 def measure_of(env: Any) -> Measure:
     """Measure of the task of an environment."""
-    name = getattr(getattr(env, "challenge", None), "NAME", "")
-    return MEASURES.get(name, SECONDS)
+    return MEASURES.get(type(getattr(env, "challenge", None)), SECONDS)

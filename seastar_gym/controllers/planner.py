@@ -113,10 +113,14 @@ class Branching:
 
     def __call__(self, states: State) -> State:
         """States after one decision, shape (states * commands, ...), those of the same state side by side."""
-        n_states, n_commands = len(states.time), len(self.commands)
+        return self.each(states, np.broadcast_to(self.commands, (len(states.time), *self.commands.shape)))
+
+    def each(self, states: State, commands: Floats) -> State:
+        """States after one decision by commands of their own, shape (states, commands, n_limbs), as of a call."""
+        n_states, n_commands, n_limbs = commands.shape
         simulator = self._simulator(n_states * n_commands)
         simulator.set_state(states.of_robots(np.repeat(np.arange(n_states), n_commands)))
-        simulator.advance(self._duration, np.tile(self.commands, (n_states, 1)))
+        simulator.advance(self._duration, commands.reshape(-1, n_limbs))
         return simulator.get_state()._replace(commands=None, phase=None)  # the next commands take their place
 
 

@@ -215,7 +215,10 @@ class Renderer:
         for obstacle in scenery.obstacles:
             self._canvas.dot(self.camera.to_pixels(obstacle.centre), ROCK, obstacle.radius * self.camera.scale)
         for ring in scenery.rings:
-            self._paint_ring(self.camera.to_pixels(ring.centre), max(4.0, ring.radius * self.camera.scale), CURRENT)
+            centre = self.camera.to_pixels(ring.centre)
+            self._paint_ring(centre, max(4.0, ring.radius * self.camera.scale), CURRENT)
+            if ring.label:
+                self._canvas.write(ring.label, centre, INK, (0.5, 0.5))
         for arrow in scenery.arrows:
             self._paint_arrow(self.camera.to_pixels(arrow))
 

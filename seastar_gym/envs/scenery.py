@@ -13,6 +13,8 @@ class Ring(NamedTuple):
 
     centre: Floats
     radius: float
+    label: str = ""
+    """What stands in it."""
 
 
 class Scenery(NamedTuple):

@@ -25,11 +25,14 @@ from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.masks import action_masks, can_be_masked, masked_limbs
 from seastar_gym.envs.observation import (
     VELOCITY_SCALE,
+    body_axes,
+    layout,
     observation_size,
     observe,
     to_float32,
     with_more,
 )
+from seastar_gym.envs.own_numbers import NO_MORE, OwnNumbers
 from seastar_gym.envs.promises import in_strokes, promised
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, drawn_scene
 from seastar_gym.envs.reward import pulses_of
@@ -91,6 +94,8 @@ class Swimming(ABC):
     """Radius of waypoints [m]."""
     observes_commands = False
     """Whether the last command of every limb is observed, after the memory of its actuator."""
+    own_numbers: OwnNumbers = NO_MORE
+    """Kinds of the numbers of `_wanted`, but for asked headings, and whether limbs are observed."""
 
     def __init__(
         self,
@@ -164,7 +169,13 @@ class Swimming(ABC):
     @property
     def observation_size(self) -> int:
         """Length of one robot's observation."""
-        return observation_size(self.scene.robot.n_limbs) + self._remembered().shape[1] + self._wanted().shape[1]
+        more = self._remembered().shape[1] + self._wanted().shape[1]
+        return observation_size(self.scene.robot.n_limbs) + more - self._n_unseen
+
+    @property
+    def _n_unseen(self) -> int:
+        """Length of the beginning of the observation that is not shown."""
+        return 0 if self.own_numbers.with_stations else layout(self.scene.robot.n_limbs).stations_and_hub.stop
 
     def reset(self, robots: Flags, generators: list[np.random.Generator], asked: Any = None) -> None:
         """Begin a new episode of the robots in a mask, shape (n_robots,).
@@ -196,7 +207,8 @@ class Swimming(ABC):
         places = stations_of(robot)
         observe(own.rest, own.limb_length, simulator.q, simulator.v, places, target_rows, VELOCITY_SCALE, out)
         more = np.hstack([self._remembered(), self._wanted()])
-        return with_more(to_float32(out, self.n_robots), more, robot.n_limbs)
+        seen = with_more(to_float32(out, self.n_robots), more, robot.n_limbs)
+        return seen[:, self._n_unseen :].copy() if self._n_unseen else seen
 
     def _remembered(self) -> Floats:
         """Numbers of the limbs that stand before the targets, shape (n_robots, k), limb after limb."""
@@ -218,6 +230,24 @@ class Swimming(ABC):
     def _wanted(self) -> Floats:
         """Numbers of the robot that stand after those of the limbs, such as asked headings, shape (n_robots, k)."""
         return np.zeros((self.n_robots, 0))
+
+    def _axes(self) -> Floats:
+        """Cosine and sine of every robot's heading, shape (2, n_robots): the same bits for one robot and for many."""
+        simulator = self.simulator
+        out = np.empty((len(simulator.q), 2, simulator.q.shape[2]))
+        body_axes(simulator.coefficients.rest, simulator.q, stations_of(simulator.scene.robot), out)
+        return out.transpose(1, 0, 2).reshape(2, -1)[:, : self.n_robots]
+
+    def heading(self) -> Floats:
+        """Direction of every robot's body frame [rad], shape (n_robots,): the same bits for one robot and for many."""
+        c, s = self._axes()
+        return np.asarray(np.arctan2(s, c))
+
+    def _in_body_frame(self, vectors: Floats) -> Floats:
+        """Vectors of the world frame, shape (n_robots, ..., 2), as robots see them."""
+        c, s = (part.reshape(-1, *[1] * (vectors.ndim - 2)) for part in self._axes())
+        x, y = vectors[..., 0], vectors[..., 1]
+        return np.stack([c * x + s * y, c * y - s * x], axis=-1)
 
     def headings_of(self, robot: int) -> Floats | None:
         """Asked headings of a robot's present episode [rad], shape (n,), a copy; None if none are asked for."""

@@ -10,12 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.decisions import checked_decision_period
 from seastar_gym.envs.headings import AskedHeadings, Headings
-from seastar_gym.envs.observation import body_axes, scene_layout
+from seastar_gym.envs.observation import scene_layout
 from seastar_gym.envs.paths import FARTHEST, cross_track_error, make_path
 from seastar_gym.envs.promises import read_certificate
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.reward import RewardWeights, reward_terms
-from seastar_gym.envs.stations import stations_of
 from seastar_gym.envs.swimming import Flags, Floats, Outcome, Score, Swimming
 from seastar_gym.scene import Numerics, Scene, SmaWires
 from seastar_gym.scene.certificate import Certificate
@@ -161,14 +160,6 @@ class SwimTask(Swimming):
     def headings_of(self, robot: int) -> Floats | None:
         """Asked headings of a robot's present episode [rad], shape (n,), a copy; None if none are asked for."""
         return None if self._asked is None else self._asked.of_robot(robot)
-
-    def heading(self) -> Floats:
-        """Direction of every robot's body frame [rad], shape (n_robots,): the same bits for one robot and for many."""
-        simulator = self.simulator
-        out = np.empty((len(simulator.q), 2, simulator.q.shape[2]))
-        body_axes(simulator.coefficients.rest, simulator.q, stations_of(simulator.scene.robot), out)
-        c, s = out.transpose(1, 0, 2).reshape(2, -1)[:, : self.n_robots]
-        return np.asarray(np.arctan2(s, c))
 
     def _waypoint(self, k: NDArray[np.int64]) -> Floats:
         """Waypoint k of every robot [m], the last one beyond the end, the origin at -1; shape (n_robots, 2)."""

@@ -7,6 +7,7 @@ from gymnasium import spaces
 
 from seastar_gym.envs.commands import Actions, action_space, command_table
 from seastar_gym.envs.headings import Headings
+from seastar_gym.envs.own_numbers import OwnNumbers
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.spec import PlainSpec
 from seastar_gym.envs.swimming import Swimming
@@ -46,6 +47,11 @@ class TaskEnv(PlainSpec):
     def added_mirror(self) -> Mirror:
         """What a mirror does to the numbers that the task adds to a limb's in the observation."""
         return self._task.added_mirror
+
+    @property
+    def own_numbers(self) -> OwnNumbers:
+        """What the task shows of its own in the observation, and whether it shows the limbs."""
+        return self._task.own_numbers
 
     @property
     def headings(self) -> Headings | None:

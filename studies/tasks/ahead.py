@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.controllers.greedy import Displacements, displacement_map, turned, waypoints_of
+from seastar_gym.controllers.greedy import Displacements, displacement_map, turned
 from seastar_gym.controllers.planner import Branching, state_of
 from seastar_gym.envs.stations import heading_of
 from seastar_gym.simulator import State
@@ -30,7 +30,7 @@ class Robots:
         self.table, self.period = inner.command_table, inner.decision_period
         self.in_strokes = self.period == self.scene.actuator.period
         self._numbers = {command.tobytes(): k for k, command in enumerate(self.table + 0.0)}
-        self._added = len(inner.added_mirror)
+        self._added, self._own = len(inner.added_mirror), inner.own_numbers
 
     def map(self) -> Displacements:
         """Mean displacements of all actions."""
@@ -41,17 +41,21 @@ class Robots:
         return np.array([self._numbers[command.tobytes()] for command in commands + 0.0])
 
     def plain(self, observations: Floats32) -> Floats32:
-        """Observations without the numbers that the task adds to each limb's."""
-        if not self._added:
-            return observations
+        """Observations without the numbers that the task adds to each limb's, and without those of its own."""
         n_limbs = self.scene.robot.n_limbs
         begin, end = 2 + 36 * n_limbs, observations.shape[1] - 4
-        of_limbs = observations[:, begin:end].reshape(self.n, n_limbs, -1)[..., : -self._added]
+        of_limbs = observations[:, begin : end - self._own.size].reshape(self.n, n_limbs, -1)
+        of_limbs = of_limbs[..., : of_limbs.shape[-1] - self._added]
         return np.hstack([observations[:, :begin], of_limbs.reshape(self.n, -1), observations[:, end:]])
+
+    def own(self, observations: Floats32) -> Floats:
+        """Numbers that the task shows of its own, shape (n, size)."""
+        return observations[:, -4 - self._own.size : -4].astype(np.float64)
 
     def targets(self, observations: Floats32) -> tuple[Floats, Floats]:
         """Both targets relative to the hub in the body frame [m], shape (n, 2) each."""
-        return waypoints_of(self.plain(observations), self.scene)
+        seen = self.scene.robot.limb_length * observations[:, -4:].astype(np.float64)
+        return seen[:, :2], seen[:, 2:]
 
     def states(self, observations: Floats32) -> State:
         """States of the robots in their body frames, with their hubs at the origin."""
@@ -88,7 +92,8 @@ def few_commands(n_limbs: int) -> Floats:
 class Ahead:
     """Simulation of commands ahead of every robot, and search for the sequence that costs least.
 
-    commands: Shape (n_commands, n_limbs). In time, robots swim on for COASTING before their place is told.
+    commands: Shape (n_commands, n_limbs), or (n, n_commands, n_limbs) where every robot has its own. In time, robots
+    swim on for COASTING before their place is told.
     """
 
     def __init__(self, robots: Robots, commands: Floats, depth: int = 1, beam: int = 4):
@@ -97,17 +102,23 @@ class Ahead:
         self.coasting = 0.0 if robots.in_strokes else COASTING
         self._swim_all = Branching(robots.scene, commands, 1, period)
 
+    def _swum(self, states: State, n: int) -> State:
+        """States of n robots after each of the commands, see `Branching`."""
+        if self.commands.ndim == 2:
+            return self._swim_all(states)
+        return self._swim_all.each(states, np.repeat(self.commands, len(states.time) // n, axis=0))
+
     def best(self, states: State, cost: Any) -> NDArray[np.intp]:
         """Number of the first command of the best sequence of every robot, shape (n,).
 
         cost: Function of hubs in the body frame where the search began [m], shape (n, m, 2), and of the number of
         decisions so far; its sum over the decisions is least.
         """
-        n, k = len(states.time), len(self.commands)
+        n, k = len(states.time), self.commands.shape[-2]
         robots = np.arange(n)[:, None]
         first, total = np.tile(np.arange(k), (n, 1)), np.zeros((n, k))
         for decision in range(1, self._depth + 1):
-            states = self._swim_all(states)
+            states = self._swum(states, n)
             hub = states.positions[:, 0]
             if self.coasting > 0.0:
                 hub = self._swim_all.coasted(states, self.coasting)[:, 0]

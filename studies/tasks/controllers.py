@@ -14,70 +14,30 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.controllers.greedy import turned
 from seastar_gym.envs.commands import command_table
-from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.tasks.challenge import Challenge
 from seastar_gym.envs.tasks.course import Courses, Pursuit
+from seastar_gym.envs.tasks.fail_blind import FailBlind
 from seastar_gym.envs.tasks.miswired import Miswired
+from seastar_gym.envs.tasks.obst_trap import ObstTrap
 from seastar_gym.envs.tasks.prey import LOOK_AHEAD, Prey
+from seastar_gym.envs.tasks.prizes import Prizes
 from seastar_gym.envs.tasks.station import Station
 from seastar_gym.simulator import State
 from studies.tasks.ahead import Ahead, Odometer, Robots, few_commands
+from studies.tasks.blind import BlindPlanner, FailureGuess, LimbsKnown
 from studies.tasks.episodes import Agent, Batch, Info
+from studies.tasks.greedy import Actions, Floats, Floats32, Greedy, GreedyOnRoute, Rest, length, route
+from studies.tasks.hypotheses import Guess
+from studies.tasks.rounds import BestRound, MostPerMetre, PlannedMostPerMetre
+from studies.tasks.trap import ClearGreedy, ClearPlanner, all_discs, discs_so_far
 
-Floats = NDArray[np.float64]
-Floats32 = NDArray[np.float32]
-Actions = NDArray[np.int64]
-
-WAYPOINT_RADIUS = 0.01
 CONTROLLERS = ("rest", "greedy", "planner", "adaptive", "informed")
 
 
-def length(vectors: Floats) -> Floats:
-    """Length over the last axis."""
-    return np.asarray(np.hypot(vectors[..., 0], vectors[..., 1]))
-
-
-class Rest:
-    """Agent that heats nothing."""
-
-    def __init__(self, robots: Robots):
-        self._actions = np.zeros(robots.n, np.int64)
-
-    def act(self, observations: Floats32, info: Info) -> Actions:
-        """Number of the command that heats no limb."""
-        return self._actions
-
-
-class Greedy:
-    """Agent that takes the action whose mean displacement ends nearest to the target, or shortens the route most."""
-
-    def __init__(self, robots: Robots):
-        self.robots, self.hub = robots, robots.map().hub
-
-    def act(self, observations: Floats32, info: Info) -> Actions:
-        """Actions of all robots."""
-        return np.argmin(self.cost(self.hub[None], *self.robots.targets(observations)), axis=1)
-
-    def cost(self, ends: Floats, target: Floats, after: Floats) -> Floats:
-        """Cost of ends in the body frame [m], shape (n or 1, m, 2)."""
-        return length(ends - target[:, None])
-
-
-def route(ends: Floats, target: Floats, after: Floats) -> Floats:
-    """Length of the rewarded route [m] that is left from ends in the body frame [m], shape (n or 1, m, 2)."""
-    return RewardWeights().way_to_next(ends, target[:, None], after[:, None], WAYPOINT_RADIUS)
-
-
 # Miswired
-
-
-class GreedyOnRoute(Greedy):
-    """Greedy agent along waypoints."""
-
-    cost = staticmethod(route)
 
 
 class WiringPlanner:
@@ -109,33 +69,11 @@ def rewired(states: State, wiring: Floats) -> State:
     )
 
 
-class WiringGuess:
-    """Greedy agent that believes in the wiring that has explained its displacements and turns best."""
+class WiringGuess(Guess):
+    """Agent that believes in the wiring that has explained its displacements and turns best."""
 
     def __init__(self, robots: Robots):
-        self._robots, self._odometer, self._map = robots, Odometer(robots), robots.map()
-        n_limbs = robots.scene.robot.n_limbs
-        self._wirings = np.array(list(itertools.product((1.0, -1.0), repeat=n_limbs)))
-        self._meant = np.array([robots.actions_of(robots.table * wiring) for wiring in self._wirings])
-        self._surprise = np.zeros((robots.n, len(self._wirings)))
-        self._last = np.zeros(robots.n, np.int64)
-
-    def act(self, observations: Floats32, info: Info) -> Actions:
-        """Actions of all robots."""
-        found = self._odometer.read()
-        if found is not None:
-            done = self._meant[:, self._last].T
-            missed = length(found[0][:, None] - self._map.hub[done]) / ERROR_OF_PLACE
-            self._surprise += missed**2 + ((found[1][:, None] - self._map.turn[done]) / ERROR_OF_TURN) ** 2
-        believed = np.argmin(self._surprise, axis=1)
-        target, after = self._robots.targets(observations)
-        best = np.argmin(route(self._map.hub[None], target, after), axis=1)
-        self._last = self._meant[believed, best]
-        return self._last
-
-
-ERROR_OF_PLACE, ERROR_OF_TURN = 0.002, 0.02
-"""By how much one decision differs from the mean of many like it [m, rad], about."""
+        super().__init__(robots, np.array(list(itertools.product((1.0, -1.0), repeat=robots.scene.robot.n_limbs))))
 
 
 # Prey
@@ -280,8 +218,26 @@ MAKERS: dict[type, dict[str, Callable[[Robots], Agent]]] = {
         "adaptive": DriftGuess,
         "informed": lambda robots: StationPlanner(robots, knows=True),
     },
+    FailBlind: {
+        "greedy": GreedyOnRoute,
+        "planner": BlindPlanner,
+        "adaptive": FailureGuess,
+        "informed": LimbsKnown,
+    },
+    ObstTrap: {
+        "greedy": ClearGreedy,
+        "planner": ClearPlanner,
+        "adaptive": lambda robots: ClearPlanner(robots, discs_so_far()),
+        "informed": lambda robots: ClearPlanner(robots, all_discs),
+    },
+    Prizes: {"greedy": MostPerMetre, "planner": PlannedMostPerMetre, "informed": BestRound},
 }
-"""Functions that make controllers, by challenge and name."""
+"""Functions that make controllers, by challenge and name. Of prizes nothing is hidden, so nobody adapts to it."""
+
+
+def is_swum(name: str, challenge: Challenge) -> bool:
+    """Whether there is a controller of a name for a challenge."""
+    return name == "rest" or name in MAKERS[type(challenge)]
 
 
 def make_controller(name: str, batch: Batch) -> Agent:

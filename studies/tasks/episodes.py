@@ -31,6 +31,8 @@ class Episodes(NamedTuple):
     """Entry `distance` of info [m]."""
     catches: Floats
     """Entry `catches` of info; 0 in tasks without."""
+    taken: Floats
+    """Entry `taken` of info; 0 in tasks without."""
     success: NDArray[np.bool_]
     """Whether each episode ended with success, shape (n_episodes,)."""
     returns: Floats
@@ -90,13 +92,18 @@ def _catches(episodes: Episodes) -> Floats:
     return np.asarray(np.nanmax(episodes.catches, axis=0))
 
 
+def _worth(episodes: Episodes) -> Floats:
+    """Worth of the prizes taken."""
+    return np.asarray(np.nanmax(episodes.taken, axis=0))
+
+
 def _millimetres(episodes: Episodes) -> Floats:
     """Mean distance from the station once the robot is there [mm]."""
     settled = np.where(episodes.time > SETTLED, episodes.distance, np.nan)
     return np.asarray(1000.0 * np.nanmean(settled, axis=0))
 
 
-RECORDED = ("time", "distance", "catches")
+RECORDED = ("time", "distance", "catches", "taken")
 SETTLED = 30.0
 """Time after which distances from a station count [s]."""
 MEASURES: dict[str, Callable[[Episodes], Floats]] = {
@@ -104,5 +111,9 @@ MEASURES: dict[str, Callable[[Episodes], Floats]] = {
     "prey": _catches,
     "fast-prey": _catches,
     "station": _millimetres,
+    "fail-blind": _seconds,
+    "obst-trap": _seconds,
+    "prizes": _worth,
+    "fast-prizes": _worth,
 }
-"""Measures by the name of the challenge; more is better for "prey", less for the others."""
+"""Measures by the name of the challenge; more is better for prey and prizes, less for the others."""

@@ -14,6 +14,7 @@ from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_model
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.envs.symmetry import VectorSymmetryReduction
+from seastar_gym.envs.tasks.obst_trap import ObstTrap
 from seastar_gym.scene.numerics import Fidelity
 from studies.tasks.episodes import Episodes, make_batch, swim
 from studies.tasks.memory import VectorMemory, Wrap
@@ -25,11 +26,18 @@ OWN: dict[str, dict[str, Any]] = {
     "prey": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
     "fast-prey": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
     "station": {"discount": 0.9},
+    "fail-blind": {"discount": 0.9},
+    "obst-trap": {"discount": 0.95},
+    "prizes": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
+    "fast-prizes": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
 }
-"""Hyperparameters that differ from the project's, by challenge: the prey is met after many seconds."""
+"""Hyperparameters that differ from the project's, by challenge: prey and prizes are met after many seconds."""
+TOLD_THE_WAY = "PPO, told the way"
+"""Learner whose reward measures the way to the goal around all discs; it swims the task as it is."""
 WRAPS: dict[str, Wrap] = {
     "PPO": VectorSymmetryReduction,
     "PPO, memory": lambda batch: VectorMemory(batch, PAST),
+    TOLD_THE_WAY: VectorSymmetryReduction,
     "RecurrentPPO": lambda batch: batch,
 }
 """What learners put around a batch, by their names. A network with a state of its own cannot have its limbs renamed
@@ -80,8 +88,9 @@ def _model(learner: str, env: BatchVecEnv, chosen: Hyperparameters, seed: int) -
 def train(id: str, task: str, learner: str, seed: int, decisions: int, fidelity: Fidelity, threads: int | None) -> Any:
     """A learner after so many decisions of training, a `PPO` or `RecurrentPPO`."""
     torch.set_num_threads(1)
+    own = {"task": ObstTrap(potential="geodesic")} if learner == TOLD_THE_WAY else {}
     batch = make_batch(
-        id, Hyperparameters().num_envs, "train", fidelity, threads, autoreset_mode=AutoresetMode.SAME_STEP
+        id, Hyperparameters().num_envs, "train", fidelity, threads, autoreset_mode=AutoresetMode.SAME_STEP, **own
     )
     period = float(batch.unwrapped.decision_period)  # type: ignore[attr-defined]
     env = BatchVecEnv(WRAPS[learner](batch))

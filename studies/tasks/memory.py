@@ -7,9 +7,9 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.observation import layout
+from seastar_gym.envs.own_numbers import places_of
 from seastar_gym.envs.stations import N_STATIONS
-from seastar_gym.envs.symmetry import memory_mirror, restore_actions, sectors, transform_observations
+from seastar_gym.envs.symmetry import observed_mirror, restore_actions, sectors, transform_observations
 
 Floats32 = NDArray[np.float32]
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ class VectorMemory(_VectorWrapper):
     Of every past observation, it keeps the tips of the limbs, the hub's velocity, the numbers of the limbs (last
     commands among them) and the targets. All of them are turned and mirrored by the element that brings the present
     target into sector 0, so that limbs have the same places throughout. At the beginning of an episode, the past is the
-    first observation.
+    first observation. Where a task shows no limbs, all of every past observation is kept.
 
     past: Number of past observations.
     """
@@ -33,11 +33,11 @@ class VectorMemory(_VectorWrapper):
         super().__init__(env)
         inner: Any = env.unwrapped
         self._actions, self._n_limbs = inner.actions, inner.scene.robot.n_limbs
-        mirror = memory_mirror(inner.scene.actuator) if inner.observe_actuators else ()
-        self._mirror = mirror + tuple((len(mirror) + k, sign) for k, sign in inner.added_mirror)
-        at = layout(self._n_limbs, len(self._mirror) * self._n_limbs)
+        self._mirror, self._own = observed_mirror(inner), inner.own_numbers
+        at = places_of(self._n_limbs, len(self._mirror) * self._n_limbs, self._own)
         tips = [2 * N_STATIONS * (limb + 1) + k for limb in range(self._n_limbs) for k in (-2, -1)]
-        self._told = np.array([*tips, *range(at.hub_velocity.start, at.size)])
+        hub_velocity = at.stations_and_hub.stop - 2
+        self._told = np.array([*tips, *range(hub_velocity, at.size)]) if self._own.with_stations else np.arange(at.size)
         self._past = np.zeros((env.num_envs, past, at.size), np.float32)
         self._elements = np.zeros(env.num_envs, np.intp)
         shape = (at.size + past * len(self._told),)
@@ -46,10 +46,10 @@ class VectorMemory(_VectorWrapper):
 
     def _shown(self, observations: Floats32, past: Floats32) -> tuple[Floats32, NDArray[np.intp]]:
         """What is shown of observations, shape (n, size), and of those before, (n, past, size); and the elements."""
-        elements = sectors(observations, self._n_limbs, self._mirror)
+        elements = sectors(observations, self._n_limbs, self._mirror, own=self._own)
         every = np.concatenate([observations[:, None], past], axis=1)
         alike = np.repeat(elements[:, None], every.shape[1], axis=1)
-        reduced = transform_observations(every, alike, self._n_limbs, self._mirror)
+        reduced = transform_observations(every, alike, self._n_limbs, self._mirror, own=self._own)
         n = len(observations)
         shown = np.concatenate([reduced[:, 0], reduced[:, 1:, self._told].reshape(n, -1)], axis=1)
         return shown.astype(np.float32), elements

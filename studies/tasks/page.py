@@ -1,6 +1,6 @@
 """Page and picture of the headroom of the tasks."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,12 +17,21 @@ UNITS = {
     "prey": "prey caught in 200 s",
     "fast-prey": "prey caught in 200 s",
     "station": "mean distance from the station after 30 s [mm]",
+    "fail-blind": "seconds to the last waypoint, the time limit if it is not reached",
+    "obst-trap": "seconds to the goal, the time limit if it is not reached",
+    "prizes": "worth of the prizes taken in 200 s",
+    "fast-prizes": "worth of the prizes taken in 115 s",
 }
 """Measures in words, by challenge."""
-SHORT = {"miswired": "seconds to the last waypoint", "station": "mean distance from the station [mm]"}
+SHORT = {
+    "miswired": "seconds to the last waypoint",
+    "station": "mean distance from the station [mm]",
+    "fail-blind": "seconds to the last waypoint",
+    "obst-trap": "seconds to the goal",
+}
 """What the picture says in their place."""
-MORE_IS_BETTER = ("prey", "fast-prey")
-ORDER = ("rest", "greedy", "planner", "adaptive", "informed", "PPO", "PPO, memory", "RecurrentPPO")
+MORE_IS_BETTER = ("prey", "fast-prey", "prizes", "fast-prizes")
+ORDER = ("rest", "greedy", "planner", "adaptive", "informed", "PPO", "PPO, memory", "PPO, told the way", "RecurrentPPO")
 """Agents from top to bottom."""
 HEADROOM, LEFT = 0.2, 1.0 / 3.0
 """A task is kept where the bound is so much better than greedy, and plain PPO leaves so much of that."""
@@ -42,14 +51,22 @@ left* is the share of the way from greedy to the bound that plain PPO does not g
 |---|---|
 | rest | no limb is ever heated |
 | greedy | the action whose mean displacement, by a map, ends nearest |
-| planner | simulates a decision ahead what is observed, with the wires, the water or the prey that it believes in |
-| adaptive | remembers: believes in the wires, the drift or the turning of the prey that has explained the past best |
-| informed | is told what is hidden: the wires, the water, the course of the prey |
+| planner | simulates a decision ahead what is observed, with the wires, the water, .. that it believes in |
+| adaptive | remembers: believes in the wires, the drift, .. that has explained the past best; keeps a map of discs |
+| informed | is told what is hidden: the wires, the water, the course of the prey, the dead limbs, all discs |
 | PPO | the project's hyperparameters, symmetric, no memory; but for the horizons of `studies.tasks.learning.OWN` |
 | PPO, memory | the same, and tips, last commands and targets of the last eight observations |
+| PPO, told the way | plain PPO of `ObstTrap`, by a reward that measures the way around all discs |
 
-The planner believes in its own wires, in still water and in a prey that swims straight on. Contracts of the tasks stand
-in the docstrings of `Miswired`, `Prey` and `Station`.
+The planner believes in its own wires, in still water, in a prey that swims straight on, in limbs that are all alive,
+and in the straight way between the discs that it sees. Of prizes nothing is hidden: there, the planner swims to the
+prize of most worth per metre as greedy does, and *informed* is the best round through those that are left, planned
+before every decision. Contracts of the tasks stand in the docstrings of `Miswired`, `Prey`, `Station`, `FailBlind`,
+`ObstTrap` and `Prizes`.
+
+In `ObstTrap`, the reward's way to the goal is the straight one, which leads into the horseshoe. That a learner does not
+arrive by this reward says little about other rewards: *told the way* is one. `Prizes` keeps draws alone in which the
+best round brings a point 40 % more than the greedy one, so its headroom is by choice of the draws.
 """
 
 
@@ -104,22 +121,26 @@ def rows_of(results: Mapping[str, Any], ids: Mapping[str, str]) -> list[Row]:
     return [row for row in rows.values() if row.agents]
 
 
-def table(row: Row) -> str:
-    """Table in Markdown of a task."""
+def table(row: Row, has_cell: Callable[[str, str], bool] = lambda id, agent: True) -> str:
+    """Table in Markdown of a task. has_cell: Whether an agent can swim a task, by its id."""
     lines = [f"## {row.id}", "", f"{UNITS[row.challenge].capitalize()}.", ""]
     lines += ["| agent | mean | 95 % interval | seeds |", "|---|---:|---|---|"]
     for agent, seeds in row.in_order:
         mean, low, high = mean_with_interval(np.concatenate(seeds))
         each = ", ".join(f"{values.mean():.3g}" for values in seeds) if len(seeds) > 1 else ""
         lines.append(f"| {agent} | {mean:.3g} | {low:.3g} to {high:.3g} | {each} |")
-    missing = [agent for agent in ORDER[:-1] if agent not in row.agents]
+    missing = [agent for agent in ORDER[:-1] if agent not in row.agents and has_cell(row.id, agent)]
     if missing:
         lines += ["", f"Not swum yet: {'; '.join(missing)}."]
-    if {"greedy", "PPO", "informed"} <= row.agents.keys():
-        verdict = "kept" if row.is_kept else "not kept"
+    if {"greedy", "informed"} <= row.agents.keys():
         better = f"{100.0 * row.headroom:.0f} % better than greedy" if row.headroom < np.inf else "greedy gets nothing"
-        lines += ["", f"Bound: {row.bound}, {better}. Gap left by PPO: {100.0 * row.left:.0f} %. By this, {verdict}."]
+        lines += ["", f"Bound: {row.bound}, {better}." + (_verdict(row) if "PPO" in row.agents else "")]
     return "\n".join(lines)
+
+
+def _verdict(row: Row) -> str:
+    """What plain PPO leaves, and whether the task is kept for that."""
+    return f" Gap left by PPO: {100.0 * row.left:.0f} %. By this, {'kept' if row.is_kept else 'not kept'}."
 
 
 def draw(rows: Sequence[Row], file: Path) -> None:
@@ -157,16 +178,34 @@ def _draw_row(axes: Any, row: Row) -> None:
         as_numbers(axes.xaxis)
 
 
-def page(results: Mapping[str, Any], ids: Mapping[str, str], picture: str) -> str:
-    """The page in Markdown. picture: Its name."""
+def page(
+    results: Mapping[str, Any], ids: Mapping[str, str], picture: Path, has_cell: Callable[[str, str], bool]
+) -> str:
+    """The page in Markdown. picture: Its file, beside which the tasks' pictures are. has_cell: See `table`."""
     rows, settings = rows_of(results, ids), results["settings"]
     text = INTRODUCTION.format(command="`python -m studies.tasks`", last=settings["episodes"] - 1, **settings)
-    tables = "\n\n".join(map(table, rows))
-    return f"{text}\n![Means and intervals]({picture})\n\n{tables}\n\n{footer(results, 'tasks.json')}\n"
+    text += _pictures(picture.parent / "tasks", dict.fromkeys(row.challenge for row in rows))
+    tables = "\n\n".join(table(row, has_cell) for row in rows)
+    return f"{text}\n![Means and intervals]({picture.name})\n\n{tables}\n\n{footer(results, 'tasks.json')}\n"
 
 
-def write_page(results: Mapping[str, Any], ids: Mapping[str, str], out: Path) -> None:
-    """Write the page and the picture beside the results."""
+def _pictures(folder: Path, challenges: Iterable[str]) -> str:
+    """Table in Markdown of the pictures of tasks that there are, two in a row; empty without any."""
+    shown = [f"![{name}]({folder.name}/{name}.png)" for name in challenges if (folder / f"{name}.png").is_file()]
+    if not shown:
+        return ""
+    pairs = [shown[k : k + 2] for k in range(0, len(shown), 2)]
+    rows = ["| " + " | ".join([*pair, ""][:2]) + " |" for pair in pairs]
+    return (
+        "\n".join(["\n`python -m studies.tasks.pictures` draws an episode of each:\n", "| | |", "|---|---|", *rows])
+        + "\n"
+    )
+
+
+def write_page(
+    results: Mapping[str, Any], ids: Mapping[str, str], out: Path, has_cell: Callable[[str, str], bool]
+) -> None:
+    """Write the page and the picture beside the results. has_cell: See `table`."""
     picture = out.with_suffix(".png")
     draw(rows_of(results, ids), picture)
-    write_atomically(out.with_suffix(".md"), page(results, ids, picture.name).encode())
+    write_atomically(out.with_suffix(".md"), page(results, ids, picture, has_cell).encode())

@@ -20,18 +20,19 @@ import numpy as np
 import tyro
 
 from seastar_gym import TASKS
+from seastar_gym.envs.tasks.envs import CHALLENGES
 from seastar_gym.files import write_atomically
 from seastar_gym.scene.numerics import Fidelity
 from studies.provenance import provenance
-from studies.tasks.controllers import CONTROLLERS, make_controller
+from studies.tasks.controllers import CONTROLLERS, is_swum, make_controller
 from studies.tasks.episodes import Episodes, measure, swim
-from studies.tasks.learning import WRAPS, evaluate, train
+from studies.tasks.learning import TOLD_THE_WAY, WRAPS, evaluate, train
 from studies.tasks.page import write_page
 
 IDS: dict[str, str] = {id: about[0] for id, about in TASKS.items()}
 """Name of the challenge of every id."""
 AGENTS = (*CONTROLLERS, *WRAPS)
-DEFAULT_LEARNERS = ("PPO", "PPO, memory")
+DEFAULT_LEARNERS = ("PPO", "PPO, memory", TOLD_THE_WAY)
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,13 @@ class Options:
     def settings(self) -> dict[str, Any]:
         """What all cells of a file have in common."""
         return {name: getattr(self, name) for name in ("decisions", "episodes", "fidelity")}
+
+
+def has_cell(id: str, agent: str) -> bool:
+    """Whether an agent can swim a task: there is a controller, or a way around discs to be told."""
+    if agent in CONTROLLERS:
+        return is_swum(agent, CHALLENGES[IDS[id]])
+    return agent != TOLD_THE_WAY or IDS[id] == "obst-trap"
 
 
 def swum(id: str, agent: str, seed: int, options: Options) -> Episodes:
@@ -102,7 +110,8 @@ def study(options: Options) -> dict[str, Any]:
     """Swim the cells that are missing, and write the results after each."""
     for seed, id, agent in itertools.product(options.seeds, options.ids, options.agents):
         name = f"{id}, {agent}, {seed}"
-        if name in read_cells(options)["cells"] or (agent in CONTROLLERS and seed != options.seeds[0]):
+        again = name in read_cells(options)["cells"] or (agent in CONTROLLERS and seed != options.seeds[0])
+        if again or not has_cell(id, agent):
             continue
         found = cell(id, agent, seed, options)
         results = read_cells(options)  # another process may have written meanwhile
@@ -121,5 +130,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ValueError as wrong:
         print(wrong, file=sys.stderr)
         return 2
-    write_page(results, IDS, options.out)
+    write_page(results, IDS, options.out, has_cell)
     return 0

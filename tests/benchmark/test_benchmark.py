@@ -16,6 +16,7 @@ from seastar_gym.benchmark.measures import MEASURES, SECONDS, measure_of
 from seastar_gym.benchmark.results import MOST, Entry, best_means, merged, read, relative, write
 from seastar_gym.controllers import GreedyPolicy, load, load_agent, scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.tasks.station import Station
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.swim import swim
 from seastar_gym.evaluation.tasks import task_ids
@@ -23,14 +24,10 @@ from seastar_gym.evaluation.tasks import task_ids
 SWIM, SHORT, OTHER = "SeastarSwim-v0", "SeastarShort-v0", "SeastarDrift-v0"
 
 
-class Challenge:
-    NAME = "station"
-
-
 class DriftEnv(SeastarSwimEnv):
     """A task of another measure, with a split."""
 
-    challenge = Challenge()
+    challenge = Station()
 
     def __init__(self, split="train", **arguments):
         assert split == "test"
@@ -96,10 +93,10 @@ def test_who_does_not_arrive_has_the_time_limit_whatever_ended_the_episode(tasks
 def test_a_task_of_another_measure_without_a_batch_is_swum_on_its_held_out_split(tasks, monkeypatch):
     monkeypatch.setattr("seastar_gym.evaluation.tasks.task_ids", lambda: [OTHER])
     env = DriftEnv("test", fidelity="fast")
-    assert measure_of(env) is MEASURES["station"] and measure_of(SeastarSwimEnv()) is SECONDS
+    assert measure_of(env) is MEASURES[Station] and measure_of(SeastarSwimEnv()) is SECONDS
     swum = swim_episodes(OTHER, scripted("rest"), [0, 1])
     side = np.hypot(*env.reset(seed=0)[0][182:184]) * 100.0
-    np.testing.assert_allclose(MEASURES["station"].of(swum), side, rtol=1e-3)
+    np.testing.assert_allclose(MEASURES[Station].of(swum), side, rtol=1e-3)
 
 
 @pytest.mark.parametrize("id", TASKS)

@@ -2,6 +2,7 @@
 
 import copy
 import inspect
+import itertools
 import json
 import pickle
 import re
@@ -15,23 +16,42 @@ from gymnasium.vector import AutoresetMode
 
 import seastar_gym
 from refusals import assert_refused
-from seastar_gym import Miswired, Prey, RewardWeights, Station, SymmetryReduction, VectorSymmetryReduction
-from seastar_gym.envs.observation import layout
+from seastar_gym import (
+    FailBlind,
+    Miswired,
+    ObstTrap,
+    Prey,
+    Prizes,
+    RewardWeights,
+    Station,
+    SymmetryReduction,
+    VectorSymmetryReduction,
+)
+from seastar_gym.envs.own_numbers import places_of
 from seastar_gym.envs.reward import pulses_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.symmetry import sectors, transform_commands
+from seastar_gym.envs.symmetry import limb_order, observed_mirror, sectors, transform_actions, transform_commands
+from seastar_gym.envs.symmetry import transform_observations as carried
 from seastar_gym.envs.tasks.course import CHASE, Courses, Pursuit, draw_course
+from seastar_gym.envs.tasks.discs import rims, ways
 from seastar_gym.envs.tasks.envs import CHALLENGES, SeastarTaskEnv, SeastarTaskVectorEnv
+from seastar_gym.envs.tasks.obst_trap import draw_discs
+from seastar_gym.envs.tasks.prizes import draw_prizes
+from seastar_gym.envs.tasks.rounds import best_round, distances, greedy_round
 from seastar_gym.scene.per_robot import with_numbers
 
 IDS = tuple(seastar_gym.TASKS)
 CONTINUOUS = "SeastarSwimContinuous-v0"
-KINDS = (Miswired, Prey, Station)
+KINDS = (Miswired, Prey, Station, FailBlind, ObstTrap, Prizes)
 HIDDEN = {
     "miswired": ["wiring"],
     "prey": ["course"],
     "fast-prey": ["course"],
     "station": ["fluid.current.u_x", "fluid.current.u_y"],
+    "fail-blind": ["limb_strengths"],
+    "obst-trap": ["discs"],
+    "prizes": [],
+    "fast-prizes": [],
 }
 """Entries of info that the robot is not told, by challenge."""
 
@@ -93,7 +113,7 @@ def test_an_episode_follows_from_its_split_and_its_number(id):
     assert all(np.array_equal(chosen[name], info[name]) for name in info)
     other = made(id, split="train").reset(options={"instance": info["instance"]})[1]
     hidden = HIDDEN[seastar_gym.TASKS[id][0]]
-    drawn = ["distance", *(name for name in hidden if name != "wiring")]
+    drawn = ["distance", *(name for name in hidden if name not in ("wiring", "limb_strengths"))]
     assert all(not np.array_equal(other[name], info[name]) for name in drawn)
 
 
@@ -126,7 +146,15 @@ def test_a_task_comes_back_from_its_spec_a_pickle_and_a_copy(id):
 
 
 @pytest.mark.parametrize(
-    "task", [Miswired(0.1, RewardWeights(100.0)), Prey(speed=(0.005, 1 / 180), wanted=1), Station(current=(0.0, 1e-3))]
+    "task",
+    [
+        Miswired(0.1, RewardWeights(100.0)),
+        Prey(speed=(0.005, 1 / 180), wanted=1),
+        Station(current=(0.0, 1e-3)),
+        FailBlind(1),
+        ObstTrap(scattered=1, potential="geodesic"),
+        Prizes(side=0.6, gain=0.1),
+    ],
 )
 def test_numbers_of_ones_own_are_in_the_spec(task):
     env = gym.make(IDS[0], fidelity="fast", task=task)
@@ -167,7 +195,7 @@ def test_the_reward_is_the_sum_of_its_terms_in_info(id):
         assert info["reward_effort"] == -0.01 * pulses < 0.0
 
 
-@pytest.mark.parametrize("id", IDS)
+@pytest.mark.parametrize("id", [id for id in IDS if HIDDEN[seastar_gym.TASKS[id][0]]])
 def test_what_is_hidden_is_not_observed(id):
     """Two robots that differ in what is hidden, and in nothing else, begin with the same observation."""
     env, (name, *_) = made(id), HIDDEN[seastar_gym.TASKS[id][0]]
@@ -179,6 +207,11 @@ def test_what_is_hidden_is_not_observed(id):
         place, velocity = task.prey()
         mirrored = _course_that_turns_the_other_way(task.courses[0], place[0], velocity[0])
         task.courses[0] = mirrored
+    elif name == "limb_strengths":
+        task.simulator.set_limb_strengths(1.0 - task.simulator.limb_strengths)
+    elif name == "discs":
+        far = np.argsort(np.hypot(*task.discs[0, :, :2].T) - task.discs[0, :, 2])[6:]
+        task.discs[0, far, 0] += 0.2
     else:
         task.drawn[name] = task.drawn[name] + 0.001
         task.simulator.set_scene(with_numbers(task.simulator.scene, task.drawn))
@@ -204,10 +237,10 @@ def test_symmetry_reduction_turns_last_commands_with_the_limbs(id):
         actions = np.full(16, action)
         seen = reduced.step(actions)[0]
         mirror = reduced._kind.mirror
-        elements = sectors(seen, 5, mirror)
+        elements = sectors(seen, 5, mirror, own=inner.own_numbers)
         assert (elements == 0).all()  # targets lie in sector 0
         if inner.added_mirror:
-            at = layout(5, 5 * len(mirror))
+            at = places_of(5, 5 * len(mirror), inner.own_numbers)
             told = seen[:, at.actuators].reshape(16, 5, -1)[..., -1]
             np.testing.assert_array_equal(
                 told, transform_commands(inner._task.last_commands, reduced._elements).astype(np.float32)
@@ -246,6 +279,12 @@ def test_pictures_show_what_is_hidden(id):
         task.wiring *= -1.0
     elif "Prey" in id:
         task.courses[:, 4] += 0.03
+    elif "Blind" in id:
+        task.drawn["limb_strengths"] = 1.0 - task.drawn["limb_strengths"]
+    elif "Trap" in id:
+        task.discs[:, 9, 1] += 0.03
+    elif "Prizes" in id:
+        task.prizes[:, 2, 2] = 3.0
     else:
         task.drawn["fluid.current.u_x"] = task.drawn["fluid.current.u_x"] + 0.002
     assert not np.array_equal(env.render(), first)
@@ -295,6 +334,11 @@ def test_numbers_of_no_episode_are_refused(number):
         (lambda: Prey(wanted=0), "Prey.wanted"),
         (lambda: Station(current=0.002), "Station.current must be the smallest and the largest"),
         (lambda: Station(tolerance=0.0), "Station.tolerance"),
+        (lambda: FailBlind(3), "FailBlind.dead must be a whole number from 0 to 2"),
+        (lambda: ObstTrap(distance=(0.1, 0.5)), "ObstTrap.distance must lie from 0.45 to 0.6 m"),
+        (lambda: ObstTrap(potential="by air"), "ObstTrap.potential must be one of 'straight', 'geodesic'"),
+        (lambda: Prizes(side=0.0), "Prizes.side"),
+        (lambda: Prizes(gain=-0.1), "Prizes.gain"),
     ],
 )
 def test_numbers_that_mean_nothing_are_refused(make, words):
@@ -348,14 +392,16 @@ def test_rewards_are_those_of_the_table(kind):
     assert named == {name for name in env.reset(seed=0)[1] if name.startswith("reward_")}
 
 
-@pytest.mark.parametrize("kind", [Miswired, Station])
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind is not Prey])
 @pytest.mark.parametrize("column, period", [(0, 1.0), (1, 0.5)])
 def test_the_observation_is_that_of_the_table(kind, column, period):
     env = SeastarTaskEnv(task=kind(), fidelity="fast", decision_period=period)
-    at = layout(5, 5 * (1 if period == 1.0 else 3))
-    documented = [tuple(map(int, row[column].split(".."))) for row in rows(kind, "Observation") if row[column]]
-    places = at.stations_and_hub, at.actuators, at.waypoints
-    assert documented == [(place.start, place.stop - 1) for place in places]
+    task = env._task
+    sees_wires = period < 1.0 and env.observe_actuators
+    at = places_of(5, 5 * (task.observes_commands + 2 * sees_wires), env.own_numbers)
+    places = [row[min(column, len(row) - 4)] for row in rows(kind, "Observation")]
+    documented = [tuple(map(int, place.split(".."))) for place in places if place]
+    assert documented == [(place.start, place.stop - 1) for place in at if place.start < place.stop]
     assert env.observation_space.shape == (at.size,)
 
 
@@ -510,6 +556,238 @@ def test_the_second_target_tells_the_velocity():
     observation, _ = env.reset(seed=0)
     ahead = 0.1 * (observation[-2:] - observation[-4:-2]) / 10.0
     assert np.hypot(*ahead) == pytest.approx(np.hypot(*env._task.prey()[1][0]), rel=1e-5)
+
+
+# FailBlind
+
+
+@pytest.mark.parametrize("period", [1.0, 0.5])
+def test_dead_limbs_do_nothing_and_nothing_is_seen_but_the_way(period):
+    env = SeastarTaskEnv(task="fail-blind", fidelity="fast", actions="continuous", decision_period=period)
+    _, first = env.reset(options={"instance": 4})
+    strengths, live = first["limb_strengths"], copy.deepcopy(env)
+    assert sorted(strengths) == [0.0, 0.0, 1.0, 1.0, 1.0]
+    for command in np.array([[1, -1, 0.5, -0.5, 0], [-1, 0, 1, 0, 1], [0, 0, 0, 0, 0]], np.float32):
+        seen, *_, info = env.step(command)
+        theirs, *_, its_info = live.step((command * strengths).astype(np.float32))
+        np.testing.assert_array_equal(info["hub_position"], its_info["hub_position"])
+        np.testing.assert_array_equal(seen[-7:], theirs[-7:])  # the way
+        np.testing.assert_array_equal(seen[:-7], command)
+
+
+@pytest.mark.parametrize("period", [1.0, 0.5])
+def test_odometry_is_the_way_in_the_frame_in_which_the_decision_began(period):
+    env = SeastarTaskEnv(task="fail-blind", fidelity="fast", actions="joint", decision_period=period)
+    seen, info = env.reset(seed=0)
+    assert not seen[-7:-4].any()
+    for action in (5, 100, 200, 77):
+        heading, before = env._task.heading()[0], info["hub_position"]
+        seen, *_, info = env.step(action)
+        x, y = (info["hub_position"] - before) / (0.025 * period)
+        c, s = np.cos(heading), np.sin(heading)
+        np.testing.assert_allclose(seen[-7:-5], [c * x + s * y, c * y - s * x], atol=1e-6)
+        assert seen[-5] == pytest.approx(env._task.heading()[0] - heading, abs=1e-6)
+    assert np.abs(seen[-7:-4]).max() > 0.01
+
+
+def test_all_sets_of_dead_limbs_are_drawn_alike():
+    strengths = SeastarTaskVectorEnv(500, task="fail-blind", fidelity="fast").reset(seed=0)[1]["limb_strengths"]
+    sets, counts = np.unique(strengths, axis=0, return_counts=True)
+    assert len(sets) == 10 and counts.min() > 25
+    one = SeastarTaskVectorEnv(9, task=FailBlind(dead=1), fidelity="fast").reset(seed=0)[1]["limb_strengths"]
+    assert (one.sum(axis=1) == 4.0).all()
+
+
+# ObstTrap
+
+
+def test_every_field_has_a_way_around_and_a_horseshoe_in_the_straight_one():
+    rng, goal = np.random.default_rng(0), np.array([0.5, 0.0])
+    for _ in range(15):
+        discs = draw_discs(rng, goal, 3, 0.85)
+        along = np.linspace([0.0, 0.0], goal, 200)
+        assert discs.shape == (11, 3) and rims(along, discs).min() < -0.005
+        assert min(rims(along[0], discs).min(), rims(goal, discs).min()) >= 0.06
+        neighbours = np.diff(discs[:8], axis=0)
+        assert (np.hypot(*neighbours[:, :2].T) < 1.7 * discs[:7, 2]).all()  # they overlap
+        found = ways(discs, goal, 0.015, 0.01)(np.zeros((1, 2)))[0]
+        assert 0.5 < found < 0.9
+        before = discs[:8, :2].mean(axis=0) - [0.01, 0.0]
+        assert rims(before, discs).min() > 0.02  # room in the horseshoe
+
+
+def test_fields_that_nobody_could_pass_are_refused():
+    with assert_refused("none can be passed"):
+        draw_discs(np.random.default_rng(0), np.array([0.5, 0.0]), 3, 0.4)
+
+
+def test_ways_on_the_grid_are_as_long_as_ways_are():
+    goal, start = np.array([0.5, 0.0]), np.zeros((1, 2))
+    free = ways(np.zeros((0, 3)), goal, 0.01, 0.01)
+    away = np.array([[0.0, 0.0], [0.1, 0.1], [0.5, -0.3], [0.33, 0.27]])
+    lengths = np.hypot(*(away - goal).T)
+    assert (free(away) >= lengths - 1e-9).all() and (free(away) < 1.03 * lengths + 1e-3).all()
+    radius = 0.1  # around one disc: two tangents and the arc between them
+    disc = np.array([[0.25, 0.0, radius - 0.01]])
+    tangent = np.sqrt(0.25**2 - radius**2)
+    around = 2.0 * tangent + radius * (np.pi - 2.0 * np.arccos(radius / 0.25))
+    assert around - 0.004 < ways(disc, goal, 0.01, 0.01)(start)[0] < 1.04 * around
+    wall = np.column_stack([np.full(41, 0.25), np.linspace(-0.4, 0.4, 41), np.full(41, 0.02)])
+    assert ways(wall, goal, 0.01, 0.01)(start)[0] == np.inf
+
+
+def test_who_is_in_a_disc_swims_to_the_nearest_way_first():
+    disc = np.array([[0.25, 0.0, 0.09]])
+    found = ways(disc, np.array([0.5, 0.0]), 0.01, 0.01)
+    inside, rim = found(np.array([[0.24, 0.0], [0.14, 0.0]]))
+    assert inside == pytest.approx(rim + 0.1, abs=0.02)
+
+
+def test_the_six_nearest_discs_are_seen_in_the_body_frame():
+    env = SeastarTaskEnv(task="obst-trap", fidelity="fast")
+    seen, info = env.reset(options={"instance": 2})
+    for action in (3, 8, 14):
+        discs = seen[-22:-4].reshape(6, 3).astype(np.float64) * 0.1
+        heading = env._task.heading()[0]
+        c, s = np.cos(heading), np.sin(heading)
+        world = discs[:, :2] @ [[c, s], [-s, c]] + info["hub_position"]
+        far = np.hypot(*(info["discs"][:, :2] - info["hub_position"]).T) - info["discs"][:, 2]
+        nearest = info["discs"][np.argsort(far)[:6]]
+        np.testing.assert_allclose(np.column_stack([world, discs[:, 2]]), nearest, atol=1e-7)
+        assert info["clearance"] == pytest.approx(far.min())
+        seen, *_, info = env.step(action)
+
+
+def test_who_touches_a_disc_ends_without_success():
+    env = SeastarTaskEnv(task="obst-trap", fidelity="fast")
+    _, info = env.reset(seed=0)
+    assert not info["is_success"]
+    env._task.discs[0, 0] = [*info["hub_position"], 0.05]
+    _, reward, over, _, info = env.step(3)
+    assert over and not info["is_success"] and info["clearance"] < 0.0 and info["reward_touch"] == -20.0
+    assert reward < -19.0
+
+
+def test_who_reaches_the_goal_ends_with_success():
+    env = SeastarTaskEnv(task="obst-trap", fidelity="fast")
+    _, info = env.reset(seed=0)
+    env._task._set_path(0, info["hub_position"][None] + [[0.005, 0.0]])
+    _, _, over, _, info = env.step(0)
+    assert over and info["is_success"] and info["reward_waypoint"] == 1.0 and info["reward_touch"] == 0.0
+
+
+def test_the_geodesic_potential_counts_the_way_around():
+    straight, around = (
+        SeastarTaskEnv(task=ObstTrap(potential=potential), fidelity="fast") for potential in ("straight", "geodesic")
+    )
+    (first, info), (its_first, _) = (env.reset(options={"instance": 5}) for env in (straight, around))
+    np.testing.assert_array_equal(first, its_first)
+    field = ways(info["discs"], np.array([info["distance"], 0.0]), 0.015, 0.01)
+    before = field(info["hub_position"][None])[0]
+    *_, info = around.step(9)
+    assert info["reward_progress"] == pytest.approx(200.0 * (before - field(info["hub_position"][None])[0]))
+    assert straight.step(9)[4]["reward_progress"] != info["reward_progress"]
+
+
+# Prizes
+
+
+def test_the_best_round_is_that_of_all_orders():
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        places, worth = rng.uniform(-0.35, 0.35, (5, 2)), rng.choice([1.0, 2.0, 4.0], 5)
+        first, between, way = np.hypot(*places.T), distances(places), rng.uniform(0.2, 1.2)
+        best = 0.0
+        for order in itertools.permutations(range(5)):
+            swum = np.cumsum([first[order[0]], *(between[a, b] for a, b in itertools.pairwise(order))])
+            best = max(best, worth[list(order)][swum <= way].sum())
+        found = best_round(first, between, worth, way)
+        assert found.worth == best == worth[found.order].sum() and len({*found.order}) == len(found.order)
+        ends = np.array([np.zeros(2), *places[found.order]])
+        assert np.hypot(*np.diff(ends, axis=0).T).sum() <= way
+        assert greedy_round(first, between, worth, way) <= best
+    assert best_round(np.ones(2), np.ones((2, 2)), np.ones(2), 0.5) == (0.0, [])
+
+
+def test_greed_costs_in_every_draw():
+    rng, about = np.random.default_rng(2), Prizes(gain=0.3)
+    for _ in range(5):
+        x, y, worth = draw_prizes(rng, about).T
+        asked = np.hypot(x, y), distances(np.column_stack([x, y])), worth, about.robot_speed * about.seconds
+        assert best_round(*asked).worth >= 1.3 * greedy_round(*asked) > 0.0
+        assert np.abs([x, y]).max() <= 0.35 and {*worth} <= {1.0, 2.0, 4.0}
+    with assert_refused("ask for less gain"):
+        draw_prizes(rng, Prizes(side=0.1, gain=5.0))
+
+
+def test_a_prize_within_reach_is_taken_once_and_in_time():
+    env = SeastarTaskEnv(task=Prizes(seconds=2.5), fidelity="fast")
+    _, info = env.reset(seed=0)
+    worth = info["prizes"][:, 2].copy()
+    env._task.prizes[0, 3, :2] = info["hub_position"]
+    seen, _, over, _, info = env.step(0)
+    assert info["taken"] == worth[3] and info["reward_prize"] == 5.0 * worth[3] and not over
+    assert info["prizes"][3, 2] == 0.0 and not seen[-8:-5].any()  # the last of the prizes that are seen is none
+    assert seen[-5] == pytest.approx(1.0 - 1.0 / 2.5)
+    assert env.step(0)[4]["reward_prize"] == 0.0
+    env._task.prizes[0, 5, :2] = info["hub_position"]
+    *_, info = env.step(0)
+    assert info["time"] == 3.0 and info["taken"] == worth[3]  # too late
+
+
+def test_prizes_are_seen_nearest_first_and_two_of_them_as_targets():
+    env = SeastarTaskEnv(task="prizes", fidelity="fast")
+    seen, info = env.reset(options={"instance": 2})
+    shown = seen[-35:-5].reshape(10, 3)
+    far = np.hypot(*shown[:, :2].T)
+    np.testing.assert_allclose(far, 10.0 * np.sort(np.hypot(*info["prizes"][:, :2].T)), rtol=1e-6)
+    np.testing.assert_allclose(seen[-4:].reshape(2, 2), shown[:2, :2], atol=1e-6)
+    heading = env._task.heading()[0]
+    away = info["prizes"][np.argmin(np.hypot(*info["prizes"][:, :2].T))]
+    angle = np.arctan2(shown[0, 1], shown[0, 0]) + heading
+    assert np.exp(1j * angle) == pytest.approx(np.exp(1j * np.arctan2(away[1], away[0])), abs=1e-6)
+    assert shown[0, 2] == away[2]
+
+
+def test_an_episode_ends_when_all_prizes_are_taken():
+    env = SeastarTaskEnv(task="prizes", fidelity="fast")
+    _, info = env.reset(seed=0)
+    env._task.prizes[0, :, :2] = info["hub_position"]
+    seen, _, over, _, info = env.step(0)
+    assert over and info["is_success"] and info["distance"] == 0.0 and not seen[-4:].any()
+    assert info["taken"] == pytest.approx(info["reward_prize"] / 5.0)
+
+
+# Symmetry
+
+
+@pytest.mark.parametrize("id", [id for id in IDS if CHALLENGES[seastar_gym.TASKS[id][0]].__class__ in KINDS[3:]])
+def test_what_a_task_shows_of_its_own_is_carried_by_the_symmetry(id):
+    """A robot turned by fifths of a turn, in a world that may be mirrored, swims and sees as the symmetry says."""
+    env, other = made(id).unwrapped, made(id).unwrapped
+    mirror, own = observed_mirror(env), env.own_numbers
+    for element in (2, 3, 9):
+        env.reset(options={"instance": 1}), other.reset(options={"instance": 1})
+        _carry(env._task, other._task, element)
+        for action in (7, 11, 2):
+            seen, theirs = (task.observe() for task in (env._task, other._task))
+            np.testing.assert_allclose(theirs, carried(seen, [element], 5, mirror, own=own), atol=2e-4)
+            action = np.array([action])
+            env.step(action[0]), other.step(transform_actions(action, [element], env.actions, 5)[0])
+        np.testing.assert_array_equal(transform_commands(env._task.last_commands, [element]), other._task.last_commands)
+
+
+def _carry(ours, theirs, element):
+    """Turn a robot by its element, and mirror its world at the x axis if that mirrors."""
+    flip = np.array([1.0, -1.0 if element % 2 else 1.0])
+    heading = flip[1] * (ours.heading() + 0.4 * np.pi * ((element + 1) // 2))
+    for name in ("waypoints", "discs", "prizes"):
+        if hasattr(ours, name):
+            world = getattr(theirs, name)
+            world[..., :2] *= flip
+    theirs.simulator.set_limb_strengths(ours.simulator.limb_strengths[:, limb_order(5)[element]])
+    theirs.simulator.reset(np.array([True]), heading)
+    theirs._begin(np.array([True]))
 
 
 # Continuous commands

@@ -94,7 +94,7 @@ def test_every_part_of_the_package_is_in_the_table():
     scenes = [Scene(actuator=actuator) for actuator in ACTUATORS.values()] + [Scene(**part) for part in PARTS.values()]
     seen = {kind for scene in scenes for kind in KINDS if f'"kind": "{kind}"' in json.dumps(scene.to_dict())}
     of_environments = {"RewardWeights", "Headings", "DomainRandomization", "Uniform", "LogUniform", "Normal"}
-    of_environments |= {"Miswired", "Prey", "Station"}
+    of_environments |= {"Miswired", "Prey", "Station", "FailBlind", "ObstTrap", "Prizes"}
     assert {name for name, kind in KINDS.items() if kind.__module__.startswith("seastar_gym")} == seen | of_environments
 
 

@@ -1,17 +1,21 @@
 """The study of the tasks: memory is kept right, controllers believe what they should, verdicts follow from numbers."""
 
+import itertools
 import json
 
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
+from PIL import Image
 
 from refusals import assert_refused
 from seastar_gym.envs.symmetry import VectorSymmetryReduction, transform_observations
 from seastar_gym.envs.tasks.envs import SeastarTaskVectorEnv
 from seastar_gym.envs.tasks.prey import Prey
+from studies.tasks import pictures
 from studies.tasks import study as module
 from studies.tasks.ahead import Ahead, Odometer, Robots, few_commands
+from studies.tasks.blind import FailureGuess, live_commands
 from studies.tasks.controllers import (
     CONTROLLERS,
     SINCE,
@@ -23,9 +27,12 @@ from studies.tasks.controllers import (
     straight_on,
 )
 from studies.tasks.episodes import Episodes, measure, swim
+from studies.tasks.learning import TOLD_THE_WAY
 from studies.tasks.memory import VectorMemory
-from studies.tasks.page import Row, rows_of, table
-from studies.tasks.study import Options, main, study
+from studies.tasks.page import Row, rows_of, table, write_page
+from studies.tasks.rounds import BestRound, MostPerMetre
+from studies.tasks.study import Options, has_cell, main, study
+from studies.tasks.trap import all_discs, discs_so_far, with_clearance
 
 
 def batch(task, n=6, **arguments):
@@ -35,7 +42,9 @@ def batch(task, n=6, **arguments):
 # Memory
 
 
-@pytest.mark.parametrize("task, period", [("miswired", 1.0), ("station", 0.5), ("prey", 1.0)])
+@pytest.mark.parametrize(
+    "task, period", [("miswired", 1.0), ("station", 0.5), ("prey", 1.0), ("fail-blind", 1.0), ("obst-trap", 0.5)]
+)
 def test_memory_shows_the_reduced_observation_and_the_past_in_the_same_limbs(task, period):
     def new():
         return batch(task, actions="joint", decision_period=period)
@@ -48,7 +57,7 @@ def test_memory_shows_the_reduced_observation_and_the_past_in_the_same_limbs(tas
         np.testing.assert_array_equal(shown[:, :size], ours)
         before, actions = memory._latest, rng.integers(0, 243, 6)
         shown, ours = memory.step(actions)[0], reduced.step(actions)[0]
-        carried = transform_observations(before, memory._elements, 5, memory._mirror)
+        carried = transform_observations(before, memory._elements, 5, memory._mirror, own=memory._own)
         np.testing.assert_array_equal(shown[:, size:].reshape(6, 2, -1)[:, 0], carried[:, memory._told])
 
 
@@ -68,8 +77,13 @@ def test_memory_ends_with_the_episode_and_the_last_observation_still_has_it():
 # Controllers
 
 
-@pytest.mark.parametrize("id", ["SeastarMiswired-v0", "SeastarPreyTimed-v0", "SeastarStation-v0"])
-@pytest.mark.parametrize("name", CONTROLLERS)
+KINDS = (
+    "SeastarMiswired-v0", "SeastarPreyTimed-v0", "SeastarStation-v0", "SeastarFailBlind-v0", "SeastarFailBlindTimed-v0",
+    "SeastarObstTrap-v0", "SeastarObstTrapTimed-v0", "SeastarPrizes-v0",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("id, name", [cell for cell in itertools.product(KINDS, CONTROLLERS) if has_cell(*cell)])
 def test_every_controller_swims_every_kind_of_task(id, name, monkeypatch):
     monkeypatch.setattr("studies.tasks.episodes.SETTLED", 0.0)
     robots = []
@@ -94,9 +108,86 @@ def test_the_wiring_is_found_by_what_limbs_do():
         actions = agent.act(observations, info)
         heated += np.abs(env.command_table[actions])
         observations, *_, info = env.step(actions)
-    believed = agent._wirings[np.argmin(agent._surprise, axis=1)]
+    believed = agent.hypotheses[agent.believed]
     well_known = heated > 8  # of limbs that were hardly heated nothing is known
     assert well_known.sum() > 12 and (believed == info["wiring"])[well_known].mean() > 0.9
+
+
+def test_dead_limbs_are_found_by_what_they_do_not_do():
+    env = batch("fail-blind", actions="joint")
+    agent = FailureGuess(Robots(env))
+    assert agent.hypotheses.shape == (16, 5)
+    observations, info = env.reset(seed=0)
+    heated = np.zeros((6, 5))
+    for _ in range(30):
+        actions = agent.act(observations, info)
+        heated += np.abs(env.command_table[actions])
+        observations, *_, info = env.step(actions)
+    well_known = heated > 8
+    assert well_known.sum() > 8
+    assert (agent.hypotheses[agent.believed] == info["limb_strengths"])[well_known].mean() > 0.9
+
+
+def test_live_limbs_alone_are_commanded():
+    commands = live_commands(np.array([1.0, 0.0, 1.0, 0.0, 0.0]))
+    assert commands.shape == (9, 5) and len(np.unique(commands, axis=0)) == 9
+    assert not commands[:, [1, 3, 4]].any() and commands[:, [0, 2]].any(axis=0).all()
+
+
+def test_commands_of_ones_own_are_simulated_by_each_robot():
+    env = batch("prey", 3)
+    observations, _ = env.reset(seed=2)
+    robots = Robots(env)
+    table = robots.table[[4, 9, 0, 17]]
+    shared, own = [], []
+    states = robots.states(observations)
+    for commands, found in ((table, shared), (np.stack([table, table[::-1], table]), own)):
+        Ahead(robots, commands, 2, 2).best(states, lambda hub, _, to=found: to.append(hub) or hub[..., 0])
+    np.testing.assert_array_equal(own[0][[0, 2]], shared[0][[0, 2]])
+    np.testing.assert_array_equal(own[0][1], shared[0][1, ::-1])
+    np.testing.assert_array_equal(own[1][[0, 2]], shared[1][[0, 2]])
+
+
+def test_discs_are_remembered_once_each_and_are_those_of_the_world():
+    env = batch("obst-trap", 2)
+    observations, info = env.reset(seed=1)
+    robots, known = Robots(env), discs_so_far()
+    for action in (3, 8, 0, 5):
+        found = [discs.copy() for discs in known(robots, observations, info)]
+        observations, *_, info = env.step(np.full(2, action))
+    for discs, every in zip(found, info["discs"], strict=True):
+        away = np.hypot(*(discs[:, None, :2] - every[:, :2]).transpose(2, 0, 1))
+        assert 6 <= len(discs) <= 11 and (away.min(axis=1) < 1e-6).all()
+        assert len({*away.argmin(axis=1).tolist()}) == len(discs)
+    np.testing.assert_array_equal(all_discs(robots, observations, info), info["discs"])
+
+
+def test_no_decision_is_to_end_near_a_disc():
+    ends = np.array([[[0.0, 0.0], [0.1, 0.0], [0.3, 0.0]]])
+    disc = np.array([[[0.1, 0.0, 0.05]]])
+    cost = with_clearance(np.array([[3.0, 1.0, 2.0]]), ends, disc)
+    assert cost[0, [0, 2]].tolist() == [3.0, 2.0] and cost[0, 1] > 1000.0
+    deeper = with_clearance(np.zeros((1, 2)), np.array([[[0.1, 0.0], [0.14, 0.0]]]), disc)
+    assert deeper[0, 0] > deeper[0, 1] > 1000.0
+
+
+def test_the_best_round_swims_past_what_greed_swims_to():
+    env = batch("prizes", 1)
+    env.reset(seed=0)
+    prizes = env._task.prizes
+    prizes[0] = 0.0  # one of little worth nearby, and many on the other side, in reach only without the former
+    prizes[0, 0] = [0.1, 0.0, 2.0]
+    prizes[0, 1:5] = [[-0.8, 0.01 * k, 4.0] for k in range(4)]
+    observations = env._task.observe()
+    heading = env._task.heading()[0]
+    greedy, best = MostPerMetre(Robots(env)), BestRound(Robots(env))
+
+    def directions(places):
+        return np.cos(np.arctan2(places[:, 1], places[:, 0]) + heading)
+
+    assert directions(greedy.chosen(observations)) == pytest.approx(1.0)
+    for chosen in best._round(observations):
+        assert directions(chosen) == pytest.approx(-1.0, abs=1e-2)
 
 
 def test_an_odometer_reads_the_way_in_the_body_frame():
@@ -169,13 +260,14 @@ def test_few_commands_heat_two_limbs_at_most():
 def episodes(**changes):
     time = np.array([[10.0, 10.0], [20.0, np.nan], [40.0, np.nan]])
     success = np.array([False, True])
-    done = Episodes(time, 0.001 * time, time / 10.0, success, returns=np.zeros(2), limit=400.0)
+    done = Episodes(time, 0.001 * time, time / 10.0, time / 5.0, success, returns=np.zeros(2), limit=400.0)
     return done._replace(**changes)
 
 
 def test_measures_are_those_of_finished_and_unfinished_episodes():
     assert measure("miswired", episodes()).tolist() == [400.0, 10.0]
     assert measure("prey", episodes()).tolist() == [4.0, 1.0]
+    assert measure("prizes", episodes()).tolist() == [8.0, 2.0]
     assert measure("station", episodes(distance=0.001 * np.array([[9.0, 1], [8, 1], [2, 3]]), time=np.array(
         [[10.0, 10], [20, 20], [40, 40]]))).tolist() == pytest.approx([2.0, 3.0])  # fmt: skip
 
@@ -202,8 +294,16 @@ def test_a_table_has_every_agent_and_the_verdict():
     text = table(row("miswired", greedy=400.0, informed=200.0, PPO=300.0))
     assert "| greedy | 400 | 400 to 400 |" in text
     assert text.endswith("Bound: informed, 50 % better than greedy. Gap left by PPO: 50 %. By this, kept.")
-    assert "Not swum yet: rest; planner; adaptive; PPO, memory." in text
+    assert "Not swum yet: rest; planner; adaptive; PPO, memory; PPO, told the way." in text
     assert "Bound" not in table(row("prey", greedy=1.0, PPO=3.0))  # a learner alone is no bound
+    assert table(row("prizes", greedy=10.0, informed=14.0)).endswith("Bound: informed, 40 % better than greedy.")
+
+
+def test_nobody_waits_for_agents_that_a_task_has_not():
+    assert not has_cell("SeastarPrizes-v0", "adaptive") and has_cell("SeastarPrizes-v0", "rest")
+    assert has_cell("SeastarObstTrap-v0", TOLD_THE_WAY) and not has_cell("SeastarPrizes-v0", TOLD_THE_WAY)
+    row_ = Row("SeastarPrizes-v0", "prizes", {"greedy": [np.ones(4)]})
+    assert "Not swum yet: rest; planner; informed; PPO; PPO, memory." in table(row_, has_cell)
 
 
 def test_the_study_goes_on_where_it_was_broken_off(tmp_path, monkeypatch):
@@ -226,6 +326,26 @@ def test_the_study_goes_on_where_it_was_broken_off(tmp_path, monkeypatch):
     assert "## SeastarPrey-v0" in page and some.out.with_suffix(".png").is_file()
     (found,) = rows_of(json.loads(some.out.read_text()), module.IDS)
     assert [values.tolist() for values in found.agents["PPO"]] == [[3.0], [4.0]]
+
+
+def test_the_page_shows_the_pictures_that_there_are(tmp_path):
+    results = {"settings": {"decisions": 1, "episodes": 4, "fidelity": "fast"}, "cells": {}}
+    for id in ("SeastarPrey-v0", "SeastarPreyTimed-v0", "SeastarStation-v0"):
+        results["cells"][f"{id}, greedy, 0"] = {"measure": [1.0, 2.0]}
+    (tmp_path / "tasks").mkdir()
+    out = tmp_path / "page.json"
+    write_page(results, module.IDS, out, has_cell)
+    assert "studies.tasks.pictures" not in out.with_suffix(".md").read_text()
+    Image.fromarray(np.zeros((2, 2, 3), np.uint8)).save(tmp_path / "tasks" / "prey.png")
+    write_page(results, module.IDS, out, has_cell)
+    assert "| ![prey](tasks/prey.png) |  |" in out.with_suffix(".md").read_text()
+
+
+def test_a_picture_shows_an_episode_of_every_task(tmp_path, monkeypatch):
+    monkeypatch.setattr(pictures, "SHOWN", {"prizes": ("SeastarPrizes-v0", "greedy", 2)})
+    assert pictures.main(["--out", str(tmp_path)]) == 0
+    with Image.open(tmp_path / "prizes.png") as drawn:
+        assert drawn.size == (960, 720)
 
 
 def test_other_settings_and_unknown_names_are_refused(tmp_path, capsys):

@@ -8,7 +8,8 @@ symmetry group is the turn (g even) or the turn and mirror (g odd) that brings s
 
 An element carries a robot with its waypoints onto another robot, whose limb j was limb `limb_order(n)[g, j]`; a mirror
 swaps the commands + and -, and does to the memory of actuators what they say (`memory_mirror`). A turn leaves the turns
-that asked headings ask for as they are, a mirror reverses them. A controller that sees
+that asked headings ask for as they are, a mirror reverses them. What a task shows of its own is carried by its kind
+(`own_numbers.py`). A controller that sees
 only waypoints in sector 0 and whose actions are carried back is equivariant: in a turned or mirrored world it swims the
 turned or mirrored way.
 
@@ -26,7 +27,7 @@ from seastar_gym.envs.symmetry.group import compose, inverse, limb_order, turns
 from seastar_gym.envs.symmetry.masks import transform_masks
 from seastar_gym.envs.symmetry.observations import reduce_observations, sectors, transform_observations
 from seastar_gym.envs.symmetry.scenes import memory_mirror, require_symmetry, symmetry_of
-from seastar_gym.envs.symmetry.wrappers import SymmetryReduction, VectorSymmetryReduction
+from seastar_gym.envs.symmetry.wrappers import SymmetryReduction, VectorSymmetryReduction, observed_mirror
 
 __all__ = [
     "SymmetryReduction",
@@ -36,6 +37,7 @@ __all__ = [
     "inverse",
     "limb_order",
     "memory_mirror",
+    "observed_mirror",
     "reduce_observations",
     "require_symmetry",
     "restore_actions",

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.envs.observation import Layout, layout
+from seastar_gym.envs.observation import layout
+from seastar_gym.envs.own_numbers import HEADINGS, NO_MORE, OwnNumbers, Places, places_of
 from seastar_gym.envs.symmetry.group import (
     Elements,
     Group,
@@ -26,7 +27,11 @@ observations: not rounding, but the next waypoint chooses the sector of a robot 
 
 
 def sectors(
-    observations: NDArray[np.floating[Any]], group: Group, mirror: Mirror = (), with_headings: bool = False
+    observations: NDArray[np.floating[Any]],
+    group: Group,
+    mirror: Mirror = (),
+    with_headings: bool = False,
+    own: OwnNumbers = NO_MORE,
 ) -> Elements:
     """Sectors of the current waypoints, 0 to 2 n_turns - 1, shape (...), in observations of shape (..., size).
 
@@ -36,11 +41,11 @@ def sectors(
     line (or there is none) to the sector anti-clockwise of the boundary. A waypoint at the hub lies in sector 0.
 
     mirror: What a mirror does to the memory of a limb's actuator, see `memory_mirror`; () if actuators have none.
-    with_headings: Whether headings are asked for.
+    with_headings: Whether headings are asked for. own: What the task shows of its own.
     """
-    at = _layout(observations, group, mirror, with_headings)
-    current = np.asarray(observations[..., at.current_waypoint], np.float64)
-    towards_next = np.asarray(observations[..., at.next_waypoint], np.float64)
+    at = _places(observations, group, mirror, with_headings, own)
+    waypoints = np.asarray(observations[..., at.waypoints], np.float64)
+    current, towards_next = waypoints[..., :2], waypoints[..., 2:]
     axis, n_turns = axis_of(group), n_turns_of(group)
     per_sector = 2 if axis is None else 1
     width = per_sector * np.pi / n_turns
@@ -63,23 +68,31 @@ def _from_axis(vectors: NDArray[np.float64], axis: float | None) -> NDArray[np.f
     return np.asarray(vectors @ np.array([[c, -s], [s, c]]))
 
 
-def _layout(observations: NDArray[np.floating[Any]], group: Group, mirror: Mirror, with_headings: bool) -> Layout:
-    """Layout of observations, shape (..., size); ValueError if they are of a robot of other limbs."""
+def _places(
+    observations: NDArray[np.floating[Any]], group: Group, mirror: Mirror, with_headings: bool, own: OwnNumbers
+) -> Places:
+    """Places in observations, shape (..., size); ValueError if they are of a robot of other limbs."""
     n_limbs = n_limbs_of(group)
-    at, size = layout(n_limbs, len(mirror) * n_limbs, with_headings), observations.shape[-1]
+    at, size = places_of(n_limbs, len(mirror) * n_limbs, _all_own(with_headings, own)), observations.shape[-1]
     if size != at.size:
         raise ValueError(f"An observation of {size} numbers is not that of a robot of {n_limbs} limbs.")
     return at
 
 
+def _all_own(with_headings: bool, own: OwnNumbers) -> OwnNumbers:
+    """What a task shows of its own, asked headings first."""
+    return own._replace(kinds=HEADINGS + own.kinds) if with_headings else own
+
+
 @cache
-def _vector_order(group: Group) -> NDArray[np.intp]:
+def _vector_order(group: Group, with_stations: bool) -> NDArray[np.intp]:
     """Order of vectors, shape (2 n_turns, size/2): vector i after element g was vector order[g, i] before."""
     n_limbs, n_turns = n_limbs_of(group), n_turns_of(group)
     at = layout(n_limbs)
-    n_stations = at.velocities.start // 2
-    stations = np.arange(n_stations).reshape(n_limbs, -1)[limb_order(group)].reshape(-1, n_stations)
-    others = np.tile(np.arange(at.hub_velocity.start // 2, at.size // 2), (2 * n_turns, 1))
+    n_others = (at.size - (at.hub_velocity.start if with_stations else at.waypoints.start)) // 2
+    n_stations = at.velocities.start // 2 if with_stations else 0
+    stations = np.arange(n_stations).reshape(n_limbs, -1)[limb_order(group)].reshape(2 * n_turns, n_stations)
+    others = np.tile(2 * n_stations + np.arange(n_others), (2 * n_turns, 1))
     return read_only(np.concatenate([stations, n_stations + stations, others], axis=1))
 
 
@@ -89,28 +102,40 @@ def transform_observations(
     group: Group,
     mirror: Mirror = (),
     with_headings: bool = False,
+    own: OwnNumbers = NO_MORE,
 ) -> NDArray[np.floating[Any]]:
     """Observations of the robots carried by the elements: a fresh array of the same shape and type.
 
     mirror: What a mirror does to the memory of a limb's actuator, see `memory_mirror`; () if actuators have none.
-    with_headings: Whether headings are asked for.
+    with_headings: Whether headings are asked for. own: What the task shows of its own.
     """
     observations, elements = np.asarray(observations), np.asarray(elements, dtype=np.intp)
-    at = _layout(observations, group, mirror, with_headings)
-    if not mirror and not with_headings:
-        return _transform_vectors(observations, elements, group)
-    hub = at.hub_velocity.stop
+    at = _places(observations, group, mirror, with_headings, own)
+    own = _all_own(with_headings, own)
+    order = _vector_order(group, own.with_stations)
+    if not mirror and not own.kinds:
+        return _transform_vectors(observations, elements, group, order)
+    hub = at.stations_and_hub.stop
     vectors = np.concatenate([observations[..., at.stations_and_hub], observations[..., at.waypoints]], axis=-1)
-    vectors = _transform_vectors(vectors, elements, group)
+    vectors = _transform_vectors(vectors, elements, group, order)
     remembered = _transform_memory(observations[..., at.actuators], elements, group, mirror)
-    asked = _transform_headings(observations[..., at.headings], elements)
-    return np.concatenate([vectors[..., :hub], remembered, asked, vectors[..., hub:]], axis=-1)
+    shown = _transform_own(observations[..., at.own], elements, group, own)
+    return np.concatenate([vectors[..., :hub], remembered, shown, vectors[..., hub:]], axis=-1)
 
 
-def _transform_headings(asked: NDArray[np.floating[Any]], elements: Elements) -> NDArray[np.floating[Any]]:
-    """Cosines and sines of turns that are asked for, shape (..., 4): the same for all limbs, reversed by a mirror."""
-    signs = np.where(is_mirror(elements)[..., None], np.tile([1, -1], asked.shape[-1] // 2), 1)
-    return asked * signs.astype(asked.dtype)
+def _transform_own(
+    numbers: NDArray[np.floating[Any]], elements: Elements, group: Group, own: OwnNumbers
+) -> NDArray[np.floating[Any]]:
+    """Numbers that the task shows of its own, shape (..., own.size)."""
+    carried = numbers.copy()
+    turns_at, at = own.places("turn"), np.array(own.places("vector"), np.intp)
+    carried[..., turns_at] *= np.where(is_mirror(elements)[..., None], -1, 1).astype(numbers.dtype)
+    if len(at):
+        pairs = np.stack([numbers[..., at], numbers[..., at + 1]], axis=-1).reshape(*numbers.shape[:-1], -1)
+        unmoved = np.tile(np.arange(len(at)), (2 * n_turns_of(group), 1))
+        pairs = _transform_vectors(pairs, elements, group, unmoved)
+        carried[..., at], carried[..., at + 1] = pairs[..., ::2], pairs[..., 1::2]
+    return carried
 
 
 def _transform_memory(
@@ -127,12 +152,12 @@ def _transform_memory(
 
 
 def _transform_vectors(
-    observations: NDArray[np.floating[Any]], elements: Elements, group: Group
+    observations: NDArray[np.floating[Any]], elements: Elements, group: Group, order: NDArray[np.intp]
 ) -> NDArray[np.floating[Any]]:
-    """Pairs of numbers of observations without memory, turned, mirrored and moved with their limbs."""
+    """Pairs of numbers, turned, mirrored and moved with their limbs by an `order` like that of `_vector_order`."""
     as_vectors = np.result_type(observations, np.complex64)  # pairs of numbers as x + iy
     vectors = np.ascontiguousarray(observations).view(as_vectors)
-    vectors = np.take_along_axis(vectors, _vector_order(group)[elements], axis=-1)
+    vectors = np.take_along_axis(vectors, order[elements], axis=-1)
     vectors *= turns(group)[elements][..., None].astype(as_vectors)
     np.conjugate(vectors, out=vectors, where=is_mirror(elements)[..., None])
     axis = axis_of(group)
@@ -142,12 +167,16 @@ def _transform_vectors(
 
 
 def reduce_observations(
-    observations: NDArray[np.floating[Any]], group: Group, mirror: Mirror = (), with_headings: bool = False
+    observations: NDArray[np.floating[Any]],
+    group: Group,
+    mirror: Mirror = (),
+    with_headings: bool = False,
+    own: OwnNumbers = NO_MORE,
 ) -> tuple[NDArray[np.floating[Any]], Elements]:
     """Observations with the current waypoint brought into sector 0, and the elements that did it.
 
     mirror: What a mirror does to the memory of a limb's actuator, see `memory_mirror`; () if actuators have none.
-    with_headings: Whether headings are asked for.
+    with_headings: Whether headings are asked for. own: What the task shows of its own.
     """
-    elements = sectors(observations, group, mirror, with_headings)
-    return transform_observations(observations, elements, group, mirror, with_headings), elements
+    elements = sectors(observations, group, mirror, with_headings, own)
+    return transform_observations(observations, elements, group, mirror, with_headings, own), elements

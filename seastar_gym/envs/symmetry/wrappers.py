@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions
+from seastar_gym.envs.own_numbers import OwnNumbers
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry.actions import restore_actions
 from seastar_gym.envs.symmetry.group import Elements, Group
@@ -26,16 +27,17 @@ else:
 
 
 class _Kind(NamedTuple):
-    """What the symmetry has to know of an environment: mode, group, mirror of observed memory, asked headings."""
+    """What the symmetry has to know of an environment: mode, group, mirror of observed memory, and what is added."""
 
     mode: Actions
     group: Group
     mirror: Mirror
     with_headings: bool
+    own: OwnNumbers
 
     def reduce(self, observations: NDArray[Any]) -> tuple[NDArray[np.floating[Any]], Elements]:
         """Reduced observations, and the elements that reduced them."""
-        return reduce_observations(observations, self.group, self.mirror, self.with_headings)
+        return reduce_observations(observations, self.group, self.mirror, self.with_headings, self.own)
 
     def restore(self, actions: Any, elements: Elements) -> Any:
         """Actions of the robots as they are."""
@@ -56,9 +58,15 @@ def _kind(env: Any) -> _Kind:
     if not isinstance(inner, SeastarSwimEnv | SeastarSwimVectorEnv):
         raise ValueError(f"Symmetry is known of SeastarSwim-v0 and the timed environments alone, not of {inner!r}.")
     require_symmetry(inner.scene, inner.randomization)
-    mirror = memory_mirror(inner.scene.actuator) if inner.observe_actuators else ()
-    mirror += tuple((len(mirror) + index, sign) for index, sign in inner.added_mirror)
-    return _Kind(inner.actions, symmetry_of(inner.scene), mirror, inner.headings is not None)
+    return _Kind(
+        inner.actions, symmetry_of(inner.scene), observed_mirror(inner), inner.headings is not None, inner.own_numbers
+    )
+
+
+def observed_mirror(env: Any) -> Mirror:
+    """What a mirror does to the numbers that are observed of every limb of an environment or a batch."""
+    mirror = memory_mirror(env.scene.actuator) if env.observe_actuators else ()
+    return mirror + tuple((len(mirror) + index, sign) for index, sign in env.added_mirror)
 
 
 class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstructorArgs):

@@ -9,9 +9,12 @@ from seastar_gym.envs.seastar_swim import RenderMode, SeastarSwimEnv
 from seastar_gym.envs.swimming import Swimming
 from seastar_gym.envs.task import Plain, make_scene, read
 from seastar_gym.envs.tasks.challenge import Challenge
+from seastar_gym.envs.tasks.fail_blind import FailBlind
 from seastar_gym.envs.tasks.miswired import Miswired
 from seastar_gym.envs.tasks.numbered import Split
+from seastar_gym.envs.tasks.obst_trap import ObstTrap
 from seastar_gym.envs.tasks.prey import Prey
+from seastar_gym.envs.tasks.prizes import Prizes
 from seastar_gym.envs.tasks.station import Station
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.checks import require_choice, shown
@@ -22,6 +25,10 @@ CHALLENGES: dict[str, Challenge] = {
     "prey": Prey(),
     "fast-prey": Prey(speed=(0.0105, 0.0135), robot_speed=0.007),
     "station": Station(),
+    "fail-blind": FailBlind(),
+    "obst-trap": ObstTrap(),
+    "prizes": Prizes(),
+    "fast-prizes": Prizes(seconds=115.0, robot_speed=0.007),
 }
 """Challenges by name."""
 
@@ -54,20 +61,26 @@ def make_task(
 class SeastarTaskEnv(SeastarSwimEnv):
     """Environment of one of the tasks whose headroom is measured, for the chapter's robot.
 
-    | id                        | `task`        | decision period [s] | `actions` | time limit [s] | reward threshold |
-    |---------------------------|---------------|---------------------|-----------|----------------|------------------|
-    | `SeastarMiswired-v0`      | `"miswired"`  | 1.0                 | `"joint"` | 400            | 150              |
-    | `SeastarMiswiredTimed-v0` | `"miswired"`  | 0.5                 | `"joint"` | 400            | 145              |
-    | `SeastarPrey-v0`          | `"prey"`      | 1.0                 | `"pairs"` | 200            | 80               |
-    | `SeastarPreyTimed-v0`     | `"fast-prey"` | 0.5                 | `"pairs"` | 200            | 130              |
-    | `SeastarStation-v0`       | `"station"`   | 1.0                 | `"joint"` | 120            | -20              |
-    | `SeastarStationTimed-v0`  | `"station"`   | 0.5                 | `"joint"` | 120            | -70              |
+    | id                         | `task`          | decision period [s] | `actions` | time limit [s] | threshold |
+    |----------------------------|-----------------|---------------------|-----------|----------------|-----------|
+    | `SeastarMiswired-v0`       | `"miswired"`    | 1.0                 | `"joint"` | 400            | 150       |
+    | `SeastarMiswiredTimed-v0`  | `"miswired"`    | 0.5                 | `"joint"` | 400            | 145       |
+    | `SeastarPrey-v0`           | `"prey"`        | 1.0                 | `"pairs"` | 200            | 80        |
+    | `SeastarPreyTimed-v0`      | `"fast-prey"`   | 0.5                 | `"pairs"` | 200            | 130       |
+    | `SeastarStation-v0`        | `"station"`     | 1.0                 | `"joint"` | 120            | -20       |
+    | `SeastarStationTimed-v0`   | `"station"`     | 0.5                 | `"joint"` | 120            | -70       |
+    | `SeastarFailBlind-v0`      | `"fail-blind"`  | 1.0                 | `"joint"` | 500            | 150       |
+    | `SeastarFailBlindTimed-v0` | `"fail-blind"`  | 0.5                 | `"joint"` | 400            | 140       |
+    | `SeastarObstTrap-v0`       | `"obst-trap"`   | 1.0                 | `"pairs"` | 300            | 95        |
+    | `SeastarObstTrapTimed-v0`  | `"obst-trap"`   | 0.5                 | `"pairs"` | 200            | 90        |
+    | `SeastarPrizes-v0`         | `"prizes"`      | 1.0                 | `"pairs"` | 200            | 80        |
+    | `SeastarPrizesTimed-v0`    | `"fast-prizes"` | 0.5                 | `"pairs"` | 115            | 70        |
 
-    The reward threshold is about the mean return of the best controllers that remember and are told nothing, in
-    docs/tasks.md; for `Station`, a little more.
+    The threshold is `reward_threshold` of the spec: about the mean return of the best controllers that remember and are
+    told nothing, in docs/tasks.md; for `Station`, a little more.
 
-    What a task asks for, observes and rewards stands in the docstring of its challenge: `Miswired`, `Prey`, `Station`.
-    Actions, masks and everything else are those of `SeastarSwimEnv`.
+    What a task asks for, observes and rewards stands in the docstring of its challenge: `Miswired`, `Prey`, `Station`,
+    `FailBlind`, `ObstTrap`, `Prizes`. Actions, masks and everything else are those of `SeastarSwimEnv`.
 
     ## Splits
     An episode is a number, and what is drawn for it follows from its split and its number alone. A reset draws the

@@ -1,0 +1,206 @@
+"""`SeastarObstTrap-v0`: a goal behind a horseshoe of discs."""
+
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.envs.own_numbers import OwnNumbers
+from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.scenery import Ring, Scenery
+from seastar_gym.envs.swimming import Floats, Score
+from seastar_gym.envs.task import SwimTask
+from seastar_gym.envs.tasks.challenge import Challenge, Range, require_range
+from seastar_gym.envs.tasks.discs import Ways, rims, ways
+from seastar_gym.envs.tasks.numbered import Numbered, Split
+from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import require_choice, require_count, require_number
+from seastar_gym.scene.serial import register_part
+
+Potential = Literal["straight", "geodesic"]
+SEEN = 6
+"""Number of discs that the robot sees."""
+
+
+@register_part
+@dataclass(frozen=True)
+class ObstTrap(Challenge):
+    """A goal behind a horseshoe of discs that is open towards the robot, and a few discs more.
+
+    A robot that swims towards the goal ends in the horseshoe. It sees the discs around it alone; one that remembers the
+    discs it has seen, and plans its way around them, finds out.
+
+    ## Episode
+    The goal lies at a distance in `distance`, behind a horseshoe of eight discs that overlap. `scattered` discs more
+    lie outside of it, none near the start or the goal. The robot has a random heading. The hub must stay out of discs,
+    limbs may pass over them. The episode ends when the goal is reached, or when a decision ends with the hub within a
+    disc, which is no success. Only fields that can be solved are drawn: there is a way that keeps 15 mm clear of all
+    discs and is no longer than `longest_way`.
+
+    ## Observation
+    That of `SeastarSwim-v0`, with the goal in the places of the current and of the next waypoint, and the six discs
+    whose rims are nearest to the hub, nearest first; places for strokes, and for decisions every 0.5 s:
+
+    | strokes  | timed    | meaning                                                     | unit  | range |
+    |----------|----------|-------------------------------------------------------------|-------|-------|
+    | 0..181   | 0..181   | stations of limbs and the hub, as in `SeastarSwim-v0`       | -     | -     |
+    |          | 182..191 | limb after limb: contractions of its wires                  | 1     | 0..1  |
+    | 182..199 | 192..209 | disc after disc: its centre relative to the hub in the body | 0.1 m | -     |
+    |          |          | frame, x and y; its radius                                  |       |       |
+    | 200..203 | 210..213 | the goal relative to the hub: x, y, and once more           | 0.1 m | -     |
+
+    ## Reward
+    | term              | meaning                                                 | default weight |
+    |-------------------|---------------------------------------------------------|----------------|
+    | `reward_progress` | decrease of the way to the goal [m], see `potential`    | 200 per metre  |
+    | `reward_waypoint` | 1 in the decision in which the goal is reached          | 1              |
+    | `reward_effort`   | minus the time for which wires were heated, in pulses   | 0.01 per pulse |
+    | `reward_touch`    | -1 in the decision in which a disc is touched           | 20             |
+
+    With `potential="straight"`, the default, the way is the straight line to the goal through all discs. It leads into
+    the horseshoe: what a learner makes of this reward says little about what it could make of another one. With
+    `potential="geodesic"` it is the shortest way around all discs. That tells what the robot does not see, so it is for
+    learners that are to be told. The task's measure is the time until the goal is reached.
+
+    ## Info
+    That of `SeastarSwim-v0`, and
+
+    | name           | type          | unit | meaning                                                          |
+    |----------------|---------------|------|------------------------------------------------------------------|
+    | `instance`     | int           | -    | number of the episode in its split                               |
+    | `clearance`    | float         | m    | distance of the hub from the nearest rim; below 0 it touches     |
+    | `discs`        | array (11, 3) | m    | all discs in the world: x, y, radius; there are 8 + `scattered`  |
+    | `reward_touch` | float         | 1    | term of the reward                                               |
+
+    `discs` has more than the robot sees.
+
+    ## Arguments
+    distance: Smallest and largest distance of the goal from the start [m].
+    scattered: Number of discs besides the horseshoe.
+    longest_way: Length of the longest way that has to be swum [m].
+    potential: What progress is measured by: "straight" or "geodesic".
+    touch: Weight of the term `reward_touch`.
+    reward: Weights of the other terms.
+    """
+
+    distance: Range = (0.45, 0.55)
+    scattered: int = 3
+    longest_way: float = 0.85
+    potential: Potential = "straight"
+    touch: float = 20.0
+    reward: RewardWeights = RewardWeights()
+
+    def __post_init__(self) -> None:
+        require_range("ObstTrap.distance", self.distance, "m")
+        nearest, farthest = self.distance
+        if nearest < NEAREST_GOAL or farthest > FARTHEST_GOAL:
+            bounds = f"{NEAREST_GOAL} to {FARTHEST_GOAL} m"
+            raise ValueError(f"ObstTrap.distance must lie from {bounds}, not {self.distance}.")
+        require_count("ObstTrap.scattered", self.scattered, 0, 20)
+        require_number("ObstTrap.longest_way", self.longest_way, "m")
+        require_choice("ObstTrap.potential", self.potential, get_args(Potential))
+        require_number("ObstTrap.touch", self.touch, "1", zero_allowed=True)
+
+    def swimming(self, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any) -> "ObstTrapTask":
+        """The task of so many robots."""
+        return ObstTrapTask(self, scene, n_robots, threads, split, **how)
+
+
+HORSESHOE = np.radians(np.linspace(-110.0, 110.0, 8))
+"""Directions of the discs of a horseshoe from its centre [rad]; the goal lies at 0."""
+ARC: Range = (0.1, 0.13)
+"""Radius of the arc on which their centres lie [m]."""
+OVERLAP = 0.6
+"""Their radius, as a share of the distance of neighbours: more than a half, so that they overlap."""
+ASIDE = 0.03
+"""Largest distance of the horseshoe's centre from the straight way [m]."""
+RADIUS: Range = (0.02, 0.045)
+"""Radius of a scattered disc [m]."""
+AROUND = 0.06
+"""Clearance of the start and of the goal [m]."""
+PASSAGE, SOLVING_STEP, STEP = 0.015, 0.02, 0.01
+"""Clearance of the way that is asked for, and steps of the grids of draws and of the geodesic potential [m]."""
+NEAREST_GOAL, FARTHEST_GOAL = 0.45, 0.6
+"""Between nearer goals and the start there is no room for a horseshoe; farther ones are too near to the grid's end."""
+MOST_DRAWS = 1000
+START = np.zeros((1, 2))
+
+
+def draw_discs(rng: np.random.Generator, goal: Floats, scattered: int, longest_way: float) -> Floats:
+    """Discs around which there is a way from the origin to the goal [m] on the x axis, shape (8 + scattered, 3).
+
+    ValueError: none were found.
+    """
+    for _ in range(MOST_DRAWS):
+        arc = rng.uniform(*ARC)
+        radius = OVERLAP * arc * 2.0 * np.sin(0.5 * (HORSESHOE[1] - HORSESHOE[0]))
+        centre = np.array([0.5 * goal[0] + rng.uniform(-0.02, 0.03), rng.uniform(-ASIDE, ASIDE)])
+        on_arc = centre + arc * np.stack([np.cos(HORSESHOE), np.sin(HORSESHOE)], axis=1)
+        others = rng.uniform([-0.05, -0.25], [goal[0] + 0.05, 0.25], (scattered, 2))
+        radii = np.concatenate([np.full(len(HORSESHOE), radius), rng.uniform(*RADIUS, scattered)])
+        discs = np.column_stack([np.concatenate([on_arc, others]), radii])
+        clear = min(rims(np.zeros(2), discs).min(), rims(goal, discs).min()) >= AROUND
+        outside = (rims(centre, discs[len(HORSESHOE) :]) >= arc + radius).all()
+        if clear and outside and ways(discs, goal, PASSAGE, SOLVING_STEP)(START)[0] <= longest_way:
+            return discs
+    raise ValueError(f"Of {MOST_DRAWS} fields of discs none can be passed: ask for fewer discs, or for longer ways.")
+
+
+class ObstTrapTask(Numbered, SwimTask):
+    """Task of robots that swim around discs."""
+
+    TERMS = (*SwimTask.TERMS, "reward_touch")
+    own_numbers = OwnNumbers(("vector", "scalar") * SEEN)
+
+    def __init__(self, about: ObstTrap, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any):
+        self.about = about
+        self.discs = np.zeros((n_robots, len(HORSESHOE) + about.scattered, 3))
+        self._is_geodesic = about.potential == "geodesic"
+        self._ways = Ways(np.zeros((n_robots, 1, 1)), STEP)
+        goal = np.array([[about.distance[0], 0.0]])
+        SwimTask.__init__(self, scene, n_robots, goal, about.reward, 0.01, True, threads, **how)
+        if self._is_geodesic:
+            shape = ways(np.zeros((0, 3)), goal[0], 0.0, STEP).lengths.shape
+            self._ways = Ways(np.zeros((n_robots, *shape)), STEP)
+        self._number(split)
+
+    def _draw(self, robot: int, rng: np.random.Generator, asked: Any) -> None:
+        goal = np.array([rng.uniform(*self.about.distance), 0.0])
+        self._set_path(robot, goal[None])
+        self.discs[robot] = draw_discs(rng, goal, self.about.scattered, self.about.longest_way)
+        if self._is_geodesic:
+            self._ways.lengths[robot] = ways(self.discs[robot], goal, PASSAGE, STEP).lengths
+
+    def _measure_way_to_go(self, hub: Floats) -> Floats:
+        if not self._is_geodesic:
+            return super()._measure_way_to_go(hub)
+        return self._ways(hub[:, None])[:, 0]
+
+    def clearance(self, hub: Floats) -> Floats:
+        """Distance of hubs [m], shape (n_robots, 2), from the nearest rim [m], shape (n_robots,)."""
+        return np.asarray(rims(hub, self.discs).min(axis=1))
+
+    def _score(self, hub: Floats, pulses: Floats) -> Score:
+        score = super()._score(hub, pulses)
+        touches = self.clearance(hub) < 0.0
+        terms = {**score.terms, "reward_touch": -self.about.touch * touches.astype(np.float64)}
+        return Score(terms, score.success & ~touches, score.over | touches)
+
+    def _wanted(self) -> Floats:
+        hub = self.simulator.hub_position()
+        order = np.argsort(rims(hub, self.discs), axis=1, kind="stable")[:, :SEEN]
+        nearest = np.take_along_axis(self.discs, order[..., None], axis=1)
+        seen = np.concatenate([self._in_body_frame(nearest[..., :2] - hub[:, None]), nearest[..., 2:]], axis=-1)
+        return seen.reshape(self.n_robots, -1) / self.scene.robot.limb_length
+
+    def _goal_facts(self, hub: Floats) -> dict[str, NDArray[Any]]:
+        return {**super()._goal_facts(hub), "clearance": self.clearance(hub), "discs": self.discs.copy()}
+
+    def scenery(self, robot: int) -> Scenery:
+        """The discs, and the end of who touched one."""
+        touches = self.clearance(self.simulator.hub_position())[robot] < 0.0
+        return Scenery(
+            obstacles=tuple(Ring(disc[:2], float(disc[2])) for disc in self.discs[robot]),
+            progress="touched a disc" if touches else None,
+        )

@@ -1,0 +1,209 @@
+"""`SeastarPrizes-v0`: prizes of different worth, more than can be reached in time."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.envs.own_numbers import OwnNumbers
+from seastar_gym.envs.scenery import Ring, Scenery
+from seastar_gym.envs.swimming import Flags, Floats, Score, Swimming
+from seastar_gym.envs.tasks.challenge import Challenge
+from seastar_gym.envs.tasks.numbered import Numbered, Split
+from seastar_gym.envs.tasks.rounds import best_round, distances, greedy_round
+from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.serial import register_part
+
+
+@register_part
+@dataclass(frozen=True)
+class Prizes(Challenge):
+    """Ten prizes of different worth, more than can be reached in time, among which the greedy choice is a poor one.
+
+    Nothing is hidden. A controller that always swims to the prize of most worth per metre gets much less than one that
+    chooses a round.
+
+    ## Episode
+    Ten prizes worth 1, 1, 2 or 4 lie anywhere in a square of `side` around the robot, which has a random heading. A
+    prize is taken where a decision ends with the hub within `radius` of it, until `seconds` have passed; the episode
+    ends when all are taken. Only draws are kept in which the best round brings a point that swims at `robot_speed` at
+    least 1 + `gain` times as much as the greedy one.
+
+    ## Observation
+    That of `SeastarSwim-v0`, with the nearest and the second nearest prize in the places of the current and of the next
+    waypoint, and all prizes, nearest first; places for strokes, and for decisions every 0.5 s:
+
+    | strokes  | timed    | meaning                                                        | unit  | range |
+    |----------|----------|----------------------------------------------------------------|-------|-------|
+    | 0..181   | 0..181   | stations of limbs and the hub, as in `SeastarSwim-v0`          | -     | -     |
+    |          | 182..191 | limb after limb: contractions of its wires                     | 1     | 0..1  |
+    | 182..212 | 192..222 | prize after prize: its place relative to the hub in the body   | 0.1 m | -     |
+    |          |          | frame, x and y; its worth; three zeros for each that is taken. | 1     | 0..4  |
+    |          |          | Then the share of time that is left                            | 1     | 0..1  |
+    | 213..216 | 223..226 | nearest and second nearest prize relative to the hub; the same | 0.1 m | -     |
+    |          |          | one where one is left, the hub where none is                   |       |       |
+
+    ## Reward
+    | term              | meaning                                                        | default weight |
+    |-------------------|----------------------------------------------------------------|----------------|
+    | `reward_progress` | increase of the attraction of the prizes that are left: sum of | 2 per worth    |
+    |                   | worth times exp(-distance/0.1 m)                               |                |
+    | `reward_prize`    | worth of the prizes taken in the decision                      | 5 per worth    |
+    | `reward_effort`   | minus the time for which wires were heated, in pulses          | 0.01 per pulse |
+
+    The task's measure is the worth of all prizes taken.
+
+    ## Info
+    That of `SeastarSwim-v0` without `waypoint_index`, `cross_track_error`, `energy_per_metre` and `reward_waypoint`;
+    `is_success` says whether all prizes are taken. Besides,
+
+    | name           | type          | unit | meaning                                                 |
+    |----------------|---------------|------|---------------------------------------------------------|
+    | `instance`     | int           | -    | number of the episode in its split                      |
+    | `distance`     | float         | m    | distance of the hub from the nearest prize that is left |
+    | `taken`        | float         | 1    | worth of the prizes taken so far                        |
+    | `prizes`       | array (10, 3) | m, 1 | prizes in the world: x, y, worth; 0 if taken            |
+    | `reward_prize` | float         | 1    | term of the reward                                      |
+
+    ## Arguments
+    side: Side of the square [m].
+    radius: Distance [m] within which a prize is taken.
+    seconds: Time in which prizes can be taken [s].
+    robot_speed: Speed of the point whose rounds are compared [m/s].
+    gain: What the best round brings more than the greedy one, as a fraction of the latter.
+    progress, prize, effort: Weights of the reward's terms.
+    """
+
+    side: float = 0.7
+    radius: float = 0.015
+    seconds: float = 200.0
+    robot_speed: float = 0.004
+    gain: float = 0.4
+    progress: float = 2.0
+    prize: float = 5.0
+    effort: float = 0.01
+
+    def __post_init__(self) -> None:
+        for name, unit in (("side", "m"), ("radius", "m"), ("seconds", "s"), ("robot_speed", "m/s")):
+            require_number(f"Prizes.{name}", getattr(self, name), unit)
+        for name in ("gain", "progress", "prize", "effort"):
+            require_number(f"Prizes.{name}", getattr(self, name), "1", zero_allowed=True)
+
+    def swimming(self, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any) -> "PrizesTask":
+        """The task of so many robots."""
+        return PrizesTask(self, scene, n_robots, threads, split, **how)
+
+
+WORTHS = np.array([1.0, 1.0, 2.0, 4.0])
+N_PRIZES = 10
+ATTRACTION = 0.1
+"""Distance over which a prize attracts [m]."""
+MOST_DRAWS = 1000
+
+
+def draw_prizes(rng: np.random.Generator, about: Prizes) -> Floats:
+    """Prizes around the origin: x, y [m], worth; shape (N_PRIZES, 3). ValueError: none were found."""
+    way = about.robot_speed * about.seconds
+    for _ in range(MOST_DRAWS):
+        places = rng.uniform(-0.5 * about.side, 0.5 * about.side, (N_PRIZES, 2))
+        worth = rng.choice(WORTHS, N_PRIZES)
+        first, between = np.hypot(places[:, 0], places[:, 1]), distances(places)
+        wanted = (1.0 + about.gain) * greedy_round(first, between, worth, way)
+        if first.min() <= about.radius or wanted > worth.sum():
+            continue
+        if best_round(first, between, worth, way).worth >= wanted:
+            return np.column_stack([places, worth])
+    raise ValueError(f"Of {MOST_DRAWS} draws of prizes, the best round brings so much more in none: ask for less gain.")
+
+
+class PrizesTask(Numbered, Swimming):
+    """Task of robots that take prizes."""
+
+    TERMS = ("reward_progress", "reward_prize", "reward_effort")
+    own_numbers = OwnNumbers(("vector", "scalar") * N_PRIZES + ("scalar",))
+
+    def __init__(self, about: Prizes, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any):
+        Swimming.__init__(self, scene, n_robots, threads, random_heading=True, **how)
+        self.about, self.waypoint_radius = about, about.radius
+        self.prizes = np.zeros((n_robots, N_PRIZES, 3))
+        self.taken = np.zeros(n_robots)
+        self._hub = np.zeros((n_robots, 2))
+        self._number(split)
+
+    def _draw(self, robot: int, rng: np.random.Generator, asked: Any) -> None:
+        self.prizes[robot] = draw_prizes(rng, self.about)
+
+    def _begin(self, robots: Flags) -> None:
+        self.taken[robots] = 0.0
+        self._hub = self.simulator.hub_position()
+
+    def waypoints_of(self, robot: int) -> Floats:
+        """None."""
+        return np.zeros((0, 2))
+
+    def _distances(self, hub: Floats) -> Floats:
+        """Distances of hubs from the prizes that are left [m], shape (n_robots, N_PRIZES); infinite from others."""
+        away = self.prizes[..., :2] - hub[:, None]
+        return np.where(self.prizes[..., 2] > 0.0, np.hypot(away[..., 0], away[..., 1]), np.inf)
+
+    def _nearest_first(self, hub: Floats) -> Floats:
+        """Prizes relative to the hub, nearest first: x, y [m], worth; then zeros for those that are taken."""
+        far = self._distances(hub)
+        order = np.argsort(far, axis=1, kind="stable")[..., None]
+        seen = np.concatenate([self.prizes[..., :2] - hub[:, None], self.prizes[..., 2:]], axis=-1)
+        return np.take_along_axis(np.where(np.isinf(far)[..., None], 0.0, seen), order, axis=1)
+
+    def _targets(self) -> Floats:
+        hub = self.simulator.hub_position()
+        near = self._nearest_first(hub)
+        second = np.where(near[:, 1, 2:] > 0.0, near[:, 1, :2], near[:, 0, :2])
+        return np.concatenate([hub + near[:, 0, :2], hub + second], axis=1)
+
+    def _wanted(self) -> Floats:
+        near = self._nearest_first(self.simulator.hub_position())
+        places = self._in_body_frame(near[..., :2]) / self.scene.robot.limb_length
+        seen = np.concatenate([places, near[..., 2:]], axis=-1).reshape(self.n_robots, -1)
+        return np.column_stack([seen, self._share_left()])
+
+    def _share_left(self) -> Floats:
+        """Share of time that is left."""
+        return np.maximum(0.0, 1.0 - self.simulator.time / self.about.seconds)
+
+    def _score(self, hub: Floats, pulses: Floats) -> Score:
+        about, worth = self.about, self.prizes[..., 2]
+        before, after = (np.exp(-self._distances(at) / ATTRACTION) for at in (self._hub, hub))
+        in_time = self.simulator.time <= about.seconds * (1.0 + ROUNDING)
+        reached = (self._distances(hub) <= about.radius) & in_time[:, None]
+        gained = np.where(reached, worth, 0.0).sum(axis=1)
+        terms = {
+            "reward_progress": about.progress * (worth * (after - before)).sum(axis=1),
+            "reward_prize": about.prize * gained,
+            "reward_effort": -about.effort * pulses,
+        }
+        worth[reached] = 0.0
+        self.taken += gained
+        self._hub = hub.copy()
+        none_left = (worth == 0.0).all(axis=1)
+        return Score(terms, none_left, none_left)
+
+    def _goal_facts(self, hub: Floats) -> dict[str, NDArray[Any]]:
+        nearest = self._distances(hub).min(axis=1)
+        return {
+            "distance": np.where(np.isinf(nearest), 0.0, nearest),
+            "taken": self.taken.copy(),
+            "prizes": self.prizes.copy(),
+        }
+
+    def scenery(self, robot: int) -> Scenery:
+        """The prizes that are left, and what they are worth."""
+        left = self.prizes[robot, self.prizes[robot, :, 2] > 0.0]
+        return Scenery(
+            rings=tuple(Ring(prize[:2], self.about.radius, f"{prize[2]:g}") for prize in left),
+            progress=f"{self.taken[robot]:g} taken, {left[:, 2].sum():g} left",
+        )
+
+
+ROUNDING = 1e-9
+"""Share of a time that is no time."""

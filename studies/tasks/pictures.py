@@ -1,0 +1,58 @@
+"""Pictures of the tasks: a held-out episode of each in strokes, as far as a controller swims it in some time.
+
+python -m studies.tasks.pictures
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from seastar_gym.command import run_command
+from studies.parser import study_parser
+from studies.tasks.controllers import make_controller
+from studies.tasks.episodes import make_batch
+
+SHOWN: dict[str, tuple[str, str, int]] = {
+    "miswired": ("SeastarMiswired-v0", "adaptive", 120),
+    "fail-blind": ("SeastarFailBlind-v0", "adaptive", 150),
+    "obst-trap": ("SeastarObstTrap-v0", "adaptive", 150),
+    "prey": ("SeastarPrey-v0", "adaptive", 60),
+    "station": ("SeastarStation-v0", "adaptive", 60),
+    "prizes": ("SeastarPrizes-v0", "informed", 110),
+}
+"""Id, controller and number of strokes, by name of the challenge."""
+
+
+def picture(id: str, controller: str, strokes: int) -> NDArray[np.uint8]:
+    """Picture of the first held-out episode of a task after so many strokes, or before its end."""
+    batch = make_batch(id, 1, "test", "fast", 1, render_mode="rgb_array")
+    agent: Any = make_controller(controller, batch)
+    observations, info = batch.reset(seed=0, options={"instance": 0})
+    pictures: Any = batch.render()
+    for _ in range(strokes):
+        observations, _, terminated, truncated, info = batch.step(agent.act(observations, info))
+        pictures = batch.render()
+        if terminated[0] or truncated[0]:
+            break
+    batch.close()
+    return np.asarray(pictures[0])
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; returns the exit code."""
+    parser = study_parser("studies.tasks.pictures", __doc__)
+    parser.add_argument("--out", type=Path, default=Path("docs/tasks"), help="folder (default: %(default)s)")
+    options = parser.parse_args(arguments)
+    options.out.mkdir(parents=True, exist_ok=True)
+    for name, shown in SHOWN.items():
+        Image.fromarray(picture(*shown)).save(options.out / f"{name}.png", optimize=True)
+        print(name, flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    run_command(main)
