@@ -14,7 +14,7 @@ import numpy as np
 import pyarrow.parquet
 
 from seastar_gym.command import run_command
-from seastar_gym.scene import Scene
+from seastar_gym.scene import Numerics, Scene
 from seastar_gym.scene.body import Body
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.executors import Executor
@@ -38,7 +38,10 @@ RADII = {"point": 0.0, "disc": 5e-3}
 GYRATION = 5e-3
 """Radius of the uniform disc whose moment of inertia the hub has, with a size or without [m]."""
 SWIM = Swim(settling=8, measured=8)
-FIDELITIES = ("fast", "reference")
+FINE = Numerics("sdirk3", 1e-3, 1e-8)
+"""Numerics of the check, with the nodes of `reference`, whose midpoint rule gathers energy in robots of heavy limbs
+whose hub weighs next to nothing."""
+SETTINGS = ("fast", "fine")
 
 
 class Curve(NamedTuple):
@@ -48,9 +51,9 @@ class Curve(NamedTuple):
     gait: str
     factor: float
 
-    def cell(self, fidelity: str, shares: tuple[float, ...] = SHARES) -> Cell:
+    def cell(self, setting: str, shares: tuple[float, ...] = SHARES) -> Cell:
         """The robots, side by side."""
-        scene, share = with_hub(RADII[self.hub], fidelity), np.array(shares)
+        scene, share = with_hub(RADII[self.hub], setting), np.array(shares)
         hub = share * self.factor * limbs_mass()
         numbers = {
             "robot.density": (1.0 - share) * self.factor * scene.robot.density,
@@ -69,23 +72,23 @@ def limbs_mass() -> float:
     return float(robot.n_limbs * robot.density * np.pi * robot.rod_radius**2 * robot.limb_length)
 
 
-def with_hub(radius: float, fidelity: str) -> Scene:
+def with_hub(radius: float, setting: str) -> Scene:
     """The chapter's robot with a body of this radius [m], as high as its limbs are thick."""
-    scene = Scene.preset(fidelity)
+    scene = Scene.preset("fast") if setting == "fast" else replace(Scene.preset("reference"), numerics=FINE)
     body = Body(radius, height=2.0 * scene.robot.rod_radius, mass=limbs_mass(), inertia=1.0)
     return replace(scene, robot=replace(scene.robot, body=body))
 
 
 def study(folder: Path, executor: Executor) -> Table:
-    """Swim all curves; returns speeds [mm/s] by fidelity, hub, gait and factor, one for each share."""
-    cells = {(fidelity, curve): curve.cell(fidelity) for fidelity in FIDELITIES for curve in CURVES}
+    """Swim all curves; returns speeds [mm/s] by setting, hub, gait and factor, one for each share."""
+    cells = {(setting, curve): curve.cell(setting) for setting in SETTINGS for curve in CURVES}
     tally = run(iter(cells.values()), folder, executor)
     if tally.problems:
         raise ValueError(f"{len(tally.problems)} cells have no results: run the command again.")
     found: Table = {"shares": [round(share, 3) for share in SHARES], "mass_kg": limbs_mass(), "mm_per_s": {}}
-    for (fidelity, curve), cell in cells.items():
+    for (setting, curve), cell in cells.items():
         table = pyarrow.parquet.read_table(Parts(folder).file(cell.name))
-        by_hub = found["mm_per_s"].setdefault(fidelity, {}).setdefault(curve.hub, {})
+        by_hub = found["mm_per_s"].setdefault(setting, {}).setdefault(curve.hub, {})
         speeds = [round(MM * speed, 3) for speed in table.column("speed").to_pylist()]
         by_hub.setdefault(curve.gait, {})[f"{curve.factor:g}"] = speeds
     return found
@@ -98,7 +101,7 @@ def draw(found: Table, file: Path) -> None:
     for ax, gait in zip(axes.flat, GAITS, strict=True):
         for k, factor in enumerate(FACTORS):
             for hub, style in (("point", "-"), ("disc", "--")):
-                speeds = found["mm_per_s"]["fast"][hub][gait][f"{factor:g}"]
+                speeds = found["mm_per_s"]["fine"][hub][gait][f"{factor:g}"]
                 label = f"{factor:g} x, {hub}" if factor == 1.0 or hub == "point" else None
                 ax.plot(shares, speeds, style, color=f"C{k}", label=label)
         ax.set(title="{" + gait.replace(",", ", ") + "}", ylim=(0.0, None))

@@ -14,7 +14,7 @@ from seastar_gym.scene.per_robot import of_robot
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.frames import frame_with
 from seastar_gym.sweep.swimming import scene_of, swim
-from studies.designs.hub import CURVES, FIDELITIES, SWIM, Curve, draw, limbs_mass
+from studies.designs.hub import CURVES, SETTINGS, SWIM, Curve, draw, limbs_mass
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
@@ -37,11 +37,11 @@ def test_a_point_hub_that_weighs_next_to_nothing_is_the_chapter_s():
 
 def test_the_page_tells_what_was_measured():
     found = json.loads((DOCS / "hub.json").read_text(encoding="utf-8"))
-    assert set(found["mm_per_s"]) == set(FIDELITIES)
+    assert set(found["mm_per_s"]) == set(SETTINGS)
     count = sum(len(speeds) for hubs in found["mm_per_s"]["fast"].values() for speeds in hubs.values())
     assert count == len(CURVES)
     page = (DOCS / "designs.md").read_text(encoding="utf-8")
-    straight = found["mm_per_s"]["reference"]["point"]["1-,3+"]["1"]
+    straight = found["mm_per_s"]["fine"]["point"]["1-,3+"]["1"]
     for share in (0.0, 0.5, 0.9):
         assert f"{straight[found['shares'].index(share)]:.2f}" in page
 
