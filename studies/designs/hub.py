@@ -39,9 +39,13 @@ GYRATION = 5e-3
 """Radius of the uniform disc whose moment of inertia the hub has, with a size or without [m]."""
 SWIM = Swim(settling=8, measured=8)
 FINE = Numerics("sdirk3", 1e-3, 1e-8)
-"""Numerics of the check, with the nodes of `reference`, whose midpoint rule gathers energy in robots of heavy limbs
+"""Numerics of the figures, with the nodes of `reference`, whose midpoint rule gathers energy in robots of heavy limbs
 whose hub weighs next to nothing."""
 SETTINGS = ("fast", "fine")
+
+
+TOP = 10.5
+"""Largest speed of the axes [mm/s]."""
 
 
 class Curve(NamedTuple):
@@ -96,21 +100,20 @@ def study(folder: Path, executor: Executor) -> Table:
 
 def draw(found: Table, file: Path) -> None:
     """Picture: speed over the share of mass in the hub, a panel for each gait."""
-    figure, axes = subplots(2, 2, figsize=(7.6, 6.4), sharex=True)
+    figure, axes = subplots(2, 2, figsize=(7.6, 6.4), sharex=True, sharey=True)
     shares = 100.0 * np.array(found["shares"])
     for ax, gait in zip(axes.flat, GAITS, strict=True):
         for k, factor in enumerate(FACTORS):
             for hub, style in (("point", "-"), ("disc", "--")):
                 speeds = found["mm_per_s"]["fine"][hub][gait][f"{factor:g}"]
-                label = f"{factor:g} x, {hub}" if factor == 1.0 or hub == "point" else None
+                label = f"{factor:g} x" if hub == "point" else f"{factor:g} x, disc" if k == 0 else None
                 ax.plot(shares, speeds, style, color=f"C{k}", label=label)
-        ax.set(title="{" + gait.replace(",", ", ") + "}", ylim=(0.0, None))
-        ax.grid(True)
+        ax.set(title="{" + gait.replace(",", ", ") + "}", ylim=(0.0, TOP))
     for ax in axes[1]:
         ax.set_xlabel("share of the mass in the hub [%]")
     for ax in axes[:, 0]:
         ax.set_ylabel("speed [mm/s]")
-    axes[0, 0].legend(fontsize=8, title="mass over the chapter's, hub", title_fontsize=8)
+    axes[0, 0].legend(fontsize=8, title="mass over the chapter's", title_fontsize=8, loc="upper left")
     figure.savefig(file, dpi=DPI)
 
 
