@@ -30,7 +30,6 @@ def configuration(options: Options) -> PPOConfig:
     ppo = options.ppo
     return (
         PPOConfig()
-        .api_stack(enable_rl_module_and_learner=True, enable_env_runner_and_connector_v2=True)
         .environment(NAME, env_config=env_config(options))
         .env_runners(
             num_env_runners=options.env_runners,

@@ -1,5 +1,6 @@
 """Trains on several machines: python -m agents.rllib --address head:6379 --env-runners 16 --out runs/cluster."""
 
+import logging
 import sys
 from collections.abc import Sequence
 
@@ -16,6 +17,7 @@ from seastar_gym.sweep.executors.on_ray import connect
 
 def run(options: Options) -> int:
     """Train; returns the exit code."""
+    logging.getLogger("ray.rllib").setLevel(logging.ERROR)  # it warns that its defaults are the new ones
     torch.set_num_threads(1)  # more are slower on so small a network
     if options.resume is None:
         claim(options.out)

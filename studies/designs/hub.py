@@ -1,8 +1,8 @@
 """Mass in the hub or in the limbs: how fast robots of equal mass swim, by the share of it that their hub has.
 
 A body of that mass stands for the hub: a point, where limbs meet as the chapter's do, or a disc of 5 mm radius with
-limbs at its rim. Limbs keep their shape and stiffness, and lose in density what the hub gains. All signed pairs of limbs
-are four gaits up to turns, {1-, 2+} to {1-, 5+}. Writes hub.json and hub.png.
+limbs at its rim. Limbs keep their shape and stiffness, and lose in density what the hub gains. All pairs of limbs are
+four gaits up to turns, {1-, 2+} to {1-, 5+}. Writes hub.json and hub.png.
 """
 
 import json
