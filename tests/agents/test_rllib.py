@@ -121,7 +121,8 @@ def test_a_run_leaves_a_policy_and_goes_on_where_it_was(tmp_path):
     rates, longer = [], replace(wanted, strokes=512)
 
     def watch(done):
-        rates.append((done.strokes, done.algorithm.learner_group._learner._get_learning_rate()))
+        optimiser = done.algorithm.learner_group._learner.get_optimizer("default_policy")
+        rates.append((done.strokes, optimiser.param_groups[0]["lr"]))
         return True
 
     again = train(longer, watch)
