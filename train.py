@@ -38,8 +38,9 @@ try:
     from agents.training import efficiency
     from agents.training.box import put_in_the_box
     from agents.training.folder import claim, export, is_unbegun, recorded, resume_command, write_config
+    from agents.training.interruption import Interruption
     from agents.training.options import Options, read_options, require_consent
-    from agents.training.watch import Interruption, Watch
+    from agents.training.watch import Watch
     from seastar_gym.command import refused_by_disk
     from seastar_gym.controllers.contract import Policy
     from seastar_gym.controllers.learned import load as load_policy

@@ -105,7 +105,7 @@ def test_every_base_dependency_is_imported_by_the_package():
     [
         (["seastar_gym"], ["render", "studies", "train", "ray", "slurm", "data"]),
         (["studies"], ["train", "sweep", "test", "data"]),
-        (["agents", "train.py"], ["train"]),
+        (["agents", "train.py"], ["train", "rllib"]),
         (["tests"], ["test", "browser", "ray", "learners"]),
         (["docs"], ["docs", "learners"]),
     ],
@@ -133,9 +133,16 @@ def test_constraints_pin_all_that_gets_installed():
     assert installed_with(requirements("test")) <= set(pins("constraints.txt"))
 
 
-def test_constraints_fit_every_build_of_a_version():
+@pytest.mark.parametrize("file", ["constraints.txt", "constraints-rllib.txt"])
+def test_constraints_fit_every_build_of_a_version(file):
     """A local tag such as +cpu would match one index only."""
-    assert all(version.local is None for version in pins("constraints.txt").values())
+    assert all(version.local is None for version in pins(file).values())
+
+
+def test_rllib_s_environment_differs_by_its_gymnasium_alone():
+    usual, its_own = pins("constraints.txt"), pins("constraints-rllib.txt")
+    assert {name for name in its_own if usual.get(name, its_own[name]) != its_own[name]} == {"gymnasium"}
+    assert all(its_own[canonicalize_name(one.name)] in one.specifier for one in requirements("rllib"))
 
 
 def test_lowest_versions_are_those_of_the_declared_ranges():

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import tempfile
 import time
 from pathlib import Path
 
@@ -39,3 +40,22 @@ def slow(cell):
     """Takes half a second; says on which node of a cluster it was."""
     time.sleep(0.5)
     return os.environ.get("RAY_NODE_ID", "").encode() or str(os.getppid()).encode()
+
+
+def sized(cell):
+    """A file of twelve kilobytes."""
+    return cell.name.encode() * 300
+
+
+def swollen(cell):
+    """A megabyte for the cell named in SWOLLEN, its name for others."""
+    return cell.name.encode() * (25_000 if cell.name == os.environ["SWOLLEN"] else 1)
+
+
+def scratching(cell):
+    """Needs a little of the disk where the cell is run."""
+    time.sleep(0.3)
+    with tempfile.NamedTemporaryFile() as file:
+        file.write(bytes(10_000))
+        file.flush()
+    return cell.name.encode()

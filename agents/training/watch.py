@@ -1,10 +1,8 @@
 """Watch over a training: progress bar, logs, checkpoints, and an orderly stop."""
 
-import signal
 import time
 from collections.abc import Callable
 from pathlib import Path
-from types import FrameType
 
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
@@ -19,28 +17,6 @@ from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.swim import Swim, swim
 from seastar_gym.files import write_atomically
-
-
-class Interruption:
-    """Context in which a first Ctrl-C (or a termination) asks for an orderly stop; a second one stops at once."""
-
-    SIGNALS = (signal.SIGINT, signal.SIGTERM)
-
-    def __enter__(self) -> "Interruption":
-        self.requested = False
-        self._before = {number: signal.signal(number, self._request) for number in self.SIGNALS}
-        return self
-
-    def _request(self, number: int, frame: FrameType | None) -> None:
-        self.requested = True
-        self._restore()
-
-    def _restore(self) -> None:
-        for number, handler in self._before.items():
-            signal.signal(number, handler)
-
-    def __exit__(self, *exception: object) -> None:
-        self._restore()
 
 
 class Watch(BaseCallback):

@@ -113,6 +113,11 @@ class Sweep:
         return tuple(axis for axis in choices if axis.is_numeric and axis.name in numbers_of(self._first))
 
     @cached_property
+    def _values(self) -> dict[str, Floats]:
+        """Values of `of_robots`, as arrays."""
+        return {axis.name: np.array(axis.values, np.float64) for axis in self.of_robots}
+
+    @cached_property
     def of_frames(self) -> tuple[Choices, ...]:
         """Choices of which every combination needs cells of its own."""
         choices = [axis for axis in self.axes if isinstance(axis, Choices)]
@@ -177,5 +182,5 @@ class Sweep:
         numbers = {axis.name: axis.at(drawn[sample, k]) for k, axis in enumerate(self.ranges)}
         for axis in reversed(self.of_robots):
             places, which = np.divmod(places, len(axis.values))
-            numbers[axis.name] = np.asarray(axis.values, np.float64)[which]
+            numbers[axis.name] = self._values[axis.name][which]
         return numbers

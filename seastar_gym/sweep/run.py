@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
+from seastar_gym.command import refused_by_disk
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.executors import Executor, Outcome, Work
 from seastar_gym.sweep.parts import Parts, part_of
@@ -12,6 +13,8 @@ ATTEMPTS = 3
 """How often a cell is tried whose worker is lost."""
 MOST_LOST = 1000
 """Cells that wait for another attempt at most. With more, something is wrong with all of them."""
+UNWRITTEN = 10
+"""Parts in a row that the disk refuses at most. With more it is full for good, and what is simulated would be lost."""
 
 
 @dataclass
@@ -47,7 +50,8 @@ def run(
 ) -> Tally:  # fmt: skip
     """Run the cells that have no part in the folder; those that were lost again at the end.
 
-    An interrupt, such as Ctrl-C, leaves the parts of all finished cells. OSError if the disk refuses a part.
+    An interrupt, such as Ctrl-C, leaves the parts of all finished cells. A part that the disk refuses costs its cell,
+    which is lost; OSError if the disk refuses UNWRITTEN in a row.
 
     work: What makes a part of a cell.
     """
@@ -73,16 +77,30 @@ def unfinished(cells: Iterable[Cell], parts: Parts, tally: Tally) -> Iterator[Ce
 
 def _attempt(outcomes: Iterator[Outcome], parts: Parts, tally: Tally, progress: Progress | None) -> list[Outcome]:
     """Write the parts of outcomes; returns those without."""
-    lost = []
+    lost = list[Outcome]()
+    refused = 0
     for outcome in outcomes:
-        if outcome.part is None:
-            lost.append(outcome)
-            tally.losses += 1
-            if len(lost) > MOST_LOST:
-                raise ValueError(f"More than {MOST_LOST} cells failed, the last one so: {outcome.problem}")
-        else:
-            parts.write(outcome.cell.name, outcome.part)
-            tally.count(outcome.cell)
+        try:
+            if outcome.part is not None:
+                parts.write(outcome.cell.name, outcome.part)
+                refused = 0
+        except OSError as failure:
+            refused += 1
+            if refused == UNWRITTEN:
+                raise
+            outcome = Outcome(outcome.cell, None, refused_by_disk(failure))
+        _count(outcome, lost, tally)
         if progress is not None:
             progress(tally)
     return lost
+
+
+def _count(outcome: Outcome, lost: list[Outcome], tally: Tally) -> None:
+    """Count an outcome. ValueError if too many are lost."""
+    if outcome.part is not None:
+        tally.count(outcome.cell)
+        return
+    lost.append(outcome)
+    tally.losses += 1
+    if len(lost) > MOST_LOST:
+        raise ValueError(f"More than {MOST_LOST} cells failed, the last one so: {outcome.problem}")

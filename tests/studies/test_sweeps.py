@@ -8,7 +8,9 @@ if find_spec("pyarrow") is None:
     pytest.skip("the extra sweep is not installed", allow_module_level=True)
 
 from seastar_gym.sweep.executors.here import Here
-from studies.speed.sweeps import nothing, seconds_per_cell, sweep_of
+from seastar_gym.sweep.executors.processes import Processes
+from studies.speed.sweep_memory import PLANS, grid, growth, planned
+from studies.speed.sweeps import cluster, nothing, seconds_per_cell, sweep_of
 
 
 def test_time_is_counted_per_cell_after_the_start():
@@ -16,3 +18,32 @@ def test_time_is_counted_per_cell_after_the_start():
     assert sweep.n_cells == 5
     per_cell, start = seconds_per_cell(sweep, Here(), nothing)
     assert per_cell > 0.0 and start > 0.0
+
+
+def test_a_cluster_is_as_fast_as_its_workers_until_one_process_cannot_give_more():
+    large = cluster(rate=10_000.0, workers=2, overhead=1e-3, strokes=10_000)
+    assert large["strokes per second"] == 64 * 10_000.0 and large["nodes kept busy"] == 64.0
+    assert large["time of a cell [s]"] == 2.0
+    small = cluster(rate=10_000.0, workers=2, overhead=1e-3, strokes=10)
+    assert small["strokes per second"] == 10_000.0 and small["nodes kept busy"] == 1.0
+    enough = cluster(10_000.0, 2, 1e-3, round(small["strokes of a cell that keeps all nodes busy"]))
+    assert enough["nodes kept busy"] == 64.0
+
+
+def test_planning_a_grid_holds_the_same_for_any_number_of_cells():
+    few, many = planned("grid of three axes", 1_000, 500), planned("grid of three axes", 1_000_000, 2_000)
+    assert grid(1_000_000).n_cells == 1_000_000
+    assert many < few + 1.0 < 10.0
+
+
+@pytest.mark.parametrize("plan", PLANS)
+def test_planning_holds_less_than_a_kilobyte_for_ten_cells(plan):
+    assert planned(plan, 100_000, 200) < 10.0 + 100_000 / 10 / 1000
+
+
+@pytest.mark.slow
+def test_a_sweep_of_a_hundred_thousand_cells_does_not_grow(tmp_path):
+    found = growth(100_000, Processes(2), tmp_path)
+    print(found)
+    assert found[-1][0] >= 100_000
+    assert found[-1][1] < found[0][1] + 20.0

@@ -63,3 +63,42 @@ def test_an_address_has_a_port():
 
     with assert_refused("HOST:PORT", "head"):
         next(RayTasks("head").run(works.named, iter(())))
+
+
+@pytest.mark.slow
+def test_a_full_disk_on_a_node_costs_cells_that_need_it(cluster, tmp_path, small_disk):
+    """One node of three has no room. Its cells are run again, elsewhere by luck; a later run does the rest."""
+    from seastar_gym.sweep.executors.on_ray import RayTasks
+
+    place, grow = small_disk(size=4096)
+    (place / "filler").write_bytes(bytes(4096))
+    cluster.add_node(num_cpus=1, env_vars={"TMPDIR": str(place), "NUMBA_CACHE_DIR": str(place)})
+    axis = Range("robot.limb_length", 0.05, 0.15).spaced(30)
+    sweep = Sweep(Scene.preset("fast"), (axis,), settling=0, measured=1, robots=1)
+    tally = run(sweep.cells(), tmp_path / "out", RayTasks(cluster.address), work=works.scratching)
+    print(f"{tally.done} cells done, {tally.losses} attempts refused, {len(tally.problems)} cells without result")
+    assert tally.losses >= 1 and tally.done + len(tally.problems) == 30 and tally.done >= 15
+    assert all("no space left on device" in problem for problem in tally.problems.values())
+    grow()
+    again = run(sweep.cells(), tmp_path / "out", RayTasks(cluster.address), work=works.scratching)
+    assert again.kept == tally.done and again.done == len(tally.problems) and not again.problems
+
+
+@pytest.mark.slow
+def test_simulating_needs_no_disk_on_a_node(cluster, tmp_path, small_disk):
+    """A node that can keep no compiled code compiles in every process, and gives the same bits."""
+    from seastar_gym.sweep.executors.here import Here
+    from seastar_gym.sweep.executors.on_ray import RayTasks
+
+    place, _ = small_disk(size=4096)
+    (place / "filler").write_bytes(bytes(4096))
+    for node in cluster.nodes:
+        cluster.remove_node(node, allow_graceful=True)
+    cluster.add_node(num_cpus=1, env_vars={"TMPDIR": str(place), "NUMBA_CACHE_DIR": str(place)})
+    axis = Range("robot.limb_length", 0.05, 0.15).spaced(4)
+    sweep = Sweep(Scene.preset("fast"), (axis,), settling=0, measured=1, robots=2)
+    tally = run(sweep.cells(), tmp_path / "full", RayTasks(cluster.address))
+    assert tally.done == 2 and not tally.losses
+    run(sweep.cells(), tmp_path / "here", Here())
+    for name in Parts(tmp_path / "here").names():
+        assert Parts(tmp_path / "full").file(name).read_bytes() == Parts(tmp_path / "here").file(name).read_bytes()

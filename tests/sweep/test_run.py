@@ -2,6 +2,7 @@
 
 import itertools
 import os
+import resource
 from pathlib import Path
 
 import pytest
@@ -75,7 +76,46 @@ def test_an_interrupt_leaves_all_finished_cells(tmp_path, sweep):
     assert run(sweep.cells(), tmp_path, Here(), work=works.named).kept == 2
 
 
-def test_a_full_disk_ends_the_run_and_keeps_what_is_there(tmp_path, sweep, monkeypatch):
+@pytest.fixture
+def largest_file():
+    """Function that limits the size of files that this process writes [bytes], as a quota does."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def test_a_part_that_the_disk_refuses_costs_its_cell_alone(tmp_path, sweep, largest_file, monkeypatch):
+    cells = list(sweep.cells())
+    monkeypatch.setenv("SWOLLEN", cells[1].name)
+    largest_file(100_000)
+    tally = run(iter(cells), tmp_path, Here(), work=works.swollen)
+    assert tally.done == 3 and tally.losses == ATTEMPTS
+    (sentence,) = tally.problems.values()
+    assert sentence.startswith("Cannot write or read ") and sentence.endswith(": file too large.")
+    assert not [file for file in Parts(tmp_path).folder.rglob("*") if file.is_file() and file.suffix != ".parquet"]
+    monkeypatch.setenv("SWOLLEN", "")
+    again = run(iter(cells), tmp_path, Here(), work=works.swollen)
+    assert (again.done, again.kept, again.problems) == (1, 3, {})
+
+
+def test_a_full_disk_keeps_what_is_there_and_the_same_run_goes_on(sweep, small_disk):
+    """Three parts of four have room. What is refused is run again when there is."""
+    place, grow = small_disk(size=44_000)
+    tally = run(sweep.cells(), place, Processes(2), work=works.sized)
+    assert tally.done == 3 and tally.losses == ATTEMPTS
+    assert "no space left on device" in next(iter(tally.problems.values()))
+    grow()
+    again = run(sweep.cells(), place, Processes(2), work=works.sized)
+    assert (again.done, again.kept, again.problems) == (1, 3, {})
+
+
+def test_a_disk_that_gets_room_in_mid_sweep_costs_nothing(sweep, small_disk):
+    place, grow = small_disk(size=44_000)
+    tally = run(sweep.cells(), place, Here(), lambda tally: tally.losses and grow(), works.sized)
+    assert tally.done == 4 and tally.losses == 1 and not tally.problems
+
+
+def test_a_disk_that_is_full_for_good_ends_the_run(tmp_path, sweep, monkeypatch):
     write = Parts.write
 
     def full(self, name, part):
@@ -84,6 +124,7 @@ def test_a_full_disk_ends_the_run_and_keeps_what_is_there(tmp_path, sweep, monke
         write(self, name, part)
 
     monkeypatch.setattr(Parts, "write", full)
+    monkeypatch.setattr("seastar_gym.sweep.run.UNWRITTEN", 2)
     with pytest.raises(OSError, match="No space left"):
         run(sweep.cells(), tmp_path, Processes(2), work=works.named)
     assert len(list(Parts(tmp_path).names())) == 1
@@ -93,7 +134,7 @@ def test_a_full_disk_of_a_worker_is_the_cell_s_problem(tmp_path, sweep):
     tally = run(sweep.cells(), tmp_path, Here(), work=works.refusing)
     assert tally.done == 0 and tally.losses == 4 * ATTEMPTS
     assert set(tally.problems) == {cell.name for cell in sweep.cells()}
-    assert "No space left" in next(iter(tally.problems.values()))
+    assert set(tally.problems.values()) == {"Cannot write or read a file: no space left on device."}
 
 
 @pytest.mark.parametrize("name", [name for name in EXECUTORS if name != "here"])

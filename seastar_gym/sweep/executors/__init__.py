@@ -7,6 +7,7 @@ that is lost costs the cell that it was at.
 from collections.abc import Callable, Iterator
 from typing import NamedTuple, Protocol
 
+from seastar_gym.command import refused_by_disk
 from seastar_gym.sweep.cells import Cell
 
 Work = Callable[[Cell], bytes]
@@ -34,4 +35,6 @@ class Executor(Protocol):
 
 def sentence_of(failure: BaseException) -> str:
     """A failure on one line."""
+    if isinstance(failure, OSError):
+        return refused_by_disk(failure)
     return " ".join(str(failure).split()) or type(failure).__name__

@@ -32,7 +32,7 @@ class RayTasks:
 
     def run(self, work: Work, cells: Iterator[Cell]) -> Iterator[Outcome]:
         """Run all cells. Tasks that are lost with their worker or node are not repeated by Ray."""
-        began = self._connect()
+        began = connect(self.address, self.workers)
         task = ray.remote(num_cpus=1, max_retries=0)(_outcome)
         pending: dict[Any, Cell] = {}
         try:
@@ -46,21 +46,6 @@ class RayTasks:
             if began:
                 ray.shutdown()
 
-    def _connect(self) -> bool:
-        """Whether a connection was made now."""
-        if ray.is_initialized():
-            return False
-        if self.address:
-            require_reachable(self.address)
-        try:
-            ray.init(
-                self.address or "local", num_cpus=None if self.address else self.workers, include_dashboard=None
-                if self.address else False, log_to_driver=False, logging_level="error",
-            )  # fmt: skip
-        except (ConnectionError, RuntimeError) as refused:
-            raise ValueError(f"There is no Ray cluster at {self.address}: {sentence_of(refused)}") from None
-        return True
-
     def _fill(self, pending: dict[Any, Cell], task: Any, work: Work, cells: Iterator[Cell]) -> bool:
         """Give tasks while there is room for them; whether any are under way."""
         room = self.workers or AHEAD * max(1, int(ray.cluster_resources().get("CPU", 1)))
@@ -70,6 +55,23 @@ class RayTasks:
                 break
             pending[task.remote(work, cell)] = cell
         return bool(pending)
+
+
+def connect(address: str | None, workers: int | None) -> bool:
+    """Connect to the cluster of a head, or start one of this machine for None; whether that was done now.
+
+    workers: Processors of a cluster that is started; those of this machine if None.
+    """
+    if ray.is_initialized():
+        return False
+    if address:
+        require_reachable(address)
+    own: dict[str, Any] = {} if address else {"num_cpus": workers, "include_dashboard": False}
+    try:
+        ray.init(address or "local", log_to_driver=False, logging_level="error", **own)
+    except (ConnectionError, RuntimeError) as refused:
+        raise ValueError(f"There is no Ray cluster at {address}: {sentence_of(refused)}") from None
+    return True
 
 
 def require_reachable(address: str) -> None:

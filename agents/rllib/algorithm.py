@@ -1,0 +1,88 @@
+"""PPO of RLlib, set up as train.py's is."""
+
+from math import sqrt
+from typing import Any
+
+from ray.rllib.algorithms.ppo import PPO, PPOConfig
+from ray.rllib.core.rl_module.default_model_config import DefaultModelConfig
+from ray.tune.registry import register_env
+
+from agents.coasting import WAYPOINT_RADIUS
+from agents.rllib.options import Options
+from seastar_gym.adapters.rllib import native_batch
+
+NAME = "seastar"
+PATIENCE = 600.0
+"""Time that env runners have for a rollout [s]: a first one may compile."""
+
+
+def make_algorithm(options: Options) -> PPO:
+    """New learner with its env runners, on the Ray cluster that is connected."""
+    register_env(NAME, native_batch)
+    return PPO(config=configuration(options))
+
+
+def configuration(options: Options) -> PPOConfig:
+    """Settings: the loss, the network and the schedule of Stable-Baselines3's PPO, in RLlib's words.
+
+    A lost env runner is started again, on another node if its own is gone, while the others go on.
+    """
+    ppo = options.ppo
+    return (
+        PPOConfig()
+        .environment(NAME, env_config=env_config(options))
+        .env_runners(
+            num_env_runners=options.env_runners,
+            num_envs_per_env_runner=ppo.num_envs // options.env_runners,
+            gym_env_vectorize_mode="vector_entry_point",
+            rollout_fragment_length=ppo.rollout,
+            sample_timeout_s=PATIENCE,
+        )
+        .learners(num_learners=0)
+        .rl_module(model_config=network(ppo.hidden))
+        .training(
+            train_batch_size_per_learner=ppo.num_envs * ppo.rollout,
+            minibatch_size=ppo.batch_size,
+            num_epochs=ppo.epochs,
+            lr=[[0, ppo.learning_rate], [options.length, 0.0]],
+            gamma=ppo.discount_per_decision,
+            lambda_=ppo.gae_lambda,
+            clip_param=ppo.clip_range,
+            entropy_coeff=ppo.entropy,
+            use_kl_loss=False,
+            vf_loss_coeff=0.5,
+            vf_clip_param=float("inf"),
+            grad_clip=0.5,
+            grad_clip_by="global_norm",
+        )
+        .fault_tolerance(restart_failed_env_runners=True, delay_between_env_runner_restarts_s=1.0)
+        .debugging(seed=options.seed, log_level="ERROR")
+    )
+
+
+def network(hidden: tuple[int, ...]) -> DefaultModelConfig:
+    """Policy and value network of their own, with tanh and Stable-Baselines3's first weights of hidden layers."""
+    return DefaultModelConfig(
+        fcnet_hiddens=list(hidden),
+        fcnet_activation="tanh",
+        fcnet_kernel_initializer="orthogonal_",
+        fcnet_kernel_initializer_kwargs={"gain": sqrt(2.0)},
+        fcnet_bias_initializer="zeros_",
+        vf_share_layers=False,
+    )
+
+
+def env_config(options: Options) -> dict[str, Any]:
+    """Arguments of the native batch."""
+    ppo = options.ppo
+    return {
+        "symmetry": ppo.symmetry,
+        "max_episode_steps": ppo.max_episode_steps,
+        "decision_period": ppo.decision_period,
+        "path": options.path,
+        "random_heading": options.random_heading,
+        "actions": ppo.actions,
+        "fidelity": options.fidelity,
+        "reward": ppo.reward,
+        "waypoint_radius": WAYPOINT_RADIUS,
+    }

@@ -1,0 +1,107 @@
+"""Options of a training on several machines: from the command line, or from the folder of a run that is continued."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import tyro
+
+from agents.hyperparameters import Hyperparameters
+from agents.training.options import ENOUGH, ENOUGH_IN_TIME, PATH_HELP
+from seastar_gym import RewardWeights
+from seastar_gym.envs.paths import make_path
+from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in
+from seastar_gym.files import write_atomically
+from seastar_gym.scene.checks import require_count
+from seastar_gym.scene.numerics import Fidelity
+
+FILE = "config.json"
+
+
+@dataclass(frozen=True)
+class Options:
+    """Train a swimmer with RLlib's PPO, on this machine or on a cluster of Ray.
+
+    The robots of the hyperparameters are spread over the env runners. Nodes need this package with its extra `rllib`.
+    Continue only runs of people whom you trust: RLlib unpickles its checkpoints."""
+
+    strokes: int | None = None
+    """Length of the training [strokes, or decisions], with which the learning rate ends; by default as in train.py."""
+    env_runners: int = 2
+    """Processes that swim, each with one processor and its share of the robots."""
+    address: str | None = None
+    """Address of a cluster's head, such as head:6379. By default, a cluster of this machine is started."""
+    path: Annotated[str, tyro.conf.arg(help=PATH_HELP)] = "random"
+    random_heading: bool = True
+    """Turn every robot at random at the start of an episode."""
+    fidelity: Fidelity = "fast"
+    """Accuracy of the simulation."""
+    seed: int = 0
+    """Seed of the network, the exploration and the paths."""
+    save_freq: int = 8_192
+    """Interval between checkpoints [strokes]."""
+    out: Path = Path("runs/rllib")
+    """Folder of the run."""
+    resume: Path | None = None
+    """Folder of a run to continue with its own options; strokes, env_runners, address and save_freq may differ."""
+    ppo: Annotated[Hyperparameters, tyro.conf.arg(name="")] = Hyperparameters()
+
+    def __post_init__(self) -> None:
+        for name in ("env_runners", "save_freq"):
+            require_count(name, getattr(self, name), 1, 1_000_000)
+        require_count("strokes", self.length, 1, 2**40)
+        if self.ppo.num_envs % self.env_runners:
+            raise ValueError(f"{self.ppo.num_envs} robots cannot be shared by {self.env_runners} env runners evenly.")
+        if self.ppo.coasting:
+            raise ValueError("Progress by coasting is a reward of train.py, not of trainings with RLlib.")
+        make_path(self.path, np.random.default_rng(0))
+
+    @property
+    def length(self) -> int:
+        """Length of the training [strokes, or decisions]."""
+        if self.strokes is not None:
+            return self.strokes
+        return ENOUGH if self.ppo.decision_period is None else ENOUGH_IN_TIME
+
+    @property
+    def limit(self) -> int:
+        """Time limit of an evaluated swim [decisions]."""
+        return decisions_in(TIME_LIMIT, self.ppo.decision_period)
+
+    def write(self) -> None:
+        """Write the options into the folder of the run."""
+        write_atomically(self.out / FILE, (json.dumps(asdict(self), indent=2, default=str) + "\n").encode())
+
+
+CHANGEABLE = {"strokes", "env_runners", "address", "save_freq", "out", "resume"}
+"""Names of the options that may change when a run is continued."""
+
+
+def read_options(arguments: Sequence[str] | None) -> Options:
+    """Options of the command line; with --resume, those of the run where the command line has no others."""
+    options = tyro.cli(Options, prog="python -m agents.rllib", args=arguments)
+    if options.resume is None:
+        return options
+    saved = saved_options(options.resume)
+    options = tyro.cli(Options, prog="python -m agents.rllib", args=arguments, default=saved)
+    changed = [name for name in saved.__dict__ if getattr(options, name) != getattr(saved, name)]
+    if forbidden := sorted(set(changed) - CHANGEABLE):
+        raise ValueError(f"The run in {options.resume} cannot continue with another {', '.join(forbidden)}.")
+    return replace(options, out=saved.out)
+
+
+def saved_options(folder: Path) -> Options:
+    """Options of the run in a folder."""
+    file = folder / FILE
+    if not file.is_file():
+        raise FileNotFoundError(f"There is no run to continue in {folder}: it has no {FILE}.")
+    try:
+        found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        ppo = found.pop("ppo")
+        ppo |= {"hidden": tuple(ppo["hidden"]), "reward": RewardWeights(**ppo["reward"])}
+        return Options(**{**found, "out": folder, "resume": folder, "ppo": Hyperparameters(**ppo)})
+    except (AttributeError, KeyError, RecursionError, TypeError, ValueError) as damaged:
+        raise ValueError(f"{file} is damaged or from another version: {str(damaged).rstrip('.')}.") from damaged

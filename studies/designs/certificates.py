@@ -1,0 +1,100 @@
+"""Certificates of the robots that won: how far the numbers of designs.json can be trusted, by their total errors.
+
+Robots are those of the table, with its rounded numbers. `seastar_gym.certify` swims random sequences of commands with
+each and compares them with swims of many nodes and short steps: some processor minutes for every robot. Certificates
+are kept in OUT, so that the command goes on with those that are missing. Writes certificates.json.
+"""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from seastar_gym.certification.measure import SAMPLES, certify
+from seastar_gym.command import run_command
+from seastar_gym.scene import Scene, SmaPulse
+from seastar_gym.scene.certificate import Certificate
+from seastar_gym.sweep.cells import Cell
+from seastar_gym.sweep.frames import Swim, frame_with
+from seastar_gym.sweep.swimming import swim
+from studies.designs.space import MEASURED, SETTLING, Body
+from studies.parser import study_parser
+
+Table = dict[str, Any]
+WINNERS = (
+    "fastest", "fastest in its lengths", "fastest at the chapter's length and angle", "fastest of them without taper",
+)  # fmt: skip
+CLASS = "repeated ternary"
+"""Class of commands that are repeated, as the study's are."""
+NODES = (7, 19)
+"""Nodes per limb of the certified settings that are told of: those of `fast`, and most."""
+STEPS = (5e-3, 1e-3)
+"""Their steps [s]."""
+DESIGNS = Path(__file__).resolve().parents[2] / "docs" / "designs.json"
+
+
+def scene_of(row: Table) -> Scene:
+    """Scene of a winner as designs.json describes it."""
+    body = Body(row["n_limbs"], 1e-3 * row["mean_radius_mm"], row["taper"])
+    robot = replace(
+        body.robot(), limb_length=1e-3 * row["limb_length_mm"], youngs_modulus=1e6 * row["youngs_modulus_MPa"]
+    )
+    return replace(Scene.preset("fast"), robot=robot, actuator=SmaPulse(row["peak_angle_rad"]))
+
+
+def certificate_of(name: str, scene: Scene, folder: Path, samples: int) -> Certificate:
+    """Certificate of a winner: that of the folder if it holds, or a new one, which is kept there."""
+    file = folder / f"{name.replace(' ', '_')}_{samples}.json"
+    if file.exists():
+        certificate = Certificate.load(file)
+        certificate.require_valid(scene)
+        return certificate
+    with tqdm(total=100, unit="%", desc=name, bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as bar:
+
+        def progress(share: float) -> None:
+            bar.update(100.0 * share - bar.n)
+
+        certificate = certify(scene, samples, progress=progress)
+    folder.mkdir(parents=True, exist_ok=True)
+    certificate.save(file)
+    return certificate
+
+
+def told(certificate: Certificate) -> Table:
+    """Errors of a robot's settings [%], and its speed at them [mm/s]."""
+    found: Table = {"samples": certificate.samples, "limit_percent": round(100 * certificate.limit_error, 3)}
+    for nodes, step in zip(NODES, STEPS, strict=True):
+        setting = next(
+            each for each in certificate.settings
+            if (each.nodes_per_limb, each.step, each.scheme) == (nodes, step, "implicit-midpoint")
+        )  # fmt: skip
+        scene = certificate.at(setting)
+        columns = swim(Cell(frame_with(scene, "straight", Swim(SETTLING, MEASURED), {}), {}, 1))
+        found[f"{nodes} nodes, {1e3 * step:g} ms"] = {
+            "repeated_percent": round(100 * setting.error((CLASS,)), 3),
+            "promised_percent": round(100 * setting.error(certificate.promised), 3),
+            "mm_per_s": round(1e3 * float(columns["speed"][0]), 3),
+        }
+    return found
+
+
+def main() -> None:
+    """Command line: certify the winners and write their errors."""
+    parser = study_parser("studies.designs.certificates", __doc__)
+    parser.add_argument("--out", type=Path, default=Path("runs/certificates"), help="folder (default: %(default)s)")
+    parser.add_argument("--samples", type=int, default=SAMPLES, help="sequences per class (default: %(default)s)")
+    parser.add_argument("--robots", nargs="*", choices=WINNERS, default=WINNERS, help="winners (default: all)")
+    options = parser.parse_args()
+    rows = json.loads(DESIGNS.read_text(encoding="utf-8"))
+    found: Table = {}
+    for name in options.robots:
+        found[name] = told(certificate_of(name, scene_of(rows[name]), options.out, options.samples))
+        (options.out / "certificates.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    print(json.dumps(found, indent=1))
+    print(f"Written: {options.out / 'certificates.json'}")
+
+
+if __name__ == "__main__":
+    run_command(main)

@@ -1,0 +1,60 @@
+"""The certificates of the fastest designs: of the robots of the table, kept, and told on the page."""
+
+import json
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+if find_spec("pyarrow") is None:
+    pytest.skip("the extra sweep is not installed", allow_module_level=True)
+
+from seastar_gym.scene.certificate import Certificate, CertifiedSetting, physics
+from seastar_gym.version import __version__
+from studies.designs import certificates
+from studies.designs.certificates import CLASS, NODES, STEPS, WINNERS, certificate_of, scene_of
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+ROWS = json.loads((DOCS / "designs.json").read_text(encoding="utf-8"))
+
+
+def made(scene, samples):
+    """A certificate that nobody measured."""
+    settings = tuple(
+        CertifiedSetting(nodes, "implicit-midpoint", step, 1e-6, {CLASS: 0.01 * nodes}, 0.0, 0.0, 1.0, 1.0)
+        for nodes, step in zip(NODES, STEPS, strict=True)
+    )
+    return Certificate(physics(scene), settings, (CLASS,), (CLASS,), samples, 0.0, 1, __version__, "none")
+
+
+@pytest.mark.parametrize("name", WINNERS)
+def test_a_row_of_the_table_is_its_robot(name):
+    robot = scene_of(ROWS[name]).robot
+    assert robot.n_limbs == ROWS[name]["n_limbs"]
+    assert robot.limb_length == pytest.approx(1e-3 * ROWS[name]["limb_length_mm"])
+    radius = robot.limbs[0].radius
+    root = radius[0] if isinstance(radius, tuple) else radius
+    assert root == pytest.approx(1e-3 * ROWS[name]["root_radius_mm"], rel=1e-3)
+
+
+def test_a_certificate_is_made_once(tmp_path, monkeypatch):
+    calls = []
+
+    def certify(scene, samples, progress):
+        calls.append(samples)
+        progress(1.0)
+        return made(scene, samples)
+
+    monkeypatch.setattr(certificates, "certify", certify)
+    scene = scene_of(ROWS["fastest"])
+    first = certificate_of("fastest", scene, tmp_path, 3)
+    assert certificate_of("fastest", scene, tmp_path, 3) == first and calls == [3]
+    with pytest.raises(ValueError, match="of another scene"):
+        certificate_of("fastest", scene_of(ROWS["fastest of them without taper"]), tmp_path, 3)
+
+
+def test_errors_are_told_beside_speeds():
+    found = certificates.told(made(scene_of(ROWS["fastest"]), 3))
+    coarse, fine = found["7 nodes, 5 ms"], found["19 nodes, 1 ms"]
+    assert coarse["repeated_percent"] == 7.0 and fine["repeated_percent"] == 19.0
+    assert coarse["mm_per_s"] == pytest.approx(ROWS["fastest"]["mm_per_s"]["fast"], rel=0.01)
