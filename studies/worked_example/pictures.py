@@ -14,8 +14,7 @@ from studies.worked_example.tables import WORDS, of_seeds
 COLOURS = {"nominal": "#cc7a00", "fitted": "#3366aa", "drawn": "#118855"}
 LABELS = {
     "robot.body.drag_coefficient": "drag of the body",
-    "fluid.drag_coefficient": "drag across limbs",
-    "fluid.tangential_drag_coefficient": "drag along limbs",
+    "fluid.drag_coefficient": "drag of the limbs",
     "robot.youngs_modulus": "Young's modulus",
     "actuator.peak_angle": "peak angle",
     "actuator.rise": "heat of a pulse",
