@@ -1,1 +1,1 @@
-"""From a user's robot to a policy: tracking, fit, draws, certificate, trainings, and swims on the robot as it was built."""
+"""From a user's robot to a policy: tracking, fit, certificate, trainings, and swims on the robot as it was built."""

@@ -61,10 +61,9 @@ def _draw_times(axes: Any, runs: Mapping[str, Any], what: str) -> None:
         times = of_seeds(some, what)
         axes.plot(np.full(len(times), place), times, "o", color=FAINT, markersize=3, alpha=0.6)
         mean, low, high = mean_with_interval(times)
-        axes.errorbar(
-            place + 0.25, mean, yerr=[[mean - low], [high - mean]], fmt="o", capsize=4, color=COLOURS[name], markersize=6
-        )
-    axes.set_xticks(range(len(runs)), [f"trained on\n{WORDS[name]}".replace(" from", "\nfrom") for name in runs],
-                    fontsize=8)  # fmt: skip
+        bar = [[mean - low], [high - mean]]
+        axes.errorbar(place + 0.25, mean, yerr=bar, fmt="o", capsize=4, color=COLOURS[name], markersize=6)
+    labels = [f"trained on\n{WORDS[name]}".replace(" from", "\nfrom") for name in runs]
+    axes.set_xticks(range(len(runs)), labels, fontsize=8)
     axes.set_xlim(-0.4, len(runs) - 0.4)
     axes.set_ylabel("time on the robot as it was built [s]")

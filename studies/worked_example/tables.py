@@ -48,8 +48,8 @@ def of_numbers(results: Mapping[str, Any]) -> str:
 def of_policies(results: Mapping[str, Any]) -> str:
     """Table of the policies' times on the robot as it was built."""
     lines = [
-        "| trained on | random paths [s] | faster than nominal [s] | pentagon [s] | faster than nominal [s] | expected, "
-        "random paths [s] |",
+        "| trained on | random paths [s] | faster than nominal [s] | pentagon [s] | faster than nominal [s] | "
+        "random paths, expected [s] |",
         "|---|---:|---:|---:|---:|---:|",
     ]
     for name, runs in results["runs"].items():

@@ -29,9 +29,7 @@ class Belief(NamedTuple):
 
 def train(belief: Belief, seed: int, strokes: int) -> tuple[LearnedPolicy, float]:
     """Policy after so many strokes on random paths with random headings, and the processor time [s]; one thread."""
-    env = make_training_env(
-        LEARNER, "random", True, scene=belief.scene, threads=1, randomization=belief.draws
-    )  # fmt: skip
+    env = make_training_env(LEARNER, "random", True, scene=belief.scene, threads=1, randomization=belief.draws)
     model = make_model(env, LEARNER, seed)
     env.reset()  # compiles, which is no part of the training
     began = time.process_time()
@@ -43,13 +41,13 @@ def train(belief: Belief, seed: int, strokes: int) -> tuple[LearnedPolicy, float
 
 
 def seconds_to_finish(policy: LearnedPolicy, scene: Scene, path: str, swims: int) -> list[float]:
-    """Times to the last waypoint [s], MAX_STROKES strokes for a robot that does not arrive; "random": held-out paths."""
+    """Times to the last waypoint [s], of MAX_STROKES strokes for who does not arrive; "random": held-out paths."""
     done = swim_many("learned", policy, path, swims, scene, max_strokes=MAX_STROKES, seed=HELD_OUT_SEED, threads=1)
     return [float(each.time[-1]) for each in done]
 
 
 def scores(policy: LearnedPolicy, belief: Belief, paths: int) -> dict[str, Any]:
-    """Times of a policy [s]: on the robot as it was built, and on the one that it was trained for, which expects them."""
+    """Times of a policy [s] on the robot as it was built, and those expected by the scene that it was trained on."""
     robot = built(*SWUM_WITH)
     return {
         "random": np.round(seconds_to_finish(policy, robot, "random", paths), 6).tolist(),

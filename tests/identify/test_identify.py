@@ -128,7 +128,8 @@ def test_the_command_line_fits_a_scene_of_ones_own_and_writes_it(tmp_path, monke
     synthetic(scene, {"actuator.peak_angle": 0.5}, n_strokes=1).to_csv(tmp_path / "path.csv", tmp_path / "commands.csv")
     (tmp_path / "mine.json").write_text(json.dumps(scene.to_dict()))
     monkeypatch.chdir(tmp_path)
-    command = ["path.csv", "commands.csv", "--scene", "mine.json", "--fit", "actuator.peak_angle", "--out", "fitted.json"]
+    command = ["path.csv", "commands.csv", "--scene", "mine.json", "--out", "fitted.json"]
+    command += ["--fit", "actuator.peak_angle"]
     assert main(command) == 0
     fitted = load_scene(tmp_path / "fitted.json")
     assert fitted.actuator.peak_angle == pytest.approx(0.5, rel=0.02)
