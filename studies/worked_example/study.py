@@ -7,8 +7,9 @@ are not those that its maker has written down. The fit finds its numbers with in
 train at. Policies are trained on the numbers written down, on those fitted and on draws from the intervals, and swim on
 the robot as it was built: held-out random paths and the pentagon.
 
-The folder of the results has the two CSV files of the tracking, the certificate, results.json and results.png. Results
-are written after every step, and a step whose result is already there is not repeated.
+The folder of the results has the two CSV files of the tracking, the certificate, results.json and results.png; the
+tables are put on the page. Results are written after every step, and a step whose result is already there is not
+repeated.
 """
 
 import itertools
@@ -32,7 +33,7 @@ from seastar_gym.scene.checks import require_count, require_number
 from seastar_gym.version import __version__
 from studies.worked_example.pictures import draw
 from studies.worked_example.robots import FITTED, NOMINAL, built, tracked
-from studies.worked_example.tables import as_markdown
+from studies.worked_example.tables import as_markdown, put_on_page
 from studies.worked_example.trainings import Belief, scores, train
 
 TRACKING, COMMANDS, CERTIFICATE, RESULTS = "tracking.csv", "commands.csv", "certificate.json", "results.json"
@@ -47,7 +48,7 @@ class Options:
     """Seeds of the trainings."""
     tracked: int = 12
     """Length of the tracking [strokes]."""
-    error: float = 0.05
+    error: float = 0.1
     """Error of the hub's path that the training's setting keeps, as a fraction of its length."""
     samples: int = 60
     """Sequences per class of commands, of the certificate."""
@@ -57,6 +58,8 @@ class Options:
     """Number of held-out random paths."""
     out: Path = Path("docs/worked_example")
     """Folder of the results."""
+    page: Path | None = Path("docs/from_measurements.md")
+    """Page that the tables are put on; None for no page."""
 
     def __post_init__(self) -> None:
         for name, least in (("tracked", 1), ("samples", 2), ("strokes", 1), ("paths", 1)):
@@ -165,9 +168,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options.out.mkdir(parents=True, exist_ok=True)
         results = read_results(options, shlex.join(["python", "-m", "studies.worked_example", *given]))
         fill(options, results)
+        draw(results, (options.out / RESULTS).with_suffix(".png"))
+        print(as_markdown(results))
+        if options.page is not None:
+            put_on_page(results, options.page)
     except ValueError as wrong:
         print(wrong, file=sys.stderr)
         return 2
-    draw(results, (options.out / RESULTS).with_suffix(".png"))
-    print(as_markdown(results))
     return 0

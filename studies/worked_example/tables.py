@@ -1,13 +1,15 @@
 """Tables of the worked example, in Markdown."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.evaluation.many import Interval, mean_with_interval
-from studies.worked_example.robots import DEVIATIONS, nominal_values
+from seastar_gym.files import write_atomically
+from studies.worked_example.robots import DEVIATIONS, NOISE, nominal_values
 
 Floats = NDArray[np.float64]
 WORDS = {"nominal": "what was written down", "fitted": "the fit", "drawn": "draws from its intervals"}
@@ -62,16 +64,71 @@ def of_policies(results: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def covered(results: Mapping[str, Any]) -> str:
+    """Sentences on the residuals, and on the numbers as built that lie outside of their intervals."""
+    found = results["fit"]
+    intervals = zip(DEVIATIONS, found["lower"], found["upper"], strict=True)
+    outside = [f"`{each.name}`" for each, low, high in intervals if not low <= each.built <= high]
+    where = "All numbers as built lie within their intervals."
+    if outside:
+        where = f"Of the numbers as built, {' and '.join(outside)} lie outside of their intervals."
+    return (
+        f"{where} Residuals are {1e3 * found['root_mean_square_m']:.3g} mm root mean square, of a camera that errs by "
+        f"{1e3 * NOISE:g} mm. What is more is of limbs that are not alike, of which the fit is not told, and of the "
+        "numerics of its scene."
+    )
+
+
+def verdict(results: Mapping[str, Any], name: str) -> str:
+    """Sentence on policies of a name against nominal ones, on random paths."""
+    gains, nominal = saved(results["runs"], name, "random"), of_seeds(results["runs"]["nominal"], "random")
+    mean, low, high = mean_with_interval(gains)
+    if low <= 0.0 <= high:
+        told = f"differ from those of what was written down by no more than seeds do, {shown((mean, low, high))} s"
+    else:
+        than = "faster" if mean > 0.0 else "slower"
+        size = sorted((abs(low), abs(high)))
+        share = 100.0 * abs(mean) / float(np.mean(nominal))
+        told = (
+            f"are {abs(mean):.1f} s [{size[0]:.1f}, {size[1]:.1f}] or {share:.0f} % {than} than those of what was "
+            f"written down, {than} in {np.sum(gains * mean > 0.0)} of {len(gains)} seeds"
+        )
+    return f"On random paths, policies of {WORDS[name]} {told}."
+
+
 def as_markdown(results: Mapping[str, Any]) -> str:
-    """Both tables, and what stands between them."""
-    found, certificate = results["fit"], results["certificate"]
-    seeds = len(results["runs"].get("drawn", {}))
+    """Both tables, the picture, and what they say."""
+    certificate, settings = results["certificate"], results["settings"]
+    seconds = [run["processor_seconds"] for runs in results["runs"].values() for run in runs.values()]
+    counts = sorted({len(runs) for runs in results["runs"].values()})
+    seeds = " to ".join(map(str, dict.fromkeys((counts[0], counts[-1]))))
     return "\n\n".join(
         [
+            f"Machine: {results['machine']}, one core. {settings['tracked']} strokes were tracked.",
             of_numbers(results),
-            f"Residuals: {1e3 * found['root_mean_square_m']:.3g} mm root mean square.",
-            f"Trained at {certificate['setting']}: an error of {100.0 * certificate['error']:.2g} %.",
+            covered(results),
+            f"Policies are trained for {settings['strokes']:,} strokes, in {np.mean(seconds):.0f} s of processor time, "
+            f"at {certificate['setting']}, the fastest setting of the certificate that keeps "
+            f"{100.0 * settings['error']:g} %. They swim {settings['paths']} held-out random paths and the pentagon on "
+            "the robot as it was built, at 2 ms with 13 nodes per limb. Means over seeds "
+            f"({seeds} of each) with 95 % intervals; gains are over the nominal policy of the same seed. *Expected* is "
+            "what the scene of the training promises.",
             of_policies(results),
-            f"Means of {seeds} seeds with 95 % intervals.",
+            " ".join(verdict(results, name) for name in results["runs"] if name != "nominal"),
+            "![Numbers that were fitted, and times of the policies](worked_example/results.png)",
         ]
     )
+
+
+BEGIN, END = "<!-- results: python -m studies.worked_example -->", "<!-- end of results -->"
+"""What the results stand between on a page."""
+
+
+def put_on_page(results: Mapping[str, Any], page: Path) -> None:
+    """Replace the results on a page; ValueError if it has no place for them."""
+    text = page.read_text(encoding="utf-8")
+    before, begin, rest = text.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not (begin and end):
+        raise ValueError(f"{page} has no lines {BEGIN} and {END} between which the results could stand.")
+    write_atomically(page, f"{before}{BEGIN}\n\n{as_markdown(results)}\n\n{END}{after}".encode())

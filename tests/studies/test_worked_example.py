@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -37,12 +38,18 @@ def results(n_seeds: int = 3) -> dict:
     fit = {"values": value, "lower": 0.95 * value, "upper": 1.05 * value, "root_mean_square_m": 1e-3}
     runs = {
         name: {
-            str(seed): {"random": [time + seed, time - seed], "pentagon": time + seed, "expected": [time]}
+            str(seed): {
+                "random": [time + seed, time - seed], "pentagon": time + seed, "expected": [time],
+                "processor_seconds": 20.0,
+            }
             for seed in range(n_seeds)
         }
         for name, time in (("nominal", 150.0), ("fitted", 140.0), ("drawn", 138.0))
     }
-    return {"fit": fit, "certificate": {"setting": "some setting", "error": 0.03}, "runs": runs}
+    return {
+        "machine": "some machine", "settings": {"tracked": 12, "strokes": 1000, "error": 0.1, "paths": 2},
+        "fit": fit, "certificate": {"setting": "some setting", "error": 0.03}, "runs": runs,
+    }  # fmt: skip
 
 
 def test_gains_are_over_the_nominal_policy_of_the_same_seed():
@@ -56,9 +63,45 @@ def test_gains_are_over_the_nominal_policy_of_the_same_seed():
 def test_results_are_told_and_drawn(tmp_path):
     text = tables.as_markdown(results())
     assert "| the fit | 140.0 [140.0, 140.0] | 10.0 [10.0, 10.0] | 141.0 [140.0, 142.0] |" in text
-    assert all(f"`{name}`" in text for name in FITTED) and "an error of 3 %" in text
+    assert all(f"`{name}`" in text for name in FITTED) and "All numbers as built lie within" in text
+    assert "of the fit are 10.0 s [10.0, 10.0] or 7 % faster than those of what was written down" in text
+    assert "faster in 3 of 3 seeds" in text
     draw(results(), tmp_path / "results.png")
     assert (tmp_path / "results.png").stat().st_size > 10_000
+
+
+def test_results_say_what_does_not_look_good():
+    found = results()
+    found["fit"]["lower"][0] = 1.01 * DEVIATIONS[0].built
+    assert f"`{FITTED[0]}` lie outside" in tables.as_markdown(found)
+    for seed, time in (("0", 149.0), ("1", 151.0), ("2", 150.5)):
+        found["runs"]["drawn"][seed]["random"] = [time]
+        found["runs"]["fitted"][seed]["random"] = [time + 10.0]
+    assert "draws from its intervals differ from those of what was written down by no more than seeds do" in (
+        tables.verdict(found, "drawn")
+    )
+    assert "slower in 3 of 3 seeds" in tables.verdict(found, "fitted")
+
+
+def test_tables_are_put_on_a_page_in_place_of_earlier_ones(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(f"Before.\n\n{tables.BEGIN}\nearlier ones\n{tables.END}\n\nAfter.\n")
+    for _ in range(2):
+        tables.put_on_page(results(), page)
+    text = page.read_text()
+    assert text.startswith("Before.") and text.endswith("After.\n") and "earlier ones" not in text
+    assert text.count(tables.as_markdown(results())) == 1
+    page.write_text("Nothing.")
+    with assert_refused("has no lines"):
+        tables.put_on_page(results(), page)
+
+
+def test_the_page_has_the_committed_results():
+    folder = Path(__file__).parents[2] / "docs"
+    page, file = folder / "from_measurements.md", folder / "worked_example" / "results.json"
+    assert tables.BEGIN in page.read_text(encoding="utf-8")
+    if file.is_file():
+        assert tables.as_markdown(json.loads(file.read_text())) in page.read_text(encoding="utf-8")
 
 
 def test_a_camera_sees_hub_and_tips_of_the_scene_that_is_fitted(monkeypatch):
@@ -92,7 +135,9 @@ def small(monkeypatch):
 @pytest.mark.filterwarnings("ignore:Errors of this scene:UserWarning")
 def test_the_way_goes_from_a_camera_to_swims_and_is_not_gone_twice(small, tmp_path, capsys):
     command = ["--tracked", "3", "--samples", "2", "--error", "0.9", "--strokes", "64", "--paths", "2"]
-    command += ["--out", str(tmp_path)]
+    page = tmp_path / "page.md"
+    page.write_text(f"{tables.BEGIN}\n{tables.END}\n")
+    command += ["--out", str(tmp_path), "--page", str(page)]
     assert main([*command, "--seeds", "0"]) == 0
     found = json.loads((tmp_path / "results.json").read_text())
 
@@ -122,6 +167,7 @@ def test_the_way_goes_from_a_camera_to_swims_and_is_not_gone_twice(small, tmp_pa
     assert {name: set(runs) for name, runs in found["runs"].items()} == {name: {"0"} for name in tables.WORDS}
     assert found["runs"]["drawn"]["0"]["random"] == [2.0, 2.0]  # no robot arrives that soon
     assert (tmp_path / "results.png").stat().st_size > 10_000
+    assert tables.as_markdown(found) in page.read_text()
 
     capsys.readouterr()
     assert main([*command, "--seeds", "0"]) == 0
