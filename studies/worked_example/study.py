@@ -4,8 +4,8 @@
 
 A robot with a body and limbs that its wires bend is tracked by a camera. The robot is a simulated one, whose numbers
 are not those that its maker has written down. The fit finds its numbers with intervals, the certificate the setting to
-train at. Policies are trained on the numbers written down, on those fitted and on draws from the intervals, and swim on
-the robot as it was built: held-out random paths and the pentagon.
+train at. Policies are trained on the numbers written down, on the same with the fitted cooling time, on all fitted ones
+and on draws from the intervals, and swim on the robot as it was built: held-out random paths and the pentagon.
 
 The folder of the results has the two CSV files of the tracking, the certificate, results.json and results.png; the
 tables are put on the page. Results are written after every step, and a step whose result is already there is not
@@ -28,7 +28,7 @@ import tyro
 from seastar_gym import Certificate, DomainRandomization, Scene, Uniform, certify
 from seastar_gym.certification.measure import machine
 from seastar_gym.files import write_atomically
-from seastar_gym.identify import Measurement, identify
+from seastar_gym.identify import Measurement, get_parameter, identify, with_parameters
 from seastar_gym.scene.checks import require_count, require_number
 from seastar_gym.version import __version__
 from studies.worked_example.pictures import draw
@@ -38,6 +38,8 @@ from studies.worked_example.trainings import Belief, scores, train
 
 TRACKING, COMMANDS, CERTIFICATE, RESULTS = "tracking.csv", "commands.csv", "certificate.json", "results.json"
 """Files in the folder of the results."""
+COOLING = "actuator.time_constant"
+"""Number that policies depend on most: some are trained on its fit alone."""
 
 
 @dataclass(frozen=True)
@@ -115,8 +117,10 @@ def beliefs(options: Options, results: dict[str, Any]) -> dict[str, Belief]:
     found = results["fit"]
     intervals = zip(FITTED, found["lower"], found["upper"], strict=True)
     draws = DomainRandomization({name: Uniform(low, high) for name, low, high in intervals})
+    nominal = replace(NOMINAL, robot=robot, numerics=fitted.numerics)
     return {
-        "nominal": Belief(replace(NOMINAL, robot=robot, numerics=fitted.numerics)),
+        "nominal": Belief(nominal),
+        "cooling": Belief(with_parameters(nominal, [COOLING], [get_parameter(fitted, COOLING)])),
         "fitted": Belief(fitted),
         "drawn": Belief(fitted, draws),
     }

@@ -12,7 +12,12 @@ from seastar_gym.files import write_atomically
 from studies.worked_example.robots import DEVIATIONS, NOISE, nominal_values
 
 Floats = NDArray[np.float64]
-WORDS = {"nominal": "what was written down", "fitted": "the fit", "drawn": "draws from its intervals"}
+WORDS = {
+    "nominal": "what was written down",
+    "cooling": "that with the fitted cooling time",
+    "fitted": "the fit",
+    "drawn": "draws from its intervals",
+}
 """What policies are trained on, in words."""
 
 

@@ -44,7 +44,7 @@ def results(n_seeds: int = 3) -> dict:
             }
             for seed in range(n_seeds)
         }
-        for name, time in (("nominal", 150.0), ("fitted", 140.0), ("drawn", 138.0))
+        for name, time in (("nominal", 150.0), ("cooling", 141.0), ("fitted", 140.0), ("drawn", 138.0))
     }
     return {
         "machine": "some machine", "settings": {"tracked": 12, "strokes": 1000, "error": 0.1, "paths": 2},
@@ -160,6 +160,9 @@ def test_the_way_goes_from_a_camera_to_swims_and_is_not_gone_twice(small, tmp_pa
     assert believed["fitted"].scene == believed["drawn"].scene == training
     assert believed["nominal"].scene.numerics == training.numerics
     assert believed["nominal"].scene.actuator == NOMINAL.actuator
+    cooling = believed["cooling"].scene
+    assert get_parameter(cooling, study.COOLING) == get_parameter(scene, study.COOLING)
+    assert replace(cooling, actuator=NOMINAL.actuator) == believed["nominal"].scene
     name, low, high = FITTED[0], fit["lower"][0], fit["upper"][0]
     assert isinstance(believed["drawn"].draws, DomainRandomization)
     assert believed["drawn"].draws.distributions[name] == Uniform(low, high)
