@@ -31,7 +31,7 @@ LABELS = {
 
 def draw(results: Mapping[str, Any], file: Path) -> None:
     """Draw numbers over those of the robot as it was built, and times on that robot."""
-    figure = new_figure(10.0, 3.6)
+    figure = new_figure(10.0, 3.9)
     numbers, random, pentagon = figure.subplots(1, 3, gridspec_kw={"width_ratios": (1.3, 1.0, 1.0)})
     pentagon.sharey(random)
     _draw_numbers(numbers, results["fit"])
@@ -39,6 +39,9 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
         _draw_times(axes, results["runs"], what)
         axes.set_title(f"policies, {title}")
     pentagon.tick_params(labelleft=False)
+    dots = random.plot([], [], "o", color=FAINT, markersize=3, label="a training; coloured: means with 95 % intervals")
+    handles = [*numbers.get_legend_handles_labels()[0], *dots]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=9)
     figure.savefig(file)
 
 
@@ -63,7 +66,6 @@ def _draw_numbers(axes: Any, found: Mapping[str, Any]) -> None:
     axes.set_xticks([], minor=True)
     axes.set_title("numbers of the robot")
     axes.grid(True, axis="x")
-    axes.legend(fontsize=8, loc="lower right", frameon=True, framealpha=0.9, edgecolor="none")
 
 
 def _draw_times(axes: Any, runs: Mapping[str, Any], what: str) -> None:
