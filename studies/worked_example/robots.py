@@ -41,7 +41,7 @@ DEVIATIONS = (
 FITTED = tuple(each.name for each in DEVIATIONS)
 """Names of the numbers that are fitted."""
 
-CURVATURE, UNLIKE = 1.0, 0.05
+CURVATURE, UNLIKE = 0.2, 0.03
 """Standard deviation of the limbs' curvature at rest [1/m], and of their stiffness as a share of it [1]."""
 CASTING = 0
 """Seed of what limbs are unlike in."""

@@ -14,7 +14,7 @@ from studies.worked_example.robots import DEVIATIONS, NOISE, nominal_values
 Floats = NDArray[np.float64]
 WORDS = {
     "nominal": "what was written down",
-    "cooling": "that with the fitted cooling time",
+    "cooling": "the same with the fitted cooling time",
     "fitted": "the fit",
     "drawn": "draws from its intervals",
 }

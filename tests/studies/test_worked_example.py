@@ -147,7 +147,7 @@ def test_the_way_goes_from_a_camera_to_swims_and_is_not_gone_twice(small, tmp_pa
     fit = found["fit"]
     assert not fit["untold"]
     truth = np.array([each.built for each in DEVIATIONS])
-    np.testing.assert_allclose(fit["values"], truth, rtol=0.3)
+    np.testing.assert_allclose(fit["values"][1:], truth[1:], rtol=0.1)  # three strokes tell little of the body's drag
     assert (np.array(fit["lower"]) < fit["values"]).all() and (np.array(fit["upper"]) > fit["values"]).all()
     scene = Scene.from_dict(fit["scene"])
     assert [get_parameter(scene, name) for name in FITTED] == fit["values"]
