@@ -18,6 +18,7 @@ from seastar_gym.controllers import learner_zip
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, Weights
 from seastar_gym.envs.commands import Actions
+from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.symmetry import VectorSymmetryReduction
 from seastar_gym.envs.task import Path as SwimPath
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -33,10 +34,12 @@ def make_training_env(
     scene: Scene | None = None,
     threads: int | None = None,
     actions: Actions | None = None,
+    randomization: DomainRandomization | None = None,
 ) -> BatchVecEnv:
     """Native batch for Stable-Baselines3, with symmetry reduction if the hyperparameters ask for it.
 
     actions: Action mode. None means that of the hyperparameters.
+    randomization: Numbers of the scene that are drawn anew for every episode.
     """
     env: gym.vector.VectorEnv[Any, Any, Any] = gym.make_vec(
         "SeastarSwim-v0",
@@ -51,6 +54,7 @@ def make_training_env(
         scene=scene,
         reward=hyperparameters.reward,
         waypoint_radius=WAYPOINT_RADIUS,
+        randomization=randomization,
         autoreset_mode=AutoresetMode.SAME_STEP,
         threads=threads,
     )

@@ -7,11 +7,13 @@ from types import ModuleType
 
 import gymnasium as gym
 import pytest
+from stable_baselines3 import PPO
 
 import seastar_gym
 from seastar_gym import Numerics, Scene
 from seastar_gym.certification import endurance, measure
 from seastar_gym.envs import paths
+from seastar_gym.evaluation import many
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -32,15 +34,26 @@ RUN = [page for page in PAGES if blocks(page)]
 
 @pytest.fixture
 def short_form(monkeypatch, tmp_path):
-    """Episodes of LONGEST steps, no window, a folder of one's own, and no path that outlives the page."""
-    make = gym.make
+    """Episodes of LONGEST steps, trainings of one rollout, certificates of one setting, no window, a folder of one's
+    own, and no path that outlives the page."""
+    make, learn = gym.make, PPO.learn
 
     def make_short(name, **arguments):
         if arguments.get("render_mode") == "human":
             arguments["render_mode"] = "rgb_array"
         return make(name, max_episode_steps=LONGEST, **arguments)
 
+    def learn_shortly(model, _):
+        return learn(model, model.n_envs * model.n_steps)
+
     monkeypatch.setattr(gym, "make", make_short)
+    monkeypatch.setattr(PPO, "learn", learn_shortly)
+    monkeypatch.setitem(many.swim_many.__kwdefaults__, "max_strokes", LONGEST)
+    monkeypatch.setattr(measure, "NODES", (12,))
+    monkeypatch.setattr(measure, "MANY_NODES", 17)
+    monkeypatch.setattr(measure, "SHORT", Numerics("implicit-midpoint", 1e-3, 1e-8))
+    monkeypatch.setattr(measure, "NUMERICS", (Numerics("implicit-midpoint", 5e-3, 1e-6),))
+    monkeypatch.setattr(endurance, "LONG", 40)
     monkeypatch.setattr(paths, "PATHS", dict(paths.PATHS))
     monkeypatch.chdir(tmp_path)
 
@@ -48,13 +61,7 @@ def short_form(monkeypatch, tmp_path):
 @pytest.fixture
 def certificate(short_form):
     """File certificate.json of the chapter's robot, of one setting, in place of the minutes that all would take."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(measure, "NODES", (12,))
-        patch.setattr(measure, "MANY_NODES", 17)
-        patch.setattr(measure, "SHORT", Numerics("implicit-midpoint", 1e-3, 1e-8))
-        patch.setattr(measure, "NUMERICS", (Numerics("implicit-midpoint", 5e-3, 1e-6),))
-        patch.setattr(endurance, "LONG", 40)
-        seastar_gym.certify(Scene(), 2).save("certificate.json")
+    seastar_gym.certify(Scene(), 2).save("certificate.json")
 
 
 @pytest.mark.filterwarnings("ignore:.*is not within the observation space:UserWarning")

@@ -10,34 +10,15 @@ reads it, `certificate.for_error(0.01)` is the scene at the fastest setting that
 """
 
 import argparse
-import json
-import runpy
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from seastar_gym.certification.measure import SAMPLES, certify
 from seastar_gym.extras import require_extra
-from seastar_gym.scene import Scene
 from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.checks import require_error
-
-
-def load_scene(file: Path | None) -> Scene:
-    """Scene of a file of Python or JSON, the chapter's for none."""
-    if file is None:
-        return Scene()
-    if not file.is_file():
-        raise ValueError(f"{file} is no file.")
-    if file.suffix == ".json":
-        return Scene.from_dict(json.loads(file.read_text(encoding="utf-8")))
-    try:
-        found = runpy.run_path(str(file)).get("scene")
-    except SyntaxError as wrong:
-        raise ValueError(f"{file}, line {wrong.lineno}, is not Python: {wrong.msg}.") from wrong
-    if not isinstance(found, Scene):
-        raise ValueError(f"{file} must define `scene`, a Scene.")
-    return found
+from seastar_gym.scene.scene_file import load_scene
 
 
 def as_text(certificate: Certificate) -> str:

@@ -2,8 +2,9 @@
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -136,7 +137,7 @@ class DomainRandomization:
         for name in numbers:
             if name not in known:
                 raise ValueError(
-                    f"The scene has no number {shown(name)} to draw: it has {', '.join(known)}, {LIMB_STRENGTHS}."
+                    f"The scene has no number {shown(name)} to draw{_why_not(scene, name, [*known, LIMB_STRENGTHS])}."
                 )
         bounds = {name: self.distributions[name].bounds for name in numbers}
         lowest = {name: low for name, (low, _) in bounds.items()}
@@ -155,6 +156,17 @@ class DomainRandomization:
         for name, distribution in self.distributions.items():
             for place in np.ndindex(values[name].shape[1:]):
                 values[name][(robot, *place)] = distribution.draw(rng)
+
+
+def _why_not(scene: Scene, name: str, known: Sequence[str]) -> str:
+    """End of the sentence that refuses to draw what a name stands for. known: Names that may be drawn."""
+    if name in numbers_of(scene):
+        return ", since it leaves that out (None): give it a value there"
+    try:
+        attrgetter(str(name))(scene)
+    except AttributeError:
+        return f": it has {', '.join(known)}"
+    return ", since it is the same for all robots of a batch"
 
 
 def drawn_scene(scene: Scene, values: dict[str, Any]) -> Scene:

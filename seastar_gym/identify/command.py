@@ -7,25 +7,31 @@ every stroke, with one command per limb.
 
 Parameters are positive numbers of the scene, by name: fluid.drag_coefficient, robot.youngs_modulus, robot.limb_length,
 robot.limbs.0.length, actuator.peak_angle, or actuator.angles.2, a point of a measured curve. Their first guesses are
-the values of the chapter's scene.
+the values of the scene: a Python file that defines `scene` (it is executed), a JSON file as `Scene.to_dict` writes it,
+or none for the chapter's.
 
 With `--synthetic`, the data are simulated with known parameters and 1 mm of noise, to show that the fit finds them.
 """
 
 import argparse
+import json
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from seastar_gym.extras import require_extra
 from seastar_gym.identify.fit import Estimate, identify
 from seastar_gym.identify.measurement import Measurement
 from seastar_gym.identify.trajectories import synthetic
-from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse, Water
+from seastar_gym.scene import Numerics
+from seastar_gym.scene.scene_file import load_scene
 
 TRUTH = {"fluid.drag_coefficient": 1.3, "robot.youngs_modulus": 1.4e6, "actuator.peak_angle": 0.55}
 """Parameters of the synthetic data."""
+STEP = 5e-3
+"""Time step where neither the scene nor the command line names one [s]."""
 
 
 def draw(estimate: Estimate, measurement: Measurement, file: Path) -> None:
@@ -56,7 +62,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("commands", nargs="?", type=Path, help="CSV file with one line of commands per stroke")
     names = f"names of the parameters to fit (default: {' '.join(TRUTH)})"
     parser.add_argument("--fit", nargs="+", default=list(TRUTH), metavar="PARAMETER", help=names)
-    parser.add_argument("--step", type=float, default=5e-3, help="time step of the implicit midpoint rule [s]")
+    parser.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the chapter's)")
+    step = "time step of the implicit midpoint rule [s] (default: the scene's own numerics, or 0.005)"
+    parser.add_argument("--step", type=float, help=step)
+    parser.add_argument("--out", type=Path, help="JSON file for the fitted scene, which certify reads")
     parser.add_argument("--picture", type=Path, help="file for a picture of the fit")
     parser.add_argument("--synthetic", action="store_true", help="fit simulated data with known parameters")
     options = parser.parse_args(arguments)
@@ -65,7 +74,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if options.picture is not None:
             require_extra("Pictures", "studies", "matplotlib")
-        scene = Scene(Seastar(), Water(), SmaPulse(), Numerics("implicit-midpoint", options.step))
+        scene = load_scene(options.scene)
+        if options.step is not None or not scene.numerics.named:
+            scene = replace(scene, numerics=Numerics("implicit-midpoint", options.step or STEP))
         if options.synthetic:
             measurement = synthetic(scene, TRUTH)
             print("truth:", ", ".join(f"{name} = {value:g}" for name, value in TRUTH.items()))
@@ -76,6 +87,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(estimate.report(), f"{time.perf_counter() - begin:.1f} s", sep="\n")
         if options.picture is not None:
             draw(estimate, measurement, options.picture)
+        if options.out is not None:
+            options.out.write_text(json.dumps(estimate.scene.to_dict()) + "\n", encoding="utf-8")
     except (ValueError, OSError, ModuleNotFoundError) as bad_input:
         print(bad_input, file=sys.stderr)
         return 2

@@ -85,6 +85,10 @@ def identify(scene: Scene, parameters: Sequence[str], measurement: Measurement, 
     residuals = Residuals(scene, tuple(parameters), measurement)
     bound = math.log(LARGEST_FACTOR)
     start = np.zeros(len(parameters))
+    try:
+        residuals.scenes(start)
+    except ValueError as impossible:
+        raise ValueError(f"A first guess needs room for small changes: {impossible}") from impossible
     fit = least_squares(residuals, start, residuals.jacobian, (-bound, bound), xtol=1e-6, ftol=1e-8)
     return estimate_of(fit, residuals, confidence)
 

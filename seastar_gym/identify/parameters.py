@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import is_finite_number, shown
-from seastar_gym.scene.per_robot import with_numbers
+from seastar_gym.scene.per_robot import numbers_of, with_numbers
 
 Floats = NDArray[np.float64]
 
@@ -28,8 +28,19 @@ def get_parameter(scene: Scene, name: str) -> float:
             known = step in {field.name for field in own if field.type not in (int, "int")}
             value = getattr(value, step) if known else None
     if not is_finite_number(value) or value <= 0.0:
-        raise ValueError(f"{shown(name)} is no positive number of this scene, such as fluid.drag_coefficient.")
+        raise ValueError(f"{shown(name)} is no positive number of this scene, {_why_not(scene, name, value)}.")
     return float(value)
+
+
+def _why_not(scene: Scene, name: str, value: Any) -> str:
+    """End of the sentence that refuses to fit what a name stands for."""
+    if numbers_of(scene).get(name, 0.0) is None:
+        return "which leaves it out (None): give it a first guess"
+    if is_finite_number(value):
+        return f"where it is {value:g}: the logarithm is fitted, so give it a first guess above zero"
+    if isinstance(value, tuple) and value and all(map(is_finite_number, value)):
+        return f"but {len(value)} of them: name one, such as {name}.1"
+    return "such as fluid.drag_coefficient"
 
 
 def with_parameters(scene: Scene, names: Sequence[str], values: Sequence[float] | Floats) -> Scene:

@@ -117,7 +117,7 @@ def weight_moment(
 def body_drag(body: Body, water: Water) -> Drag:
     """Drag from the outline, or of the coefficients that the body gives."""
     per_area = 0.5 * water.density * float(body.height)
-    shape, C_d = body.shape, water.drag_coefficient
+    shape, C_d = body.shape, water.drag_coefficient if body.drag_coefficient is None else float(body.drag_coefficient)
     along, across = shape.widths
     if all(getattr(body, name) is None for name in GIVEN_DRAG):
         if not shape.points:

@@ -46,6 +46,7 @@ class Body:
     mass: [kg]. None means the limbs' density times area and height.
     inertia: Moment of inertia about the centre of mass [kg m^2]. None means that of a uniform body of that mass.
     centre_of_mass: (x, y) [m] from the hub. None means the centre of the area.
+    drag_coefficient: Drag coefficient [1] of the whole outline, whatever side flow meets. None means the fluid's C_d.
     drag_along, drag_across: Drag coefficients [1] of flow along the body's x and y axis, with the frontal area (width
         times height) of its outline.
     drag_turning: Drag coefficient [1] of turning: the torque is that of a plate as long as the outline is wide at most,
@@ -56,20 +57,23 @@ class Body:
     attachments: `Attachment` of every limb. () attaches limbs to the rim in their directions from the hub, pointing
         away from it: a disc makes a star of that radius.
 
-    Without any of the three drag coefficients, a polygon has the drag of strips of its outline, each for the flow
-    across it, with the fluid's C_d, halved between the faces that flow meets and leaves; a disc has that of its width,
-    and none in turning. Where one of the three is given, the others are the fluid's C_d, or 0 for a disc that turns.
+    With no drag given for a motion of its own (along, across, turning), a polygon has the drag of strips of its
+    outline, each for the flow across it, with C_d, halved between the faces that flow meets and leaves; a disc has that
+    of its width, and none in turning. Where one of the three is given, the others are C_d, or 0 for a disc that turns.
+    C_d is the drag coefficient of the body, or the fluid's. It keeps the symmetry of the body, which drag of one
+    direction breaks.
 
     Flow at the body is that at the hub. Fluid that moves along with the body is that of an ellipse about the hub.
     """
 
-    PER_ROBOT: ClassVar = ("height", "mass", "inertia", *GIVEN_DRAG, *GIVEN_FLUID)
+    PER_ROBOT: ClassVar = ("height", "mass", "inertia", "drag_coefficient", *GIVEN_DRAG, *GIVEN_FLUID)
     radius: float = 0.0
     outline: Points = ()
     height: Numbers = 0.01
     mass: Numbers | None = None
     inertia: Numbers | None = None
     centre_of_mass: tuple[float, float] | None = None
+    drag_coefficient: Numbers | None = None
     drag_along: Numbers | None = None
     drag_across: Numbers | None = None
     drag_turning: Numbers | None = None
@@ -84,7 +88,7 @@ class Body:
         object.__setattr__(self, "radius", float(self.radius))
         self._check_outline()
         require_each(self, "height", partial(require_number, unit="m"))
-        dimensionless = dict.fromkeys(GIVEN_DRAG + GIVEN_FLUID, "1")
+        dimensionless = dict.fromkeys(("drag_coefficient", *GIVEN_DRAG, *GIVEN_FLUID), "1")
         for name, unit in {"mass": "kg", "inertia": "kg m^2", **dimensionless}.items():
             if getattr(self, name) is not None:
                 require_each(self, name, partial(not_negative, unit=unit))

@@ -134,7 +134,7 @@ def test_a_limb_that_has_failed_does_not_move():
         (lambda: env_with(3, 0.5, 1.0), ("3", "limb_strengths")),
         (lambda: DomainRandomization({"limb_strengths": Uniform(0.5, 1.5)}), ("limb_strengths", "0 to 1")),
         (lambda: SeastarSwimEnv(randomization="all"), ("DomainRandomization", "'all'")),
-        (lambda: env_with("robot.n_limbs", 3, 5), ("robot.n_limbs", "robot.density")),
+        (lambda: env_with("robot.n_limbs", 3, 5), ("robot.n_limbs", "same for all robots of a batch")),
         (lambda: env_with("robot.limb_length", -0.1, 0.2), ("limb_length", "positive")),
         (lambda: env_with("actuator.peak_angle", 0.1, 4.0), ("peak angle", "4 rad")),
         (lambda: env_with("fluid.current.u_x", 0.1, 0.2), ("fluid.current.u_x",)),

@@ -1,5 +1,6 @@
 """Parameters are found in data that a known robot made, and what the data cannot tell is said."""
 
+import json
 import math
 import sys
 from dataclasses import replace
@@ -8,11 +9,30 @@ import numpy as np
 import pytest
 
 from refusals import assert_refused
-from seastar_gym import Attachment, Body, Contact, Limited, MeasuredCurve, Numerics, Scene, Seastar, Simulator, SmaPulse
+from seastar_gym import (
+    AlongLimb,
+    Attachment,
+    Body,
+    Contact,
+    DomainRandomization,
+    Limb,
+    Limited,
+    MeasuredCurve,
+    Numerics,
+    Scene,
+    Seastar,
+    Simulator,
+    SmaLimb,
+    SmaPulse,
+    Stiffening,
+    Uniform,
+    Water,
+)
 from seastar_gym.identify import Measurement, get_parameter, identify, synthetic, trajectory, with_parameters
 from seastar_gym.identify.command import TRUTH, draw, main
 from seastar_gym.identify.trajectories import trajectories
 from seastar_gym.scene.per_robot import numbers_of
+from seastar_gym.scene.scene_file import load_scene
 
 SCENE = Scene(numerics=Numerics("implicit-midpoint", 0.01))
 
@@ -117,6 +137,23 @@ def test_the_command_line_fits_files(measurement, tmp_path, monkeypatch, capsys)
     assert "actuator.peak_angle = " in capsys.readouterr().out
 
 
+def test_the_command_line_fits_a_scene_of_ones_own_and_writes_it(tmp_path, monkeypatch, capsys):
+    robot = Seastar(nodes_per_limb=4, n_limbs=3)
+    scene = Scene(robot, numerics=Numerics("implicit-midpoint", 0.02, newton_tolerance=1e-6))
+    synthetic(scene, {"actuator.peak_angle": 0.5}, n_strokes=1).to_csv(tmp_path / "path.csv", tmp_path / "commands.csv")
+    (tmp_path / "mine.json").write_text(json.dumps(scene.to_dict()))
+    monkeypatch.chdir(tmp_path)
+    command = ["path.csv", "commands.csv", "--scene", "mine.json", "--out", "fitted.json"]
+    command += ["--fit", "actuator.peak_angle"]
+    assert main(command) == 0
+    fitted = load_scene(tmp_path / "fitted.json")
+    assert fitted.actuator.peak_angle == pytest.approx(0.5, rel=0.02)
+    assert replace(fitted, actuator=scene.actuator) == scene
+    (tmp_path / "none.py").write_text("robot = 3")
+    assert main([*command[:3], "none.py"]) == 2
+    assert capsys.readouterr().err == "none.py must define `scene`, a Scene.\n"
+
+
 def test_help_names_the_command_and_its_defaults(monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["__main__.py", "--help"])
     with pytest.raises(SystemExit):
@@ -179,6 +216,47 @@ def test_the_command_line_says_what_is_wrong_in_a_sentence(tmp_path, monkeypatch
 def test_what_is_no_positive_number_of_the_scene_cannot_be_fitted(name):
     with pytest.raises(ValueError, match="no positive number of this scene"):
         get_parameter(SCENE, name)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("robot.body.drag_coefficient", "which leaves it out (None): give it a first guess"),
+        ("robot.limbs.0.natural_curvature", "where it is 0: the logarithm is fitted"),
+        ("actuator.angles", "but 3 of them: name one, such as actuator.angles.1"),
+    ],
+)
+def test_a_number_that_cannot_be_fitted_as_it_is_says_what_to_do(name, words):
+    robot = Seastar(body=Body(radius=0.02), limbs=(Limb(),) * 5)
+    scene = Scene(robot, actuator=MeasuredCurve((0.0, 0.1, 1.0), (0.0, 0.5, 0.0)))
+    with assert_refused(words):
+        get_parameter(scene, name)
+
+
+def test_a_first_guess_at_the_edge_of_what_can_be_modelled_is_refused(measurement):
+    """Drag along limbs must not exceed that across them, of which the Jacobian tries a smaller one."""
+    names = ["fluid.drag_coefficient", "fluid.tangential_drag_coefficient"]
+    with assert_refused("A first guess needs room for small changes: tangential_drag_coefficient must not exceed"):
+        identify(replace(SCENE, fluid=Water(1000.0, 1.0, 1.0)), names, measurement)
+
+
+def test_every_number_of_a_body_on_limbs_that_bend_can_be_fitted_and_drawn():
+    """But for those that are the same for all robots of a batch, which can only be fitted."""
+    body = Body(radius=0.02, mass=0.02, inertia=4e-6, drag_coefficient=1.0)
+    robot = Seastar(nodes_per_limb=5, along=AlongLimb(0.9), stiffening=Stiffening(), body=body)
+    scene = Scene(robot, Water(1000.0, 1.0, 0.5, None, 1.0), SmaLimb())
+    for name, value in numbers_of(scene).items():
+        if value is None:
+            continue
+        assert get_parameter(with_parameters(scene, [name], [0.99 * value]), name) == 0.99 * value
+        assert DomainRandomization({name: Uniform(0.99 * value, value)}).first_values(scene, 2)[name][0] == value
+    for name in ("robot.body.radius", "robot.stiffening.middle", "actuator.heating_time", "actuator.delay"):
+        value = get_parameter(scene, name)
+        assert get_parameter(with_parameters(scene, [name], [0.99 * value]), name) == 0.99 * value
+        with assert_refused(f"{name!r} to draw, since it is the same for all robots of a batch"):
+            DomainRandomization({name: Uniform(0.99 * value, value)}).first_values(scene, 2)
+    with assert_refused("to draw, since it leaves that out (None)"):
+        DomainRandomization({"robot.body.drag_along": Uniform(0.5, 1.0)}).first_values(scene, 2)
 
 
 def test_every_positive_number_that_may_differ_from_robot_to_robot_may_be_fitted():

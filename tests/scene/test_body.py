@@ -1,6 +1,7 @@
 """What a body is: outlines, masses, drag and added mass from them, attachments, symmetry, and what is refused."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -84,6 +85,20 @@ def test_given_coefficients_stand_for_the_outlines():
     assert turning[2] == pytest.approx(-5.0 * 2.0 * 0.06**4 / 32.0)
 
 
+@pytest.mark.parametrize("own", [{}, {"drag_along": 0.3, "drag_turning": 2.0}])
+@pytest.mark.parametrize("body", [Body(radius=0.02), Body.rectangle(0.06, 0.03)])
+def test_a_drag_coefficient_of_the_body_stands_for_the_fluids(body, own):
+    """And leaves that of limbs as it is."""
+    (same, _), (draggy, scene) = (
+        on_body(replace(body, drag_coefficient=mine, **own), drag_coefficient=fluids)
+        for mine, fluids in ((None, 1.9), (1.9, 1.2))
+    )
+    for motion in (((0.1, 0.2), 0.0), ((0.0, 0.0), 3.0)):
+        np.testing.assert_array_equal(force_and_torque(draggy, *motion), force_and_torque(same, *motion))
+    np.testing.assert_allclose(draggy.drag[1:], 1.2 / 1.9 * same.drag[1:])
+    assert Scene.from_dict(scene.to_dict()) == scene
+
+
 def test_added_mass_is_that_of_an_ellipse():
     rods, _ = on_body(Body.rectangle(0.06, 0.03, mass=0.02, attachments=(Attachment(0, 0, 0),) * 4),
                       added_mass_coefficient=0.9)  # fmt: skip
@@ -120,6 +135,7 @@ def test_a_disc_with_a_star_is_symmetric_and_others_are_not():
     assert not Seastar(4, body=Body.rectangle(0.06, 0.03)).is_symmetric
     assert not Seastar(4, body=Body.rectangle(0.06, 0.03, attachments=CORNERS)).is_symmetric
     assert not Seastar(body=Body(radius=0.02, centre_of_mass=(1e-3, 0.0))).is_symmetric
+    assert Seastar(body=Body(radius=0.02, drag_coefficient=0.5)).is_symmetric
     assert not Seastar(body=Body(radius=0.02, drag_along=0.5)).is_symmetric
     turned = tuple(Attachment(0.02 * math.cos(a), 0.02 * math.sin(a), a) for a in 0.1 + np.arange(5) * 0.4 * math.pi)
     assert not Seastar(body=Body(radius=0.02, attachments=turned)).is_symmetric

@@ -1,0 +1,27 @@
+"""`load_scene`: a scene from a file of Python or JSON, as command lines take it."""
+
+import json
+import runpy
+from pathlib import Path
+
+from seastar_gym.scene.scene import Scene
+
+
+def load_scene(file: Path | None) -> Scene:
+    """Scene of a file of Python or JSON, the chapter's for none.
+
+    A file of Python is executed and defines `scene`; one of JSON is as `Scene.to_dict` writes it.
+    """
+    if file is None:
+        return Scene()
+    if not file.is_file():
+        raise ValueError(f"{file} is no file.")
+    if file.suffix == ".json":
+        return Scene.from_dict(json.loads(file.read_text(encoding="utf-8")))
+    try:
+        found = runpy.run_path(str(file)).get("scene")
+    except SyntaxError as wrong:
+        raise ValueError(f"{file}, line {wrong.lineno}, is not Python: {wrong.msg}.") from wrong
+    if not isinstance(found, Scene):
+        raise ValueError(f"{file} must define `scene`, a Scene.")
+    return found
