@@ -39,7 +39,9 @@ def results(n_seeds: int = 3) -> dict:
     runs = {
         name: {
             str(seed): {
-                "random": [time + seed, time - seed], "pentagon": time + seed, "expected": [time],
+                "random": [time + seed, time - seed],
+                "pentagon": time + seed,
+                "expected": [time],
                 "processor_seconds": 20.0,
             }
             for seed in range(n_seeds)
