@@ -47,8 +47,8 @@ def of_numbers(results: Mapping[str, Any]) -> str:
         DEVIATIONS, nominal_values(), found["values"], found["lower"], found["upper"], strict=True
     ):
         unit = "" if each.unit == "1" else f" [{each.unit}]"
-        fitted = f"{value:.3g} [{low:.3g}, {high:.3g}]"
-        lines.append(f"| `{each.name}`{unit} | {nominal:.3g} | {fitted} | {each.built:.3g} | {each.why} |")
+        fitted = f"{value:.4g} [{low:.4g}, {high:.4g}]"
+        lines.append(f"| `{each.name}`{unit} | {nominal:.4g} | {fitted} | {each.built:.4g} | {each.why} |")
     return "\n".join(lines)
 
 
@@ -76,7 +76,7 @@ def covered(results: Mapping[str, Any]) -> str:
     outside = [f"`{each.name}`" for each, low, high in intervals if not low <= each.built <= high]
     where = "All numbers as built lie within their intervals."
     if outside:
-        where = f"Of the numbers as built, {' and '.join(outside)} lie outside of their intervals."
+        where = f"Of the numbers as built, {len(outside)} lie outside of their intervals: {', '.join(outside)}."
     return (
         f"{where} Residuals are {1e3 * found['root_mean_square_m']:.3g} mm root mean square, of a camera that errs by "
         f"{1e3 * NOISE:g} mm. What is more is of limbs that are not alike, of which the fit is not told, and of the "
@@ -89,16 +89,16 @@ def verdict(results: Mapping[str, Any], name: str) -> str:
     gains, nominal = saved(results["runs"], name, "random"), of_seeds(results["runs"]["nominal"], "random")
     mean, low, high = mean_with_interval(gains)
     if low <= 0.0 <= high:
-        told = f"differ from those of what was written down by no more than seeds do, {shown((mean, low, high))} s"
+        told = f"differ by no more than seeds do, {shown((mean, low, high))} s"
     else:
         than = "faster" if mean > 0.0 else "slower"
         size = sorted((abs(low), abs(high)))
         share = 100.0 * abs(mean) / float(np.mean(nominal))
         told = (
-            f"are {abs(mean):.1f} s [{size[0]:.1f}, {size[1]:.1f}] or {share:.0f} % {than} than those of what was "
-            f"written down, {than} in {np.sum(gains * mean > 0.0)} of {len(gains)} seeds"
+            f"are {abs(mean):.1f} s [{size[0]:.1f}, {size[1]:.1f}] or {share:.0f} % {than}, in "
+            f"{np.sum(gains * mean > 0.0)} of {len(gains)} seeds"
         )
-    return f"On random paths, policies of {WORDS[name]} {told}."
+    return f"Against policies of what was written down, on random paths, those of {WORDS[name]} {told}."
 
 
 def as_markdown(results: Mapping[str, Any]) -> str:
@@ -109,7 +109,7 @@ def as_markdown(results: Mapping[str, Any]) -> str:
     seeds = " to ".join(map(str, dict.fromkeys((counts[0], counts[-1]))))
     return "\n\n".join(
         [
-            f"Machine: {results['machine']}, one core. {settings['tracked']} strokes were tracked.",
+            f"Machine: {results['machine']}, one core, beside other work. {settings['tracked']} strokes were tracked.",
             of_numbers(results),
             covered(results),
             f"Policies are trained for {settings['strokes']:,} strokes, in {np.mean(seconds):.0f} s of processor time, "
