@@ -117,6 +117,13 @@ def tasks(docs: Path, file: Path) -> None:
     draw(rows_of(read(docs, "tasks.json"), IDS), file)
 
 
+def hub(docs: Path, file: Path) -> None:
+    """Speed over the share of the mass in the hub."""
+    from studies.designs.hub import draw
+
+    draw(read(docs, "hub.json"), file)
+
+
 def validation(docs: Path, file: Path) -> None:
     """Measured over predicted speeds."""
     from studies.validation.pictures import draw
@@ -139,6 +146,7 @@ PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "gaits_front.png": gaits("front"),
     "gaits_lag.png": gaits("lag"),
     "heading.png": heading,
+    "hub.png": hub,
     "in_time.png": in_time,
     "limbs.png": limbs,
     "tasks.png": tasks,

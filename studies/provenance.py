@@ -43,6 +43,7 @@ COMMANDS = {
     "designs.json": "python -m studies.designs",
     "gaits.json": "python -m studies.gaits",
     "heading.json": "python -m studies.learning.heading",
+    "hub.json": "python -m studies.designs.hub",
     "limbs.json": "python -m studies.measurements.limbs --models --swims",
     "promises.json": "python -m studies.accuracy.promises",
     "tasks.json": "python -m studies.tasks",

@@ -23,6 +23,7 @@ from seastar_gym.sweep.frames import Swim, frame_with
 from seastar_gym.sweep.parts import Parts
 from seastar_gym.sweep.run import run
 from studies.parser import study_parser
+from studies.provenance import provenance
 from studies.style import DPI, MM, subplots
 
 Table = dict[str, Any]
@@ -123,7 +124,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("runs/hub"), help="folder (default: %(default)s)")
     parser.add_argument("--workers", type=int, help="processes (default: one per processor)")
     options = parser.parse_args()
-    found = study(options.out, Processes(options.workers))
+    found = {**provenance("python -m studies.designs.hub", "pyarrow"), **study(options.out, Processes(options.workers))}
     (options.out / "hub.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     draw(found, options.out / "hub.png")
     print(f"Written to {options.out}: hub.json and hub.png.")
