@@ -35,7 +35,7 @@ class AlongLimb:
     def __post_init__(self) -> None:
         require_each(self, "share", _require_share)
         require_numbers("A profile along a limb", as_tuple(self.profile), "1")
-        points = as_tuple(self.profile)
+        points = tuple(map(float, as_tuple(self.profile)))
         bend = sum(points) - 0.5 * (points[0] + points[-1]) * (len(points) > 1) if points else 0.0
         if not bend > 1e-6 * max(map(abs, points), default=0.0):
             raise ValueError(

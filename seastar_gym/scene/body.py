@@ -103,7 +103,7 @@ class Body:
             )
 
     def _check_outline(self) -> None:
-        if not self.outline:
+        if isinstance(self.outline, tuple) and not self.outline:
             return
         if self.radius:
             raise ValueError("A body has a radius or an outline, not both.")

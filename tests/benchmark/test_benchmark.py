@@ -101,9 +101,9 @@ def test_a_task_of_another_measure_without_a_batch_is_swum_on_its_held_out_split
 
 @pytest.mark.parametrize("id", TASKS)
 def test_every_task_is_measured_by_what_it_asks_for(id):
-    """Prey that is caught, the distance from the station, otherwise the time until the last waypoint."""
-    challenge = TASKS[id][0]
-    wanted = MEASURES["prey"] if "prey" in challenge else MEASURES.get(challenge, SECONDS)
+    """Prey that is caught, worth of prizes, the distance from the station, otherwise the time until all is done."""
+    challenge = TASKS[id][0].removeprefix("fast-")
+    wanted = {each.__name__.lower(): measure for each, measure in MEASURES.items()}.get(challenge, SECONDS)
     assert measure_of(gym.make(id, fidelity="fast").unwrapped) is wanted
 
 

@@ -54,17 +54,17 @@ def _grid(step: float) -> _Grid:
 
 
 class Ways(NamedTuple):
-    """Lengths of the shortest ways to a goal [m] from the nodes of a grid, infinite from where there is none."""
+    """Lengths of the shortest ways to a goal from the nodes of a grid."""
 
     lengths: Floats
-    """Shape (..., nx, ny)."""
+    """Shape (..., nx, ny) [m]; infinite where there is no way, NaN for nodes that are in a disc or too near to one."""
     step: float
     """[m]"""
 
     def __call__(self, points: Floats) -> Floats:
         """Lengths [m] from points, shape (..., k, 2), for lengths of shape (..., nx, ny).
 
-        A point that is far from all nodes with a way swims to the nearest of them first.
+        A point in a disc, with no clear node near, swims to the nearest node with a way first.
         """
         shape = self.lengths.shape[-2:]
         nearest = np.rint((points - BOX[0]) / self.step).astype(int)
@@ -75,8 +75,9 @@ class Ways(NamedTuple):
         flat = np.broadcast_to(rows, (*points.shape[:-1], rows.shape[-1]))
         there = np.take_along_axis(flat, i * shape[1] + j, axis=-1)
         away = BOX[0] + self.step * np.stack([i, j], axis=-1) - points[..., None, :]
-        found = np.asarray((there + np.hypot(away[..., 0], away[..., 1])).min(axis=-1))
-        for lost in map(tuple, np.argwhere(np.isinf(found))):
+        reached = np.where(np.isnan(there), np.inf, there + np.hypot(away[..., 0], away[..., 1]))
+        found = np.asarray(reached.min(axis=-1))
+        for lost in map(tuple, np.argwhere(np.isnan(there).all(axis=-1))):
             found[lost] = self._from_afar(points[lost], flat[lost])
         return found
 
@@ -99,5 +100,5 @@ def ways(discs: Floats, goal: Floats, clearance: float, step: float) -> Ways:
     begin = int(np.argmin(np.hypot(away[:, 0], away[:, 1])))
     if not is_free[begin]:
         return Ways(np.full(grid.nodes.shape[:2], np.inf), step)
-    lengths = dijkstra(graph, directed=False, indices=begin).reshape(grid.nodes.shape[:2])
-    return Ways(np.asarray(lengths), step)
+    lengths = np.where(is_free, dijkstra(graph, directed=False, indices=begin), np.nan)
+    return Ways(lengths.reshape(grid.nodes.shape[:2]), step)
