@@ -56,7 +56,7 @@ def test_gaits_of_several_strokes_are_measured_over_whole_periods():
 def test_a_turn_is_the_short_way_round(monkeypatch):
     """From a heading of 3 rad to one of -3 rad, in two strokes of limbs at rest."""
     headings = iter([np.array([3.0]), np.array([-3.0])])
-    monkeypatch.setattr(greedy, "body_heading", lambda positions, robot: next(headings))
+    monkeypatch.setattr(greedy, "heading_of", lambda simulator: next(headings))
     found = measure_gaits(FAST, np.zeros((1, 1, 5)), settling=0, measured=2)
     np.testing.assert_allclose(found.turn, np.pi - 3.0)
 

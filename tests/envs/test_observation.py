@@ -110,8 +110,9 @@ def test_limbs_on_a_body_are_seen_from_their_roots(nodes_per_limb):
         expected = np.concatenate([seen[0] * axis / 0.1, seen[1] * axis / 0.025], axis=1)
         expected = np.stack([expected.real, expected.imag], axis=-1).reshape(3, -1)
         np.testing.assert_allclose(found[:, : expected.shape[1]], expected, rtol=0.0, atol=1e-11)
-        assert swum == 0 or np.abs(simulator.spin()).max() > 1e-3
-        simulator.advance(0.1, rng.uniform(-1.0, 1.0, (3, 3)))
+        if swum == 0:
+            simulator.advance(0.1, rng.uniform(-1.0, 1.0, (3, 3)))
+            assert np.abs(simulator.spin()).max() > 1e-3
 
 
 def along_limbs(nodes: np.ndarray, roots: np.ndarray) -> np.ndarray:

@@ -155,7 +155,8 @@ def memory(contact: Contact | None, n_limbs: int, nodes_per_limb: int, n_points:
     share = 2 * contact.n_pairs * edges * near_edges
     capacity = 2 * contact.n_pairs * edges * min(edges, near_edges * N_LANES)
     at_body = (2 * edges - 1) * n_limbs * contact.n_corners
-    share_at_body = at_body if short else n_limbs * (NEAR_SIDES * edges + MOST_NEAR_EDGES * contact.n_corners)
+    near_body = at_body if short else n_limbs * (NEAR_SIDES * edges + MOST_NEAR_EDGES * contact.n_corners)
+    share_at_body = min(at_body, near_body)
     capacity += min(at_body, share_at_body * N_LANES)
 
     def rows(count: int = 2 * n_points) -> np.ndarray:

@@ -72,7 +72,6 @@ TRAININGS: dict[str, Training] = {
     "0.5 s, price 0.15, nearer": _every(0.5, 300_000, "shares", **_priced(0.15, aim=0.9)),
     "0.2 s": _every(0.2),
     "0.2 s, coasting": _every(0.2, **COASTING),
-    "0.2 s, coasting, twice as long": _every(0.2, 600_000, **COASTING),
     "0.2 s, price 0.1": _every(0.2, learner="shares", **_priced(0.1, discount=0.3)),
     "0.2 s, Gaussian": _every(0.2, learner="gaussian", **COASTING),
     "0.2 s, SAC": _every(0.2, 150_000, learner="sac", **COASTING),
