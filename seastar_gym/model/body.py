@@ -39,7 +39,7 @@ class OnBody(NamedTuple):
     n_limbs: int
 
     def with_corners(self, rim: Rim) -> "OnBody":
-        """The same with the corners of its outline, for contact."""
+        """Coefficients of the body together with the corners of its outline, which contact needs."""
         return self._replace(coefficients=term.with_corners(self.coefficients, rim.corners))
 
     def mass(self, per_node: Floats) -> Floats:
