@@ -149,7 +149,7 @@ def draw(rows: Sequence[Row], file: Path) -> None:
     lines = -(-len(rows) // columns)
     figure, grid = subplots(lines, columns, figsize=(3.6 * columns, 2.5 * lines + 0.4), squeeze=False)
     panels = iter(grid.flat)
-    for axes, row in zip(panels, rows, strict=False):
+    for row, axes in zip(rows, panels, strict=False):  # in this order, so that no panel is lost
         _draw_row(axes, row)
     for axes in panels:
         axes.set_axis_off()
