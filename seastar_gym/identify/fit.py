@@ -2,9 +2,9 @@
 
 Parameters are fitted by their logarithms, so their errors are relative. Each column of the Jacobian comes from a scene
 in which one parameter has changed a little. These scenes and the scene itself are simulated side by side, as robots of
-one batch. With J the derivative of the residuals r and s^2 = |r|^2/(n - p), the covariance is s^2 (J^T J)^-1, which
-holds for independent errors of equal size in all coordinates. Combinations of parameters, singular vectors of J, whose
-relative error is above UNTOLD are not determined by the data, and the estimate says so.
+one batch. Intervals are those of `covariance.py`, whose residuals may depend on those before them.
+Combinations of parameters, singular vectors of the Jacobian, whose relative error is above UNTOLD are not determined by
+the data, and the estimate says so.
 """
 
 import math
@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import OptimizeResult, least_squares
 from scipy.stats import t as student
 
+from seastar_gym.identify.covariance import SMALLEST, covariance_of
 from seastar_gym.identify.measurement import Measurement
 from seastar_gym.identify.parameters import get_parameter, with_parameters
 from seastar_gym.identify.trajectories import trajectories
@@ -148,8 +149,9 @@ def estimate_of(fit: OptimizeResult, residuals: Residuals, confidence: float) ->
     freedom = residuals.seen.sum() - len(names)
     spread = math.sqrt(2.0 * fit.cost / freedom)
     _, singular, directions = np.linalg.svd(fit.jac, full_matrices=False)
-    errors = spread / np.maximum(singular, 1e-300)
-    covariance = (directions.T * errors**2) @ directions
+    errors = spread / np.maximum(singular, SMALLEST)
+    times = residuals.measurement.time[np.nonzero(residuals.seen)[0]]
+    covariance = covariance_of(fit.jac, fit.fun, times)
     variances = np.diag(covariance)
     half = student.ppf(0.5 + 0.5 * confidence, freedom) * np.sqrt(variances)
     with np.errstate(over="ignore"):

@@ -104,7 +104,7 @@ def test_coordinates_that_were_not_seen_do_not_count(measurement):
     positions[::2, 1:] = np.nan
     partly = Measurement(measurement.time, positions, measurement.nodes, measurement.commands)
     few, all_of_them = (identify(SCENE, ["actuator.peak_angle"], data) for data in (partly, measurement))
-    assert few.upper[0] - few.lower[0] > 1.2 * (all_of_them.upper[0] - all_of_them.lower[0])
+    assert few.upper[0] - few.lower[0] > 1.05 * (all_of_them.upper[0] - all_of_them.lower[0])
     assert few.values[0] == pytest.approx(all_of_them.values[0], rel=0.02)
 
 
