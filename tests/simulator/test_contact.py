@@ -208,6 +208,20 @@ def test_schemes_agree_on_limbs_that_meet():
     assert np.linalg.norm(fine) < 0.02 * np.linalg.norm(swim("sdirk2", 5e-4))
 
 
+@pytest.mark.parametrize(("speed", "stopped"), [(5.0, False), (100.0, True)])
+def test_limbs_thrown_at_each_other_bounce_or_stop_but_never_cross(speed, stopped):
+    """Two limbs turn towards each other, their tips so fast [m/s]. Surfaces that yield hold them up to about 25 m/s."""
+    simulator = Simulator(Scene(Seastar(), None, numerics=Numerics("sdirk2", 0.02), contact=Contact()))
+    state = simulator.get_state()
+    arms = state.positions[0, 1:].reshape(5, -1, 2) - state.positions[0, 0]
+    across = np.stack([-arms[..., 1], arms[..., 0]], axis=-1) * np.array([speed, -speed, 0, 0, 0])[:, None, None] / 0.1
+    state.velocities[0, 1:] = across.reshape(-1, 2)
+    simulator.set_state(state)
+    report = simulator.stroke(np.zeros((1, 5)))
+    assert bool(report.status[0]) == stopped
+    assert not crossings(simulator.positions).any()
+
+
 def test_a_long_limb_meets_one_beyond_its_neighbour():
     """If lengths differ, every pair may touch: limbs 1 and 3 reach over a short limb 2."""
     limbs = (Limb(), Limb(length=0.03), Limb(), Limb(), Limb())

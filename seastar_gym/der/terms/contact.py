@@ -21,7 +21,9 @@ has g of half a step after the end, q_1 + h v_1/2 = q_hat + 4 (Q - q_hat) - gamm
 meet then come to rest against each other in two steps. So contact is of first order, and inelastic.
 
 A node whose limb was on its side when the step began belongs there, wherever the first guess has carried it, and a step
-at whose end edges have come to cross is halved: limbs do not pass through each other in long steps.
+at whose end edges have come to cross is halved: limbs do not pass through each other in long steps. V is at most
+k d^2/2. Limbs that meet with more energy, those of the chapter above about 25 m/s, would pass through each other in the
+shortest step, too: their robot stops and says so.
 """
 
 from collections.abc import Sequence
