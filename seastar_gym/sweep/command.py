@@ -23,14 +23,14 @@ from typing import Any
 
 from tqdm import tqdm
 
+from seastar_gym.executors import Executor
+from seastar_gym.executors.here import Here
+from seastar_gym.executors.processes import Processes
 from seastar_gym.extras import require_extra
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import shown
 from seastar_gym.sweep.axes import Axis, Range
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.executors import Executor
-from seastar_gym.sweep.executors.here import Here
-from seastar_gym.sweep.executors.processes import Processes
 from seastar_gym.sweep.run import Tally, run
 from seastar_gym.sweep.swimming import UNITS
 from seastar_gym.sweep.text import axis_of
@@ -91,12 +91,12 @@ def executor_of(options: argparse.Namespace) -> Executor:
             return Here()
         case "ray":
             require_extra("Sweeps on Ray", "ray", "ray")
-            from seastar_gym.sweep.executors.on_ray import RayTasks
+            from seastar_gym.executors.on_ray import RayTasks
 
             return RayTasks(options.address, options.workers)
         case "slurm" | "local":
             require_extra("Sweeps on SLURM", "slurm", "submitit")
-            from seastar_gym.sweep.executors.slurm import SlurmArrays
+            from seastar_gym.executors.slurm import SlurmArrays
 
             cluster = options.executor
             return SlurmArrays(options.out / "slurm", cluster, options.workers, partition=options.partition)

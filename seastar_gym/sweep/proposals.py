@@ -17,11 +17,11 @@ import pyarrow.parquet
 from optuna.trial import TrialState
 from sqlalchemy.exc import SQLAlchemyError
 
+from seastar_gym.executors import Executor, Outcome, sentence_of
 from seastar_gym.scene.checks import require_choice, require_count, require_number
 from seastar_gym.sweep.axes import Range
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.executors import Executor, Outcome, sentence_of
 from seastar_gym.sweep.parts import Parts, part_of
 from seastar_gym.sweep.run import Progress, Tally
 from seastar_gym.sweep.swimming import UNITS
@@ -71,8 +71,8 @@ def explore(
         if outcome.part is None:
             tally.losses += 1
         else:
-            parts.write(outcome.cell.name, outcome.part)
-            tally.count(outcome.cell)
+            parts.write(outcome.task.name, outcome.part)
+            tally.count(outcome.task)
         proposals.tell(outcome)
         if progress is not None:
             progress(tally)
@@ -123,9 +123,9 @@ class Proposals:
         numbers |= {axis.name: float(axis.values[places[axis.name]]) for axis in sweep.of_robots}
         return tuple(places[axis.name] for axis in sweep.of_frames), numbers
 
-    def tell(self, outcome: Outcome) -> None:
+    def tell(self, outcome: Outcome[Cell]) -> None:
         """Tell the study what came of a cell. Proposals of a lost one are put back."""
-        trials = self._waiting.pop(outcome.cell.name)
+        trials = self._waiting.pop(outcome.task.name)
         values = [None] * len(trials) if outcome.part is None else _column(outcome.part, self._search.objective)
         for trial, value in zip(trials, values, strict=True):
             if outcome.part is None:

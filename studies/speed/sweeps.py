@@ -14,14 +14,14 @@ from pathlib import Path
 from typing import Any
 
 from seastar_gym.command import run_command
+from seastar_gym.executors import Executor
+from seastar_gym.executors.here import Here
+from seastar_gym.executors.processes import Processes
 from seastar_gym.extras import require_extra
 from seastar_gym.scene import Scene
 from seastar_gym.sweep.axes import Range
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.executors import Executor
-from seastar_gym.sweep.executors.here import Here
-from seastar_gym.sweep.executors.processes import Processes
 from seastar_gym.sweep.parts import part_of
 from seastar_gym.sweep.run import run
 from studies.parser import study_parser
@@ -63,7 +63,7 @@ def measure(n_cells: int, robots: int, strokes: int, workers: tuple[int, ...]) -
         "overhead of a cell on one process [ms]": 1e3 * seconds_per_cell(empty, Processes(1), nothing)[0],
     }
     if find_spec("ray") is not None:
-        from seastar_gym.sweep.executors.on_ray import RayTasks
+        from seastar_gym.executors.on_ray import RayTasks
 
         found["overhead of a cell on Ray [ms]"] = 1e3 * seconds_per_cell(empty, RayTasks(workers=1), nothing)[0]
     for n in workers:

@@ -26,7 +26,7 @@ from agents.rllib.training import checkpoints, last_checkpoint, save_checkpoint,
 from agents.training.folder import recorded
 from seastar_gym.controllers.learned import load
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.sweep.executors.on_ray import connect
+from seastar_gym.executors.on_ray import connect
 
 ROOT = Path(__file__).resolve().parents[2]
 SMALL = Hyperparameters(num_envs=8, rollout=8, batch_size=32, epochs=2, hidden=(16, 8), max_episode_time=10.0)

@@ -7,8 +7,8 @@ import pytest
 if find_spec("pyarrow") is None:
     pytest.skip("the extra sweep is not installed", allow_module_level=True)
 
-from seastar_gym.sweep.executors.here import Here
-from seastar_gym.sweep.executors.processes import Processes
+from seastar_gym.executors.here import Here
+from seastar_gym.executors.processes import Processes
 from studies.speed.sweep_memory import PLANS, grid, growth, planned
 from studies.speed.sweeps import cluster, nothing, seconds_per_cell, sweep_of
 

@@ -36,7 +36,7 @@ def cluster(monkeypatch, tmp_path):
 
 @pytest.mark.slow
 def test_a_node_that_is_killed_in_mid_sweep_costs_its_cells(cluster, tmp_path):
-    from seastar_gym.sweep.executors.on_ray import RayTasks
+    from seastar_gym.executors.on_ray import RayTasks
 
     axis = Range("robot.limb_length", 0.05, 0.15).spaced(24)
     sweep = Sweep(Scene.preset("fast"), (axis,), settling=0, measured=1, robots=1)
@@ -58,14 +58,14 @@ def test_a_node_that_is_killed_in_mid_sweep_costs_its_cells(cluster, tmp_path):
 
 @pytest.mark.parametrize("address", ["127.0.0.1:1", "127.0.0.1:99999"])
 def test_there_is_no_cluster_at_a_wrong_address(address):
-    from seastar_gym.sweep.executors.on_ray import RayTasks
+    from seastar_gym.executors.on_ray import RayTasks
 
     with assert_refused("no Ray cluster", address):
         next(RayTasks(address).run(works.named, iter(())))
 
 
 def test_an_address_has_a_port():
-    from seastar_gym.sweep.executors.on_ray import RayTasks
+    from seastar_gym.executors.on_ray import RayTasks
 
     with assert_refused("HOST:PORT", "head"):
         next(RayTasks("head").run(works.named, iter(())))
@@ -74,7 +74,7 @@ def test_an_address_has_a_port():
 @pytest.mark.slow
 def test_a_full_disk_on_a_node_costs_cells_that_need_it(cluster, tmp_path, small_disk):
     """One node of three has no room. Its cells are run again, elsewhere by luck; a later run does the rest."""
-    from seastar_gym.sweep.executors.on_ray import RayTasks
+    from seastar_gym.executors.on_ray import RayTasks
 
     place, grow = small_disk(size=4096)
     (place / "filler").write_bytes(bytes(4096))
@@ -94,8 +94,8 @@ def test_a_full_disk_on_a_node_costs_cells_that_need_it(cluster, tmp_path, small
 @pytest.mark.slow
 def test_simulating_needs_no_disk_on_a_node(cluster, tmp_path, small_disk):
     """A node that can keep no compiled code compiles in every process, and gives the same bits."""
-    from seastar_gym.sweep.executors.here import Here
-    from seastar_gym.sweep.executors.on_ray import RayTasks
+    from seastar_gym.executors.here import Here
+    from seastar_gym.executors.on_ray import RayTasks
 
     place, _ = small_disk(size=4096)
     (place / "filler").write_bytes(bytes(4096))
