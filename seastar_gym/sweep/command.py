@@ -23,9 +23,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from seastar_gym.executors import Executor
-from seastar_gym.executors.here import Here
-from seastar_gym.executors.processes import Processes
+from seastar_gym.executors.options import add_options, executor_of
 from seastar_gym.extras import require_extra
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import shown
@@ -62,14 +60,7 @@ def make_parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn {default}")
     parser.add_argument("--robots", type=int, default=256, help=f"designs of a cell at most {default}")
-    parser.add_argument(
-        "--executor", choices=("processes", "here", "ray", "slurm", "local"), default="processes",
-        help="where cells run: processes of this machine, this process, Ray, SLURM arrays, or submitit's stand-in for "
-        "SLURM on this machine (default: %(default)s)",
-    )  # fmt: skip
-    parser.add_argument("--workers", type=int, help="cells at a time (default: one per processor)")
-    parser.add_argument("--address", help="Ray: address of the head, HOST:6379 (default: a cluster of this machine)")
-    parser.add_argument("--partition", help="SLURM: partition")
+    add_options(parser, "cells", "processes")
     parser.add_argument("--count", action="store_true", help="say how many designs and cells there are, and stop")
     return parser
 
@@ -82,25 +73,6 @@ def scene_of_file(file: Path | None) -> Scene:
         return Scene.from_dict(json.loads(file.read_text(encoding="utf-8")))
     except (json.JSONDecodeError, UnicodeDecodeError) as unfit:
         raise ValueError(f"{file} is no JSON: {unfit}.") from None
-
-
-def executor_of(options: argparse.Namespace) -> Executor:
-    """Executor that the options name. It says at once what is missing."""
-    match options.executor:
-        case "here":
-            return Here()
-        case "ray":
-            require_extra("Sweeps on Ray", "ray", "ray")
-            from seastar_gym.executors.on_ray import RayTasks
-
-            return RayTasks(options.address, options.workers)
-        case "slurm" | "local":
-            require_extra("Sweeps on SLURM", "slurm", "submitit")
-            from seastar_gym.executors.slurm import SlurmArrays
-
-            cluster = options.executor
-            return SlurmArrays(options.out / "slurm", cluster, options.workers, partition=options.partition)
-    return Processes(options.workers)
 
 
 def bar_of(total: int, bar: Any) -> Callable[[Tally], None]:
