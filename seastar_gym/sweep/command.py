@@ -1,11 +1,13 @@
 """Simulates many designs and writes how they swim: `python -m seastar_gym.sweep robot.n_limbs=3,5 --out runs/limbs`.
 
 Axes are NAME=VALUES. The name is that of a number of the scene, such as robot.limb_length, actuator.peak_angle or
-numerics.step, of a whole part (robot, fluid, actuator, numerics, contact), fidelity, or gait. The values are
+numerics.step, of a whole part (robot, fluid, actuator, numerics, contact), fidelity, gait or controller. The values are
 
     3,4,5               a list of numbers or names; parts are named by their class, SmaPulse,SmaWires, or by a JSON file
                         of a part, @robot.json. Gaits are straight, lagged, thrifty or a pair: between gaits stands a
                         slash, straight/1+,4-
+                        Controllers are agents of seastar evaluate, learned,greedy,runs/here/policy.safetensors: they
+                        swim --path, and what they learned or computed is of the scene without the robots' own numbers
     0.05:0.15:11        eleven numbers, evenly spaced, 0.05:0.15:11:log in their logarithm
     0.05:0.15           a range, 0.05:0.15:log in the logarithm, for --latin or --optuna
 
@@ -23,14 +25,17 @@ from typing import Any
 
 from tqdm import tqdm
 
+from seastar_gym.evaluation.path_file import PATH_HELP, load_path
+from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.executors.options import add_options, executor_of
 from seastar_gym.extras import require_extra
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import shown
 from seastar_gym.sweep.axes import Axis, Range
 from seastar_gym.sweep.designs import Sweep
+from seastar_gym.sweep.pilots import Course
 from seastar_gym.sweep.run import Tally, run
-from seastar_gym.sweep.swimming import UNITS
+from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS
 from seastar_gym.sweep.text import axis_of
 
 INTERRUPTED = 130
@@ -49,6 +54,9 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--gait", default="straight", help=f"what robots do, unless an axis says it {default}")
     parser.add_argument("--settling", type=int, default=2, help=f"strokes before the measurement {default}")
     parser.add_argument("--measured", type=int, default=8, help=f"strokes of the measurement {default}")
+    parser.add_argument("--path", default="pentagon", help=f"controllers: {PATH_HELP} {default}")
+    parser.add_argument("--seconds", type=float, default=TIME_LIMIT, help=f"controllers: time limit [s] {default}")
+    parser.add_argument("--decision-period", type=float, help="controllers: time between decisions [s] (default: 1)")
     parser.add_argument("--latin", type=int, default=0, metavar="N", help="designs of every combination of choices")
     parser.add_argument("--optuna", type=int, default=0, metavar="N", help="search with Optuna, N designs in all")
     parser.add_argument("--objective", default="speed", help=f"column of results that is searched for {default}")
@@ -105,7 +113,7 @@ def sweep_of(options: argparse.Namespace, axes: tuple[Axis, ...]) -> Sweep:
     return Sweep(
         scene_of_file(options.scene), axes, options.gait, options.settling, options.measured,
         1 if options.optuna and any(isinstance(axis, Range) for axis in axes) else options.latin,
-        options.seed, options.robots,
+        options.seed, options.robots, Course(load_path(options.path), options.seconds, options.decision_period),
     )  # fmt: skip
 
 
@@ -132,7 +140,7 @@ def search(sweep: Sweep, options: argparse.Namespace) -> int:
         study = explore(sweep, wanted, storage, options.optuna, options.out, executor_of(options),
                         lambda tally: bar.update(tally.designs - bar.n))  # fmt: skip
     best = study.best_trial
-    print(f"Best {options.objective}: {best.value:.6g} {UNITS[options.objective]}, {best.params}.")
+    print(f"Best {options.objective}: {best.value:.6g} {(UNITS | OF_CONTROLLERS)[options.objective]}, {best.params}.")
     return 0
 
 

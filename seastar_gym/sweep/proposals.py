@@ -24,7 +24,7 @@ from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.parts import Parts, part_of
 from seastar_gym.sweep.run import Progress, Tally
-from seastar_gym.sweep.swimming import UNITS
+from seastar_gym.sweep.swimming import units_of
 
 
 class Search(NamedTuple):
@@ -41,11 +41,11 @@ class Search(NamedTuple):
 
 def study_of(sweep: Sweep, search: Search, storage: str) -> optuna.Study:
     """Study of a sweep in a storage, such as "sqlite:///study.db"; the one that is there if there is one."""
-    require_choice("objective", search.objective, tuple(name for name in UNITS if name != "status"))
+    first = next(sweep.frames())
+    require_choice("objective", search.objective, tuple(name for name in units_of(first) if name != "status"))
     require_number("stale_after", search.stale_after, "s")
     if not sweep.axes:
         raise ValueError("A search needs something to vary, such as robot.limb_length=0.05:0.15.")
-    first = next(sweep.frames())
     told = first.text + repr([(axis.name, axis if isinstance(axis, Range) else axis.labels) for axis in sweep.axes])
     name = hashlib.sha256(f"{told}{search.objective}{search.is_largest_best}".encode()).hexdigest()[:16]
     optuna.logging.set_verbosity(optuna.logging.WARNING)

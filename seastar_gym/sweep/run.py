@@ -34,10 +34,9 @@ class Tally:
 
     def count(self, cell: Cell) -> None:
         """Count a finished cell."""
-        swum = cell.frame.swim
         self.done += 1
         self.designs += cell.n_robots
-        self.intervals += cell.n_robots * (swum.settling + swum.measured)
+        self.intervals += cell.n_robots * cell.frame.intervals
 
 
 Progress = Callable[[Tally], None]
