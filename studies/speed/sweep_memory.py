@@ -22,8 +22,8 @@ from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.parts import part_of
 from seastar_gym.sweep.run import Tally, run
 from studies.parser import study_parser
+from studies.provenance import provenance
 from studies.speed.sweeps import nothing
-from studies.speed.timing import machine
 
 require_extra("Sweeps", "sweep", "pyarrow")
 
@@ -94,7 +94,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="JSON file for the figures")
     options = parser.parse_args()
     require_count("--cells", options.cells, 10, 100_000_000)
-    found: dict[str, object] = {"machine": machine(), "cells": options.cells}
+    found: dict[str, object] = {**provenance("python -m studies.speed.sweep_memory"), "cells": options.cells}
     found["planning holds [MB]"] = {
         plan: round(planned(plan, options.cells, min(options.cells, 10_000)), 1) for plan in PLANS
     }
