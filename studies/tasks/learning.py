@@ -13,11 +13,10 @@ from stable_baselines3.common.utils import LinearSchedule
 from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_model
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
-from seastar_gym.envs.symmetry import VectorSymmetryReduction
+from seastar_gym.envs.symmetry import VectorMemory, VectorSymmetryReduction
 from seastar_gym.envs.tasks.obst_trap import ObstTrap
 from seastar_gym.scene.numerics import Fidelity
-from studies.tasks.episodes import Episodes, make_batch, swim
-from studies.tasks.memory import VectorMemory, Wrap
+from studies.tasks.episodes import Episodes, Wrap, make_batch, swim
 
 PAST = 8
 """Past observations that a learner with memory sees."""
