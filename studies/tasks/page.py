@@ -54,7 +54,7 @@ left* is the share of the way from greedy to the bound that plain PPO does not g
 | planner | simulates a decision ahead what is observed, with the wires, the water, .. that it believes in |
 | adaptive | remembers: believes in the wires, the drift, .. that has explained the past best; keeps a map of discs |
 | informed | is told what is hidden: the wires, the water, the course of the prey, the dead limbs, all discs |
-| PPO | the project's hyperparameters, symmetric, no memory; but for the horizons of `studies.tasks.learning.OWN` |
+| PPO | the project's hyperparameters, symmetric, no memory; but for the horizons of `agents.tasks.learning.OWN` |
 | PPO, memory | the same, and tips, last commands and targets of the last eight observations |
 | PPO, told the way | plain PPO of `ObstTrap`, by a reward that measures the way around all discs |
 

@@ -26,13 +26,13 @@ from seastar_gym.scene.numerics import Fidelity
 from studies.provenance import provenance
 from studies.tasks.controllers import CONTROLLERS, is_swum, make_controller
 from studies.tasks.episodes import Episodes, measure, swim
-from studies.tasks.learning import TOLD_THE_WAY, WRAPS, evaluate, train
+from studies.tasks.learning import ALL_LEARNERS, evaluate, train
 from studies.tasks.page import write_page
 
 IDS: dict[str, str] = {id: about[0] for id, about in TASKS.items()}
 """Name of the challenge of every id."""
-AGENTS = (*CONTROLLERS, *WRAPS)
-DEFAULT_LEARNERS = ("PPO", "PPO, memory", TOLD_THE_WAY)
+AGENTS = (*CONTROLLERS, *ALL_LEARNERS)
+DEFAULT_LEARNERS = ("PPO", "PPO, memory", "PPO, told the way")
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def has_cell(id: str, agent: str) -> bool:
     """Whether an agent can swim a task: there is a controller, or a way around discs to be told."""
     if agent in CONTROLLERS:
         return is_swum(agent, CHALLENGES[IDS[id]])
-    return agent != TOLD_THE_WAY or IDS[id] == "obst-trap"
+    return not ALL_LEARNERS[agent].told_the_way or IDS[id] == "obst-trap"
 
 
 def swum(id: str, agent: str, seed: int, options: Options) -> Episodes:
@@ -79,7 +79,7 @@ def swum(id: str, agent: str, seed: int, options: Options) -> Episodes:
     fidelity, threads = options.fidelity, options.num_threads
     if agent in CONTROLLERS:
         return swim(id, lambda batch: make_controller(agent, batch), options.episodes, fidelity, threads)
-    model = train(id, IDS[id], agent, seed, options.decisions, fidelity, threads)
+    model = train(id, agent, seed, options.decisions, fidelity, threads)
     return evaluate(id, agent, model, options.episodes, fidelity, threads)
 
 
