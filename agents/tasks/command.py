@@ -23,12 +23,11 @@ from agents.tasks.learning import LEARNERS, train
 from agents.training.folder import versions_and_machine
 from seastar_gym import TASKS, SmaPulse
 from seastar_gym.benchmark.episodes import swim_episodes
-from seastar_gym.controllers.learned import SHIPPED, LearnedPolicy, load, save
+from seastar_gym.controllers import learned
+from seastar_gym.controllers.learned import LearnedPolicy, load, save
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
 
-BOX = SHIPPED.parent / "tasks"
-"""Folder of the policies of the tasks."""
 RECIPES: dict[str, str] = {
     "SeastarMiswired-v0": "PPO, memory",
     "SeastarPrey-v0": "PPO, memory",
@@ -58,7 +57,7 @@ class Options:
     """Threads of the simulator; by default one for every processor."""
     cards_only: bool = False
     """Measure the policies that are there, and write their cards anew."""
-    out: Path = BOX
+    out: Path = learned.TASKS
     """Folder of the policies."""
 
     def __post_init__(self) -> None:
@@ -72,8 +71,7 @@ class Options:
 def file_of(id: str, folder: Path) -> Path:
     """File of the policy of a task."""
     task, _, period, *_ = TASKS[id]
-    suffix = "" if period == SmaPulse().period else f"-{period:g}s"
-    return folder / f"{task}{suffix}.safetensors"
+    return learned.of_task(task, None if period == SmaPulse().period else period, folder)
 
 
 def trained(id: str, seed: int, options: Options) -> tuple[LearnedPolicy, dict[str, Any]]:

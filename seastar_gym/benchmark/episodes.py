@@ -49,7 +49,7 @@ def held_out(task: str, split: Split = "test") -> dict[str, Any]:
     return {"split": split} if "split" in inspect.signature(creator).parameters else {}
 
 
-def make_batch(task: str, n: int, **arguments: Any) -> gym.vector.VectorEnv[Any, Any, Any]:
+def make_batch(task: str, n: int, /, **arguments: Any) -> gym.vector.VectorEnv[Any, Any, Any]:
     """Batch of a task, the native one where there is one."""
     mode = "sync" if gym.spec(task).vector_entry_point is None else "vector_entry_point"
     return gym.make_vec(task, n, vectorization_mode=mode, **arguments)

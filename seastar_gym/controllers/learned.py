@@ -33,6 +33,9 @@ from seastar_gym.scene.checks import is_finite_number
 SHIPPED = Path(__file__).parent / "policies" / "seastar.safetensors"
 """File of the policy in the box that decides stroke by stroke; `python train.py --ship` replaces it."""
 
+TASKS = SHIPPED.parent / "tasks"
+"""Folder of the policies of tasks; `python -m agents.tasks` replaces them."""
+
 Weights = dict[str, NDArray[np.float32]]
 
 
@@ -199,10 +202,19 @@ def in_the_box(decision_period: float | None, shipped: Path = SHIPPED, task: str
 
     A task without a policy of its own has that of waypoints.
     """
+    if task is not None and (file := of_task(task, decision_period)).is_file():
+        return file
+    return _of_period(shipped, decision_period)
+
+
+def of_task(task: str, decision_period: float | None, folder: Path = TASKS) -> Path:
+    """File of the policy of a task, by the name of its challenge, whether it is there or not."""
+    return _of_period(folder / f"{task}{SHIPPED.suffix}", decision_period)
+
+
+def _of_period(file: Path, decision_period: float | None) -> Path:
     period = "" if decision_period is None else f"-{decision_period:g}s"
-    file = shipped.with_name(f"{shipped.stem}{period}{shipped.suffix}")
-    of_task = shipped.parent / "tasks" / f"{task}{period}{shipped.suffix}"
-    return of_task if task is not None and of_task.is_file() else file
+    return file.with_name(f"{file.stem}{period}{file.suffix}")
 
 
 def load(path: str | os.PathLike[str] = SHIPPED) -> LearnedPolicy:
