@@ -165,6 +165,10 @@ def table(docs: Path, name: str) -> str:
             from studies.learning import ablations_page
 
             return ablations_page.table(read(docs, "ablations.json"))
+        case ["certificates"]:
+            from studies.designs import certificates
+
+            return certificates.table(read(docs, "certificates.json"))
         case ["fidelities", part]:
             from studies.learning.fidelities import tables
 
@@ -189,6 +193,10 @@ def table(docs: Path, name: str) -> str:
             from studies.accuracy import promises
 
             return promises.table(read(docs, "promises.json"))
+        case ["sweeps"]:
+            from studies.speed import sweeps
+
+            return sweeps.table(read(docs, "sweeps.json"))
     raise ValueError(f"No table is called {name!r}.")
 
 

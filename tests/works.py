@@ -36,10 +36,20 @@ def refusing(cell):
     raise OSError(28, "No space left on device")
 
 
+def meet():
+    """Waits until every node of a cluster is at work: processes of as many as the file in MEETING says. One that begins
+    later than others would otherwise have nothing to do in a short sweep."""
+    folder, end = Path(os.environ["MEETING"]), time.monotonic() + 120.0
+    (folder / f"{os.getppid()}.node").touch()
+    while len(list(folder.glob("*.node"))) < int((folder / "nodes").read_text()) and time.monotonic() < end:
+        time.sleep(0.05)
+
+
 def slow(cell):
-    """Takes half a second; says on which node of a cluster it was."""
+    """Takes half a second; says on which node of a cluster it was, by the number of its Ray daemon."""
+    meet()
     time.sleep(0.5)
-    return os.environ.get("RAY_NODE_ID", "").encode() or str(os.getppid()).encode()
+    return str(os.getppid()).encode()
 
 
 def sized(cell):
@@ -54,8 +64,10 @@ def swollen(cell):
 
 def scratching(cell):
     """Needs a little of the disk where the cell is run."""
+    meet()
     time.sleep(0.3)
-    with tempfile.NamedTemporaryFile() as file:
+    folder = os.environ.get("TMPDIR")  # said outright: on a full disk, tempfile by itself would look for another
+    with tempfile.NamedTemporaryFile(dir=folder) as file:
         file.write(bytes(10_000))
         file.flush()
     return cell.name.encode()

@@ -12,7 +12,7 @@ from agents.rllib.training import Round, Watch, train
 from agents.training import efficiency
 from agents.training.folder import claim
 from agents.training.interruption import Interruption
-from seastar_gym.sweep.executors.on_ray import connect
+from seastar_gym.executors.on_ray import connect
 
 
 def run(options: Options) -> int:

@@ -3,26 +3,28 @@
 Agents are names as in `seastar swim`, files of policies, or module:function. LABEL=A,B,C is one agent whose seeds are
 swum by policies A, B, C in turn, as by ten trainings. Tasks are the ids that this package registers. An agent that does
 not fit a task is left out there, with a sentence that says why.
+
+An agent's episodes on a task are a job, or several (--seeds-per-job), which an executor runs. Results are the same on
+each. Nodes of a cluster need the package, the modules and the files of policies where this machine has them.
 """
 
 import argparse
 import shlex
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, get_args
 
-import gymnasium as gym
-import numpy as np
-
 from seastar_gym.benchmark import page
-from seastar_gym.benchmark.episodes import Episodes, held_out, swim_episodes
+from seastar_gym.benchmark.jobs import Answer, Job, answers, env_of
 from seastar_gym.benchmark.measures import measure_of
 from seastar_gym.benchmark.results import Entry, merged, read, write
 from seastar_gym.command import command_parser
-from seastar_gym.controllers.roster import HELP, load_agent
+from seastar_gym.controllers.roster import HELP
 from seastar_gym.evaluation.many import HELD_OUT_SEED
 from seastar_gym.evaluation.tasks import require_task, task_ids
+from seastar_gym.executors.options import add_options, executor_of
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
 
@@ -37,6 +39,8 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("--fidelity", choices=get_args(Fidelity), help="accuracy (default: that of the task)")
     found.add_argument("--decisions", type=int, help="time limit [decisions] (default: that of the task)")
     found.add_argument("--out", type=Path, default=Path("runs/benchmark"), help=f"folder of the results {default}")
+    found.add_argument("--seeds-per-job", type=int, help="seeds of a job (default: all of a policy)")
+    add_options(found, "jobs", "here")
     found.add_argument("--merge", nargs="+", type=Path, default=[], help="files of other results, for the same page")
     return found
 
@@ -49,53 +53,76 @@ def policies_of(agent: str) -> tuple[str, list[str]]:
     )
 
 
-def measured(agent: str, task: str, options: argparse.Namespace) -> Entry:
-    """Result of an agent on a task. ValueError, with one sentence, where it does not fit."""
-    label, policies = policies_of(agent)
+def jobs_of(agent: str, task: str, options: argparse.Namespace) -> list[Job]:
+    """Jobs of an agent on a task."""
+    _, policies = policies_of(agent)
     seeds = [HELD_OUT_SEED + number for number in range(options.seeds)]
-    arguments = held_out(task) | ({} if options.fidelity is None else {"fidelity": options.fidelity})
-    env: Any = gym.make(task, disable_env_checker=True, **arguments).unwrapped
-    measure = measure_of(env)
-    rows: dict[int, dict[str, Any]] = {}
-    for number, name in enumerate(policies[: len(seeds)]):
-        own = seeds[number :: len(policies)]
-        policy = load_agent(name, env, own[0])
-        swum = swim_episodes(task, policy, own, fidelity=options.fidelity, max_decisions=options.decisions)
-        rows |= dict(zip(own, _rows(swum, measure.of(swum)), strict=True))
+    size, threads = options.seeds_per_job or len(seeds), None if options.executor == "here" else 1
+    return [
+        Job(task, agent, name, tuple(own[begin : begin + size]), options.fidelity, options.decisions, threads)
+        for number, name in enumerate(policies[: len(seeds)])
+        for own in [seeds[number :: len(policies)]]
+        for begin in range(0, len(own), size)
+    ]
+
+
+def entry_of(found: Sequence[Answer]) -> Entry:
+    """Entry of all jobs of an agent on a task."""
+    job = found[0].job
+    rows = {seed: row for each in found for seed, row in zip(each.job.seeds, each.rows, strict=True)}
+    seeds = sorted(rows)
     columns: dict[str, Any] = {name: [rows[seed][name] for seed in seeds] for name in rows[seeds[0]]}
+    measure = measure_of(env_of(job.task, job.fidelity))
     return Entry(
-        task, label, options.fidelity or "", measure.name, measure.unit, measure.better, seeds=seeds, **columns
-    )
+        job.task, policies_of(job.agent)[0], job.fidelity or "", measure.name, measure.unit, measure.better,
+        seeds=seeds, **columns,
+    )  # fmt: skip
 
 
-def _rows(swum: Episodes, scores: np.ndarray[Any, Any]) -> list[dict[str, Any]]:
-    """Results of every episode, as plain numbers."""
-    names = ("scores", "success", "returns", "decisions")
-    columns = (scores, swum.success, swum.returns, swum.decisions)
-    return [dict(zip(names, row, strict=True)) for row in zip(*(column.tolist() for column in columns), strict=True)]
-
-
-def benchmark(options: argparse.Namespace) -> list[Entry]:
-    """Results of all agents on all tasks; who does not fit is said on the way."""
+def require_sound(options: argparse.Namespace) -> list[str]:
+    """Tasks of the options; ValueError where something in them is wrong."""
     require_count("--seeds", options.seeds, 1, 10_000)
-    if options.decisions is not None:
-        require_count("--decisions", options.decisions, 1, 1_000_000)
-    tasks = task_ids() if options.tasks is None else options.tasks
+    for name in ("decisions", "seeds_per_job"):
+        if getattr(options, name) is not None:
+            require_count(f"--{name.replace('_', '-')}", getattr(options, name), 1, 1_000_000)
+    tasks: list[str] = task_ids() if options.tasks is None else options.tasks
     for task in tasks:
         require_task(task)
     labels = [policies_of(agent)[0] for agent in options.agents]
     if len(set(labels)) < len(labels):
         raise ValueError(f"Two agents are called {max(labels, key=labels.count)}: name them with LABEL=AGENT.")
-    entries = []
-    for task in tasks:
-        for agent in options.agents:
-            try:
-                entries.append(measured(agent, task, options))
-            except (ValueError, FileNotFoundError) as unfit:
-                print(f"{agent} does not swim {task}: {unfit}", file=sys.stderr)
-                continue
-            print(f"{agent}, {task}: {entries[-1].measure} {entries[-1].estimate()} [{entries[-1].unit}]", flush=True)
-    return entries
+    return tasks
+
+
+def benchmark(options: argparse.Namespace) -> tuple[list[Entry], bool]:
+    """Results of all agents on all tasks, and whether no job was lost; who does not fit is said on the way."""
+    pairs = [(task, agent) for task in require_sound(options) for agent in options.agents]
+    jobs = [job for task, agent in pairs for job in jobs_of(agent, task, options)]
+    waiting = Counter((job.task, job.agent) for job in jobs)
+    found: dict[tuple[str, str], list[Answer]] = {pair: [] for pair in pairs}
+    entries, is_whole = dict[tuple[str, str], Entry](), True
+    for answer in answers(jobs, executor_of(options)):
+        pair = answer.job.task, answer.job.agent
+        found[pair].append(answer)
+        if len(found[pair]) < waiting[pair]:
+            continue
+        task, agent = pair
+        try:
+            entries[pair] = whole(found[pair])
+        except ValueError as unfit:
+            print(f"{agent} does not swim {task}: {unfit}", file=sys.stderr)
+            is_whole &= not any(each.is_lost for each in found[pair])
+            continue
+        print(f"{agent}, {task}: {entries[pair].measure} {entries[pair].estimate()} [{entries[pair].unit}]", flush=True)
+    return [entries[pair] for pair in pairs if pair in entries], is_whole
+
+
+def whole(found: Sequence[Answer]) -> Entry:
+    """Entry of jobs. ValueError, with one sentence, where one of them has no result."""
+    for answer in found:
+        if answer.problem:
+            raise ValueError(answer.problem)
+    return entry_of(found)
 
 
 def publish(entries: Sequence[Entry], folder: Path, command: str) -> list[str]:
@@ -120,7 +147,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(given)
     try:
         others = [read(file) for file in options.merge]
-        entries = merged(*others, benchmark(options) if options.agents else [])
+        own, is_whole = benchmark(options) if options.agents else ([], True)
+        entries = merged(*others, own)
         if not entries:
             raise ValueError("There is nothing to show: no agent swam a task.")
         files = publish(entries, options.out, shlex.join(["seastar", "benchmark", *given]))
@@ -129,4 +157,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     print(page.table(entries))
     print(f"Written to {options.out}: {', '.join(files)}")
-    return 0
+    return 0 if is_whole else 1

@@ -49,10 +49,13 @@ def held_out(task: str, split: Split = "test") -> dict[str, Any]:
     return {"split": split} if "split" in inspect.signature(creator).parameters else {}
 
 
-def make_batch(task: str, n: int, /, **arguments: Any) -> gym.vector.VectorEnv[Any, Any, Any]:
-    """Batch of a task, the native one where there is one."""
-    mode = "sync" if gym.spec(task).vector_entry_point is None else "vector_entry_point"
-    return gym.make_vec(task, n, vectorization_mode=mode, **arguments)
+def make_batch(
+    task: str, n: int, /, threads: int | None = None, **arguments: Any
+) -> gym.vector.VectorEnv[Any, Any, Any]:
+    """Batch of a task, the native one where there is one. threads: Of the native one; None means one per processor."""
+    if gym.spec(task).vector_entry_point is None:
+        return gym.make_vec(task, n, vectorization_mode="sync", **arguments)
+    return gym.make_vec(task, n, vectorization_mode="vector_entry_point", threads=threads, **arguments)
 
 
 def require_seen(policy: Policy, env: Any) -> None:
@@ -71,12 +74,13 @@ def swim_episodes(
     *,
     fidelity: Fidelity | None = None,
     max_decisions: int | None = None,
+    threads: int | None = None,
     split: Split = "test",
 ) -> Episodes:
     """Episodes with these seeds, each to its end, with deterministic actions.
 
-    fidelity: None means the task's own. max_decisions: None means the time limit of the task. split: Where a task has
-    splits, the one whose episodes are swum.
+    fidelity: None means the task's own. max_decisions: None means the time limit of the task. threads: Of the
+    simulator; None means one per processor. split: Where a task has splits, the one whose episodes are swum.
     """
     arguments = held_out(task, split) | ({} if fidelity is None else {"fidelity": fidelity})
     plain: Any = gym.make(task, disable_env_checker=True, **arguments).unwrapped
@@ -85,7 +89,7 @@ def swim_episodes(
     limit = max_decisions or gym.spec(task).max_episode_steps
     if limit is None:
         raise ValueError(f"The task {task!r} has no time limit.")
-    env = make_batch(task, len(seeds), actions=mode, max_episode_steps=limit, **arguments)
+    env = make_batch(task, len(seeds), threads, actions=mode, max_episode_steps=limit, **arguments)
     episodes = _swim(env, policy, seeds, limit * plain.decision_period)
     env.close()
     return episodes

@@ -7,6 +7,7 @@ files that you trust. The policies of this project (.safetensors, and the model.
 """
 
 import importlib
+import importlib.util
 import pickle
 import re
 import zipfile
@@ -26,6 +27,18 @@ _FUNCTION = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 def is_function(name: str) -> bool:
     """Whether a name is that of a function in a module, "module:function"."""
     return _FUNCTION.fullmatch(name) is not None
+
+
+def module_file(name: str) -> Path:
+    """File of the module of a function of this name. ValueError if there is none."""
+    module = name.partition(":")[0]
+    try:
+        spec = importlib.util.find_spec(module)
+    except ModuleNotFoundError:
+        spec = None
+    if spec is None or not spec.has_location or spec.origin is None:
+        raise ValueError(f"There is no agent {name!r}: no file has the module {module}.")
+    return Path(spec.origin)
 
 
 def call_function(name: str, env: SeastarSwimEnv) -> Policy:

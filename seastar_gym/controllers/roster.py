@@ -77,6 +77,19 @@ def task_of(env: Any) -> str | None:
     return next((name for name, known in CHALLENGES.items() if known == challenge), None)
 
 
+def files_of(name: str, decision_period: float | None = None) -> list[Path]:
+    """Files that the policy of a name is made of, the module's for "module:function"; none for what is computed.
+
+    decision_period: Time between decisions [s]. None means strokes.
+    """
+    if foreign.is_function(name):
+        return [foreign.module_file(name)]
+    if name != "learned" and not _is_file(name):
+        return []
+    file = learned.in_the_box(decision_period) if name == "learned" else Path(name)
+    return [file, file.with_suffix(".json")] if file.suffix == ".safetensors" else [file]
+
+
 def _is_file(name: str) -> bool:
     return name.endswith((".zip", ".safetensors", ".pth", ".pt", ".pkl")) or len(Path(name).parts) > 1
 
@@ -93,13 +106,13 @@ def _load_agent(
         return AGENTS[name](scene, decision_period, task)
     if foreign.is_function(name):
         return foreign.call_function(name, make_env())
-    return _load_file(name) if _is_file(name) else _scripted(name, seed, decision_period)
+    return _load_file(name) if _is_file(name) else _scripted(name, seed, decision_period, scene.robot.n_limbs)
 
 
-def _scripted(name: str, seed: int, decision_period: float | None) -> Policy:
+def _scripted(name: str, seed: int, decision_period: float | None, n_limbs: int) -> Policy:
     known = (*GAITS, "random")
     try:
-        return scripted(name, rng=np.random.default_rng(seed), decision_period=decision_period)
+        return scripted(name, None, n_limbs, np.random.default_rng(seed), decision_period)
     except ValueError as unknown:
         if name in known:
             raise  # a gait that does not fit the time between decisions

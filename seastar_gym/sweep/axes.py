@@ -1,7 +1,7 @@
 """Axes of a sweep: what differs from design to design.
 
 An axis has the name of a number of the scene ("robot.limb_length", "numerics.step"), of a whole part ("robot",
-"fluid", "actuator", "numerics", "contact"), "fidelity" for the name of a preset, or "gait".
+"fluid", "actuator", "numerics", "contact"), "fidelity" for the name of a preset, "gait" or "controller".
 """
 
 import math
@@ -82,7 +82,7 @@ def _label(value: Any) -> Any:
 
 def require_known(scene: Scene, name: str) -> None:
     """ValueError unless an axis of this name can change the scene."""
-    if name in (*PARTS, "fidelity", "gait"):
+    if name in (*PARTS, "fidelity", "gait", "controller"):
         return
     first, *rest = name.split(".")
     value: Any = getattr(scene, first) if first in PARTS and rest else None

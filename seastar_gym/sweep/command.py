@@ -1,11 +1,13 @@
 """Simulates many designs and writes how they swim: `python -m seastar_gym.sweep robot.n_limbs=3,5 --out runs/limbs`.
 
 Axes are NAME=VALUES. The name is that of a number of the scene, such as robot.limb_length, actuator.peak_angle or
-numerics.step, of a whole part (robot, fluid, actuator, numerics, contact), fidelity, or gait. The values are
+numerics.step, of a whole part (robot, fluid, actuator, numerics, contact), fidelity, gait or controller. The values are
 
     3,4,5               a list of numbers or names; parts are named by their class, SmaPulse,SmaWires, or by a JSON file
                         of a part, @robot.json. Gaits are straight, lagged, thrifty or a pair: between gaits stands a
                         slash, straight/1+,4-
+                        Controllers are agents of seastar evaluate, learned,greedy,runs/here/policy.safetensors: they
+                        swim --path, and what they learned or computed is of the scene without the robots' own numbers
     0.05:0.15:11        eleven numbers, evenly spaced, 0.05:0.15:11:log in their logarithm
     0.05:0.15           a range, 0.05:0.15:log in the logarithm, for --latin or --optuna
 
@@ -23,16 +25,17 @@ from typing import Any
 
 from tqdm import tqdm
 
+from seastar_gym.evaluation.path_file import PATH_HELP, load_path
+from seastar_gym.evaluation.swim import TIME_LIMIT
+from seastar_gym.executors.options import add_options, executor_of
 from seastar_gym.extras import require_extra
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import shown
 from seastar_gym.sweep.axes import Axis, Range
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.executors import Executor
-from seastar_gym.sweep.executors.here import Here
-from seastar_gym.sweep.executors.processes import Processes
+from seastar_gym.sweep.pilots import Course
 from seastar_gym.sweep.run import Tally, run
-from seastar_gym.sweep.swimming import UNITS
+from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS
 from seastar_gym.sweep.text import axis_of
 
 INTERRUPTED = 130
@@ -51,6 +54,9 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--gait", default="straight", help=f"what robots do, unless an axis says it {default}")
     parser.add_argument("--settling", type=int, default=2, help=f"strokes before the measurement {default}")
     parser.add_argument("--measured", type=int, default=8, help=f"strokes of the measurement {default}")
+    parser.add_argument("--path", default="pentagon", help=f"controllers: {PATH_HELP} {default}")
+    parser.add_argument("--seconds", type=float, default=TIME_LIMIT, help=f"controllers: time limit [s] {default}")
+    parser.add_argument("--decision-period", type=float, help="controllers: time between decisions [s] (default: 1)")
     parser.add_argument("--latin", type=int, default=0, metavar="N", help="designs of every combination of choices")
     parser.add_argument("--optuna", type=int, default=0, metavar="N", help="search with Optuna, N designs in all")
     parser.add_argument("--objective", default="speed", help=f"column of results that is searched for {default}")
@@ -62,14 +68,7 @@ def make_parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn {default}")
     parser.add_argument("--robots", type=int, default=256, help=f"designs of a cell at most {default}")
-    parser.add_argument(
-        "--executor", choices=("processes", "here", "ray", "slurm", "local"), default="processes",
-        help="where cells run: processes of this machine, this process, Ray, SLURM arrays, or submitit's stand-in for "
-        "SLURM on this machine (default: %(default)s)",
-    )  # fmt: skip
-    parser.add_argument("--workers", type=int, help="cells at a time (default: one per processor)")
-    parser.add_argument("--address", help="Ray: address of the head, HOST:6379 (default: a cluster of this machine)")
-    parser.add_argument("--partition", help="SLURM: partition")
+    add_options(parser, "cells", "processes")
     parser.add_argument("--count", action="store_true", help="say how many designs and cells there are, and stop")
     return parser
 
@@ -82,25 +81,6 @@ def scene_of_file(file: Path | None) -> Scene:
         return Scene.from_dict(json.loads(file.read_text(encoding="utf-8")))
     except (json.JSONDecodeError, UnicodeDecodeError) as unfit:
         raise ValueError(f"{file} is no JSON: {unfit}.") from None
-
-
-def executor_of(options: argparse.Namespace) -> Executor:
-    """Executor that the options name. It says at once what is missing."""
-    match options.executor:
-        case "here":
-            return Here()
-        case "ray":
-            require_extra("Sweeps on Ray", "ray", "ray")
-            from seastar_gym.sweep.executors.on_ray import RayTasks
-
-            return RayTasks(options.address, options.workers)
-        case "slurm" | "local":
-            require_extra("Sweeps on SLURM", "slurm", "submitit")
-            from seastar_gym.sweep.executors.slurm import SlurmArrays
-
-            cluster = options.executor
-            return SlurmArrays(options.out / "slurm", cluster, options.workers, partition=options.partition)
-    return Processes(options.workers)
 
 
 def bar_of(total: int, bar: Any) -> Callable[[Tally], None]:
@@ -133,7 +113,7 @@ def sweep_of(options: argparse.Namespace, axes: tuple[Axis, ...]) -> Sweep:
     return Sweep(
         scene_of_file(options.scene), axes, options.gait, options.settling, options.measured,
         1 if options.optuna and any(isinstance(axis, Range) for axis in axes) else options.latin,
-        options.seed, options.robots,
+        options.seed, options.robots, Course(load_path(options.path), options.seconds, options.decision_period),
     )  # fmt: skip
 
 
@@ -160,7 +140,7 @@ def search(sweep: Sweep, options: argparse.Namespace) -> int:
         study = explore(sweep, wanted, storage, options.optuna, options.out, executor_of(options),
                         lambda tally: bar.update(tally.designs - bar.n))  # fmt: skip
     best = study.best_trial
-    print(f"Best {options.objective}: {best.value:.6g} {UNITS[options.objective]}, {best.params}.")
+    print(f"Best {options.objective}: {best.value:.6g} {(UNITS | OF_CONTROLLERS)[options.objective]}, {best.params}.")
     return 0
 
 

@@ -17,6 +17,7 @@ from seastar_gym.scene.per_robot import numbers_of, with_numbers
 from seastar_gym.sweep.axes import Axis, Choices, Range, require_known
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.frames import Frame, Swim, frame_with, scene_with
+from seastar_gym.sweep.pilots import Course
 
 Floats = NDArray[np.float64]
 
@@ -40,6 +41,7 @@ class Sweep:
     samples: Designs of the Latin hypercube.
     seed: Of the Latin hypercube.
     robots: Designs of a cell at most.
+    course: What controllers swim, if there is an axis of them. Gaits and their intervals are of no matter then.
     """
 
     scene: Scene
@@ -50,6 +52,7 @@ class Sweep:
     samples: int = 0
     seed: int = 0
     robots: int = 256
+    course: Course = Course()
 
     def __post_init__(self) -> None:
         if not isinstance(self.scene, Scene) or self.scene.n_robots is not None:
@@ -59,6 +62,8 @@ class Sweep:
         names = [axis.name for axis in self.axes]
         if len(set(names)) < len(names):
             raise ValueError(f"Every axis may be named once, not {shown(names)}.")
+        if {"gait", "controller"} <= set(names):
+            raise ValueError("Robots follow a gait or a controller: take one of these axes.")
         require_count("settling", self.settling, 0, 1_000_000)
         require_count("measured", self.measured, 1, 1_000_000)
         require_count("robots", self.robots, 1, 1_000_000)
@@ -154,7 +159,7 @@ class Sweep:
             axis.name: (axis.values[place], axis.labels[place])
             for axis, place in zip(self.of_frames, places, strict=True)
         }
-        frame = frame_with(self.scene, self.gait, Swim(self.settling, self.measured), choices)
+        frame = frame_with(self.scene, self.gait, Swim(self.settling, self.measured), choices, self.course)
         of_robots: tuple[Axis, ...] = (*self.ranges, *self.of_robots)
         missing = {axis.name for axis in of_robots} - set(numbers_of(frame.scene))
         if missing:

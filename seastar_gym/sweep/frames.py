@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,6 +11,7 @@ from seastar_gym.scene.checks import shown
 from seastar_gym.scene.per_robot import with_numbers
 from seastar_gym.sweep.axes import PARTS
 from seastar_gym.sweep.gait import Gait, gait_of
+from seastar_gym.sweep.pilots import Course, Pilot, pilot_of
 from seastar_gym.version import __version__
 
 FORM = 1
@@ -27,25 +28,33 @@ class Swim:
 
 @dataclass(frozen=True)
 class Frame:
-    """Scene and gait of a lane batch, before its robots get their own numbers.
+    """Scene and gait, or controller, of a lane batch, before its robots get their own numbers.
 
+    gait, swim: Of robots without a controller.
     labels: What was chosen, by the name of the axis: texts or numbers.
+    pilot: Controller, None for a gait.
     """
 
     scene: Scene
     gait: Gait
     swim: Swim
     labels: tuple[tuple[str, Any], ...]
+    pilot: Pilot | None = None
 
     @cached_property
     def text(self) -> str:
         """All that results depend on except the numbers of robots, as JSON."""
-        told = {
-            "scene": self.scene.to_dict(), "commands": self.gait.commands, "interval": self.gait.interval,
-            "settling": self.swim.settling, "measured": self.swim.measured, "labels": self.labels,
-            "version": __version__, "form": FORM,
-        }  # fmt: skip
+        told = {"scene": self.scene.to_dict(), "labels": self.labels, "version": __version__, "form": FORM}
+        if self.pilot is None:
+            told |= {"commands": self.gait.commands, "interval": self.gait.interval, **asdict(self.swim)}
+        else:
+            told["pilot"] = asdict(self.pilot)
         return json.dumps(told, sort_keys=True)
+
+    @property
+    def intervals(self) -> int:
+        """Intervals, such as strokes, that every robot swims; 0 for controllers, which end when they arrive."""
+        return self.swim.settling + self.swim.measured if self.pilot is None else 0
 
     @cached_property
     def digest(self) -> bytes:
@@ -53,15 +62,21 @@ class Frame:
         return hashlib.sha256(self.text.encode()).digest()
 
 
-def frame_with(scene: Scene, gait: Any, swim: Swim, choices: dict[str, tuple[Any, Any]]) -> Frame:
-    """Frame of a scene in which choices, (value, label) by the name of the axis, have replaced what was there."""
+def frame_with(
+    scene: Scene, gait: Any, swim: Swim, choices: dict[str, tuple[Any, Any]], course: Course = Course()
+) -> Frame:
+    """Frame of a scene in which choices, (value, label) by the name of the axis, have replaced what was there.
+
+    course: What controllers swim.
+    """
     values = {name: value for name, (value, _) in choices.items()}
     try:
         changed = scene_with(scene, values)
-        chosen_gait = gait_of(values.get("gait", gait), changed)
+        pilot = pilot_of(values["controller"], course, changed) if "controller" in values else None
+        chosen_gait = gait_of(values.get("gait", gait), changed) if pilot is None else Gait(())
     except TypeError as unfit:
         raise ValueError(f"{shown(values)} do not fit the scene: {unfit}.") from None
-    return Frame(changed, chosen_gait, swim, tuple((name, label) for name, (_, label) in choices.items()))
+    return Frame(changed, chosen_gait, swim, tuple((name, label) for name, (_, label) in choices.items()), pilot)
 
 
 def scene_with(scene: Scene, values: dict[str, Any]) -> Scene:

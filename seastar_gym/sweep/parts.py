@@ -11,7 +11,7 @@ import pyarrow.parquet
 
 from seastar_gym.files import beside
 from seastar_gym.sweep.cells import Cell
-from seastar_gym.sweep.swimming import UNITS, swim
+from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS, swim
 
 OF_SCENE = {
     "limb_length": "m", "length": "m", "rod_radius": "m", "radius": "m", "youngs_modulus": "Pa", "density": "kg/m^3",
@@ -36,7 +36,7 @@ def part_of(cell: Cell) -> bytes:
 
 
 def _field(name: str, array: Any) -> Any:
-    unit = UNITS.get(name) or OF_SCENE.get(name.rpartition(".")[2])
+    unit = (UNITS | OF_CONTROLLERS).get(name) or OF_SCENE.get(name.rpartition(".")[2])
     return pa.field(name, array.type, metadata={"unit": unit} if unit else None)
 
 

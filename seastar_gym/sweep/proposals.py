@@ -17,14 +17,14 @@ import pyarrow.parquet
 from optuna.trial import TrialState
 from sqlalchemy.exc import SQLAlchemyError
 
+from seastar_gym.executors import Executor, Outcome, sentence_of
 from seastar_gym.scene.checks import require_choice, require_count, require_number
 from seastar_gym.sweep.axes import Range
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.executors import Executor, Outcome, sentence_of
 from seastar_gym.sweep.parts import Parts, part_of
 from seastar_gym.sweep.run import Progress, Tally
-from seastar_gym.sweep.swimming import UNITS
+from seastar_gym.sweep.swimming import units_of
 
 
 class Search(NamedTuple):
@@ -41,11 +41,11 @@ class Search(NamedTuple):
 
 def study_of(sweep: Sweep, search: Search, storage: str) -> optuna.Study:
     """Study of a sweep in a storage, such as "sqlite:///study.db"; the one that is there if there is one."""
-    require_choice("objective", search.objective, tuple(name for name in UNITS if name != "status"))
+    first = next(sweep.frames())
+    require_choice("objective", search.objective, tuple(name for name in units_of(first) if name != "status"))
     require_number("stale_after", search.stale_after, "s")
     if not sweep.axes:
         raise ValueError("A search needs something to vary, such as robot.limb_length=0.05:0.15.")
-    first = next(sweep.frames())
     told = first.text + repr([(axis.name, axis if isinstance(axis, Range) else axis.labels) for axis in sweep.axes])
     name = hashlib.sha256(f"{told}{search.objective}{search.is_largest_best}".encode()).hexdigest()[:16]
     optuna.logging.set_verbosity(optuna.logging.WARNING)
@@ -71,8 +71,8 @@ def explore(
         if outcome.part is None:
             tally.losses += 1
         else:
-            parts.write(outcome.cell.name, outcome.part)
-            tally.count(outcome.cell)
+            parts.write(outcome.task.name, outcome.part)
+            tally.count(outcome.task)
         proposals.tell(outcome)
         if progress is not None:
             progress(tally)
@@ -123,9 +123,9 @@ class Proposals:
         numbers |= {axis.name: float(axis.values[places[axis.name]]) for axis in sweep.of_robots}
         return tuple(places[axis.name] for axis in sweep.of_frames), numbers
 
-    def tell(self, outcome: Outcome) -> None:
+    def tell(self, outcome: Outcome[Cell]) -> None:
         """Tell the study what came of a cell. Proposals of a lost one are put back."""
-        trials = self._waiting.pop(outcome.cell.name)
+        trials = self._waiting.pop(outcome.task.name)
         values = [None] * len(trials) if outcome.part is None else _column(outcome.part, self._search.objective)
         for trial, value in zip(trials, values, strict=True):
             if outcome.part is None:

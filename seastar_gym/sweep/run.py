@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 from seastar_gym.command import refused_by_disk
+from seastar_gym.executors import Executor, Outcome, Work
 from seastar_gym.sweep.cells import Cell
-from seastar_gym.sweep.executors import Executor, Outcome, Work
 from seastar_gym.sweep.parts import Parts, part_of
 
 ATTEMPTS = 3
@@ -34,10 +34,9 @@ class Tally:
 
     def count(self, cell: Cell) -> None:
         """Count a finished cell."""
-        swum = cell.frame.swim
         self.done += 1
         self.designs += cell.n_robots
-        self.intervals += cell.n_robots * (swum.settling + swum.measured)
+        self.intervals += cell.n_robots * cell.frame.intervals
 
 
 Progress = Callable[[Tally], None]
@@ -46,7 +45,7 @@ Progress = Callable[[Tally], None]
 
 def run(
     cells: Iterable[Cell], folder: str | os.PathLike[str], executor: Executor, progress: Progress | None = None,
-    work: Work = part_of,
+    work: Work[Cell] = part_of,
 ) -> Tally:  # fmt: skip
     """Run the cells that have no part in the folder; those that were lost again at the end.
 
@@ -56,13 +55,13 @@ def run(
     work: What makes a part of a cell.
     """
     parts, tally = Parts(folder), Tally()
-    waiting, lost = unfinished(cells, parts, tally), list[Outcome]()
+    waiting, lost = unfinished(cells, parts, tally), list[Outcome[Cell]]()
     for _ in range(ATTEMPTS):
         lost = _attempt(executor.run(work, waiting), parts, tally, progress)
         if not lost:
             return tally
-        waiting = iter([outcome.cell for outcome in lost])
-    tally.problems = {outcome.cell.name: outcome.problem for outcome in lost}
+        waiting = iter([outcome.task for outcome in lost])
+    tally.problems = {outcome.task.name: outcome.problem for outcome in lost}
     return tally
 
 
@@ -75,30 +74,32 @@ def unfinished(cells: Iterable[Cell], parts: Parts, tally: Tally) -> Iterator[Ce
             yield cell
 
 
-def _attempt(outcomes: Iterator[Outcome], parts: Parts, tally: Tally, progress: Progress | None) -> list[Outcome]:
+def _attempt(
+    outcomes: Iterator[Outcome[Cell]], parts: Parts, tally: Tally, progress: Progress | None
+) -> list[Outcome[Cell]]:
     """Write the parts of outcomes; returns those without."""
-    lost = list[Outcome]()
+    lost = list[Outcome[Cell]]()
     refused = 0
     for outcome in outcomes:
         try:
             if outcome.part is not None:
-                parts.write(outcome.cell.name, outcome.part)
+                parts.write(outcome.task.name, outcome.part)
                 refused = 0
         except OSError as failure:
             refused += 1
             if refused == UNWRITTEN:
                 raise
-            outcome = Outcome(outcome.cell, None, refused_by_disk(failure))
+            outcome = Outcome(outcome.task, None, refused_by_disk(failure))
         _count(outcome, lost, tally)
         if progress is not None:
             progress(tally)
     return lost
 
 
-def _count(outcome: Outcome, lost: list[Outcome], tally: Tally) -> None:
+def _count(outcome: Outcome[Cell], lost: list[Outcome[Cell]], tally: Tally) -> None:
     """Count an outcome. ValueError if too many are lost."""
     if outcome.part is not None:
-        tally.count(outcome.cell)
+        tally.count(outcome.task)
         return
     lost.append(outcome)
     tally.losses += 1

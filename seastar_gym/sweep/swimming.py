@@ -9,6 +9,8 @@ from seastar_gym.scene import Scene
 from seastar_gym.scene.per_robot import with_numbers
 from seastar_gym.simulator import Simulator
 from seastar_gym.sweep.cells import Cell
+from seastar_gym.sweep.frames import Frame
+from seastar_gym.sweep.piloted import steer
 
 Floats = NDArray[np.float64]
 
@@ -28,7 +30,20 @@ energy: Electric energy of the measured intervals.
 smallest_opening_angle: Between neighbouring limbs at the hub, at any time. Below zero, limbs have crossed.
 newton_iterations: Of all intervals.
 status: SolverStatus, the largest of all intervals, or REFUSED. All else is NaN unless it is zero.
+
+Of a controller, the measurement is the whole swim, and the speed is the length of the path up to the last waypoint
+reached over the time of the swim.
 """
+OF_CONTROLLERS = {"time": "s", "waypoints": "1"}
+"""Columns besides, of controllers, and their units.
+
+time: Time until the last waypoint is reached; NaN if it is not. waypoints: Number of waypoints reached.
+"""
+
+
+def units_of(frame: Frame) -> dict[str, str]:
+    """Columns of results of a frame, and their units."""
+    return UNITS if frame.pilot is None else UNITS | OF_CONTROLLERS
 
 
 def swim(cell: Cell) -> dict[str, NDArray[Any]]:
@@ -41,7 +56,7 @@ def swim(cell: Cell) -> dict[str, NDArray[Any]]:
         scene = scene_of(cell, sound) if sound.any() else cell.frame.scene
     found = measure(scene, cell, int(sound.sum())) if sound.any() else {}
     columns: dict[str, NDArray[Any]] = {}
-    for name in UNITS:
+    for name in units_of(cell.frame):
         columns[name] = np.full(cell.n_robots, np.nan)
         columns[name][sound] = found.get(name, np.nan)
     columns["status"] = np.where(sound, columns["status"], REFUSED).astype(np.int64)
@@ -62,8 +77,16 @@ def _is_sound(cell: Cell, robot: int) -> bool:
 
 
 def measure(scene: Scene, cell: Cell, n_robots: int) -> dict[str, NDArray[Any]]:
-    """Columns of results of robots side by side."""
-    simulator, gait, swum = Simulator(scene, n_robots, threads=1), cell.frame.gait, cell.frame.swim
+    """Columns of results of robots side by side, NaN where the solver failed."""
+    frame, pilot = cell.frame, cell.frame.pilot
+    columns = repeat(scene, frame, n_robots) if pilot is None else steer(scene, frame.scene, pilot, n_robots)
+    status = columns.pop("status")
+    return {**{name: np.where(status == 0.0, column, np.nan) for name, column in columns.items()}, "status": status}
+
+
+def repeat(scene: Scene, frame: Frame, n_robots: int) -> dict[str, NDArray[Any]]:
+    """Columns of results of robots side by side that repeat a gait."""
+    simulator, gait, swum = Simulator(scene, n_robots, threads=1), frame.gait, frame.swim
     interval = scene.actuator.period if gait.interval is None else gait.interval
     status, iterations, energy = np.zeros((3, n_robots))
     angle = np.full(n_robots, np.inf)
@@ -79,10 +102,8 @@ def measure(scene: Scene, cell: Cell, n_robots: int) -> dict[str, NDArray[Any]]:
     speed = np.abs(way) / (swum.measured * interval)
     with np.errstate(divide="ignore"):
         strokes = 1.0 / (speed * scene.actuator.period)
-    columns = {
+    return {
         "speed": speed, "strokes_per_metre": strokes, "ahead": way.real, "aside": way.imag,
         "turn": turn - 2.0 * np.pi * np.rint(turn / (2.0 * np.pi)), "energy": energy,
-        "smallest_opening_angle": angle, "newton_iterations": iterations,
+        "smallest_opening_angle": angle, "newton_iterations": iterations, "status": status,
     }  # fmt: skip
-    swam = status == 0.0
-    return {**{name: np.where(swam, column, np.nan) for name, column in columns.items()}, "status": status}

@@ -16,6 +16,8 @@ def axis_of(text: str) -> Axis:
         raise ValueError(f"An axis is written NAME=VALUES, such as robot.n_limbs=3,4,5, not {shown(text)}.")
     if name == "gait":
         return Choices(name, tuple(values.split("/")))
+    if name == "controller":
+        return Choices(name, tuple(values.split(",")))
     if ":" in values and not values.startswith("@"):
         return _spaced(name, values.split(":"))
     tokens = values.split(",")

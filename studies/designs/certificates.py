@@ -21,6 +21,7 @@ from seastar_gym.sweep.frames import Swim, frame_with
 from seastar_gym.sweep.swimming import swim
 from studies.designs.space import MEASURED, SETTLING, Body
 from studies.parser import study_parser
+from studies.provenance import provenance
 
 Table = dict[str, Any]
 WINNERS = (
@@ -75,9 +76,27 @@ def told(certificate: Certificate) -> Table:
         found[f"{nodes} nodes, {1e3 * step:g} ms"] = {
             "repeated_percent": round(100 * setting.error((CLASS,)), 3),
             "promised_percent": round(100 * setting.error(certificate.promised), 3),
+            "energy_growth": setting.energy_growth,
             "mm_per_s": round(1e3 * float(columns["speed"][0]), 3),
         }
     return found
+
+
+def table(found: Table) -> str:
+    """Table in Markdown of all robots and settings."""
+    lines = [
+        "| robot | setting | error, repeated | error, all classes | energy after 200 strokes | mm/s |",
+        "|---|---|---:|---:|---:|---:|",
+    ]
+    for name, robot in found["robots"].items():
+        for nodes, step in zip(NODES, STEPS, strict=True):
+            setting = f"{nodes} nodes, {1e3 * step:g} ms"
+            row = robot[setting]
+            lines.append(
+                f"| {name} | {setting} | {row['repeated_percent']:g} % | {row['promised_percent']:g} % "
+                f"| x {row['energy_growth']:g} | {row['mm_per_s']:.2f} |"
+            )
+    return "\n".join(lines)
 
 
 def main() -> None:
@@ -88,9 +107,9 @@ def main() -> None:
     parser.add_argument("--robots", nargs="*", choices=WINNERS, default=WINNERS, help="winners (default: all)")
     options = parser.parse_args()
     rows = json.loads(DESIGNS.read_text(encoding="utf-8"))
-    found: Table = {}
+    found: Table = {**provenance("python -m studies.designs.certificates"), "robots": {}}
     for name in options.robots:
-        found[name] = told(certificate_of(name, scene_of(rows[name]), options.out, options.samples))
+        found["robots"][name] = told(certificate_of(name, scene_of(rows[name]), options.out, options.samples))
         (options.out / "certificates.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     print(json.dumps(found, indent=1))
     print(f"Written: {options.out / 'certificates.json'}")

@@ -14,11 +14,11 @@ import numpy as np
 import pyarrow.parquet
 
 from seastar_gym.command import run_command
+from seastar_gym.executors import Executor
+from seastar_gym.executors.processes import Processes
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.scene.body import Body
 from seastar_gym.sweep.cells import Cell
-from seastar_gym.sweep.executors import Executor
-from seastar_gym.sweep.executors.processes import Processes
 from seastar_gym.sweep.frames import Swim, frame_with
 from seastar_gym.sweep.parts import Parts
 from seastar_gym.sweep.run import run

@@ -12,12 +12,12 @@ from typing import Any
 
 from tqdm import tqdm
 
+from seastar_gym.executors import Executor
+from seastar_gym.executors.here import Here
+from seastar_gym.executors.processes import Processes
 from seastar_gym.scene import Scene, SmaPulse
 from seastar_gym.sweep.axes import Choices
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.executors import Executor
-from seastar_gym.sweep.executors.here import Here
-from seastar_gym.sweep.executors.processes import Processes
 from seastar_gym.sweep.parts import Parts, read_parts
 from seastar_gym.sweep.run import Tally, run
 from studies.designs.space import (

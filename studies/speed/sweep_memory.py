@@ -11,18 +11,19 @@ import tracemalloc
 from pathlib import Path
 
 from seastar_gym.command import run_command
+from seastar_gym.executors import Executor, Work
+from seastar_gym.executors.processes import Processes
 from seastar_gym.extras import require_extra
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count
 from seastar_gym.sweep.axes import Range
+from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.executors import Executor, Work
-from seastar_gym.sweep.executors.processes import Processes
 from seastar_gym.sweep.parts import part_of
 from seastar_gym.sweep.run import Tally, run
 from studies.parser import study_parser
+from studies.provenance import provenance
 from studies.speed.sweeps import nothing
-from studies.speed.timing import machine
 
 require_extra("Sweeps", "sweep", "pyarrow")
 
@@ -72,7 +73,7 @@ def resident() -> float:
     return pages * resource.getpagesize() / MEGABYTE
 
 
-def growth(n_cells: int, executor: Executor, folder: Path, work: Work = nothing) -> list[tuple[int, float]]:
+def growth(n_cells: int, executor: Executor, folder: Path, work: Work[Cell] = nothing) -> list[tuple[int, float]]:
     """Cells done and memory of this process [MB], ten times on the way through a sweep."""
     sweep, found = grid(n_cells), list[tuple[int, float]]()
 
@@ -93,7 +94,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="JSON file for the figures")
     options = parser.parse_args()
     require_count("--cells", options.cells, 10, 100_000_000)
-    found: dict[str, object] = {"machine": machine(), "cells": options.cells}
+    found: dict[str, object] = {**provenance("python -m studies.speed.sweep_memory"), "cells": options.cells}
     found["planning holds [MB]"] = {
         plan: round(planned(plan, options.cells, min(options.cells, 10_000)), 1) for plan in PLANS
     }

@@ -1,11 +1,14 @@
 """Speed of sweeps on this machine: strokes per second over the number of processes, and the overhead of a cell.
 
-The overhead is what a cell costs besides its simulation: making, naming, sending and writing it. It is measured with
-cells that simulate nothing. From both follows what a cluster of such machines would do: it is as fast as its workers
-together until one process cannot give and write more cells a second.
+The overhead is what a cell costs the process that gives the cells: making, naming, sending and writing it. It is
+measured with cells that simulate nothing, on each executor. From both follows what a cluster of such machines would do:
+it is as fast as its workers together until that one process cannot give and write more cells a second.
+
+Times are processor times, and so those of a machine without other work; only the wait for the disk is by the clock.
 """
 
 import json
+import statistics
 import tempfile
 import time
 from collections.abc import Callable
@@ -14,18 +17,18 @@ from pathlib import Path
 from typing import Any
 
 from seastar_gym.command import run_command
+from seastar_gym.executors import Executor
+from seastar_gym.executors.here import Here
+from seastar_gym.executors.processes import Processes
 from seastar_gym.extras import require_extra
 from seastar_gym.scene import Scene
 from seastar_gym.sweep.axes import Range
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.executors import Executor
-from seastar_gym.sweep.executors.here import Here
-from seastar_gym.sweep.executors.processes import Processes
-from seastar_gym.sweep.parts import part_of
+from seastar_gym.sweep.parts import Parts, part_of
 from seastar_gym.sweep.run import run
 from studies.parser import study_parser
-from studies.speed.timing import machine
+from studies.provenance import provenance
 
 require_extra("Sweeps", "sweep", "pyarrow")
 
@@ -43,34 +46,55 @@ def sweep_of(n_cells: int, robots: int, measured: int) -> Sweep:
     return Sweep(Scene.preset("fast"), axes, settling=0, measured=measured, robots=robots)
 
 
-def seconds_per_cell(
-    sweep: Sweep, executor: Executor, work: Callable[[Cell], bytes] = part_of, warm: int = 2
-) -> tuple[float, float]:
-    """Time per cell [s] once the workers have started, and until then [s]. warm: Cells until then."""
+def timed(cell: Cell) -> bytes:
+    """The processor time that a cell takes [s], as text."""
+    begin = time.process_time()
+    part_of(cell)
+    return str(time.process_time() - begin).encode()
+
+
+def overhead(sweep: Sweep, executor: Executor, warm: int = 2) -> float:
+    """Processor time of this process for a cell that simulates nothing [s]. warm: Cells that do not count."""
     ends: list[float] = []
-    begin = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
-        run(sweep.cells(), folder, executor, lambda tally: ends.append(time.perf_counter()), work)
-    return (ends[-1] - ends[warm - 1]) / (len(ends) - warm), ends[warm - 1] - begin
+        run(sweep.cells(), folder, executor, lambda tally: ends.append(time.process_time()), nothing)
+    return (ends[-1] - ends[warm - 1]) / (len(ends) - warm)
+
+
+def seconds_per_cell(sweep: Sweep, executor: Executor) -> float:
+    """Processor time of a worker for a cell [s], the median: first cells of workers, which load the code, are few."""
+    with tempfile.TemporaryDirectory() as folder:
+        run(sweep.cells(), folder, executor, work=timed)
+        parts = Parts(folder)
+        return statistics.median(float(parts.file(name).read_text()) for name in parts.names())
+
+
+def disk_wait(part: bytes, n: int = 50) -> float:
+    """Time for which a process waits for the disk when it writes a part [s], the median of n."""
+    waits: list[float] = []
+    with tempfile.TemporaryDirectory() as folder:
+        for k in range(n):
+            clock, work = time.perf_counter(), time.process_time()
+            Parts(folder).write(f"{k:040x}", part)
+            waits.append(time.perf_counter() - clock - (time.process_time() - work))
+    return statistics.median(waits)
 
 
 def measure(n_cells: int, robots: int, strokes: int, workers: tuple[int, ...]) -> dict[str, Any]:
-    """All figures. n_cells, robots, strokes: Of the sweep that is simulated."""
+    """All figures. n_cells, robots, strokes: Of the sweep that is simulated, by each worker."""
     empty = sweep_of(20 * n_cells, 64, 1)
-    found: dict[str, Any] = {
-        "machine": machine(),
-        "overhead of a cell in this process [ms]": 1e3 * seconds_per_cell(empty, Here(), nothing)[0],
-        "overhead of a cell on one process [ms]": 1e3 * seconds_per_cell(empty, Processes(1), nothing)[0],
-    }
+    executors: dict[str, Callable[[], Executor]] = {"in this process": Here, "on processes": lambda: Processes(1)}
     if find_spec("ray") is not None:
-        from seastar_gym.sweep.executors.on_ray import RayTasks
+        from seastar_gym.executors.on_ray import RayTasks
 
-        found["overhead of a cell on Ray [ms]"] = 1e3 * seconds_per_cell(empty, RayTasks(workers=1), nothing)[0]
+        executors["on Ray"] = lambda: RayTasks(workers=1)
+    found: dict[str, Any] = {
+        f"overhead of a cell {name} [ms]": 1e3 * overhead(empty, make()) for name, make in executors.items()
+    }
+    found["wait for the disk per cell [ms]"] = 1e3 * disk_wait(part_of(next(sweep_of(1, robots, 1).cells())))
     for n in workers:
-        sweep = sweep_of(n_cells * n, robots, strokes)
-        seconds, start = seconds_per_cell(sweep, Processes(n), warm=n)
-        found[f"strokes per second, {n} processes"] = robots * strokes / seconds
-        found[f"start of {n} processes [s]"] = start
+        seconds = seconds_per_cell(sweep_of(n_cells * n, robots, strokes), Processes(n))
+        found[f"strokes per second, processes: {n}"] = n * robots * strokes / seconds
     return found
 
 
@@ -97,11 +121,25 @@ def cluster(rate: float, workers: int, overhead: float, strokes: int) -> dict[st
     }
 
 
-def reckon(found: dict[str, Any], workers: int, ray: bool) -> dict[str, object]:
-    """Figures of a cluster, from the measured ones."""
-    overhead = 1e-3 * found["overhead of a cell on Ray [ms]" if ray else "overhead of a cell on one process [ms]"]
-    rate = found[f"strokes per second, {workers} processes"]
-    return {name: cluster(rate, workers, overhead, strokes) for name, strokes in CELLS.items()}
+def reckon(found: dict[str, Any], workers: int) -> dict[str, object]:
+    """Figures of a cluster, from the measured ones. Its cells are given on Ray where that was measured."""
+    name = "overhead of a cell on Ray [ms]"
+    own = found[name if name in found else "overhead of a cell on processes [ms]"]
+    seconds = 1e-3 * (own + found["wait for the disk per cell [ms]"])
+    rate = found[f"strokes per second, processes: {workers}"]
+    return {name: cluster(rate, workers, seconds, strokes) for name, strokes in CELLS.items()}
+
+
+def table(found: dict[str, Any]) -> str:
+    """Table in Markdown of what NODES nodes would do with cells of several sizes."""
+    lines = ["| cell | its time [s] | nodes busy | strokes per second | limit |", "|---|---:|---:|---:|---|"]
+    for name, row in found[f"reckoned: {NODES} such nodes"].items():
+        limit = "the workers" if row["nodes kept busy"] >= NODES else "the process that gives cells"
+        lines.append(
+            f"| {name.removeprefix('a cell ')} | {row['time of a cell [s]']:.2g} | {row['nodes kept busy']:.2g} "
+            f"| {round(row['strokes per second'], -2):,.0f} | {limit} |"
+        )
+    return "\n".join(lines)
 
 
 def main() -> None:
@@ -110,8 +148,9 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="JSON file for the figures")
     parser.add_argument("--quick", action="store_true", help="fewer cells")
     options = parser.parse_args()
-    found = measure(4 if options.quick else 20, 64 if options.quick else 512, 10, (1, 2))
-    found[f"reckoned: {NODES} such nodes"] = reckon(found, 2, "overhead of a cell on Ray [ms]" in found)
+    found = provenance("python -m studies.speed.sweeps")
+    found |= measure(4 if options.quick else 10, 64 if options.quick else 256, 10, (1, 2))
+    found[f"reckoned: {NODES} such nodes"] = reckon(found, 2)
     text = json.dumps(found, indent=1)
     print(text)
     if options.out is not None:

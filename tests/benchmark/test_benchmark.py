@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -20,7 +21,10 @@ from seastar_gym.envs.tasks.station import Station
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.swim import swim
 from seastar_gym.evaluation.tasks import task_ids
+from seastar_gym.executors import Outcome
+from seastar_gym.executors.here import Here
 
+ROOT = Path(__file__).resolve().parents[2]
 SWIM, SHORT, OTHER = "SeastarSwim-v0", "SeastarShort-v0", "SeastarDrift-v0"
 
 
@@ -195,6 +199,47 @@ def test_the_command_measures_merges_and_writes_a_page(tasks, tmp_path, capsys):
     assert "2 to 4 seeds" in (both / "benchmark.md").read_text()
 
 
+FEW = (
+    "--agents", "straight", "two=random,rest", "--tasks", SWIM, "--fidelity", "fast", "--seeds", "5",
+    "--decisions", "3", "--seeds-per-job", "2",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("executor", ["processes", "ray"])
+def test_results_are_the_same_bits_on_every_executor(executor, tmp_path, monkeypatch, capsys):
+    """Jobs of two seeds each, on two workers."""
+    if executor == "ray":
+        pytest.importorskip("ray")
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    words = "--executor", executor, "--workers", "2"
+    for name, more in (("here", ()), (executor, words)):
+        assert main([*FEW, *more, "--out", str(tmp_path / name)]) == 0, capsys.readouterr().err
+    here, there = (read(tmp_path / name / "results.json") for name in ("here", executor))
+    assert here == there and [one.agent for one in here] == ["straight", "two"]
+    assert [len(one.seeds) for one in here] == [5, 5]
+
+
+class Losing:
+    """An executor that loses the first jobs that it is given."""
+
+    def __init__(self, losses):
+        self.losses = losses
+
+    def run(self, work, tasks):
+        for outcome in Here().run(work, tasks):
+            self.losses -= 1
+            yield outcome if self.losses < 0 else Outcome(outcome.task, None, "Its worker was lost: NodeDied.")
+
+
+def test_lost_jobs_are_run_again_and_those_that_are_always_lost_are_named(tasks, tmp_path, monkeypatch, capsys):
+    words = ["--agents", "rest", "--tasks", SHORT, "--seeds", "4", "--decisions", "2", "--seeds-per-job", "1"]
+    for losses, code in ((5, 0), (12, 2)):
+        monkeypatch.setattr("seastar_gym.benchmark.command.executor_of", lambda options, n=losses: Losing(n))
+        assert main([*words, "--out", str(tmp_path)]) == code
+    assert read(tmp_path / "results.json")[0].seeds == [1000, 1001, 1002, 1003]
+    assert "rest does not swim SeastarShort-v0: Its worker was lost: NodeDied." in capsys.readouterr().err
+
+
 def test_an_agent_that_does_not_fit_is_left_out_with_a_sentence(tasks, tmp_path, capsys):
     arguments = ["--agents", "lagged", "rest", "--tasks", SHORT, "--seeds", "1", "--decisions", "2"]
     assert main([*arguments, "--out", str(tmp_path)]) == 0
@@ -208,6 +253,7 @@ def test_an_agent_that_does_not_fit_is_left_out_with_a_sentence(tasks, tmp_path,
         (["--tasks", "CartPole-v1"], "There is no task 'CartPole-v1': choose of SeastarSwim-v0, "),
         (["--seeds", "0"], "--seeds must be"),
         (["--agents", "rest", "rest"], "Two agents are called rest: name them with LABEL=AGENT."),
+        (["--seeds-per-job", "0"], "--seeds-per-job must be"),
         (["--agents"], "There is nothing to show"),
         (["--merge", "nowhere.json", "--agents"], "nowhere.json"),
     ],

@@ -13,8 +13,8 @@ if find_spec("pyarrow") is None or find_spec("pandas") is None:
 
 import pandas
 
+from seastar_gym.executors.here import Here
 from seastar_gym.scene import Seastar
-from seastar_gym.sweep.executors.here import Here
 from seastar_gym.sweep.parts import read_parts
 from seastar_gym.sweep.run import run
 from studies.designs.pictures import COLOURS, draw, summary

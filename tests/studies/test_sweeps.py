@@ -7,17 +7,29 @@ import pytest
 if find_spec("pyarrow") is None:
     pytest.skip("the extra sweep is not installed", allow_module_level=True)
 
-from seastar_gym.sweep.executors.here import Here
-from seastar_gym.sweep.executors.processes import Processes
+from seastar_gym.executors.here import Here
+from seastar_gym.executors.processes import Processes
 from studies.speed.sweep_memory import PLANS, grid, growth, planned
-from studies.speed.sweeps import cluster, nothing, seconds_per_cell, sweep_of
+from studies.speed.sweeps import cluster, disk_wait, overhead, reckon, seconds_per_cell, sweep_of
 
 
-def test_time_is_counted_per_cell_after_the_start():
+def test_overhead_and_simulation_are_processor_times_of_a_cell():
     sweep = sweep_of(5, 2, 1)
     assert sweep.n_cells == 5
-    per_cell, start = seconds_per_cell(sweep, Here(), nothing)
-    assert per_cell > 0.0 and start > 0.0
+    empty, swum = overhead(sweep, Here()), seconds_per_cell(sweep, Here())
+    assert 0.0 < empty < 0.1 and swum > 0.0
+    assert disk_wait(b"part", 3) < 10.0
+
+
+def test_a_cluster_is_reckoned_with_what_ray_costs_where_that_was_measured():
+    found = {
+        "overhead of a cell on processes [ms]": 0.5, "overhead of a cell on Ray [ms]": 1.5,
+        "wait for the disk per cell [ms]": 0.5, "strokes per second, processes: 2": 10_000.0,
+    }  # fmt: skip
+    single = reckon(found, 2)["a cell of 1 design and 10 strokes"]
+    assert single == cluster(10_000.0, 2, 2e-3, 10)
+    del found["overhead of a cell on Ray [ms]"]
+    assert reckon(found, 2)["a cell of 1 design and 10 strokes"] == cluster(10_000.0, 2, 1e-3, 10)
 
 
 def test_a_cluster_is_as_fast_as_its_workers_until_one_process_cannot_give_more():

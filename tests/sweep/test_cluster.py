@@ -2,6 +2,7 @@
 
 import itertools
 import os
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -19,10 +20,12 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture
-def cluster(monkeypatch):
-    """Head without processors for tasks, and two nodes with one each."""
+def cluster(monkeypatch, tmp_path):
+    """Head without processors for tasks, and two nodes with one each. Cells of `works` wait until both are at work."""
     from ray.cluster_utils import Cluster
 
+    (tmp_path / "nodes").write_text("2")
+    monkeypatch.setenv("MEETING", str(tmp_path))
     monkeypatch.setenv("PYTHONPATH", f"{ROOT}{os.pathsep}{ROOT / 'tests'}")
     made = Cluster(initialize_head=True, head_node_args={"num_cpus": 0, "include_dashboard": False})
     made.nodes = [made.add_node(num_cpus=1), made.add_node(num_cpus=1)]
@@ -33,7 +36,7 @@ def cluster(monkeypatch):
 
 @pytest.mark.slow
 def test_a_node_that_is_killed_in_mid_sweep_costs_its_cells(cluster, tmp_path):
-    from seastar_gym.sweep.executors.on_ray import RayTasks
+    from seastar_gym.executors.on_ray import RayTasks
 
     axis = Range("robot.limb_length", 0.05, 0.15).spaced(24)
     sweep = Sweep(Scene.preset("fast"), (axis,), settling=0, measured=1, robots=1)
@@ -44,22 +47,25 @@ def test_a_node_that_is_killed_in_mid_sweep_costs_its_cells(cluster, tmp_path):
             cluster.remove_node(cluster.nodes[0], allow_graceful=False)
 
     tally = run(sweep.cells(), tmp_path, RayTasks(cluster.address), kill_a_node, works.slow)
-    print(f"{tally.done} cells done, {tally.losses} lost with their node and run again")
+    parts = Parts(tmp_path)
+    nodes = Counter(parts.file(name).read_text() for name in parts.names())
+    print(f"{tally.done} cells done, {tally.losses} lost with their node and run again; by nodes: {nodes.values()}")
     assert tally.done == 24 and not tally.problems
     assert 1 <= tally.losses <= 4
-    assert set(Parts(tmp_path).names()) == {cell.name for cell in sweep.cells()}
+    assert set(parts.names()) == {cell.name for cell in sweep.cells()}
+    assert len(nodes) == 2 and min(nodes.values()) <= 6  # what was done on the killed node before
 
 
 @pytest.mark.parametrize("address", ["127.0.0.1:1", "127.0.0.1:99999"])
 def test_there_is_no_cluster_at_a_wrong_address(address):
-    from seastar_gym.sweep.executors.on_ray import RayTasks
+    from seastar_gym.executors.on_ray import RayTasks
 
     with assert_refused("no Ray cluster", address):
         next(RayTasks(address).run(works.named, iter(())))
 
 
 def test_an_address_has_a_port():
-    from seastar_gym.sweep.executors.on_ray import RayTasks
+    from seastar_gym.executors.on_ray import RayTasks
 
     with assert_refused("HOST:PORT", "head"):
         next(RayTasks("head").run(works.named, iter(())))
@@ -68,11 +74,12 @@ def test_an_address_has_a_port():
 @pytest.mark.slow
 def test_a_full_disk_on_a_node_costs_cells_that_need_it(cluster, tmp_path, small_disk):
     """One node of three has no room. Its cells are run again, elsewhere by luck; a later run does the rest."""
-    from seastar_gym.sweep.executors.on_ray import RayTasks
+    from seastar_gym.executors.on_ray import RayTasks
 
     place, grow = small_disk(size=4096)
     (place / "filler").write_bytes(bytes(4096))
     cluster.add_node(num_cpus=1, env_vars={"TMPDIR": str(place), "NUMBA_CACHE_DIR": str(place)})
+    (tmp_path / "nodes").write_text("3")
     axis = Range("robot.limb_length", 0.05, 0.15).spaced(30)
     sweep = Sweep(Scene.preset("fast"), (axis,), settling=0, measured=1, robots=1)
     tally = run(sweep.cells(), tmp_path / "out", RayTasks(cluster.address), work=works.scratching)
@@ -87,8 +94,8 @@ def test_a_full_disk_on_a_node_costs_cells_that_need_it(cluster, tmp_path, small
 @pytest.mark.slow
 def test_simulating_needs_no_disk_on_a_node(cluster, tmp_path, small_disk):
     """A node that can keep no compiled code compiles in every process, and gives the same bits."""
-    from seastar_gym.sweep.executors.here import Here
-    from seastar_gym.sweep.executors.on_ray import RayTasks
+    from seastar_gym.executors.here import Here
+    from seastar_gym.executors.on_ray import RayTasks
 
     place, _ = small_disk(size=4096)
     (place / "filler").write_bytes(bytes(4096))

@@ -14,11 +14,11 @@ import pytest
 from optuna.trial import TrialState
 
 from refusals import assert_refused
+from seastar_gym.executors import Outcome
+from seastar_gym.executors.here import Here
 from seastar_gym.scene import Scene
 from seastar_gym.sweep.axes import Choices, Range
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.executors import Outcome
-from seastar_gym.sweep.executors.here import Here
 from seastar_gym.sweep.parts import Parts, part_of, read_parts
 from seastar_gym.sweep.proposals import Proposals, Search, explore, put_back_stale, study_of
 from seastar_gym.sweep.run import run

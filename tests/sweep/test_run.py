@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 import works
-from seastar_gym.sweep.executors import Outcome
-from seastar_gym.sweep.executors.here import Here
-from seastar_gym.sweep.executors.processes import Processes
+from seastar_gym.executors import Outcome
+from seastar_gym.executors.here import Here
+from seastar_gym.executors.processes import Processes
 from seastar_gym.sweep.parts import Parts
 from seastar_gym.sweep.run import ATTEMPTS, run
 
@@ -19,16 +19,16 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def ray_tasks(tmp_path):
     pytest.importorskip("ray")
-    from seastar_gym.sweep.executors.on_ray import RayTasks
+    from seastar_gym.executors.on_ray import RayTasks
 
     return RayTasks(workers=2)
 
 
 def jobs(tmp_path):
     pytest.importorskip("submitit")
-    from seastar_gym.sweep.executors.slurm import SlurmArrays
+    from seastar_gym.executors.slurm import SlurmArrays
 
-    return SlurmArrays(tmp_path / "jobs", "local", 2, cells_per_job=2)
+    return SlurmArrays(tmp_path / "jobs", "local", 2, tasks_per_job=2)
 
 
 EXECUTORS = {
@@ -144,7 +144,7 @@ def test_a_lost_worker_costs_its_cell_alone(name, tmp_path, sweep, monkeypatch):
     cells = list(sweep.cells())
     (tmp_path / cells[1].name).touch()
     outcomes = list(executor.run(works.deadly_once, iter(cells)))
-    lost = {outcome.cell.name for outcome in outcomes if outcome.part is None}
+    lost = {outcome.task.name for outcome in outcomes if outcome.part is None}
     job = {cells[0].name, cells[1].name} if name == "slurm" else {cells[1].name}  # a job has two cells there
     assert lost == job and len(outcomes) == len(cells), outcomes
     tally = run(sweep.cells(), tmp_path / "out", executor, work=works.deadly_once)

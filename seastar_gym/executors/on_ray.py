@@ -1,4 +1,4 @@
-"""`RayTasks`: cells as tasks of Ray Core, on a running cluster or one of this machine."""
+"""`RayTasks`: tasks as those of Ray Core, on a running cluster or one of this machine."""
 
 import socket
 from collections.abc import Iterator
@@ -7,36 +7,35 @@ from typing import Any
 import ray
 from ray.exceptions import RayError, RayTaskError
 
+from seastar_gym.executors import Outcome, Task, Work, sentence_of
+from seastar_gym.executors.here import outcome_of
 from seastar_gym.scene.checks import shown
-from seastar_gym.sweep.cells import Cell
-from seastar_gym.sweep.executors import Outcome, Work, sentence_of
-from seastar_gym.sweep.executors.here import outcome_of
 
 AHEAD = 2
 """Tasks under way for every processor of the cluster, so that none waits for the next."""
 PATIENCE = 10.0
-"""Time after which the size of the cluster is asked for again while no cell is done, or for its head to answer [s]."""
+"""Time after which the size of the cluster is asked for again while no task is done, or for its head to answer [s]."""
 
 
 class RayTasks:
-    """Runs cells as tasks of Ray, one processor each.
+    """Runs tasks as those of Ray, one processor each.
 
     Nodes need this package and its extras; results come back to this process, which alone writes files.
 
     address: Address of a cluster's head, "HOST:6379". None starts a cluster of this machine and stops it in the end.
-    workers: Cells at a time at most; as many as the cluster has processors if None.
+    workers: Tasks at a time at most; as many as the cluster has processors if None.
     """
 
     def __init__(self, address: str | None = None, workers: int | None = None):
         self.address, self.workers = address, workers
 
-    def run(self, work: Work, cells: Iterator[Cell]) -> Iterator[Outcome]:
-        """Run all cells. Tasks that are lost with their worker or node are not repeated by Ray."""
+    def run(self, work: Work[Task], tasks: Iterator[Task]) -> Iterator[Outcome[Task]]:
+        """Run all tasks. Those that are lost with their worker or node are not repeated by Ray."""
         began = connect(self.address, self.workers)
-        task = ray.remote(num_cpus=1, max_retries=0)(_outcome)
-        pending: dict[Any, Cell] = {}
+        remote = ray.remote(num_cpus=1, max_retries=0)(_outcome)
+        pending: dict[Any, Task] = {}
         try:
-            while self._fill(pending, task, work, cells):
+            while self._fill(pending, remote, work, tasks):
                 done, _ = ray.wait(list(pending), timeout=PATIENCE)
                 for reference in done:
                     yield _outcome_of(pending.pop(reference), reference)
@@ -46,14 +45,14 @@ class RayTasks:
             if began:
                 ray.shutdown()
 
-    def _fill(self, pending: dict[Any, Cell], task: Any, work: Work, cells: Iterator[Cell]) -> bool:
+    def _fill(self, pending: dict[Any, Task], remote: Any, work: Work[Task], tasks: Iterator[Task]) -> bool:
         """Give tasks while there is room for them; whether any are under way."""
         room = self.workers or AHEAD * max(1, int(ray.cluster_resources().get("CPU", 1)))
         while len(pending) < room:
-            cell = next(cells, None)
-            if cell is None:
+            task = next(tasks, None)
+            if task is None:
                 break
-            pending[task.remote(work, cell)] = cell
+            pending[remote.remote(work, task)] = task
         return bool(pending)
 
 
@@ -85,16 +84,16 @@ def require_reachable(address: str) -> None:
         raise ValueError(f"There is no Ray cluster at {address}: {sentence_of(refused)}.") from None
 
 
-def _outcome(work: Work, cell: Cell) -> tuple[bytes | None, str]:
-    """What a task returns."""
-    outcome = outcome_of(work, cell)
+def _outcome(work: Work[Task], task: Task) -> tuple[bytes | None, str]:
+    """What a task of Ray returns."""
+    outcome = outcome_of(work, task)
     return outcome.part, outcome.problem
 
 
-def _outcome_of(cell: Cell, reference: Any) -> Outcome:
+def _outcome_of(task: Task, reference: Any) -> Outcome[Task]:
     try:
-        return Outcome(cell, *ray.get(reference))
+        return Outcome(task, *ray.get(reference))
     except RayTaskError as failure:
-        return Outcome(cell, None, sentence_of(failure.cause or failure))
+        return Outcome(task, None, sentence_of(failure.cause or failure))
     except RayError as failure:
-        return Outcome(cell, None, f"Its worker was lost: {type(failure).__name__}.")
+        return Outcome(task, None, f"Its worker was lost: {type(failure).__name__}.")

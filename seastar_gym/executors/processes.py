@@ -1,4 +1,4 @@
-"""`Processes`: cells in processes of this machine."""
+"""`Processes`: tasks in processes of this machine."""
 
 import os
 import signal
@@ -8,56 +8,55 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from typing import Any, NamedTuple
 
+from seastar_gym.executors import Outcome, Task, Work
+from seastar_gym.executors.here import outcome_of
 from seastar_gym.scene.checks import require_count
-from seastar_gym.sweep.cells import Cell
-from seastar_gym.sweep.executors import Outcome, Work
-from seastar_gym.sweep.executors.here import outcome_of
 
 
 class Worker(NamedTuple):
-    """A process and the cell that it is at."""
+    """A process and the task that it is at."""
 
     process: Any
-    cell: Cell
+    task: Any
 
 
 class Processes:
-    """Runs cells in processes of this machine, each at one cell. workers: How many; one per processor if None."""
+    """Runs tasks in processes of this machine, each at one task. workers: How many; one per processor if None."""
 
     def __init__(self, workers: int | None = None):
         if workers is not None:
             require_count("workers", workers, 1, 4096)
         self.workers = workers or os.cpu_count() or 1
 
-    def run(self, work: Work, cells: Iterator[Cell]) -> Iterator[Outcome]:
-        """Run all cells. A process that dies is replaced by another."""
+    def run(self, work: Work[Task], tasks: Iterator[Task]) -> Iterator[Outcome[Task]]:
+        """Run all tasks. A process that dies is replaced by another."""
         busy: dict[Connection, Worker] = {}
         try:
-            for cell in cells:
-                _begin(busy, work, cell)
+            for task in tasks:
+                _begin(busy, work, task)
                 while len(busy) >= self.workers:
-                    yield from self._swept(busy, work, cells)
+                    yield from self._swept(busy, tasks)
             while busy:
-                yield from self._swept(busy, work, cells)
+                yield from self._swept(busy, tasks)
         finally:
             for connection, worker in busy.items():
                 worker.process.terminate()
                 worker.process.join()
                 connection.close()
 
-    def _swept(self, busy: dict[Connection, Worker], work: Work, cells: Iterator[Cell]) -> Iterator[Outcome]:
-        """Outcomes of the cells that are done next. Their processes get the next cells, or end."""
+    def _swept(self, busy: dict[Connection, Worker], tasks: Iterator[Task]) -> Iterator[Outcome[Task]]:
+        """Outcomes of the tasks that are done next. Their processes get the next tasks, or end."""
         for connection in wait(list(busy)):
             assert isinstance(connection, Connection)
-            process, cell = busy.pop(connection)
+            process, task = busy.pop(connection)
             try:
-                outcome = Outcome(cell, *connection.recv())
+                outcome = Outcome(task, *connection.recv())
             except (EOFError, OSError):
                 connection.close()
                 process.join()
-                yield Outcome(cell, None, f"Its process was lost, with exit code {process.exitcode}.")
+                yield Outcome(task, None, f"Its process was lost, with exit code {process.exitcode}.")
                 continue
-            following = next(cells, None)
+            following = next(tasks, None)
             if following is None:
                 connection.close()
                 process.join()
@@ -66,26 +65,26 @@ class Processes:
             yield outcome
 
 
-def _begin(busy: dict[Connection, Worker], work: Work, cell: Cell) -> None:
-    """Start a process with a cell."""
+def _begin(busy: dict[Connection, Worker], work: Work[Task], task: Task) -> None:
+    """Start a process with a task."""
     context = get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=serve, args=(theirs, work), daemon=True)
     process.start()
     theirs.close()
-    _give(busy, ours, Worker(process, cell))
+    _give(busy, ours, Worker(process, task))
 
 
 def _give(busy: dict[Connection, Worker], connection: Connection, worker: Worker) -> None:
-    """Give a process its cell. If the process is dead, the next look at it says so."""
+    """Give a process its task. If the process is dead, the next look at it says so."""
     busy[connection] = worker
     with suppress(OSError):
-        connection.send(worker.cell)
+        connection.send(worker.task)
 
 
-def serve(connection: Connection, work: Work) -> None:
-    """A process's life: cells are read, run and answered until there are no more."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that gives the cells
+def serve(connection: Connection, work: Work[Any]) -> None:
+    """A process's life: tasks are read, run and answered until there are no more."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that gives the tasks
     while True:
         try:
             outcome = outcome_of(work, connection.recv())
