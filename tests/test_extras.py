@@ -47,7 +47,7 @@ def assert_says(done, extra, missing):
 
 def test_there_are_commands_to_test():
     assert len(STUDIES) > 8
-    assert set(AGENTS) == {"agents.cards", "agents.evaluate", "agents.rllib", "agents.trials"}
+    assert set(AGENTS) == {"agents.cards", "agents.evaluate", "agents.rllib", "agents.tasks", "agents.trials"}
 
 
 @pytest.mark.parametrize("command", [*STUDIES, *AGENTS, "seastar_gym.identify", "seastar_gym.sweep"])
