@@ -1,6 +1,7 @@
 """The damping study: a damped robot rings less and converges with longer steps."""
 
 import csv
+import json
 
 import numpy as np
 import pytest
@@ -44,6 +45,10 @@ def test_the_study_writes_its_table_and_picture(found, monkeypatch, tmp_path, ca
     damping.main()
     with (tmp_path / "damping.csv").open() as stream:
         assert len(list(csv.DictReader(stream))) == len(found.rows)
+    kept = damping.from_data(json.loads((tmp_path / "damping.json").read_text(encoding="utf-8")))
+    assert kept.rows == found.rows and kept.agreement == found.agreement
+    for material in MATERIALS:
+        np.testing.assert_allclose(kept.ringing[material], found.ringing[material], rtol=1e-3)
     assert (tmp_path / "damping.png").stat().st_size > 10_000
     assert "Damping changes the distances that the pairs of Fig. 13.8 swim by" in capsys.readouterr().out
     assert as_table(found).row_count == 4
