@@ -11,7 +11,7 @@ from studies.chapter.pictures import PENTAGON_TIMES
 from studies.chapter.statements import PAIRS
 from studies.chapter.swims import SETTINGS, Floats, Swim
 
-UNIT = 1e-5
+UNIT = 1e-6
 """Length that counts as one in the data [m]."""
 
 

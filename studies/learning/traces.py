@@ -18,6 +18,7 @@ from seastar_gym.evaluation.swim import Swim, swim
 from studies.kept import keep
 from studies.parser import study_parser
 from studies.provenance import provenance
+from studies.style import apply_style
 
 AGENTS = ("learned", "pentagon")
 RADIUS = 0.01
@@ -66,6 +67,7 @@ def from_data(results: Mapping[str, Any]) -> list[Swim]:
 
 def draw(results: Mapping[str, Any], file: Path) -> None:
     """Write the picture."""
+    apply_style()
     draw_traces(from_data(results), RADIUS, file)
 
 
