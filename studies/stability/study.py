@@ -161,8 +161,9 @@ def from_data(results: Mapping[str, Any]) -> list[Cell]:
     """Cells from plain data."""
     cells = []
     for row in results["cells"]:
-        numbers = dict(zip(results["columns"], row, strict=True))
-        cells.append(Cell(**{name: math.nan if n is None and name != "value" else n for name, n in numbers.items()}))
+        kept: dict[str, Any] = dict(zip(results["columns"], row, strict=True))
+        numbers = {name: math.nan for name, each in kept.items() if each is None and name != "value"}
+        cells.append(Cell(**{**kept, **numbers}))
     return cells
 
 
