@@ -219,6 +219,10 @@ def table(docs: Path, name: str) -> str:
             from studies.learning import ablations_page
 
             return ablations_page.table(read(docs, "ablations.json"))
+        case ["damping"]:
+            from studies.scenes import damping
+
+            return damping.as_markdown(damping.from_data(read(docs, "damping.json")))
         case ["fidelities", part]:
             from studies.learning.fidelities import tables
 

@@ -192,6 +192,29 @@ def as_table(found: Study) -> Table:
     return table
 
 
+NAMES = {
+    "implicit-euler": "implicit Euler", "sdirk2": "SDIRK2", "sdirk3": "SDIRK3", "implicit-midpoint": "implicit midpoint",
+}  # fmt: skip
+"""Schemes as the page calls them."""
+
+
+def as_markdown(found: Study) -> str:
+    """Table of the page: the longest steps that keep the wanted error, and their speeds on one core."""
+    lines = [
+        "| scheme | " + " | ".join(f"{material}: longest step | x real time" for material in MATERIALS) + " |",
+        "|---|" + "---:|---:|" * len(MATERIALS),
+    ]
+    for scheme, steps in STEPS.items():
+        cells = []
+        for material in MATERIALS:
+            row = good_enough(rows_of(found.rows, material, scheme))
+            cells += [f"below {min(steps):g} ms", ""] if row is None else [
+                f"{1e3 * row.step:g} ms", f"{rounded(row.speed, 2):,.0f}"
+            ]  # fmt: skip
+        lines.append(f"| {NAMES[scheme]} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
 def facts(found: Study) -> list[str]:
     """Sentences about agreement and distances that go below the table."""
     lines = [
