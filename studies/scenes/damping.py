@@ -193,8 +193,11 @@ def as_table(found: Study) -> Table:
 
 
 NAMES = {
-    "implicit-euler": "implicit Euler", "sdirk2": "SDIRK2", "sdirk3": "SDIRK3", "implicit-midpoint": "implicit midpoint",
-}  # fmt: skip
+    "implicit-euler": "implicit Euler",
+    "sdirk2": "SDIRK2",
+    "sdirk3": "SDIRK3",
+    "implicit-midpoint": "implicit midpoint",
+}
 """Schemes as the page calls them."""
 
 

@@ -1,7 +1,7 @@
 """Small films of every task, for the page of the environments.
 
-The agent "adaptive", which remembers, swims the first held-out episode, or "planner" where nothing is hidden. A film has
-a picture every BETWEEN seconds of the robot's time and shows FPS of them a second.
+The agent "adaptive", which remembers, swims the first held-out episode, or "planner" where nothing is hidden. A film
+has a picture every BETWEEN seconds of the robot's time and shows FPS of them a second.
 """
 
 from collections.abc import Iterator
