@@ -82,7 +82,7 @@ A policy that swims the chapter's robot along waypoints. It decides {decides}, a
 
 ## Training
 
-{_training(policy.training)}
+{training_facts(policy.training)}
 
 ## How it swims
 
@@ -108,7 +108,7 @@ def _memory(scene: Any) -> str:
     return "" if type(scene.actuator).__name__ == "SmaPulse" else "the contraction of the wires, "
 
 
-def _training(training: Mapping[str, Any]) -> str:
+def training_facts(training: Mapping[str, Any]) -> str:
     """Facts of a training as a list."""
     commands = training.get("commands", [])
     seconds, machine = training.get("seconds"), training.get("machine")

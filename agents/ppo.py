@@ -17,10 +17,12 @@ from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers import learner_zip
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, Weights
+from seastar_gym.controllers.roster import task_of
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.randomization import DomainRandomization
-from seastar_gym.envs.symmetry import VectorSymmetryReduction
+from seastar_gym.envs.symmetry import VectorMemory, VectorSymmetryReduction, observed_mirror
 from seastar_gym.envs.task import Path as SwimPath
+from seastar_gym.envs.tasks.envs import SeastarTaskVectorEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
@@ -103,9 +105,14 @@ def require_device(device: str) -> None:
 def describe(env: BatchVecEnv, hidden: tuple[int, ...]) -> Description:
     """Description of a policy with these widths of hidden layers that learns in an environment."""
     batch: Any = env.env.unwrapped
-    symmetry = env.env_is_wrapped(VectorSymmetryReduction)[0]
+    memory = env.env if isinstance(env.env, VectorMemory) else None
+    symmetry = memory is not None or env.env_is_wrapped(VectorSymmetryReduction)[0]
     in_strokes = batch.decision_period == batch.scene.actuator.period
-    return Description(batch.actions, symmetry, batch.scene, hidden, None if in_strokes else batch.decision_period)
+    about = Description(batch.actions, symmetry, batch.scene, hidden, None if in_strokes else batch.decision_period)
+    past = 0 if memory is None else memory.recollection.past
+    if not isinstance(batch, SeastarTaskVectorEnv):
+        return about._replace(past=past)
+    return about._replace(task=task_of(batch), limb_mirror=observed_mirror(batch), own=batch.own_numbers, past=past)
 
 
 def policy_of(model: PPO) -> LearnedPolicy:

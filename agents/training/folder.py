@@ -7,6 +7,7 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import gymnasium
 import numba
@@ -28,14 +29,21 @@ def write_config(options: Options, arguments: Sequence[str], folder: Path) -> No
     """Write config.json: options, commands, versions of libraries, and machine."""
     file = folder / "config.json"
     earlier = [] if options.resume is None else json.loads(file.read_text(encoding="utf-8"))["commands"]
-    modules = (seastar_gym, gymnasium, numba, np, stable_baselines3, torch)
     config = {
         "commands": [*earlier, shlex.join(["python", "train.py", *arguments])],
         "options": asdict(options),
+        **versions_and_machine(),
+    }
+    write_atomically(file, (json.dumps(config, indent=2, default=str) + "\n").encode())
+
+
+def versions_and_machine() -> dict[str, dict[str, Any]]:
+    """Versions of the libraries that a training depends on, and the machine."""
+    modules = (seastar_gym, gymnasium, numba, np, stable_baselines3, torch)
+    return {
         "versions": {"python": platform.python_version(), **{one.__name__: one.__version__ for one in modules}},
         "machine": {"system": platform.platform(), "processors": os.cpu_count()},
     }
-    write_atomically(file, (json.dumps(config, indent=2, default=str) + "\n").encode())
 
 
 def claim(folder: Path) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from seastar_gym.controllers.contract import Policy, actions_in, require_fit
 from seastar_gym.controllers.greedy import Searcher
 from seastar_gym.envs.task import scene_observation_size
+from seastar_gym.envs.tasks.numbered import Split
 from seastar_gym.scene.numerics import Fidelity
 
 Floats = NDArray[np.float64]
@@ -40,14 +41,15 @@ class Episodes(NamedTuple):
         return self.of(name)[self.decisions - 1, np.arange(len(self.decisions))]
 
 
-def held_out(task: str) -> dict[str, Any]:
-    """Arguments that keep a task to episodes that no training draws, where it has a split of them."""
+def held_out(task: str, split: Split = "test") -> dict[str, Any]:
+    """Arguments that keep a task to the episodes of a split, where it has splits; by default those that no training
+    draws."""
     entry: Any = gym.spec(task).entry_point
     creator: Any = load_env_creator(entry) if isinstance(entry, str) else entry
-    return {"split": "test"} if "split" in inspect.signature(creator).parameters else {}
+    return {"split": split} if "split" in inspect.signature(creator).parameters else {}
 
 
-def make_batch(task: str, n: int, **arguments: Any) -> gym.vector.VectorEnv[Any, Any, Any]:
+def make_batch(task: str, n: int, /, **arguments: Any) -> gym.vector.VectorEnv[Any, Any, Any]:
     """Batch of a task, the native one where there is one."""
     mode = "sync" if gym.spec(task).vector_entry_point is None else "vector_entry_point"
     return gym.make_vec(task, n, vectorization_mode=mode, **arguments)
@@ -59,7 +61,7 @@ def require_seen(policy: Policy, env: Any) -> None:
     if isinstance(policy, Searcher) and n_seen != n_known:
         raise ValueError(f"It reads observations of {n_known} numbers, the task shows {n_seen}.")
     actions = actions_in(policy, env.actions, env.scene.robot.n_limbs)
-    require_fit(policy, env.scene, actions, env.decision_period, env.observe_actuators)
+    require_fit(policy, env.scene, actions, env.decision_period, n_seen)
 
 
 def swim_episodes(
@@ -69,12 +71,14 @@ def swim_episodes(
     *,
     fidelity: Fidelity | None = None,
     max_decisions: int | None = None,
+    split: Split = "test",
 ) -> Episodes:
     """Episodes with these seeds, each to its end, with deterministic actions.
 
-    fidelity: None means the task's own. max_decisions: None means the time limit of the task.
+    fidelity: None means the task's own. max_decisions: None means the time limit of the task. split: Where a task has
+    splits, the one whose episodes are swum.
     """
-    arguments = held_out(task) | ({} if fidelity is None else {"fidelity": fidelity})
+    arguments = held_out(task, split) | ({} if fidelity is None else {"fidelity": fidelity})
     plain: Any = gym.make(task, disable_env_checker=True, **arguments).unwrapped
     require_seen(policy, plain)
     mode = actions_in(policy, plain.actions, plain.scene.robot.n_limbs)

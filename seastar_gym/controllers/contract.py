@@ -41,22 +41,23 @@ def require_fit(
     scene: Scene,
     actions: Actions,
     decision_period: float | None = None,
-    observe_actuators: bool = True,
+    n_seen: int | None = None,
 ) -> None:
     """ValueError, with one sentence, where a policy cannot drive the robot of an environment, as far as it tells.
 
     decision_period: Time between decisions of the environment [s]. None means a stroke.
+    n_seen: Length of the environment's observations. None means those of waypoints.
     """
+    n_seen = scene_observation_size(scene) if n_seen is None else n_seen
     if isinstance(policy, LearnedPolicy):
-        policy.require_fit(scene, actions)
+        policy.require_fit(scene, actions, n_seen)
     ours = getattr(policy, "decision_period", None)
     theirs = scene.actuator.period if decision_period is None else decision_period
     if ours is not None and not math.isclose(ours, theirs):
         raise ValueError(f"The policy decides every {ours:g} s, the environment every {theirs:g} s: make them equal.")
     sees: Any = getattr(policy, "observation_space", None)
-    seen = (scene_observation_size(scene, observe_actuators),)
-    if sees is not None and sees.shape != seen:
-        raise ValueError(f"The policy sees observations of shape {sees.shape}, the environment's have {seen}.")
+    if sees is not None and sees.shape != (n_seen,):
+        raise ValueError(f"The policy sees observations of shape {sees.shape}, the environment's have {(n_seen,)}.")
     acts = getattr(policy, "action_space", None)
     if acts is not None and acts != action_space(actions, scene.robot.n_limbs):
         raise ValueError(f'The policy acts in {acts}, which is not that of an environment with actions="{actions}".')

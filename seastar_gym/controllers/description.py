@@ -9,13 +9,20 @@ from typing import Any, NamedTuple, get_args
 from seastar_gym.envs.commands import Actions, Discrete, choices
 from seastar_gym.envs.decisions import checked_decision_period
 from seastar_gym.envs.observation import OBSERVATION_LAYOUT
+from seastar_gym.envs.own_numbers import NO_MORE, Kind, OwnNumbers, places_of
+from seastar_gym.envs.symmetry import Recollection, memory_mirror, symmetry_of
+from seastar_gym.envs.symmetry.memory import MOST_PAST
 from seastar_gym.envs.task import scene_observation_size
+from seastar_gym.envs.tasks.envs import CHALLENGES
 from seastar_gym.scene import Scene
+from seastar_gym.scene.actuators.heating import Mirror
 from seastar_gym.scene.checks import require_count, shown
 from seastar_gym.version import __version__
 
 FORMAT = 2
 """Version of the entries of a description."""
+MOST_NUMBERS = 1000
+"""Most numbers of a task, or of a limb, that a description may claim."""
 WIDEST = 1_000_000
 """Largest number of neurons of a layer that a description may claim."""
 
@@ -26,6 +33,9 @@ class Description(NamedTuple):
     actions: Action mode. symmetry: Whether the policy sees reduced observations, see `seastar_gym.envs.symmetry`.
     scene: Scene of the training. hidden: Widths of the hidden layers. decision_period: Time between decisions [s].
     None means strokes.
+    task: Name of the challenge that the policy was trained for, such as "miswired". None means waypoints.
+    limb_mirror: What a mirror does to the numbers that are observed of every limb. None means those of the actuators.
+    own: What the task shows of its own. past: Number of past observations that the policy sees, see `Recollection`.
     """
 
     actions: Actions
@@ -33,6 +43,10 @@ class Description(NamedTuple):
     scene: Scene
     hidden: tuple[int, ...]
     decision_period: float | None = None
+    task: str | None = None
+    limb_mirror: Mirror | None = None
+    own: OwnNumbers = NO_MORE
+    past: int = 0
 
     def to_json(self, **more: Any) -> str:
         """Description as text; `more` adds entries for people to read."""
@@ -40,9 +54,10 @@ class Description(NamedTuple):
             "format": FORMAT,
             "seastar_gym": __version__,
             "observation_layout": OBSERVATION_LAYOUT,
-            "observation_size": scene_observation_size(self.scene),
+            "observation_size": self.observation_size,
             **self._asdict(),
             "scene": self.scene.to_dict(),
+            "own": self.own._asdict(),
             **more,
         }
         return json.dumps(facts, indent=2, default=str, allow_nan=False)
@@ -72,7 +87,32 @@ class Description(NamedTuple):
         decision_period = facts.get("decision_period")  # older descriptions have none: strokes
         if decision_period is not None:
             checked_decision_period(decision_period, scene)
-        return cls(actions, symmetry, scene, tuple(hidden), decision_period)
+        if facts.get("past") and not symmetry:
+            raise ValueError("a policy without symmetry has no past")
+        return cls(actions, symmetry, scene, tuple(hidden), decision_period, *_seen(facts))
+
+    @property
+    def mirror(self) -> Mirror:
+        """What a mirror does to the numbers that are observed of every limb."""
+        return memory_mirror(self.scene.actuator) if self.limb_mirror is None else self.limb_mirror
+
+    @property
+    def recollection(self) -> Recollection | None:
+        """What the policy sees of present and past observations; None for a policy without memory."""
+        return Recollection(symmetry_of(self.scene), self.mirror, self.own, self.past) if self.past else None
+
+    @property
+    def observation_size(self) -> int:
+        """Length of an observation of the environment."""
+        if self.limb_mirror is None and self.own == NO_MORE:
+            return scene_observation_size(self.scene)
+        n_limbs = self.scene.robot.n_limbs
+        return places_of(n_limbs, n_limbs * len(self.mirror), self.own).size
+
+    @property
+    def input_size(self) -> int:
+        """Number of inputs of the network."""
+        return self.observation_size if self.recollection is None else self.recollection.size
 
     @property
     def distributions(self) -> tuple[int, int]:
@@ -81,11 +121,46 @@ class Description(NamedTuple):
 
     def shapes(self) -> dict[str, tuple[int, ...]]:
         """Shapes of the arrays of weights, by name."""
-        widths = [scene_observation_size(self.scene), *self.hidden, math.prod(self.distributions)]
+        widths = [self.input_size, *self.hidden, math.prod(self.distributions)]
         shapes: dict[str, tuple[int, ...]] = {}
         for layer, (inputs, outputs) in enumerate(pairwise(widths)):
             shapes |= {f"{layer}.weight": (outputs, inputs), f"{layer}.bias": (outputs,)}
         return shapes
+
+
+SEEN = ("task", "limb_mirror", "own", "past")
+"""Entries on what a policy of a task sees; older descriptions have none."""
+
+
+def _seen(facts: Mapping[str, Any]) -> tuple[str | None, Mirror | None, OwnNumbers, int]:
+    """Entries on what a policy of a task sees. ValueError where one is wrong."""
+    task, mirror, own, past = (facts.get(name) for name in SEEN)
+    if task is not None and (not isinstance(task, str) or task not in CHALLENGES):
+        raise ValueError(f"its task must be one of {', '.join(CHALLENGES)}, not {shown(task)}")
+    if past:
+        require_count("its past", past, 1, MOST_PAST)
+    return task, None if mirror is None else _mirror(mirror), NO_MORE if own is None else _own(own), past or 0
+
+
+def _mirror(rows: object) -> Mirror:
+    """Mirror of the n numbers of a limb: for each, the number that takes its place, and a sign."""
+    if not isinstance(rows, list) or len(rows) > MOST_NUMBERS:
+        raise ValueError(f"its limb_mirror must be a list of pairs, not {shown(rows)}")
+    for row in rows:
+        if not isinstance(row, list) or len(row) != 2 or row[1] not in (-1, 1):
+            raise ValueError(f"its limb_mirror has {shown(row)}, not an index and a sign")
+        require_count("an index of its limb_mirror", row[0], 0, len(rows) - 1)
+    return tuple((index, sign) for index, sign in rows)
+
+
+def _own(own: object) -> OwnNumbers:
+    """What a task shows of its own."""
+    if not isinstance(own, dict) or set(own) != set(OwnNumbers._fields) or not isinstance(own["with_stations"], bool):
+        raise ValueError(f"its own must be an object with kinds and with_stations, not {shown(own)}")
+    kinds = own["kinds"]
+    if not isinstance(kinds, list) or len(kinds) > MOST_NUMBERS or not all(kind in get_args(Kind) for kind in kinds):
+        raise ValueError(f"the kinds of its own numbers must be of {', '.join(get_args(Kind))}, not {shown(kinds)}")
+    return OwnNumbers(tuple(kinds), own["with_stations"])
 
 
 def read_facts(text: str | bytes) -> dict[str, Any]:

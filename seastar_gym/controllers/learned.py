@@ -25,14 +25,16 @@ from numpy.typing import NDArray
 
 from seastar_gym.controllers.description import Description, read_facts
 from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.symmetry import memory_mirror, reduce_observations, restore_actions, symmetry_of
-from seastar_gym.envs.task import scene_observation_size
+from seastar_gym.envs.symmetry import Recollection, reduce_observations, restore_actions, symmetry_of
 from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import is_finite_number
 
 SHIPPED = Path(__file__).parent / "policies" / "seastar.safetensors"
 """File of the policy in the box that decides stroke by stroke; `python train.py --ship` replaces it."""
+
+TASKS = SHIPPED.parent / "tasks"
+"""Folder of the policies of tasks; `python -m agents.tasks` replaces them."""
 
 Weights = dict[str, NDArray[np.float32]]
 
@@ -70,6 +72,7 @@ class LearnedPolicy:
         self.actions = description.actions
         self.scene = description.scene
         self.group = symmetry_of(description.scene) if description.symmetry else None
+        self.recollection = description.recollection
         self.decision_period = description.decision_period or description.scene.actuator.period
         self.training = training or {}
         self.rng = np.random.default_rng(0) if rng is None else rng
@@ -81,12 +84,15 @@ class LearnedPolicy:
         episode_start: NDArray[np.bool_] | None = None,
         deterministic: bool = False,
     ) -> tuple[NDArray[Any], tuple[NDArray[Any], ...] | None]:
-        """Actions for observations of shape (size,) or (n, size), and None: the policy has no state.
+        """Actions for observations of shape (size,) or (n, size), and the state for the next call.
 
+        state: State that the last call gave, None for the first. A policy without memory has none. With memory, it is
+            the past observations, latest first, shape (n, past, size).
+        episode_start: Which robots have begun an episode, shape (n,); their past is the present observation.
         deterministic: Whether the most probable action is taken, rather than one drawn by its probability.
         """
         observation, n_limbs = np.asarray(observation), self.scene.robot.n_limbs
-        size = scene_observation_size(self.scene)
+        size = self.description.observation_size
         if observation.ndim not in (1, 2) or observation.shape[-1] != size:
             raise ValueError(
                 f"This policy was trained on a robot of {n_limbs} limbs: it sees {size} numbers, not an observation of "
@@ -94,9 +100,30 @@ class LearnedPolicy:
             )
         if self.group is None:
             return self._choose(observation, deterministic), None
-        reduced, elements = reduce_observations(observation, self.group, memory_mirror(self.scene.actuator))
+        if self.recollection is not None:
+            return self._remembering(self.recollection, observation, state, episode_start, deterministic)
+        about = self.description
+        reduced, elements = reduce_observations(observation, self.group, about.mirror, own=about.own)
         chosen = self._choose(reduced, deterministic)
         return restore_actions(chosen, elements, self.actions, self.group), None
+
+    def _remembering(
+        self,
+        recollection: Recollection,
+        observation: NDArray[Any],
+        state: tuple[NDArray[Any], ...] | None,
+        episode_start: NDArray[np.bool_] | None,
+        deterministic: bool,
+    ) -> tuple[NDArray[Any], tuple[NDArray[Any], ...]]:
+        """`predict` of a policy that sees past observations."""
+        present = np.atleast_2d(observation).astype(np.float32)
+        at_first = np.repeat(present[:, None], recollection.past, axis=1)
+        begun = np.zeros(len(present), bool) if episode_start is None else np.asarray(episode_start, bool)
+        past = at_first if state is None else np.where(begun[:, None, None], at_first, state[0])
+        shown, elements = recollection.shown(present, past)
+        chosen = restore_actions(self._choose(shown, deterministic), elements, self.actions, recollection.group)
+        later = np.concatenate([present[:, None], past[:, :-1]], axis=1)
+        return (chosen if observation.ndim == 2 else chosen[0]), (later,)
 
     def _choose(self, observation: NDArray[Any], deterministic: bool) -> NDArray[np.intp]:
         logits = self.logits(observation)
@@ -116,8 +143,11 @@ class LearnedPolicy:
                 x = np.tanh(x)
         return x.reshape(*x.shape[:-1], *self.description.distributions)
 
-    def require_fit(self, scene: Scene, actions: Actions) -> None:
-        """ValueError, with one sentence, where this policy cannot drive the robot of an environment."""
+    def require_fit(self, scene: Scene, actions: Actions, n_seen: int) -> None:
+        """ValueError, with one sentence, where this policy cannot drive the robot of an environment.
+
+        n_seen: Length of the environment's observations.
+        """
         ours, theirs = self.scene.robot.n_limbs, scene.robot.n_limbs
         if ours != theirs:
             raise ValueError(f"The policy was trained on a robot of {ours} limbs, the environment's has {theirs}.")
@@ -125,10 +155,12 @@ class LearnedPolicy:
             raise ValueError(
                 f'The policy answers with actions="{self.actions}", the environment takes actions="{actions}".'
             )
-        ours, theirs = scene_observation_size(self.scene), scene_observation_size(scene)
-        if ours != theirs:
+        ours = self.description.observation_size
+        if ours != n_seen:
+            task = self.description.task or "waypoints"
             raise ValueError(
-                f"The policy sees {ours} numbers, the environment shows {theirs}: their actuators remember differently."
+                f"The policy sees {ours} numbers of {task}, the environment shows {n_seen}: another task, or actuators "
+                "that remember differently."
             )
 
     def differences(self, scene: Scene) -> str:
@@ -165,11 +197,24 @@ def save(policy: LearnedPolicy, path: str | os.PathLike[str], **training: Any) -
     write_atomically(path.with_suffix(".json"), f"{text}\n".encode())
 
 
-def in_the_box(decision_period: float | None, shipped: Path = SHIPPED) -> Path:
-    """File of the policy in the box for a time between decisions [s]. None means strokes."""
-    if decision_period is None:
-        return shipped
-    return shipped.with_name(f"{shipped.stem}-{decision_period:g}s{shipped.suffix}")
+def in_the_box(decision_period: float | None, shipped: Path = SHIPPED, task: str | None = None) -> Path:
+    """File of the policy in the box for a time between decisions [s], None for strokes, and a task by its name.
+
+    A task without a policy of its own has that of waypoints.
+    """
+    if task is not None and (file := of_task(task, decision_period)).is_file():
+        return file
+    return _of_period(shipped, decision_period)
+
+
+def of_task(task: str, decision_period: float | None, folder: Path = TASKS) -> Path:
+    """File of the policy of a task, by the name of its challenge, whether it is there or not."""
+    return _of_period(folder / f"{task}{SHIPPED.suffix}", decision_period)
+
+
+def _of_period(file: Path, decision_period: float | None) -> Path:
+    period = "" if decision_period is None else f"-{decision_period:g}s"
+    return file.with_name(f"{file.stem}{period}{file.suffix}")
 
 
 def load(path: str | os.PathLike[str] = SHIPPED) -> LearnedPolicy:

@@ -6,6 +6,7 @@ the name of the function that makes it, "module:function".
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,23 +17,24 @@ from seastar_gym.controllers.planner import Planner
 from seastar_gym.controllers.scripted import GAITS, scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
+from seastar_gym.envs.tasks.envs import CHALLENGES
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 
-AGENTS: dict[str, Callable[[Scene, float | None], Policy]] = {
-    "learned": lambda scene, decision_period: learned.load(learned.in_the_box(decision_period)),
-    "greedy": lambda scene, decision_period: GreedyPolicy(scene, decision_period=decision_period),
-    "planner": lambda scene, decision_period: Planner(decision_period=decision_period),  # at fidelity "fast"
+AGENTS: dict[str, Callable[[Scene, float | None, str | None], Policy]] = {
+    "learned": lambda scene, decision_period, task: learned.load(learned.in_the_box(decision_period, task=task)),
+    "greedy": lambda scene, decision_period, task: GreedyPolicy(scene, decision_period=decision_period),
+    "planner": lambda scene, decision_period, task: Planner(decision_period=decision_period),  # at fidelity "fast"
 }
-"""Functions that make the agents that are not scripted, by name, for the scene that they swim in and the time between
-decisions [s], None for strokes."""
+"""Functions that make the agents that are not scripted, by name, for the scene that they swim in, the time between
+decisions [s], None for strokes, and the name of the task, None for waypoints."""
 
 HELP = (
-    f"Agents: {', '.join(AGENTS)} (learned is the policy in the box for the time between decisions); scripted gaits, "
-    f"{', '.join(GAITS)}, random, or a pair of limbs such as 4+,1-; files of policies (.safetensors, or a model.zip of "
-    "train.py or of plain Stable-Baselines3); module:function, which gets an environment and returns anything with "
-    "predict. A model.zip of plain Stable-Baselines3 and module:function execute the code of whoever made them: load "
-    "only files that you trust."
+    f"Agents: {', '.join(AGENTS)} (learned is the policy in the box for the task and the time between decisions); "
+    f"scripted gaits, {', '.join(GAITS)}, random, or a pair of limbs such as 4+,1-; files of policies (.safetensors, "
+    "or a model.zip of train.py or of plain Stable-Baselines3); module:function, which gets an environment and returns "
+    "anything with predict. A model.zip of plain Stable-Baselines3 and module:function execute the code of whoever "
+    "made them: load only files that you trust."
 )
 """Help of options that name agents."""
 
@@ -56,6 +58,7 @@ def load_agents(
             seed,
             make_scene(None, fidelity, decision_period),
             decision_period,
+            None,
             lambda: SeastarSwimEnv(fidelity=fidelity, decision_period=decision_period),
         )
     return agents
@@ -64,7 +67,14 @@ def load_agents(
 def load_agent(name: str, env: SeastarSwimEnv, seed: int = 0) -> Policy:
     """Policy by a name as in `HELP`, for the robot and the decisions of an environment."""
     in_strokes = env.decision_period == env.scene.actuator.period
-    return _load_agent(name, seed, env.scene, None if in_strokes else env.decision_period, lambda: env)
+    task = task_of(env)
+    return _load_agent(name, seed, env.scene, None if in_strokes else env.decision_period, task, lambda: env)
+
+
+def task_of(env: Any) -> str | None:
+    """Name of the challenge of an environment or a batch; None for waypoints, or where a challenge has no name."""
+    challenge = getattr(env, "challenge", None)
+    return next((name for name, known in CHALLENGES.items() if known == challenge), None)
 
 
 def _is_file(name: str) -> bool:
@@ -72,10 +82,15 @@ def _is_file(name: str) -> bool:
 
 
 def _load_agent(
-    name: str, seed: int, scene: Scene, decision_period: float | None, make_env: Callable[[], SeastarSwimEnv]
+    name: str,
+    seed: int,
+    scene: Scene,
+    decision_period: float | None,
+    task: str | None,
+    make_env: Callable[[], SeastarSwimEnv],
 ) -> Policy:
     if name in AGENTS:
-        return AGENTS[name](scene, decision_period)
+        return AGENTS[name](scene, decision_period, task)
     if foreign.is_function(name):
         return foreign.call_function(name, make_env())
     return _load_file(name) if _is_file(name) else _scripted(name, seed, decision_period)

@@ -136,7 +136,8 @@ def swim(
     ValueError, before it begins, where the policy was made for another robot.
     watch: Called with `env` after its reset and after every stroke, to film it for instance.
     """
-    require_fit(policy, env.scene, env.actions, env.decision_period, env.observe_actuators)
+    assert env.observation_space.shape is not None
+    require_fit(policy, env.scene, env.actions, env.decision_period, *env.observation_space.shape)
     observation, info = env.reset(seed=seed, options=reset_options)
     infos = [info]
     state, over = None, False

@@ -82,7 +82,7 @@ def learned(id: str, options: Options) -> Any:
     file = options.out / "learned" / f"{id}.zip"
     if file.is_file():
         return PPO.load(file, device="cpu")
-    model = train(id, TASKS[id][0], LEARNER, options.seed, options.decisions, options.fidelity, options.num_threads)
+    model = train(id, LEARNER, options.seed, options.decisions, options.fidelity, options.num_threads)
     file.parent.mkdir(parents=True, exist_ok=True)
     model.save(file)
     return model
@@ -94,9 +94,9 @@ def agent_of(quality: str, id: str, recorder: Recorder, options: Options) -> tup
         return recorder, Random(recorder, options.seed)
     if quality == "greedy":
         return recorder, make_controller("greedy", recorder)
-    from studies.tasks.learning import WRAPS, Trained
+    from studies.tasks.learning import ALL_LEARNERS, Trained
 
-    return WRAPS[LEARNER](recorder), cast(Agent, Trained(learned(id, options)))
+    return ALL_LEARNERS[LEARNER].wrap(recorder), cast(Agent, Trained(learned(id, options)))
 
 
 def record(id: str, quality: str, options: Options) -> list[Episode]:

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.scene.numerics import Fidelity
-from studies.tasks.memory import Wrap
 
 Floats = NDArray[np.float64]
 Batch = gym.vector.VectorEnv[Any, Any, Any]
+Wrap = Callable[[Batch], Batch]
+"""What a learner puts around a batch."""
 Info = dict[str, Any]
 
 

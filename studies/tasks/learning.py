@@ -1,47 +1,22 @@
 """Learners of the tasks: PPO as the project trains it, with a memory of past observations, and recurrent."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import torch
-from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
-from stable_baselines3 import PPO
 from stable_baselines3.common.utils import LinearSchedule
 
-from agents.hyperparameters import Hyperparameters
-from agents.ppo import make_model
+from agents.tasks.learning import LEARNERS, Learner, hyperparameters, make_learning_env, new_model
+from seastar_gym import TASKS
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
-from seastar_gym.envs.symmetry import VectorSymmetryReduction
-from seastar_gym.envs.tasks.obst_trap import ObstTrap
 from seastar_gym.scene.numerics import Fidelity
-from studies.tasks.episodes import Episodes, make_batch, swim
-from studies.tasks.memory import VectorMemory, Wrap
+from studies.tasks.episodes import Episodes, swim
 
-PAST = 8
-"""Past observations that a learner with memory sees."""
-OWN: dict[str, dict[str, Any]] = {
-    "miswired": {"discount": 0.9},
-    "prey": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
-    "fast-prey": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
-    "station": {"discount": 0.9},
-    "fail-blind": {"discount": 0.9},
-    "obst-trap": {"discount": 0.95},
-    "prizes": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
-    "fast-prizes": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
-}
-"""Hyperparameters that differ from the project's, by challenge: prey and prizes are met after many seconds."""
-TOLD_THE_WAY = "PPO, told the way"
-"""Learner whose reward measures the way to the goal around all discs; it swims the task as it is."""
-WRAPS: dict[str, Wrap] = {
-    "PPO": VectorSymmetryReduction,
-    "PPO, memory": lambda batch: VectorMemory(batch, PAST),
-    TOLD_THE_WAY: VectorSymmetryReduction,
-    "RecurrentPPO": lambda batch: batch,
-}
-"""What learners put around a batch, by their names. A network with a state of its own cannot have its limbs renamed
-from one decision to the next, so it learns without the symmetry."""
+RECURRENT = "RecurrentPPO"
+ALL_LEARNERS = {**LEARNERS, RECURRENT: Learner(symmetric=False)}
+"""Learners by name. A network with a state of its own cannot have its limbs renamed from one decision to the next, so
+it learns without the symmetry."""
 
 
 class Trained:
@@ -59,16 +34,11 @@ class Trained:
         return np.asarray(actions)
 
 
-def hyperparameters(task: str, decision_period: float) -> Hyperparameters:
-    """Those of the project, with the horizon of the task."""
-    return replace(Hyperparameters(), decision_period=decision_period, **OWN[task])
-
-
-def _model(learner: str, env: BatchVecEnv, chosen: Hyperparameters, seed: int) -> Any:
-    if learner != "RecurrentPPO":
-        return make_model(env, chosen, seed)
+def _recurrent(id: str, env: BatchVecEnv, seed: int) -> Any:
     from sb3_contrib import RecurrentPPO
 
+    task, _, period, *_ = TASKS[id]
+    chosen = hyperparameters(task, period)
     return RecurrentPPO(
         "MlpLstmPolicy",
         env,
@@ -85,21 +55,16 @@ def _model(learner: str, env: BatchVecEnv, chosen: Hyperparameters, seed: int) -
     )
 
 
-def train(id: str, task: str, learner: str, seed: int, decisions: int, fidelity: Fidelity, threads: int | None) -> Any:
+def train(id: str, name: str, seed: int, decisions: int, fidelity: Fidelity, threads: int | None) -> Any:
     """A learner after so many decisions of training, a `PPO` or `RecurrentPPO`."""
     torch.set_num_threads(1)
-    own = {"task": ObstTrap(potential="geodesic")} if learner == TOLD_THE_WAY else {}
-    batch = make_batch(
-        id, Hyperparameters().num_envs, "train", fidelity, threads, autoreset_mode=AutoresetMode.SAME_STEP, **own
-    )
-    period = float(batch.unwrapped.decision_period)  # type: ignore[attr-defined]
-    env = BatchVecEnv(WRAPS[learner](batch))
-    model: PPO = _model(learner, env, hyperparameters(task, period), seed)
+    env = make_learning_env(id, ALL_LEARNERS[name], fidelity, threads)
+    model = _recurrent(id, env, seed) if name == RECURRENT else new_model(id, env, seed)
     model.learn(decisions)
     env.close()
     return model
 
 
-def evaluate(id: str, learner: str, model: Any, n_episodes: int, fidelity: Fidelity, threads: int | None) -> Episodes:
+def evaluate(id: str, name: str, model: Any, n_episodes: int, fidelity: Fidelity, threads: int | None) -> Episodes:
     """Held-out episodes of a learner."""
-    return swim(id, lambda batch: Trained(model), n_episodes, fidelity, threads, WRAPS[learner])
+    return swim(id, lambda batch: Trained(model), n_episodes, fidelity, threads, ALL_LEARNERS[name].wrap)

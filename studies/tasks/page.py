@@ -31,7 +31,8 @@ SHORT = {
 }
 """What the picture says in their place."""
 MORE_IS_BETTER = ("prey", "fast-prey", "prizes", "fast-prizes")
-ORDER = ("rest", "greedy", "planner", "adaptive", "informed", "PPO", "PPO, memory", "PPO, told the way", "RecurrentPPO")
+ORDER = ("rest", "greedy", "planner", "adaptive", "informed", "PPO", "PPO, memory", "PPO, told the way", "RecurrentPPO",
+         "in the box")  # fmt: skip
 """Agents from top to bottom."""
 HEADROOM, LEFT = 0.2, 1.0 / 3.0
 """A task is kept where the bound is so much better than greedy, and plain PPO leaves so much of that."""
@@ -40,8 +41,9 @@ INTRODUCTION = """# Tasks with headroom
 
 {command} writes this page. Every agent swims the same {episodes} held-out episodes, numbers 0 to {last} of the
 split "test", at fidelity "{fidelity}"; learners are trained for {decisions:,} decisions on the split "train". Numbers
-are means with 95 % bootstrap intervals over episodes. Where a learner has several seeds, each is given. What is missing
-is swum by the same command, which goes on where it was broken off; `--seeds 0 1 2` adds seeds.
+are means with 95 % bootstrap intervals: over seeds where a learner has three or more, otherwise over episodes. Where a
+learner has several seeds, each is given. What is missing is swum by the same command, which goes on where it was broken
+off; `--seeds 0 1 2` adds seeds.
 
 A task is kept if the best that was found is at least 20 % better than greedy, and if plain PPO leaves at least a third
 of that. *Bound* is the best mean of all agents of a row: what can be reached, not a proof that nothing is better. *Gap
@@ -54,15 +56,20 @@ left* is the share of the way from greedy to the bound that plain PPO does not g
 | planner | simulates a decision ahead what is observed, with the wires, the water, .. that it believes in |
 | adaptive | remembers: believes in the wires, the drift, .. that has explained the past best; keeps a map of discs |
 | informed | is told what is hidden: the wires, the water, the course of the prey, the dead limbs, all discs |
-| PPO | the project's hyperparameters, symmetric, no memory; but for the horizons of `studies.tasks.learning.OWN` |
+| PPO | the project's hyperparameters, symmetric, no memory; but for the horizons of `agents.tasks.learning.OWN` |
 | PPO, memory | the same, and tips, last commands and targets of the last eight observations |
 | PPO, told the way | plain PPO of `ObstTrap`, by a reward that measures the way around all discs |
+| in the box | the policy that the package brings for the task: PPO with memory after six times as many decisions |
 
 The planner believes in its own wires, in still water, in a prey that swims straight on, in limbs that are all alive,
 and in the straight way between the discs that it sees. Of prizes nothing is hidden: there, the planner swims to the
 prize of most worth per metre as greedy does, and *informed* is the best round through those that are left, planned
 before every decision. Contracts of the tasks stand in the docstrings of `Miswired`, `Prey`, `Station`, `FailBlind`,
 `ObstTrap` and `Prizes`.
+
+Policies in the box are in `seastar_gym/controllers/policies/tasks`, each with a card. `python -m agents.tasks` trains
+them, that of `ObstTrap` by the reward that measures the way around all discs. To watch one, type
+`seastar swim --task SeastarPrey-v0 --agent learned`.
 
 In `ObstTrap`, the reward's way to the goal is the straight one, which leads into the horseshoe. That a learner does not
 arrive by this reward says little about other rewards: *told the way* is one. `Prizes` keeps draws alone in which the
@@ -121,12 +128,17 @@ def rows_of(results: Mapping[str, Any], ids: Mapping[str, str]) -> list[Row]:
     return [row for row in rows.values() if row.agents]
 
 
+def over(seeds: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Values over which an interval is taken: means of three seeds or more, otherwise measures of all episodes."""
+    return np.array([values.mean() for values in seeds]) if len(seeds) >= 3 else np.concatenate(seeds)
+
+
 def table(row: Row, has_cell: Callable[[str, str], bool] = lambda id, agent: True) -> str:
     """Table in Markdown of a task. has_cell: Whether an agent can swim a task, by its id."""
     lines = [f"## {row.id}", "", f"{UNITS[row.challenge].capitalize()}.", ""]
     lines += ["| agent | mean | 95 % interval | seeds |", "|---|---:|---|---|"]
     for agent, seeds in row.in_order:
-        mean, low, high = mean_with_interval(np.concatenate(seeds))
+        mean, low, high = mean_with_interval(over(seeds))
         each = ", ".join(f"{values.mean():.3g}" for values in seeds) if len(seeds) > 1 else ""
         lines.append(f"| {agent} | {mean:.3g} | {low:.3g} to {high:.3g} | {each} |")
     missing = [agent for agent in ORDER[:-1] if agent not in row.agents and has_cell(row.id, agent)]
@@ -162,7 +174,7 @@ def draw(rows: Sequence[Row], file: Path) -> None:
 def _draw_row(axes: Any, row: Row) -> None:
     names = [agent for agent, _ in row.in_order]
     for place, (agent, seeds) in enumerate(row.in_order):
-        mean, low, high = mean_with_interval(np.concatenate(seeds))
+        mean, low, high = mean_with_interval(over(seeds))
         colour = CYCLE[0] if agent.startswith(("PPO", "Rec")) else FAINT
         axes.plot([low, high], [place, place], color=colour, lw=2.5, solid_capstyle="butt")
         axes.plot(mean, place, "o", color=colour, ms=5)

@@ -19,20 +19,25 @@ from typing import Any, cast
 import numpy as np
 import tyro
 
+from agents.tasks.command import RECIPES, file_of
 from seastar_gym import TASKS
+from seastar_gym.controllers.learned import TASKS as LEARNED
+from seastar_gym.controllers.learned import load
 from seastar_gym.envs.tasks.envs import CHALLENGES
 from seastar_gym.files import write_atomically
 from seastar_gym.scene.numerics import Fidelity
 from studies.provenance import provenance
 from studies.tasks.controllers import CONTROLLERS, is_swum, make_controller
 from studies.tasks.episodes import Episodes, measure, swim
-from studies.tasks.learning import TOLD_THE_WAY, WRAPS, evaluate, train
+from studies.tasks.learning import ALL_LEARNERS, Trained, evaluate, train
 from studies.tasks.page import write_page
 
 IDS: dict[str, str] = {id: about[0] for id, about in TASKS.items()}
 """Name of the challenge of every id."""
-AGENTS = (*CONTROLLERS, *WRAPS)
-DEFAULT_LEARNERS = ("PPO", "PPO, memory", TOLD_THE_WAY)
+IN_THE_BOX = "in the box"
+"""Agent that swims the policy that the package brings for a task."""
+AGENTS = (*CONTROLLERS, *ALL_LEARNERS, IN_THE_BOX)
+DEFAULT_LEARNERS = ("PPO", "PPO, memory", "PPO, told the way")
 
 
 @dataclass(frozen=True)
@@ -41,7 +46,7 @@ class Options:
 
     ids: tuple[str, ...] = tuple(IDS)
     """Environments."""
-    agents: tuple[str, ...] = (*CONTROLLERS, *DEFAULT_LEARNERS)
+    agents: tuple[str, ...] = (*CONTROLLERS, *DEFAULT_LEARNERS, IN_THE_BOX)
     """Agents; "RecurrentPPO" needs sb3-contrib."""
     seeds: tuple[int, ...] = (0, 1)
     """Seeds of the trainings; agents that do not learn swim once."""
@@ -71,7 +76,9 @@ def has_cell(id: str, agent: str) -> bool:
     """Whether an agent can swim a task: there is a controller, or a way around discs to be told."""
     if agent in CONTROLLERS:
         return is_swum(agent, CHALLENGES[IDS[id]])
-    return agent != TOLD_THE_WAY or IDS[id] == "obst-trap"
+    if agent == IN_THE_BOX:
+        return id in RECIPES
+    return not ALL_LEARNERS[agent].told_the_way or IDS[id] == "obst-trap"
 
 
 def swum(id: str, agent: str, seed: int, options: Options) -> Episodes:
@@ -79,7 +86,10 @@ def swum(id: str, agent: str, seed: int, options: Options) -> Episodes:
     fidelity, threads = options.fidelity, options.num_threads
     if agent in CONTROLLERS:
         return swim(id, lambda batch: make_controller(agent, batch), options.episodes, fidelity, threads)
-    model = train(id, IDS[id], agent, seed, options.decisions, fidelity, threads)
+    if agent == IN_THE_BOX:
+        policy = load(file_of(id, LEARNED))
+        return swim(id, lambda batch: Trained(policy), options.episodes, fidelity, threads)
+    model = train(id, agent, seed, options.decisions, fidelity, threads)
     return evaluate(id, agent, model, options.episodes, fidelity, threads)
 
 
@@ -110,7 +120,7 @@ def study(options: Options) -> dict[str, Any]:
     """Swim the cells that are missing, and write the results after each."""
     for seed, id, agent in itertools.product(options.seeds, options.ids, options.agents):
         name = f"{id}, {agent}, {seed}"
-        again = name in read_cells(options)["cells"] or (agent in CONTROLLERS and seed != options.seeds[0])
+        again = name in read_cells(options)["cells"] or (agent not in ALL_LEARNERS and seed != options.seeds[0])
         if again or not has_cell(id, agent):
             continue
         found = cell(id, agent, seed, options)

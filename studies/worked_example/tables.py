@@ -76,7 +76,7 @@ def covered(results: Mapping[str, Any]) -> str:
     outside = [f"`{each.name}`" for each, low, high in intervals if not low <= each.built <= high]
     where = "All numbers as built lie within their intervals."
     if outside:
-        where = f"Of the numbers as built, {len(outside)} lie outside of their intervals: {', '.join(outside)}."
+        where = f"Of the numbers as built, outside of their intervals lie {len(outside)}: {', '.join(outside)}."
     return (
         f"{where} Residuals are {1e3 * found['root_mean_square_m']:.3g} mm root mean square, of a camera that errs by "
         f"{1e3 * NOISE:g} mm. What is more is of limbs that are not alike, of which the fit is not told, and of the "

@@ -30,7 +30,7 @@ TINY = (
 @pytest.fixture
 def small(monkeypatch):
     """A small training of every kind."""
-    learners = {learner: Training(TINY, 64, learner) for learner in ("pairs", "shares", "gaussian", "sac")}
+    learners = {learner: Training(TINY, 64, learner) for learner in ("pairs", "shares", "gaussian", "sac", "td3")}
     later = Training((*TINY, ("decision_period", 0.2)), 64, start="pairs")
     monkeypatch.setattr(trainings, "TRAININGS", learners | {"later": later})
     monkeypatch.setattr(study, "TRAININGS", learners | {"later": later})
@@ -47,7 +47,7 @@ def test_the_trainings_of_the_study_are_valid_and_differ():
 
 def test_every_learner_is_measured_and_none_twice(small, tmp_path, capsys):
     out = tmp_path / "in_time.json"
-    names = ("pairs", "shares", "gaussian", "sac", "later")
+    names = ("pairs", "shares", "gaussian", "sac", "td3", "later")
     command = ["--trainings", *names, "--paths", "2", "--again", "fast", "--networks", str(tmp_path), "--out", str(out)]
     assert main([*command, "--seeds", "0"]) == 0
     first = json.loads(out.read_text())

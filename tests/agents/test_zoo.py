@@ -13,8 +13,8 @@ from stable_baselines3.common.env_util import make_vec_env
 
 import seastar_gym
 from agents.hyperparameters import Hyperparameters
+from agents.tasks.learning import OWN
 from seastar_gym import TASKS, TIMED
-from studies.tasks.learning import OWN
 
 FILE = Path(__file__).parents[2] / "agents" / "rl_zoo3" / "ppo.yml"
 SETTINGS = yaml.safe_load(FILE.read_text(encoding="utf-8"))

@@ -12,8 +12,8 @@ from seastar_gym.envs.paths import PATHS
 def test_an_agent_of_one_line_is_made_for_the_scene_of_the_fidelity(monkeypatch):
     scenes = []
 
-    def mine(scene, decision_period):
-        assert decision_period is None
+    def mine(scene, decision_period, task):
+        assert decision_period is None and task is None
         scenes.append(scene)
         return scripted("rest")
 

@@ -25,12 +25,15 @@ The functions take batches: observations of shape (..., size), as laid out in `o
 from seastar_gym.envs.symmetry.actions import action_table, restore_actions, transform_actions, transform_commands
 from seastar_gym.envs.symmetry.group import compose, inverse, limb_order, turns
 from seastar_gym.envs.symmetry.masks import transform_masks
+from seastar_gym.envs.symmetry.memory import Recollection, VectorMemory
 from seastar_gym.envs.symmetry.observations import reduce_observations, sectors, transform_observations
 from seastar_gym.envs.symmetry.scenes import memory_mirror, require_symmetry, symmetry_of
 from seastar_gym.envs.symmetry.wrappers import SymmetryReduction, VectorSymmetryReduction, observed_mirror
 
 __all__ = [
+    "Recollection",
     "SymmetryReduction",
+    "VectorMemory",
     "VectorSymmetryReduction",
     "action_table",
     "compose",

@@ -26,7 +26,7 @@ else:
     _VectorWrapper = gym.vector.VectorWrapper  # not generic in gymnasium 1.2
 
 
-class _Kind(NamedTuple):
+class Kind(NamedTuple):
     """What the symmetry has to know of an environment: mode, group, mirror of observed memory, and what is added."""
 
     mode: Actions
@@ -52,13 +52,13 @@ class _Kind(NamedTuple):
         return {**info, "action_mask": self.mask(info["action_mask"], elements)} if "action_mask" in info else info
 
 
-def _kind(env: Any) -> _Kind:
+def kind_of(env: Any) -> Kind:
     """Kind of an environment or a batch; ValueError if its scene is not symmetric."""
     inner = getattr(env, "unwrapped", env)
     if not isinstance(inner, SeastarSwimEnv | SeastarSwimVectorEnv):
         raise ValueError(f"Symmetry is known of SeastarSwim-v0 and the timed environments alone, not of {inner!r}.")
     require_symmetry(inner.scene, inner.randomization)
-    return _Kind(
+    return Kind(
         inner.actions, symmetry_of(inner.scene), observed_mirror(inner), inner.headings is not None, inner.own_numbers
     )
 
@@ -78,7 +78,7 @@ class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstru
     def __init__(self, env: gym.Env[Any, Any]):
         gym.utils.RecordConstructorArgs.__init__(self)
         gym.Wrapper.__init__(self, env)
-        self._kind = _kind(env)
+        self._kind = kind_of(env)
         self._element = np.zeros((), np.intp)
 
     def _reduced(self, observation: NDArray[np.float32]) -> NDArray[np.floating[Any]]:
@@ -112,7 +112,7 @@ class VectorSymmetryReduction(_VectorWrapper):
 
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any]):
         super().__init__(env)
-        self._kind = _kind(env)
+        self._kind = kind_of(env)
         self._elements = np.zeros(env.num_envs, np.intp)
 
     def _reduced(self, observations: NDArray[np.float32]) -> NDArray[np.floating[Any]]:

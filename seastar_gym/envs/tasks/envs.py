@@ -70,14 +70,14 @@ class SeastarTaskEnv(SeastarSwimEnv):
     | `SeastarStation-v0`        | `"station"`     | 1.0                 | `"joint"` | 120            | -20       |
     | `SeastarStationTimed-v0`   | `"station"`     | 0.5                 | `"joint"` | 120            | -70       |
     | `SeastarFailBlind-v0`      | `"fail-blind"`  | 1.0                 | `"joint"` | 500            | 150       |
-    | `SeastarFailBlindTimed-v0` | `"fail-blind"`  | 0.5                 | `"joint"` | 400            | 140       |
+    | `SeastarFailBlindTimed-v0` | `"fail-blind"`  | 0.5                 | `"joint"` | 400            | 145       |
     | `SeastarObstTrap-v0`       | `"obst-trap"`   | 1.0                 | `"pairs"` | 300            | 95        |
-    | `SeastarObstTrapTimed-v0`  | `"obst-trap"`   | 0.5                 | `"pairs"` | 200            | 90        |
+    | `SeastarObstTrapTimed-v0`  | `"obst-trap"`   | 0.5                 | `"pairs"` | 200            | 94        |
     | `SeastarPrizes-v0`         | `"prizes"`      | 1.0                 | `"pairs"` | 200            | 80        |
-    | `SeastarPrizesTimed-v0`    | `"fast-prizes"` | 0.5                 | `"pairs"` | 115            | 70        |
+    | `SeastarPrizesTimed-v0`    | `"fast-prizes"` | 0.5                 | `"pairs"` | 115            | 76        |
 
-    The threshold is `reward_threshold` of the spec: about the mean return of the best controllers that remember and are
-    told nothing, in docs/tasks.md; for `Station`, a little more.
+    The threshold is `reward_threshold` of the spec: about the mean return of the best controller in docs/tasks.md that
+    is not told what is hidden; for `Station`, a little more.
 
     What a task asks for, observes and rewards stands in the docstring of its challenge: `Miswired`, `Prey`, `Station`,
     `FailBlind`, `ObstTrap`, `Prizes`. Actions, masks and everything else are those of `SeastarSwimEnv`.

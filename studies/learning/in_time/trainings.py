@@ -5,8 +5,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from stable_baselines3 import PPO, SAC
+import numpy as np
+from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.noise import NormalActionNoise
 
 from agents import learner_file
 from agents.hyperparameters import Hyperparameters
@@ -22,13 +24,17 @@ COMMON = Hyperparameters(discount=0.9, rollout=32, num_envs=64, gae_lambda=0.95)
 """Hyperparameters of the trainings, but for what differs."""
 COASTING: dict[str, Any] = {"coasting": True, "discount": 0.3, "num_envs": 128, "rollout": 16}
 """Progress by where the hub would come to rest, the shorter horizon that it allows, and shorter rollouts to fit."""
+STROKES: dict[str, Any] = {"discount": 0.8, "rollout": 16, "num_envs": 128, "gae_lambda": 0.9}
+"""Hyperparameters of `train.py` for strokes."""
 SHARES = (1.0, 0.6)
 """Shares of a pulse among which "shares" chooses."""
 SAC_SETTINGS: dict[str, Any] = {
     "buffer_size": 150_000, "batch_size": 512, "learning_rate": 1e-3, "learning_starts": 5_000, "train_freq": 1,
     "gradient_steps": 6,
 }  # fmt: skip
-"""Settings of SAC. An update follows every decision of the batch, with so many gradient steps."""
+"""Settings of SAC and TD3. An update follows every decision of the batch, with so many gradient steps."""
+EXPLORATION = 0.3
+"""Standard deviation of the noise of TD3's actions, of a whole pulse or the peak angle [1]."""
 
 
 @dataclass(frozen=True)
@@ -38,13 +44,13 @@ class Training:
     changes: Hyperparameters that differ from `COMMON`, as pairs of name and value.
     decisions: Its length, all robots together.
     learner: "pairs" is PPO over pairs of limbs, "shares" PPO over pairs that are heated for one of `SHARES`,
-        "gaussian" PPO on pulse widths, "sac" SAC on pulse widths.
+        "gaussian" PPO on pulse widths, "sac" SAC and "td3" TD3 on pulse widths; of strokes, on shares of the peak.
     start: Name of the training whose network, of the same seed, this one begins with.
     """
 
     changes: tuple[tuple[str, Any], ...]
     decisions: int = 300_000
-    learner: Literal["pairs", "shares", "gaussian", "sac"] = "pairs"
+    learner: Literal["pairs", "shares", "gaussian", "sac", "td3"] = "pairs"
     start: str | None = None
 
     @property
@@ -64,7 +70,10 @@ def _priced(effort: float, discount: float = 0.8, aim: float = RewardWeights().a
 
 
 TRAININGS: dict[str, Training] = {
-    "1 s": _every(1.0, 98_304, discount=0.8, rollout=16, num_envs=128, gae_lambda=0.9),
+    "1 s": _every(1.0, 98_304, **STROKES),
+    "1 s, Gaussian": _every(1.0, 98_304, learner="gaussian", **STROKES),
+    "1 s, SAC": _every(1.0, 98_304, learner="sac", **STROKES),
+    "1 s, TD3": _every(1.0, 98_304, learner="td3", **STROKES),
     "0.5 s": _every(0.5, 150_000),
     "0.5 s, coasting": _every(0.5, 150_000, **COASTING),
     "0.5 s, price 0.05": _every(0.5, 150_000, "shares", **_priced(0.05)),
@@ -145,9 +154,12 @@ def _make_env(training: Training, fidelity: Fidelity) -> BatchVecEnv:
 
 def _make_model(training: Training, env: BatchVecEnv, seed: int) -> BaseAlgorithm:
     hyperparameters = training.hyperparameters
-    if training.learner != "sac":
+    if training.learner not in ("sac", "td3"):
         return make_model(env, hyperparameters, seed)
-    return SAC(
-        "MlpPolicy", env, gamma=hyperparameters.discount_per_decision, seed=seed, device="cpu",
-        policy_kwargs={"net_arch": list(hyperparameters.hidden)}, **SAC_SETTINGS,
-    )  # fmt: skip
+    settings = SAC_SETTINGS | {"gamma": hyperparameters.discount_per_decision, "seed": seed, "device": "cpu"}
+    settings["policy_kwargs"] = {"net_arch": list(hyperparameters.hidden)}
+    if training.learner == "sac":
+        return SAC("MlpPolicy", env, **settings)
+    n_limbs = env.action_space.shape[0]  # type: ignore[index]
+    noise = NormalActionNoise(np.zeros(n_limbs), np.full(n_limbs, EXPLORATION))
+    return TD3("MlpPolicy", env, action_noise=noise, **settings)

@@ -1,0 +1,70 @@
+"""Model card of the policy of a task: what it is, how it was trained, and how it swims held-out episodes."""
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+
+from agents.cards import training_facts
+from seastar_gym.benchmark.episodes import swim_episodes
+from seastar_gym.benchmark.measures import measure_of
+from seastar_gym.controllers.learned import LearnedPolicy
+from seastar_gym.evaluation.many import HELD_OUT_SEED, mean_with_interval
+from seastar_gym.files import write_atomically
+from seastar_gym.scene.numerics import Fidelity
+
+EPISODES = 64
+"""Held-out episodes of a card."""
+FIDELITIES: tuple[Fidelity, ...] = ("fast", "balanced")
+
+
+def card(id: str, policy: LearnedPolicy, file: Path) -> str:
+    """The card of the policy in a file, as Markdown."""
+    about = policy.description
+    layers = ", ".join(map(str, about.hidden))
+    seeds = ", ".join(map(str, policy.training.get("seeds", ())))
+    past = f" and the most telling numbers of the last {about.past}" if about.past else ""
+    env: Any = gym.make(id, disable_env_checker=True).unwrapped
+    measure = measure_of(env)
+    return f"""# Model card: {file.stem}
+
+A policy of the chapter's robot for `{id}`. What it sees and is rewarded for stands in the docstring of
+`{type(env.challenge).__name__}`. It was trained in simulation, and no real robot has swum by it.
+
+| | |
+|---|---|
+| file | `{file.name}`, sha256 `{hashlib.sha256(file.read_bytes()).hexdigest()}` |
+| input | {about.input_size} numbers: the observation{past}, turned and mirrored into one sector |
+| network | layers of {layers} neurons with tanh, which numpy runs |
+| environment | `gym.make("{id}", actions="{about.actions}")` |
+| learner | {policy.training.get("learner")}, the best of seeds {seeds} |
+| licence | MIT, as the package |
+
+## Training
+
+{training_facts(policy.training)}
+
+## How it swims
+
+`python -m agents.tasks --cards-only` measures this, in {EPISODES} episodes of the split "test", where {measure.better}
+is better. Other agents stand in docs/tasks.md.
+
+| fidelity | {measure.name} [{measure.unit}]: mean (95 %) | success |
+|---|---:|---:|
+{chr(10).join(_row(id, policy, fidelity) for fidelity in FIDELITIES)}
+"""
+
+
+def _row(id: str, policy: LearnedPolicy, fidelity: Fidelity) -> str:
+    env: Any = gym.make(id, disable_env_checker=True).unwrapped
+    swum = swim_episodes(id, policy, list(range(HELD_OUT_SEED, HELD_OUT_SEED + EPISODES)), fidelity=fidelity)
+    mean, low, high = mean_with_interval(measure_of(env).of(swum))
+    return f"| `{fidelity}` | {mean:.3g} ({low:.3g} to {high:.3g}) | {swum.success.sum()} of {EPISODES} |"
+
+
+def write_card(id: str, policy: LearnedPolicy, file: Path) -> Path:
+    """Measure the policy in a file, and write its card beside it; returns the card's file."""
+    place = file.with_suffix(".md")
+    write_atomically(place, card(id, policy, file).encode())
+    return place

@@ -1,0 +1,130 @@
+"""Trains the policy of every task for the box, and writes its card.
+
+    python -m agents.tasks
+
+Several seeds of a task are trained on its split "train". The one with the largest mean return in episodes of that split
+that no seed was trained on goes into the box, with a card that says how it swims the split "test".
+"""
+
+import shlex
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tyro
+
+from agents.ppo import policy_of
+from agents.tasks.card import write_card
+from agents.tasks.learning import LEARNERS, train
+from agents.training.folder import versions_and_machine
+from seastar_gym import TASKS, SmaPulse
+from seastar_gym.benchmark.episodes import swim_episodes
+from seastar_gym.controllers import learned
+from seastar_gym.controllers.learned import LearnedPolicy, load, save
+from seastar_gym.scene.checks import require_count
+from seastar_gym.scene.numerics import Fidelity
+
+RECIPES: dict[str, str] = {
+    "SeastarMiswired-v0": "PPO, memory",
+    "SeastarPrey-v0": "PPO, memory",
+    "SeastarStation-v0": "PPO, memory",
+    "SeastarFailBlind-v0": "PPO, memory",
+    "SeastarObstTrap-v0": "PPO, memory, told the way",
+    "SeastarPrizes-v0": "PPO, memory",
+}
+"""Learner of every task that has a policy in the box."""
+VALIDATION = 64
+"""Episodes of the split "train" by which seeds are compared."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """Train the policy of every task for the box, and write its card."""
+
+    ids: tuple[str, ...] = tuple(RECIPES)
+    """Environments."""
+    seeds: tuple[int, ...] = (0, 1)
+    """Seeds of the trainings, of which the best goes into the box."""
+    decisions: int = 1_200_000
+    """Length of every training [decisions]."""
+    fidelity: Fidelity = "fast"
+    """Fidelity of the simulation."""
+    num_threads: int | None = None
+    """Threads of the simulator; by default one for every processor."""
+    cards_only: bool = False
+    """Measure the policies that are there, and write their cards anew."""
+    out: Path = learned.TASKS
+    """Folder of the policies."""
+
+    def __post_init__(self) -> None:
+        if unknown := set(self.ids) - set(RECIPES):
+            raise ValueError(f"{min(unknown)!r} has no policy in the box: choose of {', '.join(RECIPES)}.")
+        require_count("decisions", self.decisions, 1, 10**9)
+        if not self.seeds:
+            raise ValueError("There must be at least one seed.")
+
+
+def file_of(id: str, folder: Path) -> Path:
+    """File of the policy of a task."""
+    task, _, period, *_ = TASKS[id]
+    return learned.of_task(task, None if period == SmaPulse().period else period, folder)
+
+
+def trained(id: str, seed: int, options: Options) -> tuple[LearnedPolicy, dict[str, Any]]:
+    """Policy of a seed, and what is to be told of its training."""
+    began = time.process_time()
+    model = train(id, LEARNERS[RECIPES[id]], seed, options.decisions, options.fidelity, options.num_threads)
+    policy = policy_of(model)
+    return policy, {"strokes": model.num_timesteps, "seed": seed, "seconds": round(time.process_time() - began, 1)}
+
+
+def validated(id: str, policy: LearnedPolicy, options: Options) -> float:
+    """Mean return of a policy in episodes of the split "train"."""
+    swum = swim_episodes(id, policy, list(range(VALIDATION)), fidelity=options.fidelity, split="train")
+    return float(np.mean(swum.returns))
+
+
+def put_in_the_box(id: str, options: Options, command: str) -> Path:
+    """Train the seeds of a task, and keep the best; returns the policy's file."""
+    found = []
+    for seed in options.seeds:
+        policy, facts = trained(id, seed, options)
+        score = validated(id, policy, options)
+        print(f"{id}, seed {seed}: mean return {score:.1f} after {facts['seconds']:.0f} s of training", flush=True)
+        found.append((score, policy, facts))
+    score, policy, facts = max(found, key=lambda one: one[0])
+    file = file_of(id, options.out)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    save(
+        policy,
+        file,
+        **facts,
+        learner=RECIPES[id],
+        id=id,
+        seeds=list(options.seeds),
+        validation_return=round(score, 2),
+        commands=[command],
+        options={"fidelity": options.fidelity},
+        **versions_and_machine(),
+    )
+    return file
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line; returns the exit code."""
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    try:
+        options = tyro.cli(Options, prog="python -m agents.tasks", args=given)
+        for id in options.ids:
+            if not options.cards_only:
+                put_in_the_box(id, options, shlex.join(["python", "-m", "agents.tasks", *given]))
+            file = file_of(id, options.out)
+            print(write_card(id, load(file), file), flush=True)
+    except (ValueError, FileNotFoundError) as bad_input:
+        print(bad_input, file=sys.stderr)
+        return 2
+    return 0
