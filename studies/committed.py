@@ -32,18 +32,9 @@ Numbers may differ in the last bit between processors, which moves the edge of a
 UNCOVERED = {
     "continuum.png": "python -m studies.continuum",
     "convergence.png": "python -m studies.accuracy",
-    "ringing.png": "python -m studies.accuracy",
     "work_precision.png": "python -m studies.accuracy",
-    "damping.png": "python -m studies.scenes.damping",
     "designs.png": "python -m studies.designs",
     "error_bars.png": "python -m studies.accuracy.error_bars",
-    "fig_13_2.png": "python -m studies.chapter",
-    "fig_13_7a.png": "python -m studies.chapter",
-    "fig_13_8.png": "python -m studies.chapter",
-    "pentagon.png": "python -m agents.evaluate",
-    "stability_error.png": "python -m studies.stability",
-    "stability_iterations.png": "python -m studies.stability",
-    "stability_needs.png": "python -m studies.stability",
     "throughput.png": "python -m studies.speed.throughput",
 }
 """Pictures that only their study can draw."""
@@ -68,6 +59,29 @@ def bound(docs: Path, file: Path) -> None:
     from studies.learning.bound_page import draw
 
     draw(read(docs, "bound.json"), file)
+
+
+def chapter(docs: Path, file: Path) -> None:
+    """A figure of the chapter."""
+    from studies.chapter import pictures
+    from studies.chapter.kept import swims_of
+    from studies.chapter.statements import PAIRS
+
+    results = read(docs, "chapter.json")
+    match file.stem:
+        case "fig_13_2":
+            pictures.draw_pentagon_snapshots(*swims_of(results, "pentagon"), file)
+        case "fig_13_7a":
+            pictures.draw_pentagon(*swims_of(results, "pentagon"), file)
+        case "fig_13_8":
+            pictures.draw_pairs(*swims_of(results, "pairs"), list(PAIRS), file)
+
+
+def damping(docs: Path, file: Path) -> None:
+    """Ringing, distances and errors with and without damping."""
+    from studies.scenes.damping import draw, from_data
+
+    draw(from_data(read(docs, "damping.json")), file)
 
 
 def fidelities(docs: Path, file: Path) -> None:
@@ -109,6 +123,30 @@ def limbs(docs: Path, file: Path) -> None:
     draw(read(docs, "limbs.json"), file)
 
 
+def pentagon(docs: Path, file: Path) -> None:
+    """Ways round the pentagon."""
+    from studies.learning.traces import draw
+
+    draw(read(docs, "pentagon.json"), file)
+
+
+def ringing(docs: Path, file: Path) -> None:
+    """What damped ringing costs."""
+    from studies.accuracy.ringing import draw
+
+    draw(read(docs, "ringing.json"), file)
+
+
+def stability(docs: Path, file: Path) -> None:
+    """A picture of the atlas."""
+    from studies.stability.cases import STEPS, SWEEPS
+    from studies.stability.pictures import draw
+    from studies.stability.study import from_data
+
+    results = read(docs, "stability.json")
+    draw(from_data(results), SWEEPS, STEPS, results["scheme"], file)
+
+
 def tasks(docs: Path, file: Path) -> None:
     """Means and intervals of all agents on the tasks."""
     from studies.tasks.page import draw, rows_of
@@ -141,6 +179,10 @@ def work_precision_problems(docs: Path, file: Path) -> None:
 PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "ablations.png": ablations,
     "bound.png": bound,
+    "damping.png": damping,
+    "fig_13_2.png": chapter,
+    "fig_13_7a.png": chapter,
+    "fig_13_8.png": chapter,
     "fidelities.png": fidelities,
     "gaits_directions.png": gaits("directions"),
     "gaits_front.png": gaits("front"),
@@ -149,6 +191,11 @@ PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "hub.png": hub,
     "in_time.png": in_time,
     "limbs.png": limbs,
+    "pentagon.png": pentagon,
+    "ringing.png": ringing,
+    "stability_error.png": stability,
+    "stability_iterations.png": stability,
+    "stability_needs.png": stability,
     "tasks.png": tasks,
     "validation.png": validation,
     "work_precision_problems.png": work_precision_problems,
@@ -169,6 +216,10 @@ def table(docs: Path, name: str) -> str:
             from studies.designs import certificates
 
             return certificates.table(read(docs, "certificates.json"))
+        case ["damping"]:
+            from studies.scenes import damping
+
+            return damping.as_markdown(damping.from_data(read(docs, "damping.json")))
         case ["fidelities", part]:
             from studies.learning.fidelities import tables
 
@@ -197,6 +248,15 @@ def table(docs: Path, name: str) -> str:
             from studies.speed import sweeps
 
             return sweeps.table(read(docs, "sweeps.json"))
+        case ["ringing"]:
+            from studies.accuracy import ringing
+
+            return ringing.table(read(docs, "ringing.json"))
+        case ["stability"]:
+            from studies.stability import study as atlas
+            from studies.stability.cases import SWEEPS
+
+            return atlas.as_markdown(atlas.summarise(atlas.from_data(read(docs, "stability.json")), SWEEPS))
     raise ValueError(f"No table is called {name!r}.")
 
 

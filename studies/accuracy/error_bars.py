@@ -7,11 +7,12 @@ true error is at most the estimate. From the calibration's seed comes the factor
 each robot; with the factors that the package has, the sequences of another seed tell the coverage, the class with the
 lowest, and the median of estimate over true error.
 
-Writes a page with the tables, and a picture.
+Writes the numbers as JSON, a page with the tables, and a picture.
 """
 
 import math
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,13 +22,15 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from seastar_gym.certification.commands import CLASSES, draw_classes
-from seastar_gym.certification.measure import SHORT, machine, swim
+from seastar_gym.certification.measure import SHORT, swim
 from seastar_gym.command import run_command
 from seastar_gym.scene import Numerics, Scene, Seastar, Water, relaxation_time
 from seastar_gym.scene.numerics import PRESETS, Setting
 from seastar_gym.simulator import Simulator
 from seastar_gym.simulator.error_bars import factor
+from studies.kept import keep
 from studies.parser import study_parser
+from studies.provenance import footer, provenance
 from studies.style import FAINT, INK, PERCENT, subplots
 
 Floats = NDArray[np.float64]
@@ -155,8 +158,14 @@ def cost(setting: Setting, n_robots: int = 64, strokes: int = 4) -> float:
     return best[1] / best[0]
 
 
-def as_markdown(rows: list[Row], costs: dict[str, float], samples: int) -> str:
+def rows_of(results: Mapping[str, Any]) -> list[Row]:
+    """Rows from plain data."""
+    return [Row(**row) for row in results["rows"]]
+
+
+def as_markdown(results: Mapping[str, Any]) -> str:
     """Page with the tables."""
+    rows, costs, samples = rows_of(results), results["costs"], results["samples"]
     lines = [
         "# Error bars while it runs",
         "",
@@ -166,9 +175,9 @@ def as_markdown(rows: list[Row], costs: dict[str, float], samples: int) -> str:
         '`info["error_estimate"]`.',
         "",
         f"Ten strokes from rest, {samples} sequences of each of {len(CLASSES)} classes of commands: "
-        f"{10 * samples * len(CLASSES)} strokes for each robot, fidelity and seed; strokes of a sequence are not "
-        f"independent. Machine: {machine()}. Coverage holds over this mixture of commands; no class has a coverage of "
-        "its own that is promised.",
+        f"{10 * samples * len(CLASSES)} strokes for each robot, fidelity and seed. Strokes of a sequence are not "
+        "independent. Coverage holds over this mixture of commands; no class has a coverage of its own that is "
+        "promised.",
         "",
         "## Robots",
         "",
@@ -190,6 +199,10 @@ def as_markdown(rows: list[Row], costs: dict[str, float], samples: int) -> str:
         "| setting | factor | needed | lowest coverage | estimate / true error | cost |",
         "|---|---:|---:|---:|---:|---:|",
         *(_summary(name, [row for row in rows if row.setting == name], costs[name]) for name in SETTINGS),
+        "",
+        "---",
+        "",
+        footer(results, "error_bars.json"),
         "",
     ]
     return "\n".join(lines)
@@ -249,8 +262,11 @@ def main() -> None:
     options = parser.parse_args()
     with tqdm(total=len(ROBOTS), unit="robot") as bar:
         rows = measure(tuple(ROBOTS), options.samples, tuple(options.seeds), bar)
-    page = as_markdown(rows, {name: cost(setting) for name, setting in SETTINGS.items()}, options.samples)
-    options.out.parent.mkdir(parents=True, exist_ok=True)
+    costs = {name: round(cost(setting), 3) for name, setting in SETTINGS.items()}
+    about = provenance("python -m studies.accuracy.error_bars")
+    results = {**about, "samples": options.samples, "costs": costs, "rows": [row._asdict() for row in rows]}
+    page = as_markdown(results)
+    keep(results, options.out.with_suffix(".json"))
     options.out.write_text(page, encoding="utf-8")
     draw(rows, options.out.with_suffix(".png"))
     print(page)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.accuracy.ringing import ringing
 from studies.accuracy.rows import Column, front
 from studies.accuracy.settings import presets
 from studies.style import COLOURS, DPI, INK, MS, PERCENT, as_numbers, as_percent, subplots
@@ -52,7 +51,7 @@ PUBLISHED = (
 def draw_all(found: Study, folder: Path) -> list[Path]:
     """Write all pictures into a folder and return their paths."""
     paths = []
-    for name, draw in (("work_precision", work_precision), ("convergence", convergence), ("ringing", ringing)):
+    for name, draw in (("work_precision", work_precision), ("convergence", convergence)):
         figure: Figure = draw(found)
         paths.append(folder / f"{name}.png")
         figure.savefig(paths[-1], dpi=DPI)

@@ -1,27 +1,32 @@
-"""Ringing of limbs, and the error of schemes that damp it: large with the chapter's hub, small with a rigid one."""
+"""Ringing of limbs, and the error of schemes that damp it: large with the chapter's hub, small with a rigid one.
+
+Writes `ringing.json` and `ringing.png`.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.command import run_command
 from seastar_gym.gaits import PAIRS
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simulator import Simulator
 from studies.accuracy.cases import STROKES
+from studies.kept import keep, rounded
+from studies.parser import study_parser
+from studies.provenance import provenance
+from studies.style import COLOURS, DPI, INK, MM, MS, PERCENT, as_percent, subplots
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from studies.accuracy.rows import Study
-
-from studies.style import COLOURS, INK, MM, MS, PERCENT, as_percent, subplots
 
 Floats = NDArray[np.float64]
 
@@ -49,36 +54,90 @@ SAMPLES = 4000
 """Samples of a stroke, where the time steps are short enough."""
 
 
-def ringing(found: Study) -> Figure:
-    """Ringing of limbs, its strength, and the excess distance swum, for several schemes and both discretisations."""
+BEGIN, END = 0.42, 0.45
+"""Part of the second stroke that is shown closely [s]."""
+FROZEN = "converged, lengths frozen"
+COMPARED = {
+    "implicit midpoint, 0.5 ms": Numerics("implicit-midpoint", 0.5e-3),
+    "implicit midpoint, 5 ms": Numerics("implicit-midpoint", 5e-3),
+    "SDIRK2, 0.5 ms": Numerics("sdirk2", 0.5e-3),
+    "SDIRK2, 20 ms": Numerics("sdirk2", 20e-3),
+    "implicit Euler, 3 ms": Numerics("implicit-euler", 3e-3),
+}
+"""Rows of the table."""
+
+
+def measure() -> dict[str, Any]:
+    """All curves as plain data, by discretisation and setting, and the excess distances of the table [%]."""
+    compared = {
+        name: {each: rounded(float(excess(numerics, each)[-1])) for each in TITLES}
+        for name, numerics in COMPARED.items()
+    }
+    return {"percent_after_ten_strokes": compared, **{each: curves(each) for each in TITLES}}
+
+
+def table(results: Mapping[str, Any]) -> str:
+    """Table in Markdown: excess distance after ten strokes."""
+    rows = results["percent_after_ten_strokes"]
+    lines = [
+        f"| {name} | " + " | ".join(f"{row[each]:.2f} %" for each in TITLES) + " |" for name, row in rows.items()
+    ]
+    return "\n".join([f"| | {' | '.join(TITLES)} |", f"|---|{'---:|' * len(TITLES)}", *lines])
+
+
+def curves(discretisation: Discretisation) -> dict[str, Any]:
+    """Curves of a discretisation: velocities [mm/s], lengthening [mm/s] over time [s], and excess distances [%]."""
+    found: dict[str, Any] = {}
+    for name, numerics, _, _ in SHOWN:
+        time, velocity, stretching = record(numerics, discretisation=discretisation)
+        some = (time >= BEGIN - 0.02) & (time <= END + 0.02)
+        thin = slice(None, None, max(1, len(time) // 200))
+        found[name] = {
+            "close_s": _rounded(time[some], 6),
+            "velocity": _rounded(MM * velocity[some]),
+            "time_s": _rounded(time[thin], 6),
+            "lengthening": _rounded(MM * smoothed(stretching, time)[thin]),
+            "excess": _rounded(excess(numerics, discretisation)),
+        }
+    if discretisation == "chapter":
+        found[FROZEN] = {"excess": _rounded(excess(EXACT, discretisation, freeze_lengths=True))}
+    return found
+
+
+def _rounded(values: Floats, digits: int = 4) -> list[float]:
+    return [rounded(float(value), digits) for value in values]
+
+
+def draw(results: Mapping[str, Any], file: Path) -> None:
+    """Picture of ringing limbs, its strength, and the excess distance swum, for several schemes and both hubs."""
     figure, rows = subplots(2, 3, figsize=(11.0, 5.9), sharex="col", sharey="col")
     for discretisation, row in zip(TITLES, rows, strict=True):
-        draw_row(discretisation, *row)
+        draw_row(discretisation, results[discretisation], *row)
     rows[1, 1].legend(frameon=False, fontsize=8.5, loc="upper right")
     for axes, label in zip(rows[1], ("time in the stroke [ms]", "time in the stroke [s]", "strokes"), strict=True):
         axes.set_xlabel(label)
     figure.suptitle(f"What damped ringing costs: the pair {RINGING} of Fig. 13.8", x=0.01, ha="left")
-    return figure
+    figure.savefig(file, dpi=DPI)
 
 
-def draw_row(discretisation: Discretisation, close: Axes, strength: Axes, path: Axes) -> None:
+def draw_row(
+    discretisation: Discretisation, found: Mapping[str, Any], close: Axes, strength: Axes, path: Axes
+) -> None:
     """Draw one discretisation's panels."""
-    begin, end = 0.42, 0.45
-    for name, numerics, colour, width in SHOWN:
-        time, velocity, stretching = record(numerics, discretisation=discretisation)
-        some = (time >= begin - 0.02) & (time <= end + 0.02)
-        close.plot(MS * time[some], MM * velocity[some], lw=width, color=colour)
-        thin = max(1, len(time) // 200)
-        strength.semilogy(time[::thin], MM * smoothed(stretching, time)[::thin], color=colour, lw=width, label=name)
-        path.plot(*excess(numerics, discretisation), "o-", ms=3.5, lw=width, color=colour)
-    if discretisation == "chapter":
-        strokes, frozen = excess(EXACT, discretisation, freeze_lengths=True)
+    strokes = np.arange(1.0, STROKES + 1.0)
+    for name, _, colour, width in SHOWN:
+        curve = found[name]
+        close.plot(MS * np.array(curve["close_s"]), curve["velocity"], lw=width, color=colour)
+        strength.semilogy(curve["time_s"], curve["lengthening"], color=colour, lw=width, label=name)
+        path.plot(strokes, curve["excess"], "o-", ms=3.5, lw=width, color=colour)
+    if FROZEN in found:
+        frozen = found[FROZEN]["excess"]
         path.plot(strokes, frozen, "o--", ms=3.5, mfc="white", lw=1.4, color=INK)
         path.annotate(
             "converged, but every 2 ms the\nlengthwise ringing is taken out", (9, frozen[8]), (9.7, 1.0),
             ha="right", fontsize=8.5, color=INK, arrowprops={"arrowstyle": "-", "color": INK, "lw": 0.8},
         )  # fmt: skip
-    close.set(xlim=(MS * begin, MS * end), ylabel="middle node of limb 1 [mm/s]")
+    close.set(xlim=(MS * BEGIN, MS * END), ylabel="middle node of limb 1 [mm/s]")
     strength.set(ylabel="lengthening, r.m.s. [mm/s]", ylim=(0.03, 100.0))
     path.set(ylabel="farther than converged", xticks=range(0, 11, 2))
     for axes, title in zip((close, strength, path), TITLES[discretisation], strict=True):
@@ -140,13 +199,13 @@ def swum(numerics: Numerics, discretisation: Discretisation, freeze_lengths: boo
     return np.array(distances)
 
 
-def excess(numerics: Numerics, discretisation: Discretisation, freeze_lengths: bool = False) -> tuple[Floats, Floats]:
-    """Numbers of strokes, and relative excess of the distance from the start over the converged robot's [%].
+def excess(numerics: Numerics, discretisation: Discretisation, freeze_lengths: bool = False) -> Floats:
+    """Relative excess of the distance from the start over the converged robot's [%], shape (STROKES,).
 
     The converged robot has the same discretisation.
     """
     distances, exact = swum(numerics, discretisation, freeze_lengths), swum(EXACT, discretisation)
-    return np.arange(1.0, STROKES + 1.0), PERCENT * (distances / exact - 1.0)
+    return PERCENT * (distances / exact - 1.0)
 
 
 def smoothed(values: Floats, time: Floats, window: float = 0.03) -> Floats:
@@ -154,3 +213,18 @@ def smoothed(values: Floats, time: Floats, window: float = 0.03) -> Floats:
     n = max(1, round(window / (time[-1] - time[-2])))
     ones = np.convolve(np.ones(len(values)), np.ones(n), mode="same")
     return np.sqrt(np.convolve(values**2, np.ones(n), mode="same") / ones)
+
+
+def main() -> None:
+    """Command line: measure and write the files."""
+    parser = study_parser("studies.accuracy.ringing", __doc__)
+    parser.add_argument("--out", type=Path, default=Path("docs"), help="folder (default: %(default)s)")
+    options = parser.parse_args()
+    results = {**provenance("python -m studies.accuracy.ringing"), **measure()}
+    keep(results, options.out / "ringing.json")
+    draw(results, options.out / "ringing.png")
+    print(table(results))
+
+
+if __name__ == "__main__":
+    run_command(main)

@@ -3,7 +3,7 @@
 Errors are against the continuum: infinitely many nodes per limb and infinitely short steps. The error of space is that
 of N nodes with short steps against the continuum. The error of time is that of the setting against short steps with the
 same nodes. Their sum is what can be promised, because where they cancel it is by luck. Writes `accuracy.csv`, the
-summary `accuracy.md` and three pictures. `--store` also writes the table of `seastar_gym.scene.fidelity`, from which
+summary `accuracy.md` and two pictures. `--store` also writes the table of `seastar_gym.scene.fidelity`, from which
 `Scene.for_error` and the presets take their errors and speeds.
 
 The error is the hub's distance from the other path at the ends of strokes, as a fraction of that path's length. Times

@@ -2,7 +2,8 @@
 
 Each swim is computed three times: with the chapter's setting, with its ten nodes converged in time, and with ten nodes
 that are as good as a continuum. The pictures show the first and the last. The chapter's
-statements are printed beside the numbers of all three, and written to `statements.csv`.
+statements are printed beside the numbers of all three, and written to `statements.csv`. What the pictures of docs/ show
+is written to `chapter.json`.
 """
 
 from pathlib import Path
@@ -11,10 +12,11 @@ import numpy as np
 from rich.console import Console
 from tqdm import tqdm
 
-from seastar_gym.gaits import STRAIGHT, pentagon_gait
+from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import SmaPulse
 from studies.chapter import pictures
 from studies.chapter.cost import measure_cost
+from studies.chapter.kept import kept, pair_commands, pentagon_commands
 from studies.chapter.statements import (
     PAIRS,
     Statement,
@@ -26,7 +28,9 @@ from studies.chapter.statements import (
     write_csv,
 )
 from studies.chapter.swims import CONTINUUM, SETTINGS, THE_CHAPTERS, swim
+from studies.kept import keep
 from studies.parser import study_parser
+from studies.provenance import provenance
 
 STEPS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0, 40.0]) * 1e-3
 """Time steps of Fig. 13.9 [s]."""
@@ -53,7 +57,7 @@ def make_figures(out: Path, quick: bool = False, progress: bool = True) -> list[
     bar.update()
 
     bar.set_description("pentagon")
-    pentagon = [swim(setting, pentagon_gait()[:, None], 20) for setting in settings]
+    pentagon = [swim(setting, pentagon_commands(), 20) for setting in settings]
     pictures.draw_pentagon_snapshots(pentagon[-1], pentagon[0], out / "fig_13_2.png")
     bar.update()
     pictures.draw_pentagon(pentagon[-1], pentagon[0], out / "fig_13_7a.png")
@@ -62,9 +66,11 @@ def make_figures(out: Path, quick: bool = False, progress: bool = True) -> list[
     bar.update()
 
     bar.set_description("pairs")
-    pairs = [swim(setting, np.tile(list(PAIRS.values()), (10, 1, 1)), 50) for setting in settings]
+    pairs = [swim(setting, pair_commands(), 50) for setting in settings]
     pictures.draw_pairs(pairs[-1], pairs[0], list(PAIRS), out / "fig_13_8.png")
     statements += pair_statements(pairs)
+    made = provenance("python -m studies.chapter" + " --quick" * quick)
+    keep({**made, **kept(pentagon, pairs)}, out / "chapter.json")
     bar.update()
 
     bar.set_description("time steps")

@@ -5,10 +5,11 @@ nodes per limb. The error is the hub's largest distance, at ends of strokes, fro
 with 73 nodes, as a fraction of that path's length; of all commands the worst. Time steps of 1 ms add about the same
 error to both, which cancels. Orders are slopes of a line through the logarithms of errors and edge lengths.
 
-Writes a page with the table, and a picture.
+Writes the errors as JSON, a page with their table, and a picture.
 """
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
@@ -21,8 +22,10 @@ from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simulator import Simulator
 from studies.accuracy.cases import hub_path_lengths
 from studies.continuum.scenes import NAMES, scene
+from studies.kept import keep, rounded
 from studies.parser import study_parser
-from studies.style import INK, PERCENT, as_percent, subplots
+from studies.provenance import footer, provenance
+from studies.style import DPI, INK, PERCENT, as_percent, subplots
 
 Floats = NDArray[np.float64]
 
@@ -94,16 +97,35 @@ def measure(names: tuple[str, ...] = NAMES, bar: Any = None) -> list[Row]:
     return rows
 
 
-def as_markdown(rows: list[Row]) -> str:
+def as_data(rows: list[Row]) -> dict[str, Any]:
+    """Rows as plain data, with where they come from."""
+    plain = [
+        {**row._asdict(), "errors": [rounded(each) for each in row.errors], "order": round(row.order, 4)}
+        for row in rows
+    ]
+    return {**provenance("python -m studies.continuum"), "nodes_per_limb": list(NODES), "rows": plain}
+
+
+def rows_of(results: Mapping[str, Any]) -> list[Row]:
+    """Rows from plain data."""
+    return [Row(**{**row, "errors": np.array(row["errors"])}) for row in results["rows"]]
+
+
+def as_markdown(results: Mapping[str, Any]) -> str:
     """Page with the table of errors and orders."""
+    rows = rows_of(results)
     head = f"| scene | discretisation | {' | '.join(f'N = {n}' for n in NODES)} | order |"
     lines = [
         "# Errors of space",
         "",
-        "Written by `python -m studies.continuum`; its docstring (`--help`) tells what is measured. Errors in per cent "
-        "of the path. The order is fitted to 10, 19 and 37 nodes; where an error changes its sign between them (twelve "
-        "limbs), it says nothing. With undamped limbs 1 ms of time step is part of the smallest errors. Contact is of "
-        "first order in time and in space.",
+        "How far the hub is from where it is with infinitely many nodes. Every scene swims ten strokes from rest with",
+        "several commands, each repeated. The error is the hub's largest distance from the reference at ends of",
+        "strokes, in per cent of the path, of all commands the worst. The reference has",
+        f"{REFERENCE_NODES} nodes per limb.",
+        "",
+        "The order is fitted to 10, 19 and 37 nodes. It says nothing where an error changes its sign between them, as",
+        "with twelve limbs. Steps of 1 ms are part of the smallest errors of undamped limbs. Contact is of first order",
+        "in time and in space. `python -m studies.continuum` makes this page.",
         "",
         head,
         f"|---|---|{'---:|' * (len(NODES) + 1)}",
@@ -115,6 +137,10 @@ def as_markdown(rows: list[Row]) -> str:
         ),
         "",
         "![Errors over the number of nodes](continuum.png)",
+        "",
+        "---",
+        "",
+        footer(results, "continuum.json"),
         "",
     ]
     return "\n".join(lines)
@@ -144,7 +170,7 @@ def draw(rows: list[Row], path: Path) -> None:
     axes.set_ylabel("largest error of the hub's path")
     axes.set_title("A line per scene, thick lines their geometric mean", color=INK, fontsize=10, loc="left")
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=130)
+    figure.savefig(path, dpi=DPI)
 
 
 def main() -> None:
@@ -156,9 +182,10 @@ def main() -> None:
     options = parser.parse_args()
     with tqdm(total=len(NAMES), unit="scene") as bar:
         rows = measure(NAMES, bar)
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    options.out.write_text(as_markdown(rows), encoding="utf-8")
+    results = as_data(rows)
+    keep(results, options.out.with_suffix(".json"))
+    options.out.write_text(as_markdown(results), encoding="utf-8")
     draw(rows, options.out.with_suffix(".png"))
-    print(as_markdown(rows))
+    print(as_markdown(results))
     if not all(math.isfinite(row.order) for row in rows):
         raise SystemExit("The solver failed in a scene, see the empty errors.")

@@ -5,14 +5,14 @@ is accurate only with time steps that resolve the ringing. This study gives the 
 silicone. It measures the ringing, the distances that the pairs of Fig. 13.8 swim, and the time step and speed at an
 error of 1 %. Errors are those of the accuracy study, each material against its own converged paths.
 
-Prints a table, and writes `damping.csv` and one picture.
+Prints a table, and writes `damping.json`, `damping.csv` and one picture.
 """
 
 from __future__ import annotations
 
 import csv
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,9 @@ from seastar_gym.gaits import PAIRS
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.scene.numerics import SchemeName, Setting
 from studies.accuracy.cases import Cases, Swim, errors, joined, random_sequences, scene_of, swim, swims
+from studies.kept import keep, rounded
 from studies.parser import study_parser
+from studies.provenance import provenance
 from studies.speed.terms import SILICONE
 
 Floats = NDArray[np.float64]
@@ -43,6 +45,8 @@ STEPS: dict[SchemeName, tuple[float, ...]] = {
 """Time steps of every scheme [ms]."""
 TOLERANCE = 1e-7
 """Newton tolerance of the settings."""
+SAMPLES = 500
+"""Points of a curve of ringing, about."""
 WANTED = 0.01
 """Path error that a setting has to keep, as a fraction of the path's length."""
 
@@ -82,11 +86,13 @@ class Study:
     rows: One row per material and setting.
     agreement: Largest path difference of the converged solutions, by material.
     pairs: Distances that the pairs of Fig. 13.8 swim in ten strokes, converged, by material [m].
+    ringing: Times in a stroke [s] and lengthening speeds of limbs [m/s], shape (2, n), by material.
     """
 
     rows: list[Row]
     agreement: dict[str, float]
     pairs: dict[str, Floats]
+    ringing: dict[str, Floats]
 
 
 def scene(numerics: Numerics, tau: float | None) -> Scene:
@@ -109,6 +115,7 @@ def study(plan: Plan, progress: bool = True) -> Study:
     rows: list[Row] = []
     agreement: dict[str, float] = {}
     pairs: dict[str, Floats] = {}
+    ringing = {material: ring(tau) for material, tau in MATERIALS.items()}
     with tqdm(total=len(MATERIALS) * (len(settings) + len(plan.converged)), disable=not progress, unit="swim") as bar:
         for material, tau in MATERIALS.items():
             found = []
@@ -123,7 +130,35 @@ def study(plan: Plan, progress: bool = True) -> Study:
                 swum, speed = timed(cases, Numerics(scheme, 1e-3 * h, TOLERANCE), tau)
                 rows.append(Row(material, scheme, 1e-3 * h, float(errors(swum, exact).path.max()), speed))
                 bar.update()
-    return Study(rows, agreement, pairs)
+    return Study(rows, agreement, pairs, ringing)
+
+
+def ring(tau: float | None) -> Floats:
+    """Times in a stroke [s] and smoothed lengthening speeds of limbs [m/s], shape (2, n)."""
+    from studies.accuracy.ringing import record, smoothed
+
+    t, _, stretching = record(Numerics("implicit-midpoint", 1e-4, 1e-10), tau)
+    return np.array([t, smoothed(stretching, t)])[:, :: max(1, len(t) // SAMPLES)]
+
+
+def as_data(found: Study, command: str) -> dict[str, Any]:
+    """Results as plain data, with where they come from."""
+    return {
+        **provenance(command),
+        "rows": [asdict(row) for row in found.rows],
+        "agreement": found.agreement,
+        "pairs_m": {material: distances.tolist() for material, distances in found.pairs.items()},
+        "ringing": {
+            material: [[rounded(number) for number in numbers] for numbers in curve]
+            for material, curve in found.ringing.items()
+        },
+    }
+
+
+def from_data(results: Mapping[str, Any]) -> Study:
+    """Results from plain data."""
+    pairs, ringing = ({name: np.array(numbers) for name, numbers in results[k].items()} for k in ("pairs_m", "ringing"))
+    return Study([Row(**row) for row in results["rows"]], results["agreement"], pairs, ringing)
 
 
 def rows_of(rows: Sequence[Row], material: str, scheme: SchemeName) -> list[Row]:
@@ -157,6 +192,32 @@ def as_table(found: Study) -> Table:
     return table
 
 
+NAMES = {
+    "implicit-euler": "implicit Euler",
+    "sdirk2": "SDIRK2",
+    "sdirk3": "SDIRK3",
+    "implicit-midpoint": "implicit midpoint",
+}
+"""Schemes as the page calls them."""
+
+
+def as_markdown(found: Study) -> str:
+    """Table of the page: the longest steps that keep the wanted error, and their speeds on one core."""
+    lines = [
+        "| scheme | " + " | ".join(f"{material}: longest step | x real time" for material in MATERIALS) + " |",
+        "|---|" + "---:|---:|" * len(MATERIALS),
+    ]
+    for scheme, steps in STEPS.items():
+        cells = []
+        for material in MATERIALS:
+            row = good_enough(rows_of(found.rows, material, scheme))
+            cells += [f"below {min(steps):g} ms", ""] if row is None else [
+                f"{1e3 * row.step:g} ms", f"{rounded(row.speed, 2):,.0f}"
+            ]  # fmt: skip
+        lines.append(f"| {NAMES[scheme]} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
 def facts(found: Study) -> list[str]:
     """Sentences about agreement and distances that go below the table."""
     lines = [
@@ -170,27 +231,18 @@ def facts(found: Study) -> list[str]:
 
 def draw(found: Study, file: Path) -> None:
     """Draw the ringing, the distances of the pairs, and errors over the time step."""
-    from studies.accuracy.ringing import record, smoothed
-    from studies.style import (
-        COLOURS,
-        DPI,
-        FAINT,
-        INK,
-        as_numbers,
-        as_percent,
-        subplots,
-    )
+    from studies.style import COLOURS, DPI, FAINT, INK, as_numbers, as_percent, subplots
 
-    figure, (ring, pairs, front) = subplots(1, 3, figsize=(13.5, 4.6))
+    figure, (rings, pairs, front) = subplots(1, 3, figsize=(13.5, 4.6))
     styles: dict[str, dict[str, Any]] = {"undamped": {"color": INK}, "silicone": {"color": "#3366aa"}}
-    for material, tau in MATERIALS.items():
-        t, _, stretching = record(Numerics("implicit-midpoint", 1e-4, 1e-10), tau)
-        ring.semilogy(t, 1e3 * smoothed(stretching, t), lw=1.3, label=material, **styles[material])
+    for material in MATERIALS:
+        t, stretching = found.ringing[material]
+        rings.semilogy(t, 1e3 * stretching, lw=1.3, label=material, **styles[material])
         offset = 0.38 * list(MATERIALS).index(material) - 0.19
         pairs.bar(np.arange(len(PAIRS)) + offset, 1e3 * found.pairs[material], 0.36, **styles[material])
-    ring.set(xlabel="time in the stroke [s]", ylabel="lengthening speed of limbs, r.m.s. [mm/s]")
-    ring.set_title("1. How limbs ring lengthwise, pair {1-,2+}", fontsize=10.5, loc="left")
-    ring.legend(frameon=False, fontsize=8.5)
+    rings.set(xlabel="time in the stroke [s]", ylabel="lengthening speed of limbs, r.m.s. [mm/s]")
+    rings.set_title("1. How limbs ring lengthwise, pair {1-,2+}", fontsize=10.5, loc="left")
+    rings.legend(frameon=False, fontsize=8.5)
     pairs.set_xticks(np.arange(len(PAIRS)), list(PAIRS))
     pairs.set_ylabel("distance after ten strokes, converged [mm]")
     pairs.set_title("2. How far the pairs of Fig. 13.8 swim", fontsize=10.5, loc="left")
@@ -224,12 +276,14 @@ def main() -> None:
         writer = csv.DictWriter(stream, list(Row.__dataclass_fields__))
         writer.writeheader()
         writer.writerows(map(asdict, found.rows))
+    command = "python -m studies.scenes.damping" + " --quick" * options.quick
+    keep(as_data(found, command), options.out / "damping.json")
     draw(found, options.out / "damping.png")
     console = Console()
     console.print(as_table(found))
     for fact in facts(found):
         console.print(fact)
-    console.print(f"Written: {options.out / 'damping.csv'}, {options.out / 'damping.png'}")
+    console.print(f"Written: {', '.join(str(options.out / f'damping.{kind}') for kind in ('json', 'csv', 'png'))}")
 
 
 if __name__ == "__main__":

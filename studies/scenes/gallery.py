@@ -149,7 +149,7 @@ def draw(exhibit: Exhibit, file: Path, strokes: int = STROKES) -> None:
     axes.set_xlim(-128, 128)
     axes.set_ylim(-128, 128)
     axes.axis("off")
-    figure.savefig(file, dpi=160, bbox_inches="tight", pad_inches=0.02)
+    figure.savefig(file, dpi=320, bbox_inches="tight", pad_inches=0.02)
 
 
 def page(results: Mapping[str, Any]) -> str:

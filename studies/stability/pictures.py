@@ -41,26 +41,36 @@ def draw_atlas(
     cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], scheme: str, folder: Path
 ) -> list[Path]:
     """Write three pictures with one map per sweep each: what the solver needed, Newton iterations, and error."""
-    name = NAMES[scheme]
-    return [
-        _draw_needs(cells, sweeps, steps, f"{name}: needs of the solver", folder / "stability_needs.png"),
-        _draw_numbers(
-            cells, sweeps, steps, f"{name}: Newton iterations per time step", folder / "stability_iterations.png",
-            lambda cell: cell.iterations, "viridis_r", (1.0, 300.0), "{:g}", "Newton iterations per time step",
-        ),
-        _draw_numbers(
-            cells, sweeps, steps, f"{name}: error of the hub's path against the converged run",
-            folder / "stability_error.png", lambda cell: 100.0 * cell.error, "magma_r", (0.01, 100.0), "{:g} %",
-            "error of the hub's path", "no converged run",
-        ),
-    ]  # fmt: skip
+    return [draw(cells, sweeps, steps, scheme, folder / f"stability_{what}.png") for what in DRAWN]
 
 
-def _draw_needs(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], title: str, file: Path) -> Path:
+def draw(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], scheme: str, file: Path) -> Path:
+    """Write the picture that a file's name ends with, such as stability_needs.png; returns the file."""
+    return DRAWN[file.stem.rpartition("_")[2]](cells, sweeps, steps, NAMES[scheme], file)
+
+
+def _draw_iterations(
+    cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], name: str, file: Path
+) -> Path:
+    return _draw_numbers(
+        cells, sweeps, steps, f"{name}: Newton iterations per time step", file,
+        lambda cell: cell.iterations, "viridis_r", (1.0, 300.0), "{:g}", "Newton iterations per time step",
+    )  # fmt: skip
+
+
+def _draw_error(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], name: str, file: Path) -> Path:
+    return _draw_numbers(
+        cells, sweeps, steps, f"{name}: error of the hub's path against the converged run", file,
+        lambda cell: 100.0 * cell.error, "magma_r", (0.01, 100.0), "{:g} %",
+        "error of the hub's path", "no converged run",
+    )  # fmt: skip
+
+
+def _draw_needs(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], name: str, file: Path) -> Path:
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    figure, panels, foot = _panels(sweeps, title)
+    figure, panels, foot = _panels(sweeps, f"{name}: needs of the solver")
     for axes, sweep in zip(panels, sweeps, strict=True):
         grid = _grid(cells, sweep, steps, _need)
         axes.pcolormesh(grid, cmap=ListedColormap(NEED_COLOURS), vmin=-0.5, vmax=3.5, edgecolors="white", linewidth=0.5)
@@ -189,3 +199,7 @@ def _legend(foot: Axes, patches: list[Any], left: float = 0.0) -> None:
 def _save(figure: Figure, file: Path) -> Path:
     figure.savefig(file, dpi=DPI)
     return file
+
+
+DRAWN = {"needs": _draw_needs, "iterations": _draw_iterations, "error": _draw_error}
+"""Pictures of the atlas, by the end of their names."""

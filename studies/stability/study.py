@@ -2,8 +2,8 @@
 
 The atlas varies eight quantities against the time step: Young's modulus, rod radius, resolution, drag, density, random
 initial velocities and shifts, and the peak angle. Each of its cells is a scene at a time step. Prints a summary, and
-writes all cells as CSV, the summary as Markdown, and three pictures: what the solver needed to converge, Newton
-iterations per step, and the error of the hub's path.
+writes all cells as CSV, what pictures and summary show of them as JSON, and three pictures: what the solver needed to
+converge, Newton iterations per step, and the error of the hub's path.
 
 `--long` simulates 10,000 strokes of random commands by 256 robots instead. `--cost` measures what the solver's
 safeguards cost a robot that does not need them.
@@ -14,11 +14,11 @@ import itertools
 import math
 import os
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,9 @@ from tqdm import tqdm
 
 from seastar_gym.scene.numerics import SchemeName
 from studies.chapter import ISSUES_FROM, REAL_TIME_FROM
+from studies.kept import keep, rounded
 from studies.parser import study_parser
+from studies.provenance import provenance
 from studies.speed.hardening import SETTINGS, cost_table, measure_cost
 from studies.stability.cases import QUICK_STEPS, STEPS, SWEEPS, Sweep, format_value, quick_sweeps
 from studies.stability.cells import Cell, commands_of, converged_displacements, run_cell, stroke_duration
@@ -130,10 +132,39 @@ def as_table(rows: Sequence[Sequence[str]]) -> Table:
     return table
 
 
-def write_markdown(rows: Sequence[Sequence[str]], file: Path) -> None:
-    """Write the summary as a table in Markdown."""
+def as_markdown(rows: Sequence[Sequence[str]]) -> str:
+    """Summary as a table in Markdown."""
     lines = [SUMMARY, ["---", *["---:"] * (len(SUMMARY) - 1)], *rows]
-    file.write_text("".join(f"| {' | '.join(line)} |\n" for line in lines), encoding="utf-8")
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+KEPT = (
+    "sweep", "value", "step", "refused", "robots", "failed", "iterations", "regularised", "backtracks", "halvings",
+    "growth", "growth_in_vacuum", "error",
+)  # fmt: skip
+"""What pictures and summary show of a cell."""
+
+
+def as_data(cells: Iterable[Cell], command: str, scheme: SchemeName) -> dict[str, Any]:
+    """Cells as plain data, with where they come from; None where a cell has no number, and for vacuum."""
+    rows = [[_plain(getattr(cell, name)) for name in KEPT] for cell in cells]
+    return {**provenance(command), "scheme": scheme, "columns": list(KEPT), "cells": rows}
+
+
+def _plain(value: Any) -> Any:
+    if not isinstance(value, float):
+        return value
+    return rounded(value, 6) if math.isfinite(value) else None
+
+
+def from_data(results: Mapping[str, Any]) -> list[Cell]:
+    """Cells from plain data."""
+    cells = []
+    for row in results["cells"]:
+        kept: dict[str, Any] = dict(zip(results["columns"], row, strict=True))
+        numbers = {name: math.nan for name, each in kept.items() if each is None and name != "value"}
+        cells.append(Cell(**{**kept, **numbers}))
+    return cells
 
 
 def write_csv(cells: Iterable[Cell], file: Path) -> None:
@@ -172,9 +203,11 @@ def main() -> None:
     cells = atlas(sweeps, steps, options.scheme)
     options.out.mkdir(parents=True, exist_ok=True)
     rows = summarise(cells, sweeps)
-    files = [options.out / "stability.csv", options.out / "stability.md"]
+    files = [options.out / "stability.csv", options.out / "stability.json"]
     write_csv(cells, files[0])
-    write_markdown(rows, files[1])
+    command = "python -m studies.stability" + " --quick" * options.quick
+    command += f" --scheme {options.scheme}" * (options.scheme != "implicit-euler")
+    keep(as_data(cells, command, options.scheme), files[1])
     files += draw_atlas(cells, sweeps, steps, options.scheme, options.out)
     console.print(as_table(rows))
     names = ", ".join(one.name for one in files)

@@ -1,7 +1,7 @@
 """Small films of every task, for the page of the environments.
 
-The agent "adaptive", which remembers, swims the first held-out episode. A film has a picture every BETWEEN seconds of
-the robot's time and shows FPS of them a second.
+The agent "adaptive", which remembers, swims the first held-out episode, or "planner" where nothing is hidden. A film
+has a picture every BETWEEN seconds of the robot's time and shows FPS of them a second.
 """
 
 from collections.abc import Iterator
@@ -14,7 +14,8 @@ from seastar_gym import TASKS
 from seastar_gym.command import run_command
 from seastar_gym.evaluation.films import Picture, shrunk, write_gif
 from studies.parser import study_parser
-from studies.tasks.controllers import CONTROLLERS, make_controller
+from studies.tasks.ahead import Robots
+from studies.tasks.controllers import CONTROLLERS, is_swum, make_controller
 from studies.tasks.episodes import make_batch
 
 BETWEEN = 2.0
@@ -32,12 +33,17 @@ def file_name(id: str) -> str:
     return f"{short.removesuffix('Timed').lower()}{'_timed' if short.endswith('Timed') else ''}.gif"
 
 
-def pictures(id: str, agent_name: str, longest: float = LONGEST, instance: int = 0) -> Iterator[Picture]:
-    """Pictures of an episode; longest: Simulated time [s]."""
+def swimmer(batch: Any) -> str:
+    """Name of the agent that a film shows unless another one is asked for."""
+    return "adaptive" if is_swum("adaptive", Robots(batch).inner.challenge) else "planner"
+
+
+def pictures(id: str, agent_name: str | None, longest: float = LONGEST, instance: int = 0) -> Iterator[Picture]:
+    """Pictures of an episode; agent_name: None means `swimmer`. longest: Simulated time [s]."""
     batch: Any = make_batch(id, 1, "test", "fast", 1, render_mode="rgb_array")
     decision_period = TASKS[id][2]
     every = round(BETWEEN / decision_period)
-    agent = make_controller(agent_name, batch)
+    agent = make_controller(agent_name or swimmer(batch), batch)
     observations, info = batch.reset(seed=0, options={"instance": np.array([instance])})
     yield shrunk(batch.render()[0])
     for decision in range(1, round(longest / decision_period) + 1):
@@ -54,7 +60,7 @@ def main() -> None:
     """Command line: write the films."""
     parser = study_parser("studies.tasks.films", __doc__)
     parser.add_argument("--ids", nargs="*", default=list(TASKS), choices=list(TASKS), metavar="ID", help="environments")
-    parser.add_argument("--agent", default="adaptive", choices=CONTROLLERS, help="who swims (default: %(default)s)")
+    parser.add_argument("--agent", choices=CONTROLLERS, help="who swims (default: adaptive, or planner)")
     parser.add_argument("--seconds", type=float, default=LONGEST, help="longest film, simulated (default: %(default)s)")
     parser.add_argument("--instance", type=int, default=0, help="number of the episode (default: %(default)s)")
     parser.add_argument("--out", type=Path, default=Path("docs/gallery"), help="folder (default: %(default)s)")

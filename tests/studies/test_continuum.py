@@ -1,5 +1,7 @@
 """Both discretisations tend to the same robot, the chapter's with order 1 and the continuum's with order 2 or more."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -16,6 +18,15 @@ def test_both_discretisations_tend_to_the_same_robot(rows):
     for row in rows:
         assert (np.diff(row.errors) < 0.0).all(), row
         assert row.errors[-1] < (0.12 if row.discretisation == "chapter" else 1e-3), row
+
+
+def test_the_page_has_the_rows_of_the_kept_numbers(rows):
+    results = json.loads(json.dumps(study.as_data(rows)))
+    page = study.as_markdown(results)
+    for row, kept in zip(rows, study.rows_of(results), strict=True):
+        assert kept[:2] == row[:2] and kept.order == pytest.approx(row.order, abs=1e-4)
+        np.testing.assert_allclose(kept.errors, row.errors, rtol=1e-3)
+        assert f"| {row.name} | {row.discretisation} | " in page
 
 
 def test_the_chapters_order_is_one_and_the_continuums_two_or_more(rows):

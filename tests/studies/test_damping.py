@@ -1,6 +1,7 @@
 """The damping study: a damped robot rings less and converges with longer steps."""
 
 import csv
+import json
 
 import numpy as np
 import pytest
@@ -44,6 +45,18 @@ def test_the_study_writes_its_table_and_picture(found, monkeypatch, tmp_path, ca
     damping.main()
     with (tmp_path / "damping.csv").open() as stream:
         assert len(list(csv.DictReader(stream))) == len(found.rows)
+    kept = damping.from_data(json.loads((tmp_path / "damping.json").read_text(encoding="utf-8")))
+    assert kept.rows == found.rows and kept.agreement == found.agreement
+    for material in MATERIALS:
+        np.testing.assert_allclose(kept.ringing[material], found.ringing[material], rtol=1e-3)
     assert (tmp_path / "damping.png").stat().st_size > 10_000
     assert "Damping changes the distances that the pairs of Fig. 13.8 swim by" in capsys.readouterr().out
     assert as_table(found).row_count == 4
+
+
+def test_the_page_has_the_step_that_keeps_the_error(found):
+    lines = damping.as_markdown(found).splitlines()
+    assert lines[0].count("longest step") == len(MATERIALS) and len(lines) == 2 + len(damping.STEPS)
+    row = good_enough(rows_of(found.rows, "silicone", "sdirk3"))
+    assert row is not None and f"| {1e3 * row.step:g} ms | " in lines[4]
+    assert good_enough(rows_of(found.rows, "undamped", "implicit-euler")) is None and "| below 0.5 ms |  |" in lines[2]

@@ -31,7 +31,9 @@ def test_the_page_and_the_picture_show_every_robot(tmp_path):
         study.Row(robot, setting, 2.0, 0.97, 0.8, "small", 3.0, 1e-5)
         for robot in study.ROBOTS for setting in study.SETTINGS
     ]  # fmt: skip
-    page = study.as_markdown(rows, dict.fromkeys(study.SETTINGS, 4.0), samples=6)
+    results = {"samples": 6, "costs": dict.fromkeys(study.SETTINGS, 4.0), "rows": [row._asdict() for row in rows]}
+    assert study.rows_of(results) == rows
+    page = study.as_markdown({**study.provenance("python -m studies.accuracy.error_bars"), **results})
     for robot in study.ROBOTS:
         assert page.count(f"| {robot} |") == len(study.FIDELITIES)
     for setting in study.SETTINGS:

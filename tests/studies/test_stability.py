@@ -1,13 +1,16 @@
 """The atlas of stability on a tiny grid: every cell converges or says why it was refused, and the files agree."""
 
 import csv
+import json
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from PIL import Image
 from rich.console import Console
 
+from studies.kept import as_json
 from studies.stability import cells as stability_cells
 from studies.stability import study as stability
 from studies.stability.cases import SWEEPS, format_step, format_value, quick_sweeps
@@ -31,7 +34,6 @@ def folder(cells, tmp_path_factory):
     """Folder of the files that a run writes."""
     out = tmp_path_factory.mktemp("stability")
     stability.write_csv(cells, out / "cells.csv")
-    stability.write_markdown(stability.summarise(cells, GRID), out / "summary.md")
     draw_atlas(cells, GRID, STEPS, "implicit-euler", out)
     return out
 
@@ -68,7 +70,8 @@ def test_the_csv_has_every_cell_and_the_summary_counts_it(cells, folder):
     lines = list(csv.DictReader((folder / "cells.csv").read_text(encoding="utf-8").splitlines()))
     assert [(one["sweep"], float(one["step"])) for one in lines] == [(cell.sweep, cell.step) for cell in cells]
     assert lines[9]["value"] == "vacuum"
-    table = [line.strip("| ").split(" | ") for line in (folder / "summary.md").read_text(encoding="utf-8").splitlines()]
+    summary = stability.as_markdown(stability.summarise(cells, GRID))
+    table = [line.strip("| ").split(" | ") for line in summary.splitlines()]
     assert table[0] == list(stability.SUMMARY) and len(table) == 2 + len(GRID) + 1
     names = [sweep.name for sweep in GRID]
     for name, row in zip([*names, None], table[2:], strict=True):
@@ -88,6 +91,18 @@ def test_the_csv_has_every_cell_and_the_summary_counts_it(cells, folder):
 def test_pictures_are_written(folder):
     for name in ("needs", "iterations", "error"):
         assert (folder / f"stability_{name}.png").stat().st_size > 20_000
+
+
+def test_pictures_and_summary_follow_from_the_kept_numbers(cells, folder, tmp_path):
+    text = as_json(stability.as_data(cells, "python -m studies.stability", "implicit-euler"))
+    again = stability.from_data(json.loads(text))
+    assert stability.summarise(again, GRID) == stability.summarise(cells, GRID)
+    for file in draw_atlas(again, GRID, STEPS, "implicit-euler", tmp_path):
+        np.testing.assert_array_equal(image(file), image(folder / file.name))
+
+
+def image(file):
+    return np.asarray(Image.open(file))
 
 
 def test_the_table_can_be_read_in_100_columns(cells):
@@ -125,5 +140,6 @@ def test_the_study_writes_its_files_and_prints_its_table(monkeypatch, tmp_path, 
     monkeypatch.setattr("sys.argv", ["stability", "--quick", "--scheme", "sdirk2", "--out", str(tmp_path / "out")])
     stability.main()
     assert "stability.csv" in capsys.readouterr().out
-    names = {"stability.csv", "stability.md", "stability_needs.png", "stability_iterations.png", "stability_error.png"}
+    pictures = {"stability_needs.png", "stability_iterations.png", "stability_error.png"}
+    names = {"stability.csv", "stability.json", *pictures}
     assert {file.name for file in (tmp_path / "out").iterdir()} == names

@@ -1,0 +1,86 @@
+"""Ways of the policy in the box and of the chapter's script round the pentagon.
+
+Writes `pentagon.json` and `pentagon.png`.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from seastar_gym.command import run_command
+from seastar_gym.controllers.contract import actions_of
+from seastar_gym.controllers.roster import load_agents
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.evaluation.pictures import draw_traces
+from seastar_gym.evaluation.swim import Swim, swim
+from studies.kept import keep
+from studies.parser import study_parser
+from studies.provenance import provenance
+from studies.style import apply_style
+
+AGENTS = ("learned", "pentagon")
+RADIUS = 0.01
+"""Radius of the waypoints [m]."""
+MOST_STROKES = 400
+UNIT = 1e-5
+"""Length that counts as one in the data [m]."""
+
+
+def swims(max_strokes: int = MOST_STROKES) -> list[Swim]:
+    """The agents' swims at `balanced`."""
+    found = []
+    for name, policy in load_agents(AGENTS).items():
+        env = SeastarSwimEnv(path="pentagon", actions=actions_of(policy, 5), waypoint_radius=RADIUS)
+        found.append(swim(name, policy, env, max_strokes=max_strokes, seed=0))
+    return found
+
+
+def as_data(found: list[Swim]) -> dict[str, Any]:
+    """Swims as plain data."""
+    return {
+        "unit_m": UNIT,
+        "waypoints_m": found[0].waypoints.round(6).tolist(),
+        "swims": {
+            each.agent: {
+                "hub": np.rint(each.hub.T / UNIT).astype(int).tolist(),
+                "waypoints_reached": each.waypoint_index.tolist(),
+            }
+            for each in found
+        },
+    }
+
+
+def from_data(results: Mapping[str, Any]) -> list[Swim]:
+    """Swims of which the way is known, not the heat."""
+    waypoints = np.array(results["waypoints_m"])
+    found = []
+    for agent, each in results["swims"].items():
+        hub, reached = UNIT * np.transpose(each["hub"]), np.array(each["waypoints_reached"])
+        strokes = len(reached) - 1
+        none = np.full(strokes, np.nan)
+        unheated = np.zeros(strokes, int)
+        found.append(Swim(agent, waypoints, hub, reached, np.arange(strokes + 1.0), unheated, none, none, None))
+    return found
+
+
+def draw(results: Mapping[str, Any], file: Path) -> None:
+    """Write the picture."""
+    apply_style()
+    draw_traces(from_data(results), RADIUS, file)
+
+
+def main() -> None:
+    """Command line: swim, write the files."""
+    parser = study_parser("studies.learning.traces", __doc__)
+    parser.add_argument("--out", type=Path, default=Path("docs"), help="folder (default: %(default)s)")
+    options = parser.parse_args()
+    results = {**provenance("python -m studies.learning.traces"), **as_data(swims())}
+    keep(results, options.out / "pentagon.json")
+    draw(results, options.out / "pentagon.png")
+    print(", ".join(f"{each.agent}: {each.result}" for each in from_data(results)))
+
+
+if __name__ == "__main__":
+    run_command(main)
