@@ -29,12 +29,7 @@ from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
 
 RECIPES: dict[str, str] = {
-    "SeastarMiswired-v0": "PPO, memory",
-    "SeastarPrey-v0": "PPO, memory",
-    "SeastarStation-v0": "PPO, memory",
-    "SeastarFailBlind-v0": "PPO, memory",
-    "SeastarObstTrap-v0": "PPO, memory, told the way",
-    "SeastarPrizes-v0": "PPO, memory",
+    id: "PPO, memory, told the way" if about[0] == "obst-trap" else "PPO, memory" for id, about in TASKS.items()
 }
 """Learner of every task that has a policy in the box."""
 VALIDATION = 64
@@ -68,7 +63,7 @@ class Options:
             raise ValueError("There must be at least one seed.")
 
 
-def file_of(id: str, folder: Path) -> Path:
+def file_of(id: str, folder: Path = learned.TASKS) -> Path:
     """File of the policy of a task."""
     task, _, period, *_ = TASKS[id]
     return learned.of_task(task, None if period == SmaPulse().period else period, folder)

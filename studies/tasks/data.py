@@ -1,10 +1,10 @@
-"""Minari datasets of the tasks, of three qualities: random actions, the greedy rule, and PPO.
+"""Minari datasets of the tasks, of three qualities: random actions, the greedy rule, and a learned policy.
 
     python -m studies.tasks.data --episodes 100
 
-PPO is trained first, as for docs/tasks.md, and kept as OUT/learned/ID.zip. A training or a dataset that is there is not
-made again, so the command goes on where it stopped. Read them with MINARI_DATASETS_PATH=OUT, under the names
-TASK/random-v0, TASK/greedy-v0 and TASK/learned-v0.
+The learned policy is the one in the box. For a task without one, PPO is trained first, as for docs/tasks.md, and kept
+as OUT/learned/ID.zip. A training or a dataset that is there is not made again, so the command goes on where it stopped.
+Read them with MINARI_DATASETS_PATH=OUT, under the names TASK/random-v0, TASK/greedy-v0 and TASK/learned-v0.
 """
 
 import sys
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from seastar_gym import TASKS
 from seastar_gym.command import run_command
+from seastar_gym.controllers.learned import load
 from seastar_gym.data.command import name_of, write_to
 from seastar_gym.data.dataset import summary, swim_once, write
 from seastar_gym.data.recorder import Episode, Recorder
@@ -43,7 +44,7 @@ class Options:
     episodes: int = 100
     """Episodes of every dataset, of the split "train", with the seeds 0, 1, ..."""
     decisions: int = 200_000
-    """Length of a training [decisions]."""
+    """Length of a training [decisions], of tasks without a policy in the box."""
     seed: int = 0
     """Seed of the training and of the random actions."""
     fidelity: Fidelity = "fast"
@@ -94,8 +95,11 @@ def agent_of(quality: str, id: str, recorder: Recorder, options: Options) -> tup
         return recorder, Random(recorder, options.seed)
     if quality == "greedy":
         return recorder, make_controller("greedy", recorder)
+    from agents.tasks.command import file_of
     from studies.tasks.learning import ALL_LEARNERS, Trained
 
+    if (file := file_of(id)).is_file():
+        return recorder, cast(Agent, Trained(load(file)))
     return ALL_LEARNERS[LEARNER].wrap(recorder), cast(Agent, Trained(learned(id, options)))
 
 

@@ -21,7 +21,6 @@ import tyro
 
 from agents.tasks.command import RECIPES, file_of
 from seastar_gym import TASKS
-from seastar_gym.controllers.learned import TASKS as LEARNED
 from seastar_gym.controllers.learned import load
 from seastar_gym.envs.tasks.envs import CHALLENGES
 from seastar_gym.files import write_atomically
@@ -87,7 +86,7 @@ def swum(id: str, agent: str, seed: int, options: Options) -> Episodes:
     if agent in CONTROLLERS:
         return swim(id, lambda batch: make_controller(agent, batch), options.episodes, fidelity, threads)
     if agent == IN_THE_BOX:
-        policy = load(file_of(id, LEARNED))
+        policy = load(file_of(id))
         return swim(id, lambda batch: Trained(policy), options.episodes, fidelity, threads)
     model = train(id, agent, seed, options.decisions, fidelity, threads)
     return evaluate(id, agent, model, options.episodes, fidelity, threads)
