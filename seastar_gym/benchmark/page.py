@@ -73,8 +73,8 @@ def draw(scores: Mapping[str, Floats], file: Path) -> None:
     axes = figure.subplots()
     for number, (agent, of_agent) in enumerate(scores.items()):
         share, low, high = profile(of_agent, LEVELS)
-        colour, style = COLOURS[number % len(COLOURS)], LINE_STYLES[number // len(COLOURS) % len(LINE_STYLES)]
-        axes.plot(LEVELS, 100.0 * share, color=colour, linestyle=style, label=agent)
+        colour, style = COLOURS[number % len(COLOURS)], LINE_STYLES[number % len(LINE_STYLES)]  # one may hide another
+        axes.plot(LEVELS, 100.0 * share, color=colour, linestyle=style, label=agent, zorder=4.0 - 0.01 * number)
         axes.fill_between(LEVELS, 100.0 * low, 100.0 * high, color=colour, alpha=0.15, linewidth=0.0)
     axes.set(
         xlabel="score relative to the best agent's interquartile mean", ylabel="episodes that reach it [%]",
