@@ -73,8 +73,13 @@ def trained(id: str, seed: int, options: Options) -> tuple[LearnedPolicy, dict[s
     """Policy of a seed, and what is to be told of its training."""
     began = time.process_time()
     model = train(id, LEARNERS[RECIPES[id]], seed, options.decisions, options.fidelity, options.num_threads)
-    policy = policy_of(model)
+    policy = swims(policy_of(model), id)
     return policy, {"strokes": model.num_timesteps, "seed": seed, "seconds": round(time.process_time() - began, 1)}
+
+
+def swims(policy: LearnedPolicy, id: str) -> LearnedPolicy:
+    """The policy as one of a task, by whatever reward it was trained."""
+    return LearnedPolicy(policy.description._replace(task=TASKS[id][0]), policy.weights, policy.training)
 
 
 def validated(id: str, policy: LearnedPolicy, options: Options) -> float:
