@@ -73,6 +73,10 @@ Policies in the box are in `seastar_gym/controllers/policies/tasks`, each with a
 them, that of `ObstTrap` by the reward that measures the way around all discs. To watch one, type
 `seastar swim --task SeastarPrey-v0 --agent learned`.
 
+Six times the training is worth more than all else that was tried with learners. On both `Station` tasks,
+`MiswiredTimed` and `FailBlindTimed`, policies in the box beat every rule that is not told what is hidden, on
+`StationTimed` and `FailBlindTimed` also the one that is. Elsewhere rules that remember or plan are ahead.
+
 In `ObstTrap`, the reward's way to the goal is the straight one, which leads into the horseshoe. That a learner does not
 arrive by this reward says little about other rewards: *told the way* is one. `Prizes` keeps draws alone in which the
 best round brings a point 40 % more than the greedy one, so its headroom is by choice of the draws.
