@@ -73,6 +73,10 @@ Policies in the box are in `seastar_gym/controllers/policies/tasks`, each with a
 them, that of `ObstTrap` by the reward that measures the way around all discs. To watch one, type
 `seastar swim --task SeastarPrey-v0 --agent learned`.
 
+Ten of the twelve are kept. `StationTimed` and `FailBlindTimed` are not: there, plain PPO leaves 10 and 14 % of what is
+known to be possible. Their ids stay, beside those of the same tasks in strokes, but they show no difference between
+learners.
+
 Six times the training is worth more than all else that was tried with learners. On both `Station` tasks,
 `MiswiredTimed` and `FailBlindTimed`, policies in the box beat every rule that is not told what is hidden, on
 `StationTimed` and `FailBlindTimed` also the one that is. Elsewhere rules that remember or plan are ahead.
@@ -172,7 +176,7 @@ def draw(rows: Sequence[Row], file: Path) -> None:
     for axes in panels:
         axes.set_axis_off()
     handles = [grid[0, 0].plot([], [], "o-", color=colour, lw=2.5)[0] for colour in (FAINT, CYCLE[0])]
-    figure.legend(handles, ["rule or planner", "learned"], title="mean over episodes and its 95 % interval",
+    figure.legend(handles, ["rule or planner", "learned"], title="mean and its 95 % interval",
                   loc="outside upper center", ncols=2)  # fmt: skip
     figure.savefig(file)
 
@@ -181,7 +185,7 @@ def _draw_row(axes: Any, row: Row) -> None:
     names = [agent for agent, _ in row.in_order]
     for place, (agent, seeds) in enumerate(row.in_order):
         mean, low, high = mean_with_interval(over(seeds))
-        colour = CYCLE[0] if agent.startswith(("PPO", "Rec")) else FAINT
+        colour = CYCLE[0] if agent.startswith(("PPO", "Rec", "in the box")) else FAINT
         axes.plot([low, high], [place, place], color=colour, lw=2.5, solid_capstyle="butt")
         axes.plot(mean, place, "o", color=colour, ms=5)
     axes.set_yticks(range(len(names)), names)
