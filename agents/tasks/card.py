@@ -23,14 +23,18 @@ def card(id: str, policy: LearnedPolicy, file: Path) -> str:
     """The card of the policy in a file, as Markdown."""
     about = policy.description
     layers = ", ".join(map(str, about.hidden))
-    seeds = ", ".join(map(str, policy.training.get("seeds", ())))
+    tried = policy.training.get("seeds", ())
+    seeds = f"the best of seeds {', '.join(map(str, tried))}" if len(tried) > 1 else "one seed"
+    told = ""
+    if "told the way" in str(policy.training.get("learner")):
+        told = " Its training's reward measured the way around all discs, `ObstTrap(potential=\"geodesic\")`."
     past = f" and the most telling numbers of the last {about.past}" if about.past else ""
     env: Any = gym.make(id, disable_env_checker=True).unwrapped
     measure = measure_of(env)
     return f"""# Model card: {file.stem}
 
 A policy of the chapter's robot for `{id}`. What it sees and is rewarded for stands in the docstring of
-`{type(env.challenge).__name__}`. It was trained in simulation, and no real robot has swum by it.
+`{type(env.challenge).__name__}`.{told} It was trained in simulation, and no real robot has swum by it.
 
 | | |
 |---|---|
@@ -38,7 +42,7 @@ A policy of the chapter's robot for `{id}`. What it sees and is rewarded for sta
 | input | {about.input_size} numbers: the observation{past}, turned and mirrored into one sector |
 | network | layers of {layers} neurons with tanh, which numpy runs |
 | environment | `gym.make("{id}", actions="{about.actions}")` |
-| learner | {policy.training.get("learner")}, the best of seeds {seeds} |
+| learner | {policy.training.get("learner")}, {seeds} |
 | licence | MIT, as the package |
 
 ## Training

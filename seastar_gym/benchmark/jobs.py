@@ -10,7 +10,7 @@ import numpy as np
 from seastar_gym.benchmark.episodes import Episodes, held_out, swim_episodes
 from seastar_gym.benchmark.measures import measure_of
 from seastar_gym.controllers.roster import load_agent
-from seastar_gym.executors import Executor
+from seastar_gym.executors import KNOWN_FAILURES, Executor, sentence_of
 from seastar_gym.scene.numerics import Fidelity
 
 ATTEMPTS = 3
@@ -52,14 +52,18 @@ def env_of(task: str, fidelity: Fidelity | None) -> Any:
 
 def swim_job(job: Job) -> bytes:
     """Rows of a job, or the sentence of an agent that does not fit, as JSON."""
-    env = env_of(job.task, job.fidelity)
     try:
+        env = env_of(job.task, job.fidelity)
         policy = load_agent(job.policy, env, job.seeds[0])
         swum = swim_episodes(
             job.task, policy, list(job.seeds), fidelity=job.fidelity, max_decisions=job.decisions, threads=job.threads
         )
     except (ValueError, FileNotFoundError) as unfit:
         return json.dumps({"rows": [], "problem": str(unfit)}).encode()
+    except KNOWN_FAILURES:  # of the machine, which may be over when the job is run again
+        raise
+    except Exception as failure:
+        return json.dumps({"rows": [], "problem": f"{type(failure).__name__}: {sentence_of(failure)}"}).encode()
     return json.dumps({"rows": _rows(swum, measure_of(env).of(swum))}).encode()
 
 

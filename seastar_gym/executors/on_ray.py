@@ -69,7 +69,8 @@ def connect(address: str | None, workers: int | None) -> bool:
     try:
         ray.init(address or "local", log_to_driver=False, logging_level="error", **own)
     except (ConnectionError, RuntimeError) as refused:
-        raise ValueError(f"There is no Ray cluster at {address}: {sentence_of(refused)}") from None
+        where = f"There is no Ray cluster at {address}" if address else "Ray does not start here"
+        raise ValueError(f"{where}: {sentence_of(refused)}") from None
     return True
 
 

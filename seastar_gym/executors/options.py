@@ -6,6 +6,7 @@ from seastar_gym.executors import Executor
 from seastar_gym.executors.here import Here
 from seastar_gym.executors.processes import Processes
 from seastar_gym.extras import require_extra
+from seastar_gym.scene.checks import require_count
 
 
 def add_options(parser: argparse.ArgumentParser, what: str, default: str) -> None:
@@ -25,6 +26,8 @@ def add_options(parser: argparse.ArgumentParser, what: str, default: str) -> Non
 
 def executor_of(options: argparse.Namespace) -> Executor:
     """Executor that the options name. It says at once what is missing. Jobs of SLURM have their files in OUT/slurm."""
+    if options.workers is not None:
+        require_count("--workers", options.workers, 1, 1_000_000)
     match options.executor:
         case "here":
             return Here()

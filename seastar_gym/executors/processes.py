@@ -56,13 +56,16 @@ class Processes:
                 process.join()
                 yield Outcome(task, None, f"Its process was lost, with exit code {process.exitcode}.")
                 continue
-            following = next(tasks, None)
-            if following is None:
-                connection.close()
-                process.join()
-            else:
+            following = None
+            try:
+                yield outcome  # first, since the next task may depend on it, or fail to be made
+                following = next(tasks, None)
+            finally:
+                if following is None:
+                    connection.close()
+                    process.join()
+            if following is not None:
                 _give(busy, connection, Worker(process, following))
-            yield outcome
 
 
 def _begin(busy: dict[Connection, Worker], work: Work[Task], task: Task) -> None:

@@ -44,7 +44,10 @@ class SlurmArrays:
         executor.update_parameters(timeout_min=self.minutes, **self._of_slurm())
         size = ARRAY if self.cluster == "slurm" else self.workers or 1
         while jobs := list(itertools.islice(iter(partial(self._next, tasks), []), size)):
-            under_way = executor.map_array(partial(_outcomes, work), jobs)
+            try:
+                under_way = executor.map_array(partial(_outcomes, work), jobs)
+            except submitit.core.utils.FailedJobError as refused:
+                raise ValueError(f"SLURM does not take the jobs: {sentence_of(refused)}") from None
             try:
                 for job in submitit.helpers.as_completed(under_way):
                     yield from _outcomes_of(jobs[under_way.index(job)], job)

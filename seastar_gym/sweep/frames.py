@@ -1,4 +1,4 @@
-"""Frames: what all robots of a lane batch have in common, a scene and a gait."""
+"""Frames: what all robots of a lane batch have in common, a scene, and a gait or a controller."""
 
 import hashlib
 import json

@@ -81,5 +81,5 @@ def read_parts(folder: str | os.PathLike[str]) -> Any:
     files = [str(file) for file in sorted(Parts(folder).folder.glob("??/*.parquet"))]
     if not files:
         raise ValueError(f"There are no results in {folder}.")
-    schema = pa.unify_schemas([pa.parquet.read_schema(file) for file in (files[0], files[-1])])
+    schema = pa.unify_schemas([pa.parquet.read_schema(file) for file in files])  # sweeps differ in their columns
     return pa.dataset.dataset(files, schema, format="parquet").to_table()

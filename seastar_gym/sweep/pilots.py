@@ -73,8 +73,8 @@ def pilot_of(name: Any, course: Course, scene: Scene) -> Pilot:
     """
     if not isinstance(name, str):
         raise ValueError(f"A controller is the name of an agent, such as learned, not {shown(name)}.")
-    period = course.decision_period
-    seconds = checked_decision_period(period, scene)
+    seconds = checked_decision_period(course.decision_period, scene)
+    period = None if seconds == scene.actuator.period else course.decision_period
     files = files_of(name, period)
     if name == "learned" or name.endswith(".safetensors"):
         policy = load(in_the_box(period) if name == "learned" else name)

@@ -126,12 +126,13 @@ class Proposals:
     def tell(self, outcome: Outcome[Cell]) -> None:
         """Tell the study what came of a cell. Proposals of a lost one are put back."""
         trials = self._waiting.pop(outcome.task.name)
-        values = [None] * len(trials) if outcome.part is None else _column(outcome.part, self._search.objective)
-        for trial, value in zip(trials, values, strict=True):
-            if outcome.part is None:
+        if outcome.part is None:
+            for trial in trials:
                 put_back(self.study, trial.number)
-            else:
-                _tell(self.study, trial.number, value)
+            return
+        worst = -np.inf if self._search.is_largest_best else np.inf  # of designs without the objective, such as a time
+        for trial, value in zip(trials, _column(outcome.part, self._search.objective), strict=True):
+            _tell(self.study, trial.number, worst if value is None or np.isnan(value) else value)
 
 
 def _column(part: bytes, name: str) -> list[float]:
@@ -144,11 +145,9 @@ def _count(study: optuna.Study, state: TrialState) -> int:
 
 
 def _tell(study: optuna.Study, number: int, value: float | None) -> bool:
-    """Tell a result, or a failure for None and NaN; whether the proposal still waited for it."""
-    failed = value is None or not np.isfinite(value)
-    state = TrialState.FAIL if failed else TrialState.COMPLETE
+    """Tell a result, or a failure for None; whether the proposal still waited for it."""
     try:
-        study.tell(number, None if failed else value, state)
+        study.tell(number, value, TrialState.FAIL if value is None else TrialState.COMPLETE)
     except (ValueError, optuna.exceptions.UpdateFinishedTrialError):  # another process was faster
         return False
     return True

@@ -2,16 +2,15 @@
 
     python -m studies.tasks.data --episodes 100
 
-The learned policy is the one in the box. For a task without one, PPO is trained first, as for docs/tasks.md, and kept
-as OUT/learned/ID.zip. A training or a dataset that is there is not made again, so the command goes on where it stopped.
-Read them with MINARI_DATASETS_PATH=OUT, under the names TASK/random-v0, TASK/greedy-v0 and TASK/learned-v0.
+The learned policy is the one in the box. A dataset that is there is not made again, so the command goes on where it
+stopped. Read them with MINARI_DATASETS_PATH=OUT, under the names TASK/random-v0, TASK/greedy-v0 and TASK/learned-v0.
 """
 
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 import tyro
@@ -29,7 +28,6 @@ from seastar_gym.scene.numerics import Fidelity
 from studies.tasks.controllers import make_controller
 from studies.tasks.episodes import Agent, Batch, Info, make_batch
 
-LEARNER = "PPO"
 QUALITIES = ("random", "greedy", "learned")
 
 
@@ -43,10 +41,8 @@ class Options:
     """Qualities: random, greedy, learned."""
     episodes: int = 100
     """Episodes of every dataset, of the split "train", with the seeds 0, 1, ..."""
-    decisions: int = 200_000
-    """Length of a training [decisions], of tasks without a policy in the box."""
     seed: int = 0
-    """Seed of the training and of the random actions."""
+    """Seed of the random actions."""
     fidelity: Fidelity = "fast"
     """Accuracy of the simulation."""
     num_threads: int | None = None
@@ -56,7 +52,6 @@ class Options:
 
     def __post_init__(self) -> None:
         require_count("episodes", self.episodes, 1, 100_000)
-        require_count("decisions", self.decisions, 1, 2**31)
         for kind, asked, known in (("task", self.ids, tuple(TASKS)), ("quality", self.qualities, QUALITIES)):
             if unknown := set(asked) - set(known):
                 raise ValueError(f"Unknown {kind} {min(unknown)!r}: choose of {', '.join(known)}.")
@@ -74,21 +69,6 @@ class Random:
         return np.asarray(self._space.sample())
 
 
-def learned(id: str, options: Options) -> Any:
-    """Model of a task, from its file or trained now."""
-    from stable_baselines3 import PPO
-
-    from studies.tasks.learning import train
-
-    file = options.out / "learned" / f"{id}.zip"
-    if file.is_file():
-        return PPO.load(file, device="cpu")
-    model = train(id, LEARNER, options.seed, options.decisions, options.fidelity, options.num_threads)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    model.save(file)
-    return model
-
-
 def agent_of(quality: str, id: str, recorder: Recorder, options: Options) -> tuple[Batch, Agent]:
     """Agent of a quality, and the batch that it sees."""
     if quality == "random":
@@ -96,11 +76,9 @@ def agent_of(quality: str, id: str, recorder: Recorder, options: Options) -> tup
     if quality == "greedy":
         return recorder, make_controller("greedy", recorder)
     from agents.tasks.command import file_of
-    from studies.tasks.learning import ALL_LEARNERS, Trained
+    from studies.tasks.learning import Trained
 
-    if (file := file_of(id)).is_file():
-        return recorder, cast(Agent, Trained(load(file)))
-    return ALL_LEARNERS[LEARNER].wrap(recorder), cast(Agent, Trained(learned(id, options)))
+    return recorder, cast(Agent, Trained(load(file_of(id))))
 
 
 def record(id: str, quality: str, options: Options) -> list[Episode]:

@@ -61,7 +61,7 @@ left* is the share of the way from greedy to the bound that plain PPO does not g
 | PPO | the project's hyperparameters, symmetric, no memory; but for the horizons of `agents.tasks.learning.OWN` |
 | PPO, memory | the same, and tips, last commands and targets of the last eight observations |
 | PPO, told the way | plain PPO of `ObstTrap`, by a reward that measures the way around all discs |
-| in the box | the policy that the package brings for the task: PPO with memory after six times as many decisions |
+| in the box | the policy that comes with the package, one seed: PPO with memory, after six times as many decisions |
 
 The planner believes in its own wires, in still water, in a prey that swims straight on, in limbs that are all alive,
 and in the straight way between the discs that it sees. Of prizes nothing is hidden: there, the planner swims to the
@@ -77,7 +77,7 @@ Ten of the twelve are kept. `StationTimed` and `FailBlindTimed` are not: there, 
 known to be possible. Their ids stay, beside those of the same tasks in strokes, but they show no difference between
 learners.
 
-Six times the training is worth more than all else that was tried with learners. On both `Station` tasks,
+Six times the training is worth more than a memory alone. On both `Station` tasks,
 `MiswiredTimed` and `FailBlindTimed`, policies in the box beat every rule that is not told what is hidden, on
 `StationTimed` and `FailBlindTimed` also the one that is. Elsewhere rules that remember or plan are ahead.
 

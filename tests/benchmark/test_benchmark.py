@@ -240,6 +240,15 @@ def test_lost_jobs_are_run_again_and_those_that_are_always_lost_are_named(tasks,
     assert "rest does not swim SeastarShort-v0: Its worker was lost: NodeDied." in capsys.readouterr().err
 
 
+def test_an_agent_with_a_bug_does_not_cost_the_others_their_results(tasks, tmp_path, monkeypatch, capsys):
+    (tmp_path / "a_bug.py").write_text("def make(env):\n    return 1 + 'one'\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    options = ["--tasks", SHORT, "--agents", "a_bug:make", "rest", "--seeds", "2", "--out", str(tmp_path / "out")]
+    assert main([*options, "--fidelity", "fast", "--decisions", "2"]) == 0
+    assert "a_bug:make does not swim" in capsys.readouterr().err
+    assert [entry.agent for entry in read(tmp_path / "out" / "results.json")] == ["rest"]
+
+
 def test_an_agent_that_does_not_fit_is_left_out_with_a_sentence(tasks, tmp_path, capsys):
     arguments = ["--agents", "lagged", "rest", "--tasks", SHORT, "--seeds", "1", "--decisions", "2"]
     assert main([*arguments, "--out", str(tmp_path)]) == 0

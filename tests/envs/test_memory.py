@@ -48,6 +48,37 @@ def test_memory_ends_with_the_episode_and_the_last_observation_still_has_it():
     assert not np.array_equal(last[186:].reshape(3, -1)[0], last[:186][memory.recollection.told])
 
 
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+def test_no_memory_goes_from_one_episode_into_the_next(mode):
+    """Robots whose episodes end at different times: the past of a new one is its first observation."""
+    memory = VectorMemory(batch("prey", 3, autoreset_mode=mode), 2)
+    memory.unwrapped.max_episode_steps = 3
+    memory.reset(seed=0)
+    seen, size = memory.recollection, memory.recollection.places.size
+    began, ended = 0, np.zeros(3, bool)
+    for step in range(9):
+        shown, _, terminated, truncated, _ = memory.step(np.full(3, step % 21))
+        over = terminated | truncated
+        begun = over if mode == AutoresetMode.SAME_STEP else ended
+        for robot in np.flatnonzero(begun):
+            now, past = shown[robot, :size][seen.told], shown[robot, size:].reshape(2, -1)
+            np.testing.assert_array_equal(past, np.stack([now, now]))
+            began += 1
+        ended = over
+    assert began >= 3
+
+
+def test_a_reset_of_some_robots_leaves_the_others_memory():
+    memory = VectorMemory(batch("prey", 2, autoreset_mode=AutoresetMode.DISABLED), 2)
+    memory.reset(seed=0)
+    for action in (3, 4, 5):
+        shown = memory.step(np.array([action, action]))[0]
+    again, _ = memory.reset(seed=1, options={"reset_mask": np.array([True, False])})
+    np.testing.assert_array_equal(again[1], shown[1])
+    now = again[0, : memory.recollection.places.size][memory.recollection.told]
+    np.testing.assert_array_equal(again[0, memory.recollection.places.size :].reshape(2, -1), np.stack([now, now]))
+
+
 def test_masks_are_those_of_the_robots_that_are_shown():
     """Wires that are still hot may not be heated again; robots with their limbs renamed have their masks renamed."""
 

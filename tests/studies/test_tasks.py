@@ -255,7 +255,7 @@ def test_a_table_has_every_agent_and_the_verdict():
     text = table(row("miswired", greedy=400.0, informed=200.0, PPO=300.0))
     assert "| greedy | 400 | 400 to 400 |" in text
     assert text.endswith("Bound: informed, 50 % better than greedy. Gap left by PPO: 50 %. By this, kept.")
-    assert "Not swum yet: rest; planner; adaptive; PPO, memory; PPO, told the way." in text
+    assert "Not swum yet: rest; planner; adaptive; PPO, memory; PPO, told the way; in the box." in text
     assert "Bound" not in table(row("prey", greedy=1.0, PPO=3.0))  # a learner alone is no bound
     assert table(row("prizes", greedy=10.0, informed=14.0)).endswith("Bound: informed, 40 % better than greedy.")
 
@@ -265,7 +265,7 @@ def test_nobody_waits_for_agents_that_a_task_has_not():
     told = "PPO, told the way"
     assert has_cell("SeastarObstTrap-v0", told) and not has_cell("SeastarPrizes-v0", told)
     row_ = Row("SeastarPrizes-v0", "prizes", {"greedy": [np.ones(4)]})
-    assert "Not swum yet: rest; planner; informed; PPO; PPO, memory." in table(row_, has_cell)
+    assert "Not swum yet: rest; planner; informed; PPO; PPO, memory; in the box." in table(row_, has_cell)
 
 
 def test_the_study_goes_on_where_it_was_broken_off(tmp_path, monkeypatch):

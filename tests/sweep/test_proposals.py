@@ -1,5 +1,6 @@
 """Designs that Optuna proposes: told once, put back when they were lost, in SQLite and in PostgreSQL."""
 
+import math
 import os
 import pwd
 import shutil
@@ -160,6 +161,19 @@ def test_a_result_that_comes_too_late_changes_nothing(sqlite):
     for cell in cells:
         slow.tell(Outcome(cell, part_of(cell)))
     assert states(study) == [TrialState.FAIL] * 2 + [TrialState.WAITING] * 2
+
+
+@pytest.mark.parametrize("is_largest_best", [True, False])
+def test_a_design_without_the_objective_is_the_worst_and_not_tried_for_ever(is_largest_best, sqlite, monkeypatch):
+    """A time is NaN where a robot does not arrive."""
+    monkeypatch.setattr("seastar_gym.sweep.proposals._column", lambda part, name: [math.nan, 1.0])
+    search = Search(is_largest_best=is_largest_best)
+    study = study_of(SWEEP, search, sqlite)
+    proposals = Proposals(SWEEP, study, search, 2)
+    monkeypatch.setattr(proposals, "_waiting", {"cell": [study.ask(), study.ask()]})
+    proposals.tell(Outcome(type("Cell", (), {"name": "cell"})(), b"part"))
+    assert states(study) == [TrialState.COMPLETE] * 2 and study.best_value == 1.0
+    assert list(proposals.cells()) == []
 
 
 def test_bad_searches_are_refused(sqlite):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from seastar_gym.envs.own_numbers import NO_MORE, OwnNumbers, Places, places_of
@@ -90,6 +91,8 @@ class VectorMemory(_VectorWrapper):
         if kind.with_headings:
             raise ValueError("Asked headings have no place in this memory: take a task without them.")
         self.recollection = Recollection(kind.group, kind.mirror, kind.own, past)
+        self._over = np.zeros(env.num_envs, bool)  # robots whose next step begins an episode
+        self._begins_later = env.metadata.get("autoreset_mode") == AutoresetMode.NEXT_STEP
         self._past = np.zeros((env.num_envs, past, self.recollection.places.size), np.float32)
         self._elements = np.zeros(env.num_envs, np.intp)
         self.single_observation_space = gym.spaces.Box(-np.inf, np.inf, (self.recollection.size,), np.float32)
@@ -103,9 +106,11 @@ class VectorMemory(_VectorWrapper):
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin episodes."""
+        """Begin episodes, of those in `options["reset_mask"]` or of all."""
+        begun = (options or {}).get("reset_mask", np.ones(self.num_envs, bool))
         observations, info = self.env.reset(seed=seed, options=options)  # type: ignore[arg-type]
-        self._past[:] = observations[:, None]
+        self._past[begun] = observations[begun, None]
+        self._over[begun] = False
         self._latest = observations
         shown, self._elements = self.recollection.shown(observations, self._past)
         return shown, self._kind.mask_info(info, self._elements)
@@ -115,8 +120,10 @@ class VectorMemory(_VectorWrapper):
         actions = self._kind.restore(actions, self._elements)
         observations, rewards, terminated, truncated, info = self.env.step(actions)
         self._past = np.concatenate([self._latest[:, None], self._past[:, :-1]], axis=1)
-        begun = np.zeros(self.num_envs, bool)
-        if "final_obs" in info:
+        begun = self._over
+        if self._begins_later:
+            self._over = terminated | truncated
+        elif "final_obs" in info:
             begun = info["_final_obs"]
             info = {**info, **self._shown_final(info)}
         self._past[begun] = observations[begun, None]

@@ -76,8 +76,8 @@ class SeastarTaskEnv(SeastarSwimEnv):
     | `SeastarPrizes-v0`         | `"prizes"`      | 1.0                 | `"pairs"` | 200            | 80        |
     | `SeastarPrizesTimed-v0`    | `"fast-prizes"` | 0.5                 | `"pairs"` | 115            | 76        |
 
-    The threshold is `reward_threshold` of the spec: about the mean return of the best controller in docs/tasks.md that
-    is not told what is hidden; for `Station`, a little more.
+    The threshold is `reward_threshold` of the spec: about the mean return of the best rule in docs/tasks.md that is
+    not told what is hidden; for `Station`, a little more.
 
     What a task asks for, observes and rewards stands in the docstring of its challenge: `Miswired`, `Prey`, `Station`,
     `FailBlind`, `ObstTrap`, `Prizes`. Actions, masks and everything else are those of `SeastarSwimEnv`.
