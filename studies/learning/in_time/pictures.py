@@ -26,5 +26,5 @@ def draw(runs: Mapping[str, Runs], file: Path) -> None:
         as_numbers(axes.xaxis)
         axes.set_xticks([], minor=True)
         figure.legend(title="decides every .., and what else is special; one mark for each seed", alignment="left",
-                      loc="outside upper left", ncols=3)  # fmt: skip
+                      loc="outside upper left", ncols=3, fontsize="small", columnspacing=1.0)  # fmt: skip
     figure.savefig(file)
