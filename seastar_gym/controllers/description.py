@@ -137,8 +137,8 @@ def _seen(facts: Mapping[str, Any]) -> tuple[str | None, Mirror | None, OwnNumbe
     task, mirror, own, past = (facts.get(name) for name in SEEN)
     if task is not None and (not isinstance(task, str) or task not in CHALLENGES):
         raise ValueError(f"its task must be one of {', '.join(CHALLENGES)}, not {shown(task)}")
-    if past:
-        require_count("its past", past, 1, MOST_PAST)
+    if past is not None:
+        require_count("its past", past, 0, MOST_PAST)
     return task, None if mirror is None else _mirror(mirror), NO_MORE if own is None else _own(own), past or 0
 
 

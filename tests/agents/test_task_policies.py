@@ -79,6 +79,7 @@ def test_a_policy_of_another_task_is_refused():
         ({"past": -1}, "its past must be a whole number"),
         ({"past": 10**9}, "its past must be a whole number"),
         ({"past": True}, "its past must be a whole number"),
+        ({"past": False}, "its past must be a whole number"),
         ({"symmetry": False}, "a policy without symmetry has no past"),
         ({"limb_mirror": 3}, "its limb_mirror must be a list of pairs"),
         ({"limb_mirror": [[0, 2]]}, "not an index and a sign"),

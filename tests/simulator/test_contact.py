@@ -209,9 +209,10 @@ def test_schemes_agree_on_limbs_that_meet():
 
 
 @pytest.mark.parametrize(("speed", "stopped"), [(5.0, False), (100.0, True)])
-def test_neighbours_thrown_at_each_other_bounce_or_stop_but_never_cross(speed, stopped):
+@pytest.mark.parametrize("numerics", [Numerics("sdirk2", 0.02), Numerics("implicit-midpoint", 5e-3)], ids=str)
+def test_neighbours_thrown_at_each_other_bounce_or_stop_but_never_cross(numerics, speed, stopped):
     """Two limbs turn towards each other, their tips so fast [m/s]. Surfaces that yield hold them up to about 25 m/s."""
-    simulator = Simulator(Scene(Seastar(), None, numerics=Numerics("sdirk2", 0.02), contact=Contact()))
+    simulator = Simulator(Scene(Seastar(), None, numerics=numerics, contact=Contact()))
     state = simulator.get_state()
     arms = state.positions[0, 1:].reshape(5, -1, 2) - state.positions[0, 0]
     across = np.stack([-arms[..., 1], arms[..., 0]], axis=-1) * np.array([speed, -speed, 0, 0, 0])[:, None, None] / 0.1
