@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bodied_oracle import Apart, Touching, turned
+from fuzz.frames import mirrored_body, swapped
 from seastar_gym import Attachment, Body, Contact, Scene, Seastar, SmaPulse, Water
 from seastar_gym.der.linear.coupled import solve_coupled
 from seastar_gym.der.potential import factorise
@@ -214,6 +215,41 @@ def test_nodes_that_entered_a_body_belong_to_the_side_that_they_came_from():
     add_contact.plain(rods.contact, rods, work, kernel_stage, None, Lanes(0.0))
     force = turned(-stage.u[-1], work.contact.force[2 * node : 2 * node + 2, 0])
     np.testing.assert_allclose(force / np.linalg.norm(force), [-0.005 / 0.0403112887, 0.04 / 0.0403112887], atol=1e-3)
+
+
+def forces(body: Body, began: np.ndarray, guessed: np.ndarray) -> np.ndarray:
+    """Forces of contact [N] where nodes are nearer to the hub than in the first guess of a step that began at others.
+
+    Nodes and forces have the shape (N_LANES, n_nodes, 2). The hub is at the origin, and the body is not turned.
+    """
+    rods = make_rods(Scene(Seastar(N_LIMBS, N, LENGTH, body=body), contact=Contact(opening_angle=ANGLE)))
+    work, n = make_work(rods, 1), 2 * began.shape[1]
+    q_0, still = np.zeros_like(work.q), np.zeros_like(work.q)
+    for rows, nodes in ((q_0, began), (work.q, guessed)):
+        rows[:n] = nodes.reshape(N_LANES, n).T
+        place_roots.plain(rods.body, rods, rows)
+    stage = Stage(q_0, still, Lanes(1.0), Lanes(1.0), False)
+    freeze_contact.plain(rods.contact, rods, work, stage, q_0)
+    work.q[:n] *= 0.8
+    begin_body.plain(rods.body, rods, work)
+    add_contact.plain(rods.contact, rods, work, stage, None, Lanes(0.0))
+    return work.contact.force[:n].T.reshape(began.shape)
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_who_meets_a_body_is_alike_in_a_mirror_however_far_a_step_goes(name):
+    """A corner that a node comes to from beside one side of an outline or the other is met from both."""
+    body, rng = BODIES[name], np.random.default_rng(0)
+    order = [0] + [1 + limb * (N - 1) + place for limb in swapped(N_LIMBS) for place in range(N - 1)]
+    n_met = 0
+    for _ in range(20):
+        began, guessed = rng.uniform(-0.06, 0.06, (2, N_LANES, 1 + N_LIMBS * (N - 1), 2))
+        began[:, 0] = guessed[:, 0] = 0.0
+        own = forces(body, began, guessed)
+        other = forces(mirrored_body(body), *(nodes[:, order] * [1.0, -1.0] for nodes in (began, guessed)))
+        np.testing.assert_allclose(other[:, order] * [1.0, -1.0], own, atol=1e-9 * np.abs(own).max())
+        n_met += np.count_nonzero(own[:, 1:].any(axis=-1))
+    assert n_met > 100
 
 
 @pytest.mark.parametrize("name", BODIES)

@@ -292,8 +292,11 @@ def list_node_at_sides(contact, rods, work, stage, q_0, i, robots):
         if any_lane(beside):
             size, scale = sqrt(add_product(hx * hx, hy, hy)), sqrt(inverse)
             nx, ny = select(beyond, hx / size, ey * scale), select(beyond, hy / size, -ex * scale)
-            g, g_0 = add_product(hx * nx, hy, ny), height_over_side(contact, rods, q_0, i, side)
-            near = beside & (beyond | (g_0 > 0.0) | (g_0 >= height)) & (g < MARGIN * d + absolute(g - g_0))
+            # A corner's distance is the same from either side, so that a mirrored robot lists the same pairs.
+            kx, ky = edge_vector(q_0, k, i)
+            g, over = add_product(hx * nx, hy, ny), height_over_side(contact, rods, q_0, i, side)
+            g_0 = select(beyond, sqrt(add_product(kx * kx, ky, ky)), over)
+            near = beside & (beyond | (over > 0.0) | (over >= height)) & (g < MARGIN * d + absolute(g - g_0))
             if any_lane(near):
                 s = select(s < 1.0, s, 1.0)
                 put_on_list(contact, rods, work, stage, i, n_nodes(rods) - 1 + side, nx, ny, s, d, near)
