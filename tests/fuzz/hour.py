@@ -100,7 +100,7 @@ def trials(seed: int) -> Iterator[Trial]:
 
 
 class Workers:
-    """One process at a time, and a fresh one after a hang and for every set of terms, whose machine code stays loaded."""
+    """One process at a time: a fresh one after a hang, and for every set of terms, whose machine code stays loaded."""
 
     def __init__(self) -> None:
         self._pool, self._terms = self._start(), PLAIN
