@@ -25,6 +25,7 @@ from typing import Any
 
 from tqdm import tqdm
 
+from seastar_gym.command import INTERRUPTED
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.executors.options import add_options, executor_of
@@ -37,9 +38,6 @@ from seastar_gym.sweep.pilots import Course
 from seastar_gym.sweep.run import Tally, run
 from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS
 from seastar_gym.sweep.text import axis_of
-
-INTERRUPTED = 130
-"""Exit code after Ctrl-C."""
 
 
 def make_parser() -> argparse.ArgumentParser:
