@@ -104,7 +104,7 @@ class Measured(NamedTuple):
 
 
 def benchmark(options: argparse.Namespace) -> Measured:
-    """Results of all agents on all tasks; who does not fit is said on the way. Ctrl-C leaves those that are finished."""
+    """Results of all agents on all tasks, those so far after Ctrl-C; who does not fit is said on the way."""
     pairs = [(task, agent) for task in require_sound(options) for agent in options.agents]
     jobs = [job for task, agent in pairs for job in jobs_of(agent, task, options)]
     waiting = Counter((job.task, job.agent) for job in jobs)

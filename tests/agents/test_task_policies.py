@@ -17,6 +17,8 @@ from seastar_gym.benchmark.episodes import make_batch, require_seen, swim_episod
 from seastar_gym.controllers.learned import TASKS, load, save
 from seastar_gym.controllers.roster import load_agent, task_of
 from seastar_gym.envs.symmetry import VectorMemory
+from seastar_gym.envs.tasks.prey import Prey
+from seastar_gym.evaluation.swim import swim
 from seastar_gym.scene.checks import shown
 
 IDS = list(RECIPES)
@@ -67,8 +69,22 @@ def test_one_robot_is_told_what_a_batch_is():
 
 def test_a_policy_of_another_task_is_refused():
     _, policy = small_policy("SeastarFailBlind-v0", "PPO")
-    with assert_refused("numbers of fail-blind, the environment shows"):
+    with assert_refused("The policy was trained for the task fail-blind, the environment's is station."):
         require_seen(policy, gym.make("SeastarStation-v0").unwrapped)
+
+
+def test_a_policy_of_another_task_with_observations_as_long_is_refused():
+    """Miswired and Station show as many numbers, and Prey as many as waypoints; numbers of a task may differ."""
+    miswired, prey = (load(file_of(f"Seastar{task}-v0", TASKS)) for task in ("Miswired", "Prey"))
+    station, swim_env = gym.make("SeastarStation-v0").unwrapped, gym.make("SeastarSwim-v0", actions="pairs").unwrapped
+    assert miswired.description.observation_size == station.observation_space.shape[0]
+    with assert_refused("The policy was trained for the task miswired, the environment's is station."):
+        require_seen(miswired, station)
+    for ask in (lambda: require_seen(prey, swim_env), lambda: swim("prey", prey, swim_env, max_strokes=1)):
+        with assert_refused("The policy was trained for the task prey, the environment's is waypoints."):
+            ask()
+    require_seen(prey, gym.make("SeastarPrey-v0", task=Prey(speed=(0.001, 0.002)), fidelity="fast").unwrapped)
+    require_seen(load(), gym.make("SeastarPrey-v0").unwrapped)
 
 
 @pytest.mark.parametrize(
