@@ -7,12 +7,14 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import torch
+from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 import seastar_gym
-from agents.ppo import make_model, policy_of
+from agents.ppo import describe, make_model, policy_of
 from agents.tasks.command import RECIPES, file_of, main
 from agents.tasks.learning import LEARNERS, hyperparameters, make_learning_env
 from refusals import assert_refused
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.benchmark.episodes import make_batch, require_seen, swim_episodes
 from seastar_gym.controllers.learned import TASKS, load, save
 from seastar_gym.controllers.roster import load_agent, task_of
@@ -54,6 +56,12 @@ def test_a_policy_on_disk_remembers_as_its_learner_does(id, tmp_path):
         begins = terminated | truncated
         shown = wrapped.step(theirs)[0]
         np.testing.assert_array_equal(observations, wrapped._latest)
+
+
+def test_a_memory_is_seen_beneath_other_wrappers():
+    env = make_learning_env("SeastarFailBlind-v0", LEARNERS["PPO, memory"], "fast", 1)
+    wrapped = BatchVecEnv(RecordEpisodeStatistics(env.env))
+    assert describe(wrapped, (64,)) == describe(env, (64,)) and describe(wrapped, (64,)).past == 8
 
 
 def test_one_robot_is_told_what_a_batch_is():
