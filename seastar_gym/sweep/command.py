@@ -82,13 +82,17 @@ def scene_of_file(file: Path | None) -> Scene:
 
 
 def bar_of(total: int, bar: Any) -> Callable[[Tally], None]:
-    """Progress that shows cells, designs and strokes per second and the estimate of the rest."""
+    """Progress that shows cells, designs and strokes per second and the estimate of the rest.
+
+    Strokes of controllers, which end when they arrive, are not counted.
+    """
 
     def show(tally: Tally) -> None:
         seconds = max(bar.format_dict["elapsed"], 1e-9)
         bar.total = total - tally.kept
         bar.set_postfix_str(
-            f"{tally.designs / seconds:.0f} designs/s, {tally.intervals / seconds:.0f} strokes/s"
+            f"{tally.designs / seconds:.0f} designs/s"
+            + (f", {tally.intervals / seconds:.0f} strokes/s" if tally.intervals else "")
             + (f", {tally.losses} lost" if tally.losses else ""),
             refresh=False,
         )
