@@ -49,8 +49,9 @@ def study_of(sweep: Sweep, search: Search, storage: str) -> optuna.Study:
     require_number("stale_after", search.stale_after, "s")
     if not sweep.axes:
         raise ValueError("A search needs something to vary, such as robot.limb_length=0.05:0.15.")
-    told = "".join(_texts(sweep)) + repr([(axis.name, axis if isinstance(axis, Range) else axis.labels) for axis in sweep.axes])
-    name = hashlib.sha256(f"{told}{search.objective}{search.is_largest_best}".encode()).hexdigest()[:16]
+    axes = [(axis.name, axis if isinstance(axis, Range) else axis.labels) for axis in sweep.axes]
+    told = f"{''.join(_texts(sweep))}{axes}{search.objective}{search.is_largest_best}"
+    name = hashlib.sha256(told.encode()).hexdigest()[:16]
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     try:
         return optuna.create_study(

@@ -108,6 +108,8 @@ def test_a_policy_of_another_task_with_observations_as_long_is_refused():
         ({"limb_mirror": 3}, "its limb_mirror must be a list of pairs"),
         ({"limb_mirror": [[0, 2]]}, "not an index and a sign"),
         ({"limb_mirror": [[5, 1]]}, "an index of its limb_mirror must be a whole number"),
+        ({"limb_mirror": [[1, 1], [1, 1]]}, "its limb_mirror is no mirror, which undoes itself"),
+        ({"limb_mirror": [[1, 1], [0, -1]]}, "its limb_mirror is no mirror, which undoes itself"),
         ({"own": {"kinds": ["spin"], "with_stations": True}}, "the kinds of its own numbers must be of"),
         ({"own": {"kinds": []}}, "its own must be an object with kinds and with_stations"),
         ({"own": {"kinds": [["scalar"]], "with_stations": True}}, "the kinds of its own numbers must be of"),
