@@ -160,8 +160,8 @@ class LearnedPolicy:
             )
         task = self.description.task
         if task is not None and not isinstance(challenge, type(CHALLENGES[task])):
-            theirs = "waypoints" if challenge is None else name_of(challenge) or type(challenge).__name__
-            raise ValueError(f"The policy was trained for the task {task}, the environment's is {theirs}.")
+            other = "waypoints" if challenge is None else name_of(challenge) or type(challenge).__name__
+            raise ValueError(f"The policy was trained for the task {task}, the environment's is {other}.")
         ours = self.description.observation_size
         if ours != n_seen:
             task = task or "waypoints"
