@@ -68,7 +68,7 @@ def training_env(options: Options, robot: Robot) -> BatchVecEnv:
 
 def train(options: Options, folder: Path, stop: Callable[[], bool]) -> tuple[PPO, Watch]:
     """Learner, saved as model.zip, after the strokes that were asked for or when `stop()` was true; and its watch."""
-    robot = robot_of(folder)
+    robot = robot_of(options, folder)
     env = training_env(options, robot)
     new = options.resume is None or is_unbegun(folder)
     if new:
@@ -92,7 +92,7 @@ def compare(options: Options, folder: Path, remarks: Remarks) -> None:
 
     The gait of a timed environment is the lagged one, where decisions allow it.
     """
-    decision_period, robot = options.ppo.decision_period, robot_of(folder)
+    decision_period, robot = options.ppo.decision_period, robot_of(options, folder)
     evaluate(
         {"learned": load_policy(folder / "policy.safetensors"), **script(decision_period, robot.scene)},
         "pentagon",
@@ -119,7 +119,7 @@ def script(decision_period: float | None, scene: Scene | None) -> dict[str, Poli
 
 def describe(options: Options, folder: Path, trained: int, watch: Watch) -> Remarks:
     """Remarks of the report on the training. trained: Length of the whole training [strokes]."""
-    own = robot_of(folder).scene is not None
+    own = robot_of(options, folder).scene is not None
     sentences = [
         f"Swum by the robot of {options.scene}." if own else f'Swum at fidelity "{options.fidelity}".',
         f"Trained for {trained} strokes, seed {options.seed}, by the first of these commands; the last three show the "

@@ -62,7 +62,7 @@ def test_a_robot_of_a_file_is_trained_compared_and_continued(tmp_path, capsys):
     assert train.main([*TINY, *own, "--strokes", "256"]) == 0
     file.unlink()
     intervals.unlink()
-    robot = robot_of(folder)
+    robot = robot_of(saved_options(folder), folder)
     assert robot.scene == Scene(Seastar(nodes_per_limb=7, youngs_modulus=1.1e6), numerics=Numerics.preset("fast"))
     assert robot.draws == DomainRandomization({"robot.youngs_modulus": Uniform(9e5, 1.2e6)})
     with contextlib.closing(train.training_env(saved_options(folder), robot)) as env:
@@ -72,10 +72,13 @@ def test_a_robot_of_a_file_is_trained_compared_and_continued(tmp_path, capsys):
     assert f"Swum by the robot of {file}." in report
     assert f"--agents {folder / 'policy.safetensors'} pentagon --scene {folder / 'scene.json'} --report" in report
     assert train.main(["--resume", str(folder), "--strokes", "384"]) == 0
-    assert robot_of(folder) == robot
+    assert robot_of(saved_options(folder), folder) == robot
     capsys.readouterr()
     assert train.main(["--resume", str(folder), "--scene", "another.py"]) == 2
     assert "cannot continue with another scene" in capsys.readouterr().err
+    (folder / "scene.json").unlink()
+    assert train.main(["--resume", str(folder), "--strokes", "512"]) == 2
+    assert capsys.readouterr().err.endswith("scene.json is no file.\n")
 
 
 @pytest.mark.parametrize(

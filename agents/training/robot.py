@@ -63,9 +63,9 @@ def write_json(file: Path, data: object) -> None:
     write_atomically(file, (json.dumps(data, indent=2) + "\n").encode())
 
 
-def robot_of(folder: Path) -> Robot:
-    """Robot of the run in a folder."""
-    scene, intervals = folder / SCENE, folder / INTERVALS
+def robot_of(options: Options, folder: Path) -> Robot:
+    """Robot of the run with these options in a folder."""
     return Robot(
-        load_scene(scene) if scene.exists() else None, read_intervals(intervals) if intervals.exists() else None
+        None if options.scene is None else load_scene(folder / SCENE),
+        None if options.intervals is None else read_intervals(folder / INTERVALS),
     )

@@ -344,6 +344,9 @@ def test_the_command_writes_certificate_and_picture(few_settings, tmp_path, monk
     (tmp_path / "own.py").write_text("scene = Scene(\n", encoding="utf-8")
     with pytest.raises(ValueError, match=r"own\.py, line 1, is not Python: .* never closed\.$"):
         command.load_scene(tmp_path / "own.py")
+    file_of_scene.write_text("{", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"mine\.json is no scene: Expecting"):
+        command.load_scene(file_of_scene)
 
 
 def test_swims_of_many_groups_are_those_of_one_batch(monkeypatch):
