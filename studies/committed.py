@@ -30,7 +30,6 @@ DIFFERENT, TOLERANCE = 32.0, 1e-4
 Numbers may differ in the last bit between processors, which moves the edge of a line by a fraction of a pixel.
 """
 UNCOVERED = {
-    "continuum.png": "python -m studies.continuum",
     "convergence.png": "python -m studies.accuracy",
     "work_precision.png": "python -m studies.accuracy",
     "designs.png": "python -m studies.designs",
@@ -75,6 +74,13 @@ def chapter(docs: Path, file: Path) -> None:
             pictures.draw_pentagon(*swims_of(results, "pentagon"), file)
         case "fig_13_8":
             pictures.draw_pairs(*swims_of(results, "pairs"), list(PAIRS), file)
+
+
+def continuum(docs: Path, file: Path) -> None:
+    """Errors of both discretisations over the nodes."""
+    from studies.continuum.study import draw, rows_of
+
+    draw(rows_of(read(docs, "continuum.json")), file)
 
 
 def damping(docs: Path, file: Path) -> None:
@@ -180,6 +186,7 @@ def work_precision_problems(docs: Path, file: Path) -> None:
 PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "ablations.png": ablations,
     "bound.png": bound,
+    "continuum.png": continuum,
     "damping.png": damping,
     "fig_13_2.png": chapter,
     "fig_13_7a.png": chapter,
@@ -269,11 +276,13 @@ def filled(docs: Path, text: str) -> str:
 def whole_pages(docs: Path) -> dict[str, str]:
     """Pages that are made as a whole."""
     from studies.accuracy.work_precision_page import as_page
+    from studies.continuum.study import as_markdown as errors_of_space
     from studies.scenes import gallery
     from studies.tasks.page import page
     from studies.tasks.study import IDS, has_cell
 
     return {
+        "continuum.md": errors_of_space(read(docs, "continuum.json")),
         "gallery.md": gallery.page(read(docs, "gallery.json")),
         "tasks.md": page(read(docs, "tasks.json"), IDS, docs / "tasks.png", has_cell),
         "work_precision.md": as_page(read(docs, "work_precision.json"), "work_precision_problems.png"),
