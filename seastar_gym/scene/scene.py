@@ -209,7 +209,7 @@ class Scene:
         if robot.along is not None:
             self._check_along(robot.along, peak)
             return
-        if robot.discretisation == "continuum" and (robot.n_limbs > 1 or robot.body is not None):
+        if robot.discretisation == "continuum" and (robot.n_limbs > 1 or robot.has_body):
             if peak >= math.pi:
                 raise ValueError(f"A peak angle must stay below pi, not {peak:.4g} rad.")
             return

@@ -218,6 +218,14 @@ def test_limbs_attached_at_the_hub_itself_are_those_without_a_body():
         assert with_body.limbs_that_may_touch() == without.limbs_that_may_touch()
 
 
+def test_one_limb_on_a_body_without_a_size_cannot_be_turned():
+    """As without a body: nothing holds the hub."""
+    for body in (None, Body()):
+        with assert_refused("One limb"):
+            Scene(Seastar(1, 5, body=body))
+    Scene(Seastar(1, 5, body=Body(radius=0.02)))
+
+
 def test_robots_that_cannot_have_a_body_or_a_joint_are_refused():
     disc = Body(radius=0.02)
     with assert_refused("chapter", "body"):
