@@ -103,6 +103,18 @@ def test_a_robot_on_its_body_swims_alike_in_any_company():
         np.testing.assert_array_equal(alone.positions[0], together.positions[robot])
 
 
+@pytest.mark.slow
+def test_limbs_that_meet_head_on_or_go_round_each_others_tips_swim_on():
+    """Pairs of parallel limbs at the long sides of a body, whose tips come to each other from either side."""
+    corners = [(x, y, math.copysign(0.5 * math.pi, y)) for x, y in ((3, 1.5), (-3, 1.5), (-3, -1.5), (3, -1.5))]
+    frame = tuple(Attachment(0.01 * x, 0.01 * y, direction) for x, y, direction in corners)
+    robot = Seastar(4, 8, 0.06, body=Body.rectangle(0.06, 0.03, attachments=frame))
+    simulator = Simulator(Scene(robot, contact=Contact(), numerics=Numerics("implicit-midpoint", 1e-2)), 64)
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        assert (simulator.stroke(rng.integers(-1, 2, (64, 4))).status == 0).all()
+
+
 def test_a_point_body_meets_nobody():
     """The kernels are those without a body, to the last bit."""
     ends = []

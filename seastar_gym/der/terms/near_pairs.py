@@ -178,9 +178,7 @@ def list_pairs(contact, rods, work, stage, q_0, reach, limb, other, side, end, r
                 g = add_product(dx * nx, dy, ny)
                 facing = facing & (s > -OVERHANG) & (s < last_share(rods.body, edges, e))
                 if any_lane(facing):
-                    list_pair_on(
-                        rods.body, contact, rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing
-                    )
+                    list_pair_on(rods.body, contact, rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing)
 
 
 @kernel
@@ -220,7 +218,7 @@ def list_pair_on_its_side(contact, rods, work, stage, q_0, i, e, s, facing):
     side = select(select(was_beside, g_0, g) > 0.0, scale, -scale)
     tx, ty = edge_vector(ends, k, i)
     size = sqrt(add_product(tx * tx, ty, ty))
-    in_front = (s > 1.0) & (size > 0.0) & (tip_of(rods, e) > 0.0)
+    in_front = (s > 1.0) & (size > 0.0)
     nx, ny = select(in_front, tx / size, -ey * side), select(in_front, ty / size, ex * side)
     g = select(in_front, size, add_product(dx * nx, dy, ny))
     ux, uy = edge_vector(q_0, k, i)
@@ -231,12 +229,6 @@ def list_pair_on_its_side(contact, rods, work, stage, q_0, i, e, s, facing):
     near = facing & (g < MARGIN * d + absolute(g - g_0))
     if any_lane(near):
         put_on_list(contact, rods, work, stage, i, e, nx, ny, s, d, near)
-
-
-@kernel
-def tip_of(rods, e):
-    """1 for the last edge of a limb, 0 for others."""
-    return splat(1.0 if e % (rods.nodes_per_limb - 1) == rods.nodes_per_limb - 2 else 0.0)
 
 
 @kernel
