@@ -237,7 +237,7 @@ def forces(body: Body, began: np.ndarray, guessed: np.ndarray) -> np.ndarray:
 
 
 LINE = np.array([[-0.05, 0.0], [-0.07, 0.0], [-0.09, 0.0]])
-"""Nodes of a limb [m], and in `MEETING` those of another whose tip meets it, and the direction in which it is pushed."""
+"""Nodes of a limb [m]. `MEETING` has those of another whose tip meets it, and where to that is pushed."""
 MEETING = {
     "tip": ([[-0.17, 0.0005], [-0.13, 0.0005], [-0.092, 0.0005]], (-0.002, 0.0005)),
     "left": ([[-0.08, -0.05], [-0.08, -0.03], [-0.08, -0.001]], (0.0, -1.0)),
