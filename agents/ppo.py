@@ -105,7 +105,7 @@ def require_device(device: str) -> None:
 def describe(env: BatchVecEnv, hidden: tuple[int, ...]) -> Description:
     """Description of a policy with these widths of hidden layers that learns in an environment."""
     batch: Any = env.env.unwrapped
-    memory = env.env if isinstance(env.env, VectorMemory) else None
+    memory = next((layer for layer in env.layers() if isinstance(layer, VectorMemory)), None)
     symmetry = memory is not None or env.env_is_wrapped(VectorSymmetryReduction)[0]
     in_strokes = batch.decision_period == batch.scene.actuator.period
     about = Description(batch.actions, symmetry, batch.scene, hidden, None if in_strokes else batch.decision_period)

@@ -7,6 +7,9 @@ import textwrap
 from collections.abc import Callable
 from typing import NoReturn
 
+INTERRUPTED = 130
+"""Exit code after Ctrl-C."""
+
 
 def command_parser(prog: str, doc: str | None) -> argparse.ArgumentParser:
     """Parser of a command; its help begins with a docstring, paragraph by paragraph."""

@@ -149,7 +149,8 @@ def stability(docs: Path, file: Path) -> None:
 
 def tasks(docs: Path, file: Path) -> None:
     """Means and intervals of all agents on the tasks."""
-    from studies.tasks.page import draw, rows_of
+    from studies.tasks.page import draw
+    from studies.tasks.rows import rows_of
     from studies.tasks.study import IDS
 
     draw(rows_of(read(docs, "tasks.json"), IDS), file)

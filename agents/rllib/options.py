@@ -10,10 +10,9 @@ import numpy as np
 import tyro
 
 from agents.hyperparameters import Hyperparameters
-from agents.training.options import ENOUGH, ENOUGH_IN_TIME, PATH_HELP
+from agents.training.options import PATH_HELP, Lengths
 from seastar_gym import RewardWeights
 from seastar_gym.envs.paths import make_path
-from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in
 from seastar_gym.files import write_atomically
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
@@ -22,7 +21,7 @@ FILE = "config.json"
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(Lengths):
     """Train a swimmer with RLlib's PPO, on this machine or on a cluster of Ray.
 
     The robots of the hyperparameters are spread over the env runners. Nodes need this package with its extra `rllib`.
@@ -58,18 +57,6 @@ class Options:
         if self.ppo.coasting:
             raise ValueError("Progress by coasting is a reward of train.py, not of trainings with RLlib.")
         make_path(self.path, np.random.default_rng(0))
-
-    @property
-    def length(self) -> int:
-        """Length of the training [strokes, or decisions]."""
-        if self.strokes is not None:
-            return self.strokes
-        return ENOUGH if self.ppo.decision_period is None else ENOUGH_IN_TIME
-
-    @property
-    def limit(self) -> int:
-        """Time limit of an evaluated swim [decisions]."""
-        return decisions_in(TIME_LIMIT, self.ppo.decision_period)
 
     def write(self) -> None:
         """Write the options into the folder of the run."""

@@ -25,8 +25,27 @@ ENOUGH, ENOUGH_IN_TIME = 98_304, 300_000
 """Length of a training [strokes], after which more gain nothing (docs/results.md), and of one in time [decisions]."""
 
 
+class Lengths:
+    """How long a training with these options is, and its evaluated swims."""
+
+    strokes: int | None
+    ppo: Hyperparameters
+
+    @property
+    def length(self) -> int:
+        """Length of the training [strokes, or decisions]."""
+        if self.strokes is not None:
+            return self.strokes
+        return ENOUGH if self.ppo.decision_period is None else ENOUGH_IN_TIME
+
+    @property
+    def limit(self) -> int:
+        """Time limit of an evaluated swim [decisions]; the scripted gait takes 241 s round the pentagon."""
+        return decisions_in(TIME_LIMIT, self.ppo.decision_period)
+
+
 @dataclass(frozen=True)
-class Options:
+class Options(Lengths):
     """Train a swimmer with PPO and compare it with the scripted pentagon gait."""
 
     strokes: int | None = None
@@ -71,18 +90,6 @@ class Options:
         if self.seeds and (self.resume is not None or self.ship or len(set(self.seeds)) < len(self.seeds)):
             raise ValueError("--seeds are different ones of new runs, without --resume and --ship.")
         make_path(self.path, np.random.default_rng(0))
-
-    @property
-    def length(self) -> int:
-        """Length of the training [strokes, or decisions]."""
-        if self.strokes is not None:
-            return self.strokes
-        return ENOUGH if self.ppo.decision_period is None else ENOUGH_IN_TIME
-
-    @property
-    def limit(self) -> int:
-        """Time limit of an evaluated swim [decisions]; the scripted gait takes 241 s round the pentagon."""
-        return decisions_in(TIME_LIMIT, self.ppo.decision_period)
 
 
 CHANGEABLE = {"strokes", "num_threads", "device", "save_freq", "video", "ship", "ship_anyway", "out", "resume", "quick"}

@@ -99,7 +99,7 @@ class BatchVecEnv(VecEnv):
         """Close the batch."""
         self.env.close()
 
-    def _layers(self) -> list[gym.vector.VectorEnv[Any, Any, Any]]:
+    def layers(self) -> list[gym.vector.VectorEnv[Any, Any, Any]]:
         """The environment and what it wraps, outermost first."""
         layers = [self.env]
         while isinstance(layers[-1], gym.vector.VectorWrapper):
@@ -107,7 +107,7 @@ class BatchVecEnv(VecEnv):
         return layers
 
     def _owner(self, name: str) -> gym.vector.VectorEnv[Any, Any, Any]:
-        for layer in self._layers():
+        for layer in self.layers():
             if hasattr(layer, name):
                 return layer
         raise AttributeError(f"{self.env} has no attribute {name!r}.")
@@ -125,7 +125,7 @@ class BatchVecEnv(VecEnv):
         """Set an attribute of the batch, on the layer that has it."""
         if len(set(self._get_indices(indices))) != self.num_envs:
             raise ValueError("The robots share one environment: an attribute can only be set for all of them.")
-        layers = [layer for layer in self._layers() if hasattr(layer, attr_name)]
+        layers = [layer for layer in self.layers() if hasattr(layer, attr_name)]
         setattr(layers[0] if layers else self.env.unwrapped, attr_name, value)
 
     def env_method(
@@ -138,7 +138,7 @@ class BatchVecEnv(VecEnv):
 
     def env_is_wrapped(self, wrapper_class: type[Any], indices: VecEnvIndices = None) -> list[bool]:
         """Whether the batch is wrapped so; a Monitor counts as present, because its statistics are."""
-        wrapped = issubclass(wrapper_class, Monitor) or any(isinstance(one, wrapper_class) for one in self._layers())
+        wrapped = issubclass(wrapper_class, Monitor) or any(isinstance(one, wrapper_class) for one in self.layers())
         return [wrapped] * len(list(self._get_indices(indices)))
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:

@@ -6,6 +6,8 @@ not fit a task is left out there, with a sentence that says why.
 
 An agent's episodes on a task are a job, or several (--seeds-per-job), which an executor runs. Results are the same on
 each. Nodes of a cluster need the package, the modules and the files of policies where this machine has them.
+
+Ctrl-C keeps the results of agents on tasks that are finished, in OUT/interrupted.json, for --merge.
 """
 
 import argparse
@@ -14,13 +16,13 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, NamedTuple, get_args
 
 from seastar_gym.benchmark import page
 from seastar_gym.benchmark.jobs import Answer, Job, answers, env_of
 from seastar_gym.benchmark.measures import measure_of
 from seastar_gym.benchmark.results import Entry, merged, read, write
-from seastar_gym.command import command_parser
+from seastar_gym.command import INTERRUPTED, command_parser
 from seastar_gym.controllers.roster import HELP
 from seastar_gym.evaluation.many import HELD_OUT_SEED
 from seastar_gym.evaluation.tasks import require_task, task_ids
@@ -94,27 +96,36 @@ def require_sound(options: argparse.Namespace) -> list[str]:
     return tasks
 
 
-def benchmark(options: argparse.Namespace) -> tuple[list[Entry], bool]:
-    """Results of all agents on all tasks, and whether no job was lost; who does not fit is said on the way."""
+class Measured(NamedTuple):
+    """Results so far. code: Exit code, 1 where a job was lost, INTERRUPTED after Ctrl-C."""
+
+    entries: list[Entry]
+    code: int
+
+
+def benchmark(options: argparse.Namespace) -> Measured:
+    """Results of all agents on all tasks, those so far after Ctrl-C; who does not fit is said on the way."""
     pairs = [(task, agent) for task in require_sound(options) for agent in options.agents]
     jobs = [job for task, agent in pairs for job in jobs_of(agent, task, options)]
     waiting = Counter((job.task, job.agent) for job in jobs)
     found: dict[tuple[str, str], list[Answer]] = {pair: [] for pair in pairs}
-    entries, is_whole = dict[tuple[str, str], Entry](), True
-    for answer in answers(jobs, executor_of(options)):
-        pair = answer.job.task, answer.job.agent
-        found[pair].append(answer)
-        if len(found[pair]) < waiting[pair]:
-            continue
-        task, agent = pair
-        try:
-            entries[pair] = whole(found[pair])
-        except ValueError as unfit:
-            print(f"{agent} does not swim {task}: {unfit}", file=sys.stderr)
-            is_whole &= not any(each.is_lost for each in found[pair])
-            continue
-        print(f"{agent}, {task}: {entries[pair].measure} {entries[pair].estimate()} [{entries[pair].unit}]", flush=True)
-    return [entries[pair] for pair in pairs if pair in entries], is_whole
+    entries, code = dict[tuple[str, str], Entry](), 0
+    try:
+        for answer in answers(jobs, executor_of(options)):
+            pair = answer.job.task, answer.job.agent
+            found[pair].append(answer)
+            if len(found[pair]) < waiting[pair]:
+                continue
+            try:
+                entry = entries[pair] = whole(found[pair])
+            except ValueError as unfit:
+                print(f"{pair[1]} does not swim {pair[0]}: {unfit}", file=sys.stderr)
+                code |= any(each.is_lost for each in found[pair])
+                continue
+            print(f"{pair[1]}, {pair[0]}: {entry.measure} {entry.estimate()} [{entry.unit}]", flush=True)
+    except KeyboardInterrupt:
+        code = INTERRUPTED
+    return Measured([entries[pair] for pair in pairs if pair in entries], code)
 
 
 def whole(found: Sequence[Answer]) -> Entry:
@@ -141,14 +152,26 @@ def publish(entries: Sequence[Entry], folder: Path, command: str) -> list[str]:
     return ["results.json", "benchmark.md", *([] if picture is None else [picture])]
 
 
+def keep(entries: Sequence[Entry], folder: Path) -> None:
+    """Write what an interrupted benchmark has, if anything, and say where. Whole results of another one stay."""
+    file = folder / "interrupted.json"
+    if entries:
+        write(entries, file)
+    told = f"what is finished is in {file}, which --merge takes" if entries else "no agent had finished a task"
+    print(f"Interrupted: {told}.", file=sys.stderr)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     options = parser().parse_args(given)
     try:
         others = [read(file) for file in options.merge]
-        own, is_whole = benchmark(options) if options.agents else ([], True)
+        own, code = benchmark(options) if options.agents else Measured([], 0)
         entries = merged(*others, own)
+        if code == INTERRUPTED:
+            keep(entries, options.out)
+            return code
         if not entries:
             raise ValueError("There is nothing to show: no agent swam a task.")
         files = publish(entries, options.out, shlex.join(["seastar", "benchmark", *given]))
@@ -157,4 +180,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     print(page.table(entries))
     print(f"Written to {options.out}: {', '.join(files)}")
-    return 0 if is_whole else 1
+    return code

@@ -12,6 +12,7 @@ from typing import Any, get_args
 
 import gymnasium as gym
 
+from seastar_gym.benchmark.episodes import require_seen
 from seastar_gym.cli.screen import Show, rate, screen
 from seastar_gym.command import command_parser
 from seastar_gym.controllers.contract import Policy, actions_in
@@ -66,6 +67,7 @@ def watch(options: argparse.Namespace) -> str:
     """Let the agent swim and show it; returns a sentence on how it went."""
     plain: Any = make(options).unwrapped
     policy = load_agent(options.agent, plain, options.seed)
+    require_seen(policy, plain)
     actions = actions_in(policy, plain.actions, plain.scene.robot.n_limbs)
     period = plain.decision_period
     number, fps = rate(options.film, period, options.speed)

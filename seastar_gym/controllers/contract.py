@@ -6,6 +6,7 @@ from typing import Any, Protocol, get_args
 from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.envs.commands import MOST_LIMBS, Actions, action_space
 from seastar_gym.envs.task import scene_observation_size
+from seastar_gym.envs.tasks.challenge import Challenge
 from seastar_gym.scene import Scene
 
 
@@ -42,15 +43,17 @@ def require_fit(
     actions: Actions,
     decision_period: float | None = None,
     n_seen: int | None = None,
+    challenge: Challenge | None = None,
 ) -> None:
     """ValueError, with one sentence, where a policy cannot drive the robot of an environment, as far as it tells.
 
     decision_period: Time between decisions of the environment [s]. None means a stroke.
     n_seen: Length of the environment's observations. None means those of waypoints.
+    challenge: Of the environment. None means waypoints.
     """
     n_seen = scene_observation_size(scene) if n_seen is None else n_seen
     if isinstance(policy, LearnedPolicy):
-        policy.require_fit(scene, actions, n_seen)
+        policy.require_fit(scene, actions, n_seen, challenge)
     ours = getattr(policy, "decision_period", None)
     theirs = scene.actuator.period if decision_period is None else decision_period
     if ours is not None and not math.isclose(ours, theirs):

@@ -150,6 +150,8 @@ def _mirror(rows: object) -> Mirror:
         if not isinstance(row, list) or len(row) != 2 or row[1] not in (-1, 1):
             raise ValueError(f"its limb_mirror has {shown(row)}, not an index and a sign")
         require_count("an index of its limb_mirror", row[0], 0, len(rows) - 1)
+    if any(rows[index] != [place, sign] for place, (index, sign) in enumerate(rows)):
+        raise ValueError(f"its limb_mirror is no mirror, which undoes itself: {shown(rows)}")
     return tuple((index, sign) for index, sign in rows)
 
 

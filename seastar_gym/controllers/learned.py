@@ -26,6 +26,8 @@ from numpy.typing import NDArray
 from seastar_gym.controllers.description import Description, read_facts
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.symmetry import Recollection, reduce_observations, restore_actions, symmetry_of
+from seastar_gym.envs.tasks.challenge import Challenge
+from seastar_gym.envs.tasks.envs import CHALLENGES, name_of
 from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import is_finite_number
@@ -143,10 +145,11 @@ class LearnedPolicy:
                 x = np.tanh(x)
         return x.reshape(*x.shape[:-1], *self.description.distributions)
 
-    def require_fit(self, scene: Scene, actions: Actions, n_seen: int) -> None:
+    def require_fit(self, scene: Scene, actions: Actions, n_seen: int, challenge: Challenge | None = None) -> None:
         """ValueError, with one sentence, where this policy cannot drive the robot of an environment.
 
-        n_seen: Length of the environment's observations.
+        n_seen: Length of the environment's observations. challenge: Of the environment, None for waypoints. A policy
+        of a task fits that task with any numbers; one of waypoints fits wherever the observations are as long.
         """
         ours, theirs = self.scene.robot.n_limbs, scene.robot.n_limbs
         if ours != theirs:
@@ -155,9 +158,13 @@ class LearnedPolicy:
             raise ValueError(
                 f'The policy answers with actions="{self.actions}", the environment takes actions="{actions}".'
             )
+        task = self.description.task
+        if task is not None and not isinstance(challenge, type(CHALLENGES[task])):
+            other = "waypoints" if challenge is None else name_of(challenge) or type(challenge).__name__
+            raise ValueError(f"The policy was trained for the task {task}, the environment's is {other}.")
         ours = self.description.observation_size
         if ours != n_seen:
-            task = self.description.task or "waypoints"
+            task = task or "waypoints"
             raise ValueError(
                 f"The policy sees {ours} numbers of {task}, the environment shows {n_seen}: another task, or actuators "
                 "that remember differently."

@@ -17,7 +17,7 @@ from seastar_gym.controllers.planner import Planner
 from seastar_gym.controllers.scripted import GAITS, scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
-from seastar_gym.envs.tasks.envs import CHALLENGES
+from seastar_gym.envs.tasks.envs import name_of
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 
@@ -73,8 +73,7 @@ def load_agent(name: str, env: SeastarSwimEnv, seed: int = 0) -> Policy:
 
 def task_of(env: Any) -> str | None:
     """Name of the challenge of an environment or a batch; None for waypoints, or where a challenge has no name."""
-    challenge = getattr(env, "challenge", None)
-    return next((name for name, known in CHALLENGES.items() if known == challenge), None)
+    return name_of(getattr(env, "challenge", None))
 
 
 def files_of(name: str, decision_period: float | None = None) -> list[Path]:

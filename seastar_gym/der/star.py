@@ -82,6 +82,14 @@ def is_root(body, rods, place):
 
 
 @kernel
+def is_angle(body, rods, place):
+    """Whether a place is that of a body's angle, where there is nothing that moves."""
+    if body is None:
+        return False
+    return place == n_nodes(rods)
+
+
+@kernel
 def tail_node(rods, e):
     """The node where edge e starts: for a root edge the hub, or the limb's root on a body."""
     return tail_node_with(rods.body, rods, e)

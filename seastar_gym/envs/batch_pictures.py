@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.envs.camera import Camera
-from seastar_gym.envs.rendering import LARGEST, SMALLEST, Frame, Renderer, body_of, renderer_of
+from seastar_gym.envs.frame import Frame, frames_of
+from seastar_gym.envs.rendering import LARGEST, SMALLEST, Renderer, renderer_of
 from seastar_gym.envs.swimming import Swimming
 
 Picture = NDArray[np.uint8]
@@ -53,26 +54,10 @@ class BatchPictures:
 
         commands: Commands of all robots in the last stroke, shape (n_robots, n_limbs).
         """
-        task, simulator = self._task, self._task.simulator
-        positions, time, warmth = simulator.positions, simulator.time, task.warmth()
-        roots, outlines = body_of(simulator)
-        return tuple(
-            self._draw(
-                robot,
-                Frame(
-                    positions=positions[robot],
-                    command=commands[robot],
-                    trail=np.array(self._trails[robot]).reshape(-1, 2),
-                    waypoint_index=int(task.waypoint_index[robot]),
-                    time=float(time[robot]),
-                    warmth=None if warmth is None else warmth[robot],
-                    scenery=task.scenery(robot),
-                    roots=None if roots is None else roots[robot],
-                    outline=None if outlines is None else outlines[robot],
-                ),
-            )
-            for robot in robots
-        )
+        wanted = list(robots)
+        trails = {robot: np.array(self._trails[robot]).reshape(-1, 2) for robot in wanted}
+        frames = dict(zip(trails, frames_of(self._task, commands, trails), strict=True))
+        return tuple(self._draw(robot, frames[robot]) for robot in wanted)
 
     def _draw(self, robot: int, frame: Frame) -> Picture:
         renderer, body = self._get_renderer(), self._task.simulator.scene.of_robot(robot).robot

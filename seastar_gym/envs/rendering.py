@@ -5,18 +5,16 @@ Lengths are in metres, y is up; pixels count from the upper left corner, y down.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.envs.camera import Camera
 from seastar_gym.envs.canvas import Canvas, Colour, mixed
-from seastar_gym.envs.scenery import NOTHING, Scenery
+from seastar_gym.envs.frame import Frame
+from seastar_gym.envs.scenery import Scenery
 from seastar_gym.envs.waypoint_labels import waypoint_labels
 from seastar_gym.envs.window import Window
 from seastar_gym.scene import Seastar
-from seastar_gym.simulator import Simulator
 
 FloatArray = NDArray[np.float64]
 
@@ -57,42 +55,6 @@ POINTER = 0.3
 """Length of the arrow of an asked heading [limb lengths]."""
 ROOT = 0.34
 """Share of a limb, from the hub on, whose colour shows how warm its wires are."""
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """State of a swim that one picture shows."""
-
-    positions: FloatArray
-    """Node positions [m], shape (n_nodes, 2)."""
-    command: FloatArray
-    """Command of the current decision in [-1, 1], shape (n_limbs,); + is anti-clockwise."""
-    trail: FloatArray
-    """Former positions of the hub [m], shape (k, 2), oldest first; k may be 0."""
-    waypoint_index: int
-    """The waypoint that the robot swims to; the number of waypoints once all are reached."""
-    time: float
-    """Simulated time [s]."""
-    warmth: FloatArray | None = None
-    """How warm wires + and - of every limb are, from 0 to 1, shape (n_limbs, 2); None without wires."""
-    scenery: Scenery = NOTHING
-    """What the task shows besides."""
-    roots: FloatArray | None = None
-    """Places where limbs begin on a body [m], shape (n_limbs, 2); None where they begin at the hub."""
-    outline: FloatArray | None = None
-    """Outline of the body [m], shape (n, 2); None without one."""
-
-
-def body_of(simulator: Simulator) -> tuple[FloatArray | None, FloatArray | None]:
-    """Roots of limbs, shape (n_robots, n_limbs, 2), and outlines, shape (n_robots, n, 2) [m]; None without a body."""
-    body = simulator.scene.robot.body
-    if body is None or body.is_point:
-        return None, None
-    x, y = body.shape.drawn().T if body.shape.area else np.zeros((2, 0))
-    angles = simulator.orientation()[:, None]
-    c, s = np.cos(angles), np.sin(angles)
-    outline = np.stack([c * x - s * y, s * x + c * y], axis=-1)
-    return simulator.root_positions(), simulator.hub_position()[:, None] + outline
 
 
 def limb_nodes(n_limbs: int, nodes_per_limb: int) -> NDArray[np.int_]:

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions, to_commands
+from seastar_gym.envs.frame import Frame, frames_of
 from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.promises import warn_uncertified
 from seastar_gym.envs.randomization import DomainRandomization
-from seastar_gym.envs.rendering import Frame, Renderer, body_of, renderer_of
+from seastar_gym.envs.rendering import Renderer, renderer_of
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.swimming import Outcome, Swimming
 from seastar_gym.envs.task import Path, Plain, SwimTask, make_scene
@@ -350,19 +351,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
             self._trail = np.concatenate([self._trail, self.simulator.hub_position()])
 
     def _frame(self) -> Frame:
-        warmth = self._task.warmth()
-        roots, outline = body_of(self.simulator)
-        return Frame(
-            positions=self.simulator.positions[0],
-            command=self._command,
-            trail=self._trail,
-            waypoint_index=int(self._task.waypoint_index[0]),
-            time=float(self.simulator.time[0]),
-            warmth=None if warmth is None else warmth[0],
-            scenery=self._task.scenery(0),
-            roots=None if roots is None else roots[0],
-            outline=None if outline is None else outline[0],
-        )
+        (frame,) = frames_of(self._task, self._command[None], {0: self._trail})
+        return frame
 
     def _draw_frame(self) -> None:
         if self.render_mode == "human":

@@ -137,7 +137,8 @@ def swim(
     watch: Called with `env` after its reset and after every stroke, to film it for instance.
     """
     assert env.observation_space.shape is not None
-    require_fit(policy, env.scene, env.actions, env.decision_period, *env.observation_space.shape)
+    n_seen, challenge = env.observation_space.shape[0], getattr(env, "challenge", None)
+    require_fit(policy, env.scene, env.actions, env.decision_period, n_seen, challenge)
     observation, info = env.reset(seed=seed, options=reset_options)
     infos = [info]
     state, over = None, False

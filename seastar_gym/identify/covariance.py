@@ -12,6 +12,8 @@ independent parts, so it is enlarged by the factor for tau/T = 1/6 (Kiefer and V
 with s^2 = |r|^2/(n - p).
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,8 +27,23 @@ SMALLEST = 1e-100
 """Least divisor: what the data do not tell at all gets a variance that is huge, but finite."""
 
 
-def covariance_of(jacobian: Floats, residuals: Floats, times: Floats) -> Floats:
-    """Covariance of p fitted parameters, shape (p, p).
+class Uncertainty(NamedTuple):
+    """How well p parameters are known.
+
+    covariance, correlation: Of the estimates, shape (p, p). The correlation of residuals of zero is that of independent
+    errors.
+    combinations: Combinations of parameters whose errors are independent, unit vectors, shape (p, p).
+    errors: Their standard errors if residuals were independent, shape (p,).
+    """
+
+    covariance: Floats
+    correlation: Floats
+    combinations: Floats
+    errors: Floats
+
+
+def uncertainty_of(jacobian: Floats, residuals: Floats, times: Floats) -> Uncertainty:
+    """Uncertainty of p fitted parameters.
 
     jacobian: Derivative J of the residuals by the parameters, shape (n, p).
     residuals: Residuals r, shape (n,).
@@ -37,8 +54,11 @@ def covariance_of(jacobian: Floats, residuals: Floats, times: Floats) -> Floats:
     left, singular, directions = np.linalg.svd(jacobian, full_matrices=False)
     products = left * (residuals / max(error, SMALLEST))[:, None]
     sizes, axes = np.linalg.eigh(FEW_PARTS * _middle(*_sums_of_pictures(products, times)))
-    root = directions.T * (error / np.maximum(singular, SMALLEST)) @ axes
-    return (root * np.maximum(sizes, 1.0)) @ root.T  # sizes of independent errors are one
+    unit_errors = 1.0 / np.maximum(singular, SMALLEST)
+    root = directions.T * unit_errors @ axes
+    unit = (root * np.maximum(sizes, 1.0)) @ root.T  # sizes of independent errors are one
+    scale = np.sqrt(np.diag(unit))
+    return Uncertainty(error**2 * unit, unit / scale[:, None] / scale, directions, error * unit_errors)
 
 
 def _sums_of_pictures(gradients: Floats, times: Floats) -> tuple[Floats, Floats]:

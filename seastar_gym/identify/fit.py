@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import OptimizeResult, least_squares
 from scipy.stats import t as student
 
-from seastar_gym.identify.covariance import SMALLEST, covariance_of
+from seastar_gym.identify.covariance import uncertainty_of
 from seastar_gym.identify.measurement import Measurement
 from seastar_gym.identify.parameters import get_parameter, with_parameters
 from seastar_gym.identify.trajectories import trajectories
@@ -147,23 +147,19 @@ def estimate_of(fit: OptimizeResult, residuals: Residuals, confidence: float) ->
     """Estimates with confidence intervals, from a least-squares fit of the residuals."""
     names, guess = residuals.names, residuals.guess
     freedom = residuals.seen.sum() - len(names)
-    spread = math.sqrt(2.0 * fit.cost / freedom)
-    _, singular, directions = np.linalg.svd(fit.jac, full_matrices=False)
-    errors = spread / np.maximum(singular, SMALLEST)
     times = residuals.measurement.time[np.nonzero(residuals.seen)[0]]
-    covariance = covariance_of(fit.jac, fit.fun, times)
-    variances = np.diag(covariance)
-    half = student.ppf(0.5 + 0.5 * confidence, freedom) * np.sqrt(variances)
+    known = uncertainty_of(fit.jac, fit.fun, times)
+    half = student.ppf(0.5 + 0.5 * confidence, freedom) * np.sqrt(np.diag(known.covariance))
     with np.errstate(over="ignore"):
         return Estimate(
             names=names,
             values=guess * np.exp(fit.x),
             lower=guess * np.exp(fit.x - half),
             upper=guess * np.exp(fit.x + half),
-            correlation=covariance / np.sqrt(np.outer(variances, variances)),
+            correlation=known.correlation,
             untold=tuple(
                 tuple(name for name, part in zip(names, direction, strict=True) if abs(part) > SHARE)
-                for direction, error in zip(directions, errors, strict=True)
+                for direction, error in zip(known.combinations, known.errors, strict=True)
                 if error > UNTOLD
             ),
             residuals=residuals.measurement.positions - residuals.trajectory(fit.x),

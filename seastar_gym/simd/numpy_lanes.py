@@ -160,23 +160,30 @@ def borrow(bundle):
     return bundle
 
 
+def _row(row):
+    """The number of a row; compiled kernels would read before the first where numpy counts from the last."""
+    if row < 0:
+        raise IndexError(f"There is no row {row}.")
+    return operator.index(row)
+
+
 def load(rows, row):
-    return Lanes(rows[operator.index(row)].copy())
+    return Lanes(rows[_row(row)].copy())
 
 
 def store(rows, row, value):
     numbers = _operand(value)
     if numbers is NotImplemented:
         raise TypeError(f"Needs lanes or a number to store, not {value!r}.")
-    rows[operator.index(row)] = numbers
+    rows[_row(row)] = numbers
 
 
 def load_number(rows, row):
-    return float(rows[operator.index(row)])
+    return float(rows[_row(row)])
 
 
 def store_number(rows, row, value):
-    rows[operator.index(row)] = float(value)
+    rows[_row(row)] = float(value)
 
 
 def load_at(rows, row):

@@ -25,6 +25,7 @@ from typing import Any
 
 from tqdm import tqdm
 
+from seastar_gym.command import INTERRUPTED
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.executors.options import add_options, executor_of
@@ -37,9 +38,6 @@ from seastar_gym.sweep.pilots import Course
 from seastar_gym.sweep.run import Tally, run
 from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS
 from seastar_gym.sweep.text import axis_of
-
-INTERRUPTED = 130
-"""Exit code after Ctrl-C."""
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -84,13 +82,17 @@ def scene_of_file(file: Path | None) -> Scene:
 
 
 def bar_of(total: int, bar: Any) -> Callable[[Tally], None]:
-    """Progress that shows cells, designs and strokes per second and the estimate of the rest."""
+    """Progress that shows cells, designs and strokes per second and the estimate of the rest.
+
+    Strokes of controllers, which end when they arrive, are not counted.
+    """
 
     def show(tally: Tally) -> None:
         seconds = max(bar.format_dict["elapsed"], 1e-9)
         bar.total = total - tally.kept
         bar.set_postfix_str(
-            f"{tally.designs / seconds:.0f} designs/s, {tally.intervals / seconds:.0f} strokes/s"
+            f"{tally.designs / seconds:.0f} designs/s"
+            + (f", {tally.intervals / seconds:.0f} strokes/s" if tally.intervals else "")
             + (f", {tally.losses} lost" if tally.losses else ""),
             refresh=False,
         )

@@ -40,14 +40,18 @@ class Search(NamedTuple):
 
 
 def study_of(sweep: Sweep, search: Search, storage: str) -> optuna.Study:
-    """Study of a sweep in a storage, such as "sqlite:///study.db"; the one that is there if there is one."""
+    """Study of a sweep in a storage, such as "sqlite:///study.db"; the one that is there if there is one.
+
+    It is another study where anything that results depend on is other, such as the file of one of the controllers.
+    """
     first = next(sweep.frames())
     require_choice("objective", search.objective, tuple(name for name in units_of(first) if name != "status"))
     require_number("stale_after", search.stale_after, "s")
     if not sweep.axes:
         raise ValueError("A search needs something to vary, such as robot.limb_length=0.05:0.15.")
-    told = first.text + repr([(axis.name, axis if isinstance(axis, Range) else axis.labels) for axis in sweep.axes])
-    name = hashlib.sha256(f"{told}{search.objective}{search.is_largest_best}".encode()).hexdigest()[:16]
+    axes = [(axis.name, axis if isinstance(axis, Range) else axis.labels) for axis in sweep.axes]
+    told = f"{''.join(_texts(sweep))}{axes}{search.objective}{search.is_largest_best}"
+    name = hashlib.sha256(told.encode()).hexdigest()[:16]
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     try:
         return optuna.create_study(
@@ -57,6 +61,13 @@ def study_of(sweep: Sweep, search: Search, storage: str) -> optuna.Study:
         )  # fmt: skip
     except (SQLAlchemyError, optuna.exceptions.StorageInternalError, ImportError) as refused:
         raise ValueError(f"The storage {storage} cannot be used: {sentence_of(refused)[:200]}.") from None
+
+
+def _texts(sweep: Sweep) -> Iterator[str]:
+    """Texts of frames that have, between them, every value of every axis."""
+    counts = [len(axis.values) for axis in sweep.of_frames]
+    for place in range(max(counts, default=1)):
+        yield sweep.frame(tuple(min(place, count - 1) for count in counts)).text
 
 
 def explore(

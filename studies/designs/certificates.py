@@ -2,7 +2,8 @@
 
 Robots are those of the table, with its rounded numbers. `seastar_gym.certify` swims random sequences of commands with
 each and compares them with swims of many nodes and short steps: some processor minutes for every robot. Certificates
-are kept in OUT, so that the command goes on with those that are missing. Writes certificates.json.
+are kept in OUT, so that the command goes on with those that are missing. Writes certificates.json once all robots have
+theirs.
 """
 
 import json
@@ -20,6 +21,7 @@ from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.frames import Swim, frame_with
 from seastar_gym.sweep.swimming import swim
 from studies.designs.space import MEASURED, SETTLING, Body
+from studies.kept import keep
 from studies.parser import study_parser
 from studies.provenance import provenance
 
@@ -45,9 +47,14 @@ def scene_of(row: Table) -> Scene:
     return replace(Scene.preset("fast"), robot=robot, actuator=SmaPulse(row["peak_angle_rad"]))
 
 
+def file_of(name: str, folder: Path, samples: int) -> Path:
+    """File of the certificate of a winner."""
+    return folder / f"{name.replace(' ', '_')}_{samples}.json"
+
+
 def certificate_of(name: str, scene: Scene, folder: Path, samples: int) -> Certificate:
     """Certificate of a winner: that of the folder if it holds, or a new one, which is kept there."""
-    file = folder / f"{name.replace(' ', '_')}_{samples}.json"
+    file = file_of(name, folder, samples)
     if file.exists():
         certificate = Certificate.load(file)
         certificate.require_valid(scene)
@@ -107,11 +114,21 @@ def main() -> None:
     parser.add_argument("--robots", nargs="*", choices=WINNERS, default=WINNERS, help="winners (default: all)")
     options = parser.parse_args()
     rows = json.loads(DESIGNS.read_text(encoding="utf-8"))
-    found: Table = {**provenance("python -m studies.designs.certificates"), "robots": {}}
+    found: Table = {}
+
+    def add(name: str) -> None:
+        found[name] = told(certificate_of(name, scene_of(rows[name]), options.out, options.samples))
+
     for name in options.robots:
-        found["robots"][name] = told(certificate_of(name, scene_of(rows[name]), options.out, options.samples))
-        (options.out / "certificates.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    print(json.dumps(found, indent=1))
+        add(name)
+        print(json.dumps({name: found[name]}, indent=1), flush=True)
+    if missing := [name for name in WINNERS if not file_of(name, options.out, options.samples).exists()]:
+        print(f"certificates.json is written once these have certificates, too: {', '.join(missing)}.")
+        return
+    for name in set(WINNERS) - set(found):
+        add(name)
+    whole = {**provenance("python -m studies.designs.certificates"), "robots": {name: found[name] for name in WINNERS}}
+    keep(whole, options.out / "certificates.json")
     print(f"Written: {options.out / 'certificates.json'}")
 
 

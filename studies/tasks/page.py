@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,8 @@ from seastar_gym.evaluation.many import mean_with_interval
 from seastar_gym.files import write_atomically
 from studies.provenance import footer
 from studies.style import CYCLE, FAINT, as_numbers, subplots
+from studies.tasks.rows import MORE_IS_BETTER, ORDER, Row, rows_of
+from studies.tasks.verdicts import verdicts
 
 UNITS = {
     "miswired": "seconds to the last waypoint, 400 if it is not reached",
@@ -30,15 +32,8 @@ SHORT = {
     "obst-trap": "seconds to the goal",
 }
 """What the picture says in their place."""
-MORE_IS_BETTER = ("prey", "fast-prey", "prizes", "fast-prizes")
-ORDER = ("rest", "greedy", "planner", "adaptive", "informed", "PPO", "PPO, memory", "PPO, told the way", "RecurrentPPO",
-         "in the box")  # fmt: skip
-"""Agents from top to bottom."""
 OPTIONAL = "RecurrentPPO"
 """Agent that is not missing where it has not swum: it needs a package of its own."""
-HEADROOM, LEFT = 0.2, 1.0 / 3.0
-"""A task is kept where the bound is so much better than greedy, and plain PPO leaves so much of that."""
-
 INTRODUCTION = """# Tasks with headroom
 
 {command} writes this page. Every agent swims the same {episodes} held-out episodes, numbers 0 to {last} of the
@@ -73,69 +68,10 @@ Policies in the box are in `seastar_gym/controllers/policies/tasks`, each with a
 them, that of `ObstTrap` by the reward that measures the way around all discs. To watch one, type
 `seastar swim --task SeastarPrey-v0 --agent learned`.
 
-Ten of the twelve are kept. `StationTimed` and `FailBlindTimed` are not: there, plain PPO leaves 10 and 14 % of what is
-known to be possible. Their ids stay, beside those of the same tasks in strokes, but they show no difference between
-learners.
-
-Six times the training is worth more than a memory alone. On both `Station` tasks,
-`MiswiredTimed` and `FailBlindTimed`, policies in the box beat every rule that is not told what is hidden, on
-`StationTimed` and `FailBlindTimed` also the one that is. Elsewhere rules that remember or plan are ahead.
-
-In `ObstTrap`, the reward's way to the goal is the straight one, which leads into the horseshoe. That a learner does not
-arrive by this reward says little about other rewards: *told the way* is one. `Prizes` keeps draws alone in which the
-best round brings a point 40 % more than the greedy one, so its headroom is by choice of the draws.
+{verdicts}In `ObstTrap`, the reward's way to the goal is the straight one, which leads into the horseshoe. That a
+learner does not arrive by this reward says little about other rewards: *told the way* is one. `Prizes` keeps draws
+alone in which the best round brings a point 40 % more than the greedy one, so its headroom is by choice of the draws.
 """
-
-
-class Row(NamedTuple):
-    """Results of a task."""
-
-    id: str
-    challenge: str
-    agents: dict[str, list[NDArray[np.float64]]]
-    """Measures of all episodes, one array for every seed."""
-
-    @property
-    def in_order(self) -> list[tuple[str, list[NDArray[np.float64]]]]:
-        """Agents and their measures, from top to bottom."""
-        return sorted(self.agents.items(), key=lambda one: ORDER.index(one[0]))
-
-    def mean(self, agent: str) -> float:
-        """Mean measure of an agent over seeds and episodes."""
-        return float(np.mean(self.agents[agent]))
-
-    @property
-    def bound(self) -> str:
-        """The agent with the best mean."""
-        best = max if self.challenge in MORE_IS_BETTER else min
-        return best(self.agents, key=self.mean)
-
-    @property
-    def headroom(self) -> float:
-        """By how much of greedy's measure the bound is better; infinite where greedy catches nothing."""
-        greedy, bound = self.mean("greedy"), self.mean(self.bound)
-        return abs(bound - greedy) / greedy if greedy > 0.0 else np.inf
-
-    @property
-    def left(self) -> float:
-        """Share of the headroom that plain PPO leaves."""
-        greedy, bound = self.mean("greedy"), self.mean(self.bound)
-        return (bound - self.mean("PPO")) / (bound - greedy)
-
-    @property
-    def is_kept(self) -> bool:
-        """Whether the task has headroom that plain PPO does not take."""
-        return self.headroom >= HEADROOM and self.left >= LEFT
-
-
-def rows_of(results: Mapping[str, Any], ids: Mapping[str, str]) -> list[Row]:
-    """Results by task."""
-    rows = {id: Row(id, challenge, {}) for id, challenge in ids.items()}
-    for name, found in results["cells"].items():
-        id, _, rest = name.partition(", ")
-        agent, _, _ = rest.rpartition(", ")
-        rows[id].agents.setdefault(agent, []).append(np.array(found["measure"]))
-    return [row for row in rows.values() if row.agents]
 
 
 def over(seeds: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
@@ -205,7 +141,9 @@ def page(
 ) -> str:
     """The page in Markdown. picture: Its file, beside which the tasks' pictures are. has_cell: See `table`."""
     rows, settings = rows_of(results, ids), results["settings"]
-    text = INTRODUCTION.format(command="`python -m studies.tasks`", last=settings["episodes"] - 1, **settings)
+    text = INTRODUCTION.format(
+        command="`python -m studies.tasks`", last=settings["episodes"] - 1, verdicts=verdicts(rows), **settings
+    )
     text += _pictures(picture.parent / "tasks", dict.fromkeys(row.challenge for row in rows))
     tables = "\n\n".join(table(row, has_cell) for row in rows)
     return f"{text}\n![Means and intervals]({picture.name})\n\n{tables}\n\n{footer(results, 'tasks.json')}\n"

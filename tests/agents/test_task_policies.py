@@ -7,16 +7,20 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import torch
+from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 import seastar_gym
-from agents.ppo import make_model, policy_of
+from agents.ppo import describe, make_model, policy_of
 from agents.tasks.command import RECIPES, file_of, main
 from agents.tasks.learning import LEARNERS, hyperparameters, make_learning_env
 from refusals import assert_refused
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.benchmark.episodes import make_batch, require_seen, swim_episodes
 from seastar_gym.controllers.learned import TASKS, load, save
 from seastar_gym.controllers.roster import load_agent, task_of
 from seastar_gym.envs.symmetry import VectorMemory
+from seastar_gym.envs.tasks.prey import Prey
+from seastar_gym.evaluation.swim import swim
 from seastar_gym.scene.checks import shown
 
 IDS = list(RECIPES)
@@ -54,6 +58,12 @@ def test_a_policy_on_disk_remembers_as_its_learner_does(id, tmp_path):
         np.testing.assert_array_equal(observations, wrapped._latest)
 
 
+def test_a_memory_is_seen_beneath_other_wrappers():
+    env = make_learning_env("SeastarFailBlind-v0", LEARNERS["PPO, memory"], "fast", 1)
+    wrapped = BatchVecEnv(RecordEpisodeStatistics(env.env))
+    assert describe(wrapped, (64,)) == describe(env, (64,)) and describe(wrapped, (64,)).past == 8
+
+
 def test_one_robot_is_told_what_a_batch_is():
     _, policy = small_policy("SeastarFailBlind-v0", "PPO, memory")
     seen = np.random.default_rng(0).normal(size=(6, 1, policy.description.observation_size)).astype(np.float32)
@@ -67,8 +77,22 @@ def test_one_robot_is_told_what_a_batch_is():
 
 def test_a_policy_of_another_task_is_refused():
     _, policy = small_policy("SeastarFailBlind-v0", "PPO")
-    with assert_refused("numbers of fail-blind, the environment shows"):
+    with assert_refused("The policy was trained for the task fail-blind, the environment's is station."):
         require_seen(policy, gym.make("SeastarStation-v0").unwrapped)
+
+
+def test_a_policy_of_another_task_with_observations_as_long_is_refused():
+    """Miswired and Station show as many numbers, and Prey as many as waypoints; numbers of a task may differ."""
+    miswired, prey = (load(file_of(f"Seastar{task}-v0", TASKS)) for task in ("Miswired", "Prey"))
+    station, swim_env = gym.make("SeastarStation-v0").unwrapped, gym.make("SeastarSwim-v0", actions="pairs").unwrapped
+    assert miswired.description.observation_size == station.observation_space.shape[0]
+    with assert_refused("The policy was trained for the task miswired, the environment's is station."):
+        require_seen(miswired, station)
+    for ask in (lambda: require_seen(prey, swim_env), lambda: swim("prey", prey, swim_env, max_strokes=1)):
+        with assert_refused("The policy was trained for the task prey, the environment's is waypoints."):
+            ask()
+    require_seen(prey, gym.make("SeastarPrey-v0", task=Prey(speed=(0.001, 0.002)), fidelity="fast").unwrapped)
+    require_seen(load(), gym.make("SeastarPrey-v0").unwrapped)
 
 
 @pytest.mark.parametrize(
@@ -84,6 +108,8 @@ def test_a_policy_of_another_task_is_refused():
         ({"limb_mirror": 3}, "its limb_mirror must be a list of pairs"),
         ({"limb_mirror": [[0, 2]]}, "not an index and a sign"),
         ({"limb_mirror": [[5, 1]]}, "an index of its limb_mirror must be a whole number"),
+        ({"limb_mirror": [[1, 1], [1, 1]]}, "its limb_mirror is no mirror, which undoes itself"),
+        ({"limb_mirror": [[1, 1], [0, -1]]}, "its limb_mirror is no mirror, which undoes itself"),
         ({"own": {"kinds": ["spin"], "with_stations": True}}, "the kinds of its own numbers must be of"),
         ({"own": {"kinds": []}}, "its own must be an object with kinds and with_stations"),
         ({"own": {"kinds": [["scalar"]], "with_stations": True}}, "the kinds of its own numbers must be of"),

@@ -1,5 +1,6 @@
 """The benchmark measures any agent on any registered task, and its results can be merged."""
 
+import itertools
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from seastar_gym.benchmark.command import main
 from seastar_gym.benchmark.episodes import require_seen, swim_episodes
 from seastar_gym.benchmark.measures import MEASURES, SECONDS, measure_of
 from seastar_gym.benchmark.results import MOST, Entry, best_means, merged, read, relative, write
+from seastar_gym.command import INTERRUPTED
 from seastar_gym.controllers import GreedyPolicy, load, load_agent, scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.tasks.station import Station
@@ -238,6 +240,57 @@ def test_lost_jobs_are_run_again_and_those_that_are_always_lost_are_named(tasks,
         assert main([*words, "--out", str(tmp_path)]) == code
     assert read(tmp_path / "results.json")[0].seeds == [1000, 1001, 1002, 1003]
     assert "rest does not swim SeastarShort-v0: Its worker was lost: NodeDied." in capsys.readouterr().err
+
+
+def test_a_lost_agent_beside_others_is_left_out_and_the_command_exits_with_1(tasks, tmp_path, monkeypatch, capsys):
+    class LosesRandom:
+        def run(self, work, tasks):
+            for outcome in Here().run(work, tasks):
+                is_lost = outcome.task.agent == "random"
+                yield Outcome(outcome.task, None, "Its worker was lost: NodeDied.") if is_lost else outcome
+
+    monkeypatch.setattr("seastar_gym.benchmark.command.executor_of", lambda options: LosesRandom())
+    words = ["--agents", "random", "rest", "--tasks", SHORT, "--seeds", "2", "--decisions", "2"]
+    assert main([*words, "--out", str(tmp_path)]) == 1
+    assert [one.agent for one in read(tmp_path / "results.json")] == ["rest"]
+    assert "random does not swim SeastarShort-v0: Its worker was lost: NodeDied." in capsys.readouterr().err
+
+
+class Interrupted:
+    """An executor during whose run somebody presses Ctrl-C, after so many jobs."""
+
+    def __init__(self, jobs):
+        self.jobs = jobs
+
+    def run(self, work, tasks):
+        yield from Here().run(work, itertools.islice(tasks, self.jobs))
+        raise KeyboardInterrupt
+
+
+def test_an_interrupt_keeps_what_is_finished_for_another_run_to_merge(tasks, tmp_path, monkeypatch, capsys):
+    """Of two agents with two jobs each, the first is finished after three jobs. Results of an earlier run stay."""
+    words = ["--tasks", SHORT, "--seeds", "2", "--decisions", "2", "--seeds-per-job", "1", "--out", str(tmp_path)]
+    assert main(["--agents", "straight", *words]) == 0
+    before = (tmp_path / "results.json").read_bytes()
+    capsys.readouterr()
+    with monkeypatch.context() as pressed:
+        pressed.setattr("seastar_gym.benchmark.command.executor_of", lambda options: Interrupted(3))
+        assert main(["--agents", "rest", "random", *words]) == INTERRUPTED
+    kept = tmp_path / "interrupted.json"
+    told = f"Interrupted: what is finished is in {kept}, which --merge takes.\n"
+    assert capsys.readouterr().err == told
+    assert [(one.agent, one.seeds) for one in read(kept)] == [("rest", [1000, 1001])]
+    assert (tmp_path / "results.json").read_bytes() == before
+    assert main(["--agents", "random", *words, "--merge", str(kept)]) == 0
+    assert [one.agent for one in read(tmp_path / "results.json")] == ["rest", "random"]
+
+
+def test_an_interrupt_before_anything_is_finished_writes_nothing(tasks, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("seastar_gym.benchmark.command.executor_of", lambda options: Interrupted(1))
+    words = ["--agents", "rest", "--tasks", SHORT, "--seeds", "2", "--decisions", "2", "--seeds-per-job", "1"]
+    assert main([*words, "--out", str(tmp_path)]) == INTERRUPTED
+    assert capsys.readouterr().err == "Interrupted: no agent had finished a task.\n"
+    assert not list(tmp_path.iterdir())
 
 
 def test_an_agent_with_a_bug_does_not_cost_the_others_their_results(tasks, tmp_path, monkeypatch, capsys):

@@ -10,8 +10,10 @@ from PIL import Image
 
 from seastar_gym.cli import play, screen
 from seastar_gym.cli.main import COMMANDS, main
+from seastar_gym.controllers import learned
 
 ROOT = Path(__file__).resolve().parents[2]
+PREY = learned.of_task("prey", None)
 SHORT = "0.03, 0.0\n"
 
 
@@ -116,6 +118,7 @@ def test_a_window_shows_a_swim_until_it_is_closed(path, dummy_window, monkeypatc
         (["swim", "--agent", "nobody"], "Unknown scripted agent 'nobody'"),
         (["swim", "--task", "Nothing-v0"], "There is no task 'Nothing-v0': choose of SeastarSwim-v0, "),
         (["swim", "--path", "nowhere"], "Unknown path 'nowhere'"),
+        (["swim", "--agent", str(PREY), "--film", "x.gif"], "was trained for the task prey, the environment's is"),
         (["swim", "--speed", "-1"], "--speed must be"),
         (["evaluate", "--seconds", "0"], "--seconds must be"),
         (["evaluate", "--agents", "rest", "rest"], "named twice"),

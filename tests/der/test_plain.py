@@ -10,7 +10,19 @@ import numba
 import numpy as np
 import pytest
 
-from seastar_gym import AlongLimb, Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, Stiffening, Vortex, Water
+from seastar_gym import (
+    AlongLimb,
+    Body,
+    Contact,
+    Numerics,
+    Scene,
+    Seastar,
+    Simulator,
+    SmaPulse,
+    Stiffening,
+    Vortex,
+    Water,
+)
 from seastar_gym.der import motion
 from seastar_gym.der.terms import drag
 from seastar_gym.der.terms.drag import drag_slopes
@@ -29,6 +41,10 @@ COMPILED = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compi
 SCRIPT = """
 import sys, numpy, test_plain
 numpy.savez(sys.argv[1], **test_plain.ends())
+"""
+ON_BODIES = """
+import test_plain
+test_plain.swim_on_bodies()
 """
 MEETING = SmaPulse(0.62, 0.06, 0.02)
 BLOWS = {"implicit-euler": 20.0, "contact": 1.0, "no contact": 1.0}
@@ -66,15 +82,42 @@ def ends() -> dict[str, np.ndarray]:
     return found
 
 
-@COMPILED
-def test_strokes_in_plain_python_are_those_of_the_machine_code(tmp_path):
+def swim_on_bodies() -> None:
+    """A stroke of robots with a body and all other terms, some of which begin with blows."""
+    water = Water(950.0, 1.3, 0.1, Vortex(0.02, 0.1, -0.05, 0.06), 0.8)
+    outline = ((0.02, -0.01), (0.01, 0.02), (-0.02, 0.01), (-0.01, -0.02))
+    for scheme, contact, body, blow in (
+        ("implicit-euler", Contact(), Body(radius=0.02), 3.0),
+        ("implicit-midpoint", Contact(), Body(outline=outline, centre_of_mass=(2e-3, 1e-3)), 1.0),
+        ("sdirk2", None, Body(outline=outline, mass=0.01), 20.0),
+    ):
+        robot = Seastar(3, 3, relaxation_time=4e-3, body=body, along=AlongLimb(0.7), stiffening=Stiffening(2.0))
+        numerics, loads = Numerics(scheme, 0.02), ((4, 1e-3, -2e-3),)
+        scene = Scene(robot, water, MEETING, numerics, contact=contact, gravity=(1.0, -9.81), loads=loads)
+        simulator, rng = Simulator(scene, N_LANES), np.random.default_rng(0)
+        simulator.v[:, : 2 * robot.n_nodes, -2:] = blow * rng.standard_normal((1, 2 * robot.n_nodes, 2))
+        report = simulator.stroke(rng.integers(-1, 2, (N_LANES, 3)).astype(float))
+        assert report.halvings.any() and np.isfinite(simulator.positions).all()
+
+
+def in_plain_python(script: str, *arguments: str) -> None:
+    """Run a script where nothing is compiled; what reads or writes beyond its rows raises there."""
     path = os.pathsep.join(map(str, (ROOT, ROOT / "tests", ROOT / "tests" / "der")))
     answer = subprocess.run(
-        [sys.executable, "-W", "error", "-c", SCRIPT, str(tmp_path / "plain.npz")],
+        [sys.executable, "-W", "error", "-c", script, *arguments],
         cwd=ROOT, env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": path},
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert answer.returncode == 0, answer.stderr
+
+
+def test_strokes_on_bodies_stay_within_their_rows():
+    in_plain_python(ON_BODIES)
+
+
+@COMPILED
+def test_strokes_in_plain_python_are_those_of_the_machine_code(tmp_path):
+    in_plain_python(SCRIPT, str(tmp_path / "plain.npz"))
     expected = ends()
     with np.load(tmp_path / "plain.npz") as found:
         assert set(found) == set(expected)

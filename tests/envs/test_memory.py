@@ -25,14 +25,15 @@ def test_memory_shows_the_reduced_observation_and_the_past_in_the_same_limbs(tas
     memory, reduced = VectorMemory(new(), 2), VectorSymmetryReduction(new())
     (shown, _), (ours, _) = memory.reset(seed=1), reduced.reset(seed=1)
     assert shown.shape == memory.observation_space.shape
-    rng, size = np.random.default_rng(0), ours.shape[1]
+    rng, size, past = np.random.default_rng(0), ours.shape[1], [memory._latest, memory._latest]
     for _ in range(4):
         np.testing.assert_array_equal(shown[:, :size], ours)
-        before, actions = memory._latest, rng.integers(0, 243, 6)
+        past, actions = [memory._latest, past[0]], rng.integers(0, 243, 6)
         shown, ours = memory.step(actions)[0], reduced.step(actions)[0]
         seen = memory.recollection
-        carried = transform_observations(before, memory._elements, 5, seen.mirror, own=seen.own)
-        np.testing.assert_array_equal(shown[:, size:].reshape(6, 2, -1)[:, 0], carried[:, seen.told])
+        for before, told in zip(past, np.moveaxis(shown[:, size:].reshape(6, 2, -1), 1, 0), strict=True):
+            carried = transform_observations(before, memory._elements, 5, seen.mirror, own=seen.own)
+            np.testing.assert_array_equal(told, carried[:, seen.told])
 
 
 def test_memory_ends_with_the_episode_and_the_last_observation_still_has_it():

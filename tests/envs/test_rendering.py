@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from seastar_gym.envs.frame import Frame
 from seastar_gym.envs.paths import PATHS, make_path
 from seastar_gym.envs.rendering import (
     CURRENT,
@@ -17,7 +18,6 @@ from seastar_gym.envs.rendering import (
     LEGEND,
     SMALLEST,
     STATE_COLOURS,
-    Frame,
     Renderer,
 )
 from seastar_gym.envs.waypoint_labels import waypoint_labels
@@ -95,7 +95,8 @@ def test_a_picture_is_rgb_of_the_size_asked_for(size):
 def test_drawing_needs_no_display():
     script = (
         "import numpy as np; import pygame\n"
-        "from seastar_gym.envs.rendering import Frame, Renderer\n"
+        "from seastar_gym.envs.frame import Frame\n"
+        "from seastar_gym.envs.rendering import Renderer\n"
         "renderer = Renderer([[0, 1], [0, 2]], [[0.1, 0.0]], limb_length=0.1, rod_radius=1e-3, waypoint_radius=0.01)\n"
         "positions = np.array([[0.0, 0.0], [0.1, 0.0], [-0.1, 0.0]])\n"
         "picture = renderer.draw(Frame(positions, np.array([1.0, 0.0]), positions[:1], 0, 0.0))\n"

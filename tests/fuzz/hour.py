@@ -23,6 +23,7 @@ from fuzz.scenes import (
     N_ROBOTS,
     N_STROKES,
     OWN,
+    PLAIN,
     RARE,
     TERMS,
     TOUCHED_BODY,
@@ -99,24 +100,30 @@ def trials(seed: int) -> Iterator[Trial]:
 
 
 class Workers:
-    """One process at a time, and a fresh one after a hang."""
+    """One process at a time: a fresh one after a hang, and for every set of terms, whose machine code stays loaded."""
 
     def __init__(self) -> None:
-        self._pool = self._start()
+        self._pool, self._terms = self._start(), PLAIN
 
     def _start(self) -> Pool:
         return multiprocessing.get_context("spawn").Pool(1)
 
     def failure(self, trial: Trial) -> BaseException | None:
         """What the trial raised, TimeoutError for one that hung or crashed."""
+        if trial.terms and trial.terms != self._terms:
+            self._renew()
+            self._terms = trial.terms
         raised: list[BaseException] = []
         answer = self._pool.apply_async(attempt, (trial,), error_callback=raised.append)
         answer.wait(LIMIT)
         if answer.ready():
             return raised[0] if raised else None
+        self._renew()
+        return TimeoutError(f"no answer within {LIMIT:g} s: it hangs, or its process crashed")
+
+    def _renew(self) -> None:
         self.stop()
         self._pool = self._start()
-        return TimeoutError(f"no answer within {LIMIT:g} s: it hangs, or its process crashed")
 
     def stop(self) -> None:
         self._pool.terminate()

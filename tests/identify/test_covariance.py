@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import norm
 
 from seastar_gym.identify import covariance as module
-from seastar_gym.identify.covariance import covariance_of
+from seastar_gym.identify.covariance import uncertainty_of
 
 
 def line(n_pictures: int) -> tuple[np.ndarray, np.ndarray]:
@@ -25,7 +25,7 @@ def coverage(memory: float, n_pictures: int = 400) -> np.ndarray:
         for picture in range(1, n_pictures):
             errors[picture] = memory * errors[picture - 1] + np.sqrt(1.0 - memory**2) * rng.normal(size=2)
         wrong = fit @ errors.ravel()
-        covariance = covariance_of(jacobian, errors.ravel() - jacobian @ wrong, times)
+        covariance = uncertainty_of(jacobian, errors.ravel() - jacobian @ wrong, times).covariance
         held.append(np.abs(wrong) < norm.ppf(0.975) * np.sqrt(np.diag(covariance)))
     return np.mean(held, axis=0)
 
@@ -45,7 +45,7 @@ def test_the_covariance_is_at_least_that_of_independent_errors():
     times, jacobian = line(50)
     residuals = np.random.default_rng(1).normal(size=100)
     independent = residuals @ residuals / 97 * np.linalg.inv(jacobian.T @ jacobian)
-    found = covariance_of(jacobian, residuals, times)
+    found = uncertainty_of(jacobian, residuals, times).covariance
     assert np.linalg.eigvalsh(found - independent).min() > -1e-12 * np.trace(found)
 
 
@@ -53,13 +53,25 @@ def test_errors_that_are_the_same_in_both_coordinates_count_once():
     """Errors of one picture may depend on each other: means of n equal pairs have variance 1/n."""
     times = np.repeat(np.arange(2000.0), 2)
     errors = np.repeat(np.random.default_rng(2).normal(size=2000), 2)
-    found = covariance_of(np.ones((4000, 1)), errors - errors.mean(), times)
+    found = uncertainty_of(np.ones((4000, 1)), errors - errors.mean(), times).covariance
     assert found[0, 0] == pytest.approx(1.0 / 2000.0, rel=0.6) and found[0, 0] > 0.7 / 2000.0
 
 
 def test_what_the_data_do_not_tell_has_a_huge_variance():
     times, jacobian = line(50)
     jacobian[:, 2] = 0.0
-    found = covariance_of(jacobian, np.ones(100), times)
+    found = uncertainty_of(jacobian, np.ones(100), times).covariance
     assert np.isfinite(found).all() and found[2, 2] > 1e100
-    assert covariance_of(jacobian[:, :2], np.zeros(100), times).max() == 0.0
+    assert uncertainty_of(jacobian[:, :2], np.zeros(100), times).covariance.max() == 0.0
+
+
+def test_residuals_of_zero_have_the_correlation_of_independent_errors():
+    """And of what the data do not tell, every parameter correlates with itself."""
+    times, jacobian = line(50)
+    inverse = np.linalg.inv(jacobian.T @ jacobian)
+    scale = np.sqrt(np.diag(inverse))
+    found = uncertainty_of(jacobian, np.zeros(100), times)
+    np.testing.assert_allclose(found.correlation, inverse / np.outer(scale, scale), atol=1e-9)
+    assert (found.covariance == 0.0).all() and (found.errors == 0.0).all()
+    jacobian[:, 1:] = 0.0
+    np.testing.assert_allclose(np.diag(uncertainty_of(jacobian, np.ones(100), times).correlation), 1.0)

@@ -53,6 +53,23 @@ def test_a_certificate_is_made_once(tmp_path, monkeypatch):
         certificate_of("fastest", scene_of(ROWS["fastest of them without taper"]), tmp_path, 3)
 
 
+def test_some_robots_leave_the_numbers_of_all_in_place(tmp_path, monkeypatch, capsys):
+    """The file is written when the last robot has its certificate, in the order of the winners."""
+    monkeypatch.setattr(certificates, "certify", lambda scene, samples, progress: made(scene, samples))
+    monkeypatch.setattr(certificates, "told", lambda certificate: {"samples": certificate.samples})
+    kept = tmp_path / "certificates.json"
+    kept.write_text("whole")
+
+    def run(*robots):
+        monkeypatch.setattr("sys.argv", ["certificates", "--samples", "3", "--out", str(tmp_path), "--robots", *robots])
+        certificates.main()
+
+    run(*WINNERS[1:])
+    assert kept.read_text() == "whole" and "too: fastest." in capsys.readouterr().out
+    run("fastest")
+    assert list(json.loads(kept.read_text())["robots"]) == list(WINNERS)
+
+
 def test_errors_are_told_beside_speeds():
     found = certificates.told(made(scene_of(ROWS["fastest"]), 3))
     coarse, fine = found["7 nodes, 5 ms"], found["19 nodes, 1 ms"]

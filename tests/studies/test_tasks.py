@@ -25,10 +25,12 @@ from studies.tasks.controllers import (
     straight_on,
 )
 from studies.tasks.episodes import Episodes, measure, swim
-from studies.tasks.page import Row, rows_of, table, write_page
+from studies.tasks.page import table, write_page
 from studies.tasks.rounds import BestRound, MostPerMetre
+from studies.tasks.rows import Row, rows_of
 from studies.tasks.study import Options, has_cell, main, study
 from studies.tasks.trap import all_discs, discs_so_far, with_clearance
+from studies.tasks.verdicts import verdicts
 
 
 def batch(task, n=6, **arguments):
@@ -258,6 +260,20 @@ def test_a_table_has_every_agent_and_the_verdict():
     assert "Not swum yet: rest; planner; adaptive; PPO, memory; PPO, told the way; in the box." in text
     assert "Bound" not in table(row("prey", greedy=1.0, PPO=3.0))  # a learner alone is no bound
     assert table(row("prizes", greedy=10.0, informed=14.0)).endswith("Bound: informed, 40 % better than greedy.")
+
+
+def test_the_words_of_the_page_follow_from_the_numbers():
+    learned = {"PPO": 300.0, "PPO_memory": 350.0, "in the box": 190.0}
+    rules = {"rest": 400.0, "greedy": 400.0, "planner": 250.0, "adaptive": 200.0}
+    first = row("miswired", informed=180.0, **rules, **learned)._replace(id="SeastarMiswired-v0")
+    second = row("miswired", informed=195.0, **rules, **learned | {"PPO": 211.0})._replace(id="SeastarShortTimed-v0")
+    small = row("miswired", **dict.fromkeys(rules, 200.0), informed=170.0, PPO=200.0)._replace(id="SeastarSmall-v0")
+    kept, boxed = (" ".join(each.split()) for each in verdicts([first, second, small]).strip().split("\n\n"))
+    assert kept.startswith("1 of 3 tasks are kept. Not kept: `ShortTimed`, where plain PPO leaves 10 % of")
+    assert "`Small`, whose bound is only 15 % better than greedy." in kept
+    assert "on 2 of 2 tasks" in boxed and "hidden on `Miswired` and `ShortTimed`, and also" in boxed
+    assert "the one that is told on `ShortTimed`." in boxed
+    assert verdicts([row("prey", greedy=1.0)]) == ""
 
 
 def test_nobody_waits_for_agents_that_a_task_has_not():

@@ -57,7 +57,8 @@ def test_a_part_comes_from_a_file(tmp_path):
 def test_a_sweep_from_words_to_a_table(tmp_path, capsys):
     words = "robot.limb_length=0.05:0.15", "robot.n_limbs=3,5", "--latin", "3", "--out", str(tmp_path)
     assert main([*words, *QUICK]) == 0
-    assert "6 designs in 2 cells" in capsys.readouterr().out
+    printed = capsys.readouterr()
+    assert "6 designs in 2 cells" in printed.out and "strokes/s" in printed.err
     assert read_parts(tmp_path).num_rows == 6
     assert main([*words, *QUICK]) == 0
     assert "cells: 0; there before, cells: 2" in capsys.readouterr().out

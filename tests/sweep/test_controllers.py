@@ -136,7 +136,8 @@ def test_the_command_compares_controllers(tmp_path, capsys):
     path.write_text("0.03,0.0\n")
     words = ["controller=learned,straight", "robot.limb_length=0.09,0.11", "--path", str(path), "--seconds", "30"]
     assert main([*words, "--executor", "here", "--out", str(tmp_path / "out")]) == 0
-    assert "New in" in capsys.readouterr().out
+    printed = capsys.readouterr()
+    assert "New in" in printed.out and "designs/s" in printed.err and "strokes/s" not in printed.err
     table = read_parts(tmp_path / "out").to_pandas()
     assert sorted(table.controller) == ["learned", "learned", "straight", "straight"]
     assert table[table.controller == "learned"].waypoints.tolist() == [1.0, 1.0]

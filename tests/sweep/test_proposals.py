@@ -114,6 +114,18 @@ def test_another_sweep_is_another_study(sqlite):
     assert len(names) == 4
 
 
+def test_another_file_of_any_controller_is_another_study(sqlite, tmp_path):
+    file = tmp_path / "second.zip"
+    axes = (*AXES[:2], Choices("controller", ("straight", str(file))))
+
+    def study_name(contents):
+        file.write_bytes(contents)
+        return study_of(Sweep(SWEEP.scene, axes, samples=1), Search(), sqlite).study_name
+
+    first = study_name(b"one")
+    assert study_name(b"two") != first == study_name(b"one")
+
+
 def test_proposals_of_a_lost_cell_are_proposed_again(sqlite, tmp_path):
     study = explore(SWEEP, Search(), sqlite, 6, tmp_path, Losing())
     lost = [trial for trial in study.trials if trial.state == TrialState.FAIL]

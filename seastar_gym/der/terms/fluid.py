@@ -6,7 +6,7 @@ the potential stays one that is minimised, with an exact Hessian.
 
 from seastar_gym.der.geometry import edge_vector
 from seastar_gym.der.motion import relative
-from seastar_gym.der.star import n_nodes, n_places, tail_node
+from seastar_gym.der.star import is_angle, n_nodes, n_places, tail_node
 from seastar_gym.der.terms.added_mass import freeze_added_mass
 from seastar_gym.der.terms.body_forces import add_power_on_strips, freeze_turning_mass
 from seastar_gym.der.terms.current import current_velocity
@@ -65,6 +65,8 @@ def add_work_of_current(current, rods, work, v, h, frame, energy):
         return energy
     power, zero = splat(0.0), splat(0.0)
     for node in range(n_places(rods)):
+        if is_angle(rods.body, rods, node):
+            continue
         wx, wy = relative(work.current, node, load(v, 2 * node), load(v, 2 * node + 1))
         _, c_speed, _ = drag_slopes(load(rods.drag, node), wx, wy)
         slopes = (zero, (c_speed * wx, c_speed * wy), (zero, zero, zero))

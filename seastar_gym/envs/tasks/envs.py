@@ -44,6 +44,11 @@ def read_challenge(task: Challenge | Plain | str) -> Challenge:
     return challenge
 
 
+def name_of(challenge: Challenge | None) -> str | None:
+    """Name of a challenge; None for waypoints, or where it has no name."""
+    return next((name for name, known in CHALLENGES.items() if known == challenge), None)
+
+
 def make_task(
     challenge: Challenge,
     n_robots: int,

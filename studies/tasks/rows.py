@@ -1,0 +1,70 @@
+"""Results of the tasks, the bound, and which tasks are kept."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+MORE_IS_BETTER = ("prey", "fast-prey", "prizes", "fast-prizes")
+ORDER = ("rest", "greedy", "planner", "adaptive", "informed", "PPO", "PPO, memory", "PPO, told the way", "RecurrentPPO",
+         "in the box")  # fmt: skip
+"""Agents from top to bottom."""
+HEADROOM, LEFT = 0.2, 1.0 / 3.0
+"""A task is kept where the bound is so much better than greedy, and plain PPO leaves so much of that."""
+
+
+class Row(NamedTuple):
+    """Results of a task."""
+
+    id: str
+    challenge: str
+    agents: dict[str, list[NDArray[np.float64]]]
+    """Measures of all episodes, one array for every seed."""
+
+    @property
+    def in_order(self) -> list[tuple[str, list[NDArray[np.float64]]]]:
+        """Agents and their measures, from top to bottom."""
+        return sorted(self.agents.items(), key=lambda one: ORDER.index(one[0]))
+
+    def mean(self, agent: str) -> float:
+        """Mean measure of an agent over seeds and episodes."""
+        return float(np.mean(self.agents[agent]))
+
+    @property
+    def bound(self) -> str:
+        """The agent with the best mean."""
+        best = max if self.challenge in MORE_IS_BETTER else min
+        return best(self.agents, key=self.mean)
+
+    def is_ahead(self, agent: str, *others: str) -> bool:
+        """Whether the mean of an agent is better than those of the others that have swum."""
+        sign = 1.0 if self.challenge in MORE_IS_BETTER else -1.0
+        return all(sign * self.mean(agent) > sign * self.mean(other) for other in set(others) & self.agents.keys())
+
+    @property
+    def headroom(self) -> float:
+        """By how much of greedy's measure the bound is better; infinite where greedy catches nothing."""
+        greedy, bound = self.mean("greedy"), self.mean(self.bound)
+        return abs(bound - greedy) / greedy if greedy > 0.0 else np.inf
+
+    @property
+    def left(self) -> float:
+        """Share of the headroom that plain PPO leaves."""
+        greedy, bound = self.mean("greedy"), self.mean(self.bound)
+        return (bound - self.mean("PPO")) / (bound - greedy)
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether the task has headroom that plain PPO does not take."""
+        return self.headroom >= HEADROOM and self.left >= LEFT
+
+
+def rows_of(results: Mapping[str, Any], ids: Mapping[str, str]) -> list[Row]:
+    """Results by task."""
+    rows = {id: Row(id, challenge, {}) for id, challenge in ids.items()}
+    for name, found in results["cells"].items():
+        id, _, rest = name.partition(", ")
+        agent, _, _ = rest.rpartition(", ")
+        rows[id].agents.setdefault(agent, []).append(np.array(found["measure"]))
+    return [row for row in rows.values() if row.agents]
