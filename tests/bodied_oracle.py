@@ -216,7 +216,7 @@ class Touching(Rigid):
             for i in range(1, star.nodes_per_limb):
                 node = star.node(limb, i)
                 share = along(ends, node, tail, head)
-                before = start if -0.05 <= along(start, node, tail, head) <= 1.0 else ends
+                before = start if -1.0 <= along(start, node, tail, head) <= 1.0 else ends
                 side = 1.0 if height(before, node, tail, head) > 0.0 else -1.0
                 pair = self.pair(ends, node, tail, head, share, side, self.stiffness(node, 0.5))
                 if share > 1.0:

@@ -215,7 +215,7 @@ def list_pair_on_its_side(contact, rods, work, stage, q_0, i, e, s, facing):
     scale = 1.0 / sqrt(add_product(ex * ex, ey, ey))
     g = subtract_product(ex * dy, ey, dx) * scale
     foot = add_product(hx * fx, hy, fy)
-    was_beside = (foot >= -OVERHANG * squared) & (foot <= squared)
+    was_beside = (foot >= -squared) & (foot <= squared)
     side = select(select(was_beside, g_0, g) > 0.0, scale, -scale)
     tx, ty = edge_vector(ends, k, i)
     size = sqrt(add_product(tx * tx, ty, ty))
