@@ -3,6 +3,7 @@
     python train.py                        about half a minute on two cores
     python train.py --seeds 0 1 2          the same for several seeds, one after another
     python train.py --decision-period 0.5  the same for decisions twice a second, by wires
+    python train.py --scene my_robot.py    the same for a robot of your own, in that file
     python train.py --quick                a shorter training with everything that follows
     python train.py --resume runs/FOLDER   continues a run that was stopped (by Ctrl-C or killed), or trains it for more
                                            --strokes
@@ -40,27 +41,42 @@ try:
     from agents.training.folder import claim, export, is_unbegun, recorded, resume_command, write_config
     from agents.training.interruption import Interruption
     from agents.training.options import Options, read_options, require_consent
+    from agents.training.robot import SCENE, Robot, asked_for, keep, robot_of
     from agents.training.watch import Watch
+    from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
     from seastar_gym.command import refused_by_disk
-    from seastar_gym.controllers.contract import Policy
+    from seastar_gym.controllers.contract import Policy, actions_of, require_fit
     from seastar_gym.controllers.learned import load as load_policy
     from seastar_gym.controllers.scripted import scripted
+    from seastar_gym.scene import Scene
 except ModuleNotFoundError as missing:
     sys.exit(f'train.py needs {missing.name}: pip install "seastar-gym[train]".')
 
 
+def training_env(options: Options, robot: Robot) -> BatchVecEnv:
+    """Environment of a training. ValueError for a robot that it cannot have."""
+    return make_training_env(
+        options.ppo,
+        options.path,
+        options.random_heading,
+        fidelity=robot.fidelity(options),
+        scene=robot.scene,
+        threads=options.num_threads,
+        randomization=robot.draws,
+    )
+
+
 def train(options: Options, folder: Path, stop: Callable[[], bool]) -> tuple[PPO, Watch]:
     """Learner, saved as model.zip, after the strokes that were asked for or when `stop()` was true; and its watch."""
-    env = make_training_env(
-        options.ppo, options.path, options.random_heading, fidelity=options.fidelity, threads=options.num_threads
-    )
+    robot = robot_of(options, folder)
+    env = training_env(options, robot)
     new = options.resume is None or is_unbegun(folder)
     if new:
         model = make_model(env, options.ppo, options.seed, options.device)
     else:
         model = resume(folder / "model.zip", env, options.device)
     model.set_logger(configure(str(folder / "tensorboard"), ["tensorboard"]))
-    watch = Watch(options, folder, model, env, stop)
+    watch = Watch(options, robot, folder, model, env, stop)
     if not new and model.num_timesteps not in (strokes for strokes, *_ in recorded(folder)):
         watch.keep()  # a kill came between the two
     left = options.length - model.num_timesteps
@@ -76,31 +92,36 @@ def compare(options: Options, folder: Path, remarks: Remarks) -> None:
 
     The gait of a timed environment is the lagged one, where decisions allow it.
     """
-    decision_period = options.ppo.decision_period
+    decision_period, robot = options.ppo.decision_period, robot_of(options, folder)
     evaluate(
-        {"learned": load_policy(folder / "policy.safetensors"), **script(decision_period)},
+        {"learned": load_policy(folder / "policy.safetensors"), **script(decision_period, robot.scene)},
         "pentagon",
         max_strokes=options.limit,
         decision_period=decision_period,
-        fidelity=options.fidelity,
+        scene=robot.scene,
+        fidelity=robot.fidelity(options),
         video=options.video,
         report=remarks,
         out=folder / "evaluation",
     )
 
 
-def script(decision_period: float | None) -> dict[str, Policy]:
+def script(decision_period: float | None, scene: Scene | None) -> dict[str, Policy]:
     """Fastest scripted gait round the pentagon for a time between decisions [s], by its name; {} if there is none."""
     for name in ("lagged-pentagon", "pentagon"):
-        with suppress(ValueError):  # the gait needs other decisions
-            return {"script": scripted(name, decision_period=decision_period)}
+        with suppress(ValueError):  # the gait needs other decisions, or another robot
+            gait = scripted(name, decision_period=decision_period)
+            if scene is not None:
+                require_fit(gait, scene, actions_of(gait, scene.robot.n_limbs), decision_period)
+            return {"script": gait}
     return {}
 
 
 def describe(options: Options, folder: Path, trained: int, watch: Watch) -> Remarks:
     """Remarks of the report on the training. trained: Length of the whole training [strokes]."""
+    own = robot_of(options, folder).scene is not None
     sentences = [
-        f'Swum at fidelity "{options.fidelity}".',
+        f"Swum by the robot of {options.scene}." if own else f'Swum at fidelity "{options.fidelity}".',
         f"Trained for {trained} strokes, seed {options.seed}, by the first of these commands; the last three show the "
         "logs, compare again, and train on.",
     ]
@@ -112,13 +133,14 @@ def describe(options: Options, folder: Path, trained: int, watch: Watch) -> Rema
     policy = shlex.quote(str(folder / "policy.safetensors"))
     decision_period = options.ppo.decision_period
     timed = "" if decision_period is None else f" --decision-period {decision_period:g}"
+    physics = f"--scene {shlex.quote(str(folder / SCENE))}" if own else f"--fidelity {options.fidelity}"
     return Remarks(
         title="Learned against scripted round the pentagon",
         sentences=sentences,
         commands=[
             *json.loads((folder / "config.json").read_text(encoding="utf-8"))["commands"],
             f"tensorboard --logdir {shlex.quote(str(folder))}",
-            f"python -m agents.evaluate --agents {policy} pentagon --fidelity {options.fidelity} --report{timed}",
+            f"python -m agents.evaluate --agents {policy} pentagon {physics} --report{timed}",
             f"{resume_command(folder)} --strokes {2 * trained}",
         ],
         curves=[Curve.of("learned", read_progress(folder))],
@@ -148,7 +170,11 @@ def run(options: Options, arguments: Sequence[str]) -> int:
     require_consent(options)
     folder = options.out or Path("runs") / time.strftime("%Y-%m-%d_%H-%M-%S")
     if options.resume is None:
+        robot = asked_for(options)
+        if robot != Robot():
+            training_env(options, robot).close()  # refuses what cannot be trained before there is a folder
         claim(folder)
+        keep(robot, folder)
     write_config(options, arguments, folder)
     print(f"The run is in {folder}.", flush=True)
     with Interruption() as interruption:

@@ -30,7 +30,7 @@ from seastar_gym.controllers import learned
 from seastar_gym.controllers.contract import Policy, actions_of, require_fit
 from seastar_gym.controllers.roster import load_agents
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import make_scene
+from seastar_gym.envs.task import make_scene, scene_at
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.pictures import FRAMES_PER_STROKE, draw_traces, film
 from seastar_gym.evaluation.results import COLUMNS, in_words, write_csv
@@ -159,7 +159,9 @@ class Options:
     agents: AgentNames = ("learned", "pentagon")
     path: Annotated[str, tyro.conf.arg(help=PATH_HELP)] = "pentagon"
     fidelity: Fidelity = "balanced"
-    """Accuracy of the simulation."""
+    """Accuracy of the simulation. A scene that names its numerics is swum with those."""
+    scene: Path | None = None
+    """File of the robot's scene: JSON, or Python that defines `scene`, which is executed; by default the chapter's."""
     out: Path = Path("runs/evaluate")
     """Folder of the results."""
     seed: int = 0
@@ -200,7 +202,9 @@ def _remarks(agents: Mapping[str, Policy], options: Options, arguments: Sequence
     commands = dict.fromkeys(command for how in trainings.values() for command in how.get("commands", ()))
     return Remarks(
         title=f"Evaluation: {options.path}",
-        sentences=[f'Computed at fidelity "{options.fidelity}".'],
+        sentences=[
+            f'Computed at fidelity "{options.fidelity}".' if options.scene is None else f"Swum in {options.scene}."
+        ],
         commands=[*commands, shlex.join(["python", "-m", "agents.evaluate", *arguments])],
         curves=[Curve.of(name, rows) for name, rows in progress.items()],
         tables=[] if options.trials is None else [read_trials(options.trials)],
@@ -213,8 +217,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     options = tyro.cli(Options, prog="python -m agents.evaluate", args=arguments)
     try:
-        agents = load_agents(options.agents, options.seed, options.fidelity, options.decision_period)
-        path, scene = load_path(options.path), make_scene(None, options.fidelity, options.decision_period)
+        path, own = load_path(options.path), scene_at(options.scene, options.fidelity)
+        agents = load_agents(options.agents, options.seed, options.fidelity, options.decision_period, own)
+        scene = own or make_scene(None, options.fidelity, options.decision_period)
         for agent in agents.values():
             require_fit(agent, scene, actions_of(agent, scene.robot.n_limbs), options.decision_period)
         remarks = _remarks(agents, options, arguments) if options.report else None
@@ -231,7 +236,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         out=options.out,
         video=options.video,
         report=remarks,
-        fidelity=options.fidelity,
+        scene=own,
+        fidelity=options.fidelity if own is None else None,
         random_heading=options.random_heading,
     )
     return 0

@@ -1,5 +1,6 @@
 """train.py goes all the way, stops in good order, and continues where it stopped."""
 
+import contextlib
 import csv
 import errno
 import hashlib
@@ -26,6 +27,8 @@ from agents.training import efficiency
 from agents.training.efficiency import Efficiency
 from agents.training.folder import claim, recorded
 from agents.training.options import Options, read_options, saved_options
+from agents.training.robot import robot_of
+from seastar_gym import DomainRandomization, Numerics, Scene, Seastar, Uniform
 from seastar_gym.controllers import learned as policies
 from seastar_gym.controllers.learner_zip import load
 from seastar_gym.evaluation.swim import Swim
@@ -43,6 +46,59 @@ def finished(tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs") / "tiny"
     assert train.main([*TINY, "--strokes", "512", "--seed", "4", "--out", str(folder)]) == 0
     return folder
+
+
+OWN_ROBOT = """
+from seastar_gym import Scene, Seastar
+scene = Scene(Seastar(nodes_per_limb=7, youngs_modulus=1.1e6))
+"""
+
+
+def test_a_robot_of_a_file_is_trained_compared_and_continued(tmp_path, capsys):
+    file, intervals, folder = tmp_path / "own.py", tmp_path / "intervals.json", tmp_path / "run"
+    file.write_text(OWN_ROBOT)
+    intervals.write_text('{"robot.youngs_modulus": [9e5, 1.2e6]}')
+    own = ["--scene", str(file), "--intervals", str(intervals), "--out", str(folder)]
+    assert train.main([*TINY, *own, "--strokes", "256"]) == 0
+    file.unlink()
+    intervals.unlink()
+    robot = robot_of(saved_options(folder), folder)
+    assert robot.scene == Scene(Seastar(nodes_per_limb=7, youngs_modulus=1.1e6), numerics=Numerics.preset("fast"))
+    assert robot.draws == DomainRandomization({"robot.youngs_modulus": Uniform(9e5, 1.2e6)})
+    with contextlib.closing(train.training_env(saved_options(folder), robot)) as env:
+        assert env.env.unwrapped.randomization == robot.draws
+    assert policies.load(folder / "policy.safetensors").description.scene.robot == robot.scene.robot
+    report = html.unescape((folder / "evaluation" / "report.html").read_text())
+    assert f"Swum by the robot of {file}." in report
+    assert f"--agents {folder / 'policy.safetensors'} pentagon --scene {folder / 'scene.json'} --report" in report
+    assert train.main(["--resume", str(folder), "--strokes", "384"]) == 0
+    assert robot_of(saved_options(folder), folder) == robot
+    capsys.readouterr()
+    assert train.main(["--resume", str(folder), "--scene", "another.py"]) == 2
+    assert "cannot continue with another scene" in capsys.readouterr().err
+    (folder / "scene.json").unlink()
+    assert train.main(["--resume", str(folder), "--strokes", "512"]) == 2
+    assert capsys.readouterr().err.endswith("scene.json is no file.\n")
+
+
+@pytest.mark.parametrize(
+    "scene, intervals, words",
+    [
+        ("no_such.py", None, "no_such.py is no file."),
+        (None, "[1, 2]", "must be JSON such as"),
+        (None, '{"robot.youngs_modulus": 1e6}', "must be JSON such as"),
+        (None, '{"robot.youngs_modulus": [2e6, 1e6]}', "low must not exceed high"),
+        (None, '{"robot.toes": [1, 2]}', "has no number 'robot.toes' to draw"),
+    ],
+)
+def test_robots_that_cannot_be_trained_are_refused_before_there_is_a_folder(tmp_path, capsys, scene, intervals, words):
+    arguments = [] if scene is None else ["--scene", scene]
+    if intervals is not None:
+        (tmp_path / "intervals.json").write_text(intervals)
+        arguments += ["--intervals", str(tmp_path / "intervals.json")]
+    assert train.main([*TINY, *arguments, "--out", str(tmp_path / "run")]) == 2
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
 
 
 def scalars(folder):

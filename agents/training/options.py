@@ -56,7 +56,12 @@ class Options(Lengths):
     """Turn every robot at random at the start of an episode."""
     fidelity: Fidelity = "fast"
     """Accuracy of the simulation, in the training and in the comparison. Policies that were trained at "fast" swim as
-    well at "reference" as others (docs/fidelities.md)."""
+    well at "reference" as others (docs/fidelities.md). A scene that names its numerics is swum with those."""
+    scene: Path | None = None
+    """File of the robot's scene: JSON, or Python that defines `scene`, which is executed; by default the chapter's."""
+    intervals: Path | None = None
+    """JSON file of numbers of the scene by name, with the ends of their intervals, as seastar identify writes it: every
+    episode of the training draws a robot from them."""
     seed: int = 0
     """Seed of the network, the exploration and the paths."""
     seeds: tuple[int, ...] = ()
@@ -89,6 +94,8 @@ class Options(Lengths):
             raise ValueError("strokes and save_freq must be at least 1.")
         if self.seeds and (self.resume is not None or self.ship or len(set(self.seeds)) < len(self.seeds)):
             raise ValueError("--seeds are different ones of new runs, without --resume and --ship.")
+        if self.ship and not (self.scene is None and self.intervals is None):
+            raise ValueError("--ship is for policies of the chapter's robot, without --scene and --intervals.")
         make_path(self.path, np.random.default_rng(0))
 
 
@@ -120,6 +127,7 @@ def saved_options(folder: Path) -> Options:
         ppo |= {"hidden": tuple(ppo["hidden"]), "reward": RewardWeights(**ppo["reward"])}
         here: dict[str, Any] = {"out": folder, "resume": None, "ppo": Hyperparameters(**ppo), "seeds": ()}
         here |= {"ship": False, "ship_anyway": False}
+        here |= {name: Path(options[name]) for name in ("scene", "intervals") if options.get(name) is not None}
         return Options(**{**options, **here})
     except (AttributeError, KeyError, RecursionError, TypeError, ValueError) as damaged:
         raise ValueError(f"{file} is damaged or from another version: {str(damaged).rstrip('.')}.") from damaged

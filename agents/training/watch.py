@@ -13,6 +13,7 @@ from agents.ppo import policy_of
 from agents.training import efficiency
 from agents.training.folder import recorded
 from agents.training.options import Options
+from agents.training.robot import Robot
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.swim import Swim, swim
@@ -22,7 +23,15 @@ from seastar_gym.files import write_atomically
 class Watch(BaseCallback):
     """Callback for the progress bar, logs and checkpoints, which ends the training when `stop()` is true."""
 
-    def __init__(self, options: Options, folder: Path, learner: PPO, batch: BatchVecEnv, stop: Callable[[], bool]):
+    def __init__(
+        self,
+        options: Options,
+        robot: Robot,
+        folder: Path,
+        learner: PPO,
+        batch: BatchVecEnv,
+        stop: Callable[[], bool],
+    ):
         super().__init__()
         self.options, self.folder, self.learner, self.batch, self.stop = options, folder, learner, batch, stop
         self.strokes = 0  # of this process
@@ -31,7 +40,8 @@ class Watch(BaseCallback):
         self.pentagon = SeastarSwimEnv(
             "pentagon",
             actions=options.ppo.actions,
-            fidelity=options.fidelity,
+            fidelity=robot.fidelity(options),
+            scene=robot.scene,
             decision_period=options.ppo.decision_period,
         )
 

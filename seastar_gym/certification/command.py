@@ -10,6 +10,7 @@ reads it, `certificate.for_error(0.01)` is the scene at the fastest setting that
 """
 
 import argparse
+import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -55,6 +56,15 @@ def draw(certificate: Certificate, file: Path) -> None:
     plt.close(figure)
 
 
+def require_writable(option: str, file: Path | None) -> None:
+    """Make the folder of a file that an option names, if it does. ValueError where it is a folder itself."""
+    if file is None:
+        return
+    if file.is_dir():
+        raise ValueError(f"{file} is a folder: give --{option} a file.")
+    file.parent.mkdir(parents=True, exist_ok=True)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     parser = argparse.ArgumentParser(
@@ -66,6 +76,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--samples", type=int, default=SAMPLES, help=f"sequences per class {default}")
     parser.add_argument("--seed", type=int, default=0, help=f"seed of the sequences {default}")
     parser.add_argument("--out", type=Path, default=Path("certificate.json"), help=f"file to write {default}")
+    file = "JSON file for the scene at the setting that --error chooses, which train.py --scene takes"
+    parser.add_argument("--chosen", type=Path, help=file)
     options = parser.parse_args(arguments)
     try:
         require_extra("Certificates", "studies", "tqdm")
@@ -73,9 +85,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         scene.to_dict()  # now, not after minutes, refuses what a certificate could not hold
         if options.error is not None:
             require_error(options.error)
-        if options.out.is_dir():
-            raise ValueError(f"{options.out} is a folder: give --out a file.")
-        options.out.parent.mkdir(parents=True, exist_ok=True)
+        if options.chosen is not None and options.error is None:
+            raise ValueError("--chosen writes the scene that --error chooses: give both.")
+        for name in ("out", "chosen"):
+            require_writable(name, getattr(options, name))
         from tqdm import tqdm
 
         with tqdm(total=100, unit="%", bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as bar:
@@ -95,6 +108,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.error is not None:
             chosen = certificate.for_error(options.error)
             print(f"{100 * options.error:g} %: nodes_per_limb={chosen.robot.nodes_per_limb}, {chosen.numerics}")
+            if options.chosen is not None:
+                options.chosen.write_text(json.dumps(chosen.to_dict()) + "\n", encoding="utf-8")
+                print(f"Written: {options.chosen}")
     except (ValueError, ModuleNotFoundError) as bad_input:
         print(bad_input, file=sys.stderr)
         return 2

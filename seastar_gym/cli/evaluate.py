@@ -13,7 +13,7 @@ from seastar_gym.command import command_parser
 from seastar_gym.controllers.contract import actions_of
 from seastar_gym.controllers.roster import HELP, load_agents
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import make_scene
+from seastar_gym.envs.task import make_scene, scene_at
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.pictures import draw_traces
 from seastar_gym.evaluation.results import as_text, write_csv
@@ -33,6 +33,7 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("--agents", nargs="+", default=["learned", "pentagon"], help=f"{HELP} {default}")
     found.add_argument("--path", default="pentagon", help=f"{PATH_HELP} {default}")
     found.add_argument("--fidelity", choices=get_args(Fidelity), default="balanced", help=f"accuracy {default}")
+    found.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the chapter's)")
     found.add_argument("--decision-period", type=float, help="time between decisions [s] (default: a stroke of 1 s)")
     found.add_argument("--seconds", type=float, default=TIME_LIMIT, help=f"time limit [s] {default}")
     found.add_argument("--random-heading", action="store_true", help="turn the robot at random at the start")
@@ -49,14 +50,16 @@ def evaluated(options: argparse.Namespace) -> list[Swim]:
     if options.out is not None:
         require_extra("Pictures", "studies", "matplotlib")
     path = load_path(options.path)
-    n_limbs = make_scene(None, options.fidelity, options.decision_period).robot.n_limbs
-    agents = load_agents(options.agents, options.seed, options.fidelity, options.decision_period)
+    own = scene_at(options.scene, options.fidelity)
+    n_limbs = (own or make_scene(None, options.fidelity, options.decision_period)).robot.n_limbs
+    agents = load_agents(options.agents, options.seed, options.fidelity, options.decision_period, own)
     limit, swims = decisions_in(options.seconds, options.decision_period), []
     for name, policy in agents.items():
         env = SeastarSwimEnv(
             path=path,
             actions=actions_of(policy, n_limbs),
-            fidelity=options.fidelity,
+            fidelity=options.fidelity if own is None else None,
+            scene=own,
             decision_period=options.decision_period,
             random_heading=options.random_heading,
         )

@@ -22,6 +22,7 @@ from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in
 from seastar_gym.evaluation.tasks import make_task
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.numerics import Fidelity
+from seastar_gym.scene.scene_file import load_scene
 
 
 def parser() -> argparse.ArgumentParser:
@@ -34,6 +35,7 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("--speed", type=float, default=4.0, help=f"multiple of real time {default}")
     found.add_argument("--film", type=Path, help="file of a film, .mp4 or .gif, instead of a window")
     found.add_argument("--fidelity", choices=get_args(Fidelity), help="accuracy of the simulation")
+    found.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the task's)")
     found.add_argument("--decision-period", type=float, help="time between decisions [s] (default: a stroke of 1 s)")
     found.add_argument("--seconds", type=float, help="simulated time after which the swim ends")
     found.add_argument("--random-heading", action="store_true", help="turn the robot at random at the start")
@@ -49,6 +51,8 @@ def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
     asked: dict[str, Any] = {"fidelity": options.fidelity, "decision_period": options.decision_period}
     if options.path is not None:
         asked["path"] = load_path(options.path)
+    if options.scene is not None:
+        asked["scene"] = load_scene(options.scene)
     if options.random_heading:
         asked["random_heading"] = True
     return {name: value for name, value in asked.items() if value is not None}

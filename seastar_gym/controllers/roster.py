@@ -40,13 +40,20 @@ HELP = (
 
 
 def load_agents(
-    names: Sequence[str], seed: int = 0, fidelity: Fidelity = "balanced", decision_period: float | None = None
+    names: Sequence[str],
+    seed: int = 0,
+    fidelity: Fidelity = "balanced",
+    decision_period: float | None = None,
+    scene: Scene | None = None,
 ) -> dict[str, Policy]:
     """Policies by name; those of files have the file's name without its ending.
 
     names: Names as in `HELP`. seed: Seed of the random agent. fidelity: Accuracy of the simulation that agents know.
-    decision_period: Time between decisions [s]. None means strokes.
+    decision_period: Time between decisions [s]. None means strokes. scene: Scene that agents know, with its numerics.
+    None means the chapter's at `fidelity`.
     """
+    known = make_scene(None, fidelity, decision_period) if scene is None else scene
+    named = fidelity if scene is None else None
     agents: dict[str, Policy] = {}
     for name in names:
         label = Path(name).stem if _is_file(name) else name
@@ -56,10 +63,10 @@ def load_agents(
         agents[label] = _load_agent(
             name,
             seed,
-            make_scene(None, fidelity, decision_period),
+            known,
             decision_period,
             None,
-            lambda: SeastarSwimEnv(fidelity=fidelity, decision_period=decision_period),
+            lambda: SeastarSwimEnv(scene=scene, fidelity=named, decision_period=decision_period),
         )
     return agents
 

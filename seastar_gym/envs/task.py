@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from os import PathLike
+from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from seastar_gym.scene import Numerics, Scene, SmaWires
 from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.checks import require_number, shown
 from seastar_gym.scene.numerics import Fidelity
+from seastar_gym.scene.scene_file import load_scene
 from seastar_gym.scene.serial import Part, from_dict
 
 Path = str | ArrayLike
@@ -29,7 +31,7 @@ Plain = dict[str, Any]
 
 DEFAULT_FIDELITY: Fidelity = "balanced"
 
-__all__ = ["Outcome", "Path", "Plain", "SwimTask", "make_scene", "read", "scene_observation_size"]
+__all__ = ["Outcome", "Path", "Plain", "SwimTask", "make_scene", "read", "scene_at", "scene_observation_size"]
 
 
 def make_scene(
@@ -58,6 +60,17 @@ def make_scene(
             "give one of them."
         )
     return replace(scene, numerics=numerics)
+
+
+def scene_at(file: FilePath | None, fidelity: Fidelity) -> Scene | None:
+    """Scene of a file as command lines name it, with its own numerics, or those of `fidelity` where it names none.
+
+    None for no file.
+    """
+    if file is None:
+        return None
+    scene = load_scene(file)
+    return make_scene(scene, None if scene.numerics.named else fidelity)
 
 
 def read(part: Part | Plain, kind: type[Any]) -> Part:

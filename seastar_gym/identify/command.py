@@ -66,6 +66,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     step = "time step of the implicit midpoint rule [s] (default: the scene's own numerics, or 0.005)"
     parser.add_argument("--step", type=float, help=step)
     parser.add_argument("--out", type=Path, help="JSON file for the fitted scene, which certify reads")
+    intervals = "JSON file for the confidence intervals by name, from which train.py --intervals draws robots"
+    parser.add_argument("--intervals", type=Path, help=intervals)
     parser.add_argument("--picture", type=Path, help="file for a picture of the fit")
     parser.add_argument("--synthetic", action="store_true", help="fit simulated data with known parameters")
     options = parser.parse_args(arguments)
@@ -89,6 +91,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             draw(estimate, measurement, options.picture)
         if options.out is not None:
             options.out.write_text(json.dumps(estimate.scene.to_dict()) + "\n", encoding="utf-8")
+        if options.intervals is not None:
+            ends = zip(estimate.names, estimate.lower.tolist(), estimate.upper.tolist(), strict=True)
+            rows = {name: [low, high] for name, low, high in ends}
+            options.intervals.write_text(json.dumps(rows, indent=2) + "\n", encoding="utf-8")
     except (ValueError, OSError, ModuleNotFoundError) as bad_input:
         print(bad_input, file=sys.stderr)
         return 2

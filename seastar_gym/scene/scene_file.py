@@ -17,7 +17,10 @@ def load_scene(file: Path | None) -> Scene:
     if not file.is_file():
         raise ValueError(f"{file} is no file.")
     if file.suffix == ".json":
-        return Scene.from_dict(json.loads(file.read_text(encoding="utf-8")))
+        try:
+            return Scene.from_dict(json.loads(file.read_text(encoding="utf-8")))
+        except (ValueError, RecursionError) as wrong:
+            raise ValueError(f"{file} is no scene: {wrong}") from wrong
     try:
         found = runpy.run_path(str(file)).get("scene")
     except SyntaxError as wrong:

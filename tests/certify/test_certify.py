@@ -315,16 +315,23 @@ def test_the_command_writes_certificate_and_picture(few_settings, tmp_path, monk
     )
     out = tmp_path / "certificate.json"
     arguments = [str(tmp_path / "mine.py"), "--samples", "2", "--error", "0.9", "--out", str(out)]
+    arguments += ["--chosen", str(tmp_path / "chosen.json")]
     monkeypatch.setattr(sys, "argv", ["certify", *arguments])
     assert command.main() == 0
     assert Certificate.load(out).scene.robot.limb_length == 0.08
     assert out.with_suffix(".png").stat().st_size > 10_000
     assert "90 %: nodes_per_limb=5" in capsys.readouterr().out
+    assert command.load_scene(tmp_path / "chosen.json") == Certificate.load(out).for_error(0.9)
     (tmp_path / "mine.py").write_text("scene = 3\n", encoding="utf-8")
     assert command.main() == 2
     assert "must define `scene`" in capsys.readouterr().err
     monkeypatch.setattr(command, "certify", None)  # what follows is refused before anything is measured
-    for more, words in ((["--error", "0"], "positive, finite share"), (["--out", str(tmp_path)], "is a folder")):
+    for more, words in (
+        (["--error", "0"], "positive, finite share"),
+        (["--out", str(tmp_path)], "is a folder"),
+        (["--error", "0.1", "--chosen", str(tmp_path)], "is a folder"),
+        (["--chosen", "chosen.json"], "give both"),
+    ):
         assert command.main(more) == 2
         assert words in capsys.readouterr().err
     own = (
@@ -344,6 +351,9 @@ def test_the_command_writes_certificate_and_picture(few_settings, tmp_path, monk
     (tmp_path / "own.py").write_text("scene = Scene(\n", encoding="utf-8")
     with pytest.raises(ValueError, match=r"own\.py, line 1, is not Python: .* never closed\.$"):
         command.load_scene(tmp_path / "own.py")
+    file_of_scene.write_text("{", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"mine\.json is no scene: Expecting"):
+        command.load_scene(file_of_scene)
 
 
 def test_swims_of_many_groups_are_those_of_one_batch(monkeypatch):

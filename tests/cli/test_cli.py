@@ -120,6 +120,8 @@ def test_a_window_shows_a_swim_until_it_is_closed(path, dummy_window, monkeypatc
         (["swim", "--path", "nowhere"], "Unknown path 'nowhere'"),
         (["swim", "--agent", str(PREY), "--film", "x.gif"], "was trained for the task prey, the environment's is"),
         (["swim", "--speed", "-1"], "--speed must be"),
+        (["swim", "--scene", "none.json"], "none.json is no file."),
+        (["evaluate", "--scene", "none.py"], "none.py is no file."),
         (["evaluate", "--seconds", "0"], "--seconds must be"),
         (["evaluate", "--agents", "rest", "rest"], "named twice"),
     ],
@@ -196,6 +198,23 @@ def test_agents_are_compared_without_rich(path, tmp_path, capsys):
     assert max(map(len, lines[:-1])) <= 80
     assert [line.split()[0] for line in lines[3:5]] == ["straight", "2-,5+"]
     assert {file.name for file in out.iterdir()} == {"evaluation.csv", "traces.png"}
+
+
+def test_a_robot_of_a_file_swims(path, tmp_path, capsys):
+    """Half as strong as the chapter's, so it is slower; agents that plan know it."""
+    scene = tmp_path / "weak.py"
+    scene.write_text("from seastar_gym import Scene\nscene = Scene(limb_strengths=(0.5, 0.5, 0.5, 0.5, 0.5))\n")
+    arguments = ["--agents", "straight", "greedy", "--path", path, "--fidelity", "fast"]
+    seconds = []
+    for own in ([], ["--scene", str(scene)]):
+        assert main(["evaluate", *arguments, *own]) == 0
+        rows = [line.split() for line in capsys.readouterr().out.splitlines()[3:5]]
+        assert [row[0] for row in rows] == ["straight", "greedy"]
+        seconds.append([float(row[2]) for row in rows])
+    assert (np.array(seconds[0]) < seconds[1]).all()
+    film = ["swim", "--agent", "straight", "--path", path, "--fidelity", "fast", "--speed", "8", "--seconds", "2"]
+    assert main([*film, "--scene", str(scene), "--film", str(tmp_path / "x.gif")]) == 0
+    assert "0 of 1 waypoints in 2.0 s" in capsys.readouterr().out
 
 
 def test_training_without_the_repository_says_what_it_needs(tmp_path, monkeypatch, capsys):

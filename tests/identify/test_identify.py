@@ -144,11 +144,13 @@ def test_the_command_line_fits_a_scene_of_ones_own_and_writes_it(tmp_path, monke
     (tmp_path / "mine.json").write_text(json.dumps(scene.to_dict()))
     monkeypatch.chdir(tmp_path)
     command = ["path.csv", "commands.csv", "--scene", "mine.json", "--out", "fitted.json"]
-    command += ["--fit", "actuator.peak_angle"]
+    command += ["--fit", "actuator.peak_angle", "--intervals", "intervals.json"]
     assert main(command) == 0
     fitted = load_scene(tmp_path / "fitted.json")
     assert fitted.actuator.peak_angle == pytest.approx(0.5, rel=0.02)
     assert replace(fitted, actuator=scene.actuator) == scene
+    low, high = json.loads((tmp_path / "intervals.json").read_text())["actuator.peak_angle"]
+    assert low < fitted.actuator.peak_angle < high < 1.1 * low
     (tmp_path / "none.py").write_text("robot = 3")
     assert main([*command[:3], "none.py"]) == 2
     assert capsys.readouterr().err == "none.py must define `scene`, a Scene.\n"

@@ -1,0 +1,71 @@
+"""The robot of a run: the chapter's, or that of a file, with numbers that may be drawn anew for every episode."""
+
+import json
+from pathlib import Path
+from typing import NamedTuple
+
+from agents.training.options import Options
+from seastar_gym.envs.randomization import DomainRandomization, Uniform
+from seastar_gym.envs.task import scene_at
+from seastar_gym.files import write_atomically
+from seastar_gym.scene import Scene
+from seastar_gym.scene.numerics import Fidelity
+from seastar_gym.scene.scene_file import load_scene
+
+SCENE, INTERVALS = "scene.json", "intervals.json"
+"""Files in a run's folder, so that a run that is continued has the robot that it began with."""
+
+
+class Robot(NamedTuple):
+    """Robot of a run.
+
+    scene: Robot with its fluid and numerics. None means the chapter's at the run's fidelity.
+    draws: Numbers of the scene that are drawn anew for every episode of the training. None means none.
+    """
+
+    scene: Scene | None = None
+    draws: DomainRandomization | None = None
+
+    def fidelity(self, options: Options) -> Fidelity | None:
+        """Fidelity that an environment of this robot is made with; a scene has its numerics."""
+        return options.fidelity if self.scene is None else None
+
+
+def asked_for(options: Options) -> Robot:
+    """Robot that the options of a new run name. ValueError where it could not be kept in the run's folder."""
+    scene = scene_at(options.scene, options.fidelity)
+    if scene is not None:
+        scene.to_dict()
+    return Robot(scene, None if options.intervals is None else read_intervals(options.intervals))
+
+
+def read_intervals(file: Path) -> DomainRandomization:
+    """Uniform draws from intervals by name, a JSON file such as `seastar identify --intervals` writes."""
+    if not file.is_file():
+        raise ValueError(f"{file} is no file.")
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+        ends = {name: (low, high) for name, (low, high) in found.items()}
+    except (AttributeError, TypeError, ValueError, RecursionError) as wrong:
+        raise ValueError(f'{file} must be JSON such as {{"robot.youngs_modulus": [9e5, 1.1e6]}}.') from wrong
+    return DomainRandomization({name: Uniform(low, high) for name, (low, high) in ends.items()})
+
+
+def keep(robot: Robot, folder: Path) -> None:
+    """Write the robot into the folder of its run; nothing for the chapter's."""
+    if robot.scene is not None:
+        write_json(folder / SCENE, robot.scene.to_dict())
+    if robot.draws is not None:
+        write_json(folder / INTERVALS, {name: each.bounds for name, each in robot.draws.distributions.items()})
+
+
+def write_json(file: Path, data: object) -> None:
+    write_atomically(file, (json.dumps(data, indent=2) + "\n").encode())
+
+
+def robot_of(options: Options, folder: Path) -> Robot:
+    """Robot of the run with these options in a folder."""
+    return Robot(
+        None if options.scene is None else load_scene(folder / SCENE),
+        None if options.intervals is None else read_intervals(folder / INTERVALS),
+    )
