@@ -144,8 +144,8 @@ class Renderer:
 
     def _paint(self, frame: Frame) -> None:
         self._check(frame)
-        for points in (frame.positions, frame.scenery.points):
-            if not self.camera.sees(points):
+        for points in (frame.positions, frame.roots, frame.outline, frame.scenery.points):
+            if points is not None and len(points) and not self.camera.sees(points):
                 self.camera = self.camera.widened(points, REFIT_MARGIN * self._limb_length)
         self._canvas.begin(WATER)
         self._paint_scenery(frame.scenery)

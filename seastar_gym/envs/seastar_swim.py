@@ -169,6 +169,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `solver_status`          | int        | -    | `SolverStatus` of the decision, 0: converged                     |
     | `solver_message`         | str        | -    | what to do about a status other than 0; empty for 0              |
     | `smallest_opening_angle` | float      | rad  | smallest angle between neighbouring limbs; below 0: they crossed |
+    |                          |            |      | (pi with a body)                                                 |
     | `reward_progress`        | float      | 1    | term of the reward                                               |
     | `reward_waypoint`        | float      | 1    | term of the reward                                               |
     | `reward_effort`          | float      | 1    | term of the reward                                               |

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from seastar_gym.identify.measurement import Measurement
-from seastar_gym.identify.parameters import with_parameters
+from seastar_gym.identify.parameters import get_parameter, with_parameters
 from seastar_gym.scene import Scene
 from seastar_gym.scene.per_robot import frame_of, side_by_side
 from seastar_gym.simulator import Simulator
@@ -75,6 +75,8 @@ def synthetic(
     truth: Values of parameters by name, which replace those of the scene.
     """
     rng, robot = np.random.default_rng(seed), scene.robot
+    for name in truth:
+        get_parameter(scene, name)  # refuses what the scene has not
     commands = rng.integers(-1, 2, (n_strokes, robot.n_limbs)).astype(float)
     times = np.arange(math.floor(n_strokes * scene.actuator.period * rate)) / rate
     nodes = (0, *((robot.nodes_per_limb - 1) * (np.arange(robot.n_limbs) + 1)).tolist())

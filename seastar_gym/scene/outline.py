@@ -109,6 +109,7 @@ class Outline(NamedTuple):
 def is_convex(points: Sequence[tuple[float, float]]) -> bool:
     """Whether points go round a convex polygon once, anti-clockwise, with the origin inside it."""
     array = np.array(points)
+    array = array / (np.abs(array).max() or 1.0)
     edges = np.roll(array, -1, axis=0) - array
     following = np.roll(edges, -1, axis=0)
     turns = np.arctan2(

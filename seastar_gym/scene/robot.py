@@ -136,6 +136,11 @@ class Seastar:
             )
         if self.body.attachments and any(limb.direction is not None for limb in self.limbs):
             raise ValueError("Directions of limbs are named by their attachments to the body or by Limb, not by both.")
+        if not self.has_body and abs(sum(self._gaps(self.limbs)) - 2.0 * math.pi) > 1e-6:
+            raise ValueError(
+                "Limbs attached at the hub itself must leave it in different directions and be named anti-clockwise, "
+                f"not in the directions {shown([at.direction for at in self.body.attachments])}."
+            )
 
     def limb_shapes(self, index: int = 0) -> tuple[LimbShape, ...]:
         """Limbs with all values filled in, for robot `index` of a batch."""
@@ -165,7 +170,8 @@ class Seastar:
         """Angle from every limb to the next [rad]."""
         if self.body is not None and self.body.attachments:
             attached = np.array([at.direction for at in self.body.attachments])
-            return ((np.roll(attached, -1) - attached) % (2.0 * math.pi)).tolist()
+            gaps = ((np.roll(attached, -1) - attached) % (2.0 * math.pi)).tolist()
+            return [gap or 2.0 * math.pi for gap in gaps]
         directions = [limb.direction for limb in limbs if limb.direction is not None]
         return np.diff(directions, append=2.0 * math.pi).tolist() or [2.0 * math.pi / self.n_limbs] * self.n_limbs
 
@@ -216,8 +222,8 @@ class Seastar:
 
     @property
     def opening_angle(self) -> float:
-        """Smallest angle between neighbouring limbs at rest [rad]."""
-        return min(shape.gap for shape in self.limb_shapes())
+        """Smallest angle between neighbouring limbs at rest [rad]; pi with a body, as in a `StrokeReport`."""
+        return math.pi if self.has_body else min(shape.gap for shape in self.limb_shapes())
 
     def nodes(self, index: int = 0) -> NDArray[np.float64]:
         """Node positions at rest [m], shape (n_nodes, 2). Order: hub, {1,1}..{1,N-1}, {2,1}..; limb 1 along +x.

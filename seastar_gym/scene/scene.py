@@ -86,6 +86,7 @@ class Scene:
         self._check_holds_and_loads()
         self._check_contact()
         self._check_coefficients()
+        self._check_body()
 
     def _check_strengths(self) -> None:
         require_numbers("limb_strengths", self.limb_strengths, "1")
@@ -159,6 +160,24 @@ class Scene:
                 "numbers closer to those of a robot."
             )
 
+    def _check_body(self) -> None:
+        """Refuse a body whose numbers overflow or vanish together, once those of limbs are known not to."""
+        body = self.robot.body
+        if body is None or not self.robot.has_body:
+            return
+        try:
+            with np.errstate(all="ignore"):
+                sound = all(_has_sound_body(chosen(self.robot, choose)) for choose in (min, max))
+        except (OverflowError, ZeroDivisionError):
+            sound = False
+        if not sound:
+            far = max(body.shape.reach, *(math.hypot(*limb.root) for limb in self.robot.limb_shapes()))
+            raise ValueError(
+                f"Mass, rotational inertia or drag of a body overflow or vanish in double precision: it reaches "
+                f"{far:.4g} m from the hub, with mass={shown(body.mass)}, inertia={shown(body.inertia)} and "
+                f"centre_of_mass={shown(body.centre_of_mass)}."
+            )
+
     def _named_coefficients(self) -> str:
         """Numbers that stiffnesses and masses are made of, in words."""
         robots = [chosen(self.robot, choose) for choose in (min, max)]
@@ -190,7 +209,7 @@ class Scene:
         if robot.along is not None:
             self._check_along(robot.along, peak)
             return
-        if robot.discretisation == "continuum" and (robot.n_limbs > 1 or robot.body is not None):
+        if robot.discretisation == "continuum" and (robot.n_limbs > 1 or robot.has_body):
             if peak >= math.pi:
                 raise ValueError(f"A peak angle must stay below pi, not {peak:.4g} rad.")
             return
@@ -300,6 +319,17 @@ class Scene:
 def _is_chapters(robot: Seastar) -> bool:
     """Whether a robot is the chapter's except for its nodes per limb and its discretisation."""
     return robot == Seastar(nodes_per_limb=robot.nodes_per_limb, discretisation=robot.discretisation)
+
+
+def _has_sound_body(robot: Seastar) -> bool:
+    """Whether mass, inertia about the hub, with halves of root edges, and drag of turning are finite, of one robot."""
+    body, limbs = cast(Body, robot.body), robot.limb_shapes()
+    mass, (x, y), widest = body.mass_at(robot.density), body.centre, max(body.shape.widths)
+    roots = [0.5 * robot.density * limb.extreme_edges(robot.nodes_per_limb)[0][3] for limb in limbs]
+    arms = [limb.root[0] * limb.root[0] + limb.root[1] * limb.root[1] for limb in limbs]
+    inertia = body.inertia_at(robot.density) + mass * (x * x + y * y) + float(np.dot(roots, arms))
+    numbers = np.array([mass, inertia, 1.0 / inertia, *arms, widest**4 * body.height])
+    return bool(np.isfinite(numbers).all())
 
 
 def _span(numbers: Iterable[float]) -> str:

@@ -28,6 +28,7 @@ ahead, aside: That distance along limb 1 as it stood at the beginning, and to th
 turn: Rotation of the robot during the measurement.
 energy: Electric energy of the measured intervals.
 smallest_opening_angle: Between neighbouring limbs at the hub, at any time. Below zero, limbs have crossed.
+    With a body it is pi.
 newton_iterations: Of all intervals.
 status: SolverStatus, the largest of all intervals, or REFUSED. All else is NaN unless it is zero.
 

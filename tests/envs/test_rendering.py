@@ -231,6 +231,14 @@ def test_the_view_follows_a_robot_that_leaves_it_and_still_shows_the_path():
     assert renderer.camera.sees(np.array([[0.0, 0.0], [0.3, 0.0]]))
 
 
+def test_the_view_shows_all_of_a_body_that_reaches_farther_than_the_limbs():
+    renderer = renderer_of("line")
+    outline = np.array([[-2.0, -1.0], [1.0, -1.0], [1.0, 1.5]])
+    assert not renderer.camera.sees(outline)
+    renderer.draw(replace(frame_of(), outline=outline, roots=np.full((5, 2), 2.5)))
+    assert renderer.camera.sees(outline) and renderer.camera.sees(np.full((1, 2), 2.5))
+
+
 def test_the_view_stands_still_while_the_robot_is_in_it():
     renderer = renderer_of()
     before = renderer.camera

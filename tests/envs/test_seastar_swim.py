@@ -13,7 +13,17 @@ from gymnasium.utils.env_checker import check_env
 
 import seastar_gym
 from refusals import assert_refused
-from seastar_gym import DomainRandomization, Numerics, RewardWeights, Scene, Seastar, SmaPulse, SolverStatus, Uniform
+from seastar_gym import (
+    Body,
+    DomainRandomization,
+    Numerics,
+    RewardWeights,
+    Scene,
+    Seastar,
+    SmaPulse,
+    SolverStatus,
+    Uniform,
+)
 from seastar_gym.envs.paths import PATHS, cross_track_error, shortest_way
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -183,6 +193,12 @@ def test_a_reset_tells_of_a_stroke_that_has_not_happened():
     assert info["smallest_opening_angle"] == pytest.approx(2 * np.pi / 5)
     assert info["is_success"] is False and info["solver_message"] == ""
     assert not any(info[name] for name in OF_A_STROKE - {"smallest_opening_angle"})
+
+
+def test_limbs_on_a_body_have_no_opening_angle_that_could_close():
+    env = fast(scene=Scene(Seastar(4, body=Body.rectangle(0.06, 0.03))))
+    infos = [env.reset(seed=0)[1], env.step(np.array([0, 1, 0, 2]))[4]]
+    assert [info["smallest_opening_angle"] for info in infos] == [np.pi, np.pi]
 
 
 @pytest.mark.filterwarnings("ignore")  # about a dataset without a description, and a folder left to the collector

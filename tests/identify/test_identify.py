@@ -235,6 +235,11 @@ def test_a_number_that_cannot_be_fitted_as_it_is_says_what_to_do(name, words):
         get_parameter(scene, name)
 
 
+def test_a_truth_that_the_scene_has_not_is_refused():
+    with assert_refused("'fluid.drag_coefficient' is no positive number of this scene"):
+        synthetic(Scene(fluid=None), {"fluid.drag_coefficient": 1.3})
+
+
 def test_a_first_guess_at_the_edge_of_what_can_be_modelled_is_refused(measurement):
     """Drag along limbs must not exceed that across them, of which the Jacobian tries a smaller one."""
     names = ["fluid.drag_coefficient", "fluid.tangential_drag_coefficient"]

@@ -10,7 +10,7 @@ from refusals import assert_refused
 from seastar_gym import Attachment, Body, DomainRandomization, Limb, Scene, Seastar, Uniform, Water
 from seastar_gym.identify.parameters import get_parameter
 from seastar_gym.model.rods import make_rods
-from seastar_gym.scene.outline import Outline
+from seastar_gym.scene.outline import Outline, is_convex
 
 TRIANGLE = ((0.03, -0.01), (-0.01, 0.02), (-0.02, -0.02))
 HEXAGON = tuple((0.02 * math.cos(a), 0.02 * math.sin(a)) for a in np.arange(6) * math.pi / 3.0)
@@ -174,6 +174,56 @@ def test_a_joint_is_a_spring_in_a_row_with_the_clamp():
 def test_bodies_that_cannot_be_are_refused(words, body):
     with assert_refused(*words):
         Body(**body)
+
+
+FAR = (Attachment(1e200, 0.0, 0.0), Attachment(-1e200, 0.0, math.pi))
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        Body(radius=1e100),
+        Body(radius=0.02, mass=1e308, centre_of_mass=(10.0, 0.0)),
+        Body(radius=0.02, centre_of_mass=(1e200, 0.0)),
+        Body.rectangle(1e-3, 1e100),
+        Body(attachments=FAR),
+        Body(mass=1e-3, inertia=1e-320),
+    ],
+    ids=("size", "mass", "centre", "side", "arms", "inertia"),
+)
+def test_bodies_that_no_float_can_hold_are_refused(body):
+    with assert_refused("inertia", "double precision", "body"):
+        Scene(Seastar(2, 5, body=body))
+
+
+@pytest.mark.parametrize("size", [1e-200, 1e-6, 1.0, 1e200])
+def test_whether_an_outline_is_convex_does_not_depend_on_its_size(size, recwarn):
+    points = tuple((size * x, size * y) for x, y in TRIANGLE)
+    assert is_convex(points) and not is_convex(points[::-1]) and not recwarn
+
+
+@pytest.mark.parametrize("directions", [(0.0, -1.0, -3.0), (0.0, 3.0, 1.0), (0.0, 1.0, 1.0)])
+def test_limbs_attached_at_the_hub_itself_are_in_order(directions):
+    """As those without a body are: who may touch is told by the angles from each limb to the next."""
+    with assert_refused("at the hub", "anti-clockwise"):
+        Seastar(3, 5, body=Body(attachments=tuple(Attachment(0.0, 0.0, angle) for angle in directions)))
+
+
+def test_limbs_attached_at_the_hub_itself_are_those_without_a_body():
+    for directions in ((0.0,), (0.0, 1.0), (0.0, 1.0, 3.0)):
+        limbs = tuple(map(Limb, directions)) if len(directions) > 1 else ()
+        attached = Body(attachments=tuple(Attachment(0.0, 0.0, angle) for angle in directions))
+        with_body, without = Seastar(len(directions), 5, body=attached), Seastar(len(directions), 5, limbs=limbs)
+        assert [limb.gap for limb in with_body.limb_shapes()] == [limb.gap for limb in without.limb_shapes()]
+        assert with_body.limbs_that_may_touch() == without.limbs_that_may_touch()
+
+
+def test_one_limb_on_a_body_without_a_size_cannot_be_turned():
+    """As without a body: nothing holds the hub."""
+    for body in (None, Body()):
+        with assert_refused("One limb"):
+            Scene(Seastar(1, 5, body=body))
+    Scene(Seastar(1, 5, body=Body(radius=0.02)))
 
 
 def test_robots_that_cannot_have_a_body_or_a_joint_are_refused():
