@@ -4,7 +4,7 @@ Nodes are those of the star, then one per limb, its root on the body. Unknowns a
 body's angle [rad]. Roots follow from hub and angle; clamps, the rigid mass and the drag of strips are added here.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -151,7 +151,7 @@ class Pair:
 class Touching(Rigid):
     """A body whose outline limbs meet: corners (n, 2) [m], anti-clockwise, and their radius [m]; one for a disc.
 
-    limbs: (right, left) limbs that may touch. ahead: Whether contact is looked for half a step after a step's end.
+    limbs: Pairs of limbs that may touch. ahead: Whether contact is looked for half a step after a step's end.
     """
 
     corners: Array
@@ -198,9 +198,8 @@ class Touching(Rigid):
                     share = along(ends, corner, tail, head)
                     if 0.0 < share < 1.0:
                         found.append(self.pair(ends, corner, tail, head, share, side, self.stiffness(head, 0.5)))
-        for right, left in self.limbs:
-            for limb, other, side in ((right, left, -1.0), (left, right, 1.0)):
-                found += self.limb_at_limb(ends, start, limb, other, side)
+        for one, other in self.limbs:
+            found += self.limb_at_limb(ends, start, one, other) + self.limb_at_limb(ends, start, other, one)
         return found
 
     def pair(self, ends: Array, i: int, j: int, k: int, share: float, side: float, stiffness: float) -> Pair:
@@ -208,15 +207,22 @@ class Touching(Rigid):
         normal, t, share = side * np.array([-e[1], e[0]]) / np.linalg.norm(e), self.thickness, min(max(share, 0.0), 1.0)
         return Pair(i, j, k, share, normal, t[i] + (1.0 - share) * t[j] + share * t[k], stiffness)
 
-    def limb_at_limb(self, ends: Array, start: Array, limb: int, other: int, side: float) -> list[Pair]:
+    def limb_at_limb(self, ends: Array, start: Array, limb: int, other: int) -> list[Pair]:
+        """Nodes on the side of an edge on which they were, if they were beside it, and in front of its end."""
         star, found = self.star, []
         for edge in range(1, star.nodes_per_limb):
             tail, head = star.node(other, edge - 1), star.node(other, edge)
+            last = np.inf if edge == star.nodes_per_limb - 1 else 1.05
             for i in range(1, star.nodes_per_limb):
                 node = star.node(limb, i)
                 share = along(ends, node, tail, head)
+                before = start if -1.0 <= along(start, node, tail, head) <= 1.0 else ends
+                side = 1.0 if height(before, node, tail, head) > 0.0 else -1.0
                 pair = self.pair(ends, node, tail, head, share, side, self.stiffness(node, 0.5))
-                if -0.05 < share < 1.05 and side * height(start, node, tail, head) > -pair.thickness:
+                if share > 1.0:
+                    way = ends[node] - ends[head]
+                    pair = replace(pair, normal=way / np.linalg.norm(way))
+                if -0.05 < share < last:
                     found.append(pair)
         return found
 

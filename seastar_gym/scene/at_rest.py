@@ -7,12 +7,14 @@ from numpy.typing import NDArray
 
 from seastar_gym.scene.limb import LimbShape, along
 from seastar_gym.scene.outline import Outline
-from seastar_gym.scene.shape import rest_positions
+from seastar_gym.scene.shape import lines_cross, rest_positions
 
 Floats = NDArray[np.float64]
 
 FEW, MANY = 12, 60
 """Nodes of a limb that are looked at: limbs at rest are arcs."""
+CLOSE = 1e-3, 1e-2, 0.1
+"""Shares of the first edge that are looked at, too: an edge may begin within a flat body and end beyond it."""
 
 
 def touching_at_rest(
@@ -35,10 +37,16 @@ def touching_at_rest(
         np.minimum(along(limb.radius, share), 0.5 * opening_angle * limb.length * share) for limb in limbs
     ]
     for limb, (own, thick) in enumerate(zip(places, thickness, strict=True)):
-        if outline.reach and (outline.height_over(own[1:]) < thick[1:]).any():
+        near = np.array(CLOSE)[:, None]
+        close, thin = own[0] + near * (own[1] - own[0]), near[:, 0] * thick[1]
+        heights = outline.height_over(np.concatenate([close, own[1:]])) if outline.reach else np.full(1, np.inf)
+        if (heights < np.concatenate([thin, thick[1:]])).any():
             return f"limb {limb + 1} touches the body"
-    for one, other in [*pairs, *((left, right) for right, left in pairs)]:
-        if _too_near(places[one][1:], thickness[one][1:], places[other], thickness[other]):
+    for one, other in pairs:
+        near_each_other = any(
+            _too_near(places[i][1:], thickness[i][1:], places[j], thickness[j]) for i, j in ((one, other), (other, one))
+        )
+        if near_each_other or lines_cross(places[one], places[other]):
             return f"limbs {one + 1} and {other + 1} touch each other"
     return None
 

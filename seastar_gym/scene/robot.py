@@ -1,5 +1,6 @@
 """`Seastar`: a robot of limbs around a hub."""
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ from seastar_gym.scene.checks import require_choice, require_count, require_numb
 from seastar_gym.scene.limb import Limb, LimbShape, as_tuple
 from seastar_gym.scene.per_robot import Numbers, batch_size, chosen, require_each
 from seastar_gym.scene.serial import register_part
-from seastar_gym.scene.shape import around_body, limbs_that_may_touch, rest_positions, turn_per_hinge
+from seastar_gym.scene.shape import limbs_that_may_touch, rest_positions, turn_per_hinge
 from seastar_gym.scene.symmetry import PointGroup, point_group
 
 HubHinge = Literal["opening", "turning"]
@@ -176,13 +177,13 @@ class Seastar:
         return np.diff(directions, append=2.0 * math.pi).tolist() or [2.0 * math.pi / self.n_limbs] * self.n_limbs
 
     def limbs_that_may_touch(self) -> list[tuple[int, int]]:
-        """Pairs of limbs that may touch, (right, left), counted from 0."""
+        """Pairs of limbs that may touch, (right, left), counted from 0; on a body in any order."""
         alike, shapes = all(limb.length is None for limb in self.limbs), self.limb_shapes()
         if self.body is None or not self.has_body:
             return limbs_that_may_touch([shape.gap for shape in shapes], alike)
-        order, turns = around_body(shapes)
-        pairs = limbs_that_may_touch(turns, alike and not self.body.attachments and not self.body.outline)
-        return [(order[right], order[left]) for right, left in pairs]
+        if not alike or self.body.attachments or self.body.outline:
+            return list(itertools.combinations(range(self.n_limbs), 2))
+        return limbs_that_may_touch([shape.gap for shape in shapes], alike)
 
     @property
     def is_symmetric(self) -> bool:

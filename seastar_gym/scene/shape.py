@@ -54,47 +54,32 @@ def n_hub_hinges(n_limbs: int) -> int:
 def limbs_that_may_touch(gaps: Sequence[float], alike: bool) -> list[tuple[int, int]]:
     """Pairs of limbs (right, left) less than half a turn apart: neighbours, or all such pairs if lengths differ.
 
-    Limbs that begin apart may lean towards each other, by up to a quarter of a turn.
-
-    gaps: Angle from every limb to the next [rad], negative where they lean so. alike: Whether limbs have equal lengths,
-        so that none can reach over another.
+    gaps: Angle from every limb to the next [rad]. alike: Whether limbs have equal lengths, so that none can reach over
+        another.
     """
     n_limbs = len(gaps)
     turns = {
         (first, (first + steps) % n_limbs): sum(gaps[(first + k) % n_limbs] for k in range(steps))
         for first, steps in itertools.product(range(n_limbs), range(1, 2 if alike else n_limbs))
     }
-    return [pair for pair, turn in turns.items() if pair[0] != pair[1] and -0.5 * np.pi < turn < np.pi * (1.0 - 1e-9)]
-
-
-def around_body(limbs: Sequence[LimbShape]) -> tuple[list[int], list[float]]:
-    """Limbs in the order in which they begin around a body, anti-clockwise, and the angle from each to the next [rad].
-
-    The angles are those between their directions, which add up to a turn.
-    """
-    directions = np.array([limb.direction for limb in limbs])
-    roots = np.array([limb.root for limb in limbs])
-    at_hub = np.hypot(*roots.T) == 0.0
-    places = np.where(at_hub, directions, np.arctan2(roots[:, 1], roots[:, 0])) % (2.0 * np.pi)
-    leans = (directions - places + np.pi) % (2.0 * np.pi) - np.pi
-    order = np.lexsort([leans, places])
-    first = order[0]
-    turned = (places + leans)[order]
-    turns = np.diff(turned, append=places[first] + leans[first] + 2.0 * np.pi)
-    return order.tolist(), turns.tolist()
+    return [pair for pair, turn in turns.items() if pair[0] != pair[1] and turn < np.pi * (1.0 - 1e-9)]
 
 
 def cross_at_rest(nodes: NDArray[np.float64], n_limbs: int, pairs: Sequence[tuple[int, int]]) -> bool:
     """Whether limbs of any of the pairs cross. nodes: Node positions [m], shape (n_nodes, 2)."""
     limbs = [np.concatenate([nodes[:1], limb]) for limb in nodes[1:].reshape(n_limbs, -1, 2)]
+    return any(lines_cross(limbs[right], limbs[left]) for right, left in pairs)
+
+
+def lines_cross(line: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    """Whether two lines of edges cross, each with its corners, shape (n, 2)."""
 
     def cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
         return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
-    for right, left in pairs:
-        f, tails = np.diff(limbs[left], axis=0), limbs[left][:-1]
-        for tail, e in zip(limbs[right][:-1], np.diff(limbs[right], axis=0), strict=True):
-            of_e, of_f = cross(e, f) * cross(tails - tail, f), cross(e, f) * cross(tails - tail, e)
-            if ((of_e > 0.0) & (of_f > 0.0) & (np.maximum(of_e, of_f) < cross(e, f) ** 2)).any():
-                return True
+    f, tails = np.diff(other, axis=0), other[:-1]
+    for tail, e in zip(line[:-1], np.diff(line, axis=0), strict=True):
+        of_e, of_f = cross(e, f) * cross(tails - tail, f), cross(e, f) * cross(tails - tail, e)
+        if ((of_e > 0.0) & (of_f > 0.0) & (np.maximum(of_e, of_f) < cross(e, f) ** 2)).any():
+            return True
     return False

@@ -236,6 +236,28 @@ def forces(body: Body, began: np.ndarray, guessed: np.ndarray) -> np.ndarray:
     return work.contact.force[:n].T.reshape(began.shape)
 
 
+LINE = np.array([[-0.05, 0.0], [-0.07, 0.0], [-0.09, 0.0]])
+"""Nodes of a limb [m]. `MEETING` has those of another whose tip meets it, and where to that is pushed."""
+MEETING = {
+    "tip": ([[-0.17, 0.0005], [-0.13, 0.0005], [-0.092, 0.0005]], (-0.002, 0.0005)),
+    "left": ([[-0.08, -0.05], [-0.08, -0.03], [-0.08, -0.001]], (0.0, -1.0)),
+    "right": ([[-0.08, 0.05], [-0.08, 0.03], [-0.08, 0.001]], (0.0, 1.0)),
+}
+
+
+@pytest.mark.parametrize("side", MEETING)
+@pytest.mark.parametrize("limb", [1, 2])
+def test_limbs_on_a_body_meet_where_they_are(side, limb):
+    """On either side and in front of a tip, however they are numbered, since they may go round each other's tips."""
+    nodes, away = MEETING[side]
+    limbs = [np.array([[0.5, 0.5], [0.5, 0.6], [0.5, 0.7]]), LINE, np.array(nodes)]
+    if limb == 1:
+        limbs[1:] = limbs[:0:-1]
+    places = np.tile(np.concatenate([np.zeros((1, 2)), *limbs]), (N_LANES, 1, 1))
+    force = forces(UNEVEN, places, places)[0, (N - 1) * (limb + 1)]
+    np.testing.assert_allclose(force / np.linalg.norm(force), away / np.linalg.norm(away), atol=1e-9)
+
+
 @pytest.mark.parametrize("name", BODIES)
 def test_who_meets_a_body_is_alike_in_a_mirror_however_far_a_step_goes(name):
     """A corner that a node comes to from beside one side of an outline or the other is met from both."""

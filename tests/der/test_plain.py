@@ -87,7 +87,7 @@ def swim_on_bodies() -> None:
     water = Water(950.0, 1.3, 0.1, Vortex(0.02, 0.1, -0.05, 0.06), 0.8)
     outline = ((0.02, -0.01), (0.01, 0.02), (-0.02, 0.01), (-0.01, -0.02))
     for scheme, contact, body, blow in (
-        ("implicit-euler", Contact(), Body(radius=0.02), 3.0),
+        ("implicit-euler", Contact(), Body(radius=0.02), 10.0),
         ("implicit-midpoint", Contact(), Body(outline=outline, centre_of_mass=(2e-3, 1e-3)), 1.0),
         ("sdirk2", None, Body(outline=outline, mass=0.01), 20.0),
     ):

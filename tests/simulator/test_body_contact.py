@@ -103,6 +103,18 @@ def test_a_robot_on_its_body_swims_alike_in_any_company():
         np.testing.assert_array_equal(alone.positions[0], together.positions[robot])
 
 
+@pytest.mark.slow
+def test_limbs_that_meet_head_on_or_go_round_each_others_tips_swim_on():
+    """Pairs of parallel limbs at the long sides of a body, whose tips come to each other from either side."""
+    corners = [(x, y, math.copysign(0.5 * math.pi, y)) for x, y in ((3, 1.5), (-3, 1.5), (-3, -1.5), (3, -1.5))]
+    frame = tuple(Attachment(0.01 * x, 0.01 * y, direction) for x, y, direction in corners)
+    robot = Seastar(4, 8, 0.06, body=Body.rectangle(0.06, 0.03, attachments=frame))
+    simulator = Simulator(Scene(robot, contact=Contact(), numerics=Numerics("implicit-midpoint", 1e-2)), 64)
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        assert (simulator.stroke(rng.integers(-1, 2, (64, 4))).status == 0).all()
+
+
 def test_a_point_body_meets_nobody():
     """The kernels are those without a body, to the last bit."""
     ends = []
@@ -113,10 +125,10 @@ def test_a_point_body_meets_nobody():
     np.testing.assert_array_equal(*ends)
 
 
-def test_who_may_touch_around_a_body_is_told_by_where_limbs_begin():
-    """The order of attachments is free, and limbs may lean towards each other."""
+def test_who_may_touch_around_a_body():
+    """All limbs, however they are attached; of equal limbs around a disc, those beside each other."""
     leaning = Body.rectangle(0.06, 0.03, attachments=(Attachment(0.02, -0.015, -1.8), Attachment(-0.02, -0.015, -1.3)))
-    assert Seastar(2, 4, 0.03, body=leaning).limbs_that_may_touch() == [(1, 0)]
+    assert Seastar(2, 4, 0.03, body=leaning).limbs_that_may_touch() == [(0, 1)]
     assert set(Seastar(4, 4, body=Body(radius=0.02)).limbs_that_may_touch()) == {(0, 1), (1, 2), (2, 3), (3, 0)}
 
 
@@ -127,3 +139,9 @@ def test_what_touches_at_rest_is_refused():
     near = Body(radius=0.02, attachments=(Attachment(0.02, 0.0, 0.0), Attachment(0.02, 2e-3, 0.0)))
     with assert_refused("limbs 1 and 2 touch each other"):
         Scene(Seastar(2, 5, body=near), contact=Contact())
+    across = Body.rectangle(0.06, 0.03, attachments=(Attachment(0.03, 0.015, 2.4), Attachment(-0.03, 0.015, 0.7)))
+    with assert_refused("limbs 1 and 2 touch each other"):
+        Scene(Seastar(2, 5, 2.0, body=across), contact=Contact())
+    through = Body.rectangle(0.06, 1e-4, attachments=(Attachment(0.0, 5e-5, -1.6), Attachment(-0.03, 0.0, math.pi)))
+    with assert_refused("limb 1 touches the body"):
+        Scene(Seastar(2, 5, body=through), contact=Contact())

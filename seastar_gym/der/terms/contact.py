@@ -20,6 +20,9 @@ midpoint rule would keep it, and limbs that hinges press together would ring wit
 has g of half a step after the end, q_1 + h v_1/2 = q_hat + 4 (Q - q_hat) - gamma v_hat. With k to infinity, limbs that
 meet then come to rest against each other in two steps. So contact is of first order, and inelastic.
 
+Limbs that begin at one point have sides that they keep. Those on a body may go round each other's tips: there a node
+belongs to the side of an edge on which it was when the step began, and meets the end of a limb all round.
+
 A node whose limb was on its side when the step began belongs there, wherever the first guess has carried it, and a step
 at whose end edges have come to cross is halved: limbs do not pass through each other in long steps. V is at most
 k d^2/2. Limbs that meet with more energy, those of the chapter above about 25 m/s, would pass through each other in the

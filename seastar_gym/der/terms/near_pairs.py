@@ -105,15 +105,32 @@ def view_limbs(rods, work, q_0, right, left):
 
 @kernel
 def across_gap(rods, q, right, left):
-    """Unit vector from the right limb to the left: along the difference of their directions and across their sum."""
+    """Unit vector from one limb to another."""
+    return direction_across(rods.body, rods, q, right, left)
+
+
+@kernel
+def direction_across(body, rods, q, right, left):
+    """From the right limb to the left: along the difference of their directions and across their sum.
+
+    On a body, where there is no right and no left, from the middle of one limb to that of the other.
+    """
     edges = rods.nodes_per_limb - 1
-    ax, ay = edge_vector(q, tail_node(rods, right * edges), right * edges + 1)
-    bx, by = edge_vector(q, tail_node(rods, left * edges), left * edges + 1)
-    a, b = 1.0 / sqrt(add_product(ax * ax, ay, ay)), 1.0 / sqrt(add_product(bx * bx, by, by))
-    ax, ay, bx, by = a * ax, a * ay, b * bx, b * by
-    wx, wy = bx - ax - (ay + by), by - ay + (ax + bx)
-    scale = 1.0 / sqrt(add_product(wx * wx, wy, wy))
-    return scale * wx, scale * wy
+    if body is None:
+        ax, ay = edge_vector(q, tail_node(rods, right * edges), right * edges + 1)
+        bx, by = edge_vector(q, tail_node(rods, left * edges), left * edges + 1)
+        a, b = 1.0 / sqrt(add_product(ax * ax, ay, ay)), 1.0 / sqrt(add_product(bx * bx, by, by))
+        ax, ay, bx, by = a * ax, a * ay, b * bx, b * by
+        wx, wy = bx - ax - (ay + by), by - ay + (ax + bx)
+        scale = 1.0 / sqrt(add_product(wx * wx, wy, wy))
+        return scale * wx, scale * wy
+    wx, wy = splat(0.0), splat(0.0)
+    for i in range(1, edges + 1):
+        x, y = edge_vector(q, right * edges + i, left * edges + i)
+        wx, wy = wx + x, wy + y
+    size = sqrt(add_product(wx * wx, wy, wy))
+    known = size > 0.0
+    return select(known, wx / size, 1.0), select(known, wy / size, 0.0)
 
 
 @kernel
@@ -167,9 +184,60 @@ def list_pairs(contact, rods, work, stage, q_0, reach, limb, other, side, end, r
                 dx, dy = edge_vector(ends, j, i)
                 s = add_product(dx * ex, dy, ey) * inverse
                 g = add_product(dx * nx, dy, ny)
-                facing = facing & (s > -OVERHANG) & (s < 1.0 + OVERHANG)
+                facing = facing & (s > -OVERHANG) & (s < last_share(rods.body, edges, e))
                 if any_lane(facing):
-                    list_pair(contact, rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing)
+                    list_pair_on(rods.body, contact, rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing)
+
+
+@kernel
+def last_share(body, edges, e):
+    """Share of an edge up to which it meets nodes; on a body tips are round, and meet those in front of them, too."""
+    if body is None:
+        return splat(1.0 + OVERHANG)
+    return splat(np.inf if e % edges == edges - 1 else 1.0 + OVERHANG)
+
+
+@kernel
+def list_pair_on(body, contact, rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing):
+    """List node i and edge e if they are near each other in any of the robots in the mask `facing`.
+
+    Limbs that begin at one point have sides that they keep. Those on a body may go round each other's tips: there a
+    node belongs to the side of an edge on which it was when the step began, if it was beside it.
+    """
+    if body is None:
+        list_pair(contact, rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing)
+    else:
+        list_pair_on_its_side(contact, rods, work, stage, q_0, i, e, s, facing)
+
+
+@kernel
+def list_pair_on_its_side(contact, rods, work, stage, q_0, i, e, s, facing):
+    """List node i and edge e on a body, where the node is beside the edge or, at a tip, in front of it."""
+    j, k, ends = tail_node(rods, e), e + 1, work.contact.ends
+    fx, fy = edge_vector(q_0, j, k)
+    hx, hy = edge_vector(q_0, j, i)
+    squared = add_product(fx * fx, fy, fy)
+    g_0 = subtract_product(fx * hy, fy, hx) / sqrt(squared)
+    ex, ey = edge_vector(ends, j, k)
+    dx, dy = edge_vector(ends, j, i)
+    scale = 1.0 / sqrt(add_product(ex * ex, ey, ey))
+    g = subtract_product(ex * dy, ey, dx) * scale
+    foot = add_product(hx * fx, hy, fy)
+    was_beside = (foot >= -squared) & (foot <= squared)
+    side = select(select(was_beside, g_0, g) > 0.0, scale, -scale)
+    tx, ty = edge_vector(ends, k, i)
+    size = sqrt(add_product(tx * tx, ty, ty))
+    in_front = (s > 1.0) & (size > 0.0)
+    nx, ny = select(in_front, tx / size, -ey * side), select(in_front, ty / size, ex * side)
+    g = select(in_front, size, add_product(dx * nx, dy, ny))
+    ux, uy = edge_vector(q_0, k, i)
+    g_0 = select(in_front, sqrt(add_product(ux * ux, uy, uy)), absolute(g_0))
+    s = select(s > 0.0, select(s < 1.0, s, 1.0), 0.0)
+    tail = load(contact.thickness, j)
+    d = load(contact.thickness, i) + add_product(tail, s, load(contact.thickness, k) - tail)
+    near = facing & (g < MARGIN * d + absolute(g - g_0))
+    if any_lane(near):
+        put_on_list(contact, rods, work, stage, i, e, nx, ny, s, d, near)
 
 
 @kernel
