@@ -106,7 +106,7 @@ def compare(options: Options, folder: Path, remarks: Remarks) -> None:
     )
 
 
-def script(decision_period: float | None, scene: Scene | None) -> dict[str, Policy]:
+def script(decision_period: float | None, scene: Scene | None = None) -> dict[str, Policy]:
     """Fastest scripted gait round the pentagon for a time between decisions [s], by its name; {} if there is none."""
     for name in ("lagged-pentagon", "pentagon"):
         with suppress(ValueError):  # the gait needs other decisions, or another robot

@@ -168,8 +168,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `newton_iterations`      | int        | 1    | Newton iterations of the decision                                |
     | `solver_status`          | int        | -    | `SolverStatus` of the decision, 0: converged                     |
     | `solver_message`         | str        | -    | what to do about a status other than 0; empty for 0              |
-    | `smallest_opening_angle` | float      | rad  | smallest angle between neighbouring limbs; below 0: they crossed |
-    |                          |            |      | (pi with a body)                                                 |
+    | `smallest_opening_angle` | float      | rad  | between neighbouring limbs, below 0: they crossed; pi on a body  |
     | `reward_progress`        | float      | 1    | term of the reward                                               |
     | `reward_waypoint`        | float      | 1    | term of the reward                                               |
     | `reward_effort`          | float      | 1    | term of the reward                                               |

@@ -10,6 +10,7 @@ Prints tables and writes `limbs.json` and `limbs.png`. Takes about ten seconds o
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +20,21 @@ from rich.markup import escape
 from rich.table import Table
 
 from seastar_gym.command import run_command
+from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.pulse import pulse
 from studies.measurements.curves import PHASES, Curve, read_curves
 from studies.measurements.fit import Fit, fit, predict
 from studies.measurements.model import MODELS
 from studies.measurements.pictures import HEATING_SHARE, draw
-from studies.measurements.swims import FIDELITY, GAITS, STROKES, actuators, distances
+from studies.measurements.swims import (
+    FIDELITY,
+    GAITS,
+    STROKES,
+    actuators,
+    distances,
+    policies,
+    round_the_pentagon,
+)
 from studies.parser import study_parser
 from studies.provenance import provenance
 
@@ -137,12 +147,24 @@ def study_swims(console: Console) -> dict[str, Any]:
     }
 
 
+def study_policies(console: Console) -> dict[str, Any]:
+    """Strokes of policies round the pentagon with every actuator, None where they do not arrive; prints them."""
+    found: dict[str, Any] = {}
+    for limb, actuator in actuators().items():
+        scene = replace(Scene.preset(FIDELITY), actuator=actuator)
+        swims = [round_the_pentagon(name, policy, scene) for name, policy in policies(actuator.period).items()]
+        found[limb] = {one.agent: one.strokes if one.finished else None for one in swims}
+    rows = [[limb, *("-" if n is None else str(n) for n in strokes.values())] for limb, strokes in found.items()]
+    console.print(table(f"Strokes round the pentagon, {FIDELITY}", ("limb", "learned", "pentagon"), rows))
+    return found
+
+
 def main() -> None:
     """Command line."""
     parser = study_parser("studies.measurements.limbs", __doc__)
     parser.add_argument("--out", type=Path, default=Path("docs"), metavar="FOLDER", help="folder of the results")
     parser.add_argument("--models", action="store_true", help="also compare the other models")
-    parser.add_argument("--swims", action="store_true", help="also swim with the measured limbs (half a minute)")
+    parser.add_argument("--swims", action="store_true", help="also swim with the measured limbs (two minutes)")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     console, curves = Console(), read_curves()
@@ -157,6 +179,7 @@ def main() -> None:
         results["models"] = {name: dict(zip(columns[1:], cells, strict=True)) for name, cells in all_models.items()}
     if options.swims:
         results["gaits"], results["swims"] = list(GAITS), study_swims(console)
+        results["strokes_round_the_pentagon"] = study_policies(console)
     (options.out / "limbs.json").write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
     draw(results, options.out / "limbs.png")
 

@@ -5,6 +5,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.controllers.contract import Policy, actions_of
+from seastar_gym.controllers.learned import LearnedPolicy, in_the_box, load
+from seastar_gym.controllers.scripted import scripted
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.evaluation.swim import Swim, swim
 from seastar_gym.gaits import PAIRS, pair_gait, straight_gait
 from seastar_gym.scene import Scene, SmaLimb, SmaPulse
 from seastar_gym.scene.actuators.actuator import Actuator
@@ -25,6 +30,10 @@ GAITS = {
 """The pairs of Fig. 13.8, the straight swim, and the alternation of two pairs; commands of shape (n, n_limbs)."""
 
 
+MOST_STROKES = 400
+"""Strokes after which a swim round the pentagon ends."""
+
+
 def actuators() -> dict[str, Actuator]:
     """The chapter's pulse and every measured limb, at its own period."""
     limbs = {f"{liquid_metal} %": SmaLimb.preset(liquid_metal) for liquid_metal in MEASURED}
@@ -43,3 +52,18 @@ def distances(actuator: Actuator) -> Floats:
         if simulator.failed.any():
             raise RuntimeError(SolverStatus.NOT_CONVERGED.sentence)
     return np.asarray(1e3 * np.linalg.norm(simulator.hub_position() - half, axis=1) / (STROKES - STROKES // 2))
+
+
+def policies(period: float) -> dict[str, Policy]:
+    """The policy of strokes in the box, trained with the ramp, and the chapter's gait, for strokes so long [s]."""
+    trained = load(in_the_box(None))
+    ramp = replace(trained.scene, actuator=SmaPulse(heating_time=0.1 * period, cooling_time=0.9 * period))
+    learned = LearnedPolicy(trained.description._replace(scene=ramp), trained.weights)
+    return {"learned": learned, "pentagon": scripted("pentagon")}
+
+
+def round_the_pentagon(name: str, policy: Policy, scene: Scene) -> Swim:
+    """Swim of a policy that does not see how warm limbs are, as with the ramp there is nothing to see."""
+    actions = actions_of(policy, scene.robot.n_limbs)
+    env = SeastarSwimEnv("pentagon", scene=scene, actions=actions, observe_actuators=False)
+    return swim(name, policy, env, max_strokes=MOST_STROKES)

@@ -16,7 +16,7 @@ from rich.table import Table
 
 from seastar_gym.command import run_command
 from seastar_gym.gaits import STRAIGHT
-from seastar_gym.scene import AlongLimb, Body, Contact, Scene, Seastar, Stiffening, relaxation_time
+from seastar_gym.scene import AlongLimb, Body, Contact, Limb, Scene, Seastar, Stiffening, relaxation_time
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
 from seastar_gym.scene.fluid import Water
 from seastar_gym.simd.lanes import N_LANES
@@ -63,9 +63,18 @@ def scenes() -> dict[str, Scene]:
         "bent along, stiff when hot": Scene(Seastar(along=AlongLimb(), stiffening=Stiffening())),
         "a disc for a body": Scene(Seastar(body=Body(radius=0.02))),
         "a rectangle for a body": Scene(Seastar(body=Body.rectangle(0.06, 0.03))),
+        "joints of the limbs": Scene(Seastar(limbs=(Limb(joint_stiffness=2e-4),) * 5)),
         "contact, limbs apart": Scene(contact=Contact()),
+        "a rectangle for a body, contact": Scene(Seastar(body=Body.rectangle(0.06, 0.03)), contact=Contact()),
         "numbers of each robot": Scene(Seastar(youngs_modulus=np.full(n_robots, 1e6))),
         "all of these": Scene(replace(damped, youngs_modulus=np.full(n_robots, 1e6)), everything),
+        "all, a body, bent along, contact": Scene(
+            replace(
+                damped, youngs_modulus=np.full(n_robots, 1e6), along=AlongLimb(), stiffening=Stiffening(),
+                body=Body.rectangle(0.06, 0.03),
+            ),
+            everything, contact=Contact(),
+        ),
     }
 
 
