@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from itertools import chain
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -75,3 +76,13 @@ def test_the_study_writes_its_figures_and_picture(tmp_path, monkeypatch):
     errors = np.concatenate([one["errors"] for one in found["fits"].values()])
     assert errors.size == 48 and np.sum(errors < limbs.AIM) == 36
     assert (tmp_path / "limbs.png").stat().st_size > 50_000
+
+
+def test_the_page_has_the_strokes_of_the_policies_that_were_counted():
+    docs = Path(__file__).resolve().parents[2] / "docs"
+    counted = json.loads((docs / "limbs.json").read_text(encoding="utf-8"))["strokes_round_the_pentagon"]
+    page = (docs / "measurements.md").read_text(encoding="utf-8")
+    for limb, strokes in counted.items():
+        name = "the chapter's pulse" if limb == "pulse" else limb
+        cells = ["-" if n is None else str(n) for n in (strokes["learned"], strokes["pentagon"])]
+        assert f"| {' | '.join([name, *cells])} |" in page
