@@ -212,7 +212,11 @@ def list_pair_on(body, contact, rods, work, stage, q_0, i, e, side, nx, ny, s, g
 
 @kernel
 def list_pair_on_its_side(contact, rods, work, stage, q_0, i, e, s, facing):
-    """List node i and edge e on a body, where the node is beside the edge or, at a tip, in front of it."""
+    """List node i and edge e on a body, where the node is beside the edge or, at a tip, in front of it.
+
+    The side is that of the step's beginning, if the node was beside the edge then or at most an edge's length behind it.
+    Otherwise it is that of the first guess.
+    """
     j, k, ends = tail_node(rods, e), e + 1, work.contact.ends
     fx, fy = edge_vector(q_0, j, k)
     hx, hy = edge_vector(q_0, j, i)
