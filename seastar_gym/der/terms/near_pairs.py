@@ -214,7 +214,7 @@ def list_pair_on(body, contact, rods, work, stage, q_0, i, e, side, nx, ny, s, g
 def list_pair_on_its_side(contact, rods, work, stage, q_0, i, e, s, facing):
     """List node i and edge e on a body, where the node is beside the edge or, at a tip, in front of it.
 
-    The side is that of the step's beginning, if the node was beside the edge then or at most an edge's length behind it.
+    The side is that of the step's beginning, if the node was beside the edge then, or at most the edge's length behind.
     Otherwise it is that of the first guess.
     """
     j, k, ends = tail_node(rods, e), e + 1, work.contact.ends
