@@ -198,9 +198,9 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         `seastar_gym.envs.paths.register_path` added - or waypoints [m], shape (n, 2), from the origin.
         `reset(options={"path": ...})` chooses another path for one episode.
     actions: How commands are written: "limbs", "joint", "pairs" or "continuous", see above.
-    fidelity: Accuracy of the simulation: "fast", "balanced" (default), "accurate", "reference" or "chapter". Without a
-        `scene` it chooses nodes per limb, discretisation and numerics, as `Scene.preset` does, otherwise the numerics
-        alone. If `scene` names its numerics, they are used, and another fidelity is refused.
+    fidelity: Accuracy of the simulation: "fast", "balanced" (default), "accurate", "reference" or "chapter". It chooses
+        nodes per limb, discretisation and numerics, as far as `scene` names none, see `Scene.at`. A fidelity other than
+        the numerics that `scene` names is refused.
     scene: Robot, actuators, fluid and numerics; by default the chapter's robot in water.
     reward: Weights of the reward's terms.
     waypoint_radius: Distance of the hub [m] within which a waypoint is reached.

@@ -20,6 +20,7 @@ from seastar_gym import (
     RewardWeights,
     Scene,
     Seastar,
+    Simulator,
     SmaPulse,
     SolverStatus,
     Uniform,
@@ -145,7 +146,24 @@ def test_a_scene_that_names_no_numerics_swims_at_the_fidelity(fidelity):
     scene = Scene(Seastar(density=1100.0))
     for given in (scene, pickle.loads(pickle.dumps(scene)), replace(scene, contact=None)):
         env = SeastarSwimEnv(scene=given, fidelity=fidelity)
-        assert env.scene == replace(scene, numerics=Numerics.preset(fidelity or "balanced"))
+        preset = Scene.preset(fidelity or "balanced")
+        assert env.scene == replace(preset, robot=replace(preset.robot, density=1100.0))
+
+
+def swum_straight(simulator: Simulator) -> bytes:
+    simulator.stroke([[0.0, 1.0, 0.0, 0.0, -1.0]])
+    return simulator.positions.tobytes()
+
+
+@pytest.mark.parametrize("fidelity", [None, "fast"])
+def test_a_scene_is_swum_alike_however_it_is_asked_for(fidelity):
+    scene = Scene() if fidelity is None else Scene.preset(fidelity)
+    simulators = [Simulator(scene)]
+    for arguments in ({}, {"scene": Scene()}, {"scene": Scene().to_dict()}, {"scene": Scene(Seastar())}):
+        env = gym.make("SeastarSwim-v0", **arguments, **({} if fidelity is None else {"fidelity": fidelity}))
+        env.reset(seed=0)
+        simulators.append(env.unwrapped.simulator)
+    assert len({swum_straight(each) for each in simulators}) == 1
 
 
 def test_numerics_that_a_scene_names_are_kept():
@@ -246,7 +264,7 @@ def test_table_actions_do_what_the_limb_actions_they_stand_for_do(actions):
 
 def test_observation_is_that_of_the_simulators_state():
     """Recomputed from positions and velocities with complex numbers, index by index."""
-    env, rng = fast(path="random", random_heading=True, scene=Scene()), np.random.default_rng(0)
+    env, rng = fast(path="random", random_heading=True, scene=Scene(Seastar(nodes_per_limb=10))), np.random.default_rng(0)
     observation, _ = env.reset(seed=3)
     rest = env.scene.robot.nodes() @ [1.0, 1j]
     for _ in range(10):
@@ -454,11 +472,11 @@ def test_a_path_is_copied_when_the_environment_is_made():
 
 
 def test_random_heading_turns_the_robot_and_its_absence_does_not():
-    env = fast(random_heading=True, scene=Scene())
+    env = fast(random_heading=True, scene=Scene(Seastar(nodes_per_limb=10)))
     env.reset(seed=0)
     tip = env.simulator.positions[0, 9]
     assert np.hypot(*tip) == pytest.approx(0.1) and abs(tip[1]) > 1e-3
-    plain = fast(scene=Scene())
+    plain = fast(scene=Scene(Seastar(nodes_per_limb=10)))
     plain.reset(seed=0)
     np.testing.assert_array_equal(plain.simulator.positions[0], Seastar().nodes())
 
