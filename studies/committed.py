@@ -248,7 +248,7 @@ def table(docs: Path, name: str) -> str:
             from seastar_gym.benchmark import page, results
 
             return page.table(results.read(docs / "leaderboard" / "results.json"))
-        case ["errors" | "choosing" | "presets" | "timed" as name]:
+        case ["errors" | "choosing" | "presets" | "timed" | "timed_paths" as name]:
             from studies.accuracy import page as accuracy_page
 
             return str(getattr(accuracy_page, name)())

@@ -4,9 +4,10 @@ Every error is one that `info` has: `path_error` or `gait_error` is the bound, `
 the median beside it.
 """
 
+import json
 from typing import get_args
 
-from seastar_gym.scene.fidelity import Promise, TimedPromise, promise, timed_promise
+from seastar_gym.scene.fidelity import TIMED_PRESETS, Promise, TimedPromise, promise, timed_promise
 from seastar_gym.scene.numerics import Fidelity
 from studies.accuracy.tables import two_digits
 
@@ -94,3 +95,14 @@ def timed(periods: tuple[float, ...] = (0.5, 0.2, 0.1)) -> str:
         rows.append([f"`{name}`", *(each[k] for k in (0, 1) for each in found)])
     columns = [f"{what}, {period:g} s" for what in ("random", "repeated") for period in periods]
     return markdown(["fidelity", *columns], rows)
+
+
+def timed_paths() -> str:
+    """Shortest, median and longest paths [mm] of commands in time."""
+    stored = json.loads(TIMED_PRESETS.read_text(encoding="utf-8"))["paths"]
+    kinds = {"random": "random commands", "repeated": "repeated seconds"}
+    rows = [
+        [name, *(", ".join(f"{length:g}" for length in each[kind]) for each in stored.values())]
+        for kind, name in kinds.items()
+    ]
+    return markdown(["", *(f"every {period} s" for period in stored)], rows)

@@ -87,10 +87,23 @@ def scene_at(nodes: int, numerics: Numerics, like: Scene) -> Scene:
     return replace(like, robot=replace(like.robot, nodes_per_limb=nodes), numerics=numerics, actuator=SmaWires())
 
 
+def way(hub: Floats) -> Floats:
+    """Lengths of paths from the origin at whole seconds [m], shape (n,)."""
+    return np.asarray(np.linalg.norm(np.diff(hub, axis=0, prepend=0.0), axis=-1).sum(axis=0))
+
+
 def path_lengths(hub: Floats, limb_length: float) -> Floats:
-    """Lengths of paths from the origin at whole seconds [m], at least those at SLOWEST, shape (n,)."""
-    steps = np.diff(hub, axis=0, prepend=0.0)
-    return np.fmax(np.linalg.norm(steps, axis=-1).sum(axis=0), SLOWEST * limb_length * len(hub))
+    """The same, at least those at SLOWEST."""
+    return np.fmax(way(hub), SLOWEST * limb_length * len(hub))
+
+
+def paths(period: float, plan: Plan) -> dict[str, list[float]]:
+    """Shortest, median and longest path [mm] at "fast" of random commands and of repeated seconds."""
+    fast = Scene.preset("fast")
+    commands = sequences(period, plan, np.random.default_rng([SEED, round(1000 * period)]))
+    length = 1e3 * way(swim(scene_at(fast.robot.nodes_per_limb, fast.numerics, fast), commands, period))
+    kinds = {"random": length[: plan.samples], "repeated": length[plan.samples :]}
+    return {name: [two_digits(float(end)) for end in np.percentile(some, (0, 50, 100))] for name, some in kinds.items()}
 
 
 def summary(space: Floats, time: Floats, samples: int) -> dict[str, float]:
@@ -135,6 +148,7 @@ def study(plan: Plan) -> dict[str, Any]:
             "shortest path": f"{SLOWEST:g} limb lengths per second",
             "limit": f"{plan.nodes} nodes per limb, {1e3 * plan.short.step:g} ms",
         },
+        "paths": {f"{period:g}": paths(period, plan) for period in PERIODS},
         "processor_seconds": round(time.process_time() - began),
         "presets": {
             name: {f"{period:g}": {what: two_digits(one, up=True) for what, one in found[period][name].items()}
