@@ -22,6 +22,17 @@ def write_atomically(path: str | os.PathLike[str], data: bytes | str) -> None:
         part.write_bytes(data.encode() if isinstance(data, str) else data)
 
 
+def write_json(path: str | os.PathLike[str], data: object) -> None:
+    """Write data as JSON; what JSON does not know, such as a path, is written as text."""
+    write_atomically(path, json.dumps(data, indent=2, default=str) + "\n")
+
+
+def save_figure(figure: Any, path: str | os.PathLike[str], **options: Any) -> None:
+    """Draw a figure of matplotlib into a file, in the format of its ending."""
+    with beside(path) as part:
+        figure.savefig(part, format=Path(path).suffix[1:].lower() or "png", **options)
+
+
 @contextmanager
 def beside(path: str | os.PathLike[str]) -> Iterator[Path]:
     """An empty file beside `path`, to write to. It takes its place at the end, when it is on the disk.

@@ -66,13 +66,14 @@ def test_every_command_says_in_a_sentence_what_the_disk_refuses(command):
         (FileNotFoundError("There is no file out.csv."), "There is no file out.csv."),
     ],
 )
-def test_what_the_disk_refuses_is_said_in_a_sentence(failure, sentence):
+def test_what_the_disk_refuses_is_said_in_a_sentence(failure, sentence, capsys):
     def main():
         raise failure
 
     with pytest.raises(SystemExit) as ended:
         run_command(main)
-    assert ended.value.code == sentence
+    assert capsys.readouterr().err == f"{sentence}\n"
+    assert ended.value.code == (2 if failure.errno is None else 1)
 
 
 def test_a_command_keeps_its_exit_code():

@@ -69,9 +69,10 @@ def test_two_at_once_do_not_meet(tmp_path):
 @pytest.mark.parametrize("failure", [OSError(28, "No space left on device"), KeyboardInterrupt()], ids=repr)
 def test_whatever_goes_wrong_leaves_the_file_as_it_was(failure, tmp_path):
     (tmp_path / "file").write_text("before")
-    with pytest.raises(type(failure)), beside(tmp_path / "file") as place:
-        place.write_text("half")
-        raise failure
+    writing = beside(tmp_path / "file")
+    writing.__enter__().write_text("half")
+    with pytest.raises(type(failure)):
+        writing.gen.throw(failure)
     assert (tmp_path / "file").read_text() == "before" and names(tmp_path) == {"file"}
 
 

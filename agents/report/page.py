@@ -18,6 +18,7 @@ from agents.report.charts import Curve, curves_figure, paths_figure, speeds_figu
 from agents.report.playback import UNIT, Playback
 from seastar_gym.evaluation.results import number
 from seastar_gym.evaluation.swim import Swim
+from seastar_gym.files import write_atomically
 from seastar_gym.scene.csv_rows import Row as CsvRow
 from seastar_gym.scene.csv_rows import read_rows
 
@@ -82,7 +83,7 @@ def write_report(
         "swims": _script_safe(_recorded(playbacks, swims[0].waypoints, waypoint_radius)),
     }
     page = re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], PAGE.read_text(encoding="utf-8"))
-    file.write_text(page, encoding="utf-8")
+    write_atomically(file, page)
 
 
 def _section(title: str, content: str) -> str:

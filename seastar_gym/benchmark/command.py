@@ -27,6 +27,7 @@ from seastar_gym.controllers.roster import HELP
 from seastar_gym.evaluation.many import HELD_OUT_SEED
 from seastar_gym.evaluation.tasks import require_task, task_ids
 from seastar_gym.executors.options import add_options, executor_of
+from seastar_gym.files import write_atomically
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
 
@@ -138,7 +139,6 @@ def whole(found: Sequence[Answer]) -> Entry:
 
 def publish(entries: Sequence[Entry], folder: Path, command: str) -> list[str]:
     """Write results.json, benchmark.md and, where matplotlib is there, profiles.png; returns their names."""
-    folder.mkdir(parents=True, exist_ok=True)
     write(entries, folder / "results.json")
     _, scores = page.common(entries)
     picture = None
@@ -148,7 +148,7 @@ def publish(entries: Sequence[Entry], folder: Path, command: str) -> list[str]:
             picture = "profiles.png"
         except ModuleNotFoundError:
             print('No picture: that needs matplotlib, pip install "seastar-gym[studies]".')
-    (folder / "benchmark.md").write_text(page.page(entries, command, picture), encoding="utf-8")
+    write_atomically(folder / "benchmark.md", page.page(entries, command, picture))
     return ["results.json", "benchmark.md", *([] if picture is None else [picture])]
 
 

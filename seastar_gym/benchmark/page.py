@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.benchmark.results import Entry, best_means, relative
 from seastar_gym.evaluation.statistics import Estimate, estimate, profile
+from seastar_gym.files import save_figure
 
 Floats = NDArray[np.float64]
 LEVELS = np.linspace(0.0, 1.2, 241)
@@ -82,7 +83,7 @@ def draw(scores: Mapping[str, Floats], file: Path) -> None:
     )  # fmt: skip
     axes.grid(color="0.92")
     axes.legend(frameon=False, loc="lower left")
-    figure.savefig(file, dpi=140)
+    save_figure(figure, file, dpi=140)
 
 
 def page(entries: Sequence[Entry], command: str, picture: str | None) -> str:

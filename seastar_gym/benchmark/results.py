@@ -92,7 +92,7 @@ def merged(*results: Sequence[Entry]) -> list[Entry]:
 def write(entries: Sequence[Entry], file: Path) -> None:
     """Write entries as JSON."""
     text = json.dumps({"format": FORMAT, "entries": [asdict(entry) for entry in entries]}, indent=1)
-    write_atomically(file, f"{text}\n".encode())
+    write_atomically(file, f"{text}\n")
 
 
 def read(file: Path) -> list[Entry]:

@@ -10,13 +10,13 @@ reads it, `certificate.for_error(0.01)` is the scene at the fastest setting that
 """
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from seastar_gym.certification.measure import SAMPLES, certify
 from seastar_gym.extras import require_extra
+from seastar_gym.files import save_figure, write_json
 from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.checks import require_error
 from seastar_gym.scene.scene_file import load_scene
@@ -52,7 +52,7 @@ def draw(certificate: Certificate, file: Path) -> None:
     axes.set(xlabel="x real time, batch on one core", ylabel="largest error of the hub's path [%]")
     axes.grid(True, which="major", color="0.9")
     axes.legend(frameon=False)
-    figure.savefig(file, dpi=130)
+    save_figure(figure, file, dpi=130)
     plt.close(figure)
 
 
@@ -109,7 +109,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             chosen = certificate.for_error(options.error)
             print(f"{100 * options.error:g} %: nodes_per_limb={chosen.robot.nodes_per_limb}, {chosen.numerics}")
             if options.chosen is not None:
-                options.chosen.write_text(json.dumps(chosen.to_dict()) + "\n", encoding="utf-8")
+                write_json(options.chosen, chosen.to_dict())
                 print(f"Written: {options.chosen}")
     except (ValueError, ModuleNotFoundError) as bad_input:
         print(bad_input, file=sys.stderr)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation import films
 from seastar_gym.evaluation.swim import Swim
+from seastar_gym.files import save_figure
 
 Floats = NDArray[np.float64]
 
@@ -49,7 +50,7 @@ def draw_traces(swims: Sequence[Swim], waypoint_radius: float, file: Path) -> No
         loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False, ncols=2, alignment="left",
         title=f"agents, with a dot every {STROKES_PER_DOT} {swims[0].counted_in}",
     )  # fmt: skip
-    figure.savefig(file, dpi=160, bbox_inches="tight", pad_inches=0.15)
+    save_figure(figure, file, dpi=160, bbox_inches="tight", pad_inches=0.15)
 
 
 def view(path: Floats, hubs: Floats) -> tuple[Floats, Floats]:
