@@ -97,6 +97,19 @@ def require_sound(options: argparse.Namespace) -> list[str]:
     return tasks
 
 
+def require_measures(entries: Sequence[Entry]) -> None:
+    """ValueError where results of others name a task that this package has not, or another measure than its own."""
+    for task in {entry.task for entry in entries}:
+        require_task(task)
+        measure = measure_of(env_of(task, None))
+        for entry in entries:
+            if entry.task == task and (entry.measure, entry.unit, entry.better) != measure[:3]:
+                raise ValueError(
+                    f"{task} is measured by {measure.name} [{measure.unit}], of which {measure.better} is better, not "
+                    f"by {entry.measure} [{entry.unit}]."
+                )
+
+
 class Measured(NamedTuple):
     """Results so far. code: Exit code, 1 where a job was lost, INTERRUPTED after Ctrl-C."""
 
@@ -167,6 +180,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(given)
     try:
         others = [read(file) for file in options.merge]
+        require_measures([entry for entries in others for entry in entries])
         own, code = benchmark(options) if options.agents else Measured([], 0)
         entries = merged(*others, own)
         if code == INTERRUPTED:

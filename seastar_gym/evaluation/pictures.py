@@ -110,7 +110,7 @@ def _draw_trace(axes: Axes, swim: Swim, number: int) -> None:
     colour = COLOURS[number % len(COLOURS)]
     style = LINE_STYLES[number // len(COLOURS) % len(LINE_STYLES)]
     width, level = 1.4 + 0.4 * min(number, 4), 4.0 - 0.01 * number
-    label = f"{swim.agent}: {swim.result}"
+    label = f"{swim.agent}: {swim.result}".replace("$", r"\$")
     axes.plot(*hub.T, color=colour, linestyle=style, linewidth=width, zorder=level, label=label)
     dots = hub[STROKES_PER_DOT::STROKES_PER_DOT]
     axes.plot(*dots.T, color=colour, linestyle="", marker="o", markersize=width + 2.0, zorder=level)
