@@ -6,7 +6,6 @@
 From Python, `evaluate({"mine": policy, "script": scripted("pentagon")}, path)` does the same.
 """
 
-import json
 import re
 import shlex
 import sys
@@ -22,7 +21,7 @@ from rich.text import Text
 
 from agents.names import AgentNames
 from agents.report.charts import Curve, read_progress
-from agents.report.page import Remarks, ResultsTable, read_trials, write_report
+from agents.report.page import Remarks, ResultsTable, read_bound, read_trials, write_report
 from agents.report.playback import Playback, RecordingEnv
 from agents.results import results_table
 from seastar_gym.command import run_command
@@ -208,7 +207,7 @@ def _remarks(agents: Mapping[str, Policy], options: Options, arguments: Sequence
         commands=[*commands, shlex.join(["python", "-m", "agents.evaluate", *arguments])],
         curves=[Curve.of(name, rows) for name, rows in progress.items()],
         tables=[] if options.trials is None else [read_trials(options.trials)],
-        bound=json.loads(options.bound.read_text(encoding="utf-8")) if options.bound.is_file() else None,
+        bound=read_bound(options.bound) if options.bound.exists() else None,
     )
 
 

@@ -99,6 +99,46 @@ def test_an_empty_folder_has_no_results(tmp_path):
         read_parts(tmp_path)
 
 
+DAMAGES = {
+    "empty": lambda part: b"",
+    "cut": lambda part: part[: len(part) // 2],
+    "a byte of the numbers": lambda part: part[:60] + bytes([part[60] ^ 1]) + part[61:],
+    "a byte of the footer": lambda part: part[:-40] + bytes([part[-40] ^ 255]) + part[-39:],
+    "no parquet": lambda part: b"PAR1 nothing PAR1",
+    "deep text": lambda part: b"[" * 100_000,
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
+def test_a_damaged_part_is_named_left_out_and_simulated_again(damage, tmp_path, cells):
+    first, second = cells
+    assert run(iter(cells), tmp_path, Here()).done == 2
+    whole, file = read_parts(tmp_path), Parts(tmp_path).file(first.name)
+    sound = file.read_bytes()
+    file.write_bytes(damage(sound))
+    with pytest.warns(UserWarning, match=f"{file} is damaged, and left out: the same sweep simulates its cell again"):
+        assert read_parts(tmp_path).num_rows == second.n_robots
+    with pytest.warns(UserWarning, match=f"{file} is damaged"):
+        again = run(iter(cells), tmp_path, Here())
+    assert (again.done, again.kept) == (1, 1)
+    assert file.read_bytes() == sound and read_parts(tmp_path).equals(whole)
+
+
+def test_a_part_under_the_name_of_another_cell_is_damaged(tmp_path, cells):
+    first, second = cells
+    run(iter(cells), tmp_path, Here())
+    Parts(tmp_path).file(first.name).write_bytes(Parts(tmp_path).file(second.name).read_bytes())
+    with pytest.warns(UserWarning, match="it has another cell"):
+        assert run(iter(cells), tmp_path, Here()).done == 1
+
+
+def test_no_sound_part_is_no_result(tmp_path, cells):
+    run(iter(cells[:1]), tmp_path, Here())
+    Parts(tmp_path).file(cells[0].name).write_bytes(b"")
+    with pytest.warns(UserWarning, match="is damaged"), pytest.raises(ValueError, match="no results"):
+        read_parts(tmp_path)
+
+
 def test_a_part_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
     def full(descriptor):
         raise OSError(28, "No space left on device")
