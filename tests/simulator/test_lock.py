@@ -1,10 +1,12 @@
 """The lock of a simulator refuses a second change, and knows which one was interrupted."""
 
+import os
 import threading
 
 import pytest
 
 from seastar_gym.simulator.lock import BROKEN_OFF, ELSEWHERE, PAUSED, StrokeLock
+from seastar_gym.simulator.workers import Workers
 
 
 def refused(call, sentence: str) -> None:
@@ -72,3 +74,65 @@ def test_a_stroke_whose_lock_was_taken_does_not_resume():
     lock.release()
     lock.acquire()
     assert not lock.resume(stroke)
+
+
+def passes_in_a_fork(promise) -> bool:
+    """Whether a promise holds in a forked process, which has no other threads."""
+    child = os.fork()
+    if child == 0:
+        try:
+            promise()
+        except BaseException:
+            os._exit(1)
+        os._exit(0)
+    return os.waitpid(child, 0)[1] == 0
+
+
+def test_a_change_by_a_thread_that_a_fork_does_not_have_is_an_interrupted_one():
+    """Nobody in the fork would end it: it takes the lock over, and knows that robots have to be repaired."""
+    lock = StrokeLock()
+    in_a_thread(lock.acquire)
+
+    def is_taken_over():
+        refused(lock.require_intact, BROKEN_OFF)
+        with lock.change(repairs=True):
+            assert lock.broken
+        lock.require_intact()
+
+    assert passes_in_a_fork(is_taken_over)
+    refused(lock.acquire, ELSEWHERE)  # the parent's thread goes on
+
+
+def test_a_paused_stroke_is_paused_in_a_fork_too():
+    lock = StrokeLock()
+    stroke = lock.acquire()
+    lock.pause()
+
+    def goes_on():
+        refused(lock.acquire, PAUSED)
+        assert lock.resume(stroke)
+        lock.release()
+        lock.require_intact()
+
+    assert passes_in_a_fork(goes_on)
+    refused(lock.acquire, PAUSED)
+
+
+def test_a_fork_has_threads_of_its_own_to_work_with_and_to_close():
+    workers, done = Workers(2), []
+    workers.run(lambda thread, part: done.append(part), [slice(0, 1), slice(1, 2)])
+
+    def has_threads():
+        fresh = []
+        workers.close()  # those of the parent, which do not run here
+        workers.run(lambda thread, part: fresh.append(part), [slice(0, 1), slice(1, 2)])
+        assert sorted(part.start for part in fresh) == [0, 1]
+        workers.close()
+
+    def has_threads_without_closing():
+        fresh = []
+        workers.run(lambda thread, part: fresh.append(part), [slice(0, 1), slice(1, 2)])
+        assert len(fresh) == 2
+
+    assert passes_in_a_fork(has_threads) and passes_in_a_fork(has_threads_without_closing)
+    workers.close()
