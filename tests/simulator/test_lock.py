@@ -1,6 +1,7 @@
 """The lock of a simulator refuses a second change, and knows which one was interrupted."""
 
 import os
+import signal
 import threading
 
 import pytest
@@ -77,9 +78,10 @@ def test_a_stroke_whose_lock_was_taken_does_not_resume():
 
 
 def passes_in_a_fork(promise) -> bool:
-    """Whether a promise holds in a forked process, which has no other threads."""
+    """Whether a promise holds, within half a minute, in a forked process, which has no other threads."""
     child = os.fork()
     if child == 0:
+        signal.alarm(30)
         try:
             promise()
         except BaseException:
@@ -118,21 +120,26 @@ def test_a_paused_stroke_is_paused_in_a_fork_too():
     refused(lock.acquire, PAUSED)
 
 
-def test_a_fork_has_threads_of_its_own_to_work_with_and_to_close():
-    workers, done = Workers(2), []
-    workers.run(lambda thread, part: done.append(part), [slice(0, 1), slice(1, 2)])
+def work_on_two_threads(workers: Workers) -> None:
+    """Both of them, for each waits for the other."""
+    both = threading.Barrier(2, timeout=20.0)
+    workers.run(lambda thread, part: both.wait() and None, [slice(0, 1), slice(1, 2)])
 
-    def has_threads():
-        fresh = []
-        workers.close()  # those of the parent, which do not run here
-        workers.run(lambda thread, part: fresh.append(part), [slice(0, 1), slice(1, 2)])
-        assert sorted(part.start for part in fresh) == [0, 1]
+
+@pytest.mark.parametrize("closes", [False, True])
+def test_a_fork_has_threads_of_its_own_to_work_with_and_to_close(closes):
+    workers = Workers(2)
+    work_on_two_threads(workers)
+
+    def works():
+        if closes:
+            workers.close()  # those of the parent, which do not run here
+        for _ in range(3):
+            work_on_two_threads(workers)
+        assert threading.active_count() == 3
         workers.close()
+        assert threading.active_count() == 1
 
-    def has_threads_without_closing():
-        fresh = []
-        workers.run(lambda thread, part: fresh.append(part), [slice(0, 1), slice(1, 2)])
-        assert len(fresh) == 2
-
-    assert passes_in_a_fork(has_threads) and passes_in_a_fork(has_threads_without_closing)
+    assert passes_in_a_fork(works)
+    work_on_two_threads(workers)
     workers.close()
