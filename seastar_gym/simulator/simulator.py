@@ -189,7 +189,7 @@ class Simulator:
 
         Their errors are not estimated until they are reset: the state has no like on the mesh of the twin.
         """
-        arrays = checked_state(state, self.scene.robot.nodes(), self._drive.at_rest, self._drive.longest)
+        arrays = checked_state(state, self.coefficients.rest_shapes(), self._drive.at_rest, self._drive.longest)
         positions, velocities, time, actuators, commands, phase, orientation, spin = arrays
         checked_commands(commands, self.scene, self._drive.strengths, "State.commands")
         with self._new_state(of_all=True):
@@ -278,11 +278,8 @@ class Simulator:
         return self._batch.read(self.v[:, :2])
 
     def heading(self) -> Floats:
-        """Rotation of the rest shape that fits the nodes best [rad], shape (n_robots,).
-
-        The rest shape is that of the batch's first robot.
-        """
-        return best_fit_heading(self.positions, self.scene.robot.nodes())
+        """Rotation of every robot's own rest shape that fits its nodes best [rad], shape (n_robots,)."""
+        return best_fit_heading(self.positions, self.coefficients.rest_shapes())
 
     def orientation(self) -> Floats:
         """Angle by which every robot's body has turned from rest [rad], shape (n_robots,); without one, its heading."""
