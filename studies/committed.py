@@ -1,4 +1,4 @@
-"""Pictures, tables and footers of docs/ that follow from numbers which are committed there.
+"""Pictures, tables and footers of docs/ and README.md that follow from numbers which are committed there.
 
     python -m studies.committed
 
@@ -248,6 +248,10 @@ def table(docs: Path, name: str) -> str:
             from seastar_gym.benchmark import page, results
 
             return page.table(results.read(docs / "leaderboard" / "results.json"))
+        case ["errors" | "choosing" | "presets" | "timed" as name]:
+            from studies.accuracy import page as accuracy_page
+
+            return str(getattr(accuracy_page, name)())
         case ["promises"]:
             from studies.accuracy import promises
 
@@ -293,7 +297,7 @@ def pages(docs: Path) -> Iterator[tuple[Path, str]]:
     """Pages that have made parts, and what they should be."""
     for name, text in whole_pages(docs).items():
         yield docs / name, text
-    for file in sorted(docs.glob("*.md")):
+    for file in sorted([*docs.glob("*.md"), *docs.parent.glob("README.md")]):
         text = file.read_text(encoding="utf-8")
         if BLOCK.search(text):
             yield file, filled(docs, text)

@@ -129,11 +129,12 @@ class Certificate:
     def kept_by(self, error: float, robot: Seastar | None = None) -> Scene:
         """What `Scene.for_error` gives with this certificate; ValueError where it has lapsed.
 
-        robot: Robot that is to be the certificate's, and to keep its nodes per limb. None chooses them.
+        robot: Robot that is to be the certificate's, and to keep the nodes per limb that it names. None chooses them.
         """
-        if robot is None:
+        if robot is not None:
+            self.require_valid(replace(self.scene, robot=robot))
+        if robot is None or robot.named_resolution[1] is None:
             return self.for_error(error)
-        self.require_valid(replace(self.scene, robot=robot))
         nodes = robot.nodes_per_limb
         some = tuple(each for each in self.settings if each.nodes_per_limb == nodes)
         if robot.discretisation != "continuum" or not some:

@@ -7,7 +7,7 @@ import numpy as np
 from rich.table import Table
 from tqdm import tqdm
 
-from seastar_gym.scene import Numerics, Scene
+from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator
 from studies.stability.cells import largest_strain
@@ -48,7 +48,8 @@ def long_run(
     progress: bool = True,
 ) -> LongRun:
     """Simulate strokes of random commands, drawn for every robot and stroke."""
-    simulator = Simulator(Scene(numerics=Numerics.preset(fidelity)), robots, threads)
+    scene = Scene(Seastar(nodes_per_limb=10), numerics=Numerics.preset(fidelity))
+    simulator = Simulator(scene, robots, threads)
     rng, start = np.random.default_rng(0), time.perf_counter()
     iterations, regularised, halvings, cuts, strain, speed = np.zeros((6, strokes))
     for k in tqdm(range(strokes), unit="stroke", disable=not progress):

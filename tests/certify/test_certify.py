@@ -205,12 +205,13 @@ def test_the_environment_tells_the_errors_of_a_certified_scene(certificate, tmp_
     for given in (certificate, tmp_path / "mine.json", str(tmp_path / "mine.json")):
         env = gym.make("SeastarSwim-v0", scene=certificate.at(setting), certificate=given)
         info = env.reset(seed=0)[1]
-        assert info["path_error"] == setting.error(certificate.actions)
+        assert max(info["path_error"], info["gait_error"]) == setting.error(certificate.actions)
+        assert info["gait_error"] == setting.error(("repeated ternary", "alternating ternary"))
         assert (info["space_error"], info["time_error"]) == (setting.space_error, setting.time_error)
-        assert info["real_time_factor"] == setting.speed
+        assert info["batch_real_time_factor"] == setting.speed
     envs = gym.make_vec("SeastarSwim-v0", 3, vectorization_mode="vector_entry_point",
                         scene=certificate.at(setting), certificate=certificate)  # fmt: skip
-    assert (envs.reset(seed=0)[1]["path_error"] == setting.error(certificate.actions)).all()
+    assert (envs.reset(seed=0)[1]["path_error"] == info["path_error"]).all()
     assert isinstance(env.unwrapped, PlainSpec)
     assert json.loads(env.spec.to_json())["kwargs"]["certificate"] == str(tmp_path / "mine.json")
 
