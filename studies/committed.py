@@ -265,6 +265,10 @@ def table(docs: Path, name: str) -> str:
             from studies.stability.cases import SWEEPS
 
             return atlas.as_markdown(atlas.summarise(atlas.from_data(read(docs, "stability.json")), SWEEPS))
+        case ["validation"]:
+            from studies.validation import laws
+
+            return laws.table(read(docs, "validation.json"))
     raise ValueError(f"No table is called {name!r}.")
 
 
