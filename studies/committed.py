@@ -224,6 +224,10 @@ def table(docs: Path, name: str) -> str:
             from studies.designs import certificates
 
             return certificates.table(read(docs, "certificates.json"))
+        case ["chapter", part]:
+            from studies.chapter import kept
+
+            return str(getattr(kept, f"{part}_table")(read(docs, "chapter.json")))
         case ["damping"]:
             from studies.scenes import damping
 

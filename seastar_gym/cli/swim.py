@@ -42,7 +42,7 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the task's)")
     found.add_argument(
         "--decision-period", type=float,
-        help=f"time between decisions [s] (default: {LEARNED_PERIOD:g} s for the learned policy on a path, else the task's)",
+        help=f"time between decisions [s] (default: the task's; {LEARNED_PERIOD:g} for the learned policy on a path)",
     )  # fmt: skip
     found.add_argument("--seconds", type=float, help="simulated time after which the swim ends")
     found.add_argument("--random-heading", action="store_true", help="turn the robot at random at the start")
