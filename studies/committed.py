@@ -224,6 +224,10 @@ def table(docs: Path, name: str) -> str:
             from studies.designs import certificates
 
             return certificates.table(read(docs, "certificates.json"))
+        case ["chapter", part]:
+            from studies.chapter import kept
+
+            return str(getattr(kept, f"{part}_table")(read(docs, "chapter.json")))
         case ["damping"]:
             from studies.scenes import damping
 
@@ -269,6 +273,10 @@ def table(docs: Path, name: str) -> str:
             from studies.stability.cases import SWEEPS
 
             return atlas.as_markdown(atlas.summarise(atlas.from_data(read(docs, "stability.json")), SWEEPS))
+        case ["validation"]:
+            from studies.validation import laws
+
+            return laws.table(read(docs, "validation.json"))
     raise ValueError(f"No table is called {name!r}.")
 
 

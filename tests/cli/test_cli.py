@@ -95,6 +95,19 @@ def test_the_learned_policy_swims_in_a_registered_task(tmp_path, capsys):
     assert film.stat().st_size > 1000
 
 
+@pytest.mark.parametrize(
+    "more, seconds",
+    [([], "0.4 s"), (["--agent", "straight"], "1.0 s"), (["--decision-period", "1"], "1.0 s"),
+     (["--task", "SeastarSwim-v0"], "1.0 s")],
+)  # fmt: skip
+def test_without_options_the_policy_of_the_picture_on_top_swims(more, seconds, tmp_path, capsys):
+    """It decides every 0.2 s; whoever asks for an agent, a task or a time between decisions gets that."""
+    film = tmp_path / "swim.gif"
+    arguments = ["--fidelity", "fast", "--speed", "8", "--seconds", "0.4", "--film", str(film)]
+    assert main(["swim", *arguments, *more]) == 0
+    assert f"0 of 5 waypoints in {seconds}." in capsys.readouterr().out
+
+
 def test_a_window_shows_a_swim_until_it_is_closed(path, dummy_window, monkeypatch, capsys):
     arguments = ["swim", "--agent", "straight", "--path", path, "--fidelity", "fast", "--speed", "100"]
     assert main(arguments) == 0
