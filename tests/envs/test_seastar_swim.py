@@ -79,6 +79,15 @@ def test_gymnasiums_checker_passes_with_pictures(monkeypatch):
     check_env(gym.make("SeastarSwim-v0", render_mode="rgb_array", fidelity="fast").unwrapped)
 
 
+@pytest.mark.filterwarnings("ignore")
+def test_gymnasiums_checker_passes_without_a_display(monkeypatch):
+    """It makes the environment with every render mode that it names."""
+    pygame = pytest.importorskip("pygame")
+    pygame.display.quit()
+    monkeypatch.setenv("SDL_VIDEODRIVER", "no-such-driver")
+    check_env(gym.make("SeastarSwim-v0", fidelity="fast").unwrapped)
+
+
 @pytest.mark.parametrize("actions", ["limbs", "joint", "pairs"])
 def test_stable_baselines_checker_passes(actions):
     sb3 = pytest.importorskip("stable_baselines3.common.env_checker")
