@@ -209,6 +209,7 @@ def in_child(root: Path, arguments: list[str], seconds: float, tracer: Tracer | 
             code = pytest.main([*arguments, "-q", "-p", "no:cacheprovider"], [tracer] if tracer else [])
             if tracer:
                 Path(out).write_text(json.dumps(tracer.as_lists()), encoding="utf-8")
+        sys.stdout.flush()
         os._exit(int(code))
     end = time.monotonic() + seconds
     while time.monotonic() < end:
