@@ -10,8 +10,10 @@ environment, commands are repeated at every decision, which heats the same wires
 import hashlib
 import os
 from abc import ABC, abstractmethod
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,7 @@ from seastar_gym.envs.decisions import checked_decision_period
 from seastar_gym.envs.observation import OBSERVATION_LAYOUT, scene_layout
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.stations import heading_of
+from seastar_gym.files import beside
 from seastar_gym.scene import Scene
 from seastar_gym.simulator import Simulator
 
@@ -71,15 +74,12 @@ def displacement_map(scene: Scene, actions: Actions = "joint", decision_period: 
     key = hashlib.sha256(repr(asked).encode()).hexdigest()[:24]
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "seastar-gym"
     file = cache / f"displacements-{key}.npz"
-    if file.is_file():
-        with np.load(file, allow_pickle=False) as known:
-            return Displacements(known["hub"], known["turn"])
+    with suppress(OSError, ValueError, KeyError, EOFError, BadZipFile), np.load(file, allow_pickle=False) as known:
+        return Displacements(known["hub"], known["turn"])
     commands = command_table(actions, scene.robot.n_limbs)[:, None]
     measured = measure_gaits(scene, commands, settling, measured_strokes, decision_period)
-    cache.mkdir(parents=True, exist_ok=True)
-    part = file.with_name(f"{file.stem}.{os.getpid()}.npz")  # whoever looks finds the whole file or none
-    np.savez(part, hub=measured.hub, turn=measured.turn)
-    os.replace(part, file)
+    with beside(file) as part, part.open("wb") as stream:
+        np.savez(stream, hub=measured.hub, turn=measured.turn)
     return measured
 
 

@@ -201,7 +201,7 @@ def save(policy: LearnedPolicy, path: str | os.PathLike[str], **training: Any) -
     data = safetensors.numpy.save({name: np.ascontiguousarray(array) for name, array in policy.weights.items()})
     text = policy.description.to_json(sha256=hashlib.sha256(data).hexdigest(), training={**policy.training, **training})
     write_atomically(path, data)
-    write_atomically(path.with_suffix(".json"), f"{text}\n".encode())
+    write_atomically(path.with_suffix(".json"), f"{text}\n")
 
 
 def in_the_box(decision_period: float | None, shipped: Path = SHIPPED, task: str | None = None) -> Path:

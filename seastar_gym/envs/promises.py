@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import get_args
 
 from seastar_gym.scene import Scene, SmaWires
-from seastar_gym.scene.certificate import Certificate, CertifiedSetting, physics
+from seastar_gym.scene.certificate import Certificate, physics
 from seastar_gym.scene.checks import shown
 from seastar_gym.scene.fidelity import measured, timed_promise
 from seastar_gym.scene.numerics import Fidelity
@@ -39,18 +39,13 @@ def promised(
         return dict.fromkeys(NAMES, math.nan)
     gaits = [name for name in certificate.actions if name in REPEATED]
     others = [name for name in certificate.actions if name not in REPEATED]
-    bounds, medians = ((_largest(of, others), _largest(of, gaits)) for of in (setting.errors, _typical(setting)))
+    bounds, medians = ((_largest(of, others), _largest(of, gaits)) for of in (setting.errors, setting.typical))
     return dict(zip(NAMES, (*bounds, *medians, setting.space_error, setting.time_error, setting.speed), strict=True))
 
 
 def _largest(errors: Mapping[str, float], classes: Sequence[str]) -> float:
     """Largest error of some classes of commands, NaN of none."""
     return max((errors.get(name, math.nan) for name in classes), default=math.nan)
-
-
-def _typical(setting: CertifiedSetting) -> Mapping[str, float]:
-    """Medians by class, as far as the certificate has them."""
-    return getattr(setting, "typical", {})
 
 
 def _by_the_table(scene: Scene) -> dict[str, float]:

@@ -210,7 +210,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     waypoint_radius: Distance of the hub [m] within which a waypoint is reached.
     random_heading: Whether the robot is turned at random at the start of every episode.
     render_mode: "rgb_array": `render` returns a picture of the end of the decision. "rgb_array_list": `render` returns
-        `frames_per_stroke` pictures of the decision. "human": a window shows as many.
+        `frames_per_stroke` pictures of the decision. "human": a window shows as many;
+        without a display nobody sees them, and a warning says so.
     frames_per_stroke: Number of pictures of a decision, at equal intervals; the last shows its end. None means ten per
         second of simulated time, and one at least.
     randomization: Distributions of numbers of the scene that are drawn at the start of every episode.

@@ -96,6 +96,7 @@ class SwimTask(Swimming):
         decision_period: float | None = None,
         observe_actuators: bool = True,
         headings: Headings | Plain | None = None,
+        effort: bool = False,
     ):
         randomization, reward = read(randomization, DomainRandomization), read(reward, RewardWeights)
         headings = read(headings, Headings)
@@ -118,7 +119,7 @@ class SwimTask(Swimming):
         super().__init__(
             scene, n_robots, threads, random_heading=random_heading, draws=randomization,
             certificate=known, error_bars=error_bars, actions=actions,
-            decision_period=decision_period, observe_actuators=observe_actuators,
+            decision_period=decision_period, observe_actuators=observe_actuators, effort=effort,
         )  # fmt: skip
         self.randomization = randomization
         self.path: Path = path if isinstance(path, str) else waypoints

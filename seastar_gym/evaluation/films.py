@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.extras import require_extra
+from seastar_gym.files import beside
 
 Picture = NDArray[np.uint8]
 """Red, green and blue, shape (height, width, 3)."""
@@ -40,7 +41,6 @@ def film(file: Path, fps: float) -> Iterator[Callable[[Picture], None]]:
     fps: Pictures per second. GIFs are shown for hundredths of a second, so theirs is rounded.
     """
     write = _mp4 if film_format(file) == ".mp4" else _gif
-    file.parent.mkdir(parents=True, exist_ok=True)
     with write(file, fps) as add:
         last: list[Picture] = []
 
@@ -57,12 +57,13 @@ def film(file: Path, fps: float) -> Iterator[Callable[[Picture], None]]:
 def _mp4(file: Path, fps: float) -> Iterator[Callable[[Picture], None]]:
     import imageio.v2 as imageio
 
-    fast = ["-preset", "veryfast"]
-    movie: Any = imageio.get_writer(
-        file, format="FFMPEG", mode="I", fps=fps, codec="libx264", quality=7, output_params=fast
-    )
-    with movie:
-        yield movie.append_data
+    fast = ["-preset", "veryfast", "-f", "mp4"]
+    with beside(file) as part:
+        movie: Any = imageio.get_writer(
+            part, format="FFMPEG", mode="I", fps=fps, codec="libx264", quality=7, output_params=fast
+        )
+        with movie:
+            yield movie.append_data
 
 
 @contextmanager
@@ -107,4 +108,5 @@ def write_gif(pictures: list[Picture], file: Path, fps: float) -> None:
     palette.putpalette(frequent_colours(sample, COLOURS // 2).tobytes() + bytes(blends.getpalette() or ()))
     images = [Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     duration = 10 * max(2, round(100.0 / fps))  # viewers slow down what is shown for less than two hundredths
-    images[0].save(file, save_all=True, append_images=images[1:], duration=duration, loop=0, optimize=True)
+    with beside(file) as part:
+        images[0].save(part, "GIF", save_all=True, append_images=images[1:], duration=duration, loop=0, optimize=True)

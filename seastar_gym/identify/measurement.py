@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.checks import is_whole_number, shown
+from seastar_gym.files import beside, write_atomically
+from seastar_gym.scene.checks import is_whole_number, require_unmasked, shown
 from seastar_gym.scene.csv_rows import Row, read_numbers, read_rows
 
 Floats = NDArray[np.float64]
@@ -35,6 +36,7 @@ class Measurement:
     def __post_init__(self) -> None:
         for name in ("time", "positions", "commands"):
             array = getattr(self, name)
+            require_unmasked(name, array)
             if not isinstance(array, np.ndarray) or array.dtype.kind not in "iuf":
                 raise ValueError(f"{name} must be an array of numbers, not {shown(array)}.")
         if not isinstance(self.nodes, tuple) or not all(map(is_whole_number, self.nodes)) or self.time.ndim != 1:
@@ -71,5 +73,6 @@ class Measurement:
         names = ["time", *(f"{axis}{node}" for node in self.nodes for axis in "xy")]
         numbers = np.column_stack([self.time, self.positions.reshape(len(self.time), -1)])
         lines = [names, *(["" if math.isnan(x) else f"{x:.7g}" for x in row] for row in numbers.tolist())]
-        Path(trajectory).write_text("".join(",".join(line) + "\n" for line in lines), encoding="utf-8")
-        np.savetxt(commands, self.commands, "%g", ",")
+        write_atomically(trajectory, "".join(",".join(line) + "\n" for line in lines))
+        with beside(commands) as part:
+            np.savetxt(part, self.commands, "%g", ",")

@@ -1,9 +1,9 @@
 """`load_scene`: a scene from a file of Python or JSON, as command lines take it."""
 
-import json
 import runpy
 from pathlib import Path
 
+from seastar_gym.files import read_json
 from seastar_gym.scene.scene import Scene
 
 
@@ -18,8 +18,8 @@ def load_scene(file: Path | None) -> Scene:
         raise ValueError(f"{file} is no file.")
     if file.suffix == ".json":
         try:
-            return Scene.from_dict(json.loads(file.read_text(encoding="utf-8")))
-        except (ValueError, RecursionError) as wrong:
+            return Scene.from_dict(read_json(file))
+        except ValueError as wrong:
             raise ValueError(f"{file} is no scene: {wrong}") from wrong
     try:
         found = runpy.run_path(str(file)).get("scene")

@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.dataset
 import pyarrow.parquet
 
-from seastar_gym.files import beside
+from seastar_gym.files import write_atomically
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS, swim
 
@@ -62,13 +62,8 @@ class Parts:
         return self.file(name).exists()
 
     def write(self, name: str, part: bytes) -> None:
-        """Write a part beside its place and rename it: whoever looks finds all of it or nothing."""
-        file = self.file(name)
-        file.parent.mkdir(parents=True, exist_ok=True)
-        with beside(file) as place, place.open("wb") as stream:
-            stream.write(part)
-            stream.flush()
-            os.fsync(stream.fileno())
+        """Write a part: whoever looks finds all of it or nothing."""
+        write_atomically(self.file(name), part)
 
     def names(self) -> Iterator[str]:
         """Names of the finished cells."""

@@ -79,6 +79,15 @@ def test_gymnasiums_checker_passes_with_pictures(monkeypatch):
     check_env(gym.make("SeastarSwim-v0", render_mode="rgb_array", fidelity="fast").unwrapped)
 
 
+@pytest.mark.filterwarnings("ignore")
+def test_gymnasiums_checker_passes_without_a_display(monkeypatch):
+    """It makes the environment with every render mode that it names."""
+    pygame = pytest.importorskip("pygame")
+    pygame.display.quit()
+    monkeypatch.setenv("SDL_VIDEODRIVER", "no-such-driver")
+    check_env(gym.make("SeastarSwim-v0", fidelity="fast").unwrapped)
+
+
 @pytest.mark.parametrize("actions", ["limbs", "joint", "pairs"])
 def test_stable_baselines_checker_passes(actions):
     sb3 = pytest.importorskip("stable_baselines3.common.env_checker")
@@ -480,7 +489,7 @@ def test_random_heading_turns_the_robot_and_its_absence_does_not():
     assert np.hypot(*tip) == pytest.approx(0.1) and abs(tip[1]) > 1e-3
     plain = fast(scene=Scene(Seastar(nodes_per_limb=10)))
     plain.reset(seed=0)
-    np.testing.assert_array_equal(plain.simulator.positions[0], Seastar().nodes())
+    np.testing.assert_array_equal(plain.simulator.positions[0], Seastar(nodes_per_limb=10).nodes())
 
 
 def test_pickled_environments_continue_to_the_same_bits():

@@ -24,15 +24,17 @@ def one_cell(*axes, **options):
 
 def test_results_are_those_of_the_simulator():
     found = swim(one_cell(Choices("robot.limb_length", (0.08, 0.1))))
-    simulator = Simulator(FAST)
+    simulator = Simulator(FAST, effort=True)
     simulator.stroke([STRAIGHT])
     begin = simulator.hub_position()[0]
-    energy = sum(simulator.stroke([STRAIGHT]).energy[0] for _ in range(2))
+    reports = [simulator.stroke([STRAIGHT]) for _ in range(2)]
     way = simulator.hub_position()[0] - begin
     assert found["ahead"][1] == pytest.approx(way[0], rel=1e-12) and abs(found["aside"][1]) < 1e-12
     assert found["speed"][1] == pytest.approx(way[0] / 2.0, rel=1e-12)
     assert found["strokes_per_metre"][1] == pytest.approx(2.0 / way[0], rel=1e-12)
-    assert found["energy"][1] == pytest.approx(energy, rel=1e-12)
+    for name in ("energy", "work"):
+        assert found[name][1] == pytest.approx(sum(getattr(report, name)[0] for report in reports), rel=1e-12)
+    assert found["peak_moment"][1] == max(report.peak_moment[0] for report in reports)
     assert abs(found["turn"][1]) < 1e-9
     assert found["status"].tolist() == [0, 0]
 
@@ -96,6 +98,46 @@ def test_pandas_and_polars_read_the_parts(tmp_path):
 
 def test_an_empty_folder_has_no_results(tmp_path):
     with pytest.raises(ValueError, match="no results"):
+        read_parts(tmp_path)
+
+
+DAMAGES = {
+    "empty": lambda part: b"",
+    "cut": lambda part: part[: len(part) // 2],
+    "a byte of the numbers": lambda part: part[:60] + bytes([part[60] ^ 1]) + part[61:],
+    "a byte of the footer": lambda part: part[:-40] + bytes([part[-40] ^ 255]) + part[-39:],
+    "no parquet": lambda part: b"PAR1 nothing PAR1",
+    "deep text": lambda part: b"[" * 100_000,
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
+def test_a_damaged_part_is_named_left_out_and_simulated_again(damage, tmp_path, cells):
+    first, second = cells
+    assert run(iter(cells), tmp_path, Here()).done == 2
+    whole, file = read_parts(tmp_path), Parts(tmp_path).file(first.name)
+    sound = file.read_bytes()
+    file.write_bytes(damage(sound))
+    with pytest.warns(UserWarning, match=f"{file} is damaged, and left out: the same sweep simulates its cell again"):
+        assert read_parts(tmp_path).num_rows == second.n_robots
+    with pytest.warns(UserWarning, match=f"{file} is damaged"):
+        again = run(iter(cells), tmp_path, Here())
+    assert (again.done, again.kept) == (1, 1)
+    assert file.read_bytes() == sound and read_parts(tmp_path).equals(whole)
+
+
+def test_a_part_under_the_name_of_another_cell_is_damaged(tmp_path, cells):
+    first, second = cells
+    run(iter(cells), tmp_path, Here())
+    Parts(tmp_path).file(first.name).write_bytes(Parts(tmp_path).file(second.name).read_bytes())
+    with pytest.warns(UserWarning, match="it has another cell"):
+        assert run(iter(cells), tmp_path, Here()).done == 1
+
+
+def test_no_sound_part_is_no_result(tmp_path, cells):
+    run(iter(cells[:1]), tmp_path, Here())
+    Parts(tmp_path).file(cells[0].name).write_bytes(b"")
+    with pytest.warns(UserWarning, match="is damaged"), pytest.raises(ValueError, match="no results"):
         read_parts(tmp_path)
 
 
