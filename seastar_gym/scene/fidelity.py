@@ -94,9 +94,9 @@ class TimedPromise:
 
     space_error: float
     time_error: float
-    gait_error: float = math.nan
-    typical_error: float = math.nan
-    typical_gait_error: float = math.nan
+    gait_error: float
+    typical_error: float
+    typical_gait_error: float
 
     @property
     def path_error(self) -> float:
