@@ -104,6 +104,8 @@ def bar_of(total: int, bar: Any) -> Callable[[Tally], None]:
 def as_text(tally: Tally, out: Path) -> str:
     """What was done, in a sentence or two."""
     text = f"New in {out}: {tally.designs:,} designs, cells: {tally.done}; there before, cells: {tally.kept}."
+    if tally.damaged:
+        text += f" Damaged before, and simulated again: {', '.join(map(str, tally.damaged))}."
     if tally.problems:
         name, problem = next(iter(tally.problems.items()))
         text += f" Without result, cells: {len(tally.problems)}, such as {name[:8]}: {problem}"
