@@ -6,12 +6,11 @@ import tempfile
 import time
 from pathlib import Path
 
-import pyarrow
-import pyarrow.parquet
-
 
 def part(cell, text=""):
     """A part of a cell without results, but with a text that is written as it is."""
+    import pyarrow.parquet  # here: processes that are killed before import it for nothing
+
     table = pyarrow.table({"text": [text]}).replace_schema_metadata({"cell": cell.name})
     sink = pyarrow.BufferOutputStream()
     pyarrow.parquet.write_table(table, sink, compression="none", use_dictionary=False, write_statistics=False)

@@ -138,6 +138,9 @@ def search(sweep: Sweep, options: argparse.Namespace) -> int:
     from seastar_gym.sweep.proposals import Search, explore
 
     options.out.mkdir(parents=True, exist_ok=True)
+    for file in options.out.glob("study.db*"):
+        if file.is_symlink():  # SQLite writes through links
+            raise ValueError(f"{file} is a link: take it out, or name the database itself with --storage.")
     storage = options.storage or f"sqlite:///{options.out}/study.db"
     wanted = Search(options.objective, not options.minimize, options.seed, options.stale_after)
     with tqdm(total=options.optuna, unit="design") as bar:

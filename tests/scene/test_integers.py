@@ -9,6 +9,7 @@ import pytest
 from every_part import ACTUATORS, PARTS
 from seastar_gym import Headings, Normal, RewardWeights, Scene, Seastar, Simulator, Uniform
 from seastar_gym.envs.randomization import LogUniform
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.tasks.envs import CHALLENGES
 from seastar_gym.scene.per_robot import PerRobot
 from seastar_gym.scene.serial import KINDS
@@ -84,6 +85,12 @@ def test_a_whole_number_or_one_of_numpy_is_the_float():
                 assert repr(replace(part, **{name: other})) == repr(expected), (type(part), name, kind)
                 tried.add((type(part), name))
     assert len(numbers - tried) <= 1 and len(tried) > 90, numbers - tried
+
+
+@pytest.mark.parametrize("number", [np.float32(0.02), np.float16(0.02), 1], ids=repr)
+def test_numbers_of_an_environment_are_floats_too(number):
+    env = SeastarSwimEnv(waypoint_radius=number, decision_period=1, scene=Scene())
+    assert repr(env._task.waypoint_radius) == repr(float(number)) and repr(env.decision_period) == "1.0"
 
 
 def test_numbers_of_each_robot_are_floats_in_any_array():
