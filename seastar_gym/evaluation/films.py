@@ -57,8 +57,8 @@ def film(file: Path, fps: float) -> Iterator[Callable[[Picture], None]]:
 def _mp4(file: Path, fps: float) -> Iterator[Callable[[Picture], None]]:
     import imageio.v2 as imageio
 
-    fast = ["-preset", "veryfast", "-f", "mp4"]
-    with beside(file) as part:
+    fast = ["-preset", "veryfast"]
+    with beside(file, ".mp4") as part:
         movie: Any = imageio.get_writer(
             part, format="FFMPEG", mode="I", fps=fps, codec="libx264", quality=7, output_params=fast
         )

@@ -14,6 +14,8 @@ from seastar_gym.scene.csv_rows import Row, read_numbers, read_rows
 
 Floats = NDArray[np.float64]
 
+FARTHEST = 1e3
+"""Largest coordinate [m]. Squares of much larger ones would have no float."""
 NODE = re.compile("[0-9]{1,5}")
 """Number of a node in the name of a column."""
 
@@ -43,6 +45,8 @@ class Measurement:
             raise ValueError(f"nodes must be a tuple of whole numbers, not {shown(self.nodes)}, and time a single row.")
         if self.positions.shape != (len(self.time), len(self.nodes), 2) or not np.isfinite(self.positions).any():
             raise ValueError(f"{len(self.time)} times and {len(self.nodes)} nodes do not fit the positions measured.")
+        if np.nanmax(np.abs(self.positions)) > FARTHEST:
+            raise ValueError(f"Positions must be within {FARTHEST:g} m of the origin, in metres.")
         if self.commands.ndim != 2 or not len(self.commands):
             raise ValueError("commands must have one row per stroke with one number per limb.")
         if not np.isfinite(self.time).all() or self.time.min() < 0.0 or (np.diff(self.time) < 0.0).any():

@@ -3,7 +3,8 @@
 import math
 import sys
 from reprlib import Repr
-from typing import Any
+from types import UnionType
+from typing import Any, Union, get_args, get_origin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +44,24 @@ def is_finite_number(value: object) -> bool:
         return math.isfinite(float(value))  # type: ignore[arg-type]
     except OverflowError:
         return False
+
+
+def as_float(value: Any) -> Any:
+    """A finite number as a Python float: other kinds could compute otherwise. Anything else unchanged."""
+    return float(value) if is_finite_number(value) else value
+
+
+def as_typed(value: Any, kind: Any) -> Any:
+    """Value whose finite numbers are floats where a type says so, at any depth of tuples. Anything else unchanged."""
+    kinds = get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
+    if float in kinds:
+        value = as_float(value)
+    for inner in (get_args(each) for each in kinds if get_origin(each) is tuple and type(value) is tuple):
+        if inner[-1:] == (...,):
+            return tuple(as_typed(one, inner[0]) for one in value)
+        if len(inner) == len(value):
+            return tuple(map(as_typed, value, inner))
+    return value
 
 
 def require_number(name: str, value: float, unit: str, *, zero_allowed: bool = False) -> None:

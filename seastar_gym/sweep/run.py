@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from seastar_gym.command import refused_by_disk
 from seastar_gym.executors import Executor, Outcome, Work
@@ -21,11 +22,13 @@ UNWRITTEN = 10
 class Tally:
     """Counts of a run.
 
-    kept: Cells that had parts before. done: Cells and, in them, designs and intervals (such as strokes) that were run.
+    kept: Cells that had parts before. damaged: Parts that were damaged before, whose cells are run again.
+    done: Cells and, in them, designs and intervals (such as strokes) that were run.
     losses: Attempts that failed. problems: Why cells have no part after all attempts, by the name of the cell.
     """
 
     kept: int = 0
+    damaged: list[Path] = field(default_factory=list)
     done: int = 0
     designs: int = 0
     intervals: int = 0
@@ -66,12 +69,14 @@ def run(
 
 
 def unfinished(cells: Iterable[Cell], parts: Parts, tally: Tally) -> Iterator[Cell]:
-    """Cells without a part; others are counted."""
+    """Cells without a sound part; others are counted."""
     for cell in cells:
         if parts.has(cell.name):
             tally.kept += 1
-        else:
-            yield cell
+            continue
+        if parts.file(cell.name).exists():
+            tally.damaged.append(parts.file(cell.name))
+        yield cell
 
 
 def _attempt(
