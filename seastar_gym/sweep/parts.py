@@ -10,6 +10,7 @@ import pyarrow.dataset
 import pyarrow.parquet
 
 from seastar_gym.files import beside
+from seastar_gym.scene.checks import require_file
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS, swim
 
@@ -78,6 +79,7 @@ class Parts:
 
 def read_parts(folder: str | os.PathLike[str]) -> Any:
     """All results of a folder as one pyarrow.Table, in the order of the cells' names."""
+    require_file("folder", folder)
     files = [str(file) for file in sorted(Parts(folder).folder.glob("??/*.parquet"))]
     if not files:
         raise ValueError(f"There are no results in {folder}.")
