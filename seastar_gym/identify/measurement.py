@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.files import beside, write_atomically
-from seastar_gym.scene.checks import is_whole_number, require_unmasked, shown
+from seastar_gym.scene.checks import is_whole_number, require_file, require_unmasked, shown
 from seastar_gym.scene.csv_rows import Row, read_numbers, read_rows
 
 Floats = NDArray[np.float64]
@@ -55,6 +55,8 @@ class Measurement:
     @classmethod
     def from_csv(cls, trajectory: str | Path, commands: str | Path) -> "Measurement":
         """Measurement from two CSV files, whose form `python -m seastar_gym.identify --help` shows."""
+        require_file("trajectory", trajectory)
+        require_file("commands", commands)
         names, *rows = read_rows(trajectory) or [Row(str(trajectory), ())]
         nodes = tuple(int(name[1:]) for name in names.fields[1::2] if NODE.fullmatch(name[1:]))
         expected = ("time", *(f"{axis}{node}" for node in nodes for axis in "xy"))
@@ -74,6 +76,8 @@ class Measurement:
 
     def to_csv(self, trajectory: str | Path, commands: str | Path) -> None:
         """Write two CSV files that `from_csv` reads."""
+        require_file("trajectory", trajectory)
+        require_file("commands", commands)
         names = ["time", *(f"{axis}{node}" for node in self.nodes for axis in "xy")]
         numbers = np.column_stack([self.time, self.positions.reshape(len(self.time), -1)])
         lines = [names, *(["" if math.isnan(x) else f"{x:.7g}" for x in row] for row in numbers.tolist())]

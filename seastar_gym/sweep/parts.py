@@ -10,6 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet
 
 from seastar_gym.files import write_atomically
+from seastar_gym.scene.checks import require_file
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS, swim
 
@@ -92,6 +93,7 @@ def read_parts(folder: str | os.PathLike[str]) -> Any:
 
     Parts that are damaged are left out with a warning: the same sweep simulates their cells again.
     """
+    require_file("folder", folder)
     tables = []
     for file in sorted(Parts(folder).folder.glob("??/*.parquet")):
         try:

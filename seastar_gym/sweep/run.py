@@ -7,6 +7,7 @@ from pathlib import Path
 
 from seastar_gym.command import refused_by_disk
 from seastar_gym.executors import Executor, Outcome, Work
+from seastar_gym.scene.checks import require_callable, require_file, require_kind, shown
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.parts import Parts, part_of
 
@@ -57,6 +58,10 @@ def run(
 
     work: What makes a part of a cell.
     """
+    require_file("folder", folder)
+    require_kind("executor", executor, Executor, "an executor, such as Processes()")
+    if progress is not None:
+        require_callable("progress", progress)
     parts, tally = Parts(folder), Tally()
     waiting, lost = unfinished(cells, parts, tally), list[Outcome[Cell]]()
     for _ in range(ATTEMPTS):
@@ -70,7 +75,12 @@ def run(
 
 def unfinished(cells: Iterable[Cell], parts: Parts, tally: Tally) -> Iterator[Cell]:
     """Cells without a sound part; others are counted."""
-    for cell in cells:
+    try:
+        each = iter(cells)
+    except TypeError:
+        raise ValueError(f"cells must be cells, as Sweep.cells gives them, not {shown(cells)}.") from None
+    for cell in each:
+        require_kind("A cell", cell, Cell, "a Cell, as Sweep.cells gives it")
         if parts.has(cell.name):
             tally.kept += 1
             continue
