@@ -19,7 +19,6 @@ import tyro
 from rich.console import Console
 from rich.text import Text
 
-from agents.names import AgentNames
 from agents.report.charts import Curve, read_progress
 from agents.report.page import Remarks, ResultsTable, read_bound, read_trials, write_report
 from agents.report.playback import Playback, RecordingEnv
@@ -27,7 +26,7 @@ from agents.results import results_table
 from seastar_gym.command import run_command
 from seastar_gym.controllers import learned
 from seastar_gym.controllers.contract import Policy, actions_of
-from seastar_gym.controllers.roster import fitting_agents
+from seastar_gym.controllers.roster import DEFAULTS, HELP, fitting_agents
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene, scene_at
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
@@ -155,7 +154,7 @@ def _write_report(
 class Options:
     """Compare agents on a path: print a table and write it as CSV, with a picture of the traces and a video of each."""
 
-    agents: AgentNames | None = None
+    agents: Annotated[tuple[str, ...] | None, tyro.conf.arg(help=f"{HELP} {DEFAULTS}")] = None
     path: Annotated[str, tyro.conf.arg(help=PATH_HELP)] = "pentagon"
     fidelity: Fidelity = "balanced"
     """Accuracy of the simulation. A scene that names its numerics is swum with those."""

@@ -6,7 +6,15 @@ from typing import get_args
 
 from seastar_gym import RewardWeights
 from seastar_gym.envs.commands import Discrete
-from seastar_gym.scene.checks import require_choice, require_count, require_finite, require_number, shown
+from seastar_gym.scene.checks import (
+    require_choice,
+    require_count,
+    require_finite,
+    require_flag,
+    require_kind,
+    require_number,
+    shown,
+)
 
 MOST_STROKES, MOST_WEIGHTS = 2**24, 2**26
 """Strokes of a rollout of all robots, and weights of a network: with more, memory ends before the first update."""
@@ -72,8 +80,9 @@ class Hyperparameters:
             require_number("decision_period", self.decision_period, "s")
         for name in ("learning_rate", "discount", "gae_lambda", "clip_range", "entropy"):
             require_finite(name, getattr(self, name), "1")
-        if not isinstance(self.symmetry, bool) or not isinstance(self.reward, RewardWeights):
-            raise ValueError(f"symmetry must be True or False, and reward RewardWeights, not {shown(self.symmetry)}.")
+        require_flag("symmetry", self.symmetry)
+        require_flag("coasting", self.coasting)
+        require_kind("reward", self.reward, RewardWeights, "RewardWeights")
         strokes = int(self.num_envs) * int(self.rollout)
         if strokes > MOST_STROKES:
             raise ValueError(f"num_envs times rollout must be at most {MOST_STROKES:,}, not {strokes:,}.")

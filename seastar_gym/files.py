@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import re
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -34,17 +35,19 @@ def save_figure(figure: Any, path: str | os.PathLike[str], **options: Any) -> No
 
 
 @contextmanager
-def beside(path: str | os.PathLike[str]) -> Iterator[Path]:
+def beside(path: str | os.PathLike[str], ending: str = PART) -> Iterator[Path]:
     """An empty file beside `path`, to write to. It takes its place at the end, when it is on the disk.
 
     Whatever goes wrong before, an interrupt too, leaves `path` as it was and nothing beside it. A link at `path` is
     replaced, and the file that it points to stays as it is. OSError, with one sentence, for a folder or a device.
+
+    ending: Of the name of the file beside, for libraries that choose a format by it.
     """
     path = Path(path)
     if path.exists() and not path.is_file():
         raise FileExistsError(f"{path} is no file that can be written over.")
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(part_name(path.name))
+    part = path.with_name(part_name(path.name, ending))
     part.open("xb").close()  # a new file: what is there, a link too, is refused
     try:
         yield part
@@ -54,9 +57,9 @@ def beside(path: str | os.PathLike[str]) -> Iterator[Path]:
         part.unlink(missing_ok=True)
 
 
-def part_name(name: str) -> str:
+def part_name(name: str, ending: str = PART) -> str:
     """Name that no other process, and no other thread, writes a file of this name under."""
-    return f".{name}.{os.getpid()}.{secrets.token_hex(4)}{PART}"
+    return f".{name}.{os.getpid()}.{secrets.token_hex(4)}{ending}"
 
 
 def is_part_of(file: Path, name: str) -> bool:
@@ -85,7 +88,7 @@ def read_json(path: str | os.PathLike[str]) -> Any:
     except RecursionError:
         raise ValueError(f"{path} is no JSON that can be read: it is nested too deeply.") from None
     except ValueError as damaged:
-        reason = str(damaged).splitlines()[0].rstrip(".")
+        reason = re.split("[;\n]", str(damaged))[0].rstrip(".")
         raise ValueError(f"{path} is no JSON that can be read: {reason}.") from damaged
 
 

@@ -93,7 +93,9 @@ class Curve:
 
     @classmethod
     def of(cls, name: str, progress: Sequence[Sequence[float]]) -> "Curve":
-        """From rows of strokes trained, strokes round the pentagon, waypoints reached."""
+        """From rows of strokes trained, strokes round the pentagon, waypoints reached. ValueError for none."""
+        if not progress:
+            raise ValueError(f"The training of {name} has no learning curve yet: it was stopped before a checkpoint.")
         trained, pentagon, waypoints = np.array(progress, dtype=float).T
         return cls(name, trained, np.where(waypoints == PENTAGON_WAYPOINTS, pentagon, np.nan))
 

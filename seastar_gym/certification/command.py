@@ -2,7 +2,8 @@
 
 The scene is a Python file that defines `scene`, a JSON file as `Scene.to_dict` writes it, or none for the chapter's. A
 file of Python is executed. Errors are those of the hub's path in space, in time and in sum, over classes of commands
-that are listed in seastar_gym/certification/commands.py, against swims with 37 nodes per limb and steps of 0.25 ms.
+that are listed in seastar_gym/certification/commands.py, against swims with 37 nodes per limb and steps of 0.25 ms:
+the largest of a class, and the typical one, which is the median.
 
 Writes a certificate (JSON), and a picture of error over speed where matplotlib is installed. `Certificate.load(file)`
 reads it, `certificate.for_error(0.01)` is the scene at the fastest setting that keeps 1 %, and

@@ -18,6 +18,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.controllers.given import observed
 from seastar_gym.envs.commands import Actions, command_table
 from seastar_gym.envs.decisions import checked_decision_period
 from seastar_gym.envs.observation import OBSERVATION_LAYOUT, scene_layout
@@ -25,6 +26,7 @@ from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.stations import heading_of
 from seastar_gym.files import beside
 from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import require_kind, require_number
 from seastar_gym.simulator import Simulator
 
 Floats = NDArray[np.float64]
@@ -97,8 +99,19 @@ def waypoints_of(
     with_headings: Whether headings are asked for.
     """
     at, length = scene_layout(scene, with_headings=with_headings), scene.robot.limb_length
+    observations = np.atleast_2d(observed(observations, at.size))
     current, after = observations[:, at.current_waypoint], observations[:, at.next_waypoint]
     return length * current.astype(np.float64), length * after.astype(np.float64)
+
+
+def require_search(scene: Scene, waypoint_radius: float, reward: object, decision_period: float | None) -> None:
+    """ValueError for what no policy can search with."""
+    require_kind("scene", scene, Scene, "a Scene")
+    if scene.n_robots is not None:
+        raise ValueError("scene must be that of one robot.")
+    require_number("waypoint_radius", waypoint_radius, "m")
+    require_kind("reward", reward, RewardWeights, "RewardWeights")
+    checked_decision_period(decision_period, scene)
 
 
 class Searcher(ABC):
@@ -120,7 +133,7 @@ class Searcher(ABC):
         deterministic: bool = False,
     ) -> tuple[NDArray[np.int64], None]:
         """Actions for observations of shape (size,) or (n, size), and None: there is no state."""
-        chosen = self.choose(np.atleast_2d(observation))
+        chosen = self.choose(np.atleast_2d(observed(observation, 1)))
         return (chosen[0] if np.ndim(observation) == 1 else chosen), None
 
 
@@ -141,6 +154,7 @@ class GreedyPolicy(Searcher):
         reward: RewardWeights = RewardWeights(),
         decision_period: float | None = None,
     ):
+        require_search(scene, waypoint_radius, reward, decision_period)
         self.scene, self.waypoint_radius, self.reward = scene, waypoint_radius, reward
         self.decision_period = decision_period
         self._hub = displacement_map(scene, self.actions, decision_period).hub

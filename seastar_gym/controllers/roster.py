@@ -7,7 +7,7 @@ the name of the function that makes it, "module:function".
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -20,6 +20,14 @@ from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
 from seastar_gym.envs.tasks.envs import name_of
 from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import (
+    require_choice,
+    require_kind,
+    require_number,
+    require_seed,
+    require_texts,
+    shown,
+)
 from seastar_gym.scene.numerics import Fidelity
 
 AGENTS: dict[str, Callable[[Scene, float | None, str | None], Policy]] = {
@@ -55,7 +63,7 @@ def load_agents(
     decision_period: Time between decisions [s]. None means strokes. scene: Scene that agents know, with its numerics.
     None means the chapter's at `fidelity`.
     """
-    known = make_scene(None, fidelity, decision_period) if scene is None else scene
+    known = _known(seed, fidelity, decision_period, scene)
     make_env = partial(_make_env, scene, fidelity, decision_period)
     return {
         label: _load_agent(name, seed, known, decision_period, None, make_env) for label, name in _labels(names).items()
@@ -78,7 +86,7 @@ def fitting_agents(
 
     names: Names as in `HELP`. None means `default_agents`. ValueError, with their sentences, where none fits.
     """
-    known = make_scene(None, fidelity, decision_period) if scene is None else scene
+    known = _known(seed, fidelity, decision_period, scene)
     make_env = partial(_make_env, scene, fidelity, decision_period)
     agents, left_out = dict[str, Policy](), list[str]()
     for label, name in _labels(default_agents(known) if names is None else names).items():
@@ -94,6 +102,17 @@ def fitting_agents(
     return agents, left_out
 
 
+def _known(seed: int, fidelity: Fidelity, decision_period: float | None, scene: Scene | None) -> Scene:
+    """Scene that agents know."""
+    require_seed(seed)
+    require_choice("fidelity", fidelity, get_args(Fidelity))
+    known = make_scene(None, fidelity) if scene is None else scene
+    require_kind("scene", known, Scene, "a Scene, or None")
+    if decision_period is not None:
+        require_number("decision_period", decision_period, "s")
+    return make_scene(None, fidelity, decision_period) if scene is None else scene
+
+
 def _make_env(scene: Scene | None, fidelity: Fidelity, decision_period: float | None) -> SeastarSwimEnv:
     named = fidelity if scene is None else None
     return SeastarSwimEnv(scene=scene, fidelity=named, decision_period=decision_period)
@@ -101,6 +120,7 @@ def _make_env(scene: Scene | None, fidelity: Fidelity, decision_period: float | 
 
 def _labels(names: Sequence[str]) -> dict[str, str]:
     """Names by what agents are called: a file without its ending, and without its folder where that is enough."""
+    require_texts("Agents", names)
     labels: dict[str, str] = {}
     for name in names:
         label = Path(name).stem if _is_file(name) else name
@@ -113,6 +133,10 @@ def _labels(names: Sequence[str]) -> dict[str, str]:
 
 def load_agent(name: str, env: SeastarSwimEnv, seed: int = 0) -> Policy:
     """Policy by a name as in `HELP`, for the robot and the decisions of an environment."""
+    require_kind("name", name, str, "the name of an agent")
+    require_seed(seed)
+    if not all(hasattr(env, known) for known in ("decision_period", "scene", "step")):
+        raise ValueError(f"env must be an environment of this package, not {shown(env)}.")
     in_strokes = env.decision_period == env.scene.actuator.period
     task = task_of(env)
     return _load_agent(name, seed, env.scene, None if in_strokes else env.decision_period, task, lambda: env)

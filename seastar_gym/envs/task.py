@@ -19,7 +19,7 @@ from seastar_gym.envs.reward import RewardWeights, reward_terms
 from seastar_gym.envs.swimming import Flags, Floats, Outcome, Score, Swimming
 from seastar_gym.scene import Scene, SmaWires
 from seastar_gym.scene.certificate import Certificate
-from seastar_gym.scene.checks import require_number, shown
+from seastar_gym.scene.checks import as_float, require_number, shown
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.scene_file import load_scene
 from seastar_gym.scene.serial import Part, from_dict
@@ -102,6 +102,7 @@ class SwimTask(Swimming):
         headings = read(headings, Headings)
         if not isinstance(randomization, DomainRandomization | None):
             raise ValueError(f"randomization must be a DomainRandomization or None, not {shown(randomization)}.")
+        waypoint_radius = as_float(waypoint_radius)
         require_number("waypoint_radius", waypoint_radius, "m")
         if waypoint_radius > FARTHEST:
             raise ValueError(f"waypoint_radius must be at most {FARTHEST:g} m, not {shown(waypoint_radius)}.")

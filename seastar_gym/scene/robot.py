@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.scene.along import AlongLimb, Stiffening
 from seastar_gym.scene.body import Body
-from seastar_gym.scene.checks import require_choice, require_count, require_number, shown
+from seastar_gym.scene.checks import require_choice, require_count, require_limbs, require_number, shown
 from seastar_gym.scene.limb import Limb, LimbShape, as_tuple
 from seastar_gym.scene.per_robot import Numbers, batch_size, chosen, require_each
 from seastar_gym.scene.serial import register_part
@@ -76,7 +76,7 @@ class Seastar:
     body: Body | None = None
 
     def __post_init__(self) -> None:
-        require_count("n_limbs", self.n_limbs, 1, 12)
+        require_limbs(self.n_limbs)
         self._fill_in_resolution()
         require_count("nodes_per_limb", self.nodes_per_limb, 2, 10_000)
         require_each(self, "limb_length", partial(require_number, unit="m"))

@@ -13,11 +13,12 @@ registered classes only: it evaluates no text and imports nothing.
 import inspect
 import sys
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from functools import cache, wraps
+from typing import Any, ClassVar, TypeVar, get_origin, get_type_hints
 
 import numpy as np
 
-from seastar_gym.scene.checks import shown
+from seastar_gym.scene.checks import as_typed, shown
 from seastar_gym.scene.per_robot import PerRobot
 from seastar_gym.scene.unnamed import Unnamed
 
@@ -39,13 +40,31 @@ def register_part(kind: type[Part]) -> type[Part]:
 
     The class must keep its constructor's arguments as attributes of the same names and compare by value, as a dataclass
     does. The arguments may be numbers, texts, None, tuples, dicts and parts of registered classes. The class must be
-    registered before a scene with it is read.
+    registered before a scene with it is read. Finite numbers of a dataclass with `__post_init__` become floats before
+    it, where its annotations say float.
     """
     known = KINDS.setdefault(kind.__name__, kind)
     if (known.__module__, known.__qualname__) != (kind.__module__, kind.__qualname__):
         raise ValueError(f"There is a part of the name {kind.__name__} already: give this class another one.")
     KINDS[kind.__name__] = kind
+    if hasattr(kind, "__post_init__"):
+        _make_floats(kind)
     return kind
+
+
+def _make_floats(kind: type) -> None:
+    """Have a dataclass make floats of its numbers before it checks them, where its annotations say float."""
+    check = kind.__post_init__  # type: ignore[attr-defined]
+    annotations = cache(lambda: get_type_hints(kind))
+
+    @wraps(check)
+    def floats_first(part: Any, *arguments: Any) -> None:
+        for name, hint in annotations().items():
+            if get_origin(hint) is not ClassVar and hasattr(part, name):
+                object.__setattr__(part, name, as_typed(getattr(part, name), hint))
+        check(part, *arguments)
+
+    kind.__post_init__ = floats_first  # type: ignore[attr-defined]
 
 
 def _arguments(kind: type) -> list[str]:

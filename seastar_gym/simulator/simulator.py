@@ -328,10 +328,12 @@ class Simulator:
         duration: Length of the interval [s].
         commands: Commands given now, as for `stroke`. None gives none, and what is under way continues.
 
-        An actuator without memory is at rest after its period, and refuses commands before: limbs would jump. Pieces
-        of an interval have the time steps of the whole, save that a step in which a piece ends is cut in two. Every
-        interval depends on the `State` at its beginning only, so Newton's first guess is made anew, and pieces equal
-        the whole to newton_tolerance, not to the last bit.
+        An actuator without memory is at rest after its period, and refuses commands before: limbs would jump. Every
+        interval depends on the `State` at its beginning only, so Newton's first guess is made anew. Pieces that end
+        where time steps do equal the whole to newton_tolerance, or to about 1e-5 limb lengths where something is
+        linearised at the first guess: flow along limbs, added mass, a body. A step in which a piece ends is cut in two,
+        which is another discretisation: limbs that ring faster than steps resolve then ring otherwise, by 4 % of the
+        largest speed at fidelity "fast" and 11 % at "balanced", and the hub is 4e-6 and 4e-5 limb lengths away.
         """
         with self._whole_interval(duration, commands):
             self._batch.advance(0, len(self._batch.times) - 1)

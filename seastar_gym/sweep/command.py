@@ -94,6 +94,8 @@ def bar_of(total: int, bar: Any) -> Callable[[Tally], None]:
 def as_text(tally: Tally, out: Path) -> str:
     """What was done, in a sentence or two."""
     text = f"New in {out}: {tally.designs:,} designs, cells: {tally.done}; there before, cells: {tally.kept}."
+    if tally.damaged:
+        text += f" Damaged before, and simulated again: {', '.join(map(str, tally.damaged))}."
     if tally.problems:
         name, problem = next(iter(tally.problems.items()))
         text += f" Without result, cells: {len(tally.problems)}, such as {name[:8]}: {problem}"
@@ -127,6 +129,9 @@ def search(sweep: Sweep, options: argparse.Namespace) -> int:
     from seastar_gym.sweep.proposals import Search, explore
 
     options.out.mkdir(parents=True, exist_ok=True)
+    for file in options.out.glob("study.db*"):
+        if file.is_symlink():  # SQLite writes through links
+            raise ValueError(f"{file} is a link: take it out, or name the database itself with --storage.")
     storage = options.storage or f"sqlite:///{options.out}/study.db"
     wanted = Search(options.objective, not options.minimize, options.seed, options.stale_after)
     with tqdm(total=options.optuna, unit="design") as bar:

@@ -64,7 +64,7 @@ def motions(straight: Sequence[Swim]) -> dict[str, dict[str, list[float]]]:
     units = np.array([MM, MM, MM, 1.0])
     return {
         swim.label: {
-            name: [rounded(each) for each in units * stroke_motion(swim, number)]
+            name: [rounded(each, 6) for each in units * stroke_motion(swim, number)]
             for name, number in (("first", 0), (f"{len(swim.commands)}th", -1))
         }
         for swim in straight

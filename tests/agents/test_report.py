@@ -213,6 +213,11 @@ def test_a_damaged_curve_is_refused_with_its_line(tmp_path, text, words):
         read_progress(tmp_path)
 
 
+def test_a_training_without_a_checkpoint_has_no_curve():
+    with assert_refused("The training of a has no learning curve yet"):
+        Curve.of("a", [])
+
+
 def test_several_curves_have_their_median_and_range():
     finished = {"a": 170, "b": 160, "c": 180}
     curves = [Curve.of(name, [[1, 9, 4], [2, strokes, 5]]) for name, strokes in finished.items()]

@@ -193,7 +193,7 @@ def turning_momentum(rigid, u, rates):
 @pytest.mark.parametrize("scheme", list(SCHEMES))
 def test_in_vacuum_a_step_leaves_the_oracle_s_minimum_by_a_move_of_the_whole_robot_that_keeps_its_momentum(scheme):
     """As far as the first guess is off. Schemes of several stages are tried at their first one."""
-    scene, rods, rigid = make(UNEVEN, None)
+    _, rods, rigid = make(UNEVEN, None)
     tableau, h = SCHEMES[scheme], 0.01
     gamma = h * tableau.a[0]
     start = random_stage(rods, rigid, h, seed=1)

@@ -128,6 +128,14 @@ def test_weight_gives_a_lopsided_body_its_impulse_to_rounding(scheme):
     np.testing.assert_allclose(momenta(simulator)[0] - before, impulse, rtol=0.0, atol=1e-10 * mass)
 
 
+@pytest.mark.parametrize("h, share", [(8e-3, 1e-3), (4e-3, 1e-4), (1e-3, 5e-5)])
+def test_the_midpoint_rule_keeps_nearly_all_angular_momentum_of_a_robot_with_a_body(h, share):
+    simulator = thrown(Numerics("implicit-midpoint", h, 1e-10))
+    _, before = momenta(simulator)
+    simulator.advance(0.4, [[1.0, -0.5, 0.3]])
+    assert momenta(simulator)[1] == pytest.approx(before, rel=share)
+
+
 @pytest.mark.parametrize("scheme, order", [("implicit-midpoint", 2), ("implicit-euler", 1), ("sdirk2", 2)])
 def test_a_robot_with_a_lopsided_body_keeps_the_order_of_its_scheme(scheme, order):
     """Angles and angular momentum, too, as steps get shorter; stiff edges ring, so limbs are soft."""

@@ -83,6 +83,15 @@ def test_a_search_from_words_to_its_best(tmp_path, capsys):
     assert (tmp_path / "study.db").exists() and read_parts(tmp_path).num_rows == 4
 
 
+def test_a_search_does_not_write_through_a_link(tmp_path, capsys):
+    (tmp_path / "somebody's").touch()
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "study.db").symlink_to(tmp_path / "somebody's")
+    assert main(["robot.limb_length=0.08:0.1", "--optuna", "1", "--out", str(tmp_path / "out")]) == 2
+    assert "study.db is a link" in capsys.readouterr().err
+    assert (tmp_path / "somebody's").stat().st_size == 0
+
+
 @pytest.mark.parametrize("ending", [".json", ".py"])
 def test_a_scene_comes_from_a_file(ending, tmp_path):
     file = tmp_path / f"scene{ending}"
