@@ -24,20 +24,25 @@ from seastar_gym.scene.scene_file import load_scene
 
 def as_text(certificate: Certificate) -> str:
     """Table of the certificate, fastest settings first."""
-    lines = [f"{'setting':44} {'space':>8} {'time':>8} {'sum':>8} {'actions':>8} {'small':>8} {'x real time':>12}"]
+    bounds = {"sum": certificate.promised, "actions": certificate.actions, "small": ("small",)}
+    lines = [f"{'setting':44} {'space':>8} {'time':>8}" + "".join(f" {name + ' (typical)':>17}" for name in bounds)]
+    lines[0] += f" {'x real time':>12}"
     for each in sorted(certificate.settings, key=lambda each: -each.speed):
-        errors = (
-            each.space_error, each.time_error, each.error(certificate.promised), each.error(certificate.actions),
-            each.errors["small"],
-        )  # fmt: skip
-        shares = " ".join(f"{100 * error:>6.2g} %" for error in errors)
+        shares = " ".join(_percent(error, 6) for error in (each.space_error, each.time_error))
+        for some in bounds.values():
+            shares += f" {_percent(each.error(some), 6)} ({_percent(each.typical_error(some))})".ljust(18)
         gathers = "" if each.endures else "  gathers energy over long swims, not chosen"
         lines.append(f"{each!s:44} {shares} {each.speed:>12,.0f}{gathers}")
     lines.append(
         f"With {100 * certificate.confidence():.0f} % confidence, at most 5 % of the sequences of a class exceed its "
-        f"error ({certificate.samples} of each were measured). The limit errs by {100 * certificate.limit_error:.2g} %."
+        f"error ({certificate.samples} of each were measured); half of them exceed the typical one. The limit errs by "
+        f"{_percent(certificate.limit_error)}."
     )
     return "\n".join(lines)
+
+
+def _percent(share: float, width: int = 0) -> str:
+    return f"{100 * share:>{width}.2g} %"
 
 
 def draw(certificate: Certificate, file: Path) -> None:
@@ -89,6 +94,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise ValueError("--chosen writes the scene that --error chooses: give both.")
         for name in ("out", "chosen"):
             require_writable(name, getattr(options, name))
+        if options.out.suffix == ".png":
+            raise ValueError(f"{options.out} is where the picture goes: give --out a file such as certificate.json.")
         from tqdm import tqdm
 
         with tqdm(total=100, unit="%", bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as bar:

@@ -5,13 +5,14 @@ the name of the function that makes it, "module:function".
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from seastar_gym.controllers import foreign, learned, learner_zip
-from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.contract import Policy, actions_of, require_fit
 from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.planner import Planner
 from seastar_gym.controllers.scripted import GAITS, scripted
@@ -37,6 +38,8 @@ HELP = (
     "made them: load only files that you trust."
 )
 """Help of options that name agents."""
+DEFAULTS = "(default: learned pentagon; greedy straight for robots without five limbs)"
+"""Help on `default_agents`."""
 
 
 def load_agents(
@@ -53,22 +56,59 @@ def load_agents(
     None means the chapter's at `fidelity`.
     """
     known = make_scene(None, fidelity, decision_period) if scene is None else scene
+    make_env = partial(_make_env, scene, fidelity, decision_period)
+    return {
+        label: _load_agent(name, seed, known, decision_period, None, make_env) for label, name in _labels(names).items()
+    }
+
+
+def default_agents(scene: Scene) -> tuple[str, ...]:
+    """Names of the agents that are compared unless others are named; the first two are for five limbs only."""
+    return ("learned", "pentagon") if scene.robot.n_limbs == 5 else ("greedy", "straight")
+
+
+def fitting_agents(
+    names: Sequence[str] | None,
+    seed: int = 0,
+    fidelity: Fidelity = "balanced",
+    decision_period: float | None = None,
+    scene: Scene | None = None,
+) -> tuple[dict[str, Policy], list[str]]:
+    """Policies by name, as `load_agents` gives them, of all agents that fit the robot, and a sentence on each other.
+
+    names: Names as in `HELP`. None means `default_agents`. ValueError, with their sentences, where none fits.
+    """
+    known = make_scene(None, fidelity, decision_period) if scene is None else scene
+    make_env = partial(_make_env, scene, fidelity, decision_period)
+    agents, left_out = dict[str, Policy](), list[str]()
+    for label, name in _labels(default_agents(known) if names is None else names).items():
+        try:
+            policy = _load_agent(name, seed, known, decision_period, None, make_env)
+            require_fit(policy, known, actions_of(policy, known.robot.n_limbs), decision_period)
+        except (ValueError, OSError) as unfit:
+            left_out.append(f"{label} is left out: {unfit}")
+        else:
+            agents[label] = policy
+    if not agents:
+        raise ValueError(" ".join(left_out) or "There is nothing to evaluate: name at least one agent.")
+    return agents, left_out
+
+
+def _make_env(scene: Scene | None, fidelity: Fidelity, decision_period: float | None) -> SeastarSwimEnv:
     named = fidelity if scene is None else None
-    agents: dict[str, Policy] = {}
+    return SeastarSwimEnv(scene=scene, fidelity=named, decision_period=decision_period)
+
+
+def _labels(names: Sequence[str]) -> dict[str, str]:
+    """Names by what agents are called: a file without its ending, and without its folder where that is enough."""
+    labels: dict[str, str] = {}
     for name in names:
         label = Path(name).stem if _is_file(name) else name
-        label = str(Path(name).with_suffix("")) if label in agents else label
-        if label in agents:
+        label = str(Path(name).with_suffix("")) if label in labels else label
+        if label in labels:
             raise ValueError(f"The agent {name!r} is named twice.")
-        agents[label] = _load_agent(
-            name,
-            seed,
-            known,
-            decision_period,
-            None,
-            lambda: SeastarSwimEnv(scene=scene, fidelity=named, decision_period=decision_period),
-        )
-    return agents
+        labels[label] = name
+    return labels
 
 
 def load_agent(name: str, env: SeastarSwimEnv, seed: int = 0) -> Policy:

@@ -19,6 +19,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.scene.checks import require_unmasked
+
 Waypoints: TypeAlias = NDArray[np.float64]
 MakePath: TypeAlias = Callable[[np.random.Generator], Waypoints]
 
@@ -173,6 +175,7 @@ def shortest_way(position: ArrayLike, waypoint: ArrayLike, after: ArrayLike, rad
 
 
 def _checked_waypoints(path: ArrayLike) -> NDArray[np.float64]:
+    require_unmasked("A path", path)
     try:
         waypoints = np.asarray(path)
     except ValueError as ragged:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.files import beside, write_atomically
-from seastar_gym.scene.checks import is_whole_number, shown
+from seastar_gym.scene.checks import is_whole_number, require_unmasked, shown
 from seastar_gym.scene.csv_rows import Row, read_numbers, read_rows
 
 Floats = NDArray[np.float64]
@@ -38,6 +38,7 @@ class Measurement:
     def __post_init__(self) -> None:
         for name in ("time", "positions", "commands"):
             array = getattr(self, name)
+            require_unmasked(name, array)
             if not isinstance(array, np.ndarray) or array.dtype.kind not in "iuf":
                 raise ValueError(f"{name} must be an array of numbers, not {shown(array)}.")
         if not isinstance(self.nodes, tuple) or not all(map(is_whole_number, self.nodes)) or self.time.ndim != 1:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 LONGEST_SHOWN = 200
 """Largest number of characters of a value in a sentence."""
+DEEPEST = 3
+"""Depth of lists within lists in which masked entries are looked for: no argument has more axes."""
 
 _SHORT = Repr()
 """Writer of values that writes only the beginning of large lists, tuples and dicts."""
@@ -111,8 +113,21 @@ def require_numbers(name: str, values: object, unit: str) -> None:
         raise ValueError(f"{name} must be a tuple of finite numbers [{unit}], not {shown(values)}.")
 
 
+def require_unmasked(name: str, value: object) -> None:
+    """Refuse masked arrays with masked entries, also in lists: numpy would take the numbers that they hide."""
+    if _is_masked(value, DEEPEST):
+        raise ValueError(f"{name} must be without masked entries: fill them, or leave them out.")
+
+
+def _is_masked(value: object, depth: int) -> bool:
+    if isinstance(value, np.ma.MaskedArray):
+        return bool(np.ma.is_masked(value))
+    return depth > 0 and isinstance(value, list | tuple) and any(_is_masked(part, depth - 1) for part in value)
+
+
 def as_array(name: str, value: object) -> NDArray[Any]:
-    """Value as an array, of whatever shape and numbers. ValueError if its rows differ in length."""
+    """Value as an array, of whatever shape and numbers. ValueError if rows differ in length or entries are masked."""
+    require_unmasked(name, value)
     try:
         return np.asarray(value)
     except ValueError as ragged:

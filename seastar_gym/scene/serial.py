@@ -3,10 +3,11 @@
     data = json.loads(json.dumps(scene.to_dict()))
     assert Scene.from_dict(data) == scene  # to the last bit
 
-A part of a scene is a dict of its `kind` and its constructor's arguments. Arguments that are left out have their
-defaults, so that scenes written before a new term was added can be read. A tuple is a list, and numbers of each robot
-are a kind of their own. The outermost dict also has the `version` of this form. What could not be read back is refused
-when it is written. Reading constructs parts of registered classes only: it evaluates no text and imports nothing.
+A part of a scene is a dict of its `kind` and its constructor's arguments. Those that nobody named, so that a fidelity
+chooses them, are None. Arguments that are left out have their defaults, so that scenes written before a new term was
+added can be read. A tuple is a list, and numbers of each robot are a kind of their own. The outermost dict also has the
+`version` of this form. What could not be read back is refused when it is written. Reading constructs parts of
+registered classes only: it evaluates no text and imports nothing.
 """
 
 import inspect
@@ -19,6 +20,7 @@ import numpy as np
 
 from seastar_gym.scene.checks import as_typed, shown
 from seastar_gym.scene.per_robot import PerRobot
+from seastar_gym.scene.unnamed import Unnamed
 
 VERSION = 1
 """Version of the plain form."""
@@ -87,6 +89,8 @@ def _written(value: Any, where: str) -> Any:
         fields = {name: getattr(value, name) for name in _arguments(type(value))}
         return {"kind": kind, **{name: _written(one, f"{where}.{name}") for name, one in fields.items()}}
     match value:
+        case Unnamed():
+            return None
         case None | bool() | str():
             return value
         case np.bool_():

@@ -20,11 +20,13 @@ from fuzz.scenes import (
     COMPILED,
     CONTACT,
     EVERYTHING,
+    FLUID,
     N_ROBOTS,
     N_STROKES,
     OWN,
     PLAIN,
     RARE,
+    SWIMMER,
     TERMS,
     TOUCHED_BODY,
     Terms,
@@ -37,7 +39,7 @@ LIMIT = 120.0
 BLOCK = 8
 """Cases of a set of terms, which has to be compiled, before the next."""
 
-EVERY = 4
+EVERY = 2
 """Sets of terms, one of which may have rare ones."""
 
 OF_SWIMS: dict[str, Callable[[int], None]] = {
@@ -76,9 +78,9 @@ def attempt(trial: Trial) -> None:
 
 
 def sets_of_terms(rng: Random) -> Iterator[Terms]:
-    """Those with contact and with everything first, then those that tests compile, then any, some with rare terms."""
-    yield from (CONTACT, EVERYTHING, frozenset(TERMS), frozenset({OWN, "contact"}))
-    yield from (TOUCHED_BODY, BENT)
+    """Those with contact, with a body and with everything first, then those that tests compile, then any, some with rare terms."""
+    yield from (SWIMMER, CONTACT, EVERYTHING, frozenset(TERMS), frozenset({OWN, "contact"}))
+    yield from (TOUCHED_BODY, BENT, SWIMMER | FLUID | {OWN})
     yield from (terms for terms in COMPILED if terms not in (CONTACT, frozenset({OWN, "contact"})))
     sets = [frozenset(chosen) for size in range(1, 9) for chosen in itertools.combinations(TERMS, size)]
     rng.shuffle(sets)

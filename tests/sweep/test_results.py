@@ -27,15 +27,17 @@ def one_cell(*axes, **options):
 
 def test_results_are_those_of_the_simulator():
     found = swim(one_cell(Choices("robot.limb_length", (0.08, 0.1))))
-    simulator = Simulator(FAST)
+    simulator = Simulator(FAST, effort=True)
     simulator.stroke([STRAIGHT])
     begin = simulator.hub_position()[0]
-    energy = sum(simulator.stroke([STRAIGHT]).energy[0] for _ in range(2))
+    reports = [simulator.stroke([STRAIGHT]) for _ in range(2)]
     way = simulator.hub_position()[0] - begin
     assert found["ahead"][1] == pytest.approx(way[0], rel=1e-12) and abs(found["aside"][1]) < 1e-12
     assert found["speed"][1] == pytest.approx(way[0] / 2.0, rel=1e-12)
     assert found["strokes_per_metre"][1] == pytest.approx(2.0 / way[0], rel=1e-12)
-    assert found["energy"][1] == pytest.approx(energy, rel=1e-12)
+    for name in ("energy", "work"):
+        assert found[name][1] == pytest.approx(sum(getattr(report, name)[0] for report in reports), rel=1e-12)
+    assert found["peak_moment"][1] == max(report.peak_moment[0] for report in reports)
     assert abs(found["turn"][1]) < 1e-9
     assert found["status"].tolist() == [0, 0]
 
