@@ -117,13 +117,11 @@ TASKS: dict[str, tuple[str, Actions, float, float, float]] = {
     "SeastarPrey-v0": ("prey", "pairs", 1.0, 200.0, 80.0),
     "SeastarPreyTimed-v0": ("fast-prey", "pairs", 0.5, 200.0, 130.0),
     "SeastarStation-v0": ("station", "joint", 1.0, 120.0, -20.0),
-    "SeastarStationTimed-v0": ("station", "joint", 0.5, 120.0, -70.0),
     "SeastarFailBlind-v0": ("fail-blind", "joint", 1.0, 500.0, 150.0),
-    "SeastarFailBlindTimed-v0": ("fail-blind", "joint", 0.5, 400.0, 145.0),
     "SeastarObstTrap-v0": ("obst-trap", "pairs", 1.0, 300.0, 95.0),
     "SeastarObstTrapTimed-v0": ("obst-trap", "pairs", 0.5, 200.0, 94.0),
-    "SeastarPrizes-v0": ("prizes", "pairs", 1.0, 200.0, 80.0),
-    "SeastarPrizesTimed-v0": ("fast-prizes", "pairs", 0.5, 115.0, 76.0),
+    "SeastarPrizes-v0": ("prizes", "pairs", 1.0, 201.0, 80.0),
+    "SeastarPrizesTimed-v0": ("fast-prizes", "pairs", 0.5, 115.5, 76.0),
 }
 """Name of the challenge, actions, time between decisions [s], time limit [s] and reward threshold of tasks, by id."""
 

@@ -1,4 +1,4 @@
-"""Pictures, tables and footers of docs/ that follow from numbers which are committed there.
+"""Pictures, tables and footers of docs/ and README.md that follow from numbers which are committed there.
 
     python -m studies.committed
 
@@ -231,6 +231,10 @@ def table(docs: Path, name: str) -> str:
             from studies.designs import certificates
 
             return certificates.table(read(docs, "certificates.json"))
+        case ["chapter", part]:
+            from studies.chapter import kept
+
+            return str(getattr(kept, f"{part}_table")(read(docs, "chapter.json")))
         case ["designs", part]:
             from studies.designs import pictures
 
@@ -259,6 +263,10 @@ def table(docs: Path, name: str) -> str:
             from seastar_gym.benchmark import page, results
 
             return page.table(results.read(docs / "leaderboard" / "results.json"))
+        case ["errors" | "choosing" | "presets" | "timed" | "timed_paths" as name]:
+            from studies.accuracy import page as accuracy_page
+
+            return str(getattr(accuracy_page, name)())
         case ["promises"]:
             from studies.accuracy import promises
 
@@ -276,6 +284,10 @@ def table(docs: Path, name: str) -> str:
             from studies.stability.cases import SWEEPS
 
             return atlas.as_markdown(atlas.summarise(atlas.from_data(read(docs, "stability.json")), SWEEPS))
+        case ["validation"]:
+            from studies.validation import laws
+
+            return laws.table(read(docs, "validation.json"))
     raise ValueError(f"No table is called {name!r}.")
 
 
@@ -304,7 +316,7 @@ def pages(docs: Path) -> Iterator[tuple[Path, str]]:
     """Pages that have made parts, and what they should be."""
     for name, text in whole_pages(docs).items():
         yield docs / name, text
-    for file in sorted(docs.glob("*.md")):
+    for file in sorted([*docs.glob("*.md"), *docs.parent.glob("README.md")]):
         text = file.read_text(encoding="utf-8")
         if BLOCK.search(text):
             yield file, filled(docs, text)

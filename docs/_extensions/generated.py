@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from contracts import contracts, registered
-from reference import modules, public
+from reference import names, public
 from sphinx.application import Sphinx
 
 DOCS = Path(__file__).resolve().parents[1]
@@ -32,8 +32,8 @@ def more_pages() -> str:
 GENERATORS: dict[str, Callable[..., str]] = {
     "changelog": changelog,
     "contracts": contracts,
-    "modules": modules,
     "more_pages": more_pages,
+    "names": names,
     "public": public,
     "registered": registered,
 }

@@ -194,7 +194,7 @@ class Simulator:
 
         Their errors are not estimated until they are reset: the state has no like on the mesh of the twin.
         """
-        arrays = checked_state(state, self.scene.robot.nodes(), self._drive.at_rest, self._drive.longest)
+        arrays = checked_state(state, self.coefficients.rest_shapes(), self._drive.at_rest, self._drive.longest)
         positions, velocities, time, actuators, commands, phase, orientation, spin = arrays
         checked_commands(commands, self.scene, self._drive.strengths, "State.commands")
         with self._new_state(of_all=True):
@@ -283,11 +283,8 @@ class Simulator:
         return self._batch.read(self.v[:, :2])
 
     def heading(self) -> Floats:
-        """Rotation of the rest shape that fits the nodes best [rad], shape (n_robots,).
-
-        The rest shape is that of the batch's first robot.
-        """
-        return best_fit_heading(self.positions, self.scene.robot.nodes())
+        """Rotation of every robot's own rest shape that fits its nodes best [rad], shape (n_robots,)."""
+        return best_fit_heading(self.positions, self.coefficients.rest_shapes())
 
     def orientation(self) -> Floats:
         """Angle by which every robot's body has turned from rest [rad], shape (n_robots,); without one, its heading."""
@@ -331,10 +328,12 @@ class Simulator:
         duration: Length of the interval [s].
         commands: Commands given now, as for `stroke`. None gives none, and what is under way continues.
 
-        An actuator without memory is at rest after its period, and refuses commands before: limbs would jump. Pieces
-        of an interval have the time steps of the whole, save that a step in which a piece ends is cut in two. Every
-        interval depends on the `State` at its beginning only, so Newton's first guess is made anew, and pieces equal
-        the whole to newton_tolerance, not to the last bit.
+        An actuator without memory is at rest after its period, and refuses commands before: limbs would jump. Every
+        interval depends on the `State` at its beginning only, so Newton's first guess is made anew. Pieces that end
+        where time steps do equal the whole to newton_tolerance, or to about 1e-5 limb lengths where something is
+        linearised at the first guess: flow along limbs, added mass, a body. A step in which a piece ends is cut in two,
+        which is another discretisation: limbs that ring faster than steps resolve then ring otherwise, by 4 % of the
+        largest speed at fidelity "fast" and 11 % at "balanced", and the hub is 4e-6 and 4e-5 limb lengths away.
         """
         with self._whole_interval(duration, commands):
             self._batch.advance(0, len(self._batch.times) - 1)

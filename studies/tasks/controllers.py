@@ -6,6 +6,7 @@
 | `greedy`   | a map of the mean displacement of every action; it takes the one that ends nearest                    |
 | `planner`  | what is observed: it simulates a decision ahead, of the robot, water and prey that it believes in     |
 | `adaptive` | what is observed, with a memory; it believes in what has explained the past best                      |
+| `prior`    | besides, how `ObstTrap` draws horseshoes: it believes in the most probable one                        |
 | `informed` | what is hidden, too; the best that was found, which is no proof that nothing is better                |
 """
 
@@ -32,9 +33,9 @@ from studies.tasks.episodes import Agent, Batch, Info
 from studies.tasks.greedy import Actions, Floats, Floats32, Greedy, GreedyOnRoute, Rest, length, route
 from studies.tasks.hypotheses import Guess
 from studies.tasks.rounds import BestRound, MostPerMetre, PlannedMostPerMetre
-from studies.tasks.trap import ClearGreedy, ClearPlanner, all_discs, discs_so_far
+from studies.tasks.trap import ClearGreedy, ClearPlanner, all_discs, discs_by_the_prior, discs_so_far
 
-CONTROLLERS = ("rest", "greedy", "planner", "adaptive", "informed")
+CONTROLLERS = ("rest", "greedy", "planner", "adaptive", "prior", "informed")
 
 
 # Miswired
@@ -228,6 +229,7 @@ MAKERS: dict[type, dict[str, Callable[[Robots], Agent]]] = {
         "greedy": ClearGreedy,
         "planner": ClearPlanner,
         "adaptive": lambda robots: ClearPlanner(robots, discs_so_far()),
+        "prior": lambda robots: ClearPlanner(robots, discs_by_the_prior()),
         "informed": lambda robots: ClearPlanner(robots, all_discs),
     },
     Prizes: {"greedy": MostPerMetre, "planner": PlannedMostPerMetre, "informed": BestRound},

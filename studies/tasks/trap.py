@@ -7,7 +7,18 @@ import numpy as np
 
 from seastar_gym.controllers.greedy import turned
 from seastar_gym.envs.tasks.discs import Ways, rims, ways
-from seastar_gym.envs.tasks.obst_trap import PASSAGE, STEP
+from seastar_gym.envs.tasks.obst_trap import (
+    ARC,
+    EXTENT,
+    FIRST,
+    LAST,
+    OPENING,
+    PASSAGE,
+    SEEN,
+    STEP,
+    Horseshoe,
+    draw_horseshoe,
+)
 from studies.tasks.ahead import Ahead, Robots
 from studies.tasks.episodes import Info
 from studies.tasks.greedy import Actions, Floats, Floats32, Greedy, length
@@ -18,6 +29,10 @@ TOO_NEAR = 1e3
 """Cost of one that does."""
 SAME = 0.005
 """Discs whose centres are so near [m] are the same one."""
+ALIKE = 0.025
+"""Discs of an imagined horseshoe whose centres are so near to those that were seen [m] may be the same ones."""
+IMAGINED = 400
+"""Horseshoes among which `prior` looks for the most probable one."""
 
 Known = Callable[[Robots, Floats32, Info], list[Floats]]
 """Discs that are known of each robot in the world [m], shape (m, 3), as a function of robots, observations and info."""
@@ -100,5 +115,57 @@ def discs_so_far() -> Known:
             new = np.column_stack([places, discs[:, 2]])[away > SAME]
             remembered[robot] = np.concatenate([remembered[robot], new])
         return remembered
+
+    return known
+
+
+class Belief:
+    """Belief of one robot in one of several horseshoes, by the discs that it has seen and those that it has not.
+
+    horseshoes: Discs that may be there in the world [m], shape (n_horseshoes, 8, 3), the most probable one first.
+    """
+
+    def __init__(self, horseshoes: Floats):
+        self._horseshoes = horseshoes
+        self._is_missing = np.zeros(horseshoes.shape[:2], bool)
+
+    def look(self, hub: Floats, seen: Floats, known: Floats) -> Floats:
+        """Discs that it believes in besides those that it knows, shape (8 or 0, 3).
+
+        seen: The discs in sight [m], shape (6, 3): no other rim is nearer than theirs. known: All that were seen.
+        """
+        away = self._horseshoes[..., None, :2] - known[:, :2]
+        is_known = np.hypot(away[..., 0], away[..., 1]).min(axis=-1) <= ALIKE
+        in_sight = rims(hub, self._horseshoes) <= rims(hub, seen).max() - ALIKE
+        self._is_missing |= in_sight & ~is_known
+        told = is_known.sum(axis=1) - (is_known.shape[1] * self._is_missing).sum(axis=1)
+        best = int(np.argmax(told))
+        return self._horseshoes[best] if told[best] >= 0 else self._horseshoes[best, :0]
+
+
+def horseshoes_to(goal: float) -> Floats:
+    """Horseshoes that the generator may draw before a goal at this distance [m], their mean first, shape (n, 8, 3)."""
+    rng = np.random.default_rng(0)
+    mean = Horseshoe(np.array([0.5 * (FIRST + goal - LAST), 0.0]), np.mean(ARC), np.mean(EXTENT), 0.0, 0.03)
+    others = (draw_horseshoe(rng, goal, rng.uniform(-OPENING, OPENING)) for _ in range(IMAGINED))
+    return np.stack([mean.discs, *(one.discs for one in others)])
+
+
+def discs_by_the_prior() -> Known:
+    """Memory of discs, and the horseshoe of the task's generator that explains best what was seen so far."""
+    so_far, beliefs = discs_so_far(), list[Belief]()
+
+    def known(robots: Robots, observations: Floats32, info: Info) -> list[Floats]:
+        if not beliefs:
+            goals = length(robots.targets(observations)[0])
+            beliefs.extend(Belief(horseshoes_to(goal)) for goal in goals)
+        hub, heading = robots.inner.simulator.hub_position(), robots.heading()
+        seen = seen_discs(robots, observations)
+        found = []
+        for robot, discs in enumerate(so_far(robots, observations, info)):
+            places = hub[robot] + turned(seen[robot, :, :2], np.full(SEEN, heading[robot]))
+            sight = np.column_stack([places, seen[robot, :, 2]])
+            found.append(np.concatenate([discs, beliefs[robot].look(hub[robot], sight, discs)]))
+        return found
 
     return known

@@ -35,7 +35,7 @@ def small_policy(id, learner):
     return model, policy_of(model)
 
 
-@pytest.mark.parametrize("id", ["SeastarFailBlind-v0", "SeastarObstTrap-v0", "SeastarStationTimed-v0"])
+@pytest.mark.parametrize("id", ["SeastarFailBlind-v0", "SeastarObstTrap-v0", "SeastarMiswiredTimed-v0"])
 def test_a_policy_on_disk_remembers_as_its_learner_does(id, tmp_path):
     """Through episodes of several lengths side by side, whose past begins anew with each."""
     model, policy = small_policy(id, "PPO, memory")

@@ -28,6 +28,7 @@ from seastar_gym import (
     VectorSymmetryReduction,
 )
 from seastar_gym.envs.own_numbers import places_of
+from seastar_gym.envs.promises import NAMES
 from seastar_gym.envs.reward import pulses_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import limb_order, observed_mirror, sectors, transform_actions, transform_commands
@@ -372,9 +373,9 @@ def test_info_is_that_of_the_docstrings(id):
         "heading_error",
         "reward_heading",
     }
-    measured = {"path_error", "space_error", "time_error", "real_time_factor"}
+    measured = {*NAMES}
     if env.unwrapped.decision_period < 1.0:
-        common -= {"real_time_factor"}  # speeds were measured of strokes
+        common -= {"batch_real_time_factor"}  # speeds were measured of strokes
     assert {*own} <= {*found} and {*found} <= common | {*own}
     without = re.search(r"without (.*?);", " ".join(inspect.getdoc(kind).split()))
     missing = set(re.findall(r"`(\w+)`", without[1])) if without else set()
@@ -422,6 +423,53 @@ def test_arguments_of_the_environments_are_those_of_their_docstrings():
     assert {*named(of_one), *of_batch} - {"frames_per_stroke"} == set(
         inspect.signature(SeastarTaskVectorEnv).parameters
     )
+
+
+def test_documented_numbers_of_prey_are_those_that_are_swum():
+    """Second points 10 s ahead, meetings within 100 s, and the weights and speeds of the docstring."""
+    assert Prey() == Prey((0.006, 0.008), (0.12, 0.2), 0.2, 0.004, 0.02, 3, 50.0, 10.0, 0.01)
+    assert CHALLENGES["fast-prey"] == Prey(speed=(0.0105, 0.0135), robot_speed=0.007)
+    assert CHASE[-1] == 100.0
+    env = SeastarTaskEnv(task="prey", fidelity="fast")
+    seen, info = env.reset(options={"instance": 3})
+    course, heading = Courses(info["course"]), env._task.heading()[0]
+    c, s = np.cos(heading), np.sin(heading)
+    ahead = course.place(0.0) + 10.0 * course.velocity(0.0) - info["hub_position"]
+    np.testing.assert_allclose(0.1 * seen[-2:], np.array([[c, s], [-s, c]]) @ ahead, atol=1e-7)
+    assert np.hypot(*(course.place(0.0) - info["hub_position"])) >= 0.08
+
+
+def test_documented_numbers_of_station_are_those_that_are_swum():
+    """Distances count to 20 mm and no farther; the weights and draws are those of the docstring."""
+    assert Station() == Station((0.001, 0.0025), (0.0, 0.05), 0.002, 200.0, 100.0, 0.01)
+    env = SeastarTaskEnv(task=Station(current=(0.0, 0.0)), fidelity="fast")
+    env.reset(seed=0)
+    for away, counted in ((0.015, 0.015), (0.02, 0.02), (0.021, 0.02), (0.5, 0.02)):
+        env._task.station[0] = env._task.simulator.hub_position()[0] + [away, 0.0]
+        assert env.step(0)[4]["reward_distance"] == pytest.approx(-100.0 * counted, rel=1e-3)
+
+
+def test_documented_numbers_of_prizes_are_those_that_are_swum():
+    """Ten prizes of 1, 1, 2 and 4 in a square of 0.7 m, taken within 15 mm, that attract over 0.1 m."""
+    assert Prizes() == Prizes(0.7, 0.015, 200.0, 0.004, 0.4, 2.0, 5.0, 0.01)
+    assert CHALLENGES["fast-prizes"] == Prizes(seconds=115.0, robot_speed=0.007)
+    drawn = np.concatenate([draw_prizes(np.random.default_rng(seed), Prizes()) for seed in range(8)])
+    worth, share = np.unique(drawn[:, 2], return_counts=True)
+    assert len(drawn) == 80 and worth.tolist() == [1.0, 2.0, 4.0] and share[0] == max(share)
+    assert 0.3 < np.abs(drawn[:, :2]).max() <= 0.35
+    env = SeastarTaskEnv(task="prizes", fidelity="fast")
+    _, info = env.reset(seed=0)
+    hub = info["hub_position"]
+    env._task.prizes[0] = [*(hub + [0.0151, 0.0]), 2.0]
+    env._task.prizes[0, 0, :2] = hub + [0.0149, 0.0]
+    env._task._hub = hub[None].copy()
+    after = env.step(0)[4]
+    assert after["taken"] == 2.0
+    env._task.prizes[0] = [*(hub + [0.3, 0.0]), 0.0]
+    env._task.prizes[0, 0, 2] = 4.0
+    env._task._hub = hub[None] - [0.1, 0.0]  # as if it had come by a tenth of a metre
+    gained = 2.0 * 4.0 * (np.exp(-3.0) - np.exp(-4.0))
+    assert env.step(0)[4]["reward_progress"] == pytest.approx(gained, rel=1e-3)
 
 
 # Miswired
@@ -601,19 +649,37 @@ def test_all_sets_of_dead_limbs_are_drawn_alike():
 # ObstTrap
 
 
-def test_every_field_has_a_way_around_and_a_horseshoe_in_the_straight_one():
-    rng, goal = np.random.default_rng(0), np.array([0.5, 0.0])
-    for _ in range(15):
-        discs = draw_discs(rng, goal, 3, 0.85)
-        along = np.linspace([0.0, 0.0], goal, 200)
-        assert discs.shape == (11, 3) and rims(along, discs).min() < -0.005
-        assert min(rims(along[0], discs).min(), rims(goal, discs).min()) >= 0.06
-        neighbours = np.diff(discs[:8], axis=0)
-        assert (np.hypot(*neighbours[:, :2].T) < 1.7 * discs[:7, 2]).all()  # they overlap
-        found = ways(discs, goal, 0.015, 0.01)(np.zeros((1, 2)))[0]
-        assert 0.5 < found < 0.9
-        before = discs[:8, :2].mean(axis=0) - [0.01, 0.0]
-        assert rims(before, discs).min() > 0.02  # room in the horseshoe
+@pytest.fixture(scope="module")
+def fields():
+    """Fields of discs before a goal half a metre away."""
+    rng = np.random.default_rng(0)
+    return [draw_discs(rng, np.array([0.5, 0.0]), 3, 0.85) for _ in range(60)]
+
+
+def has_horseshoe(discs) -> bool:
+    """Whether the first eight discs overlap, each with the next."""
+    return bool((np.hypot(*np.diff(discs[:8, :2], axis=0).T) < 1.9 * discs[0, 2]).all())
+
+
+def test_every_field_has_a_way_around(fields):
+    goal = np.array([0.5, 0.0])
+    for discs in fields:
+        assert discs.shape == (11, 3) and min(rims(np.zeros(2), discs).min(), rims(goal, discs).min()) >= 0.06
+        assert ways(discs, goal, 0.015, 0.01)(np.zeros((1, 2)))[0] < 0.9
+
+
+def test_horseshoes_lie_anywhere_open_to_any_side_of_the_start_and_may_be_absent(fields):
+    there = [discs for discs in fields if has_horseshoe(discs)]
+    assert 0.65 < len(there) / len(fields) < 0.95
+    centres, opening, in_the_way = [], [], []
+    for discs in there:
+        ends, middle = discs[[0, 7], :2].mean(axis=0), discs[3:5, :2].mean(axis=0)
+        centres.append(discs[:8, :2].mean(axis=0))
+        opening.append(np.arctan2(*(middle - ends)[::-1]))
+        in_the_way.append(rims(np.linspace([0.0, 0.0], [0.5, 0.0], 200), discs[:8]).min() < -0.005)
+    assert (np.ptp(centres, axis=0) > [0.1, 0.08]).all() and np.mean(in_the_way) > 0.9
+    assert 0.15 < np.mean(np.abs(opening) > np.radians(60.0)) < 0.5 and 0.3 < np.mean(np.array(opening) > 0.0) < 0.7
+    assert all(rims(discs[3:5, :2].mean(axis=0), discs[8:]).min() > 0.0 for discs in there)
 
 
 def test_fields_that_nobody_could_pass_are_refused():
@@ -666,6 +732,15 @@ def test_who_touches_a_disc_ends_without_success():
     _, reward, over, _, info = env.step(3)
     assert over and not info["is_success"] and info["clearance"] < 0.0 and info["reward_touch"] == -20.0
     assert reward < -19.0
+
+
+def test_who_reaches_the_goal_in_a_disc_has_touched_it():
+    env = SeastarTaskEnv(task="obst-trap", fidelity="fast")
+    _, info = env.reset(seed=0)
+    env._task._set_path(0, info["hub_position"][None] + [[0.005, 0.0]])
+    env._task.discs[0, 0] = [*info["hub_position"], 0.05]
+    _, _, over, _, info = env.step(0)
+    assert over and not info["is_success"] and info["reward_touch"] == -20.0
 
 
 def test_who_reaches_the_goal_ends_with_success():
@@ -733,6 +808,27 @@ def test_a_prize_within_reach_is_taken_once_and_in_time():
     env._task.prizes[0, 5, :2] = info["hub_position"]
     *_, info = env.step(0)
     assert info["time"] == 3.0 and info["taken"] == worth[3]  # too late
+
+
+@pytest.mark.parametrize("id", [id for id in IDS if "Prizes" in id])
+def test_prizes_end_as_terminated_when_the_time_that_they_show_is_up(id):
+    """What is observed ends an episode, and what is not observed cuts it off."""
+    env, batch = made(id), gym.make_vec(id, 2, "vector_entry_point", fidelity="fast")
+    decisions = round(env.unwrapped.challenge.seconds / env.unwrapped.decision_period)
+    env.reset(seed=0), batch.reset(seed=[0, 0])
+    for _ in range(decisions):
+        seen, _, terminated, truncated, info = env.step(0)
+        _, _, all_terminated, all_truncated, _ = batch.step(np.zeros(2, int))
+        assert not truncated and not all_truncated.any() and terminated == all_terminated.all()
+        assert terminated == (seen[-5] < 1e-6)
+    assert terminated and not info["is_success"] and info["time"] == pytest.approx(env.unwrapped.challenge.seconds)
+
+
+@pytest.mark.parametrize("id", [id for id in IDS if "Prizes" not in id])
+def test_a_time_limit_that_no_observation_tells_cuts_an_episode_off(id):
+    env = made(id, max_episode_steps=2)
+    env.reset(options={"instance": 0})
+    assert env.step(0)[2:4] == (False, False) and env.step(0)[2:4] == (False, True)
 
 
 def test_prizes_are_seen_nearest_first_and_two_of_them_as_targets():

@@ -192,6 +192,7 @@ def test_files_that_are_no_trajectory_are_refused(tmp_path, text):
         (HEADER + ROW, "", "commands.csv has no line with one number per limb"),
         (HEADER + ROW, COMMAND + "1\n", "commands.csv, line 2: every line must have one number per limb"),
         ("\xff", COMMAND, "path.csv, line 1: this is no UTF-8 text"),
+        (HEADER + "0,1e308,0\n", COMMAND, "path.csv: Positions must be within 1000 m"),
     ],
 )
 def test_a_file_that_cannot_be_read_is_refused_by_its_name(tmp_path, path, commands, words):

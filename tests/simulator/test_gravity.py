@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from hubs import TEN
 from refusals import assert_refused
 from seastar_gym import Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 
@@ -23,7 +24,7 @@ def test_a_robot_in_vacuum_falls_freely_with_whatever_density_and_taper():
 @pytest.mark.parametrize("density", [1100.0, 900.0])
 def test_a_straight_limb_sinks_or_rises_broadside_with_its_terminal_velocity(density):
     radius, C_d = 1.6e-3, 1.2
-    robot = Seastar(n_limbs=1, density=density, rod_radius=radius)
+    robot = Seastar(nodes_per_limb=10, n_limbs=1, density=density, rod_radius=radius)
     water = Water(drag_coefficient=C_d)
     simulator = Simulator(Scene(robot, water, SmaPulse(0.0), Numerics("sdirk2", 0.02), gravity=(0.0, -9.81)))
     for _ in range(5):
@@ -36,14 +37,14 @@ def test_a_straight_limb_sinks_or_rises_broadside_with_its_terminal_velocity(den
 
 
 def test_limbs_as_dense_as_the_water_feel_no_gravity():
-    simulator, floating = Simulator(Scene()), Simulator(Scene(gravity=G))
+    simulator, floating = Simulator(Scene(TEN)), Simulator(Scene(TEN, gravity=G))
     for each in (simulator, floating):
         each.stroke([[0, 1, 0, 0, -1]])
     np.testing.assert_allclose(floating.positions, simulator.positions, rtol=0.0, atol=1e-15)
 
 
 def test_weights_add_to_loads_and_differ_from_robot_to_robot():
-    robots = Seastar(density=np.array([1000.0, 2000.0]))
+    robots = Seastar(nodes_per_limb=10, density=np.array([1000.0, 2000.0]))
     scene = Scene(robots, None, numerics=MIDPOINT, gravity=(0.0, -1.0), loads=((0, 0.0, 1e-3),))
     simulator = Simulator(scene, 2)
     simulator.stroke(np.zeros((2, 5)))
@@ -55,4 +56,4 @@ def test_weights_add_to_loads_and_differ_from_robot_to_robot():
 @pytest.mark.parametrize("gravity", [(0.0,), (0.0, float("nan")), 9.81, (0.0, 0.0, -9.81), "down"])
 def test_gravity_that_is_not_two_numbers_is_refused(gravity):
     with assert_refused("gravity"):
-        Scene(gravity=gravity)
+        Scene(TEN, gravity=gravity)

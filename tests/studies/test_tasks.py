@@ -41,7 +41,7 @@ def batch(task, n=6, **arguments):
 
 
 KINDS = (
-    "SeastarMiswired-v0", "SeastarPreyTimed-v0", "SeastarStation-v0", "SeastarFailBlind-v0", "SeastarFailBlindTimed-v0",
+    "SeastarMiswired-v0", "SeastarPreyTimed-v0", "SeastarStation-v0", "SeastarFailBlind-v0",
     "SeastarObstTrap-v0", "SeastarObstTrapTimed-v0", "SeastarPrizes-v0",
 )  # fmt: skip
 

@@ -6,12 +6,15 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 
+from seastar_gym.executors.here import Here
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Scene, Seastar, SmaPulse
 from seastar_gym.simulator import Simulator
 from seastar_gym.sweep.axes import Choices
+from seastar_gym.sweep.command import as_text
 from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.parts import Parts, part_of, read_parts
+from seastar_gym.sweep.run import run
 from seastar_gym.sweep.swimming import REFUSED, UNITS, swim
 
 FAST = Scene.preset("fast")
@@ -98,6 +101,62 @@ def test_pandas_and_polars_read_the_parts(tmp_path):
 
 def test_an_empty_folder_has_no_results(tmp_path):
     with pytest.raises(ValueError, match="no results"):
+        read_parts(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def cells():
+    """Two cells of two designs each."""
+    axes = Choices("robot.n_limbs", (3, 5)), Choices("robot.limb_length", (0.08, 0.1))
+    return list(Sweep(FAST, axes, settling=0, measured=1).cells())
+
+
+def flipped(part):
+    """The part with another bit in its first page of numbers, which its checksum tells."""
+    column = pyarrow.parquet.ParquetFile(pyarrow.BufferReader(part)).metadata.row_group(0).column(1)
+    place = column.dictionary_page_offset + column.total_compressed_size - 1
+    return part[:place] + bytes([part[place] ^ 1]) + part[place + 1 :]
+
+
+DAMAGES = {
+    "empty": lambda part: b"",
+    "cut": lambda part: part[: len(part) // 2],
+    "zeros": lambda part: part[:100] + bytes(100) + part[200:],
+    "a bit of a number": flipped,
+    "a byte of the footer": lambda part: part[:-40] + bytes([part[-40] ^ 255]) + part[-39:],
+    "no parquet": lambda part: b"PAR1 nothing PAR1",
+    "deep text": lambda part: b"[" * 100_000,
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
+def test_a_damaged_part_is_named_left_out_and_simulated_again(damage, tmp_path, cells):
+    first, second = cells
+    assert run(iter(cells), tmp_path, Here()).done == 2
+    whole, file = read_parts(tmp_path), Parts(tmp_path).file(first.name)
+    sound = file.read_bytes()
+    file.write_bytes(damage(sound))
+    with pytest.warns(UserWarning, match=rf"{file} is damaged: .*\. It is left out: the same sweep simulates its cell"):
+        assert read_parts(tmp_path).num_rows == second.n_robots
+    again = run(iter(cells), tmp_path, Here())
+    assert (again.done, again.kept, again.damaged) == (1, 1, [file])
+    assert as_text(again, tmp_path).endswith(f"Damaged before, and simulated again: {file}.")
+    assert file.read_bytes() == sound and read_parts(tmp_path).equals(whole)
+
+
+def test_a_part_under_the_name_of_another_cell_is_damaged(tmp_path, cells):
+    first, second = cells
+    run(iter(cells), tmp_path, Here())
+    Parts(tmp_path).file(first.name).write_bytes(Parts(tmp_path).file(second.name).read_bytes())
+    with pytest.warns(UserWarning, match="it has another cell"):
+        assert read_parts(tmp_path).num_rows == second.n_robots
+    assert run(iter(cells), tmp_path, Here()).done == 1
+
+
+def test_no_sound_part_is_no_result(tmp_path, cells):
+    run(iter(cells[:1]), tmp_path, Here())
+    Parts(tmp_path).file(cells[0].name).write_bytes(b"")
+    with pytest.warns(UserWarning, match="is damaged"), pytest.raises(ValueError, match="no results"):
         read_parts(tmp_path)
 
 

@@ -66,20 +66,20 @@ def make_task(
 class SeastarTaskEnv(SeastarSwimEnv):
     """Environment of one of the tasks whose headroom is measured, for the chapter's robot.
 
-    | id                         | `task`          | decision period [s] | `actions` | time limit [s] | threshold |
-    |----------------------------|-----------------|---------------------|-----------|----------------|-----------|
-    | `SeastarMiswired-v0`       | `"miswired"`    | 1.0                 | `"joint"` | 400            | 150       |
-    | `SeastarMiswiredTimed-v0`  | `"miswired"`    | 0.5                 | `"joint"` | 400            | 145       |
-    | `SeastarPrey-v0`           | `"prey"`        | 1.0                 | `"pairs"` | 200            | 80        |
-    | `SeastarPreyTimed-v0`      | `"fast-prey"`   | 0.5                 | `"pairs"` | 200            | 130       |
-    | `SeastarStation-v0`        | `"station"`     | 1.0                 | `"joint"` | 120            | -20       |
-    | `SeastarStationTimed-v0`   | `"station"`     | 0.5                 | `"joint"` | 120            | -70       |
-    | `SeastarFailBlind-v0`      | `"fail-blind"`  | 1.0                 | `"joint"` | 500            | 150       |
-    | `SeastarFailBlindTimed-v0` | `"fail-blind"`  | 0.5                 | `"joint"` | 400            | 145       |
-    | `SeastarObstTrap-v0`       | `"obst-trap"`   | 1.0                 | `"pairs"` | 300            | 95        |
-    | `SeastarObstTrapTimed-v0`  | `"obst-trap"`   | 0.5                 | `"pairs"` | 200            | 94        |
-    | `SeastarPrizes-v0`         | `"prizes"`      | 1.0                 | `"pairs"` | 200            | 80        |
-    | `SeastarPrizesTimed-v0`    | `"fast-prizes"` | 0.5                 | `"pairs"` | 115            | 76        |
+    | id                        | `task`          | decision period [s] | `actions` | time limit [s] | threshold |
+    |---------------------------|-----------------|---------------------|-----------|----------------|-----------|
+    | `SeastarMiswired-v0`      | `"miswired"`    | 1.0                 | `"joint"` | 400            | 150       |
+    | `SeastarMiswiredTimed-v0` | `"miswired"`    | 0.5                 | `"joint"` | 400            | 145       |
+    | `SeastarPrey-v0`          | `"prey"`        | 1.0                 | `"pairs"` | 200            | 80        |
+    | `SeastarPreyTimed-v0`     | `"fast-prey"`   | 0.5                 | `"pairs"` | 200            | 130       |
+    | `SeastarStation-v0`       | `"station"`     | 1.0                 | `"joint"` | 120            | -20       |
+    | `SeastarFailBlind-v0`     | `"fail-blind"`  | 1.0                 | `"joint"` | 500            | 150       |
+    | `SeastarObstTrap-v0`      | `"obst-trap"`   | 1.0                 | `"pairs"` | 300            | 95        |
+    | `SeastarObstTrapTimed-v0` | `"obst-trap"`   | 0.5                 | `"pairs"` | 200            | 94        |
+    | `SeastarPrizes-v0`        | `"prizes"`      | 1.0                 | `"pairs"` | 201            | 80        |
+    | `SeastarPrizesTimed-v0`   | `"fast-prizes"` | 0.5                 | `"pairs"` | 115.5          | 76        |
+
+    `Prizes` ends by itself a decision before its time limit.
 
     The threshold is `reward_threshold` of the spec: about the mean return of the best rule in docs/tasks.md that is
     not told what is hidden; for `Station`, a little more.

@@ -1,7 +1,7 @@
-"""`SeastarObstTrap-v0`: a goal behind a horseshoe of discs."""
+"""`SeastarObstTrap-v0`: a goal behind discs, most of which may form a horseshoe."""
 
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,17 +26,19 @@ SEEN = 6
 @register_part
 @dataclass(frozen=True)
 class ObstTrap(Challenge):
-    """A goal behind a horseshoe of discs that is open towards the robot, and a few discs more.
+    """A goal behind discs, most of which form a horseshoe that may be open towards the robot.
 
-    A robot that swims towards the goal ends in the horseshoe. It sees the discs around it alone; one that remembers the
-    discs it has seen, and plans its way around them, finds out.
+    A robot that swims towards the goal ends in the horseshoe, or at its side. It sees the discs around it alone; one
+    that remembers the discs it has seen, and plans its way around them, finds out. Where the horseshoe lies and opens,
+    and whether there is one, is drawn: knowing the draws is no help.
 
     ## Episode
-    The goal lies at a distance in `distance`, behind a horseshoe of eight discs that overlap. `scattered` discs more
-    lie outside of it, none near the start or the goal. The robot has a random heading. The hub must stay out of discs,
-    limbs may pass over them. The episode ends when the goal is reached, or when a decision ends with the hub within a
-    disc, which is no success. Only fields that can be solved are drawn: there is a way that keeps 15 mm clear of all
-    discs and is no longer than `longest_way`.
+    The goal lies at a distance in `distance`. In four episodes of five, eight discs of one radius overlap in a
+    horseshoe: anywhere between start and goal, up to 50 mm aside, open to any side but that of the goal. In the others
+    the eight are scattered, as `scattered` discs more always are. None is near the start or the goal. The robot has a
+    random heading. The hub must stay out of discs, limbs may pass over them. The episode ends when the goal is reached,
+    or when a decision ends with the hub within a disc, which is no success. Only fields that can be solved are drawn:
+    there is a way that keeps 15 mm clear of all discs and is no longer than `longest_way`.
 
     ## Observation
     That of `SeastarSwim-v0`, with the goal in the places of the current and of the next waypoint, and the six discs
@@ -84,7 +86,7 @@ class ObstTrap(Challenge):
     reward: Weights of the other terms.
     """
 
-    distance: Range = (0.45, 0.55)
+    distance: Range = (0.45, 0.6)
     scattered: int = 3
     longest_way: float = 0.85
     potential: Potential = "straight"
@@ -107,13 +109,21 @@ class ObstTrap(Challenge):
         return ObstTrapTask(self, scene, n_robots, threads, split, **how)
 
 
-HORSESHOE = np.radians(np.linspace(-110.0, 110.0, 8))
-"""Directions of the discs of a horseshoe from its centre [rad]; the goal lies at 0."""
-ARC: Range = (0.1, 0.13)
-"""Radius of the arc on which their centres lie [m]."""
-OVERLAP = 0.6
-"""Their radius, as a share of the distance of neighbours: more than a half, so that they overlap."""
-ASIDE = 0.03
+N_HORSESHOE = 8
+"""Discs of a horseshoe, or of one that is absent."""
+PRESENCE = 0.8
+"""Share of the episodes with a horseshoe."""
+ARC: Range = (0.095, 0.13)
+"""Radius of the arc on which the centres of its discs lie [m]."""
+EXTENT: Range = (1.7, 2.0)
+"""Angle from the middle of the arc to its ends [rad]."""
+OVERLAP: Range = (0.55, 0.7)
+"""Radius of its discs, as a share of the distance of neighbours: more than a half, so that they overlap."""
+OPENING = 0.5 * np.pi
+"""Largest angle between the way from the goal to the start and the direction in which a horseshoe opens [rad]."""
+FIRST, LAST = 0.12, 0.17
+"""Least distances, along the straight way, of a horseshoe's centre from the start and from the goal [m]."""
+ASIDE = 0.05
 """Largest distance of the horseshoe's centre from the straight way [m]."""
 RADIUS: Range = (0.02, 0.045)
 """Radius of a scattered disc [m]."""
@@ -127,22 +137,52 @@ MOST_DRAWS = 1000
 START = np.zeros((1, 2))
 
 
+class Horseshoe(NamedTuple):
+    """Discs that overlap on an arc."""
+
+    centre: Floats
+    """Centre of the arc: x, y [m]."""
+    arc: float
+    """Radius of the arc [m]."""
+    extent: float
+    """Angle from the middle of the arc to its ends [rad]."""
+    middle: float
+    """Direction of the middle from the centre [rad]: 0 is towards the goal, and the horseshoe opens the other way."""
+    radius: float
+    """Radius of the discs [m]."""
+
+    @property
+    def discs(self) -> Floats:
+        """Its discs, shape (N_HORSESHOE, 3)."""
+        at = self.middle + np.linspace(-self.extent, self.extent, N_HORSESHOE)
+        places = self.centre + self.arc * np.stack([np.cos(at), np.sin(at)], axis=1)
+        return np.column_stack([places, np.full(N_HORSESHOE, self.radius)])
+
+
+def draw_horseshoe(rng: np.random.Generator, goal: float, middle: float) -> Horseshoe:
+    """A horseshoe of a direction [rad] somewhere on the way to a goal at this distance [m]."""
+    arc, extent = rng.uniform(*ARC), rng.uniform(*EXTENT)
+    centre = np.array([rng.uniform(FIRST, goal - LAST), rng.uniform(-ASIDE, ASIDE)])
+    spacing = 2.0 * arc * np.sin(extent / (N_HORSESHOE - 1))
+    return Horseshoe(centre, arc, extent, middle, rng.uniform(*OVERLAP) * spacing)
+
+
 def draw_discs(rng: np.random.Generator, goal: Floats, scattered: int, longest_way: float) -> Floats:
     """Discs around which there is a way from the origin to the goal [m] on the x axis, shape (8 + scattered, 3).
 
-    ValueError: none were found.
+    The first eight are a horseshoe, or as many of its discs that are scattered, too. ValueError: none were found.
     """
+    is_there, middle = rng.random() < PRESENCE, rng.uniform(-OPENING, OPENING)
     for _ in range(MOST_DRAWS):
-        arc = rng.uniform(*ARC)
-        radius = OVERLAP * arc * 2.0 * np.sin(0.5 * (HORSESHOE[1] - HORSESHOE[0]))
-        centre = np.array([0.5 * goal[0] + rng.uniform(-0.02, 0.03), rng.uniform(-ASIDE, ASIDE)])
-        on_arc = centre + arc * np.stack([np.cos(HORSESHOE), np.sin(HORSESHOE)], axis=1)
-        others = rng.uniform([-0.05, -0.25], [goal[0] + 0.05, 0.25], (scattered, 2))
-        radii = np.concatenate([np.full(len(HORSESHOE), radius), rng.uniform(*RADIUS, scattered)])
-        discs = np.column_stack([np.concatenate([on_arc, others]), radii])
-        clear = min(rims(np.zeros(2), discs).min(), rims(goal, discs).min()) >= AROUND
-        outside = (rims(centre, discs[len(HORSESHOE) :]) >= arc + radius).all()
-        if clear and outside and ways(discs, goal, PASSAGE, SOLVING_STEP)(START)[0] <= longest_way:
+        horseshoe = draw_horseshoe(rng, goal[0], middle)
+        discs = rng.uniform([-0.05, -0.25, RADIUS[0]], [goal[0] + 0.05, 0.25, RADIUS[1]], (N_HORSESHOE + scattered, 3))
+        discs[:N_HORSESHOE, 2] = horseshoe.radius
+        if is_there:
+            discs[:N_HORSESHOE] = horseshoe.discs
+            if (rims(horseshoe.centre, discs[N_HORSESHOE:]) < horseshoe.arc + horseshoe.radius).any():
+                continue
+        clear = min(rims(START[0], discs).min(), rims(goal, discs).min()) >= AROUND
+        if clear and ways(discs, goal, PASSAGE, SOLVING_STEP)(START)[0] <= longest_way:
             return discs
     raise ValueError(f"Of {MOST_DRAWS} fields of discs none can be passed: ask for fewer discs, or for longer ways.")
 
@@ -155,7 +195,7 @@ class ObstTrapTask(Numbered, SwimTask):
 
     def __init__(self, about: ObstTrap, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any):
         self.about = about
-        self.discs = np.zeros((n_robots, len(HORSESHOE) + about.scattered, 3))
+        self.discs = np.zeros((n_robots, N_HORSESHOE + about.scattered, 3))
         self._is_geodesic = about.potential == "geodesic"
         self._ways = Ways(np.zeros((n_robots, 1, 1)), STEP)
         goal = np.array([[about.distance[0], 0.0]])

@@ -27,9 +27,9 @@ class Prizes(Challenge):
 
     ## Episode
     Ten prizes worth 1, 1, 2 or 4 lie anywhere in a square of `side` around the robot, which has a random heading. A
-    prize is taken where a decision ends with the hub within `radius` of it, until `seconds` have passed; the episode
-    ends when all are taken. Only draws are kept in which the best round brings a point that swims at `robot_speed` at
-    least 1 + `gain` times as much as the greedy one.
+    prize is taken where a decision ends with the hub within `radius` of it. The episode ends, as `terminated`, when all
+    are taken or `seconds` have passed: the time that is left is observed. Only draws are kept in which the best round
+    brings a point that swims at `robot_speed` at least 1 + `gain` times as much as the greedy one.
 
     ## Observation
     That of `SeastarSwim-v0`, with the nearest and the second nearest prize in the places of the current and of the next
@@ -186,7 +186,7 @@ class PrizesTask(Numbered, Swimming):
         self.taken += gained
         self._hub = hub.copy()
         none_left = (worth == 0.0).all(axis=1)
-        return Score(terms, none_left, none_left)
+        return Score(terms, none_left, none_left | (self.simulator.time >= about.seconds * (1.0 - ROUNDING)))
 
     def _goal_facts(self, hub: Floats) -> dict[str, NDArray[Any]]:
         nearest = self._distances(hub).min(axis=1)
