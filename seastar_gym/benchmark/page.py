@@ -108,8 +108,8 @@ def page(entries: Sequence[Entry], command: str, picture: str | None) -> str:
     lines = [
         "# Leaderboard",
         "",
-        f"Means over {numbers} episodes, one for each seed, with bootstrap intervals of 95 %, and the share of them that",
-        f"ended with success ({code(' '.join(command.split()))}).",
+        f"Means over {numbers} episodes, one for each seed, with bootstrap intervals of 95 %, and the share of them",
+        f"that ended with success ({code(' '.join(command.split()))}).",
         "Results of others are merged with `seastar benchmark --merge`.",
         "",
         table(entries),
