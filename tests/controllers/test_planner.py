@@ -85,5 +85,5 @@ def test_it_swims_round_a_corner_faster_than_by_the_displacement_map():
 
 @pytest.mark.parametrize("arguments", [(0, 1), (1, 0)])
 def test_a_search_of_nothing_is_refused(arguments):
-    with pytest.raises(ValueError, match="at least 1"):
+    with pytest.raises(ValueError, match="whole number from 1"):
         Budget(*arguments)
