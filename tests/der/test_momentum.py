@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import oracle
-from hubs import HUBS
+from hubs import HUBS, TEN
 from seastar_gym import Scene, SmaPulse
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import make_work
@@ -96,7 +96,7 @@ def test_in_vacuum_one_step_balances_the_momentum_and_bends_no_limb():
 
 
 def test_in_a_fluid_steps_that_leave_digits_enough_stay_what_they_are():
-    rate = float(make_rods(Scene()).scales.unsettled_rate[0])
+    rate = float(make_rods(Scene(TEN)).scales.unsettled_rate[0])
     assert rate * GAMMA**2 < LOST
     _, stages, q = settled(fluid=True)
     np.testing.assert_array_equal(q, stages.q)

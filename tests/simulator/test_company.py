@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hubs import TEN
 from seastar_gym import (
     Body,
     Contact,
@@ -88,7 +89,7 @@ KINDS_OF_A_GROUP = st.lists(st.sampled_from(KINDS), min_size=N_LANES, max_size=N
 def brief(scheme: str, step: float, **terms) -> Scene:
     """A scene whose strokes take four steps."""
     return Scene(
-        actuator=SmaPulse(0.5, 2.0 * step, 2.0 * step), numerics=Numerics(scheme, step, max_iterations=20), **terms
+        TEN, actuator=SmaPulse(0.5, 2.0 * step, 2.0 * step), numerics=Numerics(scheme, step, max_iterations=20), **terms
     )
 
 

@@ -14,7 +14,8 @@ MIDPOINT = Numerics("implicit-midpoint", 0.01, newton_tolerance=1e-10)
 
 def test_a_robot_in_vacuum_falls_freely_with_whatever_density_and_taper():
     limbs = (Limb(radius=(2e-3, 1e-3)), Limb(), Limb(length=0.05), Limb(), Limb())
-    simulator = Simulator(Scene(Seastar(density=1300.0, limbs=limbs), None, numerics=MIDPOINT, gravity=G))
+    robot = Seastar(nodes_per_limb=10, density=1300.0, limbs=limbs)
+    simulator = Simulator(Scene(robot, None, numerics=MIDPOINT, gravity=G))
     at_rest = simulator.positions[0]
     simulator.stroke(STILL)
     np.testing.assert_allclose(simulator.velocities[0], np.tile(G, (46, 1)), rtol=1e-9)
