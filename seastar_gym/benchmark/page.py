@@ -94,8 +94,8 @@ def page(entries: Sequence[Entry], command: str, picture: str | None) -> str:
     lines = [
         "# Leaderboard",
         "",
-        f"Means over {numbers} episodes, one for each seed, with bootstrap intervals of 95 %, and the share of them that",
-        f"ended with success (`{command}`). Results of others are merged with `seastar benchmark --merge`.",
+        f"Means over {numbers} episodes, one for each seed, with bootstrap intervals of 95 %, and the share of them",
+        f"that ended with success (`{command}`). Results of others are merged with `seastar benchmark --merge`.",
         "",
         table(entries),
     ]
