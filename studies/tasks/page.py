@@ -34,13 +34,15 @@ OPTIONAL = "RecurrentPPO"
 """Agent that is not missing where it has not swum: it needs a package of its own."""
 INTRODUCTION = """# Tasks with headroom
 
-{command} writes this page. Every agent swims the same held-out episodes, the first of the split "test", at fidelity
-"{fidelity}", {episodes} of them or as many as the table says. Learners are trained for {decisions:,} decisions on the
-split "train". Numbers are means. Their 95 % intervals are those of a bootstrap over seeds and episodes; of one seed,
-over episodes. Where a learner has several seeds, the mean of each is given. What is missing, or has swum fewer
-episodes, is swum by the same command, which goes on where it was broken off; `--seeds 0 1 2` adds seeds. Rows of 16
-episodes are older; their runs recorded no versions, and learners of `Prizes` among them were trained when the end of
-its time counted as a cut.
+{command} writes this page. Every agent swims the same held-out episodes, the first of the split "test", at
+fidelity "{fidelity}", {episodes} of them or as many as the table says. Learners are trained for {decisions:,} decisions
+on the split "train". Numbers are means. Their 95 % intervals are those of a bootstrap over seeds and episodes; of one
+seed, over episodes. Where a learner has several seeds, the mean of each is given. What is missing, or has swum fewer
+episodes, is swum by the same command, which goes on where it was broken off; `--seeds 0 1 2` adds seeds.
+
+Rows of 16 episodes are older but for `ObstTrap`: their runs recorded no versions, and learners of `Prizes` among them
+were trained when the end of its time counted as a cut. The policies in the box for `ObstTrap` were trained when its
+horseshoe lay half way to the goal in every episode, and its other learners are still to be trained.
 
 A task is kept if the best that was found is at least 20 % better than greedy, and if PPO leaves at least a third of
 that after {decisions:,} decisions. *Bound* is the best mean of all agents of a row: what can be reached, not a proof

@@ -148,7 +148,9 @@ class Belief:
 def horseshoes_to(goal: float) -> Floats:
     """Horseshoes that the generator may draw before a goal at this distance [m], their mean first, shape (n, 8, 3)."""
     rng = np.random.default_rng(0)
-    mean = Horseshoe(np.array([0.5 * (FIRST + goal - LAST), 0.0]), np.mean(ARC), np.mean(EXTENT), 0.0, 0.03)
+    mean = Horseshoe(
+        np.array([0.5 * (FIRST + goal - LAST), 0.0]), float(np.mean(ARC)), float(np.mean(EXTENT)), 0.0, 0.03
+    )
     others = (draw_horseshoe(rng, goal, *draw_kind(rng)) for _ in range(IMAGINED))
     return np.stack([mean.discs, *(one.discs for one in others)])
 
