@@ -239,10 +239,18 @@ def table(docs: Path, name: str) -> str:
             from studies.designs import pictures
 
             return str(getattr(pictures, part)(read(docs, "designs.json")))
+        case ["contracts"]:
+            from studies import contracts
+
+            return contracts.contracts()
         case ["damping"]:
             from studies.scenes import damping
 
             return damping.as_markdown(damping.from_data(read(docs, "damping.json")))
+        case ["environments"]:
+            from studies import contracts
+
+            return contracts.registered()
         case ["fidelities", part]:
             from studies.learning.fidelities import tables
 

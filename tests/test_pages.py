@@ -1,5 +1,6 @@
 """Every block of Python on README and the pages of the guide runs, in short form, and their links lead somewhere."""
 
+import ast
 import json
 import re
 import shlex
@@ -11,6 +12,7 @@ import gymnasium as gym
 import pytest
 from stable_baselines3 import PPO
 
+import documented
 import seastar_gym
 from seastar_gym import Certificate, Numerics, Scene
 from seastar_gym.certification import command, endurance, measure
@@ -117,6 +119,34 @@ def test_the_robot_of_the_guide_has_a_setting_below_one_per_cent():
 
 def test_pages_have_lines_that_certify():
     assert len(CERTIFYING) > 2 and any("--chosen" in line for line in CERTIFYING)
+
+
+PUBLIC_ELSEWHERE = (
+    "seastar_gym.der.", "seastar_gym.simd.", "seastar_gym.envs.seastar_swim", "seastar_gym.envs.tasks.envs",
+)
+"""Kernels, which equations.md tells, and the environments, whose contracts environments.md has."""
+
+
+def test_what_pages_import_is_documented():
+    known = {(module, name) for module, names in documented.NAMES.findall(documented.PAGE.read_text("utf-8"))
+             for name in names.split()}  # fmt: skip
+    found = [
+        (node.module, alias.name)
+        for page in RUN
+        for block in blocks(page)
+        for node in ast.walk(ast.parse(block))
+        if isinstance(node, ast.ImportFrom) and str(node.module).startswith(("seastar_gym", "agents"))
+        for alias in node.names
+    ]
+    assert len(found) > 20
+    private = [
+        f"{module}.{name}" for module, name in found
+        if (module, name) not in known and name not in seastar_gym.__all__
+        and not module.startswith(PUBLIC_ELSEWHERE)
+        and name not in documented.documented()
+        and not any(known_module == f"{module}.{name}" for known_module, _ in known)
+    ]  # fmt: skip
+    assert not private
 
 
 def test_no_block_hides_from_the_tests():

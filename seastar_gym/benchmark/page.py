@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.benchmark.results import Entry, best_means, relative
-from seastar_gym.evaluation.statistics import Estimate, estimate, profile
+from seastar_gym.evaluation.many import mean_with_interval
+from seastar_gym.evaluation.statistics import Estimate, profile
 from seastar_gym.files import save_figure
 
 Floats = NDArray[np.float64]
@@ -33,7 +34,7 @@ def code(command: str) -> str:
 
 
 def table(entries: Sequence[Entry]) -> str:
-    """Table in Markdown: interquartile means with intervals, and successes, of all agents on all tasks."""
+    """Table in Markdown: means with intervals, and successes, of all agents on all tasks."""
     agents = names(entries, "agent")
     lines = [f"| task | measure | {' | '.join(map(plain, agents))} |", "|---|---|" + "---:|" * len(agents)]
     for task, fidelity in dict.fromkeys((entry.task, entry.fidelity) for entry in entries):
@@ -65,7 +66,7 @@ def common(entries: Sequence[Entry]) -> tuple[list[str], dict[str, Floats]]:
 
 def overall(scores: Mapping[str, Floats]) -> str:
     """Table in Markdown of the relative scores over all tasks, best agent first."""
-    found = {agent: estimate(of_agent) for agent, of_agent in scores.items()}
+    found = {agent: Estimate(*mean_with_interval(of_agent.ravel())) for agent, of_agent in scores.items()}
     lines = ["| agent | relative score |", "|---|---:|"]
     for agent, mean in sorted(found.items(), key=lambda pair: -pair[1].mean):
         lines.append(f"| {plain(agent)} | {_fine(mean)} |")
@@ -91,7 +92,7 @@ def draw(scores: Mapping[str, Floats], file: Path) -> None:
         axes.plot(LEVELS, 100.0 * share, color=colour, linestyle=style, label=label, zorder=level)
         axes.fill_between(LEVELS, 100.0 * low, 100.0 * high, color=colour, alpha=0.15, linewidth=0.0)
     axes.set(
-        xlabel="score relative to the best agent's interquartile mean", ylabel="episodes that reach it [%]",
+        xlabel="score relative to the best agent's mean", ylabel="episodes that reach it [%]",
         xlim=(LEVELS[0], LEVELS[-1]), ylim=(0.0, 102.0),
     )  # fmt: skip
     axes.grid(color="0.92")
@@ -107,9 +108,9 @@ def page(entries: Sequence[Entry], command: str, picture: str | None) -> str:
     lines = [
         "# Leaderboard",
         "",
-        f"Interquartile means over {numbers} seeds with stratified bootstrap intervals of 95 %, and the share of",
-        f"episodes that ended with success ({code(' '.join(command.split()))}). Results of others are merged with",
-        "`seastar benchmark --merge`.",
+        f"Means over {numbers} episodes, one for each seed, with bootstrap intervals of 95 %, and the share of them",
+        f"that ended with success ({code(' '.join(command.split()))}).",
+        "Results of others are merged with `seastar benchmark --merge`.",
         "",
         table(entries),
     ]

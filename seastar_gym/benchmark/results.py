@@ -9,8 +9,8 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.evaluation.many import HELD_OUT_SEED
-from seastar_gym.evaluation.statistics import Estimate, estimate
+from seastar_gym.evaluation.many import HELD_OUT_SEED, mean_with_interval
+from seastar_gym.evaluation.statistics import Estimate
 from seastar_gym.files import read_json, write_atomically
 from seastar_gym.scene.checks import is_finite_number, is_whole_number
 from seastar_gym.scene.numerics import Fidelity
@@ -76,8 +76,9 @@ class Entry:
         return self.task, self.agent, self.fidelity
 
     def estimate(self) -> Estimate:
-        """Interquartile mean of the scores, with its interval."""
-        return estimate(np.array(self.scores)[:, None])
+        """Mean of the scores, failures among them, with its interval over episodes."""
+        mean, *ends = mean_with_interval(np.array(self.scores))
+        return Estimate(mean, *ends) if len(self.scores) > 1 else Estimate(mean, np.nan, np.nan)
 
     @property
     def success_rate(self) -> float:
@@ -86,7 +87,7 @@ class Entry:
 
 
 def relative(entry: Entry, best: float) -> NDArray[np.float64]:
-    """Scores relative to the best interquartile mean of their task: 1 is as good, 0.5 half as good, MOST the most."""
+    """Scores relative to the best mean of their task: 1 is as good, 0.5 half as good, MOST the most."""
     scores = np.array(entry.scores)
     ratio = np.where(scores == best, 1.0, MOST)
     part, whole = (scores, best) if entry.better == "more" else (best, scores)
@@ -95,7 +96,7 @@ def relative(entry: Entry, best: float) -> NDArray[np.float64]:
 
 
 def best_means(entries: Iterable[Entry]) -> dict[str, float]:
-    """Best interquartile mean of every task."""
+    """Best mean of every task."""
     found: dict[str, float] = {}
     for entry in entries:
         mean, choose = entry.estimate().mean, max if entry.better == "more" else min

@@ -13,7 +13,7 @@ CONFIDENCE, RESAMPLES = 0.95, 2000
 
 
 class Estimate(NamedTuple):
-    """Interquartile mean, and the ends of its interval; NaN for those of a single seed."""
+    """A mean, and the ends of its interval; NaN for those of a single seed."""
 
     mean: float
     low: float

@@ -1,6 +1,7 @@
 """`load_scene`: a scene from a file of Python or JSON, as command lines take it."""
 
 import runpy
+import traceback
 from os import PathLike
 from pathlib import Path
 
@@ -24,11 +25,21 @@ def load_scene(file: str | PathLike[str] | None) -> Scene:
         try:
             return Scene.from_dict(read_json(file))
         except ValueError as wrong:
-            raise ValueError(f"{file} is no scene: {wrong}") from wrong
+            raise ValueError(f"{file} is no scene: {str(wrong).rstrip('.')}.") from wrong
     try:
         found = runpy.run_path(str(file)).get("scene")
     except SyntaxError as wrong:
         raise ValueError(f"{file}, line {wrong.lineno}, is not Python: {wrong.msg}.") from wrong
+    except ValueError:
+        raise  # a sentence of ours, as of a robot without limbs
+    except Exception as wrong:  # the file is anybody's code
+        raise ValueError(f"{file}, {_line(wrong, file)}{type(wrong).__name__}: {str(wrong).rstrip('.')}.") from wrong
     if not isinstance(found, Scene):
         raise ValueError(f"{file} must define `scene`, a Scene.")
     return found
+
+
+def _line(wrong: Exception, file: Path) -> str:
+    """Last line of a file at which something went wrong, as the beginning of a sentence."""
+    lines = [frame.lineno for frame in traceback.extract_tb(wrong.__traceback__) if frame.filename == str(file)]
+    return f"line {lines[-1]}: " if lines else ""

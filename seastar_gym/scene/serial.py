@@ -55,7 +55,7 @@ def register_part(kind: type[Part]) -> type[Part]:
 def _make_floats(kind: type) -> None:
     """Have a dataclass make floats of its numbers before it checks them, where its annotations say float."""
     check = kind.__post_init__  # type: ignore[attr-defined]
-    annotations = cache(lambda: get_type_hints(kind))
+    annotations = cache(lambda: {name: hint for name, hint in get_type_hints(kind).items() if "float" in str(hint)})
 
     @wraps(check)
     def floats_first(part: Any, *arguments: Any) -> None:

@@ -18,7 +18,7 @@ def table(results: Mapping[str, Any]) -> str:
     lines = [f"| | {' | '.join(f'{turn:g}°' for turn in turns)} | {more} |", f"| --- |{' ---: |' * (len(turns) + 1)}"]
     for each in results["swims"].values():
         for what, unit in (("seconds", "s"), ("joules", "J")):
-            first, *_, last = each[what]
+            first, last = each[what][0], each[what][-1]
             numbers = [*each[what], None if first is None or last is None else last - first]
             cells = ["-" if one is None else f"{one:.0f}" for one in numbers]
             lines.append(f"| {each['what']} [{unit}] | {' | '.join(cells)} |")

@@ -1,17 +1,19 @@
 """Results of the tasks, the bound, and which tasks are kept."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from seastar_gym.evaluation.many import CONFIDENCE, RESAMPLES
 
 MORE_IS_BETTER = ("prey", "fast-prey", "prizes", "fast-prizes")
 ORDER = ("rest", "greedy", "planner", "adaptive", "prior", "informed", "PPO", "PPO, memory", "PPO, told the way",
          "RecurrentPPO", "in the box")  # fmt: skip
 """Agents from top to bottom."""
 HEADROOM, LEFT = 0.2, 1.0 / 3.0
-"""A task is kept where the bound is so much better than greedy, and plain PPO leaves so much of that."""
+"""A task is kept where the bound is so much better than greedy, and PPO leaves so much of that."""
 
 
 class Row(NamedTuple):
@@ -29,7 +31,7 @@ class Row(NamedTuple):
 
     def mean(self, agent: str) -> float:
         """Mean measure of an agent over seeds and episodes."""
-        return float(np.mean(self.agents[agent]))
+        return float(np.mean([values.mean() for values in self.agents[agent]]))
 
     @property
     def bound(self) -> str:
@@ -50,14 +52,33 @@ class Row(NamedTuple):
 
     @property
     def left(self) -> float:
-        """Share of the headroom that plain PPO leaves."""
+        """Share of the headroom that PPO leaves."""
+        return self.left_by("PPO")
+
+    def left_by(self, agent: str) -> float:
+        """Share of the headroom that an agent leaves."""
         greedy, bound = self.mean("greedy"), self.mean(self.bound)
-        return (bound - self.mean("PPO")) / (bound - greedy)
+        return abs(bound - self.mean(agent)) / abs(bound - greedy)
 
     @property
     def is_kept(self) -> bool:
-        """Whether the task has headroom that plain PPO does not take."""
+        """Whether the task has headroom that PPO does not take."""
         return self.headroom >= HEADROOM and self.left >= LEFT
+
+
+def interval(seeds: Sequence[NDArray[np.float64]]) -> tuple[float, float]:
+    """Ends of the interval of the mean that holds for other seeds and other episodes.
+
+    All seeds swim the same episodes, so that a bootstrap draws seeds, and episodes for all of them alike.
+    """
+    most = min(map(len, seeds))
+    values = np.array([of_seed[:most] for of_seed in seeds])
+    rng, (n_seeds, n_episodes) = np.random.default_rng(0), values.shape
+    drawn_seeds = rng.multinomial(n_seeds, np.full(n_seeds, 1.0 / n_seeds), RESAMPLES) / n_seeds
+    drawn_episodes = rng.multinomial(n_episodes, np.full(n_episodes, 1.0 / n_episodes), RESAMPLES) / n_episodes
+    tail = 50.0 * (1.0 - CONFIDENCE)
+    low, high = np.percentile(((drawn_seeds @ values) * drawn_episodes).sum(axis=1), [tail, 100.0 - tail])
+    return float(low), float(high)
 
 
 def rows_of(results: Mapping[str, Any], ids: Mapping[str, str]) -> list[Row]:

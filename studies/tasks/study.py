@@ -3,8 +3,8 @@
     python -m studies.tasks
 
 A cell is a task, an agent and a seed. Every cell is swum on the same held-out episodes, the first of the split "test";
-learners are trained on the split "train" before. Results are written after every cell, and a cell whose result is
-already in the file is not repeated, so the study can be broken off and continued, also with more seeds.
+learners are trained on the split "train" before. Results are written after every cell, and a cell that is already in
+the file with as many episodes is not repeated, so the study can be broken off and continued, also with more seeds.
 """
 
 import itertools
@@ -51,7 +51,7 @@ class Options:
     """Seeds of the trainings; agents that do not learn swim once."""
     decisions: int = 200_000
     """Length of every training [decisions]."""
-    episodes: int = 16
+    episodes: int = 64
     """Number of held-out episodes."""
     fidelity: Fidelity = "fast"
     """Fidelity of the simulated swims."""
@@ -68,7 +68,7 @@ class Options:
     @property
     def settings(self) -> dict[str, Any]:
         """What all cells of a file have in common."""
-        return {name: getattr(self, name) for name in ("decisions", "episodes", "fidelity")}
+        return {name: getattr(self, name) for name in ("decisions", "fidelity")}
 
 
 def has_cell(id: str, agent: str) -> bool:
@@ -107,8 +107,7 @@ def cell(id: str, agent: str, seed: int, options: Options) -> dict[str, Any]:
 def read_cells(options: Options) -> dict[str, Any]:
     """Results in the output file, or empty ones; ValueError if they were made with other settings."""
     if not options.out.is_file():
-        made = provenance("python -m studies.tasks", "torch", "stable_baselines3")
-        return {**made, "settings": options.settings, "cells": {}}
+        return {"settings": options.settings, "cells": {}}
     results: Any = json.loads(options.out.read_text(encoding="utf-8"))
     if results.get("settings") != options.settings:
         raise ValueError(f"{options.out} has results of {results.get('settings')}, not of {options.settings}.")
@@ -119,11 +118,13 @@ def study(options: Options) -> dict[str, Any]:
     """Swim the cells that are missing, and write the results after each."""
     for seed, id, agent in itertools.product(options.seeds, options.ids, options.agents):
         name = f"{id}, {agent}, {seed}"
-        again = name in read_cells(options)["cells"] or (agent not in ALL_LEARNERS and seed != options.seeds[0])
-        if again or not has_cell(id, agent):
+        before = read_cells(options)["cells"].get(name, {"measure": ()})["measure"]
+        again = agent not in ALL_LEARNERS and seed != options.seeds[0]
+        if again or len(before) >= options.episodes or not has_cell(id, agent):
             continue
         found = cell(id, agent, seed, options)
         results = read_cells(options)  # another process may have written meanwhile
+        results |= provenance("python -m studies.tasks", "torch", "stable_baselines3")
         results["cells"][name] = found
         options.out.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(options.out, (json.dumps(results) + "\n").encode())

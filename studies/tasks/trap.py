@@ -12,12 +12,12 @@ from seastar_gym.envs.tasks.obst_trap import (
     EXTENT,
     FIRST,
     LAST,
-    OPENING,
     PASSAGE,
     SEEN,
     STEP,
     Horseshoe,
     draw_horseshoe,
+    draw_kind,
 )
 from studies.tasks.ahead import Ahead, Robots
 from studies.tasks.episodes import Info
@@ -122,7 +122,8 @@ def discs_so_far() -> Known:
 class Belief:
     """Belief of one robot in one of several horseshoes, by the discs that it has seen and those that it has not.
 
-    horseshoes: Discs that may be there in the world [m], shape (n_horseshoes, 8, 3), the most probable one first.
+    horseshoes: Discs that may be there in the world [m], shape (n_horseshoes, 8, 3), NaN where one is missing;
+    the most probable horseshoe first.
     """
 
     def __init__(self, horseshoes: Floats):
@@ -140,14 +141,17 @@ class Belief:
         self._is_missing |= in_sight & ~is_known
         told = is_known.sum(axis=1) - (is_known.shape[1] * self._is_missing).sum(axis=1)
         best = int(np.argmax(told))
-        return self._horseshoes[best] if told[best] >= 0 else self._horseshoes[best, :0]
+        believed = self._horseshoes[best]
+        return believed[~np.isnan(believed[:, 0])] if told[best] >= 0 else believed[:0]
 
 
 def horseshoes_to(goal: float) -> Floats:
     """Horseshoes that the generator may draw before a goal at this distance [m], their mean first, shape (n, 8, 3)."""
     rng = np.random.default_rng(0)
-    mean = Horseshoe(np.array([0.5 * (FIRST + goal - LAST), 0.0]), np.mean(ARC), np.mean(EXTENT), 0.0, 0.03)
-    others = (draw_horseshoe(rng, goal, rng.uniform(-OPENING, OPENING)) for _ in range(IMAGINED))
+    mean = Horseshoe(
+        np.array([0.5 * (FIRST + goal - LAST), 0.0]), float(np.mean(ARC)), float(np.mean(EXTENT)), 0.0, 0.03
+    )
+    others = (draw_horseshoe(rng, goal, *draw_kind(rng)) for _ in range(IMAGINED))
     return np.stack([mean.discs, *(one.discs for one in others)])
 
 

@@ -15,22 +15,33 @@ def verdicts(rows: Sequence[Row]) -> str:
     judged = [row for row in rows if {"greedy", "informed", "PPO"} <= row.agents.keys()]
     boxed = [row for row in rows if {BOX, MEMORY, *RULES[:3]} <= row.agents.keys()]
     paragraphs = [_kept(judged)] * bool(judged) + [_in_the_box(boxed)] * bool(boxed)
-    return "".join(f"{textwrap.fill(each, 120, break_on_hyphens=False)}\n\n" for each in paragraphs)
+    text = "".join(f"{textwrap.fill(each, 120, break_on_hyphens=False)}\n\n" for each in paragraphs)
+    return f"{_summary(judged)}\n\n{text}" if judged else text
+
+
+def _summary(rows: Sequence[Row]) -> str:
+    lines = ["| task | bound | better than greedy | gap left by PPO | gap left by the policy in the box | kept |"]
+    lines.append("|---|---|---:|---:|---:|---|")
+    for row in rows:
+        better = f"{100.0 * row.headroom:.0f} %" if row.headroom < 10.0 else "more than ten times"
+        left = (f"{100.0 * row.left_by(agent):.0f} %" if agent in row.agents else "" for agent in ("PPO", BOX))
+        lines.append(
+            f"| {_name(row)} | {row.bound} | {better} | {' | '.join(left)} | {'yes' if row.is_kept else 'no'} |"
+        )
+    return "\n".join(lines)
 
 
 def _kept(rows: Sequence[Row]) -> str:
     dropped = [row for row in rows if not row.is_kept]
     text = f"{len(rows) - len(dropped)} of {len(rows)} tasks are kept."
     if dropped:
-        text += (
-            f" Not kept: {'; '.join(map(_why_not, dropped))}. Their ids stay, but show no difference between learners."
-        )
+        text += f" Not kept: {'; '.join(map(_why_not, dropped))}."
     return text
 
 
 def _why_not(row: Row) -> str:
     if row.left < LEFT:
-        return f"{_name(row)}, where plain PPO leaves {100.0 * row.left:.0f} % of the gap"
+        return f"{_name(row)}, where PPO leaves {100.0 * row.left:.0f} % of the gap"
     return f"{_name(row)}, whose bound is only {100.0 * row.headroom:.0f} % better than greedy"
 
 

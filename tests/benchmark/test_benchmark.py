@@ -147,6 +147,13 @@ def test_relative_scores_are_one_for_the_best():
     assert best_means([replace(one, better="more") for one in (slow, fast)]) == {SWIM: 3.0}
 
 
+def test_a_failure_counts_in_the_mean():
+    """An interquartile mean would hide the quarter that does not arrive."""
+    found = entry(scores=(100.0, 100.0, 100.0, 300.0)).estimate()
+    assert found.mean == 150.0 and found.low == 100.0 and found.high > 150.0
+    assert str(entry(scores=(100.0,)).estimate()) == "100.0"
+
+
 def test_results_come_back_from_their_file_and_the_later_of_two_counts(tmp_path):
     write([entry(), entry("b")], tmp_path / "results.json")
     found = read(tmp_path / "results.json")
@@ -245,7 +252,7 @@ def test_the_command_measures_merges_and_writes_a_page(tasks, tmp_path, capsys):
     printed = capsys.readouterr().out
     assert "| SeastarShort-v0 | time until done [s], less is better |" in printed
     written = (out / "benchmark.md").read_text()
-    assert "over 4 seeds" in written and "profiles.png" in written and f"--tasks {SHORT}" in written
+    assert "over 4 episodes" in written and "profiles.png" in written and f"--tasks {SHORT}" in written
     facts = json.loads((out / "results.json").read_text())["entries"]
     assert [one["agent"] for one in facts] == ["straight", "greedy"] and facts[0]["seeds"] == [1000, 1001, 1002, 1003]
 
@@ -257,7 +264,7 @@ def test_the_command_measures_merges_and_writes_a_page(tasks, tmp_path, capsys):
     assert main(["--agents", "two=straight,rest", *arguments, "--merge", str(out / "results.json")]) == 0
     merged_entries = read(both / "results.json")
     assert [one.agent for one in merged_entries] == ["straight", "greedy", "two"]
-    assert "2 to 4 seeds" in (both / "benchmark.md").read_text()
+    assert "2 to 4 episodes" in (both / "benchmark.md").read_text()
 
 
 FEW = (

@@ -79,7 +79,7 @@ def test_a_setting_endures_up_to_a_growth_by_half():
 
 
 def test_the_energy_of_a_swim_that_fails_grows_without_bound(monkeypatch):
-    monkeypatch.setattr(Simulator, "stroke", lambda *_: SimpleNamespace(status=np.array([1] * 17)))
+    monkeypatch.setattr(Simulator, "stroke", lambda *_: SimpleNamespace(status=np.array([1] + [0] * 16)))
     assert endurance.energy_growth(SCENE) == np.inf
 
 

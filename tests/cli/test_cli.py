@@ -233,6 +233,16 @@ def test_a_robot_of_a_file_swims(path, tmp_path, capsys):
     assert "0 of 1 waypoints in 2.0 s" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("command", ["swim", "evaluate", "certify", "sweep", "identify"])
+def test_what_goes_wrong_in_a_scene_file_is_said_with_its_line(command, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("wrong.py").write_text("import math\nscene = nothing\n")
+    scene = ["wrong.py"] if command == "certify" else ["--scene", "wrong.py"]
+    assert main([command, *scene, *(["--synthetic"] if command == "identify" else [])]) == 2
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert last == "wrong.py, line 2: NameError: name 'nothing' is not defined."
+
+
 THREE_LIMBS = "from seastar_gym import Scene, Seastar\nscene = Scene(robot=Seastar(n_limbs=3))\n"
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from seastar_gym import Numerics, Scene, Seastar, Simulator, ThermalSma
 from seastar_gym.controllers.greedy import waypoints_of
-from seastar_gym.controllers.planner import Budget, Planner, state_of
+from seastar_gym.controllers.planner import Budget, Planner, Targets, state_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.swim import swim
@@ -83,7 +83,36 @@ def test_it_swims_round_a_corner_faster_than_by_the_displacement_map():
     assert done.finished and done.strokes <= 15
 
 
+def test_who_can_arrive_at_the_last_waypoint_arrives_by_the_fewest_decisions():
+    """Robots one and two strokes from it, side by side with one that is far away, however far the search looks."""
+    _, observations = swum(n_robots=5)
+    planner = Planner(FAST, 0.0004, Budget(3, 21), threads=1)
+    states = state_of(observations, FAST)
+    once = planner._swim_all(states)
+    first = once.positions[:, 0].reshape(5, 21, 2)
+    twice = planner._swim_all(once).positions[:, 0].reshape(5, 21, 21, 2)
+    wanted = [4, 9, 16, 11]
+    goals = np.stack([first[0, 4], first[1, 9], twice[2, 16, 3], twice[3, 11, 12], [1.0, 0.0]])
+    chosen = planner._search(states, Targets(goals, goals))
+    assert chosen[:2].tolist() == wanted[:2]
+    for robot in (2, 3):  # by the command that the goal is made of, or another one from which it is in reach
+        assert np.hypot(*(twice[robot, chosen[robot]] - goals[robot]).T).min() <= 0.0004
+        assert np.hypot(*(first[robot] - goals[robot]).T).min() > 0.0004
+
+
+def test_a_waypoint_that_is_not_the_last_is_passed_and_not_arrived_at():
+    """The search goes on to the one after it, and takes the sequence that is nearest to that in the end."""
+    _, observations = swum(n_robots=1)
+    planner = Planner(FAST, 0.02, Budget(2, 21), threads=1)
+    states = state_of(observations, FAST)
+    after = np.array([[0.2, 0.1]])
+    (chosen,) = planner._search(states, Targets(np.zeros((1, 2)), after))  # the robot is within the first one
+    ends = planner._swim_all(planner._swim_all(states)).positions[:, 0].reshape(21, 21, 2)
+    way = np.hypot(*np.moveaxis(ends - after, -1, 0))
+    assert way[chosen].min() == pytest.approx(way.min(), abs=1e-6)
+
+
 @pytest.mark.parametrize("arguments", [(0, 1), (1, 0)])
 def test_a_search_of_nothing_is_refused(arguments):
-    with pytest.raises(ValueError, match="at least 1"):
+    with pytest.raises(ValueError, match="whole number from 1"):
         Budget(*arguments)

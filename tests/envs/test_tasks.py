@@ -532,6 +532,20 @@ def test_the_station_is_near_and_rewards_count_its_distance():
     assert info["is_success"] == (info["distance"] <= 0.002)
 
 
+@pytest.mark.parametrize("decisions, r_squared", [(1, 0.97), (2, 0.98)])
+def test_the_current_shows_in_the_velocity_of_a_resting_hub(decisions, r_squared):
+    """A line through one observation tells it, as the docstring of Station says."""
+    batch = gym.make_vec("SeastarStation-v0", 64, "vector_entry_point", fidelity="fast", split="test")
+    batch.reset(options={"instance": np.arange(64)})
+    for _ in range(decisions):
+        seen, *_, info = batch.step(np.zeros(64, int))
+    flow = np.stack([info["fluid.current.u_x"], info["fluid.current.u_y"]], axis=1)
+    in_body = batch.unwrapped._task._in_body_frame(flow)
+    of_hub = np.column_stack([np.ones(64), seen[:, 180:182]])
+    _, missed, *_ = np.linalg.lstsq(of_hub, in_body)
+    assert 1.0 - missed.sum() / np.square(in_body - in_body.mean(axis=0)).sum() == pytest.approx(r_squared, abs=0.01)
+
+
 def test_a_robot_knows_still_water_only():
     env = SeastarTaskEnv(task="station", fidelity="fast", actions="joint")
     assert env.scene.fluid.current is None and env.simulator.scene.fluid.current is not None
@@ -653,12 +667,12 @@ def test_all_sets_of_dead_limbs_are_drawn_alike():
 def fields():
     """Fields of discs before a goal half a metre away."""
     rng = np.random.default_rng(0)
-    return [draw_discs(rng, np.array([0.5, 0.0]), 3, 0.85) for _ in range(60)]
+    return [draw_discs(rng, np.array([0.5, 0.0]), 3, 0.85) for _ in range(120)]
 
 
-def has_horseshoe(discs) -> bool:
-    """Whether the first eight discs overlap, each with the next."""
-    return bool((np.hypot(*np.diff(discs[:8, :2], axis=0).T) < 1.9 * discs[0, 2]).all())
+def joints(discs) -> int:
+    """Number of the first eight discs that overlap with the next: 7 in a horseshoe, 4 in one with a hole."""
+    return int((np.hypot(*np.diff(discs[:8, :2], axis=0).T) < 1.9 * discs[0, 2]).sum())
 
 
 def test_every_field_has_a_way_around(fields):
@@ -668,18 +682,21 @@ def test_every_field_has_a_way_around(fields):
         assert ways(discs, goal, 0.015, 0.01)(np.zeros((1, 2)))[0] < 0.9
 
 
-def test_horseshoes_lie_anywhere_open_to_any_side_of_the_start_and_may_be_absent(fields):
-    there = [discs for discs in fields if has_horseshoe(discs)]
-    assert 0.65 < len(there) / len(fields) < 0.95
-    centres, opening, in_the_way = [], [], []
-    for discs in there:
-        ends, middle = discs[[0, 7], :2].mean(axis=0), discs[3:5, :2].mean(axis=0)
-        centres.append(discs[:8, :2].mean(axis=0))
-        opening.append(np.arctan2(*(middle - ends)[::-1]))
-        in_the_way.append(rims(np.linspace([0.0, 0.0], [0.5, 0.0], 200), discs[:8]).min() < -0.005)
-    assert (np.ptp(centres, axis=0) > [0.1, 0.08]).all() and np.mean(in_the_way) > 0.9
-    assert 0.15 < np.mean(np.abs(opening) > np.radians(60.0)) < 0.5 and 0.3 < np.mean(np.array(opening) > 0.0) < 0.7
-    assert all(rims(discs[3:5, :2].mean(axis=0), discs[8:]).min() > 0.0 for discs in there)
+def test_horseshoes_may_be_absent_or_have_a_hole(fields):
+    whole, there = (np.mean([joints(discs) >= least for discs in fields]) for least in (7, 4))
+    assert 0.7 < there < 0.9 and 0.35 < whole / there < 0.65
+
+
+def test_horseshoes_lie_anywhere_and_open_to_any_side_of_the_start(fields):
+    whole = [discs for discs in fields if joints(discs) == 7]
+    centres = np.array([discs[:8, :2].mean(axis=0) for discs in whole])
+    forth = np.array([discs[3:5, :2].mean(axis=0) - discs[[0, 7], :2].mean(axis=0) for discs in whole])
+    opening = np.degrees(np.arctan2(forth[:, 1], forth[:, 0]))
+    along = np.linspace([0.0, 0.0], [0.5, 0.0], 200)
+    assert (np.ptp(centres, axis=0) > [0.08, 0.07]).all()
+    assert (np.abs(opening) <= 90.0).all() and (opening > 50.0).any() and (opening < -50.0).any()
+    assert np.mean([rims(along, discs[:8]).min() < -0.005 for discs in whole]) > 0.9
+    assert all(rims(discs[3:5, :2].mean(axis=0), discs[8:]).min() > 0.0 for discs in whole)
 
 
 def test_fields_that_nobody_could_pass_are_refused():

@@ -10,7 +10,7 @@ import os
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from multiprocessing.pool import Pool
+from multiprocessing.pool import AsyncResult, Pool
 from random import Random
 from typing import NamedTuple
 
@@ -38,8 +38,8 @@ from fuzz.scenes import (
 LIMIT = 120.0
 """Seconds of processor time for a trial, and for machine code that it may have to compile: others may use it, too."""
 
-WAIT = 15.0 * LIMIT
-"""Seconds for one that uses no processor."""
+WAIT = 10.0 * LIMIT
+"""Seconds in which one uses less than a second of processor time before it is taken for one that waits for ever."""
 
 BLOCK = 8
 """Cases of a set of terms, which has to be compiled, before the next."""
@@ -124,14 +124,22 @@ class Workers:
             self._terms = trial.terms
         raised: list[BaseException] = []
         answer = self._pool.apply_async(attempt, (trial,), error_callback=raised.append)
-        end, begin = time.monotonic() + WAIT, processor_time(self._process)
         with contextlib.suppress(OSError):  # there is no such process: it crashed
-            while not answer.ready() and time.monotonic() < end and processor_time(self._process) < begin + LIMIT:
-                answer.wait(0.5)
+            self._wait(answer)
         if answer.ready():
             return raised[0] if raised else None
         self._renew()
         return TimeoutError(f"no answer within {LIMIT:g} s: it hangs, or its process crashed")
+
+    def _wait(self, answer: AsyncResult) -> None:
+        """Wait until there is an answer, or time is up."""
+        begin = used = processor_time(self._process)
+        since = time.monotonic()
+        while not answer.ready() and used < begin + LIMIT and time.monotonic() < since + WAIT:
+            answer.wait(0.5)
+            now = processor_time(self._process)
+            if now > used + 1.0:
+                used, since = now, time.monotonic()
 
     def _renew(self) -> None:
         self.stop()

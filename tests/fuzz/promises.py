@@ -251,9 +251,10 @@ def check_energy(case: Case) -> None:
 
     What contact and moving water store is not in the energies that a simulator tells of. Newton tolerances as loose as
     a thousandth of a limb leave residual forces that do work, so they are at most the default here. A robot that begins
-    with a hinge folded to pi has no energy to begin with: the least nudge makes another one of it.
+    with a hinge folded to pi has no energy to begin with: the least nudge makes another one of it. Robots with a body
+    are tried in vacuum: in water the guard looks at steps with much energy alone, as was measured without a body.
     """
-    scene, fluid = case.scene, case.scene.fluid
+    scene, fluid = case.scene, None if case.scene.robot.has_body else case.scene.fluid
     if fluid is not None:
         fluid = replace(fluid, current=None, added_mass_coefficient=None)
     tolerance = min(scene.numerics.newton_tolerance, Numerics().newton_tolerance)

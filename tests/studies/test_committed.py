@@ -12,6 +12,7 @@ import pytest
 from seastar_gym.controllers.greedy import measure_gaits
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
+from seastar_gym.evaluation.tasks import task_ids
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__
 from studies import committed
@@ -84,6 +85,19 @@ def test_every_picture_is_covered_or_has_a_command():
 def test_every_file_of_numbers_has_a_footer():
     text = "".join(file.read_text(encoding="utf-8") for file in DOCS.glob("*.md"))
     assert [file.name for file in DOCS.glob("*.json") if f"*Numbers: [{file.name}]" not in text] == []
+
+
+def test_the_page_of_environments_holds_every_contract():
+    """On GitHub as on the site: ids, spaces, observation, reward, info."""
+    text = (DOCS / "environments.md").read_text(encoding="utf-8")
+    for id in task_ids():
+        assert f"| `{id}` | [Seastar" in text
+    parts = dict(re.findall(r"^## (Seastar\w*Env)\n(.*?)(?=^## |\Z)", text, re.DOTALL | re.MULTILINE))
+    for name in ("SeastarSwimEnv", "SeastarSwimVectorEnv", "SeastarTaskEnv", "SeastarTaskVectorEnv"):
+        assert name in parts
+    headings = re.findall(r"^### (.*)$", parts["SeastarSwimEnv"], re.MULTILINE)
+    assert {"Action space", "Observation space", "Reward", "Info", "Arguments"} <= set(headings), headings
+    assert "`path_error`" in parts["SeastarSwimEnv"]
 
 
 def test_a_table_of_no_study_is_refused():

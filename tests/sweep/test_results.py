@@ -42,6 +42,17 @@ def test_results_are_those_of_the_simulator():
     assert found["status"].tolist() == [0, 0]
 
 
+@pytest.mark.parametrize("order", [(0, 1, 2), (1, 2, 0), (2, 0, 1)])
+def test_the_smallest_opening_angle_is_that_of_any_interval(order):
+    """Whichever interval has it: neighbours turned towards each other, with force, a little, or not at all."""
+    commands = np.array([[0.0, 1.0, -1.0, 0.0, 0.0], [0.0, 0.4, -0.4, 0.0, 0.0], np.zeros(5)])[list(order)]
+    found = swim(one_cell(gait=commands, settling=1, measured=2))["smallest_opening_angle"]
+    simulator = Simulator(FAST)
+    angles = [simulator.stroke([command]).smallest_opening_angle[0] for command in commands]
+    assert found.tolist() == [min(angles)] and np.ptp(angles) > 0.1
+    assert angles.index(min(angles)) == order.index(0)
+
+
 def test_a_turned_gait_swims_aside_and_turns_nothing():
     gait = np.roll([STRAIGHT], 1, axis=1)
     found = swim(one_cell(gait=gait))

@@ -34,11 +34,12 @@ class ObstTrap(Challenge):
 
     ## Episode
     The goal lies at a distance in `distance`. In four episodes of five, eight discs of one radius overlap in a
-    horseshoe: anywhere between start and goal, up to 50 mm aside, open to any side but that of the goal. In the others
-    the eight are scattered, as `scattered` discs more always are. None is near the start or the goal. The robot has a
-    random heading. The hub must stay out of discs, limbs may pass over them. The episode ends when the goal is reached,
-    or when a decision ends with the hub within a disc, which is no success. Only fields that can be solved are drawn:
-    there is a way that keeps 15 mm clear of all discs and is no longer than `longest_way`.
+    horseshoe: anywhere between start and goal, up to 50 mm aside, open to any side but that of the goal. Half of the
+    horseshoes have a hole, where two discs are missing, anywhere but at their ends. Discs that are missing there, all
+    eight where there is no horseshoe, and `scattered` discs more lie elsewhere. None is near the start or the goal. The
+    robot has a random heading. The hub must stay out of discs, limbs may pass over them. The episode ends when the goal
+    is reached, or when a decision ends with the hub within a disc, which is no success. Only fields that can be solved
+    are drawn: there is a way that keeps 15 mm clear of all discs and is no longer than `longest_way`.
 
     ## Observation
     That of `SeastarSwim-v0`, with the goal in the places of the current and of the next waypoint, and the six discs
@@ -119,6 +120,8 @@ EXTENT: Range = (1.7, 2.0)
 """Angle from the middle of the arc to its ends [rad]."""
 OVERLAP: Range = (0.55, 0.7)
 """Radius of its discs, as a share of the distance of neighbours: more than a half, so that they overlap."""
+HOLE, WIDTH = 0.5, 2
+"""Share of the horseshoes with a hole, and the number of discs that are missing there."""
 OPENING = 0.5 * np.pi
 """Largest angle between the way from the goal to the start and the direction in which a horseshoe opens [rad]."""
 FIRST, LAST = 0.12, 0.17
@@ -150,36 +153,48 @@ class Horseshoe(NamedTuple):
     """Direction of the middle from the centre [rad]: 0 is towards the goal, and the horseshoe opens the other way."""
     radius: float
     """Radius of the discs [m]."""
+    hole: int = N_HORSESHOE
+    """Number of the first of the WIDTH discs that are missing; N_HORSESHOE for none."""
 
     @property
     def discs(self) -> Floats:
-        """Its discs, shape (N_HORSESHOE, 3)."""
+        """Its discs, shape (N_HORSESHOE, 3); NaN where one is missing."""
         at = self.middle + np.linspace(-self.extent, self.extent, N_HORSESHOE)
         places = self.centre + self.arc * np.stack([np.cos(at), np.sin(at)], axis=1)
-        return np.column_stack([places, np.full(N_HORSESHOE, self.radius)])
+        discs = np.column_stack([places, np.full(N_HORSESHOE, self.radius)])
+        discs[self.hole : self.hole + WIDTH] = np.nan
+        return discs
 
 
-def draw_horseshoe(rng: np.random.Generator, goal: float, middle: float) -> Horseshoe:
-    """A horseshoe of a direction [rad] somewhere on the way to a goal at this distance [m]."""
+def draw_kind(rng: np.random.Generator) -> tuple[float, int]:
+    """Fields `middle` and `hole` of a horseshoe."""
+    hole = int(rng.integers(1, N_HORSESHOE - WIDTH)) if rng.random() < HOLE else N_HORSESHOE
+    return rng.uniform(-OPENING, OPENING), hole
+
+
+def draw_horseshoe(rng: np.random.Generator, goal: float, middle: float, hole: int) -> Horseshoe:
+    """A horseshoe of a kind, somewhere on the way to a goal at this distance [m]."""
     arc, extent = rng.uniform(*ARC), rng.uniform(*EXTENT)
     centre = np.array([rng.uniform(FIRST, goal - LAST), rng.uniform(-ASIDE, ASIDE)])
     spacing = 2.0 * arc * np.sin(extent / (N_HORSESHOE - 1))
-    return Horseshoe(centre, arc, extent, middle, rng.uniform(*OVERLAP) * spacing)
+    return Horseshoe(centre, arc, extent, middle, rng.uniform(*OVERLAP) * spacing, hole)
 
 
 def draw_discs(rng: np.random.Generator, goal: Floats, scattered: int, longest_way: float) -> Floats:
     """Discs around which there is a way from the origin to the goal [m] on the x axis, shape (8 + scattered, 3).
 
-    The first eight are a horseshoe, or as many of its discs that are scattered, too. ValueError: none were found.
+    The first eight are a horseshoe, or as many discs of which some or all are scattered. ValueError: none were found.
     """
-    is_there, middle = rng.random() < PRESENCE, rng.uniform(-OPENING, OPENING)
+    is_there, kind = rng.random() < PRESENCE, draw_kind(rng)  # before, so that what is refused changes no shares
     for _ in range(MOST_DRAWS):
-        horseshoe = draw_horseshoe(rng, goal[0], middle)
+        horseshoe = draw_horseshoe(rng, goal[0], *kind)
         discs = rng.uniform([-0.05, -0.25, RADIUS[0]], [goal[0] + 0.05, 0.25, RADIUS[1]], (N_HORSESHOE + scattered, 3))
         discs[:N_HORSESHOE, 2] = horseshoe.radius
         if is_there:
-            discs[:N_HORSESHOE] = horseshoe.discs
-            if (rims(horseshoe.centre, discs[N_HORSESHOE:]) < horseshoe.arc + horseshoe.radius).any():
+            is_part = ~np.isnan(horseshoe.discs[:, 0])
+            discs[:N_HORSESHOE][is_part] = horseshoe.discs[is_part]
+            outside = np.concatenate([discs[:N_HORSESHOE][~is_part], discs[N_HORSESHOE:]])
+            if (rims(horseshoe.centre, outside) < horseshoe.arc + horseshoe.radius).any():
                 continue
         clear = min(rims(START[0], discs).min(), rims(goal, discs).min()) >= AROUND
         if clear and ways(discs, goal, PASSAGE, SOLVING_STEP)(START)[0] <= longest_way:

@@ -1,4 +1,4 @@
-"""`SeastarStation-v0`: a place to keep in a current that is not known."""
+"""`SeastarStation-v0`: a place to keep in a current that shows in the velocities."""
 
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
@@ -21,11 +21,11 @@ ARROW = 20.0
 @register_part
 @dataclass(frozen=True)
 class Station(Challenge):
-    """A point to keep the hub at, in a uniform current that is not known.
+    """A point to keep the hub at, in a uniform current that is not told but shows in the velocities.
 
-    The current would carry a resting robot by 0.1 to 0.3 m in an episode. A controller that remembers how far it
-    drifted off what it meant to do knows the current; one that thinks two decisions ahead, over all commands, places
-    the hub to fractions of a millimetre.
+    The current would carry a resting robot by 0.1 to 0.3 m in an episode. It is hardly hidden: after one decision at
+    rest, a line through the hub's velocity over ground tells the current with R2 = 0.97. What the task tests is to
+    place the hub to fractions of a millimetre while the water flows, as one that thinks two decisions ahead does.
 
     ## Episode
     The robot rests over ground, with its hub at the origin and a random heading, and the station lies at a distance in
@@ -64,8 +64,8 @@ class Station(Challenge):
     | `instance`          | int        | -    | number of the episode in its split             |
     | `distance`          | float      | m    | distance of the hub from the station           |
     | `station`           | array (2,) | m    | station in the world: x, y                     |
-    | `fluid.current.u_x` | float      | m/s  | velocity of the water, which is not observed   |
-    | `fluid.current.u_y` | float      | m/s  | velocity of the water, which is not observed   |
+    | `fluid.current.u_x` | float      | m/s  | velocity of the water, in the world            |
+    | `fluid.current.u_y` | float      | m/s  | velocity of the water, in the world            |
     | `reward_distance`   | float      | 1    | term of the reward                             |
 
     ## Arguments
