@@ -15,7 +15,6 @@ if it is no worse.
 Exit status: 0 done; 1 a file could not be written, or the policy was not put in the box; 2 wrong options; 130 stopped.
 """
 
-import json
 import shlex
 import sys
 import threading
@@ -38,13 +37,13 @@ try:
     from agents.report.page import Remarks
     from agents.training import efficiency
     from agents.training.box import put_in_the_box
-    from agents.training.folder import claim, export, is_unbegun, recorded, resume_command, write_config
+    from agents.training.folder import export, held, is_unbegun, recorded, resume_command, write_config
     from agents.training.interruption import Interruption
-    from agents.training.options import Options, read_options, require_consent
+    from agents.training.options import Options, config_of, read_options, require_consent
     from agents.training.robot import SCENE, Robot, asked_for, keep, robot_of
     from agents.training.watch import Watch
     from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
-    from seastar_gym.command import refused_by_disk
+    from seastar_gym.command import ended_by_disk
     from seastar_gym.controllers.contract import Policy, actions_of, require_fit
     from seastar_gym.controllers.learned import load as load_policy
     from seastar_gym.controllers.scripted import scripted
@@ -138,7 +137,7 @@ def describe(options: Options, folder: Path, trained: int, watch: Watch) -> Rema
         title="Learned against scripted round the pentagon",
         sentences=sentences,
         commands=[
-            *json.loads((folder / "config.json").read_text(encoding="utf-8"))["commands"],
+            *config_of(folder)["commands"],
             f"tensorboard --logdir {shlex.quote(str(folder))}",
             f"python -m agents.evaluate --agents {policy} pentagon {physics} --report{timed}",
             f"{resume_command(folder)} --strokes {2 * trained}",
@@ -169,14 +168,18 @@ def run(options: Options, arguments: Sequence[str]) -> int:
     require_device(options.device)
     require_consent(options)
     folder = options.out or Path("runs") / time.strftime("%Y-%m-%d_%H-%M-%S")
-    if options.resume is None:
-        robot = asked_for(options)
-        if robot != Robot():
-            training_env(options, robot).close()  # refuses what cannot be trained before there is a folder
-        claim(folder)
+    robot = asked_for(options) if options.resume is None else Robot()
+    if robot != Robot():
+        training_env(options, robot).close()  # refuses what cannot be trained before there is a folder
+    with held(folder, options.resume is None):
         keep(robot, folder)
-    write_config(options, arguments, folder)
-    print(f"The run is in {folder}.", flush=True)
+        write_config(options, arguments, folder)
+        print(f"The run is in {folder}.", flush=True)
+        return train_and_compare(options, folder)
+
+
+def train_and_compare(options: Options, folder: Path) -> int:
+    """Train, compare, report, in the folder of the run; returns the exit code."""
     with Interruption() as interruption:
         model, watch = train(options, folder, lambda: interruption.requested)
     export(model, folder)
@@ -216,8 +219,7 @@ def main(arguments: Sequence[str]) -> int:
             options = read_options(arguments)
             return run_seeds(options, arguments) if options.seeds else run(options, arguments)
     except OSError as failure:
-        print(refused_by_disk(failure), file=sys.stderr)
-        return 2 if failure.errno is None else 1
+        return ended_by_disk(failure)
     except ValueError as wrong:
         print(wrong, file=sys.stderr)
         return 2

@@ -140,7 +140,7 @@ def write_card(file: Path, threads: int | None = None) -> Path:
     """Measure the policy in a file, and write its card beside it; returns the card's file."""
     policy, place = load(file), file.with_suffix(".md")
     text = card(policy, file, hashlib.sha256(file.read_bytes()).hexdigest(), measure(policy, threads))
-    write_atomically(place, text.encode())
+    write_atomically(place, text)
     return place
 
 

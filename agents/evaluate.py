@@ -6,7 +6,6 @@
 From Python, `evaluate({"mine": policy, "script": scripted("pentagon")}, path)` does the same.
 """
 
-import json
 import re
 import shlex
 import sys
@@ -20,15 +19,14 @@ import tyro
 from rich.console import Console
 from rich.text import Text
 
-from agents.names import AgentNames
 from agents.report.charts import Curve, read_progress
-from agents.report.page import Remarks, ResultsTable, read_trials, write_report
+from agents.report.page import Remarks, ResultsTable, read_bound, read_trials, write_report
 from agents.report.playback import Playback, RecordingEnv
 from agents.results import results_table
 from seastar_gym.command import run_command
 from seastar_gym.controllers import learned
-from seastar_gym.controllers.contract import Policy, actions_of, require_fit
-from seastar_gym.controllers.roster import load_agents
+from seastar_gym.controllers.contract import Policy, actions_of
+from seastar_gym.controllers.roster import DEFAULTS, HELP, fitting_agents
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene, scene_at
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
@@ -156,7 +154,7 @@ def _write_report(
 class Options:
     """Compare agents on a path: print a table and write it as CSV, with a picture of the traces and a video of each."""
 
-    agents: AgentNames = ("learned", "pentagon")
+    agents: Annotated[tuple[str, ...] | None, tyro.conf.arg(help=f"{HELP} {DEFAULTS}")] = None
     path: Annotated[str, tyro.conf.arg(help=PATH_HELP)] = "pentagon"
     fidelity: Fidelity = "balanced"
     """Accuracy of the simulation. A scene that names its numerics is swum with those."""
@@ -208,7 +206,7 @@ def _remarks(agents: Mapping[str, Policy], options: Options, arguments: Sequence
         commands=[*commands, shlex.join(["python", "-m", "agents.evaluate", *arguments])],
         curves=[Curve.of(name, rows) for name, rows in progress.items()],
         tables=[] if options.trials is None else [read_trials(options.trials)],
-        bound=json.loads(options.bound.read_text(encoding="utf-8")) if options.bound.is_file() else None,
+        bound=read_bound(options.bound) if options.bound.exists() else None,
     )
 
 
@@ -218,10 +216,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = tyro.cli(Options, prog="python -m agents.evaluate", args=arguments)
     try:
         path, own = load_path(options.path), scene_at(options.scene, options.fidelity)
-        agents = load_agents(options.agents, options.seed, options.fidelity, options.decision_period, own)
-        scene = own or make_scene(None, options.fidelity, options.decision_period)
-        for agent in agents.values():
-            require_fit(agent, scene, actions_of(agent, scene.robot.n_limbs), options.decision_period)
+        agents, left_out = fitting_agents(options.agents, options.seed, options.fidelity, options.decision_period, own)
+        print("".join(f"{sentence}\n" for sentence in left_out), end="", file=sys.stderr)
         remarks = _remarks(agents, options, arguments) if options.report else None
     except (ValueError, OSError) as bad_input:
         print(bad_input, file=sys.stderr)

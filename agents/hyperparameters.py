@@ -1,11 +1,23 @@
 """Hyperparameters of PPO, each with the measurement that chose it."""
 
+import operator
 from dataclasses import dataclass
 from typing import get_args
 
 from seastar_gym import RewardWeights
 from seastar_gym.envs.commands import Discrete
-from seastar_gym.scene.checks import require_choice, require_count, require_finite, require_number, shown
+from seastar_gym.scene.checks import (
+    require_choice,
+    require_count,
+    require_finite,
+    require_flag,
+    require_kind,
+    require_number,
+    shown,
+)
+
+MOST_STROKES, MOST_WEIGHTS = 2**24, 2**26
+"""Strokes of a rollout of all robots, and weights of a network: with more, memory ends before the first update."""
 
 
 @dataclass(frozen=True)
@@ -68,9 +80,12 @@ class Hyperparameters:
             require_number("decision_period", self.decision_period, "s")
         for name in ("learning_rate", "discount", "gae_lambda", "clip_range", "entropy"):
             require_finite(name, getattr(self, name), "1")
-        if not isinstance(self.symmetry, bool) or not isinstance(self.reward, RewardWeights):
-            raise ValueError(f"symmetry must be True or False, and reward RewardWeights, not {shown(self.symmetry)}.")
+        require_flag("symmetry", self.symmetry)
+        require_flag("coasting", self.coasting)
+        require_kind("reward", self.reward, RewardWeights, "RewardWeights")
         strokes = int(self.num_envs) * int(self.rollout)
+        if strokes > MOST_STROKES:
+            raise ValueError(f"num_envs times rollout must be at most {MOST_STROKES:,}, not {strokes:,}.")
         if strokes % int(self.batch_size):
             raise ValueError(
                 f"batch_size must divide the {strokes} strokes of a rollout of all robots, {self.batch_size} does not."
@@ -83,6 +98,8 @@ class Hyperparameters:
             raise ValueError(f"hidden must be widths of at least 1, not {shown(self.hidden)}.")
         for width in self.hidden:
             require_count("a width in hidden", width, 1, 2**20)
+        if sum(map(operator.mul, self.hidden, (*self.hidden[1:], 1_000))) > MOST_WEIGHTS:
+            raise ValueError(f"hidden must be layers of {MOST_WEIGHTS:,} weights at most, not {shown(self.hidden)}.")
 
     @property
     def max_episode_steps(self) -> int:

@@ -25,6 +25,7 @@ from seastar_gym.envs.task import Path as SwimPath
 from seastar_gym.envs.tasks.envs import SeastarTaskVectorEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import require_count, require_kind, shown
 from seastar_gym.scene.numerics import Fidelity
 
 
@@ -43,6 +44,7 @@ def make_training_env(
     actions: Action mode. None means that of the hyperparameters.
     randomization: Numbers of the scene that are drawn anew for every episode.
     """
+    require_kind("hyperparameters", hyperparameters, Hyperparameters, "Hyperparameters")
     env: gym.vector.VectorEnv[Any, Any, Any] = gym.make_vec(
         "SeastarSwim-v0",
         num_envs=hyperparameters.num_envs,
@@ -75,6 +77,9 @@ def make_model(
     tensorboard_log: str | os.PathLike[str] | None = None,
 ) -> PPO:
     """New learner on an environment."""
+    require_kind("env", env, BatchVecEnv, "a BatchVecEnv, as make_training_env gives it")
+    require_kind("hyperparameters", hyperparameters, Hyperparameters, "Hyperparameters")
+    require_count("seed", seed, 0, 2**32 - 1)
     require_device(device)
     return PPO(
         "MlpPolicy",
@@ -89,15 +94,15 @@ def make_model(
         ent_coef=hyperparameters.entropy,
         policy_kwargs={"net_arch": list(hyperparameters.hidden)},
         tensorboard_log=None if tensorboard_log is None else os.fspath(tensorboard_log),
-        seed=seed,
+        seed=int(seed),
         device=device,
     )
 
 
 def require_device(device: str) -> None:
     """ValueError for a device that is not there; Stable-Baselines3 would quietly take the processor."""
-    if device not in ("cpu", "cuda", "auto"):
-        raise ValueError(f"device must be 'cpu', 'cuda' or 'auto', not {device!r}.")
+    if not isinstance(device, str) or device not in ("cpu", "cuda", "auto"):
+        raise ValueError(f"device must be 'cpu', 'cuda' or 'auto', not {shown(device)}.")
     if device == "cuda" and not torch.cuda.is_available():
         raise ValueError("There is no CUDA device that torch can use: take device cpu or auto.")
 
@@ -117,6 +122,7 @@ def describe(env: BatchVecEnv, hidden: tuple[int, ...]) -> Description:
 
 def policy_of(model: PPO) -> LearnedPolicy:
     """Policy that a learner on a `BatchVecEnv` has learned so far."""
+    require_kind("model", model, PPO, "a PPO of Stable-Baselines3")
     env = model.get_env()
     if not isinstance(env, BatchVecEnv):
         raise ValueError(f"Only a learner on a BatchVecEnv says what its policy expects, not one on {env}.")

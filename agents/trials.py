@@ -26,6 +26,7 @@ from seastar_gym.envs.task import make_scene
 from seastar_gym.evaluation.disturbances import CURRENT_DIRECTIONS, DISTURBANCES
 from seastar_gym.evaluation.many import statistics, swim_many
 from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in
+from seastar_gym.files import beside
 from seastar_gym.scene.checks import require_count, require_number
 from seastar_gym.scene.numerics import Fidelity
 
@@ -141,8 +142,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(bad_input, file=sys.stderr)
         return 2
     _print(rows, options.decision_period)
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    with options.out.open("w", newline="", encoding="utf-8") as file:
+    with beside(options.out) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, fieldnames=list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)

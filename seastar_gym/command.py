@@ -30,10 +30,16 @@ def refused_by_disk(failure: OSError) -> str:
     return f"Cannot write or read {where}: {(failure.strerror or 'unknown error').lower()}."
 
 
+def ended_by_disk(failure: OSError) -> int:
+    """Print the error in a sentence; returns the exit code: 1 where the disk refuses, 2 where this package does."""
+    print(refused_by_disk(failure), file=sys.stderr)
+    return 2 if failure.errno is None else 1
+
+
 def run_command(main: Callable[[], int | None]) -> NoReturn:
-    """Run a command line and exit with its code, or with a sentence and 1 where the disk refuses a file."""
+    """Run a command line and exit with its code, or as `ended_by_disk` where it cannot write or read a file."""
     try:
         code = main()
     except OSError as failure:
-        sys.exit(refused_by_disk(failure))
+        code = ended_by_disk(failure)
     sys.exit(code)

@@ -4,8 +4,12 @@ import sys
 from importlib.util import find_spec
 
 
+class MissingExtra(ModuleNotFoundError):  # noqa: N818, what it is a kind of is named so
+    """A module of an extra is missing; its text is a sentence with the command that installs it."""
+
+
 def require_extra(who: str, extra: str, *modules: str) -> None:
-    """End a command `python -m ..` with a sentence where modules of an extra are missing; else ModuleNotFoundError.
+    """End a command `python -m ..` with a sentence where modules of an extra are missing; else MissingExtra.
 
     who: Who needs them, in the plural: "The studies".
     """
@@ -15,7 +19,7 @@ def require_extra(who: str, extra: str, *modules: str) -> None:
     sentence = f'{who} need {", ".join(missing)}: pip install "seastar-gym[{extra}]".'
     if is_command():
         sys.exit(sentence)
-    raise ModuleNotFoundError(sentence, name=missing[0])
+    raise MissingExtra(sentence, name=missing[0])
 
 
 def is_command() -> bool:

@@ -1,39 +1,99 @@
-"""Files that are written all at once."""
+"""Files that are written all at once, and JSON files of others."""
 
+import json
+import math
 import os
+import re
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
+
+PART = ".part"
+"""End of the names of files that are being written."""
 
 
-def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
+def write_atomically(path: str | os.PathLike[str], data: bytes | str) -> None:
     """Write a file: whoever looks at `path`, after a crash too, finds the old file or the new one, never half a file.
 
-    It is written beside its place, as `path`.part, and takes the place when it is on the disk.
+    data: Text is written in UTF-8.
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(path.name + ".part")
-    try:
-        with part.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(part, path)
-    except OSError:
-        part.unlink(missing_ok=True)
-        raise
+    with beside(path) as part:
+        part.write_bytes(data.encode() if isinstance(data, str) else data)
+
+
+def write_json(path: str | os.PathLike[str], data: object) -> None:
+    """Write data as JSON; what JSON does not know, such as a path, is written as text."""
+    write_atomically(path, json.dumps(data, indent=2, default=str) + "\n")
+
+
+def save_figure(figure: Any, path: str | os.PathLike[str], **options: Any) -> None:
+    """Draw a figure of matplotlib into a file, in the format of its ending."""
+    with beside(path) as part:
+        figure.savefig(part, format=Path(path).suffix[1:].lower() or "png", **options)
 
 
 @contextmanager
-def beside(path: Path) -> Iterator[Path]:
-    """A place of this process beside a file, to write to. It takes the file's place at the end.
+def beside(path: str | os.PathLike[str], ending: str = PART) -> Iterator[Path]:
+    """An empty file beside `path`, to write to. It takes its place at the end, when it is on the disk.
 
-    Whatever goes wrong before, an interrupt too, leaves the file as it was and nothing beside it.
+    Whatever goes wrong before, an interrupt too, leaves `path` as it was and nothing beside it. A link at `path` is
+    replaced, and the file that it points to stays as it is. OSError, with one sentence, for a folder or a device.
+
+    ending: Of the name of the file beside, for libraries that choose a format by it.
     """
-    part = path.with_name(f".{path.name}.{os.getpid()}")
+    path = Path(path)
+    if path.exists() and not path.is_file():
+        raise FileExistsError(f"{path} is no file that can be written over.")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(part_name(path.name, ending))
+    part.open("xb").close()  # a new file: what is there, a link too, is refused
     try:
         yield part
+        _to_disk(part)
         os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)
+
+
+def part_name(name: str, ending: str = PART) -> str:
+    """Name that no other process, and no other thread, writes a file of this name under."""
+    return f".{name}.{os.getpid()}.{secrets.token_hex(4)}{ending}"
+
+
+def is_part_of(file: Path, name: str) -> bool:
+    """Whether a file is what a process that was killed left of a file of this name."""
+    return file.name.startswith(f".{name}.") and file.name.endswith(PART)
+
+
+def _to_disk(file: Path) -> None:
+    descriptor = os.open(file, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def read_json(path: str | os.PathLike[str]) -> Any:
+    """Contents of a JSON file, whose numbers are all finite.
+
+    FileNotFoundError or ValueError, with one sentence, where there are none.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FileNotFoundError(f"There is no file {path}.")
+    try:
+        return json.loads(path.read_text(encoding="utf-8-sig"), parse_constant=_finite, parse_float=_finite)
+    except RecursionError:
+        raise ValueError(f"{path} is no JSON that can be read: it is nested too deeply.") from None
+    except ValueError as damaged:
+        reason = re.split("[;\n]", str(damaged))[0].rstrip(".")
+        raise ValueError(f"{path} is no JSON that can be read: {reason}.") from damaged
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text[:40]} is no finite number")
+    return number

@@ -7,6 +7,16 @@ anti-clockwise. In time, a stroke is a decision, and the share is that of a puls
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.scene.checks import (
+    as_finite,
+    is_whole_number,
+    require_count,
+    require_finite,
+    require_limbs,
+    require_number,
+    shown,
+)
+
 Floats = NDArray[np.float64]
 
 SWIMMING_STROKES, RESTING_STROKES = 45, 5
@@ -15,8 +25,12 @@ SWIMMING_STROKES, RESTING_STROKES = 45, 5
 
 def pair_gait(plus: int, minus: int, n_limbs: int = 5) -> Floats:
     """One stroke of the pair {plus+, minus-}: two limbs, numbered from 1, turned against each other (Fig. 13.8)."""
-    if plus == minus or not {plus, minus} <= set(range(1, n_limbs + 1)):
-        raise ValueError(f"A pair needs two different limbs from 1 to {n_limbs}, not {plus} and {minus}.")
+    require_limbs(n_limbs)
+    are_limbs = all(is_whole_number(limb) and 1 <= limb <= n_limbs for limb in (plus, minus))
+    if not are_limbs or plus == minus:
+        raise ValueError(
+            f"A pair needs two different limbs from 1 to {n_limbs}, not {shown(plus)} and {shown(minus)}."
+        )
     command = np.zeros((1, n_limbs))
     command[0, [plus - 1, minus - 1]] = 1.0, -1.0
     return command
@@ -35,6 +49,8 @@ def pentagon_gait(swimming: int = SWIMMING_STROKES, resting: int = RESTING_STROK
 
     swimming, resting: Strokes of every side.
     """
+    require_count("swimming", swimming, 0, MOST_DECISIONS)
+    require_count("resting", resting, 0, MOST_DECISIONS)
     sides = []
     for side in range(5):
         command = np.roll(straight_gait(), side, axis=1)
@@ -56,6 +72,10 @@ LAG, THRIFTY_LAG = 0.6, 0.5
 """Best time from one pair of the lagged gait to the other [s], for full pulses and for those of the thrifty gait."""
 THRIFTY_LEVEL = 0.6
 """Share of a full pulse in the thrifty gait."""
+MOST_DECISIONS = 1_000_000
+"""Most strokes of a side of the pentagon, and most numbers of strokes that are written as decisions."""
+SHORTEST = 1e-3
+"""Shortest time between decisions of a gait [s]."""
 WAVE = (5, 4, 3, 2, 1)
 """Limbs of the turning wave, in its order."""
 LAGGED_SIDES, LAGGED_REST = {0.5: 22, 0.6: 20}, 2
@@ -66,6 +86,12 @@ are still rotated turn the robot at every corner, by 4 degrees."""
 def in_time(strokes: Floats, decision_period: float) -> Floats:
     """Strokes of a second each as decisions, shape (n_decisions, n_limbs): no commands between those of the strokes."""
     every = decisions_per_second(decision_period)
+    strokes = as_finite("strokes", strokes, (None, None))
+    if strokes.ndim != 2 or strokes.size * every > MOST_DECISIONS:
+        raise ValueError(
+            f"strokes must have shape (n_strokes, n_limbs), of {MOST_DECISIONS:,} numbers at most once they are "
+            f"decisions, not {strokes.shape}."
+        )
     decisions = np.zeros((len(strokes) * every, strokes.shape[1]))
     decisions[::every] = strokes
     return decisions
@@ -73,6 +99,10 @@ def in_time(strokes: Floats, decision_period: float) -> Floats:
 
 def decisions_per_second(decision_period: float) -> int:
     """Decisions in a second. ValueError if that is no whole number."""
+    require_number("decision_period", decision_period, "s")
+    if decision_period < SHORTEST:
+        raise ValueError(f"decision_period of a gait must be at least {SHORTEST:g} s, not {decision_period:.4g} s.")
+    decision_period = float(decision_period)
     every = max(1, round(PERIOD / decision_period))
     if not np.isclose(every * decision_period, PERIOD, rtol=1e-9):
         raise ValueError(f"Gaits need a whole number of decisions a second, not one every {decision_period:.4g} s.")
@@ -85,6 +115,12 @@ def lagged_gait(decision_period: float, n_limbs: int = 5, lag: float = LAG, leve
     The lag [s] is rounded to decisions, half up. level: Share of a full pulse.
     """
     every = decisions_per_second(decision_period)
+    require_limbs(n_limbs)
+    require_number("lag", lag, "s")
+    require_finite("level", level, "of a full pulse")
+    if abs(level) > 1.0:
+        raise ValueError(f"level must be from -1 to 1, not {shown(level)}.")
+    lag = min(float(lag), 2.0 * PERIOD)  # which is too late anyway
     late = int(lag / decision_period + 0.5)
     if not 0 < late < every:
         raise ValueError(f"A lagged gait needs two decisions a second or more, not one every {decision_period:.4g} s.")

@@ -1,4 +1,4 @@
-"""Pictures, tables and footers of docs/ that follow from numbers which are committed there.
+"""Pictures, tables and footers of docs/ and README.md that follow from numbers which are committed there.
 
     python -m studies.committed
 
@@ -32,7 +32,6 @@ Numbers may differ in the last bit between processors, which moves the edge of a
 UNCOVERED = {
     "convergence.png": "python -m studies.accuracy",
     "work_precision.png": "python -m studies.accuracy",
-    "designs.png": "python -m studies.designs",
     "error_bars.png": "python -m studies.accuracy.error_bars",
     "throughput.png": "python -m studies.speed.throughput",
 }
@@ -162,6 +161,13 @@ def tasks(docs: Path, file: Path) -> None:
     draw(rows_of(read(docs, "tasks.json"), IDS), file)
 
 
+def designs(docs: Path, file: Path) -> None:
+    """Speed over what varies."""
+    from studies.designs.pictures import draw
+
+    draw(read(docs, "designs.json"), file)
+
+
 def hub(docs: Path, file: Path) -> None:
     """Speed over the share of the mass in the hub."""
     from studies.designs.hub import draw
@@ -191,6 +197,7 @@ PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "fig_13_2.png": chapter,
     "fig_13_7a.png": chapter,
     "fig_13_8.png": chapter,
+    "designs.png": designs,
     "fidelities.png": fidelities,
     "gaits_directions.png": gaits("directions"),
     "gaits_front.png": gaits("front"),
@@ -224,10 +231,26 @@ def table(docs: Path, name: str) -> str:
             from studies.designs import certificates
 
             return certificates.table(read(docs, "certificates.json"))
+        case ["chapter", part]:
+            from studies.chapter import kept
+
+            return str(getattr(kept, f"{part}_table")(read(docs, "chapter.json")))
+        case ["designs", part]:
+            from studies.designs import pictures
+
+            return str(getattr(pictures, part)(read(docs, "designs.json")))
+        case ["contracts"]:
+            from studies import contracts
+
+            return contracts.contracts()
         case ["damping"]:
             from studies.scenes import damping
 
             return damping.as_markdown(damping.from_data(read(docs, "damping.json")))
+        case ["environments"]:
+            from studies import contracts
+
+            return contracts.registered()
         case ["fidelities", part]:
             from studies.learning.fidelities import tables
 
@@ -248,6 +271,10 @@ def table(docs: Path, name: str) -> str:
             from seastar_gym.benchmark import page, results
 
             return page.table(results.read(docs / "leaderboard" / "results.json"))
+        case ["errors" | "choosing" | "presets" | "timed" | "timed_paths" as name]:
+            from studies.accuracy import page as accuracy_page
+
+            return str(getattr(accuracy_page, name)())
         case ["promises"]:
             from studies.accuracy import promises
 
@@ -265,6 +292,10 @@ def table(docs: Path, name: str) -> str:
             from studies.stability.cases import SWEEPS
 
             return atlas.as_markdown(atlas.summarise(atlas.from_data(read(docs, "stability.json")), SWEEPS))
+        case ["validation"]:
+            from studies.validation import laws
+
+            return laws.table(read(docs, "validation.json"))
     raise ValueError(f"No table is called {name!r}.")
 
 
@@ -293,7 +324,7 @@ def pages(docs: Path) -> Iterator[tuple[Path, str]]:
     """Pages that have made parts, and what they should be."""
     for name, text in whole_pages(docs).items():
         yield docs / name, text
-    for file in sorted(docs.glob("*.md")):
+    for file in sorted([*docs.glob("*.md"), *docs.parent.glob("README.md")]):
         text = file.read_text(encoding="utf-8")
         if BLOCK.search(text):
             yield file, filled(docs, text)

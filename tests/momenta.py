@@ -26,13 +26,21 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def bodied_momenta(simulator: Simulator) -> tuple[np.ndarray, float]:
-    """Momentum [kg m/s] and angular momentum about the origin [kg m^2/s] of a robot whose roots balance each other."""
+    """Momentum [kg m/s] and angular momentum about the origin [kg m^2/s] of a robot with a body."""
     rods, q, v = simulator.coefficients.rods(0), simulator.positions[0], simulator.velocities[0]
     mass, omega, n = rods.mass[: len(q)], simulator.spin()[0], rods.nodes_per_limb - 1
+    S_x, S_y = turned(rods.body.moment, simulator.orientation()[0])
+    turning = omega * np.array([-S_y, S_x])
     roots = root_places(simulator.scene.robot, q[None, 0], simulator.orientation())[0]
     arms = roots - q[0]
     moving_roots = v[0] + omega * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
     tails_q = np.concatenate([np.vstack([roots[k], q[1 + k * n : (k + 1) * n]]) for k in range(rods.n_limbs)])
     tails_v = np.concatenate([np.vstack([moving_roots[k], v[1 + k * n : (k + 1) * n]]) for k in range(rods.n_limbs)])
-    spin = cross(q, v) @ mass + rods.body.inertia[0] * omega
-    return mass @ v, spin - cross(q[1:] - tails_q, v[1:] - tails_v) @ rods.edge_mass
+    spin = cross(q, v) @ mass + rods.body.inertia[0] * omega + cross(q[0], turning) + S_x * v[0, 1] - S_y * v[0, 0]
+    return mass @ v + turning, spin - cross(q[1:] - tails_q, v[1:] - tails_v) @ rods.edge_mass
+
+
+def turned(moment: np.ndarray, angle: np.ndarray | float) -> np.ndarray:
+    """A moment of mass [kg m], (x, y), on a body turned by an angle [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([c * moment[0] - s * moment[1], s * moment[0] + c * moment[1]])

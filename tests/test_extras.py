@@ -7,10 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from seastar_gym.cli.main import COMMANDS
 from seastar_gym.command import run_command
 
 ROOT = Path(__file__).resolve().parent.parent
 OF_STUDIES = ("matplotlib", "rich", "tqdm")
+OF_EXTRAS = ("h5py", "imageio", "matplotlib", "minari", "optuna", "pandas", "PIL", "plotly", "pyarrow", "pygame",
+             "rich", "sqlalchemy", "stable_baselines3", "tensorboard", "tqdm", "tyro")  # fmt: skip
 OF_TRAIN = ("imageio", "plotly", "stable_baselines3", "tensorboard", "torch", "tyro")
 
 
@@ -66,13 +69,14 @@ def test_every_command_says_in_a_sentence_what_the_disk_refuses(command):
         (FileNotFoundError("There is no file out.csv."), "There is no file out.csv."),
     ],
 )
-def test_what_the_disk_refuses_is_said_in_a_sentence(failure, sentence):
+def test_what_the_disk_refuses_is_said_in_a_sentence(failure, sentence, capsys):
     def main():
         raise failure
 
     with pytest.raises(SystemExit) as ended:
         run_command(main)
-    assert ended.value.code == sentence
+    assert capsys.readouterr().err == f"{sentence}\n"
+    assert ended.value.code == (2 if failure.errno is None else 1)
 
 
 def test_a_command_keeps_its_exit_code():
@@ -89,6 +93,18 @@ def test_a_study_without_its_extra_says_how_to_get_it(command, tmp_path):
 
 def test_a_sweep_without_its_extra_says_how_to_get_it(tmp_path):
     assert_says(python(tmp_path, ("pyarrow",), "-m", "seastar_gym.sweep", "--help"), "sweep", ("pyarrow",))
+
+
+@pytest.mark.parametrize("command", sorted(COMMANDS))
+def test_help_of_every_command_needs_no_extra_or_says_which(command, tmp_path):
+    """With the base dependencies alone."""
+    code = f"from seastar_gym.cli.main import main; raise SystemExit(main([{command!r}, '--help']))"
+    done = python(tmp_path, OF_EXTRAS, "-c", code)
+    if done.returncode:
+        extra = {"sweep": "sweep", "train": "train"}[command]
+        assert_says(done, extra, OF_EXTRAS)
+    else:
+        assert done.stdout.startswith(f"usage: seastar {command} ") and not done.stderr
 
 
 @pytest.mark.parametrize("extra, module", [("ray", "ray"), ("slurm", "submitit")])

@@ -1,6 +1,9 @@
 """Every block of Python on README and the pages of the guide runs, in short form, and their links lead somewhere."""
 
+import ast
+import json
 import re
+import shlex
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -9,9 +12,10 @@ import gymnasium as gym
 import pytest
 from stable_baselines3 import PPO
 
+import documented
 import seastar_gym
-from seastar_gym import Numerics, Scene
-from seastar_gym.certification import endurance, measure
+from seastar_gym import Certificate, Numerics, Scene
+from seastar_gym.certification import command, endurance, measure
 from seastar_gym.envs import paths
 from seastar_gym.evaluation import many
 
@@ -19,6 +23,7 @@ ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 FENCED = re.compile(r"^```(\S*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 LINK = re.compile(r"\]\((?!\w+:)([^)#\s]*)(#[^)\s]+)?\)")
+CERTIFY = re.compile(r"(?:-m seastar_gym\.certify|seastar certify)((?: [\w./-]+)+)")
 LONGEST = 3  # steps of an episode
 
 
@@ -74,6 +79,74 @@ def test_every_block_of_python_runs(page, monkeypatch, request):
     monkeypatch.setitem(sys.modules, module.__name__, module)  # where dataclasses look for their names
     for block in blocks(page):
         exec(compile(block, page.name, "exec"), vars(module))
+
+
+CERTIFYING = sorted({match[1] for page in PAGES for match in CERTIFY.finditer(page.read_text(encoding="utf-8"))})
+
+
+@pytest.fixture
+def one_setting(monkeypatch):
+    """Certificates of 19 nodes and 1 ms alone, against steps of 0.5 ms, with swims of 40 strokes: seconds."""
+    monkeypatch.setattr(measure, "NODES", (19,))
+    monkeypatch.setattr(measure, "SHORT", Numerics("implicit-midpoint", 5e-4, 1e-8))
+    monkeypatch.setattr(measure, "NUMERICS", (Numerics("implicit-midpoint", 1e-3, 1e-7),))
+    monkeypatch.setattr(endurance, "LONG", 40)
+
+
+@pytest.fixture
+def scenes_of_pages(tmp_path, monkeypatch):
+    """A folder with the scene of own_robot.md and the fitted one of the worked example."""
+    monkeypatch.chdir(tmp_path)
+    Path("my_scene.py").write_text(blocks(ROOT / "docs" / "own_robot.md")[0], encoding="utf-8")
+    fitted = json.loads((ROOT / "docs" / "worked_example" / "results.json").read_text(encoding="utf-8"))["fit"]["scene"]
+    Path("fitted.json").write_text(json.dumps(fitted), encoding="utf-8")
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("scenes_of_pages")
+@pytest.mark.parametrize("line", CERTIFYING)
+def test_lines_that_certify_find_a_setting_as_pages_say(line):
+    """Of two sequences per class."""
+    assert command.main([*shlex.split(line), "--samples", "2"]) == 0
+    assert any(each.endures for each in Certificate.load("certificate.json").settings)
+
+
+@pytest.mark.usefixtures("scenes_of_pages", "one_setting")
+def test_the_robot_of_the_guide_has_a_setting_below_one_per_cent():
+    (line,) = [line for line in CERTIFYING if "--error 0.01" in line]
+    assert command.main([*shlex.split(line), "--samples", "2"]) == 0
+
+
+def test_pages_have_lines_that_certify():
+    assert len(CERTIFYING) > 2 and any("--chosen" in line for line in CERTIFYING)
+
+
+PUBLIC_ELSEWHERE = (
+    "seastar_gym.der.", "seastar_gym.simd.", "seastar_gym.envs.seastar_swim", "seastar_gym.envs.tasks.envs",
+)
+"""Kernels, which equations.md tells, and the environments, whose contracts environments.md has."""
+
+
+def test_what_pages_import_is_documented():
+    known = {(module, name) for module, names in documented.NAMES.findall(documented.PAGE.read_text("utf-8"))
+             for name in names.split()}  # fmt: skip
+    found = [
+        (node.module, alias.name)
+        for page in RUN
+        for block in blocks(page)
+        for node in ast.walk(ast.parse(block))
+        if isinstance(node, ast.ImportFrom) and str(node.module).startswith(("seastar_gym", "agents"))
+        for alias in node.names
+    ]
+    assert len(found) > 20
+    private = [
+        f"{module}.{name}" for module, name in found
+        if (module, name) not in known and name not in seastar_gym.__all__
+        and not module.startswith(PUBLIC_ELSEWHERE)
+        and name not in documented.documented()
+        and not any(known_module == f"{module}.{name}" for known_module, _ in known)
+    ]  # fmt: skip
+    assert not private
 
 
 def test_no_block_hides_from_the_tests():

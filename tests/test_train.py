@@ -7,6 +7,7 @@ import hashlib
 import html
 import itertools
 import json
+import math
 import os
 import re
 import shlex
@@ -25,13 +26,14 @@ import train
 from agents.training import box as shipping
 from agents.training import efficiency
 from agents.training.efficiency import Efficiency
-from agents.training.folder import claim, recorded
+from agents.training.folder import held, recorded
 from agents.training.options import Options, read_options, saved_options
 from agents.training.robot import robot_of
 from seastar_gym import DomainRandomization, Numerics, Scene, Seastar, Uniform
 from seastar_gym.controllers import learned as policies
 from seastar_gym.controllers.learner_zip import load
 from seastar_gym.evaluation.swim import Swim
+from seastar_gym.files import part_name
 
 REPOSITORY = Path(train.__file__).parent
 TINY = shlex.split(
@@ -263,11 +265,114 @@ def test_a_run_killed_before_its_first_checkpoint_is_continued_from_its_beginnin
 
 
 def test_an_empty_folder_is_taken(tmp_path):
-    (tmp_path / "config.json.part").write_text("{")
-    claim(tmp_path)
-    (tmp_path / "somebody's").write_text("work")
-    with pytest.raises(ValueError, match="exists already"):
-        claim(tmp_path)
+    (tmp_path / part_name("config.json")).write_text("{")
+    with held(tmp_path, new=True):
+        (tmp_path / "somebody's").write_text("work")
+    with pytest.raises(ValueError, match="exists already"), held(tmp_path, new=True):
+        pass
+
+
+def test_two_never_train_in_one_folder(finished, tmp_path, capsys):
+    before = (finished / "progress.csv").read_text()
+    with held(finished, new=False):
+        assert train.main(["--resume", str(finished), "--strokes", "1024"]) == 2
+        assert_one_sentence(capsys, "Another process trains in", str(finished))
+    with held(tmp_path / "new", new=True):
+        assert train.main([*TINY, "--strokes", "128", "--out", str(tmp_path / "new")]) == 2
+        assert_one_sentence(capsys, "Another process trains in")
+    assert (finished / "progress.csv").read_text() == before and not list((tmp_path / "new").iterdir())
+    with held(finished, new=False):
+        pass
+
+
+RUN = ("config.json", "model.zip", "progress.csv", "efficiency.json", "policy.json", "checkpoints", "tensorboard",
+       "evaluation", "config.json.part", "scene.json")  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["link", "dangling", "pipe", "folder of somebody"])
+@pytest.mark.parametrize("name", RUN)
+def test_a_folder_with_links_is_not_continued(name, kind, finished, tmp_path, capsys):
+    folder, somebodys = tmp_path / "run", tmp_path / "somebody"
+    shutil.copytree(finished, folder)
+    somebodys.mkdir()
+    (somebodys / "file").write_text("work")
+    place = folder / name
+    shutil.rmtree(place) if place.is_dir() else place.unlink(missing_ok=True)
+    if kind == "pipe":
+        os.mkfifo(place)
+    else:
+        place.symlink_to(somebodys / {"link": "file", "dangling": "new", "folder of somebody": ""}[kind])
+    assert train.main(["--resume", str(folder), "--strokes", "1024"]) == 2
+    assert_one_sentence(capsys)
+    assert [file.name for file in somebodys.iterdir()] == ["file"] and (somebodys / "file").read_text() == "work"
+
+
+def damaged_config(change):
+    """Function that changes the config.json in a folder."""
+
+    def damage(folder):
+        config = json.loads((folder / "config.json").read_text())
+        change(config)
+        (folder / "config.json").write_text(json.dumps(config))
+
+    return damage
+
+
+def damaged_ppo(**changes):
+    return damaged_config(lambda config: config["options"]["ppo"].update(changes))
+
+
+def damaged_options(**changes):
+    return damaged_config(lambda config: config["options"].update(changes))
+
+
+def damaged_file(name, text):
+    return lambda folder: (folder / name).write_text(text)
+
+
+DEEP = "[" * 100_000
+DAMAGES = {
+    "no commands": damaged_config(lambda config: config.pop("commands")),
+    "commands null": damaged_config(lambda config: config.update(commands=None)),
+    "commands of numbers": damaged_config(lambda config: config.update(commands=[1])),
+    "options null": damaged_config(lambda config: config.update(options=None)),
+    "no versions": damaged_config(lambda config: config.pop("versions")),
+    "ppo a list": damaged_options(ppo=[]),
+    "a huge rollout": damaged_ppo(rollout=1_000_000_000),
+    "a rollout of text": damaged_ppo(rollout="16"),
+    "huge layers": damaged_ppo(hidden=[2**20, 2**20]),
+    "many layers": damaged_ppo(hidden=[2**20] * 100_000),
+    "hidden null": damaged_ppo(hidden=None),
+    "reward null": damaged_ppo(reward=None),
+    "an infinite discount": damaged_ppo(discount=math.inf),
+    "a learning rate of text": damaged_ppo(learning_rate="fast"),
+    "a negative seed": damaged_options(seed=-1),
+    "a huge seed": damaged_options(seed=10**30),
+    "a seed of text": damaged_options(seed="0"),
+    "strokes of text": damaged_options(strokes="many"),
+    "save_freq nan": damaged_options(save_freq=math.nan),
+    "fidelity 3": damaged_options(fidelity=3),
+    "device null": damaged_options(device=None),
+    "video 1": damaged_options(video=1),
+    "a path of numbers": damaged_options(path=7),
+    "threads -1": damaged_options(num_threads=-1),
+    **{f"{name} deep": damaged_file(name, DEEP) for name in ("config.json", "efficiency.json", "progress.csv")},
+    **{f"{name} null": damaged_file(name, "null") for name in ("config.json", "efficiency.json", "progress.csv")},
+    "efficiency of text": damaged_file("efficiency.json", '{"seconds": "long"}'),
+    "efficiency null": damaged_file("efficiency.json", '{"strokes": null}'),
+    "efficiency nan": damaged_file("efficiency.json", '{"seconds": NaN}'),
+    "no zip": damaged_file("model.zip", "PK"),
+    "deep scene": lambda folder: (damaged_options(scene="x.py")(folder), damaged_file("scene.json", DEEP)(folder)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
+def test_a_damaged_folder_is_refused_in_a_sentence(damage, finished, tmp_path, capsys):
+    folder = tmp_path / "run"
+    shutil.copytree(finished, folder)
+    damage(folder)
+    assert train.main(["--resume", str(folder), "--strokes", "1024"]) == 2
+    assert_one_sentence(capsys)
 
 
 def test_a_checkpoint_that_a_kill_cut_short_is_completed(finished, tmp_path):

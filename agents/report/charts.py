@@ -63,7 +63,8 @@ def _trace(done: Swim, number: int) -> go.Scatter:
     hub = MM * done.hub
     dots = np.arange(len(hub)) % STROKES_PER_DOT == 0
     return go.Scatter(
-        x=_rounded(hub[:, 0]), y=_rounded(hub[:, 1]), mode="lines+markers", name=f"{done.agent} ({done.result})",
+        x=_rounded(hub[:, 0]), y=_rounded(hub[:, 1]), mode="lines+markers",
+        name=html.escape(f"{done.agent} ({done.result})"),
         line={"color": COLOURS[number % len(COLOURS)], "dash": DASHES[number // len(COLOURS) % len(DASHES)]},
         marker={"size": np.where(dots, 6, 0).tolist()},
         text=[f"{done.counted_in[:-1]} {stroke}, {time:g} s" for stroke, time in enumerate(done.time.round(6))],
@@ -92,7 +93,9 @@ class Curve:
 
     @classmethod
     def of(cls, name: str, progress: Sequence[Sequence[float]]) -> "Curve":
-        """From rows of strokes trained, strokes round the pentagon, waypoints reached."""
+        """From rows of strokes trained, strokes round the pentagon, waypoints reached. ValueError for none."""
+        if not progress:
+            raise ValueError(f"The training of {name} has no learning curve yet: it was stopped before a checkpoint.")
         trained, pentagon, waypoints = np.array(progress, dtype=float).T
         return cls(name, trained, np.where(waypoints == PENTAGON_WAYPOINTS, pentagon, np.nan))
 
@@ -116,7 +119,7 @@ def curves_figure(curves: Sequence[Curve], baselines: Mapping[str, int]) -> go.F
         _add_band(figure, curves)
     for number, curve in enumerate(curves):
         figure.add_scatter(
-            x=curve.trained.tolist(), y=_with_gaps(curve.pentagon), name=curve.name, mode="lines+markers",
+            x=curve.trained.tolist(), y=_with_gaps(curve.pentagon), name=html.escape(curve.name), mode="lines+markers",
             line={"color": COLOURS[number % len(COLOURS)], "width": 1 if len(curves) > 2 else 2}, marker={"size": 5},
         )  # fmt: skip
     _add_unfinished(figure, curves)
@@ -178,7 +181,8 @@ def speeds_figure(directions: Sequence[float], speeds: Mapping[str, Sequence[flo
     for number, (name, values) in enumerate(speeds.items()):
         around = [*values, *list(values)[-2::-1]][:-1] * n_limbs
         figure.add_scatterpolar(
-            theta=[*angles, angles[0]], r=np.round([*around, around[0]], 3).tolist(), name=name, mode="lines",
+            theta=[*angles, angles[0]], r=np.round([*around, around[0]], 3).tolist(), mode="lines",
+            name=html.escape(name),
             line={"color": COLOURS[number % len(COLOURS)], "dash": DASHES[number // len(COLOURS) % len(DASHES)]},
             hovertemplate="%{theta:.0f}\u00b0: %{r:.2f} mm",
         )  # fmt: skip

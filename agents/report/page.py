@@ -18,6 +18,8 @@ from agents.report.charts import Curve, curves_figure, paths_figure, speeds_figu
 from agents.report.playback import UNIT, Playback
 from seastar_gym.evaluation.results import number
 from seastar_gym.evaluation.swim import Swim
+from seastar_gym.files import read_json, write_atomically
+from seastar_gym.scene.checks import is_finite_number
 from seastar_gym.scene.csv_rows import Row as CsvRow
 from seastar_gym.scene.csv_rows import read_rows
 
@@ -82,7 +84,7 @@ def write_report(
         "swims": _script_safe(_recorded(playbacks, swims[0].waypoints, waypoint_radius)),
     }
     page = re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], PAGE.read_text(encoding="utf-8"))
-    file.write_text(page, encoding="utf-8")
+    write_atomically(file, page)
 
 
 def _section(title: str, content: str) -> str:
@@ -137,13 +139,26 @@ def read_trials(file: Path) -> ResultsTable:
     return ResultsTable("Trials, with 95 % confidence intervals", TRIALS, rows)
 
 
+def read_bound(file: Path) -> dict[str, Any]:
+    """The JSON that studies.learning.bound wrote. ValueError: it is none."""
+    found = read_json(file)
+    match found:
+        case {"fidelity": str(), "directions_deg": list(directions), "mm_per_stroke": dict(speeds)} if directions:
+            rows = [directions, *speeds.values()]
+            sound = all(isinstance(row, list) and all(map(is_finite_number, row)) for row in rows)
+            if sound and {len(row) for row in rows} == {len(directions)}:
+                return dict(found)
+    raise ValueError(f"{file} is no result of studies.learning.bound.")
+
+
 def _trial(names: CsvRow, line: CsvRow) -> Row:
     if len(line.fields) != len(names.fields):
         raise line.refused(f"the line must have {len(names.fields)} fields, as the first one, not {len(line.fields)}")
     row = dict(zip(names.fields, line.fields, strict=True))
-    numbers = {name: _float_or_none(text, line) for name, text in row.items() if name.startswith(MEASURED)}
+    measured = [name + end for name in MEASURED for end in ("", "_low", "_high")]
+    numbers = {name: _float_or_none(row[name], line) for name in measured if name in row}
     rates = {name: 100.0 * value for name, value in numbers.items() if "rate" in name and value is not None}
-    return {**row, **numbers, **rates}
+    return {**{name: row[name] for name in TRIALS}, **numbers, **rates}
 
 
 def _float_or_none(text: str, line: CsvRow) -> float | None:
@@ -152,14 +167,17 @@ def _float_or_none(text: str, line: CsvRow) -> float | None:
         value = float(text)
     except ValueError:
         raise line.refused(f"{text!r} is no number") from None
+    if np.isinf(value):
+        raise line.refused(f"{text!r} is no finite number")
     return None if np.isnan(value) else value
 
 
 def _cell(row: Row, name: str) -> str:
     value = row[name]
     text = html.escape(number(value))
-    if value is not None and f"{name}_low" in row:
-        text += f" <small>[{number(row[f'{name}_low'])}, {number(row[f'{name}_high'])}]</small>"
+    if value is not None and {f"{name}_low", f"{name}_high"} <= set(row):
+        low, high = (html.escape(number(row[f"{name}_{end}"])) for end in ("low", "high"))
+        text += f" <small>[{low}, {high}]</small>"
     return f'<td{_side(name)} data-name="{name}">{text}</td>'
 
 

@@ -10,7 +10,7 @@ import torch
 from agents.rllib.options import Options, read_options
 from agents.rllib.training import Round, Watch, train
 from agents.training import efficiency
-from agents.training.folder import claim
+from agents.training.folder import held
 from agents.training.interruption import Interruption
 from seastar_gym.executors.on_ray import connect
 
@@ -19,14 +19,13 @@ def run(options: Options) -> int:
     """Train; returns the exit code."""
     logging.getLogger("ray.rllib").setLevel(logging.ERROR)  # it warns that its defaults are the new ones
     torch.set_num_threads(1)  # more are slower on so small a network
-    if options.resume is None:
-        claim(options.out)
-    connect(options.address, options.env_runners)
-    options.write()
-    print(f"The run is in {options.out}.", flush=True)
-    with Interruption() as interruption:
-        done = train(options, watch_of(interruption))
-    ray.shutdown()
+    with held(options.out, options.resume is None):
+        connect(options.address, options.env_runners)
+        options.write()
+        print(f"The run is in {options.out}.", flush=True)
+        with Interruption() as interruption:
+            done = train(options, watch_of(interruption))
+        ray.shutdown()
     if interruption.requested:
         print(f"Stopped after {done.strokes} strokes. Continue with\n    python -m agents.rllib --resume {options.out}")
         return 130

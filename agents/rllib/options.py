@@ -1,23 +1,19 @@
 """Options of a training on several machines: from the command line, or from the folder of a run that is continued."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import tyro
 
 from agents.hyperparameters import Hyperparameters
-from agents.training.options import PATH_HELP, Lengths
-from seastar_gym import RewardWeights
+from agents.training.options import CONFIG, PATH_HELP, Lengths, faults_of, hyperparameters_of
 from seastar_gym.envs.paths import make_path
-from seastar_gym.files import write_atomically
+from seastar_gym.files import read_json, write_json
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
-
-FILE = "config.json"
 
 
 @dataclass(frozen=True)
@@ -60,7 +56,7 @@ class Options(Lengths):
 
     def write(self) -> None:
         """Write the options into the folder of the run."""
-        write_atomically(self.out / FILE, (json.dumps(asdict(self), indent=2, default=str) + "\n").encode())
+        write_json(self.out / CONFIG, asdict(self))
 
 
 CHANGEABLE = {"strokes", "env_runners", "address", "save_freq", "out", "resume"}
@@ -82,13 +78,9 @@ def read_options(arguments: Sequence[str] | None) -> Options:
 
 def saved_options(folder: Path) -> Options:
     """Options of the run in a folder."""
-    file = folder / FILE
+    file = folder / CONFIG
     if not file.is_file():
-        raise FileNotFoundError(f"There is no run to continue in {folder}: it has no {FILE}.")
-    try:
-        found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-        ppo = found.pop("ppo")
-        ppo |= {"hidden": tuple(ppo["hidden"]), "reward": RewardWeights(**ppo["reward"])}
-        return Options(**{**found, "out": folder, "resume": folder, "ppo": Hyperparameters(**ppo)})
-    except (AttributeError, KeyError, RecursionError, TypeError, ValueError) as damaged:
-        raise ValueError(f"{file} is damaged or from another version: {str(damaged).rstrip('.')}.") from damaged
+        raise FileNotFoundError(f"There is no run to continue in {folder}: it has no {CONFIG}.")
+    with faults_of(file):
+        found = read_json(file)
+        return Options(**{**found, "out": folder, "resume": folder, "ppo": hyperparameters_of(found)})

@@ -81,7 +81,7 @@ def keep(done: Round, options: Options, seconds: float) -> None:
     save(policy, folder / "policy.safetensors", strokes=done.strokes, seed=options.seed)
     rows = [row for row in recorded(folder) if row[0] < done.strokes]
     rows.append([done.strokes, swum.strokes, swum.waypoints_reached])
-    write_atomically(folder / "progress.csv", "".join(",".join(map(str, row)) + "\n" for row in rows).encode())
+    write_atomically(folder / "progress.csv", "".join(",".join(map(str, row)) + "\n" for row in rows))
     efficiency.write(efficiency.read(folder).after(done.strokes, seconds, swum), folder)
     reached = "" if swum.finished else f" (only {swum.waypoints_reached} waypoints)"
     print(f"{done.strokes} strokes trained: the pentagon takes {swum.strokes}{reached}.", flush=True)

@@ -70,5 +70,5 @@ def _row(id: str, policy: LearnedPolicy, fidelity: Fidelity) -> str:
 def write_card(id: str, policy: LearnedPolicy, file: Path) -> Path:
     """Measure the policy in a file, and write its card beside it; returns the card's file."""
     place = file.with_suffix(".md")
-    write_atomically(place, card(id, policy, file).encode())
+    write_atomically(place, card(id, policy, file))
     return place

@@ -102,7 +102,6 @@ def put_in_the_box(id: str, options: Options, command: str) -> Path:
         found.append((score, policy, facts))
     score, policy, facts = max(found, key=lambda one: one[0])
     file = file_of(id, options.out)
-    file.parent.mkdir(parents=True, exist_ok=True)
     save(
         policy,
         file,

@@ -1,12 +1,13 @@
 """Sample efficiency of a training: strokes and seconds until the policy rounds the pentagon in 170 s."""
 
-import json
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from agents.report.page import ResultsTable
+from agents.training.options import faults_of
 from seastar_gym.evaluation.swim import Swim
-from seastar_gym.files import write_atomically
+from seastar_gym.files import read_json, write_json
+from seastar_gym.scene.checks import require_number
 
 TARGET = 170.0
 """Simulated time round the pentagon [s]; the greedy agent takes 200 s, trained policies 153 s."""
@@ -24,6 +25,11 @@ class Efficiency:
     seconds: float = 0.0
     strokes_to_target: int | None = None
     seconds_to_target: float | None = None
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            if value is not None or not name.endswith("_to_target"):
+                require_number(name, value, "1", zero_allowed=True)
 
     def after(self, strokes: int, seconds: float, pentagon: Swim) -> "Efficiency":
         """Efficiency after so many strokes and seconds, with a policy that swims the pentagon so."""
@@ -53,7 +59,7 @@ class Efficiency:
 
 def write(found: Efficiency, folder: Path) -> None:
     """Write the figures into the folder of a run."""
-    write_atomically(folder / FILE, (json.dumps(asdict(found), indent=2) + "\n").encode())
+    write_json(folder / FILE, asdict(found))
 
 
 def read(folder: Path) -> Efficiency:
@@ -61,7 +67,5 @@ def read(folder: Path) -> Efficiency:
     file = folder / FILE
     if not file.exists():
         return Efficiency()
-    try:
-        return Efficiency(**json.loads(file.read_text(encoding="utf-8")))
-    except (TypeError, ValueError) as damaged:
-        raise ValueError(f"{file} is damaged or from another version: {str(damaged).rstrip('.')}.") from damaged
+    with faults_of(file):
+        return Efficiency(**read_json(file))

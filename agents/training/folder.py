@@ -1,10 +1,11 @@
 """Folder of a training run: config.json, model.zip with its checkpoints, progress.csv and the trained policy."""
 
-import json
+import fcntl
 import os
 import platform
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -20,21 +21,20 @@ import seastar_gym
 from agents.ppo import policy_of
 from agents.report.charts import read_progress
 from agents.training import efficiency
-from agents.training.options import Options
+from agents.training.options import CONFIG, Options, config_of
 from seastar_gym.controllers.learned import save as save_policy
-from seastar_gym.files import write_atomically
+from seastar_gym.files import is_part_of, write_json
 
 
 def write_config(options: Options, arguments: Sequence[str], folder: Path) -> None:
     """Write config.json: options, commands, versions of libraries, and machine."""
-    file = folder / "config.json"
-    earlier = [] if options.resume is None else json.loads(file.read_text(encoding="utf-8"))["commands"]
+    earlier = [] if options.resume is None else config_of(folder)["commands"]
     config = {
         "commands": [*earlier, shlex.join(["python", "train.py", *arguments])],
         "options": asdict(options),
         **versions_and_machine(),
     }
-    write_atomically(file, (json.dumps(config, indent=2, default=str) + "\n").encode())
+    write_json(folder / CONFIG, config)
 
 
 def versions_and_machine() -> dict[str, dict[str, Any]]:
@@ -46,20 +46,57 @@ def versions_and_machine() -> dict[str, dict[str, Any]]:
     }
 
 
-def claim(folder: Path) -> None:
-    """Make the folder of a new run. It may exist if it is empty, or has only a file that a killed run left."""
+@contextmanager
+def held(folder: Path, new: bool) -> Iterator[None]:
+    """Context in which this process alone trains in a folder, whose files are its own. ValueError where it cannot.
+
+    new: Whether the run begins. Its folder may exist if it is empty, or has only files that a killed run left.
+    """
+    if new:
+        _make(folder)
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        _lock(descriptor, folder)
+        require_empty(folder) if new else require_own_files(folder)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _lock(descriptor: int, folder: Path) -> None:
+    """Lock a folder until the descriptor is closed or the process ends, however it does."""
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise ValueError(f"Another process trains in {folder}: wait for its end, or stop it.") from None
+
+
+def _make(folder: Path) -> None:
     if "\0" in str(folder):
         raise ValueError(f"{str(folder)!r} is no name of a folder.")
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"{folder} is no folder: give another --out.")
     folder.mkdir(parents=True, exist_ok=True)
-    if any(file.name != "config.json.part" for file in folder.iterdir()):
+
+
+def require_empty(folder: Path) -> None:
+    """ValueError unless a folder is empty, or has only files that a killed run left."""
+    if not all(is_part_of(file, CONFIG) for file in folder.iterdir()):
         raise ValueError(f"{folder} exists already: give another --out, or continue the run in it with --resume.")
+
+
+def require_own_files(folder: Path) -> None:
+    """ValueError where there is anything in the folder of a run but files and folders, such as links."""
+    for place, folders, files in os.walk(folder):
+        for name in (*folders, *files):
+            file = Path(place, name)
+            if file.is_symlink() or not (file.is_file() or file.is_dir()):
+                raise ValueError(f"{file} is a link or a device, which no run has in its folder: take it out.")
 
 
 def export(model: PPO, folder: Path) -> None:
     """Write policy.safetensors and policy.json: the trained policy without the learner."""
-    config = json.loads((folder / "config.json").read_text(encoding="utf-8"))
+    config = config_of(folder)
     save_policy(
         policy_of(model),
         folder / "policy.safetensors",

@@ -1,20 +1,24 @@
 """Options of a training run: from the command line, or from the folder of a run that is continued."""
 
-import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 import tyro
 
 from agents.hyperparameters import Hyperparameters
 from seastar_gym import RewardWeights
+from seastar_gym.controllers.learned import reason_of
 from seastar_gym.envs.paths import PATHS, make_path
 from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in
+from seastar_gym.files import read_json
+from seastar_gym.scene.checks import require_choice, require_count, require_flag, shown
 from seastar_gym.scene.numerics import Fidelity
 
+CONFIG = "config.json"
 PATH_HELP = (
     f"Name of the path to train on: {', '.join(PATHS)}. Random paths teach every direction and every turn, also those "
     "of the pentagon."
@@ -90,8 +94,15 @@ class Options(Lengths):
     ppo: Annotated[Hyperparameters, tyro.conf.arg(name="")] = Hyperparameters()
 
     def __post_init__(self) -> None:
-        if self.length < 1 or self.save_freq < 1:
-            raise ValueError("strokes and save_freq must be at least 1.")
+        require_count("strokes", self.length, 1, 2**40)
+        require_count("save_freq", self.save_freq, 1, 2**40)
+        require_count("seed", self.seed, 0, 2**32 - 1)
+        if self.num_threads is not None:
+            require_count("num_threads", self.num_threads, 1, 1_000_000)
+        require_choice("fidelity", self.fidelity, get_args(Fidelity))
+        require_choice("device", self.device, ("cpu", "cuda", "auto"))
+        for name in ("random_heading", "video", "quick"):
+            require_flag(name, getattr(self, name))
         if self.seeds and (self.resume is not None or self.ship or len(set(self.seeds)) < len(self.seeds)):
             raise ValueError("--seeds are different ones of new runs, without --resume and --ship.")
         if self.ship and not (self.scene is None and self.intervals is None):
@@ -118,19 +129,43 @@ def read_options(arguments: Sequence[str]) -> Options:
 
 def saved_options(folder: Path) -> Options:
     """Options of the run in a folder, without --ship, which has to be asked for again."""
-    file = folder / "config.json"
-    if not file.is_file():
-        raise FileNotFoundError(f"There is no run to continue in {folder}: it has no config.json.")
-    try:
-        options = json.loads(file.read_text(encoding="utf-8"))["options"]
-        ppo = options.pop("ppo")
-        ppo |= {"hidden": tuple(ppo["hidden"]), "reward": RewardWeights(**ppo["reward"])}
-        here: dict[str, Any] = {"out": folder, "resume": None, "ppo": Hyperparameters(**ppo), "seeds": ()}
+    options = config_of(folder)["options"]
+    with faults_of(folder / CONFIG):
+        here: dict[str, Any] = {"out": folder, "resume": None, "ppo": hyperparameters_of(options), "seeds": ()}
         here |= {"ship": False, "ship_anyway": False}
         here |= {name: Path(options[name]) for name in ("scene", "intervals") if options.get(name) is not None}
         return Options(**{**options, **here})
-    except (AttributeError, KeyError, RecursionError, TypeError, ValueError) as damaged:
-        raise ValueError(f"{file} is damaged or from another version: {str(damaged).rstrip('.')}.") from damaged
+
+
+def config_of(folder: Path) -> dict[str, Any]:
+    """Entries of the config.json of a run: its options, commands, versions and machine."""
+    file = folder / CONFIG
+    if not file.is_file():
+        raise FileNotFoundError(f"There is no run to continue in {folder}: it has no {CONFIG}.")
+    with faults_of(file):
+        config = read_json(file)
+        commands = config["commands"]
+        if not isinstance(commands, list) or not all(isinstance(command, str) for command in commands):
+            raise ValueError(f"its commands must be texts, not {shown(commands)}")
+        for name in ("options", "versions", "machine"):
+            if not isinstance(config[name], dict):
+                raise ValueError(f"its {name} must be names with values, not {shown(config[name])}")
+        return dict(config)
+
+
+def hyperparameters_of(options: dict[str, Any]) -> Hyperparameters:
+    """Hyperparameters among the options of a config.json."""
+    ppo = options["ppo"]
+    return Hyperparameters(**ppo | {"hidden": tuple(ppo["hidden"]), "reward": RewardWeights(**ppo["reward"])})
+
+
+@contextmanager
+def faults_of(file: Path) -> Iterator[None]:
+    """Context in which any fault of a file's contents becomes a ValueError with one sentence."""
+    try:
+        yield
+    except (AttributeError, KeyError, OverflowError, TypeError, ValueError) as damaged:
+        raise ValueError(f"{file} is damaged or from another version: {reason_of(damaged)}.") from damaged
 
 
 def require_consent(options: Options) -> None:

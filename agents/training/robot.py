@@ -1,13 +1,12 @@
 """The robot of a run: the chapter's, or that of a file, with numbers that may be drawn anew for every episode."""
 
-import json
 from pathlib import Path
 from typing import NamedTuple
 
 from agents.training.options import Options
 from seastar_gym.envs.randomization import DomainRandomization, Uniform
 from seastar_gym.envs.task import scene_at
-from seastar_gym.files import write_atomically
+from seastar_gym.files import read_json, write_json
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.scene_file import load_scene
@@ -44,9 +43,9 @@ def read_intervals(file: Path) -> DomainRandomization:
     if not file.is_file():
         raise ValueError(f"{file} is no file.")
     try:
-        found = json.loads(file.read_text(encoding="utf-8"))
+        found = read_json(file)
         ends = {name: (low, high) for name, (low, high) in found.items()}
-    except (AttributeError, TypeError, ValueError, RecursionError) as wrong:
+    except (AttributeError, TypeError, ValueError) as wrong:
         raise ValueError(f'{file} must be JSON such as {{"robot.youngs_modulus": [9e5, 1.1e6]}}.') from wrong
     return DomainRandomization({name: Uniform(low, high) for name, (low, high) in ends.items()})
 
@@ -57,10 +56,6 @@ def keep(robot: Robot, folder: Path) -> None:
         write_json(folder / SCENE, robot.scene.to_dict())
     if robot.draws is not None:
         write_json(folder / INTERVALS, {name: each.bounds for name, each in robot.draws.distributions.items()})
-
-
-def write_json(file: Path, data: object) -> None:
-    write_atomically(file, (json.dumps(data, indent=2) + "\n").encode())
 
 
 def robot_of(options: Options, folder: Path) -> Robot:

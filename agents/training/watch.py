@@ -105,7 +105,7 @@ class Watch(BaseCallback):
         self.learner.logger.record("eval/pentagon_waypoints", done.waypoints_reached)
         rows = [*recorded(self.folder), [strokes, done.strokes, done.waypoints_reached]]
         text = "".join(",".join(map(str, row)) + "\n" for row in rows)
-        write_atomically(self.folder / "progress.csv", text.encode())
+        write_atomically(self.folder / "progress.csv", text)
         seconds = self._before.seconds + sum(self.seconds.values())
         self.efficiency = self.efficiency.after(strokes, seconds, done)
         efficiency.write(self.efficiency, self.folder)

@@ -1,4 +1,4 @@
-"""What pages do not say themselves: tables from the registry, contracts and references from docstrings, new pages.
+"""What pages do not say themselves: references from docstrings, the changelog, new pages.
 
 A page has a line `<!-- site: NAME words -->`, which GitHub does not show, and the site has what the function NAME of
 GENERATORS makes of the words, in Markdown.
@@ -9,8 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from contracts import contracts, registered
-from reference import modules, public
+from reference import names, public
 from sphinx.application import Sphinx
 
 DOCS = Path(__file__).resolve().parents[1]
@@ -31,11 +30,9 @@ def more_pages() -> str:
 
 GENERATORS: dict[str, Callable[..., str]] = {
     "changelog": changelog,
-    "contracts": contracts,
-    "modules": modules,
     "more_pages": more_pages,
+    "names": names,
     "public": public,
-    "registered": registered,
 }
 
 

@@ -2,7 +2,6 @@
 
 import ast
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -18,24 +17,10 @@ def public(package: str) -> str:
     )
 
 
-def modules(*arguments: str) -> str:
-    """Reference of the modules of packages, but for what the first of them exports and for packages named with "-"."""
-    left_out = tuple(name[1:] for name in arguments if name.startswith("-"))
-    packages = [name for name in arguments if not name.startswith("-") and (ROOT / name).is_dir()]
-    known = set(exported(packages[0]))
-    found = [name for package in packages for name in names_of_modules(package) if not is_within(name, left_out)]
-    return "\n\n".join(filter(None, (section(name, known) for name in found)))
-
-
-def is_within(module: str, packages: tuple[str, ...]) -> bool:
-    return any(module == package or module.startswith(f"{package}.") for package in packages)
-
-
-def names_of_modules(package: str) -> Iterator[str]:
-    for file in sorted((ROOT / package).rglob("*.py")):
-        name = ".".join(file.relative_to(ROOT).with_suffix("").parts)
-        if file.stem not in ("__main__",):
-            yield name.removesuffix(".__init__")
+def names(module: str, *named: str) -> str:
+    """Docstring of a module, and reference of some of its names."""
+    told = [described(node, module, 6) for _, node in (defined(module, name) for name in named) if node]
+    return "\n\n".join([markdown(ast.get_docstring(parsed(module)) or ""), *told])
 
 
 def parsed(module: str) -> ast.Module:
@@ -69,16 +54,6 @@ def defined(module: str, name: str) -> tuple[str, Definition | None]:
         if isinstance(node, ast.ImportFrom) and node.module and any(alias.name == name for alias in node.names):
             return defined(node.module, name)
     return module, None
-
-
-def section(module: str, known: set[tuple[str, str]]) -> str:
-    """Docstring of a module, and of its public classes and functions that are not described elsewhere."""
-    tree = parsed(module)
-    nodes = [node for node in tree.body if isinstance(node, Definition) and (module, node.name) not in known]
-    found = [described(node, module, 6) for node in nodes if not node.name.startswith("_") and ast.get_docstring(node)]
-    if not found:
-        return ""
-    return "\n\n".join([f"## {module}", markdown(ast.get_docstring(tree) or ""), *found])
 
 
 def described(node: Definition, module: str, fence: int) -> str:

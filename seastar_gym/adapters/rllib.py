@@ -11,6 +11,7 @@
 Neither Ray nor RLlib is imported here: nodes need this module, and whoever registers it has Ray.
 """
 
+import inspect
 from collections.abc import Mapping
 from typing import Any
 
@@ -18,6 +19,7 @@ import gymnasium as gym
 
 from seastar_gym.envs.symmetry import VectorSymmetryReduction
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.scene.checks import require_flag, shown
 
 Batch = gym.vector.VectorEnv[Any, Any, Any]
 
@@ -29,8 +31,14 @@ def native_batch(context: Mapping[str, Any]) -> Batch:
     observations are reduced to one sector (false by default). An env runner has one processor, and so one thread,
     unless "threads" says otherwise.
     """
+    if not isinstance(context, Mapping) or not all(isinstance(name, str) for name in context):
+        raise ValueError(f"context must be arguments of SeastarSwimVectorEnv by name, not {shown(context)}.")
     arguments = {"threads": 1, **context}
     symmetry = arguments.pop("symmetry", False)
+    require_flag("symmetry", symmetry)
+    unknown = arguments.keys() - inspect.signature(SeastarSwimVectorEnv).parameters.keys()
+    if unknown:
+        raise ValueError(f"SeastarSwimVectorEnv has no argument {shown(sorted(unknown)[0])}.")
     batch: Batch = SeastarSwimVectorEnv(**arguments)
     return OfRunner(VectorSymmetryReduction(batch) if symmetry else batch)
 

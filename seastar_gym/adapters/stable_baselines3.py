@@ -17,6 +17,10 @@ Info = dict[str, Any]
 
 DRAWN = 16
 """Robots in a picture of the batch: of more, none could be recognised."""
+HOW_TO_MAKE = (
+    'BatchVecEnv(gym.make_vec("SeastarSwim-v0", 16, vectorization_mode="vector_entry_point", '
+    'autoreset_mode="SameStep"))'
+)
 
 
 class BatchVecEnv(VecEnv):
@@ -25,7 +29,8 @@ class BatchVecEnv(VecEnv):
     Gives what its `DummyVecEnv` of single environments behind a `Monitor` gives: fresh arrays every step, and at the
     end of an episode `terminal_observation`, `TimeLimit.truncated` and `episode` (return `r`, length `l`, seconds `t`)
     in that robot's info. The robots share one environment, so methods are the batch's own, and attributes can be set
-    for all of them only. With render_mode "rgb_array" the first DRAWN robots are drawn, side by side.
+    for all of them only. For the same reason `make_vec_env(..., vec_env_cls=BatchVecEnv)` is refused. With render_mode
+    "rgb_array" the first DRAWN robots are drawn, side by side.
 
     seconds_in_steps: Time spent in the steps so far [s], the simulator's share of a training.
     """
@@ -33,6 +38,11 @@ class BatchVecEnv(VecEnv):
     actions: NDArray[Any]
 
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any]):
+        if not isinstance(env, gym.vector.VectorEnv):
+            raise ValueError(
+                "BatchVecEnv wraps one batch, not functions that make single environments, as make_vec_env gives them: "
+                f"{HOW_TO_MAKE}."
+            )
         mode = env.metadata.get("autoreset_mode")
         if mode is not AutoresetMode.SAME_STEP:
             raise ValueError(f"Stable-Baselines3 needs autoreset_mode=AutoresetMode.SAME_STEP, not {mode}.")

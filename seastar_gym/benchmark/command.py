@@ -27,6 +27,7 @@ from seastar_gym.controllers.roster import HELP
 from seastar_gym.evaluation.many import HELD_OUT_SEED
 from seastar_gym.evaluation.tasks import require_task, task_ids
 from seastar_gym.executors.options import add_options, executor_of
+from seastar_gym.files import write_atomically
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
 
@@ -96,6 +97,19 @@ def require_sound(options: argparse.Namespace) -> list[str]:
     return tasks
 
 
+def require_measures(entries: Sequence[Entry]) -> None:
+    """ValueError where results of others name a task that this package has not, or another measure than its own."""
+    for task in {entry.task for entry in entries}:
+        require_task(task)
+        measure = measure_of(env_of(task, None))
+        for entry in entries:
+            if entry.task == task and (entry.measure, entry.unit, entry.better) != measure[:3]:
+                raise ValueError(
+                    f"{task} is measured by {measure.name} [{measure.unit}], of which {measure.better} is better, not "
+                    f"by {entry.measure} [{entry.unit}]."
+                )
+
+
 class Measured(NamedTuple):
     """Results so far. code: Exit code, 1 where a job was lost, INTERRUPTED after Ctrl-C."""
 
@@ -138,7 +152,6 @@ def whole(found: Sequence[Answer]) -> Entry:
 
 def publish(entries: Sequence[Entry], folder: Path, command: str) -> list[str]:
     """Write results.json, benchmark.md and, where matplotlib is there, profiles.png; returns their names."""
-    folder.mkdir(parents=True, exist_ok=True)
     write(entries, folder / "results.json")
     _, scores = page.common(entries)
     picture = None
@@ -148,7 +161,7 @@ def publish(entries: Sequence[Entry], folder: Path, command: str) -> list[str]:
             picture = "profiles.png"
         except ModuleNotFoundError:
             print('No picture: that needs matplotlib, pip install "seastar-gym[studies]".')
-    (folder / "benchmark.md").write_text(page.page(entries, command, picture), encoding="utf-8")
+    write_atomically(folder / "benchmark.md", page.page(entries, command, picture))
     return ["results.json", "benchmark.md", *([] if picture is None else [picture])]
 
 
@@ -167,6 +180,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(given)
     try:
         others = [read(file) for file in options.merge]
+        require_measures([entry for entries in others for entry in entries])
         own, code = benchmark(options) if options.agents else Measured([], 0)
         entries = merged(*others, own)
         if code == INTERRUPTED:

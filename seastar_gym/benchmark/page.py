@@ -1,5 +1,6 @@
 """Table, profiles and page of a benchmark."""
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from seastar_gym.benchmark.results import Entry, best_means, relative
 from seastar_gym.evaluation.many import mean_with_interval
 from seastar_gym.evaluation.statistics import Estimate, profile
+from seastar_gym.files import save_figure
 
 Floats = NDArray[np.float64]
 LEVELS = np.linspace(0.0, 1.2, 241)
@@ -20,17 +22,28 @@ def names(entries: Sequence[Entry], what: str) -> list[str]:
     return list(dict.fromkeys(getattr(entry, what) for entry in entries))
 
 
+def plain(name: str) -> str:
+    """A name as Markdown shows it, whatever is in it."""
+    return re.sub(r"([\\`*\[\]<>|&~$])", r"\\\1", name)
+
+
+def code(command: str) -> str:
+    """A command as code in Markdown, between more backticks than it has in a row."""
+    ticks = "`" * (1 + max(map(len, re.findall("`+", command)), default=0))
+    return f"{ticks} {command} {ticks}" if len(ticks) > 1 else f"`{command}`"
+
+
 def table(entries: Sequence[Entry]) -> str:
     """Table in Markdown: means with intervals, and successes, of all agents on all tasks."""
     agents = names(entries, "agent")
-    lines = [f"| task | measure | {' | '.join(agents)} |", "|---|---|" + "---:|" * len(agents)]
+    lines = [f"| task | measure | {' | '.join(map(plain, agents))} |", "|---|---|" + "---:|" * len(agents)]
     for task, fidelity in dict.fromkeys((entry.task, entry.fidelity) for entry in entries):
         row = {one.agent: one for one in entries if (one.task, one.fidelity) == (task, fidelity)}
         first = next(iter(row.values()))
-        at = f", `{fidelity}`" if fidelity else ""
-        measure = f"{first.measure} [{first.unit}], {first.better} is better"
+        at = f", {code(fidelity)}" if fidelity else ""
+        measure = f"{plain(first.measure)} [{plain(first.unit)}], {first.better} is better"
         cells = [_cell(row[agent]) if agent in row else "\u2013" for agent in agents]
-        lines.append(f"| {task}{at} | {measure} | {' | '.join(cells)} |")
+        lines.append(f"| {plain(task)}{at} | {measure} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
@@ -56,7 +69,7 @@ def overall(scores: Mapping[str, Floats]) -> str:
     found = {agent: Estimate(*mean_with_interval(of_agent.ravel())) for agent, of_agent in scores.items()}
     lines = ["| agent | relative score |", "|---|---:|"]
     for agent, mean in sorted(found.items(), key=lambda pair: -pair[1].mean):
-        lines.append(f"| {agent} | {_fine(mean)} |")
+        lines.append(f"| {plain(agent)} | {_fine(mean)} |")
     return "\n".join(lines)
 
 
@@ -75,7 +88,8 @@ def draw(scores: Mapping[str, Floats], file: Path) -> None:
     for number, (agent, of_agent) in enumerate(scores.items()):
         share, low, high = profile(of_agent, LEVELS)
         colour, style = COLOURS[number % len(COLOURS)], LINE_STYLES[number % len(LINE_STYLES)]  # one may hide another
-        axes.plot(LEVELS, 100.0 * share, color=colour, linestyle=style, label=agent, zorder=4.0 - 0.01 * number)
+        label, level = agent.replace("$", r"\$"), 4.0 - 0.01 * number
+        axes.plot(LEVELS, 100.0 * share, color=colour, linestyle=style, label=label, zorder=level)
         axes.fill_between(LEVELS, 100.0 * low, 100.0 * high, color=colour, alpha=0.15, linewidth=0.0)
     axes.set(
         xlabel="score relative to the best agent's mean", ylabel="episodes that reach it [%]",
@@ -83,7 +97,7 @@ def draw(scores: Mapping[str, Floats], file: Path) -> None:
     )  # fmt: skip
     axes.grid(color="0.92")
     axes.legend(frameon=False, loc="lower left")
-    figure.savefig(file, dpi=140)
+    save_figure(figure, file, dpi=140)
 
 
 def page(entries: Sequence[Entry], command: str, picture: str | None) -> str:
@@ -95,7 +109,8 @@ def page(entries: Sequence[Entry], command: str, picture: str | None) -> str:
         "# Leaderboard",
         "",
         f"Means over {numbers} episodes, one for each seed, with bootstrap intervals of 95 %, and the share of them",
-        f"that ended with success (`{command}`). Results of others are merged with `seastar benchmark --merge`.",
+        f"that ended with success ({code(' '.join(command.split()))}).",
+        "Results of others are merged with `seastar benchmark --merge`.",
         "",
         table(entries),
     ]

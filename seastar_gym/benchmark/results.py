@@ -1,21 +1,34 @@
 """Results of a benchmark: one entry for every task and agent, in a file that can be merged with others."""
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.evaluation.many import mean_with_interval
+from seastar_gym.evaluation.many import HELD_OUT_SEED, mean_with_interval
 from seastar_gym.evaluation.statistics import Estimate
-from seastar_gym.files import write_atomically
+from seastar_gym.files import read_json, write_atomically
+from seastar_gym.scene.checks import is_finite_number, is_whole_number
+from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__
 
 FORMAT = 1
 """Version of the file."""
+LONGEST = 100
+"""Characters of a name at most."""
+LARGEST = 1e6
+"""Largest score and number of decisions; `seastar benchmark` has no longer episodes."""
+SOUND: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "scores": (lambda one: is_finite_number(one) and 0.0 <= one <= LARGEST, f"numbers from 0 to {LARGEST:g}"),
+    "success": (lambda one: isinstance(one, bool), "true or false"),
+    "returns": (lambda one: is_finite_number(one) and abs(one) <= 1e3 * LARGEST, f"numbers up to {1e3 * LARGEST:g}"),
+    "decisions": (lambda one: is_whole_number(one) and 1 <= one <= LARGEST, f"counts up to {LARGEST:g}"),
+}
+"""What the numbers of every episode are."""
 MOST = 2.0
 """Largest relative score, of episodes twice as good as the best agent's."""
 
@@ -41,11 +54,21 @@ class Entry:
     version: str = __version__
 
     def __post_init__(self) -> None:
-        lists = (self.scores, self.success, self.returns, self.decisions)
-        if self.better not in ("less", "more") or not self.seeds or any(len(one) != len(self.seeds) for one in lists):
+        texts = (self.task, self.agent, self.measure, self.unit, self.version)
+        if not all(isinstance(text, str) and text.isprintable() and len(text) <= LONGEST for text in texts):
+            raise ValueError(f"its names are not all texts on one line, of {LONGEST} characters at most")
+        if self.better not in ("less", "more") or self.fidelity not in ("", *get_args(Fidelity)) or not self._is_whole:
             raise ValueError(f"the entry of {self.agent} on {self.task} is not whole")
-        if not np.isfinite(np.array([self.scores, self.returns], float)).all():
-            raise ValueError(f"the scores of {self.agent} on {self.task} are not all numbers")
+        if self.seeds != list(range(HELD_OUT_SEED, HELD_OUT_SEED + len(self.seeds))):
+            raise ValueError(f"the seeds of {self.agent} on {self.task} are not {HELD_OUT_SEED} and those that follow")
+        for name, (is_sound, numbers) in SOUND.items():
+            if not all(map(is_sound, getattr(self, name))):
+                raise ValueError(f"the {name} of {self.agent} on {self.task} are not all {numbers}")
+
+    @property
+    def _is_whole(self) -> bool:
+        lists = (self.seeds, *(getattr(self, name) for name in SOUND))
+        return all(isinstance(one, list) for one in lists) and {len(one) for one in lists} == {len(self.seeds) or -1}
 
     @property
     def key(self) -> tuple[str, str, str]:
@@ -94,15 +117,22 @@ def merged(*results: Sequence[Entry]) -> list[Entry]:
 def write(entries: Sequence[Entry], file: Path) -> None:
     """Write entries as JSON."""
     text = json.dumps({"format": FORMAT, "entries": [asdict(entry) for entry in entries]}, indent=1)
-    write_atomically(file, f"{text}\n".encode())
+    write_atomically(file, f"{text}\n")
 
 
 def read(file: Path) -> list[Entry]:
     """Entries that `write` wrote. ValueError, with one sentence, for anything else."""
     try:
-        facts: Any = json.loads(file.read_text(encoding="utf-8"))
+        facts = read_json(file)
         if facts["format"] != FORMAT:
             raise ValueError(f"its format is {facts['format']}, this version knows {FORMAT}")
-        return [Entry(**entry) for entry in facts["entries"]]
+        entries = [Entry(**entry) for entry in facts["entries"]]
     except (KeyError, TypeError, ValueError) as wrong:
         raise ValueError(f"{file} is no result of a benchmark: {str(wrong).rstrip('.')}.") from wrong
+    for entry in entries:
+        if entry.version != __version__:
+            raise ValueError(
+                f"{file} has results of version {entry.version} of seastar_gym, not of this one, {__version__}: "
+                "measure them again."
+            )
+    return entries

@@ -2,7 +2,8 @@
 
 The scene is a Python file that defines `scene`, a JSON file as `Scene.to_dict` writes it, or none for the chapter's. A
 file of Python is executed. Errors are those of the hub's path in space, in time and in sum, over classes of commands
-that are listed in seastar_gym/certification/commands.py, against swims with 37 nodes per limb and steps of 0.25 ms.
+that are listed in seastar_gym/certification/commands.py, against swims with 37 nodes per limb and steps of 0.25 ms:
+the largest of a class, and the typical one, which is the median.
 
 Writes a certificate (JSON), and a picture of error over speed where matplotlib is installed. `Certificate.load(file)`
 reads it, `certificate.for_error(0.01)` is the scene at the fastest setting that keeps 1 %, and
@@ -10,13 +11,13 @@ reads it, `certificate.for_error(0.01)` is the scene at the fastest setting that
 """
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from seastar_gym.certification.measure import SAMPLES, certify
 from seastar_gym.extras import require_extra
+from seastar_gym.files import save_figure, write_json
 from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.checks import require_error
 from seastar_gym.scene.scene_file import load_scene
@@ -24,20 +25,25 @@ from seastar_gym.scene.scene_file import load_scene
 
 def as_text(certificate: Certificate) -> str:
     """Table of the certificate, fastest settings first."""
-    lines = [f"{'setting':44} {'space':>8} {'time':>8} {'sum':>8} {'actions':>8} {'small':>8} {'x real time':>12}"]
+    bounds = {"sum": certificate.promised, "actions": certificate.actions, "small": ("small",)}
+    lines = [f"{'setting':44} {'space':>8} {'time':>8}" + "".join(f" {name + ' (typical)':>17}" for name in bounds)]
+    lines[0] += f" {'x real time':>12}"
     for each in sorted(certificate.settings, key=lambda each: -each.speed):
-        errors = (
-            each.space_error, each.time_error, each.error(certificate.promised), each.error(certificate.actions),
-            each.errors["small"],
-        )  # fmt: skip
-        shares = " ".join(f"{100 * error:>6.2g} %" for error in errors)
+        shares = " ".join(_percent(error, 6) for error in (each.space_error, each.time_error))
+        for some in bounds.values():
+            shares += f" {_percent(each.error(some), 6)} ({_percent(each.typical_error(some))})".ljust(18)
         gathers = "" if each.endures else "  gathers energy over long swims, not chosen"
         lines.append(f"{each!s:44} {shares} {each.speed:>12,.0f}{gathers}")
     lines.append(
         f"With {100 * certificate.confidence():.0f} % confidence, at most 5 % of the sequences of a class exceed its "
-        f"error ({certificate.samples} of each were measured). The limit errs by {100 * certificate.limit_error:.2g} %."
+        f"error ({certificate.samples} of each were measured); half of them exceed the typical one. The limit errs by "
+        f"{_percent(certificate.limit_error)}."
     )
     return "\n".join(lines)
+
+
+def _percent(share: float, width: int = 0) -> str:
+    return f"{100 * share:>{width}.2g} %"
 
 
 def draw(certificate: Certificate, file: Path) -> None:
@@ -52,7 +58,7 @@ def draw(certificate: Certificate, file: Path) -> None:
     axes.set(xlabel="x real time, batch on one core", ylabel="largest error of the hub's path [%]")
     axes.grid(True, which="major", color="0.9")
     axes.legend(frameon=False)
-    figure.savefig(file, dpi=130)
+    save_figure(figure, file, dpi=130)
     plt.close(figure)
 
 
@@ -89,6 +95,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise ValueError("--chosen writes the scene that --error chooses: give both.")
         for name in ("out", "chosen"):
             require_writable(name, getattr(options, name))
+        if options.out.suffix == ".png":
+            raise ValueError(f"{options.out} is where the picture goes: give --out a file such as certificate.json.")
         from tqdm import tqdm
 
         with tqdm(total=100, unit="%", bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as bar:
@@ -109,7 +117,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             chosen = certificate.for_error(options.error)
             print(f"{100 * options.error:g} %: nodes_per_limb={chosen.robot.nodes_per_limb}, {chosen.numerics}")
             if options.chosen is not None:
-                options.chosen.write_text(json.dumps(chosen.to_dict()) + "\n", encoding="utf-8")
+                write_json(options.chosen, chosen.to_dict())
                 print(f"Written: {options.chosen}")
     except (ValueError, ModuleNotFoundError) as bad_input:
         print(bad_input, file=sys.stderr)

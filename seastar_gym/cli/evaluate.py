@@ -11,7 +11,7 @@ from typing import get_args
 
 from seastar_gym.command import command_parser
 from seastar_gym.controllers.contract import actions_of
-from seastar_gym.controllers.roster import HELP, load_agents
+from seastar_gym.controllers.roster import DEFAULTS, HELP, fitting_agents
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene, scene_at
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
@@ -30,7 +30,7 @@ def parser() -> argparse.ArgumentParser:
     """Parser of the options."""
     default = "(default: %(default)s)"
     found = command_parser("seastar evaluate", __doc__)
-    found.add_argument("--agents", nargs="+", default=["learned", "pentagon"], help=f"{HELP} {default}")
+    found.add_argument("--agents", nargs="+", help=f"{HELP} {DEFAULTS}")
     found.add_argument("--path", default="pentagon", help=f"{PATH_HELP} {default}")
     found.add_argument("--fidelity", choices=get_args(Fidelity), default="balanced", help=f"accuracy {default}")
     found.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the chapter's)")
@@ -52,7 +52,8 @@ def evaluated(options: argparse.Namespace) -> list[Swim]:
     path = load_path(options.path)
     own = scene_at(options.scene, options.fidelity)
     n_limbs = (own or make_scene(None, options.fidelity, options.decision_period)).robot.n_limbs
-    agents = load_agents(options.agents, options.seed, options.fidelity, options.decision_period, own)
+    agents, left_out = fitting_agents(options.agents, options.seed, options.fidelity, options.decision_period, own)
+    print("".join(f"{sentence}\n" for sentence in left_out), end="", file=sys.stderr)
     limit, swims = decisions_in(options.seconds, options.decision_period), []
     for name, policy in agents.items():
         env = SeastarSwimEnv(

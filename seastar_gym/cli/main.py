@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from seastar_gym.command import command_parser, run_command
+from seastar_gym.extras import MissingExtra
 from seastar_gym.version import __version__
 
 
@@ -38,7 +39,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for name, command in COMMANDS.items():
         commands.add_parser(name, help=command.help, add_help=False)
     name = parser.parse_args(given[:1]).command
-    answer: int = importlib.import_module(COMMANDS[name].module).main(given[1:])
+    try:
+        answer: int = importlib.import_module(COMMANDS[name].module).main(given[1:])
+    except MissingExtra as missing:
+        print(missing, file=sys.stderr)
+        return 2
     return answer
 
 

@@ -1,5 +1,6 @@
 """Where pictures go: into a window, or into the file of a film."""
 
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -46,10 +47,10 @@ def screen(file: Path | None, fps: float) -> Iterator[Show]:
 @contextmanager
 def _window(fps: float) -> Iterator[Show]:
     pygame, window = import_pygame(), Window()
-    try:
+    with warnings.catch_warnings(action="ignore"):
         window.is_wanted(SIZE)
-    except RuntimeError as no_display:
-        raise ValueError("No window can be opened here: write a film, --film swim.mp4 or swim.gif.") from no_display
+    if not window.is_seen:
+        raise ValueError("No window can be opened here: write a film, --film swim.mp4 or swim.gif.")
 
     def show(picture: Picture) -> bool:
         if not window.is_wanted(SIZE):

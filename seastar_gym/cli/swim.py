@@ -1,7 +1,8 @@
 """Lets an agent swim, in a window or into a film.
 
 The window needs a display; a film, --film swim.mp4 or swim.gif, does not. With --task the agent swims in a registered
-environment, as that has been made; otherwise it swims along --path.
+environment, as that has been made; otherwise it swims along --path. Without options, the learned policy decides every
+0.2 s which limbs to heat, as in the picture of README.md.
 """
 
 import argparse
@@ -24,6 +25,9 @@ from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.scene_file import load_scene
 
+LEARNED_PERIOD = 0.2
+"""Time between decisions of the learned policy on a path, where no option says another [s]."""
+
 
 def parser() -> argparse.ArgumentParser:
     """Parser of the options."""
@@ -36,11 +40,20 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("--film", type=Path, help="file of a film, .mp4 or .gif, instead of a window")
     found.add_argument("--fidelity", choices=get_args(Fidelity), help="accuracy of the simulation")
     found.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the task's)")
-    found.add_argument("--decision-period", type=float, help="time between decisions [s] (default: a stroke of 1 s)")
+    found.add_argument(
+        "--decision-period", type=float,
+        help=f"time between decisions [s] (default: the task's; {LEARNED_PERIOD:g} for the learned policy on a path)",
+    )  # fmt: skip
     found.add_argument("--seconds", type=float, help="simulated time after which the swim ends")
     found.add_argument("--random-heading", action="store_true", help="turn the robot at random at the start")
     found.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn at random {default}")
     return found
+
+
+def decision_period(options: argparse.Namespace) -> float | None:
+    """Time between decisions that the options ask for [s]; None for that of the task."""
+    plain = options.agent == "learned" and options.task is None and options.scene is None
+    return LEARNED_PERIOD if plain and options.decision_period is None else options.decision_period
 
 
 def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
@@ -48,7 +61,7 @@ def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
     for name in ("speed", "decision_period", "seconds"):
         if getattr(options, name) is not None:
             require_number(f"--{name.replace('_', '-')}", getattr(options, name), "1")
-    asked: dict[str, Any] = {"fidelity": options.fidelity, "decision_period": options.decision_period}
+    asked: dict[str, Any] = {"fidelity": options.fidelity, "decision_period": decision_period(options)}
     if options.path is not None:
         asked["path"] = load_path(options.path)
     if options.scene is not None:
@@ -62,8 +75,8 @@ def make(options: argparse.Namespace, **more: Any) -> gym.Env[Any, Any]:
     """Environment that the options ask for."""
     task = "SeastarSwim-v0" if options.task is None else options.task
     arguments = {**arguments_of(options), **more}
-    if options.decision_period is not None:
-        arguments["max_episode_steps"] = decisions_in(TIME_LIMIT, options.decision_period)
+    if (period := decision_period(options)) is not None:
+        arguments["max_episode_steps"] = decisions_in(TIME_LIMIT, period)
     return make_task(task, **arguments)
 
 

@@ -8,6 +8,7 @@ from seastar_gym.envs.commands import MOST_LIMBS, Actions, action_space
 from seastar_gym.envs.task import scene_observation_size
 from seastar_gym.envs.tasks.challenge import Challenge
 from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import shown
 
 
 class Policy(Protocol):
@@ -17,6 +18,12 @@ class Policy(Protocol):
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
     ) -> tuple[Any, Any]:
         """Action for an observation, and the recurrent state for the next call."""
+
+
+def require_policy(policy: object) -> None:
+    """ValueError for what has no `predict`."""
+    if not callable(getattr(policy, "predict", None)) or isinstance(policy, type):
+        raise ValueError(f"A policy must have predict(observation, ...), which {shown(policy)} has not.")
 
 
 def actions_of(policy: Policy, n_limbs: int) -> Actions:

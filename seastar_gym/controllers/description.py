@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple, cast, get_args
 
 from seastar_gym.envs.commands import Actions, Discrete, choices
 from seastar_gym.envs.decisions import checked_decision_period
@@ -16,7 +16,7 @@ from seastar_gym.envs.task import scene_observation_size
 from seastar_gym.envs.tasks.envs import CHALLENGES
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.heating import Mirror
-from seastar_gym.scene.checks import require_count, shown
+from seastar_gym.scene.checks import is_whole_number, require_count, require_kind, shown
 from seastar_gym.version import __version__
 
 FORMAT = 2
@@ -69,27 +69,47 @@ class Description(NamedTuple):
 
     @classmethod
     def from_facts(cls, facts: Mapping[str, Any]) -> "Description":
-        """Description from the entries of `to_json`; KeyError where one is missing, ValueError where one is wrong."""
+        """Description from the entries of `to_json`; ValueError where one is missing or wrong."""
+        require_kind("facts", facts, Mapping, "entries by name, as to_json writes them")
+        missing = [name for name in WRITTEN if name not in facts]
+        if missing:
+            raise ValueError(f"It does not say {missing[0]!r}.")
         for name, ours in (("format", FORMAT), ("observation_layout", OBSERVATION_LAYOUT)):
             if facts[name] != ours or isinstance(facts[name], bool):
-                raise ValueError(f"its {name} is {shown(facts[name])}, this version of seastar_gym knows {ours}")
-        actions, symmetry, hidden = facts["actions"], facts["symmetry"], facts["hidden"]
-        if actions not in get_args(Discrete):
+                raise ValueError(f"Its {name} is {shown(facts[name])}, this version of seastar_gym knows {ours}.")
+        return cls._of(facts, Scene.from_dict(facts["scene"]))
+
+    @classmethod
+    def _of(cls, facts: Mapping[str, Any], scene: Scene) -> "Description":
+        """Description from its entries, with the scene of its own."""
+        actions: Any = facts["actions"]
+        symmetry, hidden = facts["symmetry"], facts["hidden"]
+        if not isinstance(actions, str) or actions not in get_args(Discrete):
             known = ", ".join(map(repr, get_args(Discrete)))
-            raise ValueError(f"its actions must be one of {known}, not {shown(actions)}")
+            raise ValueError(f"Its actions must be one of {known}, not {shown(actions)}.")
         if not isinstance(symmetry, bool):
-            raise ValueError(f"its symmetry must be true or false, not {shown(symmetry)}")
+            raise ValueError(f"Its symmetry must be true or false, not {shown(symmetry)}.")
         if not isinstance(hidden, list):
-            raise ValueError(f"its hidden must be a list of widths, not {shown(hidden)}")
+            raise ValueError(f"Its hidden must be a list of widths, not {shown(hidden)}.")
         for width in hidden:
             require_count("a width of its hidden layers", width, 1, WIDEST)
-        scene = Scene.from_dict(facts["scene"])
         decision_period = facts.get("decision_period")  # older descriptions have none: strokes
         if decision_period is not None:
             checked_decision_period(decision_period, scene)
-        if facts.get("past") and not symmetry:
-            raise ValueError("a policy without symmetry has no past")
-        return cls(actions, symmetry, scene, tuple(hidden), decision_period, *_seen(facts))
+        seen = _seen(facts)
+        if seen[-1] and not symmetry:
+            raise ValueError("A policy without symmetry has no past.")
+        return cls(cast(Discrete, actions), symmetry, scene, tuple(hidden), decision_period, *seen)
+
+    def check(self) -> None:
+        """ValueError, with one sentence, where an entry is none of its kind."""
+        require_kind("own", self.own, OwnNumbers, "OwnNumbers")
+        require_kind("scene", self.scene, Scene, "a Scene")
+        require_kind("hidden", self.hidden, tuple, "a tuple of widths")
+        rows = None if self.limb_mirror is None else _rows(self.limb_mirror)
+        kinds = list(self.own.kinds) if isinstance(self.own.kinds, tuple) else self.own.kinds
+        own = {"kinds": kinds, "with_stations": self.own.with_stations}
+        self._of({**self._asdict(), "limb_mirror": rows, "own": own, "hidden": list(self.hidden)}, self.scene)
 
     @property
     def mirror(self) -> Mirror:
@@ -128,6 +148,8 @@ class Description(NamedTuple):
         return shapes
 
 
+WRITTEN = ("format", "observation_layout", "actions", "symmetry", "hidden", "scene")
+"""Entries that every description has."""
 SEEN = ("task", "limb_mirror", "own", "past")
 """Entries on what a policy of a task sees; older descriptions have none."""
 
@@ -136,48 +158,58 @@ def _seen(facts: Mapping[str, Any]) -> tuple[str | None, Mirror | None, OwnNumbe
     """Entries on what a policy of a task sees. ValueError where one is wrong."""
     task, mirror, own, past = (facts.get(name) for name in SEEN)
     if task is not None and (not isinstance(task, str) or task not in CHALLENGES):
-        raise ValueError(f"its task must be one of {', '.join(CHALLENGES)}, not {shown(task)}")
+        raise ValueError(f"Its task must be one of {', '.join(CHALLENGES)}, not {shown(task)}.")
     if past is not None:
         require_count("its past", past, 0, MOST_PAST)
     return task, None if mirror is None else _mirror(mirror), NO_MORE if own is None else _own(own), past or 0
 
 
+def _rows(mirror: object) -> object:
+    """Mirror as it is written."""
+    pairs = isinstance(mirror, tuple) and all(isinstance(row, tuple) for row in mirror)
+    return [list(row) for row in mirror] if pairs else mirror  # type: ignore[attr-defined]
+
+
 def _mirror(rows: object) -> Mirror:
     """Mirror of the n numbers of a limb: for each, the number that takes its place, and a sign."""
     if not isinstance(rows, list) or len(rows) > MOST_NUMBERS:
-        raise ValueError(f"its limb_mirror must be a list of pairs, not {shown(rows)}")
+        raise ValueError(f"Its limb_mirror must be a list of pairs, not {shown(rows)}.")
     for row in rows:
-        if not isinstance(row, list) or len(row) != 2 or row[1] not in (-1, 1):
-            raise ValueError(f"its limb_mirror has {shown(row)}, not an index and a sign")
+        if not isinstance(row, list) or len(row) != 2 or not is_whole_number(row[1]) or abs(row[1]) != 1:
+            raise ValueError(f"Its limb_mirror has {shown(row)}, not an index and a sign.")
         require_count("an index of its limb_mirror", row[0], 0, len(rows) - 1)
     if any(rows[index] != [place, sign] for place, (index, sign) in enumerate(rows)):
-        raise ValueError(f"its limb_mirror is no mirror, which undoes itself: {shown(rows)}")
+        raise ValueError(f"Its limb_mirror is no mirror, which undoes itself: {shown(rows)}.")
     return tuple((index, sign) for index, sign in rows)
 
 
 def _own(own: object) -> OwnNumbers:
     """What a task shows of its own."""
     if not isinstance(own, dict) or set(own) != set(OwnNumbers._fields) or not isinstance(own["with_stations"], bool):
-        raise ValueError(f"its own must be an object with kinds and with_stations, not {shown(own)}")
+        raise ValueError(f"Its own must be an object with kinds and with_stations, not {shown(own)}.")
     kinds = own["kinds"]
-    if not isinstance(kinds, list) or len(kinds) > MOST_NUMBERS or not all(kind in get_args(Kind) for kind in kinds):
-        raise ValueError(f"the kinds of its own numbers must be of {', '.join(get_args(Kind))}, not {shown(kinds)}")
+    known = isinstance(kinds, list) and all(isinstance(kind, str) and kind in get_args(Kind) for kind in kinds)
+    if not known or len(kinds) > MOST_NUMBERS:
+        raise ValueError(f"The kinds of its own numbers must be of {', '.join(get_args(Kind))}, not {shown(kinds)}.")
     return OwnNumbers(tuple(kinds), own["with_stations"])
 
 
 def read_facts(text: str | bytes) -> dict[str, Any]:
     """Entries of a description in JSON. ValueError for anything but an object with finite numbers."""
-    text = text if isinstance(text, str) else text.decode()
+    require_kind("A description", text, str | bytes, "text")
     try:
+        text = text if isinstance(text, str) else text.decode()
         facts = json.loads(text, parse_constant=_finite, parse_float=_finite)
+    except (json.JSONDecodeError, UnicodeDecodeError) as unfit:
+        raise ValueError(f"Its description is no JSON: {unfit}.") from None
     except RecursionError:
-        raise ValueError("its description is nested too deeply") from None
+        raise ValueError("Its description is nested too deeply.") from None
     if not isinstance(facts, dict):
-        raise ValueError(f"its description is a {type(facts).__name__}, not an object with names")
+        raise ValueError(f"Its description is a {type(facts).__name__}, not an object with names.")
     return facts
 
 
 def _finite(text: str) -> float:
     if not math.isfinite(float(text)):
-        raise ValueError(f"its description says {text}, which is no finite number")
+        raise ValueError(f"Its description says {text}, which is no finite number.")
     return float(text)

@@ -10,18 +10,23 @@ environment, commands are repeated at every decision, which heats the same wires
 import hashlib
 import os
 from abc import ABC, abstractmethod
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.controllers.given import observed
 from seastar_gym.envs.commands import Actions, command_table
 from seastar_gym.envs.decisions import checked_decision_period
 from seastar_gym.envs.observation import OBSERVATION_LAYOUT, scene_layout
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.stations import heading_of
+from seastar_gym.files import beside
 from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import require_kind, require_number
 from seastar_gym.simulator import Simulator
 
 Floats = NDArray[np.float64]
@@ -71,15 +76,12 @@ def displacement_map(scene: Scene, actions: Actions = "joint", decision_period: 
     key = hashlib.sha256(repr(asked).encode()).hexdigest()[:24]
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "seastar-gym"
     file = cache / f"displacements-{key}.npz"
-    if file.is_file():
-        with np.load(file, allow_pickle=False) as known:
-            return Displacements(known["hub"], known["turn"])
+    with suppress(OSError, ValueError, KeyError, EOFError, BadZipFile), np.load(file, allow_pickle=False) as known:
+        return Displacements(known["hub"], known["turn"])
     commands = command_table(actions, scene.robot.n_limbs)[:, None]
     measured = measure_gaits(scene, commands, settling, measured_strokes, decision_period)
-    cache.mkdir(parents=True, exist_ok=True)
-    part = file.with_name(f"{file.stem}.{os.getpid()}.npz")  # whoever looks finds the whole file or none
-    np.savez(part, hub=measured.hub, turn=measured.turn)
-    os.replace(part, file)
+    with beside(file) as part, part.open("wb") as stream:
+        np.savez(stream, hub=measured.hub, turn=measured.turn)
     return measured
 
 
@@ -97,8 +99,19 @@ def waypoints_of(
     with_headings: Whether headings are asked for.
     """
     at, length = scene_layout(scene, with_headings=with_headings), scene.robot.limb_length
+    observations = np.atleast_2d(observed(observations, at.size))
     current, after = observations[:, at.current_waypoint], observations[:, at.next_waypoint]
     return length * current.astype(np.float64), length * after.astype(np.float64)
+
+
+def require_search(scene: Scene, waypoint_radius: float, reward: object, decision_period: float | None) -> None:
+    """ValueError for what no policy can search with."""
+    require_kind("scene", scene, Scene, "a Scene")
+    if scene.n_robots is not None:
+        raise ValueError("scene must be that of one robot.")
+    require_number("waypoint_radius", waypoint_radius, "m")
+    require_kind("reward", reward, RewardWeights, "RewardWeights")
+    checked_decision_period(decision_period, scene)
 
 
 class Searcher(ABC):
@@ -120,7 +133,7 @@ class Searcher(ABC):
         deterministic: bool = False,
     ) -> tuple[NDArray[np.int64], None]:
         """Actions for observations of shape (size,) or (n, size), and None: there is no state."""
-        chosen = self.choose(np.atleast_2d(observation))
+        chosen = self.choose(np.atleast_2d(observed(observation, 1)))
         return (chosen[0] if np.ndim(observation) == 1 else chosen), None
 
 
@@ -141,6 +154,7 @@ class GreedyPolicy(Searcher):
         reward: RewardWeights = RewardWeights(),
         decision_period: float | None = None,
     ):
+        require_search(scene, waypoint_radius, reward, decision_period)
         self.scene, self.waypoint_radius, self.reward = scene, waypoint_radius, reward
         self.decision_period = decision_period
         self._hub = displacement_map(scene, self.actions, decision_period).hub

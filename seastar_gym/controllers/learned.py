@@ -24,13 +24,14 @@ import safetensors.numpy
 from numpy.typing import NDArray
 
 from seastar_gym.controllers.description import Description, read_facts
+from seastar_gym.controllers.given import as_floating, starts
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.symmetry import Recollection, reduce_observations, restore_actions, symmetry_of
 from seastar_gym.envs.tasks.challenge import Challenge
 from seastar_gym.envs.tasks.envs import CHALLENGES, name_of
 from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import is_finite_number
+from seastar_gym.scene.checks import is_finite_number, require_file, require_flag, require_kind, require_number, shown
 
 SHIPPED = Path(__file__).parent / "policies" / "seastar.safetensors"
 """File of the policy in the box that decides stroke by stroke; `python train.py --ship` replaces it."""
@@ -64,11 +65,16 @@ class LearnedPolicy:
         training: Mapping[str, Any] | None = None,
         rng: np.random.Generator | None = None,
     ):
+        require_kind("description", description, Description, "a Description")
+        description.check()
+        _require_weights(weights)
+        require_kind("training", training, Mapping | None, "entries by name, or None")
+        require_kind("rng", rng, np.random.Generator | None, "a numpy Generator, or None")
         shapes = {name: array.shape for name, array in weights.items()}
         if shapes != description.shapes():
-            raise ValueError(f"its weights have the shapes {shapes}, not {description.shapes()}")
+            raise ValueError(f"Its weights have the shapes {shapes}, not {description.shapes()}.")
         if not all(array.dtype == np.float32 and np.isfinite(array).all() for array in weights.values()):
-            raise ValueError("its weights are not all finite numbers of single precision")
+            raise ValueError("Its weights are not all finite numbers of single precision.")
         self.description = description
         self.weights = weights
         self.actions = description.actions
@@ -93,7 +99,8 @@ class LearnedPolicy:
         episode_start: Which robots have begun an episode, shape (n,); their past is the present observation.
         deterministic: Whether the most probable action is taken, rather than one drawn by its probability.
         """
-        observation, n_limbs = np.asarray(observation), self.scene.robot.n_limbs
+        require_flag("deterministic", deterministic)
+        observation, n_limbs = as_floating("observation", observation), self.scene.robot.n_limbs
         size = self.description.observation_size
         if observation.ndim not in (1, 2) or observation.shape[-1] != size:
             raise ValueError(
@@ -119,8 +126,9 @@ class LearnedPolicy:
     ) -> tuple[NDArray[Any], tuple[NDArray[Any], ...]]:
         """`predict` of a policy that sees past observations."""
         present = np.atleast_2d(observation).astype(np.float32)
+        _require_past(state, (len(present), recollection.past, present.shape[1]))
         at_first = np.repeat(present[:, None], recollection.past, axis=1)
-        begun = np.zeros(len(present), bool) if episode_start is None else np.asarray(episode_start, bool)
+        begun = starts(episode_start, len(present))
         past = at_first if state is None else np.where(begun[:, None, None], at_first, state[0])
         shown, elements = recollection.shown(present, past)
         chosen = restore_actions(self._choose(shown, deterministic), elements, self.actions, recollection.group)
@@ -184,6 +192,19 @@ class LearnedPolicy:
         return f"trained in another scene, with {', '.join(parts)}." if parts else ""
 
 
+def _require_weights(weights: object) -> None:
+    """ValueError unless weights are arrays by name."""
+    if not isinstance(weights, dict) or not all(isinstance(array, np.ndarray) for array in weights.values()):
+        raise ValueError(f"weights must be arrays by name, not {shown(weights)}.")
+
+
+def _require_past(state: object, shape: tuple[int, ...]) -> None:
+    """ValueError unless a state is None or past observations of this shape."""
+    past = state[0] if isinstance(state, tuple) and len(state) == 1 else None
+    if state is not None and (not isinstance(past, np.ndarray) or past.dtype.kind != "f" or past.shape != shape):
+        raise ValueError(f"state must be None or what the last call gave, past observations of shape {shape}.")
+
+
 def _flat(facts: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """Nested entries with dotted names: {"robot": {"n_limbs": 5}} -> {"robot.n_limbs": 5}."""
     flat: dict[str, Any] = {}
@@ -197,11 +218,12 @@ def save(policy: LearnedPolicy, path: str | os.PathLike[str], **training: Any) -
 
     training: Entries on how the policy was trained: commands, seed, versions of libraries, ...
     """
+    require_kind("policy", policy, LearnedPolicy, "a LearnedPolicy")
     path = _checked_suffix(path)
     data = safetensors.numpy.save({name: np.ascontiguousarray(array) for name, array in policy.weights.items()})
     text = policy.description.to_json(sha256=hashlib.sha256(data).hexdigest(), training={**policy.training, **training})
     write_atomically(path, data)
-    write_atomically(path.with_suffix(".json"), f"{text}\n".encode())
+    write_atomically(path.with_suffix(".json"), f"{text}\n")
 
 
 def in_the_box(decision_period: float | None, shipped: Path = SHIPPED, task: str | None = None) -> Path:
@@ -209,6 +231,9 @@ def in_the_box(decision_period: float | None, shipped: Path = SHIPPED, task: str
 
     A task without a policy of its own has that of waypoints.
     """
+    if decision_period is not None:
+        require_number("decision_period", decision_period, "s")
+    require_kind("task", task, str | None, "the name of a task, or None")
     if task is not None and (file := of_task(task, decision_period)).is_file():
         return file
     return _of_period(shipped, decision_period)
@@ -237,7 +262,7 @@ def load(path: str | os.PathLike[str] = SHIPPED) -> LearnedPolicy:
     try:
         facts = read_facts(path.with_suffix(".json").read_bytes())
         if hashlib.sha256(data).hexdigest() != facts["sha256"]:
-            raise ValueError("the weights are not those that its .json file describes")
+            raise ValueError("The weights are not those that its .json file describes.")
         description, weights = Description.from_facts(facts), safetensors.numpy.load(data)
         return LearnedPolicy(description, weights, checked_training(facts["training"]))
     except (KeyError, TypeError, ValueError, safetensors.SafetensorError) as unfit:
@@ -247,23 +272,25 @@ def load(path: str | os.PathLike[str] = SHIPPED) -> LearnedPolicy:
 def reason_of(unfit: Exception) -> str:
     """First sentence of an exception, without its full stop, to end another sentence with."""
     said = f"it does not say {unfit}" if isinstance(unfit, KeyError) else " ".join(str(unfit).split())
-    return said.split(". ")[0].rstrip(".")
+    first = said.split(". ")[0].rstrip(".")
+    return first[0].lower() + first[1:] if first[1:2].islower() or first[1:2] == " " else first
 
 
 def checked_training(training: object) -> dict[str, Any]:
     """Entries on the training of a policy; ValueError where reports could not read them."""
     if not isinstance(training, dict):
-        raise ValueError(f"its training is a {type(training).__name__}, not an object with names")
+        raise ValueError(f"Its training is a {type(training).__name__}, not an object with names.")
     progress, commands = training.get("progress", []), training.get("commands", [])
     rows = progress if isinstance(progress, list) else [progress]
     if not all(isinstance(row, list) and len(row) == 3 and all(map(is_finite_number, row)) for row in rows):
-        raise ValueError("the progress of its training must be rows of three numbers")
+        raise ValueError("The progress of its training must be rows of three numbers.")
     if not isinstance(commands, list) or not all(isinstance(command, str) for command in commands):
-        raise ValueError("the commands of its training must be texts")
+        raise ValueError("The commands of its training must be texts.")
     return training
 
 
 def _checked_suffix(path: str | os.PathLike[str]) -> Path:
+    require_file("path", path)
     path = Path(path)
     if path.suffix != ".safetensors":
         raise ValueError(f"A policy is in a file named .safetensors, not in {path}.")

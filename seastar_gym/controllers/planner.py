@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.controllers.greedy import Searcher, waypoints_of
+from seastar_gym.controllers.given import observed
+from seastar_gym.controllers.greedy import Searcher, require_search, waypoints_of
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.decisions import checked_decision_period
 from seastar_gym.envs.headings import Headings, wrapped
@@ -22,10 +23,15 @@ from seastar_gym.envs.stations import N_STATIONS, body_heading, node_weights, of
 from seastar_gym.envs.task import make_scene
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Recalled
-from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.checks import require_count, require_kind, require_number
 from seastar_gym.simulator import Simulator, State
+from seastar_gym.simulator.simulator import MAX_THREADS
 
 Floats = NDArray[np.float64]
+
+
+DEEPEST, WIDEST = 1000, 100_000
+"""Most decisions that are looked ahead, and most states that are kept."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +47,8 @@ class Budget:
     wires' cooling, a comparison without it sees power strokes, but not what the limbs cost on their way back."""
 
     def __post_init__(self) -> None:
-        if self.depth < 1 or self.beam < 1:
-            raise ValueError(f"depth and beam must be at least 1, not {self.depth} and {self.beam}.")
+        require_count("depth", self.depth, 1, DEEPEST)
+        require_count("beam", self.beam, 1, WIDEST)
         require_number("coasting", self.coasting, "s", zero_allowed=True)
 
 
@@ -54,6 +60,8 @@ TIMED_BUDGETS = {0.5: Budget(3, 8, 0.5), 0.2: Budget(3, 4, 0.8), 0.1: Budget(2, 
 
 def budget_for(decision_period: float | None) -> Budget:
     """Budget for a time between decisions [s]. None means strokes."""
+    if decision_period is not None:
+        require_number("decision_period", decision_period, "s")
     shorter = [seconds for seconds in TIMED_BUDGETS if decision_period is not None and seconds >= decision_period]
     return TIMED_BUDGETS[min(shorter)] if shorter else Budget()
 
@@ -158,8 +166,13 @@ class Planner(Searcher):
         decision_period: float | None = None,
         headings: Headings | None = None,
     ):
+        require_kind("headings", headings, Headings | None, "Headings, or None")
+        require_kind("budget", budget, Budget | None, "a Budget, or None")
         self.headings = headings
         self.scene = make_scene(None, "fast", decision_period) if scene is None else scene
+        require_search(self.scene, waypoint_radius, reward, decision_period)
+        if threads is not None:
+            require_count("threads", threads, 1, MAX_THREADS)
         self.waypoint_radius, self.reward, self.decision_period = waypoint_radius, reward, decision_period
         self.budget = budget_for(decision_period) if budget is None else budget
         self._commands = command_table(self.actions, self.scene.robot.n_limbs)
@@ -167,6 +180,7 @@ class Planner(Searcher):
 
     def choose(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
         """Actions for observations of shape (n, size)."""
+        observations = np.atleast_2d(observed(observations, scene_layout(self.scene).size))
         return self._search(state_of(observations, self.scene), self._targets(observations))
 
     def _targets(self, observations: NDArray[np.float32]) -> Targets:

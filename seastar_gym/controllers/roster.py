@@ -5,13 +5,14 @@ the name of the function that makes it, "module:function".
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from seastar_gym.controllers import foreign, learned, learner_zip
-from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.contract import Policy, actions_of, require_fit
 from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.planner import Planner
 from seastar_gym.controllers.scripted import GAITS, scripted
@@ -19,6 +20,14 @@ from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
 from seastar_gym.envs.tasks.envs import name_of
 from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import (
+    require_choice,
+    require_kind,
+    require_number,
+    require_seed,
+    require_texts,
+    shown,
+)
 from seastar_gym.scene.numerics import Fidelity
 
 AGENTS: dict[str, Callable[[Scene, float | None, str | None], Policy]] = {
@@ -37,6 +46,8 @@ HELP = (
     "made them: load only files that you trust."
 )
 """Help of options that name agents."""
+DEFAULTS = "(default: learned pentagon; greedy straight for robots without five limbs)"
+"""Help on `default_agents`."""
 
 
 def load_agents(
@@ -52,27 +63,80 @@ def load_agents(
     decision_period: Time between decisions [s]. None means strokes. scene: Scene that agents know, with its numerics.
     None means the chapter's at `fidelity`.
     """
-    known = make_scene(None, fidelity, decision_period) if scene is None else scene
+    known = _known(seed, fidelity, decision_period, scene)
+    make_env = partial(_make_env, scene, fidelity, decision_period)
+    return {
+        label: _load_agent(name, seed, known, decision_period, None, make_env) for label, name in _labels(names).items()
+    }
+
+
+def default_agents(scene: Scene) -> tuple[str, ...]:
+    """Names of the agents that are compared unless others are named; the first two are for five limbs only."""
+    return ("learned", "pentagon") if scene.robot.n_limbs == 5 else ("greedy", "straight")
+
+
+def fitting_agents(
+    names: Sequence[str] | None,
+    seed: int = 0,
+    fidelity: Fidelity = "balanced",
+    decision_period: float | None = None,
+    scene: Scene | None = None,
+) -> tuple[dict[str, Policy], list[str]]:
+    """Policies by name, as `load_agents` gives them, of all agents that fit the robot, and a sentence on each other.
+
+    names: Names as in `HELP`. None means `default_agents`. ValueError, with their sentences, where none fits.
+    """
+    known = _known(seed, fidelity, decision_period, scene)
+    make_env = partial(_make_env, scene, fidelity, decision_period)
+    agents, left_out = dict[str, Policy](), list[str]()
+    for label, name in _labels(default_agents(known) if names is None else names).items():
+        try:
+            policy = _load_agent(name, seed, known, decision_period, None, make_env)
+            require_fit(policy, known, actions_of(policy, known.robot.n_limbs), decision_period)
+        except (ValueError, OSError) as unfit:
+            left_out.append(f"{label} is left out: {unfit}")
+        else:
+            agents[label] = policy
+    if not agents:
+        raise ValueError(" ".join(left_out) or "There is nothing to evaluate: name at least one agent.")
+    return agents, left_out
+
+
+def _known(seed: int, fidelity: Fidelity, decision_period: float | None, scene: Scene | None) -> Scene:
+    """Scene that agents know."""
+    require_seed(seed)
+    require_choice("fidelity", fidelity, get_args(Fidelity))
+    known = make_scene(None, fidelity) if scene is None else scene
+    require_kind("scene", known, Scene, "a Scene, or None")
+    if decision_period is not None:
+        require_number("decision_period", decision_period, "s")
+    return make_scene(None, fidelity, decision_period) if scene is None else scene
+
+
+def _make_env(scene: Scene | None, fidelity: Fidelity, decision_period: float | None) -> SeastarSwimEnv:
     named = fidelity if scene is None else None
-    agents: dict[str, Policy] = {}
+    return SeastarSwimEnv(scene=scene, fidelity=named, decision_period=decision_period)
+
+
+def _labels(names: Sequence[str]) -> dict[str, str]:
+    """Names by what agents are called: a file without its ending, and without its folder where that is enough."""
+    require_texts("Agents", names)
+    labels: dict[str, str] = {}
     for name in names:
         label = Path(name).stem if _is_file(name) else name
-        label = str(Path(name).with_suffix("")) if label in agents else label
-        if label in agents:
+        label = str(Path(name).with_suffix("")) if label in labels else label
+        if label in labels:
             raise ValueError(f"The agent {name!r} is named twice.")
-        agents[label] = _load_agent(
-            name,
-            seed,
-            known,
-            decision_period,
-            None,
-            lambda: SeastarSwimEnv(scene=scene, fidelity=named, decision_period=decision_period),
-        )
-    return agents
+        labels[label] = name
+    return labels
 
 
 def load_agent(name: str, env: SeastarSwimEnv, seed: int = 0) -> Policy:
     """Policy by a name as in `HELP`, for the robot and the decisions of an environment."""
+    require_kind("name", name, str, "the name of an agent")
+    require_seed(seed)
+    if not all(hasattr(env, known) for known in ("decision_period", "scene", "step")):
+        raise ValueError(f"env must be an environment of this package, not {shown(env)}.")
     in_strokes = env.decision_period == env.scene.actuator.period
     task = task_of(env)
     return _load_agent(name, seed, env.scene, None if in_strokes else env.decision_period, task, lambda: env)

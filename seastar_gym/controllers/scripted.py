@@ -13,12 +13,13 @@ shorter ones than a second, and wires.
 import re
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.controllers.given import observed, starts
 from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, action_space, command_table
 from seastar_gym.gaits import (
     PERIOD,
@@ -31,6 +32,7 @@ from seastar_gym.gaits import (
     thrifty_gait,
     turning_wave,
 )
+from seastar_gym.scene.checks import as_finite, require_choice, require_kind, require_limbs, require_number, shown
 
 Floats = NDArray[np.float64]
 PolicyState = tuple[NDArray[np.int64], ...] | None
@@ -61,7 +63,9 @@ class OpenLoopPolicy:
     """
 
     def __init__(self, commands: ArrayLike, actions: Actions = "limbs", decision_period: float | None = None):
-        commands = np.asarray(commands, dtype=np.float64)
+        commands = as_finite("commands", commands, ())
+        require_choice("actions", actions, get_args(Actions))
+        _require_period(decision_period)
         if commands.ndim != 2 or commands.size == 0:
             raise ValueError(f"A gait needs commands of shape (n_strokes, n_limbs), not {commands.shape}.")
         self.actions: Actions = actions
@@ -81,18 +85,33 @@ class OpenLoopPolicy:
         state: State that the last call returned, the decisions made, shape (n,), in a tuple; None before the first.
         episode_start: Whether an episode begins with this decision, so that the gait starts again, shape (n,).
         """
-        alone = np.ndim(observation) == 1
-        swum = np.zeros(1 if alone else len(observation), dtype=np.int64) if state is None else state[0]
-        if episode_start is not None:
-            swum = np.where(episode_start, 0, swum)
+        observation = observed(observation, 0)
+        alone = observation.ndim == 1
+        n = 1 if alone else len(observation)
+        swum = np.where(starts(episode_start, n), 0, _decisions(state, n))
         action = self._gait[swum % len(self._gait)]
         return action[0] if alone else action, (swum + 1,)
+
+
+def _decisions(state: object, n: int) -> NDArray[np.int64]:
+    """Decisions made, shape (n,), of a state."""
+    made = state[0] if isinstance(state, tuple) and len(state) == 1 else None
+    if state is not None and (not isinstance(made, np.ndarray) or made.dtype.kind not in "iu" or made.shape != (n,)):
+        raise ValueError(f"state must be None or what the last call gave, decisions made of shape ({n},).")
+    return np.zeros(n, np.int64) if made is None else made
+
+
+def _require_period(decision_period: float | None) -> None:
+    if decision_period is not None:
+        require_number("decision_period", decision_period, "s")
 
 
 class RandomPolicy:
     """Policy of uniformly random actions, the baseline that any gait has to beat."""
 
     def __init__(self, rng: np.random.Generator, actions: Actions = "limbs", n_limbs: int = 5):
+        require_kind("rng", rng, np.random.Generator, "a numpy Generator")
+        require_limbs(n_limbs)
         self.actions: Actions = actions
         self._rng = rng
         self._space = action_space(actions, n_limbs)
@@ -105,7 +124,7 @@ class RandomPolicy:
         deterministic: bool = False,
     ) -> tuple[NDArray[Any], PolicyState]:
         """Action of one robot for an observation of shape (size,), or of n robots for shape (n, size)."""
-        shape = (*np.shape(observation)[:-1], *(self._space.shape or ()))
+        shape = (*observed(observation, 0).shape[:-1], *(self._space.shape or ()))
         if isinstance(self._space, spaces.Box):
             return self._rng.uniform(-1.0, 1.0, shape).astype(np.float32), None
         n_choices = self._space.n if isinstance(self._space, spaces.Discrete) else self._space.nvec[0]
@@ -147,6 +166,12 @@ def scripted(
     rng: Generator of the random policy; by default one with seed 0. decision_period: Of the environment [s]. None
     means strokes, of any length.
     """
+    require_kind("name", name, str, "the name of a gait")
+    require_limbs(n_limbs)
+    _require_period(decision_period)
+    require_kind("rng", rng, np.random.Generator | None, "a numpy Generator, or None")
+    if actions is not None:
+        require_choice("actions", actions, get_args(Actions))
     if name == "random":
         return RandomPolicy(np.random.default_rng(0) if rng is None else rng, actions or "limbs", n_limbs)
     commands = _gait(name, n_limbs, PERIOD if decision_period is None else decision_period)
@@ -162,4 +187,6 @@ def _gait(name: str, n_limbs: int, decision_period: float) -> Floats:
     if name in GAITS:
         return GAITS[name](n_limbs, decision_period)
     names = ", ".join((*GAITS, "random"))
-    raise ValueError(f'Unknown scripted agent {name!r}: choose one of {names}, or a pair of a + and a - limb: "4+,1-".')
+    raise ValueError(
+        f'Unknown scripted agent {shown(name)}: choose one of {names}, or a pair of a + and a - limb: "4+,1-".'
+    )

@@ -7,6 +7,8 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from seastar_gym.scene.checks import require_kind
+
 if TYPE_CHECKING:
     _VectorWrapper = gym.vector.VectorWrapper[Any, Any, Any, Any, Any]
 else:
@@ -41,6 +43,7 @@ class Recorder(_VectorWrapper):
     """
 
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any]):
+        require_kind("env", env, gym.vector.VectorEnv, "a batch, as gym.make_vec gives it")
         super().__init__(env)
         mode = env.metadata.get("autoreset_mode")
         if mode is not AutoresetMode.NEXT_STEP:
@@ -62,7 +65,7 @@ class Recorder(_VectorWrapper):
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Begin episodes of all robots."""
-        if options is not None and "reset_mask" in options:
+        if isinstance(options, dict) and "reset_mask" in options:
             raise ValueError("A recorder begins episodes of all robots: leave reset_mask out.")
         observations, info = self.env.reset(seed=seed, options=options)  # type: ignore[arg-type]
         if isinstance(seed, list):

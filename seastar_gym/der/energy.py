@@ -1,17 +1,17 @@
-"""Elastic and kinetic energy of a lane group."""
+"""Elastic and kinetic energy of a lane group, and the moments that resist its actuators."""
 
 from seastar_gym.der.geometry import half_angle
 from seastar_gym.der.star import edge_of
-from seastar_gym.der.terms.along import natural_moment
+from seastar_gym.der.terms.along import natural_moment, natural_tangent, stiffening_rate
 from seastar_gym.der.terms.bending import bending_energy, moment
 from seastar_gym.der.terms.body import move_roots
 from seastar_gym.der.terms.body_forces import add_turning_energy
-from seastar_gym.der.terms.clamp import clamp_energy
+from seastar_gym.der.terms.clamp import add_clamp_moments, clamp_energy
 from seastar_gym.der.terms.hub import set_natural_hub_angles
 from seastar_gym.der.terms.inertia import kinetic_energy
 from seastar_gym.der.terms.stretching import stretching_energy, tension
 from seastar_gym.simd.compilation import entry_point, kernel
-from seastar_gym.simd.lanes import borrow, load, splat, store
+from seastar_gym.simd.lanes import add_product, borrow, load, splat, store, subtract_product
 
 
 @kernel
@@ -54,6 +54,57 @@ def elastic_energy(rods, work, q):
             hinge = hinge_energy(rods, work, e, before, edge, 1.0, natural_moment(rods.along, rods, work, e))
             total += stretching_energy(rods, e, tension(rods, e, edge.length)) + hinge
     return total
+
+
+@kernel
+def add_hub_hinge_moments(clamp, rods, work, q, moments):
+    """Add dU/d(delta) of the hub hinges [N m], of every limb's rotation delta; nothing with a rigid hub.
+
+    The natural angle of the hinge from limb j to limb j + 1 grows with the rotation of j + 1 and falls with that of j.
+    """
+    if clamp is not None:
+        return
+    edges = rods.nodes_per_limb - 1
+    for limb in range(rods.n_limbs):
+        after = (limb + 1) % rods.n_limbs
+        t = half_angle(edge_of(rods, q, limb * edges), edge_of(rods, q, after * edges), rods.hub.side)
+        natural_moment = load(work.hub_EI_kappa_bar, limb)
+        natural = 0.5 * load(rods.bending.dl_over_EI, limb * edges) * natural_moment
+        push = moment(rods, work, limb * edges, t, natural_moment) * add_product(1.0, natural, natural)
+        store(moments, limb, load(moments, limb) + push)
+        store(moments, after, load(moments, after) - push)
+
+
+@kernel
+def add_moments_along(along, rods, work, actuation, q, moments):
+    """Add dU/d(delta) of the hinges within limbs [N m], where actuators bend or stiffen them."""
+    if along is None:
+        return
+    edges = rods.nodes_per_limb - 1
+    for limb in range(rods.n_limbs):
+        delta, total, edge = load(actuation.delta_psi_start, limb), splat(0.0), edge_of(rods, q, limb * edges)
+        rate = stiffening_rate(along, delta)
+        for e in range(limb * edges + 1, (limb + 1) * edges):
+            before, edge = edge, edge_of(rods, q, e)
+            bend = moment(rods, work, e, half_angle(before, edge, 1.0), natural_moment(along, rods, work, e))
+            natural = natural_tangent(along, e, delta)
+            total = subtract_product(total, load(along.share, e) * bend, add_product(1.0, natural, natural))
+            total = add_product(total, rate, bending_energy(rods, work, e, bend))
+        store(moments, limb, load(moments, limb) + total)
+
+
+@kernel
+def fill_moments(rods, work, actuation, q, moments):
+    """Fill rows with dU/d(delta) [N m] of every limb's rotation `actuation.delta_psi_start`: what resists its actuator.
+
+    Leaves in `work` what is natural at these rotations.
+    """
+    set_natural_hub_angles(rods, work, actuation, splat(0.0))
+    for limb in range(rods.n_limbs):
+        store(moments, limb, 0.0)
+    add_clamp_moments(rods.clamp, rods, work, actuation, q, moments)
+    add_hub_hinge_moments(rods.clamp, rods, work, q, moments)
+    add_moments_along(rods.along, rods, work, actuation, q, moments)
 
 
 @entry_point

@@ -159,5 +159,5 @@ def make_work(rods: Rods, n_stages: int) -> Work:
         contact=contact.memory(rods.contact, n_limbs, rods.nodes_per_limb, n_points),
         tension=None if rods.damping is None else rows(n_edges),
         bending=None if rods.damping is None else rows(n_edges),
-        body=body.memory(rods.body, n_limbs),
+        body=body.memory(rods.body, n_limbs, n_stages),
     )

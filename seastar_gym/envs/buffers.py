@@ -5,6 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.scene.checks import require_kind
+
 
 class Buffers(NamedTuple):
     """Arrays of one step of a batch, such as rows of a learner's memory; none of them shares memory with another.
@@ -25,6 +27,7 @@ class Buffers(NamedTuple):
 
 def require_buffers(out: Buffers, n_robots: int, size: int) -> None:
     """ValueError, with one sentence, for arrays that cannot take the results of so many robots."""
+    require_kind("out", out, Buffers, "Buffers")
     shapes = {"observations": (n_robots, size)}
     for name, buffer in out._asdict().items():
         shape, kind = shapes.get(name, (n_robots,)), "f" if name in ("observations", "rewards") else "b"

@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from seastar_gym.scene.checks import require_choice
+from seastar_gym.scene.checks import require_choice, require_unmasked
 
 Discrete: TypeAlias = Literal["limbs", "joint", "pairs"]
 """Action modes with a finite number of actions."""
@@ -74,6 +74,7 @@ def _command_table(actions: Actions, n_limbs: int) -> NDArray[np.float64]:
 
 def as_array(value: object) -> NDArray[Any]:
     """Value as an array; an array of objects for rows of different lengths, so that they are refused in a sentence."""
+    require_unmasked("What is given", value)
     try:
         return np.asarray(value)
     except ValueError:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from seastar_gym.envs.observation import scene_layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.stations import heading_of
+from seastar_gym.scene.checks import as_floats, require_kind
 
 GoalObservation = dict[str, NDArray[np.float64]]
 
@@ -30,6 +31,7 @@ class GoalForm(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     """
 
     def __init__(self, env: gym.Env[NDArray[np.float32], Any]):
+        require_kind("env", env, gym.Env, "an environment of waypoints")
         RecordConstructorArgs.__init__(self)
         super().__init__(env)
         swim = env.unwrapped
@@ -62,7 +64,10 @@ class GoalForm(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
 
     def compute_reward(self, achieved_goal: Any, desired_goal: Any, info: Any) -> NDArray[np.float64]:
         """Rewards, shape (...), of goals of shape (..., 2); info is not needed."""
-        distance = np.linalg.norm(np.asarray(achieved_goal) - np.asarray(desired_goal), axis=-1)
+        achieved, desired = as_floats("achieved_goal", achieved_goal), as_floats("desired_goal", desired_goal)
+        if achieved.shape != desired.shape or achieved.shape[-1:] != (2,):
+            raise ValueError(f"Goals must have one shape (..., 2), not {achieved.shape} and {desired.shape}.")
+        distance = np.linalg.norm(achieved - desired, axis=-1)
         return np.where(distance <= self._radius, 0.0, -1.0)
 
     def _observed(self, seen: NDArray[np.float32], info: dict[str, Any]) -> GoalObservation:

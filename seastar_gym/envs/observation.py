@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 from seastar_gym.envs.stations import N_STATIONS
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import StatefulActuator
+from seastar_gym.scene.checks import require_count, require_flag, require_limbs
 from seastar_gym.simd.compilation import entry_point, kernel
 from seastar_gym.simd.lanes import add_product, borrow, load, load_number, select, splat, sqrt, store
 
@@ -41,6 +42,9 @@ OBSERVATION_LAYOUT = 2
 """Version of this table, which saved policies name. A change of order, unit or frame gives it another number."""
 VELOCITY_SCALE = 0.025
 """Unit of velocities [m/s]: nodes and hub move at 12 to 24 mm/s root mean square after strokes of random commands."""
+
+MOST_REMEMBERED = 1_000_000
+"""Most numbers that the actuators of a robot may remember."""
 
 
 class Layout(NamedTuple):
@@ -70,12 +74,19 @@ class Layout(NamedTuple):
         return int(self.next_waypoint.stop)
 
 
-@cache
 def layout(n_limbs: int, n_remembered: int = 0, with_headings: bool = False) -> Layout:
     """Layout for a robot of n_limbs limbs whose actuators remember n_remembered numbers in all.
 
     with_headings: Whether headings are asked for.
     """
+    require_limbs(n_limbs)
+    require_count("n_remembered", n_remembered, 0, MOST_REMEMBERED)
+    require_flag("with_headings", with_headings)
+    return _layout(n_limbs, n_remembered, with_headings)
+
+
+@cache
+def _layout(n_limbs: int, n_remembered: int, with_headings: bool) -> Layout:
     along_limbs = 2 * N_STATIONS * n_limbs
     ends = np.cumsum([along_limbs, along_limbs, 2, n_remembered, 4 if with_headings else 0, 2, 2]).tolist()
     return Layout(*map(slice, [0, *ends[:-1]], ends))

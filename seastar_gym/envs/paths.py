@@ -19,6 +19,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.scene.checks import require_callable, require_kind, require_unmasked, shown
+
 Waypoints: TypeAlias = NDArray[np.float64]
 MakePath: TypeAlias = Callable[[np.random.Generator], Waypoints]
 
@@ -57,7 +59,11 @@ def register_path(name: str) -> Callable[[MakePath], MakePath]:
     another path has the name.
     """
 
+    if not isinstance(name, str) or not name:
+        raise ValueError(f"The name of a path must be a text, not {shown(name)}.")
+
     def register(make: MakePath) -> MakePath:
+        require_callable("A path", make)
         if PATHS.setdefault(name, make) is not make:
             raise ValueError(f"There is a path of the name {name!r} already: give this one another name.")
         return make
@@ -71,10 +77,12 @@ def make_path(path: str | ArrayLike, rng: np.random.Generator) -> Waypoints:
     rng: Generator of paths that are drawn, such as "random". ValueError: the name is unknown, or the array is not one
     or more finite points of the plane.
     """
+    require_kind("rng", rng, np.random.Generator, "a numpy Generator")
     if not isinstance(path, str):
         return _checked_waypoints(path)
     if path not in PATHS:
-        raise ValueError(f"Unknown path {path!r}: choose one of {', '.join(PATHS)}, or give an array of waypoints.")
+        known = ", ".join(PATHS)
+        raise ValueError(f"Unknown path {shown(path)}: choose one of {known}, or give an array of waypoints.")
     return _checked_waypoints(PATHS[path](rng))
 
 
@@ -173,6 +181,7 @@ def shortest_way(position: ArrayLike, waypoint: ArrayLike, after: ArrayLike, rad
 
 
 def _checked_waypoints(path: ArrayLike) -> NDArray[np.float64]:
+    require_unmasked("A path", path)
     try:
         waypoints = np.asarray(path)
     except ValueError as ragged:

@@ -2,6 +2,7 @@
 
 import math
 import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -13,16 +14,18 @@ from seastar_gym.scene.checks import shown
 from seastar_gym.scene.fidelity import measured, timed_promise
 from seastar_gym.scene.numerics import Fidelity
 
-NAMES = ("path_error", "space_error", "time_error", "real_time_factor")
-"""Entries of `info`."""
+IN_TIME = ("path_error", "gait_error", "typical_error", "typical_gait_error", "space_error", "time_error")
+"""Entries of `info` where decisions are no strokes."""
+NAMES = (*IN_TIME, "batch_real_time_factor")
+"""Entries of `info` where they are strokes: errors, and the speed of a batch."""
+REPEATED = ("repeated ternary", "alternating ternary")
+"""Classes of a certificate's commands that `gait_error` is of."""
 
 
 def promised(
     scene: Scene, certificate: Certificate | None = None, decision_period: float | None = None
 ) -> dict[str, float]:
     """Measured errors and speed of a scene by their names in `info`; NaN for scenes not measured, nothing in time.
-
-    The path error is that over every sequence of an environment's actions, repeated ones included.
 
     certificate: Where they stand, the package's own table of the chapter's robot if None. decision_period: Time
     between decisions [s]. None means strokes, which alone certificates are of.
@@ -34,16 +37,22 @@ def promised(
     setting = certificate.of(scene) if physics(scene) == physics(certificate.scene) else None
     if setting is None:
         return dict.fromkeys(NAMES, math.nan)
-    numbers = setting.error(certificate.actions), setting.space_error, setting.time_error, setting.speed
-    return dict(zip(NAMES, numbers, strict=True))
+    gaits = [name for name in certificate.actions if name in REPEATED]
+    others = [name for name in certificate.actions if name not in REPEATED]
+    bounds, medians = ((_largest(of, others), _largest(of, gaits)) for of in (setting.errors, setting.typical))
+    return dict(zip(NAMES, (*bounds, *medians, setting.space_error, setting.time_error, setting.speed), strict=True))
+
+
+def _largest(errors: Mapping[str, float], classes: Sequence[str]) -> float:
+    """Largest error of some classes of commands, NaN of none."""
+    return max((errors.get(name, math.nan) for name in classes), default=math.nan)
 
 
 def _by_the_table(scene: Scene) -> dict[str, float]:
     known = measured(scene)
     if known is None:
         return dict.fromkeys(NAMES, math.nan)
-    numbers = max(known.path_error, known.gait_error), known.space_error, known.time_error, known.speed
-    return dict(zip(NAMES, numbers, strict=True))
+    return {name: getattr(known, name) for name in IN_TIME} | {"batch_real_time_factor": known.speed}
 
 
 def _in_time(scene: Scene, decision_period: float) -> dict[str, float]:
@@ -52,7 +61,7 @@ def _in_time(scene: Scene, decision_period: float) -> dict[str, float]:
     known = timed_promise(wired[0], decision_period) if wired else None
     if known is None:
         return {}
-    return {"path_error": known.path_error, "space_error": known.space_error, "time_error": known.time_error}
+    return {name: getattr(known, name) for name in IN_TIME}
 
 
 def read_certificate(

@@ -153,11 +153,14 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `waypoint_index`         | int        | 1    | number of waypoints reached so far                               |
     | `distance`               | float      | m    | distance of the hub from the current waypoint                    |
     | `cross_track_error`      | float      | m    | distance of the hub from the current leg of the path             |
-    | `path_error`             | float      | 1    | measured error of the hub's path, as a fraction of its length    |
-    | `space_error`            | float      | 1    | part of it that more nodes per limb would remove                 |
+    | `path_error`             | float      | 1    | largest error of random commands, a fraction of the hub's path   |
+    | `gait_error`             | float      | 1    | largest error of repeated and alternating commands               |
+    | `typical_error`          | float      | 1    | median error of random commands                                  |
+    | `typical_gait_error`     | float      | 1    | median error of repeated and alternating commands                |
+    | `space_error`            | float      | 1    | part of `path_error` that more nodes per limb would remove       |
     | `time_error`             | float      | 1    | part of it that shorter time steps would remove                  |
     | `error_estimate`         | float      | m    | estimate of the hub's error, only with `error_bars`              |
-    | `real_time_factor`       | float      | 1    | measured simulated time per computing time, batch on one core    |
+    | `batch_real_time_factor` | float      | 1    | simulated time per computing time, of a large batch on one core  |
     | `heading`                | float      | rad  | direction of the body frame in the world, only with `headings`   |
     | `heading_error`          | float      | rad  | turn to the asked heading, -pi to pi, only with `headings`       |
     | `is_success`             | bool       | -    | whether the last waypoint is reached                             |
@@ -176,14 +179,15 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
 
     `energy_per_metre` is infinite where the route has not become shorter; heat and energy are NaN for actuators that do
     not say it.
-    `path_error` is that over every sequence of strokes by whole commands, repeated ones included; `space_error` and
-    `time_error` are those of the usual swims, straight, round the pentagon, or of random commands. They belong to the
-    robot's resolution and the numerics (see `seastar_gym.scene.fidelity`), and are NaN for other robots and scenes than
-    the chapter's, unless a `certificate` has them, and for what was not measured. `error_estimate` is of the very swim,
-    of any robot: the true error since the reset, of space and time, lies below it in about 95 % of strokes
-    (docs/error_bars.md); NaN after a failure. Where decisions are no strokes, errors are those of `SmaWires` at whole
-    seconds, over random commands and random seconds that are repeated. There `info` has them for the chapter's robot
-    alone, at a fidelity and with decisions of 0.1 to 0.5 s, and it has no `real_time_factor`.
+    Errors from `path_error` to `time_error` were measured before, over sequences of commands that docs/accuracy.md
+    names; among those of `path_error` are the straight swim and the pentagon. They belong to the robot's resolution and
+    the numerics (see `seastar_gym.scene.fidelity`), and are NaN for other robots and scenes than the chapter's, unless
+    a `certificate` has them, and for what was not measured. Where decisions are no strokes, they are those of
+    `SmaWires` at whole seconds, over random commands and random seconds that are repeated; there `info` has them for
+    the chapter's robot alone, at a fidelity and with decisions of 0.1 to 0.5 s, and no `batch_real_time_factor`. That
+    was measured before, too, of robots that fill the lanes of a processor: one robot alone is slower (docs/speed.md).
+    `error_estimate` is of the very swim, of any robot: the true error since the reset, of space and time, lies below it
+    in about 95 % of strokes (docs/error_bars.md); NaN after a failure.
     With `randomization`, `info` has the drawn numbers by their names, too.
 
     ## Starting state
@@ -198,15 +202,16 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         `seastar_gym.envs.paths.register_path` added - or waypoints [m], shape (n, 2), from the origin.
         `reset(options={"path": ...})` chooses another path for one episode.
     actions: How commands are written: "limbs", "joint", "pairs" or "continuous", see above.
-    fidelity: Accuracy of the simulation: "fast", "balanced" (default), "accurate", "reference" or "chapter". Without a
-        `scene` it chooses nodes per limb, discretisation and numerics, as `Scene.preset` does, otherwise the numerics
-        alone. If `scene` names its numerics, they are used, and another fidelity is refused.
+    fidelity: Accuracy of the simulation: "fast", "balanced" (default), "accurate", "reference" or "chapter". It chooses
+        nodes per limb, discretisation and numerics, as far as `scene` names none, see `Scene.at`. A fidelity other than
+        the numerics that `scene` names is refused.
     scene: Robot, actuators, fluid and numerics; by default the chapter's robot in water.
     reward: Weights of the reward's terms.
     waypoint_radius: Distance of the hub [m] within which a waypoint is reached.
     random_heading: Whether the robot is turned at random at the start of every episode.
     render_mode: "rgb_array": `render` returns a picture of the end of the decision. "rgb_array_list": `render` returns
-        `frames_per_stroke` pictures of the decision. "human": a window shows as many.
+        `frames_per_stroke` pictures of the decision. "human": a window shows as many;
+        without a display nobody sees them, and a warning says so.
     frames_per_stroke: Number of pictures of a decision, at equal intervals; the last shows its end. None means ten per
         second of simulated time, and one at least.
     randomization: Distributions of numbers of the scene that are drawn at the start of every episode.

@@ -128,16 +128,20 @@ def at_stations(positions: Floats, robot: Seastar, orientation: Floats | None = 
     return np.concatenate([from_hub[..., :1, :], along.reshape(*positions.shape[:-2], -1, 2)], axis=-2)
 
 
-def body_heading(positions: Floats, robot: Seastar, orientation: Floats | None = None) -> Floats:
+def body_heading(
+    positions: Floats, robot: Seastar, orientation: Floats | None = None, rest: Floats | None = None
+) -> Floats:
     """Direction of the body frame's x axis [rad], shape (n_robots,), see `observation.py`.
 
     positions: Node positions [m], shape (n_robots, n_nodes, 2). orientation: As in `roots_from_hub`.
+    rest: Node positions at rest [m], shape (n_nodes, 2) or (n_robots, n_nodes, 2). None means those of `robot`.
     """
-    rest = at_stations(robot.nodes(), robot, np.zeros(()))
-    return best_fit_heading(at_stations(positions, robot, orientation), rest)
+    shapes = robot.nodes() if rest is None else rest
+    at_rest = at_stations(shapes, robot, np.zeros(shapes.shape[:-2]))
+    return best_fit_heading(at_stations(positions, robot, orientation), at_rest)
 
 
 def heading_of(simulator: Simulator) -> Floats:
-    """`body_heading` of the robots of a simulator [rad], shape (n_robots,)."""
-    robot = simulator.scene.robot
-    return body_heading(simulator.positions, robot, simulator.orientation() if robot.has_body else None)
+    """`body_heading` of the robots of a simulator [rad], shape (n_robots,), each by its own shape at rest."""
+    robot, orientation = simulator.scene.robot, simulator.orientation() if simulator.scene.robot.has_body else None
+    return body_heading(simulator.positions, robot, orientation, simulator.coefficients.rest_shapes())

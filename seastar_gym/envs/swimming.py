@@ -110,6 +110,7 @@ class Swimming(ABC):
         actions: Actions = "limbs",
         decision_period: float | None = None,
         observe_actuators: bool = True,
+        effort: bool = False,
     ):
         require_flag("random_heading", random_heading)
         require_flag("observe_actuators", observe_actuators)
@@ -122,8 +123,8 @@ class Swimming(ABC):
         self.scene = self._drawn_from = scene
         self._draws = draws
         self.drawn = {} if draws is None else draws.first_values(scene, n_robots)
-        self.simulator = Simulator(drawn_scene(scene, self.drawn), n_robots, threads, error_bars)
-        self._error_bars = error_bars
+        self.simulator = Simulator(drawn_scene(scene, self.drawn), n_robots, threads, error_bars, effort)
+        self._error_bars, self._effort = error_bars, effort
         self.certificate = certificate
         self._promise = self.simulator.scene, self._promise_of(self.simulator.scene)
         self._promised_names = tuple(self._promise[1])
@@ -302,6 +303,7 @@ class Swimming(ABC):
             "limbs_heated": np.count_nonzero(commands, axis=1),
             "heating_time": report.heating_time,
             "energy": report.energy,
+            **({"work": report.work, "peak_moment": report.peak_moment} if self._effort else {}),
             **({"masked_limbs": masked} if self._can_be_masked else {}),
             "newton_iterations": report.newton_iterations,
             "solver_status": report.status,
@@ -321,6 +323,7 @@ class Swimming(ABC):
             "limbs_heated": counts,
             "heating_time": none,
             "energy": none.copy(),
+            **({"work": none.copy(), "peak_moment": none.copy()} if self._effort else {}),
             **({"masked_limbs": counts.copy()} if self._can_be_masked else {}),
             "newton_iterations": counts.copy(),
             "solver_status": counts.copy(),

@@ -17,9 +17,9 @@ from seastar_gym.envs.promises import read_certificate
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.reward import RewardWeights, reward_terms
 from seastar_gym.envs.swimming import Flags, Floats, Outcome, Score, Swimming
-from seastar_gym.scene import Numerics, Scene, SmaWires
+from seastar_gym.scene import Scene, SmaWires
 from seastar_gym.scene.certificate import Certificate
-from seastar_gym.scene.checks import require_number, shown
+from seastar_gym.scene.checks import as_float, require_number, shown
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.scene_file import load_scene
 from seastar_gym.scene.serial import Part, from_dict
@@ -29,37 +29,26 @@ Path = str | ArrayLike
 Plain = dict[str, Any]
 """Part of a scene, or of the task, as plain data, see `seastar_gym.scene.serial`."""
 
-DEFAULT_FIDELITY: Fidelity = "balanced"
-
 __all__ = ["Outcome", "Path", "Plain", "SwimTask", "make_scene", "read", "scene_at", "scene_observation_size"]
 
 
 def make_scene(
     scene: Scene | Plain | None, fidelity: Fidelity | None, decision_period: float | None = None
 ) -> Scene:
-    """Scene with the numerics that it names, otherwise with those of `fidelity`, by default "balanced".
+    """Scene with the nodes and numerics that it names, otherwise with those of `fidelity`, see `Scene.at`.
 
-    Without a scene, it is the fidelity's own, with its nodes per limb and its discretisation, and with wires for
-    decisions that are not strokes. ValueError where scene and fidelity name different numerics.
+    Without a scene, it is the chapter's at the fidelity, with wires for decisions that are not strokes.
 
     decision_period: Time between decisions [s]. None means a stroke.
     """
     if scene is None:
-        chapters = Scene.preset(DEFAULT_FIDELITY if fidelity is None else fidelity)
+        chapters = Scene().at(fidelity)
         in_strokes = decision_period is None or decision_period == chapters.actuator.period
         return chapters if in_strokes else replace(chapters, actuator=SmaWires())
     scene = read(scene, Scene)
     if not isinstance(scene, Scene):
         raise ValueError(f"scene must be a Scene, not {shown(scene)}.")
-    if fidelity is None and scene.numerics.named:
-        return scene
-    numerics = Numerics.preset(DEFAULT_FIDELITY if fidelity is None else fidelity)
-    if scene.numerics.named and scene.numerics != numerics:
-        raise ValueError(
-            f'fidelity="{fidelity}" contradicts the numerics that the scene names, {shown(scene.numerics)}: '
-            "give one of them."
-        )
-    return replace(scene, numerics=numerics)
+    return scene.at(fidelity)
 
 
 def scene_at(file: FilePath | None, fidelity: Fidelity) -> Scene | None:
@@ -107,11 +96,13 @@ class SwimTask(Swimming):
         decision_period: float | None = None,
         observe_actuators: bool = True,
         headings: Headings | Plain | None = None,
+        effort: bool = False,
     ):
         randomization, reward = read(randomization, DomainRandomization), read(reward, RewardWeights)
         headings = read(headings, Headings)
         if not isinstance(randomization, DomainRandomization | None):
             raise ValueError(f"randomization must be a DomainRandomization or None, not {shown(randomization)}.")
+        waypoint_radius = as_float(waypoint_radius)
         require_number("waypoint_radius", waypoint_radius, "m")
         if waypoint_radius > FARTHEST:
             raise ValueError(f"waypoint_radius must be at most {FARTHEST:g} m, not {shown(waypoint_radius)}.")
@@ -129,7 +120,7 @@ class SwimTask(Swimming):
         super().__init__(
             scene, n_robots, threads, random_heading=random_heading, draws=randomization,
             certificate=known, error_bars=error_bars, actions=actions,
-            decision_period=decision_period, observe_actuators=observe_actuators,
+            decision_period=decision_period, observe_actuators=observe_actuators, effort=effort,
         )  # fmt: skip
         self.randomization = randomization
         self.path: Path = path if isinstance(path, str) else waypoints

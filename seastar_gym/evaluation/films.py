@@ -1,5 +1,6 @@
 """Films: pictures one after another into a file, MP4 by ffmpeg or animated GIF by Pillow."""
 
+import os
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,12 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.extras import require_extra
+from seastar_gym.files import beside
+from seastar_gym.scene.checks import require_file, require_number, shown
 
 Picture = NDArray[np.uint8]
 """Red, green and blue, shape (height, width, 3)."""
 
 CLOSING_SECONDS = 1.5
 """How long a film rests on its last picture."""
+SLOWEST, FASTEST = 0.01, 1000.0
+"""Fewest and most pictures per second."""
 SCALE = 2
 """Pixels of a picture that become one of a GIF, each way."""
 COLOURS = 64
@@ -34,17 +39,22 @@ def film_format(file: Path) -> str:
 
 
 @contextmanager
-def film(file: Path, fps: float) -> Iterator[Callable[[Picture], None]]:
+def film(file: str | os.PathLike[str], fps: float) -> Iterator[Callable[[Picture], None]]:
     """Context that gives a function to add pictures with; the film rests on its last one.
 
     fps: Pictures per second. GIFs are shown for hundredths of a second, so theirs is rounded.
     """
+    require_file("file", file)
+    require_number("fps", fps, "1/s")
+    if not SLOWEST <= fps <= FASTEST:
+        raise ValueError(f"fps must be from {SLOWEST:g} to {FASTEST:g} pictures per second, not {shown(fps)}.")
+    file = Path(file)
     write = _mp4 if film_format(file) == ".mp4" else _gif
-    file.parent.mkdir(parents=True, exist_ok=True)
     with write(file, fps) as add:
         last: list[Picture] = []
 
         def keep(picture: Picture) -> None:
+            _require_picture(picture)
             last[:] = [picture]
             add(picture)
 
@@ -53,16 +63,23 @@ def film(file: Path, fps: float) -> Iterator[Callable[[Picture], None]]:
             add(picture)
 
 
+def _require_picture(picture: object) -> None:
+    is_array = isinstance(picture, np.ndarray) and picture.dtype == np.uint8
+    if not is_array or picture.ndim != 3 or picture.shape[2] != 3 or not picture.size:  # type: ignore[attr-defined]
+        raise ValueError("A picture must be an array of red, green and blue from 0 to 255, shape (height, width, 3).")
+
+
 @contextmanager
 def _mp4(file: Path, fps: float) -> Iterator[Callable[[Picture], None]]:
     import imageio.v2 as imageio
 
     fast = ["-preset", "veryfast"]
-    movie: Any = imageio.get_writer(
-        file, format="FFMPEG", mode="I", fps=fps, codec="libx264", quality=7, output_params=fast
-    )
-    with movie:
-        yield movie.append_data
+    with beside(file, ".mp4") as part:
+        movie: Any = imageio.get_writer(
+            part, format="FFMPEG", mode="I", fps=fps, codec="libx264", quality=7, output_params=fast
+        )
+        with movie:
+            yield movie.append_data
 
 
 @contextmanager
@@ -107,4 +124,5 @@ def write_gif(pictures: list[Picture], file: Path, fps: float) -> None:
     palette.putpalette(frequent_colours(sample, COLOURS // 2).tobytes() + bytes(blends.getpalette() or ()))
     images = [Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     duration = 10 * max(2, round(100.0 / fps))  # viewers slow down what is shown for less than two hundredths
-    images[0].save(file, save_all=True, append_images=images[1:], duration=duration, loop=0, optimize=True)
+    with beside(file) as part:
+        images[0].save(part, "GIF", save_all=True, append_images=images[1:], duration=duration, loop=0, optimize=True)

@@ -7,17 +7,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import bootstrap
 
-from seastar_gym.controllers.contract import Policy, actions_of, require_fit
+from seastar_gym.controllers.contract import Policy, actions_of, require_fit, require_policy
 from seastar_gym.envs.commands import to_commands
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.task import Outcome, SwimTask
 from seastar_gym.envs.task import Path as SwimPath
 from seastar_gym.evaluation.disturbances import Disturbance, DisturbedTask
-from seastar_gym.evaluation.swim import Swim
+from seastar_gym.evaluation.swim import MOST_DECISIONS, Swim
 from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import require_count, require_kind
 
 HELD_OUT_SEED = 1_000
 """Seed of the paths that policies are measured on; trainings draw theirs from small seeds."""
+MOST_SWIMS, LARGEST_SEED = 1_000_000, 2**63
+"""Most swims side by side, and the largest seed of their paths."""
 MM = 1000.0
 RESAMPLES, CONFIDENCE = 2000, 0.95
 
@@ -47,6 +50,13 @@ def swim_many(
     The path "random" has random headings. waypoint_radius: Radius of the waypoints [m]. decision_period: Time between
     decisions [s]. None means a stroke.
     """
+    require_kind("agent", agent, str, "a text")
+    require_policy(policy)
+    require_kind("scene", scene, Scene, "a Scene")
+    require_kind("disturbance", disturbance, Disturbance, "a Disturbance")
+    require_count("n_swims", n_swims, 1, MOST_SWIMS)
+    require_count("max_strokes", max_strokes, 1, MOST_DECISIONS)
+    require_count("seed", seed, 0, LARGEST_SEED)
     actions = actions_of(policy, scene.robot.n_limbs)
     require_fit(policy, scene, actions, decision_period)
     with_heading = isinstance(path, str) and path == "random"

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation import films
 from seastar_gym.evaluation.swim import Swim
+from seastar_gym.files import save_figure
 
 Floats = NDArray[np.float64]
 
@@ -49,7 +50,7 @@ def draw_traces(swims: Sequence[Swim], waypoint_radius: float, file: Path) -> No
         loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False, ncols=2, alignment="left",
         title=f"agents, with a dot every {STROKES_PER_DOT} {swims[0].counted_in}",
     )  # fmt: skip
-    figure.savefig(file, dpi=160, bbox_inches="tight", pad_inches=0.15)
+    save_figure(figure, file, dpi=160, bbox_inches="tight", pad_inches=0.15)
 
 
 def view(path: Floats, hubs: Floats) -> tuple[Floats, Floats]:
@@ -109,7 +110,7 @@ def _draw_trace(axes: Axes, swim: Swim, number: int) -> None:
     colour = COLOURS[number % len(COLOURS)]
     style = LINE_STYLES[number // len(COLOURS) % len(LINE_STYLES)]
     width, level = 1.4 + 0.4 * min(number, 4), 4.0 - 0.01 * number
-    label = f"{swim.agent}: {swim.result}"
+    label = f"{swim.agent}: {swim.result}".replace("$", r"\$")
     axes.plot(*hub.T, color=colour, linestyle=style, linewidth=width, zorder=level, label=label)
     dots = hub[STROKES_PER_DOT::STROKES_PER_DOT]
     axes.plot(*dots.T, color=colour, linestyle="", marker="o", markersize=width + 2.0, zorder=level)

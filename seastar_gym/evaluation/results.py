@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from seastar_gym.evaluation.swim import Swim
+from seastar_gym.files import beside
 
 MM = 1000.0
 """Millimetres in a metre."""
@@ -50,7 +51,7 @@ def in_words(swims: Sequence[Swim]) -> list[dict[str, str | int | float | None]]
 def write_csv(swims: Sequence[Swim], file: Path) -> None:
     """Write the rows of `results` as CSV."""
     rows = results(swims)
-    with file.open("w", newline="", encoding="utf-8") as stream:
+    with beside(file) as part, part.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.DictWriter(stream, fieldnames=list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)

@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.controllers.contract import Policy, require_fit
+from seastar_gym.controllers.contract import Policy, require_fit, require_policy
 from seastar_gym.envs.paths import cross_track_error, path_length
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.scene.checks import require_callable, require_count, require_kind
 
 Floats = NDArray[np.float64]
+MOST_DECISIONS = 1_000_000_000
+"""Most decisions of a swim."""
 TIME_LIMIT = 400.0
 """Time after which a swim that is evaluated ends, unless another limit is given [s]."""
 
@@ -136,6 +139,12 @@ def swim(
     ValueError, before it begins, where the policy was made for another robot.
     watch: Called with `env` after its reset and after every stroke, to film it for instance.
     """
+    require_kind("agent", agent, str, "a text")
+    require_policy(policy)
+    require_kind("env", env, SeastarSwimEnv, "an environment of waypoints, without wrappers: gym.make(...).unwrapped")
+    require_count("max_strokes", max_strokes, 1, MOST_DECISIONS)
+    if watch is not None:
+        require_callable("watch", watch)
     assert env.observation_space.shape is not None
     n_seen, challenge = env.observation_space.shape[0], getattr(env, "challenge", None)
     require_fit(policy, env.scene, env.actions, env.decision_period, n_seen, challenge)

@@ -5,7 +5,7 @@ the same bits on each. A worker that is lost costs the task that it was at.
 """
 
 from collections.abc import Callable, Iterator
-from typing import Generic, NamedTuple, Protocol, TypeVar
+from typing import Generic, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 from seastar_gym.command import refused_by_disk
 
@@ -27,6 +27,7 @@ class Outcome(NamedTuple, Generic[Task]):
     problem: str = ""
 
 
+@runtime_checkable
 class Executor(Protocol):
     """A place where tasks are run."""
 

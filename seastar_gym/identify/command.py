@@ -14,7 +14,6 @@ With `--synthetic`, the data are simulated with known parameters and 1 mm of noi
 """
 
 import argparse
-import json
 import sys
 import time
 from collections.abc import Sequence
@@ -22,6 +21,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from seastar_gym.extras import require_extra
+from seastar_gym.files import save_figure, write_json
 from seastar_gym.identify.fit import Estimate, identify
 from seastar_gym.identify.measurement import Measurement
 from seastar_gym.identify.trajectories import synthetic
@@ -49,7 +49,7 @@ def draw(estimate: Estimate, measurement: Measurement, file: Path) -> None:
     over_time.axhline(0.0, color="black", linewidth=0.8)
     over_time.set(xlabel="time [s]", ylabel="measured minus fitted, x and y [mm]")
     over_time.set_title(f"{1e3 * estimate.root_mean_square:.2f} mm root mean square")
-    figure.savefig(file, dpi=120)
+    save_figure(figure, file, dpi=120)
     plt.close(figure)
 
 
@@ -90,11 +90,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.picture is not None:
             draw(estimate, measurement, options.picture)
         if options.out is not None:
-            options.out.write_text(json.dumps(estimate.scene.to_dict()) + "\n", encoding="utf-8")
+            write_json(options.out, estimate.scene.to_dict())
         if options.intervals is not None:
             ends = zip(estimate.names, estimate.lower.tolist(), estimate.upper.tolist(), strict=True)
-            rows = {name: [low, high] for name, low, high in ends}
-            options.intervals.write_text(json.dumps(rows, indent=2) + "\n", encoding="utf-8")
+            write_json(options.intervals, {name: [low, high] for name, low, high in ends})
     except (ValueError, OSError, ModuleNotFoundError) as bad_input:
         print(bad_input, file=sys.stderr)
         return 2

@@ -22,7 +22,7 @@ from seastar_gym.identify.measurement import Measurement
 from seastar_gym.identify.parameters import get_parameter, with_parameters
 from seastar_gym.identify.trajectories import trajectories
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import is_finite_number, shown
+from seastar_gym.scene.checks import is_finite_number, require_kind, shown
 
 Floats = NDArray[np.float64]
 
@@ -79,6 +79,8 @@ def identify(scene: Scene, parameters: Sequence[str], measurement: Measurement, 
     parameters: Names of positive numbers of the scene, such as "fluid.density". The scene's values are the first guess.
     confidence: Probability that the truth lies within a confidence interval.
     """
+    require_kind("scene", scene, Scene, "a Scene")
+    require_kind("measurement", measurement, Measurement, "a Measurement")
     if isinstance(parameters, str) or not isinstance(parameters, Sequence) or not parameters:
         raise ValueError(f"parameters must be names of numbers, such as fluid.density, not {shown(parameters)}.")
     if not is_finite_number(confidence) or not 0.0 < confidence < 1.0:

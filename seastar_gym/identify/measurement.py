@@ -8,11 +8,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.checks import is_whole_number, shown
+from seastar_gym.files import beside, write_atomically
+from seastar_gym.scene.checks import is_whole_number, require_file, require_unmasked, shown
 from seastar_gym.scene.csv_rows import Row, read_numbers, read_rows
 
 Floats = NDArray[np.float64]
 
+FARTHEST = 1e3
+"""Largest coordinate [m]. Squares of much larger ones would have no float."""
 NODE = re.compile("[0-9]{1,5}")
 """Number of a node in the name of a column."""
 
@@ -35,12 +38,15 @@ class Measurement:
     def __post_init__(self) -> None:
         for name in ("time", "positions", "commands"):
             array = getattr(self, name)
+            require_unmasked(name, array)
             if not isinstance(array, np.ndarray) or array.dtype.kind not in "iuf":
                 raise ValueError(f"{name} must be an array of numbers, not {shown(array)}.")
         if not isinstance(self.nodes, tuple) or not all(map(is_whole_number, self.nodes)) or self.time.ndim != 1:
             raise ValueError(f"nodes must be a tuple of whole numbers, not {shown(self.nodes)}, and time a single row.")
         if self.positions.shape != (len(self.time), len(self.nodes), 2) or not np.isfinite(self.positions).any():
             raise ValueError(f"{len(self.time)} times and {len(self.nodes)} nodes do not fit the positions measured.")
+        if np.nanmax(np.abs(self.positions)) > FARTHEST:
+            raise ValueError(f"Positions must be within {FARTHEST:g} m of the origin, in metres.")
         if self.commands.ndim != 2 or not len(self.commands):
             raise ValueError("commands must have one row per stroke with one number per limb.")
         if not np.isfinite(self.time).all() or self.time.min() < 0.0 or (np.diff(self.time) < 0.0).any():
@@ -49,6 +55,8 @@ class Measurement:
     @classmethod
     def from_csv(cls, trajectory: str | Path, commands: str | Path) -> "Measurement":
         """Measurement from two CSV files, whose form `python -m seastar_gym.identify --help` shows."""
+        require_file("trajectory", trajectory)
+        require_file("commands", commands)
         names, *rows = read_rows(trajectory) or [Row(str(trajectory), ())]
         nodes = tuple(int(name[1:]) for name in names.fields[1::2] if NODE.fullmatch(name[1:]))
         expected = ("time", *(f"{axis}{node}" for node in nodes for axis in "xy"))
@@ -68,8 +76,11 @@ class Measurement:
 
     def to_csv(self, trajectory: str | Path, commands: str | Path) -> None:
         """Write two CSV files that `from_csv` reads."""
+        require_file("trajectory", trajectory)
+        require_file("commands", commands)
         names = ["time", *(f"{axis}{node}" for node in self.nodes for axis in "xy")]
         numbers = np.column_stack([self.time, self.positions.reshape(len(self.time), -1)])
         lines = [names, *(["" if math.isnan(x) else f"{x:.7g}" for x in row] for row in numbers.tolist())]
-        Path(trajectory).write_text("".join(",".join(line) + "\n" for line in lines), encoding="utf-8")
-        np.savetxt(commands, self.commands, "%g", ",")
+        write_atomically(trajectory, "".join(",".join(line) + "\n" for line in lines))
+        with beside(commands) as part:
+            np.savetxt(part, self.commands, "%g", ",")

@@ -8,28 +8,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import is_finite_number, shown
+from seastar_gym.scene.checks import as_finite, is_finite_number, require_kind, require_texts, shown
 from seastar_gym.scene.per_robot import numbers_of, with_numbers
 
 Floats = NDArray[np.float64]
+
+UNKNOWN = ...
+"""What a name stands for that the scene has not."""
 
 
 def get_parameter(scene: Scene, name: str) -> float:
     """Value of a parameter of the scene. ValueError if no positive number, counts excepted, has that name."""
     if not isinstance(scene, Scene) or not isinstance(name, str):
         raise ValueError(f"A Scene and a parameter's name are needed, not {shown(scene)} and {shown(name)}.")
+    value = _found(scene, name)
+    if not is_finite_number(value) or value <= 0.0:
+        raise ValueError(f"{shown(name)} is no positive number of this scene, {_why_not(scene, name, value)}.")
+    return float(value)
+
+
+def _found(scene: Scene, name: str) -> Any:
+    """What a name stands for; UNKNOWN for nothing, and for counts."""
     first, *rest = name.split(".")
-    value: Any = getattr(scene, first) if first in ("robot", "fluid", "actuator", "contact") else None
+    value: Any = getattr(scene, first) if first in ("robot", "fluid", "actuator", "contact") else UNKNOWN
     for step in rest:
         if isinstance(value, tuple) and step.isdigit() and int(step) < len(value):
             value = value[int(step)]
         else:
             own = fields(value) if is_dataclass(value) else ()
             known = step in {field.name for field in own if field.type not in (int, "int")}
-            value = getattr(value, step) if known else None
-    if not is_finite_number(value) or value <= 0.0:
-        raise ValueError(f"{shown(name)} is no positive number of this scene, {_why_not(scene, name, value)}.")
-    return float(value)
+            value = getattr(value, step) if known else UNKNOWN
+    return value
 
 
 def _why_not(scene: Scene, name: str, value: Any) -> str:
@@ -45,4 +54,12 @@ def _why_not(scene: Scene, name: str, value: Any) -> str:
 
 def with_parameters(scene: Scene, names: Sequence[str], values: Sequence[float] | Floats) -> Scene:
     """Scene with other values of the named parameters."""
-    return with_numbers(scene, {name: float(value) for name, value in zip(names, values, strict=True)})
+    require_kind("scene", scene, Scene, "a Scene")
+    require_texts("names", names)
+    for name in names:
+        if "." not in name or _found(scene, name) is UNKNOWN:
+            raise ValueError(f"{shown(name)} is no number of this scene, such as fluid.drag_coefficient.")
+    numbers = as_finite("values", values, (len(names),))
+    if numbers.ndim != 1:
+        raise ValueError(f"values must be one for each of {len(names)} names, not of shape {numbers.shape}.")
+    return with_numbers(scene, dict(zip(names, numbers.tolist(), strict=True)))

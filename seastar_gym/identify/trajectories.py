@@ -11,10 +11,14 @@ from scipy.interpolate import CubicHermiteSpline
 from seastar_gym.identify.measurement import Measurement
 from seastar_gym.identify.parameters import get_parameter, with_parameters
 from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import as_finite, require_count, require_kind, require_number, require_seed
 from seastar_gym.scene.per_robot import frame_of, side_by_side
 from seastar_gym.simulator import Simulator
 
 Floats = NDArray[np.float64]
+
+MOST_STROKES, MOST_TIMES = 100_000, 10_000_000
+"""Most strokes and times of a simulated measurement."""
 
 
 def trajectory(time: Floats, nodes: Sequence[int], commands: Floats, scene: Scene) -> Floats:
@@ -23,7 +27,16 @@ def trajectory(time: Floats, nodes: Sequence[int], commands: Floats, scene: Scen
     Positions between time steps are interpolated by cubic Hermite polynomials, which are as accurate as the schemes.
     NaN if the solver gave up.
     """
-    return batch_of_trajectories(time, nodes, commands, [scene])[0]
+    require_kind("scene", scene, Scene, "a Scene")
+    times, given = as_finite("time", time, (None,)), as_finite("commands", commands, (None, scene.robot.n_limbs))
+    if times.ndim != 1 or not len(times) or times[0] < 0.0 or (np.diff(times) < 0.0).any():
+        raise ValueError("time must be a row of times that are not negative, and in order [s].")
+    if given.ndim != 2 or not len(given):
+        raise ValueError(f"commands must have shape (n_strokes, {scene.robot.n_limbs}), not {given.shape}.")
+    require_kind("nodes", nodes, (tuple, list), "a tuple of whole numbers")
+    for node in nodes:
+        require_count("A node", node, 0, scene.robot.n_nodes - 1)
+    return batch_of_trajectories(times, nodes, given, [scene])[0]
 
 
 def batch_of_trajectories(time: Floats, nodes: Sequence[int], commands: Floats, scenes: Sequence[Scene]) -> Floats:
@@ -74,6 +87,14 @@ def synthetic(
 
     truth: Values of parameters by name, which replace those of the scene.
     """
+    require_kind("scene", scene, Scene, "a Scene")
+    require_kind("truth", truth, dict, "a dict of values by name")
+    require_count("n_strokes", n_strokes, 1, MOST_STROKES)
+    require_number("rate", rate, "Hz")
+    require_number("noise", noise, "m", zero_allowed=True)
+    require_seed(seed)
+    if n_strokes * scene.actuator.period * rate > MOST_TIMES:
+        raise ValueError(f"{n_strokes} strokes at {rate:g} Hz are more than {MOST_TIMES:,} times.")
     rng, robot = np.random.default_rng(seed), scene.robot
     for name in truth:
         get_parameter(scene, name)  # refuses what the scene has not

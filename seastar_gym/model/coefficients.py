@@ -93,3 +93,7 @@ class Coefficients:
         """Node positions of a robot at rest [m], shape (n_nodes, 2)."""
         group, lane = divmod(int(robot), N_LANES)
         return self.rest[group % len(self.rest), : 2 * self._scene.robot.n_nodes, lane].reshape(-1, 2)
+
+    def rest_shapes(self) -> Floats:
+        """Node positions at rest [m], shape (n_nodes, 2) if no number differs, else (n_robots, n_nodes, 2)."""
+        return self.nodes(0) if self.are_shared else np.array([self.nodes(robot) for robot in range(self.n_robots)])

@@ -21,7 +21,7 @@ def make_mesh(limbs: Sequence[LimbShape], nodes_per_limb: int) -> Mesh:
     at_edges, at_nodes = edges_along(nodes_per_limb), nodes_along(nodes_per_limb)
     return Mesh(
         n_limbs=n_limbs,
-        nodes_per_limb=nodes_per_limb,
+        nodes_per_limb=int(nodes_per_limb),
         l=l,
         dl=np.concatenate([[0.5 * n_limbs * mean(root_edges)], l * np.tile(edges_at_node, n_limbs)]),
         root_edges=root_edges,

@@ -2,14 +2,18 @@
 
 import math
 import sys
+from os import PathLike
 from reprlib import Repr
-from typing import Any
+from types import UnionType
+from typing import Any, Union, get_args, get_origin
 
 import numpy as np
 from numpy.typing import NDArray
 
 LONGEST_SHOWN = 200
 """Largest number of characters of a value in a sentence."""
+DEEPEST = 3
+"""Depth of lists within lists in which masked entries are looked for: no argument has more axes."""
 
 _SHORT = Repr()
 """Writer of values that writes only the beginning of large lists, tuples and dicts."""
@@ -43,6 +47,24 @@ def is_finite_number(value: object) -> bool:
         return False
 
 
+def as_float(value: Any) -> Any:
+    """A finite number as a Python float: other kinds could compute otherwise. Anything else unchanged."""
+    return float(value) if is_finite_number(value) else value
+
+
+def as_typed(value: Any, kind: Any) -> Any:
+    """Value whose finite numbers are floats where a type says so, at any depth of tuples. Anything else unchanged."""
+    kinds = get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
+    if float in kinds:
+        value = as_float(value)
+    for inner in (get_args(each) for each in kinds if get_origin(each) is tuple and type(value) is tuple):
+        if inner[-1:] == (...,):
+            return tuple(as_typed(one, inner[0]) for one in value)
+        if len(inner) == len(value):
+            return tuple(map(as_typed, value, inner))
+    return value
+
+
 def require_number(name: str, value: float, unit: str, *, zero_allowed: bool = False) -> None:
     """Refuse what is no positive, finite number. Zero may be allowed. unit: Unit in the sentence."""
     if not is_finite_number(value) or value < 0 or (value == 0 and not zero_allowed):
@@ -62,9 +84,42 @@ def require_error(error: object) -> None:
         raise ValueError(f"error must be a positive, finite share of the path's length, not {shown(error)}.")
 
 
-def require_count(name: str, value: int, smallest: int, largest: int) -> None:
+MOST_LIMBS = 12
+"""Most limbs of a robot."""
+
+
+def require_kind(name: str, value: object, kind: Any, words: str) -> None:
+    """Refuse what is not of a kind. words: What it must be, such as "a Scene"."""
+    if not isinstance(value, kind) or (isinstance(value, type) and kind is not type):
+        raise ValueError(f"{name} must be {words}, not {shown(value)}.")
+
+
+def require_callable(name: str, value: object) -> None:
+    """Refuse what is no function."""
+    if not callable(value):
+        raise ValueError(f"{name} must be a function, not {shown(value)}.")
+
+
+def require_limbs(n_limbs: object) -> None:
+    """Refuse what is no number of limbs that a robot may have."""
+    require_count("n_limbs", n_limbs, 1, MOST_LIMBS)
+
+
+def require_texts(name: str, values: object) -> None:
+    """Refuse what is no sequence of texts, such as a single text."""
+    if not isinstance(values, list | tuple) or not all(isinstance(value, str) for value in values):
+        raise ValueError(f"{name} must be a list of texts, not {shown(values)}.")
+
+
+def require_file(name: str, file: object) -> None:
+    """Refuse what is no path of a file or folder, such as one of several lines."""
+    if not isinstance(file, str | PathLike) or not str(file).isprintable():
+        raise ValueError(f"{name} must be a path, not {shown(file)}.")
+
+
+def require_count(name: str, value: object, smallest: int, largest: int) -> None:
     """Refuse what is no whole number from `smallest` to `largest`."""
-    if not is_whole_number(value) or not smallest <= value <= largest:
+    if not is_whole_number(value) or not smallest <= value <= largest:  # type: ignore[operator]
         raise ValueError(f"{name} must be a whole number from {smallest} to {largest}, not {shown(value)}.")
 
 
@@ -92,8 +147,21 @@ def require_numbers(name: str, values: object, unit: str) -> None:
         raise ValueError(f"{name} must be a tuple of finite numbers [{unit}], not {shown(values)}.")
 
 
+def require_unmasked(name: str, value: object) -> None:
+    """Refuse masked arrays with masked entries, also in lists: numpy would take the numbers that they hide."""
+    if _is_masked(value, DEEPEST):
+        raise ValueError(f"{name} must be without masked entries: fill them, or leave them out.")
+
+
+def _is_masked(value: object, depth: int) -> bool:
+    if isinstance(value, np.ma.MaskedArray):
+        return bool(np.ma.is_masked(value))
+    return depth > 0 and isinstance(value, list | tuple) and any(_is_masked(part, depth - 1) for part in value)
+
+
 def as_array(name: str, value: object) -> NDArray[Any]:
-    """Value as an array, of whatever shape and numbers. ValueError if its rows differ in length."""
+    """Value as an array, of whatever shape and numbers. ValueError if rows differ in length or entries are masked."""
+    require_unmasked(name, value)
     try:
         return np.asarray(value)
     except ValueError as ragged:
@@ -107,3 +175,15 @@ def as_floats(name: str, value: object) -> NDArray[np.float64]:
         raise ValueError(f"{name} must be numbers, not {array.dtype} values.")
     with np.errstate(over="ignore"):  # what no float can hold is infinite, and refused where it must be finite
         return array.astype(float)
+
+
+def as_finite(name: str, value: object, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
+    """Value as an array of finite floats. shape: The last axes, None for one of any length; more may go before them."""
+    array = as_floats(name, value)
+    last = array.shape[array.ndim - len(shape) :] if array.ndim >= len(shape) else None
+    if last is None or any(wanted not in (None, length) for wanted, length in zip(shape, last, strict=True)):
+        wanted = ", ".join("n" if length is None else str(length) for length in shape)
+        raise ValueError(f"{name} must be numbers of shape (..., {wanted}), not {array.shape}.")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} must be finite numbers.")
+    return array

@@ -5,11 +5,13 @@ the chapter's water, over ten strokes from rest. For example, promise("fast").pa
 the continuum's path, that of infinitely many nodes and infinitely short steps, by at most 3 % of the path's length.
 
 An error is the largest of those sequences of commands that `measured_over()` counts, so it is no bound for all others:
-it bounds 95 % of random sequences with 93 % confidence. docs/accuracy.md says how many of fresh ones exceed it.
+it bounds 95 % of random sequences with 93 % confidence. docs/accuracy.md says how many of fresh ones exceed it. A
+typical error is their median.
 """
 
 import json
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, fields
 from functools import cache
 from pathlib import Path
 from typing import Any, Protocol
@@ -50,6 +52,8 @@ class Promise:
     heading_error: Such a sum for the heading [deg], the largest over the swims of path_error.
     end_error: Such a sum for the hub after the last stroke, the largest over the swims of path_error.
     speed: Simulated time over computing time, for a batch on one core of the machine named in presets.json.
+    typical_error: Median of the sum of both errors over the random commands of path_error; of presets alone.
+    typical_gait_error, typical_slow_error: The same over the commands of gait_error and of slow_error.
     """
 
     discretisation: str
@@ -67,6 +71,9 @@ class Promise:
     heading_error: float
     end_error: float
     speed: float
+    typical_error: float = math.nan
+    typical_gait_error: float = math.nan
+    typical_slow_error: float = math.nan
 
     def __str__(self) -> str:
         adapted = "" if self.path_tolerance is None else f" adapted to {100 * self.path_tolerance:g} %"
@@ -77,16 +84,23 @@ class Promise:
 class TimedPromise:
     """Measured errors of a preset where wires (`SmaWires`) are commanded several times a second.
 
-    Largest distances of the hub from its path at whole seconds, as fractions of the path's length, over random commands
-    and over random seconds that are repeated: `python -m studies.accuracy.timed --store` measures them.
+    Largest distances of the hub from its path at whole seconds, as fractions of the path's length, or of a tenth of a
+    limb length per second where that is longer: `python -m studies.accuracy.timed --store` measures them.
+
+    space_error, time_error: Largest errors over random commands.
+    gait_error: Sum of such errors, the largest over random seconds that are repeated.
+    typical_error, typical_gait_error: Medians of the sum over the same commands.
     """
 
     space_error: float
     time_error: float
+    gait_error: float
+    typical_error: float
+    typical_gait_error: float
 
     @property
     def path_error(self) -> float:
-        """The sum of the two."""
+        """The sum of the errors of space and time."""
         return self.space_error + self.time_error
 
 
@@ -181,7 +195,8 @@ def timed_promise(preset: str, decision_period: float) -> TimedPromise | None:
     if not shorter or not longer:
         return None
     around = rows[max(shorter)], rows[min(longer)]
-    return TimedPromise(max(row.space_error for row in around), max(row.time_error for row in around))
+    names = [field.name for field in fields(TimedPromise)]
+    return TimedPromise(**{name: max(getattr(row, name) for row in around) for name in names})
 
 
 @cache

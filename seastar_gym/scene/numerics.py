@@ -11,7 +11,7 @@ from seastar_gym.scene.checks import (
     require_number,
     shown,
 )
-from seastar_gym.scene.robot import Discretisation
+from seastar_gym.scene.robot import NODES, Discretisation
 from seastar_gym.scene.serial import register_part
 
 SchemeName = Literal["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
@@ -42,9 +42,8 @@ class Numerics:
         SolverStatus.ITERATION_LIMIT.
     path_tolerance: Error of the hub's path as a fraction of its length, from 0.001 to 0.02, by which steps are adapted
         (up to `step`). Only for the scheme "implicit-midpoint". None means steps of equal length.
-    named: Whether these numerics were chosen. False only for those of a `Scene` that was given none. A `Simulator` uses
-        them in either case, while an environment prefers its own fidelity if they are not named. It does not count in
-        comparisons.
+    named: Whether these numerics were chosen. False only for those of a `Scene` that was given none, which a fidelity
+        may replace. It does not count in comparisons.
     """
 
     scheme: SchemeName = "implicit-euler"
@@ -67,7 +66,7 @@ class Numerics:
                 raise ValueError(f"path_tolerance must be from 0.001 to 0.02, not {shown(self.path_tolerance)}.")
             if self.scheme != "implicit-midpoint":
                 raise ValueError(f'path_tolerance needs the scheme "implicit-midpoint", not {shown(self.scheme)}.')
-        if not self.named and self != Numerics():
+        if not self.named and self not in (DEFAULT, Numerics()):  # the latter in older files
             object.__setattr__(self, "named", True)
 
     @classmethod
@@ -94,9 +93,13 @@ class Setting(NamedTuple):
 
 PRESETS: dict[Fidelity, Setting] = {
     "fast": Setting("continuum", 7, Numerics("implicit-midpoint", 5e-3, newton_tolerance=1e-5)),
-    "balanced": Setting("continuum", 12, Numerics("implicit-midpoint", 5e-3, newton_tolerance=1e-5)),
+    "balanced": Setting("continuum", NODES["continuum"], Numerics("implicit-midpoint", 5e-3, newton_tolerance=1e-5)),
     "accurate": Setting("continuum", 19, Numerics("implicit-midpoint", 1e-3, newton_tolerance=1e-6)),
     "reference": Setting("continuum", 37, Numerics("implicit-midpoint", 0.3e-3)),
-    "chapter": Setting("chapter", 10, Numerics("implicit-euler", 3e-3)),
+    "chapter": Setting("chapter", NODES["chapter"], Numerics("implicit-euler", 3e-3)),
 }
 """Chosen from the front that `python -m studies.accuracy` measures."""
+
+DEFAULT_FIDELITY: Fidelity = "balanced"
+DEFAULT = PRESETS[DEFAULT_FIDELITY].numerics
+"""Numerics of a `Scene` that is given none."""

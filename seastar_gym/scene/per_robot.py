@@ -10,7 +10,7 @@ from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
-from seastar_gym.scene.checks import shown
+from seastar_gym.scene.checks import as_float, shown
 
 Part = TypeVar("Part")
 
@@ -28,23 +28,18 @@ class PerRobot(tuple[float, ...]):
 
 
 def require_each(part: Any, name: str, check: Callable[[str, float], None]) -> None:
-    """Check a number of a part, or the number of each robot, and store them as a Python number or as PerRobot."""
+    """Check a number of a part, or the number of each robot, and store them as a float or as PerRobot."""
     value = getattr(part, name)
     if not isinstance(value, np.ndarray | tuple):
         check(name, value)
-        object.__setattr__(part, name, _plain(value))
+        object.__setattr__(part, name, as_float(value))
         return
-    numbers = value.tolist() if isinstance(value, np.ndarray) else list(map(_plain, value))
+    numbers = value.tolist() if isinstance(value, np.ndarray) else list(value)
     if not isinstance(numbers, list) or not numbers or isinstance(numbers[0], list):
         raise ValueError(f"{name} must be a number, or one for every robot of shape (n_robots,), not {shown(value)}.")
     for number in numbers:
         check(name, number)
-    object.__setattr__(part, name, PerRobot(numbers))
-
-
-def _plain(number: Any) -> Any:
-    """Python number of a number of numpy, which could force single precision on later results."""
-    return number.item() if isinstance(number, np.generic) else number
+    object.__setattr__(part, name, PerRobot(map(as_float, numbers)))
 
 
 def column(numbers: Numbers, n_axes: int = 1) -> Any:

@@ -3,25 +3,29 @@
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from operator import itemgetter
-from typing import ClassVar, Literal, get_args
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.scene.along import AlongLimb, Stiffening
 from seastar_gym.scene.body import Body
-from seastar_gym.scene.checks import require_choice, require_count, require_number, shown
+from seastar_gym.scene.checks import require_choice, require_count, require_limbs, require_number, shown
 from seastar_gym.scene.limb import Limb, LimbShape, as_tuple
 from seastar_gym.scene.per_robot import Numbers, batch_size, chosen, require_each
 from seastar_gym.scene.serial import register_part
 from seastar_gym.scene.shape import limbs_that_may_touch, rest_positions, turn_per_hinge
 from seastar_gym.scene.symmetry import PointGroup, point_group
+from seastar_gym.scene.unnamed import UnnamedChoice, UnnamedCount, is_named
 
 HubHinge = Literal["opening", "turning"]
 Discretisation = Literal["chapter", "continuum"]
+
+NODES: dict[Discretisation, int] = {"continuum": 12, "chapter": 10}
+"""Nodes per limb of a robot that names none, where no fidelity chooses them."""
 
 
 @register_part
@@ -30,7 +34,8 @@ class Seastar:
     """Robot of limbs around a hub (Fig. 13.4a). Limbs are straight, equal, uniform and evenly spread unless overridden.
 
     n_limbs: Number of limbs.
-    nodes_per_limb: N, the number of nodes of a limb including the hub.
+    nodes_per_limb: N, the number of nodes of a limb including the hub. None means that a fidelity chooses it; without
+        one it is 12, as of "balanced", and 10 in the chapter's discretisation.
     limb_length: L [m]. It is also the unit of length of tolerances and observations.
     rod_radius: r_0 [m], radius of the limbs.
     youngs_modulus: E [Pa].
@@ -46,6 +51,7 @@ class Seastar:
         infinitely many.
         "chapter" joins neighbouring limbs by hinges at the hub, and lumps mass and drag at the nodes, as the chapter
         does: with ten nodes that robot is 12 to 26 % off. With infinitely many nodes the two are the same robot.
+        None means that a fidelity chooses it; without one it is "continuum".
     along: How an actuator's rotation is spread along its limb. None means that it turns the limb at the hub.
     stiffening: How much stiffer a limb is while its actuator is hot. None means that heat does not stiffen it.
     body: Body between the limbs, which are clamped to it, instead of the point hub. None means a point.
@@ -56,7 +62,7 @@ class Seastar:
 
     PER_ROBOT: ClassVar = ("limb_length", "rod_radius", "youngs_modulus", "density", "relaxation_time")
     n_limbs: int = 5
-    nodes_per_limb: int = 10
+    nodes_per_limb: int | Any = None  # a number once it is constructed
     limb_length: Numbers = 0.1
     rod_radius: Numbers = 1.6e-3
     youngs_modulus: Numbers = 1e6
@@ -64,13 +70,14 @@ class Seastar:
     hub_hinge: HubHinge = "opening"
     limbs: tuple[Limb, ...] = ()
     relaxation_time: Numbers | None = None
-    discretisation: Discretisation = "continuum"
+    discretisation: Discretisation | Any = None  # a choice once it is constructed
     along: AlongLimb | None = None
     stiffening: Stiffening | None = None
     body: Body | None = None
 
     def __post_init__(self) -> None:
-        require_count("n_limbs", self.n_limbs, 1, 12)
+        require_limbs(self.n_limbs)
+        self._fill_in_resolution()
         require_count("nodes_per_limb", self.nodes_per_limb, 2, 10_000)
         require_each(self, "limb_length", partial(require_number, unit="m"))
         require_each(self, "rod_radius", partial(require_number, unit="m"))
@@ -79,7 +86,6 @@ class Seastar:
         if self.relaxation_time is not None:
             require_each(self, "relaxation_time", partial(require_number, unit="s", zero_allowed=True))
         require_choice("hub_hinge", self.hub_hinge, get_args(HubHinge))
-        require_choice("discretisation", self.discretisation, get_args(Discretisation))
         if self.discretisation == "continuum" and self.hub_hinge != "opening":
             raise ValueError(
                 f'hub_hinge="{self.hub_hinge}" measures hinges at the hub, which only discretisation="chapter" has: '
@@ -89,6 +95,26 @@ class Seastar:
             raise ValueError("One limb has no hub hinge that could be measured by its turning angle.")
         self._check_limbs()
         self._check_along()
+
+    def _fill_in_resolution(self) -> None:
+        if not is_named(self.discretisation):
+            object.__setattr__(self, "discretisation", UnnamedChoice("continuum"))
+        require_choice("discretisation", self.discretisation, get_args(Discretisation))
+        if not is_named(self.nodes_per_limb):
+            object.__setattr__(self, "nodes_per_limb", UnnamedCount(NODES[self.discretisation]))
+
+    def resolved(self, discretisation: Discretisation, nodes_per_limb: int) -> "Seastar":
+        """Robot with a discretisation and its nodes per limb as far as it names none itself."""
+        named, nodes = self.named_resolution
+        own = discretisation if named is None else named
+        others = nodes_per_limb if own == discretisation else NODES[own]
+        return replace(self, discretisation=str(own), nodes_per_limb=int(others if nodes is None else nodes))
+
+    @property
+    def named_resolution(self) -> tuple[Discretisation | None, int | None]:
+        """Discretisation and nodes per limb, None for what was not named."""
+        discretisation, nodes = self.discretisation, self.nodes_per_limb
+        return discretisation if is_named(discretisation) else None, nodes if is_named(nodes) else None
 
     def _check_along(self) -> None:
         for name, kind in (("along", AlongLimb), ("stiffening", Stiffening)):

@@ -7,7 +7,7 @@ robot of a batch.
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from operator import itemgetter
 from os import PathLike
@@ -32,7 +32,7 @@ from seastar_gym.scene.checks import (
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.fidelity import NOT_MEASURED, cheapest
 from seastar_gym.scene.fluid import Water
-from seastar_gym.scene.numerics import MAX_STEPS, PRESETS, Fidelity, Numerics, SchemeName
+from seastar_gym.scene.numerics import DEFAULT, DEFAULT_FIDELITY, MAX_STEPS, PRESETS, Fidelity, Numerics, SchemeName
 from seastar_gym.scene.per_robot import batch_size, chosen
 from seastar_gym.scene.robot import Discretisation, Seastar
 from seastar_gym.scene.serial import from_dict, register_part, to_dict
@@ -47,8 +47,7 @@ class Scene:
     robot: Robot of limbs around a hub.
     fluid: Fluid around the robot. None means vacuum.
     actuator: Actuator that turns the limbs at the hub.
-    numerics: Settings of time stepping. Without any, a `Simulator` uses the chapter's and an environment those of its
-        fidelity.
+    numerics: Settings of time stepping. Without any, they are those of the fidelity "balanced".
     held_nodes: Indices of nodes that do not move. Holding the hub and a limb's first node clamps the limb.
     loads: Constant forces on nodes, (node, F_x, F_y) [N] each.
     limb_strengths: Factors by which the rotations of the limbs are reduced, from 0 (no rotation) to 1 (full), one per
@@ -61,7 +60,7 @@ class Scene:
     robot: Seastar = field(default_factory=Seastar)
     fluid: Water | None = field(default_factory=Water)
     actuator: Actuator = field(default_factory=SmaPulse)
-    numerics: Numerics = field(default_factory=partial(Numerics, named=False))
+    numerics: Numerics = field(default_factory=partial(replace, DEFAULT, named=False))
     held_nodes: tuple[int, ...] = ()
     loads: tuple[tuple[int, float, float], ...] = ()
     limb_strengths: tuple[float, ...] = ()
@@ -259,6 +258,27 @@ class Scene:
         discretisation, nodes_per_limb, numerics = PRESETS[fidelity]
         return cls(Seastar(nodes_per_limb=nodes_per_limb, discretisation=discretisation), numerics=numerics)
 
+    def at(self, fidelity: Fidelity | None = None) -> "Scene":
+        """Scene with the nodes per limb, discretisation and numerics of a fidelity, as far as it names none itself.
+
+        Held and loaded nodes are counted on a mesh, so a scene with any keeps its own. ValueError where scene and
+        fidelity name different numerics.
+
+        fidelity: None means that of the scene if it names its numerics, otherwise "balanced".
+        """
+        wanted = DEFAULT_FIDELITY if fidelity is None else fidelity
+        require_choice("fidelity", wanted, get_args(Fidelity))
+        discretisation, nodes_per_limb, numerics = PRESETS[wanted]
+        if self.numerics.named and fidelity is not None and self.numerics != numerics:
+            raise ValueError(
+                f'fidelity="{fidelity}" contradicts the numerics that the scene names, {shown(self.numerics)}: '
+                "give one of them."
+            )
+        if self.held_nodes or self.loads:
+            discretisation, nodes_per_limb = self.robot.discretisation, self.robot.nodes_per_limb
+        robot = self.robot.resolved(discretisation, nodes_per_limb)
+        return replace(self, robot=robot, numerics=self.numerics if self.numerics.named else numerics)
+
     @classmethod
     def for_error(
         cls,
@@ -273,7 +293,7 @@ class Scene:
         the path's length. ValueError if no measured setting keeps it, or if the robot was not measured.
 
         any_gait: Require it for the repetition of any command, too, which is harder.
-        robot: The robot with the nodes per limb and the discretisation that it is to keep. None chooses them.
+        robot: The robot. Nodes per limb and a discretisation that it names are kept, others are chosen.
         certificate: `Certificate` of the scene, or the file of one, whose errors are those of any gait. It lapses where
             the robot or the version of the package differs. None means the package's table, which is of the chapter's
             robot and water.
@@ -285,7 +305,7 @@ class Scene:
             return cast(Scene, as_certificate(certificate).kept_by(error, robot))
         if robot is not None and not _is_chapters(robot):
             raise ValueError(NOT_MEASURED.format(shown(robot)))
-        best = cheapest(error, any_gait, *(() if robot is None else (robot.discretisation, robot.nodes_per_limb)))
+        best = cheapest(error, any_gait, *(() if robot is None else robot.named_resolution))
         numerics = Numerics(
             cast(SchemeName, best.scheme), best.step, best.newton_tolerance, path_tolerance=best.path_tolerance
         )

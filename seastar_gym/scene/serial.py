@@ -3,21 +3,24 @@
     data = json.loads(json.dumps(scene.to_dict()))
     assert Scene.from_dict(data) == scene  # to the last bit
 
-A part of a scene is a dict of its `kind` and its constructor's arguments. Arguments that are left out have their
-defaults, so that scenes written before a new term was added can be read. A tuple is a list, and numbers of each robot
-are a kind of their own. The outermost dict also has the `version` of this form. What could not be read back is refused
-when it is written. Reading constructs parts of registered classes only: it evaluates no text and imports nothing.
+A part of a scene is a dict of its `kind` and its constructor's arguments. Those that nobody named, so that a fidelity
+chooses them, are None. Arguments that are left out have their defaults, so that scenes written before a new term was
+added can be read. A tuple is a list, and numbers of each robot are a kind of their own. The outermost dict also has the
+`version` of this form. What could not be read back is refused when it is written. Reading constructs parts of
+registered classes only: it evaluates no text and imports nothing.
 """
 
 import inspect
 import sys
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from functools import cache, wraps
+from typing import Any, ClassVar, TypeVar, get_origin, get_type_hints
 
 import numpy as np
 
-from seastar_gym.scene.checks import shown
+from seastar_gym.scene.checks import as_typed, shown
 from seastar_gym.scene.per_robot import PerRobot
+from seastar_gym.scene.unnamed import Unnamed
 
 VERSION = 1
 """Version of the plain form."""
@@ -37,13 +40,31 @@ def register_part(kind: type[Part]) -> type[Part]:
 
     The class must keep its constructor's arguments as attributes of the same names and compare by value, as a dataclass
     does. The arguments may be numbers, texts, None, tuples, dicts and parts of registered classes. The class must be
-    registered before a scene with it is read.
+    registered before a scene with it is read. Finite numbers of a dataclass with `__post_init__` become floats before
+    it, where its annotations say float.
     """
     known = KINDS.setdefault(kind.__name__, kind)
     if (known.__module__, known.__qualname__) != (kind.__module__, kind.__qualname__):
         raise ValueError(f"There is a part of the name {kind.__name__} already: give this class another one.")
     KINDS[kind.__name__] = kind
+    if hasattr(kind, "__post_init__"):
+        _make_floats(kind)
     return kind
+
+
+def _make_floats(kind: type) -> None:
+    """Have a dataclass make floats of its numbers before it checks them, where its annotations say float."""
+    check = kind.__post_init__  # type: ignore[attr-defined]
+    annotations = cache(lambda: {name: hint for name, hint in get_type_hints(kind).items() if "float" in str(hint)})
+
+    @wraps(check)
+    def floats_first(part: Any, *arguments: Any) -> None:
+        for name, hint in annotations().items():
+            if get_origin(hint) is not ClassVar and hasattr(part, name):
+                object.__setattr__(part, name, as_typed(getattr(part, name), hint))
+        check(part, *arguments)
+
+    kind.__post_init__ = floats_first  # type: ignore[attr-defined]
 
 
 def _arguments(kind: type) -> list[str]:
@@ -68,6 +89,8 @@ def _written(value: Any, where: str) -> Any:
         fields = {name: getattr(value, name) for name in _arguments(type(value))}
         return {"kind": kind, **{name: _written(one, f"{where}.{name}") for name, one in fields.items()}}
     match value:
+        case Unnamed():
+            return None
         case None | bool() | str():
             return value
         case np.bool_():

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.der.energy import energies
 from seastar_gym.der.rods import Work, make_work
-from seastar_gym.der.stepping.report import REPORT_ROWS, SMALLEST_HUB_T
+from seastar_gym.der.stepping.report import MOMENTS, PEAK_MOMENT, REPORT_ROWS, SMALLEST_HUB_T, WORK
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stroke import advance
 from seastar_gym.der.terms.hub import Actuation
@@ -48,10 +48,11 @@ class Batch:
     rotations: Rotations of the limbs by their actuators now [rad], k = n_limbs.
     status: SolverStatus, k = 1.
     report: Counts of the present interval, k = len(REPORT_ROWS).
+    effort: Work and moments of the actuators in the present interval, k = MOMENTS + n_limbs; 0 if nobody asks.
     last_hub: Hub position at the end of the last interval [m], shape (n_robots, 2).
     """
 
-    def __init__(self, scene: Scene, n_robots: int, threads: int):
+    def __init__(self, scene: Scene, n_robots: int, threads: int, effort: bool):
         self._scene, self.n_robots = scene, n_robots
         n_groups, n_limbs, n_rows = -(-n_robots // N_LANES), scene.robot.n_limbs, 2 * scene.robot.n_nodes
         self._scheme = SCHEMES[scene.numerics.scheme]
@@ -69,6 +70,7 @@ class Batch:
         self.rotations = np.zeros((n_groups, n_limbs, N_LANES))
         self.status = np.zeros((n_groups, 1, N_LANES))
         self.report = np.zeros((n_groups, len(REPORT_ROWS), N_LANES))
+        self.effort = np.zeros((n_groups, MOMENTS + n_limbs if effort else 0, N_LANES))
         self._held_rows = np.array([2 * node + axis for node in scene.held_nodes for axis in (0, 1)], dtype=int)
         self._held = self.q[:, self._held_rows]
         self.last_hub = self.hub_position()
@@ -212,6 +214,7 @@ class Batch:
         self.a[:] = 0.0  # an interval depends on the state at its beginning only
         self.report[:] = 0.0
         self.report[:, SMALLEST_HUB_T] = np.inf
+        self.effort[:] = 0.0
 
     def advance(self, begin: int, end: int) -> None:
         """Advance all robots from the time step `begin` of the interval to `end`."""
@@ -225,7 +228,7 @@ class Batch:
             advance(
                 self.coefficients.rods(part.start), work, self._scheme, SCHEMES["implicit-euler"], actuation,
                 self.q[part], self.v[part], self.a[part], self.peaks[part], times, shape, self.status[part],
-                self.report[part], self.coefficients.limits(part.start),
+                self.report[part], self.coefficients.limits(part.start), self.effort[part],
             )  # fmt: skip
 
         bounds = self._part_bounds()
@@ -249,13 +252,20 @@ class Batch:
         self.rotations[:] = self.peaks * (self.shape[end] if self.shape.ndim == 1 else self.shape[:, end])
 
     def end(self) -> dict[str, Floats]:
-        """End an interval: release held nodes, put lost robots at rest. Returns the report's rows, (n_robots,) each."""
+        """End an interval: release held nodes, put lost robots at rest. Returns the report's rows, (n_robots,) each.
+
+        With them are work and peak_moment of the actuators, NaN if nobody asks for them.
+        """
         self.q[:, self._held_rows] = self._held
         self.v[:, self._held_rows] = 0.0
         if self.failed.any():
             self._put_lost_robots_at_rest()
         self.last_hub = self.hub_position()
-        return dict(zip(REPORT_ROWS, self.read(self.report).T, strict=True))
+        effort = np.full((2, self.n_robots), np.nan)
+        if self.effort.size:
+            effort = self.read(self.effort).T[[WORK, PEAK_MOMENT]]
+        rows = dict(zip(REPORT_ROWS, self.read(self.report).T, strict=True))
+        return {**rows, "work": effort[0], "peak_moment": effort[1]}
 
     def _put_lost_robots_at_rest(self) -> None:
         """Put failed robots whose state is not finite at rest where their hub was last."""

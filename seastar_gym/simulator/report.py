@@ -61,6 +61,10 @@ class StrokeReport(NamedTuple):
         error_bars.py. NaN without `error_bars`.
     heating_time: Time for which wires were heated, summed over limbs [s]; NaN if the actuator does not say it.
     energy: Electric energy of that heat, with the actuator's heating power [J]; NaN if the actuator does not say it.
+    work: Mechanical work of the actuators, from their moments at the ends of the steps of `Numerics.step` [J]. What
+        limbs give back counts as negative. NaN without `effort`.
+    peak_moment: Largest moment that a limb resisted its actuator with at these times [N m], likewise. A moment is the
+        slope of the elastic energy in the limb's rotation.
     """
 
     status: NDArray[np.int64]
@@ -76,6 +80,8 @@ class StrokeReport(NamedTuple):
     error_estimate: Floats
     heating_time: Floats
     energy: Floats
+    work: Floats
+    peak_moment: Floats
 
 
 def make_report(
@@ -97,5 +103,7 @@ def make_report(
         error_estimate=error_estimate,
         heating_time=heating_time,
         energy=power * heating_time,
+        work=rows["work"],
+        peak_moment=rows["peak_moment"],
         **{name: rows[name].astype(np.int64) for name in COUNTS},
     )

@@ -51,13 +51,13 @@ class State(NamedTuple):
 def checked_state(state: object, rest: Floats, actuators_at_rest: Floats, longest: float) -> list[Floats]:
     """Arrays of a state, at rest where it has None. ValueError if a shape or a number is wrong.
 
-    rest: Node positions at rest [m], shape (n_nodes, 2).
+    rest: Node positions at rest [m], shape (n_nodes, 2), or those of every robot, shape (n_robots, n_nodes, 2).
     actuators_at_rest: Shape (n_robots, n_limbs, n_state). longest: Time for which commands may be under way [s].
     """
     if not isinstance(state, tuple | list) or not 3 <= len(state) <= len(State._fields):
         raise ValueError(f"A State of {', '.join(State._fields)} is needed, not {type(state).__name__}.")
     n_robots, n_limbs, _ = actuators_at_rest.shape
-    nodes, each = (n_robots, *rest.shape), np.zeros(n_robots)
+    nodes, each = (n_robots, *rest.shape[-2:]), np.zeros(n_robots)
     positions, velocities, time, actuators, commands, phase, orientation, spin = State(*state)
     arrays = [
         _checked_array("State.positions", positions, nodes),

@@ -12,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import is_finite_number, require_flag, shown
+from seastar_gym.scene.checks import as_finite, is_finite_number, require_count, require_flag, require_kind, shown
 
 Floats = NDArray[np.float64]
 
 PARTS = ("robot", "fluid", "actuator", "numerics", "contact")
 """Parts of a scene that an axis may replace as a whole."""
+MOST_VALUES = 1_000_000
+"""Most values of an axis that are spaced evenly."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,7 @@ class Range:
     is_log: bool = False
 
     def __post_init__(self) -> None:
+        _require_name(self.name)
         require_flag("is_log", self.is_log)
         if not is_finite_number(self.low) or not is_finite_number(self.high) or self.low >= self.high:
             raise ValueError(f"{self.name} must go from a finite number to a larger one, not {shown(self)}.")
@@ -38,6 +41,7 @@ class Range:
 
     def at(self, share: Floats) -> Floats:
         """Numbers at shares of the way from `low` to `high`."""
+        share = as_finite("share", share, ())
         if self.is_log:
             low, high = math.log(self.low), math.log(self.high)
             return np.clip(np.exp(low + share * (high - low)), self.low, self.high)
@@ -45,6 +49,7 @@ class Range:
 
     def spaced(self, n: int) -> "Choices":
         """Axis of n of its numbers, both ends included."""
+        require_count("n", n, 1, MOST_VALUES)
         return Choices(self.name, tuple(self.at(np.linspace(0.0, 1.0, n)).tolist()))
 
 
@@ -60,11 +65,14 @@ class Choices:
     labels: tuple[Any, ...] = field(default=())
 
     def __post_init__(self) -> None:
+        _require_name(self.name)
+        require_kind("labels", self.labels, tuple, "a tuple")
         if not isinstance(self.values, tuple) or not self.values:
             raise ValueError(f"{self.name} needs a tuple of values to choose from, not {shown(self.values)}.")
         labels = self.labels or tuple(map(_label, self.values))
         object.__setattr__(self, "labels", labels)
-        if len(labels) != len(self.values) or len(set(labels)) < len(labels):
+        known = all(isinstance(label, str | int | float) for label in labels)
+        if not known or len(labels) != len(self.values) or len(set(labels)) < len(labels):
             raise ValueError(f"Values of {self.name} need labels that differ, not {shown(labels)}.")
 
     @property
@@ -74,6 +82,12 @@ class Choices:
 
 
 Axis: TypeAlias = Range | Choices
+
+
+def _require_name(name: object) -> None:
+    """Refuse what is no name of an axis."""
+    if not isinstance(name, str) or not name:
+        raise ValueError(f"The name of an axis must be a text, not {shown(name)}.")
 
 
 def _label(value: Any) -> Any:

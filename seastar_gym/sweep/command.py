@@ -17,7 +17,6 @@ with the cells that have none.
 """
 
 import argparse
-import json
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -32,6 +31,7 @@ from seastar_gym.executors.options import add_options, executor_of
 from seastar_gym.extras import require_extra
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import shown
+from seastar_gym.scene.scene_file import load_scene
 from seastar_gym.sweep.axes import Axis, Range
 from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.pilots import Course
@@ -48,7 +48,7 @@ def make_parser() -> argparse.ArgumentParser:
     default = "(default: %(default)s)"
     parser.add_argument("axes", nargs="*", metavar="NAME=VALUES", help="what differs from design to design")
     parser.add_argument("--out", type=Path, default=Path("runs/sweep"), help=f"folder of the results {default}")
-    parser.add_argument("--scene", type=Path, help="JSON file of the scene (default: the chapter's at `fast`)")
+    parser.add_argument("--scene", type=Path, help="file of the scene, .py or .json (default: the chapter's at `fast`)")
     parser.add_argument("--gait", default="straight", help=f"what robots do, unless an axis says it {default}")
     parser.add_argument("--settling", type=int, default=2, help=f"strokes before the measurement {default}")
     parser.add_argument("--measured", type=int, default=8, help=f"strokes of the measurement {default}")
@@ -69,16 +69,6 @@ def make_parser() -> argparse.ArgumentParser:
     add_options(parser, "cells", "processes")
     parser.add_argument("--count", action="store_true", help="say how many designs and cells there are, and stop")
     return parser
-
-
-def scene_of_file(file: Path | None) -> Scene:
-    """Scene of a JSON file, the chapter's at `fast` for none."""
-    if file is None:
-        return Scene.preset("fast")
-    try:
-        return Scene.from_dict(json.loads(file.read_text(encoding="utf-8")))
-    except (json.JSONDecodeError, UnicodeDecodeError) as unfit:
-        raise ValueError(f"{file} is no JSON: {unfit}.") from None
 
 
 def bar_of(total: int, bar: Any) -> Callable[[Tally], None]:
@@ -104,6 +94,8 @@ def bar_of(total: int, bar: Any) -> Callable[[Tally], None]:
 def as_text(tally: Tally, out: Path) -> str:
     """What was done, in a sentence or two."""
     text = f"New in {out}: {tally.designs:,} designs, cells: {tally.done}; there before, cells: {tally.kept}."
+    if tally.damaged:
+        text += f" Damaged before, and simulated again: {', '.join(map(str, tally.damaged))}."
     if tally.problems:
         name, problem = next(iter(tally.problems.items()))
         text += f" Without result, cells: {len(tally.problems)}, such as {name[:8]}: {problem}"
@@ -112,8 +104,9 @@ def as_text(tally: Tally, out: Path) -> str:
 
 def sweep_of(options: argparse.Namespace, axes: tuple[Axis, ...]) -> Sweep:
     """Sweep that the options describe."""
+    scene = Scene.preset("fast") if options.scene is None else load_scene(options.scene)
     return Sweep(
-        scene_of_file(options.scene), axes, options.gait, options.settling, options.measured,
+        scene, axes, options.gait, options.settling, options.measured,
         1 if options.optuna and any(isinstance(axis, Range) for axis in axes) else options.latin,
         options.seed, options.robots, Course(load_path(options.path), options.seconds, options.decision_period),
     )  # fmt: skip
@@ -136,6 +129,9 @@ def search(sweep: Sweep, options: argparse.Namespace) -> int:
     from seastar_gym.sweep.proposals import Search, explore
 
     options.out.mkdir(parents=True, exist_ok=True)
+    for file in options.out.glob("study.db*"):
+        if file.is_symlink():  # SQLite writes through links
+            raise ValueError(f"{file} is a link: take it out, or name the database itself with --storage.")
     storage = options.storage or f"sqlite:///{options.out}/study.db"
     wanted = Search(options.objective, not options.minimize, options.seed, options.stale_after)
     with tqdm(total=options.optuna, unit="design") as bar:

@@ -64,6 +64,7 @@ class Sweep:
             raise ValueError(f"Every axis may be named once, not {shown(names)}.")
         if {"gait", "controller"} <= set(names):
             raise ValueError("Robots follow a gait or a controller: take one of these axes.")
+        require_count("samples", self.samples, 0, MOST_NUMBERS)
         require_count("settling", self.settling, 0, 1_000_000)
         require_count("measured", self.measured, 1, 1_000_000)
         require_count("robots", self.robots, 1, 1_000_000)

@@ -14,7 +14,7 @@ from seastar_gym.sweep.gait import Gait, gait_of
 from seastar_gym.sweep.pilots import Course, Pilot, pilot_of
 from seastar_gym.version import __version__
 
-FORM = 1
+FORM = 2
 """Form of the results. Parts of another form are other parts."""
 
 

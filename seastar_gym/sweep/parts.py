@@ -1,15 +1,16 @@
 """Parts: the results of a cell each, as Parquet files with units and the scene in their metadata."""
 
 import os
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
-import pyarrow.dataset
 import pyarrow.parquet
 
-from seastar_gym.files import beside
+from seastar_gym.files import write_atomically
+from seastar_gym.scene.checks import require_file
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS, swim
 
@@ -43,8 +44,20 @@ def _field(name: str, array: Any) -> Any:
 def to_parquet(table: Any) -> bytes:
     """A table as a Parquet file."""
     sink = pa.BufferOutputStream()
-    pa.parquet.write_table(table, sink, compression="zstd")
+    pa.parquet.write_table(table, sink, compression="zstd", write_page_checksum=True)
     return sink.getvalue().to_pybytes()
+
+
+def read_part(file: Path) -> Any:
+    """Table of a part. ValueError, with one sentence, if it is damaged."""
+    try:
+        with pa.parquet.ParquetFile(file, page_checksum_verification=True) as part:
+            table = part.read()
+    except (OSError, pa.ArrowException) as damaged:
+        raise ValueError(f"{file} is damaged: {str(damaged).splitlines()[0].rstrip('.')}.") from damaged
+    if (table.schema.metadata or {}).get(b"cell") != file.stem.encode():
+        raise ValueError(f"{file} is damaged: it has another cell.")
+    return table
 
 
 class Parts:
@@ -58,28 +71,35 @@ class Parts:
         return self.folder / name[:2] / f"{name}.parquet"
 
     def has(self, name: str) -> bool:
-        """Whether the cell of this name is finished."""
-        return self.file(name).exists()
+        """Whether the cell of this name is finished: its part is there and sound."""
+        try:
+            read_part(self.file(name))
+        except ValueError:
+            return False
+        return True
 
     def write(self, name: str, part: bytes) -> None:
-        """Write a part beside its place and rename it: whoever looks finds all of it or nothing."""
-        file = self.file(name)
-        file.parent.mkdir(parents=True, exist_ok=True)
-        with beside(file) as place, place.open("wb") as stream:
-            stream.write(part)
-            stream.flush()
-            os.fsync(stream.fileno())
+        """Write a part: whoever looks finds all of it or nothing."""
+        write_atomically(self.file(name), part)
 
     def names(self) -> Iterator[str]:
-        """Names of the finished cells."""
+        """Names of the cells that have parts."""
         for place in sorted(self.folder.glob("??/*.parquet")):
             yield place.stem
 
 
 def read_parts(folder: str | os.PathLike[str]) -> Any:
-    """All results of a folder as one pyarrow.Table, in the order of the cells' names."""
-    files = [str(file) for file in sorted(Parts(folder).folder.glob("??/*.parquet"))]
-    if not files:
+    """All results of a folder as one pyarrow.Table, in the order of the cells' names.
+
+    Parts that are damaged are left out with a warning: the same sweep simulates their cells again.
+    """
+    require_file("folder", folder)
+    tables = []
+    for file in sorted(Parts(folder).folder.glob("??/*.parquet")):
+        try:
+            tables.append(read_part(file))
+        except ValueError as damaged:
+            warnings.warn(f"{damaged} It is left out: the same sweep simulates its cell again.", stacklevel=2)
+    if not tables:
         raise ValueError(f"There are no results in {folder}.")
-    schema = pa.unify_schemas([pa.parquet.read_schema(file) for file in files])  # sweeps differ in their columns
-    return pa.dataset.dataset(files, schema, format="parquet").to_table()
+    return pa.concat_tables(tables, promote_options="default")  # sweeps differ in their columns

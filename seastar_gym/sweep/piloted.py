@@ -26,12 +26,12 @@ def steer(scene: Scene, frame: Scene, pilot: Pilot, n_robots: int) -> dict[str, 
     require_fit(policy, scene, actions, pilot.decision_period)
     task = SwimTask(
         scene, n_robots, np.array(pilot.waypoints), RewardWeights(), RADIUS, False, 1, actions=actions,
-        decision_period=pilot.decision_period,
+        decision_period=pilot.decision_period, effort=True,
     )  # fmt: skip
     task.reset(np.ones(n_robots, bool), [np.random.default_rng(robot) for robot in range(n_robots)])
     begin = task.heading()
     swimming, begins, state = np.ones(n_robots, bool), np.ones(n_robots, bool), None
-    status, iterations, energy, time, turn = np.zeros((5, n_robots))
+    status, iterations, energy, work, moment, time, turn = np.zeros((7, n_robots))
     hub, angle = np.zeros((n_robots, 2)), np.full(n_robots, np.inf)
     for _ in range(pilot.decisions):
         chosen, state = policy.predict(task.observe(), state=state, episode_start=begins, deterministic=True)
@@ -40,6 +40,8 @@ def steer(scene: Scene, frame: Scene, pilot: Pilot, n_robots: int) -> dict[str, 
         done, now = task.step(commands), swimming
         iterations[now] += done.info["newton_iterations"][now]
         energy[now] += done.info["energy"][now]
+        work[now] += done.info["work"][now]
+        moment[now] = np.maximum(moment, done.info["peak_moment"])[now]
         angle[now] = np.fmin(angle, done.info["smallest_opening_angle"])[now]
         status[now], time[now] = done.info["solver_status"][now], done.info["time"][now]
         hub[now], turn[now] = done.info["hub_position"][now], (task.heading() - begin)[now]
@@ -56,7 +58,7 @@ def steer(scene: Scene, frame: Scene, pilot: Pilot, n_robots: int) -> dict[str, 
     return {
         "speed": speed, "strokes_per_metre": strokes, "ahead": way.real, "aside": way.imag,
         "turn": turn - 2.0 * np.pi * np.rint(turn / (2.0 * np.pi)), "energy": energy,
-        "smallest_opening_angle": angle, "newton_iterations": iterations,
+        "work": work, "peak_moment": moment, "smallest_opening_angle": angle, "newton_iterations": iterations,
         "time": np.where(reached == len(pilot.waypoints), time, np.nan), "waypoints": reached.astype(np.float64),
         "status": status,
     }  # fmt: skip

@@ -3,9 +3,11 @@
 import os
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from seastar_gym.command import refused_by_disk
 from seastar_gym.executors import Executor, Outcome, Work
+from seastar_gym.scene.checks import require_callable, require_file, require_kind, shown
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.parts import Parts, part_of
 
@@ -21,11 +23,13 @@ UNWRITTEN = 10
 class Tally:
     """Counts of a run.
 
-    kept: Cells that had parts before. done: Cells and, in them, designs and intervals (such as strokes) that were run.
+    kept: Cells that had parts before. damaged: Parts that were damaged before, whose cells are run again.
+    done: Cells and, in them, designs and intervals (such as strokes) that were run.
     losses: Attempts that failed. problems: Why cells have no part after all attempts, by the name of the cell.
     """
 
     kept: int = 0
+    damaged: list[Path] = field(default_factory=list)
     done: int = 0
     designs: int = 0
     intervals: int = 0
@@ -54,6 +58,10 @@ def run(
 
     work: What makes a part of a cell.
     """
+    require_file("folder", folder)
+    require_kind("executor", executor, Executor, "an executor, such as Processes()")
+    if progress is not None:
+        require_callable("progress", progress)
     parts, tally = Parts(folder), Tally()
     waiting, lost = unfinished(cells, parts, tally), list[Outcome[Cell]]()
     for _ in range(ATTEMPTS):
@@ -66,12 +74,19 @@ def run(
 
 
 def unfinished(cells: Iterable[Cell], parts: Parts, tally: Tally) -> Iterator[Cell]:
-    """Cells without a part; others are counted."""
-    for cell in cells:
+    """Cells without a sound part; others are counted."""
+    try:
+        each = iter(cells)
+    except TypeError:
+        raise ValueError(f"cells must be cells, as Sweep.cells gives them, not {shown(cells)}.") from None
+    for cell in each:
+        require_kind("A cell", cell, Cell, "a Cell, as Sweep.cells gives it")
         if parts.has(cell.name):
             tally.kept += 1
-        else:
-            yield cell
+            continue
+        if parts.file(cell.name).exists():
+            tally.damaged.append(parts.file(cell.name))
+        yield cell
 
 
 def _attempt(

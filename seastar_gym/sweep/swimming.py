@@ -18,7 +18,7 @@ REFUSED = -1
 """Status of a design that a scene refuses; others have that of the solver, see `SolverStatus`."""
 UNITS = {
     "speed": "m/s", "strokes_per_metre": "1/m", "ahead": "m", "aside": "m", "turn": "rad", "energy": "J",
-    "smallest_opening_angle": "rad", "newton_iterations": "1", "status": "1",
+    "work": "J", "peak_moment": "N m", "smallest_opening_angle": "rad", "newton_iterations": "1", "status": "1",
 }  # fmt: skip
 """Columns of results and their units.
 
@@ -27,6 +27,8 @@ strokes_per_metre: Periods of the actuator that a metre takes at that speed.
 ahead, aside: That distance along limb 1 as it stood at the beginning, and to the left of it.
 turn: Rotation of the robot during the measurement.
 energy: Electric energy of the measured intervals.
+work: Mechanical work of the actuators in these intervals, see `StrokeReport`.
+peak_moment: Largest moment that a limb resisted its actuator with in them.
 smallest_opening_angle: Between neighbouring limbs at the hub, at any time. Below zero, limbs have crossed.
     With a body it is pi.
 newton_iterations: Of all intervals.
@@ -87,17 +89,19 @@ def measure(scene: Scene, cell: Cell, n_robots: int) -> dict[str, NDArray[Any]]:
 
 def repeat(scene: Scene, frame: Frame, n_robots: int) -> dict[str, NDArray[Any]]:
     """Columns of results of robots side by side that repeat a gait."""
-    simulator, gait, swum = Simulator(scene, n_robots, threads=1), frame.gait, frame.swim
+    simulator, gait, swum = Simulator(scene, n_robots, threads=1, effort=True), frame.gait, frame.swim
     interval = scene.actuator.period if gait.interval is None else gait.interval
-    status, iterations, energy = np.zeros((3, n_robots))
+    status, iterations, energy, work, moment = np.zeros((5, n_robots))
     angle = np.full(n_robots, np.inf)
     hub, heading = simulator.hub_position(), simulator.heading()
     for k in range(swum.settling + swum.measured):
         if k == swum.settling:
             hub, heading, energy[:] = simulator.hub_position(), simulator.heading(), 0.0
+            work[:] = moment[:] = 0.0
         report = simulator.advance(interval, np.tile(gait.commands[k % len(gait.commands)], (n_robots, 1)))
         status, angle = np.maximum(status, report.status), np.fmin(angle, report.smallest_opening_angle)
         iterations, energy = iterations + report.newton_iterations, energy + report.energy
+        work, moment = work + report.work, np.maximum(moment, report.peak_moment)
     way = (simulator.hub_position() - hub) @ [1.0, 1.0j] * np.exp(-1j * heading)
     turn = simulator.heading() - heading
     speed = np.abs(way) / (swum.measured * interval)
@@ -106,5 +110,6 @@ def repeat(scene: Scene, frame: Frame, n_robots: int) -> dict[str, NDArray[Any]]
     return {
         "speed": speed, "strokes_per_metre": strokes, "ahead": way.real, "aside": way.imag,
         "turn": turn - 2.0 * np.pi * np.rint(turn / (2.0 * np.pi)), "energy": energy,
-        "smallest_opening_angle": angle, "newton_iterations": iterations, "status": status,
+        "work": work, "peak_moment": moment, "smallest_opening_angle": angle, "newton_iterations": iterations,
+        "status": status,
     }  # fmt: skip

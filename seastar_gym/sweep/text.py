@@ -1,9 +1,9 @@
 """Axes as text, NAME=VALUES, see command.py."""
 
-import json
 from pathlib import Path
 from typing import Any
 
+from seastar_gym.files import read_json
 from seastar_gym.scene.checks import shown
 from seastar_gym.scene.serial import KINDS, from_dict
 from seastar_gym.sweep.axes import PARTS, Axis, Choices, Range
@@ -69,7 +69,4 @@ def _label(word: str) -> Any:
 
 
 def _part_of_file(file: Path) -> Any:
-    try:
-        return from_dict(json.loads(file.read_text(encoding="utf-8")), object)
-    except (json.JSONDecodeError, UnicodeDecodeError) as unfit:
-        raise ValueError(f"{file} is no JSON: {unfit}.") from None
+    return from_dict(read_json(file), object)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.scene.numerics import Setting
-from studies.accuracy.cases import Cases, Swim, errors, hub_path_lengths, scene_of, swim
-from studies.accuracy.rows import Figures, Row, figures
+from studies.accuracy.cases import Cases, Errors, Swim, errors, hub_path_lengths, scene_of, swim
+from studies.accuracy.rows import Figures, Row, figures, medians
 from studies.accuracy.settings import Plan, Resolution
 
 Floats = NDArray[np.float64]
@@ -106,13 +106,18 @@ def converge(
     return Exact(limit, dict(zip(resolutions, fine, strict=True)))
 
 
-def compared(batches: Sequence[Cases], swum: Sequence[Swim], exact: Sequence[Swim], limit: Sequence[Swim]) -> Figures:
-    """Largest errors of swims of all batches against others, as fractions of the lengths of the limit's paths.
+def against(swum: Sequence[Swim], exact: Sequence[Swim], limit: Sequence[Swim]) -> list[Errors]:
+    """Errors of swims of all batches against others, as fractions of the lengths of the limit's paths.
 
     With the same lengths for space and time, no swim errs by more than the sum of the two.
     """
     all_three = zip(swum, exact, limit, strict=True)
-    return figures(batches, [errors(each, other, hub_path_lengths(last.hub)) for each, other, last in all_three])
+    return [errors(each, other, hub_path_lengths(last.hub)) for each, other, last in all_three]
+
+
+def compared(batches: Sequence[Cases], swum: Sequence[Swim], exact: Sequence[Swim], limit: Sequence[Swim]) -> Figures:
+    """Largest errors of swims of all batches against others."""
+    return figures(batches, against(swum, exact, limit))
 
 
 def second_opinion(cases: Cases, plan: Plan, bar: Any) -> dict[str, Figures]:
@@ -129,16 +134,16 @@ def second_opinion(cases: Cases, plan: Plan, bar: Any) -> dict[str, Figures]:
     ]  # fmt: skip
     plain, fine, short, other = (found[0] for found in swim_batches([cases], [scene_of(each) for each in wanted], bar))
 
-    def against(each: Swim, other: Swim) -> Figures:
+    def doubt(each: Swim, other: Swim) -> Figures:
         return compared([cases], [each], [other], [fine])
 
     def third(found: Figures) -> Figures:
         return found._replace(path=found.path / 3.0, straight=found.straight / 3.0, pair=found.pair / 3.0)
 
     return {
-        f"space, from {nodes} and {finer} nodes": third(against(plain, fine)),
-        f"time, midpoint {1e3 * step:g} ms": against(plain, short),
-        f"scheme, sdirk3 {1e3 * step:g} ms": against(other, short),
+        f"space, from {nodes} and {finer} nodes": third(doubt(plain, fine)),
+        f"time, midpoint {1e3 * step:g} ms": doubt(plain, short),
+        f"scheme, sdirk3 {1e3 * step:g} ms": doubt(other, short),
     }
 
 
@@ -146,21 +151,23 @@ def measure(
     batches: Sequence[Cases], exact: Exact, settings: Sequence[Setting], bar: Any, physics: Scene = Scene()
 ) -> list[Row]:
     """Rows of all settings, yet without speeds."""
-    space = {each: compared(batches, fine, exact.limit, exact.limit) for each, fine in exact.fine.items()}
+    space = {each: against(fine, exact.limit, exact.limit) for each, fine in exact.fine.items()}
     swum = swim_batches(batches, [scene_of(each, physics) for each in settings], bar)
     size = np.array([len(batch) * len(batch.commands) for batch in batches])
     rows = []
     for setting, mine in zip(settings, swum, strict=True):
         resolution = setting.discretisation, setting.nodes_per_limb
+        time = against(mine, exact.fine[resolution], exact.limit)
         rows.append(
             Row(
                 setting,
-                space[resolution],
-                compared(batches, mine, exact.fine[resolution], exact.limit),
+                figures(batches, space[resolution]),
+                figures(batches, time),
                 iterations=float(size @ [each.iterations for each in mine] / size.sum()),
                 steps=float(size @ [each.steps for each in mine] / size.sum()),
                 rejections=sum(each.rejections for each in mine),
                 halvings=sum(each.halvings for each in mine),
+                typical=medians(batches, space[resolution], time),
             )
         )
     return rows

@@ -147,7 +147,8 @@ def draw_row(
 
 def scene(numerics: Numerics, discretisation: Discretisation, relaxation_time: float | None = None) -> Scene:
     """The chapter's scene with these numerics; relaxation_time: That of a damped material [s], or None."""
-    return Scene(Seastar(discretisation=discretisation, relaxation_time=relaxation_time), numerics=numerics)
+    robot = Seastar(nodes_per_limb=10, discretisation=discretisation, relaxation_time=relaxation_time)
+    return Scene(robot, numerics=numerics)
 
 
 def record(

@@ -75,6 +75,17 @@ def figures(batches: Sequence[Cases], found: Sequence[Errors]) -> Figures:
     )
 
 
+def medians(batches: Sequence[Cases], space: Sequence[Errors], time: Sequence[Errors]) -> Figures:
+    """Median path errors, of space and time together, of random, slow and repeated or alternating commands."""
+    kinds = np.array([kind for batch in batches for kind in batch.kinds])
+    path = np.concatenate([one.path + other.path for one, other in zip(space, time, strict=True)])
+
+    def middle(kind: str) -> float:
+        return float(np.median(path[kinds == kind])) if (kinds == kind).any() else math.nan
+
+    return Figures(random=middle("random"), slow=middle("slow"), gait=middle("gait"))
+
+
 def at_least(some: Sequence[Figures]) -> Figures:
     """The largest of every column."""
     columns = {name: max(getattr(each, name) for each in some) for name in Figures._fields if "worst" not in name}
@@ -91,6 +102,7 @@ class Row:
     rejections, halvings: Numbers of rejected and of halved time steps, in all swims.
     speed, straight_speed: Real-time factors on one core, for mixed commands and for the straight swim.
     sure_space, sure_time: Errors that can be promised, see `promised`.
+    typical: Medians of the sum of both errors.
     """
 
     setting: Setting
@@ -104,6 +116,7 @@ class Row:
     straight_speed: float = math.nan
     sure_space: Figures = Figures()
     sure_time: Figures = Figures()
+    typical: Figures = Figures()
 
     @property
     def resolution(self) -> tuple[str, int]:

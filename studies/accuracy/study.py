@@ -21,6 +21,7 @@ from tqdm import tqdm
 from seastar_gym.gaits import PAIRS
 from seastar_gym.scene import Scene, fidelity
 from studies.accuracy.cases import (
+    Cases,
     gaits,
     joined,
     pentagon,
@@ -32,17 +33,16 @@ from studies.accuracy.cases import (
 )
 from studies.accuracy.convergence import converge, measure, n_groups, second_opinion
 from studies.accuracy.rows import Row, Study, promised
-from studies.accuracy.settings import PHYSICS, QUICK, Plan, settings, settings_of_others
+from studies.accuracy.settings import PHYSICS, QUICK, Plan, presets, settings, settings_of_others
 from studies.accuracy.speeds import measure_speeds
-from studies.accuracy.tables import TABLE_WIDTH, as_markdown, as_tables, facts, store, write_csv
+from studies.accuracy.tables import TABLE_WIDTH, as_markdown, as_tables, facts, store, store_typical, write_csv
 from studies.parser import study_parser
 
 
 def study(plan: Plan, progress: bool = True) -> Study:
     """Run the whole study; drawing is left to the caller."""
     rng = np.random.default_rng(0)
-    some = joined(swims(), random_sequences(plan.n_random, rng), slow_sequences(plan.n_slow, rng))
-    batches = [joined(some, gaits(), random_gaits(plan.n_gaits, rng)), pentagon(*plan.side)]
+    batches = [sequences(plan, rng), pentagon(*plan.side)]
     mine = settings(plan)
     resolutions = list(dict.fromkeys((each.discretisation, each.nodes_per_limb) for each in mine))
 
@@ -68,6 +68,20 @@ def study(plan: Plan, progress: bool = True) -> Study:
     hub = exact.limit[0].hub
     distances = dict(zip(("straight", *PAIRS), np.hypot(*hub[-1, :5].T).tolist(), strict=True))
     return Study(rows, others, refused, doubt, distances, float(hub[0, 0, 0]))
+
+
+def sequences(plan: Plan, rng: np.random.Generator) -> Cases:
+    """All command sequences of equal length."""
+    some = joined(swims(), random_sequences(plan.n_random, rng), slow_sequences(plan.n_slow, rng))
+    return joined(some, gaits(), random_gaits(plan.n_gaits, rng))
+
+
+def typical_rows(plan: Plan) -> list[Row]:
+    """Rows of the presets, for their medians: without speeds, and without the pentagon, which is one sequence."""
+    batches, mine = [sequences(plan, np.random.default_rng(0))], list(presets().values())
+    resolutions = [(each.discretisation, each.nodes_per_limb) for each in mine]
+    with tqdm(total=n_groups(batches) * (1 + len(resolutions) + len(mine)), unit="swim") as each:
+        return measure(batches, converge(batches, plan, resolutions, each), mine, each)
 
 
 def study_other(name: str, physics: Scene, plan: Plan, bar: Any) -> list[Row]:
@@ -100,7 +114,11 @@ def main() -> None:
     parser.add_argument(
         "--store", action="store_true", help="also write the table of errors and speeds that comes with the package"
     )
+    parser.add_argument("--typical", action="store_true", help="measure and store the medians of the presets alone")
     options = parser.parse_args()
+    if options.typical:
+        store_typical(typical_rows(Plan()))
+        return
     if options.quick and options.store:
         parser.error("--store needs the whole study, not --quick.")
     from studies.accuracy import pictures as accuracy_pictures

@@ -155,7 +155,23 @@ def as_promise(row: Row) -> dict[str, Any]:
         "path_error": float(f"{space + time:.6g}"),
         **{f"{kind}_error": up(row.promise(kind)) for kind in ("gait", "slow", "straight", "heading", "end")},
         "speed": two_digits(row.speed),
+        **as_typical(row),
     }
+
+
+def as_typical(row: Row) -> dict[str, float]:
+    """Fields of a `fidelity.Promise` that are medians, rounded upwards to two digits."""
+    found = row.typical
+    kinds = {"typical_error": found.random, "typical_gait_error": found.gait, "typical_slow_error": found.slow}
+    return {name: two_digits(error, up=True) for name, error in kinds.items()}
+
+
+def store_typical(rows: Sequence[Row], path: Path = fidelity.PRESETS) -> None:
+    """Write medians of presets into the package's table and keep its bounds and speeds."""
+    table, by_setting = json.loads(path.read_text(encoding="utf-8")), {row.setting: row for row in rows}
+    for name, setting in presets().items():
+        table["presets"][name] |= as_typical(by_setting[setting])
+    path.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
 
 
 def measured_over(plan: Plan) -> dict[str, Any]:

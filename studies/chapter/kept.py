@@ -5,11 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from seastar_gym.gaits import pentagon_gait
+from seastar_gym import gaits
 from seastar_gym.scene import Scene
 from studies.chapter.pictures import PENTAGON_TIMES
-from studies.chapter.statements import PAIRS
-from studies.chapter.swims import SETTINGS, Floats, Swim
+from studies.chapter.statements import PAIRS, stroke_motion
+from studies.chapter.swims import MM, SETTINGS, Floats, Swim
+from studies.kept import rounded
 
 UNIT = 1e-6
 """Length that counts as one in the data [m]."""
@@ -17,7 +18,7 @@ UNIT = 1e-6
 
 def pentagon_commands() -> Floats:
     """Commands round the pentagon, shape (n_strokes, 1, n_limbs)."""
-    return pentagon_gait()[:, None]
+    return gaits.pentagon_gait()[:, None]
 
 
 def pair_commands() -> Floats:
@@ -53,14 +54,59 @@ def from_data(kept: Mapping[str, Any], commands: Floats) -> Swim:
     return swim
 
 
-def kept(pentagon: Sequence[Swim], pairs: Sequence[Swim]) -> dict[str, Any]:
-    """What the pictures of docs/ show of the swims in the continuum and with the chapter's setting."""
+def distances(pairs: Sequence[Swim]) -> dict[str, list[float]]:
+    """Distances of the pairs after their strokes [mm], by the setting's label."""
+    return {swim.label: [rounded(MM * np.hypot(*end), 6) for end in swim.positions[-1, :, 0]] for swim in pairs}
+
+
+def motions(straight: Sequence[Swim]) -> dict[str, dict[str, list[float]]]:
+    """Motion of the hub in the first and last stroke, by the setting's label: `stroke_motion` in [mm] and [s]."""
+    units = np.array([MM, MM, MM, 1.0])
+    return {
+        swim.label: {
+            name: [rounded(each, 6) for each in units * stroke_motion(swim, number)]
+            for name, number in (("first", 0), (f"{len(swim.commands)}th", -1))
+        }
+        for swim in straight
+    }
+
+
+def pairs_table(results: Mapping[str, Any]) -> str:
+    """Distances of the pairs in Markdown, a column for every setting."""
+    columns = results["pairs_mm"]
+    lines = [f"| pair | {' | '.join(columns)} |", f"|---|{'---:|' * len(columns)}"]
+    for name, *row in zip(gaits.PAIRS, *columns.values(), strict=True):
+        lines.append(f"| {name} | {' | '.join(f'{each:.2f}' for each in row)} |")
+    return "\n".join(lines)
+
+
+def strokes_table(results: Mapping[str, Any]) -> str:
+    """Motion of the hub in the first and the last stroke in Markdown."""
+    lines = [
+        "| setting | stroke | forward while heated, 0.1 s [mm] | forward after that [mm] | until [s] | back [mm] "
+        "| left [mm] |",
+        "|---|---|---:|---:|---:|---:|---:|",
+    ]
+    for label, strokes in results["straight_mm"].items():
+        for stroke, (heated, after, back, turn) in strokes.items():
+            left = heated + after - back
+            lines.append(f"| {label} | {stroke} | {heated:.1f} | {after:.1f} | {turn:.2f} | {back:.1f} | {left:.1f} |")
+    return "\n".join(lines)
+
+
+def kept(straight: Sequence[Swim], pentagon: Sequence[Swim], pairs: Sequence[Swim]) -> dict[str, Any]:
+    """What the pictures and tables of docs/ show: all settings, and the swims in the continuum and with the chapter's.
+
+    straight, pentagon: Swims of every setting of SETTINGS. pairs: Of these and of the limit.
+    """
     return {
         "unit_m": UNIT,
+        "pairs_mm": distances(pairs),
+        "straight_mm": motions(straight),
         "pentagon": {
             "continuum": as_data(pentagon[-1], PENTAGON_TIMES), "chapter": as_data(pentagon[0])
         },
-        "pairs": {"continuum": as_data(pairs[-1]), "chapter": as_data(pairs[0])},
+        "pairs": {"continuum": as_data(pairs[len(SETTINGS) - 1]), "chapter": as_data(pairs[0])},
     }  # fmt: skip
 
 

@@ -24,7 +24,8 @@ BISECTORS = (36.0, 72.0, 108.0, 144.0)
 class Statement:
     """A statement of the chapter and a quantity that it is about.
 
-    values: Values in `unit`, of every setting of `swims.SETTINGS`, or of every discretisation.
+    values: Values in `unit`, of every setting of `swims.SETTINGS` and perhaps of `swims.LIMIT`, or of every
+        discretisation.
     """
 
     sentence: str
@@ -33,12 +34,14 @@ class Statement:
     values: tuple[float, ...]
 
 
-def stroke_motion(straight: Swim) -> tuple[float, float, float, float]:
-    """Motion of the hub along x in the last stroke: (advance while heated, advance after that, return, time of return).
+def stroke_motion(straight: Swim, stroke: int = -1) -> tuple[float, float, float, float]:
+    """Motion of the hub along x in a stroke: (advance while heated, advance after that, return, time of return).
 
-    Distances in [m]; the time at which the hub turns back is in [s] from the stroke's start.
+    stroke: Number of the stroke from 0, or from the end. Distances in [m]; the time at which the hub turns back is in
+    [s] from the stroke's start.
     """
-    start, end = straight.at_strokes()[-2:]
+    begins = straight.at_strokes()
+    start, end = begins[:-1][stroke], begins[1:][stroke]
     x, since = straight.hub()[start : end + 1, 0], straight.time[start : end + 1] - straight.time[start]
     heated = int(np.searchsorted(since, straight.scene.actuator.corners[1] - 1e-9))
     farthest = int(np.argmax(x))
@@ -54,6 +57,8 @@ def straight_statements(swims: Sequence[Swim]) -> list[Statement]:
     return [
         Statement("the net motion of the robot is forward", "x after 10 strokes", "mm",
                   tuple(MM * s.hub()[-1, 0] for s in swims)),
+        Statement(forward, "forward while heated, first stroke", "mm",
+                  tuple(MM * stroke_motion(swim, 0)[0] for swim in swims)),
         Statement(forward, "forward while heated, 10th stroke", "mm", tuple(MM * np.array(moves[0]))),
         Statement(forward, "forward after that", "mm", tuple(MM * np.array(moves[1]))),
         Statement(back, "backward", "mm", tuple(MM * np.array(moves[2]))),
@@ -117,13 +122,14 @@ def cost_statements(costs: Sequence[Cost]) -> list[Statement]:
     ]  # fmt: skip
 
 
-COLUMNS = ("its setting", "its ten nodes, converged", "continuum")
-"""Columns of values. Of the cost, the second is empty."""
+COLUMNS = ("its setting", "its ten nodes, converged", "continuum", "73 nodes")
+"""Columns of values. Of the cost, the second is empty; the last has the pairs only."""
 
 
 def cells(row: Statement) -> tuple[float | None, ...]:
     """A row's values in COLUMNS."""
-    return row.values if len(row.values) == len(COLUMNS) else (row.values[0], None, *row.values[1:])
+    values = row.values if len(row.values) > 2 else (row.values[0], None, *row.values[1:])
+    return (*values, *[None] * (len(COLUMNS) - len(values)))
 
 
 def as_table(statements: Sequence[Statement]) -> Table:

@@ -1,4 +1,5 @@
-"""Picture of the designs: speed over everything that varies, and over the density by where the mass lies."""
+"""Picture and table of the designs: speed over everything that varies, and over the density by where the mass lies;
+what the best robots are, and what they cost."""
 
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,51 @@ TOP = 22.0
 """Largest speed of the axes [mm/s]."""
 SHARES = (0, 1, 10, 25, 50, 75, 90, 99, 100)
 """Percentiles that tell of a distribution."""
+
+ROBOTS = {
+    "the chapter's": "the chapter's",
+    "fastest": "fastest",
+    "fastest in its lengths": "fastest in limb lengths per stroke",
+    "fastest at the chapter's length and angle": "fastest of the chapter's length and angle",
+    "fastest of them without taper": "fastest of these without taper",
+    "fastest at the chapter's work": "fastest at the chapter's work per stroke",
+    "fastest at ten times that work": "fastest at ten times that work",
+    "least work per metre, not slower": "least work per metre, not slower than the chapter's",
+}
+"""Robots of the table, by their names in designs.json."""
+CHAPTER = {
+    "n_limbs": 5, "root_radius_mm": 1.6, "taper": 1.0, "limb_length_mm": 100.0, "youngs_modulus_MPa": 1.0,
+    "peak_angle_rad": 0.628,
+}  # fmt: skip
+
+
+def robots(found: dict[str, Any]) -> str:
+    """Table in Markdown of the best robots: speeds [mm/s] at three fidelities, and work and moment at `reference`."""
+    lines = [
+        "| robot | limbs | radius, root to tip | length | modulus | peak angle | `fast` | `balanced` | `reference` "
+        "| work per stroke | peak moment | work per metre |",
+        "|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|",
+    ]
+    for name, label in ROBOTS.items():
+        row = CHAPTER | found[name]
+        root, tip = row["root_radius_mm"], row["taper"] * row["root_radius_mm"]
+        radius = f"{root:g} mm" if row["taper"] == 1.0 else f"{root:g} to {tip:.3g} mm"
+        speeds = " | ".join(f"{speed:.2f}" for speed in row["mm_per_s"].values())
+        lines.append(
+            f"| {label} | {row['n_limbs']} | {radius} | {row['limb_length_mm']:.0f} mm "
+            f"| {row['youngs_modulus_MPa']:.2g} MPa | {row['peak_angle_rad']:.3f} | {speeds} "
+            f"| {row['mJ_per_stroke']['reference']:.3g} mJ | {row['peak_mN_m']['reference']:.3g} mN m "
+            f"| {row['J_per_metre']:.3g} J |"
+        )
+    return "\n".join(lines)
+
+
+def by_work(found: dict[str, Any]) -> str:
+    """Table in Markdown of the fastest robots that do with some times the work of the chapter's."""
+    head = " | ".join(f"{factor:g}" for factor, _ in found["fastest_by_work"])
+    speeds = " | ".join(f"{speed:.2f}" for _, speed in found["fastest_by_work"])
+    columns = "---:|" * len(found["fastest_by_work"])
+    return f"| work per stroke at most, of the chapter's | {head} |\n|---|{columns}\n| fastest [mm/s] | {speeds} |"
 
 
 def summary(table: Any) -> dict[str, Any]:

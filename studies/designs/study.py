@@ -1,7 +1,8 @@
 """Simulates 102,480 robots, swims the fastest again at finer settings, and writes designs.json and designs.png.
 
 Limb length, radius, stiffness, taper, number of limbs and peak angle vary; all swim {2+, n-}, eight strokes from rest,
-of which the last five count, at `fast`. The scene of the fastest is written to fastest.json, for `certify`. Results are
+of which the last five count, at `fast`. They are ranked by speed, by speed at the work per stroke of the chapter's
+robot, and by work per metre. The scene of the fastest is written to fastest.json, for `certify`. Results are
 kept in folders of OUT, so that the command goes on after an interrupt.
 """
 
@@ -40,6 +41,10 @@ CLEARANCE = 0.1
 CHECKS = ("fast", "balanced", "reference")
 """Fidelities at which the winners swim."""
 MM = 1e3
+MEASURES = {"mm_per_s": ("speed", MM), "mJ_per_stroke": ("work", 1e3 / MEASURED), "peak_mN_m": ("peak_moment", 1e3)}
+"""What is told of a robot: a column of results, and its factor."""
+LIMITS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
+"""Limits of the work per stroke, over that of the chapter's robot."""
 
 
 def results(sweep: Sweep, folder: Path, executor: Executor) -> Any:
@@ -71,31 +76,32 @@ def scene_of(row: Any) -> Scene:
 
 
 def at_all_fidelities(scene: Scene, folder: Path) -> Table:
-    """Speeds of a robot [mm/s] at CHECKS."""
+    """MEASURES of a robot at CHECKS, and its work per metre at the last [J/m]."""
     sweep = Sweep(scene, (Choices("fidelity", CHECKS),), settling=SETTLING, measured=MEASURED)
     run(sweep.cells(), folder, Here())
     names = [cell.name for cell in sweep.cells()]
     import pyarrow.parquet
 
-    return {
-        fidelity: round(MM * pyarrow.parquet.read_table(Parts(folder).file(name)).column("speed").to_pylist()[0], 3)
-        for fidelity, name in zip(CHECKS, names, strict=True)
+    rows = [pyarrow.parquet.read_table(Parts(folder).file(name)).to_pylist()[0] for name in names]
+    found: Table = {
+        measure: {fidelity: round(factor * row[name], 5) for fidelity, row in zip(CHECKS, rows, strict=True)}
+        for measure, (name, factor) in MEASURES.items()
     }
+    return {**found, "J_per_metre": round(found["mJ_per_stroke"][CHECKS[-1]] / found["mm_per_s"][CHECKS[-1]], 4)}
 
 
 def winner(row: Any, folder: Path) -> Table:
-    """A design in numbers, and its speeds."""
+    """A design in numbers, its speeds and its work."""
     scene = scene_of(row)
-    body, speeds = BODIES[row["robot"]], at_all_fidelities(scene, folder)
-    length = scene.robot.limb_length
+    body, found = BODIES[row["robot"]], at_all_fidelities(scene, folder)
+    length, speed = scene.robot.limb_length, found["mm_per_s"][CHECKS[-1]]
     return {
         "n_limbs": body.n_limbs, "mean_radius_mm": MM * body.radius, "taper": body.taper,
         "root_radius_mm": round(MM * body.profile[0], 2), "limb_length_mm": round(MM * length, 1),
         "youngs_modulus_MPa": round(1e-6 * scene.robot.youngs_modulus, 3),
         "peak_angle_rad": round(float(scene.actuator.peak_angle), 3),
         "smallest_opening_angle_rad": round(float(row["smallest_opening_angle"]), 2),
-        "mm_per_s": speeds, "limb_lengths_per_stroke": round(speeds["reference"] / MM / length, 3),
-        "strokes_per_metre": round(MM / speeds["reference"], 1),
+        **found, "limb_lengths_per_stroke": round(speed / MM / length, 3), "strokes_per_metre": round(MM / speed, 1),
     }  # fmt: skip
 
 
@@ -117,15 +123,25 @@ def study(folder: Path, executor: Executor) -> tuple[Table, Any]:
     same = same[(same.status == 0) & (same.smallest_opening_angle > CLEARANCE)]
     mass = results(masses(), folder / "masses", executor)
     checks = folder / "checks"
-    relative = table.speed / table["robot.limb_length"]
+    relative, work = table.speed / table["robot.limb_length"], 1e3 / MEASURED * table.work
+    chapter = at_all_fidelities(Scene.preset("fast"), checks)
+    speed, limit = chapter["mm_per_s"]["fast"] / MM, chapter["mJ_per_stroke"]["fast"]
     uniform = same[same.taper == 1.0]
     return {
         "designs": len(designs), "failed": len(designs) - len(sound), "count": len(table),
-        "the chapter's": {"mm_per_s": at_all_fidelities(Scene.preset("fast"), checks)},
+        "the chapter's": chapter,
         "fastest": winner(table.loc[table.speed.idxmax()], checks),
         "fastest in its lengths": winner(table.loc[relative.idxmax()], checks),
         "fastest at the chapter's length and angle": winner(same.loc[same.speed.idxmax()], checks),
         "fastest of them without taper": winner(uniform.loc[uniform.speed.idxmax()], checks),
+        "fastest at the chapter's work": winner(table.loc[table.speed[work <= limit].idxmax()], checks),
+        "fastest at ten times that work": winner(table.loc[table.speed[work <= 10.0 * limit].idxmax()], checks),
+        "least work per metre, not slower": winner(
+            table.loc[(table.work / table.speed)[table.speed >= speed].idxmin()], checks
+        ),
+        "fastest_by_work": [
+            [factor, round(MM * float(table.speed[work <= factor * limit].max()), 3)] for factor in LIMITS
+        ],
         "speeds_mm_per_s": {name: quantiles(table, name) for name in ("n_limbs", "radius", "taper")},
         "masses": masses_by_taper(mass),
     }, table  # fmt: skip

@@ -12,12 +12,15 @@ COLOURS = {"strokes": FAINT, "wires": CYCLE[0], "planner": CYCLE[2], "learned": 
 
 
 def table(results: Mapping[str, Any]) -> str:
-    """Table of the results in Markdown."""
+    """Table of the results in Markdown. The last column is what the largest turn costs beyond none."""
     turns = results["turns_deg"]
-    lines = [f"| | {' | '.join(f'{turn:g}°' for turn in turns)} |", f"| --- |{' ---: |' * len(turns)}"]
+    more = f"{turns[-1]:g}° less {turns[0]:g}°"
+    lines = [f"| | {' | '.join(f'{turn:g}°' for turn in turns)} | {more} |", f"| --- |{' ---: |' * (len(turns) + 1)}"]
     for each in results["swims"].values():
         for what, unit in (("seconds", "s"), ("joules", "J")):
-            cells = ["-" if one is None else f"{one:.0f}" for one in each[what]]
+            first, last = each[what][0], each[what][-1]
+            numbers = [*each[what], None if first is None or last is None else last - first]
+            cells = ["-" if one is None else f"{one:.0f}" for one in numbers]
             lines.append(f"| {each['what']} [{unit}] | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 

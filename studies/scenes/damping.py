@@ -27,6 +27,7 @@ from seastar_gym.command import run_command
 from seastar_gym.gaits import PAIRS
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.scene.numerics import SchemeName, Setting
+from seastar_gym.simulator import Simulator
 from studies.accuracy.cases import Cases, Swim, errors, joined, random_sequences, scene_of, swim, swims
 from studies.kept import keep, rounded
 from studies.parser import study_parser
@@ -47,6 +48,8 @@ TOLERANCE = 1e-7
 """Newton tolerance of the settings."""
 SAMPLES = 500
 """Points of a curve of ringing, about."""
+PAIRS_STROKES, PAIRS_STEP = 10, 0.25e-3
+"""Strokes of the pairs of Fig. 13.8, and their time step [s]."""
 WANTED = 0.01
 """Path error that a setting has to keep, as a fraction of the path's length."""
 
@@ -58,14 +61,16 @@ class Plan:
     n_random: Number of random sequences.
     converged: Schemes and time steps [s] whose solutions have to agree.
     shortest: Shortest time step of a setting [ms].
+    nodes: Nodes per limb of the pairs of Fig. 13.8. With 73 distances are those of infinitely many to 0.02 %.
     """
 
     n_random: int = 16
     converged: tuple[tuple[SchemeName, float], ...] = (("sdirk3", 2e-5), ("implicit-midpoint", 2e-5))
     shortest: float = 0.0
+    nodes: int = 73
 
 
-QUICK = Plan(n_random=3, converged=(("sdirk3", 2e-4), ("implicit-midpoint", 2e-4)), shortest=2.0)
+QUICK = Plan(n_random=3, converged=(("sdirk3", 2e-4), ("implicit-midpoint", 2e-4)), shortest=2.0, nodes=19)
 
 
 @dataclass(frozen=True)
@@ -85,7 +90,7 @@ class Study:
 
     rows: One row per material and setting.
     agreement: Largest path difference of the converged solutions, by material.
-    pairs: Distances that the pairs of Fig. 13.8 swim in ten strokes, converged, by material [m].
+    pairs: Distances that the pairs of Fig. 13.8 swim in ten strokes, with many nodes, by material [m].
     ringing: Times in a stroke [s] and lengthening speeds of limbs [m/s], shape (2, n), by material.
     """
 
@@ -125,12 +130,21 @@ def study(plan: Plan, progress: bool = True) -> Study:
             # The midpoint rule is the more accurate reference for undamped rods.
             exact = found[-1]
             agreement[material] = float(errors(found[0], exact).path.max())
-            pairs[material] = np.linalg.norm(exact.hub[-1, 1 : 1 + len(PAIRS)], axis=-1)
+            pairs[material] = pair_distances(tau, plan.nodes)
             for scheme, h in settings:
                 swum, speed = timed(cases, Numerics(scheme, 1e-3 * h, TOLERANCE), tau)
                 rows.append(Row(material, scheme, 1e-3 * h, float(errors(swum, exact).path.max()), speed))
                 bar.update()
     return Study(rows, agreement, pairs, ringing)
+
+
+def pair_distances(tau: float | None, nodes: int) -> Floats:
+    """Distances that the pairs swim in ten strokes with a relaxation time tau [s], in [m], shape (n_pairs,)."""
+    robot = Seastar(nodes_per_limb=nodes, relaxation_time=tau)
+    simulator = Simulator(Scene(robot, numerics=Numerics("implicit-midpoint", PAIRS_STEP)), len(PAIRS))
+    for _ in range(PAIRS_STROKES):
+        simulator.stroke(list(PAIRS.values()))
+    return np.linalg.norm(simulator.hub_position(), axis=-1)
 
 
 def ring(tau: float | None) -> Floats:

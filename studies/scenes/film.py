@@ -69,7 +69,9 @@ def main() -> None:
     policy = load(in_the_box(options.decision_period))
     gait = scripted("pentagon", policy.actions)
     chapter = frames(gait, round(2 / BETWEEN), actions=gait.actions, fidelity="balanced")
-    learned = frames(policy, parts, actions=policy.actions, scene=policy.scene, decision_period=policy.decision_period)
+    # As `seastar swim` shows it, and at the same fidelity as the other.
+    timed = {"fidelity": "balanced", "decision_period": policy.decision_period}
+    learned = frames(policy, parts, actions=policy.actions, **timed)
     film = side_by_side(chapter, learned, options.frames)
     write_gif(film + [film[-1]] * REST, options.out, FPS)
     print(f"Written: {options.out}, {len(film)} frames of {BETWEEN} s.")

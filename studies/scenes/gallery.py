@@ -8,7 +8,7 @@ other work of the machine affects all of them alike, and the median over strokes
 import json
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,7 @@ from studies.style import INK, subplots
 
 Floats = NDArray[np.float64]
 
-NUMERICS = Numerics.preset("balanced")
+NUMERICS, NODES = Numerics.preset("balanced"), 10
 ROBOTS, ROUNDS, STROKES = 64, 9, 5
 """Robots and rounds of the measured cost, and strokes in a picture."""
 REST, HEATED, PATH = "#c8c8c8", "#2b6cb0", "#c53030"
@@ -59,14 +59,15 @@ def exhibits() -> list[Exhibit]:
     straight = (0.0, 1.0, 0.0, 0.0, -1.0)
 
     def five(**pieces: object) -> Scene:
-        return Scene(numerics=NUMERICS, **pieces)  # type: ignore[arg-type]
+        scene = Scene(numerics=NUMERICS, **pieces)  # type: ignore[arg-type]
+        return replace(scene, robot=replace(scene.robot, nodes_per_limb=NODES))
 
     return [
         Exhibit("default", "Scene()", five(), straight),
         Exhibit(
             "one limb",
-            "Seastar(1), actuator=SmaPulse(0.0), held_nodes=(0,), loads=((9, 0.0, -1e-3),)",
-            five(robot=Seastar(1), actuator=SmaPulse(0.0), held_nodes=(0,), loads=((9, 0.0, -1e-3),)),
+            "Seastar(1, 10), actuator=SmaPulse(0.0), held_nodes=(0,), loads=((9, 0.0, -1e-3),)",
+            five(robot=Seastar(1, 10), actuator=SmaPulse(0.0), held_nodes=(0,), loads=((9, 0.0, -1e-3),)),
             (0.0,),
         ),
         Exhibit(
@@ -160,8 +161,9 @@ def page(results: Mapping[str, Any]) -> str:
         "Scenes that differ from the default. The robot is grey at rest and blue at the end of the first heating, and",
         f"its hub's path over {STROKES} strokes is red. The bar is 50 mm long. The cost is the processor time of a",
         "stroke of random commands relative to the default scene in the same run, to within a few per cent",
-        f"({ROBOTS} robots, one thread, fidelity `balanced`). Thin tips take more Newton iterations, and some of these",
-        "a regularised matrix. [Films of the tasks](environments.md#films-of-the-tasks) are with the environments.",
+        f"({ROBOTS} robots, one thread, ten nodes per limb, numerics of `balanced`). Thin tips take more Newton",
+        "iterations, and some of these a regularised matrix. [Films of the tasks](environments.md#films-of-the-tasks)",
+        "are with the environments.",
         "",
         "| | scene | cost | Newton iterations per step |",
         "|---|---|---:|---:|",

@@ -25,7 +25,7 @@ from seastar_gym.der.stepping.stroke import advance
 from seastar_gym.der.terms.hub import set_natural_hub_angles
 from seastar_gym.model.limits import make_limits
 from seastar_gym.model.rods import make_rods
-from seastar_gym.scene import Numerics, Scene
+from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.simd.compilation import entry_point, inlined_kernel
 from seastar_gym.simd.lanes import any_lane, borrow, load, load_number, select, splat, store
 from seastar_gym.simd.rows import aligned_rows, to_rows
@@ -89,7 +89,7 @@ class Pair:
     """One stroke that either kernel repeats, in the chapter's scene with these numerics."""
 
     def __init__(self, numerics: Numerics):
-        self.scene = Scene(numerics=numerics)
+        self.scene = Scene(Seastar(nodes_per_limb=10), numerics=numerics)
         simulator = Simulator(self.scene, ROBOTS, threads=1)
         commands = np.random.default_rng(0).integers(-1, 2, (4, ROBOTS, self.scene.robot.n_limbs)).astype(float)
         for command in commands[:-1]:

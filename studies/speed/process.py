@@ -65,4 +65,7 @@ def process_seconds(code: str, cache: str) -> float:
 
 
 TIMED = "import time; start = time.perf_counter(); {}; print(time.perf_counter() - start)"
-FIRST_STROKE = "import seastar_gym as s; s.Simulator(s.Scene()).stroke([[0, 1, 0, 0, -1]])"
+FIRST_STROKE = (
+    "import seastar_gym as s; "
+    "s.Simulator(s.Scene(s.Seastar(nodes_per_limb=10), numerics=s.Numerics())).stroke([[0, 1, 0, 0, -1]])"
+)

@@ -16,7 +16,7 @@ from rich.table import Table
 
 from seastar_gym.command import run_command
 from seastar_gym.gaits import STRAIGHT
-from seastar_gym.scene import AlongLimb, Body, Contact, Limb, Scene, Seastar, Stiffening, relaxation_time
+from seastar_gym.scene import AlongLimb, Body, Contact, Limb, Numerics, Scene, Seastar, Stiffening, relaxation_time
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
 from seastar_gym.scene.fluid import Water
 from seastar_gym.simd.lanes import N_LANES
@@ -55,7 +55,7 @@ def scenes() -> dict[str, Scene]:
         "current on a grid": Water(current=everything.current),
         "added mass": Water(added_mass_coefficient=1.0),
     }
-    return {
+    found = {
         THE_CHAPTERS: Scene(),
         **{name: Scene(fluid=fluid) for name, fluid in fluids.items()},
         "material damping": Scene(damped),
@@ -76,6 +76,12 @@ def scenes() -> dict[str, Scene]:
             everything, contact=Contact(),
         ),
     }
+    return {name: in_ten_nodes(scene) for name, scene in found.items()}
+
+
+def in_ten_nodes(scene: Scene) -> Scene:
+    """Scene with the nodes and steps of the chapter, in the continuum's discretisation."""
+    return replace(scene, robot=replace(scene.robot, nodes_per_limb=10), numerics=Numerics())
 
 
 @dataclass(frozen=True)
@@ -151,6 +157,7 @@ def main() -> None:
     arguments = parser.parse_args()
     costs = measure(scenes(), arguments.rounds)
     touching = {THE_CHAPTERS: Scene(), "contact, a pair of limbs pressed together": Scene(contact=Contact())}
+    touching = {name: in_ten_nodes(scene) for name, scene in touching.items()}
     costs += measure(touching, arguments.rounds, PRESSING)[1:]
     Console().print(as_table(costs))
     arguments.out.mkdir(parents=True, exist_ok=True)

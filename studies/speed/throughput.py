@@ -17,7 +17,7 @@ from rich.table import Table
 from tqdm import tqdm
 
 from seastar_gym.command import run_command
-from seastar_gym.scene import Numerics, Scene
+from seastar_gym.scene import Numerics, Scene, Seastar
 from studies.parser import study_parser
 from studies.speed.operations import count_operations, flops
 from studies.speed.parts import part_seconds
@@ -64,7 +64,7 @@ def start_up_figures() -> list[Figure]:
 
 def measure(seconds: float, progress: bool = True) -> tuple[list[Figure], dict[str, list[tuple[int, float]]]]:
     """Rows of the table, and the curves of the picture: real-time factor over batch size, and cost over N."""
-    chapter = Scene(numerics=Numerics.preset("chapter"))
+    chapter = Scene(Seastar(nodes_per_limb=10), numerics=Numerics.preset("chapter"))
     steps = {
         "batch": lambda: [median("batch, one core", "x real time", real_time_factors(chapter, 512, 1, 4 * seconds))],
         "threads": lambda: [

@@ -21,7 +21,7 @@ class Case:
     all_commands: Simulate one robot for every command of -1, 0 and +1 per limb.
     """
 
-    robot: Seastar = field(default_factory=Seastar)
+    robot: Seastar = Seastar(nodes_per_limb=10)
     fluid: Water | None = field(default_factory=Water)
     peak_angle: float = math.pi / 5
     speed: float = 0.0
@@ -47,7 +47,7 @@ class Sweep:
 
 
 def _robot(**changes: float | int) -> Case:
-    return Case(robot=replace(Seastar(), **changes))  # type: ignore[arg-type]
+    return Case(robot=replace(Seastar(nodes_per_limb=10), **changes))  # type: ignore[arg-type]
 
 
 def _number(value: float | None) -> float:

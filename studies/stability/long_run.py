@@ -1,16 +1,25 @@
-"""Long runs of random commands."""
+"""Long runs: of random commands, and of gaits in which the implicit midpoint rule may gather energy."""
 
 import time
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from rich.table import Table
 from tqdm import tqdm
 
-from seastar_gym.scene import Numerics, Scene
+from seastar_gym.certification.commands import STROKES
+from seastar_gym.certification.endurance import LONG, WINDOW, long_swims
+from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator
 from studies.stability.cells import largest_strain
+
+Floats = NDArray[np.float64]
+
+SAMPLES = 8
+"""Commands that are repeated, and pairs of commands that are swum in turn: 17 gaits with the fastest one."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +57,8 @@ def long_run(
     progress: bool = True,
 ) -> LongRun:
     """Simulate strokes of random commands, drawn for every robot and stroke."""
-    simulator = Simulator(Scene(numerics=Numerics.preset(fidelity)), robots, threads)
+    scene = Scene(Seastar(nodes_per_limb=10), numerics=Numerics.preset(fidelity))
+    simulator = Simulator(scene, robots, threads)
     rng, start = np.random.default_rng(0), time.perf_counter()
     iterations, regularised, halvings, cuts, strain, speed = np.zeros((6, strokes))
     for k in tqdm(range(strokes), unit="stroke", disable=not progress):
@@ -72,4 +82,45 @@ def long_table(run: LongRun) -> Table:
     table = Table("quantity", "value", title="Long run of random commands")
     for one in fields(LongRun):
         table.add_row(one.name.replace("_", " "), f"{getattr(run, one.name):.5g}")
+    return table
+
+
+class Resonance(NamedTuple):
+    """Setting of the implicit midpoint rule. step: [s]. stiffness: Factor of the chapter's Young's modulus."""
+
+    nodes: int
+    step: float
+    stiffness: float = 1.0
+
+
+RESONANCES = (
+    *(Resonance(nodes, 5e-3) for nodes in (7, 10, 12, 18, 19, 20, 22)),
+    *(Resonance(19, step) for step in (4e-3, 2.5e-3)),
+    *(Resonance(nodes, step, 10.0) for step in (5e-3, 2e-3, 1e-3) for nodes in (7, 10, 13, 19)),
+    *(Resonance(nodes, 5e-3, 0.1) for nodes in (7, 10, 13, 19)),
+)
+
+
+def energy_growths(setting: Resonance, strokes: int = LONG) -> Floats:
+    """Largest kinetic energy at the ends of the last strokes over that of the first, for each gait; the fastest first.
+
+    strokes: Length of the swims, of which WINDOW are the first ones and as many the last.
+    """
+    commands, robot = long_swims(Seastar().n_limbs, SAMPLES, 0), Seastar(nodes_per_limb=setting.nodes)
+    robot = replace(robot, youngs_modulus=setting.stiffness * robot.youngs_modulus)
+    simulator = Simulator(Scene(robot, numerics=Numerics("implicit-midpoint", setting.step)), commands.shape[1], 1)
+    energies = np.empty((strokes, commands.shape[1]))
+    for k in range(strokes):
+        simulator.stroke(commands[k % STROKES])
+        energies[k] = simulator.kinetic_energy()
+    return np.where(simulator.failed, np.inf, energies[-WINDOW:].max(axis=0) / energies[:WINDOW].max(axis=0))
+
+
+def growth_table(settings: tuple[Resonance, ...] = RESONANCES, strokes: int = LONG) -> Table:
+    """By how much the kinetic energy of long swims grows, as a table for the terminal."""
+    table = Table("nodes", "step", "stiffness", "fastest gait", "median", "largest", title="Growth of kinetic energy")
+    for setting in tqdm(settings, unit="setting"):
+        found = energy_growths(setting, strokes)
+        numbers = (f"{each:.3g}" for each in (found[0], np.median(found), found.max()))
+        table.add_row(str(setting.nodes), f"{1e3 * setting.step:g} ms", f"x {setting.stiffness:g}", *numbers)
     return table

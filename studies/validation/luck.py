@@ -1,4 +1,4 @@
-"""How much hangs on which four speeds the unknowns are identified from: many other fours, of the same simulations."""
+"""How much hangs on which four speeds the model is fitted to: many other fours, of the same simulations."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -16,7 +16,7 @@ TOP = 100.0
 
 
 def draw(results: Mapping[str, Any], file: Path) -> None:
-    """Scatter plot: measured speed over prediction, 90 % intervals, and speeds that were identified from as rings."""
+    """Scatter plot: measured speed over prediction, 90 % intervals, and the speeds that were fitted to as rings."""
     figure, axes = subplots(figsize=(6.4, 6.4))
     line = np.array([0.0, TOP])
     axes.plot(line, line, color=INK, lw=1.0, label="predicted as measured")
@@ -30,7 +30,7 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
     for material, colour in COLOURS.items():
         axes.plot([], [], "o", ms=5, color=colour, label=f"{material} % liquid metal in the limbs")
     axes.plot(
-        [], [], "o", ms=8, mfc="white", mew=1.6, color=INK, label="one of the four speeds that\nidentify the model"
+        [], [], "o", ms=8, mfc="white", mew=1.6, color=INK, label="one of the four speeds that\nthe model is fitted to"
     )
     off = 100.0 * results["models"]["full"]["score"]["error"]
     predicted = sum(not one["identified_from"] for one in results["speeds_mm_per_s"])

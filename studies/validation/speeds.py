@@ -7,7 +7,7 @@ import numpy as np
 
 FILE = Path(__file__).with_name("swimmer_speeds.csv")
 TRAINED_MATERIALS = (0, 10, 30, 50)
-"""Materials [% of liquid metal] with a speed that the unknowns are identified from. That of 40 % is predicted only."""
+"""Materials [% of liquid metal] with a speed that the model is fitted to. That of 40 % is predicted only."""
 
 
 class Condition(NamedTuple):
@@ -34,7 +34,7 @@ def read_speeds() -> list[Condition]:
 
 
 def training(conditions: list[Condition]) -> list[int]:
-    """Indices of the four runs that unknowns are identified from: the middle frequency of four materials.
+    """Indices of the four runs that the model is fitted to: the middle frequency of four materials.
 
     The lower middle one of an even number. The rule was set before any speed was predicted.
     """

@@ -1,8 +1,9 @@
-"""Identify the unknowns of a measured swimmer from four of its 37 speeds, and predict the others with 90 % intervals.
+"""Fit a model of a measured swimmer to four of its 37 speeds, and predict the others with 90 % intervals.
 
 Robots with many samples of the unknowns swim in every condition, side by side in batches. The four speeds weigh the
 samples, and the weighted samples predict the other speeds. So no fit can end in the wrong minimum, and what the speeds
-do not tell of the unknowns is in the intervals. Then parts of the model are left out, one at a time.
+do not tell of the unknowns is in the intervals. Then parts of the model are left out, one at a time, and laws of one
+constant are fitted to the same four speeds.
 
 Speeds are kept in the folder RUNS, so the study goes on where it was interrupted. It prints its tables and writes
 `validation.json` and `validation.png`.
@@ -18,8 +19,10 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
+from seastar_gym.files import write_atomically
 from studies.parser import study_parser
 from studies.provenance import provenance
+from studies.validation import laws
 from studies.validation.inference import MODEL, SCATTER, Score, effective, hindsight, one_speed, predict, score, weights
 from studies.validation.luck import other_fours, scores
 from studies.validation.pictures import draw
@@ -93,7 +96,7 @@ def score_row(name: str, one: Score, fours: dict[str, list[float]]) -> list[str]
 
 
 def print_tables(console: Console, analyses: dict[str, dict[str, Any]], values: dict[str, Floats]) -> None:
-    table = Table(title="Predictions of the speeds that were not identified from")
+    table = Table(title="Predictions of the speeds that were not fitted to")
     for header in ("model", "error", "bias", "worst", "within 90 %", "high/low", "other fours: error"):
         table.add_column(header)
     full = analyses["full"]
@@ -129,6 +132,7 @@ def as_json(
         },
         "before": asdict(full["blind"]),
         "one_speed_for_all": full["one speed"],
+        "laws": laws.law_scores(conditions, full["chosen"], other_fours(conditions, FOURS)),
         "unknowns": [one._asdict() for one in told(values, full["weight"])],
         "sweeps": dict(zip(("0", "25", "50", "75"), sweeps_told(full["weight"]), strict=True)),
         "best_known": {"powers": powers, "narrower": narrower},
@@ -144,6 +148,13 @@ def as_json(
     }  # fmt: skip
 
 
+def add_laws(file: Path, conditions: list[Condition]) -> None:
+    """Write the laws of one constant into results that are there."""
+    results = json.loads(file.read_text(encoding="utf-8"))
+    results["laws"] = laws.law_scores(conditions, training(conditions), other_fours(conditions, FOURS))
+    write_atomically(file, (json.dumps(results, indent=1) + "\n").encode())
+
+
 def main() -> None:
     """Command line: simulate, weigh, predict, and leave parts out."""
     parser = study_parser("studies.validation", __doc__)
@@ -152,10 +163,16 @@ def main() -> None:
         "--variants", nargs="*", metavar="PART", choices=VARIANTS, default=list(VARIANTS),
         help="parts to leave out (default: all)",
     )  # fmt: skip
+    parser.add_argument(
+        "--only-laws", action="store_true", help="add the laws of one constant to the results that are there"
+    )
     parser.add_argument("--runs", type=Path, default=Path("runs/validation"), help="folder of speeds")
     parser.add_argument("--out", type=Path, default=Path("docs"), help="folder of results (default: %(default)s)")
     arguments = parser.parse_args()
     console, conditions, values = Console(), read_speeds(), samples(arguments.samples)
+    if arguments.only_laws:
+        add_laws(arguments.out / "validation.json", conditions)
+        return
     simulated = simulate(conditions, "full", arguments.samples, arguments.runs, console)
     analyses = {"full": analyse(simulated, conditions)}
     fewer = min(OF_VARIANTS, arguments.samples)
@@ -174,5 +191,6 @@ def main() -> None:
     console.print(f"Best known: {result['best_known']}, sweeps: {result['sweeps']}")
     arguments.out.mkdir(parents=True, exist_ok=True)
     result = {**provenance("python -m studies.validation", "scipy"), **result}
+    console.print(laws.table(result), markup=False)
     (arguments.out / "validation.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     draw(result, arguments.out / "validation.png")

@@ -34,6 +34,8 @@ RAMP = 0.1
 """Time in which the chapter's ramp rises [s]."""
 NONE_OF_IT = 1e-6
 """Factor of a coefficient that is left out, so that the same code runs."""
+INSTANTS = 2001
+"""Instants of a period at which its curve is taken."""
 LOOSE = 1.0
 """Largest distance of the samples' polygon from the curve [1/m]."""
 SIDES = (1.0, 1.0, -1.0, -1.0)
@@ -117,15 +119,21 @@ def bending(liquid_metal: int, frequency: float, ramp: bool = False) -> tuple[tu
 
     ramp: The chapter's ramp between the same curvatures, instead of the fit of the measured curve.
     """
-    numbers = MEASURED[liquid_metal]._asdict()
-    numbers["width"] = numbers.pop("heating_time")
-    t = np.linspace(0.0, 1.0 / frequency, 2001)
-    k = curvature(numbers, frequency, t)
-    k[-1] = k[0]
+    t, k = measured_curve(liquid_metal, frequency)
     if ramp:
         t, k = np.array([0.0, RAMP, t[-1]]), np.array([k[0], k.min(), k[0]])
     kept = polygon(t, k)
     return tuple(t[kept].tolist()), k[kept]
+
+
+def measured_curve(liquid_metal: int, frequency: float) -> tuple[Floats, Floats]:
+    """Times [s] and curvatures [1/m] of a limb over one period: the fit of what was measured of this material."""
+    numbers = MEASURED[liquid_metal]._asdict()
+    numbers["width"] = numbers.pop("heating_time")
+    t = np.linspace(0.0, 1.0 / frequency, INSTANTS)
+    k = curvature(numbers, frequency, t)
+    k[-1] = k[0]
+    return t, k
 
 
 def polygon(t: Floats, k: Floats) -> list[int]:

@@ -18,16 +18,17 @@ DRAG_NUMERICS = Numerics("sdirk3", 2e-3, newton_tolerance=1e-12)
 
 def driven_speed(acceleration: float, time: float) -> float:
     """Speed [m/s] after a time [s] from rest; each node carries a load of its mass times an acceleration [m/s^2]."""
-    mass = make_rods(Scene()).mass
+    robot = Seastar(nodes_per_limb=10)
+    mass = make_rods(Scene(robot)).mass
     loads = tuple((node, acceleration * m, 0.0) for node, m in enumerate(mass))
-    simulator = Simulator(Scene(Seastar(), Water(), pause(time), DRAG_NUMERICS, loads=loads))
+    simulator = Simulator(Scene(robot, Water(), pause(time), DRAG_NUMERICS, loads=loads))
     let_pass(simulator)
     return float(simulator.hub_velocity()[0, 0])
 
 
 def coasted(speed: float, time: float, discretisation: Discretisation = "continuum") -> Floats:
     """(speed [m/s], distance [m]) of a straight robot that coasts for a time [s] from an initial speed [m/s]."""
-    robot = Seastar(discretisation=discretisation)
+    robot = Seastar(nodes_per_limb=10, discretisation=discretisation)
     simulator = Simulator(Scene(robot, Water(), pause(time), DRAG_NUMERICS))
     velocities = np.tile([speed, 0.0], (1, robot.n_nodes, 1))
     simulator.set_state(State(simulator.positions, velocities, simulator.time))

@@ -23,6 +23,6 @@ def let_pass(simulator: Simulator) -> None:
 
 HUB = (0,)
 """Held nodes that clamp limbs of IN_LINE at the hub."""
-IN_LINE = {"continuum": Seastar(2), "chapter": Seastar(2, hub_hinge="turning", discretisation="chapter")}
+IN_LINE = {"continuum": Seastar(2, 10), "chapter": Seastar(2, 10, hub_hinge="turning", discretisation="chapter")}
 """Two limbs in a line, in either discretisation. What mirrors itself in them does not turn them about the hub, so that
 each is clamped there."""

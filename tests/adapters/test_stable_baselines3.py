@@ -4,10 +4,12 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
+from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize, VecVideoRecorder
 
+from refusals import assert_refused
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.commands import command_table
@@ -207,6 +209,11 @@ def test_stable_baselines_records_a_video(tmp_path):
     recorder.close()
     (video,) = tmp_path.glob("*.mp4")
     assert video.stat().st_size > 1000 and recorder.frames_per_sec == 10
+
+
+def test_make_vec_env_is_told_what_to_do_instead():
+    with assert_refused("BatchVecEnv wraps one batch", "gym.make_vec"):
+        make_vec_env("SeastarSwim-v0", 2, vec_env_cls=BatchVecEnv)
 
 
 def test_closing_closes_the_batch():

@@ -278,7 +278,7 @@ def test_command_line_evaluates_scripted_agents(tmp_path, capsys):
 
 
 def test_the_policy_in_the_box_and_scripted_agents_are_evaluated_without_torch():
-    code = "import sys, agents.evaluate as e; e.load_agents(['pentagon', 'random', 'learned']); print(*sys.modules)"
+    code = "import sys, agents.evaluate as e; e.fitting_agents(['pentagon', 'random', 'learned']); print(*sys.modules)"
     answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     loaded = set(answer.stdout.split())
     assert "seastar_gym.controllers.scripted" in loaded

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -14,6 +15,7 @@ from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.evaluation.many import mean_with_interval
 from seastar_gym.evaluation.swim import swim
 from studies.learning.in_time import study, trainings
 from studies.learning.in_time.shares import ChosenCommands, SharesPolicy, shares_of_pairs
@@ -21,6 +23,7 @@ from studies.learning.in_time.study import Options, main
 from studies.learning.in_time.tables import as_markdown, pulses_per_metre
 from studies.learning.in_time.trainings import TRAININGS, Training, learn
 
+DOCS = Path(__file__).resolve().parents[2] / "docs"
 TINY = (
     ("decision_period", 0.5), ("num_envs", 8), ("rollout", 8), ("batch_size", 32), ("epochs", 1), ("hidden", (8,)),
     ("max_episode_time", 10.0),
@@ -43,6 +46,36 @@ def test_the_trainings_of_the_study_are_valid_and_differ():
     for training in TRAININGS.values():
         assert training.hyperparameters.decision_period is not None
         assert training.start is None or TRAININGS[training.start].learner == "pairs"
+
+
+def test_no_seed_is_left_out_of_the_committed_results():
+    runs = json.loads((DOCS / "in_time.json").read_text(encoding="utf-8"))["runs"]
+    assert all(list(found) == [str(seed) for seed in range(len(found))] for found in runs.values())
+
+
+@pytest.mark.parametrize("page", ["results.md", "training.md"])
+def test_pages_beside_the_study_quote_its_mean_of_ten_seeds(page):
+    """The fastest training stands beside all ten, and each is named once."""
+    runs = json.loads((DOCS / "in_time.json").read_text(encoding="utf-8"))["runs"]["0.2 s, coasting"]
+    text = (DOCS / page).read_text(encoding="utf-8")
+    seconds = {
+        fidelity: np.array([run["pentagon"][fidelity]["seconds"] for run in runs.values()])
+        for fidelity in ("fast", "balanced", "reference")
+    }
+    shown = ["{:.1f} [{:.1f}, {:.1f}] s".format(*mean_with_interval(each)) for each in seconds.values()]
+    if page == "results.md":
+        assert f"| 0.2 s | {' | '.join(shown)} |" in text
+        assert "seed 1 |" not in text
+    assert f"{seconds['fast'].mean():.1f}" in text
+
+
+def test_a_seed_that_was_missing_stands_in_its_place(small, tmp_path):
+    out = tmp_path / "in_time.json"
+    command = ["--trainings", "pairs", "--paths", "2", "--again", "fast"]
+    command += ["--networks", str(tmp_path), "--out", str(out)]
+    for seed in ("1", "0"):
+        assert main([*command, "--seeds", seed]) == 0
+    assert list(json.loads(out.read_text())["runs"]["pairs"]) == ["0", "1"]
 
 
 def test_every_learner_is_measured_and_none_twice(small, tmp_path, capsys):

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from agents.evaluate import evaluate, main
 from agents.report.charts import Curve, curves_figure, read_progress, speeds_figure, to_html
-from agents.report.page import MEASURED, Remarks, read_trials, table_html
+from agents.report.page import MEASURED, Remarks, ResultsTable, read_trials, table_html
 from agents.report.playback import UNIT, RecordingEnv
 from refusals import assert_refused
 from seastar_gym.controllers.scripted import scripted
@@ -155,6 +155,41 @@ def test_trials_are_shown_with_their_confidence_intervals(tmp_path):
             read_trials(tmp_path / "other.csv")
 
 
+def test_every_column_of_trials_is_text_not_markup(tmp_path):
+    """Whatever columns a CSV has: `agent_low` would be an interval of the agent."""
+    measured = [name + end for name in MEASURED for end in ("", "_low", "_high")]
+    words = ["path", "disturbance", "agent", "fidelity", "swims"]
+    header = [*words, *measured, *(name + end for name in words for end in ("_low", "_high"))]
+    evil = '"<img src=x onerror=alert(1)>"'
+    row = [*[evil] * 5, *["1.0"] * len(measured), *[evil] * 10]
+    (tmp_path / "trials.csv").write_text(",".join(header) + "\n" + ",".join(row) + "\n")
+    assert "<img" not in table_html(read_trials(tmp_path / "trials.csv"))
+    rows = [{"agent": "a", "agent_low": "<img>", "agent_high": "<img>"}]
+    assert "<img" not in table_html(ResultsTable("Trials", {"agent": "agent"}, rows))
+    (tmp_path / "trials.csv").write_text(",".join(header) + "\n" + ",".join(["inf" if f == "1.0" else f for f in row]))
+    with assert_refused("'inf' is no finite number"):
+        read_trials(tmp_path / "trials.csv")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "", "[" * 100_000, "null", "[]", "{}",
+        '{"directions_deg": [0, 18], "mm_per_stroke": {"a": [1]}, "fidelity": "fast"}',
+        '{"directions_deg": 5, "mm_per_stroke": {}, "fidelity": "fast"}',
+        '{"directions_deg": [0, NaN], "mm_per_stroke": {"a": [1, 2]}, "fidelity": "fast"}',
+        '{"directions_deg": [0, 18], "mm_per_stroke": {"a": ["<b>", 2]}, "fidelity": "fast"}',
+    ],
+)  # fmt: skip
+def test_damaged_speeds_are_refused_in_a_sentence(text, tmp_path, capsys):
+    (tmp_path / "bound.json").write_text(text)
+    arguments = ["--report", "--no-video", "--out", str(tmp_path / "out")]
+    assert main([*arguments, "--bound", str(tmp_path / "bound.json")]) == 2
+    said = capsys.readouterr().err
+    assert "bound.json is no " in said and said.count("\n") == 1, said
+    assert not (tmp_path / "out").exists()
+
+
 # Learning curves
 
 
@@ -176,6 +211,11 @@ def test_a_damaged_curve_is_refused_with_its_line(tmp_path, text, words):
     (tmp_path / "progress.csv").write_text(text)
     with assert_refused(str(tmp_path / "progress.csv"), words):
         read_progress(tmp_path)
+
+
+def test_a_training_without_a_checkpoint_has_no_curve():
+    with assert_refused("The training of a has no learning curve yet"):
+        Curve.of("a", [])
 
 
 def test_several_curves_have_their_median_and_range():

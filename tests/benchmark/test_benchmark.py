@@ -2,6 +2,9 @@
 
 import itertools
 import json
+import math
+import os
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,6 +24,7 @@ from seastar_gym.controllers import GreedyPolicy, load, load_agent, scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.tasks.station import Station
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.evaluation.many import HELD_OUT_SEED
 from seastar_gym.evaluation.swim import swim
 from seastar_gym.evaluation.tasks import task_ids
 from seastar_gym.executors import Outcome
@@ -57,8 +61,8 @@ def entry(agent="a", scores=(2.0, 2.0, 4.0, 4.0), **more):
     n = len(scores)
     facts = {
         "task": SWIM, "agent": agent, "fidelity": "", "measure": "time", "unit": "s", "better": "less",
-        "seeds": list(range(n)), "scores": list(scores), "success": [True] * n, "returns": [0.0] * n,
-        "decisions": [1] * n,
+        "seeds": list(range(HELD_OUT_SEED, HELD_OUT_SEED + n)), "scores": list(scores), "success": [True] * n,
+        "returns": [0.0] * n, "decisions": [1] * n,
     }  # fmt: skip
     return Entry(**facts | more)
 
@@ -161,18 +165,73 @@ def test_results_come_back_from_their_file_and_the_later_of_two_counts(tmp_path)
 
 
 @pytest.mark.parametrize(
-    "text", ["", "[]", "{}", '{"format": 2, "entries": []}', '{"format": 1, "entries": [{"task": "x"}]}']
-)
+    "text",
+    [
+        "", "[]", "{}", "[" * 100_000, "null", '{"format": 1, "entries": 5}', '{"format": 1, "entries": [5]}',
+        '{"format": 2, "entries": []}', '{"format": 1, "entries": [{"task": "x"}]}',
+    ],
+)  # fmt: skip
 def test_other_files_are_refused(tmp_path, text):
     (tmp_path / "results.json").write_text(text)
     with assert_refused("is no result of a benchmark"):
         read(tmp_path / "results.json")
 
 
-@pytest.mark.parametrize("wrong", [{"success": [True]}, {"scores": [np.nan] * 4}, {"better": "other"}, {"seeds": []}])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"success": [True]}, {"better": "other"}, {"seeds": []}, {"seeds": [0, 0]}, {"seeds": [1001, 1000, 1002, 1003]},
+        {"seeds": [0, 1, 2, 3]}, {"seeds": None}, {"fidelity": "f`|"}, {"seeds": {}}, {"scores": "1234"},
+        {"success": [1, 0, 1, 0]}, {"decisions": [0, 1, 2, 3]}, {"decisions": [1.0] * 4},
+        *({name: [value] * 4} for name in ("scores", "returns")
+          for value in (math.nan, math.inf, 1e308, 10**400, None, "1", True)),
+        {"scores": [-1.0] * 4},
+    ],
+    ids=repr,
+)  # fmt: skip
 def test_entries_that_are_not_whole_are_refused(wrong):
     with pytest.raises(ValueError, match="of a on"):
         entry(**wrong)
+
+
+@pytest.mark.parametrize("name", ["two\nlines", "x" * 101, None, 5, "\x1b[2J", "\u202e"])
+def test_names_are_texts_on_one_line(name):
+    for field in ("agent", "task", "measure", "unit"):
+        with pytest.raises(ValueError, match="its names are not all texts on one line"):
+            entry(**{field: name})
+
+
+def test_results_of_another_version_or_measure_are_not_merged(tmp_path, capsys):
+    file, arguments = tmp_path / "results.json", ["--agents", "--out", str(tmp_path / "out"), "--merge"]
+    for wrong, sentence in (
+        ({"version": "0.0.9"}, f"has results of version 0.0.9 of seastar_gym, not of this one, {__version__}"),
+        ({"better": "more"}, "SeastarSwim-v0 is measured by time until done [s], of which less is better"),
+        ({"unit": "h"}, "SeastarSwim-v0 is measured by time until done [s]"),
+        ({"task": "CartPole-v1"}, "CartPole-v1"),
+    ):
+        write([entry(**{"measure": SECONDS.name} | wrong)], file)
+        assert main([*arguments, str(file)]) == 2
+        said = capsys.readouterr().err
+        assert sentence in said and said.count("\n") == 1, said
+        assert not (tmp_path / "out").exists()
+
+
+def test_names_are_text_not_markup_in_the_page(tmp_path):
+    wicked = "<script>a|b`c`[d](e)*$\\frac{$&lt;"
+    entries = [entry(wicked, measure="m|<b>", unit="|"), entry("b")]
+    rows = [line for line in page.page(entries, f"seastar `{wicked}`", None).splitlines() if line.startswith("|")]
+    assert [len(re.findall(r"(?<!\\)\|", row)) for row in rows] == [5, 5, 5, 3, 3, 3, 3]
+    assert not any(re.search(r"(?<!\\)<", row) for row in rows)
+    assert page.plain(wicked) == r"\<script\>a\|b\`c\`\[d\](e)\*\$\\frac{\$\&lt;"
+    assert page.code("a`b``c") == "``` a`b``c ```" and page.code("a") == "`a`"
+    page.draw(page.common([entry(wicked), entry("b")])[1], tmp_path / "profiles.png")
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir], ids=["pipe", "folder"])
+def test_what_is_no_file_is_not_merged(make, tmp_path, capsys):
+    make(tmp_path / "results.json")
+    assert main(["--agents", "--merge", str(tmp_path / "results.json")]) == 2
+    assert "There is no file" in capsys.readouterr().err
 
 
 def test_only_tasks_that_all_agents_swam_are_added_up():

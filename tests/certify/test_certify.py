@@ -1,12 +1,12 @@
 """Certificates of scenes: what they measure, promise and refuse, and when they lapse."""
 
 import json
+import os
 import subprocess
 import sys
 import warnings
 from dataclasses import replace
 from functools import partial
-from types import SimpleNamespace
 
 import gymnasium as gym
 import numpy as np
@@ -15,10 +15,11 @@ import pytest
 import seastar_gym
 from refusals import assert_refused
 from seastar_gym import Body, Certificate, Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires
-from seastar_gym.certification import command, commands, endurance, measure
+from seastar_gym.certification import command, commands, measure
+from seastar_gym.envs.promises import REPEATED
 from seastar_gym.envs.spec import PlainSpec
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.scene.certificate import resolved
+from seastar_gym.scene.certificate import _digest, resolved
 
 SMALL_ROBOT = Seastar(limb_length=0.08)
 SCENE = Scene(SMALL_ROBOT)
@@ -48,6 +49,19 @@ def test_every_setting_has_the_errors_of_every_class_and_more_nodes_leave_less_e
     coarse, fine = certificate.settings[0], certificate.settings[2]
     assert fine.space_error < 0.6 * coarse.space_error
     assert 0.0 < certificate.limit_error < fine.space_error
+
+
+def test_a_typical_error_is_the_median_of_a_class(certificate):
+    errors = np.zeros((len(commands.CLASSES), 5))
+    errors[1] = [0.05, 0.011, 0.9, 0.012, 0.04]
+    assert measure.by_class(errors.ravel(), 5)["random continuous"] == 0.9
+    assert measure.by_class(errors.ravel(), 5, np.median)["random continuous"] == 0.04
+    for each in certificate.settings:
+        assert all(0.0 < each.typical[name] <= each.errors[name] for name in commands.CLASSES)
+        assert each.typical_error(certificate.promised) == max(each.typical[name] for name in certificate.promised)
+    first = certificate.settings[0]
+    bound, typical = first.error(certificate.promised), first.typical_error(certificate.promised)
+    assert f"{100 * bound:.2g} % ({100 * typical:.2g} %)" in command.as_text(certificate)
 
 
 def test_errors_bound_those_of_the_sequences_they_were_measured_on(certificate):
@@ -109,20 +123,6 @@ def test_settings_that_gather_energy_over_long_swims_are_not_chosen(certificate)
         growing(*certificate.settings).for_error(largest)
 
 
-def test_the_energy_of_a_swim_that_fails_grows_without_bound(monkeypatch):
-    monkeypatch.setattr(Simulator, "stroke", lambda *_: SimpleNamespace(status=np.array([1] * 17)))
-    assert endurance.energy_growth(SCENE) == np.inf
-
-
-@pytest.mark.parametrize("n_limbs", [1, 2, 3, 5, 12])
-def test_long_swims_turn_mirrored_limbs_against_each_other(n_limbs):
-    commands = endurance.long_swims(n_limbs, samples=2, seed=0)
-    assert commands.shape == (10, 5, n_limbs) and np.abs(commands).max() == 1.0
-    pairs = endurance.mirrored_pairs(n_limbs)
-    if n_limbs > 2:
-        np.testing.assert_array_equal(pairs[:, 1:], -pairs[:, :0:-1])
-
-
 def test_the_function_the_command_and_the_modules_have_names_of_their_own():
     code = (
         "import seastar_gym.certification.measure as measure, seastar_gym\n"
@@ -180,23 +180,89 @@ def test_a_certificate_is_read_back_as_it_was_written(certificate, tmp_path):
     assert Certificate.load(tmp_path / "mine.json") == certificate
 
 
-DAMAGES = (
-    lambda data: data.pop("settings"),
-    lambda data: data.update(format=7),
-    lambda data: data["settings"][0].update(speed="fast"),
-    lambda data: data.update(settings=[]),
-    lambda data: data.update(scene={}),
+def changed(certificate, folder, change, sign=True):
+    """File of a certificate whose content was changed, with the digest of the new content."""
+    file = folder / "mine.json"
+    certificate.save(file)
+    data = json.loads(file.read_text(encoding="utf-8"))
+    change(data)
+    if sign:
+        data["digest"] = _digest({name: part for name, part in data.items() if name != "digest"})
+    file.write_text(json.dumps(data), encoding="utf-8")
+    return file
+
+
+DAMAGES = {
+    "setting": lambda data: data.pop("settings"),
+    "form is 7": lambda data: data.update(format=7),
+    "form is 2": lambda data: data.update(format=2),
+    "speed": lambda data: data["settings"][0].update(speed="fast"),
+    "settings must": lambda data: data.update(settings=[]),
+    "version": lambda data: data.update(scene={}),
+    "errors must be a finite number, not negative": lambda data: data["settings"][0]["errors"].update(small=-0.1),
+    "typical must be a finite number": lambda data: data["settings"][0]["typical"].update(small=float("nan")),
+    "same classes": lambda data: data["settings"][0]["errors"].pop("small"),
+    "errors must be numbers by class": lambda data: data["settings"][0].update(errors=[0.1]),
+    "space_error must be": lambda data: data["settings"][0].update(space_error=-0.1),
+    "time_error must be": lambda data: data["settings"][0].update(time_error=True),
+    "energy_growth must be": lambda data: data["settings"][0].update(energy_growth=-1.0),
+    "nodes_per_limb must be": lambda data: data["settings"][0].update(nodes_per_limb=-7),
+    "samples must be": lambda data: data.update(samples=-5),
+    "limit_error must be": lambda data: data.update(limit_error=-1e-3),
+    "promised must be": lambda data: data.update(promised=["of yesterday"]),
+    "actions must be": lambda data: data.update(actions=[]),
+    "classes must be a whole number": lambda data: data.update(classes="one"),
+}
+
+
+@pytest.mark.parametrize("words", DAMAGES)
+def test_a_damaged_certificate_is_refused(certificate, tmp_path, words):
+    with assert_refused("is no certificate", words):
+        Certificate.load(changed(certificate, tmp_path, DAMAGES[words]))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda data: data["scene"]["robot"].update(youngs_modulus=2e6),
+        lambda data: data["settings"][0]["errors"].update(small=1e-9),
+        lambda data: data.update(samples=10_000),
+        lambda data: data.update(digest="0"),
+    ],
 )
+def test_the_errors_of_a_file_are_those_of_its_scene(certificate, tmp_path, change):
+    with assert_refused("is no certificate", "content was changed since it was measured"):
+        Certificate.load(changed(certificate, tmp_path, change, sign=False))
+    changed(certificate, tmp_path, lambda data: data.update(dict(reversed(data.items()))), sign=False)
+    assert Certificate.load(tmp_path / "mine.json") == certificate
 
 
-@pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_certificate_is_refused(certificate, tmp_path, damage):
-    certificate.save(tmp_path / "mine.json")
-    data = json.loads((tmp_path / "mine.json").read_text(encoding="utf-8"))
-    damage(data)
-    (tmp_path / "mine.json").write_text(json.dumps(data), encoding="utf-8")
+DEEP = '{"format": 3, "digest": ' + '{"a": ' * 900 + "1" + "}" * 901
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, DEEP, "[]", "3"])
+def test_a_file_of_anything_else_is_no_certificate(tmp_path, text):
+    (tmp_path / "mine.json").write_text(text, encoding="utf-8")
     with assert_refused("is no certificate"):
         Certificate.load(tmp_path / "mine.json")
+    with assert_refused("cannot be read"):
+        Certificate.load("no\0file.json")
+
+
+def test_a_certificate_is_written_all_at_once(certificate, tmp_path, monkeypatch):
+    """A write that breaks off leaves the file that was there."""
+    certificate.save(tmp_path / "mine.json")
+
+    def full_disk(*_):
+        raise OSError("no space left")
+
+    monkeypatch.setattr(os, "fsync", full_disk)
+    with pytest.raises(OSError, match="no space left"):
+        replace(certificate, machine="another").save(tmp_path / "mine.json")
+    with pytest.raises(OSError, match="no space left"):
+        command.draw(certificate, tmp_path / "mine.json")
+    assert Certificate.load(tmp_path / "mine.json") == certificate
+    assert [each.name for each in tmp_path.iterdir()] == ["mine.json"]
 
 
 def test_the_environment_tells_the_errors_of_a_certified_scene(certificate, tmp_path):
@@ -205,12 +271,15 @@ def test_the_environment_tells_the_errors_of_a_certified_scene(certificate, tmp_
     for given in (certificate, tmp_path / "mine.json", str(tmp_path / "mine.json")):
         env = gym.make("SeastarSwim-v0", scene=certificate.at(setting), certificate=given)
         info = env.reset(seed=0)[1]
-        assert info["path_error"] == setting.error(certificate.actions)
+        assert max(info["path_error"], info["gait_error"]) == setting.error(certificate.actions)
+        assert info["gait_error"] == setting.error(REPEATED)
+        assert info["typical_gait_error"] == setting.typical_error(REPEATED)
+        assert info["typical_error"] == setting.typical_error(tuple({*certificate.actions} - {*REPEATED}))
         assert (info["space_error"], info["time_error"]) == (setting.space_error, setting.time_error)
-        assert info["real_time_factor"] == setting.speed
+        assert info["batch_real_time_factor"] == setting.speed
     envs = gym.make_vec("SeastarSwim-v0", 3, vectorization_mode="vector_entry_point",
                         scene=certificate.at(setting), certificate=certificate)  # fmt: skip
-    assert (envs.reset(seed=0)[1]["path_error"] == setting.error(certificate.actions)).all()
+    assert (envs.reset(seed=0)[1]["path_error"] == info["path_error"]).all()
     assert isinstance(env.unwrapped, PlainSpec)
     assert json.loads(env.spec.to_json())["kwargs"]["certificate"] == str(tmp_path / "mine.json")
 
@@ -259,7 +328,7 @@ def test_a_certificate_is_of_strokes(certificate):
             made(scene=scene, certificate=wired, decision_period="0.5")
         for period in (None, 1.0):
             info = made(scene=scene, certificate=wired, decision_period=period).reset(seed=0)[1]
-            assert np.all(info["path_error"] == wired.settings[0].error(wired.actions))
+            assert np.all(info["gait_error"] == wired.settings[0].error(REPEATED))
 
 
 def test_wires_of_the_chapters_robot_need_no_certificate_in_time_and_others_are_told_of_error_bars():
@@ -276,6 +345,7 @@ def test_scenes_without_one_answer_are_refused():
         (Scene(Seastar(limb_length=np.array([0.1, 0.2]))), "of_robot"),
         (Scene(held_nodes=(0,)), "Held and loaded nodes"),
         (Scene(actuator=SmaPulse(0.0)), "Nothing moves"),
+        (Scene(limb_strengths=(0.0,) * 5), "Nothing moves"),
         (3, "needs a Scene"),
     ):
         with assert_refused(word):
@@ -329,6 +399,7 @@ def test_the_command_writes_certificate_and_picture(few_settings, tmp_path, monk
     for more, words in (
         (["--error", "0"], "positive, finite share"),
         (["--out", str(tmp_path)], "is a folder"),
+        (["--out", str(tmp_path / "mine.png")], "where the picture goes"),
         (["--error", "0.1", "--chosen", str(tmp_path)], "is a folder"),
         (["--chosen", "chosen.json"], "give both"),
     ):

@@ -1,5 +1,6 @@
 """The command `seastar`: what it shows, writes and refuses, in a sentence each."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -8,6 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from agents.evaluate import main as agents_evaluate
+from seastar_gym import Scene, Seastar
 from seastar_gym.cli import play, screen
 from seastar_gym.cli.main import COMMANDS, main
 from seastar_gym.controllers import learned
@@ -93,6 +96,19 @@ def test_the_learned_policy_swims_in_a_registered_task(tmp_path, capsys):
     assert main(["swim", *task, "--film", str(film)]) == 0
     assert "0 of 5 waypoints in 1.0 s" in capsys.readouterr().out
     assert film.stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    "more, seconds",
+    [([], "0.4 s"), (["--agent", "straight"], "1.0 s"), (["--decision-period", "1"], "1.0 s"),
+     (["--task", "SeastarSwim-v0"], "1.0 s")],
+)  # fmt: skip
+def test_without_options_the_policy_of_the_picture_on_top_swims(more, seconds, tmp_path, capsys):
+    """It decides every 0.2 s; whoever asks for an agent, a task or a time between decisions gets that."""
+    film = tmp_path / "swim.gif"
+    arguments = ["--fidelity", "fast", "--speed", "8", "--seconds", "0.4", "--film", str(film)]
+    assert main(["swim", *arguments, *more]) == 0
+    assert f"0 of 5 waypoints in {seconds}." in capsys.readouterr().out
 
 
 def test_a_window_shows_a_swim_until_it_is_closed(path, dummy_window, monkeypatch, capsys):
@@ -215,6 +231,46 @@ def test_a_robot_of_a_file_swims(path, tmp_path, capsys):
     film = ["swim", "--agent", "straight", "--path", path, "--fidelity", "fast", "--speed", "8", "--seconds", "2"]
     assert main([*film, "--scene", str(scene), "--film", str(tmp_path / "x.gif")]) == 0
     assert "0 of 1 waypoints in 2.0 s" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", ["swim", "evaluate", "certify", "sweep", "identify"])
+def test_what_goes_wrong_in_a_scene_file_is_said_with_its_line(command, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("wrong.py").write_text("import math\nscene = nothing\n")
+    scene = ["wrong.py"] if command == "certify" else ["--scene", "wrong.py"]
+    assert main([command, *scene, *(["--synthetic"] if command == "identify" else [])]) == 2
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert last == "wrong.py, line 2: NameError: name 'nothing' is not defined."
+
+
+THREE_LIMBS = "from seastar_gym import Scene, Seastar\nscene = Scene(robot=Seastar(n_limbs=3))\n"
+
+
+@pytest.mark.parametrize("ending", [".py", ".json"])
+def test_a_robot_of_three_limbs_is_compared_by_agents_that_it_can_have(ending, path, tmp_path, capsys):
+    scene = tmp_path / f"three{ending}"
+    as_json = json.dumps(Scene(robot=Seastar(n_limbs=3)).to_dict())
+    scene.write_text(THREE_LIMBS if ending == ".py" else as_json)
+    arguments = ["--scene", str(scene), "--path", path, "--fidelity", "fast", "--seconds", "2"]
+    assert main(["evaluate", *arguments]) == 0
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()[3:]] == ["greedy", "straight"]
+
+
+@pytest.mark.parametrize("command", [main, lambda words: agents_evaluate([*words[1:], "--no-video"])])
+def test_agents_that_do_not_fit_are_left_out_with_a_sentence_each(command, path, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("three.py").write_text(THREE_LIMBS)
+    arguments = ["--path", path, "--fidelity", "fast", "--scene", "three.py"]
+    arguments += ["--seconds", "2"] if command is main else ["--max-strokes", "2"]
+    assert command(["evaluate", "--agents", "learned", "straight", "pentagon", "nobody", "none.zip", *arguments]) == 0
+    said = capsys.readouterr()
+    assert "straight" in said.out and "learned" not in said.out
+    sentences = said.err.splitlines()
+    left_out = [sentence.partition(" is left out: ")[0] for sentence in sentences]
+    assert left_out == ["learned", "pentagon", "nobody", "none"]
+    assert all(sentence.endswith(".") for sentence in sentences)
+    assert command(["evaluate", "--agents", "learned", *arguments]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
 
 
 def test_training_without_the_repository_says_what_it_needs(tmp_path, monkeypatch, capsys):

@@ -114,5 +114,5 @@ def test_a_waypoint_that_is_not_the_last_is_passed_and_not_arrived_at():
 
 @pytest.mark.parametrize("arguments", [(0, 1), (1, 0)])
 def test_a_search_of_nothing_is_refused(arguments):
-    with pytest.raises(ValueError, match="at least 1"):
+    with pytest.raises(ValueError, match="whole number from 1"):
         Budget(*arguments)

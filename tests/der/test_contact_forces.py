@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from hubs import TEN
 from seastar_gym import Scene
 from seastar_gym.der.terms.contact import (
     add_contact,
@@ -86,7 +87,7 @@ def test_where_the_stage_is_asked_and_where_the_state_ends_is_the_same_energy_wi
 
 
 def test_edges_cross_where_each_cuts_the_other_and_not_at_their_ends():
-    rods = make_rods(Scene())
+    rods = make_rods(Scene(TEN))
     q = np.zeros((46, 2))
     q[1], q[2], q[10] = [0.0, 0.0], [1.0, 0.0], [0.5, 1.0]
     for y, crossing in ((-0.5, True), (0.5, False), (0.0, False)):

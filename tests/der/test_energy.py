@@ -5,9 +5,10 @@ import pytest
 
 import oracle
 from hubs import HUBS
-from seastar_gym import Scene, SmaPulse
-from seastar_gym.der.energy import elastic_energy, energies
+from seastar_gym import AlongLimb, Body, Limb, Scene, Seastar, SmaPulse, Stiffening
+from seastar_gym.der.energy import elastic_energy, energies, fill_moments
 from seastar_gym.der.rods import make_work
+from seastar_gym.der.terms.body import place_roots
 from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
 from seastar_gym.der.terms.inertia import kinetic_energy
 from seastar_gym.model.rods import make_rods
@@ -73,6 +74,41 @@ def test_kinetic_energy_is_that_of_the_oracle_of_the_velocities_that_a_frame_see
     v, frame = RNG.standard_normal(SHAPE.shape), (0.3, -0.7)
     found = plain(kinetic_energy.plain(make_rods(Scene(robot)), rows(v), frame))[0]
     assert found == pytest.approx(oracle.kinetic_energy(star, v - frame), rel=1e-13)
+
+
+ACTUATED = {
+    "rigid hub": Seastar(3, 4),
+    "limbs bent": Seastar(3, 4, limbs=tuple(Limb(natural_curvature=k) for k in (4.0, 0.0, -3.0))),
+    "bent along": Seastar(3, 4, along=AlongLimb(0.7, (1.0, 3.0, 0.5))),
+    "bent along and stiffer": Seastar(3, 4, along=AlongLimb(0.7), stiffening=Stiffening(2.5, 0.4, 0.1)),
+    "stiffer only": Seastar(3, 4, stiffening=Stiffening(2.5, 0.4, 0.1)),
+    "body": Seastar(3, 4, body=Body(radius=0.02)),
+    "opening": Seastar(4, 4, hub_hinge="opening", discretisation="chapter"),
+    "turning": Seastar(5, 4, hub_hinge="turning", discretisation="chapter"),
+    "one hub hinge": Seastar(2, 4, hub_hinge="turning", discretisation="chapter"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ACTUATED)
+def test_the_moment_that_resists_an_actuator_is_the_slope_of_the_energy_in_its_rotation(name):
+    robot = ACTUATED[name]
+    rods, rng = make_rods(Scene(robot, actuator=SmaPulse(0.3))), np.random.default_rng(0)
+    q = rows(robot.nodes() + 2e-3 * rng.standard_normal((robot.n_nodes, 2)))
+    if robot.has_body:
+        q = np.vstack([q, np.full((1, N_LANES), 2e-3), np.zeros((1 + 2 * robot.n_limbs, N_LANES))])
+        place_roots.plain(rods.body, rods, q)
+    work, turns = make_work(rods, 1), rng.uniform(-0.2, 0.2, robot.n_limbs)
+
+    def actuation(turns):
+        return Actuation(*(np.tile(turns[:, None], N_LANES) for _ in range(2)))
+
+    def energy(turns):
+        set_natural_hub_angles.plain(rods, work, actuation(turns), Lanes(0.0))
+        return plain(elastic_energy.plain(rods, work, q))[0]
+
+    moments = np.zeros((robot.n_limbs, N_LANES))
+    fill_moments.plain(rods, work, actuation(turns), q, moments)
+    np.testing.assert_allclose(moments[:, 0], gradient(energy, turns, 1e-3), rtol=1e-6)
 
 
 def test_energies_of_a_state_are_those_of_its_shape_and_of_its_velocities_in_the_laboratory():

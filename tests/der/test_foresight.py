@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from hubs import TEN
 from seastar_gym import Scene, Seastar
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.foresight import (
@@ -24,7 +25,7 @@ from seastar_gym.simd.numpy_lanes import Lanes
 from slopes import plain
 from touching import touching_limbs
 
-ROBOT = Seastar()
+ROBOT = TEN
 RODS = make_rods(Scene(ROBOT))
 EDGE = ROBOT.limb_length / 9
 WORK = make_work(RODS, 1)

@@ -9,7 +9,7 @@ import pytest
 
 import oracle
 from continuum_oracle import Continuum
-from hubs import HUBS
+from hubs import HUBS, TEN
 from momenta import momenta
 from oracle import Star
 from seastar_gym import Scene, SmaPulse, Vortex, Water
@@ -33,7 +33,7 @@ from seastar_gym.simd.rows import aligned_rows
 from stages import robot_and_star, turn_limbs
 
 STAR = Continuum()
-RODS = make_rods(Scene(actuator=SmaPulse(0.5)))
+RODS = make_rods(Scene(TEN, actuator=SmaPulse(0.5)))
 
 
 def circling(places: np.ndarray) -> np.ndarray:
@@ -45,7 +45,7 @@ def circling(places: np.ndarray) -> np.ndarray:
 STREAM = Continuum(tangential_drag_coefficient=0.2, added_mass_coefficient=0.7, current=circling)
 PULL = np.random.default_rng(5).standard_normal((STAR.n_nodes, 2))
 STREAM_RODS = make_rods(Scene(
-    fluid=Water(tangential_drag_coefficient=0.2, added_mass_coefficient=0.7, current=Vortex(0.4, 0.1, 0.2, 0.06)),
+    TEN, fluid=Water(tangential_drag_coefficient=0.2, added_mass_coefficient=0.7, current=Vortex(0.4, 0.1, 0.2, 0.06)),
     actuator=SmaPulse(0.5),
     loads=tuple((node, *force) for node, force in enumerate(PULL.tolist())),
 ))

@@ -178,6 +178,10 @@ def step_of(h=0.01, size=1.0, limit=20.0, retrying=NOBODY) -> Step:
     return Step(Lanes(0.0), Lanes(size), Lanes(h), Lanes(limit), Mask(retrying))
 
 
+SILENT = np.zeros((2, 0, N_LANES))
+"""Memory of the effort that nobody asks for."""
+
+
 def stroke_limits(adaptive=False, most=MOST) -> Limits:
     return Limits(np.array([1e-9]), 20, most, adaptive, np.array([LIMIT]))
 
@@ -277,7 +281,7 @@ def test_every_group_follows_its_own_peaks_through_all_intervals_and_says_why_it
     failed, report = np.zeros((2, 1, N_LANES)), np.zeros((2, len(REPORT_ROWS), N_LANES))
     failed[0, 0, -1] = 2.0
     rotation, q = Actuation(*np.zeros((2, 5, N_LANES))), np.arange(2.0)[:, None, None] * np.ones((2, 1, N_LANES))
-    stroke(RODS, None, MIDPOINT, EULER, rotation, q, q, q, peaks, times, shape, failed, report, stroke_limits())
+    stroke(RODS, None, MIDPOINT, EULER, rotation, q, q, q, peaks, times, shape, failed, report, stroke_limits(), SILENT)
     assert [group for *_, group in covered] == [0.0, 0.0, 1.0, 1.0]
     np.testing.assert_allclose([duration for *_, duration, _ in covered], [0.1, 0.3, 0.1, 0.3])
     for k, (start, end, *_) in enumerate(covered):

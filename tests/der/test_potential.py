@@ -5,7 +5,7 @@ import pytest
 
 import oracle
 from continuum_oracle import Continuum
-from hubs import HUBS
+from hubs import HUBS, TEN
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, StrokeReport, Water
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
@@ -148,7 +148,7 @@ def test_energies_are_those_of_the_oracle(n_limbs, nodes_per_limb, hub, fluid):
 
 
 def test_elastic_energy_within_a_stroke_is_that_of_the_present_actuation():
-    simulator, star = Simulator(Scene(numerics=Numerics(step=0.01)), n_robots=2), Continuum()
+    simulator, star = Simulator(Scene(TEN, numerics=Numerics(step=0.01)), n_robots=2), Continuum()
     commands = np.array([[0.0, 1.0, 0.0, 0.0, -1.0], [0.3, 0.0, 0.0, -0.7, 0.0]])
     for time in simulator.stroke_in_parts(commands, 10):
         delta_psi = commands * oracle.pulse(round(time, 9))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
+from hubs import TEN
 from seastar_gym import Attachment, Body, Numerics, Scene, Seastar, Simulator, SmaPulse, ThermalSma
 from seastar_gym.envs.observation import (
     VELOCITY_SCALE,
@@ -22,7 +23,7 @@ from seastar_gym.simd.rows import to_rows
 from seastar_gym.simulator import State
 
 SCENES = [
-    Scene(numerics=Numerics.preset("fast")),
+    Scene(TEN, numerics=Numerics.preset("fast")),
     Scene(Seastar(3, 4, limb_length=0.2), actuator=SmaPulse(0.3), numerics=Numerics.preset("fast")),
     Scene(Seastar(nodes_per_limb=7), numerics=Numerics.preset("fast")),
 ]
@@ -64,7 +65,7 @@ def test_a_layout_names_every_place_once_and_in_the_order_of_the_table(n_limbs, 
 
 
 def test_the_layout_of_a_scene_finds_what_its_actuators_remember():
-    scene = Scene(actuator=ThermalSma(), numerics=Numerics.preset("fast"))
+    scene = Scene(TEN, actuator=ThermalSma(), numerics=Numerics.preset("fast"))
     env, plain = SeastarSwimEnv(scene=scene), SeastarSwimEnv(fidelity="fast")
     env.reset(seed=0)
     seen, at = env.step([0, 1, 0, 0, 2])[0], scene_layout(scene)
@@ -124,11 +125,11 @@ def along_limbs(nodes: np.ndarray, roots: np.ndarray) -> np.ndarray:
 
 
 def test_at_rest_the_body_frame_is_that_of_limb_1():
-    simulator = Simulator(Scene(), 2)
+    simulator = Simulator(Scene(TEN), 2)
     simulator.reset(heading=[0.0, 2.0])
     observation = observations_of(simulator, np.zeros((2, 4)))
     np.testing.assert_allclose(observation[:, 16:18], [[1.0, 0.0], [1.0, 0.0]], atol=1e-15)  # tip of limb 1
-    np.testing.assert_allclose(observation[:, :90].reshape(2, 45, 2) * 0.1, [Seastar().nodes()[1:]] * 2, atol=1e-15)
+    np.testing.assert_allclose(observation[:, :90].reshape(2, 45, 2) * 0.1, [TEN.nodes()[1:]] * 2, atol=1e-15)
     assert not observation[:, 90:].any()
 
 
@@ -194,7 +195,7 @@ def test_what_is_seen_of_a_smooth_robot_converges_with_the_fourth_power_of_the_e
 
 
 def test_a_robot_without_a_direction_is_seen_in_the_world_frame_not_as_nan():
-    simulator = Simulator(Scene())
+    simulator = Simulator(Scene(TEN))
     state = simulator.get_state()
     simulator.set_state(state._replace(positions=np.full_like(state.positions, 0.2)))
     observation = observations_of(simulator, np.array([[0.3, 0.2, 0.2, 0.4]]))

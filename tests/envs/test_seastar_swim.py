@@ -20,10 +20,12 @@ from seastar_gym import (
     RewardWeights,
     Scene,
     Seastar,
+    Simulator,
     SmaPulse,
     SolverStatus,
     Uniform,
 )
+from seastar_gym.envs import promises
 from seastar_gym.envs.paths import PATHS, cross_track_error, shortest_way
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -32,8 +34,7 @@ from seastar_gym.scene.fidelity import promise
 STRAIGHT = np.array([0, 1, 0, 0, 2])
 REST = np.zeros(5, int)
 FACTS = {
-    "time", "hub_position", "waypoint_index", "distance", "cross_track_error", "path_error",
-    "space_error", "time_error", "real_time_factor",
+    "time", "hub_position", "waypoint_index", "distance", "cross_track_error", *promises.NAMES,
 }  # fmt: skip
 OF_A_STROKE = {
     "is_success", "limbs_heated", "heating_time", "energy", "energy_per_metre", "newton_iterations", "solver_status",
@@ -78,6 +79,15 @@ def test_gymnasiums_checker_passes_with_pictures(monkeypatch):
     check_env(gym.make("SeastarSwim-v0", render_mode="rgb_array", fidelity="fast").unwrapped)
 
 
+@pytest.mark.filterwarnings("ignore")
+def test_gymnasiums_checker_passes_without_a_display(monkeypatch):
+    """It makes the environment with every render mode that it names."""
+    pygame = pytest.importorskip("pygame")
+    pygame.display.quit()
+    monkeypatch.setenv("SDL_VIDEODRIVER", "no-such-driver")
+    check_env(gym.make("SeastarSwim-v0", fidelity="fast").unwrapped)
+
+
 @pytest.mark.parametrize("actions", ["limbs", "joint", "pairs"])
 def test_stable_baselines_checker_passes(actions):
     sb3 = pytest.importorskip("stable_baselines3.common.env_checker")
@@ -109,23 +119,24 @@ def test_spaces_follow_the_robot(n_limbs, nodes_per_limb):
 def test_info_tells_what_was_measured_of_the_fidelity(fidelity):
     _, info = SeastarSwimEnv(fidelity=fidelity).reset(seed=0)
     known = promise(fidelity)
-    found = [info[name] for name in ("path_error", "space_error", "time_error", "real_time_factor")]
-    of_any_actions = max(known.path_error, known.gait_error)
-    assert found == [of_any_actions, known.space_error, known.time_error, known.speed]
+    for name in promises.IN_TIME:
+        assert info[name] == getattr(known, name), name
+    assert info["batch_real_time_factor"] == known.speed
+    assert info["typical_error"] < info["path_error"] and info["typical_gait_error"] < info["gait_error"]
     assert known.path_error == pytest.approx(info["space_error"] + info["time_error"], rel=1e-5)
 
 
 @pytest.mark.parametrize("scene", [Scene(Seastar(youngs_modulus=2e6)), Scene(fluid=None), Scene(Seastar(5, 9))])
 def test_info_promises_nothing_for_scenes_that_were_not_measured(scene):
     _, info = SeastarSwimEnv(scene=scene, fidelity="fast").reset(seed=0)
-    assert np.isnan([info["path_error"], info["real_time_factor"]]).all()
+    assert np.isnan([info["path_error"], info["batch_real_time_factor"]]).all()
 
 
 def test_info_promises_nothing_for_robots_that_were_drawn():
     draws = DomainRandomization({"limb_strengths": Uniform(0.5, 0.9)})
     env = fast(randomization=draws)
     for info in (env.reset(seed=0)[1], env.step(STRAIGHT)[4]):
-        assert np.isnan([info["path_error"], info["real_time_factor"]]).all()
+        assert np.isnan([info["path_error"], info["batch_real_time_factor"]]).all()
 
 
 def test_info_promises_nothing_once_the_scene_or_a_strength_was_changed():
@@ -137,7 +148,7 @@ def test_info_promises_nothing_once_the_scene_or_a_strength_was_changed():
     env.simulator.set_scene(chapters)
     assert env.step(STRAIGHT)[4]["path_error"] == known
     env.simulator.set_limb_strengths([1.0, 1.0, 0.5, 1.0, 1.0])
-    assert np.isnan(env.step(STRAIGHT)[4]["real_time_factor"])
+    assert np.isnan(env.step(STRAIGHT)[4]["batch_real_time_factor"])
 
 
 @pytest.mark.parametrize("fidelity", [None, "fast", "chapter"])
@@ -145,7 +156,24 @@ def test_a_scene_that_names_no_numerics_swims_at_the_fidelity(fidelity):
     scene = Scene(Seastar(density=1100.0))
     for given in (scene, pickle.loads(pickle.dumps(scene)), replace(scene, contact=None)):
         env = SeastarSwimEnv(scene=given, fidelity=fidelity)
-        assert env.scene == replace(scene, numerics=Numerics.preset(fidelity or "balanced"))
+        preset = Scene.preset(fidelity or "balanced")
+        assert env.scene == replace(preset, robot=replace(preset.robot, density=1100.0))
+
+
+def swum_straight(simulator: Simulator) -> bytes:
+    simulator.stroke([[0.0, 1.0, 0.0, 0.0, -1.0]])
+    return simulator.positions.tobytes()
+
+
+@pytest.mark.parametrize("fidelity", [None, "fast"])
+def test_a_scene_is_swum_alike_however_it_is_asked_for(fidelity):
+    scene = Scene() if fidelity is None else Scene.preset(fidelity)
+    simulators = [Simulator(scene)]
+    for arguments in ({}, {"scene": Scene()}, {"scene": Scene().to_dict()}, {"scene": Scene(Seastar())}):
+        env = gym.make("SeastarSwim-v0", **arguments, **({} if fidelity is None else {"fidelity": fidelity}))
+        env.reset(seed=0)
+        simulators.append(env.unwrapped.simulator)
+    assert len({swum_straight(each) for each in simulators}) == 1
 
 
 def test_numerics_that_a_scene_names_are_kept():
@@ -246,7 +274,8 @@ def test_table_actions_do_what_the_limb_actions_they_stand_for_do(actions):
 
 def test_observation_is_that_of_the_simulators_state():
     """Recomputed from positions and velocities with complex numbers, index by index."""
-    env, rng = fast(path="random", random_heading=True, scene=Scene()), np.random.default_rng(0)
+    scene, rng = Scene(Seastar(nodes_per_limb=10)), np.random.default_rng(0)
+    env = fast(path="random", random_heading=True, scene=scene)
     observation, _ = env.reset(seed=3)
     rest = env.scene.robot.nodes() @ [1.0, 1j]
     for _ in range(10):
@@ -454,13 +483,13 @@ def test_a_path_is_copied_when_the_environment_is_made():
 
 
 def test_random_heading_turns_the_robot_and_its_absence_does_not():
-    env = fast(random_heading=True, scene=Scene())
+    env = fast(random_heading=True, scene=Scene(Seastar(nodes_per_limb=10)))
     env.reset(seed=0)
     tip = env.simulator.positions[0, 9]
     assert np.hypot(*tip) == pytest.approx(0.1) and abs(tip[1]) > 1e-3
-    plain = fast(scene=Scene())
+    plain = fast(scene=Scene(Seastar(nodes_per_limb=10)))
     plain.reset(seed=0)
-    np.testing.assert_array_equal(plain.simulator.positions[0], Seastar().nodes())
+    np.testing.assert_array_equal(plain.simulator.positions[0], Seastar(nodes_per_limb=10).nodes())
 
 
 def test_pickled_environments_continue_to_the_same_bits():

@@ -28,6 +28,7 @@ from seastar_gym import (
     VectorSymmetryReduction,
 )
 from seastar_gym.envs.own_numbers import places_of
+from seastar_gym.envs.promises import NAMES
 from seastar_gym.envs.reward import pulses_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import limb_order, observed_mirror, sectors, transform_actions, transform_commands
@@ -372,9 +373,9 @@ def test_info_is_that_of_the_docstrings(id):
         "heading_error",
         "reward_heading",
     }
-    measured = {"path_error", "space_error", "time_error", "real_time_factor"}
+    measured = {*NAMES}
     if env.unwrapped.decision_period < 1.0:
-        common -= {"real_time_factor"}  # speeds were measured of strokes
+        common -= {"batch_real_time_factor"}  # speeds were measured of strokes
     assert {*own} <= {*found} and {*found} <= common | {*own}
     without = re.search(r"without (.*?);", " ".join(inspect.getdoc(kind).split()))
     missing = set(re.findall(r"`(\w+)`", without[1])) if without else set()

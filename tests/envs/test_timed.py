@@ -15,6 +15,7 @@ from refusals import assert_refused
 from seastar_gym import Limited, MeasuredCurve, Numerics, RewardWeights, Scene, Seastar, SmaPulse, SmaWires, ThermalSma
 from seastar_gym.envs.commands import to_commands
 from seastar_gym.envs.masks import action_masks
+from seastar_gym.envs.promises import IN_TIME, NAMES
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.fidelity import promise, timed_promise
@@ -171,17 +172,16 @@ def test_what_is_no_decision_period_is_refused(period):
             make(decision_period=period)
 
 
-NAMES = ("path_error", "space_error", "time_error", "real_time_factor")
-
-
 @pytest.mark.parametrize("period", [0.5, 0.2, 0.1])
 @pytest.mark.parametrize("fidelity", ["fast", "reference"])
 def test_errors_of_timed_commands_are_promised_to_wires(fidelity, period):
     info = SeastarSwimEnv(fidelity=fidelity, decision_period=period).reset(seed=0)[1]
     known = timed_promise(fidelity, period)
-    assert (info["space_error"], info["time_error"]) == (known.space_error, known.time_error)
-    assert info["path_error"] == info["space_error"] + info["time_error"] > 0.0
-    assert "real_time_factor" not in info
+    for name in IN_TIME:
+        assert info[name] == getattr(known, name) > 0.0, name
+    assert info["path_error"] == info["space_error"] + info["time_error"]
+    assert info["typical_error"] < info["path_error"] and info["typical_gait_error"] < info["gait_error"]
+    assert "batch_real_time_factor" not in info
 
 
 def test_weak_limbs_are_promised_nothing_in_time():
@@ -204,9 +204,8 @@ def test_other_robots_and_wires_are_promised_nothing_in_time(scene):
 
 
 def test_strokes_keep_their_promises():
-    assert SeastarSwimEnv(fidelity="fast").reset(seed=0)[1]["path_error"] == max(
-        promise("fast").path_error, promise("fast").gait_error
-    )
+    info, known = SeastarSwimEnv(fidelity="fast").reset(seed=0)[1], promise("fast")
+    assert (info["path_error"], info["gait_error"]) == (known.path_error, known.gait_error)
 
 
 # Heat

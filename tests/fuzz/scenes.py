@@ -57,7 +57,7 @@ TERMS = (*IN_WATER, "damping", "loads", "contact", OWN, ROTATIONS, CHAPTER)
 """What a scene has or has not: every set of them is machine code of its own, 20 to 40 s to compile."""
 
 BODY, ALONG, STIFFENING = RARE = ("body", "bent along", "stiffening")
-"""Terms that are drawn rarely: each doubles the sets of terms. The last two have machine code in common."""
+"""Terms that not all sets of terms are drawn with: each doubles them. The last two have machine code in common."""
 
 PLAIN: Terms = frozenset()
 CONTACT: Terms = frozenset({"contact"})
@@ -65,6 +65,8 @@ FLUID: Terms = frozenset({*IN_WATER, "damping"})
 EVERYTHING: Terms = frozenset(TERMS) - {OWN, CHAPTER}
 TOUCHED_BODY: Terms = frozenset({BODY, "contact"})
 BENT: Terms = frozenset({ALONG, STIFFENING})
+SWIMMER: Terms = frozenset({BODY, ALONG, STIFFENING, "contact", ROTATIONS})
+"""A body, limbs that wires bend along their length and stiffen (`SmaLimb` and the others), and contact."""
 COMPILED: tuple[Terms, ...] = (
     PLAIN, CONTACT, frozenset({ROTATIONS}), frozenset({OWN}), frozenset({OWN, ROTATIONS}), frozenset({OWN, "contact"}),
     FLUID, frozenset({"loads"}), frozenset({CHAPTER}), frozenset({CHAPTER, "contact"}),
@@ -276,13 +278,14 @@ def draw_actuator(draw: Draw, terms: Terms, robot: Seastar, step: float) -> Actu
         simple = MeasuredCurve(times, angles, own.each(lambda: draw.rng.random()))
     if ROTATIONS not in terms:
         return simple
-    if draw.maybe(0.3):
+    kind = draw.rng.choice(["wires", "thermal", "limb", "limited"])
+    if kind == "wires":
         return draw_wires(draw, own.each(lambda: peak), heating, cooling)
-    if draw.maybe(0.4):
+    if kind == "thermal":
         cold = draw.each(lambda: draw.rng.uniform(0.0, 21.0))
         return ThermalSma(own.each(lambda: peak), heating, cooling, draw.each(lambda: draw.around(2.0 * heating, 0.9)),
                           draw.each(lambda: draw.around(220.0, 1.0)), cold)  # fmt: skip
-    if draw.maybe(0.4):
+    if kind == "limb":
         tau, rise = (draw.each(lambda middle=middle: draw.around(middle, 0.9)) for middle in (2.0 * heating, 9.0))
         delay = draw.or_zero(draw.rng.uniform(0.1, 1.0) * heating)
         return SmaLimb(own.each(lambda: peak), rise, 7.0, tau, heating, delay, heating + cooling)
@@ -403,7 +406,9 @@ def draw_state(rng: Random, simulator: Simulator, kinds: tuple[str, ...]) -> Sta
         v[list(scene.held_nodes)] = 0.0
     if state.orientation is None:
         return state
-    return state._replace(orientation=best_fit_heading(state.positions, scene.robot.nodes()))
+    orientation = best_fit_heading(state.positions, simulator.coefficients.rest_shapes())
+    spin = rng.choice([0.0, 1.0]) * numbers.standard_normal(len(orientation)) * 10.0 ** rng.uniform(-1.0, 1.0)
+    return state._replace(orientation=orientation, spin=spin)
 
 
 def draw_commands(rng: Random, n_strokes: int, n_robots: int, n_limbs: int) -> np.ndarray:

@@ -150,6 +150,12 @@ def test_limbs_on_a_body_and_limbs_that_bend_along_their_length(terms, seed):
 
 
 @pytest.mark.slow
+@drawn(30, [TOUCHED_BODY])
+def test_free_robots_with_a_body_keep_their_momentum(terms, seed):
+    promises.check_momentum(draw_case(Random(seed), terms))
+
+
+@pytest.mark.slow
 @drawn(10, [TOUCHED_BODY, BENT])
 def test_they_swim_alike_turned_mirrored_and_elsewhere(terms, seed):
     promises.check_frames(draw_case(Random(seed), terms, wild=False))

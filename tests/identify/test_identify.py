@@ -192,6 +192,7 @@ def test_files_that_are_no_trajectory_are_refused(tmp_path, text):
         (HEADER + ROW, "", "commands.csv has no line with one number per limb"),
         (HEADER + ROW, COMMAND + "1\n", "commands.csv, line 2: every line must have one number per limb"),
         ("\xff", COMMAND, "path.csv, line 1: this is no UTF-8 text"),
+        (HEADER + "0,1e308,0\n", COMMAND, "path.csv: Positions must be within 1000 m"),
     ],
 )
 def test_a_file_that_cannot_be_read_is_refused_by_its_name(tmp_path, path, commands, words):
@@ -308,3 +309,22 @@ def test_a_measurement_that_does_not_fit_the_robot_is_refused(measurement):
         identify(SCENE, ["fluid.density"], late)
     with pytest.raises(ValueError, match="do not fit the positions"):
         Measurement(measurement.time[1:], measurement.positions, measurement.nodes, measurement.commands)
+    rest = measurement.nodes, measurement.commands
+    with pytest.raises(ValueError, match="time must be an array of numbers"):
+        Measurement(measurement.time.tolist(), measurement.positions, *rest)
+    with pytest.raises(ValueError, match="positions must be an array of numbers"):
+        Measurement(measurement.time, measurement.positions.astype(str), *rest)
+
+
+@pytest.mark.parametrize("confidence", [0.0, 1.0, -0.1, np.nan, True, "0.9"])
+def test_the_confidence_of_an_interval_is_between_0_and_1(measurement, confidence):
+    with pytest.raises(ValueError, match="confidence must be between 0 and 1"):
+        identify(SCENE, ["fluid.density"], measurement, confidence)
+
+
+def test_a_synthetic_measurement_has_eight_strokes_25_pictures_a_second_and_a_millimetre_of_noise():
+    scene = Scene(Seastar(nodes_per_limb=3), numerics=Numerics("implicit-midpoint", 0.02))
+    found = synthetic(scene, {})
+    assert len(found.commands) == 8 and len(found.time) == 200 and np.ptp(found.time) == pytest.approx(7.96)
+    exact = trajectory(found.time, found.nodes, found.commands, scene)
+    assert np.std(found.positions - exact) == pytest.approx(1e-3, rel=0.05)

@@ -186,7 +186,7 @@ def test_for_error_of_a_robot_keeps_its_resolution(robot):
 
 def test_for_error_refuses_ten_of_the_chapters_nodes_what_none_of_their_steps_can_keep():
     with pytest.raises(ValueError, match=r"^No measured setting keeps the path error below 1 %"):
-        Scene.for_error(0.01, robot=Seastar(discretisation="chapter"))
+        Scene.for_error(0.01, robot=Seastar(nodes_per_limb=10, discretisation="chapter"))
 
 
 @pytest.mark.parametrize("robot", [Seastar(youngs_modulus=2e6), Seastar(n_limbs=3), "seastar", 10])

@@ -69,7 +69,7 @@ ACTUATORS = {
 }
 
 
-UNEVEN = Seastar(3, limb_length=0.1 * SPREAD, limbs=(
+UNEVEN = Seastar(3, 10, 0.1 * SPREAD, limbs=(
     Limb(length=0.12 * SPREAD[::-1], radius=1.6e-3 * SPREAD), Limb(natural_curvature=3.0 * (SPREAD - 1.0)),
     Limb(radius=(2e-3, 1e-3), youngs_modulus=1e6 * SPREAD**2),
 ))  # fmt: skip

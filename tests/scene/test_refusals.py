@@ -46,7 +46,7 @@ def test_a_seastar_has_one_to_twelve_limbs(value):
         Seastar(n_limbs=value)
 
 
-@pytest.mark.parametrize("value", [1, 0, -1, 10.0, "10", None, False, 10**6], ids=repr)
+@pytest.mark.parametrize("value", [1, 0, -1, 10.0, "10", False, 10**6], ids=repr)
 def test_a_limb_has_two_nodes_or_more(value):
     with assert_refused("nodes_per_limb", "whole number", repr(value)):
         Seastar(nodes_per_limb=value)
@@ -109,11 +109,11 @@ def test_a_path_tolerance_is_one_that_was_measured_and_for_the_implicit_midpoint
         Numerics("sdirk2", path_tolerance=0.01)
 
 
-@pytest.mark.parametrize("node", [-1, 46, 1.5, "0", True, None], ids=repr)
+@pytest.mark.parametrize("node", [-1, 56, 1.5, "0", True, None], ids=repr)
 def test_held_and_loaded_nodes_are_nodes_of_the_robot(node):
-    with assert_refused("node", "0 to 45", repr(node)):
+    with assert_refused("node", "0 to 55", repr(node)):
         Scene(held_nodes=(node,))
-    with assert_refused("node", "0 to 45", repr(node)):
+    with assert_refused("node", "0 to 55", repr(node)):
         Scene(loads=((node, 1.0, 0.0),))
 
 

@@ -22,12 +22,12 @@ FIDELITIES = ("fast", "balanced", "accurate", "reference", "chapter")
 def test_defaults_are_the_chapters_values_in_the_continuums_discretisation():
     robot, water, actuator = Seastar(), Water(), SmaPulse()
     assert dataclasses.astuple(robot) == (
-        *(5, 10, 0.1, 1.6e-3, 1e6, 1000.0, "opening", (), None, "continuum"), *(None, None, None),
+        *(5, 12, 0.1, 1.6e-3, 1e6, 1000.0, "opening", (), None, "continuum"), *(None, None, None),
     )  # fmt: skip
     assert dataclasses.astuple(water) == (1000.0, 1.0, None, None, None)
     assert dataclasses.astuple(actuator)[:3] == (math.pi / 5, 0.1, 0.9)
     assert Numerics().scheme == "implicit-euler"
-    assert Scene() == Scene(robot, water, actuator, Numerics())
+    assert Scene() == Scene(robot, water, actuator, Numerics.preset("balanced")) == Scene.preset("balanced")
 
 
 @pytest.mark.parametrize("vector", [(0.001, 0.0), [0.001, 0.0]])
@@ -39,7 +39,7 @@ def test_a_uniform_current_given_as_a_vector_is_told_how_to_be_given(vector):
 
 
 def test_a_scene_knows_whether_its_numerics_were_named_and_is_otherwise_the_same():
-    plain, named = Scene(), Scene(numerics=Numerics())
+    plain, named = Scene(), Scene.preset("balanced")
     assert not plain.numerics.named and named.numerics.named
     assert plain == named and hash(plain) == hash(named) and repr(plain) == repr(named)
     for same in (dataclasses.replace(plain, robot=Seastar()), copy.deepcopy(plain), plain.of_robot(0)):
@@ -51,8 +51,33 @@ def test_a_scene_knows_whether_its_numerics_were_named_and_is_otherwise_the_same
         Numerics(named="no")
 
 
+@pytest.mark.parametrize("fidelity", FIDELITIES)
+def test_a_fidelity_chooses_the_resolution_that_a_robot_does_not_name(fidelity):
+    preset, soft = Scene.preset(fidelity), Scene(Seastar(youngs_modulus=1e5))
+    assert Scene().at(fidelity) == preset and Scene().at() == Scene()
+    assert soft.at(fidelity).robot == dataclasses.replace(preset.robot, youngs_modulus=1e5)
+    assert soft.at(fidelity).robot.named_resolution == (preset.robot.discretisation, preset.robot.nodes_per_limb)
+    for nodes in (10, 12):  # the default, too, is kept where somebody names it
+        named = dataclasses.replace(Scene(dataclasses.replace(Seastar(), nodes_per_limb=nodes)), gravity=None)
+        assert named.at(fidelity).robot.nodes_per_limb == nodes
+    continuum = Scene(Seastar(discretisation="continuum"))
+    assert continuum.at(fidelity).robot.discretisation == "continuum"
+    held = Scene(held_nodes=(0, 1), loads=((11, 0.0, 1e-3),))
+    assert held.at(fidelity).robot == held.robot  # nodes are counted on a mesh
+
+
+def test_a_resolution_that_nobody_named_is_not_lost():
+    robot = Seastar(discretisation="chapter")
+    assert robot.nodes_per_limb == 10 and robot.named_resolution == ("chapter", None)
+    assert dataclasses.replace(robot, discretisation="continuum") == Seastar()
+    for same in (dataclasses.replace(Seastar(), limb_length=0.1), copy.deepcopy(Seastar()), Scene().of_robot(0).robot):
+        assert same == Seastar(nodes_per_limb=12) and same.named_resolution == (None, None)
+    with assert_refused("discretisation", "'exact'"):
+        Seastar(discretisation="exact")
+
+
 def test_chapter_robot_has_46_nodes_in_the_documented_order():
-    robot = Seastar()
+    robot = Seastar(nodes_per_limb=10)
     nodes = robot.nodes()
     assert robot.n_nodes == 46 and nodes.shape == (46, 2)
     assert robot.edge_length == pytest.approx(0.1 / 9)

@@ -276,7 +276,7 @@ def test_a_mirrored_robot_swims_the_mirrored_way():
         ({"limbs": (Limb(direction=0.0), *(Limb(),) * 4)}, "Either every limb"),
         ({"limbs": tuple(Limb(direction=x) for x in (0.0, 2.0, 1.0, 3.0, 4.0))}, "increase"),
         ({"limbs": tuple(Limb(direction=x) for x in (0.5, 1.0, 2.0, 3.0, 4.0))}, "begin at 0"),
-        ({"limbs": (Limb(natural_curvature=300.0),) * 5}, "too much for 10 nodes"),
+        ({"limbs": (Limb(natural_curvature=400.0),) * 5}, "too much for 12 nodes"),
         ({"n_limbs": 1, "hub_hinge": "turning", "discretisation": "chapter"}, "One limb"),
         ({"n_limbs": 0}, "from 1 to 12"),
     ],

@@ -91,6 +91,65 @@ def test_a_robot_with_a_lopsided_body_turns_about_its_centre_of_mass():
     assert errors[1] < 2e-5 and errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
 
 
+LOPSIDED = Body(
+    outline=((0.03, -0.01), (0.02, 0.02), (-0.02, 0.015), (-0.025, -0.02)), mass=4e-3, centre_of_mass=(4e-3, -3e-3),
+    attachments=(Attachment(0.03, 0.005, 0.3), Attachment(-0.01, 0.018, 1.4), Attachment(-0.02, -0.01, 3.6)),
+)  # fmt: skip
+"""Neither its centre of mass nor that of its limbs is the hub."""
+
+
+def thrown(numerics: Numerics, **parts) -> Simulator:
+    """A robot around a lopsided body that moves, turns and bends its limbs in vacuum."""
+    simulator = Simulator(Scene(Seastar(3, 5, body=LOPSIDED), None, SmaPulse(0.5), numerics, **parts))
+    set_moving(simulator, (0.05, -0.02), 3.0)
+    return simulator
+
+
+@pytest.mark.parametrize("newton_tolerance", [1e-4, 1e-10])
+@pytest.mark.parametrize("h", [0.05, 8e-3, 1e-3])
+@pytest.mark.parametrize("scheme", ["implicit-midpoint", "implicit-euler", "sdirk2", "sdirk3"])
+def test_a_robot_with_a_lopsided_body_keeps_its_momentum_to_rounding(scheme, h, newton_tolerance):
+    simulator = thrown(Numerics(scheme, h, newton_tolerance))
+    mass = simulator.coefficients.rods(0).mass.sum()
+    before, _ = momenta(simulator)
+    for pieces in (0.1, 0.033, 0.4):
+        simulator.advance(pieces, [[1.0, -0.5, 0.3]] if pieces == 0.1 else None)
+        after, _ = momenta(simulator)
+        assert np.abs(after - before).max() < 1e-11 * mass * np.abs(simulator.velocities).max()
+
+
+@pytest.mark.parametrize("scheme", ["implicit-midpoint", "implicit-euler", "sdirk2", "sdirk3"])
+def test_weight_gives_a_lopsided_body_its_impulse_to_rounding(scheme):
+    simulator = thrown(Numerics(scheme, 4e-3, 1e-10), gravity=(0.3, -0.5))
+    mass = simulator.coefficients.rods(0).mass.sum()
+    before, _ = momenta(simulator)
+    simulator.advance(0.3, [[1.0, -0.5, 0.3]])
+    impulse = mass * 0.3 * np.array([0.3, -0.5])
+    np.testing.assert_allclose(momenta(simulator)[0] - before, impulse, rtol=0.0, atol=1e-10 * mass)
+
+
+@pytest.mark.parametrize("h, share", [(8e-3, 1e-3), (4e-3, 1e-4), (1e-3, 5e-5)])
+def test_the_midpoint_rule_keeps_nearly_all_angular_momentum_of_a_robot_with_a_body(h, share):
+    simulator = thrown(Numerics("implicit-midpoint", h, 1e-10))
+    _, before = momenta(simulator)
+    simulator.advance(0.4, [[1.0, -0.5, 0.3]])
+    assert momenta(simulator)[1] == pytest.approx(before, rel=share)
+
+
+@pytest.mark.parametrize("scheme, order", [("implicit-midpoint", 2), ("implicit-euler", 1), ("sdirk2", 2)])
+def test_a_robot_with_a_lopsided_body_keeps_the_order_of_its_scheme(scheme, order):
+    """Angles and angular momentum, too, as steps get shorter; stiff edges ring, so limbs are soft."""
+    ends = []
+    for h in (2e-3, 1e-3, 2.5e-4):
+        simulator = thrown(Numerics(scheme, h, 1e-10))
+        _, spin = momenta(simulator)
+        simulator.advance(0.1, [[0.5, -0.3, 0.2]])
+        ends.append(np.array([*simulator.hub_position()[0], simulator.orientation()[0], momenta(simulator)[1] / spin]))
+    far, near = (np.abs(end[:3] - ends[-1][:3]) for end in ends[:-1])
+    assert np.linalg.norm(far) > 0.8 * 2**order * np.linalg.norm(near)
+    assert abs(ends[-1][3] - 1.0) < {1: 2e-2}.get(order, 1e-4)
+
+
 def complete_elliptic(k: float) -> float:
     a, b = 1.0, math.sqrt(1.0 - k * k)
     while abs(a - b) > 1e-15:

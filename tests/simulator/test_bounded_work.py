@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from hubs import TEN
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State, StrokeReport
 from seastar_gym.der.stepping.report import STEPS
 from seastar_gym.model import limits as module
@@ -38,7 +39,7 @@ def in_parts(simulator: Simulator, commands: np.ndarray, parts: int) -> tuple[np
 
 def test_error_control_and_halvings_together_keep_the_shortest_step_and_the_bound():
     """Error control goes down to 1/4096 here, and then Newton is stuck; on top of each other they took for ever."""
-    scene = Scene(Seastar(12), None, SmaPulse(1.3), Numerics.preset("accurate"))
+    scene = Scene(Seastar(12, 10), None, SmaPulse(1.3), Numerics.preset("accurate"))
     simulator, command = Simulator(scene), np.array([[1.0, -1.0] * 6])
     for _ in range(3):
         steps, report = in_parts(simulator, command, 200)
@@ -51,7 +52,7 @@ def test_error_control_and_halvings_together_keep_the_shortest_step_and_the_boun
 @pytest.mark.parametrize("speed", [0.0, 3.0], ids="{:g} m/s".format)
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_robots_that_need_more_iterations_than_they_have_fail_and_the_others_keep_every_bit(monkeypatch, scheme, speed):
-    scene = Scene(numerics=numerics(scheme, 0.05))
+    scene = Scene(TEN, numerics=numerics(scheme, 0.05))
     free, commands = swimmers(scene, speed=speed)
     needed = free.stroke(commands).newton_iterations
     most = int(np.median(needed))
@@ -75,12 +76,12 @@ def test_robots_that_need_more_iterations_than_they_have_fail_and_the_others_kee
 
 
 def test_a_robot_that_had_too_few_iterations_swims_again_after_a_reset(monkeypatch):
-    scene = Scene(numerics=numerics("implicit-euler", 0.05))
+    scene = Scene(TEN, numerics=numerics("implicit-euler", 0.05))
     with monkeypatch.context() as patch:
         patch.setattr(module, "MOST_ITERATIONS", -1950)  # and 100 for each of 20 steps
         simulator, commands = swimmers(scene, 3)
         assert (simulator.stroke(commands).status == SolverStatus.ITERATION_LIMIT).all()
-    simulator.set_scene(Scene(Seastar(density=1001.0), numerics=scene.numerics))
+    simulator.set_scene(Scene(Seastar(nodes_per_limb=10, density=1001.0), numerics=scene.numerics))
     assert simulator.failed.all()
     simulator.reset()
     assert not simulator.stroke(commands).status.any()
@@ -88,7 +89,8 @@ def test_a_robot_that_had_too_few_iterations_swims_again_after_a_reset(monkeypat
 
 def test_adapted_steps_that_were_halved_grow_again_within_their_interval():
     """From velocities that need short steps at first: without growth, they took 65,533 for the two intervals."""
-    scene = Scene(actuator=SmaPulse(0.3, 0.1, 0.1), numerics=Numerics("implicit-midpoint", 0.1, path_tolerance=0.02))
+    adapted = Numerics("implicit-midpoint", 0.1, path_tolerance=0.02)
+    scene = Scene(TEN, actuator=SmaPulse(0.3, 0.1, 0.1), numerics=adapted)
     simulator, rng = Simulator(scene, 8), np.random.default_rng(0)
     state = simulator.get_state()
     simulator.set_state(State(state.positions, 300.0 * rng.standard_normal(state.positions.shape), state.time))
@@ -101,6 +103,6 @@ def test_adapted_steps_that_were_halved_grow_again_within_their_interval():
 
 def test_the_bound_leaves_room_for_the_strokes_of_every_fidelity():
     for fidelity in ("fast", "balanced", "accurate", "reference", "chapter"):
-        scene = Scene(numerics=Numerics.preset(fidelity))
+        scene = Scene(TEN, numerics=Numerics.preset(fidelity))
         report = Simulator(scene).stroke([[1.0, -1.0, 1.0, -1.0, 1.0]])
         assert report.newton_iterations[0] < 0.05 * make_limits(scene).most_iterations

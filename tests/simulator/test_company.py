@@ -1,11 +1,28 @@
 """Whoever shares a lane group with a robot, and whatever becomes of them, it moves to the same bits as alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seastar_gym import Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, State, UniformCurrent, Water
+from hubs import TEN
+from seastar_gym import (
+    Body,
+    Contact,
+    Limb,
+    Numerics,
+    Scene,
+    Seastar,
+    Simulator,
+    SmaPulse,
+    State,
+    UniformCurrent,
+    Water,
+)
+from seastar_gym.envs.stations import heading_of
+from seastar_gym.scene.per_robot import side_by_side
 from seastar_gym.simd.lanes import N_LANES
 
 SCHEMES = ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
@@ -72,7 +89,7 @@ KINDS_OF_A_GROUP = st.lists(st.sampled_from(KINDS), min_size=N_LANES, max_size=N
 def brief(scheme: str, step: float, **terms) -> Scene:
     """A scene whose strokes take four steps."""
     return Scene(
-        actuator=SmaPulse(0.5, 2.0 * step, 2.0 * step), numerics=Numerics(scheme, step, max_iterations=20), **terms
+        TEN, actuator=SmaPulse(0.5, 2.0 * step, 2.0 * step), numerics=Numerics(scheme, step, max_iterations=20), **terms
     )
 
 
@@ -104,3 +121,33 @@ def test_a_neighbours_listed_pairs_take_no_place_from_a_robot_with_long_chains()
     """Chains too long for all pairs of node and edge at once; the pairs near a robot are counted robot by robot."""
     scene = brief("implicit-euler", 5e-3, robot=Seastar(nodes_per_limb=40), contact=Contact())
     assert_alike_in_company(scene, ["shifted", *["crumpled"] * (N_LANES - 2), "crossed"], 1)
+
+
+CURVED = Seastar(4, 5, limbs=(Limb(natural_curvature=(0.0, 6.0, -3.0)), Limb(), Limb(), Limb()))
+"""Three robots whose first limbs are bent differently at rest."""
+ON_A_BODY = replace(CURVED, body=Body.rectangle(0.06, 0.03))
+
+
+def unequal(robot: Seastar, order: list[int]) -> Simulator:
+    """Some of the three robots, in any order, each with a heading of its own."""
+    scene = side_by_side([Scene(robot).of_robot(k) for k in order])
+    simulator = Simulator(scene, len(order))
+    simulator.reset(heading=0.5 * np.array(order) - 0.3)
+    return simulator
+
+
+@pytest.mark.parametrize("order", [[0, 1, 2], [2, 0, 1], [1], [2]])
+@pytest.mark.parametrize("read", [Simulator.heading, heading_of])
+def test_a_heading_is_that_of_a_robots_own_shape_at_rest(read, order):
+    found = read(unequal(CURVED, order))
+    np.testing.assert_allclose(found, 0.5 * np.array(order) - 0.3, rtol=0.0, atol=1e-14)
+    alone = [read(unequal(CURVED, [robot]))[0] for robot in order]
+    np.testing.assert_array_equal(found, alone)
+
+
+@pytest.mark.parametrize("order", [[0, 1, 2], [2, 1, 0]])
+def test_a_state_without_orientation_has_that_of_every_robots_own_shape(order):
+    simulator = unequal(ON_A_BODY, order)
+    simulator.set_state(simulator.get_state()._replace(orientation=None))
+    np.testing.assert_allclose(simulator.orientation(), 0.5 * np.array(order) - 0.3, rtol=0.0, atol=1e-14)
+    assert simulator.elastic_energy().max() < 1e-20

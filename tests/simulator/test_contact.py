@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import oracle
+from hubs import TEN
 from refusals import assert_refused
 from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 from seastar_gym.model.rods import make_rods
@@ -70,7 +71,7 @@ def test_distinct_commands_stand_for_all():
 
 
 CROSSING = pytest.mark.parametrize(
-    "robot, peak_angle", [(Seastar(), 0.75), (Seastar(discretisation="chapter"), np.pi / 5)], ids=["rigid", "hinges"]
+    "robot, peak_angle", [(TEN, 0.75), (Seastar(discretisation="chapter"), np.pi / 5)], ids=["rigid", "hinges"]
 )
 """Where limbs would cross: the default's need to be driven past each other, the chapter's hub overshoots."""
 
@@ -100,7 +101,7 @@ def test_no_crossing_by_the_worst_commands(fidelity, robot, peak_angle):
 @pytest.mark.parametrize("peak_angle", [0.75, 0.85, 0.94])
 def test_limbs_driven_past_each_other_do_not_cross(peak_angle, fidelity):
     """Up to the largest peak angle that a scene accepts; where hub hinges come near pi, robots may fail, and say so."""
-    scene = Scene(actuator=SmaPulse(peak_angle), numerics=Numerics.preset(fidelity), contact=Contact())
+    scene = Scene(TEN, actuator=SmaPulse(peak_angle), numerics=Numerics.preset(fidelity), contact=Contact())
     simulator = Simulator(scene, len(CLOSING))
     for _ in range(2):
         crossed, status = crossed_on_the_way(simulator, CLOSING, 40)
@@ -112,7 +113,7 @@ def test_limbs_driven_past_each_other_do_not_cross(peak_angle, fidelity):
 @pytest.mark.parametrize("fidelity", ["fast", "balanced"])
 def test_no_crossing_in_a_thousand_strokes(fidelity):
     rng = np.random.default_rng(1)
-    simulator = Simulator(Scene(numerics=Numerics.preset(fidelity), contact=Contact()), 2 * len(DISTINCT))
+    simulator = Simulator(Scene(TEN, numerics=Numerics.preset(fidelity), contact=Contact()), 2 * len(DISTINCT))
     for _ in range(1000):
         crossed, status = crossed_on_the_way(simulator, worst_commands(rng, DISTINCT), 20)
         assert not crossed.any()
@@ -123,7 +124,7 @@ def test_limbs_that_do_not_meet_swim_as_without_contact():
     straight = np.tile([0.0, 1.0, 0.0, 0.0, -1.0], (2, 1))
     ends = []
     for contact in (None, Contact()):
-        simulator = Simulator(Scene(contact=contact), 2)
+        simulator = Simulator(Scene(TEN, contact=contact), 2)
         for _ in range(3):
             simulator.stroke(straight)
         ends.append(simulator.positions)
@@ -132,7 +133,7 @@ def test_limbs_that_do_not_meet_swim_as_without_contact():
 
 def test_a_robot_swims_alike_in_any_company():
     """Who else is in its lane group, and what they touch, changes no bit."""
-    scene = Scene(numerics=Numerics.preset("balanced"), contact=Contact())
+    scene = Scene(TEN, numerics=Numerics.preset("balanced"), contact=Contact())
     together = Simulator(scene, len(CLOSING), threads=2)
     together.stroke(CLOSING)
     for robot in (0, 17, 61, len(CLOSING) - 1):
@@ -142,11 +143,11 @@ def test_a_robot_swims_alike_in_any_company():
 
 
 def test_moduli_of_each_robot():
-    scene = Scene(contact=Contact(modulus=np.array([1e4, 1e6])))
+    scene = Scene(TEN, contact=Contact(modulus=np.array([1e4, 1e6])))
     both = Simulator(scene, 2)
     both.stroke(np.tile(CLOSING[5], (2, 1)))
     for robot, modulus in enumerate((1e4, 1e6)):
-        alone = Simulator(Scene(contact=Contact(modulus=modulus)), 1)
+        alone = Simulator(Scene(TEN, contact=Contact(modulus=modulus)), 1)
         alone.stroke(CLOSING[5:6])
         np.testing.assert_array_equal(alone.positions[0], both.positions[robot])
     assert (both.positions[0] != both.positions[1]).any()
@@ -155,7 +156,7 @@ def test_moduli_of_each_robot():
 @pytest.mark.parametrize("scheme", ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"])
 def test_limbs_push_each_other_alike(scheme):
     """In vacuum nothing but actuators and contact acts, so the momentum stays."""
-    scene = Scene(fluid=None, numerics=Numerics(scheme, 2e-3, newton_tolerance=1e-10), contact=Contact())
+    scene = Scene(TEN, fluid=None, numerics=Numerics(scheme, 2e-3, newton_tolerance=1e-10), contact=Contact())
     simulator = Simulator(scene, 1)
     masses = make_rods(scene).mass
     for _ in simulator.stroke_in_parts(np.array([[1.0, -1.0, 0.0, 0.0, 0.0]]), 100):
@@ -168,7 +169,7 @@ def test_pressed_limbs_rest_where_statics_says():
     pushes with what bending of the last hinge leaves of F, EI/dl over the edge length squared times the way of the tip.
     """
     gap, force, opening = 0.04, 0.02, 0.0385
-    robot = Seastar(n_limbs=2, limbs=(Limb(direction=0.0), Limb(direction=gap)))
+    robot = Seastar(nodes_per_limb=10, n_limbs=2, limbs=(Limb(direction=0.0), Limb(direction=gap)))
     tip, nodes = robot.nodes_per_limb - 1, robot.nodes()
     push = np.array([-np.sin(gap), np.cos(gap)])
     scene = Scene(
@@ -197,7 +198,7 @@ def test_schemes_agree_on_limbs_that_meet():
     """Contact is inelastic and of first order with every scheme: with shorter steps they come together."""
 
     def swim(scheme, step):
-        simulator = Simulator(Scene(numerics=Numerics(scheme, step), contact=Contact()), 1)
+        simulator = Simulator(Scene(TEN, numerics=Numerics(scheme, step), contact=Contact()), 1)
         for _ in range(2):
             simulator.stroke(np.array([[1.0, -1.0, 0.0, 0.0, 0.0]]))
         return simulator.hub_position()[0]
@@ -212,7 +213,7 @@ def test_schemes_agree_on_limbs_that_meet():
 @pytest.mark.parametrize("numerics", [Numerics("sdirk2", 0.02), Numerics("implicit-midpoint", 5e-3)], ids=str)
 def test_neighbours_thrown_at_each_other_bounce_or_stop_but_never_cross(numerics, speed, stopped):
     """Two limbs turn towards each other, their tips so fast [m/s]. Surfaces that yield hold them up to about 25 m/s."""
-    simulator = Simulator(Scene(Seastar(), None, numerics=numerics, contact=Contact()))
+    simulator = Simulator(Scene(TEN, None, numerics=numerics, contact=Contact()))
     state = simulator.get_state()
     arms = state.positions[0, 1:].reshape(5, -1, 2) - state.positions[0, 0]
     across = np.stack([-arms[..., 1], arms[..., 0]], axis=-1) * np.array([speed, -speed, 0, 0, 0])[:, None, None] / 0.1
@@ -226,10 +227,10 @@ def test_neighbours_thrown_at_each_other_bounce_or_stop_but_never_cross(numerics
 def test_a_long_limb_meets_one_beyond_its_neighbour():
     """If lengths differ, every pair may touch: limbs 1 and 3 reach over a short limb 2."""
     limbs = (Limb(), Limb(length=0.03), Limb(), Limb(), Limb())
-    rods = make_rods(Scene(robot=Seastar(limbs=limbs), contact=Contact()))
+    rods = make_rods(Scene(robot=Seastar(nodes_per_limb=10, limbs=limbs), contact=Contact()))
     pairs = {tuple(pair) for pair in rods.contact.pairs.reshape(-1, 2).astype(int).tolist()}
     assert {(0, 1), (0, 2), (4, 1)} <= pairs
-    assert len(make_rods(Scene(contact=Contact())).contact.pairs) == 10
+    assert len(make_rods(Scene(TEN, contact=Contact())).contact.pairs) == 10
 
 
 @pytest.mark.parametrize(
@@ -238,8 +239,8 @@ def test_a_long_limb_meets_one_beyond_its_neighbour():
         (lambda: Contact(modulus=0.0), "modulus"),
         (lambda: Contact(modulus=np.nan), "modulus"),
         (lambda: Contact(opening_angle=-0.1), "opening_angle"),
-        (lambda: Scene(contact=True), "contact"),
-        (lambda: Scene(contact=Contact(opening_angle=1.3)), "touch at rest"),
+        (lambda: Scene(TEN, contact=True), "contact"),
+        (lambda: Scene(TEN, contact=Contact(opening_angle=1.3)), "touch at rest"),
         (lambda: Scene(robot=Seastar(n_limbs=1), actuator=SmaPulse(peak_angle=0.0), contact=Contact()), "half a turn"),
         (lambda: Scene(robot=CROSSED, contact=Contact()), "cross at rest"),
     ],
@@ -253,7 +254,7 @@ def test_bad_contact_is_refused_in_one_sentence(make, sentence):
 def test_contact_beside_other_terms():
     """Added mass, drag along limbs, damping and a current are terms beside it; nothing fails."""
     scene = Scene(
-        robot=Seastar(relaxation_time=1.6e-3),
+        robot=Seastar(nodes_per_limb=10, relaxation_time=1.6e-3),
         fluid=Water(tangential_drag_coefficient=0.1, added_mass_coefficient=1.0),
         numerics=Numerics.preset("balanced"),
         contact=Contact(),

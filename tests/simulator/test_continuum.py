@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
+from hubs import TEN
 from momenta import momenta
 from refusals import assert_refused
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, State
 from seastar_gym.gaits import PAIRS, STRAIGHT
 from seastar_gym.model.rods import make_rods
 
-TEN = Seastar()
+TEN = TEN
 LIMIT = {"straight": 34.360, "{1-,2+}": 28.189, "{1-,4+}": 39.355, "{1-,5+}": 32.282}
 """Distances after ten strokes with N to infinity and h to 0 [mm]."""
 AFTER_ONE = 4.708

@@ -269,6 +269,35 @@ def test_a_robot_that_fails_has_no_estimate_until_its_reset():
     assert np.isfinite(simulator.stroke(COMMANDS[2]).error_estimate).all()
 
 
+def test_a_robot_whose_twin_fails_has_no_estimate_until_its_reset():
+    simulator, plain = swimmers(n_strokes=1), Simulator(FAST, N_ROBOTS, 1)
+    simulator._bars.twin.v[0, 0, 2] = np.nan
+    for commands in COMMANDS[1:3]:
+        report = simulator.stroke(commands)
+        assert not simulator.failed.any() and not report.status.any()
+        assert np.isnan(report.error_estimate).tolist() == simulator._bars.twin.failed.tolist()
+        assert np.isnan(simulator.error_estimate).sum() == 1
+    for commands in COMMANDS[:3]:
+        plain.stroke(commands)
+    np.testing.assert_array_equal(simulator.positions, plain.positions)
+    simulator.reset(np.isnan(simulator.error_estimate))
+    assert np.isfinite(simulator.stroke(COMMANDS[3]).error_estimate).all()
+
+
+@pytest.mark.parametrize("lengths", [0.1, (0.1, 0.2)], ids=["one length", "each its own"])
+def test_the_estimate_is_at_least_what_newton_leaves(lengths):
+    """Newton's tolerance counts beside the distance of the two hubs, in limb lengths, but not at rest."""
+    robot = replace(FAST.robot, limb_length=np.array(lengths) if np.ndim(lengths) else lengths)
+    numerics = Numerics("implicit-midpoint", 5e-3, newton_tolerance=1e-3)
+    simulator = Simulator(replace(FAST, robot=robot, numerics=numerics), 2, error_bars=True)
+    assert not simulator.error_estimate.any()
+    estimate = simulator.stroke(COMMANDS[0, :2]).error_estimate
+    distance = np.linalg.norm(simulator.hub_position() - simulator._bars.twin.hub_position(), axis=1)
+    floor = 1e-3 * np.broadcast_to(lengths, 2)
+    assert (distance > 0.0).all()
+    np.testing.assert_allclose(estimate, error_bars.FACTORS["implicit-midpoint"] * (distance + floor), rtol=1e-12)
+
+
 def test_limb_strengths_hold_for_the_twin():
     strengths = (1.0, 0.5, 0.0, 0.8, 1.0)
     simulator = Simulator(FAST, N_ROBOTS, 1, error_bars=True)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from hubs import TEN
 from refusals import assert_refused
 from seastar_gym import Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 
@@ -13,7 +14,8 @@ MIDPOINT = Numerics("implicit-midpoint", 0.01, newton_tolerance=1e-10)
 
 def test_a_robot_in_vacuum_falls_freely_with_whatever_density_and_taper():
     limbs = (Limb(radius=(2e-3, 1e-3)), Limb(), Limb(length=0.05), Limb(), Limb())
-    simulator = Simulator(Scene(Seastar(density=1300.0, limbs=limbs), None, numerics=MIDPOINT, gravity=G))
+    robot = Seastar(nodes_per_limb=10, density=1300.0, limbs=limbs)
+    simulator = Simulator(Scene(robot, None, numerics=MIDPOINT, gravity=G))
     at_rest = simulator.positions[0]
     simulator.stroke(STILL)
     np.testing.assert_allclose(simulator.velocities[0], np.tile(G, (46, 1)), rtol=1e-9)
@@ -23,7 +25,7 @@ def test_a_robot_in_vacuum_falls_freely_with_whatever_density_and_taper():
 @pytest.mark.parametrize("density", [1100.0, 900.0])
 def test_a_straight_limb_sinks_or_rises_broadside_with_its_terminal_velocity(density):
     radius, C_d = 1.6e-3, 1.2
-    robot = Seastar(n_limbs=1, density=density, rod_radius=radius)
+    robot = Seastar(nodes_per_limb=10, n_limbs=1, density=density, rod_radius=radius)
     water = Water(drag_coefficient=C_d)
     simulator = Simulator(Scene(robot, water, SmaPulse(0.0), Numerics("sdirk2", 0.02), gravity=(0.0, -9.81)))
     for _ in range(5):
@@ -36,14 +38,14 @@ def test_a_straight_limb_sinks_or_rises_broadside_with_its_terminal_velocity(den
 
 
 def test_limbs_as_dense_as_the_water_feel_no_gravity():
-    simulator, floating = Simulator(Scene()), Simulator(Scene(gravity=G))
+    simulator, floating = Simulator(Scene(TEN)), Simulator(Scene(TEN, gravity=G))
     for each in (simulator, floating):
         each.stroke([[0, 1, 0, 0, -1]])
     np.testing.assert_allclose(floating.positions, simulator.positions, rtol=0.0, atol=1e-15)
 
 
 def test_weights_add_to_loads_and_differ_from_robot_to_robot():
-    robots = Seastar(density=np.array([1000.0, 2000.0]))
+    robots = Seastar(nodes_per_limb=10, density=np.array([1000.0, 2000.0]))
     scene = Scene(robots, None, numerics=MIDPOINT, gravity=(0.0, -1.0), loads=((0, 0.0, 1e-3),))
     simulator = Simulator(scene, 2)
     simulator.stroke(np.zeros((2, 5)))
@@ -55,4 +57,4 @@ def test_weights_add_to_loads_and_differ_from_robot_to_robot():
 @pytest.mark.parametrize("gravity", [(0.0,), (0.0, float("nan")), 9.81, (0.0, 0.0, -9.81), "down"])
 def test_gravity_that_is_not_two_numbers_is_refused(gravity):
     with assert_refused("gravity"):
-        Scene(gravity=gravity)
+        Scene(TEN, gravity=gravity)

@@ -9,6 +9,7 @@ import pytest
 
 from refusals import assert_refused
 from seastar_gym import (
+    Body,
     Limited,
     MeasuredCurve,
     Numerics,
@@ -20,6 +21,7 @@ from seastar_gym import (
     SmaWires,
     State,
     ThermalSma,
+    Water,
 )
 from seastar_gym.simulator.schedule import interval_times, step_times
 
@@ -99,6 +101,36 @@ def test_an_interval_in_pieces_is_the_whole(actuator, cuts):
     off = np.abs(pieces.hub_position() - whole.hub_position()).max()
     on_grid = all(abs(cut / 0.01 - round(cut / 0.01)) < 1e-9 for cut in cuts)
     assert off < (1e-9 if on_grid else 1e-5), off
+
+
+def parted(scene: Scene, cut: float) -> tuple[float, float]:
+    """Distance of hubs over a limb's length, and of velocities over the largest, after a stroke in two pieces."""
+    whole, pieces = Simulator(scene), Simulator(scene)
+    whole.advance(1.0, [[1.0, -0.5, 0.3, 0.0, -1.0]])
+    pieces.advance(cut, [[1.0, -0.5, 0.3, 0.0, -1.0]])
+    pieces.advance(1.0 - cut)
+    hub = np.abs(pieces.hub_position() - whole.hub_position()).max() / 0.1
+    return hub, np.abs(pieces.velocities - whole.velocities).max() / np.abs(whole.velocities).max()
+
+
+LINEARISED = {
+    "a body": Scene(Seastar(nodes_per_limb=6, body=Body(radius=0.02, mass=0.01, centre_of_mass=(0.01, 0.005)))),
+    "flow along limbs": Scene(Seastar(), Water(tangential_drag_coefficient=0.2, added_mass_coefficient=0.5)),
+}
+
+
+@pytest.mark.parametrize("scene", LINEARISED.values(), ids=LINEARISED)
+def test_what_is_linearised_at_a_first_guess_leaves_pieces_by_1e_5_limb_lengths(scene):
+    """Though they end where time steps do."""
+    tight = replace(scene, numerics=Numerics("implicit-midpoint", 0.003, newton_tolerance=1e-10))
+    for cut in (0.1 + 10 * 0.003, 0.1 + 100 * 0.003):
+        assert 1e-9 < parted(tight, cut)[0] < 1e-5
+
+
+def test_a_cut_within_a_step_moves_ringing_limbs_by_some_per_cent_of_their_speed_and_the_hub_hardly():
+    off = np.array([parted(FAST, 0.1 + (steps + share) * 0.005) for steps in (6, 60) for share in (0.15, 0.5, 0.85)])
+    assert off[:, 0].max() < 1e-5
+    assert 0.01 < off[:, 1].max() < 0.05
 
 
 def test_random_cuts_of_many_commands_are_the_scheme_s_accuracy_away():

@@ -1,10 +1,13 @@
 """The lock of a simulator refuses a second change, and knows which one was interrupted."""
 
+import os
+import signal
 import threading
 
 import pytest
 
 from seastar_gym.simulator.lock import BROKEN_OFF, ELSEWHERE, PAUSED, StrokeLock
+from seastar_gym.simulator.workers import Workers
 
 
 def refused(call, sentence: str) -> None:
@@ -72,3 +75,71 @@ def test_a_stroke_whose_lock_was_taken_does_not_resume():
     lock.release()
     lock.acquire()
     assert not lock.resume(stroke)
+
+
+def passes_in_a_fork(promise) -> bool:
+    """Whether a promise holds, within half a minute, in a forked process, which has no other threads."""
+    child = os.fork()
+    if child == 0:
+        signal.alarm(30)
+        try:
+            promise()
+        except BaseException:
+            os._exit(1)
+        os._exit(0)
+    return os.waitpid(child, 0)[1] == 0
+
+
+def test_a_change_by_a_thread_that_a_fork_does_not_have_is_an_interrupted_one():
+    """Nobody in the fork would end it: it takes the lock over, and knows that robots have to be repaired."""
+    lock = StrokeLock()
+    in_a_thread(lock.acquire)
+
+    def is_taken_over():
+        refused(lock.require_intact, BROKEN_OFF)
+        with lock.change(repairs=True):
+            assert lock.broken
+        lock.require_intact()
+
+    assert passes_in_a_fork(is_taken_over)
+    refused(lock.acquire, ELSEWHERE)  # the parent's thread goes on
+
+
+def test_a_paused_stroke_is_paused_in_a_fork_too():
+    lock = StrokeLock()
+    stroke = lock.acquire()
+    lock.pause()
+
+    def goes_on():
+        refused(lock.acquire, PAUSED)
+        assert lock.resume(stroke)
+        lock.release()
+        lock.require_intact()
+
+    assert passes_in_a_fork(goes_on)
+    refused(lock.acquire, PAUSED)
+
+
+def work_on_two_threads(workers: Workers) -> None:
+    """Both of them, for each waits for the other."""
+    both = threading.Barrier(2, timeout=20.0)
+    workers.run(lambda thread, part: both.wait() and None, [slice(0, 1), slice(1, 2)])
+
+
+@pytest.mark.parametrize("closes", [False, True])
+def test_a_fork_has_threads_of_its_own_to_work_with_and_to_close(closes):
+    workers = Workers(2)
+    work_on_two_threads(workers)
+
+    def works():
+        if closes:
+            workers.close()  # those of the parent, which do not run here
+        for _ in range(3):
+            work_on_two_threads(workers)
+        assert threading.active_count() == 3
+        workers.close()
+        assert threading.active_count() == 1
+
+    assert passes_in_a_fork(works)
+    work_on_two_threads(workers)
+    workers.close()

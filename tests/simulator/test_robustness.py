@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import oracle
 from continuum_oracle import Continuum
-from hubs import HUBS, robot_with
+from hubs import HUBS, TEN, robot_with
 from momenta import momenta
 from oracle import Star
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State, StrokeReport, Water
@@ -137,13 +137,13 @@ def opposed(n_limbs: int = 5) -> np.ndarray:
 @pytest.mark.parametrize(
     "robot, step, speed",
     [
-        (Seastar(), 0.01, 0.1),
-        (Seastar(), 0.05, 100.0),
+        (TEN, 0.01, 0.1),
+        (TEN, 0.05, 100.0),
         (Seastar(nodes_per_limb=40), 0.05, 0.0),
         (Seastar(nodes_per_limb=80), 0.05, 0.0),
-        (Seastar(), 0.01, 0.0),
-        (Seastar(), 0.2, 0.0),
-        *((Seastar(youngs_modulus=10.0**k), 0.02, 0.0) for k in range(2, 12)),
+        (TEN, 0.01, 0.0),
+        (TEN, 0.2, 0.0),
+        *((Seastar(nodes_per_limb=10, youngs_modulus=10.0**k), 0.02, 0.0) for k in range(2, 12)),
     ],
     ids=lambda value: f"{value.nodes_per_limb} nodes, {value.youngs_modulus:g} Pa" if type(value) is Seastar else None,
 )
@@ -166,7 +166,7 @@ def test_hard_cases_arrive(robot, step, speed, scheme):
 def test_a_number_that_is_none_ends_its_own_robots_stroke_and_touches_no_other(scheme, row, where, value):
     """The robot is laid out at rest where its hub was, and waits for a reset."""
     n_robots, ill = N_LANES + 2, 1
-    scene, others = Scene(numerics=Numerics(scheme, 0.02)), np.arange(N_LANES + 2) != 1
+    scene, others = Scene(TEN, numerics=Numerics(scheme, 0.02)), np.arange(N_LANES + 2) != 1
     well, sick = Simulator(scene, n_robots), Simulator(scene, n_robots)
     commands = random_commands(n_robots, 3)
     for simulator in (well, sick):
@@ -190,7 +190,7 @@ def test_a_number_that_is_none_ends_its_own_robots_stroke_and_touches_no_other(s
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_robots_in_trouble_move_to_the_same_bits_alone_in_a_batch_and_on_two_threads(scheme):
-    n_robots, scene = N_LANES + 3, Scene(numerics=Numerics(scheme, 0.01))
+    n_robots, scene = N_LANES + 3, Scene(TEN, numerics=Numerics(scheme, 0.01))
     batches = [rattled(Simulator(scene, n_robots, threads), 1.0) for threads in (1, 2)]
     state = batches[0].get_state()
     singles = [Simulator(scene) for _ in range(n_robots)]
@@ -225,7 +225,7 @@ def test_linear_momentum_stays_to_rounding_whatever_a_step_needs(scheme):
     needed, cuts = 0, 0
     for step in (1e-3, 1e-2, 5e-2):
         for speed in (1.0, 10.0, 100.0):
-            simulator = rattled(Simulator(Scene(fluid=None, numerics=Numerics(scheme, step)), 8), speed)
+            simulator = rattled(Simulator(Scene(TEN, fluid=None, numerics=Numerics(scheme, step)), 8), speed)
             before, _ = kept(simulator)
             report = simulator.stroke(np.zeros((8, 5)))
             after, _ = kept(simulator)
@@ -254,7 +254,7 @@ def test_linear_momentum_stays_to_rounding_at_any_tolerance_and_stiffness(scheme
 def test_implicit_midpoint_keeps_angular_momentum_where_steps_are_halved_and_velocities_cut():
     """No other scheme does, see test_swim.py, nor do steps that were halved so often that implicit Euler made them."""
     numerics = Numerics("implicit-midpoint", 1e-3, newton_tolerance=1e-12)
-    simulator = rattled(Simulator(Scene(fluid=None, numerics=numerics), 8), 1.0)
+    simulator = rattled(Simulator(Scene(TEN, fluid=None, numerics=numerics), 8), 1.0)
     _, before = kept(simulator)
     report = simulator.stroke(np.zeros((8, 5)))
     _, after = kept(simulator)
@@ -273,7 +273,8 @@ def test_50_strokes_turn_and_mirror_with_their_commands_to_a_multiple_of_roundin
 
     Not from every one: a nudge may be to the side they take anyway, so there are four. At 50 ms they find two robots.
     """
-    mirror, robots = [0, 4, 3, 2, 1], [Simulator(Scene(numerics=Numerics(scheme, step)), N_LANES) for _ in range(7)]
+    scene, mirror = Scene(TEN, numerics=Numerics(scheme, step)), [0, 4, 3, 2, 1]
+    robots = [Simulator(scene, N_LANES) for _ in range(7)]
     at_rest, rng = robots[0].get_state(), np.random.default_rng(0)
     for twin in robots[3:]:
         nudge = 1e-16 * rng.standard_normal(at_rest.positions.shape)
@@ -300,7 +301,7 @@ def test_50_strokes_turn_and_mirror_with_their_commands_to_a_multiple_of_roundin
 def energies(numerics: Numerics, fluid: Water | None, speed: float, n_steps: int = 60) -> np.ndarray:
     """Energies of eight rattled robots after every step, over the first, shape (n_steps + 1, 8)."""
     half = 0.5 * n_steps * numerics.step
-    simulator = rattled(Simulator(Scene(Seastar(), fluid, SmaPulse(0.0, half, half), numerics), 8), speed)
+    simulator = rattled(Simulator(Scene(TEN, fluid, SmaPulse(0.0, half, half), numerics), 8), speed)
     found = [simulator.elastic_energy() + simulator.kinetic_energy()]
     for _ in simulator.stroke_in_parts(np.zeros((8, 5)), n_steps):
         found.append(simulator.elastic_energy() + simulator.kinetic_energy())

@@ -6,6 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import oracle
+from hubs import TEN
 from seastar_gym import Numerics, Scene, Simulator
 from seastar_gym.simulator.schedule import step_times
 
@@ -55,7 +56,7 @@ def test_a_step_longer_than_the_ramps_still_sees_both_corners(scheme):
     """The robot ends where it ends with steps of exactly the ramps' lengths."""
     ends = []
     for step in (0.9, 5.0):
-        simulator = Simulator(Scene(numerics=Numerics(scheme, step)))
+        simulator = Simulator(Scene(TEN, numerics=Numerics(scheme, step)))
         report = simulator.stroke([[0.0, 0.5, 0.0, 0.0, -0.5]])
         assert report.covered[0] == pytest.approx(1.0)
         ends.append(simulator.positions)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hubs import robot_with
+from hubs import TEN, robot_with
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State, StrokeReport, Water
 from seastar_gym.simd.lanes import N_LANES
 
@@ -23,8 +23,8 @@ STRAIGHT = np.array([[0.0, 1.0, 0.0, 0.0, -1.0]])
 def scene_of(scheme="implicit-midpoint", step=0.01, **numerics) -> Scene:
     """The chapter's robot; "adaptive" is the implicit midpoint rule with steps adapted to their error."""
     if scheme == "adaptive":
-        return Scene(numerics=Numerics("implicit-midpoint", step, path_tolerance=0.02, **numerics))
-    return Scene(numerics=Numerics(scheme, step, **numerics))
+        return Scene(TEN, numerics=Numerics("implicit-midpoint", step, path_tolerance=0.02, **numerics))
+    return Scene(TEN, numerics=Numerics(scheme, step, **numerics))
 
 
 def random_commands(n_robots: int, n_strokes: int = 3, seed: int = 0) -> np.ndarray:
@@ -53,8 +53,8 @@ def assert_same_bits(one: State, other: State) -> None:
 
 
 def test_robots_begin_at_rest_with_the_hub_at_the_origin():
-    simulator = Simulator(Scene(), n_robots=3)
-    np.testing.assert_array_equal(simulator.positions, np.tile(Seastar().nodes(), (3, 1, 1)))
+    simulator = Simulator(Scene(TEN), n_robots=3)
+    np.testing.assert_array_equal(simulator.positions, np.tile(TEN.nodes(), (3, 1, 1)))
     for zero in (simulator.velocities, simulator.time, simulator.hub_position(), simulator.hub_velocity()):
         assert not zero.any()
     assert simulator.positions.shape == simulator.velocities.shape == (3, 46, 2)
@@ -67,13 +67,13 @@ def test_a_robot_left_alone_stays_where_it_is(scheme):
     simulator = Simulator(scene_of(scheme))
     for _ in range(3):
         simulator.stroke(np.zeros((1, 5)))
-    np.testing.assert_allclose(simulator.positions[0], Seastar().nodes(), rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(simulator.positions[0], TEN.nodes(), rtol=0.0, atol=1e-13)
     assert simulator.elastic_energy()[0] < 1e-25
 
 
 def test_held_nodes_stay_where_they_are_to_the_last_bit():
     held = [0, 1, 2]
-    simulator = Simulator(Scene(held_nodes=(0, 1, 2), numerics=Numerics("implicit-midpoint", 0.01)), 2)
+    simulator = Simulator(Scene(TEN, held_nodes=(0, 1, 2), numerics=Numerics("implicit-midpoint", 0.01)), 2)
     state = simulator.get_state()
     simulator.set_state(state._replace(positions=state.positions + 0.03, velocities=state.velocities + 0.01))
     start = simulator.positions
@@ -97,7 +97,7 @@ def test_what_is_read_is_a_copy():
 
 
 def test_time_counts_strokes():
-    simulator = Simulator(Scene(actuator=SmaPulse(heating_time=0.1, cooling_time=0.2), numerics=Numerics(step=0.05)))
+    simulator = Simulator(Scene(TEN, actuator=SmaPulse(cooling_time=0.2), numerics=Numerics(step=0.05)))
     for _ in range(1000):
         simulator.stroke(np.zeros((1, 5)))
     assert simulator.time[0] == 1000 * (0.1 + 0.2)
@@ -110,7 +110,7 @@ def test_reset_puts_the_chosen_robots_at_rest_and_touches_no_other():
     simulator.reset(mask)
     after = simulator.get_state()
     assert_same_bits(after.of_robots(~mask), before.of_robots(~mask))
-    np.testing.assert_array_equal(after.positions[mask], np.tile(Seastar().nodes(), (mask.sum(), 1, 1)))
+    np.testing.assert_array_equal(after.positions[mask], np.tile(TEN.nodes(), (mask.sum(), 1, 1)))
     assert not after.velocities[mask].any() and not after.time[mask].any()
 
 
@@ -127,11 +127,11 @@ def test_no_state_leaks_across_a_reset():
 
 
 def test_heading_turns_the_robot_at_rest():
-    simulator, headings = Simulator(Scene(), n_robots=3), np.array([0.0, 0.7, -3.0])
+    simulator, headings = Simulator(Scene(TEN), n_robots=3), np.array([0.0, 0.7, -3.0])
     simulator.reset(heading=headings)
     for nodes, heading in zip(simulator.positions, headings, strict=True):
         c, s = np.cos(heading), np.sin(heading)
-        np.testing.assert_allclose(nodes, Seastar().nodes() @ [[c, s], [-s, c]], rtol=0.0, atol=1e-16)
+        np.testing.assert_allclose(nodes, TEN.nodes() @ [[c, s], [-s, c]], rtol=0.0, atol=1e-16)
     simulator.reset(np.array([False, True, False]), heading=1.0)
     np.testing.assert_allclose(simulator.positions[1, 9], [0.1 * np.cos(1.0), 0.1 * np.sin(1.0)], rtol=1e-14)
 
@@ -270,7 +270,7 @@ def test_a_stroke_in_parts_gives_the_same_bits_as_a_whole_one(scheme, parts):
 
 def test_a_stroke_of_any_length_pauses_after_equal_times():
     numerics = Numerics("implicit-midpoint", 1e-29)
-    simulator = Simulator(Scene(actuator=SmaPulse(0.1, 1e-28, 9e-28), numerics=numerics))
+    simulator = Simulator(Scene(TEN, actuator=SmaPulse(0.1, 1e-28, 9e-28), numerics=numerics))
     times, _ = finish(simulator.stroke_in_parts(np.zeros((1, 5)), 10))
     np.testing.assert_allclose(times, 1e-28 * np.arange(1, 11), rtol=1e-9, atol=0.0)
 
@@ -424,7 +424,7 @@ def test_robots_with_wild_velocities_arrive(scheme, speed):
 
 
 @pytest.mark.parametrize(
-    "robot, step", [(Seastar(nodes_per_limb=40), 0.05), (Seastar(), 0.01), (Seastar(n_limbs=12), 0.02)]
+    "robot, step", [(Seastar(nodes_per_limb=40), 0.05), (TEN, 0.01), (Seastar(n_limbs=12), 0.02)]
 )
 def test_scenes_that_defeat_plain_newton_arrive(robot, step):
     commands = np.resize([1.0, -1.0], (1, robot.n_limbs))
@@ -446,7 +446,7 @@ def test_nodes_are_within_the_tolerance_as_a_rule_and_nowhere_far_beyond_it(sche
     actuator, ends = SmaPulse(heating_time=h, cooling_time=h), {}
     for tolerance in (1e-6, 1e-8, 1e-13):
         numerics = Numerics(scheme, h, newton_tolerance=tolerance)
-        simulator = Simulator(Scene(actuator=actuator, numerics=numerics), n_robots)
+        simulator = Simulator(Scene(TEN, actuator=actuator, numerics=numerics), n_robots)
         simulator.set_state(swimmers.get_state())
         parts = simulator.stroke_in_parts(random_commands(n_robots, seed=1)[0], 2)
         next(parts)
@@ -462,7 +462,7 @@ def test_a_step_that_does_not_converge_is_two_steps_of_half_its_length():
     h, ends, halvings = 0.01, {}, {}
     for step, max_iterations in ((h, 2), (h / 2, 60), (h, 60)):
         numerics = Numerics("implicit-euler", step, newton_tolerance=1e-4, max_iterations=max_iterations)
-        simulator = Simulator(Scene(actuator=SmaPulse(0.1, h, h), numerics=numerics))
+        simulator = Simulator(Scene(TEN, actuator=SmaPulse(0.1, h, h), numerics=numerics))
         set_motion(simulator, random_velocities(1, 0.01))
         report = simulator.stroke(STRAIGHT)
         halvings[step, max_iterations], ends[step, max_iterations] = report.halvings[0], simulator.positions
@@ -562,7 +562,7 @@ def test_every_status_is_one_sentence():
 def test_vacuum_and_water_without_density_give_the_same_bits():
     ends = []
     for fluid in (None, Water(density=0.0)):
-        simulator = Simulator(Scene(fluid=fluid, numerics=Numerics(step=0.01)))
+        simulator = Simulator(Scene(TEN, fluid=fluid, numerics=Numerics(step=0.01)))
         simulator.stroke(STRAIGHT)
         ends.append(simulator.positions)
     np.testing.assert_array_equal(*ends)

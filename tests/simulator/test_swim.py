@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import oracle
-from hubs import HUBS, robot_with
+from hubs import HUBS, TEN, robot_with
 from momenta import momenta
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 from seastar_gym.model.rods import make_rods
@@ -16,7 +16,7 @@ STRAIGHT = np.array([[0.0, 1.0, 0.0, 0.0, -1.0]])
 FIFTH_OF_TURN = 2.0 * np.pi / 5.0
 
 
-def swimmer(scheme, step, n_robots=1, fluid=Water(), robot=Seastar(), **numerics) -> Simulator:
+def swimmer(scheme, step, n_robots=1, fluid=Water(), robot=TEN, **numerics) -> Simulator:
     return Simulator(Scene(robot, fluid, numerics=Numerics(scheme, step, **numerics)), n_robots)
 
 
@@ -64,7 +64,7 @@ def test_symmetric_gait_does_not_drift_sideways(scheme):
 
 
 CONVERGED = pytest.mark.parametrize(
-    "robot, one, ten", [(CHAPTER, 4.91276e-3, 38.4133e-3), (Seastar(), 4.70556e-3, 34.3600e-3)], ids=["chapter", "new"]
+    "robot, one, ten", [(CHAPTER, 4.91276e-3, 38.4133e-3), (TEN, 4.70556e-3, 34.3600e-3)], ids=["chapter", "new"]
 )
 """Distances of ten nodes after one stroke and after ten, with h to 0 [m]."""
 
@@ -109,7 +109,7 @@ PAIRS = np.array(
 BISECTORS = [36.0, 72.0, 108.0, 144.0]
 
 
-@pytest.mark.parametrize("robot, third_goes_farther", [(CHAPTER, False), (Seastar(), True)], ids=["chapter", "new"])
+@pytest.mark.parametrize("robot, third_goes_farther", [(CHAPTER, False), (TEN, True)], ids=["chapter", "new"])
 def test_every_pair_of_figure_13_8_moves_along_its_bisector_and_1_4_goes_farthest(robot, third_goes_farther):
     """That {1-,5+} goes farther than {1-,3+} is the chapter's discretisation, not mechanics."""
     hub = swim(swimmer("implicit-midpoint", 0.5e-3, 4, robot=robot), PAIRS)[-1]
@@ -213,7 +213,7 @@ def test_hub_of_a_robot_without_fluid_stays_where_its_mass_allows():
     simulator = swimmer("sdirk2", 0.01, 2, None)
     swim(simulator, np.array([[1.0, -1.0, 0.0, 0.5, 0.0], [0.0, 0.0, 1.0, 1.0, 1.0]]), 3)
     centre = np.einsum("n,rnd->rd", make_rods(simulator.scene).mass, simulator.positions)
-    assert np.abs(simulator.positions - Seastar().nodes()).max() > 1e-3
+    assert np.abs(simulator.positions - TEN.nodes()).max() > 1e-3
     np.testing.assert_allclose(centre / make_rods(simulator.scene).mass.sum(), 0.0, atol=1e-10)
 
 

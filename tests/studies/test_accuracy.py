@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from seastar_gym import Numerics, Scene
 from seastar_gym.gaits import PAIRS, STRAIGHT
-from seastar_gym.scene.fidelity import Promise
+from seastar_gym.scene.fidelity import PRESETS, Promise
 from seastar_gym.scene.numerics import Setting
 from seastar_gym.simulator import Simulator
 from studies.accuracy import convergence
@@ -34,7 +35,7 @@ from studies.accuracy.cases import (
     swims,
     symmetric_form,
 )
-from studies.accuracy.rows import Figures, Row
+from studies.accuracy.rows import Figures, Row, medians
 from studies.accuracy.settings import MS, Plan, presets, settings
 
 TINY = Plan(
@@ -342,8 +343,30 @@ def test_what_is_stored_can_be_promised(found, tmp_path):
         assert measured.total("path") <= kept.path_error * (1 + 1e-5)
         assert kept.path_error <= 1.11 * measured.promise("path") + 1e-12
         assert kept.path_error == pytest.approx(kept.space_error + kept.time_error, rel=1e-5)
+        assert measured.typical.random <= kept.typical_error <= 1.11 * kept.path_error
+        assert measured.typical.gait <= kept.typical_gait_error <= kept.gait_error
     speeds = [entry["speed"] for entry in stored["settings"]]
     assert speeds == sorted(speeds, reverse=True)
+
+
+def test_medians_are_stored_beside_bounds_and_speeds_that_stay(found, tmp_path):
+    file = tmp_path / "presets.json"
+    shutil.copy(PRESETS, file)
+    accuracy_tables.store_typical(found.rows, file)
+    before, after = (json.loads(each.read_text(encoding="utf-8")) for each in (PRESETS, file))
+    by_setting = {each.setting: each for each in found.rows}
+    for name, setting in presets().items():
+        typical = accuracy_tables.as_typical(by_setting[setting])
+        assert before["presets"][name] | typical == after["presets"][name] and "typical_error" in typical
+    assert after["settings"] == before["settings"] and after["machine"] == before["machine"]
+
+
+def test_medians_are_of_the_sum_of_both_errors():
+    cases = Cases(("a", "b", "c", "d"), ("random", "random", "random", "gait"), np.zeros((1, 4, 5)))
+    paths = np.array([1.0, 5.0, 2.0, 7.0]), np.array([9.0, 1.0, 2.0, 1.0])
+    space, time = (Errors(path, np.zeros(4), np.zeros(4)) for path in paths)
+    found = medians([cases], [space], [time])
+    assert (found.random, found.gait) == (6.0, 8.0) and np.isnan(found.slow)
 
 
 def test_a_study_whose_limit_is_in_doubt_is_not_stored(found, tmp_path):

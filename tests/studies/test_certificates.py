@@ -21,7 +21,9 @@ ROWS = json.loads((DOCS / "designs.json").read_text(encoding="utf-8"))
 def made(scene, samples):
     """A certificate that nobody measured."""
     settings = tuple(
-        CertifiedSetting(nodes, "implicit-midpoint", step, 1e-6, {CLASS: 0.01 * nodes}, 0.0, 0.0, 1.0, 1.0)
+        CertifiedSetting(
+            nodes, "implicit-midpoint", step, 1e-6, {CLASS: 0.01 * nodes}, {CLASS: 0.005 * nodes}, 0.0, 0.0, 1.0, 1.0
+        )
         for nodes, step in zip(NODES, STEPS, strict=True)
     )
     return Certificate(physics(scene), settings, (CLASS,), (CLASS,), samples, 0.0, 1, __version__, "none")

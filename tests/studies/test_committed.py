@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from seastar_gym.controllers.greedy import measure_gaits
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
-from seastar_gym.scene.fidelity import TIMED_PRESETS, promise
+from seastar_gym.evaluation.tasks import task_ids
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__
 from studies import committed
-from studies.accuracy import timed
 from studies.accuracy.tables import two_digits
 from studies.committed import BLOCK, PICTURES, UNCOVERED, filled, is_drawn_so, main, pages, table
 from studies.learning.bound import MEASURED, MM, SETTLING
@@ -87,6 +87,19 @@ def test_every_file_of_numbers_has_a_footer():
     assert [file.name for file in DOCS.glob("*.json") if f"*Numbers: [{file.name}]" not in text] == []
 
 
+def test_the_page_of_environments_holds_every_contract():
+    """On GitHub as on the site: ids, spaces, observation, reward, info."""
+    text = (DOCS / "environments.md").read_text(encoding="utf-8")
+    for id in task_ids():
+        assert f"| `{id}` | [Seastar" in text
+    parts = dict(re.findall(r"^## (Seastar\w*Env)\n(.*?)(?=^## |\Z)", text, re.DOTALL | re.MULTILINE))
+    for name in ("SeastarSwimEnv", "SeastarSwimVectorEnv", "SeastarTaskEnv", "SeastarTaskVectorEnv"):
+        assert name in parts
+    headings = re.findall(r"^### (.*)$", parts["SeastarSwimEnv"], re.MULTILINE)
+    assert {"Action space", "Observation space", "Reward", "Info", "Arguments"} <= set(headings), headings
+    assert "`path_error`" in parts["SeastarSwimEnv"]
+
+
 def test_a_table_of_no_study_is_refused():
     with pytest.raises(ValueError, match="No table is called 'luck'"):
         table(DOCS, "luck")
@@ -116,15 +129,24 @@ def test_footers_say_command_versions_and_machine_and_what_is_not_known():
     assert footer({"command": "x", "machine": "y"}, "luck.json").endswith("Not recorded by that run: versions.*")
 
 
-def test_the_tables_of_presets_are_those_that_come_with_the_package():
-    text = (DOCS / "accuracy.md").read_text(encoding="utf-8")
-    assert all(line in text for line in timed.table(json.loads(TIMED_PRESETS.read_text(encoding="utf-8"))).splitlines())
-    for name in get_args(Fidelity):
-        row = promise(name)
-        errors = row.space_error, row.time_error, row.path_error, row.gait_error, row.slow_error, row.straight_error
-        cells = [f"{two_digits(100 * error):g} %" for error in errors]
-        line = next(line for line in text.splitlines() if line.startswith(f"| `{name}` |"))
-        assert [cell.strip(" *") for cell in line.split("|")[5:11]] == cells, name
+@pytest.mark.parametrize("page", ["README.md", "docs/choosing.md"])
+def test_errors_on_a_page_are_those_that_info_tells(page):
+    """Largest and typical errors of random and of repeated commands, every second and every 0.2 s, and the speed."""
+    blocks = [block[3] for block in BLOCK.finditer((DOCS.parent / page).read_text(encoding="utf-8"))]
+    lines = [re.search(r"`(?:fidelity=\")?(\w+)\"?`", line) for block in blocks for line in block.splitlines()]
+    rows = {found[1]: found.string for found in lines if found}
+    if page == "README.md" and not rows:
+        pytest.skip("README has no table of errors")
+    assert {"fast", "balanced", "reference"} <= set(rows) <= set(get_args(Fidelity))
+    for name, row in rows.items():
+        cells, speed = [], 0.0
+        for period in (1.0, 0.2):
+            info = SeastarSwimEnv(fidelity=name, decision_period=period).reset(seed=0)[1]
+            for kind in ("", "gait_"):
+                typical, bound = info[f"typical_{kind}error"], info[f"{kind or 'path_'}error"]
+                cells.append(f"{two_digits(100 * bound):g} % ({two_digits(100 * typical):g} %)")
+            speed = info.get("batch_real_time_factor", 0.0) or speed
+        assert row.endswith(f"| {' | '.join(cells)} | {speed:,.0f} |"), name
 
 
 def test_the_page_that_swims_has_the_strokes_of_the_simulator():

@@ -1,6 +1,7 @@
 """Turn, then swim; and the study of what turning is worth."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,6 +22,8 @@ from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.swim import swim
 from seastar_gym.gaits import turning_wave
 from studies.learning import heading
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
 class Resting:
@@ -98,3 +101,17 @@ class Resting200:
 
     def predict(self, observation, state=None, episode_start=None, deterministic=False):
         return 0, None
+
+
+def test_the_page_compares_the_same_rule_with_strokes_and_wires():
+    """In seconds and joules, beyond the way without a turn; other controllers are named."""
+    swims = json.loads((DOCS / "heading.json").read_text(encoding="utf-8"))["swims"]
+    said = " ".join((DOCS / "gaits.md").read_text(encoding="utf-8").split())
+    for name, sentence in {
+        "strokes": "takes {} s and {} J more than to swim straight with the chapter's strokes",
+        "wires": "and {} s and {} J more with wires every 0.2 s",
+        "planner": "the planner takes {} s and {} J more",
+        "learned": "the learned policy {} s and {} J",
+    }.items():
+        more = [swims[name][what][-1] - swims[name][what][0] for what in ("seconds", "joules")]
+        assert sentence.format(*(f"{round(each):g}" for each in more)) in said

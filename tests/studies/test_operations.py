@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from hubs import TEN
 from seastar_gym import Numerics, Scene, Seastar, der
 from studies.speed.operations import count_operations, flops
 
@@ -17,7 +18,7 @@ def iteration_flops(**robot):
 
 @pytest.mark.parametrize(
     ("robot", "iteration", "divisions", "roots", "step"),
-    [(THE_CHAPTERS, 11_600, 227, 91, 1_300), (Seastar(), 13_720, 276, 137, 1_310)],
+    [(THE_CHAPTERS, 11_600, 227, 91, 1_300), (TEN, 13_720, 276, 137, 1_310)],
     ids=["chapter", "continuum"],
 )
 def test_an_iteration_costs_no_more_than_when_it_was_tuned(robot, iteration, divisions, roots, step):

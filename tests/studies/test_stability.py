@@ -12,6 +12,7 @@ from rich.console import Console
 
 from studies.kept import as_json
 from studies.stability import cells as stability_cells
+from studies.stability import long_run
 from studies.stability import study as stability
 from studies.stability.cases import SWEEPS, format_step, format_value, quick_sweeps
 from studies.stability.pictures import draw_atlas
@@ -131,6 +132,14 @@ def test_a_long_run_keeps_strain_and_speed_bounded():
     assert run.failed == 0 and 0.0 < run.strain < 0.05 and 0.0 < run.speed < 1.0
     assert run.strain_late <= run.strain and run.speed_late <= run.speed
     assert stability.long_table(run).row_count == 13
+
+
+def test_growth_is_the_energy_of_late_strokes_over_that_of_early_ones():
+    """Short swims of few nodes: nothing grows, and implicit midpoint gaits repeat themselves."""
+    setting = long_run.Resonance(4, 5e-3)
+    found = long_run.energy_growths(setting, strokes=40)
+    assert found.shape == (17,) and np.all(found < 1.5) and np.median(found) == pytest.approx(1.0, abs=0.1)
+    assert long_run.growth_table((setting,), strokes=21).row_count == 1
 
 
 def test_the_study_writes_its_files_and_prints_its_table(monkeypatch, tmp_path, capsys):

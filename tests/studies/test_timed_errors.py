@@ -7,7 +7,7 @@ import pytest
 
 from seastar_gym.scene.fidelity import TIMED_PRESETS, timed_promise
 from seastar_gym.scene.numerics import Numerics
-from studies.accuracy.timed import PERIODS, QUICK, SAMPLES, Plan, errors, sequences, table
+from studies.accuracy.timed import PERIODS, QUICK, SAMPLES, SLOWEST, Plan, errors, path_lengths, sequences, summary
 
 TINY = QUICK._replace(samples=2, nodes=13, short=Numerics("implicit-midpoint", 2e-3, 1e-8))
 
@@ -27,21 +27,35 @@ def test_more_nodes_err_less_in_space():
     found = errors(0.5, TINY, lambda: ticks.append(1))
     assert len(ticks) == 3 and 0.0 < found["balanced"]["space_error"] < found["fast"]["space_error"] < 0.2
     assert all(0.0 < each["time_error"] < 0.2 for each in found.values())
+    for each in found.values():
+        assert 0.0 < each["typical_error"] <= each["space_error"] + each["time_error"]
+        assert 0.0 < each["typical_gait_error"] <= each["gait_error"]
+
+
+def test_random_and_repeated_commands_are_bounded_apart():
+    space, time = np.array([0.01, 0.03, 0.02, 0.5, 0.4, 0.1]), np.array([0.02, 0.01, 0.01, 0.1, 0.3, 0.1])
+    found = summary(space, time, 3)
+    assert found == pytest.approx(
+        {"space_error": 0.03, "time_error": 0.02, "gait_error": 0.8, "typical_error": 0.03, "typical_gait_error": 0.6}
+    )
+
+
+def test_a_path_that_goes_nowhere_counts_as_a_slow_one():
+    hub = np.zeros((10, 2, 2))
+    hub[:, 1, 0] = 0.02 * np.arange(1, 11)
+    np.testing.assert_allclose(path_lengths(hub, 0.1), [10 * SLOWEST * 0.1, 0.2])
 
 
 def test_the_table_is_that_of_the_whole_study():
     stored = json.loads(TIMED_PRESETS.read_text())
     assert stored["measured_over"]["random"] == stored["measured_over"]["a repeated second"] == SAMPLES
     assert set(stored["presets"]) == set(Plan().presets)
-    for name, rows in stored["presets"].items():
-        assert set(rows) == {f"{period:g}" for period in PERIODS}
-        for period in PERIODS:
-            known = timed_promise(name, period)
-            cell = f"{float(f'{100 * known.path_error:.2g}'):g}"
-            assert f" {cell} |" in next(line for line in table(stored).splitlines() if f"`{name}`" in line)
+    assert all(set(rows) == {f"{period:g}" for period in PERIODS} for rows in stored["presets"].values())
 
 
 @pytest.mark.parametrize("period", PERIODS)
 def test_dearer_presets_err_less(period):
-    paths = [timed_promise(name, period).path_error for name in ("fast", "balanced", "accurate", "reference")]
-    assert paths == sorted(paths, reverse=True)
+    rows = [timed_promise(name, period) for name in ("fast", "balanced", "accurate", "reference")]
+    for column in ("path_error", "gait_error", "typical_error", "typical_gait_error"):
+        found = [getattr(row, column) for row in rows]
+        assert found == sorted(found, reverse=True), column

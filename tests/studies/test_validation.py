@@ -1,12 +1,13 @@
 """Validation against a measured swimmer: data, scenes, weights, and intervals that are honest where truth is known."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.stats import norm
 
-from studies.validation import simulate, study
+from studies.validation import laws, simulate, study
 from studies.validation.inference import LEVEL, SPREAD, effective, predict, quantiles, score, weights
 from studies.validation.luck import other_fours
 from studies.validation.priors import SWEEPS, UNKNOWNS, place_in_range, samples
@@ -14,6 +15,7 @@ from studies.validation.separation import best_known, told
 from studies.validation.speeds import read_speeds, training
 from studies.validation.swimmer import LOOSE, bending, round_limb, scene
 
+DOCS = Path(__file__).resolve().parents[2] / "docs"
 CONDITIONS = read_speeds()
 MEASURED = np.array([condition.speed for condition in CONDITIONS])
 CHOSEN = training(CONDITIONS)
@@ -29,7 +31,7 @@ def made_up(values: dict[str, np.ndarray]) -> np.ndarray:
 # Data
 
 
-def test_there_are_37_speeds_of_five_materials_and_at_most_four_are_identified_from():
+def test_there_are_37_speeds_of_five_materials_and_the_model_is_fitted_to_four():
     assert len(CONDITIONS) == 37 and len({condition.liquid_metal for condition in CONDITIONS}) == 5
     assert len(CHOSEN) == 4 and all(0.019 < condition.speed < 0.059 for condition in CONDITIONS)
     assert [CONDITIONS[k].name for k in CHOSEN] == ["0-0.7", "10-0.8", "30-1.0", "50-2.0"]
@@ -143,6 +145,36 @@ def test_what_speeds_do_not_depend_on_stays_as_unknown_as_it_was():
     assert narrower < 0.6 and abs(powers["limb length"]) == 1.0
 
 
+# Laws of one constant
+
+
+def test_a_law_that_the_speeds_follow_has_no_error_and_its_constant_is_a_geometric_mean():
+    shape = np.array([1.0, 2.0, 3.0, 5.0])
+    assert laws.law_error(shape, 0.7 * shape, [0, 2]) == pytest.approx(0.0, abs=1e-12)
+    measured = shape * [1.0, 1.0, 4.0, 2.0]  # the mean of log a is that of 2
+    assert laws.law_error(shape, measured, [0, 2]) == pytest.approx(np.mean([1.0, 0.0]))
+
+
+def test_the_committed_laws_are_those_of_the_committed_speeds():
+    kept = json.loads((DOCS / "validation.json").read_text(encoding="utf-8"))
+    found = laws.law_scores(CONDITIONS, CHOSEN, other_fours(CONDITIONS, study.FOURS))
+    assert len(found) == len(kept["laws"]) == 13
+    for one, other in zip(found, kept["laws"], strict=True):
+        assert one["error"] == pytest.approx(other["error"], rel=1e-6)
+        assert one["fours"] == pytest.approx(other["fours"], rel=1e-6)
+    root_f_dk = next(one for one in found if one["powers"] == [0.5, 1.0])
+    assert (root_f_dk["error"], root_f_dk["fours"][1]) == pytest.approx((0.162, 0.173), abs=5e-4)
+
+
+def test_laws_are_added_to_results_that_are_there(tmp_path, monkeypatch):
+    file = tmp_path / "validation.json"
+    file.write_text('{"samples": 512, "laws": []}', encoding="utf-8")
+    monkeypatch.setattr("sys.argv", ["validation", "--only-laws", "--out", str(tmp_path)])
+    study.main()
+    results = json.loads(file.read_text(encoding="utf-8"))
+    assert results["samples"] == 512 and len(results["laws"]) == 13
+
+
 def test_the_command_writes_its_page(tmp_path, monkeypatch):
     def invented(condition, values, variant, finer=1):
         return made_up(values)[:, CONDITIONS.index(condition)]
@@ -153,6 +185,6 @@ def test_the_command_writes_its_page(tmp_path, monkeypatch):
     monkeypatch.setattr("sys.argv", arguments)
     study.main()
     found = json.loads((tmp_path / "validation.json").read_text(encoding="utf-8"))
-    assert found["discretisation"] == 0.0
+    assert found["discretisation"] == 0.0 and len(found["laws"]) == 13
     assert set(found["models"]) == {"full", study.SAME_SAMPLES, "ramp"} and len(found["speeds_mm_per_s"]) == 37
     assert (tmp_path / "validation.png").stat().st_size > 10_000

@@ -12,7 +12,7 @@ from refusals import assert_refused
 from seastar_gym.scene import Scene
 from seastar_gym.sweep.axes import Range
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.parts import Parts
+from seastar_gym.sweep.parts import Parts, read_part
 from seastar_gym.sweep.run import run
 
 ray = pytest.importorskip("ray")
@@ -48,7 +48,7 @@ def test_a_node_that_is_killed_in_mid_sweep_costs_its_cells(cluster, tmp_path):
 
     tally = run(sweep.cells(), tmp_path, RayTasks(cluster.address), kill_a_node, works.slow)
     parts = Parts(tmp_path)
-    nodes = Counter(parts.file(name).read_text() for name in parts.names())
+    nodes = Counter(read_part(parts.file(name))["text"][0].as_py() for name in parts.names())
     print(f"{tally.done} cells done, {tally.losses} lost with their node and run again; by nodes: {nodes.values()}")
     assert tally.done == 24 and not tally.problems
     assert 1 <= tally.losses <= 4

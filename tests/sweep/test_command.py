@@ -83,9 +83,20 @@ def test_a_search_from_words_to_its_best(tmp_path, capsys):
     assert (tmp_path / "study.db").exists() and read_parts(tmp_path).num_rows == 4
 
 
-def test_a_scene_comes_from_a_file(tmp_path):
-    file = tmp_path / "scene.json"
-    file.write_text(json.dumps(Scene.preset("fast").to_dict()))
+def test_a_search_does_not_write_through_a_link(tmp_path, capsys):
+    (tmp_path / "somebody's").touch()
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "study.db").symlink_to(tmp_path / "somebody's")
+    assert main(["robot.limb_length=0.08:0.1", "--optuna", "1", "--out", str(tmp_path / "out")]) == 2
+    assert "study.db is a link" in capsys.readouterr().err
+    assert (tmp_path / "somebody's").stat().st_size == 0
+
+
+@pytest.mark.parametrize("ending", [".json", ".py"])
+def test_a_scene_comes_from_a_file(ending, tmp_path):
+    file = tmp_path / f"scene{ending}"
+    as_python = 'from seastar_gym import Scene\nscene = Scene.preset("fast")\n'
+    file.write_text(as_python if ending == ".py" else json.dumps(Scene.preset("fast").to_dict()))
     assert main(["--scene", str(file), "--out", str(tmp_path), *QUICK]) == 0
     assert read_parts(tmp_path).num_rows == 1
 
@@ -102,7 +113,8 @@ def test_a_scene_comes_from_a_file(tmp_path):
         (["robot.limb_length=0.1:0.2:3:4"], "LOW:HIGH"),
         (["actuator=Muscle"], "Muscle"),
         (["robot=@nowhere.json"], "nowhere.json"),
-        (["--scene", "nowhere.json"], "nowhere.json"),
+        (["--scene", "nowhere.json"], "nowhere.json is no file."),
+        (["--scene", "nowhere.py"], "nowhere.py is no file."),
         (["--gait", "gallop"], "gallop"),
         (["--workers", "0"], "workers"),
         (["--optuna", "5"], "something to vary"),
@@ -124,7 +136,7 @@ def test_bad_input_is_one_sentence(words, sentence, tmp_path, capsys):
 def test_no_json_is_one_sentence(tmp_path, capsys):
     (tmp_path / "scene.json").write_text("{")
     assert main(["--scene", str(tmp_path / "scene.json")]) == 2
-    assert "is no JSON" in capsys.readouterr().err
+    assert "is no scene" in capsys.readouterr().err
 
 
 def command(tmp_path, *words):

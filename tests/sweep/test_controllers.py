@@ -54,6 +54,7 @@ def test_a_design_swims_as_the_environment_does():
     assert done.finished and found["waypoints"].tolist() == [2.0, 2.0, 2.0]
     assert found["time"][2] == done.time[-1] and found["energy"][2] == pytest.approx(done.energy.sum())
     np.testing.assert_allclose([found["ahead"][2], found["aside"][2]], done.hub[-1], rtol=1e-12)
+    assert (found["work"] > 0.0).all() and (found["peak_moment"] > 0.0).all()
     assert found["speed"][2] == pytest.approx(0.07 / done.time[-1])
     assert found["strokes_per_metre"][2] == pytest.approx(done.time[-1] / 0.07)
     assert found["status"].tolist() == [0, 0, 0] and len(set(found["time"])) > 1

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from refusals import assert_refused
-from seastar_gym.scene import Numerics, Scene, Seastar, SmaPulse
+from seastar_gym.scene import Limb, Numerics, Scene, Seastar, SmaPulse
 from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.sweep.axes import Choices, Range
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.swimming import scene_of
+from seastar_gym.sweep.swimming import scene_of, swim
 
 FAST = Scene.preset("fast")
 LENGTH = Range("robot.limb_length", 0.05, 0.15)
@@ -48,6 +48,21 @@ def test_numbers_of_robots_are_simulated_side_by_side():
     assert [cell.frame.scene.numerics.step for cell in cells] == [2e-3, 5e-3]
     scene = scene_of(cells[0], np.ones(2, bool))
     assert scene.n_robots == 2 and scene.of_robot(1).robot.limb_length == 0.1
+
+
+def test_what_a_design_does_is_the_same_beside_any_others():
+    """Limb 1 is bent at rest, in every design by another amount, and the way ahead is along it."""
+    robot = Seastar(3, 4, limbs=(Limb(natural_curvature=1.0), Limb(), Limb()))
+    bent = np.array([0.0, 8.0, -5.0])
+    frame = next(Sweep(Scene(robot), (LENGTH,), settling=0, measured=1, samples=1).cells()).frame
+
+    def swum(order):
+        return swim(Cell(frame, {"robot.limbs.0.natural_curvature": bent[order]}, len(order)))
+
+    together = swum([0, 1, 2])
+    for order in ([2, 0, 1], [1], [2]):
+        for name, values in swum(order).items():
+            np.testing.assert_array_equal(values, together[name][order], err_msg=name)
 
 
 def test_every_row_and_column_of_a_latin_hypercube_has_one_design():

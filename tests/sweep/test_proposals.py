@@ -19,8 +19,10 @@ from seastar_gym.executors import Outcome
 from seastar_gym.executors.here import Here
 from seastar_gym.scene import Scene
 from seastar_gym.sweep.axes import Choices, Range
+from seastar_gym.sweep.command import make_parser
 from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.parts import Parts, part_of, read_parts
+from seastar_gym.sweep.pilots import Course
 from seastar_gym.sweep.proposals import Proposals, Search, explore, put_back_stale, study_of
 from seastar_gym.sweep.run import run
 
@@ -186,6 +188,17 @@ def test_a_design_without_the_objective_is_the_worst_and_not_tried_for_ever(is_l
     proposals.tell(Outcome(type("Cell", (), {"name": "cell"})(), b"part"))
     assert states(study) == [TrialState.COMPLETE] * 2 and study.best_value == 1.0
     assert list(proposals.cells()) == []
+
+
+def test_defaults_of_the_command_are_those_of_the_classes():
+    told, sweep, course = vars(make_parser().parse_args([])), Sweep(SWEEP.scene, ()), Course()
+    for name in ("gait", "settling", "measured", "seed", "robots"):
+        assert told[name] == getattr(sweep, name)
+    assert (told["path"], told["seconds"], told["decision_period"]) == (
+        course.path, course.seconds, course.decision_period,
+    )  # fmt: skip
+    wanted = Search()
+    assert (told["objective"], told["stale_after"]) == (wanted.objective, wanted.stale_after) == ("speed", 600.0)
 
 
 def test_bad_searches_are_refused(sqlite):

@@ -6,12 +6,15 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 
+from seastar_gym.executors.here import Here
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Scene, Seastar, SmaPulse
 from seastar_gym.simulator import Simulator
 from seastar_gym.sweep.axes import Choices
+from seastar_gym.sweep.command import as_text
 from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.parts import Parts, part_of, read_parts
+from seastar_gym.sweep.run import run
 from seastar_gym.sweep.swimming import REFUSED, UNITS, swim
 
 FAST = Scene.preset("fast")
@@ -24,17 +27,30 @@ def one_cell(*axes, **options):
 
 def test_results_are_those_of_the_simulator():
     found = swim(one_cell(Choices("robot.limb_length", (0.08, 0.1))))
-    simulator = Simulator(FAST)
+    simulator = Simulator(FAST, effort=True)
     simulator.stroke([STRAIGHT])
     begin = simulator.hub_position()[0]
-    energy = sum(simulator.stroke([STRAIGHT]).energy[0] for _ in range(2))
+    reports = [simulator.stroke([STRAIGHT]) for _ in range(2)]
     way = simulator.hub_position()[0] - begin
     assert found["ahead"][1] == pytest.approx(way[0], rel=1e-12) and abs(found["aside"][1]) < 1e-12
     assert found["speed"][1] == pytest.approx(way[0] / 2.0, rel=1e-12)
     assert found["strokes_per_metre"][1] == pytest.approx(2.0 / way[0], rel=1e-12)
-    assert found["energy"][1] == pytest.approx(energy, rel=1e-12)
+    for name in ("energy", "work"):
+        assert found[name][1] == pytest.approx(sum(getattr(report, name)[0] for report in reports), rel=1e-12)
+    assert found["peak_moment"][1] == max(report.peak_moment[0] for report in reports)
     assert abs(found["turn"][1]) < 1e-9
     assert found["status"].tolist() == [0, 0]
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (1, 2, 0), (2, 0, 1)])
+def test_the_smallest_opening_angle_is_that_of_any_interval(order):
+    """Whichever interval has it: neighbours turned towards each other, with force, a little, or not at all."""
+    commands = np.array([[0.0, 1.0, -1.0, 0.0, 0.0], [0.0, 0.4, -0.4, 0.0, 0.0], np.zeros(5)])[list(order)]
+    found = swim(one_cell(gait=commands, settling=1, measured=2))["smallest_opening_angle"]
+    simulator = Simulator(FAST)
+    angles = [simulator.stroke([command]).smallest_opening_angle[0] for command in commands]
+    assert found.tolist() == [min(angles)] and np.ptp(angles) > 0.1
+    assert angles.index(min(angles)) == order.index(0)
 
 
 def test_a_turned_gait_swims_aside_and_turns_nothing():
@@ -96,6 +112,62 @@ def test_pandas_and_polars_read_the_parts(tmp_path):
 
 def test_an_empty_folder_has_no_results(tmp_path):
     with pytest.raises(ValueError, match="no results"):
+        read_parts(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def cells():
+    """Two cells of two designs each."""
+    axes = Choices("robot.n_limbs", (3, 5)), Choices("robot.limb_length", (0.08, 0.1))
+    return list(Sweep(FAST, axes, settling=0, measured=1).cells())
+
+
+def flipped(part):
+    """The part with another bit in its first page of numbers, which its checksum tells."""
+    column = pyarrow.parquet.ParquetFile(pyarrow.BufferReader(part)).metadata.row_group(0).column(1)
+    place = column.dictionary_page_offset + column.total_compressed_size - 1
+    return part[:place] + bytes([part[place] ^ 1]) + part[place + 1 :]
+
+
+DAMAGES = {
+    "empty": lambda part: b"",
+    "cut": lambda part: part[: len(part) // 2],
+    "zeros": lambda part: part[:100] + bytes(100) + part[200:],
+    "a bit of a number": flipped,
+    "a byte of the footer": lambda part: part[:-40] + bytes([part[-40] ^ 255]) + part[-39:],
+    "no parquet": lambda part: b"PAR1 nothing PAR1",
+    "deep text": lambda part: b"[" * 100_000,
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
+def test_a_damaged_part_is_named_left_out_and_simulated_again(damage, tmp_path, cells):
+    first, second = cells
+    assert run(iter(cells), tmp_path, Here()).done == 2
+    whole, file = read_parts(tmp_path), Parts(tmp_path).file(first.name)
+    sound = file.read_bytes()
+    file.write_bytes(damage(sound))
+    with pytest.warns(UserWarning, match=rf"{file} is damaged: .*\. It is left out: the same sweep simulates its cell"):
+        assert read_parts(tmp_path).num_rows == second.n_robots
+    again = run(iter(cells), tmp_path, Here())
+    assert (again.done, again.kept, again.damaged) == (1, 1, [file])
+    assert as_text(again, tmp_path).endswith(f"Damaged before, and simulated again: {file}.")
+    assert file.read_bytes() == sound and read_parts(tmp_path).equals(whole)
+
+
+def test_a_part_under_the_name_of_another_cell_is_damaged(tmp_path, cells):
+    first, second = cells
+    run(iter(cells), tmp_path, Here())
+    Parts(tmp_path).file(first.name).write_bytes(Parts(tmp_path).file(second.name).read_bytes())
+    with pytest.warns(UserWarning, match="it has another cell"):
+        assert read_parts(tmp_path).num_rows == second.n_robots
+    assert run(iter(cells), tmp_path, Here()).done == 1
+
+
+def test_no_sound_part_is_no_result(tmp_path, cells):
+    run(iter(cells[:1]), tmp_path, Here())
+    Parts(tmp_path).file(cells[0].name).write_bytes(b"")
+    with pytest.warns(UserWarning, match="is damaged"), pytest.raises(ValueError, match="no results"):
         read_parts(tmp_path)
 
 

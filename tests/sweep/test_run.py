@@ -130,6 +130,21 @@ def test_a_disk_that_is_full_for_good_ends_the_run(tmp_path, sweep, monkeypatch)
     assert len(list(Parts(tmp_path).names())) == 1
 
 
+def test_parts_that_the_disk_refuses_now_and_then_end_no_run(tmp_path, sweep, monkeypatch):
+    """Those refused in a row are counted: here never two, but two before the last cell."""
+    write, order = Parts.write, itertools.count()
+
+    def flickering(self, name, part):
+        if next(order) in (0, 2):
+            raise OSError(28, "No space left on device", "parts")
+        write(self, name, part)
+
+    monkeypatch.setattr(Parts, "write", flickering)
+    monkeypatch.setattr("seastar_gym.sweep.run.UNWRITTEN", 2)
+    tally = run(sweep.cells(), tmp_path, Here(), work=works.named)
+    assert tally.done == 4 and tally.losses == 2 and not tally.problems
+
+
 def test_a_full_disk_of_a_worker_is_the_cell_s_problem(tmp_path, sweep):
     tally = run(sweep.cells(), tmp_path, Here(), work=works.refusing)
     assert tally.done == 0 and tally.losses == 4 * ATTEMPTS

@@ -7,13 +7,19 @@ move of the whole robot is then off by that share of the last Newton step, which
 
 So where that can be seen, at any step in vacuum and in a fluid at very long ones, the whole robot takes one Newton step
 of its own after the others: from the residual summed over the nodes, and its slope. In vacuum it is exact.
+
+A body whose centre of mass is not the hub has the momentum b = omega J_S because it turns, too (body.py). Stages take
+its rate as d_theta J*_S - gamma omega*^2 A*_S from their first guess, which is off by the scheme's error. Here the rate
+is B = (b - b_hat)/gamma, of the angle that the stage has found, with b_hat = b_0 + h sum_{j<i} a_ij B_j: b follows the
+tableau as velocities do, and what nodes get is what b loses. The implicit midpoint rule ends with b of the angle and
+velocity that it extrapolates to, so that its B is the difference of b over the whole step.
 """
 
 from seastar_gym.der.motion import node_motion
 from seastar_gym.der.potential import node_slopes
 from seastar_gym.der.star import n_nodes, root_place
 from seastar_gym.der.terms.body import place_roots, root_motion, tail_motion
-from seastar_gym.der.terms.body_forces import add_body
+from seastar_gym.der.terms.body_forces import add_body, add_turning_rate, begin_turning, end_turning
 from seastar_gym.der.terms.drag import middle_slopes
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import any_lane, load, select, splat, store
@@ -22,11 +28,16 @@ LOST = 1e8  # of stiffness over inertia: rounding is some 1e-10 of a Newton step
 
 
 @kernel
-def settle_momentum(rods, work, stage, robots):
-    """Move the robots in the mask whose momentum may be unbalanced to where it is balanced."""
+def settle_momentum(rods, work, scheme, k, stage, q_0, v_0, h, robots):
+    """Move the robots in the mask whose momentum may be unbalanced to where it is balanced, after stage k of a step.
+
+    q_0, v_0: State at the beginning of the step, of length h [s].
+    """
     unsettled = robots & (load(rods.scales.unsettled_rate, 0) * stage.gamma * stage.gamma > LOST)
     if any_lane(unsettled):
+        begin_turning(rods.body, rods, work, scheme, k, q_0, v_0, h)
         move_as_a_whole(rods, work, stage, unsettled)
+        end_turning(rods.body, rods, work, k, stage)
 
 
 @kernel
@@ -60,6 +71,7 @@ def add_roots(body, rods, work, stage, fx, fy, xx, xy, yy):
         return fx, fy, xx, xy, yy
     of_hub, zero = node_motion(work, stage, 0), splat(0.0)
     _, (fx, fy), (xx, xy, yy) = add_body(body, rods, work, stage, None, of_hub, zero, (fx, fy), (xx, xy, yy))
+    fx, fy = add_turning_rate(body, rods, work, stage, (fx, fy))
     for limb in range(rods.n_limbs):
         motion = root_motion(rods, work, stage, limb)
         _, g, h = node_slopes(None, rods, work, stage, root_place(rods, limb), motion)

@@ -19,6 +19,10 @@ NEWTON_ITERATIONS, REGULARISED, BACKTRACKS, STEPS, HALVINGS, REJECTIONS, ENERGY_
     len(REPORT_ROWS)
 )
 
+# Rows of a lane group's effort, if it is asked for: work of the actuators [J], the largest moment that resisted one
+# [N m] and, limb after limb, the last moments [N m].
+WORK, PEAK_MOMENT, MOMENTS = range(3)
+
 
 @kernel
 def add_to_report(report, row, amount):

@@ -110,7 +110,7 @@ def solve_stages(rods, work, scheme, actuation, q, v, a, step, active, limits, r
         left = limits.most_iterations - load(report, NEWTON_ITERATIONS)
         most, good = select(left < step.iteration_limit, left, step.iteration_limit), good & (left > 0.0)
         good, phi, iterations, regularised, backtracks = minimise(rods, work, stage, good, tolerance, most)
-        settle_momentum(rods, work, stage, good)
+        settle_momentum(rods, work, scheme, k, stage, q, v, step.h, good)
         good = those_uncrossed(rods.contact, rods, work, stage, q, good)
         guarded = guarded | (regularised + backtracks > 0.0)
         if scheme.dissipative:

@@ -1,11 +1,12 @@
 """A whole sequence of time intervals for many robots, in one compiled call."""
 
+from seastar_gym.der.energy import fill_moments
 from seastar_gym.der.geometry import larger
 from seastar_gym.der.stepping.interval import cover_interval
-from seastar_gym.der.stepping.report import NEWTON_ITERATIONS
+from seastar_gym.der.stepping.report import MOMENTS, NEWTON_ITERATIONS, PEAK_MOMENT, WORK
 from seastar_gym.der.terms.body import move_roots
 from seastar_gym.simd.compilation import entry_point, kernel
-from seastar_gym.simd.lanes import borrow, load, select, splat, store
+from seastar_gym.simd.lanes import absolute, add_product, borrow, load, select, splat, store
 
 STUCK, SPENT = 1.0, 3.0  # SolverStatus.NOT_CONVERGED and ITERATION_LIMIT
 
@@ -18,8 +19,37 @@ def shape_of_limb(shape, group, k, limb):
     return load(borrow(shape[group, k]), limb % shape.shape[2])
 
 
+@kernel
+def begin_effort(rods, work, actuation, q, effort):
+    """Fill the rows of the moments at the beginning of an interval."""
+    fill_moments(rods, work, actuation, q, work.hub_moment)
+    for limb in range(rods.n_limbs):
+        store(effort, MOMENTS + limb, load(work.hub_moment, limb))
+
+
+@kernel
+def end_effort(rods, work, actuation, q, robots, effort):
+    """Add the work of the actuators in an interval that ends at q, by the trapezoidal rule, for the robots in the mask.
+
+    Leaves the rotations of its end as those of the beginning of the next, and what limbs turned in their place.
+    """
+    done, largest = load(effort, WORK), load(effort, PEAK_MOMENT)
+    for limb in range(rods.n_limbs):
+        start, end = load(actuation.delta_psi_start, limb), load(actuation.delta_psi_end, limb)
+        store(actuation.delta_psi_start, limb, end)
+        store(actuation.delta_psi_end, limb, end - start)
+    fill_moments(rods, work, actuation, q, work.hub_moment)
+    for limb in range(rods.n_limbs):
+        before, after = load(effort, MOMENTS + limb), load(work.hub_moment, limb)
+        done = add_product(done, 0.5 * (before + after), load(actuation.delta_psi_end, limb))
+        largest = larger(largest, larger(absolute(before), absolute(after)))
+        store(effort, MOMENTS + limb, after)
+    store(effort, WORK, select(robots, done, load(effort, WORK)))
+    store(effort, PEAK_MOMENT, select(robots, largest, load(effort, PEAK_MOMENT)))
+
+
 @entry_point
-def advance(rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shape, failed, report, limits):
+def advance(rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shape, failed, report, limits, effort):
     """Advance lane groups through the intervals between `times`, in place.
 
     scheme, fallback: Tableaux of the time steps, and of the steps of robots that had to retry often (one stage).
@@ -33,9 +63,12 @@ def advance(rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shap
     failed: 0 for robots that go on, else their SolverStatus, shape (n_groups, 1, N_LANES).
     report: Counts and extremes, added to, shape (n_groups, len(REPORT_ROWS), N_LANES).
     limits: Tolerances and bounds, see limits.py.
+    effort: Work and moments of the actuators, added to, shape (n_groups, MOMENTS + n_limbs, N_LANES), see report.py;
+        (n_groups, 0, N_LANES) where nobody asks for them.
     """
     rods_rows, memory, rotation = borrow(rods), borrow(work), borrow(actuation)
     tableau, fallback_tableau, bounds = borrow(scheme), borrow(fallback), borrow(limits)
+    asked = effort.shape[1] > 0
     for group in range(q.shape[0]):
         q_rows, v_rows, a_rows, peak_rows = borrow(q[group]), borrow(v[group]), borrow(a[group]), borrow(peaks[group])
         failed_rows, report_rows = borrow(failed[group]), borrow(report[group])
@@ -47,10 +80,14 @@ def advance(rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shap
                 peak = load(peak_rows, limb)
                 store(rotation.delta_psi_start, limb, peak * shape_of_limb(shape, group, k, limb))
                 store(rotation.delta_psi_end, limb, peak * shape_of_limb(shape, group, k + 1, limb))
+            if asked and k == 0:
+                begin_effort(rods_rows, memory, rotation, q_rows, borrow(effort[group]))
             alive = cover_interval(
                 rods_rows, memory, tableau, fallback_tableau, rotation, q_rows, v_rows, a_rows, times[k + 1] - times[k],
                 alive, bounds, report_rows,
             )  # fmt: skip
+            if asked:
+                end_effort(rods_rows, memory, rotation, q_rows, alive, borrow(effort[group]))
         spent = load(report_rows, NEWTON_ITERATIONS) >= bounds.most_iterations
         reason = select(spent, splat(SPENT), splat(STUCK))
         store(failed_rows, 0, select(alive, splat(0.0), larger(status, reason)))

@@ -87,6 +87,17 @@ def stiffening(along, delta):
 
 
 @kernel
+def stiffening_rate(along, delta):
+    """d(ln f)/d(delta) of a limb that is turned by delta [1/rad]; 0 where actuators act at the hub only (None)."""
+    if along is None:
+        return 0.0 * delta
+    middle, slope, inverse_peak = load(along.middle, 0), load(along.slope, 0), load(along.inverse_peak, 0)
+    t = hyperbolic_tangent(slope * (absolute(delta) * inverse_peak - middle))
+    rate = load(along.gain, 0) * slope * inverse_peak * (1.0 - t * t) / stiffening(along, delta)
+    return select(delta < 0.0, -rate, rate)
+
+
+@kernel
 def natural_tangent(along, hinge, delta):
     """tan(phi_bar/2) of a hinge of a limb that is turned by delta [rad]."""
     return tangent(0.5 * add_product(load(along.turn, hinge), load(along.share, hinge), delta))

@@ -67,6 +67,7 @@ class BodyWork(NamedTuple):
 
     turn: (cos, sin) of its angle, by the iterate. arm: A_k by the iterate, (x, y) per limb and corner [m].
     frozen: What a stage takes from its first guess, see FROZEN. hat: X_hat and U_hat, per limb [m], [m/s].
+    turning: b_hat [kg m/s] of the stage, then B [N] of every stage, (x, y) each, see stepping/momentum.py.
     system: Coupling of hub and angle, (x, y) [N]; stiffness of the angle [N m] and its residual [N m].
     """
 
@@ -74,6 +75,7 @@ class BodyWork(NamedTuple):
     arm: np.ndarray
     frozen: np.ndarray
     hat: np.ndarray
+    turning: np.ndarray
     system: np.ndarray
 
 
@@ -131,11 +133,11 @@ def with_corners(body: Body, corners: Floats) -> Body:
     return body._replace(n_arms=body.n_arms + len(corners), arm=np.concatenate([body.arm, corners.reshape(-1)]))
 
 
-def memory(body: Body | None, n_limbs: int) -> BodyWork | None:
-    """Zeroed memory for the body of one lane group."""
+def memory(body: Body | None, n_limbs: int, n_stages: int) -> BodyWork | None:
+    """Zeroed memory for the body of one lane group, and a scheme of n_stages stages."""
     if body is None:
         return None
-    counts = (2, 2 * body.n_arms, FROZEN, HAT * n_limbs, SYSTEM)
+    counts = (2, 2 * body.n_arms, FROZEN, HAT * n_limbs, 2 + 2 * n_stages, SYSTEM)
     return BodyWork(*(aligned_rows(count, N_LANES) for count in counts))
 
 

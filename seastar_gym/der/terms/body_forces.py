@@ -30,7 +30,7 @@ from seastar_gym.der.terms.body import (
     turned,
 )
 from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.lanes import absolute, add_product, load, select, splat, store, subtract_product
+from seastar_gym.simd.lanes import absolute, add_product, load, load_number, select, splat, store, subtract_product
 
 STRIP_ROWS = 4
 
@@ -188,6 +188,58 @@ def add_turning_momentum(body, rods, q, v, p):
     c, s = rotation(angle(body, rods, q))
     x, y = turned(c, s, body.moment, 0)
     return subtract_product(p[0], omega, y), add_product(p[1], omega, x)
+
+
+@kernel
+def begin_turning(body, rods, work, scheme, k, q_0, v_0, h):
+    """Put b_hat of stage k of a step from (q_0, v_0) into work.body.turning, in scenes with a body."""
+    if body is None:
+        return
+    zero = splat(0.0)
+    x, y = add_turning_momentum(body, rods, q_0, v_0, (zero, zero))
+    for other in range(k):
+        weight = load_number(scheme.a, k * scheme.n_stages + other) * h
+        x = add_product(x, weight, load(work.body.turning, 2 + 2 * other))
+        y = add_product(y, weight, load(work.body.turning, 3 + 2 * other))
+    store(work.body.turning, 0, x)
+    store(work.body.turning, 1, y)
+
+
+@kernel
+def turning_rate(body, rods, work, stage):
+    """B (x, y) of a stage [N], by the iterate."""
+    row, inverse = 2 * n_nodes(rods), load(body.inverse_scale, 0)
+    theta, theta_hat = load(work.q, row) * inverse, load(stage.q_hat, row) * inverse
+    omega, omega_hat = (theta - theta_hat) * stage.inverse_gamma, load(stage.v_hat, row) * inverse
+    rate = stage.inverse_gamma
+    if stage.ahead:
+        theta, omega, rate = theta + (theta - theta_hat), omega + (omega - omega_hat), 0.5 * rate
+    c, s = rotation(theta)
+    x, y = turned(c, s, body.moment, 0)
+    b_x, b_y = load(work.body.turning, 0), load(work.body.turning, 1)
+    return rate * (-omega * y - b_x), rate * (omega * x - b_y)
+
+
+@kernel
+def add_turning_rate(body, rods, work, stage, force):
+    """Replace what add_body takes for the rate of b by B, in a residual [N]."""
+    row, inverse = 2 * n_nodes(rods), load(body.inverse_scale, 0)
+    omega = (load(work.q, row) - load(stage.q_hat, row)) * stage.inverse_gamma * inverse
+    rate = (omega - load(stage.v_hat, row) * inverse) * stage.inverse_gamma
+    x, y = turning_rate(body, rods, work, stage)
+    x -= rate * load(work.body.frozen, J_X) - load(work.body.frozen, F_X)
+    y -= rate * load(work.body.frozen, J_Y) - load(work.body.frozen, F_Y)
+    return force[0] + x, force[1] + y
+
+
+@kernel
+def end_turning(body, rods, work, k, stage):
+    """Keep B of stage k, in scenes with a body."""
+    if body is None:
+        return
+    x, y = turning_rate(body, rods, work, stage)
+    store(work.body.turning, 2 + 2 * k, x)
+    store(work.body.turning, 3 + 2 * k, y)
 
 
 @kernel

@@ -30,7 +30,7 @@ import numpy as np
 from seastar_gym.der.geometry import edge_vector, rotation, tangent
 from seastar_gym.der.mesh import Mesh
 from seastar_gym.der.star import load_root_edge, tail_node
-from seastar_gym.der.terms.along import bending_stiffness, turned, turned_at_hub
+from seastar_gym.der.terms.along import bending_stiffness, stiffening_rate, turned, turned_at_hub
 from seastar_gym.der.terms.body import add_to_system, angle
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, select, splat, sqrt, store, subtract_product
@@ -129,17 +129,25 @@ def turned_energy(K, c, s, p_x, p_y):
 
 
 @kernel
+def sum_of_turns(rods, work):
+    """S [N m] of root edges turned by (c, s) in work.hub_turn."""
+    S_x, S_y = splat(0.0), splat(0.0)
+    for limb in range(rods.n_limbs):
+        K = clamp_stiffness(rods, work, limb)
+        c, s = load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1)
+        S_x, S_y = add_product(S_x, K, c), add_product(S_y, K, s)
+    return S_x, S_y
+
+
+@kernel
 def energy_of_turns(body, rods, work, q):
     """E [J] of root edges turned by (c, s) in work.hub_turn, two rows per limb, from their natural directions.
 
     q: Where a body's orientation is found, or None for a body that has not turned.
     """
-    S_x, S_y, total = splat(0.0), splat(0.0), splat(0.0)
-    for limb in range(rods.n_limbs):
-        K = clamp_stiffness(rods, work, limb)
-        c, s = load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1)
-        S_x, S_y = add_product(S_x, K, c), add_product(S_y, K, s)
+    S_x, S_y = sum_of_turns(rods, work)
     p_x, p_y = turn_of_hub(q, body, rods, S_x, S_y)
+    total = splat(0.0)
     for limb in range(rods.n_limbs):
         c, s = load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1)
         total += turned_energy(clamp_stiffness(rods, work, limb), c, s, p_x, p_y)
@@ -162,8 +170,8 @@ def unturned(body, S_x, S_y):
 
 
 @kernel
-def clamp_energy(rods, work, q):
-    """E [J] at the natural directions in `work`."""
+def turn_clamps(rods, work, q):
+    """Fill work.hub_turn with what root edges at q are turned by from the natural directions in `work`."""
     for limb in range(rods.n_limbs):
         e = limb * (rods.nodes_per_limb - 1)
         ex, ey = edge_vector(q, tail_node(rods, e), e + 1)
@@ -171,7 +179,32 @@ def clamp_energy(rods, work, q):
         c, s = turn_from(work.hub_direction, limb, ex * inverse, ey * inverse)
         store(work.hub_turn, 2 * limb, c)
         store(work.hub_turn, 2 * limb + 1, s)
+
+
+@kernel
+def clamp_energy(rods, work, q):
+    """E [J] at the natural directions in `work`."""
+    turn_clamps(rods, work, q)
     return energy_of_turns(rods.body, rods, work, q)
+
+
+@kernel
+def add_clamp_moments(clamp, rods, work, actuation, q, moments):
+    """Add dE/d(delta) of the clamps [N m], of every limb's rotation delta, at the natural directions in `work`.
+
+    With stiffness f K, f that of along.py, a clamp has -share M_j + E_j d(ln f)/d(delta), E_j its part of E.
+    """
+    if clamp is None:
+        return
+    turn_clamps(rods, work, q)
+    S_x, S_y = sum_of_turns(rods, work)
+    p_x, p_y = hub_orientation(rods.body, rods, q, S_x, S_y)
+    for limb in range(rods.n_limbs):
+        K, c, s = clamp_stiffness(rods, work, limb), load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1)
+        moment = turned_at_hub(rods.along, rods, limb, K * subtract_product(s * p_x, c, p_y))
+        rate = stiffening_rate(rods.along, load(actuation.delta_psi_start, limb))
+        stiffer = add_product(-moment, rate, turned_energy(K, c, s, p_x, p_y))
+        store(moments, limb, load(moments, limb) + stiffer)
 
 
 @kernel

@@ -1,7 +1,7 @@
 """Commands and actions under the symmetry group: what a turned or mirrored robot is told."""
 
 from functools import cache
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +16,9 @@ from seastar_gym.envs.symmetry.group import (
     n_limbs_of,
     n_turns_of,
     read_only,
+    require_group,
 )
+from seastar_gym.scene.checks import require_choice, shown
 
 
 def transform_commands(
@@ -86,4 +88,10 @@ def restore_actions(
     actions: NDArray[Any], elements: ArrayLike, mode: Actions, group: Group
 ) -> NDArray[Any]:
     """Actions of the robots as they are, from those chosen on observations reduced by the elements."""
-    return transform_actions(actions, inverse(elements, group), mode, group)
+    require_group(group)
+    require_choice("mode", mode, get_args(Actions))
+    checked = as_array(elements)
+    n = 2 * n_turns_of(group)
+    if checked.dtype.kind not in "iu" or (checked.size and (checked.min() < 0 or checked.max() >= n)):
+        raise ValueError(f"elements must be whole numbers from 0 to {n - 1}, not {shown(elements)}.")
+    return transform_actions(actions, inverse(checked, group), mode, group)

@@ -9,10 +9,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.scene.checks import MOST_LIMBS, is_whole_number, require_count, shown
 from seastar_gym.scene.symmetry import PointGroup
 
 Elements = NDArray[np.intp]
 Group = int | PointGroup
+
+
+def require_group(group: object) -> None:
+    """ValueError for what is neither a number of limbs nor a `PointGroup`."""
+    if not isinstance(group, PointGroup):
+        require_count("group", group, 1, MOST_LIMBS)
+
+
+def require_mirror(mirror: object) -> None:
+    """ValueError unless a mirror is a pair of index and sign for each number of a limb."""
+    rows = mirror if isinstance(mirror, tuple) else (None,)
+    if not all(isinstance(row, tuple) and len(row) == 2 and _is_row(row[0], row[1], len(rows)) for row in rows):
+        raise ValueError(f"mirror must be a tuple of pairs, an index and a sign, not {shown(mirror)}.")
+
+
+def _is_row(index: object, sign: object, n: int) -> bool:
+    """Whether a row of the mirror of n numbers is an index and a sign."""
+    are_whole = is_whole_number(index) and is_whole_number(sign)
+    return are_whole and 0 <= index < n and sign in (-1, 1)  # type: ignore[operator]
 
 
 def n_limbs_of(group: Group) -> int:

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from seastar_gym.envs.own_numbers import NO_MORE, OwnNumbers, Places, places_of
 from seastar_gym.envs.stations import N_STATIONS
-from seastar_gym.envs.symmetry.group import Elements, Group, n_limbs_of
+from seastar_gym.envs.symmetry.group import Elements, Group, n_limbs_of, require_group, require_mirror
 from seastar_gym.envs.symmetry.observations import sectors, transform_observations
 from seastar_gym.envs.symmetry.wrappers import kind_of
 from seastar_gym.scene.actuators.heating import Mirror
-from seastar_gym.scene.checks import require_count
+from seastar_gym.scene.checks import require_count, require_kind
 
 if TYPE_CHECKING:
     _VectorWrapper = gym.vector.VectorWrapper[Any, Any, Any, Any, Any]
@@ -40,8 +40,11 @@ class Recollection:
     """
 
     def __init__(self, group: Group, mirror: Mirror, own: OwnNumbers = NO_MORE, past: int = 1):
+        require_group(group)
+        require_mirror(mirror)
+        require_kind("own", own, OwnNumbers, "OwnNumbers")
         require_count("past", past, 1, MOST_PAST)
-        self.group, self.mirror, self.own, self.past = group, mirror, own, past
+        self.group, self.mirror, self.own, self.past = group, mirror, own, int(past)
 
     @cached_property
     def places(self) -> Places:
@@ -86,6 +89,7 @@ class VectorMemory(_VectorWrapper):
     """
 
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any], past: int):
+        require_kind("env", env, gym.vector.VectorEnv, "a batch, as gym.make_vec gives it")
         super().__init__(env)
         self._kind = kind = kind_of(env)
         if kind.with_headings:
@@ -107,8 +111,9 @@ class VectorMemory(_VectorWrapper):
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Begin episodes, of those in `options["reset_mask"]` or of all."""
-        begun = (options or {}).get("reset_mask", np.ones(self.num_envs, bool))
         observations, info = self.env.reset(seed=seed, options=options)  # type: ignore[arg-type]
+        mask = (options or {}).get("reset_mask")
+        begun = np.ones(self.num_envs, bool) if mask is None else np.asarray(mask)
         self._past[begun] = observations[begun, None]
         self._over[begun] = False
         self._latest = observations

@@ -17,9 +17,12 @@ from seastar_gym.envs.symmetry.group import (
     n_limbs_of,
     n_turns_of,
     read_only,
+    require_group,
+    require_mirror,
     turns,
 )
 from seastar_gym.scene.actuators.heating import Mirror
+from seastar_gym.scene.checks import as_array, require_flag, require_kind
 
 BOUNDARY_WIDTH = 1e-6
 """Angle [rad] from a boundary between two sectors within which a waypoint lies on it. It is far above the rounding of
@@ -178,5 +181,12 @@ def reduce_observations(
     mirror: What a mirror does to the memory of a limb's actuator, see `memory_mirror`; () if actuators have none.
     with_headings: Whether headings are asked for. own: What the task shows of its own.
     """
+    require_group(group)
+    require_mirror(mirror)
+    require_flag("with_headings", with_headings)
+    require_kind("own", own, OwnNumbers, "OwnNumbers")
+    observations = as_array("observations", observations)
+    if observations.dtype.kind != "f" or not observations.ndim:
+        raise ValueError(f"Observations must be floats, of shape (..., size), not {observations.dtype} values.")
     elements = sectors(observations, group, mirror, with_headings, own)
     return transform_observations(observations, elements, group, mirror, with_headings, own), elements

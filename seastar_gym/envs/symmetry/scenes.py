@@ -5,8 +5,9 @@ from collections.abc import Iterable, Iterator
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization
 from seastar_gym.envs.symmetry.group import Group
 from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.actuator import Actuator, Mirrored, StatefulActuator
+from seastar_gym.scene.actuators.actuator import Actuator, Mirrored, StatefulActuator, is_actuator
 from seastar_gym.scene.actuators.heating import Mirror
+from seastar_gym.scene.checks import require_kind, shown
 from seastar_gym.scene.symmetry import SAME, PointGroup
 
 
@@ -22,6 +23,7 @@ def symmetry_of(scene: Scene) -> Group:
 
     Robots of the chapter's discretisation have all or none.
     """
+    require_kind("scene", scene, Scene, "a Scene")
     robot, nothing = scene.robot, tuple(range(scene.robot.n_limbs))
     if robot.discretisation == "chapter":
         return robot.n_limbs if robot.is_symmetric else PointGroup(1, None, (nothing, nothing))
@@ -41,6 +43,8 @@ def _feels_directions(scene: Scene) -> bool:
 
 def memory_mirror(actuator: Actuator) -> Mirror:
     """What a mirror does to the numbers that are observed of a limb's actuator; empty without memory."""
+    if not is_actuator(actuator):
+        raise ValueError(f"actuator must be an actuator, such as SmaWires, not {shown(actuator)}.")
     if not isinstance(actuator, StatefulActuator) or not isinstance(actuator, Mirrored):
         return ()
     return actuator.mirror[: actuator.observe(actuator.rest).shape[-1]]

@@ -19,6 +19,7 @@ from seastar_gym.envs.symmetry.observations import reduce_observations
 from seastar_gym.envs.symmetry.scenes import memory_mirror, require_symmetry, symmetry_of
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.actuators.heating import Mirror
+from seastar_gym.scene.checks import require_kind
 
 if TYPE_CHECKING:
     _VectorWrapper = gym.vector.VectorWrapper[Any, Any, Any, Any, Any]
@@ -76,6 +77,7 @@ class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstru
     """
 
     def __init__(self, env: gym.Env[Any, Any]):
+        require_kind("env", env, gym.Env, "an environment of one robot")
         gym.utils.RecordConstructorArgs.__init__(self)
         gym.Wrapper.__init__(self, env)
         self._kind = kind_of(env)
@@ -111,6 +113,7 @@ class VectorSymmetryReduction(_VectorWrapper):
     """
 
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any]):
+        require_kind("env", env, gym.vector.VectorEnv, "a batch, as gym.make_vec gives it")
         super().__init__(env)
         self._kind = kind_of(env)
         self._elements = np.zeros(env.num_envs, np.intp)

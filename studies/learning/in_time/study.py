@@ -107,6 +107,7 @@ def study(options: Options, results: dict[str, Any]) -> None:
         if str(seed) in runs:
             continue
         found = runs[str(seed)] = result(name, seed, options)
+        results["runs"][name] = runs = dict(sorted(runs.items(), key=lambda run: int(run[0])))
         write_atomically(options.out, (json.dumps(results, indent=1) + "\n").encode())
         pentagon = ", ".join(f"{one['seconds']:g} s at {fidelity}" for fidelity, one in found["pentagon"].items())
         print(f"{name}, seed {seed}: {pentagon}; held-out {found['held_out']['seconds']:.1f} s", flush=True)

@@ -1,4 +1,4 @@
-"""The environments as tables: their ids from Gymnasium's registry, their contracts from their docstrings."""
+"""Tables of docs/environments.md: ids from Gymnasium's registry, contracts from docstrings."""
 
 import importlib
 import inspect
@@ -6,6 +6,7 @@ import re
 from typing import Any
 
 import gymnasium as gym
+from gymnasium import spaces
 from gymnasium.envs.registration import EnvSpec
 
 import seastar_gym
@@ -27,12 +28,34 @@ def environment(entry_point: str) -> type[Any]:
 
 def registered() -> str:
     """Table of all ids: what `gym.make` gives by default."""
-    lines = ["| id | class | time limit [decisions] | arguments by default |", "|---|---|---:|---|"]
-    for spec in specs():
-        arguments = ", ".join(f"`{name}={value!r}`" for name, value in spec.kwargs.items()) or "-"
-        name = str(spec.entry_point).partition(":")[2]
-        lines.append(f"| `{spec.id}` | [{name}](#{name.lower()}) | {spec.max_episode_steps or '-'} | {arguments} |")
-    return "\n".join(lines)
+    head = "| id | contract | actions | observation | time limit [decisions] | arguments by default |"
+    return "\n".join([head, "|---|---|---|---|---:|---|", *map(row, specs())])
+
+
+def row(spec: EnvSpec) -> str:
+    """Row of an id. An environment of a task has the contract of its challenge, too."""
+    env: Any = gym.make(spec.id, disable_env_checker=True).unwrapped
+    names = [type(env).__name__, *([type(env.challenge).__name__] if hasattr(env, "challenge") else [])]
+    links = ", ".join(f"[{name}](#{name.lower()})" for name in names)
+    arguments = ", ".join(f"`{name}={short(value)}`" for name, value in spec.kwargs.items()) or "-"
+    (size,) = env.observation_space.shape
+    limit = spec.max_episode_steps or "-"
+    return f"| `{spec.id}` | {links} | {actions(env.action_space)} | {size} numbers | {limit} | {arguments} |"
+
+
+def actions(space: gym.Space[Any]) -> str:
+    """A space of actions in a few words."""
+    match space:
+        case spaces.Discrete():
+            return f"`Discrete({space.n})`"
+        case spaces.MultiDiscrete():
+            return f"`MultiDiscrete({space.nvec.tolist()})`"
+    return f"`Box(-1, 1, {space.shape})`"
+
+
+def short(value: Any) -> str:
+    """An argument; a part of a scene or a task by the name of its class."""
+    return f"{value['kind']}()" if isinstance(value, dict) else repr(value)
 
 
 def contracts() -> str:

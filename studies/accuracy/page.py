@@ -1,0 +1,108 @@
+"""Tables of the presets' errors for README.md and docs/, from the tables that come with the package.
+
+Every error is one that `info` has: `path_error` or `gait_error` is the bound, `typical_error` or `typical_gait_error`
+the median beside it.
+"""
+
+import json
+from typing import get_args
+
+from seastar_gym.scene.fidelity import TIMED_PRESETS, Promise, TimedPromise, promise, timed_promise
+from seastar_gym.scene.numerics import Fidelity
+from studies.accuracy.tables import two_digits
+
+IN_README: tuple[Fidelity, ...] = ("fast", "balanced", "reference")
+PERIOD = 0.2
+"""Time between decisions [s] of the column of commands in time."""
+PURPOSES: dict[Fidelity, str] = {
+    "fast": "searching, training", "balanced": "doing anything else; it is the default",
+    "accurate": "measuring a difference of a few per cent", "reference": "checking one of the above",
+    "chapter": "repeating the chapter's figures",
+}  # fmt: skip
+
+
+def percent(error: float) -> str:
+    """Error in per cent, of two digits."""
+    return f"{two_digits(100 * error):g} %"
+
+
+def pair(bound: float, typical: float) -> str:
+    """A bound and the median below it."""
+    return f"{percent(bound)} ({percent(typical)})"
+
+
+def cells(known: Promise | TimedPromise) -> list[str]:
+    """Errors of random and of repeated commands."""
+    return [pair(known.path_error, known.typical_error), pair(known.gait_error, known.typical_gait_error)]
+
+
+def in_time(name: Fidelity) -> TimedPromise:
+    """Errors of a preset where commands come in time."""
+    known = timed_promise(name, PERIOD)
+    assert known is not None
+    return known
+
+
+def markdown(head: list[str], rows: list[list[str]], n_texts: int = 1) -> str:
+    """Table whose first columns are texts and whose others are numbers."""
+    lines = [head, ["---"] * n_texts + ["---:"] * (len(head) - n_texts), *rows]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+ERRORS = ["random, every 1 s", "repeated, every 1 s", f"random, every {PERIOD:g} s", f"repeated, every {PERIOD:g} s"]
+
+
+def errors() -> str:
+    """Largest and, in brackets, typical errors and speeds of some presets."""
+    rows = [
+        [f"`{name}`", *cells(promise(name)), *cells(in_time(name)), f"{promise(name).speed:,.0f}"] for name in IN_README
+    ]
+    return markdown(["fidelity", *ERRORS, "x real time"], rows)
+
+
+def choosing() -> str:
+    """The same of all presets, by what they are for."""
+    rows = [
+        [why, f'`fidelity="{name}"`', *cells(promise(name)), *cells(in_time(name)), f"{promise(name).speed:,.0f}"]
+        for name, why in PURPOSES.items()
+    ]
+    return markdown(["you are", "take", *ERRORS, "x real time"], rows, 2)
+
+
+def presets() -> str:
+    """Numerics of all presets, and their errors by part and by commands."""
+    rows = []
+    for name in get_args(Fidelity):
+        row = promise(name)
+        nodes = f"{row.nodes_per_limb}{'' if row.discretisation == 'continuum' else ', chapter' + chr(39) + 's'}"
+        scheme = row.scheme.replace("-", " ").replace("euler", "Euler")
+        rows.append([
+            f"`{name}`", nodes, f"{scheme}, {1e3 * row.step:g} ms", f"{row.newton_tolerance:.0e}",
+            percent(row.space_error), percent(row.time_error),
+            f"**{percent(row.path_error)}** ({percent(row.typical_error)})",
+            pair(row.gait_error, row.typical_gait_error), pair(row.slow_error, row.typical_slow_error),
+            percent(row.straight_error), f"{row.speed:,.0f}",
+        ])  # fmt: skip
+    head = ["fidelity", "N", "scheme and step", "Newton tolerance", "space", "time", "path error", "gaits", "slow"]
+    return markdown([*head, "straight", "x real time"], rows)
+
+
+def timed(periods: tuple[float, ...] = (0.5, 0.2, 0.1)) -> str:
+    """Errors of all presets for times between decisions [s], of random commands and then of repeated seconds."""
+    rows = []
+    for name in get_args(Fidelity):
+        found = [cells(known) for known in (timed_promise(name, period) for period in periods) if known is not None]
+        rows.append([f"`{name}`", *(each[k] for k in (0, 1) for each in found)])
+    columns = [f"{what}, {period:g} s" for what in ("random", "repeated") for period in periods]
+    return markdown(["fidelity", *columns], rows)
+
+
+def timed_paths() -> str:
+    """Shortest, median and longest paths [mm] of commands in time."""
+    stored = json.loads(TIMED_PRESETS.read_text(encoding="utf-8"))["paths"]
+    kinds = {"random": "random commands", "repeated": "repeated seconds"}
+    rows = [
+        [name, *(", ".join(f"{length:g}" for length in each[kind]) for each in stored.values())]
+        for kind, name in kinds.items()
+    ]
+    return markdown(["", *(f"every {period} s" for period in stored)], rows)

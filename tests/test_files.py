@@ -1,0 +1,174 @@
+"""Files are written all at once and never through a link, and JSON that is damaged is refused in a sentence."""
+
+import os
+import re
+import stat
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from refusals import assert_refused
+from seastar_gym.benchmark.command import publish
+from seastar_gym.benchmark.measures import SECONDS
+from seastar_gym.benchmark.results import Entry
+from seastar_gym.controllers.learned import load, save
+from seastar_gym.evaluation.films import film
+from seastar_gym.evaluation.many import HELD_OUT_SEED
+from seastar_gym.evaluation.pictures import draw_traces
+from seastar_gym.evaluation.results import write_csv
+from seastar_gym.evaluation.swim import Swim
+from seastar_gym.files import beside, read_json, write_atomically, write_json
+from seastar_gym.identify.measurement import Measurement
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture
+def somebodys(tmp_path):
+    """A file of somebody else."""
+    file = tmp_path / "somebody's"
+    file.write_text("work")
+    return file
+
+
+def names(folder):
+    return {file.name for file in folder.iterdir()}
+
+
+def test_a_link_is_replaced_and_what_it_points_to_stays(tmp_path, somebodys):
+    target = tmp_path / "run" / "config.json"
+    target.parent.mkdir()
+    for name in (".config.json", "config.json.part", f".config.json.{os.getpid()}", f".config.json.{os.getpid()}.part"):
+        (target.parent / name).symlink_to(somebodys)
+    target.symlink_to(somebodys)
+    before = names(target.parent)
+    write_atomically(target, "mine")
+    assert somebodys.read_text() == "work" and target.read_text() == "mine" and not target.is_symlink()
+    assert names(target.parent) == before
+    hard = tmp_path / "hard"
+    os.link(somebodys, hard)
+    write_atomically(hard, b"mine")
+    assert somebodys.read_text() == "work" and hard.read_bytes() == b"mine"
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir], ids=["pipe", "folder"])
+def test_what_is_no_file_is_not_written_over(make, tmp_path):
+    make(tmp_path / "results.json")
+    for link in (False, True):
+        target = tmp_path / "link.json" if link else tmp_path / "results.json"
+        if link:
+            target.symlink_to(tmp_path / "results.json")
+        with pytest.raises(OSError, match=r"is no file that can be written over\.$"):
+            write_atomically(target, "mine")
+    assert names(tmp_path) == {"results.json", "link.json"}
+
+
+def test_a_file_is_as_readable_as_any_other(tmp_path):
+    write_atomically(tmp_path / "new" / "ours", "text")
+    (tmp_path / "theirs").write_text("text")
+    ours, theirs = (stat.S_IMODE(file.stat().st_mode) for file in (tmp_path / "new" / "ours", tmp_path / "theirs"))
+    assert ours == theirs
+
+
+def test_two_at_once_do_not_meet(tmp_path):
+    """Not even two threads of one process; the later of them counts."""
+    with beside(tmp_path / "file") as first:
+        with beside(tmp_path / "file") as second:
+            assert first != second
+            second.write_text("second")
+        first.write_text("first")
+    assert (tmp_path / "file").read_text() == "first" and names(tmp_path) == {"file"}
+
+
+@pytest.mark.parametrize("failure", [OSError(28, "No space left on device"), KeyboardInterrupt()], ids=repr)
+def test_whatever_goes_wrong_leaves_the_file_as_it_was(failure, tmp_path):
+    (tmp_path / "file").write_text("before")
+    writing = beside(tmp_path / "file")
+    writing.__enter__().write_text("half")
+    with pytest.raises(type(failure)):
+        writing.gen.throw(failure)
+    assert (tmp_path / "file").read_text() == "before" and names(tmp_path) == {"file"}
+
+
+def swims():
+    hub, ends, one = np.array([[0.0, 0.0], [0.01, 0.0]]), np.array([0, 1]), np.zeros(1)
+    return [Swim("a$b", hub[1:], hub, ends, ends.astype(float), one, one, one, None)]
+
+
+def filmed(file):
+    with film(file, 10.0) as add:
+        add(np.zeros((64, 64, 3), np.uint8))
+
+
+def measured():
+    return Measurement(np.array([0.5]), np.zeros((1, 1, 2)), (0,), np.zeros((1, 5)))
+
+
+ENTRY = Entry(
+    "SeastarSwim-v0", "a", "", SECONDS.name, "s", "less", [HELD_OUT_SEED], [1.0], [True], [1.0], [1]
+)  # fmt: skip
+WRITERS = {
+    "evaluation.csv": lambda file: write_csv(swims(), file),
+    "traces.png": lambda file: draw_traces(swims(), 0.01, file),
+    "film.gif": filmed,
+    "film.mp4": filmed,
+    "trajectory.csv": lambda file: measured().to_csv(file, file.with_name("other.csv")),
+    "commands.csv": lambda file: measured().to_csv(file.with_name("other.csv"), file),
+    "policy.safetensors": lambda file: save(load(), file),
+    "policy.json": lambda file: save(load(), file.with_suffix(".safetensors")),
+    "results.json": lambda file: publish([ENTRY], file.parent, "command"),
+    "benchmark.md": lambda file: publish([ENTRY], file.parent, "command"),
+    "profiles.png": lambda file: publish([ENTRY, replace(ENTRY, agent="b")], file.parent, "command"),
+    "config.json": lambda file: write_json(file, {"a": 1}),
+}
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_no_writer_writes_through_a_link(name, tmp_path, somebodys):
+    place = tmp_path / "out" / name
+    place.parent.mkdir()
+    place.symlink_to(somebodys)
+    WRITERS[name](place)
+    assert somebodys.read_text() == "work"
+    assert place.is_file() and not place.is_symlink() and place.stat().st_size > 0
+    assert not [file for file in place.parent.iterdir() if file.name.startswith(".")]
+
+
+CALLS = re.compile(
+    r"""(\S*)\.(?:write_text|write_bytes)\(|(\S*)\.open\(["'][wax]|(?:savefig|savez\w*|savetxt)\((\w*)"""
+)
+
+
+@pytest.mark.parametrize("room", ["seastar_gym", "agents", "train.py"])
+def test_all_writers_write_beside_their_file(room):
+    """What writes by itself writes to the place that `beside` gives."""
+    files = [ROOT / room] if room.endswith(".py") else (ROOT / room).rglob("*.py")
+    for file in files:
+        for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), start=1):
+            for call in CALLS.finditer(line):
+                place = next(filter(None, call.groups()), "")
+                assert place in ("part", "stream"), f"{file}, line {number}: {line}"
+
+
+DAMAGED = {
+    "empty": "", "cut": '{"a": ', "deep": "[" * 100_000, "deep names": '{"a":' * 100_000, "nan": "[NaN]",
+    "infinite": '{"a": -Infinity}', "long": "9" * 10_000, "no text": b"\xff\xfe", "overflowing": "[1e999]",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", DAMAGED.values(), ids=DAMAGED)
+def test_damaged_json_is_refused_by_its_name(text, tmp_path):
+    (tmp_path / "data.json").write_bytes(text if isinstance(text, bytes) else text.encode())
+    with assert_refused("data.json is no JSON that can be read"):
+        read_json(tmp_path / "data.json")
+
+
+def test_json_that_is_no_file_is_missing(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for name in ("pipe", "", "none"):
+        with pytest.raises(FileNotFoundError, match="There is no file"):
+            read_json(tmp_path / name)
+    (tmp_path / "data.json").write_text("\ufeff[1, 2.5]", encoding="utf-8")
+    assert read_json(tmp_path / "data.json") == [1, 2.5]
