@@ -49,7 +49,7 @@ def make(case: Case, robots: Iterable[int] | None = None, threads: int = 1) -> S
     scene = case.scene
     if scene.n_robots is not None and robots is not None:
         scene = side_by_side([scene.of_robot(robot) for robot in chosen])
-    simulator = Simulator(scene, len(chosen), threads)
+    simulator = Simulator(scene, len(chosen), threads, effort=True)
     simulator.set_state(case.state.of_robots(chosen))
     return simulator
 
