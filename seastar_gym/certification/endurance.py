@@ -33,22 +33,34 @@ def energy_growth(scene: Scene, samples: int = 8, seed: int = 0) -> float:
     Robots repeat one command, or two in turn, `samples` of each, and swim the alternation of mirrored pairs. A setting
     that gathers no energy has about 1, one that resonates ten and more; at `ENOUGH` the swims end.
     """
+    return float(np.max(energy_growths(scene, samples, seed, enough=ENOUGH)))
+
+
+def energy_growths(
+    scene: Scene, samples: int = 8, seed: int = 0, strokes: int = LONG, enough: float | None = None
+) -> Floats:
+    """Growth of the energy of each long swim, shape (1 + 2 samples,), see `energy_growth`; inf for those that fail.
+
+    strokes: Length of the swims. enough: Growth of any of them, also by failure, at which all end.
+    """
     commands = long_swims(scene.robot.n_limbs, samples, seed)
-    simulator, energies = with_the_water(scene, commands.shape[1]), np.empty((LONG, commands.shape[1]))
-    for stroke in range(LONG):
-        if simulator.stroke(commands[stroke % STROKES]).status.any():
-            return float(np.inf)
+    n = commands.shape[1]
+    simulator, energies, failed = with_the_water(scene, n), np.empty((strokes, n)), np.zeros(n, bool)
+    for stroke in range(strokes):
+        failed |= simulator.stroke(commands[stroke % STROKES]).status > 0
         energies[stroke] = kinetic_energy(simulator)
-        if stroke >= WINDOW and (growth := _growth(energies[:WINDOW], energies[stroke : stroke + 1])) >= ENOUGH:
+        growth = _growth(energies[:WINDOW], energies[stroke : stroke + 1]) if stroke >= WINDOW else np.zeros(n)
+        growth[failed] = np.inf
+        if enough is not None and growth.max() >= enough:
             return growth
-    return _growth(energies[:WINDOW], energies[-WINDOW:])
+    return np.where(failed, np.inf, _growth(energies[:WINDOW], energies[-WINDOW:]))
 
 
-def _growth(early: Floats, late: Floats) -> float:
-    """Largest late energy over the largest early one of the same swim, the worst; both of shape (strokes, n)."""
+def _growth(early: Floats, late: Floats) -> Floats:
+    """Largest late energy over the largest early one of the same swim; both of shape (strokes, n)."""
     first = early.max(axis=0)
     least = max(NOISE * first.max(), np.finfo(float).tiny)
-    return float(np.max(late.max(axis=0) / np.maximum(first, least)))
+    return np.asarray(late.max(axis=0) / np.maximum(first, least))
 
 
 def long_swims(n_limbs: int, samples: int, seed: int) -> Floats:

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from rich.table import Table
 from tqdm import tqdm
 
-from seastar_gym.certification.commands import STROKES
-from seastar_gym.certification.endurance import LONG, WINDOW, long_swims
+from seastar_gym.certification.endurance import LONG, energy_growths
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator
@@ -101,26 +100,22 @@ RESONANCES = (
 )
 
 
-def energy_growths(setting: Resonance, strokes: int = LONG) -> Floats:
+def growths(setting: Resonance, strokes: int = LONG) -> Floats:
     """Largest kinetic energy at the ends of the last strokes over that of the first, for each gait; the fastest first.
 
-    strokes: Length of the swims, of which WINDOW are the first ones and as many the last.
+    strokes: Length of the swims.
     """
-    commands, robot = long_swims(Seastar().n_limbs, SAMPLES, 0), Seastar(nodes_per_limb=setting.nodes)
+    robot = Seastar(nodes_per_limb=setting.nodes)
     robot = replace(robot, youngs_modulus=setting.stiffness * robot.youngs_modulus)
-    simulator = Simulator(Scene(robot, numerics=Numerics("implicit-midpoint", setting.step)), commands.shape[1], 1)
-    energies = np.empty((strokes, commands.shape[1]))
-    for k in range(strokes):
-        simulator.stroke(commands[k % STROKES])
-        energies[k] = simulator.kinetic_energy()
-    return np.where(simulator.failed, np.inf, energies[-WINDOW:].max(axis=0) / energies[:WINDOW].max(axis=0))
+    scene = Scene(robot, numerics=Numerics("implicit-midpoint", setting.step))
+    return energy_growths(scene, SAMPLES, strokes=strokes)
 
 
 def growth_table(settings: tuple[Resonance, ...] = RESONANCES, strokes: int = LONG) -> Table:
     """By how much the kinetic energy of long swims grows, as a table for the terminal."""
     table = Table("nodes", "step", "stiffness", "fastest gait", "median", "largest", title="Growth of kinetic energy")
     for setting in tqdm(settings, unit="setting"):
-        found = energy_growths(setting, strokes)
+        found = growths(setting, strokes)
         numbers = (f"{each:.3g}" for each in (found[0], np.median(found), found.max()))
         table.add_row(str(setting.nodes), f"{1e3 * setting.step:g} ms", f"x {setting.stiffness:g}", *numbers)
     return table

@@ -126,7 +126,7 @@ def unlike_the_default() -> Scene:
         robot=Seastar(youngs_modulus=2e6, limbs=(Limb(radius=(2e-3, 1e-3)),) * 5),
         fluid=Water(tangential_drag_coefficient=0.1, current=UniformCurrent(0.01, 0.0)),
         actuator=SmaPulse(peak_angle=0.5),
-        numerics=Numerics.preset("fast"),
+        numerics=Numerics.preset("accurate"),
         held_nodes=(3,),
         loads=((9, 0.0, 1e-3),),
         limb_strengths=(1.0, 1.0, 0.5, 1.0, 1.0),

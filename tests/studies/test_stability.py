@@ -137,7 +137,7 @@ def test_a_long_run_keeps_strain_and_speed_bounded():
 def test_growth_is_the_energy_of_late_strokes_over_that_of_early_ones():
     """Short swims of few nodes: nothing grows, and implicit midpoint gaits repeat themselves."""
     setting = long_run.Resonance(4, 5e-3)
-    found = long_run.energy_growths(setting, strokes=40)
+    found = long_run.growths(setting, strokes=40)
     assert found.shape == (17,) and np.all(found < 1.5) and np.median(found) == pytest.approx(1.0, abs=0.1)
     assert long_run.growth_table((setting,), strokes=21).row_count == 1
 

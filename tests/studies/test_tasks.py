@@ -155,7 +155,7 @@ def test_who_knows_how_horseshoes_are_drawn_gains_little(n_imagined, monkeypatch
     """
     monkeypatch.setattr("studies.tasks.trap.IMAGINED", n_imagined)
     swum = []
-    for number in range(60 if n_imagined else 24):
+    for number in range(60):
         rng = np.random.default_rng([1, number])
         goal = np.array([rng.uniform(0.45, 0.6), 0.0])
         discs, belief = draw_discs(rng, goal, 3, 0.85), Belief(horseshoes_to(goal[0]))
