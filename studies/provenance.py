@@ -40,7 +40,6 @@ def _processor() -> str:
 
 
 COMMANDS = {
-    "designs.json": "python -m studies.designs",
     "gaits.json": "python -m studies.gaits",
     "heading.json": "python -m studies.learning.heading",
     "hub.json": "python -m studies.designs.hub",
