@@ -21,6 +21,7 @@ UNITS = {
     "obst-trap": "seconds to the goal, the time limit if it is not reached",
     "prizes": "worth of the prizes taken in 200 s",
     "fast-prizes": "worth of the prizes taken in 115 s",
+    "heading": "seconds to the last waypoint, 300 if it is not reached",
 }
 """Measures in words, by challenge."""
 SHORT = {
@@ -28,6 +29,7 @@ SHORT = {
     "station": "mean distance from the station [mm]",
     "fail-blind": "seconds to the last waypoint",
     "obst-trap": "seconds to the goal",
+    "heading": "seconds to the last waypoint",
 }
 """What the picture says in their place."""
 OPTIONAL = "RecurrentPPO"

@@ -13,7 +13,7 @@ from seastar_gym.envs.tasks.discs import rims
 from seastar_gym.envs.tasks.envs import SeastarTaskVectorEnv
 from seastar_gym.envs.tasks.obst_trap import draw_discs
 from seastar_gym.envs.tasks.prey import Prey
-from studies.tasks import pictures
+from studies.tasks import heading, pictures
 from studies.tasks import study as module
 from studies.tasks.ahead import Ahead, Odometer, Robots, few_commands
 from studies.tasks.blind import FailureGuess, live_commands
@@ -63,6 +63,13 @@ def test_every_controller_swims_every_kind_of_task(id, name, monkeypatch):
     assert done.time.shape == (3, 2) and np.isfinite(done.returns).all()
     assert np.isfinite(measure(module.IDS[id], done)).all()
     assert robots[0]._task.instance.tolist() == [0, 1] and robots[0]._task.split == "test"
+
+
+def test_random_paths_with_random_headings_are_swum_by_rules(monkeypatch):
+    monkeypatch.setattr(heading, "LIMIT", 1.0)
+    for agent in heading.RULES:
+        done = heading.swum(agent, 0, 0, 2, "fast", 1)
+        assert done.time[-1].tolist() == [1.0, 1.0] and measure("heading", done).tolist() == [1.0, 1.0]
 
 
 def test_the_wiring_is_found_by_what_limbs_do():
@@ -357,6 +364,8 @@ def test_nobody_waits_for_agents_that_a_task_has_not():
     assert not has_cell("SeastarPrizes-v0", "adaptive") and has_cell("SeastarPrizes-v0", "rest")
     told = "PPO, told the way"
     assert has_cell("SeastarObstTrap-v0", told) and not has_cell("SeastarPrizes-v0", told)
+    assert has_cell(heading.ID, heading.RULE) and not has_cell(heading.ID, "greedy")
+    assert not has_cell("SeastarPrey-v0", heading.RULE)
     row_ = Row("SeastarPrizes-v0", "prizes", {"greedy": [np.ones(4)]})
     assert "Not swum yet: rest; planner; informed; PPO; PPO, memory; in the box." in table(row_, has_cell)
 
