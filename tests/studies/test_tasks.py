@@ -155,7 +155,10 @@ def decisions_of_a_point(discs, goal, believed) -> int:
 
 @pytest.mark.parametrize("n_imagined", [0, pytest.param(400, marks=pytest.mark.slow)])
 def test_who_knows_how_horseshoes_are_drawn_gains_little(n_imagined, monkeypatch):
-    """Less than a third of what is to be gained by knowing them.
+    """Less than a third of the gap between who remembers discs and who is told them all, field by field.
+
+    The mean of what it gains more than that third lies below 0 by 1.64 standard errors or more, so that at most one
+    such sample in twenty would say so of a rule that gains the third. Fields are the same in every run.
 
     Without imagined horseshoes it believes in the mean one until it sees that it is not there; with them, in the one
     that explains best what it has seen.
@@ -172,9 +175,15 @@ def test_who_knows_how_horseshoes_are_drawn_gains_little(n_imagined, monkeypatch
             lambda hub, seen, known: discs,  # noqa: B023
         )
         swum.append([decisions_of_a_point(discs, goal, rule) for rule in rules])
-    adaptive, prior, informed = np.mean(swum, axis=0)
-    assert adaptive - informed > 5.0
-    assert adaptive - prior < (adaptive - informed) / 3.0
+    adaptive, prior, informed = np.array(swum, float).T
+    gap = adaptive - informed
+    beyond = adaptive - prior - gap / 3.0
+    assert gap.mean() > 3.0 * standard_error(gap)
+    assert beyond.mean() < -1.64 * standard_error(beyond)
+
+
+def standard_error(values):
+    return values.std(ddof=1) / len(values) ** 0.5
 
 
 def test_a_horseshoe_is_believed_in_until_it_is_not_seen():
