@@ -67,7 +67,8 @@ def test_kernels_are_given_every_weight_that_is_not_zero(n):
 @pytest.mark.parametrize("n", [2, 4, 7, 10, 19])
 def test_a_straight_robot_has_its_stations_on_its_limbs_and_its_heading_turns_with_it(n):
     robot, angle = Seastar(nodes_per_limb=n), 2.5
-    np.testing.assert_allclose(at_stations(robot.nodes(), robot), Seastar(nodes_per_limb=10).nodes(), rtol=0.0, atol=1e-15)
+    ten = Seastar(nodes_per_limb=10)
+    np.testing.assert_allclose(at_stations(robot.nodes(), robot), ten.nodes(), rtol=0.0, atol=1e-15)
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     turned = robot.nodes() @ turn + [3.0, -1.0]
     np.testing.assert_allclose(body_heading(turned[None], robot), angle, atol=1e-13)
