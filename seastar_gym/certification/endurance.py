@@ -33,7 +33,7 @@ def energy_growth(scene: Scene, samples: int = 8, seed: int = 0) -> float:
     Robots repeat one command, or two in turn, `samples` of each, and swim the alternation of mirrored pairs. A setting
     that gathers no energy has about 1, one that resonates ten and more; at `ENOUGH` the swims end.
     """
-    return float(np.max(energy_growths(scene, samples, seed, enough=ENOUGH)))
+    return float(np.max(energy_growths(scene, samples, seed, LONG, ENOUGH)))
 
 
 def energy_growths(

@@ -104,6 +104,7 @@ class Pair:
         self.rods, self.limits = make_rods(self.scene), make_limits(self.scene)
         self.times = step_times(self.scene.actuator.corners, numerics.step)
         self.shape = np.asarray(self.scene.actuator.delta_psi(self.times))
+        self.no_effort = np.zeros((len(self.q), 0, self.q.shape[-1]))
 
     def seconds(self, safeguarded: bool) -> float:
         """Processor time of the stroke [s]; leaves the final state in `q` and `v` and the counts in `report`."""
@@ -114,7 +115,7 @@ class Pair:
         if safeguarded:
             advance(
                 self.rods, work, self.scheme, SCHEMES["implicit-euler"], actuation, self.q, self.v, self.a, self.peaks,
-                self.times, self.shape, self.failed, self.report, self.limits,
+                self.times, self.shape, self.failed, self.report, self.limits, self.no_effort,
             )  # fmt: skip
         else:
             advance_plainly(

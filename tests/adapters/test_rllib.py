@@ -32,5 +32,5 @@ def test_runners_with_neighbouring_seeds_have_no_robot_in_common():
 
 
 def test_the_context_has_arguments_of_the_batch():
-    with pytest.raises(TypeError, match="colour"):
+    with pytest.raises(ValueError, match="colour"):
         native_batch({**CONTEXT, "colour": "red"})

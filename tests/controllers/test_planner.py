@@ -48,7 +48,7 @@ def test_an_observation_is_the_whole_state(robot):
 
 
 def test_the_state_of_the_rods_is_seen_beside_what_actuators_remember():
-    scene = Scene(actuator=ThermalSma(), numerics=FAST.numerics)
+    scene = Scene(Seastar(nodes_per_limb=10), actuator=ThermalSma(), numerics=FAST.numerics)
     env, observations = swum(scene=scene)
     twin = Simulator(scene, 3, threads=1)
     twin.set_state(state_of(observations, scene))

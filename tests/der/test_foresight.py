@@ -69,7 +69,7 @@ def test_limbs_that_touch_are_not_predictable():
 
 
 def length(gamma: float, **robot: float) -> float:
-    rods = make_rods(Scene(Seastar(**robot)))
+    rods = make_rods(Scene(Seastar(nodes_per_limb=10, **robot)))
     return float(np.max(plain(foreseeable_length.plain(rods, SimpleNamespace(gamma=Lanes(gamma))))))
 
 
