@@ -218,15 +218,24 @@ def in_child(root: Path, arguments: list[str], seconds: float, tracer: Tracer | 
                 Path(out).write_text(json.dumps(tracer.as_lists()), encoding="utf-8")
         sys.stdout.flush()
         os._exit(int(code))
+    return waited_for(child, seconds)
+
+
+def waited_for(child: int, seconds: float) -> int:
+    """Exit code of a child process, which is killed, with its own children, where its time is over: -1."""
     end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        done, status = os.waitpid(child, os.WNOHANG)
-        if done:
-            return os.waitstatus_to_exitcode(status)
-        time.sleep(0.02)
-    os.killpg(child, signal.SIGKILL)
-    os.waitpid(child, 0)
-    return -1
+    try:
+        while time.monotonic() < end:
+            done, status = os.waitpid(child, os.WNOHANG)
+            if done:
+                child = 0
+                return os.waitstatus_to_exitcode(status)
+            time.sleep(0.02)
+        return -1
+    finally:
+        if child:
+            os.killpg(child, signal.SIGKILL)
+            os.waitpid(child, 0)
 
 
 def asked(mutant: Mutant, tests: str, touched: Touched) -> list[str]:
