@@ -112,8 +112,8 @@ def require_texts(name: str, values: object) -> None:
 
 
 def require_file(name: str, file: object) -> None:
-    """Refuse what is no path of a file or folder, such as one of several lines."""
-    if not isinstance(file, str | PathLike) or not str(file).isprintable():
+    """Refuse what is no path of a file or folder, such as an empty one or one of several lines."""
+    if not isinstance(file, str | PathLike) or not (str(file) and str(file).isprintable()):
         raise ValueError(f"{name} must be a path, not {shown(file)}.")
 
 

@@ -42,6 +42,10 @@ class SolverStatus(IntEnum):
 COUNTS = ("newton_iterations", "regularised", "backtracks", "steps", "halvings", "rejections", "energy_cuts")
 
 
+MEASURED_IF_ASKED = ("error_estimate", "work", "peak_moment")
+"""Fields of a report that are NaN unless the simulator has `error_bars` or `effort`."""
+
+
 class StrokeReport(NamedTuple):
     """Outcome and cost of a stroke, or of any other interval; every array has shape (n_robots,).
 
