@@ -151,5 +151,5 @@ def test_importing_a_study_without_its_extra_is_a_missing_module(tmp_path):
     code = "import studies.speed.terms"
     done = python(tmp_path, ("rich",), "-c", code)
     assert done.stderr.splitlines()[-1] == (
-        'ModuleNotFoundError: The studies need rich: pip install "seastar-gym[studies]".'
+        'seastar_gym.extras.MissingExtra: The studies need rich: pip install "seastar-gym[studies]".'
     )

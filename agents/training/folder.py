@@ -23,7 +23,7 @@ from agents.report.charts import read_progress
 from agents.training import efficiency
 from agents.training.options import CONFIG, Options, config_of
 from seastar_gym.controllers.learned import save as save_policy
-from seastar_gym.files import is_part_of, write_json
+from seastar_gym.files import PART, is_part_of, write_json
 
 
 def write_config(options: Options, arguments: Sequence[str], folder: Path) -> None:
@@ -58,6 +58,7 @@ def held(folder: Path, new: bool) -> Iterator[None]:
     try:
         _lock(descriptor, folder)
         require_empty(folder) if new else require_own_files(folder)
+        _clear(folder)
         yield
     finally:
         os.close(descriptor)
@@ -92,6 +93,12 @@ def require_own_files(folder: Path) -> None:
             file = Path(place, name)
             if file.is_symlink() or not (file.is_file() or file.is_dir()):
                 raise ValueError(f"{file} is a link or a device, which no run has in its folder: take it out.")
+
+
+def _clear(folder: Path) -> None:
+    """Remove what a killed run was writing. The folder is locked, so nobody else is."""
+    for part in folder.rglob(f".*{PART}"):
+        part.unlink()
 
 
 def export(model: PPO, folder: Path) -> None:

@@ -13,6 +13,8 @@ from seastar_gym.scene.per_robot import numbers_of, with_numbers
 
 Floats = NDArray[np.float64]
 
+COUNTS = (int, "int", int | Any)
+"""Types of fields that are counts, which nobody fits."""
 UNKNOWN = ...
 """What a name stands for that the scene has not."""
 
@@ -36,7 +38,7 @@ def _found(scene: Scene, name: str) -> Any:
             value = value[int(step)]
         else:
             own = fields(value) if is_dataclass(value) else ()
-            known = step in {field.name for field in own if field.type not in (int, "int")}
+            known = step in {field.name for field in own if field.type not in COUNTS}
             value = getattr(value, step) if known else UNKNOWN
     return value
 

@@ -54,7 +54,9 @@ def nodes_of(row: Row) -> str:
 
 def two_digits(value: float, up: bool = False) -> float:
     """Value rounded to two significant digits; up: round upwards."""
-    unit = 10.0 ** (math.floor(math.log10(value)) - 1) if value > 0.0 and math.isfinite(value) else 1.0
+    if not math.isfinite(value):
+        return value
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1) if value > 0.0 else 1.0
     scaled = value / unit
     whole = math.ceil(scaled - 1e-9) if up else round(scaled)
     return float(f"{whole * unit:.2g}")

@@ -42,11 +42,10 @@ class Episodes(NamedTuple):
     """Time limit [s]."""
 
 
-def make_batch(id: str, n: int, split: str, fidelity: Fidelity, threads: int | None, **arguments: Any) -> Batch:
-    """Native batch of a task."""
-    return gym.make_vec(
-        id, n, vectorization_mode="vector_entry_point", split=split, fidelity=fidelity, threads=threads, **arguments
-    )
+def make_batch(id: str, n: int, split: str | None, fidelity: Fidelity, threads: int | None, **arguments: Any) -> Batch:
+    """Native batch of a task. split: None where it has none."""
+    arguments |= {} if split is None else {"split": split}
+    return gym.make_vec(id, n, vectorization_mode="vector_entry_point", fidelity=fidelity, threads=threads, **arguments)
 
 
 def swim(
@@ -59,9 +58,14 @@ def swim(
 ) -> Episodes:
     """The first episodes of the split "test", each to its end."""
     batch = wrap(make_batch(id, n_episodes, "test", fidelity, threads))
-    inner: Any = batch.unwrapped
     agent = make_agent(batch)
-    observations, info = batch.reset(seed=0, options={"instance": np.arange(n_episodes)})
+    return swim_to_the_end(batch, agent, *batch.reset(seed=0, options={"instance": np.arange(n_episodes)}))
+
+
+def swim_to_the_end(batch: Batch, agent: Agent, observations: NDArray[np.float32], info: Info) -> Episodes:
+    """Episodes of a batch from their first observations and info, each to its end; closes the batch."""
+    inner: Any = batch.unwrapped
+    n_episodes = batch.num_envs
     over, success, returns = np.zeros(n_episodes, bool), np.zeros(n_episodes, bool), np.zeros(n_episodes)
     history: dict[str, list[Floats]] = {name: [] for name in RECORDED}
     for _ in range(inner.max_episode_steps):
@@ -116,5 +120,6 @@ MEASURES: dict[str, Callable[[Episodes], Floats]] = {
     "obst-trap": _seconds,
     "prizes": _worth,
     "fast-prizes": _worth,
+    "heading": _seconds,
 }
 """Measures by the name of the challenge; more is better for prey and prizes, less for the others."""

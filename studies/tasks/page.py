@@ -21,6 +21,7 @@ UNITS = {
     "obst-trap": "seconds to the goal, the time limit if it is not reached",
     "prizes": "worth of the prizes taken in 200 s",
     "fast-prizes": "worth of the prizes taken in 115 s",
+    "heading": "seconds to the last waypoint, 300 if it is not reached",
 }
 """Measures in words, by challenge."""
 SHORT = {
@@ -28,6 +29,7 @@ SHORT = {
     "station": "mean distance from the station [mm]",
     "fail-blind": "seconds to the last waypoint",
     "obst-trap": "seconds to the goal",
+    "heading": "seconds to the last waypoint",
 }
 """What the picture says in their place."""
 OPTIONAL = "RecurrentPPO"
@@ -40,9 +42,9 @@ on the split "train". Numbers are means. Their 95 % intervals are those of a boo
 seed, over episodes. Where a learner has several seeds, the mean of each is given. What is missing, or has swum fewer
 episodes, is swum by the same command, which goes on where it was broken off; `--seeds 0 1 2` adds seeds.
 
-Rows of 16 episodes are older but for `ObstTrap`: their runs recorded no versions, and learners of `Prizes` among them
-were trained when the end of its time counted as a cut. The policies in the box for `ObstTrap` were trained when its
-horseshoe lay half way to the goal in every episode, and its other learners are still to be trained.
+Rows of 16 episodes are older: their runs recorded no versions, and learners of `Prizes` among them were trained when
+the end of its time counted as a cut. The policies in the box for `ObstTrap` were trained when its horseshoe lay half
+way to the goal in every episode, and its other learners are still to be trained.
 
 A task is kept if the best that was found is at least 20 % better than greedy, and if PPO leaves at least a third of
 that after {decisions:,} decisions. *Bound* is the best mean of all agents of a row: what can be reached, not a proof
@@ -56,6 +58,7 @@ that nothing is better. *Gap left* is the share of the way from greedy to the bo
 | adaptive | remembers: goes by the wires, the drift, .. that have explained the past best; keeps a map of discs |
 | prior | besides, is told how `ObstTrap` draws horseshoes: it swims around the most probable one, too |
 | informed | is told what is hidden: the wires, the water, the course of the prey, the dead limbs, all discs |
+| turn, then swim | of `SeastarSwimHeading-v0`: a wave of single limbs turns, then the policy in the box swims |
 | PPO | tuned for this robot and symmetric: the project's hyperparameters, horizons of `agents.tasks.learning.OWN` |
 | PPO, memory | the same, and tips, last commands and targets of the last eight observations |
 | PPO, told the way | PPO of `ObstTrap`, by a reward that measures the way around all discs |
@@ -67,6 +70,10 @@ velocities over ground (R2 = 0.97 after one decision at rest), so that the task 
 nothing is hidden: there, the planner swims to the prize of most worth per metre as greedy does, and *informed* is the
 best round through those that are left, planned before every decision. Contracts of the tasks stand in the docstrings of
 `Miswired`, `Prey`, `Station`, `FailBlind`, `ObstTrap` and `Prizes`.
+
+In `SeastarSwimHeading-v0` nothing is hidden, either, and its agents are other ones, so that it is not judged. They swim
+random paths with random headings, those of the seeds from 1000 on, that no training draws, within 300 s. *Turn, then
+swim* decides every 0.2 s, as its wave asks for, the others every 0.5 s, among them PPO of `studies.learning.heading`.
 
 Policies in the box are in `seastar_gym/controllers/policies/tasks`, each with a card. `python -m agents.tasks` trains
 them, that of `ObstTrap` by the reward that measures the way around all discs. To watch one, type

@@ -16,22 +16,22 @@ from studies.parser import study_parser
 from studies.tasks.controllers import make_controller
 from studies.tasks.episodes import make_batch
 
-SHOWN: dict[str, tuple[str, str, int]] = {
+SHOWN: dict[str, tuple[str, str, int] | tuple[str, str, int, int]] = {
     "miswired": ("SeastarMiswired-v0", "adaptive", 120),
     "fail-blind": ("SeastarFailBlind-v0", "adaptive", 150),
-    "obst-trap": ("SeastarObstTrap-v0", "adaptive", 150),
+    "obst-trap": ("SeastarObstTrap-v0", "adaptive", 150, 7),
     "prey": ("SeastarPrey-v0", "adaptive", 60),
     "station": ("SeastarStation-v0", "adaptive", 60),
     "prizes": ("SeastarPrizes-v0", "informed", 110),
 }
-"""Id, controller and number of strokes, by name of the challenge."""
+"""Id, controller, number of strokes and, if not the first, of the episode, by name of the challenge."""
 
 
-def picture(id: str, controller: str, strokes: int) -> NDArray[np.uint8]:
-    """Picture of the first held-out episode of a task after so many strokes, or before its end."""
+def picture(id: str, controller: str, strokes: int, instance: int = 0) -> NDArray[np.uint8]:
+    """Picture of a held-out episode of a task after so many strokes, or before its end."""
     batch = make_batch(id, 1, "test", "fast", 1, render_mode="rgb_array")
     agent: Any = make_controller(controller, batch)
-    observations, info = batch.reset(seed=0, options={"instance": 0})
+    observations, info = batch.reset(seed=0, options={"instance": instance})
     pictures: Any = batch.render()
     for _ in range(strokes):
         observations, _, terminated, truncated, info = batch.step(agent.act(observations, info))

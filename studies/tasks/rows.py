@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from seastar_gym.evaluation.many import CONFIDENCE, RESAMPLES
 
 MORE_IS_BETTER = ("prey", "fast-prey", "prizes", "fast-prizes")
-ORDER = ("rest", "greedy", "planner", "adaptive", "prior", "informed", "PPO", "PPO, memory", "PPO, told the way",
-         "RecurrentPPO", "in the box")  # fmt: skip
+ORDER = ("rest", "greedy", "planner", "adaptive", "prior", "informed", "turn, then swim", "PPO", "PPO, memory",
+         "PPO, told the way", "RecurrentPPO", "in the box")  # fmt: skip
 """Agents from top to bottom."""
 HEADROOM, LEFT = 0.2, 1.0 / 3.0
 """A task is kept where the bound is so much better than greedy, and PPO leaves so much of that."""

@@ -26,16 +26,17 @@ from seastar_gym.envs.tasks.envs import CHALLENGES
 from seastar_gym.files import write_atomically
 from seastar_gym.scene.numerics import Fidelity
 from studies.provenance import provenance
+from studies.tasks import heading
 from studies.tasks.controllers import CONTROLLERS, is_swum, make_controller
 from studies.tasks.episodes import Episodes, measure, swim
 from studies.tasks.learning import ALL_LEARNERS, Trained, evaluate, train
 from studies.tasks.page import write_page
 
-IDS: dict[str, str] = {id: about[0] for id, about in TASKS.items()}
+IDS: dict[str, str] = {id: about[0] for id, about in TASKS.items()} | {heading.ID: "heading"}
 """Name of the challenge of every id."""
 IN_THE_BOX = "in the box"
 """Agent that swims the policy that the package brings for a task."""
-AGENTS = (*CONTROLLERS, *ALL_LEARNERS, IN_THE_BOX)
+AGENTS = (*CONTROLLERS, heading.RULE, *ALL_LEARNERS, IN_THE_BOX)
 DEFAULT_LEARNERS = ("PPO", "PPO, memory", "PPO, told the way")
 
 
@@ -45,7 +46,7 @@ class Options:
 
     ids: tuple[str, ...] = tuple(IDS)
     """Environments."""
-    agents: tuple[str, ...] = (*CONTROLLERS, *DEFAULT_LEARNERS, IN_THE_BOX)
+    agents: tuple[str, ...] = (*CONTROLLERS, heading.RULE, *DEFAULT_LEARNERS, IN_THE_BOX)
     """Agents; "RecurrentPPO" needs sb3-contrib."""
     seeds: tuple[int, ...] = (0, 1)
     """Seeds of the trainings; agents that do not learn swim once."""
@@ -73,6 +74,8 @@ class Options:
 
 def has_cell(id: str, agent: str) -> bool:
     """Whether an agent can swim a task: there is a controller, or a way around discs to be told."""
+    if id == heading.ID or agent == heading.RULE:
+        return id == heading.ID and agent in heading.AGENTS
     if agent in CONTROLLERS:
         return is_swum(agent, CHALLENGES[IDS[id]])
     if agent == IN_THE_BOX:
@@ -83,6 +86,8 @@ def has_cell(id: str, agent: str) -> bool:
 def swum(id: str, agent: str, seed: int, options: Options) -> Episodes:
     """Held-out episodes of an agent."""
     fidelity, threads = options.fidelity, options.num_threads
+    if id == heading.ID:
+        return heading.swum(agent, seed, options.decisions, options.episodes, fidelity, threads)
     if agent in CONTROLLERS:
         return swim(id, lambda batch: make_controller(agent, batch), options.episodes, fidelity, threads)
     if agent == IN_THE_BOX:

@@ -145,7 +145,7 @@ def test_a_scene_for_an_error_is_that_of_its_certificate(certificate, tmp_path):
     kept = Scene.for_error(0.9, robot=Seastar(limb_length=0.08, nodes_per_limb=9), certificate=certificate)
     assert kept.robot.nodes_per_limb == 9 and kept.robot.limb_length == 0.08
     with assert_refused("measured with 5, 9 nodes per limb"):
-        Scene.for_error(0.9, robot=Seastar(limb_length=0.08), certificate=certificate)
+        Scene.for_error(0.9, robot=Seastar(limb_length=0.08, nodes_per_limb=10), certificate=certificate)
     with assert_refused("No measured setting keeps"):
         Scene.for_error(1e-9, certificate=certificate)
 
@@ -260,7 +260,7 @@ def test_a_certificate_is_written_all_at_once(certificate, tmp_path, monkeypatch
     with pytest.raises(OSError, match="no space left"):
         replace(certificate, machine="another").save(tmp_path / "mine.json")
     with pytest.raises(OSError, match="no space left"):
-        command.draw(certificate, tmp_path / "mine.json")
+        command.draw(certificate, tmp_path / "mine.png")
     assert Certificate.load(tmp_path / "mine.json") == certificate
     assert [each.name for each in tmp_path.iterdir()] == ["mine.json"]
 
@@ -423,7 +423,7 @@ def test_the_command_writes_certificate_and_picture(few_settings, tmp_path, monk
     with pytest.raises(ValueError, match=r"own\.py, line 1, is not Python: .* never closed\.$"):
         command.load_scene(tmp_path / "own.py")
     file_of_scene.write_text("{", encoding="utf-8")
-    with pytest.raises(ValueError, match=r"mine\.json is no scene: Expecting"):
+    with pytest.raises(ValueError, match=r"mine\.json is no scene: .*Expecting"):
         command.load_scene(file_of_scene)
 
 

@@ -66,11 +66,11 @@ def test_potential_falls_along_the_newton_direction_at_the_rate_of_the_decrement
 
 
 @pytest.mark.parametrize("hub", HUBS)
-@pytest.mark.parametrize("gamma", [3e-3, 5e-3, 7e-3])
+@pytest.mark.parametrize("gamma", [3e-3, 4e-3, 5e-3])
 def test_smallest_pivot_is_positive_exactly_where_the_hessian_is_positive_definite(hub, gamma):
     robot, star = robot_and_star(nodes_per_limb=4, hub=hub)
     definite = []
-    for seed in range(8):
+    for seed in range(64 // N_LANES):
         stages = RandomStages(star, gamma, bend=0.3, stretch=0.02, seed=seed)
         found = stages.run(rods_of(robot))
         smallest = [np.linalg.eigvalsh(stages.hessian(lane))[0] for lane in range(N_LANES)]

@@ -144,7 +144,7 @@ def test_a_measurement_is_read_as_it_was_written(measurement, tmp_path):
     found = Measurement.from_csv(*files)
     np.testing.assert_allclose(found.positions, measurement.positions, rtol=1e-6)
     np.testing.assert_array_equal(found.commands, measurement.commands)
-    assert found.nodes == measurement.nodes == (0, 9, 18, 27, 36, 45)
+    assert found.nodes == measurement.nodes == (0, 11, 22, 33, 44, 55)
 
 
 def test_the_command_line_fits_files(measurement, tmp_path, monkeypatch, capsys):

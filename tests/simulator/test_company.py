@@ -86,11 +86,10 @@ def assert_alike_in_company(scene: Scene, kinds: list[str], seed: int) -> None:
 KINDS_OF_A_GROUP = st.lists(st.sampled_from(KINDS), min_size=N_LANES, max_size=N_LANES)
 
 
-def brief(scheme: str, step: float, **terms) -> Scene:
+def brief(scheme: str, step: float, robot: Seastar = TEN, **terms) -> Scene:
     """A scene whose strokes take four steps."""
-    return Scene(
-        TEN, actuator=SmaPulse(0.5, 2.0 * step, 2.0 * step), numerics=Numerics(scheme, step, max_iterations=20), **terms
-    )
+    pulse, numerics = SmaPulse(0.5, 2.0 * step, 2.0 * step), Numerics(scheme, step, max_iterations=20)
+    return Scene(robot, actuator=pulse, numerics=numerics, **terms)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

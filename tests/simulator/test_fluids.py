@@ -126,7 +126,7 @@ def test_terminal_speed_is_where_load_and_drag_balance(along):
 def test_a_robot_at_rest_drifts_until_it_moves_with_the_current(along):
     """Quadratic drag: 1 - v/u = 1/(1 + k u t). A stiff cross has half its length along the current, half across."""
     u, time = 0.1, 2.0
-    robot = Seastar(n_limbs=4, youngs_modulus=1e9, relaxation_time=0.0)
+    robot = Seastar(n_limbs=4, nodes_per_limb=10, youngs_modulus=1e9, relaxation_time=0.0)
     scene = Scene(
         robot, Water(1000.0, 1.2, along, UniformCurrent(u, 0.0), 0.0),
         SmaPulse(0.0, 1.0, 1.0), Numerics("implicit-midpoint", 2e-3, newton_tolerance=1e-11),

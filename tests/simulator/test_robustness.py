@@ -23,6 +23,8 @@ from seastar_gym.simulator.report import MEASURED_IF_ASKED
 
 SCHEMES = ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
 EPSILON = np.finfo(float).eps
+EIGHT = 8
+"""Robots of a test whose numbers were looked at, however many lanes a processor has."""
 
 
 def rattled(simulator: Simulator, speed: float, shift: float = 0.0, seed: int = 0) -> Simulator:
@@ -191,7 +193,7 @@ def test_a_number_that_is_none_ends_its_own_robots_stroke_and_touches_no_other(s
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_robots_in_trouble_move_to_the_same_bits_alone_in_a_batch_and_on_two_threads(scheme):
-    n_robots, scene = N_LANES + 3, Scene(TEN, numerics=Numerics(scheme, 0.01))
+    n_robots, scene = 11, Scene(TEN, numerics=Numerics(scheme, 0.01))  # groups of 8 or 4 lanes, the last not full
     batches = [rattled(Simulator(scene, n_robots, threads), 1.0) for threads in (1, 2)]
     state = batches[0].get_state()
     singles = [Simulator(scene) for _ in range(n_robots)]
@@ -275,22 +277,22 @@ def test_50_strokes_turn_and_mirror_with_their_commands_to_a_multiple_of_roundin
     Not from every one: a nudge may be to the side they take anyway, so there are four. At 50 ms they find two robots.
     """
     scene, mirror = Scene(TEN, numerics=Numerics(scheme, step)), [0, 4, 3, 2, 1]
-    robots = [Simulator(scene, N_LANES) for _ in range(7)]
+    robots = [Simulator(scene, EIGHT) for _ in range(7)]
     at_rest, rng = robots[0].get_state(), np.random.default_rng(0)
     for twin in robots[3:]:
         nudge = 1e-16 * rng.standard_normal(at_rest.positions.shape)
         twin.set_state(at_rest._replace(positions=at_rest.positions + nudge))
-    for commands in random_commands(N_LANES, 50):
+    for commands in random_commands(EIGHT, 50):
         carried = commands, np.roll(commands, 1, axis=1), -commands[:, mirror], *[commands] * 4
         for simulator, command in zip(robots, carried, strict=True):
             assert not simulator.stroke(command).status.any()
     parted = [np.abs(twin.positions - robots[0].positions).max(axis=(1, 2)) for twin in robots[3:]]
     steady = np.max(parted, axis=0) < SYMMETRY_ROUNDING
-    assert steady.sum() >= N_LANES - 2
-    hub, limbs = robots[0].positions[:, :1], robots[0].positions[:, 1:].reshape(N_LANES, 5, 9, 2)
+    assert steady.sum() >= EIGHT - 2
+    hub, limbs = robots[0].positions[:, :1], robots[0].positions[:, 1:].reshape(EIGHT, 5, 9, 2)
     c, s = math.cos(0.4 * math.pi), math.sin(0.4 * math.pi)
-    turned = np.concatenate([hub, np.roll(limbs, 1, axis=1).reshape(N_LANES, -1, 2)], axis=1) @ [[c, s], [-s, c]]
-    mirrored = np.concatenate([hub, limbs[:, mirror].reshape(N_LANES, -1, 2)], axis=1) * [1.0, -1.0]
+    turned = np.concatenate([hub, np.roll(limbs, 1, axis=1).reshape(EIGHT, -1, 2)], axis=1) @ [[c, s], [-s, c]]
+    mirrored = np.concatenate([hub, limbs[:, mirror].reshape(EIGHT, -1, 2)], axis=1) * [1.0, -1.0]
     assert np.abs(hub).max() > 0.01
     for found, expected in ((robots[1].positions, turned), (robots[2].positions, mirrored)):
         np.testing.assert_allclose(found[steady], expected[steady], rtol=0.0, atol=SYMMETRY_ROUNDING)

@@ -13,7 +13,7 @@ from seastar_gym.envs.tasks.discs import rims
 from seastar_gym.envs.tasks.envs import SeastarTaskVectorEnv
 from seastar_gym.envs.tasks.obst_trap import draw_discs
 from seastar_gym.envs.tasks.prey import Prey
-from studies.tasks import pictures
+from studies.tasks import heading, pictures
 from studies.tasks import study as module
 from studies.tasks.ahead import Ahead, Odometer, Robots, few_commands
 from studies.tasks.blind import FailureGuess, live_commands
@@ -63,6 +63,13 @@ def test_every_controller_swims_every_kind_of_task(id, name, monkeypatch):
     assert done.time.shape == (3, 2) and np.isfinite(done.returns).all()
     assert np.isfinite(measure(module.IDS[id], done)).all()
     assert robots[0]._task.instance.tolist() == [0, 1] and robots[0]._task.split == "test"
+
+
+def test_random_paths_with_random_headings_are_swum_by_rules(monkeypatch):
+    monkeypatch.setattr(heading, "LIMIT", 1.0)
+    for agent in heading.RULES:
+        done = heading.swum(agent, 0, 0, 2, "fast", 1)
+        assert done.time[-1].tolist() == [1.0, 1.0] and measure("heading", done).tolist() == [1.0, 1.0]
 
 
 def test_the_wiring_is_found_by_what_limbs_do():
@@ -148,7 +155,10 @@ def decisions_of_a_point(discs, goal, believed) -> int:
 
 @pytest.mark.parametrize("n_imagined", [0, pytest.param(400, marks=pytest.mark.slow)])
 def test_who_knows_how_horseshoes_are_drawn_gains_little(n_imagined, monkeypatch):
-    """Less than a third of what is to be gained by knowing them.
+    """Less than a third of the gap between who remembers discs and who is told them all, field by field.
+
+    The mean of what it gains more than that third lies below 0 by 1.64 standard errors or more, so that at most one
+    such sample in twenty would say so of a rule that gains the third. Fields are the same in every run.
 
     Without imagined horseshoes it believes in the mean one until it sees that it is not there; with them, in the one
     that explains best what it has seen.
@@ -165,9 +175,15 @@ def test_who_knows_how_horseshoes_are_drawn_gains_little(n_imagined, monkeypatch
             lambda hub, seen, known: discs,  # noqa: B023
         )
         swum.append([decisions_of_a_point(discs, goal, rule) for rule in rules])
-    adaptive, prior, informed = np.mean(swum, axis=0)
-    assert adaptive - informed > 5.0
-    assert adaptive - prior < (adaptive - informed) / 3.0
+    adaptive, prior, informed = np.array(swum, float).T
+    gap = adaptive - informed
+    beyond = adaptive - prior - gap / 3.0
+    assert gap.mean() > 3.0 * standard_error(gap)
+    assert beyond.mean() < -1.64 * standard_error(beyond)
+
+
+def standard_error(values):
+    return values.std(ddof=1) / len(values) ** 0.5
 
 
 def test_a_horseshoe_is_believed_in_until_it_is_not_seen():
@@ -330,7 +346,8 @@ def test_a_table_has_every_agent_and_the_verdict():
     text = table(row("miswired", greedy=400.0, informed=200.0, PPO=300.0))
     assert "| greedy | 400 | 400 to 400 | 4 |  |" in text
     assert text.endswith("Bound: informed, 50 % better than greedy. Gap left by PPO: 50 %. By this, kept.")
-    assert "Not swum yet: rest; planner; adaptive; prior; PPO, memory; PPO, told the way; in the box." in text
+    missing = "rest; planner; adaptive; prior; turn, then swim; PPO, memory; PPO, told the way; in the box"
+    assert f"Not swum yet: {missing}." in text
     assert "Bound" not in table(row("prey", greedy=1.0, PPO=3.0))  # a learner alone is no bound
     assert table(row("prizes", greedy=10.0, informed=14.0)).endswith("Bound: informed, 40 % better than greedy.")
 
@@ -357,6 +374,8 @@ def test_nobody_waits_for_agents_that_a_task_has_not():
     assert not has_cell("SeastarPrizes-v0", "adaptive") and has_cell("SeastarPrizes-v0", "rest")
     told = "PPO, told the way"
     assert has_cell("SeastarObstTrap-v0", told) and not has_cell("SeastarPrizes-v0", told)
+    assert has_cell(heading.ID, heading.RULE) and not has_cell(heading.ID, "greedy")
+    assert not has_cell("SeastarPrey-v0", heading.RULE)
     row_ = Row("SeastarPrizes-v0", "prizes", {"greedy": [np.ones(4)]})
     assert "Not swum yet: rest; planner; informed; PPO; PPO, memory; in the box." in table(row_, has_cell)
 
