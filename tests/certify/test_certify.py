@@ -427,6 +427,13 @@ def test_the_command_writes_certificate_and_picture(few_settings, tmp_path, monk
         command.load_scene(file_of_scene)
 
 
+def test_a_speed_is_the_simulated_time_of_all_robots_over_processor_time_the_best_of_three_strokes(monkeypatch):
+    times = iter([0.0, 3.0, 3.0, 5.0, 5.0, 9.0])
+    monkeypatch.setattr(measure.time, "thread_time", lambda: next(times))
+    scene = resolved(replace(SCENE, actuator=SmaPulse(0.3, 0.1, 0.4)), 5, Numerics("sdirk2", 2e-2, 1e-6))
+    assert measure.speed(scene, np.zeros((commands.STROKES, 6, scene.robot.n_limbs))) == 6 * 0.5 / 2.0
+
+
 def test_swims_of_many_groups_are_those_of_one_batch(monkeypatch):
     monkeypatch.setattr(measure, "GROUP", 5)
     drawn, scene = commands.draw_classes(2, 5, 1), resolved(SCENE, 5, Numerics("sdirk2", 2e-2, 1e-6))

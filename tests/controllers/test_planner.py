@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seastar_gym import Numerics, Scene, Seastar, Simulator, ThermalSma
+from seastar_gym import Headings, Numerics, RewardWeights, Scene, Seastar, Simulator, ThermalSma
 from seastar_gym.controllers.greedy import waypoints_of
 from seastar_gym.controllers.planner import Budget, Planner, Targets, state_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -98,6 +98,19 @@ def test_who_can_arrive_at_the_last_waypoint_arrives_by_the_fewest_decisions():
     for robot in (2, 3):  # by the command that the goal is made of, or another one from which it is in reach
         assert np.hypot(*(twice[robot, chosen[robot]] - goals[robot]).T).min() <= 0.0004
         assert np.hypot(*(first[robot] - goals[robot]).T).min() > 0.0004
+
+
+def test_what_is_left_to_turn_lengthens_the_way_at_its_price_in_the_reward():
+    nodes, passed = FAST.robot.nodes()[None], np.zeros((1, 1), bool)
+    price = RewardWeights().heading / RewardWeights().progress
+    for near, turn, passes in ((0.05, 0.5, False), (0.005, 0.1, True)):
+        places = np.array([[near, 0.0]]), np.array([[0.1, 0.0]])
+        (straight,), _, _ = Planner(FAST)._judge(nodes, passed, Targets(*places))
+        asked = Targets(*places, np.array([turn]), np.array([0.8]))
+        way, now, _ = Planner(FAST, headings=Headings(tolerance=0.2))._judge(nodes, passed, asked)
+        assert now.item() == passes
+        expected = 0.1 + price * 0.8 if passes else straight[0] + price * (turn + (0.8 - turn))
+        assert way.item() == pytest.approx(expected, rel=1e-9)
 
 
 def test_a_waypoint_that_is_not_the_last_is_passed_and_not_arrived_at():

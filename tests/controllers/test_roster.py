@@ -3,10 +3,11 @@
 import pytest
 
 from agents import evaluate, trials
-from seastar_gym import Scene
-from seastar_gym.controllers.roster import AGENTS, load_agents
+from seastar_gym import Scene, Seastar
+from seastar_gym.controllers.roster import AGENTS, load_agent, load_agents
 from seastar_gym.controllers.scripted import GAITS, scripted
 from seastar_gym.envs.paths import PATHS
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 
 
 def test_an_agent_of_one_line_is_made_for_the_scene_of_the_fidelity(monkeypatch):
@@ -20,6 +21,13 @@ def test_an_agent_of_one_line_is_made_for_the_scene_of_the_fidelity(monkeypatch)
     monkeypatch.setitem(AGENTS, "mine", mine)
     assert list(load_agents(["mine", "rest"], fidelity="fast")) == ["mine", "rest"]
     assert [type(scene) for scene in scenes] == [Scene] and scenes[0] == Scene.preset("fast")
+
+
+def test_an_agent_by_its_name_fits_the_environment():
+    env = SeastarSwimEnv(fidelity="fast", scene=Scene(Seastar(4)))
+    policy = load_agent("rest", env)
+    action, _ = policy.predict(env.reset(seed=0)[0])
+    assert env.action_space.contains(action) and not env.step(action)[4]["limbs_heated"]
 
 
 @pytest.mark.parametrize("command", [evaluate.main, trials.main])

@@ -107,6 +107,12 @@ def test_episode_start_begins_the_gait_anew_for_that_robot_alone():
     np.testing.assert_array_equal(state[0], [50, 1])
 
 
+@pytest.mark.parametrize("made", [np.zeros(2), [0, 0], np.zeros(3, int), np.zeros((2, 1), int)])
+def test_a_state_that_no_call_gave_is_refused(made):
+    with pytest.raises(ValueError, match=r"decisions made of shape \(2,\)"):
+        scripted("pentagon").predict(np.zeros((2, 186), np.float32), (made,))
+
+
 def test_two_episodes_can_share_one_gait():
     gait = scripted("pentagon")
     first, second = strokes_of(gait, 60), strokes_of(gait, 60)

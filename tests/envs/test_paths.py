@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
+from refusals import assert_refused
+from seastar_gym import RewardWeights, Scene, Seastar
 from seastar_gym.envs import paths
 from seastar_gym.envs.paths import PATHS, cross_track_error, make_path, path_length, register_path, shortest_way
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.task import SwimTask
 
 ORIGIN = np.zeros(2)
 
@@ -235,3 +238,25 @@ def test_waypoints_of_a_registered_path_are_checked(monkeypatch):
     monkeypatch.setattr(paths, "PATHS", {"nowhere": lambda rng: np.zeros((1, 2))})
     with pytest.raises(ValueError, match="must lead away from the origin"):
         path_of("nowhere")
+
+
+def test_a_longer_path_of_another_robot_leaves_the_way_to_go_as_it_is():
+    scene = Scene(Seastar(nodes_per_limb=3))
+    task = SwimTask(scene, 2, [[0.1, 0.0], [0.1, 0.1]], RewardWeights(), 0.01, False, 1)
+    generators = [np.random.default_rng(robot) for robot in range(2)]
+    task.reset(np.array([True, True]), generators)
+    before = task._measure_way_to_go(np.zeros((2, 2)))
+    task.reset(np.array([False, True]), generators, [[0.1, 0.0], [0.1, 0.1], [0.2, 0.1], [0.2, 0.3]])
+    after = task._measure_way_to_go(np.zeros((2, 2)))
+    assert after[0] == before[0] and after[1] == pytest.approx(before[1] + 0.3)
+
+
+def test_waypoints_are_as_large_as_the_farthest_place_at_most():
+    SeastarSwimEnv(waypoint_radius=paths.FARTHEST)
+    with assert_refused("waypoint_radius must be at most 1e"):
+        SeastarSwimEnv(waypoint_radius=1.001 * paths.FARTHEST)
+
+
+def test_a_fidelity_of_a_scene_that_nobody_measured_promises_nothing():
+    with pytest.warns(UserWarning, match='fidelity="fast" promises nothing for it, and errors in info are NaN'):
+        SeastarSwimEnv(scene=Scene(Seastar(limb_length=0.12)), fidelity="fast")

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from seastar_gym.envs.frame import Frame
+from seastar_gym import Body, Scene, Seastar, Simulator
+from seastar_gym.envs.frame import Frame, body_of
 from seastar_gym.envs.paths import PATHS, make_path
 from seastar_gym.envs.rendering import (
     CURRENT,
@@ -229,6 +230,17 @@ def test_pictures_share_no_memory():
 def test_everything_in_a_frame_shows(change):
     renderer = renderer_of()
     assert not np.array_equal(renderer.draw(frame_of()), renderer.draw(replace(frame_of(), **change)))
+
+
+def test_a_body_is_where_its_robot_is_and_turns_with_it():
+    scene = Scene(Seastar(3, 4, body=Body.rectangle(0.06, 0.02)))
+    simulator, angles = Simulator(scene, 2), np.array([0.0, 0.7])
+    simulator.reset(heading=angles)
+    roots, outlines = body_of(simulator)
+    corners = scene.robot.body.shape.drawn() @ [1.0, 1.0j]
+    np.testing.assert_allclose(outlines @ [1.0, 1.0j], corners * np.exp(1j * angles)[:, None], atol=1e-12)
+    np.testing.assert_array_equal(roots, simulator.root_positions())
+    assert body_of(Simulator(Scene(Seastar(3, 4)))) == (None, None)
 
 
 def test_the_current_waypoint_has_its_own_colour():

@@ -36,7 +36,7 @@ from seastar_gym.envs.symmetry import transform_observations as carried
 from seastar_gym.envs.tasks.course import CHASE, Courses, Pursuit, draw_course
 from seastar_gym.envs.tasks.discs import rims, ways
 from seastar_gym.envs.tasks.envs import CHALLENGES, SeastarTaskEnv, SeastarTaskVectorEnv
-from seastar_gym.envs.tasks.obst_trap import draw_discs
+from seastar_gym.envs.tasks.obst_trap import FIRST, LAST, draw_discs, draw_horseshoe, draw_kind
 from seastar_gym.envs.tasks.prizes import draw_prizes
 from seastar_gym.envs.tasks.rounds import best_round, distances, greedy_round
 from seastar_gym.scene.per_robot import with_numbers
@@ -337,6 +337,7 @@ def test_numbers_of_no_episode_are_refused(number):
         (lambda: Station(tolerance=0.0), "Station.tolerance"),
         (lambda: FailBlind(3), "FailBlind.dead must be a whole number from 0 to 2"),
         (lambda: ObstTrap(distance=(0.1, 0.5)), "ObstTrap.distance must lie from 0.45 to 0.6 m"),
+        (lambda: ObstTrap(scattered=21), "ObstTrap.scattered must be a whole number from 0 to 20"),
         (lambda: ObstTrap(potential="by air"), "ObstTrap.potential must be one of 'straight', 'geodesic'"),
         (lambda: Prizes(side=0.0), "Prizes.side"),
         (lambda: Prizes(gain=-0.1), "Prizes.gain"),
@@ -520,6 +521,12 @@ def test_a_resting_robot_is_carried_by_the_current():
     assert 0.9 < drift @ flow / (flow @ flow) < 1.0 and abs(drift[0] * flow[1] - drift[1] * flow[0]) < 1e-9
 
 
+def test_a_station_is_no_waypoint():
+    env = SeastarTaskEnv(task="station", fidelity="fast")
+    env.reset(seed=0)
+    assert env.waypoints.shape == (0, 2)
+
+
 def test_the_station_is_near_and_rewards_count_its_distance():
     task = Station(distance=(0.01, 0.03))
     env = SeastarTaskEnv(task=task, fidelity="fast", actions="joint")
@@ -562,6 +569,14 @@ def test_the_velocity_of_a_prey_is_the_derivative_of_its_place():
     np.testing.assert_allclose(Courses(courses).velocity(time), slope, rtol=1e-6, atol=1e-9)
     speeds = np.array([np.hypot(*Courses(courses).velocity(t * np.ones(5)).T) for t in np.linspace(0.0, 400.0, 4001)])
     assert (speeds > 0.0035).all() and (np.sqrt((speeds**2).mean(axis=0)) < 0.0085).all()
+
+
+def test_a_course_begins_at_its_time_and_at_its_angles():
+    numbers = np.array([[0.01, -0.02, 7.0, 0.1, 0.03, 0.4, 1.1, 0.05]])
+    expected = 0.01 - 0.02j + 0.1 * np.exp(0.4j) + 0.03 * np.exp(1.1j)
+    assert Courses(numbers).place(7.0) @ [1.0, 1.0j] == pytest.approx(expected)
+    later = 0.01 - 0.02j + 0.1 * np.exp(0.5j) + 0.03 * np.exp(1.3j)
+    assert Courses(numbers).place(9.0) @ [1.0, 1.0j] == pytest.approx(later)
 
 
 def test_a_course_comes_back():
@@ -699,6 +714,12 @@ def test_horseshoes_lie_anywhere_and_open_to_any_side_of_the_start(fields):
     assert all(rims(discs[3:5, :2].mean(axis=0), discs[8:]).min() > 0.0 for discs in whole)
 
 
+def test_the_centre_of_a_horseshoe_is_neither_at_the_start_nor_at_the_goal():
+    rng, goal = np.random.default_rng(0), 0.5
+    x = [draw_horseshoe(rng, goal, *draw_kind(rng)).centre[0] for _ in range(500)]
+    assert FIRST <= min(x) < FIRST + 0.01 and goal - LAST - 0.01 < max(x) <= goal - LAST
+
+
 def test_fields_that_nobody_could_pass_are_refused():
     with assert_refused("none can be passed"):
         draw_discs(np.random.default_rng(0), np.array([0.5, 0.0]), 3, 0.4)
@@ -819,6 +840,7 @@ def test_a_prize_within_reach_is_taken_once_and_in_time():
     env._task.prizes[0, 3, :2] = info["hub_position"]
     seen, _, over, _, info = env.step(0)
     assert info["taken"] == worth[3] and info["reward_prize"] == 5.0 * worth[3] and not over
+    assert len(env._task.scenery(0).rings) == len(worth) - 1
     assert info["prizes"][3, 2] == 0.0 and not seen[-8:-5].any()  # the last of the prizes that are seen is none
     assert seen[-5] == pytest.approx(1.0 - 1.0 / 2.5)
     assert env.step(0)[4]["reward_prize"] == 0.0

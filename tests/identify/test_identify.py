@@ -30,6 +30,7 @@ from seastar_gym import (
 )
 from seastar_gym.identify import Measurement, get_parameter, identify, synthetic, trajectory, with_parameters
 from seastar_gym.identify.command import TRUTH, draw, main
+from seastar_gym.identify.fit import Residuals
 from seastar_gym.identify.trajectories import trajectories
 from seastar_gym.scene.per_robot import numbers_of
 from seastar_gym.scene.scene_file import load_scene
@@ -53,6 +54,23 @@ def test_three_parameters_are_recovered_within_their_intervals_from_data_with_1_
     assert all(name in estimate.report() for name in TRUTH)
     draw(estimate, measurement, tmp_path / "fit.png")
     assert (tmp_path / "fit.png").stat().st_size > 10_000
+
+
+def test_the_picture_of_a_fit_has_residuals_in_millimetres(measurement, tmp_path, monkeypatch):
+    figures = []
+    monkeypatch.setattr("seastar_gym.identify.command.save_figure", lambda figure, *_, **__: figures.append(figure))
+    estimate = identify(SCENE, ["actuator.peak_angle"], measurement)
+    draw(estimate, measurement, tmp_path / "fit.png")
+    paths, over_time = figures[0].axes
+    np.testing.assert_allclose(paths.lines[1].get_xydata(), 1e3 * measurement.positions[:, 0])
+    np.testing.assert_allclose(over_time.lines[0].get_ydata(), 1e3 * estimate.residuals[:, 0, 0])
+    np.testing.assert_allclose(over_time.lines[1].get_ydata(), 1e3 * estimate.residuals[:, 0, 1])
+
+
+def test_residuals_of_what_cannot_be_modelled_are_infinite(measurement):
+    residuals = Residuals(SCENE, ("actuator.peak_angle",), measurement)
+    found = residuals(np.array([math.log(1e6)]))
+    assert found.shape == (measurement.positions.size,) and np.isinf(found).all()
 
 
 def test_intervals_are_as_wide_as_estimates_scatter():
