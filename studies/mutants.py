@@ -54,6 +54,10 @@ EQUIVALENT: dict[tuple[str, str], str] = {
      "together = np.flatnonzero(np.hypot(*(path - path[waypoint]).T) < same_place)"): EXACTLY,
     ("seastar_gym/envs/tasks/discs.py",
      "is_free = (rims(grid.nodes, discs).min(axis=-1, initial=np.inf) > clearance).ravel()"): EXACTLY,
+    ("seastar_gym/envs/rendering.py",
+     "place = self.camera.to_pixels(label.place) + distance * label.direction / [1.0, -1.0]"): "1/1 and 1/-1.",
+    ("seastar_gym/identify/covariance.py", "remembered = REMEMBERED * (times[-1] - times[1])"):
+        "Every time is there for x and for y.",
     ("seastar_gym/envs/tasks/obst_trap.py", "touches = self.clearance(hub) <= 0.0"): EXACTLY,
 }  # fmt: skip
 """Reasons why mutants, (file, line after the change), behave as the original does."""

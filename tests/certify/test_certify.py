@@ -370,6 +370,9 @@ def test_classes_are_drawn_for_any_number_of_limbs(n_limbs):
 
 
 def test_confidence_is_that_of_the_largest_of_so_many_samples(certificate):
+    assert replace(certificate, samples=100_000).samples == 100_000
+    with assert_refused("samples"):
+        replace(certificate, samples=100_001)
     assert replace(certificate, samples=60).confidence() == pytest.approx(0.954, abs=1e-3)
 
 

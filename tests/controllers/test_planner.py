@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seastar_gym import Headings, Numerics, RewardWeights, Scene, Seastar, Simulator, ThermalSma
+from seastar_gym import Body, Headings, Numerics, RewardWeights, Scene, Seastar, Simulator, ThermalSma
 from seastar_gym.controllers.greedy import waypoints_of
 from seastar_gym.controllers.planner import Budget, Planner, Targets, state_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -57,6 +57,13 @@ def test_the_state_of_the_rods_is_seen_beside_what_actuators_remember():
         waypoints_of(observations, scene)[0], env.waypoints, env.simulator.hub_position(), strict=True
     ):
         assert np.hypot(*found) == pytest.approx(np.hypot(*(waypoints[0] - hub)), rel=1e-5)
+
+
+def test_the_roots_of_limbs_on_a_body_are_part_of_the_state():
+    scene = Scene(Seastar(4, 5, body=Body.rectangle(0.06, 0.02)), numerics=FAST.numerics)
+    env, observations = swum(1, 1, scene)
+    found, there = state_of(observations, scene), env.simulator.positions - env.simulator.hub_position()[:, None]
+    np.testing.assert_allclose(np.linalg.norm(found.positions, axis=-1), np.linalg.norm(there, axis=-1), atol=1e-4)
 
 
 def test_a_batch_gets_the_actions_of_single_robots():

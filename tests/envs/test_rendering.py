@@ -348,6 +348,7 @@ def test_what_cannot_be_drawn_is_refused_with_a_sentence(change, sentence):
 
 
 def test_a_picture_too_small_to_read_is_refused():
+    assert renderer_of(size=SMALLEST)._text_height == 12
     with pytest.raises(ValueError, match="at least 320 x 240 pixels, not 100 x 100"):
         renderer_of(size=(100, 100))
 

@@ -19,6 +19,8 @@ from seastar_gym.envs.promises import IN_TIME, NAMES
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.fidelity import promise, timed_promise
+from seastar_gym.scene.numerics import MAX_STEPS
+from seastar_gym.simulator.schedule import SHORTEST
 
 IDS = {"SeastarSwimTimed-v0": 0.5, "SeastarSwimTimedModerate-v0": 0.2, "SeastarSwimTimedHard-v0": 0.1}
 FAST = Numerics.preset("fast")
@@ -134,6 +136,15 @@ def test_reset_forgets_the_heat():
 
 
 # Decision periods
+
+
+def test_a_decision_takes_no_less_and_no_more_than_an_interval_may():
+    scene = Scene(actuator=SmaWires())
+    shortest, longest = SHORTEST * scene.numerics.step, MAX_STEPS * scene.numerics.step
+    assert SeastarSwimEnv(scene=scene, decision_period=1.01 * shortest).decision_period == 1.01 * shortest
+    for seconds in (0.99 * shortest, 1.01 * longest):
+        with assert_refused("decision_period must be from"):
+            SeastarSwimEnv(scene=scene, decision_period=seconds)
 
 
 def test_a_decision_is_a_stroke_unless_another_period_is_asked_for():

@@ -133,6 +133,7 @@ def test_a_trajectory_is_that_of_the_simulator_at_the_ends_of_strokes():
     found = trajectory(np.array([0.0, 1.0]), (0, 9), commands, SCENE)
     np.testing.assert_allclose(found[0], SCENE.robot.nodes()[[0, 9]], atol=1e-15)
     np.testing.assert_allclose(found[1], simulator.positions[0, [0, 9]], atol=1e-12)
+    np.testing.assert_array_equal(trajectory(np.array([0.0, 1.0]), (0, 9), commands[:1], SCENE), found)
 
 
 def test_a_measurement_is_read_as_it_was_written(measurement, tmp_path):
