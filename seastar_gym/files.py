@@ -62,6 +62,12 @@ def part_name(name: str, ending: str = PART) -> str:
     return f".{name}.{os.getpid()}.{secrets.token_hex(4)}{ending}"
 
 
+def is_left_behind(file: Path) -> bool:
+    """Whether a file is what a process was writing that has ended since. Files that others named so are not ours."""
+    written_by = re.fullmatch(rf"\..+\.(\d+)\.[0-9a-f]{{8}}{re.escape(PART)}", file.name)
+    return written_by is not None and file.is_file() and not Path("/proc", written_by[1]).exists()
+
+
 def is_part_of(file: Path, name: str) -> bool:
     """Whether a file is what a process that was killed left of a file of this name."""
     return file.name.startswith(f".{name}.") and file.name.endswith(PART)

@@ -90,7 +90,7 @@ def between(left: Any, right: Any, operator: ast.AST, lines: list[bytes]) -> tup
 
 
 def whole(node: Any, new: str) -> tuple[int, int, int, str] | None:
-    """The same of a node on one line."""
+    """(line, begin, end, new) of a node on one line."""
     one_line = node.lineno == node.end_lineno
     return (node.lineno, node.col_offset, node.end_col_offset, new) if one_line else None
 

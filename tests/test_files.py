@@ -3,6 +3,8 @@
 import os
 import re
 import stat
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +21,7 @@ from seastar_gym.evaluation.many import HELD_OUT_SEED
 from seastar_gym.evaluation.pictures import draw_traces
 from seastar_gym.evaluation.results import write_csv
 from seastar_gym.evaluation.swim import Swim
-from seastar_gym.files import beside, read_json, write_atomically, write_json
+from seastar_gym.files import beside, is_left_behind, part_name, read_json, write_atomically, write_json
 from seastar_gym.identify.measurement import Measurement
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -70,6 +72,19 @@ def test_a_file_is_as_readable_as_any_other(tmp_path):
     (tmp_path / "theirs").write_text("text")
     ours, theirs = (stat.S_IMODE(file.stat().st_mode) for file in (tmp_path / "new" / "ours", tmp_path / "theirs"))
     assert ours == theirs
+
+
+def test_only_what_an_ended_process_was_writing_is_left_behind(tmp_path):
+    """Not what this one writes, nor files and folders of others that end in the same way."""
+    code = "from seastar_gym.files import part_name; print(part_name('model.zip'))"
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    names = ended.stdout.strip(), part_name("model.zip"), ".notes.part", ".my.2.zip.part"
+    for name in names:
+        (tmp_path / name).touch()
+    assert [name for name in names if is_left_behind(tmp_path / name)] == [names[0]]
+    (tmp_path / names[0]).unlink()
+    (tmp_path / names[0]).mkdir()
+    assert not is_left_behind(tmp_path / names[0])
 
 
 def test_two_at_once_do_not_meet(tmp_path):

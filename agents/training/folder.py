@@ -23,7 +23,7 @@ from agents.report.charts import read_progress
 from agents.training import efficiency
 from agents.training.options import CONFIG, Options, config_of
 from seastar_gym.controllers.learned import save as save_policy
-from seastar_gym.files import PART, is_part_of, write_json
+from seastar_gym.files import PART, is_left_behind, is_part_of, write_json
 
 
 def write_config(options: Options, arguments: Sequence[str], folder: Path) -> None:
@@ -96,9 +96,9 @@ def require_own_files(folder: Path) -> None:
 
 
 def _clear(folder: Path) -> None:
-    """Remove what a killed run was writing. The folder is locked, so nobody else is."""
-    for part in folder.rglob(f".*{PART}"):
-        part.unlink()
+    """Remove what a process that was killed was writing."""
+    for file in filter(is_left_behind, [*folder.rglob(f".*{PART}")]):
+        file.unlink()
 
 
 def export(model: PPO, folder: Path) -> None:

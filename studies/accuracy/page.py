@@ -61,7 +61,7 @@ def errors() -> str:
 
 
 def choosing() -> str:
-    """The same of all presets, by what they are for."""
+    """Largest and, in brackets, typical errors and speeds of all presets, by what they are for."""
     rows = [
         [why, f'`fidelity="{name}"`', *cells(promise(name)), *cells(in_time(name)), f"{promise(name).speed:,.0f}"]
         for name, why in PURPOSES.items()
