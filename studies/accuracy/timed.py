@@ -93,7 +93,7 @@ def way(hub: Floats) -> Floats:
 
 
 def path_lengths(hub: Floats, limb_length: float) -> Floats:
-    """Lengths of paths from the origin at whole seconds, at least those of a hub that swims at SLOWEST [m], shape (n,)."""
+    """Lengths of paths at whole seconds, at least those of a hub that swims at SLOWEST [m], shape (n,)."""
     return np.fmax(way(hub), SLOWEST * limb_length * len(hub))
 
 
