@@ -49,6 +49,7 @@ way to the goal in every episode, and its other learners are still to be trained
 A task is kept if the best that was found is at least 20 % better than greedy, and if PPO leaves at least a third of
 that after {decisions:,} decisions. *Bound* is the best mean of all agents of a row: what can be reached, not a proof
 that nothing is better. *Gap left* is the share of the way from greedy to the bound that a learner does not go.
+Comparisons are over the episodes that all agents of a task have swum.
 
 | agent | what it is |
 |---|---|

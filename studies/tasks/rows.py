@@ -29,25 +29,29 @@ class Row(NamedTuple):
         """Agents and their measures, from top to bottom."""
         return sorted(self.agents.items(), key=lambda one: ORDER.index(one[0]))
 
-    def mean(self, agent: str) -> float:
-        """Mean measure of an agent over seeds and episodes."""
-        return float(np.mean([values.mean() for values in self.agents[agent]]))
+    def mean(self, agent: str, episodes: int | None = None) -> float:
+        """Mean measure of an agent over seeds and the first episodes, all if None."""
+        return float(np.mean([values[:episodes].mean() for values in self.agents[agent]]))
+
+    def shared(self, agent: str) -> float:
+        """Mean measure of an agent over the episodes that all agents of the row have swum, for comparisons."""
+        return self.mean(agent, min(len(values) for seeds in self.agents.values() for values in seeds))
 
     @property
     def bound(self) -> str:
         """The agent with the best mean."""
         best = max if self.challenge in MORE_IS_BETTER else min
-        return best(self.agents, key=self.mean)
+        return best(self.agents, key=self.shared)
 
     def is_ahead(self, agent: str, *others: str) -> bool:
         """Whether the mean of an agent is better than those of the others that have swum."""
         sign = 1.0 if self.challenge in MORE_IS_BETTER else -1.0
-        return all(sign * self.mean(agent) > sign * self.mean(other) for other in set(others) & self.agents.keys())
+        return all(sign * self.shared(agent) > sign * self.shared(other) for other in set(others) & self.agents.keys())
 
     @property
     def headroom(self) -> float:
         """By how much of greedy's measure the bound is better; infinite where greedy catches nothing."""
-        greedy, bound = self.mean("greedy"), self.mean(self.bound)
+        greedy, bound = self.shared("greedy"), self.shared(self.bound)
         return abs(bound - greedy) / greedy if greedy > 0.0 else np.inf
 
     @property
@@ -57,8 +61,8 @@ class Row(NamedTuple):
 
     def left_by(self, agent: str) -> float:
         """Share of the headroom that an agent leaves."""
-        greedy, bound = self.mean("greedy"), self.mean(self.bound)
-        return abs(bound - self.mean(agent)) / abs(bound - greedy)
+        greedy, bound = self.shared("greedy"), self.shared(self.bound)
+        return abs(bound - self.shared(agent)) / abs(bound - greedy)
 
     @property
     def is_kept(self) -> bool:

@@ -305,6 +305,13 @@ def test_measures_are_those_of_finished_and_unfinished_episodes():
         [[10.0, 10], [20, 20], [40, 40]]))).tolist() == pytest.approx([2.0, 3.0])  # fmt: skip
 
 
+def test_agents_are_compared_over_the_episodes_that_all_have_swum():
+    easy_then_hard, few = np.array([100.0] * 4 + [300.0] * 4), np.full(4, 150.0)
+    row = Row("id", "miswired", {"greedy": [few], "informed": [easy_then_hard], "PPO": [np.full(4, 125.0)]})
+    assert row.mean("informed") == 200.0 and row.shared("informed") == 100.0
+    assert row.bound == "informed" and row.left == pytest.approx(0.5) and row.is_ahead("informed", "greedy")
+
+
 def row(challenge, **means):
     return Row("id", challenge, {name.replace("_", ", "): [np.full(4, mean)] for name, mean in means.items()})
 
