@@ -56,6 +56,7 @@ def test_a_seed_draws_the_same_mutants_and_another_seed_others(tmp_path):
 def test_mutants_are_killed_survive_are_not_covered_or_are_equivalent_and_the_checkout_stays(tmp_path, monkeypatch):
     make_checkout(tmp_path)
     monkeypatch.setattr(mutants, "PRELOADED", ())
+    monkeypatch.setenv("PYTEST_ADDOPTS", "--numprocesses=2")
     monkeypatch.setitem(mutants.EQUIVALENT, ("toy/code.py", "LIMIT: int = 4"), "Nobody reads it.")
     found = study(tmp_path, ROOMS, 8, 0, 60.0, tmp_path / "out")
     said = {(each["before"], each["after"]): verdict for verdict, some in found["mutants"].items() for each in some}
