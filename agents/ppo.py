@@ -117,7 +117,11 @@ def describe(env: BatchVecEnv, hidden: tuple[int, ...]) -> Description:
     past = 0 if memory is None else memory.recollection.past
     if not isinstance(batch, SeastarTaskVectorEnv):
         return about._replace(past=past)
-    return about._replace(task=task_of(batch), limb_mirror=observed_mirror(batch), own=batch.own_numbers, past=past)
+    layout = batch.layout
+    return about._replace(
+        task=task_of(batch), limb_mirror=observed_mirror(batch), entries=layout.entries,
+        shows_limbs=layout.shows_limbs, past=past,
+    )  # fmt: skip
 
 
 def policy_of(model: PPO) -> LearnedPolicy:

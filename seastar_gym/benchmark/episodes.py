@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.controllers.contract import Policy, actions_in, require_fit
 from seastar_gym.controllers.greedy import Searcher
-from seastar_gym.envs.task import scene_observation_size
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.tasks.numbered import Split
 from seastar_gym.scene.numerics import Fidelity
 
@@ -60,7 +60,7 @@ def make_batch(
 
 def require_seen(policy: Policy, env: Any) -> None:
     """ValueError where an agent cannot know what a task shows, or cannot drive its robot."""
-    n_seen, n_known = env.observation_space.shape[0], scene_observation_size(env.scene)
+    n_seen, n_known = env.observation_space.shape[0], Layout.of(env.scene).size
     if isinstance(policy, Searcher) and n_seen != n_known:
         raise ValueError(f"It reads observations of {n_known} numbers, the task shows {n_seen}.")
     actions = actions_in(policy, env.actions, env.scene.robot.n_limbs)

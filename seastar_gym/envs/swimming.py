@@ -14,25 +14,17 @@ import functools
 import operator
 from abc import ABC, abstractmethod
 from collections.abc import Generator
+from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.decisions import checked_decision_period
+from seastar_gym.envs.commands import Actions, checked_decision_period
 from seastar_gym.envs.headings import Headings
+from seastar_gym.envs.layout import HEADINGS, VELOCITY_SCALE, Entry, Layout
 from seastar_gym.envs.masks import action_masks, can_be_masked, masked_limbs
-from seastar_gym.envs.observation import (
-    VELOCITY_SCALE,
-    body_axes,
-    layout,
-    observation_size,
-    observe,
-    to_float32,
-    with_more,
-)
-from seastar_gym.envs.own_numbers import NO_MORE, OwnNumbers
+from seastar_gym.envs.observation import body_axes, observe, to_float32
 from seastar_gym.envs.promises import in_strokes, promised
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, drawn_scene
 from seastar_gym.envs.reward import pulses_of
@@ -94,8 +86,10 @@ class Swimming(ABC):
     """Radius of waypoints [m]."""
     observes_commands = False
     """Whether the last command of every limb is observed, after the memory of its actuator."""
-    own_numbers: OwnNumbers = NO_MORE
-    """Kinds of the numbers of `_wanted`, but for asked headings, and whether limbs are observed."""
+    entries: tuple[Entry, ...] = ()
+    """What the numbers of `_wanted` are, but for asked headings."""
+    shows_limbs = True
+    """Whether the stations of the limbs and the hub's velocity are observed."""
 
     def __init__(
         self,
@@ -167,16 +161,11 @@ class Swimming(ABC):
         """What pictures of a robot show besides its waypoints."""
         return NOTHING
 
-    @property
-    def observation_size(self) -> int:
-        """Length of one robot's observation."""
-        more = self._remembered().shape[1] + self._wanted().shape[1]
-        return observation_size(self.scene.robot.n_limbs) + more - self._n_unseen
-
-    @property
-    def _n_unseen(self) -> int:
-        """Length of the beginning of the observation that is not shown."""
-        return 0 if self.own_numbers.with_stations else layout(self.scene.robot.n_limbs).stations_and_hub.stop
+    @functools.cached_property
+    def layout(self) -> Layout:
+        """What one robot's observation consists of."""
+        bare = Layout.of(self.scene, self.observe_actuators, (HEADINGS if self.headings else ()) + self.entries)
+        return replace(bare, of_limb=bare.of_limb + self.observes_commands, shows_limbs=self.shows_limbs)
 
     def reset(self, robots: Flags, generators: list[np.random.Generator], asked: Any = None) -> None:
         """Begin a new episode of the robots in a mask, shape (n_robots,).
@@ -200,16 +189,20 @@ class Swimming(ABC):
         self._begin(robots)
 
     def observe(self) -> NDArray[np.float32]:
-        """Observations, shape (n_robots, size), a fresh array; see observation.py."""
+        """Observations, shape (n_robots, size), a fresh array; see layout.py."""
         simulator = self.simulator
         target_rows = to_rows(self._targets())
         own, robot = simulator.coefficients, simulator.scene.robot
-        out = np.empty((len(target_rows), observation_size(robot.n_limbs), target_rows.shape[2]))
+        bare = Layout(robot.n_limbs)
+        out = np.empty((len(target_rows), bare.size, target_rows.shape[2]))
         places = stations_of(robot)
         observe(own.rest, own.limb_length, simulator.q, simulator.v, places, target_rows, VELOCITY_SCALE, out)
-        more = np.hstack([self._remembered(), self._wanted()])
-        seen = with_more(to_float32(out, self.n_robots), more, robot.n_limbs)
-        return seen[:, self._n_unseen :].copy() if self._n_unseen else seen
+        seen = to_float32(out, self.n_robots)
+        if self.layout == bare:
+            return seen
+        stations_and_hub = seen[:, bare.stations_and_hub if self.shows_limbs else slice(0)]
+        more = [part.astype(np.float32) for part in (self._remembered(), self._wanted())]
+        return np.hstack([stations_and_hub, *more, seen[:, bare.waypoints]])
 
     def _remembered(self) -> Floats:
         """Numbers of the limbs that stand before the targets, shape (n_robots, k), limb after limb."""
@@ -229,7 +222,7 @@ class Swimming(ABC):
         return self.simulator.observe_actuators()
 
     def _wanted(self) -> Floats:
-        """Numbers of the robot that stand after those of the limbs, such as asked headings, shape (n_robots, k)."""
+        """Further entries of the observation, such as asked headings, shape (n_robots, k)."""
         return np.zeros((self.n_robots, 0))
 
     def _axes(self) -> Floats:

@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.decisions import checked_decision_period
+from seastar_gym.envs.commands import Actions, checked_decision_period
 from seastar_gym.envs.headings import AskedHeadings, Headings
-from seastar_gym.envs.observation import scene_layout
 from seastar_gym.envs.paths import FARTHEST, cross_track_error, make_path
 from seastar_gym.envs.promises import read_certificate
 from seastar_gym.envs.randomization import DomainRandomization
@@ -29,7 +27,7 @@ Path = str | ArrayLike
 Plain = dict[str, Any]
 """Part of a scene, or of the task, as plain data, see `seastar_gym.scene.serial`."""
 
-__all__ = ["Outcome", "Path", "Plain", "SwimTask", "make_scene", "read", "scene_at", "scene_observation_size"]
+__all__ = ["Outcome", "Path", "Plain", "SwimTask", "make_scene", "read", "scene_at"]
 
 
 def make_scene(
@@ -65,11 +63,6 @@ def scene_at(file: FilePath | None, fidelity: Fidelity) -> Scene | None:
 def read(part: Part | Plain, kind: type[Any]) -> Part:
     """Part that was given as an object or in plain form."""
     return from_dict(part, kind) if isinstance(part, dict) else part
-
-
-def scene_observation_size(scene: Scene, observe_actuators: bool = True, with_headings: bool = False) -> int:
-    """Length of the observation of a scene's robot. with_headings: Whether headings are asked for."""
-    return scene_layout(scene, observe_actuators, with_headings).size
 
 
 class SwimTask(Swimming):

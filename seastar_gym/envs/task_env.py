@@ -7,7 +7,7 @@ from gymnasium import spaces
 
 from seastar_gym.envs.commands import Actions, action_space, command_table
 from seastar_gym.envs.headings import Headings
-from seastar_gym.envs.own_numbers import OwnNumbers
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.spec import PlainSpec
 from seastar_gym.envs.swimming import Swimming
@@ -31,7 +31,7 @@ class TaskEnv(PlainSpec):
         actions_of_one = action_space(task.actions, n_limbs)
         has_table = isinstance(actions_of_one, spaces.Discrete)
         self.command_table = command_table(task.actions, n_limbs) if has_table else None
-        return actions_of_one, spaces.Box(-np.inf, np.inf, (task.observation_size,), np.float32)
+        return actions_of_one, spaces.Box(-np.inf, np.inf, (task.layout.size,), np.float32)
 
     @property
     def decision_period(self) -> float:
@@ -49,9 +49,9 @@ class TaskEnv(PlainSpec):
         return self._task.added_mirror
 
     @property
-    def own_numbers(self) -> OwnNumbers:
-        """What the task shows of its own in the observation, and whether it shows the limbs."""
-        return self._task.own_numbers
+    def layout(self) -> Layout:
+        """What one robot's observation consists of, and the places of all that."""
+        return self._task.layout
 
     @property
     def headings(self) -> Headings | None:

@@ -194,7 +194,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         out: Arrays that the results are written into, and that are returned then; by default fresh ones.
         """
         if out is not None:
-            require_buffers(out, self.num_envs, self._task.observation_size)
+            require_buffers(out, self.num_envs, self._task.layout.size)
         if not self._has_begun:
             raise gym.error.ResetNeeded("The episodes have not begun or were interrupted: call reset() before step().")
         if self.autoreset_mode is AutoresetMode.DISABLED and self._needs_reset.any():

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.controllers.greedy import turned
-from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout
+from seastar_gym.envs.layout import VELOCITY_SCALE, Layout
 from seastar_gym.envs.stations import heading_of
 from seastar_gym.envs.task import Outcome, SwimTask
 from seastar_gym.scene.checks import require_number
@@ -79,7 +79,7 @@ class DisturbedTask:
     def observe(self) -> NDArray[np.float32]:
         """Observations of the disturbed robots, shape (n_robots, size)."""
         seen, scene = self.task.observe(), self.task.simulator.scene
-        at = scene_layout(scene)
+        at = Layout.of(scene)
         if self.disturbance.current > 0.0:
             axes = heading_of(self.task.simulator)
             seen[:, at.hub_velocity] += turned(self._current, -axes) / VELOCITY_SCALE

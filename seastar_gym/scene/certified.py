@@ -1,6 +1,7 @@
 """What `Scene.for_error` asks of a certificate, without importing its class, which is made of scenes."""
 
 from collections.abc import Callable
+from importlib import import_module
 from os import PathLike
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -30,6 +31,7 @@ def reads_certificates(read: Read) -> Read:
 def as_certificate(certificate: Certified | str | PathLike[str]) -> Certified:
     """Certificate of an object or a file; ValueError for anything else."""
     if isinstance(certificate, str | PathLike):
+        import_module("seastar_gym.scene.certificate")  # which registers its reader, and is made of scenes
         return _READERS[0](Path(certificate))
     if not isinstance(certificate, Certified):
         raise ValueError(f"certificate must be a Certificate or a file of one, not {shown(certificate)}.")

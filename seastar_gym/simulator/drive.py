@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.actuators.actuator import Actuator, Deaf, StatefulActuator, stroke_at
+from seastar_gym.scene.actuators.actuator import JUMP, Actuator, Deaf, StatefulActuator, stroke_at
 from seastar_gym.scene.actuators.heating import Heated
 from seastar_gym.scene.per_robot import column
 from seastar_gym.simulator.schedule import SAME_TIME, interval_times
@@ -14,8 +14,6 @@ Floats = NDArray[np.float64]
 
 KNOWN_INTERVALS = 64
 """Largest number of intervals whose time steps are kept."""
-JUMP = 1e-9
-"""Rotation over the peak angle. A limb that would turn by more at once would jump."""
 
 
 class Drive:

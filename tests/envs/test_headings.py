@@ -15,15 +15,16 @@ from refusals import assert_refused
 from seastar_gym import Headings, RewardWeights, Scene, Seastar, SmaWires, SymmetryReduction
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.headings import wrapped
-from seastar_gym.envs.observation import layout
+from seastar_gym.envs.layout import HEADINGS, Layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.stations import body_heading
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.gaits import turning_wave
 from seastar_gym.scene.numerics import Numerics
+from symmetries import symmetry_for
 
 ID = "SeastarSwimHeading-v0"
-AT = layout(5, 10, True)
+AT = Layout(5, 2, HEADINGS)
 CORNERS = [[0.05, 0.0], [0.05, 0.05], [0.0, 0.0]]
 
 
@@ -233,13 +234,13 @@ def test_a_carried_robot_is_asked_for_the_carried_turns():
 def test_only_a_mirror_changes_a_turn():
     seen = np.random.default_rng(0).normal(size=(10, AT.size))
     mirror = symmetry.memory_mirror(SmaWires())
-    carried = symmetry.transform_observations(seen, np.arange(10), 5, mirror, True)
+    carried = symmetry_for(5, mirror, entries=HEADINGS).carry(seen, np.arange(10))
     expected = seen[:, AT.headings].copy()
     expected[1::2, 1::2] *= -1.0
     np.testing.assert_array_equal(carried[:, AT.headings], expected)
-    plain = symmetry.transform_observations(np.delete(seen, AT.headings, axis=1), np.arange(10), 5, mirror)
+    plain = symmetry_for(5, mirror).carry(np.delete(seen, AT.headings, axis=1), np.arange(10))
     np.testing.assert_array_equal(np.delete(carried, AT.headings, axis=1), plain)
-    back = symmetry.transform_observations(carried, symmetry.inverse(np.arange(10), 5), 5, mirror, True)
+    back = symmetry_for(5, mirror, entries=HEADINGS).carry(carried, symmetry.inverse(np.arange(10), 5))
     np.testing.assert_allclose(back, seen, atol=1e-13)
 
 
@@ -252,7 +253,7 @@ def test_strokes_without_memory_are_carried_with_headings():
 
 def test_observations_with_other_numbers_are_refused():
     with assert_refused("not that of a robot of 5 limbs"):
-        symmetry.reduce_observations(np.zeros((1, AT.size)), 5, symmetry.memory_mirror(SmaWires()))
+        symmetry_for(5, symmetry.memory_mirror(SmaWires())).reduce(np.zeros((1, AT.size)))
 
 
 # Pictures

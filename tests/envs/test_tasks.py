@@ -27,12 +27,11 @@ from seastar_gym import (
     SymmetryReduction,
     VectorSymmetryReduction,
 )
-from seastar_gym.envs.own_numbers import places_of
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.promises import NAMES
 from seastar_gym.envs.reward import pulses_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.symmetry import limb_order, observed_mirror, sectors, transform_actions, transform_commands
-from seastar_gym.envs.symmetry import transform_observations as carried
+from seastar_gym.envs.symmetry import limb_order, symmetry_in, transform_commands
 from seastar_gym.envs.tasks.course import CHASE, Courses, Pursuit, draw_course
 from seastar_gym.envs.tasks.discs import rims, ways
 from seastar_gym.envs.tasks.envs import CHALLENGES, SeastarTaskEnv, SeastarTaskVectorEnv
@@ -237,12 +236,9 @@ def test_symmetry_reduction_turns_last_commands_with_the_limbs(id):
     for action in (5, 11):
         actions = np.full(16, action)
         seen = reduced.step(actions)[0]
-        mirror = reduced._kind.mirror
-        elements = sectors(seen, 5, mirror, own=inner.own_numbers)
-        assert (elements == 0).all()  # targets lie in sector 0
+        assert (symmetry_in(inner).sectors(seen) == 0).all()  # targets lie in sector 0
         if inner.added_mirror:
-            at = places_of(5, 5 * len(mirror), inner.own_numbers)
-            told = seen[:, at.actuators].reshape(16, 5, -1)[..., -1]
+            told = seen[:, inner.layout.actuators].reshape(16, 5, -1)[..., -1]
             np.testing.assert_array_equal(
                 told, transform_commands(inner._task.last_commands, reduced._elements).astype(np.float32)
             )
@@ -394,16 +390,21 @@ def test_rewards_are_those_of_the_table(kind):
     assert named == {name for name in env.reset(seed=0)[1] if name.startswith("reward_")}
 
 
+def places_of(at):
+    """What is seen of the limbs' shape, of their numbers, of what the task shows, and the targets."""
+    return at.stations_and_hub, at.actuators, at.further, at.waypoints
+
+
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind is not Prey])
 @pytest.mark.parametrize("column, period", [(0, 1.0), (1, 0.5)])
 def test_the_observation_is_that_of_the_table(kind, column, period):
     env = SeastarTaskEnv(task=kind(), fidelity="fast", decision_period=period)
     task = env._task
     sees_wires = period < 1.0 and env.observe_actuators
-    at = places_of(5, 5 * (task.observes_commands + 2 * sees_wires), env.own_numbers)
+    at = Layout(5, task.observes_commands + 2 * sees_wires, task.entries, task.shows_limbs)
     places = [row[min(column, len(row) - 4)] for row in rows(kind, "Observation")]
     documented = [tuple(map(int, place.split(".."))) for place in places if place]
-    assert documented == [(place.start, place.stop - 1) for place in at if place.start < place.stop]
+    assert documented == [(place.start, place.stop - 1) for place in places_of(at) if place.start < place.stop]
     assert env.observation_space.shape == (at.size,)
 
 
@@ -900,15 +901,14 @@ def test_an_episode_ends_when_all_prizes_are_taken():
 def test_what_a_task_shows_of_its_own_is_carried_by_the_symmetry(id):
     """A robot turned by fifths of a turn, in a world that may be mirrored, swims and sees as the symmetry says."""
     env, other = made(id).unwrapped, made(id).unwrapped
-    mirror, own = observed_mirror(env), env.own_numbers
     for element in (2, 3, 9):
         env.reset(options={"instance": 1}), other.reset(options={"instance": 1})
         _carry(env._task, other._task, element)
         for action in (7, 11, 2):
             seen, theirs = (task.observe() for task in (env._task, other._task))
-            np.testing.assert_allclose(theirs, carried(seen, [element], 5, mirror, own=own), atol=2e-4)
+            np.testing.assert_allclose(theirs, symmetry_in(env).carry(seen, [element]), atol=2e-4)
             action = np.array([action])
-            env.step(action[0]), other.step(transform_actions(action, [element], env.actions, 5)[0])
+            env.step(action[0]), other.step(symmetry_in(env).carry_actions(action, [element])[0])
         np.testing.assert_array_equal(transform_commands(env._task.last_commands, [element]), other._task.last_commands)
 
 

@@ -19,8 +19,7 @@ from seastar_gym.envs.promises import IN_TIME, NAMES
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.fidelity import promise, timed_promise
-from seastar_gym.scene.numerics import MAX_STEPS
-from seastar_gym.simulator.schedule import SHORTEST
+from seastar_gym.scene.numerics import MAX_STEPS, SHORTEST
 
 IDS = {"SeastarSwimTimed-v0": 0.5, "SeastarSwimTimedModerate-v0": 0.2, "SeastarSwimTimedHard-v0": 0.1}
 FAST = Numerics.preset("fast")

@@ -10,7 +10,7 @@ from agents.trials import Options, main
 from seastar_gym import RewardWeights, Scene, ThermalSma
 from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.scripted import scripted
-from seastar_gym.envs.observation import scene_layout
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import SwimTask
 from seastar_gym.evaluation.disturbances import Disturbance, DisturbedTask
@@ -40,7 +40,7 @@ def test_nothing_disturbed_is_the_task_itself():
 
 def test_a_current_carries_the_robots_its_own_way_and_the_waypoints_stay():
     task, speed = disturbed(current=1e-3), 1e-3
-    first, at = task.observe(), scene_layout(FAST)
+    first, at = task.observe(), Layout.of(FAST)
     np.testing.assert_allclose(first[:, at.hub_velocity], 0.0, atol=1e-6)  # at rest in the world
     np.testing.assert_array_equal(first[:, at.waypoints], disturbed().observe()[:, at.waypoints])
     waypoint, hubs = np.linalg.norm(first[:, at.current_waypoint], axis=1), []
@@ -62,10 +62,10 @@ def test_a_current_carries_the_robots_its_own_way_and_the_waypoints_stay():
 def test_a_current_is_seen_in_the_hubs_velocity_whatever_actuators_remember():
     """At rest in the world, beside wires that are cold: nothing but the waypoints is seen."""
     scene = replace(FAST, actuator=ThermalSma())
-    seen, at = disturbed(scene=scene, current=1e-3).observe(), scene_layout(scene)
+    seen, at = disturbed(scene=scene, current=1e-3).observe(), Layout.of(scene)
     np.testing.assert_allclose(seen[:, at.hub_velocity], 0.0, atol=1e-6)
     np.testing.assert_array_equal(seen[:, at.actuators], 0.0)
-    np.testing.assert_array_equal(seen[:, at.waypoints], disturbed().observe()[:, scene_layout(FAST).waypoints])
+    np.testing.assert_array_equal(seen[:, at.waypoints], disturbed().observe()[:, Layout.of(FAST).waypoints])
 
 
 def test_every_limb_is_the_weak_one_of_some_robot():

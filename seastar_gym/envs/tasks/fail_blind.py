@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from seastar_gym.envs.headings import wrapped
-from seastar_gym.envs.observation import VELOCITY_SCALE
-from seastar_gym.envs.own_numbers import OwnNumbers
+from seastar_gym.envs.layout import VELOCITY_SCALE, Entry
 from seastar_gym.envs.randomization import LIMB_STRENGTHS
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.scenery import Scenery
@@ -102,7 +101,8 @@ class FailBlindTask(Numbered, SwimTask):
     """Task of robots with dead limbs that see their way alone."""
 
     observes_commands = True
-    own_numbers = OwnNumbers(("vector", "turn"), with_stations=False)
+    entries: tuple[Entry, ...] = ("vector", "pseudoscalar")
+    shows_limbs = False
 
     def __init__(self, about: FailBlind, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any):
         self.about = about

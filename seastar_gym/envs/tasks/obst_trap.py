@@ -6,7 +6,7 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.own_numbers import OwnNumbers
+from seastar_gym.envs.layout import Entry
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.scenery import Ring, Scenery
 from seastar_gym.envs.swimming import Floats, Score
@@ -206,7 +206,7 @@ class ObstTrapTask(Numbered, SwimTask):
     """Task of robots that swim around discs."""
 
     TERMS = (*SwimTask.TERMS, "reward_touch")
-    own_numbers = OwnNumbers(("vector", "scalar") * SEEN)
+    entries: tuple[Entry, ...] = ("vector", "scalar") * SEEN
 
     def __init__(self, about: ObstTrap, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any):
         self.about = about

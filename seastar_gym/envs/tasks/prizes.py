@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.own_numbers import OwnNumbers
+from seastar_gym.envs.layout import Entry
 from seastar_gym.envs.scenery import Ring, Scenery
 from seastar_gym.envs.swimming import Flags, Floats, Score, Swimming
 from seastar_gym.envs.tasks.challenge import Challenge
@@ -122,7 +122,7 @@ class PrizesTask(Numbered, Swimming):
     """Task of robots that take prizes."""
 
     TERMS = ("reward_progress", "reward_prize", "reward_effort")
-    own_numbers = OwnNumbers(("vector", "scalar") * N_PRIZES + ("scalar",))
+    entries: tuple[Entry, ...] = (*("vector", "scalar") * N_PRIZES, "scalar")
 
     def __init__(self, about: Prizes, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any):
         Swimming.__init__(self, scene, n_robots, threads, random_heading=True, **how)

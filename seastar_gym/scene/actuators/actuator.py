@@ -22,6 +22,9 @@ from seastar_gym.scene.per_robot import Numbers
 
 Floats = NDArray[np.float64]
 
+JUMP = 1e-9
+"""Rotation over the peak angle. A limb that would turn by more at once would jump."""
+
 
 @runtime_checkable
 class Actuator(Protocol):
