@@ -27,8 +27,8 @@ from seastar_gym.command import run_command
 from seastar_gym.controllers import learned
 from seastar_gym.controllers.contract import Policy, actions_of
 from seastar_gym.controllers.roster import DEFAULTS, HELP, fitting_agents
+from seastar_gym.envs.options import make_scene, scene_at
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import make_scene, scene_at
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.pictures import FRAMES_PER_STROKE, draw_traces, film
 from seastar_gym.evaluation.results import COLUMNS, in_words, write_csv

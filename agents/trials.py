@@ -22,7 +22,7 @@ from agents.names import AgentNames
 from seastar_gym.command import run_command
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.roster import load_agents
-from seastar_gym.envs.task import make_scene
+from seastar_gym.envs.options import make_scene
 from seastar_gym.evaluation.disturbances import CURRENT_DIRECTIONS, DISTURBANCES
 from seastar_gym.evaluation.many import statistics, swim_many
 from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in

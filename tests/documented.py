@@ -199,7 +199,7 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         "Hyperparameters": dict(vars(training())),
         "make_model": dict(env=training_env(), hyperparameters=training(), seed=0, device="cpu"),
         "make_training_env": dict(hyperparameters=training(), path=PATH, random_heading=False, fidelity=None,
-                                  scene=FAST, threads=1, actions=None, randomization=None),
+                                  scene=FAST, threads=1, actions="pairs", randomization=None),
         "policy_of": dict(model=named("make_model")(training_env(), training(), 0)),
     }.items():  # fmt: skip
         yield name, named(name), arguments

@@ -12,8 +12,8 @@ from typing import get_args
 from seastar_gym.command import command_parser
 from seastar_gym.controllers.contract import actions_of
 from seastar_gym.controllers.roster import DEFAULTS, HELP, fitting_agents
+from seastar_gym.envs.options import make_scene, scene_at
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import make_scene, scene_at
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.pictures import draw_traces
 from seastar_gym.evaluation.results import as_text, write_csv

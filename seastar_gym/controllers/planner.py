@@ -17,9 +17,9 @@ from seastar_gym.controllers.greedy import Searcher, require_search, waypoints_o
 from seastar_gym.envs.commands import checked_decision_period, command_table
 from seastar_gym.envs.headings import Headings, wrapped
 from seastar_gym.envs.layout import HEADINGS, N_STATIONS, VELOCITY_SCALE, Layout, memory_size
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.stations import body_heading, node_weights, of_beginning
-from seastar_gym.envs.task import make_scene
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Recalled
 from seastar_gym.scene.checks import require_count, require_kind, require_number

@@ -2,27 +2,21 @@
 
 import contextlib
 from collections.abc import Generator, Iterator
-from os import PathLike
 from typing import Any, Literal
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.commands import Actions, to_commands
+from seastar_gym.envs.commands import to_commands
 from seastar_gym.envs.frame import Frame, frames_of
-from seastar_gym.envs.headings import Headings
+from seastar_gym.envs.options import SwimOptions, with_options
 from seastar_gym.envs.promises import warn_uncertified
-from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.rendering import Renderer, renderer_of
-from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.swimming import Outcome, Swimming
-from seastar_gym.envs.task import Path, Plain, SwimTask, make_scene
+from seastar_gym.envs.task import SwimTask
 from seastar_gym.envs.task_env import TaskEnv, checked_options
-from seastar_gym.scene import Scene
-from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.checks import require_choice, require_count, require_seed
-from seastar_gym.scene.numerics import Fidelity
 
 FRAMES_PER_SECOND = 10
 """Pictures per second of simulated time, unless another number is asked for."""
@@ -209,11 +203,6 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     reward: Weights of the reward's terms.
     waypoint_radius: Distance of the hub [m] within which a waypoint is reached.
     random_heading: Whether the robot is turned at random at the start of every episode.
-    render_mode: "rgb_array": `render` returns a picture of the end of the decision. "rgb_array_list": `render` returns
-        `frames_per_stroke` pictures of the decision. "human": a window shows as many;
-        without a display nobody sees them, and a warning says so.
-    frames_per_stroke: Number of pictures of a decision, at equal intervals; the last shows its end. None means ten per
-        second of simulated time, and one at least.
     randomization: Distributions of numbers of the scene that are drawn at the start of every episode.
     certificate: Measured errors of the scene for `info`: a `Certificate`, or the file of one that
         `python -m seastar_gym.certify` wrote. Refused where it is of another scene or version, or decisions are no
@@ -226,6 +215,11 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     observe_actuators: Whether observations have the memory of the actuators.
     headings: Headings that are asked for at the waypoints, a `Headings`: along the legs, at random, or given angles.
         None asks for none.
+    render_mode: "rgb_array": `render` returns a picture of the end of the decision. "rgb_array_list": `render` returns
+        `frames_per_stroke` pictures of the decision. "human": a window shows as many;
+        without a display nobody sees them, and a warning says so.
+    frames_per_stroke: Number of pictures of a decision, at equal intervals; the last shows its end. None means ten per
+        second of simulated time, and one at least.
 
     `scene`, `reward`, `randomization` and `headings` may be given as plain data, as `Scene.to_dict` and
     `seastar_gym.scene.serial.to_dict` write them. `env.spec` has them so:
@@ -234,31 +228,13 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
 
     metadata = {"render_modes": ["human", "rgb_array", "rgb_array_list"], "render_fps": FRAMES_PER_SECOND}
 
+    @with_options
     def __init__(
-        self,
-        path: Path = "pentagon",
-        actions: Actions = "limbs",
-        fidelity: Fidelity | None = None,
-        scene: Scene | Plain | None = None,
-        reward: RewardWeights | Plain = RewardWeights(),
-        waypoint_radius: float = 0.01,
-        random_heading: bool = False,
-        render_mode: RenderMode | None = None,
-        frames_per_stroke: int | None = None,
-        randomization: DomainRandomization | Plain | None = None,
-        certificate: Certificate | str | PathLike[str] | None = None,
-        error_bars: bool = False,
-        decision_period: float | None = None,
-        observe_actuators: bool = True,
-        headings: Headings | Plain | None = None,
+        self, *given: Any, render_mode: RenderMode | None = None, frames_per_stroke: int | None = None, **options: Any
     ):
         self._set_pictures(render_mode, frames_per_stroke)
-        modelled = make_scene(scene, fidelity, decision_period)
-        task = SwimTask(
-            modelled, 1, path, reward, waypoint_radius, random_heading, 1, randomization, certificate, error_bars,
-            actions, decision_period, observe_actuators, headings,
-        )  # fmt: skip
-        warn_uncertified(modelled, None if scene is None else fidelity, task.certificate, decision_period)
+        task = SwimTask(SwimOptions(*given, **options), 1, 1)
+        warn_uncertified(task.scene, task.options.fidelity_of_scene, task.certificate, task.options.decision_period)
         self._begin_with(task, frames_per_stroke)
 
     def _set_pictures(self, render_mode: RenderMode | None, frames_per_stroke: int | None) -> None:

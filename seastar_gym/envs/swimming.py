@@ -20,21 +20,19 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.commands import Actions, checked_decision_period
-from seastar_gym.envs.headings import Headings
+from seastar_gym.envs.commands import checked_decision_period
 from seastar_gym.envs.layout import HEADINGS, VELOCITY_SCALE, Entry, Layout
 from seastar_gym.envs.masks import action_masks, can_be_masked, masked_limbs
 from seastar_gym.envs.observation import body_axes, observe, to_float32
-from seastar_gym.envs.promises import in_strokes, promised
-from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, drawn_scene
+from seastar_gym.envs.options import SwimOptions
+from seastar_gym.envs.promises import in_strokes, promised, read_certificate
+from seastar_gym.envs.randomization import LIMB_STRENGTHS, drawn_scene
 from seastar_gym.envs.reward import pulses_of
 from seastar_gym.envs.scenery import NOTHING, Scenery
 from seastar_gym.envs.stations import stations_of
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Deaf
 from seastar_gym.scene.actuators.heating import Mirror
-from seastar_gym.scene.certificate import Certificate
-from seastar_gym.scene.checks import require_flag
 from seastar_gym.simd.rows import to_rows
 from seastar_gym.simulator import Simulator, SolverStatus, StrokeReport
 
@@ -72,16 +70,16 @@ class Draws(Protocol):
 
 
 class Swimming(ABC):
-    """Task of `n_robots` robots, for the arguments see `SeastarSwimEnv`.
+    """Task of `n_robots` robots.
 
     Every robot has an episode and a generator of its own, so a robot of a batch does what it would do alone.
+
+    options: Of the environment, see `SeastarSwimEnv`. threads: Of the simulator, one for every processor if None.
+    draws: Numbers of the scene that are drawn for every episode. effort: Whether info has the actuators' work.
     """
 
     TERMS: tuple[str, ...]
     """Names of the reward's terms."""
-    randomization: DomainRandomization | None = None
-    headings: Headings | None = None
-    """Headings that are asked for at the waypoints, None if none are."""
     waypoint_radius: float
     """Radius of waypoints [m]."""
     observes_commands = False
@@ -93,33 +91,25 @@ class Swimming(ABC):
 
     def __init__(
         self,
-        scene: Scene,
+        options: SwimOptions,
         n_robots: int,
         threads: int | None,
         *,
-        random_heading: bool = False,
         draws: Draws | None = None,
-        certificate: Certificate | None = None,
-        error_bars: bool = False,
-        actions: Actions = "limbs",
-        decision_period: float | None = None,
-        observe_actuators: bool = True,
         effort: bool = False,
     ):
-        require_flag("random_heading", random_heading)
-        require_flag("observe_actuators", observe_actuators)
-        self.decision_period = checked_decision_period(decision_period, scene)
+        scene = options.modelled
+        self.options = options
+        self.decision_period = checked_decision_period(options.decision_period, scene)
         self._has_promises = True
         self._in_strokes = in_strokes(scene, self.decision_period)
-        self.actions: Actions = actions
-        self.observe_actuators = observe_actuators
         self._can_be_masked = can_be_masked(scene.actuator)
         self.scene = self._drawn_from = scene
         self._draws = draws
         self.drawn = {} if draws is None else draws.first_values(scene, n_robots)
-        self.simulator = Simulator(drawn_scene(scene, self.drawn), n_robots, threads, error_bars, effort)
-        self._error_bars, self._effort = error_bars, effort
-        self.certificate = certificate
+        self.simulator = Simulator(drawn_scene(scene, self.drawn), n_robots, threads, options.error_bars, effort)
+        self._effort = effort
+        self.certificate = read_certificate(options.certificate, scene, self.decision_period)
         self._promise = self.simulator.scene, self._promise_of(self.simulator.scene)
         self._promised_names = tuple(self._promise[1])
         peak = np.max(self.simulator.scene.actuator.peak_angle)  # before the first draw the largest that may be drawn
@@ -128,7 +118,7 @@ class Swimming(ABC):
                 'With hub_hinge="turning" some actions would close a hub hinge, where its curvature is infinite: use '
                 'hub_hinge="opening" or a smaller peak angle.'
             )
-        self.random_heading, self.n_robots = random_heading, n_robots
+        self.n_robots = n_robots
         self.waypoint_index = np.zeros(n_robots, np.int64)  # the waypoint to swim to; 0 in tasks without
         self.last_commands = np.zeros((n_robots, scene.robot.n_limbs))
         self._energy = np.zeros(n_robots)  # since the reset [J]
@@ -164,7 +154,8 @@ class Swimming(ABC):
     @functools.cached_property
     def layout(self) -> Layout:
         """What one robot's observation consists of."""
-        bare = Layout.of(self.scene, self.observe_actuators, (HEADINGS if self.headings else ()) + self.entries)
+        asked = HEADINGS if self.options.headings is not None else ()
+        bare = Layout.of(self.scene, self.options.observe_actuators, asked + self.entries)
         return replace(bare, of_limb=bare.of_limb + self.observes_commands, shows_limbs=self.shows_limbs)
 
     def reset(self, robots: Flags, generators: list[np.random.Generator], asked: Any = None) -> None:
@@ -176,7 +167,7 @@ class Swimming(ABC):
         headings = np.zeros(self.n_robots)
         for robot in np.flatnonzero(robots):
             self._draw(int(robot), generators[robot], asked)
-            if self.random_heading:
+            if self.options.random_heading:
                 headings[robot] = generators[robot].uniform(-np.pi, np.pi)
             if self._draws is not None:
                 self._draws.draw(self.drawn, int(robot), generators[robot])
@@ -206,7 +197,7 @@ class Swimming(ABC):
 
     def _remembered(self) -> Floats:
         """Numbers of the limbs that stand before the targets, shape (n_robots, k), limb after limb."""
-        wires = self._observed_wires() if self.observe_actuators else np.zeros((self.n_robots, 0))
+        wires = self._observed_wires() if self.options.observe_actuators else np.zeros((self.n_robots, 0))
         if not self.observes_commands:
             return wires
         of_limbs = [wires.reshape(*self.last_commands.shape, -1), self.last_commands[..., None]]
@@ -249,7 +240,7 @@ class Swimming(ABC):
 
     def action_masks(self) -> Flags:
         """Actions that wires can follow now, shape (n_robots, k), see masks.py."""
-        return action_masks(self.actions, self._deaf_wires())
+        return action_masks(self.options.actions, self._deaf_wires())
 
     def _deaf_wires(self) -> Flags:
         """Wires that cannot be heated now, by their names in commands, shape (n_robots, n_limbs, 2)."""
@@ -334,7 +325,7 @@ class Swimming(ABC):
             **self._goal_facts(hub),
             **({"action_mask": self.action_masks().astype(np.int8)} if self._can_be_masked else {}),
             **(self._promised() if self._has_promises else {}),
-            **({"error_estimate": self.simulator.error_estimate} if self._error_bars else {}),
+            **({"error_estimate": self.simulator.error_estimate} if self.options.error_bars else {}),
             **{name: values.copy() for name, values in self.drawn.items()},
         }
 

@@ -27,10 +27,10 @@ class TaskEnv(PlainSpec):
     def _set_task(self, task: Swimming) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
         """Take the task; returns the spaces of one robot's actions and observations."""
         n_limbs = task.scene.robot.n_limbs
-        self._task, self.actions = task, task.actions
-        actions_of_one = action_space(task.actions, n_limbs)
+        self._task, self.actions = task, task.options.actions
+        actions_of_one = action_space(self.actions, n_limbs)
         has_table = isinstance(actions_of_one, spaces.Discrete)
-        self.command_table = command_table(task.actions, n_limbs) if has_table else None
+        self.command_table = command_table(self.actions, n_limbs) if has_table else None
         return actions_of_one, spaces.Box(-np.inf, np.inf, (task.layout.size,), np.float32)
 
     @property
@@ -41,7 +41,7 @@ class TaskEnv(PlainSpec):
     @property
     def observe_actuators(self) -> bool:
         """Whether observations have the memory of the actuators."""
-        return self._task.observe_actuators
+        return self._task.options.observe_actuators
 
     @property
     def added_mirror(self) -> Mirror:
@@ -56,7 +56,7 @@ class TaskEnv(PlainSpec):
     @property
     def headings(self) -> Headings | None:
         """Headings that are asked for at the waypoints, None if none are."""
-        return self._task.headings
+        return self._task.options.headings
 
     @property
     def scene(self) -> Scene:
@@ -66,7 +66,7 @@ class TaskEnv(PlainSpec):
     @property
     def randomization(self) -> DomainRandomization | None:
         """Distributions of the numbers that are drawn for every episode."""
-        return self._task.randomization
+        return self._task.options.randomization
 
     @property
     def simulator(self) -> Simulator:

@@ -2,7 +2,6 @@
 
 import contextlib
 from collections.abc import Iterable, Iterator
-from os import PathLike
 from typing import Any, Literal
 
 import gymnasium as gym
@@ -16,19 +15,14 @@ from seastar_gym.envs.batch_attributes import BatchAttributes
 from seastar_gym.envs.batch_info import Info, of_some, with_masks
 from seastar_gym.envs.batch_pictures import BatchPictures, Picture
 from seastar_gym.envs.buffers import Buffers, require_buffers
-from seastar_gym.envs.commands import Actions, as_array, to_commands
-from seastar_gym.envs.headings import Headings
+from seastar_gym.envs.commands import as_array, to_commands
+from seastar_gym.envs.options import SwimOptions, with_options
 from seastar_gym.envs.promises import warn_uncertified
-from seastar_gym.envs.randomization import DomainRandomization
-from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.seastar_swim import FRAMES_PER_SECOND
 from seastar_gym.envs.swimming import Swimming
-from seastar_gym.envs.task import Path, Plain, SwimTask, make_scene
+from seastar_gym.envs.task import SwimTask
 from seastar_gym.envs.task_env import checked_options
-from seastar_gym.scene import Scene
-from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.checks import require_choice, require_count, require_seed, shown
-from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator.simulator import MAX_ROBOTS
 
 Observations = NDArray[np.float32]
@@ -67,34 +61,20 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         "render_modes": ["rgb_array"], "render_fps": FRAMES_PER_SECOND, "autoreset_mode": AutoresetMode.NEXT_STEP,
     }  # fmt: skip
 
+    @with_options
     def __init__(
         self,
         num_envs: int = 1,
         max_episode_steps: int | None = None,
-        path: Path = "pentagon",
-        actions: Actions = "limbs",
-        fidelity: Fidelity | None = None,
-        scene: Scene | Plain | None = None,
-        reward: RewardWeights | Plain = RewardWeights(),
-        waypoint_radius: float = 0.01,
-        random_heading: bool = False,
+        *given: Any,
         render_mode: Literal["rgb_array"] | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
-        randomization: DomainRandomization | Plain | None = None,
-        certificate: Certificate | str | PathLike[str] | None = None,
-        error_bars: bool = False,
-        decision_period: float | None = None,
-        observe_actuators: bool = True,
-        headings: Headings | Plain | None = None,
+        **options: Any,
     ):
         self._set_batch(num_envs, max_episode_steps, render_mode, autoreset_mode)
-        modelled = make_scene(scene, fidelity, decision_period)
-        task = SwimTask(
-            modelled, num_envs, path, reward, waypoint_radius, random_heading, threads, randomization, certificate,
-            error_bars, actions, decision_period, observe_actuators, headings,
-        )  # fmt: skip
-        warn_uncertified(modelled, None if scene is None else fidelity, task.certificate, decision_period)
+        task = SwimTask(SwimOptions(*given, **options), num_envs, threads)
+        warn_uncertified(task.scene, task.options.fidelity_of_scene, task.certificate, task.options.decision_period)
         self._begin_with(task)
 
     def _set_batch(

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from seastar_gym.controllers.greedy import turned
 from seastar_gym.envs.layout import VELOCITY_SCALE, Layout
 from seastar_gym.envs.stations import heading_of
-from seastar_gym.envs.task import Outcome, SwimTask
+from seastar_gym.envs.swimming import Outcome
+from seastar_gym.envs.task import SwimTask
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.per_robot import column
 

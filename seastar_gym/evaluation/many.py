@@ -9,9 +9,10 @@ from scipy.stats import bootstrap
 
 from seastar_gym.controllers.contract import Policy, actions_of, require_fit, require_policy
 from seastar_gym.envs.commands import to_commands
-from seastar_gym.envs.reward import RewardWeights
-from seastar_gym.envs.task import Outcome, SwimTask
-from seastar_gym.envs.task import Path as SwimPath
+from seastar_gym.envs.options import Path as SwimPath
+from seastar_gym.envs.options import SwimOptions
+from seastar_gym.envs.swimming import Outcome
+from seastar_gym.envs.task import SwimTask
 from seastar_gym.evaluation.disturbances import Disturbance, DisturbedTask
 from seastar_gym.evaluation.swim import MOST_DECISIONS, Swim
 from seastar_gym.scene import Scene
@@ -60,10 +61,11 @@ def swim_many(
     actions = actions_of(policy, scene.robot.n_limbs)
     require_fit(policy, scene, actions, decision_period)
     with_heading = isinstance(path, str) and path == "random"
-    inner = SwimTask(
-        scene, n_swims, path, RewardWeights(), waypoint_radius, with_heading, threads, actions=actions,
+    options = SwimOptions(
+        path, actions, scene=scene, waypoint_radius=waypoint_radius, random_heading=with_heading,
         decision_period=decision_period,
     )  # fmt: skip
+    inner = SwimTask(options, n_swims, threads)
     task = DisturbedTask(inner, disturbance, np.random.default_rng([seed, n_swims]))
     task.reset([np.random.default_rng([seed, swim]) for swim in range(n_swims)])
     waypoints, counts = inner.waypoints.copy(), inner.n_waypoints

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.controllers.contract import actions_of, require_fit
 from seastar_gym.envs.commands import to_commands
-from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.task import SwimTask
 from seastar_gym.scene import Scene
 from seastar_gym.sweep.pilots import Pilot
@@ -24,10 +24,10 @@ def steer(scene: Scene, frame: Scene, pilot: Pilot, n_robots: int) -> dict[str, 
     n_limbs, policy = scene.robot.n_limbs, pilot.policy(frame)
     actions = actions_of(policy, n_limbs)
     require_fit(policy, scene, actions, pilot.decision_period)
-    task = SwimTask(
-        scene, n_robots, np.array(pilot.waypoints), RewardWeights(), RADIUS, False, 1, actions=actions,
-        decision_period=pilot.decision_period, effort=True,
-    )  # fmt: skip
+    options = SwimOptions(
+        np.array(pilot.waypoints), actions, scene=scene, waypoint_radius=RADIUS, decision_period=pilot.decision_period
+    )
+    task = SwimTask(options, n_robots, 1, effort=True)
     task.reset(np.ones(n_robots, bool), [np.random.default_rng(robot) for robot in range(n_robots)])
     begin = task.heading()
     swimming, begins, state = np.ones(n_robots, bool), np.ones(n_robots, bool), None

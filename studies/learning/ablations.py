@@ -28,8 +28,8 @@ from agents.ppo import make_model, make_training_env, policy_of
 from seastar_gym.command import run_command
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import LearnedPolicy
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.reward import RewardWeights
-from seastar_gym.envs.task import make_scene
 from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
 from seastar_gym.files import write_atomically
 from seastar_gym.scene.numerics import Fidelity

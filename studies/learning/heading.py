@@ -34,9 +34,9 @@ from seastar_gym.controllers.turning import TurnThenSwim
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.layout import HEADINGS, Layout
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import Symmetry, VectorSymmetryReduction, memory_mirror
-from seastar_gym.envs.task import make_scene
 from seastar_gym.evaluation.swim import Swim, decisions_in, swim
 from seastar_gym.files import write_atomically
 from seastar_gym.gaits import turning_wave

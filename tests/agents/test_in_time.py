@@ -12,8 +12,8 @@ from stable_baselines3 import SAC
 from seastar_gym.controllers import learner_zip
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.commands import command_table
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import make_scene
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.many import mean_with_interval
 from seastar_gym.evaluation.swim import swim

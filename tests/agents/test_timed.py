@@ -24,8 +24,8 @@ from seastar_gym.controllers.learned import LearnedPolicy, load, save
 from seastar_gym.controllers.planner import Budget, Planner, budget_for, state_of
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs import symmetry
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import make_scene
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.many import swim_many
 from seastar_gym.evaluation.swim import decisions_in, swim

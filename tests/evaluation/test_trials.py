@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from agents.trials import Options, main
-from seastar_gym import RewardWeights, Scene, ThermalSma
+from seastar_gym import Scene, ThermalSma
 from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.layout import Layout
+from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import SwimTask
 from seastar_gym.evaluation.disturbances import Disturbance, DisturbedTask
@@ -22,7 +23,7 @@ N = 16
 
 
 def disturbed(path="pentagon", scene=FAST, **disturbance):
-    inner = SwimTask(scene, N, path, RewardWeights(), 0.01, True, threads=1)
+    inner = SwimTask(SwimOptions(path, scene=scene, random_heading=True), N, 1)
     task = DisturbedTask(inner, Disturbance(**disturbance), np.random.default_rng(0))
     task.reset([np.random.default_rng(swim) for swim in range(N)])
     return task

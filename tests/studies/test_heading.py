@@ -17,8 +17,8 @@ from seastar_gym.controllers.planner import Budget, Planner
 from seastar_gym.controllers.turning import TurnThenSwim
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.layout import HEADINGS
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import make_scene
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.swim import swim
 from seastar_gym.gaits import turning_wave
