@@ -8,9 +8,9 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
-from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
+from episodes import both, swim_together
 from refusals import assert_refused
 from seastar_gym import Headings, RewardWeights, Scene, Seastar, SmaWires, SymmetryReduction
 from seastar_gym.envs import symmetry
@@ -145,12 +145,6 @@ def test_turns_go_the_shortest_way_round(angle, turn):
 # Promises of every environment
 
 
-def test_the_registered_environment_passes_gymnasiums_and_stable_baselines_checkers():
-    env = gym.make(ID, fidelity="fast").unwrapped
-    check_env(env, skip_render_check=True)
-    pytest.importorskip("stable_baselines3.common.env_checker").check_env(env, warn=True, skip_render_check=True)
-
-
 def test_nothing_changes_without_headings():
     env = SeastarSwimEnv(fidelity="fast")
     assert env.headings is None and not {"heading", "heading_error", "reward_heading"} & set(env.reset(seed=0)[1])
@@ -160,21 +154,10 @@ def test_nothing_changes_without_headings():
 @pytest.mark.parametrize("asked", ["along", "random", 0.5])
 def test_the_batch_has_the_bits_of_single_environments(mode, asked):
     arguments = {
-        "fidelity": "fast", "path": "random", "random_heading": True, "max_episode_steps": 3,
+        "path": "random", "random_heading": True, "max_episode_steps": 3,
         "headings": Headings(asked, 1.0), "waypoint_radius": 0.15,
     }  # fmt: skip
-    batch = gym.make_vec(ID, 3, "vector_entry_point", autoreset_mode=mode, **arguments)
-    singles = gym.make_vec(ID, 3, "sync", vector_kwargs={"autoreset_mode": mode}, **arguments)
-    np.testing.assert_array_equal(batch.reset(seed=1)[0], singles.reset(seed=1)[0])
-    singles.action_space.seed(0)
-    for _ in range(7):
-        actions = singles.action_space.sample()
-        *found, info = batch.step(actions)
-        *expected, its_info = singles.step(actions)
-        for one, other in zip(found, expected, strict=True):
-            np.testing.assert_array_equal(one, other)
-        for name in ("heading", "heading_error", "reward_heading", "waypoint_index"):
-            np.testing.assert_array_equal(info[name], its_info[name], err_msg=name)
+    swim_together(*both(ID, 3, mode, **arguments), 7)
 
 
 @pytest.mark.parametrize("asked", ["along", "random", 0.1, (1 / 3, 0.1, -2.0)])
