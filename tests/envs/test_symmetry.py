@@ -37,7 +37,7 @@ from seastar_gym import (
 )
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.commands import command_table, to_commands
-from seastar_gym.envs.layout import Layout
+from seastar_gym.envs.layout import HEADINGS, Layout
 from seastar_gym.envs.masks import action_masks
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
@@ -103,6 +103,23 @@ def test_limbs_go_where_the_rest_shape_goes(n_limbs):
     for element in range(2 * n_limbs):
         carried = tips @ matrix(element, n_limbs).T
         np.testing.assert_allclose(carried[symmetry.limb_order(n_limbs)[element]], tips, atol=1e-15)
+
+
+def test_old_names_do_the_same_for_one_release():
+    mirror, seen = symmetry.memory_mirror(SmaWires()), np.random.default_rng(0).normal(size=(20, 200))
+    ours, elements = symmetry_for(5, mirror, "pairs", HEADINGS).reduce(seen)
+    theirs, its_elements = symmetry.reduce_observations(seen, 5, mirror, with_headings=True)
+    np.testing.assert_array_equal(theirs, ours)
+    np.testing.assert_array_equal(its_elements, elements)
+    actions = random_actions("pairs", 5, 20)
+    restored = symmetry_for(5, mode="pairs").restore(actions, elements)
+    np.testing.assert_array_equal(symmetry.restore_actions(actions, elements, "pairs", 5), restored)
+
+
+@pytest.mark.parametrize("group, mirror, at", [(4, (), Layout(5)), (5, ((1, 1), (0, 1)), Layout(5)), (5, (), "five")])
+def test_what_does_not_fit_together_is_no_symmetry(group, mirror, at):
+    with assert_refused("layout"):
+        symmetry.Symmetry(group, mirror, at)
 
 
 # Observations
