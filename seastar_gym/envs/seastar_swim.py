@@ -1,7 +1,7 @@
 """`SeastarSwim-v0`: the environment of one robot. Its docstring is the contract that users read."""
 
 import contextlib
-from collections.abc import Generator, Iterator
+from collections.abc import Generator
 from typing import Any, Literal
 
 import gymnasium as gym
@@ -249,7 +249,6 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         of_a_decision = max(1, round(FRAMES_PER_SECOND * task.decision_period))
         self.frames_per_stroke = of_a_decision if frames_per_stroke is None else frames_per_stroke
         self.metadata = {**self.metadata, "render_fps": max(1, round(self.frames_per_stroke / task.decision_period))}
-        self._running = False
         self._command = np.zeros(self.scene.robot.n_limbs)
         self._trail = np.zeros((0, 2))
         self._frames: list[NDArray[np.uint8]] = []
@@ -272,7 +271,6 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         with self._until_whole():
             asked = checked_options(options, {self._option}).get(self._option)
             self._task.reset(np.ones(1, bool), [self.np_random], asked)
-        self._running = True
         self._command = np.zeros_like(self._command)
         self._trail = self.simulator.hub_position()
         self._frames = []
@@ -295,16 +293,6 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         terminated = bool(outcome.terminated[0])
         self._running = not terminated
         return self._task.observe()[0], float(outcome.reward[0]), terminated, False, _of_one_robot(outcome.info)
-
-    @contextlib.contextmanager
-    def _until_whole(self) -> Iterator[None]:
-        """Context of a step or reset: after an interruption, robot and task disagree, and only a reset helps."""
-        was_running, self._running = self._running, False
-        try:
-            yield
-        except ValueError:  # refused before anything changed
-            self._running = was_running
-            raise
 
     def _swim(self, command: NDArray[np.float64]) -> Outcome:
         if self.render_mode in (None, "rgb_array"):

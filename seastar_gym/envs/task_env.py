@@ -1,5 +1,7 @@
 """Common base of the environments of one robot and of a batch: task, action mode, and options of a reset."""
 
+import contextlib
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -23,6 +25,8 @@ class TaskEnv(PlainSpec):
     actions: Actions
     _option = "path"
     """Name of the option by which a reset asks for something of the task."""
+    _running = False
+    """Whether an episode has begun and was not interrupted."""
 
     def _set_task(self, task: Swimming) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
         """Take the task; returns the spaces of one robot's actions and observations."""
@@ -32,6 +36,17 @@ class TaskEnv(PlainSpec):
         has_table = isinstance(actions_of_one, spaces.Discrete)
         self.command_table = command_table(self.actions, n_limbs) if has_table else None
         return actions_of_one, spaces.Box(-np.inf, np.inf, (task.layout.size,), np.float32)
+
+    @contextlib.contextmanager
+    def _until_whole(self) -> Iterator[None]:
+        """Context of a step or reset: after an interruption, robots and task disagree, and only a reset helps."""
+        was_running, self._running = self._running, False
+        try:
+            yield
+        except ValueError:  # refused before anything changed
+            self._running = was_running
+            raise
+        self._running = True
 
     @property
     def decision_period(self) -> float:

@@ -1,7 +1,6 @@
 """`SeastarSwim-v0` as a native batch: all robots in one simulator, with the bits of one environment each."""
 
-import contextlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import Any, Literal
 
 import gymnasium as gym
@@ -109,7 +108,6 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         self._own_attributes: dict[str, tuple[Any, ...]] = {}
         self._elapsed = np.zeros(num_envs, np.int64)
         self._needs_reset = np.ones(num_envs, bool)
-        self._has_begun = False
 
     @property
     def waypoints(self) -> tuple[NDArray[np.float64], ...]:
@@ -154,7 +152,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         mask = as_array(mask)
         if mask.dtype != bool or mask.shape != (self.num_envs,) or not mask.any():
             raise ValueError(f"reset_mask must be boolean of shape ({self.num_envs},) with at least one True.")
-        if not self._has_begun and not mask.all():
+        if not self._running and not mask.all():
             raise gym.error.ResetNeeded("The first reset must be of all robots: call reset() without a reset_mask.")
         return mask
 
@@ -175,7 +173,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         """
         if out is not None:
             require_buffers(out, self.num_envs, self._task.layout.size)
-        if not self._has_begun:
+        if not self._running:
             raise gym.error.ResetNeeded("The episodes have not begun or were interrupted: call reset() before step().")
         if self.autoreset_mode is AutoresetMode.DISABLED and self._needs_reset.any():
             raise gym.error.ResetNeeded(
@@ -191,17 +189,6 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
             return *results, info
         out.take(results)
         return *out, info
-
-    @contextlib.contextmanager
-    def _until_whole(self) -> Iterator[None]:
-        """Context of a step or reset: after an interruption, robots and task disagree, and only a reset helps."""
-        had_begun, self._has_begun = self._has_begun, False
-        try:
-            yield
-        except ValueError:  # refused before anything changed
-            self._has_begun = had_begun
-            raise
-        self._has_begun = True
 
     def _step(
         self, commands: NDArray[np.float64], resting: Flags

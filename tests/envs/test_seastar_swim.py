@@ -515,6 +515,7 @@ def test_what_is_no_action_is_refused_and_changes_nothing(action):
         ({"scene": "chapter"}, "Scene"),
         ({"scene": Seastar()}, "Scene"),
         ({"reward": {"progress": 1.0}}, "RewardWeights"),
+        ({"reward": 1.0}, "RewardWeights"),
         ({"waypoint_radius": 0.0}, "waypoint_radius"),
         ({"waypoint_radius": np.nan}, "waypoint_radius"),
         ({"waypoint_radius": "10 mm"}, "waypoint_radius"),
@@ -538,9 +539,11 @@ def test_what_is_no_action_is_refused_and_changes_nothing(action):
     ids=str,
 )
 def test_arguments_that_mean_nothing_are_refused_with_a_sentence(arguments, words):
-    with pytest.raises(ValueError, match=words) as caught:
-        SeastarSwimEnv(**arguments)
-    assert str(caught.value).endswith(".") and "\n" not in str(caught.value)
+    for make in (SeastarSwimEnv, SeastarSwimVectorEnv):
+        if make is SeastarSwimEnv or not {"render_mode", "frames_per_stroke"} & {*arguments}:  # a batch has its own
+            with pytest.raises(ValueError, match=words) as caught:
+                make(**arguments)
+            assert str(caught.value).endswith(".") and "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("name", ["progress", "waypoint", "effort"])

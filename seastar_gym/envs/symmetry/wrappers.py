@@ -155,7 +155,7 @@ class VectorSymmetryReduction(_VectorWrapper):
         return {"final_obs": final, "final_info": self._symmetry.carry_info(info["final_info"], elements)}
 
 
-class VectorMemory(_VectorWrapper):
+class VectorMemory(VectorSymmetryReduction):
     """Wrapper of a native batch that shows a `Recollection`, and takes actions that were chosen on it.
 
     At the beginning of an episode, the past is the first observation. Asked headings are not shown in the past.
@@ -164,23 +164,15 @@ class VectorMemory(_VectorWrapper):
     """
 
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any], past: int):
-        require_kind("env", env, gym.vector.VectorEnv, "a batch, as gym.make_vec gives it")
         super().__init__(env)
-        self._symmetry = symmetry_in(env)
         if self._symmetry.layout.asks_headings:
             raise ValueError("Asked headings have no place in this memory: take a task without them.")
         self.recollection = Recollection(self._symmetry, past)
         self._over = np.zeros(env.num_envs, bool)  # robots whose next step begins an episode
         self._begins_later = env.metadata.get("autoreset_mode") == AutoresetMode.NEXT_STEP
         self._past = np.zeros((env.num_envs, past, self.recollection.layout.size), np.float32)
-        self._elements = np.zeros(env.num_envs, np.intp)
         self.single_observation_space = gym.spaces.Box(-np.inf, np.inf, (self.recollection.size,), np.float32)
         self.observation_space = gym.vector.utils.batch_space(self.single_observation_space, env.num_envs)
-
-    def action_masks(self) -> NDArray[np.bool_]:
-        """Actions on what was shown last that the wires can follow, shape (num_envs, k)."""
-        inner: Any = self.unwrapped
-        return self._symmetry.carry_masks(inner.action_masks(), self._elements)
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None

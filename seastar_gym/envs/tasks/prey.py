@@ -147,10 +147,6 @@ class PreyTask(Numbered, Swimming):
         away = self.prey()[0] - hub
         return np.hypot(away[:, 0], away[:, 1])
 
-    def waypoints_of(self, robot: int) -> Floats:
-        """None."""
-        return np.zeros((0, 2))
-
     def _targets(self) -> Floats:
         place, velocity = self.prey()
         return np.concatenate([place, place + LOOK_AHEAD * velocity], axis=1)

@@ -139,10 +139,6 @@ class PrizesTask(Numbered, Swimming):
         self.taken[robots] = 0.0
         self._hub = self.simulator.hub_position()
 
-    def waypoints_of(self, robot: int) -> Floats:
-        """None."""
-        return np.zeros((0, 2))
-
     def _distances(self, hub: Floats) -> Floats:
         """Distances of hubs from the prizes that are left [m], shape (n_robots, N_PRIZES); infinite from others."""
         away = self.prizes[..., :2] - hub[:, None]

@@ -148,10 +148,6 @@ class StationTask(Numbered, Swimming):
         away = hub - self.station
         return np.hypot(away[:, 0], away[:, 1])
 
-    def waypoints_of(self, robot: int) -> Floats:
-        """None."""
-        return np.zeros((0, 2))
-
     def _targets(self) -> Floats:
         return np.concatenate([self.station, self.station], axis=1)
 
