@@ -1,8 +1,8 @@
 """`Scene`: robot, fluid, actuator, contact and numerics of a simulation.
 
 Each part checks itself, and a `Scene` checks the parts together. What cannot be modelled is refused with a ValueError
-that says why in one sentence. Numbers listed in a part's `PER_ROBOT` may be arrays of shape (n_robots,), one for each
-robot of a batch.
+that says why in one sentence. Those of the type `Numbers` may be arrays of shape (n_robots,), one for each robot
+of a batch.
 """
 
 import math

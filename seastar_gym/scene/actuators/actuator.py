@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.scene.actuators.heating import Mirror
 from seastar_gym.scene.checks import shown
-from seastar_gym.scene.per_robot import Numbers
+from seastar_gym.scene.number import Numbers
 
 Floats = NDArray[np.float64]
 

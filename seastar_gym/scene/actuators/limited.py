@@ -2,16 +2,16 @@
 
 import math
 from dataclasses import dataclass
-from functools import partial
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.scene.actuators.actuator import Actuator, StatefulActuator, is_actuator, stroke_at
 from seastar_gym.scene.actuators.heating import Heated, Mirror
-from seastar_gym.scene.checks import require_number, shown
-from seastar_gym.scene.per_robot import Numbers, batch_size, column, require_each
+from seastar_gym.scene.checks import shown
+from seastar_gym.scene.number import Numbers, check_numbers, positive
+from seastar_gym.scene.per_robot import batch_size, column
 from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
@@ -30,18 +30,14 @@ class Limited:
     [rad]. Between time steps the rotation is linear.
     """
 
-    PER_ROBOT: ClassVar = ("largest_angle", "largest_rate")
     actuator: Actuator
-    largest_angle: Numbers | None = None
-    largest_rate: Numbers | None = None
+    largest_angle: Annotated[Numbers | None, positive("rad")] = None
+    largest_rate: Annotated[Numbers | None, positive("rad/s")] = None
 
     def __post_init__(self) -> None:
         if not is_actuator(self.actuator) or isinstance(self.actuator, StatefulActuator):
             raise ValueError(f"Limited follows an actuator without memory, not {shown(self.actuator)}.")
-        if self.largest_angle is not None:
-            require_each(self, "largest_angle", partial(require_number, unit="rad"))
-        if self.largest_rate is not None:
-            require_each(self, "largest_rate", partial(require_number, unit="rad/s"))
+        check_numbers(self)
         batch_size(self)
 
     @property

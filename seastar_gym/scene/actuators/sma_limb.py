@@ -20,15 +20,15 @@ curve is from its fit. The repeated pulse of any period follows from them, warm 
 
 import math
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import ClassVar, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.scene.actuators.heating import MIRRORED_WIRES, SPENT, WIRE_POWER, Mirror, left_after
-from seastar_gym.scene.checks import is_whole_number, require_number, shown
-from seastar_gym.scene.per_robot import Numbers, batch_size, column, require_each
+from seastar_gym.scene.checks import is_whole_number, shown
+from seastar_gym.scene.number import Numbers, check_numbers, not_negative, positive
+from seastar_gym.scene.per_robot import batch_size, column
 from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
@@ -89,29 +89,19 @@ class SmaLimb:
     heating_power: Electric power of a heated wire [W], an assumption, see `heating.WIRE_POWER`.
     """
 
-    PER_ROBOT: ClassVar = ("peak_angle", "rise", "middle", "time_constant", "rest_curvature", "curvature_change")
-    peak_angle: Numbers = math.pi / 5
-    rise: Numbers = MEASURED[0].rise
-    middle: Numbers = MEASURED[0].middle
-    time_constant: Numbers = MEASURED[0].time_constant
-    heating_time: float = MEASURED[0].heating_time
-    delay: float = MEASURED[0].delay
-    period: float = 1.0
-    rest_curvature: Numbers = MEASURED[0].rest_curvature
-    curvature_change: Numbers = MEASURED[0].curvature_change
-    heating_power: float = WIRE_POWER
+    peak_angle: Annotated[Numbers, not_negative("rad")] = math.pi / 5
+    rise: Annotated[Numbers, positive("widths of the transformation")] = MEASURED[0].rise
+    middle: Annotated[Numbers, positive("widths of the transformation")] = MEASURED[0].middle
+    time_constant: Annotated[Numbers, positive("s")] = MEASURED[0].time_constant
+    heating_time: Annotated[float, positive("s")] = MEASURED[0].heating_time
+    delay: Annotated[float, not_negative("s")] = MEASURED[0].delay
+    period: Annotated[float, positive("s")] = 1.0
+    rest_curvature: Annotated[Numbers, not_negative("1/m")] = MEASURED[0].rest_curvature
+    curvature_change: Annotated[Numbers, not_negative("1/m")] = MEASURED[0].curvature_change
+    heating_power: Annotated[float, not_negative("W")] = WIRE_POWER
 
     def __post_init__(self) -> None:
-        require_each(self, "peak_angle", partial(require_number, unit="rad", zero_allowed=True))
-        for name in ("rise", "middle"):
-            require_each(self, name, partial(require_number, unit="widths of the transformation"))
-        for name in ("rest_curvature", "curvature_change"):
-            require_each(self, name, partial(require_number, unit="1/m", zero_allowed=True))
-        require_each(self, "time_constant", partial(require_number, unit="s"))
-        for name in ("heating_time", "period"):
-            require_number(name, getattr(self, name), "s")
-        require_number("delay", self.delay, "s", zero_allowed=True)
-        require_number("heating_power", self.heating_power, "W", zero_allowed=True)
+        check_numbers(self)
         batch_size(self)
         slowest, fastest = np.max(self.time_constant), np.min(self.time_constant)
         if not 1e-9 * slowest <= self.heating_time <= 100.0 * fastest:

@@ -24,8 +24,7 @@ effective numbers, not those of one alloy.
 
 import math
 from dataclasses import dataclass
-from functools import partial
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,8 +38,9 @@ from seastar_gym.scene.actuators.heating import (
     seconds_of_wires,
 )
 from seastar_gym.scene.actuators.pulse import HeatingAndCooling
-from seastar_gym.scene.checks import require_finite, require_number, shown
-from seastar_gym.scene.per_robot import Numbers, batch_size, column, require_each
+from seastar_gym.scene.checks import shown
+from seastar_gym.scene.number import Numbers, check_numbers, finite, not_negative, positive
+from seastar_gym.scene.per_robot import batch_size, column
 from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
@@ -74,31 +74,21 @@ class ThermalSma(HeatingAndCooling):
     TEMPERATURES: ClassVar = (
         "water_temperature", "martensite_finish", "austenite_start", "martensite_start", "austenite_finish",
     )  # fmt: skip
-    PER_ROBOT: ClassVar = ("peak_angle", "time_constant", "steady_rise", *TEMPERATURES, "largest_temperature")
-    peak_angle: Numbers = math.pi / 5
-    heating_time: float = 0.1
-    cooling_time: float = 0.9
-    time_constant: Numbers = 0.42
-    steady_rise: Numbers = 220.0
-    water_temperature: Numbers = 20.0
-    austenite_start: Numbers = 23.5
-    austenite_finish: Numbers = 70.5
-    martensite_start: Numbers = 56.0
-    martensite_finish: Numbers = 21.5
-    largest_temperature: Numbers | None = None
-    heating_power: float = WIRE_POWER
+    peak_angle: Annotated[Numbers, not_negative("rad")] = math.pi / 5
+    heating_time: Annotated[float, positive("s")] = 0.1
+    cooling_time: Annotated[float, positive("s")] = 0.9
+    time_constant: Annotated[Numbers, positive("s")] = 0.42
+    steady_rise: Annotated[Numbers, positive("K")] = 220.0
+    water_temperature: Annotated[Numbers, finite("deg C")] = 20.0
+    austenite_start: Annotated[Numbers, finite("deg C")] = 23.5
+    austenite_finish: Annotated[Numbers, finite("deg C")] = 70.5
+    martensite_start: Annotated[Numbers, finite("deg C")] = 56.0
+    martensite_finish: Annotated[Numbers, finite("deg C")] = 21.5
+    largest_temperature: Annotated[Numbers | None, finite("deg C")] = None
+    heating_power: Annotated[float, not_negative("W")] = WIRE_POWER
 
     def __post_init__(self) -> None:
-        require_each(self, "peak_angle", partial(require_number, unit="rad", zero_allowed=True))
-        for name, unit in (("heating_time", "s"), ("cooling_time", "s")):
-            require_number(name, getattr(self, name), unit)
-        for name, unit in (("time_constant", "s"), ("steady_rise", "K")):
-            require_each(self, name, partial(require_number, unit=unit))
-        for name in self.TEMPERATURES:
-            require_each(self, name, partial(require_finite, unit="deg C"))
-        require_number("heating_power", self.heating_power, "W", zero_allowed=True)
-        if self.largest_temperature is not None:
-            require_each(self, "largest_temperature", partial(require_finite, unit="deg C"))
+        check_numbers(self)
         batch_size(self)
         if self.heating_time / 100.0 > np.min(self.time_constant):
             raise ValueError("heating_time must be at most 100 time constants, after which nothing changes any more.")

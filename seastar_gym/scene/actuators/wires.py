@@ -2,8 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from functools import partial
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,8 +15,9 @@ from seastar_gym.scene.actuators.heating import (
     pulse_left,
     seconds_of_wires,
 )
-from seastar_gym.scene.checks import require_flag, require_number
-from seastar_gym.scene.per_robot import Numbers, column, require_each
+from seastar_gym.scene.checks import require_flag
+from seastar_gym.scene.number import Numbers, check_numbers, not_negative, positive
+from seastar_gym.scene.per_robot import column
 from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
@@ -53,23 +53,19 @@ class SmaWires:
     heating_power: Electric power of a heated wire [W], an assumption, see `heating.WIRE_POWER`.
     """
 
-    PER_ROBOT: ClassVar = ("peak_angle",)
-    peak_angle: Numbers = math.pi / 5
-    heating_time: float = 0.1
-    cooling_time: float = 0.9
-    period: float = None  # type: ignore[assignment]  # a number after __post_init__
+    peak_angle: Annotated[Numbers, not_negative("rad")] = math.pi / 5
+    heating_time: Annotated[float, positive("s")] = 0.1
+    cooling_time: Annotated[float, positive("s")] = 0.9
+    period: Annotated[float, positive("s")] = None  # type: ignore[assignment]  # a number after __post_init__
     deaf: bool = False
-    heating_power: float = WIRE_POWER
+    heating_power: Annotated[float, not_negative("W")] = WIRE_POWER
 
     def __post_init__(self) -> None:
-        require_each(self, "peak_angle", partial(require_number, unit="rad", zero_allowed=True))
-        for name in ("heating_time", "cooling_time"):
-            require_number(name, getattr(self, name), "s")
+        check_numbers(self)
         if self.period is None:
             object.__setattr__(self, "period", self.heating_time + self.cooling_time)
-        require_number("period", self.period, "s")
+            check_numbers(self)  # which refuses a sum beyond all floats
         require_flag("deaf", self.deaf)
-        require_number("heating_power", self.heating_power, "W", zero_allowed=True)
 
     @property
     def corners(self) -> tuple[float, ...]:
