@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.scene.actuators.heating import MIRRORED_WIRES, SPENT, WIRE_POWER, Mirror, left_after
-from seastar_gym.scene.checks import is_whole_number, shown
+from seastar_gym.scene.checks import as_floats, is_whole_number, shown
 from seastar_gym.scene.number import Numbers, check_numbers, not_negative, positive
 from seastar_gym.scene.per_robot import batch_size, column
 from seastar_gym.scene.serial import register_part
@@ -134,7 +134,8 @@ class SmaLimb:
             )
         period = min(1.0, 1.0 / FREQUENCIES[liquid_metal][0]) if period is None else period
         if limb_length is not None:
-            peak_angle = np.multiply(MEASURED[liquid_metal].curvature_change, limb_length)
+            change = MEASURED[liquid_metal].curvature_change
+            peak_angle = np.multiply(change, as_floats("limb_length", limb_length))
         return replace(cls(peak_angle, period=period), **MEASURED[liquid_metal]._asdict())
 
     @property
