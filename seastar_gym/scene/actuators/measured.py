@@ -7,6 +7,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.scene.actuators.actuator import ActuatorBase
 from seastar_gym.scene.actuators.heating import WIRE_POWER, share_of_pulse
 from seastar_gym.scene.checks import require_number, require_numbers, shown
 from seastar_gym.scene.csv_rows import read_numbers
@@ -18,7 +19,7 @@ Floats = NDArray[np.float64]
 
 @register_part
 @dataclass(frozen=True)
-class MeasuredCurve:
+class MeasuredCurve(ActuatorBase):
     """Actuator with a measured curve of rotation, linear between samples and equal in every stroke.
 
     times: Increasing times [s], from 0 to the period. No time step straddles a sample, so samples closer than the step

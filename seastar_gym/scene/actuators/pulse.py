@@ -7,6 +7,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.scene.actuators.actuator import ActuatorBase
 from seastar_gym.scene.actuators.heating import WIRE_POWER, share_of_pulse
 from seastar_gym.scene.number import Numbers, check_numbers, not_negative, positive
 from seastar_gym.scene.serial import register_part
@@ -45,7 +46,7 @@ class HeatingAndCooling:
 
 @register_part
 @dataclass(frozen=True)
-class SmaPulse(HeatingAndCooling):
+class SmaPulse(HeatingAndCooling, ActuatorBase):
     """Actuator of Fig. 13.5b: rotation rises linearly while the alloy is heated and falls linearly while it cools.
 
     peak_angle: Largest rotation [rad].

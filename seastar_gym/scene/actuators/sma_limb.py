@@ -23,9 +23,9 @@ from dataclasses import dataclass, replace
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from seastar_gym.scene.actuators.heating import MIRRORED_WIRES, SPENT, WIRE_POWER, Mirror, left_after
+from seastar_gym.scene.actuators.heating import SPENT, WIRE_POWER, WirePair
 from seastar_gym.scene.checks import as_floats, is_whole_number, shown
 from seastar_gym.scene.number import Numbers, check_numbers, not_negative, positive
 from seastar_gym.scene.per_robot import batch_size, column
@@ -66,7 +66,7 @@ move them.
 
 @register_part
 @dataclass(frozen=True)
-class SmaLimb:
+class SmaLimb(WirePair):
     """Actuator of two wires per limb that heat, cool and recover their shape as measured. Defaults: `preset(0)`.
 
     The state of a limb is (theta_+, theta_-, w_+, w_-, r_+, r_-): temperatures above the water [widths of the
@@ -150,11 +150,6 @@ class SmaLimb:
         """State at rest, shape (6,)."""
         return np.zeros(6)
 
-    @property
-    def mirror(self) -> Mirror:
-        """What a mirror does to the state: the wires change places, see `actuator.mirrored`."""
-        return (*MIRRORED_WIRES, (3, 1), (2, 1), (5, 1), (4, 1))
-
     def share(self, temperature: Floats, n_axes: int = 2) -> Floats:
         """Share of their shape that wires of a temperature [widths] have recovered.
 
@@ -169,17 +164,8 @@ class SmaLimb:
         change = column(self.curvature_change, n_axes) * self.share(temperature, n_axes)
         return np.asarray(column(self.rest_curvature, n_axes) - change)
 
-    def delta_psi(self, t: ArrayLike) -> Floats:
-        """Rotation by command 1 at time t [s] of a stroke that begins at rest [rad]. t may have any shape."""
-        t, n_robots = np.asarray(t, dtype=float), batch_size(self)
-        from_start = np.append(0.0, t.ravel())
-        if n_robots is None:
-            return self.respond(from_start, np.ones(()), self.rest)[0][1:].reshape(t.shape)
-        rest = np.broadcast_to(self.rest, (n_robots, 1, 6))
-        return self.respond(from_start, np.ones((n_robots, 1)), rest)[0][1:].reshape(*t.shape, n_robots)
-
     def temperatures(self, t: Floats, commands: Floats, state: Floats) -> Floats:
-        """Temperatures of the wires [widths], shape (len(t), *S, 2). Arguments as in `StatefulActuator.respond`."""
+        """Temperatures of the wires [widths], shape (len(t), *S, 2). Arguments as in `respond`."""
         waiting, left = self._pulse(t, commands, state)
         since, tau = (t - t[0]).reshape(-1, *(1,) * left.ndim), column(self.time_constant, 2)
         heated = np.clip(since - waiting, 0.0, left)
@@ -188,22 +174,19 @@ class SmaLimb:
         return np.asarray(state[..., :2] * np.exp(-since / tau) + lifted * np.exp(-cooled / tau))
 
     def respond(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
-        """Rotations and state as in `StatefulActuator`, exact at all times t."""
+        """Rotations and state as in `ActuatorBase`, exact at all times t."""
         temperature, duration = self.temperatures(t, commands, state), t[-1] - t[0]
         share = self.share(temperature)
         waiting, left = self._pulse(t, commands, state)
-        left = left_after(np.maximum(duration - waiting, 0.0), left, self.heating_time)
+        left = self._left_after(np.maximum(duration - waiting, 0.0), left)
         waiting = np.where(waiting - duration > SPENT * self.delay, waiting - duration, 0.0)
         turned = column(self.peak_angle) * (share[..., 0] - share[..., 1])
         return turned, np.concatenate([temperature[-1], waiting, left], axis=-1)
 
     def _pulse(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
         """Time from t[0] until every wire is heated, and time for which it is heated then [s], shape (*S, 2) each."""
-        waiting, left = state[..., 2:4], state[..., 4:]
-        if t[0] > 0.0:
-            return waiting, left
-        wanted = self.heating_time * np.stack([np.maximum(commands, 0.0), np.maximum(-commands, 0.0)], axis=-1)
-        return np.where((wanted > 0.0) & (left == 0.0), self.delay, waiting), np.where(wanted > 0.0, wanted, left)
+        left = self._left(t, commands, state)
+        return np.where((left > 0.0) & (state[..., 4:] == 0.0), self.delay, state[..., 2:4]), left
 
     def observe(self, state: Floats) -> Floats:
         """Temperatures over the middle of the transformation, shape (..., 2)."""
