@@ -54,7 +54,7 @@ class Actuator(Protocol):
 class ActuatorBase(Actuator):
     """Base of actuators, with the answers of one that remembers nothing and says no more than it has to.
 
-    has_memory: Whether the rotation of a limb depends on its earlier commands, too.
+    has_memory: Whether the rotation of a limb depends on its earlier commands, too: whether the class has `respond`.
     rest: State of an actuator at rest, shape (n_state,), or (n_robots, 1, n_state); n_state is 0 without memory.
     mirror: (index, sign) for each number of the state: number k of the mirrored limb is sign times number `index` of
         the limb. The same holds for the numbers of `observe`. None: it is not known.
@@ -64,7 +64,7 @@ class ActuatorBase(Actuator):
 
     @property
     def has_memory(self) -> bool:
-        return False
+        return type(self).respond is not ActuatorBase.respond
 
     @property
     def rest(self) -> Floats:
@@ -134,6 +134,10 @@ def _own_or_base(name: str) -> property:
 for _name in {name for kind in (Actuator, ActuatorBase) for name in vars(kind) if not name.startswith("_")}:
     if _name not in vars(Adapted):
         setattr(Adapted, _name, _own_or_base(_name))
+
+
+StatefulActuator = Mirrored = ActuatorBase
+"""Names that it had in earlier releases, for one more."""
 
 
 def complete(actuator: Actuator) -> ActuatorBase:

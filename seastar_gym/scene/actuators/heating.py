@@ -1,4 +1,4 @@
-"""Heat that actuators are given: how long their wires are heated, and at what electric power."""
+"""Heat that actuators are given, how long and at what electric power, and pairs of wires that are heated."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,7 +39,6 @@ class WirePair(ActuatorBase):
     is left of its pulse.
     """
 
-    has_memory = True
     heating_time: float
 
     @property

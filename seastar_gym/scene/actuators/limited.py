@@ -28,7 +28,6 @@ class Limited(ActuatorBase):
     [rad]. Between time steps the rotation is linear.
     """
 
-    has_memory = True
     actuator: Actuator
     largest_angle: Annotated[Numbers | None, positive("rad")] = None
     largest_rate: Annotated[Numbers | None, positive("rad/s")] = None
