@@ -19,6 +19,7 @@ from seastar_gym import (
     Limited,
     MeasuredCurve,
     Numerics,
+    Scene,
     Seastar,
     ShearCurrent,
     SmaLimb,
@@ -31,6 +32,7 @@ from seastar_gym import (
     Water,
 )
 from seastar_gym.scene.number import declared
+from seastar_gym.scene.per_robot import unit_of
 from seastar_gym.scene.serial import KINDS
 
 NOT_A_NUMBER = [math.nan, math.inf, -math.inf, "0.1", None, True, 1j, [0.1]]
@@ -133,3 +135,14 @@ def test_docstrings_have_the_units_that_are_declared(kind):
         told = [text for text in entries if name in text.partition(":")[0].split(", ")] or [kind.__doc__]
         unit = each.number.unit.partition(" of ")[0]
         assert unit in ("1", "limb lengths") or any(f"[{unit}]" in text for text in told), name
+
+
+def test_a_number_has_the_unit_of_the_part_in_which_it_stands():
+    scene = Scene(Seastar(limbs=(Limb(),) * 5, stiffening=Stiffening()), actuator=Limited(SmaPulse()))
+    for name, unit in {
+        "robot.n_limbs": "1", "robot.limbs.4.length": "m", "robot.stiffening.middle": "1", "fluid.density": "kg/m^3",
+        "actuator.actuator.peak_angle": "rad", "numerics.newton_tolerance": "limb lengths",
+        "robot.hub_hinge": None, "robot.limbs.5.length": None, "robot.body.mass": None, "fidelity": None, "robot": None,
+    }.items():  # fmt: skip
+        assert unit_of(scene, name) == unit, name
+    assert unit_of(Scene(actuator=SmaLimb()), "actuator.middle") == "widths of the transformation"
