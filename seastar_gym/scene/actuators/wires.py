@@ -80,7 +80,8 @@ class SmaWires(WirePair):
         return turned, np.concatenate([contraction[-1], self._left_after(since[-1], left)], axis=-1)
 
     def _left(self, t: Floats, commands: Floats, state: Floats) -> Floats:
-        return super()._left(t, np.where(self.deaf_wires(state)[..., 0], 0.0, commands), state)
+        heard = np.where(self.deaf_wires(state)[..., 0], 0.0, commands) if self.deaf else commands
+        return super()._left(t, heard, state)
 
     def _contraction(self, since: Floats, before: Floats, left: Floats) -> Floats:
         """Contraction of wires after times `since` [s], from the one `before`, if they are heated for `left` [s]."""
