@@ -136,10 +136,6 @@ for _name in {name for kind in (Actuator, ActuatorBase) for name in vars(kind) i
         setattr(Adapted, _name, _own_or_base(_name))
 
 
-StatefulActuator = Mirrored = ActuatorBase
-"""Names that it had in earlier releases, for one more."""
-
-
 def complete(actuator: Actuator) -> ActuatorBase:
     """Actuator that answers everything that may be asked of one."""
     return actuator if isinstance(actuator, ActuatorBase) else Adapted(actuator)  # type: ignore[abstract]  # it passes on all
