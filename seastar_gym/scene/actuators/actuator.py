@@ -138,7 +138,7 @@ for _name in {name for kind in (Actuator, ActuatorBase) for name in vars(kind) i
 
 def complete(actuator: Actuator) -> ActuatorBase:
     """Actuator that answers everything that may be asked of one."""
-    return actuator if isinstance(actuator, ActuatorBase) else Adapted(actuator)  # type: ignore[abstract]  # it passes on all
+    return actuator if isinstance(actuator, ActuatorBase) else Adapted(actuator)  # type: ignore[abstract]
 
 
 def mirrored(actuator: ActuatorBase, numbers: Floats) -> Floats:
