@@ -12,7 +12,7 @@ from seastar_gym.envs.layout import OBSERVATION_LAYOUT, Entry, Layout, memory_si
 from seastar_gym.envs.symmetry import Recollection, Symmetry, memory_mirror, symmetry_of
 from seastar_gym.envs.symmetry.symmetry import MOST_PAST
 from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.heating import Mirror
+from seastar_gym.scene.actuators.actuator import Mirror
 from seastar_gym.scene.checks import is_whole_number, require_count, require_kind, shown
 from seastar_gym.version import __version__
 

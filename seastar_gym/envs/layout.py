@@ -17,7 +17,7 @@ index                 meaning                                           unit
 with m = 9 n_limbs stations in the order {1,1}..{1,9}, {2,1}.. (m = 45 for five limbs: 186 numbers). On the last leg the
 next waypoint is the current one. Distances of waypoints are not clipped.
 
-If actuators have a memory (a `StatefulActuator`), the numbers of its `observe` for limb 1, limb 2, .. stand before the
+If actuators have a memory (`has_memory`), the numbers of its `observe` for limb 1, limb 2, .. stand before the
 waypoints, which are always the last four numbers; an environment may leave the memory out. A task may add numbers to
 those of every limb, such as its last command.
 
@@ -35,7 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.actuator import Actuator, StatefulActuator
+from seastar_gym.scene.actuators.actuator import Actuator, complete
 from seastar_gym.scene.checks import require_count, require_flag, require_limbs, shown
 
 OBSERVATION_LAYOUT = 2
@@ -163,7 +163,8 @@ class Layout:
 
 def memory_size(actuator: Actuator) -> int:
     """Numbers that are observed of an actuator, 0 without memory."""
-    return actuator.observe(actuator.rest).shape[-1] if isinstance(actuator, StatefulActuator) else 0
+    known = complete(actuator)
+    return known.observe(known.rest).shape[-1]
 
 
 def layout(n_limbs: int, n_remembered: int = 0, with_headings: bool = False) -> Layout:

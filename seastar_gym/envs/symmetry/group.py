@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.envs.commands import Actions, command_table
 from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.actuator import Actuator, Mirrored, StatefulActuator, is_actuator
-from seastar_gym.scene.actuators.heating import Mirror
+from seastar_gym.scene.actuators.actuator import Actuator, Mirror, complete, is_actuator
 from seastar_gym.scene.checks import MOST_LIMBS, is_whole_number, require_count, require_kind, shown
 from seastar_gym.scene.symmetry import SAME, PointGroup
 
@@ -123,9 +122,8 @@ def memory_mirror(actuator: Actuator) -> Mirror:
     """What a mirror does to the numbers that are observed of a limb's actuator; empty without memory."""
     if not is_actuator(actuator):
         raise ValueError(f"actuator must be an actuator, such as SmaWires, not {shown(actuator)}.")
-    if not isinstance(actuator, StatefulActuator) or not isinstance(actuator, Mirrored):
-        return ()
-    return actuator.mirror[: actuator.observe(actuator.rest).shape[-1]]
+    known = complete(actuator)
+    return (known.mirror or ())[: known.observe(known.rest).shape[-1]]
 
 
 def transform_commands(

@@ -29,7 +29,7 @@ from seastar_gym.envs.symmetry.group import (
     turns,
 )
 from seastar_gym.scene import Scene, checks
-from seastar_gym.scene.actuators.heating import Mirror
+from seastar_gym.scene.actuators.actuator import Mirror
 from seastar_gym.scene.checks import require_choice, require_count, require_kind, shown
 
 Floating = NDArray[np.floating[Any]]

@@ -16,8 +16,7 @@ from seastar_gym.envs.symmetry.group import memory_mirror, symmetry_of
 from seastar_gym.envs.symmetry.symmetry import Recollection, Symmetry
 from seastar_gym.envs.task_env import TaskEnv
 from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.actuator import Mirrored, StatefulActuator
-from seastar_gym.scene.actuators.heating import Mirror
+from seastar_gym.scene.actuators.actuator import Mirror, complete
 from seastar_gym.scene.checks import require_kind
 from seastar_gym.scene.symmetry import PointGroup
 
@@ -43,7 +42,7 @@ def _asymmetries(scene: Scene, drawn: Iterable[str]) -> Iterator[str]:
         )
     if len(set(scene.limb_strengths)) > 1:
         yield "its limbs are not equally strong"
-    if isinstance(scene.actuator, StatefulActuator) and not isinstance(scene.actuator, Mirrored):
+    if complete(scene.actuator).mirror is None:
         yield "its actuators remember what they did, and do not say what a mirror makes of it (`mirror`)"
     if any(node != 0 for node in scene.held_nodes):
         yield "nodes of limbs are held"
