@@ -4,6 +4,8 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
+from seastar_gym import SolverStatus
+
 
 def swum(env, n: int = 5, **reset) -> list:
     """Observations, rewards, ends and infos of random actions."""
@@ -19,6 +21,16 @@ def swum(env, n: int = 5, **reset) -> list:
 def assert_same(ours, theirs) -> None:
     for one, other in zip(ours, theirs, strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+def break_robot(env, status: SolverStatus = SolverStatus.NOT_CONVERGED, robot: int = 0) -> None:
+    """Put all nodes of a robot into one point, where no angle is defined, or write a coordinate that is no number."""
+    if status == SolverStatus.NOT_FINITE:
+        env.simulator.q[0, 7, robot] = np.nan
+        return
+    state = env.simulator.get_state()
+    state.positions[robot] = 0.02
+    env.simulator.set_state(state)
 
 
 def both(id: str, num_envs: int = 3, autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP, **arguments) -> tuple:

@@ -11,6 +11,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import seastar_gym
+from episodes import break_robot
 from refusals import assert_refused
 from seastar_gym import (
     Body,
@@ -446,15 +447,6 @@ def test_random_heading_turns_the_robot_and_its_absence_does_not():
 
 
 # Failure
-
-
-def break_robot(env: SeastarSwimEnv, status: SolverStatus) -> None:
-    """Put all nodes into one point, where no angle is defined, or write a coordinate that is no number."""
-    if status == SolverStatus.NOT_FINITE:
-        env.simulator.q[0, 7, 0] = np.nan
-        return
-    state = env.simulator.get_state()
-    env.simulator.set_state(state._replace(positions=np.full_like(state.positions, 0.02)))
 
 
 @pytest.mark.parametrize("status", [SolverStatus.NOT_CONVERGED, SolverStatus.NOT_FINITE])

@@ -9,7 +9,7 @@ import pytest
 from gymnasium.utils.env_match import check_environments_match
 from gymnasium.vector import AutoresetMode
 
-from episodes import assert_same_infos, assert_same_steps, both, swim_together
+from episodes import assert_same_infos, assert_same_steps, both, break_robot, swim_together
 from refusals import assert_refused
 from seastar_gym import DomainRandomization, Numerics, RewardWeights, Scene, Seastar, SolverStatus, Uniform
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -250,7 +250,7 @@ def test_infos_have_the_same_names_types_and_shapes_always(autoreset_mode):
         if autoreset_mode is DISABLED and over.any():
             infos.append(batch.reset(options={"reset_mask": over})[1])
         if stroke == 3:
-            break_robot(batch, 1)
+            break_robot(batch, robot=1)
         *_, terminated, truncated, info = batch.step(np.ones((3, 5), int))
         over = terminated | truncated
         infos.append(info)
@@ -387,16 +387,6 @@ def test_gymnasium_records_a_video(tmp_path):
 # Failure
 
 
-def break_robot(batch: SeastarSwimVectorEnv, robot: int, status: SolverStatus = SolverStatus.NOT_CONVERGED) -> None:
-    """Put all nodes of one robot into one point, where no angle is defined, or write a coordinate that is no number."""
-    if status == SolverStatus.NOT_FINITE:
-        batch.simulator.q[0, 7, robot] = np.nan
-        return
-    state = batch.simulator.get_state()
-    state.positions[robot] = 0.02
-    batch.simulator.set_state(state)
-
-
 @pytest.mark.parametrize("status", [SolverStatus.NOT_CONVERGED, SolverStatus.NOT_FINITE])
 @pytest.mark.parametrize("autoreset_mode", [NEXT_STEP, SAME_STEP])
 def test_a_robot_that_cannot_be_solved_ends_its_episode_and_no_other(autoreset_mode, status):
@@ -405,7 +395,7 @@ def test_a_robot_that_cannot_be_solved_ends_its_episode_and_no_other(autoreset_m
     for batch in (well, ill):
         batch.reset(seed=0)
         batch.step(np.ones((5, 5), int))
-    break_robot(ill, 2, status)
+    break_robot(ill, status, 2)
     actions = np.random.default_rng(0).integers(0, 3, (5, 5))
     for k in range(4):
         observations, reward, terminated, truncated, info = ill.step(actions)
@@ -425,7 +415,7 @@ def test_a_robot_that_cannot_be_solved_ends_its_episode_and_no_other(autoreset_m
 def test_the_message_of_a_failed_robot_is_that_of_a_single_environment():
     batch = native(2)
     batch.reset(seed=0)
-    break_robot(batch, 1)
+    break_robot(batch, robot=1)
     info = batch.step(np.zeros((2, 5), int))[4]
     assert info["solver_message"][1] == SolverStatus.NOT_CONVERGED.sentence
     assert info["solver_message"][0] == "" and info["_solver_message"].all()
