@@ -21,7 +21,7 @@ NAMES = re.compile(r"^<!-- site: names (\S+) (.*) -->$", re.MULTILINE)
 FAST = Scene(numerics=Numerics.preset("fast"))
 PATH = np.array([[0.03, 0.0]])
 MADE_BY_THE_PACKAGE = {
-    "CertifiedSetting", "Episode", "Estimate", "Layout", "Outcome", "Promise", "Score", "Swim", "Tally",
+    "CertifiedSetting", "Episode", "Estimate", "Outcome", "Promise", "Score", "Swim", "Tally",
     "Actuator", "ActuatorBase", "Executor", "Policy", "Challenge", "Numbered", "Swimming",
 }  # fmt: skip
 """Records that functions return, protocols, and bases of classes of one's own."""
