@@ -36,10 +36,10 @@ from seastar_gym import (
     Water,
     relaxation_time,
 )  # fmt: skip
+from seastar_gym.accuracy import chapters_certificate, timed_certificate
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.identify import Measurement, get_parameter, identify
-from seastar_gym.scene.fidelity import cheapest, promise
 
 CURVE = {"times": (0.0, 0.5, 1.0), "angles": (0.0, 0.5, 0.0)}
 FAST = Scene(numerics=Numerics.preset("fast"))
@@ -95,8 +95,9 @@ TARGETS = [
     (ShearCurrent, {"rate": 1.0}),
     (Vortex, {"circulation": 1.0}), (Uniform, {"low": 1.0, "high": 2.0}), (LogUniform, {"low": 1.0, "high": 2.0}),
     (Normal, {"mean": 1.0, "deviation": 1.0}), (DomainRandomization, {"distributions": {}}), (RewardWeights, {}),
-    (relaxation_time, {"loss_factor": 0.1, "frequency": 10.0}), (promise, {"setting": "fast"}),
-    (cheapest, {"error": 0.05}), (Simulator, {"scene": FAST, "n_robots": 2}), (AT_REST.reset, {}),
+    (relaxation_time, {"loss_factor": 0.1, "frequency": 10.0}), (timed_certificate, {"decision_period": 0.2}),
+    (chapters_certificate().for_error, {"error": 0.05}), (chapters_certificate().of, {"scene": FAST}),
+    (Simulator, {"scene": FAST, "n_robots": 2}), (AT_REST.reset, {}),
     (AT_REST.set_limb_strengths, {"strengths": 1.0}), (AT_REST.set_scene, {"scene": FAST}),
     (AT_REST.set_state, {"state": AT_REST.get_state()}), (state, AT_REST.get_state()._asdict()),
     (AT_REST.stroke, {"commands": np.zeros((2, 5))}), (step, {"action": np.zeros(5, int)}),

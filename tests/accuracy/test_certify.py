@@ -15,14 +15,17 @@ import pytest
 import seastar_gym
 from refusals import assert_refused
 from seastar_gym import Body, Certificate, Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires
-from seastar_gym.certification import command, commands, measure
-from seastar_gym.envs.promises import REPEATED
+from seastar_gym.accuracy import command, commands, measure
+from seastar_gym.accuracy.certificate import _digest
+from seastar_gym.accuracy.setting import at, resolved
 from seastar_gym.envs.spec import PlainSpec
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.scene.certificate import _digest, resolved
+from seastar_gym.scene.numerics import Resolution
 
 SMALL_ROBOT = Seastar(limb_length=0.08)
 SCENE = Scene(SMALL_ROBOT)
+REPEATED = ("repeated ternary", "alternating ternary")
+"""Classes of a certificate's commands that `gait_error` is of."""
 SAMPLES = 2
 
 
@@ -67,10 +70,9 @@ def test_a_typical_error_is_the_median_of_a_class(certificate):
 def test_errors_bound_those_of_the_sequences_they_were_measured_on(certificate):
     drawn = commands.draw_classes(SAMPLES, 5, 0)
     limit = measure.swim(resolved(SCENE, 33, measure.SHORT), drawn)
-    lengths = measure.path_lengths(limit, 0.08)
+    lengths = measure.path_lengths(SCENE, limit.hub)
     for each in certificate.settings:
-        hub = measure.swim(certificate.at(each), drawn)
-        errors = np.linalg.norm(hub - limit, axis=-1).max(axis=0) / lengths
+        errors = measure.errors(measure.swim(certificate.at(each), drawn), limit, lengths).path
         for name, found in zip(commands.CLASSES, errors.reshape(-1, SAMPLES), strict=True):
             assert found.max() <= each.errors[name] * 1.05, (str(each), name)
 
@@ -125,13 +127,13 @@ def test_settings_that_gather_energy_over_long_swims_are_not_chosen(certificate)
 
 def test_the_function_the_command_and_the_modules_have_names_of_their_own():
     code = (
-        "import seastar_gym.certification.measure as measure, seastar_gym\n"
+        "import seastar_gym.accuracy.measure as measure, seastar_gym\n"
         "try:\n    import seastar_gym.certify\n"
         "except ImportError as refusal:\n    print(refusal)\n"
         "assert seastar_gym.certify is measure.certify"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert "modules are in seastar_gym.certification" in done.stdout
+    assert "modules are in seastar_gym.accuracy" in done.stdout
     command = [sys.executable, "-m", "seastar_gym.certify", "-h"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout.startswith("usage: seastar certify [-h]")
@@ -163,16 +165,6 @@ def test_a_scene_for_an_error_is_refused_where_the_certificate_has_lapsed(certif
         Scene.for_error(0.9, certificate=3)
     with assert_refused("cannot be read"):
         Scene.for_error(0.9, certificate="not there.json")
-
-
-def test_the_share_of_fresh_sequences_that_exceed_an_error_is_counted(certificate):
-    shares = measure.exceeded(certificate, certificate.at(certificate.settings[3]), 4, seed=1)
-    assert set(shares) == set(commands.CLASSES) and all(0.0 <= share <= 1.0 for share in shares.values())
-    nothing = tuple(replace(each, errors=dict.fromkeys(commands.CLASSES, 0.0)) for each in certificate.settings)
-    none_kept = replace(certificate, settings=nothing)
-    assert set(measure.exceeded(none_kept, certificate.at(certificate.settings[3]), 2, seed=1).values()) == {1.0}
-    with assert_refused("not measured"):
-        measure.exceeded(certificate, replace(SCENE, numerics=Numerics("sdirk3", 1e-3)), 2, seed=1)
 
 
 def test_a_certificate_is_read_back_as_it_was_written(certificate, tmp_path):
@@ -442,8 +434,74 @@ def test_swims_of_many_groups_are_those_of_one_batch(monkeypatch):
     drawn, scene = commands.draw_classes(2, 5, 1), resolved(SCENE, 5, Numerics("sdirk2", 2e-2, 1e-6))
     shares = []
     (swum,) = measure.swim_all([scene], drawn, shares.append)
-    np.testing.assert_array_equal(swum, measure.swim(scene, drawn))
+    alone = measure.swim(scene, drawn)
+    np.testing.assert_array_equal(swum.hub, alone.hub)
+    for each, other in zip(swum, alone, strict=True):
+        np.testing.assert_allclose(each, other, rtol=1e-9, atol=1e-12)
     assert shares[-1] == pytest.approx(1.0)
     simulator = Simulator(scene, drawn.shape[1])
     simulator.stroke(drawn[0])
-    np.testing.assert_array_equal(swum[0], simulator.hub_position())
+    np.testing.assert_array_equal(swum.hub[0], simulator.hub_position())
+
+
+def swims(hub, heading=None):
+    """Swims with these hubs [m], shape (strokes, n, 2), and headings [rad]."""
+    hub = np.asarray(hub, float)
+    zeros = np.zeros(hub.shape[:2])
+    return measure.Swims(hub, zeros if heading is None else np.asarray(heading, float), *[zeros] * 5)
+
+
+def test_path_error_is_the_largest_distance_over_the_length_of_the_converged_path():
+    exact = swims([[[3.0, 4.0]], [[3.0, 9.0]]])
+    lengths = measure.path_lengths(SCENE, exact.hub)
+    assert lengths == pytest.approx([10.0])
+    off = measure.errors(swims([[[3.0, 4.5]], [[3.0, 9.1]]]), exact, lengths)
+    assert off.path == pytest.approx([0.05]) and off.end == pytest.approx([0.01])
+
+
+def test_space_and_time_of_the_same_length_bound_the_whole_error():
+    """Of a path of its own, the error of time of a robot that swims too far would be too small."""
+    limit, fine, coarse = (swims([[[length, 0.0]]]) for length in (1.0, 2.0, 2.5))
+    lengths = measure.path_lengths(SCENE, limit.hub)
+    parts = measure.errors(fine, limit, lengths).path + measure.errors(coarse, fine, lengths).path
+    assert measure.errors(coarse, limit, lengths).path == pytest.approx(parts.tolist())
+    assert parts == pytest.approx([1.5])
+
+
+def test_heading_error_knows_that_a_turn_is_a_turn():
+    hub = [[[1.0, 0.0]]]
+    off = measure.errors(swims(hub, [[3.1]]), swims(hub, [[-3.1]]), np.ones(1))
+    assert off.heading == pytest.approx([2.0 * np.pi - 6.2])
+
+
+def test_errors_are_infinite_of_the_robots_whose_solver_failed():
+    limit = np.cumsum(np.full((10, 2, 2), [0.003, 0.004]), axis=0)
+    hub = limit + [0.0, 0.001]
+    hub[3, 1] = np.nan
+    found = measure.errors(swims(hub), swims(limit), measure.path_lengths(SCENE, limit))
+    np.testing.assert_allclose(found.path, [0.02, np.inf])
+    assert np.isinf([found.end[1], found.heading[1]]).all()
+
+
+def test_space_and_time_are_errors_against_many_nodes_and_short_steps():
+    """Settings with one mesh have one error of space; the limit has none, nor has a setting of short steps in time."""
+    short, coarse = Numerics("implicit-midpoint", 5e-3, 1e-8), Numerics("sdirk2", 2e-2, 1e-6)
+    some = [Resolution("continuum", n, each) for n, each in ((5, coarse), (9, coarse), (5, short))]
+    drawn = commands.draw_classes(1, 5, 3)
+    found = measure.measure(SCENE, some, Resolution("continuum", 9, short), lambda *_: short, drawn)
+    np.testing.assert_array_equal(found.space[0].path, found.space[2].path)
+    assert not found.space[1].path.any() and not found.time[2].path.any()
+    lengths = measure.path_lengths(SCENE, found.limit.hub)
+    whole = measure.errors(found.swims[0], found.limit, lengths).path
+    assert (whole <= found.space[0].path + found.time[0].path + 1e-12).all() and whole.max() > 1e-3
+
+
+def test_decisions_are_told_at_whole_seconds(monkeypatch):
+    scene = at(replace(SCENE, actuator=SmaWires()), Resolution("continuum", 5, Numerics("sdirk2", 2e-2, 1e-6)))
+    drawn = np.random.default_rng(0).uniform(-1.0, 1.0, (4, 2, 5))
+    (swum,) = measure.swim_all([scene], drawn, period=0.5)
+    np.testing.assert_array_equal(swum.hub, measure.swim(scene, drawn, 0.5).hub[[1, 3]])
+    simulator = Simulator(scene, 2)
+    simulator.advance(0.5, drawn[0])
+    simulator.advance(0.5, drawn[1])
+    np.testing.assert_array_equal(swum.hub[0], simulator.hub_position())

@@ -17,7 +17,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.certificate import CLASSES_VERSION
+from seastar_gym.accuracy.certificate import CLASSES_VERSION
 
 Floats = NDArray[np.float64]
 Draw = Callable[[np.random.Generator, int, int], Floats]
