@@ -16,7 +16,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
 from tqdm import tqdm
 
 from seastar_gym.accuracy.chapter import STROKES
@@ -29,7 +28,7 @@ from studies.accuracy.convergence import measured, rows_of, second_opinion
 from studies.accuracy.rows import Row, Study, promised
 from studies.accuracy.settings import PHYSICS, QUICK, Plan, presets, settings, settings_of_others
 from studies.accuracy.speeds import measure_speeds
-from studies.accuracy.tables import TABLE_WIDTH, as_markdown, as_tables, facts, store, store_typical, write_csv
+from studies.accuracy.tables import as_markdown, store, store_typical, write_csv
 from studies.parser import study_parser
 
 
@@ -118,13 +117,8 @@ def main() -> None:
     write_csv(found, options.out / "accuracy.csv")
     (options.out / "accuracy.md").write_text(as_markdown(found), encoding="utf-8")
     pictures = accuracy_pictures.draw_all(found, options.out)
-    console = Console()
-    console.width = max(console.width, TABLE_WIDTH)
-    for table in as_tables(found):
-        console.print(table)
-    for fact in facts(found):
-        console.print(fact)
+    print(as_markdown(found))
     if options.store:
         store(found)
-        console.print(f"Stored: {STROKES}")
-    console.print(f"Written: {', '.join(str(path) for path in (options.out / 'accuracy.csv', *pictures))}")
+        print(f"Stored: {STROKES}")
+    print(f"Written: {', '.join(str(path) for path in (options.out / 'accuracy.csv', *pictures))}")

@@ -2,12 +2,10 @@
 
 import csv
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
-
-from rich.table import Table
 
 from seastar_gym.accuracy import Certificate, Setting, chapter
 from seastar_gym.accuracy.certificate import CLASSES_VERSION
@@ -21,8 +19,6 @@ from studies.speed.timing import machine
 
 LARGEST_DOUBT = 3e-4
 """Largest path error of the limit itself, of each kind, with which results are stored."""
-TABLE_WIDTH = 160
-"""Width of the printed table [characters]."""
 
 
 def summary(found: Study) -> list[tuple[str, Row]]:
@@ -79,7 +75,8 @@ def facts(found: Study) -> list[str]:
 
 def as_markdown(found: Study) -> str:
     """Summary in Markdown."""
-    tables = [(summary(found), ""), *((_unnamed(rows), name) for name, rows in found.others.items())]
+    others = (([("", row) for row in rows], name) for name, rows in found.others.items())
+    tables = [(summary(found), ""), *others]
     lines = []
     for table, name in tables:
         lines += [f"{name.capitalize()}:", ""] if name else []
@@ -87,26 +84,6 @@ def as_markdown(found: Study) -> str:
         lines += [f"| {' | '.join(as_cells(preset, row))} |" for preset, row in table]
         lines.append("")
     return "\n".join([*lines, *facts(found), f"Speeds: one core of {machine()}."]) + "\n"
-
-
-def as_tables(found: Study) -> list[Table]:
-    """Summary for the terminal: the chapter's robot, then other physics."""
-    head = f"Errors against the continuum, worst cases; speed on one core ({machine()})"
-    others = [_as_table(name.capitalize(), _unnamed(rows)) for name, rows in found.others.items()]
-    return [_as_table(head, summary(found)), *others]
-
-
-def _unnamed(rows: Sequence[Row]) -> list[tuple[str, Row]]:
-    return [("", row) for row in rows]
-
-
-def _as_table(title: str, lines: Iterable[tuple[str, Row]]) -> Table:
-    table = Table(title=title)
-    for column in COLUMNS:
-        table.add_column(column, justify="left" if column in ("preset", "scheme and step") else "right")
-    for name, row in lines:
-        table.add_row(*as_cells(name, row), style="bold" if name else "")
-    return table
 
 
 COSTS = ("iterations", "steps", "rejections", "halvings", "speed", "straight_speed")
