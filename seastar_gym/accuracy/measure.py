@@ -27,6 +27,7 @@ from seastar_gym.scene import Numerics, Scene
 from seastar_gym.scene.checks import require_count, require_seed, shown
 from seastar_gym.scene.numerics import Resolution
 from seastar_gym.scene.robot import Discretisation
+from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator import Simulator
 from seastar_gym.version import __version__
 
@@ -184,8 +185,8 @@ def errors(swum: Swims, exact: Swims, lengths: Floats) -> Errors:
 
 
 def machine() -> str:
-    """Machine that speeds are measured on."""
-    return f"{os.cpu_count()} cores, {platform.machine()}, Python {platform.python_version()}"
+    """Machine that speeds are measured on: cores, architecture, lanes and Python."""
+    return f"{os.cpu_count()} cores, {platform.machine()}, {N_LANES} lanes, Python {platform.python_version()}"
 
 
 def swim(scene: Scene, commands: Floats, period: float | None = None, error_bars: bool = False) -> Swims:

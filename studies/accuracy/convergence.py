@@ -31,11 +31,9 @@ def short(plan: Plan, discretisation: Discretisation, nodes: int) -> Numerics:
     return Numerics("implicit-midpoint", step, TIGHT)
 
 
-def measured(
-    cases: Cases, plan: Plan, resolutions: Sequence[Resolution], progress: Progress, physics: Scene = Scene()
-) -> Measured:
+def measured(cases: Cases, plan: Plan, resolutions: Sequence[Resolution], progress: Progress) -> Measured:
     """Swims of some cases and their errors at all resolutions."""
-    return measure(physics, resolutions, tight(*plan.limit), partial(short, plan), cases.commands, progress)
+    return measure(Scene(), resolutions, tight(*plan.limit), partial(short, plan), cases.commands, progress)
 
 
 def rows_of(batches: Sequence[Cases], found: Sequence[Measured], resolutions: Sequence[Resolution]) -> list[Row]:

@@ -150,16 +150,12 @@ class Study:
     """Results of the study.
 
     rows: One row per setting.
-    others: Rows of the second table by the name of its physics.
-    refused: Why a physics of the second table was left out, by its name.
     doubt: Errors of the limit itself, by what they are from.
     distances: Distances of the straight swim and the pairs after ten strokes in the limit [m], by name.
     first_stroke: Hub x of the straight swim after one stroke in the limit [m].
     """
 
     rows: list[Row]
-    others: dict[str, list[Row]]
-    refused: dict[str, str]
     doubt: dict[str, Figures]
     distances: dict[str, float]
     first_stroke: float

@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 from typing import get_args
 
-from seastar_gym.scene import Numerics, Scene, Seastar, Water
+from seastar_gym.scene import Numerics
 from seastar_gym.scene.numerics import PRESETS, Fidelity, Resolution, SchemeName
 from seastar_gym.scene.robot import Discretisation
-from studies.speed.terms import SILICONE
 
 MS = 1e-3
 """Seconds per millisecond."""
@@ -21,11 +20,6 @@ ADAPTED = (0.02, 0.01, 0.005)
 """Path tolerances of the settings with adapted steps."""
 LARGEST_ADAPTED = 5 * MS
 """Largest adapted time step [s]."""
-PHYSICS: dict[str, Scene] = {
-    "drag along limbs": Scene(fluid=Water(tangential_drag_coefficient=0.1)),
-    "silicone": Scene(Seastar(relaxation_time=SILICONE)),
-}
-"""Scenes of the second table: a tenth of the drag along limbs, and the damping of a soft silicone."""
 Mesh = tuple[Discretisation, int]
 """Discretisation and nodes per limb N."""
 
@@ -45,7 +39,6 @@ class Plan:
     shortest: Shortest time step of the settings [s].
     finest: Most nodes per limb with which settings are measured at all tolerances, and adapted steps.
     rounds: Rounds of timing.
-    n_others, limit_of_others, fine_of_others: Random sequences, limit and fine step [s] of the second table.
     """
 
     n_random: int = 51
@@ -61,15 +54,11 @@ class Plan:
     shortest: float = 0.1 * MS
     finest: int = 19
     rounds: int = 3
-    n_others: int = 16
-    limit_of_others: tuple[int, float] = (37, 0.1 * MS)
-    fine_of_others: float = 0.1 * MS
 
 
 QUICK = Plan(
     n_random=6, n_slow=2, n_gaits=2, side=(1, 0), limit=(37, 0.4 * MS), fine=0.4 * MS, opinion=(10, 1 * MS),
-    meshes=(("continuum", 7), ("continuum", 10), ("chapter", 10)), shortest=2 * MS, rounds=1, n_others=2,
-    limit_of_others=(19, 1 * MS), fine_of_others=1 * MS,
+    meshes=(("continuum", 7), ("continuum", 10), ("chapter", 10)), shortest=2 * MS, rounds=1,
 )  # fmt: skip
 
 
@@ -104,11 +93,3 @@ def _numerics(plan: Plan, mesh: Mesh) -> list[Numerics]:
     ]
     adapted = [Numerics("implicit-midpoint", LARGEST_ADAPTED, 1e-7, path_tolerance=tolerance) for tolerance in ADAPTED]
     return fixed + (adapted if nodes <= plan.finest else [])
-
-
-def settings_of_others() -> list[Resolution]:
-    """The few settings of the second table."""
-    some = (Numerics("sdirk2", 20 * MS, 1e-6), Numerics("implicit-midpoint", 5 * MS, 1e-6),
-            Numerics("implicit-midpoint", 1 * MS, 1e-7))  # fmt: skip
-    meshes: tuple[Mesh, ...] = (("continuum", 7), ("continuum", 10), ("continuum", 19), ("chapter", 10))
-    return [Resolution(*mesh, numerics) for mesh in meshes for numerics in some]

@@ -26,7 +26,7 @@ from seastar_gym.scene import Scene
 from studies.accuracy.cases import Cases, gaits, joined, pentagon, random_gaits, random_sequences, slow_sequences, swims
 from studies.accuracy.convergence import measured, rows_of, second_opinion
 from studies.accuracy.rows import Row, Study, promised
-from studies.accuracy.settings import PHYSICS, QUICK, Plan, presets, settings, settings_of_others
+from studies.accuracy.settings import QUICK, Plan, presets, settings
 from studies.accuracy.speeds import measure_speeds
 from studies.accuracy.tables import as_markdown, store, store_typical, write_csv
 from studies.parser import study_parser
@@ -43,17 +43,10 @@ def study(plan: Plan, progress: bool = True) -> Study:
     for batch in batches:
         with bar(f"errors of {len(batch)} swims", progress) as report:
             found.append(measured(batch, plan, mine, report))
-    others: dict[str, list[Row]] = {}
-    refused: dict[str, str] = {}
-    for name, physics in PHYSICS.items():
-        try:
-            others[name] = study_other(name, physics, plan, progress)
-        except ValueError as refusal:  # of a scene that cannot be modelled
-            refused[name] = str(refusal)
-    rows = with_speeds(rows_of(batches, found, mine), Scene(), plan, progress)
+    rows = with_speeds(rows_of(batches, found, mine), plan, progress)
     hub = found[0].limit.hub
     distances = dict(zip(("straight", *PAIRS), np.hypot(*hub[-1, :5].T).tolist(), strict=True))
-    return Study(rows, others, refused, doubt, distances, float(hub[0, 0, 0]))
+    return Study(rows, doubt, distances, float(hub[0, 0, 0]))
 
 
 @contextmanager
@@ -76,19 +69,10 @@ def typical_rows(plan: Plan) -> list[Row]:
         return rows_of([cases], [measured(cases, plan, mine, report)], mine)
 
 
-def study_other(name: str, physics: Scene, plan: Plan, progress: bool) -> list[Row]:
-    """Rows of the few settings of the second table for other physics. ValueError if its scene cannot be modelled."""
-    cases = joined(swims(), random_sequences(plan.n_others, np.random.default_rng(0)))
-    mine, plan = settings_of_others(), replace(plan, limit=plan.limit_of_others, fine=plan.fine_of_others)
-    with bar(name, progress) as report:
-        rows = rows_of([cases], [measured(cases, plan, mine, report, physics)], mine)
-    return with_speeds(rows, physics, plan, progress)
-
-
-def with_speeds(rows: list[Row], physics: Scene, plan: Plan, progress: bool) -> list[Row]:
+def with_speeds(rows: list[Row], plan: Plan, progress: bool) -> list[Row]:
     """Rows with their speeds and promises."""
     with bar("speeds", progress) as report:
-        speeds = measure_speeds([at(physics, row.resolution) for row in rows], plan.rounds, report)
+        speeds = measure_speeds([at(Scene(), row.resolution) for row in rows], plan.rounds, report)
     timed = zip(rows, speeds, strict=True)
     return promised([replace(row, speed=float(mixed), straight_speed=float(alone)) for row, (mixed, alone) in timed])
 

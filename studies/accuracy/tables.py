@@ -9,13 +9,13 @@ from typing import Any, get_args
 
 from seastar_gym.accuracy import Certificate, Setting, chapter
 from seastar_gym.accuracy.certificate import CLASSES_VERSION
+from seastar_gym.accuracy.measure import machine
 from seastar_gym.accuracy.setting import physics
 from seastar_gym.scene import Scene
 from seastar_gym.version import __version__
 from studies.accuracy.cases import STROKES, gaits
 from studies.accuracy.rows import UNSEEN, Column, Figures, Row, Study, fronts, path_front
 from studies.accuracy.settings import Plan, presets
-from studies.speed.timing import machine
 
 LARGEST_DOUBT = 3e-4
 """Largest path error of the limit itself, of each kind, with which results are stored."""
@@ -69,21 +69,14 @@ def facts(found: Study) -> list[str]:
     return [
         f"Limit: {1e3 * found.first_stroke:.4f} mm after one stroke straight on, and after ten {distances} mm.",
         f"Error of the limit itself, worst path: {doubts}.",
-        *(f"Left out is {name}: {why}" for name, why in found.refused.items()),
     ]
 
 
 def as_markdown(found: Study) -> str:
     """Summary in Markdown."""
-    others = (([("", row) for row in rows], name) for name, rows in found.others.items())
-    tables = [(summary(found), ""), *others]
-    lines = []
-    for table, name in tables:
-        lines += [f"{name.capitalize()}:", ""] if name else []
-        lines += [f"| {' | '.join(COLUMNS)} |", "|---|---:|---|---:|" + "---:|" * (len(COLUMNS) - 4)]
-        lines += [f"| {' | '.join(as_cells(preset, row))} |" for preset, row in table]
-        lines.append("")
-    return "\n".join([*lines, *facts(found), f"Speeds: one core of {machine()}."]) + "\n"
+    lines = [f"| {' | '.join(COLUMNS)} |", "|---|---:|---|---:|" + "---:|" * (len(COLUMNS) - 4)]
+    lines += [f"| {' | '.join(as_cells(preset, row))} |" for preset, row in summary(found)]
+    return "\n".join([*lines, "", *facts(found), f"Speeds: one core of {machine()}."]) + "\n"
 
 
 COSTS = ("iterations", "steps", "rejections", "halvings", "speed", "straight_speed")
@@ -100,18 +93,16 @@ def write_csv(found: Study, path: Path) -> None:
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow([
-            "physics", "discretisation", "nodes_per_limb", "scheme", "step_s", "newton_tolerance", "path_tolerance",
+            "discretisation", "nodes_per_limb", "scheme", "step_s", "newton_tolerance", "path_tolerance",
             *(f"space_{name}" for name in names), *(f"time_{name}" for name in names),
             *(f"promise_{name.replace('heading', 'heading_deg')}" for name in columns), *COSTS,
         ])  # fmt: skip
-        for physics, row in [("chapter", row) for row in found.rows] + [
-            (name, row) for name, rows in found.others.items() for row in rows
-        ]:
+        for row in found.rows:
             n = row.resolution.numerics
             key = [n.scheme, n.step, n.newton_tolerance, "" if n.path_tolerance is None else n.path_tolerance]
             sums = [row.promise(column) for column in columns]
             costs = [getattr(row, name) for name in COSTS]
-            writer.writerow([physics, *row.mesh, *key, *map(_cell, (*row.space, *row.time, *sums, *costs))])
+            writer.writerow([*row.mesh, *key, *map(_cell, (*row.space, *row.time, *sums, *costs))])
 
 
 def _cell(value: Any) -> Any:

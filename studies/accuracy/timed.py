@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.accuracy import Certificate, Setting, chapter
 from seastar_gym.accuracy.certificate import CLASSES_VERSION
-from seastar_gym.accuracy.measure import Progress, measure, path_lengths, swim_all
+from seastar_gym.accuracy.measure import Progress, machine, measure, path_lengths, swim_all
 from seastar_gym.accuracy.setting import at, physics
 from seastar_gym.command import run_command
 from seastar_gym.scene import Numerics, Scene, SmaWires
@@ -31,7 +31,6 @@ from studies.accuracy.page import PERIODS, timed
 from studies.accuracy.study import bar
 from studies.accuracy.tables import two_digits, up
 from studies.parser import study_parser
-from studies.speed.timing import machine
 
 Floats = NDArray[np.float64]
 

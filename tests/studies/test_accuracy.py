@@ -35,8 +35,7 @@ from studies.accuracy.settings import MS, Plan, presets, settings
 
 TINY = Plan(
     n_random=2, n_slow=1, n_gaits=1, side=(1, 0), limit=(13, 5 * MS), fine=5 * MS, opinion=(4, 5 * MS),
-    meshes=(("continuum", 10), ("chapter", 4)), shortest=10 * MS, rounds=1, n_others=1,
-    limit_of_others=(7, 5 * MS), fine_of_others=5 * MS,
+    meshes=(("continuum", 10), ("chapter", 4)), shortest=10 * MS, rounds=1,
 )  # fmt: skip
 KINDS = ("path", "straight", "pair", "pentagon", "random", "slow", "gait", "heading", "end")
 
@@ -261,9 +260,8 @@ def test_presets_and_the_chapters_steps_are_among_the_settings():
 def test_tables_and_csv_are_written(found, tmp_path):
     accuracy_tables.write_csv(found, tmp_path / "a.csv")
     rows = list(csv.DictReader((tmp_path / "a.csv").read_text().splitlines()))
-    others = sum(map(len, found.others.values()))
-    assert len(rows) == len(found.rows) + others
-    some = {"physics", "scheme", "step_s", "nodes_per_limb", "space_path", "time_gait", "promise_heading_deg", "speed"}
+    assert len(rows) == len(found.rows)
+    some = {"scheme", "step_s", "nodes_per_limb", "space_path", "time_gait", "promise_heading_deg", "speed"}
     assert some <= set(rows[0])
     assert float(rows[0]["time_path"]) == pytest.approx(found.rows[0].time.path, rel=1e-4)
     assert float(rows[0]["promise_path"]) == pytest.approx(found.rows[0].promise("path"), rel=1e-4)
@@ -271,14 +269,7 @@ def test_tables_and_csv_are_written(found, tmp_path):
     assert all(line.count("|") == len(accuracy_tables.COLUMNS) + 1 for line in lines if line.startswith("|"))
     for name in presets():
         assert any(line.startswith(f"| {name} |") for line in lines)
-    shown = sum(len(rows) for rows in found.others.values()) + len(accuracy_tables.summary(found))
-    assert sum(line.startswith("| ") for line in lines) == shown + 1 + len(found.others)
-    assert set(found.others) == {"drag along limbs", "silicone"} and not found.refused
-
-
-def test_physics_that_a_scene_refuses_are_left_out_with_a_reason(found):
-    lines = accuracy_tables.as_markdown(replace(found, others={}, refused={"honey": "Too thick."}))
-    assert "Left out is honey: Too thick." in lines
+    assert sum(line.startswith("| ") for line in lines) == 1 + len(accuracy_tables.summary(found))
 
 
 def test_pictures_are_drawn(found, tmp_path):
