@@ -46,7 +46,7 @@ EXACTLY = "A distance that is exactly the limit does not happen."
 SHADE = "Nobody sees a 255th of a colour."
 EQUIVALENT: dict[tuple[str, str], str] = {
     ("seastar_gym/accuracy/measure.py",
-     "for k, ((nodes, numerics), hub) in enumerate(zip(settings, swum[len(NODES) :], strict=False), start=1):"):
+     "for k, (each, space, in_time) in enumerate(zip(settings, swum.space, swum.time, strict=False), start=1):"):
         "There are as many swims as settings.",
     ("seastar_gym/envs/rendering.py", "PLANNED: Colour = (190, 199, 208)"): SHADE,
     ("seastar_gym/envs/rendering.py", "WATER: Colour = (250, 253, 254)"): SHADE,

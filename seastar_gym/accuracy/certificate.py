@@ -29,7 +29,7 @@ from seastar_gym.version import __version__
 FORMAT = 3
 """Version of the file's form."""
 CLASSES_VERSION = 1
-"""Version of the classes of commands, see seastar_gym/accuracy/commands.py. Errors of another are of others."""
+"""Version of the classes of commands, see commands.py. Errors of another are of others: certificates lapse."""
 MOST_SAMPLES = 100_000
 """Most sequences of a class that can be asked for."""
 REPEATED = ("repeated", "alternating")

@@ -12,11 +12,12 @@ reads it, `certificate.for_error(0.01)` is the scene at the fastest setting that
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from seastar_gym.accuracy.certificate import Certificate
-from seastar_gym.accuracy.measure import SAMPLES, certify
+from seastar_gym.accuracy.measure import SAMPLES, Progress, certify
 from seastar_gym.extras import require_extra
 from seastar_gym.files import save_figure, write_json
 from seastar_gym.scene.checks import require_error
@@ -71,6 +72,20 @@ def require_writable(option: str, file: Path | None) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
 
 
+@contextmanager
+def progress_bar(what: str = "", shown: bool = True) -> Iterator[Progress]:
+    """Bar of the share of some work that is done."""
+    from tqdm import tqdm
+
+    bar_format = "{l_bar}{bar}| {elapsed}<{remaining}"
+    with tqdm(total=100, unit="%", desc=what, disable=not shown, bar_format=bar_format) as bar:
+
+        def progress(share: float) -> None:
+            bar.update(100.0 * share - bar.n)
+
+        yield progress
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     parser = argparse.ArgumentParser(
@@ -97,13 +112,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             require_writable(name, getattr(options, name))
         if options.out.suffix == ".png":
             raise ValueError(f"{options.out} is where the picture goes: give --out a file such as certificate.json.")
-        from tqdm import tqdm
-
-        with tqdm(total=100, unit="%", bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as bar:
-
-            def progress(share: float) -> None:
-                bar.update(100.0 * share - bar.n)
-
+        with progress_bar() as progress:
             certificate = certify(scene, options.samples, options.seed, progress)
         certificate.save(options.out)
         print(as_text(certificate))

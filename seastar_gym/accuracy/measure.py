@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.accuracy.certificate import MOST_SAMPLES, Certificate
-from seastar_gym.accuracy.commands import ACTIONS, CLASSES, PROMISED, STROKES, VERSION, draw_classes
+from seastar_gym.accuracy.certificate import CLASSES_VERSION, MOST_SAMPLES, Certificate
+from seastar_gym.accuracy.commands import ACTIONS, CLASSES, PROMISED, STROKES, draw_classes
 from seastar_gym.accuracy.endurance import energy_growth
 from seastar_gym.accuracy.setting import Setting, at, physics
 from seastar_gym.accuracy.water import carried, velocity, with_the_water
@@ -141,7 +141,7 @@ def certify(scene: Scene, samples: int = SAMPLES, seed: int = 0, progress: Progr
         report(SHARE_OF_SWIMS + (1.0 - SHARE_OF_SWIMS) * k / len(settings))
     return Certificate(
         physics(scene), tuple(found), PROMISED, ACTIONS, samples, limit_error=_promised(of_limit, samples),
-        classes=VERSION, version=__version__, machine=machine(),
+        classes=CLASSES_VERSION, version=__version__, machine=machine(),
     )  # fmt: skip
 
 

@@ -24,7 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import beta
 
-from seastar_gym.accuracy import Certificate, chapters_certificate, commands, measure
+from seastar_gym.accuracy import Certificate, chapters_certificate, measure
+from seastar_gym.accuracy.certificate import CLASSES_VERSION
 from seastar_gym.accuracy.commands import CLASSES, draw_classes
 from seastar_gym.accuracy.setting import resolved
 from seastar_gym.command import run_command
@@ -173,7 +174,7 @@ def _cells(found: dict[str, Any]) -> list[tuple[str, dict[tuple[str, str], int]]
 
 def read_results(file: Path, samples: int) -> dict[str, Any]:
     """Results in the file, or empty ones; ValueError if it has those of other sequences or another version."""
-    wanted = {"samples": samples, "seed": SEED, "classes": commands.VERSION, "version": __version__}
+    wanted = {"samples": samples, "seed": SEED, "classes": CLASSES_VERSION, "version": __version__}
     if not file.is_file():
         about = "Written by python -m studies.accuracy.promises; exceedances are numbers of sequences."
         command = f"python -m studies.accuracy.promises --samples {samples}"

@@ -10,16 +10,13 @@ The error is the hub's distance from the other path at the ends of strokes, as a
 are processor times of one thread, the best of several rounds, for a batch of random commands.
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from tqdm import tqdm
 
 from seastar_gym.accuracy.chapter import STROKES
-from seastar_gym.accuracy.measure import Progress
+from seastar_gym.accuracy.command import progress_bar
 from seastar_gym.accuracy.setting import at
 from seastar_gym.gaits import PAIRS
 from seastar_gym.scene import Scene
@@ -37,23 +34,16 @@ def study(plan: Plan, progress: bool = True) -> Study:
     rng = np.random.default_rng(0)
     batches, mine = [sequences(plan, rng), pentagon(*plan.side)], settings(plan)
     few = joined(swims(), random_sequences(min(11, plan.n_random), rng))
-    with bar("second opinion", progress) as report:
+    with progress_bar("second opinion", progress) as report:
         doubt = second_opinion(few, plan, report)
     found = []
     for batch in batches:
-        with bar(f"errors of {len(batch)} swims", progress) as report:
+        with progress_bar(f"errors of {len(batch)} swims", progress) as report:
             found.append(measured(batch, plan, mine, report))
     rows = with_speeds(rows_of(batches, found, mine), plan, progress)
     hub = found[0].limit.hub
     distances = dict(zip(("straight", *PAIRS), np.hypot(*hub[-1, :5].T).tolist(), strict=True))
     return Study(rows, doubt, distances, float(hub[0, 0, 0]))
-
-
-@contextmanager
-def bar(what: str, shown: bool = True) -> Iterator[Progress]:
-    """Bar of the share of some work that is done."""
-    with tqdm(total=100.0, desc=what, disable=not shown, bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as each:
-        yield lambda share: each.update(100.0 * share - each.n) and None
 
 
 def sequences(plan: Plan, rng: np.random.Generator) -> Cases:
@@ -65,13 +55,13 @@ def sequences(plan: Plan, rng: np.random.Generator) -> Cases:
 def typical_rows(plan: Plan) -> list[Row]:
     """Rows of the presets, for their medians: without speeds, and without the pentagon, which is one sequence."""
     cases, mine = sequences(plan, np.random.default_rng(0)), list(presets().values())
-    with bar("medians") as report:
+    with progress_bar("medians") as report:
         return rows_of([cases], [measured(cases, plan, mine, report)], mine)
 
 
 def with_speeds(rows: list[Row], plan: Plan, progress: bool) -> list[Row]:
     """Rows with their speeds and promises."""
-    with bar("speeds", progress) as report:
+    with progress_bar("speeds", progress) as report:
         speeds = measure_speeds([at(Scene(), row.resolution) for row in rows], plan.rounds, report)
     timed = zip(rows, speeds, strict=True)
     return promised([replace(row, speed=float(mixed), straight_speed=float(alone)) for row, (mixed, alone) in timed])

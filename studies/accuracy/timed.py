@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.accuracy import Certificate, Setting, chapter
 from seastar_gym.accuracy.certificate import CLASSES_VERSION
+from seastar_gym.accuracy.command import progress_bar
 from seastar_gym.accuracy.measure import Progress, machine, measure, path_lengths, swim_all
 from seastar_gym.accuracy.setting import at, physics
 from seastar_gym.command import run_command
@@ -28,7 +29,6 @@ from seastar_gym.scene import Numerics, Scene, SmaWires
 from seastar_gym.scene.numerics import PRESETS, Fidelity, Resolution
 from seastar_gym.version import __version__
 from studies.accuracy.page import PERIODS, timed
-from studies.accuracy.study import bar
 from studies.accuracy.tables import two_digits, up
 from studies.parser import study_parser
 
@@ -107,7 +107,7 @@ def errors(period: float, plan: Plan, progress: Progress) -> dict[str, Setting]:
 def study(period: float, plan: Plan) -> Certificate:
     """Errors of all presets for a time between decisions [s]."""
     began = time.process_time()
-    with bar(f"every {period:g} s") as progress:
+    with progress_bar(f"every {period:g} s") as progress:
         settings = tuple(errors(period, plan, progress).values())
     return Certificate(
         physics(SCENE), settings, ("random",), ("random", "repeated"), plan.samples,
