@@ -13,11 +13,11 @@ import pytest
 
 from refusals import assert_refused
 from seastar_gym.benchmark.command import publish
-from seastar_gym.benchmark.measures import SECONDS
 from seastar_gym.benchmark.results import Entry
 from seastar_gym.controllers.learned import load, save
 from seastar_gym.evaluation.films import film
 from seastar_gym.evaluation.many import HELD_OUT_SEED
+from seastar_gym.evaluation.measures import SECONDS
 from seastar_gym.evaluation.pictures import draw_traces
 from seastar_gym.evaluation.results import write_csv
 from seastar_gym.evaluation.swim import Swim

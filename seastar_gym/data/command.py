@@ -5,7 +5,6 @@ A dataset is called TASK/LABEL-v0. Episodes have the seeds 0, 1, ... of the spli
 """
 
 import argparse
-import inspect
 import os
 import shlex
 import sys
@@ -13,17 +12,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, get_args
 
-import gymnasium as gym
 import numpy as np
-from gymnasium.envs.registration import load_env_creator
 
-from seastar_gym.benchmark.episodes import require_seen
 from seastar_gym.command import command_parser
 from seastar_gym.controllers.contract import Policy, actions_in
 from seastar_gym.controllers.roster import HELP, load_agent
 from seastar_gym.controllers.scripted import RandomPolicy
 from seastar_gym.data.dataset import record, require_new, summary, write
-from seastar_gym.evaluation.tasks import require_task
+from seastar_gym.evaluation.tasks import env_of, parameters_of, require_seen, require_task
 from seastar_gym.extras import require_extra
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
@@ -66,7 +62,7 @@ def recorded(task: str, agent: str, options: argparse.Namespace, command: str) -
     arguments: dict[str, Any] = {} if options.fidelity is None else {"fidelity": options.fidelity}
     if options.random_paths:
         arguments |= _random_paths(task)
-    env: Any = gym.make(task, disable_env_checker=True, **arguments).unwrapped
+    env = env_of(task, **arguments)
     policy = _load(name, env, options.seed)
     require_seen(policy, env)
     arguments["actions"] = actions_in(policy, env.actions, env.scene.robot.n_limbs)
@@ -77,9 +73,7 @@ def recorded(task: str, agent: str, options: argparse.Namespace, command: str) -
 
 def _random_paths(task: str) -> dict[str, Any]:
     """Arguments for random paths and headings."""
-    entry: Any = gym.spec(task).entry_point
-    creator: Any = load_env_creator(entry) if isinstance(entry, str) else entry
-    if "path" not in inspect.signature(creator).parameters:
+    if "path" not in parameters_of(task):
         raise ValueError(f"{task} has no paths: leave --random-paths out.")
     return {"path": "random", "random_heading": True}
 

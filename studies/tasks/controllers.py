@@ -26,10 +26,11 @@ from seastar_gym.envs.tasks.obst_trap import ObstTrap
 from seastar_gym.envs.tasks.prey import LOOK_AHEAD, Prey
 from seastar_gym.envs.tasks.prizes import Prizes
 from seastar_gym.envs.tasks.station import Station
+from seastar_gym.evaluation.rollout import Batch, Info
 from seastar_gym.simulator import State
 from studies.tasks.ahead import Ahead, Odometer, Robots, few_commands
 from studies.tasks.blind import BlindPlanner, FailureGuess, LimbsKnown
-from studies.tasks.episodes import Agent, Batch, Info
+from studies.tasks.episodes import Agent
 from studies.tasks.greedy import Actions, Floats, Floats32, Greedy, GreedyOnRoute, Rest, length, route
 from studies.tasks.hypotheses import Guess
 from studies.tasks.rounds import BestRound, MostPerMetre, PlannedMostPerMetre

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.evaluation.rollout import Info
 from studies.tasks.ahead import Robots
-from studies.tasks.episodes import Info
 
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]

@@ -23,7 +23,7 @@ from seastar_gym.envs.paths import PENTAGON_SIDE, make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.films import CLOSING_SECONDS
 from seastar_gym.evaluation.pictures import COLOURS, FPS, FRAMES_PER_STROKE
-from seastar_gym.evaluation.swim import Swim, swim
+from seastar_gym.evaluation.swim import Swim
 
 ROOT = Path(__file__).resolve().parents[2]
 SHORT = [[0.02, 0.0]]
@@ -87,26 +87,6 @@ def test_unknown_energy_is_no_number():
     done = made_up_swim([(0.0, 0.0), (0.03, 0.0)], [0, 0])
     unknown = replace(done, heating_time=np.full(1, np.nan), energy=np.full(1, np.nan))
     assert unknown.joules_per_metre is None and unknown.seconds_heated is None
-
-
-class Recorder:
-    """A policy that writes down what it is asked."""
-
-    def __init__(self):
-        self.asked = []
-
-    def predict(self, observation, state=None, episode_start=None, deterministic=False):
-        self.asked.append((state, bool(episode_start[0]), deterministic))
-        return np.array([0, 1, 0, 0, 2]), len(self.asked)
-
-
-def test_a_policy_gets_its_state_back_and_hears_of_the_start_once():
-    recorder = Recorder()
-    done = swim("recorder", recorder, SeastarSwimEnv(fidelity="fast"), max_strokes=3, seed=0)
-    assert recorder.asked == [(None, True, True), (1, False, True), (2, False, True)]
-    assert done.strokes == 3
-    np.testing.assert_array_equal(done.time, [0.0, 1.0, 2.0, 3.0])
-    np.testing.assert_array_equal(done.limbs_heated, [2, 2, 2])
 
 
 def test_the_scripted_pentagon_rounds_the_pentagon():

@@ -15,7 +15,7 @@ from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.evaluation.many import mean_with_interval
+from seastar_gym.evaluation.statistics import mean_with_interval
 from seastar_gym.evaluation.swim import swim
 from studies.learning.in_time import study, trainings
 from studies.learning.in_time.shares import ChosenCommands, SharesPolicy, shares_of_pairs
