@@ -1,6 +1,4 @@
-"""Many swims side by side, nominal or disturbed, and their means with confidence intervals."""
-
-from collections.abc import Sequence
+"""Many swims side by side, nominal or disturbed."""
 
 import numpy as np
 
@@ -9,7 +7,6 @@ from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.task import Path as SwimPath
 from seastar_gym.evaluation.disturbances import Disturbance, DisturbedTask
 from seastar_gym.evaluation.rollout import TaskBatch, rollout
-from seastar_gym.evaluation.statistics import Estimate, mean_with_interval
 from seastar_gym.evaluation.swim import MOST_DECISIONS, RECORDED, Swim, swims_of
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count, require_kind
@@ -18,7 +15,6 @@ HELD_OUT_SEED = 1_000
 """Seed of the paths that policies are measured on; trainings draw theirs from small seeds."""
 MOST_SWIMS, LARGEST_SEED = 1_000_000, 2**63
 """Most swims side by side, and the largest seed of their paths."""
-MM = 1000.0
 
 
 def swim_many(
@@ -59,22 +55,3 @@ def swim_many(
     swims = swims_of(agent, rollout(batch, policy, until=max_strokes, record=RECORDED))
     batch.close()
     return swims
-
-
-def statistics(swims: Sequence[Swim]) -> dict[str, Estimate]:
-    """Mean measures of a set of swims, by name, with intervals; strokes and seconds are those of finished swims."""
-    finished = np.array([done.finished for done in swims], dtype=np.float64)
-    strokes = np.array([done.strokes for done in swims if done.finished], dtype=np.float64)
-    errors = MM * np.array([done.cross_track_errors.mean() for done in swims])
-    seconds = np.array([done.time[-1] for done in swims if done.finished], dtype=np.float64)
-    effort = np.array([done.heated_per_metre for done in swims if done.heated_per_metre is not None], dtype=np.float64)
-    joules = np.array([done.joules_per_metre for done in swims if done.joules_per_metre is not None], dtype=np.float64)
-    measures = {
-        "success_rate": finished,
-        "strokes_to_finish": strokes,
-        "mean_cross_track_error_mm": errors,
-        "limbs_heated_per_metre": effort,
-        "simulated_time_s": seconds,
-        "energy_per_metre_J": joules,
-    }
-    return {name: mean_with_interval(values) for name, values in measures.items()}

@@ -36,5 +36,4 @@ def test_help_tells_the_names_of_all_agents(command, capsys):
         command(["--help"])
     text = " ".join(capsys.readouterr().out.replace("│", " ").split())
     assert ", ".join(AGENTS) in text and ", ".join(GAITS) in text
-    assert f"usage: python -m {command.__module__}" in text
-    assert command is trials.main or ", ".join(PATHS) in text
+    assert "usage: seastar evaluate" in text and ", ".join(PATHS) in text
