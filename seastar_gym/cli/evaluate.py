@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
-from seastar_gym.command import command_parser
+from seastar_gym.command import answered, command_parser
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.controllers.roster import DEFAULTS, HELP, fitting_agents, load_agents
@@ -90,6 +90,7 @@ def limit_of(options: argparse.Namespace) -> int:
 
 def compared(options: argparse.Namespace, command: str) -> None:
     """Let the agents swim the path. command: What was typed."""
+    require_sound(options)
     (fidelity,) = options.fidelity
     path, own = load_path(options.path), scene_at(options.scene, fidelity)
     agents, left_out = fitting_agents(options.agents, options.seed, fidelity, options.decision_period, own)
@@ -126,6 +127,7 @@ def remarks(agents: Mapping[str, Policy], options: argparse.Namespace, command: 
 
 def swum_often(options: argparse.Namespace) -> None:
     """Let the agents swim the sets."""
+    require_sound(options)
     rows, period = list[Row](), options.decision_period
     for fidelity in options.fidelity:
         agents = load_agents(options.agents or OF_TRIALS, options.seed, fidelity, period)
@@ -142,13 +144,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     options = parser().parse_args(given)
-    try:
-        require_sound(options)
-        if options.sets is not None:
-            swum_often(options)
-        else:
-            compared(options, shlex.join(["seastar", "evaluate", *given]))
-    except (ValueError, ImportError, FileNotFoundError) as bad_input:
-        print(bad_input, file=sys.stderr)
-        return 2
-    return 0
+    command = shlex.join(["seastar", "evaluate", *given])
+    return answered(lambda: compared(options, command) if options.sets is None else swum_often(options))

@@ -6,7 +6,6 @@ environment, as that has been made; otherwise it swims along --path. Without opt
 """
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, get_args
@@ -14,7 +13,7 @@ from typing import Any, get_args
 import gymnasium as gym
 
 from seastar_gym.cli.screen import Show, rate, screen
-from seastar_gym.command import command_parser
+from seastar_gym.command import answered, command_parser
 from seastar_gym.controllers.contract import Policy, actions_in
 from seastar_gym.controllers.roster import HELP, load_agent
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
@@ -129,9 +128,4 @@ def outcome(env: Any, info: dict[str, Any]) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
     options = parser().parse_args(arguments)
-    try:
-        print(watch(options))
-    except (ValueError, ImportError, FileNotFoundError) as bad_input:
-        print(bad_input, file=sys.stderr)
-        return 2
-    return 0
+    return answered(lambda: print(watch(options)))

@@ -5,6 +5,7 @@ A dataset is called TASK/LABEL-v0. Episodes have the seeds 0, 1, ... of the spli
 """
 
 import argparse
+import itertools
 import os
 import shlex
 import sys
@@ -14,7 +15,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from seastar_gym.command import command_parser
+from seastar_gym.command import answered, command_parser
 from seastar_gym.controllers.contract import Policy, actions_in
 from seastar_gym.controllers.roster import HELP, load_agent
 from seastar_gym.controllers.scripted import RandomPolicy
@@ -85,27 +86,27 @@ def _load(name: str, env: Any, seed: int) -> Policy:
     return load_agent(name, env, seed)
 
 
+def record_all(options: argparse.Namespace, command: str) -> int:
+    """Record every agent on every task; returns the exit code, 2 where nothing was recorded."""
+    require_extra("Datasets", "data", "minari", "h5py")
+    require_count("--episodes", options.episodes, 1, 1_000_000)
+    for task in options.tasks:
+        require_task(task)
+    write_to(options.out)
+    done = 0
+    for task, agent in itertools.product(options.tasks, options.agents):
+        try:
+            line = recorded(task, agent, options, command)
+        except (ValueError, FileNotFoundError) as unfit:
+            print(f"{agent} is not recorded on {task}: {unfit}", file=sys.stderr)
+            continue
+        print(line, flush=True)
+        done += 1
+    return 0 if done else 2
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     options = parser().parse_args(given)
-    done = 0
-    try:
-        require_extra("Datasets", "data", "minari", "h5py")
-        require_count("--episodes", options.episodes, 1, 1_000_000)
-        for task in options.tasks:
-            require_task(task)
-        write_to(options.out)
-        for task in options.tasks:
-            for agent in options.agents:
-                try:
-                    line = recorded(task, agent, options, shlex.join(["seastar", "data", *given]))
-                except (ValueError, FileNotFoundError) as unfit:
-                    print(f"{agent} is not recorded on {task}: {unfit}", file=sys.stderr)
-                    continue
-                print(line, flush=True)
-                done += 1
-    except (ValueError, ImportError) as bad_input:
-        print(bad_input, file=sys.stderr)
-        return 2
-    return 0 if done else 2
+    return answered(lambda: record_all(options, shlex.join(["seastar", "data", *given])))

@@ -12,7 +12,8 @@ from seastar_gym.controllers.contract import Policy, actions_of
 from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
-from seastar_gym.evaluation.pictures import FRAMES_PER_STROKE, draw_traces, film
+from seastar_gym.evaluation.films import film
+from seastar_gym.evaluation.pictures import FPS, FRAMES_PER_STROKE, draw_traces
 from seastar_gym.evaluation.playback import Playback, RecordingEnv
 from seastar_gym.evaluation.results import as_text, results, write_csv
 from seastar_gym.evaluation.swim import TIME_LIMIT, Swim, decisions_in, swim
@@ -100,7 +101,12 @@ def _swim_once(
     if video is None and not record:
         return swim(name, policy, SeastarSwimEnv(**environment), **episode), None
     env = RecordingEnv(film=video is not None, frames_per_stroke=FRAMES_PER_STROKE, **environment)
-    with film(video) if video is not None else nullcontext() as watch:
+    with film(video, FPS) if video is not None else nullcontext(lambda picture: None) as add:
+
+        def watch(env: SeastarSwimEnv) -> None:
+            for picture in env.render() or ():
+                add(picture)
+
         swum = swim(name, policy, env, **episode, watch=watch)
     env.close()
     return swum, env.playback(name)

@@ -25,9 +25,8 @@ from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.comparison import evaluate
-from seastar_gym.evaluation.many import swim_many
 from seastar_gym.evaluation.results import as_text
-from seastar_gym.evaluation.swim import decisions_in, swim
+from seastar_gym.evaluation.swim import swim
 from seastar_gym.gaits import in_time, lagged_gait, straight_gait, thrifty_gait, turning_wave
 
 PERIODS = (0.5, 0.2, 0.1)
@@ -119,16 +118,6 @@ def test_an_agent_for_other_decisions_is_refused():
     for period in (1.0, 0.2):
         with assert_refused("every 0.5 s", f"every {period:g} s"):
             swim("a", scripted("lagged", decision_period=0.5), SeastarSwimEnv(decision_period=period), max_strokes=1)
-
-
-def test_many_timed_swims_are_those_one_by_one():
-    policy, scene = scripted("lagged", decision_period=0.5), make_scene(None, "fast", 0.5)
-    arguments = {"max_strokes": decisions_in(10.0, 0.5), "threads": 1, "decision_period": 0.5}
-    one, other = swim_many("lagged", policy, "line", 2, scene, **arguments)
-    alone = swim("lagged", policy, SeastarSwimEnv("line", scene=scene, decision_period=0.5), max_strokes=20)
-    for name in ("hub", "time", "limbs_heated", "heating_time", "energy"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
-        np.testing.assert_array_equal(getattr(one, name), getattr(alone, name))
 
 
 # Search

@@ -24,7 +24,6 @@ from seastar_gym.envs.tasks.station import Station
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.many import HELD_OUT_SEED
 from seastar_gym.evaluation.measures import MEASURES, SECONDS, measure_of
-from seastar_gym.evaluation.swim import swim
 from seastar_gym.evaluation.tasks import make_batch, require_seen, swim_episodes, task_ids
 from seastar_gym.executors import Outcome
 from seastar_gym.executors.here import Here
@@ -72,15 +71,6 @@ def entry(agent="a", scores=(2.0, 2.0, 4.0, 4.0), **more):
 def test_tasks_are_the_registered_ids_of_this_package(tasks):
     assert {SWIM, "SeastarSwimTimed-v0", SHORT} <= set(task_ids())
     assert not any(id.startswith("CartPole") for id in task_ids())
-
-
-def test_an_episode_of_a_batch_is_that_of_one_robot(tasks):
-    swum = swim_episodes(SHORT, scripted("straight"), [3, 4])
-    alone = gym.make(SHORT).unwrapped
-    done = swim("straight", scripted("straight"), alone, max_strokes=30, seed=4)
-    assert swum.decisions[1] == done.strokes and bool(swum.success[1]) == done.finished
-    assert swum.last("time")[1] == pytest.approx(done.time[-1])
-    assert SECONDS.of(swum)[1] == (done.time[-1] if done.finished else 30.0)
 
 
 def test_returns_are_sums_of_rewards(tasks):

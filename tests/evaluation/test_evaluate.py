@@ -245,17 +245,6 @@ def test_what_cannot_be_evaluated_is_refused(agents, more, complaint):
 # The command line
 
 
-def test_command_line_evaluates_scripted_agents(tmp_path, capsys):
-    path = tmp_path / "path.csv"
-    path.write_text("0.01, 0.0\n0.02, 0.0\n")
-    arguments = ["--agents", "straight", "2-,5+", "--path", str(path), "--fidelity", "fast", "--no-video"]
-    assert main([*arguments, "--max-strokes", "5", "--out", str(tmp_path / "out")]) == 0
-    printed = capsys.readouterr().out
-    assert "straight" in printed
-    assert "of 2" in printed
-    assert {file.name for file in (tmp_path / "out").iterdir()} == {"evaluation.csv", "traces.png"}
-
-
 def test_the_policy_in_the_box_and_scripted_agents_are_evaluated_without_torch():
     code = "import sys, seastar_gym.cli.evaluate as e; e.fitting_agents(['pentagon', 'random', 'learned'])"
     code += "; print(*sys.modules)"

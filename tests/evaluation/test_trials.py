@@ -12,7 +12,7 @@ from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.observation import scene_layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import SwimTask
+from seastar_gym.envs.task import SwimTask, make_scene
 from seastar_gym.evaluation.disturbances import Disturbance, DisturbedTask
 from seastar_gym.evaluation.many import swim_many
 from seastar_gym.evaluation.results import statistics
@@ -115,14 +115,17 @@ def test_impossible_disturbances_are_refused(arguments):
         Disturbance(**arguments)
 
 
-def test_a_batch_of_swims_is_measured_as_one_swim():
-    agent = GreedyPolicy(FAST)
-    one = swim("greedy", agent, SeastarSwimEnv("square", actions="joint", fidelity="fast"), max_strokes=30)
-    for done in swim_many("greedy", agent, "square", 3, FAST, max_strokes=30, threads=1):
-        np.testing.assert_allclose(done.hub, one.hub, atol=1e-12)
-        np.testing.assert_array_equal(done.waypoint_index, one.waypoint_index)
-        np.testing.assert_array_equal(done.limbs_heated, one.limbs_heated)
-        np.testing.assert_allclose(done.time, one.time)
+@pytest.mark.parametrize(
+    "agent, path, period, strokes",
+    [(GreedyPolicy(FAST), "square", None, 30), (scripted("lagged", decision_period=0.5), "line", 0.5, 20)],
+)
+def test_swims_of_a_batch_are_those_of_one_robot(agent, path, period, strokes):
+    scene = make_scene(None, "fast", period)
+    env = SeastarSwimEnv(path, actions=agent.actions, scene=scene, decision_period=period)
+    one = swim("one", agent, env, max_strokes=strokes)
+    for done in swim_many("many", agent, path, 3, scene, max_strokes=strokes, threads=1, decision_period=period):
+        for name in ("hub", "waypoint_index", "time", "limbs_heated", "heating_time", "energy"):
+            np.testing.assert_array_equal(getattr(done, name), getattr(one, name))
 
 
 def test_a_swim_ends_at_its_last_waypoint():
