@@ -7,7 +7,7 @@ from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.task import Path as SwimPath
 from seastar_gym.evaluation.disturbances import Disturbance, DisturbedTask
 from seastar_gym.evaluation.rollout import TaskBatch, rollout
-from seastar_gym.evaluation.swim import MOST_DECISIONS, RECORDED, Swim, swims_of
+from seastar_gym.evaluation.swim import MOST_DECISIONS, RECORDED, TIME_LIMIT, Swim, decisions_in, swims_of
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count, require_kind
 
@@ -25,7 +25,7 @@ def swim_many(
     scene: Scene,
     disturbance: Disturbance = Disturbance(),
     *,
-    max_strokes: int = 400,
+    max_strokes: int | None = None,
     waypoint_radius: float = 0.01,
     seed: int = 0,
     threads: int | None = None,
@@ -33,15 +33,16 @@ def swim_many(
 ) -> list[Swim]:
     """Swims of `n_swims` robots side by side, each to its last waypoint or for `max_strokes` strokes, or decisions.
 
-    The path "random" has random headings. waypoint_radius: Radius of the waypoints [m]. decision_period: Time between
-    decisions [s]. None means a stroke.
+    The path "random" has random headings. max_strokes: None means 400, or the decisions of 400 s. waypoint_radius:
+    Radius of the waypoints [m]. decision_period: Time between decisions [s]. None means a stroke.
     """
     require_kind("agent", agent, str, "a text")
     require_policy(policy)
     require_kind("scene", scene, Scene, "a Scene")
     require_kind("disturbance", disturbance, Disturbance, "a Disturbance")
     require_count("n_swims", n_swims, 1, MOST_SWIMS)
-    require_count("max_strokes", max_strokes, 1, MOST_DECISIONS)
+    if max_strokes is not None:
+        require_count("max_strokes", max_strokes, 1, MOST_DECISIONS)
     require_count("seed", seed, 0, LARGEST_SEED)
     actions = actions_of(policy, scene.robot.n_limbs)
     require_fit(policy, scene, actions, decision_period)
@@ -50,8 +51,8 @@ def swim_many(
         disturbance, np.random.default_rng([seed, n_swims]), scene, n_swims, path, RewardWeights(), waypoint_radius,
         with_heading, threads, actions=actions, decision_period=decision_period,
     )  # fmt: skip
-    batch = TaskBatch(task)
+    batch, limit = TaskBatch(task), max_strokes or decisions_in(TIME_LIMIT, decision_period)
     batch.np_random = tuple(np.random.default_rng([seed, swim]) for swim in range(n_swims))
-    swims = swims_of(agent, rollout(batch, policy, until=max_strokes, record=RECORDED))
+    swims = swims_of(agent, rollout(batch, policy, until=limit, record=RECORDED))
     batch.close()
     return swims

@@ -14,7 +14,6 @@ from seastar_gym.envs.task import make_scene
 from seastar_gym.evaluation.disturbances import CURRENT_DIRECTIONS, DISTURBANCES
 from seastar_gym.evaluation.many import swim_many
 from seastar_gym.evaluation.results import MEANS, Row, number, statistics, text_table
-from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in
 from seastar_gym.scene.csv_rows import Row as CsvRow
 from seastar_gym.scene.csv_rows import read_rows
 from seastar_gym.scene.numerics import Fidelity
@@ -58,13 +57,12 @@ def trials(
     decision_period: Time between decisions [s]. None means a stroke. threads: Of the simulator; None means one for
     every processor. max_strokes: Time limit [decisions]; None means that of 400 s.
     """
-    limit = decisions_in(TIME_LIMIT, decision_period) if max_strokes is None else max_strokes
     scene, rows = make_scene(None, fidelity, decision_period), list[Row]()
     for path, label, n_swims in _sets(sets, swims):
         for agent, policy in agents.items():
             found = swim_many(
                 agent, policy, path, n_swims, scene, DISTURBANCES[label], seed=seed, threads=threads,
-                decision_period=decision_period, max_strokes=limit,
+                decision_period=decision_period, max_strokes=max_strokes,
             )  # fmt: skip
             row: Row = {"path": path, "disturbance": label, "agent": agent, "fidelity": fidelity, "swims": n_swims}
             for name, numbers in statistics(found).items():

@@ -13,16 +13,15 @@ from pathlib import Path
 
 import numpy as np
 import tyro
-from numpy.typing import NDArray
 
 from seastar_gym import TASKS
 from seastar_gym.command import run_command
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import load
+from seastar_gym.controllers.scripted import scripted
 from seastar_gym.data.command import name_of, write_to
 from seastar_gym.data.dataset import summary, write
 from seastar_gym.data.recorder import Episode, Recorder
-from seastar_gym.evaluation.rollout import Batch, Info
 from seastar_gym.evaluation.tasks import make_batch
 from seastar_gym.extras import require_extra
 from seastar_gym.scene.checks import require_count
@@ -59,22 +58,10 @@ class Options:
                 raise ValueError(f"Unknown {kind} {min(unknown)!r}: choose of {', '.join(known)}.")
 
 
-class Random:
-    """Agent that draws actions uniformly."""
-
-    def __init__(self, batch: Batch, seed: int):
-        self._space = batch.action_space
-        self._space.seed(seed)
-
-    def act(self, observations: NDArray[np.float32], info: Info) -> NDArray[np.int64]:
-        """Actions of all robots."""
-        return np.asarray(self._space.sample())
-
-
 def agent_of(quality: str, id: str, recorder: Recorder, options: Options) -> Agent | Policy:
     """Agent of a quality."""
     if quality == "random":
-        return Random(recorder, options.seed)
+        return scripted("random", TASKS[id][1], rng=np.random.default_rng(options.seed))
     if quality == "greedy":
         return make_controller("greedy", recorder)
     from agents.tasks.command import file_of

@@ -19,17 +19,6 @@ def length(vectors: Floats) -> Floats:
     return np.asarray(np.hypot(vectors[..., 0], vectors[..., 1]))
 
 
-class Rest:
-    """Agent that heats nothing."""
-
-    def __init__(self, robots: Robots):
-        self._actions = np.zeros(robots.n, np.int64)
-
-    def act(self, observations: Floats32, info: Info) -> Actions:
-        """Number of the command that heats no limb."""
-        return self._actions
-
-
 class Greedy:
     """Agent that takes the action whose mean displacement ends nearest to the target, or shortens the route most."""
 

@@ -6,7 +6,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-MORE_IS_BETTER = ("prey", "fast-prey", "prizes", "fast-prizes")
+from seastar_gym.envs.tasks.envs import CHALLENGES
+from seastar_gym.evaluation.measures import measure_of_challenge
+
+MORE_IS_BETTER = tuple(name for name, each in CHALLENGES.items() if measure_of_challenge(each).better == "more")
 ORDER = ("rest", "greedy", "planner", "adaptive", "prior", "informed", "turn, then swim", "PPO", "PPO, memory",
          "PPO, told the way", "RecurrentPPO", "in the box")  # fmt: skip
 """Agents from top to bottom."""

@@ -38,7 +38,7 @@ def small(monkeypatch):
     monkeypatch.setattr(trainings, "TRAININGS", learners | {"later": later})
     monkeypatch.setattr(study, "TRAININGS", learners | {"later": later})
     monkeypatch.setattr(trainings, "SAC_SETTINGS", trainings.SAC_SETTINGS | {"learning_starts": 16, "batch_size": 16})
-    monkeypatch.setattr(study, "TIME_LIMIT", 2.0)
+    monkeypatch.setattr("seastar_gym.evaluation.many.TIME_LIMIT", 2.0)
 
 
 def test_the_trainings_of_the_study_are_valid_and_differ():
