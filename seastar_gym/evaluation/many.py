@@ -6,8 +6,8 @@ from seastar_gym.controllers.contract import Policy, actions_of, require_fit, re
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.task import Path as SwimPath
 from seastar_gym.evaluation.disturbances import Disturbance, DisturbedTask
-from seastar_gym.evaluation.rollout import TaskBatch, rollout
-from seastar_gym.evaluation.swim import MOST_DECISIONS, RECORDED, TIME_LIMIT, Swim, decisions_in, swims_of
+from seastar_gym.evaluation.rollout import MOST_DECISIONS, TaskBatch, rollout
+from seastar_gym.evaluation.swim import RECORDED, TIME_LIMIT, Swim, decisions_in, swims_of
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count, require_kind
 

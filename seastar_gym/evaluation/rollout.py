@@ -7,7 +7,7 @@
     found.success.mean(), found.last("time")
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import gymnasium as gym
@@ -15,13 +15,17 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.contract import Policy, require_policy
 from seastar_gym.envs.swimming import Swimming
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.scene.checks import require_callable, require_count, require_kind, require_texts
 
 Floats = NDArray[np.float64]
 Batch = gym.vector.VectorEnv[Any, Any, Any]
 Info = dict[str, Any]
+
+MOST_DECISIONS = 1_000_000_000
+"""Most decisions of a swim."""
 
 
 class Episodes(NamedTuple):
@@ -61,7 +65,7 @@ def rollout(
     seeds: int | list[int] | None = None,
     options: Info | None = None,
     until: int | None = None,
-    record: Iterable[str] = (),
+    record: Sequence[str] = (),
     on_step: Callable[[Info], bool | None] | None = None,
 ) -> Episodes:
     """An episode of every robot of a batch, or of an environment's one, to its end, with deterministic actions.
@@ -74,6 +78,13 @@ def rollout(
     on_step: Called with the info of the reset and of every decision; True ends the rollout.
     """
     is_batch = isinstance(env, gym.vector.VectorEnv)
+    require_kind("env", env, gym.Env | gym.vector.VectorEnv, "an environment or a batch")
+    require_policy(policy)
+    require_texts("record", record)
+    if until is not None:
+        require_count("until", until, 1, MOST_DECISIONS)
+    if on_step is not None:
+        require_callable("on_step", on_step)
     n: int = env.num_envs if is_batch else 1  # type: ignore[union-attr]
     observations, info = env.reset(seed=seeds, options=options)  # type: ignore[arg-type]
     waypoints: Any = getattr(env.unwrapped, "waypoints", ())

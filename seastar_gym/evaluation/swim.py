@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 from seastar_gym.controllers.contract import Policy, require_fit, require_policy
 from seastar_gym.envs.paths import cross_track_error, path_length
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.evaluation.rollout import Episodes, Info, rollout
+from seastar_gym.evaluation.rollout import MOST_DECISIONS, Episodes, Info, rollout
 from seastar_gym.scene.checks import require_callable, require_count, require_kind
 
 Floats = NDArray[np.float64]
-MOST_DECISIONS = 1_000_000_000
-"""Most decisions of a swim."""
 TIME_LIMIT = 400.0
 """Time after which a swim that is evaluated ends, unless another limit is given [s]."""
 RECORDED = ("hub_position", "waypoint_index", "time", "limbs_heated", "heating_time", "energy", "solver_message")
