@@ -59,7 +59,8 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from seastar_gym.certification.measure import certify
+    from seastar_gym.accuracy.certificate import Certificate
+    from seastar_gym.accuracy.measure import certify
     from seastar_gym.envs.headings import Headings
     from seastar_gym.envs.randomization import DomainRandomization, LogUniform, Normal, Uniform
     from seastar_gym.envs.reward import RewardWeights
@@ -93,7 +94,6 @@ if TYPE_CHECKING:
         Water,
         relaxation_time,
     )
-    from seastar_gym.scene.certificate import Certificate
     from seastar_gym.scene.serial import register_part
     from seastar_gym.simulator import Simulator, SolverStatus, State, StrokeReport
 else:
@@ -101,7 +101,7 @@ else:
         __name__,
         {
             **dict.fromkeys(__all__, "scene"),  # but for these
-            "Certificate": "scene.certificate",
+            "Certificate": "accuracy.certificate",
             "DomainRandomization": "envs.randomization",
             "FailBlind": "envs.tasks.fail_blind",
             "Headings": "envs.headings",
@@ -120,7 +120,7 @@ else:
             "SymmetryReduction": "envs.symmetry",
             "Uniform": "envs.randomization",
             "VectorSymmetryReduction": "envs.symmetry",
-            "certify": "certification.measure",
+            "certify": "accuracy.measure",
             "register_part": "scene.serial",
         },
     )

@@ -10,13 +10,13 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from seastar_gym.accuracy.certificate import Certificate
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.paths import FARTHEST, make_path
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.scene import Scene, SmaWires
-from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.checks import as_float, require_flag, require_kind, require_number, shown
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.scene_file import load_scene

@@ -8,10 +8,10 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.commands import to_commands
+from seastar_gym.accuracy.info import warn_uncertified
+from seastar_gym.envs.commands import to_commands, unless_strokes
 from seastar_gym.envs.frame import Frame, frames_of
 from seastar_gym.envs.options import SwimOptions, with_options
-from seastar_gym.envs.promises import warn_uncertified
 from seastar_gym.envs.rendering import Renderer, renderer_of
 from seastar_gym.envs.swimming import Outcome, Swimming
 from seastar_gym.envs.task import SwimTask
@@ -175,7 +175,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     not say it.
     Errors from `path_error` to `time_error` were measured before, over sequences of commands that docs/accuracy.md
     names; among those of `path_error` are the straight swim and the pentagon. They belong to the robot's resolution and
-    the numerics (see `seastar_gym.scene.fidelity`), and are NaN for other robots and scenes than the chapter's, unless
+    the numerics (see `seastar_gym.accuracy`), and are NaN for other robots and scenes than the chapter's, unless
     a `certificate` has them, and for what was not measured. Where decisions are no strokes, they are those of
     `SmaWires` at whole seconds, over random commands and random seconds that are repeated; there `info` has them for
     the chapter's robot alone, at a fidelity and with decisions of 0.1 to 0.5 s, and no `batch_real_time_factor`. That
@@ -234,7 +234,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     ):
         self._set_pictures(render_mode, frames_per_stroke)
         task = SwimTask(SwimOptions(*given, **options), 1, 1)
-        warn_uncertified(task.scene, task.options.fidelity_of_scene, task.certificate, task.options.decision_period)
+        timed = unless_strokes(task.options.decision_period, task.scene)
+        warn_uncertified(task.scene, task.options.fidelity_of_scene, task.certificate, timed)
         self._begin_with(task, frames_per_stroke)
 
     def _set_pictures(self, render_mode: RenderMode | None, frames_per_stroke: int | None) -> None:

@@ -10,13 +10,13 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from seastar_gym.accuracy.info import warn_uncertified
 from seastar_gym.envs.batch_attributes import BatchAttributes
 from seastar_gym.envs.batch_info import Info, of_some, with_masks
 from seastar_gym.envs.batch_pictures import BatchPictures, Picture
 from seastar_gym.envs.buffers import Buffers, require_buffers
-from seastar_gym.envs.commands import as_array, to_commands
+from seastar_gym.envs.commands import as_array, to_commands, unless_strokes
 from seastar_gym.envs.options import SwimOptions, with_options
-from seastar_gym.envs.promises import warn_uncertified
 from seastar_gym.envs.seastar_swim import FRAMES_PER_SECOND
 from seastar_gym.envs.swimming import Swimming
 from seastar_gym.envs.task import SwimTask
@@ -73,7 +73,8 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
     ):
         self._set_batch(num_envs, max_episode_steps, render_mode, autoreset_mode)
         task = SwimTask(SwimOptions(*given, **options), num_envs, threads)
-        warn_uncertified(task.scene, task.options.fidelity_of_scene, task.certificate, task.options.decision_period)
+        timed = unless_strokes(task.options.decision_period, task.scene)
+        warn_uncertified(task.scene, task.options.fidelity_of_scene, task.certificate, timed)
         self._begin_with(task)
 
     def _set_batch(

@@ -24,8 +24,8 @@ from seastar_gym import (
     SymmetryReduction,
     VectorSymmetryReduction,
 )
+from seastar_gym.accuracy.info import NAMES
 from seastar_gym.envs.layout import Layout
-from seastar_gym.envs.promises import NAMES
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import limb_order, symmetry_in, transform_commands
 from seastar_gym.envs.tasks.course import CHASE, Courses, Pursuit, draw_course

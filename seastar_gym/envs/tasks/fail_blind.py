@@ -111,7 +111,7 @@ class FailBlindTask(Numbered, SwimTask):
         options = replace(options, path="random", random_heading=True, reward=about.reward)
         blind = replace(options, observe_actuators=False)  # wires of dead limbs stay cold
         SwimTask.__init__(self, blind, n_robots, threads)
-        self._has_promises = False  # errors were measured of whole robots
+        self._tells_errors = False  # errors were measured of whole robots
         self._draws = AnyLimbs(about.dead)
         self.drawn = self._draws.first_values(self.scene, n_robots)
         self._number(split)
