@@ -21,7 +21,7 @@ import numpy as np
 from seastar_gym.command import run_command
 from seastar_gym.files import write_atomically
 from studies.parser import study_parser
-from studies.provenance import footer
+from studies.provenance import FINAL, footer
 
 BLOCK = re.compile(r"(<!-- made: (.+?) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 DIFFERENT, TOLERANCE = 32.0, 1e-4
@@ -34,6 +34,8 @@ UNCOVERED = {
     "work_precision.png": "python -m studies.accuracy",
     "error_bars.png": "python -m studies.accuracy.error_bars",
     "throughput.png": "python -m studies.speed.throughput",
+    "damping.png": f"python -m studies.scenes.damping, at commit {FINAL['damping.json']}",
+    "fidelities.png": f"python -m studies.learning.fidelities, at commit {FINAL['fidelities.json']}",
 }
 """Pictures that only their study can draw."""
 
@@ -80,20 +82,6 @@ def continuum(docs: Path, file: Path) -> None:
     from studies.continuum.study import draw, rows_of
 
     draw(rows_of(read(docs, "continuum.json")), file)
-
-
-def damping(docs: Path, file: Path) -> None:
-    """Ringing, distances and errors with and without damping."""
-    from studies.scenes.damping import draw, from_data
-
-    draw(from_data(read(docs, "damping.json")), file)
-
-
-def fidelities(docs: Path, file: Path) -> None:
-    """Strokes by the fidelity of the training and the physics of the swims."""
-    from studies.learning.fidelities.pictures import draw
-
-    draw(read(docs, "fidelities.json"), file)
 
 
 def gaits(which: str) -> Callable[[Path, Path], None]:
@@ -193,12 +181,10 @@ PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "ablations.png": ablations,
     "bound.png": bound,
     "continuum.png": continuum,
-    "damping.png": damping,
     "fig_13_2.png": chapter,
     "fig_13_7a.png": chapter,
     "fig_13_8.png": chapter,
     "designs.png": designs,
-    "fidelities.png": fidelities,
     "gaits_directions.png": gaits("directions"),
     "gaits_front.png": gaits("front"),
     "gaits_lag.png": gaits("lag"),
@@ -243,18 +229,10 @@ def table(docs: Path, name: str) -> str:
             from studies import contracts
 
             return contracts.contracts()
-        case ["damping"]:
-            from studies.scenes import damping
-
-            return damping.as_markdown(damping.from_data(read(docs, "damping.json")))
         case ["environments"]:
             from studies import contracts
 
             return contracts.registered()
-        case ["fidelities", part]:
-            from studies.learning.fidelities import tables
-
-            return str(getattr(tables, f"{part}_table")(read(docs, "fidelities.json")))
         case ["gaits", *part]:
             from studies.gaits import pages
 

@@ -7,7 +7,6 @@ converge, Newton iterations per step, and the error of the hub's path.
 
 `--long` simulates 10,000 strokes of random commands by 256 robots instead. `--growth` measures by how much the kinetic
 energy of 17 gaits grows over 200 strokes of the implicit midpoint rule, with some nodes, steps and stiffnesses.
-`--cost` measures what the solver's safeguards cost a robot that does not need them.
 """
 
 import csv
@@ -33,7 +32,6 @@ from studies.chapter import ISSUES_FROM, REAL_TIME_FROM
 from studies.kept import keep, rounded
 from studies.parser import study_parser
 from studies.provenance import provenance
-from studies.speed.hardening import SETTINGS, cost_table, measure_cost
 from studies.stability.cases import QUICK_STEPS, STEPS, SWEEPS, Sweep, format_value, quick_sweeps
 from studies.stability.cells import Cell, commands_of, converged_displacements, run_cell, stroke_duration
 from studies.stability.long_run import growth_table, long_run, long_table
@@ -179,14 +177,13 @@ def write_csv(cells: Iterable[Cell], file: Path) -> None:
 
 
 def main() -> None:
-    """Command line: run the atlas, the long run or the measurement of cost, and print its table."""
+    """Command line: run the atlas or the long run, and print its table."""
     parser = study_parser("studies.stability", __doc__)
     parser.add_argument("--quick", action="store_true", help="run a coarser grid, in a fraction of the time")
     parser.add_argument("--scheme", choices=get_args(SchemeName), default="implicit-euler", metavar="SCHEME",
                         help="scheme of the atlas: %(choices)s (default: %(default)s)")  # fmt: skip
     parser.add_argument("--long", action="store_true", help="simulate a long run of random commands instead")
     parser.add_argument("--growth", action="store_true", help="measure the energy that long swims gather instead")
-    parser.add_argument("--cost", action="store_true", help="measure the cost of the safeguards instead")
     parser.add_argument(
         "--out", type=Path, default=Path("runs/stability"), help="folder for tables and pictures (default: %(default)s)"
     )
@@ -197,9 +194,6 @@ def main() -> None:
         return
     if options.growth:
         console.print(growth_table())
-        return
-    if options.cost:
-        console.print(cost_table([measure_cost(numerics) for numerics in SETTINGS]))
         return
     from studies.stability.pictures import draw_atlas
 

@@ -5,7 +5,7 @@ import importlib
 import pytest
 
 ROOMS = ("accuracy", "stability", "chapter", "validation", "verification")
-MODULES = ("speed.throughput", "speed.terms", "speed.foresight", "scenes.gallery", "scenes.damping", "scenes.thermal")
+MODULES = ("speed.throughput", "speed.terms", "scenes.gallery", "scenes.thermal")
 
 
 @pytest.mark.parametrize("command", [*ROOMS, *MODULES])
@@ -21,7 +21,7 @@ def test_help_names_the_command_and_shows_the_docstring_in_the_width_of_the_term
     assert all(len(line) <= 80 for line in shown.splitlines())
 
 
-@pytest.mark.parametrize("name", ["ablations", "bound", "pentagon"])
+@pytest.mark.parametrize("name", ["ablations", "bound"])
 def test_help_of_a_study_of_learning_names_its_command(name, capsys):
     module = importlib.import_module(f"studies.learning.{name}")
     with pytest.raises(SystemExit):
