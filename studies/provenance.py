@@ -52,9 +52,13 @@ COMMANDS = {
 
 
 FINAL = dict.fromkeys(
-    ("damping.json", "fidelities.json", "pentagon_from_rest.json", "pentagon_reheated.json"), "0e818f3"
-)
-"""Files whose numbers are final, by the last commit that has the code of their study."""
+    (
+        "damping.json", "damping.png", "fidelities.json", "fidelities.png", "pentagon_from_rest.json",
+        "pentagon_reheated.json",
+    ),
+    "0e818f3",
+)  # fmt: skip
+"""Files of docs/ that are final, and the last commit that has the code of their study."""
 
 
 def footer(results: Mapping[str, Any], file: str) -> str:

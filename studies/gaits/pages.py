@@ -27,22 +27,8 @@ def what_evolved(each: Table) -> str:
     return f"{each['actuator']}, {each['towards']}, {each['price_mm_per_joule']:g} mm/J{slots}"
 
 
-TITLES = {
-    "named": "Named gaits",
-    "thermal": "Named gaits with thermal wires",
-    "fastest": "The fastest straight gaits of a second from rest",
-    "turning": "Those that turn most",
-    "evolved": "Evolved, wires heated again before they are cold",
-    "directions": "Speed by direction [mm/s], degrees from limb 1",
-    "robustness": "Other robots and waters, speed [mm/s] at `fast`",
-    "numerics": "Other resolutions, schemes and steps, speed [mm/s]",
-}
-"""What the tables show, by their names."""
-
-
-def tables(results: Table) -> str:
-    """All tables of the study, with their titles."""
-    return "\n".join(f"{TITLES[name]}:\n\n{table}" for name, table in parts(results).items())
+TABLES = ("named", "thermal", "fastest", "turning", "evolved", "directions", "robustness", "numerics")
+"""Names of the tables."""
 
 
 def parts(results: Table) -> dict[str, str]:

@@ -17,13 +17,6 @@ LABELS = {
 }
 
 
-def draw_all(results: dict[str, Any], folder: Path) -> None:
-    """Write gaits_directions.png, gaits_front.png and gaits_lag.png."""
-    draw_directions(results, folder / "gaits_directions.png")
-    draw_front(results, folder / "gaits_front.png")
-    draw_lag(results, folder / "gaits_lag.png")
-
-
 def draw_directions(results: dict[str, Any], file: Path) -> None:
     """Speed by direction; the sector of 36 degrees is repeated by turns and mirror images."""
     figure = new_figure(5.6, 5.4)

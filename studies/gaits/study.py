@@ -4,8 +4,6 @@ Measures named gaits, every gait of a second from rest (40,890 classes), and gai
 before they are cold. Writes `gaits.json`, three pictures and the tables in Markdown.
 """
 
-import argparse
-import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,18 +14,18 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from seastar_gym.envs.commands import command_table
-from seastar_gym.files import write_atomically
 from seastar_gym.scene import Numerics, Scene, SmaPulse, Water
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.actuators.wires import SmaWires
+from studies.frame import Study
+from studies.gaits import pictures
 from studies.gaits.crossing import crossings
 from studies.gaits.enumeration import SLOTS, distinct_codes, gaits_of
 from studies.gaits.evolution import evolve
 from studies.gaits.named import BEHIND, FORWARD, GAITS, SLOT, lagged
+from studies.gaits.pages import TABLES, parts
 from studies.gaits.periodic import Swimming, events_of, joined, measure, timed
 from studies.learning.bound import all_directions, distinct_gaits, mixed_speed
-from studies.parser import study_parser
-from studies.provenance import provenance
 from studies.speed.terms import SILICONE
 
 Floats = NDArray[np.float64]
@@ -304,20 +302,22 @@ def study(plan: Plan) -> Table:
     }
 
 
-def main() -> None:
-    """Command line: run the study and write its files."""
-    from studies.gaits.pages import tables
-    from studies.gaits.pictures import draw_all
+@dataclass(frozen=True)
+class Options:
+    """Gaits in time."""
 
-    parser: argparse.ArgumentParser = study_parser("studies.gaits", __doc__)
-    parser.add_argument("--quick", action="store_true", help="simulate fewer gaits")
-    parser.add_argument("--out", type=Path, default=Path("runs/gaits"), help="folder (default: %(default)s)")
-    options = parser.parse_args()
-    command = "python -m studies.gaits" + " --quick" * options.quick
-    results = {**provenance(command, "cma"), **study(QUICK if options.quick else Plan())}
-    options.out.mkdir(parents=True, exist_ok=True)
-    write_atomically(options.out / "gaits.json", (json.dumps(results, indent=1) + "\n").encode())
-    draw_all(results, options.out)
-    (options.out / "gaits_tables.md").write_text(tables(results), encoding="utf-8")
-    print(tables(results))
-    print(f"Written to {options.out}: gaits.json, gaits_tables.md and three pictures.")
+    quick: bool = False
+    """Simulate fewer gaits."""
+    out: Path = Path("runs/gaits")
+    """Folder of the files, or the file of the numbers."""
+
+
+STUDY = Study(
+    "gaits",
+    lambda options, results: results.update(study(QUICK if options.quick else Plan())),
+    Options,
+    "gaits.json",
+    pictures={f"gaits_{name}.png": getattr(pictures, f"draw_{name}") for name in ("directions", "front", "lag")},
+    tables={f"gaits {name}": lambda results, name=name: parts(results)[name] for name in TABLES},  # type: ignore[misc]
+    packages=("cma",),
+)
