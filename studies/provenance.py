@@ -53,8 +53,8 @@ COMMANDS = {
 
 FINAL = dict.fromkeys(
     (
-        "damping.json", "damping.png", "fidelities.json", "fidelities.png", "pentagon_from_rest.json",
-        "pentagon_reheated.json",
+        "damping.json", "damping.png", "fidelities.json", "fidelities.png", "gaits.json", "gaits_directions.png",
+        "gaits_front.png", "gaits_lag.png", "pentagon_from_rest.json", "pentagon_reheated.json",
     ),
     "0e818f3",
 )  # fmt: skip
