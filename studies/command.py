@@ -18,7 +18,7 @@ import tyro
 
 from seastar_gym.command import command_parser
 from studies.frame import DOCS, Results, Study, require_known
-from studies.pages import check, draw, fill
+from studies.pages import check, draw, fill, show
 from studies.provenance import provenance
 
 HERE = Path(__file__).parent
@@ -80,7 +80,8 @@ def told(study: Study, results: Results, out: Path, file: Path) -> None:
         results.save()
     results.read()
     files = [file, *study.write(results, out)]
-    print(*(f"{name}:\n\n{text(results)}\n" for name, text in study.tables.items()), sep="\n")
+    for name, text in study.tables.items():
+        show(f"{name}:\n\n{text(results)}")
     print(f"Written: {', '.join(map(str, files))}")
     if file.resolve() == DOCS / study.home / study.file:
         fill(DOCS, (study,))

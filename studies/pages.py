@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.console import Console
+from rich.markdown import Markdown
 
 from seastar_gym.files import write_atomically
 from studies.frame import Study
@@ -33,6 +35,11 @@ def read(file: Path) -> Any:
 def numbers(docs: Path, study: Study) -> Any:
     """Numbers of a study, if it keeps any."""
     return read(docs / study.home / study.file) if study.file else {}
+
+
+def show(text: str) -> None:
+    """Print Markdown as tables that a terminal shows."""
+    Console().print(Markdown(text))
 
 
 def footer_of(file: Path) -> str:

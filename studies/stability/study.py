@@ -22,9 +22,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.table import Table
 from tqdm import tqdm
 
 from seastar_gym.scene.numerics import SchemeName
@@ -117,20 +115,6 @@ def _errors(cells: list[Cell], sweep: Sweep) -> str:
     return ", ".join(f"{100 * error:.2g}" if math.isfinite(error) else "-" for error in errors) + " %"
 
 
-def as_table(rows: Sequence[Sequence[str]]) -> Table:
-    """Summary for a terminal of 100 columns or more."""
-    title = "Stability: one stroke per robot, time steps from 10 µs to 1 s"
-    table = Table(title=title, box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
-    table.add_column(SUMMARY[0])
-    for name, column in zip(SUMMARY[1:], list(zip(*rows, strict=True))[1:], strict=True):
-        table.add_column(name, justify="right", width=max(map(len, [*name.split(), *column])))
-    for row in rows[:-1]:
-        table.add_row(*row)
-    table.add_section()
-    table.add_row(*rows[-1])
-    return table
-
-
 def as_markdown(rows: Sequence[Sequence[str]]) -> str:
     """Summary as a table in Markdown."""
     lines = [SUMMARY, ["---", *["---:"] * (len(SUMMARY) - 1)], *rows]
@@ -207,7 +191,6 @@ def run(options: Options, results: Results) -> None:
     options.out.mkdir(parents=True, exist_ok=True)
     write_csv(cells, options.out / "stability.csv")
     results.update(as_data(cells, options.scheme))
-    console.print(as_table(summarise(cells, sweeps)))
     console.print(f"{time.perf_counter() - start:.0f} s. Written, too: {options.out / 'stability.csv'}")
 
 

@@ -8,14 +8,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from rich.console import Console
 from tqdm import tqdm
 
 from studies.frame import Results, Study
+from studies.pages import show
 from studies.verification.drag import quadratic_drag
 from studies.verification.elastica import elastica
 from studies.verification.frequencies import natural_frequencies
-from studies.verification.page import Section, as_page, as_table
+from studies.verification.page import Section, as_page
 from studies.verification.published import published_codes
 from studies.verification.waves import bending_waves
 
@@ -37,15 +37,15 @@ class Options:
     """Page to write."""
 
 
-def run(options: Options, _: Results) -> None:
-    """Compute all sections, write the page and print its tables."""
+def run(options: Options, _: Results) -> str | None:
+    """Compute all sections, write the page and show it."""
     sections = [section() for section in tqdm(SECTIONS.values(), unit="section")]
     options.out.parent.mkdir(parents=True, exist_ok=True)
     options.out.write_text(as_page(sections), encoding="utf-8")
-    console = Console()
-    for section in sections:
-        console.print(as_table(section))
-    console.print(f"Written: {options.out}")
+    show(as_page(sections))
+    print(f"Written: {options.out}")
+    outside = [row.quantity for section in sections for row in section.rows if not row.holds]
+    return f"Outside of their bounds: {'; '.join(outside)}." if outside else None
 
 
 STUDY = Study("verification", run, Options)

@@ -61,7 +61,7 @@ def test_the_planner_turns_to_either_side_and_keeps_a_heading_that_is_met():
     assert ends[0] > 2.0 and ends[1] > 2.0 and ends[2] == 0.5
 
 
-def test_strokes_and_wires_arrive_and_wires_turn_faster(tmp_path, capsys):
+def test_strokes_and_wires_arrive_and_wires_turn_faster(tmp_path):
     options = ["--decisions", "0", "--turns", "0", "72", "--swimmers", "strokes", "wires"]
     assert main(["learning.heading", *options, "--out", str(tmp_path)]) == 0
     results = json.loads((tmp_path / "heading.json").read_text())
@@ -70,7 +70,6 @@ def test_strokes_and_wires_arrive_and_wires_turn_faster(tmp_path, capsys):
         assert each["seconds"][1] > each["seconds"][0] > 10.0 and each["joules"][1] > each["joules"][0]
     assert wires["seconds"][1] - wires["seconds"][0] < 0.6 * (strokes["seconds"][1] - strokes["seconds"][0])
     assert (tmp_path / "heading.png").stat().st_size > 10_000
-    assert heading.table(results) in capsys.readouterr().out
 
 
 def test_a_learner_behind_the_reduction_does_the_carried_thing():

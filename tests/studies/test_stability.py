@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PIL import Image
-from rich.console import Console
 
 from studies.command import main
 from studies.kept import as_json
@@ -111,16 +110,6 @@ def test_pictures_and_summary_follow_from_the_kept_numbers(cells, results, folde
 
 def image(file):
     return np.asarray(Image.open(file))
-
-
-def test_the_table_can_be_read_in_100_columns(cells):
-    console = Console(width=100)
-    with console.capture() as capture:
-        console.print(stability.as_table(stability.summarise(cells, GRID)))
-    text = capture.get()
-    assert "…" not in text
-    for word in ("against", "failed", "iterations", "3, 20 ms", "nowhere", "36 ... 179 °"):
-        assert word in text
 
 
 def test_a_failure_is_counted_in_its_cell(cells):
