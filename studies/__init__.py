@@ -11,11 +11,8 @@ from seastar_gym.extras import is_command, require_extra
 require_extra("The studies", "studies", "matplotlib", "rich", "tqdm", "tyro")
 
 
-def run_as_study(words: list[str]) -> None:
-    """Run `python -m studies.NAME` as `python -m studies NAME`. words: Of the command line."""
-    at = words.index("-m") + 1
-    os.execv(sys.executable, [*words[:at], "studies", words[at].removeprefix("studies."), *words[at + 1 :]])
-
-
-if is_command() and any(word.startswith("studies.") for word in sys.orig_argv):
-    run_as_study(sys.orig_argv)
+# `python -m studies.NAME` is `python -m studies NAME`
+at = sys.orig_argv.index("-m") + 1 if is_command() and "-m" in sys.orig_argv else 0
+if at and sys.orig_argv[at].startswith("studies."):
+    name, options = sys.orig_argv[at].removeprefix("studies."), sys.orig_argv[at + 1 :]
+    os.execv(sys.executable, [*sys.orig_argv[:at], "studies", name, *options])

@@ -67,7 +67,7 @@ def run(study: Study, given: Sequence[str], doc: str) -> int:
     about = provenance(command, *study.packages)
     results = Results(about, file, study.settings(options) if study.settings else None)
     failed = study.run(options, results)
-    if results and file is not None:
+    if results.keys() - {"settings"} and file is not None:
         told(study, results, out, file)
     if failed:
         print(failed, file=sys.stderr)
