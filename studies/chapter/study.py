@@ -29,7 +29,7 @@ from studies.chapter.statements import (
     straight_statements,
     write_csv,
 )
-from studies.chapter.swims import CONTINUUM, LIMIT, SETTINGS, THE_CHAPTERS, swim
+from studies.chapter.swims import CONTINUUM, LIMIT, QUICK, SETTINGS, THE_CHAPTERS, swim
 from studies.frame import Results, Study
 
 STEPS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0, 40.0]) * 1e-3
@@ -44,7 +44,7 @@ def make_figures(out: Path, quick: bool = False, progress: bool = True) -> tuple
     quick: Take 1 ms as converged, and fewer time steps.
     """
     out.mkdir(parents=True, exist_ok=True)
-    *settings, limit = [setting.coarser(1e-3 if quick else 0.0) for setting in (*SETTINGS, LIMIT)]
+    *settings, limit = [setting.coarser(QUICK if quick else 0.0) for setting in (*SETTINGS, LIMIT)]
     steps, seconds = (QUICK_STEPS, 0.01) if quick else (STEPS, 0.5)
     bar = tqdm(total=3 + 2 * len(steps), unit="part", disable=not progress)
     actuator = SmaPulse()
