@@ -70,15 +70,6 @@ def test_pages_beside_the_study_quote_its_mean_of_ten_seeds(page):
     assert f"{seconds['fast'].mean():.1f}" in text
 
 
-def test_a_seed_that_was_missing_stands_in_its_place(small, tmp_path):
-    out = tmp_path / "in_time.json"
-    command = ["learning.in_time", "--trainings", "pairs", "--paths", "2", "--again", "fast"]
-    command += ["--networks", str(tmp_path), "--out", str(out)]
-    for seed in ("1", "0"):
-        assert main([*command, "--seeds", seed]) == 0
-    assert list(json.loads(out.read_text())["runs"]["pairs"]) == ["0", "1"]
-
-
 def test_every_learner_is_measured_and_none_twice(small, tmp_path, capsys):
     out = tmp_path / "in_time.json"
     names = ("pairs", "shares", "gaussian", "sac", "td3", "later")
