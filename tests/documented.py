@@ -20,7 +20,7 @@ NAMES = re.compile(r"^<!-- site: names (\S+) (.*) -->$", re.MULTILINE)
 FAST = Scene(numerics=Numerics.preset("fast"))
 PATH = np.array([[0.03, 0.0]])
 MADE_BY_THE_PACKAGE = {
-    "CertifiedSetting", "Episode", "Estimate", "Layout", "Outcome", "Promise", "Score", "Swim", "Tally",
+    "CertifiedSetting", "Episode", "Episodes", "Estimate", "Layout", "Outcome", "Promise", "Score", "Swim", "Tally",
     "Actuator", "Executor", "Mirrored", "Policy", "StatefulActuator", "Challenge", "Numbered", "Swimming",
 }  # fmt: skip
 """Records that functions return, protocols, and bases of classes of one's own."""
@@ -178,6 +178,7 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         "Budget": dict(depth=2, beam=2, coasting=0.0),
         "OpenLoopPolicy": dict(commands=np.zeros((1, 5)), actions="limbs", decision_period=None),
         "RandomPolicy": dict(rng=rng(0), actions="limbs", n_limbs=5),
+        "rollout": dict(env=env(), policy=straight(), seeds=0, options=None, until=1, record=["time"], on_step=None),
         "swim": dict(agent="a", policy=straight(), env=gym.make("SeastarSwim-v0", scene=FAST, path=PATH).unwrapped,
                      max_strokes=1, seed=0, reset_options=None, watch=None),
         "swim_many": dict(agent="a", policy=straight(), path=PATH, n_swims=1, scene=FAST, max_strokes=1,

@@ -45,7 +45,7 @@ CURVE = {"times": (0.0, 0.5, 1.0), "angles": (0.0, 0.5, 0.0)}
 FAST = Scene(numerics=Numerics.preset("fast"))
 AT_REST = Simulator(FAST, 2)
 ROOT = Path(__file__).parents[1]
-FUNCTIONS = ("watch", "make", "function")
+FUNCTIONS = ("watch", "on_step", "make", "function")
 """Arguments that are functions of the caller's: what they raise is theirs."""
 UNUSED = ("state", "episode_start", "deterministic", "info")
 """Arguments that are there for the form alone, at most of the calls."""

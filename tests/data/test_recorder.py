@@ -9,7 +9,7 @@ import seastar_gym  # noqa: F401
 from refusals import assert_refused
 from seastar_gym import VectorSymmetryReduction
 from seastar_gym.controllers import load
-from seastar_gym.data.dataset import by_policy, record, summary
+from seastar_gym.data.dataset import record, summary
 from seastar_gym.data.recorder import Recorder
 
 SHORT = {"actions": "pairs", "fidelity": "fast", "max_episode_steps": 3}
@@ -84,17 +84,6 @@ def test_actions_are_copied():
         batch.step(actions)
         actions += 1
     assert batch.episodes()[0].actions.tolist() == [3, 4, 5]
-
-
-def test_a_policy_with_a_memory_begins_with_the_first_call():
-    class Counting:
-        def predict(self, observation, state=None, episode_start=None, deterministic=False):
-            assert deterministic
-            count = np.where(episode_start, 0, state if state is not None else -9) + 1
-            return count, count
-
-    act = by_policy(Counting(), 2)
-    assert [act(np.zeros((2, 1)), {}).tolist() for _ in range(3)] == [[1, 1], [2, 2], [3, 3]]
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.SAME_STEP, AutoresetMode.DISABLED])
