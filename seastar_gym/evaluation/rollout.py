@@ -79,6 +79,8 @@ def rollout(
     """
     is_batch = isinstance(env, gym.vector.VectorEnv)
     require_kind("env", env, gym.Env | gym.vector.VectorEnv, "an environment or a batch")
+    if is_batch:
+        require_next_step("A rollout", env)
     require_policy(policy)
     require_texts("record", record)
     if until is not None:
@@ -103,16 +105,22 @@ def rollout(
         if not swimming.all():
             actions = np.array(actions)
             actions[~swimming] = 0  # rest, in every action mode
-        rewards: Any
         observations, rewards, terminated, truncated, info = env.step(actions)
         begins = np.logical_or(terminated, truncated) & np.ones(n, bool)
-        returns += np.where(swimming, rewards, 0.0)
+        returns += np.where(swimming, rewards, 0.0)  # type: ignore[arg-type]
         decisions += swimming
         success |= swimming & begins & info["is_success"]
         swimming &= ~begins
         is_over = look(info)
     entries = {name: np.array(values) for name, values in kept.items()}
     return Episodes(entries, success, returns, decisions, waypoints if is_batch else (waypoints,))
+
+
+def require_next_step(who: str, batch: Any) -> None:
+    """ValueError where a batch begins episodes otherwise than with the step after an end, so that info is another's."""
+    mode = batch.metadata.get("autoreset_mode")
+    if mode is not AutoresetMode.NEXT_STEP:
+        raise ValueError(f"{who} needs autoreset_mode=AutoresetMode.NEXT_STEP, not {mode}.")
 
 
 class TaskBatch(SeastarSwimVectorEnv):

@@ -11,6 +11,7 @@ from seastar_gym import VectorSymmetryReduction
 from seastar_gym.controllers import load
 from seastar_gym.data.dataset import record, summary
 from seastar_gym.data.recorder import Recorder
+from seastar_gym.evaluation.rollout import rollout
 
 SHORT = {"actions": "pairs", "fidelity": "fast", "max_episode_steps": 3}
 TASK = "SeastarSwim-v0"
@@ -90,5 +91,7 @@ def test_actions_are_copied():
 def test_other_resets_are_refused(mode):
     with assert_refused("A recorder needs autoreset_mode=AutoresetMode.NEXT_STEP"):
         recorder(autoreset_mode=mode)
+    with assert_refused("A rollout needs autoreset_mode=AutoresetMode.NEXT_STEP"):
+        rollout(gym.make_vec(TASK, 1, vectorization_mode="vector_entry_point", autoreset_mode=mode), load())
     with assert_refused("leave reset_mask out"):
         recorder().reset(options={"reset_mask": np.array([True, False])})
