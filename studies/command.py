@@ -22,8 +22,8 @@ from studies.pages import check, draw, fill, show
 from studies.provenance import provenance
 
 HERE = Path(__file__).parent
-DECLARED = ("\nSTUDY = Study(", "\ndef main() -> None:")
-"""What a module of a study has: the frame's declaration, or a command line of its own."""
+DECLARED = "\nSTUDY = Study("
+"""What a module of a study has."""
 
 
 def declared() -> dict[str, str]:
@@ -31,7 +31,7 @@ def declared() -> dict[str, str]:
     found = {}
     for file in sorted(HERE.rglob("*.py")):
         text = file.read_text(encoding="utf-8")
-        if file != Path(__file__) and any(each in text for each in DECLARED):
+        if file != Path(__file__) and DECLARED in text:
             name = ".".join(file.relative_to(HERE).with_suffix("").parts).removesuffix(".study")
             found[name] = (ast.get_docstring(ast.parse(text)) or "").partition("\n")[0]
     return found
@@ -44,13 +44,8 @@ def module_of(name: str) -> Any:
 
 
 def all_studies() -> Iterator[Study]:
-    """Every study of the frame."""
-    from studies.accuracy.made import STUDIES
-
-    yield from STUDIES
-    for name in declared():
-        module = module_of(name)
-        yield from [module.STUDY] if hasattr(module, "STUDY") else []
+    """Every study."""
+    return (module_of(name).STUDY for name in declared())
 
 
 def run(study: Study, given: Sequence[str], doc: str) -> int:
@@ -96,11 +91,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             chosen = [study for study in all_studies() if name in ("", study.name)]
             return check(DOCS, chosen) if "--check" in given else draw(DOCS, chosen)
         if name:
-            module = module_of(name)
-            if hasattr(module, "STUDY"):
-                return run(module.STUDY, given, module.__doc__)
-            sys.argv = [name, *given]
-            return module.main() or 0
+            return run(module_of(name).STUDY, given, module_of(name).__doc__)
         require_known("study", [each for each in given[:1] if each not in ("-h", "--help")], names)
     except (ValueError, ModuleNotFoundError) as wrong:
         print(wrong, file=sys.stderr)

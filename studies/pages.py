@@ -37,6 +37,11 @@ def numbers(docs: Path, study: Study) -> Any:
     return read(docs / study.home / study.file) if study.file else {}
 
 
+def told(docs: Path, studies: Sequence[Study]) -> list[Study]:
+    """Studies whose numbers are in the folder, or that keep none."""
+    return [study for study in studies if (docs / study.home / study.file).exists()]
+
+
 def show(text: str) -> None:
     """Print Markdown as tables that a terminal shows."""
     Console().print(Markdown(text))
@@ -72,7 +77,7 @@ def filled(text: str, blocks: dict[str, Callable[[], str]], of_all: bool = True)
 
 def pages(docs: Path, studies: Sequence[Study]) -> Iterator[tuple[Path, str]]:
     """Pages that these studies make or fill, and what they should be."""
-    for study in studies:
+    for study in told(docs, studies):
         for name, page in study.pages.items():
             yield docs / name, page(numbers(docs, study))
     blocks = tables(docs, studies)
@@ -96,7 +101,7 @@ def is_drawn_so(docs: Path, study: Study, name: str) -> bool:
 
 def stale(docs: Path, studies: Sequence[Study]) -> list[str]:
     """Names of pictures and pages that are not what their numbers say."""
-    wrong = [name for study in studies for name in study.pictures if not is_drawn_so(docs, study, name)]
+    wrong = [name for study in told(docs, studies) for name in study.pictures if not is_drawn_so(docs, study, name)]
     return wrong + [file.name for file, text in pages(docs, studies) if file.read_text(encoding="utf-8") != text]
 
 
@@ -109,7 +114,7 @@ def check(docs: Path, studies: Sequence[Study]) -> int:
 
 def draw(docs: Path, studies: Sequence[Study]) -> int:
     """Draw the pictures and fill the pages again; returns the exit code."""
-    for study in studies:
+    for study in told(docs, studies):
         for name, picture in study.pictures.items():
             picture(numbers(docs, study), docs / study.home / name)
     fill(docs, studies)

@@ -19,13 +19,13 @@ from seastar_gym.version import __version__
 from studies.accuracy.tables import two_digits
 from studies.command import all_studies
 from studies.learning.bound import MEASURED, MM, SETTLING
-from studies.pages import BLOCK, check, draw, filled, is_drawn_so, pages, tables
+from studies.pages import BLOCK, check, draw, filled, is_drawn_so, pages, tables, told
 from studies.provenance import FINAL, footer, machine, provenance
 from studies.scenes.page import UNIT, transitions
 
 DOCS = Path(__file__).parents[2] / "docs"
 STUDIES = list(all_studies())
-PICTURES = {name: study for study in STUDIES for name in study.pictures if not study.home}
+PICTURES = {name: study for study in told(DOCS, STUDIES) for name in study.pictures if not study.home}
 
 
 def read(name):
@@ -81,7 +81,7 @@ def test_every_picture_is_made_of_its_numbers_or_by_a_study_or_is_final():
     drawn = {name for study in STUDIES for name in study.drawn}
     final = {name for name in FINAL if name.endswith(".png")}
     assert {file.name for file in DOCS.glob("*.png")} == PICTURES.keys() | drawn | final
-    assert len(PICTURES) == sum(len(study.pictures) for study in STUDIES if not study.home)
+    assert len(PICTURES) == sum(len(study.pictures) for study in told(DOCS, STUDIES) if not study.home)
     assert not (PICTURES.keys() & drawn or (PICTURES.keys() | drawn) & final)
 
 
