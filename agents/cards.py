@@ -17,7 +17,7 @@ import tyro
 
 from seastar_gym.command import run_command
 from seastar_gym.controllers.learned import SHIPPED, LearnedPolicy, load
-from seastar_gym.envs.task import make_scene
+from seastar_gym.envs.options import make_scene
 from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
 from seastar_gym.evaluation.swim import TIME_LIMIT, Swim
 from seastar_gym.files import write_atomically

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.controllers.greedy import turned
 from seastar_gym.envs.commands import command_table
-from seastar_gym.envs.observation import Layout, scene_layout
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.stations import heading_of
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -35,7 +35,7 @@ RIDGE = 1e-6
 class Coasting(NamedTuple):
     """Displacement of the hub until rest, in the body frame, as a linear function of what is observed of the robot.
 
-    layout: Places in an observation. coefficients: Shape (k + 1, 2), the constant last [limb lengths].
+    layout: Of the observations. coefficients: Shape (k + 1, 2), the constant last [limb lengths].
     """
 
     layout: Layout
@@ -54,7 +54,7 @@ def fit_coasting(scene: Scene, decision_period: float | None, rng: np.random.Gen
     """
     env = SeastarSwimVectorEnv(ROBOTS, actions="pairs", scene=scene, decision_period=decision_period)
     env.reset(seed=0)
-    twins, layout = Simulator(scene, ROBOTS), scene_layout(scene)
+    twins, layout = Simulator(scene, ROBOTS), Layout.of(scene)
     n_commands = len(command_table("pairs", scene.robot.n_limbs))
     seen, ways = [], []
     for _ in range(DECISIONS):

@@ -2,7 +2,7 @@
 
 import operator
 from dataclasses import dataclass
-from typing import get_args
+from typing import Any, get_args
 
 from seastar_gym import RewardWeights
 from seastar_gym.envs.commands import Discrete
@@ -100,6 +100,16 @@ class Hyperparameters:
             require_count("a width in hidden", width, 1, 2**20)
         if sum(map(operator.mul, self.hidden, (*self.hidden[1:], 1_000))) > MOST_WEIGHTS:
             raise ValueError(f"hidden must be layers of {MOST_WEIGHTS:,} weights at most, not {shown(self.hidden)}.")
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Arguments of the training environment that are known here, see `SwimOptions`."""
+        return {
+            "actions": self.actions,
+            "decision_period": self.decision_period,
+            "max_episode_steps": self.max_episode_steps,
+            "reward": self.reward,
+        }
 
     @property
     def max_episode_steps(self) -> int:

@@ -18,13 +18,10 @@ from seastar_gym.controllers import learner_zip
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, Weights
 from seastar_gym.controllers.roster import task_of
-from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.randomization import DomainRandomization
+from seastar_gym.envs.options import Path as SwimPath
 from seastar_gym.envs.symmetry import VectorMemory, VectorSymmetryReduction, observed_mirror
-from seastar_gym.envs.task import Path as SwimPath
 from seastar_gym.envs.tasks.envs import SeastarTaskVectorEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count, require_kind, shown
 from seastar_gym.scene.numerics import Fidelity
 
@@ -34,33 +31,25 @@ def make_training_env(
     path: SwimPath,
     random_heading: bool,
     fidelity: Fidelity | None = None,
-    scene: Scene | None = None,
     threads: int | None = None,
-    actions: Actions | None = None,
-    randomization: DomainRandomization | None = None,
+    **options: Any,
 ) -> BatchVecEnv:
     """Native batch for Stable-Baselines3, with symmetry reduction if the hyperparameters ask for it.
 
-    actions: Action mode. None means that of the hyperparameters.
-    randomization: Numbers of the scene that are drawn anew for every episode.
+    options: Further options of the environment, see `SwimOptions`; those of the hyperparameters unless they are named.
     """
     require_kind("hyperparameters", hyperparameters, Hyperparameters, "Hyperparameters")
     env: gym.vector.VectorEnv[Any, Any, Any] = gym.make_vec(
         "SeastarSwim-v0",
         num_envs=hyperparameters.num_envs,
         vectorization_mode="vector_entry_point",
-        max_episode_steps=hyperparameters.max_episode_steps,
-        decision_period=hyperparameters.decision_period,
-        path=path,
-        random_heading=random_heading,
-        actions=hyperparameters.actions if actions is None else actions,
-        fidelity=fidelity,
-        scene=scene,
-        reward=hyperparameters.reward,
-        waypoint_radius=WAYPOINT_RADIUS,
-        randomization=randomization,
         autoreset_mode=AutoresetMode.SAME_STEP,
         threads=threads,
+        path=path,
+        random_heading=random_heading,
+        fidelity=fidelity,
+        waypoint_radius=WAYPOINT_RADIUS,
+        **{**hyperparameters.options, **options},
     )
     if hyperparameters.coasting:
         swum = cast(SeastarSwimVectorEnv, env.unwrapped).scene
@@ -117,7 +106,11 @@ def describe(env: BatchVecEnv, hidden: tuple[int, ...]) -> Description:
     past = 0 if memory is None else memory.recollection.past
     if not isinstance(batch, SeastarTaskVectorEnv):
         return about._replace(past=past)
-    return about._replace(task=task_of(batch), limb_mirror=observed_mirror(batch), own=batch.own_numbers, past=past)
+    layout = batch.layout
+    return about._replace(
+        task=task_of(batch), limb_mirror=observed_mirror(batch), entries=layout.entries,
+        shows_limbs=layout.shows_limbs, past=past,
+    )  # fmt: skip
 
 
 def policy_of(model: PPO) -> LearnedPolicy:

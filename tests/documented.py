@@ -13,6 +13,7 @@ import gymnasium as gym
 import numpy as np
 
 from seastar_gym import Numerics, Scene
+from symmetries import symmetry_for
 
 PAGE = Path(__file__).parents[1] / "docs" / "reference_modules.md"
 NAMES = re.compile(r"^<!-- site: names (\S+) (.*) -->$", re.MULTILINE)
@@ -20,7 +21,7 @@ NAMES = re.compile(r"^<!-- site: names (\S+) (.*) -->$", re.MULTILINE)
 FAST = Scene(numerics=Numerics.preset("fast"))
 PATH = np.array([[0.03, 0.0]])
 MADE_BY_THE_PACKAGE = {
-    "Setting", "Episode", "Episodes", "Estimate", "Layout", "Outcome", "Score", "Swim", "Tally",
+    "Setting", "Episode", "Episodes", "Estimate", "Outcome", "Score", "Swim", "Tally",
     "Actuator", "ActuatorBase", "Executor", "Policy", "Challenge", "Numbered", "Swimming",
 }  # fmt: skip
 """Records that functions return, protocols, and bases of classes of one's own."""
@@ -156,12 +157,11 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         "load_scene": dict(file=None),
         "timed_certificate": dict(decision_period=0.2),
         "make_path": dict(path="random", rng=rng(0)),
-        "layout": dict(n_limbs=5, n_remembered=0, with_headings=False),
-        "Recollection": dict(group=5, mirror=(), past=1),
+        "Layout": dict(n_limbs=5, of_limb=0, entries=(), shows_limbs=True),
+        "Recollection": dict(symmetry=symmetry_for(5), past=1),
+        "Symmetry": dict(group=5, mirror=(), layout=named("Layout")(5), actions="limbs"),
         "VectorMemory": dict(env=batch(), past=1),
         "memory_mirror": dict(actuator=FAST.actuator),
-        "reduce_observations": dict(observations=observations(), group=5, mirror=(), with_headings=False),
-        "restore_actions": dict(actions=np.zeros((2, 5), int), elements=np.zeros(2, int), mode="limbs", group=5),
         "symmetry_of": dict(scene=FAST),
         "GoalForm": dict(env=env()),
         "GreedyPolicy": dict(scene=FAST, waypoint_radius=0.01, decision_period=None),
@@ -198,7 +198,7 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         "Hyperparameters": dict(vars(training())),
         "make_model": dict(env=training_env(), hyperparameters=training(), seed=0, device="cpu"),
         "make_training_env": dict(hyperparameters=training(), path=PATH, random_heading=False, fidelity=None,
-                                  scene=FAST, threads=1, actions=None, randomization=None),
+                                  scene=FAST, threads=1, actions="pairs", randomization=None),
         "policy_of": dict(model=named("make_model")(training_env(), training(), 0)),
     }.items():  # fmt: skip
         yield name, named(name), arguments
@@ -228,6 +228,8 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         yield name, of_batch(name).reset, dict(seed=0, options=None)
         yield name, of_batch(name).step, dict(actions=np.zeros(2, int))
     yield "BatchVecEnv", of_batch("BatchVecEnv", "SameStep").step, dict(actions=np.zeros(2, int))
+    yield "Symmetry", symmetry_for(5).reduce, dict(observations=observations())
+    yield "Symmetry", symmetry_for(5).restore, dict(actions=np.zeros((2, 5), int), elements=np.zeros(2, int))
     yield "GoalForm", goal_form().reset, dict(seed=0, options=None)
     yield "GoalForm", goal_form().step, dict(action=0)
     yield "GoalForm", goal_form().compute_reward, dict(

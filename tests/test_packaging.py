@@ -1,6 +1,7 @@
 """What the project says about itself (dependencies, versions, README commands) is true."""
 
 import ast
+import importlib
 import importlib.metadata
 import re
 import runpy
@@ -120,6 +121,37 @@ def test_importing_the_package_leaves_out_what_it_does_not_need():
     loaded = set(answer.stdout.split())
     assert "seastar_gym" in loaded
     assert loaded.isdisjoint({"torch", "stable_baselines3", "matplotlib", "plotly", "pygame", "imageio", "rich"})
+
+
+@pytest.mark.parametrize(
+    "code, most",
+    [("import seastar_gym", 4), ("from seastar_gym.controllers import load; load()", 43)],
+    ids=["the package", "a policy"],
+)
+def test_what_needs_no_compiler_loads_none(code, most):
+    code = f"import sys; {code}; print(*sys.modules)"
+    answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    loaded = set(answer.stdout.split())
+    assert loaded.isdisjoint({"numba", "llvmlite", "scipy", "torch", "seastar_gym.accuracy"})
+    assert len({name for name in loaded if name.partition(".")[0] == "seastar_gym"}) <= most
+
+
+def test_names_of_the_package_are_those_of_its_modules():
+    """What type checkers see, what is there when it is asked for, and what `dir` says are the same."""
+    import seastar_gym
+    from seastar_gym import controllers
+    from seastar_gym.envs import symmetry
+
+    for package in (seastar_gym, controllers, symmetry):
+        (block,) = (node for node in ast.parse(Path(package.__file__).read_text()).body if isinstance(node, ast.If))
+        for line in block.body:
+            for alias in line.names:
+                assert getattr(package, alias.name) is getattr(importlib.import_module(line.module), alias.name)
+                assert alias.name in package.__all__
+        assert all(hasattr(package, name) for name in package.__all__) and {*package.__all__} <= {*dir(package)}
+        with pytest.raises(AttributeError, match=f"module '{package.__name__}' has no attribute 'nothing'"):
+            package.nothing  # noqa: B018
+    assert seastar_gym.envs.rendering.__name__ == "seastar_gym.envs.rendering"
 
 
 @pytest.mark.parametrize(

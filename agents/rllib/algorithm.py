@@ -77,12 +77,9 @@ def env_config(options: Options) -> dict[str, Any]:
     ppo = options.ppo
     return {
         "symmetry": ppo.symmetry,
-        "max_episode_steps": ppo.max_episode_steps,
-        "decision_period": ppo.decision_period,
         "path": options.path,
         "random_heading": options.random_heading,
-        "actions": ppo.actions,
         "fidelity": options.fidelity,
-        "reward": ppo.reward,
         "waypoint_radius": WAYPOINT_RADIUS,
+        **ppo.options,
     }

@@ -10,7 +10,7 @@ from ray.rllib.core import COMPONENT_LEARNER, COMPONENT_RL_MODULE, DEFAULT_MODUL
 from agents.rllib.options import Options
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, Weights
-from seastar_gym.envs.task import make_scene
+from seastar_gym.envs.options import make_scene
 
 ACTOR = "encoder.actor_encoder.net.mlp."
 """Beginning of the names of the policy's hidden layers, as RLlib calls them."""

@@ -11,7 +11,7 @@ from agents.training.options import Options
 from seastar_gym.controllers.learned import SHIPPED, LearnedPolicy, in_the_box
 from seastar_gym.controllers.learned import load as load_policy
 from seastar_gym.controllers.learned import save as save_policy
-from seastar_gym.envs.task import make_scene
+from seastar_gym.envs.options import make_scene
 from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
 
 

@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from agents.training.options import Options
+from seastar_gym.envs.options import scene_at
 from seastar_gym.envs.randomization import DomainRandomization, Uniform
-from seastar_gym.envs.task import scene_at
 from seastar_gym.files import read_json, write_json
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity

@@ -22,7 +22,7 @@ import seastar_gym  # noqa: F401, registers the environments
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, save
 from seastar_gym.envs.buffers import Buffers
-from seastar_gym.envs.symmetry import memory_mirror, reduce_observations, restore_actions
+from seastar_gym.envs.symmetry import Symmetry
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def train(options: Options, quiet: bool = False) -> LearnedPolicy:
         threads=options.num_threads,
     )
     scene, n, steps = envs.scene, options.num_envs, options.rollout
-    n_limbs, mirror = scene.robot.n_limbs, memory_mirror(scene.actuator)
+    symmetry = Symmetry.of(scene, actions="pairs")
     size, n_actions = envs.single_observation_space.shape[0], int(envs.single_action_space.n)
     agent = Agent(size, n_actions, options.hidden)
     optimizer = torch.optim.Adam(agent.parameters(), lr=options.learning_rate, eps=1e-5)
@@ -112,7 +112,7 @@ def train(options: Options, quiet: bool = False) -> LearnedPolicy:
     values, advantages = torch.zeros((steps + 1, n)), torch.zeros((steps, n))
 
     # Symmetry: every observation is turned and mirrored until its waypoint is in one sector, and the action back.
-    observations[0], elements = reduce_observations(envs.reset(seed=options.seed)[0], n_limbs, mirror)
+    observations[0], elements = symmetry.reduce(envs.reset(seed=options.seed)[0])
     updates = max(1, options.strokes // (n * steps))
     began, returns, finished = time.perf_counter(), np.zeros(n), []
     for update in range(updates):
@@ -124,15 +124,15 @@ def train(options: Options, quiet: bool = False) -> LearnedPolicy:
                 actions[step] = choices.sample()
                 log_probs[step], values[step] = choices.log_prob(actions[step]), agent.value(seen)
                 row = Buffers(observations[step + 1], rewards[step], terminated[step], truncated[step])
-                *_, info = envs.step(restore_actions(actions[step].numpy(), elements, "pairs", n_limbs), out=row)
-                observations[step + 1], elements = reduce_observations(row.observations, n_limbs, mirror)
+                *_, info = envs.step(symmetry.restore(actions[step].numpy(), elements), out=row)
+                observations[step + 1], elements = symmetry.reduce(row.observations)
                 returns += rewards[step]
                 over = terminated[step] | truncated[step]
                 finished = [*finished, *returns[over]][-100:]
                 returns[over] = 0.0
                 cut = np.flatnonzero(truncated[step] & ~terminated[step])
                 if len(cut):  # an episode out of time would have gone on: its last state has a value
-                    last, _ = reduce_observations(np.stack(list(info["final_obs"][cut])), n_limbs, mirror)
+                    last, _ = symmetry.reduce(np.stack(list(info["final_obs"][cut])))
                     rewards[step, cut] += options.discount * agent.value(torch.from_numpy(last)).numpy()
             values[steps] = agent.value(torch.from_numpy(observations[steps]))
             going_on = torch.from_numpy(~(terminated | truncated)).float()

@@ -17,7 +17,7 @@ from seastar_gym.command import answered, command_parser
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.controllers.roster import DEFAULTS, HELP, fitting_agents, load_agents
-from seastar_gym.envs.task import scene_at
+from seastar_gym.envs.options import scene_at
 from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.results import Row, write_csv

@@ -10,12 +10,10 @@ They need numpy and safetensors. What an agent of one's own must have is in `con
     action, _ = policy.predict(observation, deterministic=True)
 """
 
-from seastar_gym.controllers.contract import Policy
-from seastar_gym.controllers.greedy import GreedyPolicy
+from typing import TYPE_CHECKING
+
 from seastar_gym.controllers.learned import LearnedPolicy, in_the_box, load
-from seastar_gym.controllers.planner import Planner
-from seastar_gym.controllers.roster import load_agent, load_agents
-from seastar_gym.controllers.scripted import scripted
+from seastar_gym.lazy import lazily
 
 __all__ = [
     "GreedyPolicy",
@@ -28,3 +26,22 @@ __all__ = [
     "load_agents",
     "scripted",
 ]
+
+if TYPE_CHECKING:
+    from seastar_gym.controllers.contract import Policy
+    from seastar_gym.controllers.greedy import GreedyPolicy
+    from seastar_gym.controllers.planner import Planner
+    from seastar_gym.controllers.roster import load_agent, load_agents
+    from seastar_gym.controllers.scripted import scripted
+else:
+    __getattr__, __dir__ = lazily(
+        __name__,
+        {
+            "GreedyPolicy": "greedy",
+            "Planner": "planner",
+            "Policy": "contract",
+            "load_agent": "roster",
+            "load_agents": "roster",
+            "scripted": "scripted",
+        },
+    )

@@ -1,14 +1,18 @@
-"""What every controller has, `predict`, and whether a controller can drive the robot of an environment."""
+"""What every controller has, `predict`, what that is given, and whether it can drive the robot of an environment."""
 
 import math
-from typing import Any, Protocol, get_args
+from typing import TYPE_CHECKING, Any, Protocol, get_args
 
-from seastar_gym.controllers.learned import LearnedPolicy
+import numpy as np
+from numpy.typing import NDArray
+
 from seastar_gym.envs.commands import MOST_LIMBS, Actions, action_space
-from seastar_gym.envs.task import scene_observation_size
-from seastar_gym.envs.tasks.challenge import Challenge
+from seastar_gym.envs.layout import Layout
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import shown
+from seastar_gym.scene.checks import as_array, shown
+
+if TYPE_CHECKING:
+    from seastar_gym.envs.tasks.challenge import Challenge
 
 
 class Policy(Protocol):
@@ -50,7 +54,7 @@ def require_fit(
     actions: Actions,
     decision_period: float | None = None,
     n_seen: int | None = None,
-    challenge: Challenge | None = None,
+    challenge: "Challenge | None" = None,
 ) -> None:
     """ValueError, with one sentence, where a policy cannot drive the robot of an environment, as far as it tells.
 
@@ -58,8 +62,8 @@ def require_fit(
     n_seen: Length of the environment's observations. None means those of waypoints.
     challenge: Of the environment. None means waypoints.
     """
-    n_seen = scene_observation_size(scene) if n_seen is None else n_seen
-    if isinstance(policy, LearnedPolicy):
+    n_seen = Layout.of(scene).size if n_seen is None else n_seen
+    if hasattr(policy, "require_fit"):
         policy.require_fit(scene, actions, n_seen, challenge)
     ours = getattr(policy, "decision_period", None)
     theirs = scene.actuator.period if decision_period is None else decision_period
@@ -71,3 +75,31 @@ def require_fit(
     acts = getattr(policy, "action_space", None)
     if acts is not None and acts != action_space(actions, scene.robot.n_limbs):
         raise ValueError(f'The policy acts in {acts}, which is not that of an environment with actions="{actions}".')
+
+
+def as_floating(name: str, value: object) -> NDArray[np.floating[Any]]:
+    """Value as an array of floats of its own precision, of whatever shape."""
+    array = as_array(name, value)
+    if array.dtype.kind not in "iuf":
+        raise ValueError(f"{name} must be numbers, not {array.dtype} values.")
+    return array
+
+
+def observed(observation: object, smallest: int) -> NDArray[np.floating[Any]]:
+    """Observations of one robot, shape (size,), or several, shape (n, size). smallest: Least numbers of each."""
+    array = as_floating("observation", observation)
+    if array.ndim not in (1, 2) or array.shape[-1] < smallest:
+        raise ValueError(
+            f"An observation must have shape (size,) or (n, size), with {smallest} numbers or more, not {array.shape}."
+        )
+    return array
+
+
+def starts(episode_start: object, n: int) -> NDArray[np.bool_]:
+    """Which of n robots begin an episode; none if it is not said."""
+    if episode_start is None:
+        return np.zeros(n, bool)
+    flags = as_array("episode_start", episode_start)
+    if flags.dtype.kind not in "biu" or flags.shape not in ((), (1,), (n,)):
+        raise ValueError(f"episode_start must be flags of shape ({n},), not {shown(episode_start)}.")
+    return np.broadcast_to(flags.astype(bool), (n,))

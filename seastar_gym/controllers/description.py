@@ -6,14 +6,11 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any, NamedTuple, cast, get_args
 
-from seastar_gym.envs.commands import Actions, Discrete, choices
-from seastar_gym.envs.decisions import checked_decision_period
-from seastar_gym.envs.observation import OBSERVATION_LAYOUT
-from seastar_gym.envs.own_numbers import NO_MORE, Kind, OwnNumbers, places_of
-from seastar_gym.envs.symmetry import Recollection, memory_mirror, symmetry_of
-from seastar_gym.envs.symmetry.memory import MOST_PAST
-from seastar_gym.envs.task import scene_observation_size
-from seastar_gym.envs.tasks.envs import CHALLENGES
+from seastar_gym.envs import TASKS
+from seastar_gym.envs.commands import Actions, Discrete, checked_decision_period, choices
+from seastar_gym.envs.layout import OBSERVATION_LAYOUT, Entry, Layout, memory_size
+from seastar_gym.envs.symmetry import Recollection, Symmetry, memory_mirror, symmetry_of
+from seastar_gym.envs.symmetry.symmetry import MOST_PAST
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Mirror
 from seastar_gym.scene.checks import is_whole_number, require_count, require_kind, shown
@@ -35,7 +32,8 @@ class Description(NamedTuple):
     None means strokes.
     task: Name of the challenge that the policy was trained for, such as "miswired". None means waypoints.
     limb_mirror: What a mirror does to the numbers that are observed of every limb. None means those of the actuators.
-    own: What the task shows of its own. past: Number of past observations that the policy sees, see `Recollection`.
+    entries, shows_limbs: Of the observations, see `Layout`. past: Number of past observations that the policy sees, see
+    `Recollection`.
     """
 
     actions: Actions
@@ -45,7 +43,8 @@ class Description(NamedTuple):
     decision_period: float | None = None
     task: str | None = None
     limb_mirror: Mirror | None = None
-    own: OwnNumbers = NO_MORE
+    entries: tuple[Entry, ...] = ()
+    shows_limbs: bool = True
     past: int = 0
 
     def to_json(self, **more: Any) -> str:
@@ -55,12 +54,18 @@ class Description(NamedTuple):
             "seastar_gym": __version__,
             "observation_layout": OBSERVATION_LAYOUT,
             "observation_size": self.observation_size,
-            **self._asdict(),
+            **self._written(),
             "scene": self.scene.to_dict(),
-            "own": self.own._asdict(),
             **more,
         }
         return json.dumps(facts, indent=2, default=str, allow_nan=False)
+
+    def _written(self) -> dict[str, Any]:
+        """Entries as they are written, but for the scene."""
+        facts = self._asdict()
+        kinds, shows_limbs = facts.pop("entries"), facts.pop("shows_limbs")
+        rows = [WRITTEN_AS.get(kind, kind) for kind in kinds] if isinstance(kinds, tuple) else kinds
+        return {**facts, "own": {"kinds": rows, "with_stations": shows_limbs}}
 
     @classmethod
     def from_json(cls, text: str | bytes) -> "Description":
@@ -103,13 +108,10 @@ class Description(NamedTuple):
 
     def check(self) -> None:
         """ValueError, with one sentence, where an entry is none of its kind."""
-        require_kind("own", self.own, OwnNumbers, "OwnNumbers")
         require_kind("scene", self.scene, Scene, "a Scene")
         require_kind("hidden", self.hidden, tuple, "a tuple of widths")
         rows = None if self.limb_mirror is None else _rows(self.limb_mirror)
-        kinds = list(self.own.kinds) if isinstance(self.own.kinds, tuple) else self.own.kinds
-        own = {"kinds": kinds, "with_stations": self.own.with_stations}
-        self._of({**self._asdict(), "limb_mirror": rows, "own": own, "hidden": list(self.hidden)}, self.scene)
+        self._of({**self._written(), "limb_mirror": rows, "hidden": list(self.hidden)}, self.scene)
 
     @property
     def mirror(self) -> Mirror:
@@ -117,22 +119,30 @@ class Description(NamedTuple):
         return memory_mirror(self.scene.actuator) if self.limb_mirror is None else self.limb_mirror
 
     @property
-    def recollection(self) -> Recollection | None:
-        """What the policy sees of present and past observations; None for a policy without memory."""
-        return Recollection(symmetry_of(self.scene), self.mirror, self.own, self.past) if self.past else None
+    def layout(self) -> Layout:
+        """Layout of an observation of the environment."""
+        of_limb = memory_size(self.scene.actuator) if self.limb_mirror is None else len(self.limb_mirror)
+        return Layout(self.scene.robot.n_limbs, of_limb, self.entries, self.shows_limbs)
 
     @property
     def observation_size(self) -> int:
         """Length of an observation of the environment."""
-        if self.limb_mirror is None and self.own == NO_MORE:
-            return scene_observation_size(self.scene)
-        n_limbs = self.scene.robot.n_limbs
-        return places_of(n_limbs, n_limbs * len(self.mirror), self.own).size
+        return self.layout.size
+
+    @property
+    def reduction(self) -> Symmetry | None:
+        """Symmetry by which observations are reduced; None for a policy that sees them as they are."""
+        return Symmetry(symmetry_of(self.scene), self.mirror, self.layout, self.actions) if self.symmetry else None
+
+    @property
+    def recollection(self) -> Recollection | None:
+        """What the policy sees of present and past observations; None for a policy without memory."""
+        return Recollection(self.reduction, self.past) if self.reduction is not None and self.past else None
 
     @property
     def input_size(self) -> int:
         """Number of inputs of the network."""
-        return self.observation_size if self.recollection is None else self.recollection.size
+        return self.layout.size if self.recollection is None else self.recollection.size
 
     @property
     def distributions(self) -> tuple[int, int]:
@@ -152,16 +162,23 @@ WRITTEN = ("format", "observation_layout", "actions", "symmetry", "hidden", "sce
 """Entries that every description has."""
 SEEN = ("task", "limb_mirror", "own", "past")
 """Entries on what a policy of a task sees; older descriptions have none."""
+WRITTEN_AS: dict[str, str] = {"pseudoscalar": "turn"}
+"""Words for entries of an observation that are others in a description."""
+KINDS: dict[str, Entry] = {WRITTEN_AS.get(entry, entry): entry for entry in get_args(Entry)}
+"""Entries of an observation by their words in a description."""
+CHALLENGES = tuple(dict.fromkeys(about[0] for about in TASKS.values()))
+"""Names of challenges that policies are trained for."""
 
 
-def _seen(facts: Mapping[str, Any]) -> tuple[str | None, Mirror | None, OwnNumbers, int]:
+def _seen(facts: Mapping[str, Any]) -> tuple[str | None, Mirror | None, tuple[Entry, ...], bool, int]:
     """Entries on what a policy of a task sees. ValueError where one is wrong."""
     task, mirror, own, past = (facts.get(name) for name in SEEN)
     if task is not None and (not isinstance(task, str) or task not in CHALLENGES):
         raise ValueError(f"Its task must be one of {', '.join(CHALLENGES)}, not {shown(task)}.")
     if past is not None:
         require_count("its past", past, 0, MOST_PAST)
-    return task, None if mirror is None else _mirror(mirror), NO_MORE if own is None else _own(own), past or 0
+    entries, shows_limbs = ((), True) if own is None else _own(own)
+    return task, None if mirror is None else _mirror(mirror), entries, shows_limbs, past or 0
 
 
 def _rows(mirror: object) -> object:
@@ -183,15 +200,16 @@ def _mirror(rows: object) -> Mirror:
     return tuple((index, sign) for index, sign in rows)
 
 
-def _own(own: object) -> OwnNumbers:
-    """What a task shows of its own."""
-    if not isinstance(own, dict) or set(own) != set(OwnNumbers._fields) or not isinstance(own["with_stations"], bool):
+def _own(own: object) -> tuple[tuple[Entry, ...], bool]:
+    """Further entries of an observation, and whether it shows the limbs."""
+    facts = own if isinstance(own, dict) else {}
+    if set(facts) != {"kinds", "with_stations"} or not isinstance(facts["with_stations"], bool):
         raise ValueError(f"Its own must be an object with kinds and with_stations, not {shown(own)}.")
-    kinds = own["kinds"]
-    known = isinstance(kinds, list) and all(isinstance(kind, str) and kind in get_args(Kind) for kind in kinds)
+    kinds = facts["kinds"]
+    known = isinstance(kinds, list) and all(isinstance(kind, str) and kind in KINDS for kind in kinds)
     if not known or len(kinds) > MOST_NUMBERS:
-        raise ValueError(f"The kinds of its own numbers must be of {', '.join(get_args(Kind))}, not {shown(kinds)}.")
-    return OwnNumbers(tuple(kinds), own["with_stations"])
+        raise ValueError(f"The kinds of its own numbers must be of {', '.join(KINDS)}, not {shown(kinds)}.")
+    return tuple(KINDS[kind] for kind in kinds), facts["with_stations"]
 
 
 def read_facts(text: str | bytes) -> dict[str, Any]:

@@ -18,10 +18,9 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.controllers.given import observed
-from seastar_gym.envs.commands import Actions, command_table
-from seastar_gym.envs.decisions import checked_decision_period
-from seastar_gym.envs.observation import OBSERVATION_LAYOUT, scene_layout
+from seastar_gym.controllers.contract import observed
+from seastar_gym.envs.commands import Actions, checked_decision_period, command_table
+from seastar_gym.envs.layout import OBSERVATION_LAYOUT, Layout
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.stations import heading_of
 from seastar_gym.files import beside
@@ -92,13 +91,13 @@ def _decisions(strokes: int, scene: Scene, decision_period: float | None) -> int
 
 
 def waypoints_of(
-    observations: NDArray[np.float32], scene: Scene, with_headings: bool = False
+    observations: NDArray[np.float32], scene: Scene, layout: Layout | None = None
 ) -> tuple[Floats, Floats]:
     """Current and next waypoint [m] relative to the hub in the body frame, (n, 2) each.
 
-    with_headings: Whether headings are asked for.
+    layout: Of the observations. None means that of waypoints without headings.
     """
-    at, length = scene_layout(scene, with_headings=with_headings), scene.robot.limb_length
+    at, length = Layout.of(scene) if layout is None else layout, scene.robot.limb_length
     observations = np.atleast_2d(observed(observations, at.size))
     current, after = observations[:, at.current_waypoint], observations[:, at.next_waypoint]
     return length * current.astype(np.float64), length * after.astype(np.float64)

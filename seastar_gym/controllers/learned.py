@@ -16,22 +16,23 @@ import os
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import safetensors
 import safetensors.numpy
 from numpy.typing import NDArray
 
+from seastar_gym.controllers.contract import as_floating, starts
 from seastar_gym.controllers.description import Description, read_facts
-from seastar_gym.controllers.given import as_floating, starts
 from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.symmetry import Recollection, reduce_observations, restore_actions, symmetry_of
-from seastar_gym.envs.tasks.challenge import Challenge
-from seastar_gym.envs.tasks.envs import CHALLENGES, name_of
+from seastar_gym.envs.symmetry import Recollection
 from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import is_finite_number, require_file, require_flag, require_kind, require_number, shown
+
+if TYPE_CHECKING:
+    from seastar_gym.envs.tasks.challenge import Challenge
 
 SHIPPED = Path(__file__).parent / "policies" / "seastar.safetensors"
 """File of the policy in the box that decides stroke by stroke; `python train.py --ship` replaces it."""
@@ -79,8 +80,7 @@ class LearnedPolicy:
         self.weights = weights
         self.actions = description.actions
         self.scene = description.scene
-        self.group = symmetry_of(description.scene) if description.symmetry else None
-        self.recollection = description.recollection
+        self.reduction, self.recollection = description.reduction, description.recollection
         self.decision_period = description.decision_period or description.scene.actuator.period
         self.training = training or {}
         self.rng = np.random.default_rng(0) if rng is None else rng
@@ -107,14 +107,12 @@ class LearnedPolicy:
                 f"This policy was trained on a robot of {n_limbs} limbs: it sees {size} numbers, not an observation of "
                 f"shape {observation.shape}."
             )
-        if self.group is None:
+        if self.reduction is None:
             return self._choose(observation, deterministic), None
         if self.recollection is not None:
             return self._remembering(self.recollection, observation, state, episode_start, deterministic)
-        about = self.description
-        reduced, elements = reduce_observations(observation, self.group, about.mirror, own=about.own)
-        chosen = self._choose(reduced, deterministic)
-        return restore_actions(chosen, elements, self.actions, self.group), None
+        reduced, elements = self.reduction.reduce(observation)
+        return self.reduction.restore(self._choose(reduced, deterministic), elements), None
 
     def _remembering(
         self,
@@ -131,7 +129,7 @@ class LearnedPolicy:
         begun = starts(episode_start, len(present))
         past = at_first if state is None else np.where(begun[:, None, None], at_first, state[0])
         shown, elements = recollection.shown(present, past)
-        chosen = restore_actions(self._choose(shown, deterministic), elements, self.actions, recollection.group)
+        chosen = recollection.symmetry.restore(self._choose(shown, deterministic), elements)
         later = np.concatenate([present[:, None], past[:, :-1]], axis=1)
         return (chosen if observation.ndim == 2 else chosen[0]), (later,)
 
@@ -153,7 +151,7 @@ class LearnedPolicy:
                 x = np.tanh(x)
         return x.reshape(*x.shape[:-1], *self.description.distributions)
 
-    def require_fit(self, scene: Scene, actions: Actions, n_seen: int, challenge: Challenge | None = None) -> None:
+    def require_fit(self, scene: Scene, actions: Actions, n_seen: int, challenge: "Challenge | None" = None) -> None:
         """ValueError, with one sentence, where this policy cannot drive the robot of an environment.
 
         n_seen: Length of the environment's observations. challenge: Of the environment, None for waypoints. A policy
@@ -167,9 +165,8 @@ class LearnedPolicy:
                 f'The policy answers with actions="{self.actions}", the environment takes actions="{actions}".'
             )
         task = self.description.task
-        if task is not None and not isinstance(challenge, type(CHALLENGES[task])):
-            other = "waypoints" if challenge is None else name_of(challenge) or type(challenge).__name__
-            raise ValueError(f"The policy was trained for the task {task}, the environment's is {other}.")
+        if task is not None:
+            require_task(task, challenge)
         ours = self.description.observation_size
         if ours != n_seen:
             task = task or "waypoints"
@@ -190,6 +187,15 @@ class LearnedPolicy:
             if ours.get(name) != theirs.get(name) and name.split(".")[0] != "numerics" and name != RESOLUTION
         ]
         return f"trained in another scene, with {', '.join(parts)}." if parts else ""
+
+
+def require_task(task: str, challenge: "Challenge | None") -> None:
+    """ValueError unless a challenge is that of a task of this name, with any numbers."""
+    from seastar_gym.envs.tasks.envs import CHALLENGES, name_of  # whoever has a challenge has imported them
+
+    if not isinstance(challenge, type(CHALLENGES[task])):
+        other = "waypoints" if challenge is None else name_of(challenge) or type(challenge).__name__
+        raise ValueError(f"The policy was trained for the task {task}, the environment's is {other}.")
 
 
 def _require_weights(weights: object) -> None:

@@ -12,15 +12,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.controllers.given import observed
+from seastar_gym.controllers.contract import observed
 from seastar_gym.controllers.greedy import Searcher, require_search, waypoints_of
-from seastar_gym.envs.commands import command_table
-from seastar_gym.envs.decisions import checked_decision_period
+from seastar_gym.envs.commands import checked_decision_period, command_table
 from seastar_gym.envs.headings import Headings, wrapped
-from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout
+from seastar_gym.envs.layout import HEADINGS, N_STATIONS, VELOCITY_SCALE, Layout, memory_size
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.reward import RewardWeights
-from seastar_gym.envs.stations import N_STATIONS, body_heading, node_weights, of_beginning
-from seastar_gym.envs.task import make_scene
+from seastar_gym.envs.stations import body_heading, node_weights, of_beginning
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import complete
 from seastar_gym.scene.checks import require_count, require_kind, require_number
@@ -66,14 +65,16 @@ def budget_for(decision_period: float | None) -> Budget:
     return TIMED_BUDGETS[min(shorter)] if shorter else Budget()
 
 
-def state_of(observations: NDArray[np.float32], scene: Scene) -> State:
+def state_of(observations: NDArray[np.float32], scene: Scene, layout: Layout | None = None) -> State:
     """State that observations, shape (n, size), were made from, in the body frame with the hub at its origin.
 
+    layout: Of the observations. None means that of waypoints without headings.
     Actuators have the state that they recall from what is observed, and are at rest if they recall none. Bodies point
     along the frame and do not turn.
     """
-    n, robot, at, actuator = len(observations), scene.robot, scene_layout(scene), scene.actuator
-    seen = observations[:, at.actuators].astype(np.float64).reshape(n, robot.n_limbs, -1)
+    n, robot, actuator, at = len(observations), scene.robot, scene.actuator, layout or Layout.of(scene)
+    of_limbs = observations[:, at.actuators].astype(np.float64).reshape(n, robot.n_limbs, -1)
+    seen = of_limbs[..., : memory_size(actuator)]
     at_stations = node_weights(robot.nodes_per_limb)
     nodes, velocities = (
         at_stations @ observations[:, place].astype(np.float64).reshape(n, -1, N_STATIONS, 2)
@@ -176,20 +177,22 @@ class Planner(Searcher):
         self.waypoint_radius, self.reward, self.decision_period = waypoint_radius, reward, decision_period
         self.budget = budget_for(decision_period) if budget is None else budget
         self._commands = command_table(self.actions, self.scene.robot.n_limbs)
+        self._layout = Layout.of(self.scene, entries=() if headings is None else HEADINGS)
         self._swim_all = Branching(self.scene, self._commands, threads, decision_period)
 
     def choose(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
         """Actions for observations of shape (n, size)."""
-        observations = np.atleast_2d(observed(observations, scene_layout(self.scene).size))
-        return self._search(state_of(observations, self.scene), self._targets(observations))
+        observations = np.atleast_2d(observed(observations, self._layout.size))
+        return self._search(state_of(observations, self.scene, self._layout), self._targets(observations))
 
     def _targets(self, observations: NDArray[np.float32]) -> Targets:
         """Targets that observations, shape (n, size), tell of."""
+        waypoints = waypoints_of(observations, self.scene, self._layout)
         if self.headings is None:
-            return Targets(*waypoints_of(observations, self.scene))
-        seen = observations[:, scene_layout(self.scene, with_headings=True).headings].astype(np.float64)
+            return Targets(*waypoints)
+        seen = observations[:, self._layout.headings].astype(np.float64)
         turns = np.arctan2(seen[:, 1::2], seen[:, ::2])
-        return Targets(*waypoints_of(observations, self.scene, True), turns[:, 0], turns[:, 1])
+        return Targets(*waypoints, turns[:, 0], turns[:, 1])
 
     def _search(self, start: State, targets: Targets) -> NDArray[np.int64]:
         """First action of the best sequence for every robot, shape (n,)."""

@@ -16,8 +16,8 @@ from seastar_gym.controllers.contract import Policy, actions_of, require_fit
 from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.planner import Planner
 from seastar_gym.controllers.scripted import GAITS, scripted
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import make_scene
 from seastar_gym.envs.tasks.envs import name_of
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import (

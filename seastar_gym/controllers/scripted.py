@@ -19,7 +19,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.controllers.given import observed, starts
+from seastar_gym.controllers.contract import observed, starts
 from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, action_space, command_table
 from seastar_gym.gaits import (
     PERIOD,

@@ -15,7 +15,7 @@ from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.scripted import to_actions
 from seastar_gym.envs.commands import Actions, to_commands
 from seastar_gym.envs.headings import Headings
-from seastar_gym.envs.observation import scene_layout
+from seastar_gym.envs.layout import HEADINGS, Layout
 from seastar_gym.envs.symmetry import transform_commands
 from seastar_gym.scene import Scene
 
@@ -51,7 +51,7 @@ class TurnThenSwim:
     ) -> tuple[NDArray[Any], tuple[bool, int]]:
         """Action of one robot for an observation of shape (size,), and whether it turns, with the gait's decisions."""
         turns, k = (False, 0) if state is None else state
-        at = scene_layout(self.scene, with_headings=True)
+        at = Layout.of(self.scene, entries=HEADINGS)
         c, s = observation[at.headings][:2].astype(np.float64).tolist()
         left = math.atan2(s, c)
         turns = bool(abs(left) > (END if turns else BEGIN) * self.headings.tolerance)

@@ -8,7 +8,6 @@ from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
-from seastar_gym.envs.observation import scene_layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.stations import heading_of
 from seastar_gym.scene.checks import as_floats, require_kind
@@ -40,8 +39,7 @@ class GoalForm(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         self._swim = swim
         self._length = float(swim.scene.robot.limb_length)
         self._radius = float(swim._task.waypoint_radius) / self._length
-        (size,) = swim.observation_space.shape or (0,)
-        self._without_waypoints = np.delete(np.arange(size), scene_layout(swim.scene).waypoints)
+        self._without_waypoints = np.delete(np.arange(swim.layout.size), swim.layout.waypoints)
         shapes = {"observation": (len(self._without_waypoints) + 2,), "achieved_goal": (2,), "desired_goal": (2,)}
         self.observation_space = spaces.Dict(
             {name: spaces.Box(-np.inf, np.inf, shape, np.float64) for name, shape in shapes.items()}

@@ -1,119 +1,12 @@
-"""Observation of a robot: positions and velocities of its stations, velocity of the hub and waypoints, in a body frame.
-
-A limb has nine stations, evenly spaced from hub to tip, whatever its nodes, see stations.py: observations, and policies
-made for them, do not depend on the mesh. Stations of the chapter's robot are its nodes.
-
-The body frame has its origin at the hub. Its x axis is the direction of limb 1 of the rest shape, after the rotation
-that fits the rest shape best to the robot (least squares over all stations). Every number is of order one; lengths are
-in units of the robot's own limb length:
-
-index                 meaning                                           unit
-0 .. 2m-1             station positions relative to the hub, x and y    limb lengths
-2m .. 4m-1            station velocities relative to the hub, x and y   VELOCITY_SCALE
-4m, 4m+1              hub velocity, x and y                             VELOCITY_SCALE
-4m+2, 4m+3            current waypoint relative to the hub, x and y     limb lengths
-4m+4, 4m+5            next waypoint relative to the hub, x and y        limb lengths
-
-with m = 9 n_limbs stations in the order {1,1}..{1,9}, {2,1}.. (m = 45 for five limbs: 186 numbers). On the last leg the
-next waypoint is the current one. Distances of waypoints are not clipped.
-
-If actuators have a memory (`has_memory`), the numbers of its `observe` for limb 1, limb 2, .. stand before the
-waypoints, which are always the last four numbers; an environment may leave the memory out. `Layout` names all these
-places.
-
-If headings are asked for (`headings.py`), four numbers more stand before the waypoints, after the memory: cosine and
-sine of the turn to the heading at the current waypoint, and of that to the heading at the next.
-"""
-
-from functools import cache
-from typing import Any, NamedTuple
+"""Observations of robots, filled by kernels: what they see, in the order and the units of `layout.py`."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.stations import N_STATIONS
-from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.actuator import complete
-from seastar_gym.scene.checks import require_count, require_flag, require_limbs
+from seastar_gym.envs.layout import Layout as Layout  # both by their old place, for one release
+from seastar_gym.envs.layout import layout as layout
 from seastar_gym.simd.compilation import entry_point, kernel
 from seastar_gym.simd.lanes import add_product, borrow, load, load_number, select, splat, sqrt, store
-
-OBSERVATION_LAYOUT = 2
-"""Version of this table, which saved policies name. A change of order, unit or frame gives it another number."""
-VELOCITY_SCALE = 0.025
-"""Unit of velocities [m/s]: nodes and hub move at 12 to 24 mm/s root mean square after strokes of random commands."""
-
-MOST_REMEMBERED = 1_000_000
-"""Most numbers that the actuators of a robot may remember."""
-
-
-class Layout(NamedTuple):
-    """Places in an observation, as slices of its last axis; the table of this module tells their meaning."""
-
-    positions: slice
-    velocities: slice
-    hub_velocity: slice
-    actuators: slice
-    headings: slice
-    current_waypoint: slice
-    next_waypoint: slice
-
-    @property
-    def stations_and_hub(self) -> slice:
-        """Place of the positions, the velocities and the hub's velocity."""
-        return slice(0, self.hub_velocity.stop)
-
-    @property
-    def waypoints(self) -> slice:
-        """Place of the current waypoint and the next."""
-        return slice(self.current_waypoint.start, self.next_waypoint.stop)
-
-    @property
-    def size(self) -> int:
-        """Length of the observation."""
-        return int(self.next_waypoint.stop)
-
-
-def layout(n_limbs: int, n_remembered: int = 0, with_headings: bool = False) -> Layout:
-    """Layout for a robot of n_limbs limbs whose actuators remember n_remembered numbers in all.
-
-    with_headings: Whether headings are asked for.
-    """
-    require_limbs(n_limbs)
-    require_count("n_remembered", n_remembered, 0, MOST_REMEMBERED)
-    require_flag("with_headings", with_headings)
-    return _layout(n_limbs, n_remembered, with_headings)
-
-
-@cache
-def _layout(n_limbs: int, n_remembered: int, with_headings: bool) -> Layout:
-    along_limbs = 2 * N_STATIONS * n_limbs
-    ends = np.cumsum([along_limbs, along_limbs, 2, n_remembered, 4 if with_headings else 0, 2, 2]).tolist()
-    return Layout(*map(slice, [0, *ends[:-1]], ends))
-
-
-def scene_layout(scene: Scene, observe_actuators: bool = True, with_headings: bool = False) -> Layout:
-    """Layout for the robot of a scene, with the memory of its actuators or without, with asked headings or without."""
-    actuator, n_limbs = complete(scene.actuator), scene.robot.n_limbs
-    remembered = actuator.observe(actuator.rest).shape[-1] if observe_actuators else 0
-    return layout(n_limbs, remembered * n_limbs, with_headings)
-
-
-def observation_size(n_limbs: int) -> int:
-    """Length of the observation of a robot of n_limbs limbs whose actuators remember nothing."""
-    return layout(n_limbs).size
-
-
-def with_more(observations: NDArray[Any], more: NDArray[Any], n_limbs: int) -> NDArray[Any]:
-    """Observations, shape (n, size), with more numbers, shape (n, k), before the waypoints; unchanged if k = 0.
-
-    more: Memory of actuators, then asked headings, as far as there are any.
-    """
-    if more.shape[1] == 0:
-        return observations
-    at = layout(n_limbs)
-    parts = observations[:, at.stations_and_hub], more.astype(observations.dtype), observations[:, at.waypoints]
-    return np.hstack(parts)
 
 
 @kernel

@@ -1,29 +1,22 @@
 """`SeastarSwim-v0`: the environment of one robot. Its docstring is the contract that users read."""
 
 import contextlib
-from collections.abc import Generator, Iterator
-from os import PathLike
+from collections.abc import Generator
 from typing import Any, Literal
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.accuracy.certificate import Certificate
 from seastar_gym.accuracy.info import warn_uncertified
-from seastar_gym.envs.commands import Actions, to_commands
-from seastar_gym.envs.decisions import unless_strokes
+from seastar_gym.envs.commands import to_commands, unless_strokes
 from seastar_gym.envs.frame import Frame, frames_of
-from seastar_gym.envs.headings import Headings
-from seastar_gym.envs.randomization import DomainRandomization
+from seastar_gym.envs.options import SwimOptions, with_options
 from seastar_gym.envs.rendering import Renderer, renderer_of
-from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.swimming import Outcome, Swimming
-from seastar_gym.envs.task import Path, Plain, SwimTask, make_scene
+from seastar_gym.envs.task import SwimTask
 from seastar_gym.envs.task_env import TaskEnv, checked_options
-from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_choice, require_count, require_seed
-from seastar_gym.scene.numerics import Fidelity
 
 FRAMES_PER_SECOND = 10
 """Pictures per second of simulated time, unless another number is asked for."""
@@ -210,11 +203,6 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     reward: Weights of the reward's terms.
     waypoint_radius: Distance of the hub [m] within which a waypoint is reached.
     random_heading: Whether the robot is turned at random at the start of every episode.
-    render_mode: "rgb_array": `render` returns a picture of the end of the decision. "rgb_array_list": `render` returns
-        `frames_per_stroke` pictures of the decision. "human": a window shows as many;
-        without a display nobody sees them, and a warning says so.
-    frames_per_stroke: Number of pictures of a decision, at equal intervals; the last shows its end. None means ten per
-        second of simulated time, and one at least.
     randomization: Distributions of numbers of the scene that are drawn at the start of every episode.
     certificate: Measured errors of the scene for `info`: a `Certificate`, or the file of one that
         `python -m seastar_gym.certify` wrote. Refused where it is of another scene or version, or decisions are no
@@ -227,6 +215,11 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     observe_actuators: Whether observations have the memory of the actuators.
     headings: Headings that are asked for at the waypoints, a `Headings`: along the legs, at random, or given angles.
         None asks for none.
+    render_mode: "rgb_array": `render` returns a picture of the end of the decision. "rgb_array_list": `render` returns
+        `frames_per_stroke` pictures of the decision. "human": a window shows as many;
+        without a display nobody sees them, and a warning says so.
+    frames_per_stroke: Number of pictures of a decision, at equal intervals; the last shows its end. None means ten per
+        second of simulated time, and one at least.
 
     `scene`, `reward`, `randomization` and `headings` may be given as plain data, as `Scene.to_dict` and
     `seastar_gym.scene.serial.to_dict` write them. `env.spec` has them so:
@@ -235,32 +228,14 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
 
     metadata = {"render_modes": ["human", "rgb_array", "rgb_array_list"], "render_fps": FRAMES_PER_SECOND}
 
+    @with_options
     def __init__(
-        self,
-        path: Path = "pentagon",
-        actions: Actions = "limbs",
-        fidelity: Fidelity | None = None,
-        scene: Scene | Plain | None = None,
-        reward: RewardWeights | Plain = RewardWeights(),
-        waypoint_radius: float = 0.01,
-        random_heading: bool = False,
-        render_mode: RenderMode | None = None,
-        frames_per_stroke: int | None = None,
-        randomization: DomainRandomization | Plain | None = None,
-        certificate: Certificate | str | PathLike[str] | None = None,
-        error_bars: bool = False,
-        decision_period: float | None = None,
-        observe_actuators: bool = True,
-        headings: Headings | Plain | None = None,
+        self, *given: Any, render_mode: RenderMode | None = None, frames_per_stroke: int | None = None, **options: Any
     ):
         self._set_pictures(render_mode, frames_per_stroke)
-        modelled = make_scene(scene, fidelity, decision_period)
-        task = SwimTask(
-            modelled, 1, path, reward, waypoint_radius, random_heading, 1, randomization, certificate, error_bars,
-            actions, decision_period, observe_actuators, headings,
-        )  # fmt: skip
-        timed = unless_strokes(decision_period, modelled)
-        warn_uncertified(modelled, None if scene is None else fidelity, task.certificate, timed)
+        task = SwimTask(SwimOptions(*given, **options), 1, 1)
+        timed = unless_strokes(task.options.decision_period, task.scene)
+        warn_uncertified(task.scene, task.options.fidelity_of_scene, task.certificate, timed)
         self._begin_with(task, frames_per_stroke)
 
     def _set_pictures(self, render_mode: RenderMode | None, frames_per_stroke: int | None) -> None:
@@ -275,7 +250,6 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         of_a_decision = max(1, round(FRAMES_PER_SECOND * task.decision_period))
         self.frames_per_stroke = of_a_decision if frames_per_stroke is None else frames_per_stroke
         self.metadata = {**self.metadata, "render_fps": max(1, round(self.frames_per_stroke / task.decision_period))}
-        self._running = False
         self._command = np.zeros(self.scene.robot.n_limbs)
         self._trail = np.zeros((0, 2))
         self._frames: list[NDArray[np.uint8]] = []
@@ -298,7 +272,6 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         with self._until_whole():
             asked = checked_options(options, {self._option}).get(self._option)
             self._task.reset(np.ones(1, bool), [self.np_random], asked)
-        self._running = True
         self._command = np.zeros_like(self._command)
         self._trail = self.simulator.hub_position()
         self._frames = []
@@ -321,16 +294,6 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
         terminated = bool(outcome.terminated[0])
         self._running = not terminated
         return self._task.observe()[0], float(outcome.reward[0]), terminated, False, _of_one_robot(outcome.info)
-
-    @contextlib.contextmanager
-    def _until_whole(self) -> Iterator[None]:
-        """Context of a step or reset: after an interruption, robot and task disagree, and only a reset helps."""
-        was_running, self._running = self._running, False
-        try:
-            yield
-        except ValueError:  # refused before anything changed
-            self._running = was_running
-            raise
 
     def _swim(self, command: NDArray[np.float64]) -> Outcome:
         if self.render_mode in (None, "rgb_array"):

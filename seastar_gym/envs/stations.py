@@ -12,14 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.envs.layout import N_STATIONS
 from seastar_gym.scene import Seastar
 from seastar_gym.simulator import Simulator
 from seastar_gym.simulator.body_frame import best_fit_heading
 
 Floats = NDArray[np.float64]
-
-N_STATIONS = 9
-"""Stations of a limb: the nodes {i,1}..{i,9} of the chapter's robot."""
 
 
 class Stations(NamedTuple):

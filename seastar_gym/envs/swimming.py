@@ -14,34 +14,24 @@ import functools
 import operator
 from abc import ABC, abstractmethod
 from collections.abc import Generator
+from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.accuracy.certificate import Certificate
-from seastar_gym.accuracy.info import errors_in_info
-from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.decisions import checked_decision_period, unless_strokes
-from seastar_gym.envs.headings import Headings
+from seastar_gym.accuracy.info import errors_in_info, read_certificate
+from seastar_gym.envs.commands import checked_decision_period, unless_strokes
+from seastar_gym.envs.layout import HEADINGS, VELOCITY_SCALE, Entry, Layout
 from seastar_gym.envs.masks import action_masks, can_be_masked, masked_limbs
-from seastar_gym.envs.observation import (
-    VELOCITY_SCALE,
-    body_axes,
-    layout,
-    observation_size,
-    observe,
-    to_float32,
-    with_more,
-)
-from seastar_gym.envs.own_numbers import NO_MORE, OwnNumbers
-from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, drawn_scene
+from seastar_gym.envs.observation import body_axes, observe, to_float32
+from seastar_gym.envs.options import SwimOptions
+from seastar_gym.envs.randomization import LIMB_STRENGTHS, drawn_scene
 from seastar_gym.envs.reward import pulses_of
 from seastar_gym.envs.scenery import NOTHING, Scenery
 from seastar_gym.envs.stations import stations_of
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Mirror, complete
-from seastar_gym.scene.checks import require_flag
 from seastar_gym.simd.rows import to_rows
 from seastar_gym.simulator import Simulator, SolverStatus, StrokeReport
 
@@ -79,51 +69,45 @@ class Draws(Protocol):
 
 
 class Swimming(ABC):
-    """Task of `n_robots` robots, for the arguments see `SeastarSwimEnv`.
+    """Task of `n_robots` robots.
 
     Every robot has an episode and a generator of its own, so a robot of a batch does what it would do alone.
+
+    options: Of the environment, see `SeastarSwimEnv`. threads: Of the simulator, one for every processor if None.
+    draws: Numbers of the scene that are drawn for every episode. effort: Whether info has the actuators' work.
     """
 
     TERMS: tuple[str, ...]
     """Names of the reward's terms."""
-    randomization: DomainRandomization | None = None
-    headings: Headings | None = None
-    """Headings that are asked for at the waypoints, None if none are."""
     waypoint_radius: float
     """Radius of waypoints [m]."""
     observes_commands = False
     """Whether the last command of every limb is observed, after the memory of its actuator."""
-    own_numbers: OwnNumbers = NO_MORE
-    """Kinds of the numbers of `_wanted`, but for asked headings, and whether limbs are observed."""
+    entries: tuple[Entry, ...] = ()
+    """What the numbers of `_wanted` are, but for asked headings."""
+    shows_limbs = True
+    """Whether the stations of the limbs and the hub's velocity are observed."""
 
     def __init__(
         self,
-        scene: Scene,
+        options: SwimOptions,
         n_robots: int,
         threads: int | None,
         *,
-        random_heading: bool = False,
         draws: Draws | None = None,
-        certificate: Certificate | None = None,
-        error_bars: bool = False,
-        actions: Actions = "limbs",
-        decision_period: float | None = None,
-        observe_actuators: bool = True,
         effort: bool = False,
     ):
-        require_flag("random_heading", random_heading)
-        require_flag("observe_actuators", observe_actuators)
-        self.decision_period = checked_decision_period(decision_period, scene)
+        scene = options.modelled
+        self.options = options
+        self.decision_period = checked_decision_period(options.decision_period, scene)
         self._tells_errors = True
-        self.actions: Actions = actions
-        self.observe_actuators = observe_actuators
         self._can_be_masked = can_be_masked(scene.actuator)
         self.scene = self._drawn_from = scene
         self._draws = draws
         self.drawn = {} if draws is None else draws.first_values(scene, n_robots)
-        self.simulator = Simulator(drawn_scene(scene, self.drawn), n_robots, threads, error_bars, effort)
-        self._error_bars, self._effort = error_bars, effort
-        self.certificate = certificate
+        self.simulator = Simulator(drawn_scene(scene, self.drawn), n_robots, threads, options.error_bars, effort)
+        self._effort = effort
+        self.certificate = read_certificate(options.certificate, scene, unless_strokes(self.decision_period, scene))
         self._measured = self.simulator.scene, self._errors_of(self.simulator.scene)
         self._names_of_errors = tuple(self._measured[1])
         peak = np.max(self.simulator.scene.actuator.peak_angle)  # before the first draw the largest that may be drawn
@@ -132,7 +116,7 @@ class Swimming(ABC):
                 'With hub_hinge="turning" some actions would close a hub hinge, where its curvature is infinite: use '
                 'hub_hinge="opening" or a smaller peak angle.'
             )
-        self.random_heading, self.n_robots = random_heading, n_robots
+        self.n_robots = n_robots
         self.waypoint_index = np.zeros(n_robots, np.int64)  # the waypoint to swim to; 0 in tasks without
         self.last_commands = np.zeros((n_robots, scene.robot.n_limbs))
         self._energy = np.zeros(n_robots)  # since the reset [J]
@@ -157,24 +141,20 @@ class Swimming(ABC):
     def _goal_facts(self, hub: Floats) -> dict[str, NDArray[Any]]:
         """Entries of info that belong to the task; arrays over robots."""
 
-    @abstractmethod
     def waypoints_of(self, robot: int) -> Floats:
         """Waypoints of a robot's present episode [m], shape (n, 2), a copy; n is 0 in tasks without."""
+        return np.zeros((0, 2))
 
     def scenery(self, robot: int) -> Scenery:
         """What pictures of a robot show besides its waypoints."""
         return NOTHING
 
-    @property
-    def observation_size(self) -> int:
-        """Length of one robot's observation."""
-        more = self._remembered().shape[1] + self._wanted().shape[1]
-        return observation_size(self.scene.robot.n_limbs) + more - self._n_unseen
-
-    @property
-    def _n_unseen(self) -> int:
-        """Length of the beginning of the observation that is not shown."""
-        return 0 if self.own_numbers.with_stations else layout(self.scene.robot.n_limbs).stations_and_hub.stop
+    @functools.cached_property
+    def layout(self) -> Layout:
+        """What one robot's observation consists of."""
+        asked = HEADINGS if self.options.headings is not None else ()
+        bare = Layout.of(self.scene, self.options.observe_actuators, asked + self.entries)
+        return replace(bare, of_limb=bare.of_limb + self.observes_commands, shows_limbs=self.shows_limbs)
 
     def reset(self, robots: Flags, generators: list[np.random.Generator], asked: Any = None) -> None:
         """Begin a new episode of the robots in a mask, shape (n_robots,).
@@ -185,7 +165,7 @@ class Swimming(ABC):
         headings = np.zeros(self.n_robots)
         for robot in np.flatnonzero(robots):
             self._draw(int(robot), generators[robot], asked)
-            if self.random_heading:
+            if self.options.random_heading:
                 headings[robot] = generators[robot].uniform(-np.pi, np.pi)
             if self._draws is not None:
                 self._draws.draw(self.drawn, int(robot), generators[robot])
@@ -198,20 +178,24 @@ class Swimming(ABC):
         self._begin(robots)
 
     def observe(self) -> NDArray[np.float32]:
-        """Observations, shape (n_robots, size), a fresh array; see observation.py."""
+        """Observations, shape (n_robots, size), a fresh array; see layout.py."""
         simulator = self.simulator
         target_rows = to_rows(self._targets())
         own, robot = simulator.coefficients, simulator.scene.robot
-        out = np.empty((len(target_rows), observation_size(robot.n_limbs), target_rows.shape[2]))
+        bare = Layout(robot.n_limbs)
+        out = np.empty((len(target_rows), bare.size, target_rows.shape[2]))
         places = stations_of(robot)
         observe(own.rest, own.limb_length, simulator.q, simulator.v, places, target_rows, VELOCITY_SCALE, out)
-        more = np.hstack([self._remembered(), self._wanted()])
-        seen = with_more(to_float32(out, self.n_robots), more, robot.n_limbs)
-        return seen[:, self._n_unseen :].copy() if self._n_unseen else seen
+        seen = to_float32(out, self.n_robots)
+        if self.layout == bare:
+            return seen
+        stations_and_hub = seen[:, bare.stations_and_hub if self.shows_limbs else slice(0)]
+        more = [part.astype(np.float32) for part in (self._remembered(), self._wanted())]
+        return np.hstack([stations_and_hub, *more, seen[:, bare.waypoints]])
 
     def _remembered(self) -> Floats:
         """Numbers of the limbs that stand before the targets, shape (n_robots, k), limb after limb."""
-        wires = self._observed_wires() if self.observe_actuators else np.zeros((self.n_robots, 0))
+        wires = self._observed_wires() if self.options.observe_actuators else np.zeros((self.n_robots, 0))
         if not self.observes_commands:
             return wires
         of_limbs = [wires.reshape(*self.last_commands.shape, -1), self.last_commands[..., None]]
@@ -227,7 +211,7 @@ class Swimming(ABC):
         return self.simulator.observe_actuators()
 
     def _wanted(self) -> Floats:
-        """Numbers of the robot that stand after those of the limbs, such as asked headings, shape (n_robots, k)."""
+        """Further entries of the observation, such as asked headings, shape (n_robots, k)."""
         return np.zeros((self.n_robots, 0))
 
     def _axes(self) -> Floats:
@@ -254,7 +238,7 @@ class Swimming(ABC):
 
     def action_masks(self) -> Flags:
         """Actions that wires can follow now, shape (n_robots, k), see masks.py."""
-        return action_masks(self.actions, self._deaf_wires())
+        return action_masks(self.options.actions, self._deaf_wires())
 
     def _deaf_wires(self) -> Flags:
         """Wires that cannot be heated now, by their names in commands, shape (n_robots, n_limbs, 2)."""
@@ -340,7 +324,7 @@ class Swimming(ABC):
             **self._goal_facts(hub),
             **({"action_mask": self.action_masks().astype(np.int8)} if self._can_be_masked else {}),
             **(self._errors() if self._tells_errors else {}),
-            **({"error_estimate": self.simulator.error_estimate} if self._error_bars else {}),
+            **({"error_estimate": self.simulator.error_estimate} if self.options.error_bars else {}),
             **{name: values.copy() for name, values in self.drawn.items()},
         }
 

@@ -1,130 +1,31 @@
 """The task behind `SeastarSwim-v0`: robots that swim along waypoints, each on a path of its own."""
 
-from dataclasses import replace
-from os import PathLike
-from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from seastar_gym.accuracy.certificate import Certificate
-from seastar_gym.accuracy.info import read_certificate
-from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.decisions import checked_decision_period, unless_strokes
-from seastar_gym.envs.headings import AskedHeadings, Headings
-from seastar_gym.envs.observation import scene_layout
-from seastar_gym.envs.paths import FARTHEST, cross_track_error, make_path
-from seastar_gym.envs.randomization import DomainRandomization
-from seastar_gym.envs.reward import RewardWeights, reward_terms
-from seastar_gym.envs.swimming import Flags, Floats, Outcome, Score, Swimming
-from seastar_gym.scene import Scene, SmaWires
-from seastar_gym.scene.checks import as_float, require_number, shown
-from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.scene.scene_file import load_scene
-from seastar_gym.scene.serial import Part, from_dict
-
-Path = str | ArrayLike
-"""Path by its name, or waypoints [m], shape (n, 2)."""
-Plain = dict[str, Any]
-"""Part of a scene, or of the task, as plain data, see `seastar_gym.scene.serial`."""
-
-__all__ = ["Outcome", "Path", "Plain", "SwimTask", "make_scene", "read", "scene_at", "scene_observation_size"]
-
-
-def make_scene(
-    scene: Scene | Plain | None, fidelity: Fidelity | None, decision_period: float | None = None
-) -> Scene:
-    """Scene with the nodes and numerics that it names, otherwise with those of `fidelity`, see `Scene.at`.
-
-    Without a scene, it is the chapter's at the fidelity, with wires for decisions that are not strokes.
-
-    decision_period: Time between decisions [s]. None means a stroke.
-    """
-    if scene is None:
-        chapters = Scene().at(fidelity)
-        in_strokes = decision_period is None or decision_period == chapters.actuator.period
-        return chapters if in_strokes else replace(chapters, actuator=SmaWires())
-    scene = read(scene, Scene)
-    if not isinstance(scene, Scene):
-        raise ValueError(f"scene must be a Scene, not {shown(scene)}.")
-    return scene.at(fidelity)
-
-
-def scene_at(file: FilePath | None, fidelity: Fidelity) -> Scene | None:
-    """Scene of a file as command lines name it, with its own numerics, or those of `fidelity` where it names none.
-
-    None for no file.
-    """
-    if file is None:
-        return None
-    scene = load_scene(file)
-    return make_scene(scene, None if scene.numerics.named else fidelity)
-
-
-def read(part: Part | Plain, kind: type[Any]) -> Part:
-    """Part that was given as an object or in plain form."""
-    return from_dict(part, kind) if isinstance(part, dict) else part
-
-
-def scene_observation_size(scene: Scene, observe_actuators: bool = True, with_headings: bool = False) -> int:
-    """Length of the observation of a scene's robot. with_headings: Whether headings are asked for."""
-    return scene_layout(scene, observe_actuators, with_headings).size
+from seastar_gym.envs.headings import AskedHeadings
+from seastar_gym.envs.options import Path, SwimOptions
+from seastar_gym.envs.paths import cross_track_error, make_path
+from seastar_gym.envs.reward import reward_terms
+from seastar_gym.envs.swimming import Flags, Floats, Score, Swimming
 
 
 class SwimTask(Swimming):
-    """Task of `n_robots` robots that swim along waypoints, for the arguments see `SeastarSwimEnv`.
+    """Task of `n_robots` robots that swim along waypoints.
 
     Every robot has its own path and its own generator, so a robot of a batch does what it would do alone.
     """
 
     TERMS: tuple[str, ...] = ("reward_progress", "reward_waypoint", "reward_effort")
 
-    def __init__(
-        self,
-        scene: Scene,
-        n_robots: int,
-        path: Path,
-        reward: RewardWeights | Plain,
-        waypoint_radius: float,
-        random_heading: bool,
-        threads: int | None,
-        randomization: DomainRandomization | Plain | None = None,
-        certificate: Certificate | str | PathLike[str] | None = None,
-        error_bars: bool = False,
-        actions: Actions = "limbs",
-        decision_period: float | None = None,
-        observe_actuators: bool = True,
-        headings: Headings | Plain | None = None,
-        effort: bool = False,
-    ):
-        randomization, reward = read(randomization, DomainRandomization), read(reward, RewardWeights)
-        headings = read(headings, Headings)
-        if not isinstance(randomization, DomainRandomization | None):
-            raise ValueError(f"randomization must be a DomainRandomization or None, not {shown(randomization)}.")
-        waypoint_radius = as_float(waypoint_radius)
-        require_number("waypoint_radius", waypoint_radius, "m")
-        if waypoint_radius > FARTHEST:
-            raise ValueError(f"waypoint_radius must be at most {FARTHEST:g} m, not {shown(waypoint_radius)}.")
-        if not isinstance(reward, RewardWeights):
-            raise ValueError(f"reward must be RewardWeights, not {shown(reward)}.")
-        if not isinstance(headings, Headings | None):
-            raise ValueError(f"headings must be Headings or None, not {shown(headings)}.")
-        waypoints = make_path(path, np.random.default_rng(0))  # refuses a bad path now, not at the first reset
-        if headings is not None:
-            headings.of_path(waypoints, np.random.default_rng(0))  # likewise
+    def __init__(self, options: SwimOptions, n_robots: int, threads: int | None, *, effort: bool = False):
+        self._asked = None if options.headings is None else AskedHeadings(options.headings, n_robots)
+        if options.headings is not None:
             self.TERMS = (*self.TERMS, "reward_heading")
-        self.headings = headings
-        self._asked = None if headings is None else AskedHeadings(headings, n_robots)
-        timed = unless_strokes(checked_decision_period(decision_period, scene), scene)
-        super().__init__(
-            scene, n_robots, threads, random_heading=random_heading, draws=randomization,
-            certificate=read_certificate(certificate, scene, timed), error_bars=error_bars, actions=actions,
-            decision_period=decision_period, observe_actuators=observe_actuators, effort=effort,
-        )  # fmt: skip
-        self.randomization = randomization
-        self.path: Path = path if isinstance(path, str) else waypoints
-        self.reward, self.waypoint_radius = reward, waypoint_radius
+        super().__init__(options, n_robots, threads, draws=options.randomization, effort=effort)
+        self.reward, self.waypoint_radius = options.reward, options.waypoint_radius
         self.waypoints = np.zeros((n_robots, 1, 2))
         self._way_after = np.zeros((n_robots, 1))  # from waypoint k to the last [m]
         self.n_waypoints = np.ones(n_robots, np.int64)
@@ -132,7 +33,7 @@ class SwimTask(Swimming):
         self._turn_to_go = np.zeros(n_robots)  # [rad]
 
     def _draw(self, robot: int, rng: np.random.Generator, asked: Path | None) -> None:
-        waypoints = make_path(self.path if asked is None else asked, rng)
+        waypoints = make_path(self.options.path if asked is None else asked, rng)
         if self._asked is not None:
             self._asked.begin(robot, self._asked.headings.of_path(waypoints, rng))
         self._set_path(robot, waypoints)

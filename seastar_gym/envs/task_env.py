@@ -1,5 +1,7 @@
 """Common base of the environments of one robot and of a batch: task, action mode, and options of a reset."""
 
+import contextlib
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -7,7 +9,7 @@ from gymnasium import spaces
 
 from seastar_gym.envs.commands import Actions, action_space, command_table
 from seastar_gym.envs.headings import Headings
-from seastar_gym.envs.own_numbers import OwnNumbers
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.spec import PlainSpec
 from seastar_gym.envs.swimming import Swimming
@@ -23,15 +25,28 @@ class TaskEnv(PlainSpec):
     actions: Actions
     _option = "path"
     """Name of the option by which a reset asks for something of the task."""
+    _running = False
+    """Whether an episode has begun and was not interrupted."""
 
     def _set_task(self, task: Swimming) -> tuple[spaces.Space[Any], spaces.Space[Any]]:
         """Take the task; returns the spaces of one robot's actions and observations."""
         n_limbs = task.scene.robot.n_limbs
-        self._task, self.actions = task, task.actions
-        actions_of_one = action_space(task.actions, n_limbs)
+        self._task, self.actions = task, task.options.actions
+        actions_of_one = action_space(self.actions, n_limbs)
         has_table = isinstance(actions_of_one, spaces.Discrete)
-        self.command_table = command_table(task.actions, n_limbs) if has_table else None
-        return actions_of_one, spaces.Box(-np.inf, np.inf, (task.observation_size,), np.float32)
+        self.command_table = command_table(self.actions, n_limbs) if has_table else None
+        return actions_of_one, spaces.Box(-np.inf, np.inf, (task.layout.size,), np.float32)
+
+    @contextlib.contextmanager
+    def _until_whole(self) -> Iterator[None]:
+        """Context of a step or reset: after an interruption, robots and task disagree, and only a reset helps."""
+        was_running, self._running = self._running, False
+        try:
+            yield
+        except ValueError:  # refused before anything changed
+            self._running = was_running
+            raise
+        self._running = True
 
     @property
     def decision_period(self) -> float:
@@ -41,7 +56,7 @@ class TaskEnv(PlainSpec):
     @property
     def observe_actuators(self) -> bool:
         """Whether observations have the memory of the actuators."""
-        return self._task.observe_actuators
+        return self._task.options.observe_actuators
 
     @property
     def added_mirror(self) -> Mirror:
@@ -49,14 +64,14 @@ class TaskEnv(PlainSpec):
         return self._task.added_mirror
 
     @property
-    def own_numbers(self) -> OwnNumbers:
-        """What the task shows of its own in the observation, and whether it shows the limbs."""
-        return self._task.own_numbers
+    def layout(self) -> Layout:
+        """What one robot's observation consists of, and the places of all that."""
+        return self._task.layout
 
     @property
     def headings(self) -> Headings | None:
         """Headings that are asked for at the waypoints, None if none are."""
-        return self._task.headings
+        return self._task.options.headings
 
     @property
     def scene(self) -> Scene:
@@ -66,7 +81,7 @@ class TaskEnv(PlainSpec):
     @property
     def randomization(self) -> DomainRandomization | None:
         """Distributions of the numbers that are drawn for every episode."""
-        return self._task.randomization
+        return self._task.options.randomization
 
     @property
     def simulator(self) -> Simulator:

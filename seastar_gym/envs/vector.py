@@ -1,8 +1,6 @@
 """`SeastarSwim-v0` as a native batch: all robots in one simulator, with the bits of one environment each."""
 
-import contextlib
-from collections.abc import Iterable, Iterator
-from os import PathLike
+from collections.abc import Iterable
 from typing import Any, Literal
 
 import gymnasium as gym
@@ -12,24 +10,18 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from seastar_gym.accuracy.certificate import Certificate
 from seastar_gym.accuracy.info import warn_uncertified
 from seastar_gym.envs.batch_attributes import BatchAttributes
 from seastar_gym.envs.batch_info import Info, of_some, with_masks
 from seastar_gym.envs.batch_pictures import BatchPictures, Picture
 from seastar_gym.envs.buffers import Buffers, require_buffers
-from seastar_gym.envs.commands import Actions, as_array, to_commands
-from seastar_gym.envs.decisions import unless_strokes
-from seastar_gym.envs.headings import Headings
-from seastar_gym.envs.randomization import DomainRandomization
-from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.commands import as_array, to_commands, unless_strokes
+from seastar_gym.envs.options import SwimOptions, with_options
 from seastar_gym.envs.seastar_swim import FRAMES_PER_SECOND
 from seastar_gym.envs.swimming import Swimming
-from seastar_gym.envs.task import Path, Plain, SwimTask, make_scene
+from seastar_gym.envs.task import SwimTask
 from seastar_gym.envs.task_env import checked_options
-from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_choice, require_count, require_seed, shown
-from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator.simulator import MAX_ROBOTS
 
 Observations = NDArray[np.float32]
@@ -68,35 +60,21 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         "render_modes": ["rgb_array"], "render_fps": FRAMES_PER_SECOND, "autoreset_mode": AutoresetMode.NEXT_STEP,
     }  # fmt: skip
 
+    @with_options
     def __init__(
         self,
         num_envs: int = 1,
         max_episode_steps: int | None = None,
-        path: Path = "pentagon",
-        actions: Actions = "limbs",
-        fidelity: Fidelity | None = None,
-        scene: Scene | Plain | None = None,
-        reward: RewardWeights | Plain = RewardWeights(),
-        waypoint_radius: float = 0.01,
-        random_heading: bool = False,
+        *given: Any,
         render_mode: Literal["rgb_array"] | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
-        randomization: DomainRandomization | Plain | None = None,
-        certificate: Certificate | str | PathLike[str] | None = None,
-        error_bars: bool = False,
-        decision_period: float | None = None,
-        observe_actuators: bool = True,
-        headings: Headings | Plain | None = None,
+        **options: Any,
     ):
         self._set_batch(num_envs, max_episode_steps, render_mode, autoreset_mode)
-        modelled = make_scene(scene, fidelity, decision_period)
-        task = SwimTask(
-            modelled, num_envs, path, reward, waypoint_radius, random_heading, threads, randomization, certificate,
-            error_bars, actions, decision_period, observe_actuators, headings,
-        )  # fmt: skip
-        timed = unless_strokes(decision_period, modelled)
-        warn_uncertified(modelled, None if scene is None else fidelity, task.certificate, timed)
+        task = SwimTask(SwimOptions(*given, **options), num_envs, threads)
+        timed = unless_strokes(task.options.decision_period, task.scene)
+        warn_uncertified(task.scene, task.options.fidelity_of_scene, task.certificate, timed)
         self._begin_with(task)
 
     def _set_batch(
@@ -131,7 +109,6 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         self._own_attributes: dict[str, tuple[Any, ...]] = {}
         self._elapsed = np.zeros(num_envs, np.int64)
         self._needs_reset = np.ones(num_envs, bool)
-        self._has_begun = False
 
     @property
     def waypoints(self) -> tuple[NDArray[np.float64], ...]:
@@ -176,7 +153,7 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         mask = as_array(mask)
         if mask.dtype != bool or mask.shape != (self.num_envs,) or not mask.any():
             raise ValueError(f"reset_mask must be boolean of shape ({self.num_envs},) with at least one True.")
-        if not self._has_begun and not mask.all():
+        if not self._running and not mask.all():
             raise gym.error.ResetNeeded("The first reset must be of all robots: call reset() without a reset_mask.")
         return mask
 
@@ -196,8 +173,8 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
         out: Arrays that the results are written into, and that are returned then; by default fresh ones.
         """
         if out is not None:
-            require_buffers(out, self.num_envs, self._task.observation_size)
-        if not self._has_begun:
+            require_buffers(out, self.num_envs, self._task.layout.size)
+        if not self._running:
             raise gym.error.ResetNeeded("The episodes have not begun or were interrupted: call reset() before step().")
         if self.autoreset_mode is AutoresetMode.DISABLED and self._needs_reset.any():
             raise gym.error.ResetNeeded(
@@ -213,17 +190,6 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
             return *results, info
         out.take(results)
         return *out, info
-
-    @contextlib.contextmanager
-    def _until_whole(self) -> Iterator[None]:
-        """Context of a step or reset: after an interruption, robots and task disagree, and only a reset helps."""
-        had_begun, self._has_begun = self._has_begun, False
-        try:
-            yield
-        except ValueError:  # refused before anything changed
-            self._has_begun = had_begun
-            raise
-        self._has_begun = True
 
     def _step(
         self, commands: NDArray[np.float64], resting: Flags

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from seastar_gym.controllers.contract import Policy, actions_of
 from seastar_gym.controllers.learned import LearnedPolicy
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import make_scene
 from seastar_gym.evaluation.films import film
 from seastar_gym.evaluation.pictures import FPS, FRAMES_PER_STROKE, draw_traces
 from seastar_gym.evaluation.playback import Playback, RecordingEnv

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.controllers.greedy import turned
-from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout
+from seastar_gym.envs.layout import VELOCITY_SCALE
+from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.stations import heading_of
 from seastar_gym.envs.swimming import Flags, Outcome
 from seastar_gym.envs.task import SwimTask
@@ -58,11 +59,18 @@ DISTURBANCES = {
 class DisturbedTask(SwimTask):
     """Task whose robots are disturbed; positions are those in the world, where the waypoints stand still.
 
-    rng: Draws noise and lost strokes. what, how: Arguments of `SwimTask`.
+    rng: Draws noise and lost strokes. options, n_robots, threads: See `SwimTask`.
     """
 
-    def __init__(self, disturbance: Disturbance, rng: np.random.Generator, *what: Any, **how: Any):
-        super().__init__(*what, **how)
+    def __init__(
+        self,
+        disturbance: Disturbance,
+        rng: np.random.Generator,
+        options: SwimOptions,
+        n_robots: int,
+        threads: int | None,
+    ):
+        super().__init__(options, n_robots, threads)
         self.disturbance, self._rng = disturbance, rng
         robots, n_limbs = np.arange(self.n_robots), self.scene.robot.n_limbs
         angles = 2.0 * np.pi / CURRENT_DIRECTIONS * robots
@@ -86,8 +94,7 @@ class DisturbedTask(SwimTask):
 
     def observe(self) -> NDArray[np.float32]:
         """Observations of the disturbed robots, shape (n_robots, size)."""
-        seen = super().observe()
-        at = scene_layout(self.scene)
+        seen, at = super().observe(), self.layout
         if self.disturbance.current > 0.0:
             axes = heading_of(self.simulator)
             seen[:, at.hub_velocity] += turned(self._current, -axes) / VELOCITY_SCALE

@@ -3,8 +3,8 @@
 import numpy as np
 
 from seastar_gym.controllers.contract import Policy, actions_of, require_fit, require_policy
-from seastar_gym.envs.reward import RewardWeights
-from seastar_gym.envs.task import Path as SwimPath
+from seastar_gym.envs.options import Path as SwimPath
+from seastar_gym.envs.options import SwimOptions
 from seastar_gym.evaluation.disturbances import Disturbance, DisturbedTask
 from seastar_gym.evaluation.rollout import MOST_DECISIONS, TaskBatch, rollout
 from seastar_gym.evaluation.swim import RECORDED, TIME_LIMIT, Swim, decisions_in, swims_of
@@ -47,10 +47,11 @@ def swim_many(
     actions = actions_of(policy, scene.robot.n_limbs)
     require_fit(policy, scene, actions, decision_period)
     with_heading = isinstance(path, str) and path == "random"
-    task = DisturbedTask(
-        disturbance, np.random.default_rng([seed, n_swims]), scene, n_swims, path, RewardWeights(), waypoint_radius,
-        with_heading, threads, actions=actions, decision_period=decision_period,
+    options = SwimOptions(
+        path, actions, scene=scene, waypoint_radius=waypoint_radius, random_heading=with_heading,
+        decision_period=decision_period,
     )  # fmt: skip
+    task = DisturbedTask(disturbance, np.random.default_rng([seed, n_swims]), options, n_swims, threads)
     batch, limit = TaskBatch(task), max_strokes or decisions_in(TIME_LIMIT, decision_period)
     batch.np_random = tuple(np.random.default_rng([seed, swim]) for swim in range(n_swims))
     swims = swims_of(agent, rollout(batch, policy, until=limit, record=RECORDED))

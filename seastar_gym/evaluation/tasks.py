@@ -8,7 +8,7 @@ from gymnasium.envs.registration import load_env_creator
 
 from seastar_gym.controllers.contract import Policy, actions_in, require_fit
 from seastar_gym.controllers.greedy import Searcher
-from seastar_gym.envs.task import scene_observation_size
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.tasks.numbered import Split
 from seastar_gym.evaluation.rollout import Batch, Episodes, rollout
 from seastar_gym.scene.numerics import Fidelity
@@ -63,7 +63,7 @@ def make_batch(task: str, n: int, /, threads: int | None = None, **arguments: An
 
 def require_seen(policy: Policy, env: Any) -> None:
     """ValueError where an agent cannot know what a task shows, or cannot drive its robot."""
-    n_seen, n_known = env.observation_space.shape[0], scene_observation_size(env.scene)
+    n_seen, n_known = env.observation_space.shape[0], Layout.of(env.scene).size
     if isinstance(policy, Searcher) and n_seen != n_known:
         raise ValueError(f"It reads observations of {n_known} numbers, the task shows {n_seen}.")
     actions = actions_in(policy, env.actions, env.scene.robot.n_limbs)

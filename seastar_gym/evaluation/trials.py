@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from seastar_gym.controllers.contract import Policy
-from seastar_gym.envs.task import make_scene
+from seastar_gym.envs.options import make_scene
 from seastar_gym.evaluation.disturbances import CURRENT_DIRECTIONS, DISTURBANCES
 from seastar_gym.evaluation.many import swim_many
 from seastar_gym.evaluation.results import MEANS, Row, number, statistics, text_table

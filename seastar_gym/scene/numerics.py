@@ -13,6 +13,8 @@ Fidelity = Literal["fast", "balanced", "accurate", "reference", "chapter"]
 
 MAX_STEPS = 10_000_000
 """Largest number of time steps in a stroke. More would take minutes even for one robot."""
+SHORTEST = 1e-6
+"""Shortest interval, as a fraction of a step: rounding of times is far below it."""
 
 MOST_ITERATIONS, MOST_ITERATIONS_PER_STEP = 200_000, 100
 """Limit of a robot's Newton iterations in a stroke: a constant, and an allowance for every time step.

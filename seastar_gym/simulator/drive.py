@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.actuators.actuator import Actuator, complete, stroke_at
+from seastar_gym.scene.actuators.actuator import JUMP, Actuator, complete, stroke_at
 from seastar_gym.scene.per_robot import column
 from seastar_gym.simulator.schedule import SAME_TIME, interval_times
 
@@ -11,8 +11,6 @@ Floats = NDArray[np.float64]
 
 KNOWN_INTERVALS = 64
 """Largest number of intervals whose time steps are kept."""
-JUMP = 1e-9
-"""Rotation over the peak angle. A limb that would turn by more at once would jump."""
 
 
 class Drive:

@@ -6,13 +6,10 @@ from itertools import pairwise
 import numpy as np
 
 from seastar_gym.scene.checks import require_number
-from seastar_gym.scene.numerics import MAX_STEPS
+from seastar_gym.scene.numerics import MAX_STEPS, SHORTEST
 
 SAME_TIME = 1e-9
 """Fraction of a step. A shorter remainder before a corner is rounding of the division, not a step."""
-
-SHORTEST = 1e-6
-"""Shortest interval, as a fraction of a step: rounding of times is far below it."""
 
 
 def require_duration(duration: float, step: float) -> None:

@@ -12,10 +12,10 @@ from seastar_gym.controllers.contract import Policy, require_fit
 from seastar_gym.controllers.learned import in_the_box, load
 from seastar_gym.controllers.roster import AGENTS, files_of, load_agent
 from seastar_gym.controllers.scripted import scripted
-from seastar_gym.envs.decisions import checked_decision_period
+from seastar_gym.envs.commands import checked_decision_period
+from seastar_gym.envs.options import Path as SwimPath
 from seastar_gym.envs.paths import make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import Path as SwimPath
 from seastar_gym.evaluation.many import HELD_OUT_SEED
 from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.scene import Scene

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.controllers.contract import actions_of, require_fit
-from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.task import SwimTask
 from seastar_gym.evaluation.rollout import TaskBatch, rollout
 from seastar_gym.scene import Scene
@@ -130,10 +130,10 @@ def steer(scene: Scene, frame: Scene, pilot: Pilot, n_robots: int) -> dict[str, 
     n_limbs, policy, waypoints = scene.robot.n_limbs, pilot.policy(frame), np.array(pilot.waypoints)
     actions = actions_of(policy, n_limbs)
     require_fit(policy, scene, actions, pilot.decision_period)
-    task = SwimTask(
-        scene, n_robots, waypoints, RewardWeights(), RADIUS, False, 1, actions=actions,
-        decision_period=pilot.decision_period, effort=True,
-    )  # fmt: skip
+    options = SwimOptions(
+        waypoints, actions, scene=scene, waypoint_radius=RADIUS, decision_period=pilot.decision_period
+    )
+    task = SwimTask(options, n_robots, 1, effort=True)
     headings: list[Floats] = []
     swum = rollout(
         TaskBatch(task), policy, seeds=0, until=pilot.decisions, record=OF_EPISODES,

@@ -23,8 +23,8 @@ from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_model, make_training_env, policy_of
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import LearnedPolicy
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.reward import RewardWeights
-from seastar_gym.envs.task import make_scene
 from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
 from seastar_gym.scene.numerics import Fidelity
 from studies.frame import Results, Study, require_known

@@ -26,10 +26,10 @@ from seastar_gym.controllers.greedy import Displacements, measure_gaits
 from seastar_gym.controllers.planner import Branching
 from seastar_gym.controllers.roster import HELP, load_agents
 from seastar_gym.envs.commands import Actions, command_table
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.paths import LINE_LENGTH, make_path
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import action_table
-from seastar_gym.envs.task import make_scene
 from seastar_gym.evaluation.many import swim_many
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity

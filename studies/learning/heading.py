@@ -28,14 +28,10 @@ from seastar_gym.controllers.planner import Planner
 from seastar_gym.controllers.turning import TurnThenSwim
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.headings import Headings
+from seastar_gym.envs.layout import HEADINGS, Layout
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.symmetry import (
-    VectorSymmetryReduction,
-    memory_mirror,
-    reduce_observations,
-    restore_actions,
-)
-from seastar_gym.envs.task import make_scene
+from seastar_gym.envs.symmetry import Symmetry, VectorSymmetryReduction, memory_mirror
 from seastar_gym.evaluation.swim import Swim, decisions_in, swim
 from seastar_gym.gaits import turning_wave
 from seastar_gym.scene import Scene
@@ -76,10 +72,11 @@ class Reduced:
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
     ) -> tuple[Any, Any]:
         """Action for an observation of one robot, and None."""
-        n_limbs, mirror = self.scene.robot.n_limbs, memory_mirror(self.scene.actuator)
-        reduced, element = reduce_observations(observation, n_limbs, mirror, with_headings=True)
+        layout, mirror = Layout.of(self.scene, entries=HEADINGS), memory_mirror(self.scene.actuator)
+        symmetry = Symmetry(self.scene.robot.n_limbs, mirror, layout, self.actions)
+        reduced, element = symmetry.reduce(observation)
         action, _ = self.model.predict(reduced, deterministic=deterministic)
-        return restore_actions(action, element, self.actions, n_limbs), None
+        return symmetry.restore(action, element), None
 
 
 COLOURS = {"strokes": FAINT, "wires": CYCLE[0], "planner": CYCLE[2], "learned": CYCLE[1]}

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.controllers.greedy import Displacements, displacement_map, turned
+from seastar_gym.controllers.greedy import Displacements, displacement_map, turned, waypoints_of
 from seastar_gym.controllers.planner import Branching, state_of
 from seastar_gym.envs.stations import heading_of
 from seastar_gym.simulator import State
@@ -30,7 +30,7 @@ class Robots:
         self.table, self.period = inner.command_table, inner.decision_period
         self.in_strokes = self.period == self.scene.actuator.period
         self._numbers = {command.tobytes(): k for k, command in enumerate(self.table + 0.0)}
-        self._added, self._own = len(inner.added_mirror), inner.own_numbers
+        self._layout = inner.layout
 
     def map(self) -> Displacements:
         """Mean displacements of all actions."""
@@ -40,26 +40,17 @@ class Robots:
         """Numbers of commands, shape (n, n_limbs)."""
         return np.array([self._numbers[command.tobytes()] for command in commands + 0.0])
 
-    def plain(self, observations: Floats32) -> Floats32:
-        """Observations without the numbers that the task adds to each limb's, and without those of its own."""
-        n_limbs = self.scene.robot.n_limbs
-        begin, end = 2 + 36 * n_limbs, observations.shape[1] - 4
-        of_limbs = observations[:, begin : end - self._own.size].reshape(self.n, n_limbs, -1)
-        of_limbs = of_limbs[..., : of_limbs.shape[-1] - self._added]
-        return np.hstack([observations[:, :begin], of_limbs.reshape(self.n, -1), observations[:, end:]])
-
     def own(self, observations: Floats32) -> Floats:
         """Numbers that the task shows of its own, shape (n, size)."""
-        return observations[:, -4 - self._own.size : -4].astype(np.float64)
+        return observations[:, self._layout.further].astype(np.float64)
 
     def targets(self, observations: Floats32) -> tuple[Floats, Floats]:
         """Both targets relative to the hub in the body frame [m], shape (n, 2) each."""
-        seen = self.scene.robot.limb_length * observations[:, -4:].astype(np.float64)
-        return seen[:, :2], seen[:, 2:]
+        return waypoints_of(observations, self.scene, self._layout)
 
     def states(self, observations: Floats32) -> State:
         """States of the robots in their body frames, with their hubs at the origin."""
-        return state_of(self.plain(observations), self.scene)
+        return state_of(observations, self.scene, self._layout)
 
     def heading(self) -> Floats:
         """Directions of the body frames in the world [rad]."""

@@ -59,7 +59,7 @@ def seen(monkeypatch):
     found, step = [], SwimTask.step
 
     def observed(task, commands):
-        found.append((task.path, task.reward.aim))
+        found.append((task.options.path, task.reward.aim))
         return step(task, commands)
 
     monkeypatch.setattr(SwimTask, "step", observed)

@@ -8,9 +8,9 @@ from agents import coasting
 from agents.coasting import CoastingProgress, fit_coasting
 from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_training_env
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.stations import body_heading
-from seastar_gym.envs.task import make_scene
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.simulator import Simulator
 

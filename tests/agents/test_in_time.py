@@ -12,8 +12,8 @@ from stable_baselines3 import SAC
 from seastar_gym.controllers import learner_zip
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.commands import command_table
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import make_scene
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.statistics import mean_with_interval
 from seastar_gym.evaluation.swim import swim
@@ -23,6 +23,7 @@ from studies.learning.in_time.shares import ChosenCommands, SharesPolicy, shares
 from studies.learning.in_time.study import Options
 from studies.learning.in_time.tables import as_markdown, pulses_per_metre
 from studies.learning.in_time.trainings import TRAININGS, Training, learn
+from symmetries import symmetry_for
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 TINY = (
@@ -150,7 +151,7 @@ def test_policies_of_shares_are_equivariant(discrete):
     commands, _ = policy.predict(seen, deterministic=True)
     for element in range(10):
         elements = np.full(len(seen), element)
-        carried, _ = policy.predict(symmetry.transform_observations(seen, elements, 5, mirror), deterministic=True)
+        carried, _ = policy.predict(symmetry_for(5, mirror).carry(seen, elements), deterministic=True)
         np.testing.assert_allclose(carried, symmetry.transform_commands(commands, elements), atol=1e-4)
 
 

@@ -21,13 +21,14 @@ from seastar_gym.controllers.learned import LearnedPolicy, load, save
 from seastar_gym.controllers.planner import Budget, Planner, budget_for, state_of
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs import symmetry
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import make_scene
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.results import as_text
 from seastar_gym.evaluation.swim import swim
 from seastar_gym.gaits import in_time, lagged_gait, straight_gait, thrifty_gait, turning_wave
+from symmetries import symmetry_for
 
 PERIODS = (0.5, 0.2, 0.1)
 FAST, SDIRK3 = Numerics.preset("fast"), Numerics("sdirk3", 1e-2, 1e-6)
@@ -240,8 +241,8 @@ def test_a_timed_policy_behind_the_symmetry_is_equivariant():
     actions, _ = policy.predict(seen, deterministic=True)
     for element in range(10):
         elements = np.full(len(seen), element)
-        carried, _ = policy.predict(symmetry.transform_observations(seen, elements, 5, mirror), deterministic=True)
-        np.testing.assert_array_equal(carried, symmetry.transform_actions(actions, elements, "pairs", 5))
+        carried, _ = policy.predict(symmetry_for(5, mirror).carry(seen, elements), deterministic=True)
+        np.testing.assert_array_equal(carried, symmetry_for(5, mode="pairs").carry_actions(actions, elements))
 
 
 def test_masks_are_handed_out_robot_by_robot():

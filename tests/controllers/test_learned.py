@@ -20,11 +20,11 @@ from every_part import ACTUATORS, PARTS
 from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, SmaPulse, UniformCurrent, Water
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import SHIPPED, LearnedPolicy, load, save
-from seastar_gym.envs import symmetry
 from seastar_gym.envs.commands import command_table
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import scene_observation_size
 from seastar_gym.evaluation.swim import swim
+from symmetries import symmetry_for
 
 ROOT = Path(__file__).resolve().parents[2]
 FAST = Numerics.preset("fast")
@@ -50,7 +50,7 @@ def file(policy, tmp_path):
 
 
 def observations(scene=Scene(), n=2000, seed=0):
-    size = scene_observation_size(scene)
+    size = Layout.of(scene).size
     return np.random.default_rng(seed).normal(size=(n, size)).astype(np.float32)
 
 
@@ -67,13 +67,13 @@ def test_a_saved_policy_acts_as_stable_baselines_does(actions, reduced, scene, t
     save(policy_of(learner), tmp_path / "policy.safetensors")
     policy, n_limbs = load(tmp_path / "policy.safetensors"), scene.robot.n_limbs
     seen = observations(scene)
-    shown, elements = symmetry.reduce_observations(seen, n_limbs) if reduced else (seen, np.zeros(len(seen), int))
+    shown, elements = symmetry_for(n_limbs).reduce(seen) if reduced else (seen, np.zeros(len(seen), int))
     chosen = learner.predict(shown, deterministic=True)[0]
     actual, state = policy.predict(seen, deterministic=True)
     best, second = np.moveaxis(np.sort(policy.logits(shown), axis=-1)[..., :-3:-1], -1, 0)
     clear = (best - second > 1e-6).all(axis=-1)  # elsewhere rounding decides
     assert clear.mean() > 0.95
-    np.testing.assert_array_equal(actual[clear], symmetry.restore_actions(chosen, elements, actions, n_limbs)[clear])
+    np.testing.assert_array_equal(actual[clear], symmetry_for(n_limbs, mode=actions).restore(chosen, elements)[clear])
     assert state is None
 
 
@@ -105,8 +105,8 @@ def test_any_network_behind_the_symmetry_is_equivariant(policy):
     actions, _ = policy.predict(seen, deterministic=True)
     for element in range(10):
         elements = np.full(len(seen), element)
-        carried, _ = policy.predict(symmetry.transform_observations(seen, elements, 5), deterministic=True)
-        np.testing.assert_array_equal(carried, symmetry.transform_actions(actions, elements, "joint", 5))
+        carried, _ = policy.predict(symmetry_for(5).carry(seen, elements), deterministic=True)
+        np.testing.assert_array_equal(carried, symmetry_for(5, mode="joint").carry_actions(actions, elements))
 
 
 # On disk

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from seastar_gym import Headings, Limited, RewardWeights, Scene, SmaPulse, SmaWires, ThermalSma
-from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout
+from seastar_gym.envs.layout import HEADINGS, VELOCITY_SCALE, Layout
 from seastar_gym.envs.paths import PATHS
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -49,7 +49,7 @@ def test_the_actions_are_those_of_the_table(row):
 
 
 def test_the_observation_is_that_of_the_table():
-    rows, at = table("Observation"), scene_layout(Scene())
+    rows, at = table("Observation"), Layout.of(Scene())
     documented = [slice(int(first), int(last) + 1) for first, last in (row["index"].split("..") for row in rows)]
     assert documented == [at.positions, at.velocities, at.hub_velocity, at.current_waypoint, at.next_waypoint]
     lengths = {"0.1 m": Scene().robot.limb_length, "0.025 m/s": VELOCITY_SCALE}
@@ -63,9 +63,9 @@ def test_the_observation_is_that_of_the_table():
 def test_the_memory_of_actuators_is_that_of_the_table(actuator, n):
     (row,) = [line for line in section("Observation").splitlines() if f"`{type(actuator).__name__}`" in line]
     assert ("+, -" in row) == (n > 1)
-    at = scene_layout(Scene(actuator=actuator))
+    at = Layout.of(Scene(actuator=actuator))
     assert at.actuators == slice(182, 182 + 5 * n) and (n != 2 or f"has {at.size} numbers" in section("Observation"))
-    assert f"{scene_layout(Scene(actuator=SmaWires()), with_headings=True).size} with headings" in section(
+    assert f"{Layout.of(Scene(actuator=SmaWires()), entries=HEADINGS).size} with headings" in section(
         "Observation"
     )
 

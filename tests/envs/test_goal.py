@@ -6,7 +6,7 @@ import pytest
 
 from refusals import assert_refused
 from seastar_gym.envs.goal import GoalForm
-from seastar_gym.envs.observation import scene_layout
+from seastar_gym.envs.layout import Layout
 
 STRAIGHT = np.array([0, 1, 0, 0, 2])
 
@@ -23,7 +23,7 @@ def test_an_observation_has_the_goals_in_the_world_and_the_robot_without_waypoin
     assert env.observation_space.contains(observed)
     np.testing.assert_allclose(observed["achieved_goal"], 10.0 * info["hub_position"])
     np.testing.assert_allclose(observed["desired_goal"], [0.3, 0.0])
-    at = scene_layout(plain.unwrapped.scene)
+    at = Layout.of(plain.unwrapped.scene)
     np.testing.assert_array_equal(observed["observation"][:182], seen[:182])
     cosine, sine = observed["observation"][-2:]
     x, y = observed["desired_goal"] - observed["achieved_goal"]

@@ -8,22 +8,23 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
-from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
+from episodes import both, swim_together
 from refusals import assert_refused
 from seastar_gym import Headings, RewardWeights, Scene, Seastar, SmaWires, SymmetryReduction
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.headings import wrapped
-from seastar_gym.envs.observation import layout
+from seastar_gym.envs.layout import HEADINGS, Layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.stations import body_heading
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.gaits import turning_wave
 from seastar_gym.scene.numerics import Numerics
+from symmetries import symmetry_for
 
 ID = "SeastarSwimHeading-v0"
-AT = layout(5, 10, True)
+AT = Layout(5, 2, HEADINGS)
 CORNERS = [[0.05, 0.0], [0.05, 0.05], [0.0, 0.0]]
 
 
@@ -144,12 +145,6 @@ def test_turns_go_the_shortest_way_round(angle, turn):
 # Promises of every environment
 
 
-def test_the_registered_environment_passes_gymnasiums_and_stable_baselines_checkers():
-    env = gym.make(ID, fidelity="fast").unwrapped
-    check_env(env, skip_render_check=True)
-    pytest.importorskip("stable_baselines3.common.env_checker").check_env(env, warn=True, skip_render_check=True)
-
-
 def test_nothing_changes_without_headings():
     env = SeastarSwimEnv(fidelity="fast")
     assert env.headings is None and not {"heading", "heading_error", "reward_heading"} & set(env.reset(seed=0)[1])
@@ -159,21 +154,10 @@ def test_nothing_changes_without_headings():
 @pytest.mark.parametrize("asked", ["along", "random", 0.5])
 def test_the_batch_has_the_bits_of_single_environments(mode, asked):
     arguments = {
-        "fidelity": "fast", "path": "random", "random_heading": True, "max_episode_steps": 3,
+        "path": "random", "random_heading": True, "max_episode_steps": 3,
         "headings": Headings(asked, 1.0), "waypoint_radius": 0.15,
     }  # fmt: skip
-    batch = gym.make_vec(ID, 3, "vector_entry_point", autoreset_mode=mode, **arguments)
-    singles = gym.make_vec(ID, 3, "sync", vector_kwargs={"autoreset_mode": mode}, **arguments)
-    np.testing.assert_array_equal(batch.reset(seed=1)[0], singles.reset(seed=1)[0])
-    singles.action_space.seed(0)
-    for _ in range(7):
-        actions = singles.action_space.sample()
-        *found, info = batch.step(actions)
-        *expected, its_info = singles.step(actions)
-        for one, other in zip(found, expected, strict=True):
-            np.testing.assert_array_equal(one, other)
-        for name in ("heading", "heading_error", "reward_heading", "waypoint_index"):
-            np.testing.assert_array_equal(info[name], its_info[name], err_msg=name)
+    swim_together(*both(ID, 3, mode, **arguments), 7)
 
 
 @pytest.mark.parametrize("asked", ["along", "random", 0.1, (1 / 3, 0.1, -2.0)])
@@ -233,13 +217,13 @@ def test_a_carried_robot_is_asked_for_the_carried_turns():
 def test_only_a_mirror_changes_a_turn():
     seen = np.random.default_rng(0).normal(size=(10, AT.size))
     mirror = symmetry.memory_mirror(SmaWires())
-    carried = symmetry.transform_observations(seen, np.arange(10), 5, mirror, True)
+    carried = symmetry_for(5, mirror, entries=HEADINGS).carry(seen, np.arange(10))
     expected = seen[:, AT.headings].copy()
     expected[1::2, 1::2] *= -1.0
     np.testing.assert_array_equal(carried[:, AT.headings], expected)
-    plain = symmetry.transform_observations(np.delete(seen, AT.headings, axis=1), np.arange(10), 5, mirror)
+    plain = symmetry_for(5, mirror).carry(np.delete(seen, AT.headings, axis=1), np.arange(10))
     np.testing.assert_array_equal(np.delete(carried, AT.headings, axis=1), plain)
-    back = symmetry.transform_observations(carried, symmetry.inverse(np.arange(10), 5), 5, mirror, True)
+    back = symmetry_for(5, mirror, entries=HEADINGS).carry(carried, symmetry.inverse(np.arange(10), 5))
     np.testing.assert_allclose(back, seen, atol=1e-13)
 
 
@@ -252,7 +236,7 @@ def test_strokes_without_memory_are_carried_with_headings():
 
 def test_observations_with_other_numbers_are_refused():
     with assert_refused("not that of a robot of 5 limbs"):
-        symmetry.reduce_observations(np.zeros((1, AT.size)), 5, symmetry.memory_mirror(SmaWires()))
+        symmetry_for(5, symmetry.memory_mirror(SmaWires())).reduce(np.zeros((1, AT.size)))
 
 
 # Pictures

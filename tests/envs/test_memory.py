@@ -6,7 +6,7 @@ from gymnasium.vector import AutoresetMode
 
 from refusals import assert_refused
 from seastar_gym.envs.headings import Headings
-from seastar_gym.envs.symmetry import VectorMemory, VectorSymmetryReduction, transform_observations
+from seastar_gym.envs.symmetry import VectorMemory, VectorSymmetryReduction
 from seastar_gym.envs.tasks.envs import SeastarTaskVectorEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 
@@ -32,7 +32,7 @@ def test_memory_shows_the_reduced_observation_and_the_past_in_the_same_limbs(tas
         shown, ours = memory.step(actions)[0], reduced.step(actions)[0]
         seen = memory.recollection
         for before, told in zip(past, np.moveaxis(shown[:, size:].reshape(6, 2, -1), 1, 0), strict=True):
-            carried = transform_observations(before, memory._elements, 5, seen.mirror, own=seen.own)
+            carried = seen.symmetry.carry(before, memory._elements)
             np.testing.assert_array_equal(told, carried[:, seen.told])
 
 
@@ -55,7 +55,7 @@ def test_no_memory_goes_from_one_episode_into_the_next(mode):
     memory = VectorMemory(batch("prey", 3, autoreset_mode=mode), 2)
     memory.unwrapped.max_episode_steps = 3
     memory.reset(seed=0)
-    seen, size = memory.recollection, memory.recollection.places.size
+    seen, size = memory.recollection, memory.recollection.layout.size
     began, ended = 0, np.zeros(3, bool)
     for step in range(9):
         shown, _, terminated, truncated, _ = memory.step(np.full(3, step % 21))
@@ -76,8 +76,8 @@ def test_a_reset_of_some_robots_leaves_the_others_memory():
         shown = memory.step(np.array([action, action]))[0]
     again, _ = memory.reset(seed=1, options={"reset_mask": np.array([True, False])})
     np.testing.assert_array_equal(again[1], shown[1])
-    now = again[0, : memory.recollection.places.size][memory.recollection.told]
-    np.testing.assert_array_equal(again[0, memory.recollection.places.size :].reshape(2, -1), np.stack([now, now]))
+    now = again[0, : memory.recollection.layout.size][memory.recollection.told]
+    np.testing.assert_array_equal(again[0, memory.recollection.layout.size :].reshape(2, -1), np.stack([now, now]))
 
 
 def test_masks_are_those_of_the_robots_that_are_shown():

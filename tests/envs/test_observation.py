@@ -1,4 +1,4 @@
-"""Every number of an observation is what the table in envs/observation.py says, whichever way the robot points."""
+"""Every number of an observation is what the table in envs/layout.py says, whichever way the robot points."""
 
 import numpy as np
 import pytest
@@ -6,15 +6,8 @@ from scipy.interpolate import CubicSpline
 
 from hubs import TEN
 from seastar_gym import Attachment, Body, Numerics, Scene, Seastar, Simulator, SmaPulse, ThermalSma
-from seastar_gym.envs.observation import (
-    VELOCITY_SCALE,
-    at_station,
-    layout,
-    observation_size,
-    observe,
-    scene_layout,
-    to_float32,
-)
+from seastar_gym.envs.layout import HEADINGS, VELOCITY_SCALE, Layout
+from seastar_gym.envs.observation import at_station, layout, observe, to_float32
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.stations import at_stations, stations, stations_of
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -32,7 +25,7 @@ SCENES = [
 def observations_of(simulator: Simulator, targets: np.ndarray) -> np.ndarray:
     """float64 observations, shape (n_robots, size), for targets of shape (n_robots, 4) [m]."""
     rows, robot = to_rows(targets), simulator.scene.robot
-    out = np.full((len(rows), observation_size(robot.n_limbs), N_LANES), np.nan)
+    out = np.full((len(rows), Layout(robot.n_limbs).size, N_LANES), np.nan)
     own, places = simulator.coefficients, stations_of(robot)
     observe(own.rest, own.limb_length, simulator.q, simulator.v, places, rows, VELOCITY_SCALE, out)
     return out.transpose(0, 2, 1).reshape(-1, out.shape[1])[: simulator.n_robots]
@@ -50,16 +43,24 @@ def expected_observation(robot: Seastar, q: np.ndarray, v: np.ndarray, waypoint,
 
 def test_scale_and_size_are_the_documented_ones():
     assert VELOCITY_SCALE == 0.025
-    assert observation_size(5) == 186
+    assert Layout(5).size == 186
 
 
 @pytest.mark.parametrize("with_headings", [False, True])
 @pytest.mark.parametrize("n_limbs, n_remembered", [(5, 0), (5, 20), (1, 3)])
 def test_a_layout_names_every_place_once_and_in_the_order_of_the_table(n_limbs, n_remembered, with_headings):
     at = layout(n_limbs, n_remembered, with_headings)
+    assert at == Layout(n_limbs, n_remembered // n_limbs, HEADINGS if with_headings else ())
     places = np.arange(at.size)
-    np.testing.assert_array_equal(np.concatenate([places[place] for place in at]), places)
-    assert [len(places[place]) for place in at] == [2 * 9 * n_limbs] * 2 + [2, n_remembered, 4 * with_headings, 2, 2]
+    each = [
+        places[place]
+        for place in (
+            at.positions, at.velocities, at.hub_velocity, at.actuators, at.headings, at.current_waypoint,
+            at.next_waypoint,
+        )
+    ]  # fmt: skip
+    np.testing.assert_array_equal(np.concatenate(each), places)
+    assert [len(one) for one in each] == [2 * 9 * n_limbs] * 2 + [2, n_remembered, 4 * with_headings, 2, 2]
     np.testing.assert_array_equal(places[at.waypoints], places[-4:])
     np.testing.assert_array_equal(places[at.stations_and_hub], places[: 4 * 9 * n_limbs + 2])
 
@@ -68,10 +69,10 @@ def test_the_layout_of_a_scene_finds_what_its_actuators_remember():
     scene = Scene(TEN, actuator=ThermalSma(), numerics=Numerics.preset("fast"))
     env, plain = SeastarSwimEnv(scene=scene), SeastarSwimEnv(fidelity="fast")
     env.reset(seed=0)
-    seen, at = env.step([0, 1, 0, 0, 2])[0], scene_layout(scene)
+    seen, at = env.step([0, 1, 0, 0, 2])[0], Layout.of(scene)
     np.testing.assert_allclose(seen[at.actuators], env.simulator.observe_actuators()[0], rtol=1e-6)
     assert np.any(seen[at.actuators])
-    first, bare = plain.reset(seed=0)[0], scene_layout(plain.scene)
+    first, bare = plain.reset(seed=0)[0], Layout.of(plain.scene)
     np.testing.assert_array_equal(env.reset(seed=0)[0][at.waypoints], first[bare.waypoints])
     assert env.observation_space.shape == (at.size,) and plain.observation_space.shape == (bare.size,)
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from refusals import assert_refused
-from seastar_gym import RewardWeights, Scene, Seastar
+from seastar_gym import Scene, Seastar
 from seastar_gym.envs import paths
+from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.paths import PATHS, cross_track_error, make_path, path_length, register_path, shortest_way
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import SwimTask
@@ -242,7 +243,7 @@ def test_waypoints_of_a_registered_path_are_checked(monkeypatch):
 
 def test_a_longer_path_of_another_robot_leaves_the_way_to_go_as_it_is():
     scene = Scene(Seastar(nodes_per_limb=3))
-    task = SwimTask(scene, 2, [[0.1, 0.0], [0.1, 0.1]], RewardWeights(), 0.01, False, 1)
+    task = SwimTask(SwimOptions([[0.1, 0.0], [0.1, 0.1]], scene=scene), 2, 1)
     generators = [np.random.default_rng(robot) for robot in range(2)]
     task.reset(np.array([True, True]), generators)
     before = task._measure_way_to_go(np.zeros((2, 2)))

@@ -37,12 +37,13 @@ from seastar_gym import (
 )
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.commands import command_table, to_commands
+from seastar_gym.envs.layout import HEADINGS, Layout
 from seastar_gym.envs.masks import action_masks
-from seastar_gym.envs.observation import observation_size
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.actuators.actuator import mirrored
+from symmetries import symmetry_for
 
 N_LIMBS = (3, 4, 5, 7, 8)
 MODES = ("limbs", "joint", "pairs", "continuous")
@@ -50,7 +51,7 @@ ROUNDING = 2e-6  # of float32 observations of order one
 
 
 def observations_of(n_limbs, n=50, dtype=np.float64, seed=0):
-    return np.random.default_rng(seed).normal(size=(n, observation_size(n_limbs))).astype(dtype)
+    return np.random.default_rng(seed).normal(size=(n, Layout(n_limbs).size)).astype(dtype)
 
 
 def matrix(element, n_limbs):
@@ -104,13 +105,30 @@ def test_limbs_go_where_the_rest_shape_goes(n_limbs):
         np.testing.assert_allclose(carried[symmetry.limb_order(n_limbs)[element]], tips, atol=1e-15)
 
 
+def test_old_names_do_the_same_for_one_release():
+    mirror, seen = symmetry.memory_mirror(SmaWires()), np.random.default_rng(0).normal(size=(20, 200))
+    ours, elements = symmetry_for(5, mirror, "pairs", HEADINGS).reduce(seen)
+    theirs, its_elements = symmetry.reduce_observations(seen, 5, mirror, with_headings=True)
+    np.testing.assert_array_equal(theirs, ours)
+    np.testing.assert_array_equal(its_elements, elements)
+    actions = random_actions("pairs", 5, 20)
+    restored = symmetry_for(5, mode="pairs").restore(actions, elements)
+    np.testing.assert_array_equal(symmetry.restore_actions(actions, elements, "pairs", 5), restored)
+
+
+@pytest.mark.parametrize("group, mirror, at", [(4, (), Layout(5)), (5, ((1, 1), (0, 1)), Layout(5)), (5, (), "five")])
+def test_what_does_not_fit_together_is_no_symmetry(group, mirror, at):
+    with assert_refused("layout"):
+        symmetry.Symmetry(group, mirror, at)
+
+
 # Observations
 
 
 @pytest.mark.parametrize("n_limbs", N_LIMBS)
 def test_every_vector_is_carried_by_the_matrix_and_moves_with_its_limb(n_limbs):
     observations = observations_of(n_limbs, n=2 * n_limbs)
-    carried = symmetry.transform_observations(observations, np.arange(2 * n_limbs), n_limbs)
+    carried = symmetry_for(n_limbs).carry(observations, np.arange(2 * n_limbs))
     for element in range(2 * n_limbs):
         before, after = (one[element].reshape(-1, 2) for one in (observations, carried))
         expected = before @ matrix(element, n_limbs).T
@@ -125,7 +143,7 @@ def test_every_vector_is_carried_by_the_matrix_and_moves_with_its_limb(n_limbs):
 @pytest.mark.parametrize("n_limbs", N_LIMBS)
 @pytest.mark.parametrize("dtype, atol", [(np.float64, 1e-13), (np.float32, ROUNDING)])
 def test_reduced_waypoints_lie_in_sector_zero(n_limbs, dtype, atol):
-    reduced, elements = symmetry.reduce_observations(observations_of(n_limbs, 500, dtype=dtype), n_limbs)
+    reduced, elements = symmetry_for(n_limbs).reduce(observations_of(n_limbs, 500, dtype=dtype))
     assert reduced.dtype == dtype
     assert set(elements) == set(range(2 * n_limbs))
     assert direction(reduced).min() >= -atol
@@ -135,39 +153,39 @@ def test_reduced_waypoints_lie_in_sector_zero(n_limbs, dtype, atol):
 @pytest.mark.parametrize("n_limbs", N_LIMBS)
 def test_reduced_observations_are_restored_by_the_inverse(n_limbs):
     observations = observations_of(n_limbs)
-    reduced, elements = symmetry.reduce_observations(observations, n_limbs)
-    restored = symmetry.transform_observations(reduced, symmetry.inverse(elements, n_limbs), n_limbs)
+    reduced, elements = symmetry_for(n_limbs).reduce(observations)
+    restored = symmetry_for(n_limbs).carry(reduced, symmetry.inverse(elements, n_limbs))
     np.testing.assert_allclose(restored, observations, atol=1e-14)
 
 
 @pytest.mark.parametrize("n_limbs", N_LIMBS)
 def test_reduction_does_not_tell_carried_robots_apart(n_limbs):
     observations = observations_of(n_limbs)
-    reduced, _ = symmetry.reduce_observations(observations, n_limbs)
+    reduced, _ = symmetry_for(n_limbs).reduce(observations)
     for element in range(2 * n_limbs):
-        carried = symmetry.transform_observations(observations, element * np.ones(len(observations), int), n_limbs)
-        np.testing.assert_allclose(symmetry.reduce_observations(carried, n_limbs)[0], reduced, atol=1e-13)
+        carried = symmetry_for(n_limbs).carry(observations, element * np.ones(len(observations), int))
+        np.testing.assert_allclose(symmetry_for(n_limbs).reduce(carried)[0], reduced, atol=1e-13)
 
 
 def test_element_zero_changes_no_bit_and_shares_no_memory():
     observations = observations_of(5, dtype=np.float32)
-    same = symmetry.transform_observations(observations, np.zeros(len(observations), int), 5)
+    same = symmetry_for(5).carry(observations, np.zeros(len(observations), int))
     np.testing.assert_array_equal(same, observations)
     assert not np.shares_memory(same, observations)
 
 
 def test_one_observation_is_a_batch_without_an_axis():
     observations = observations_of(5)
-    batch, elements = symmetry.reduce_observations(observations, 5)
+    batch, elements = symmetry_for(5).reduce(observations)
     for one, reduced, element in zip(observations, batch, elements, strict=True):
-        alone, its_element = symmetry.reduce_observations(one, 5)
+        alone, its_element = symmetry_for(5).reduce(one)
         np.testing.assert_array_equal(alone, reduced)
         assert its_element == element and its_element.shape == ()
 
 
 def test_observations_of_another_robot_are_refused():
     with pytest.raises(ValueError, match="not that of a robot of 7 limbs"):
-        symmetry.reduce_observations(observations_of(5), 7)
+        symmetry_for(7).reduce(observations_of(5))
 
 
 # Boundaries
@@ -185,7 +203,7 @@ def test_on_a_boundary_the_next_waypoint_decides_and_rounding_does_not(n_limbs, 
     width = np.pi / n_limbs
     angle = boundary * width
     observation = aimed(n_limbs, angle + noise, angle + (1.0 if left else -1.0))
-    assert symmetry.sectors(observation, n_limbs) == (boundary if left else boundary - 1) % (2 * n_limbs)
+    assert symmetry_for(n_limbs).sectors(observation) == (boundary if left else boundary - 1) % (2 * n_limbs)
 
 
 @pytest.mark.parametrize("n_limbs", N_LIMBS)
@@ -193,11 +211,11 @@ def test_on_a_boundary_the_next_waypoint_decides_and_rounding_does_not(n_limbs, 
 def test_where_nothing_decides_the_sector_is_that_anticlockwise_of_the_boundary(n_limbs, behind):
     for boundary in range(2 * n_limbs):
         angle = boundary * np.pi / n_limbs
-        assert symmetry.sectors(aimed(n_limbs, angle, angle + behind), n_limbs) == boundary
+        assert symmetry_for(n_limbs).sectors(aimed(n_limbs, angle, angle + behind)) == boundary
 
 
 def test_a_waypoint_at_the_hub_lies_in_sector_zero():
-    assert symmetry.sectors(aimed(5, 0.0, 0.0, distance=0.0), 5) == 0
+    assert symmetry_for(5).sectors(aimed(5, 0.0, 0.0, distance=0.0)) == 0
 
 
 # Commands and actions
@@ -218,7 +236,7 @@ def test_a_mirror_swaps_plus_and_minus():
 def test_action_maps_say_what_the_command_map_says(mode, n_limbs):
     actions = random_actions(mode, n_limbs, 200)
     elements = np.random.default_rng(2).integers(0, 2 * n_limbs, 200)
-    carried = symmetry.transform_actions(actions, elements, mode, n_limbs)
+    carried = symmetry_for(n_limbs, mode=mode).carry_actions(actions, elements)
     np.testing.assert_array_equal(
         to_commands(mode, n_limbs, carried, 200),
         symmetry.transform_commands(to_commands(mode, n_limbs, actions, 200), elements),
@@ -232,7 +250,7 @@ def test_action_maps_are_a_group_action(mode, n_limbs):
     everywhere = np.ones(30, int)
 
     def carry(actions, element):
-        return symmetry.transform_actions(actions, element * everywhere, mode, n_limbs)
+        return symmetry_for(n_limbs, mode=mode).carry_actions(actions, element * everywhere)
 
     np.testing.assert_array_equal(carry(actions, 0), actions)
     for first in range(2 * n_limbs):
@@ -244,14 +262,14 @@ def test_action_maps_are_a_group_action(mode, n_limbs):
 @pytest.mark.parametrize("mode", MODES)
 def test_restored_actions_are_those_before_the_reduction(mode):
     actions, elements = random_actions(mode, 5, 100), np.random.default_rng(3).integers(0, 10, 100)
-    reduced = symmetry.transform_actions(actions, elements, mode, 5)
-    np.testing.assert_array_equal(symmetry.restore_actions(reduced, elements, mode, 5), actions)
+    reduced = symmetry_for(5, mode=mode).carry_actions(actions, elements)
+    np.testing.assert_array_equal(symmetry_for(5, mode=mode).restore(reduced, elements), actions)
 
 
 @pytest.mark.parametrize("action", [-1, 243, 0.5])
 def test_an_action_that_is_none_is_refused(action):
     with pytest.raises(ValueError, match="an action is a whole number from 0 to 242"):
-        symmetry.restore_actions(np.array([action]), np.zeros(1, int), "joint", 5)
+        symmetry_for(5, mode="joint").restore(np.array([action]), np.zeros(1, int))
 
 
 def test_cached_tables_cannot_be_changed():
@@ -276,12 +294,12 @@ def swim(path, element, n_strokes=8):
     """
     env = gym.make("SeastarSwim-v0", path=path, actions="joint", fidelity="fast").unwrapped
     env.reset(seed=0)
-    for action in symmetry.transform_actions(random_actions("joint", 5, 4), element, "joint", 5):
+    for action in symmetry_for(5, mode="joint").carry_actions(random_actions("joint", 5, 4), element):
         observation, *_ = env.step(action)
     hubs, commands = [], []
     for _ in range(n_strokes):
-        reduced, its_element = symmetry.reduce_observations(observation, 5)
-        action = symmetry.restore_actions(a_policy(reduced), its_element, "joint", 5)
+        reduced, its_element = symmetry_for(5).reduce(observation)
+        action = symmetry_for(5, mode="joint").restore(a_policy(reduced), its_element)
         observation, *_, info = env.step(action)
         hubs.append(info["hub_position"])
         commands.append(env.command_table[action])
@@ -304,7 +322,7 @@ def test_a_policy_behind_the_reduction_is_equivariant(element):
 def test_a_random_policy_in_the_wrapper_swims_the_carried_way(n_limbs, nodes_per_limb):
     """From rest, along a carried path, for every element of the group."""
     path = np.array([[0.01, 0.013], [-0.03, 0.02], [0.02, -0.03]])
-    weights = np.random.default_rng(6).normal(size=(observation_size(n_limbs), 1 + n_limbs * (n_limbs - 1)))
+    weights = np.random.default_rng(6).normal(size=(Layout(n_limbs).size, 1 + n_limbs * (n_limbs - 1)))
     scene = Scene(robot=Seastar(n_limbs, nodes_per_limb), numerics=Numerics.preset("fast"))
 
     def hubs_along(path):
@@ -364,12 +382,12 @@ def test_what_actuators_remember_is_carried_with_the_robot(actuator, n_limbs):
 def test_memory_is_restored_by_the_inverse_and_another_size_refused():
     mirror = symmetry.memory_mirror(ThermalSma())
     assert mirror == ((1, 1), (0, 1), (3, 1), (2, 1)) and symmetry.memory_mirror(SmaPulse()) == ()
-    observations = np.random.default_rng(0).normal(size=(50, observation_size(5) + 20))
-    reduced, elements = symmetry.reduce_observations(observations, 5, mirror)
-    restored = symmetry.transform_observations(reduced, symmetry.inverse(elements, 5), 5, mirror)
+    observations = np.random.default_rng(0).normal(size=(50, Layout(5).size + 20))
+    reduced, elements = symmetry_for(5, mirror).reduce(observations)
+    restored = symmetry_for(5, mirror).carry(reduced, symmetry.inverse(elements, 5))
     np.testing.assert_allclose(restored, observations, atol=1e-14)
     with assert_refused("not that of a robot of 5 limbs"):
-        symmetry.reduce_observations(observations, 5)
+        symmetry_for(5).reduce(observations)
 
 
 # Wrappers
@@ -385,10 +403,10 @@ def test_the_wrapper_does_what_the_functions_do(mode):
     observation, info = plain.reset(seed=3)
     reduced, its_info = wrapped.reset(seed=3)
     for action in random_actions(mode, 4, 6):
-        expected, element = symmetry.reduce_observations(observation, 4)
+        expected, element = symmetry_for(4).reduce(observation)
         np.testing.assert_array_equal(reduced, expected)
         assert wrapped.observation_space.contains(reduced)
-        observation, *outcome, info = plain.step(symmetry.restore_actions(action, element, mode, 4))
+        observation, *outcome, info = plain.step(symmetry_for(4, mode=mode).restore(action, element))
         reduced, *its_outcome, its_info = wrapped.step(action)
         assert its_outcome == outcome
         np.testing.assert_array_equal(its_info["hub_position"], info["hub_position"])
@@ -609,20 +627,20 @@ def test_the_group_is_found_from_limbs_body_and_attachments(name):
 @pytest.mark.parametrize("name", LESSER)
 def test_lesser_groups_bring_waypoints_into_their_sector_and_do_not_tell_carried_robots_apart(name):
     group, observations = symmetry.symmetry_of(LESSER[name][0]), observations_of(4, 300)
-    reduced, elements = symmetry.reduce_observations(observations, group)
+    reduced, elements = symmetry_for(group).reduce(observations)
     assert set(elements) == set(elements_of(group))
     width = (2.0 if group.axis is None else 1.0) * np.pi / group.n_turns
     assert ((direction(reduced) - (group.axis or 0.0)) % (2.0 * np.pi)).max() <= width + 1e-12
     for element in elements_of(group):
-        carried = symmetry.transform_observations(observations, np.full(300, element), group)
+        carried = symmetry_for(group).carry(observations, np.full(300, element))
         tips, its_tips = (one[:, :72].reshape(300, 4, 9, 2)[:, :, -1] for one in (observations, carried))
         order = symmetry.limb_order(group)[element]
         np.testing.assert_allclose(its_tips, (tips @ matrix_in(group, element).T)[:, order], atol=1e-12)
-        np.testing.assert_allclose(symmetry.reduce_observations(carried, group)[0], reduced, atol=1e-12)
+        np.testing.assert_allclose(symmetry_for(group).reduce(carried)[0], reduced, atol=1e-12)
     for mode in MODES:
         actions = random_actions(mode, 4, 300)
-        carried = symmetry.transform_actions(actions, elements, mode, group)
-        back = symmetry.restore_actions(carried, elements, mode, group)
+        carried = symmetry_for(group, mode=mode).carry_actions(actions, elements)
+        back = symmetry_for(group, mode=mode).restore(carried, elements)
         np.testing.assert_array_equal(back, actions)
 
 
@@ -715,7 +733,7 @@ def test_a_carried_robot_swims_the_carried_way(name):
         np.testing.assert_allclose(found.positions, expected.positions, rtol=0.0, atol=1e-9)
         np.testing.assert_allclose(found.actuators, expected.actuators, rtol=0.0, atol=1e-9)
         seen = np.concatenate([np.zeros((10, 182)), simulator.observe_actuators(), np.ones((10, 4))], axis=1)
-        carried = symmetry.transform_observations(seen, elements, 5, mirror)[:, 182:-4]
+        carried = symmetry_for(5, mirror).carry(seen, elements)[:, 182:-4]
         np.testing.assert_allclose(carried, other.observe_actuators(), rtol=0.0, atol=1e-9)
 
 
@@ -746,7 +764,7 @@ def carried_wires(wires, elements):
 def test_masks_are_carried_with_the_actions(mode):
     """A mask of the carried robot is true for the carried actions of which that of the robot is true."""
     deaf, elements = np.random.default_rng(2).random((10, 5, 2)) < 0.3, np.arange(10)
-    masks = symmetry.transform_masks(action_masks(mode, deaf), elements, mode, 5)
+    masks = symmetry_for(5, mode=mode).carry_masks(action_masks(mode, deaf), elements)
     np.testing.assert_array_equal(masks, action_masks(mode, carried_wires(deaf, elements)))
 
 
@@ -781,7 +799,7 @@ def test_observations_of_another_memory_are_refused():
     seen = observations_of(5)
     mirror = symmetry.memory_mirror(SmaWires())
     with assert_refused("not that of a robot of 5 limbs"):
-        symmetry.reduce_observations(seen, 5, mirror)
+        symmetry_for(5, mirror).reduce(seen)
     assert symmetry.memory_mirror(SmaPulse()) == ()
 
 

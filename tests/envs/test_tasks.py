@@ -1,20 +1,17 @@
-"""Every registered task keeps the same promises, and each of them is what its docstring says."""
+"""Every registered task is what its docstring says, besides what test_conformance.py says of all ids."""
 
 import copy
 import inspect
 import itertools
-import json
-import pickle
 import re
 
 import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
-from gymnasium.utils.env_checker import check_env
-from gymnasium.vector import AutoresetMode
 
 import seastar_gym
+from episodes import assert_same, swum
 from refusals import assert_refused
 from seastar_gym import (
     FailBlind,
@@ -28,11 +25,9 @@ from seastar_gym import (
     VectorSymmetryReduction,
 )
 from seastar_gym.accuracy.info import NAMES
-from seastar_gym.envs.own_numbers import places_of
-from seastar_gym.envs.reward import pulses_of
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.symmetry import limb_order, observed_mirror, sectors, transform_actions, transform_commands
-from seastar_gym.envs.symmetry import transform_observations as carried
+from seastar_gym.envs.symmetry import limb_order, symmetry_in, transform_commands
 from seastar_gym.envs.tasks.course import CHASE, Courses, Pursuit, draw_course
 from seastar_gym.envs.tasks.discs import rims, ways
 from seastar_gym.envs.tasks.envs import CHALLENGES, SeastarTaskEnv, SeastarTaskVectorEnv
@@ -61,49 +56,7 @@ def made(id: str, **arguments):
     return gym.make(id, fidelity="fast", **arguments)
 
 
-def swum(env, n: int = 5, **reset) -> list:
-    """Observations, rewards, ends and infos of random actions."""
-    observation, info = env.reset(**{"seed": 3, **reset})
-    env.action_space.seed(4)
-    history = [observation, *info.values()]
-    for _ in range(n):
-        observation, *others, info = env.step(env.action_space.sample())
-        history += [observation, *others, *info.values()]
-    return history
-
-
-def assert_same(ours, theirs):
-    for one, other in zip(ours, theirs, strict=True):
-        np.testing.assert_array_equal(one, other)
-
-
-# Promises of every id
-
-
-@pytest.mark.parametrize("id", [CONTINUOUS, *IDS])
-def test_a_task_passes_gymnasiums_and_stable_baselines_checkers(id):
-    env = made(id).unwrapped
-    check_env(env, skip_render_check=True)
-    pytest.importorskip("stable_baselines3.common.env_checker").check_env(env, warn=True, skip_render_check=True)
-
-
-@pytest.mark.parametrize("id", IDS)
-@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
-def test_the_batch_has_the_bits_of_single_environments(id, mode):
-    arguments = {"fidelity": "fast", "max_episode_steps": 3}
-    batch = gym.make_vec(id, 3, "vector_entry_point", autoreset_mode=mode, **arguments)
-    singles = gym.make_vec(id, 3, "sync", vector_kwargs={"autoreset_mode": mode}, **arguments)
-    (first, info), (its_first, its_info) = batch.reset(seed=1), singles.reset(seed=1)
-    assert_same([first, *(info[name] for name in its_info)], [its_first, *its_info.values()])
-    singles.action_space.seed(0)
-    for _ in range(8):
-        actions = singles.action_space.sample()
-        *found, info = batch.step(actions)
-        *expected, its_info = singles.step(actions)
-        assert_same(found, expected)
-        for name in its_info:
-            if name not in ("final_obs", "final_info"):
-                np.testing.assert_array_equal(info[name], its_info[name], err_msg=name)
+# Promises of every task
 
 
 @pytest.mark.parametrize("id", IDS)
@@ -137,15 +90,6 @@ def test_a_batch_takes_one_number_or_one_for_each_robot(id):
     assert info["instance"].tolist() == [3, 7] and not np.array_equal(each[0], each[1])
 
 
-@pytest.mark.parametrize("id", IDS)
-def test_a_task_comes_back_from_its_spec_a_pickle_and_a_copy(id):
-    env = made(id, split="test")
-    spec = EnvSpec.from_json(json.dumps(json.loads(env.spec.to_json()), sort_keys=True))
-    expected = swum(env)
-    for other in (gym.make(spec), pickle.loads(pickle.dumps(env)), copy.deepcopy(env)):
-        assert_same(swum(other), expected)
-
-
 @pytest.mark.parametrize(
     "task",
     [
@@ -162,38 +106,6 @@ def test_numbers_of_ones_own_are_in_the_spec(task):
     other = gym.make(EnvSpec.from_json(env.spec.to_json()))
     assert other.unwrapped.challenge == task
     assert_same(swum(other, 2), swum(env, 2))
-
-
-@pytest.mark.parametrize("id", IDS)
-def test_the_middle_of_an_episode_goes_on_to_the_same_bits_in_a_pickle(id):
-    env = made(id)
-    env.reset(seed=0)
-    env.step(7)
-    twin = pickle.loads(pickle.dumps(env))
-    for action in (3, 0, 12):
-        assert_same(list(env.step(action)[4].values()), list(twin.step(action)[4].values()))
-
-
-@pytest.mark.parametrize("id", IDS)
-def test_observations_share_no_memory_and_no_number_of_theirs_is_constant(id):
-    batch = gym.make_vec(id, 8, "vector_entry_point", fidelity="fast")
-    seen = [batch.reset(seed=0)[0]]
-    batch.action_space.seed(0)
-    seen += [batch.step(batch.action_space.sample())[0] for _ in range(12)]
-    assert not np.shares_memory(seen[-1], seen[-2])
-    assert (np.ptp(np.concatenate(seen), axis=0) > 0.0).all()
-
-
-@pytest.mark.parametrize("id", IDS)
-def test_the_reward_is_the_sum_of_its_terms_in_info(id):
-    env = made(id)
-    names = [name for name in env.reset(seed=0)[1] if name.startswith("reward_")]
-    for action in (3, 9, 14):
-        _, reward, _, _, info = env.step(action)
-        assert [name for name in info if name.startswith("reward_")] == names
-        assert reward == pytest.approx(sum(info[name] for name in names), abs=1e-12)
-        pulses = pulses_of(np.array([info["heating_time"]]), env.unwrapped.command_table[[action]])[0]
-        assert info["reward_effort"] == -0.01 * pulses < 0.0
 
 
 @pytest.mark.parametrize("id", [id for id in IDS if HIDDEN[seastar_gym.TASKS[id][0]]])
@@ -237,12 +149,9 @@ def test_symmetry_reduction_turns_last_commands_with_the_limbs(id):
     for action in (5, 11):
         actions = np.full(16, action)
         seen = reduced.step(actions)[0]
-        mirror = reduced._kind.mirror
-        elements = sectors(seen, 5, mirror, own=inner.own_numbers)
-        assert (elements == 0).all()  # targets lie in sector 0
+        assert (symmetry_in(inner).sectors(seen) == 0).all()  # targets lie in sector 0
         if inner.added_mirror:
-            at = places_of(5, 5 * len(mirror), inner.own_numbers)
-            told = seen[:, at.actuators].reshape(16, 5, -1)[..., -1]
+            told = seen[:, inner.layout.actuators].reshape(16, 5, -1)[..., -1]
             np.testing.assert_array_equal(
                 told, transform_commands(inner._task.last_commands, reduced._elements).astype(np.float32)
             )
@@ -264,7 +173,6 @@ def test_the_time_limit_is_that_of_the_table(id):
     assert CHALLENGES[task.strip('"')] == inner.challenge and f'"{inner.actions}"' == actions
     assert inner.decision_period == float(period) and env.spec.reward_threshold == float(threshold)
     assert env.spec.max_episode_steps == round(float(limit) / float(period))
-    assert gym.make_vec(id, 2, "vector_entry_point").max_episode_steps == env.spec.max_episode_steps
 
 
 @pytest.mark.parametrize("id", IDS)
@@ -289,9 +197,6 @@ def test_pictures_show_what_is_hidden(id):
     else:
         task.drawn["fluid.current.u_x"] = task.drawn["fluid.current.u_x"] + 0.002
     assert not np.array_equal(env.render(), first)
-    batch = gym.make_vec(id, 2, "vector_entry_point", fidelity="fast", render_mode="rgb_array")
-    batch.reset(seed=0)
-    assert len(batch.render()) == 2
 
 
 @pytest.mark.parametrize(
@@ -394,16 +299,21 @@ def test_rewards_are_those_of_the_table(kind):
     assert named == {name for name in env.reset(seed=0)[1] if name.startswith("reward_")}
 
 
+def places_of(at):
+    """What is seen of the limbs' shape, of their numbers, of what the task shows, and the targets."""
+    return at.stations_and_hub, at.actuators, at.further, at.waypoints
+
+
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind is not Prey])
 @pytest.mark.parametrize("column, period", [(0, 1.0), (1, 0.5)])
 def test_the_observation_is_that_of_the_table(kind, column, period):
     env = SeastarTaskEnv(task=kind(), fidelity="fast", decision_period=period)
     task = env._task
     sees_wires = period < 1.0 and env.observe_actuators
-    at = places_of(5, 5 * (task.observes_commands + 2 * sees_wires), env.own_numbers)
+    at = Layout(5, task.observes_commands + 2 * sees_wires, task.entries, task.shows_limbs)
     places = [row[min(column, len(row) - 4)] for row in rows(kind, "Observation")]
     documented = [tuple(map(int, place.split(".."))) for place in places if place]
-    assert documented == [(place.start, place.stop - 1) for place in at if place.start < place.stop]
+    assert documented == [(place.start, place.stop - 1) for place in places_of(at) if place.start < place.stop]
     assert env.observation_space.shape == (at.size,)
 
 
@@ -863,13 +773,6 @@ def test_prizes_end_as_terminated_when_the_time_that_they_show_is_up(id):
     assert terminated and not info["is_success"] and info["time"] == pytest.approx(env.unwrapped.challenge.seconds)
 
 
-@pytest.mark.parametrize("id", [id for id in IDS if "Prizes" not in id])
-def test_a_time_limit_that_no_observation_tells_cuts_an_episode_off(id):
-    env = made(id, max_episode_steps=2)
-    env.reset(options={"instance": 0})
-    assert env.step(0)[2:4] == (False, False) and env.step(0)[2:4] == (False, True)
-
-
 def test_prizes_are_seen_nearest_first_and_two_of_them_as_targets():
     env = SeastarTaskEnv(task="prizes", fidelity="fast")
     seen, info = env.reset(options={"instance": 2})
@@ -900,15 +803,14 @@ def test_an_episode_ends_when_all_prizes_are_taken():
 def test_what_a_task_shows_of_its_own_is_carried_by_the_symmetry(id):
     """A robot turned by fifths of a turn, in a world that may be mirrored, swims and sees as the symmetry says."""
     env, other = made(id).unwrapped, made(id).unwrapped
-    mirror, own = observed_mirror(env), env.own_numbers
     for element in (2, 3, 9):
         env.reset(options={"instance": 1}), other.reset(options={"instance": 1})
         _carry(env._task, other._task, element)
         for action in (7, 11, 2):
             seen, theirs = (task.observe() for task in (env._task, other._task))
-            np.testing.assert_allclose(theirs, carried(seen, [element], 5, mirror, own=own), atol=2e-4)
+            np.testing.assert_allclose(theirs, symmetry_in(env).carry(seen, [element]), atol=2e-4)
             action = np.array([action])
-            env.step(action[0]), other.step(transform_actions(action, [element], env.actions, 5)[0])
+            env.step(action[0]), other.step(symmetry_in(env).carry_actions(action, [element])[0])
         np.testing.assert_array_equal(transform_commands(env._task.last_commands, [element]), other._task.last_commands)
 
 

@@ -1,17 +1,15 @@
 """Decisions within a stroke: the timed environments, their actions, masks, heat and pictures."""
 
-import copy
-import pickle
 import re
 from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
 import seastar_gym
+from episodes import both, swim_together
 from refusals import assert_refused
 from seastar_gym import Limited, MeasuredCurve, Numerics, RewardWeights, Scene, Seastar, SmaPulse, SmaWires, ThermalSma
 from seastar_gym.accuracy import chapters_certificate, timed_certificate
@@ -20,8 +18,7 @@ from seastar_gym.envs.commands import to_commands
 from seastar_gym.envs.masks import action_masks
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.scene.numerics import MAX_STEPS
-from seastar_gym.simulator.schedule import SHORTEST
+from seastar_gym.scene.numerics import MAX_STEPS, SHORTEST
 
 IDS = {"SeastarSwimTimed-v0": 0.5, "SeastarSwimTimedModerate-v0": 0.2, "SeastarSwimTimedHard-v0": 0.1}
 FAST = Numerics.preset("fast")
@@ -32,30 +29,7 @@ HOT = Scene(actuator=ThermalSma(largest_temperature=240.0 - 220.0 * np.exp(-0.05
 STRAIGHT = np.array([0, 1, 0, 0, 2])
 
 
-def swum(env, n=6):
-    """Observations, rewards and infos of random actions."""
-    observation, info = env.reset(seed=3)
-    env.action_space.seed(4)
-    history = [observation, *info.values()]
-    for _ in range(n):
-        observation, *others, info = env.step(env.action_space.sample())
-        history += [observation, *others, *info.values()]
-    return history
-
-
-def assert_same(ours, theirs):
-    for one, other in zip(ours, theirs, strict=True):
-        np.testing.assert_array_equal(one, other)
-
-
 # Registered environments
-
-
-@pytest.mark.parametrize("id", IDS)
-def test_a_timed_environment_passes_gymnasiums_and_stable_baselines_checkers(id):
-    env = gym.make(id, fidelity="fast").unwrapped
-    check_env(env, skip_render_check=True)
-    pytest.importorskip("stable_baselines3.common.env_checker").check_env(env, warn=True, skip_render_check=True)
 
 
 @pytest.mark.parametrize("id", ["SeastarSwim-v0", "SeastarSwimHeading-v0", *IDS])
@@ -66,7 +40,6 @@ def test_ids_are_those_of_the_table(id):
     assert inner.decision_period == float(period) and f'"{inner.actions}"' == actions
     assert env.spec.max_episode_steps == int(decisions) == round(float(limit) / float(period))
     assert type(inner.scene.actuator).__name__ == actuator
-    assert gym.make_vec(id, 2).max_episode_steps == int(decisions)
     assert gym.make_vec(id, 2).decision_period == float(period)
     env.reset(seed=0)
     assert env.step(env.action_space.sample())[4]["time"] == float(period)
@@ -76,55 +49,12 @@ def test_the_table_has_all_timed_environments():
     assert seastar_gym.TIMED == IDS
 
 
-@pytest.mark.parametrize("id", IDS)
-@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
-def test_the_batch_has_the_bits_of_single_environments(id, mode):
-    arguments = {"fidelity": "fast", "path": "random", "random_heading": True, "max_episode_steps": 3}
-    batch = gym.make_vec(id, 3, "vector_entry_point", autoreset_mode=mode, **arguments)
-    singles = gym.make_vec(id, 3, "sync", vector_kwargs={"autoreset_mode": mode}, **arguments)
-    assert_same_steps(batch, singles, 8)
-
-
 @pytest.mark.parametrize("actions", MODES)
 @pytest.mark.parametrize("scene", [DEAF, HOT])
 def test_a_batch_with_masks_has_the_bits_of_single_environments(actions, scene):
     arguments = {"scene": scene, "actions": actions, "decision_period": 0.2, "max_episode_steps": 4}
     for mode in (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP):
-        batch = gym.make_vec("SeastarSwim-v0", 2, "vector_entry_point", autoreset_mode=mode, **arguments)
-        singles = gym.make_vec("SeastarSwim-v0", 2, "sync", vector_kwargs={"autoreset_mode": mode}, **arguments)
-        assert_same_steps(batch, singles, 7)
-
-
-def assert_same_steps(batch, singles, n):
-    np.testing.assert_array_equal(batch.reset(seed=1)[0], singles.reset(seed=1)[0])
-    singles.action_space.seed(0)
-    for _ in range(n):
-        actions = singles.action_space.sample()
-        *found, info = batch.step(actions)
-        *expected, its_info = singles.step(actions)
-        assert_same(found, expected)
-        for name in ("heating_time", "energy", "energy_per_metre", "action_mask", "masked_limbs", "time"):
-            if name in its_info:
-                np.testing.assert_array_equal(info[name], its_info[name], err_msg=name)
-        np.testing.assert_array_equal(batch.call("action_masks"), singles.call("action_masks"))
-
-
-@pytest.mark.parametrize("id", IDS)
-def test_a_timed_environment_comes_back_from_its_spec_and_from_a_pickle(id):
-    env = gym.make(id, fidelity="fast")
-    spec = gym.envs.registration.EnvSpec.from_json(env.spec.to_json())
-    expected = swum(env)
-    for other in (gym.make(spec), pickle.loads(pickle.dumps(env)), copy.deepcopy(env)):
-        assert_same(swum(other), expected)
-
-
-def test_a_pickle_in_the_middle_of_an_episode_goes_on_to_the_same_bits():
-    env = SeastarSwimEnv(actions="pairs", fidelity="fast", decision_period=0.2)
-    env.reset(seed=0)
-    env.step(7)
-    twin = pickle.loads(pickle.dumps(env))
-    for action in (3, 0, 12):
-        np.testing.assert_array_equal(env.step(action)[0], twin.step(action)[0])
+        swim_together(*both("SeastarSwim-v0", 2, mode, fidelity=None, **arguments), 7)
 
 
 def test_reset_forgets_the_heat():

@@ -10,7 +10,7 @@ import pytest
 from seastar_gym import Scene
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.commands import Actions, action_space, to_commands
-from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import SwimTask
 from seastar_gym.evaluation.rollout import TaskBatch, rollout
@@ -70,7 +70,7 @@ def test_episodes_of_a_batch_are_those_of_one_robot_each(kind):
 
 
 def test_who_has_arrived_rests_until_all_have():
-    task = SwimTask(Scene.preset("fast"), 2, "line", RewardWeights(), 0.01, False, 1)
+    task = SwimTask(SwimOptions("line", scene=Scene.preset("fast")), 2, 1)
     robots, commands = TaskBatch(task), []
     robots.reset(seed=0)
     step = robots.step

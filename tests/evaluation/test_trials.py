@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from agents.trials import main
-from seastar_gym import RewardWeights, Scene, ThermalSma
+from seastar_gym import Scene, ThermalSma
 from seastar_gym.controllers.greedy import GreedyPolicy
 from seastar_gym.controllers.scripted import scripted
-from seastar_gym.envs.observation import scene_layout
+from seastar_gym.envs.layout import Layout
+from seastar_gym.envs.options import SwimOptions, make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import SwimTask, make_scene
+from seastar_gym.envs.task import SwimTask
 from seastar_gym.evaluation.disturbances import Disturbance, DisturbedTask
 from seastar_gym.evaluation.many import swim_many
 from seastar_gym.evaluation.results import statistics
@@ -24,9 +25,8 @@ N = 16
 
 def disturbed(path="pentagon", scene=FAST, **disturbance):
     rng = np.random.default_rng(0)
-    return begun(
-        DisturbedTask(Disturbance(**disturbance), rng, scene, N, path, RewardWeights(), 0.01, True, threads=1)
-    )
+    options = SwimOptions(path, scene=scene, random_heading=True)
+    return begun(DisturbedTask(Disturbance(**disturbance), rng, options, N, 1))
 
 
 def begun(task):
@@ -40,7 +40,7 @@ def hubs_of(task):
 
 
 def test_nothing_disturbed_is_the_task_itself():
-    task, plain = disturbed(), begun(SwimTask(FAST, N, "pentagon", RewardWeights(), 0.01, True, threads=1))
+    task, plain = disturbed(), begun(SwimTask(SwimOptions(scene=FAST, random_heading=True), N, 1))
     commands = np.tile([0.0, 1.0, 0.0, 0.0, -1.0], (N, 1))
     for _ in range(3):
         np.testing.assert_array_equal(task.observe(), plain.observe())
@@ -51,7 +51,7 @@ def test_nothing_disturbed_is_the_task_itself():
 
 def test_a_current_carries_the_robots_its_own_way_and_the_waypoints_stay():
     task, speed = disturbed(current=1e-3), 1e-3
-    first, at = task.observe(), scene_layout(FAST)
+    first, at = task.observe(), Layout.of(FAST)
     np.testing.assert_allclose(first[:, at.hub_velocity], 0.0, atol=1e-6)  # at rest in the world
     np.testing.assert_array_equal(first[:, at.waypoints], disturbed().observe()[:, at.waypoints])
     waypoint, hubs = np.linalg.norm(first[:, at.current_waypoint], axis=1), []
@@ -73,10 +73,10 @@ def test_a_current_carries_the_robots_its_own_way_and_the_waypoints_stay():
 def test_a_current_is_seen_in_the_hubs_velocity_whatever_actuators_remember():
     """At rest in the world, beside wires that are cold: nothing but the waypoints is seen."""
     scene = replace(FAST, actuator=ThermalSma())
-    seen, at = disturbed(scene=scene, current=1e-3).observe(), scene_layout(scene)
+    seen, at = disturbed(scene=scene, current=1e-3).observe(), Layout.of(scene)
     np.testing.assert_allclose(seen[:, at.hub_velocity], 0.0, atol=1e-6)
     np.testing.assert_array_equal(seen[:, at.actuators], 0.0)
-    np.testing.assert_array_equal(seen[:, at.waypoints], disturbed().observe()[:, scene_layout(FAST).waypoints])
+    np.testing.assert_array_equal(seen[:, at.waypoints], disturbed().observe()[:, Layout.of(FAST).waypoints])
 
 
 def test_every_limb_is_the_weak_one_of_some_robot():

@@ -20,7 +20,7 @@ from seastar_gym import (
     SmaWires,
     Stiffening,
 )
-from seastar_gym.envs.symmetry.scenes import require_symmetry
+from seastar_gym.envs.symmetry import require_symmetry
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.identify.parameters import get_parameter, with_parameters
 from seastar_gym.scene.per_robot import numbers_of

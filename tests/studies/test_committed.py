@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from seastar_gym.controllers.greedy import measure_gaits
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import make_scene
 from seastar_gym.evaluation.tasks import task_ids
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__

@@ -16,13 +16,15 @@ from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers.planner import Budget, Planner
 from seastar_gym.controllers.turning import TurnThenSwim
 from seastar_gym.envs import symmetry
+from seastar_gym.envs.layout import HEADINGS
+from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import make_scene
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.swim import swim
 from seastar_gym.gaits import turning_wave
 from studies.command import main
 from studies.learning import heading
+from symmetries import symmetry_for
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
@@ -81,9 +83,10 @@ def test_a_learner_behind_the_reduction_does_the_carried_thing():
     agent, scene = heading.Reduced(model, env.scene, 0.5), env.scene
     seen = np.repeat(np.random.default_rng(0).normal(size=(1, 200)), 10, axis=0).astype(np.float32)
     elements = np.arange(10)
-    carried = symmetry.transform_observations(seen, elements, 5, symmetry.memory_mirror(scene.actuator), True)
+    carried = symmetry_for(5, symmetry.memory_mirror(scene.actuator), entries=HEADINGS).carry(seen, elements)
     actions = np.array([agent.predict(one, deterministic=True)[0] for one in carried])
-    np.testing.assert_array_equal(actions, symmetry.transform_actions(np.full(10, actions[0]), elements, "pairs", 5))
+    theirs = symmetry_for(5, mode="pairs").carry_actions(np.full(10, actions[0]), elements)
+    np.testing.assert_array_equal(actions, theirs)
 
 
 def test_a_swim_that_does_not_arrive_has_no_time(monkeypatch):

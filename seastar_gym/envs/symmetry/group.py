@@ -1,4 +1,4 @@
-"""Symmetry groups: their elements, their products, and how they turn vectors and order limbs.
+"""Symmetry groups of robots: their elements, their products, and how they turn vectors, order limbs and command them.
 
 A group is the number of limbs, which stands for all turns and mirrors of the regular polygon, or a `PointGroup`.
 """
@@ -9,8 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.scene.checks import MOST_LIMBS, is_whole_number, require_count, shown
-from seastar_gym.scene.symmetry import PointGroup
+from seastar_gym.envs.commands import Actions, command_table
+from seastar_gym.scene import Scene
+from seastar_gym.scene.actuators.actuator import Actuator, Mirror, complete, is_actuator
+from seastar_gym.scene.checks import MOST_LIMBS, is_whole_number, require_count, require_kind, shown
+from seastar_gym.scene.symmetry import SAME, PointGroup
 
 Elements = NDArray[np.intp]
 Group = int | PointGroup
@@ -90,3 +93,61 @@ def read_only(table: NDArray[Any]) -> NDArray[Any]:
     """Table that can be cached and shared, because nobody can write to it."""
     table.setflags(write=False)
     return table
+
+
+def symmetry_of(scene: Scene) -> Group:
+    """Turns and mirrors that leave the robot of a scene unchanged: all of its polygon, or those that there are.
+
+    Robots of the chapter's discretisation have all or none.
+    """
+    require_kind("scene", scene, Scene, "a Scene")
+    robot, nothing = scene.robot, tuple(range(scene.robot.n_limbs))
+    if robot.discretisation == "chapter":
+        return robot.n_limbs if robot.is_symmetric else PointGroup(1, None, (nothing, nothing))
+    group = robot.point_group(_feels_directions(scene))
+    is_whole = robot.is_symmetric and group.n_turns == robot.n_limbs and group.axis == 0.0
+    return robot.n_limbs if is_whole else group
+
+
+def _feels_directions(scene: Scene) -> bool:
+    """Whether fluid that moves along with a body is that of an ellipse along its axes."""
+    body, fluid = scene.robot.body, scene.fluid
+    if body is None or fluid is None or fluid.added_mass_coefficient is None:
+        return False
+    along, across = body.shape.widths
+    return abs(along - across) > SAME
+
+
+def memory_mirror(actuator: Actuator) -> Mirror:
+    """What a mirror does to the numbers that are observed of a limb's actuator; empty without memory."""
+    if not is_actuator(actuator):
+        raise ValueError(f"actuator must be an actuator, such as SmaWires, not {shown(actuator)}.")
+    known = complete(actuator)
+    return (known.mirror or ())[: known.observe(known.rest).shape[-1]]
+
+
+def transform_commands(
+    commands: NDArray[np.floating[Any]], elements: ArrayLike, group: Group | None = None
+) -> NDArray[np.floating[Any]]:
+    """Commands, shape (..., n_limbs), of the robots carried by the elements.
+
+    group: None means that of the regular polygon.
+    """
+    moved = move_limbs(np.asarray(commands), np.asarray(elements, dtype=np.intp), group)
+    return np.where(is_mirror(elements)[..., None], -moved, moved) + 0.0  # no -0.0
+
+
+def move_limbs(values: NDArray[Any], elements: Elements, group: Group | None = None) -> NDArray[Any]:
+    """Values of the limbs, shape (..., n_limbs), in the order of the robots carried by the elements."""
+    order = limb_order(values.shape[-1] if group is None else group)[elements]
+    shape = np.broadcast_shapes(values.shape, order.shape)
+    return np.take_along_axis(np.broadcast_to(values, shape), np.broadcast_to(order, shape), axis=-1)
+
+
+@cache
+def action_table(actions: Actions, group: Group) -> NDArray[np.intp]:
+    """Actions, shape (2 n_turns, n_actions), that each action becomes under each element; for "joint" and "pairs"."""
+    commands = command_table(actions, n_limbs_of(group))
+    number = {command.tobytes(): action for action, command in enumerate(commands + 0.0)}
+    carried = transform_commands(commands, np.arange(2 * n_turns_of(group))[:, None], group)
+    return read_only(np.array([[number[command.tobytes()] for command in row] for row in carried]))

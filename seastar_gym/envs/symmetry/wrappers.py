@@ -1,25 +1,24 @@
-"""Wrappers that reduce `SeastarSwim-v0` and the timed environments to one sector, for any learner.
+"""Wrappers that reduce `SeastarSwim-v0` and the timed environments to one sector, or remember, for any learner.
 
 A robot has the sectors of its own symmetry, see the package's docstring.
 """
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.own_numbers import OwnNumbers
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.symmetry.actions import restore_actions
-from seastar_gym.envs.symmetry.group import Elements, Group
-from seastar_gym.envs.symmetry.masks import transform_masks
-from seastar_gym.envs.symmetry.observations import reduce_observations
-from seastar_gym.envs.symmetry.scenes import memory_mirror, require_symmetry, symmetry_of
-from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.scene.actuators.actuator import Mirror
+from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization
+from seastar_gym.envs.symmetry.group import memory_mirror, symmetry_of
+from seastar_gym.envs.symmetry.symmetry import Recollection, Symmetry
+from seastar_gym.envs.task_env import TaskEnv
+from seastar_gym.scene import Scene
+from seastar_gym.scene.actuators.actuator import Mirror, complete
 from seastar_gym.scene.checks import require_kind
+from seastar_gym.scene.symmetry import PointGroup
 
 if TYPE_CHECKING:
     _VectorWrapper = gym.vector.VectorWrapper[Any, Any, Any, Any, Any]
@@ -27,41 +26,44 @@ else:
     _VectorWrapper = gym.vector.VectorWrapper  # not generic in gymnasium 1.2
 
 
-class Kind(NamedTuple):
-    """What the symmetry has to know of an environment: mode, group, mirror of observed memory, and what is added."""
-
-    mode: Actions
-    group: Group
-    mirror: Mirror
-    with_headings: bool
-    own: OwnNumbers
-
-    def reduce(self, observations: NDArray[Any]) -> tuple[NDArray[np.floating[Any]], Elements]:
-        """Reduced observations, and the elements that reduced them."""
-        return reduce_observations(observations, self.group, self.mirror, self.with_headings, self.own)
-
-    def restore(self, actions: Any, elements: Elements) -> Any:
-        """Actions of the robots as they are."""
-        return restore_actions(actions, elements, self.mode, self.group)
-
-    def mask(self, masks: NDArray[Any], elements: Elements) -> NDArray[Any]:
-        """Masks of reduced robots."""
-        return transform_masks(masks, elements, self.mode, self.group)
-
-    def mask_info(self, info: dict[str, Any], elements: Elements) -> dict[str, Any]:
-        """Info with the masks of reduced robots, if it has any."""
-        return {**info, "action_mask": self.mask(info["action_mask"], elements)} if "action_mask" in info else info
+def require_symmetry(scene: Scene, randomization: DomainRandomization | None = None) -> None:
+    """ValueError for scenes, and draws of their numbers, that every turn and mirror would change."""
+    why = next(_asymmetries(scene, () if randomization is None else randomization.distributions), None)
+    if why is not None:
+        raise ValueError(f"This scene has neither the symmetry of the regular polygon nor a lesser one: {why}.")
 
 
-def kind_of(env: Any) -> Kind:
-    """Kind of an environment or a batch; ValueError if its scene is not symmetric."""
+def _asymmetries(scene: Scene, drawn: Iterable[str]) -> Iterator[str]:
+    """Reasons why a scene, some of whose numbers are drawn, is not symmetric."""
+    group = symmetry_of(scene)
+    if isinstance(group, PointGroup) and group.is_trivial:
+        yield "its limbs are not alike, straight and evenly spread" + (
+            "" if scene.robot.body is None else " around a body of their symmetry"
+        )
+    if len(set(scene.limb_strengths)) > 1:
+        yield "its limbs are not equally strong"
+    if complete(scene.actuator).mirror is None:
+        yield "its actuators remember what they did, and do not say what a mirror makes of it (`mirror`)"
+    if any(node != 0 for node in scene.held_nodes):
+        yield "nodes of limbs are held"
+    if scene.loads:
+        yield "its nodes are loaded"
+    if scene.gravity is not None:
+        yield "gravity has a direction"
+    if scene.fluid is not None and scene.fluid.current is not None:
+        yield "its water has a current"
+    for name in drawn:
+        if name == LIMB_STRENGTHS or name.startswith("robot.limbs."):
+            yield f"{name} is drawn for every limb by itself"
+
+
+def symmetry_in(env: Any) -> Symmetry:
+    """Symmetry of an environment or a batch; ValueError if its scene is not symmetric."""
     inner = getattr(env, "unwrapped", env)
-    if not isinstance(inner, SeastarSwimEnv | SeastarSwimVectorEnv):
+    if not isinstance(inner, TaskEnv):
         raise ValueError(f"Symmetry is known of SeastarSwim-v0 and the timed environments alone, not of {inner!r}.")
     require_symmetry(inner.scene, inner.randomization)
-    return Kind(
-        inner.actions, symmetry_of(inner.scene), observed_mirror(inner), inner.headings is not None, inner.own_numbers
-    )
+    return Symmetry(symmetry_of(inner.scene), observed_mirror(inner), inner.layout, inner.actions)
 
 
 def observed_mirror(env: Any) -> Mirror:
@@ -80,30 +82,30 @@ class SymmetryReduction(gym.Wrapper[Any, Any, Any, Any], gym.utils.RecordConstru
         require_kind("env", env, gym.Env, "an environment of one robot")
         gym.utils.RecordConstructorArgs.__init__(self)
         gym.Wrapper.__init__(self, env)
-        self._kind = kind_of(env)
+        self._symmetry = symmetry_in(env)
         self._element = np.zeros((), np.intp)
 
     def _reduced(self, observation: NDArray[np.float32]) -> NDArray[np.floating[Any]]:
-        reduced, self._element = self._kind.reduce(observation)
+        reduced, self._element = self._symmetry.reduce(observation)
         return reduced
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Actions on the last reduced observation that the wires can follow, shape (k,)."""
         inner: Any = self.unwrapped
-        return self._kind.mask(inner.action_masks(), self._element)
+        return self._symmetry.carry_masks(inner.action_masks(), self._element)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode; the observation is reduced."""
         observation, info = self.env.reset(seed=seed, options=options)
         reduced = self._reduced(observation)
-        return reduced, self._kind.mask_info(info, self._element)
+        return reduced, self._symmetry.carry_info(info, self._element)
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Swim for one decision by an action that was chosen on the last reduced observation."""
-        action = self._kind.restore(action, self._element)
+        action = self._symmetry.restore(action, self._element)
         observation, reward, terminated, truncated, info = self.env.step(action)
         reduced = self._reduced(observation)
-        return reduced, reward, terminated, truncated, self._kind.mask_info(info, self._element)
+        return reduced, reward, terminated, truncated, self._symmetry.carry_info(info, self._element)
 
 
 class VectorSymmetryReduction(_VectorWrapper):
@@ -115,17 +117,17 @@ class VectorSymmetryReduction(_VectorWrapper):
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any]):
         require_kind("env", env, gym.vector.VectorEnv, "a batch, as gym.make_vec gives it")
         super().__init__(env)
-        self._kind = kind_of(env)
+        self._symmetry = symmetry_in(env)
         self._elements = np.zeros(env.num_envs, np.intp)
 
     def _reduced(self, observations: NDArray[np.float32]) -> NDArray[np.floating[Any]]:
-        reduced, self._elements = self._kind.reduce(observations)
+        reduced, self._elements = self._symmetry.reduce(observations)
         return reduced
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Actions on the last reduced observations that the wires can follow, shape (num_envs, k)."""
         inner: Any = self.unwrapped
-        return self._kind.mask(inner.action_masks(), self._elements)
+        return self._symmetry.carry_masks(inner.action_masks(), self._elements)
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
@@ -133,20 +135,77 @@ class VectorSymmetryReduction(_VectorWrapper):
         """Begin episodes; the observations are reduced."""
         observations, info = self.env.reset(seed=seed, options=options)  # type: ignore[arg-type]
         reduced = self._reduced(observations)
-        return reduced, self._kind.mask_info(info, self._elements)
+        return reduced, self._symmetry.carry_info(info, self._elements)
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """Swim for one decision with every robot, by actions that were chosen on the last reduced observations."""
-        actions = self._kind.restore(actions, self._elements)
+        actions = self._symmetry.restore(actions, self._elements)
         observations, rewards, terminated, truncated, info = self.env.step(actions)
         if "final_obs" in info:
             info = {**info, **self._reduced_final(info)}
         reduced = self._reduced(observations)
-        return reduced, rewards, terminated, truncated, self._kind.mask_info(info, self._elements)
+        return reduced, rewards, terminated, truncated, self._symmetry.carry_info(info, self._elements)
 
     def _reduced_final(self, info: dict[str, Any]) -> dict[str, Any]:
         """Last observations and infos of episodes that are over, of reduced robots."""
         final, elements = info["final_obs"].copy(), np.zeros(self.num_envs, np.intp)
         for robot in np.flatnonzero(info["_final_obs"]):
-            final[robot], elements[robot] = self._kind.reduce(final[robot])
-        return {"final_obs": final, "final_info": self._kind.mask_info(info["final_info"], elements)}
+            final[robot], elements[robot] = self._symmetry.reduce(final[robot])
+        return {"final_obs": final, "final_info": self._symmetry.carry_info(info["final_info"], elements)}
+
+
+class VectorMemory(VectorSymmetryReduction):
+    """Wrapper of a native batch that shows a `Recollection`, and takes actions that were chosen on it.
+
+    At the beginning of an episode, the past is the first observation. Asked headings are not shown in the past.
+
+    past: Number of past observations.
+    """
+
+    def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any], past: int):
+        super().__init__(env)
+        if self._symmetry.layout.asks_headings:
+            raise ValueError("Asked headings have no place in this memory: take a task without them.")
+        self.recollection = Recollection(self._symmetry, past)
+        self._over = np.zeros(env.num_envs, bool)  # robots whose next step begins an episode
+        self._begins_later = env.metadata.get("autoreset_mode") == AutoresetMode.NEXT_STEP
+        self._past = np.zeros((env.num_envs, past, self.recollection.layout.size), np.float32)
+        self.single_observation_space = gym.spaces.Box(-np.inf, np.inf, (self.recollection.size,), np.float32)
+        self.observation_space = gym.vector.utils.batch_space(self.single_observation_space, env.num_envs)
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begin episodes, of those in `options["reset_mask"]` or of all."""
+        observations, info = self.env.reset(seed=seed, options=options)  # type: ignore[arg-type]
+        mask = (options or {}).get("reset_mask")
+        begun = np.ones(self.num_envs, bool) if mask is None else np.asarray(mask)
+        self._past[begun] = observations[begun, None]
+        self._over[begun] = False
+        self._latest = observations
+        shown, self._elements = self.recollection.shown(observations, self._past)
+        return shown, self._symmetry.carry_info(info, self._elements)
+
+    def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+        """Swim for one decision by actions that were chosen on what was shown last."""
+        actions = self._symmetry.restore(actions, self._elements)
+        observations, rewards, terminated, truncated, info = self.env.step(actions)
+        self._past = np.concatenate([self._latest[:, None], self._past[:, :-1]], axis=1)
+        begun = self._over
+        if self._begins_later:
+            self._over = terminated | truncated
+        elif "final_obs" in info:
+            begun = info["_final_obs"]
+            info = {**info, **self._shown_final(info)}
+        self._past[begun] = observations[begun, None]
+        self._latest = observations
+        shown, self._elements = self.recollection.shown(observations, self._past)
+        return shown, rewards, terminated, truncated, self._symmetry.carry_info(info, self._elements)
+
+    def _shown_final(self, info: dict[str, Any]) -> dict[str, Any]:
+        """Last observations with their past, and masks, of episodes that are over."""
+        over, final, elements = info["_final_obs"], info["final_obs"].copy(), np.zeros(self.num_envs, np.intp)
+        shown, elements[over] = self.recollection.shown(np.stack(list(final[over])), self._past[over])
+        for robot, last in zip(np.flatnonzero(over), shown, strict=True):
+            final[robot] = last
+        return {"final_obs": final, "final_info": self._symmetry.carry_info(info["final_info"], elements)}

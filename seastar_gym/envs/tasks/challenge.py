@@ -2,11 +2,11 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
+from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.swimming import Swimming
 from seastar_gym.envs.tasks.numbered import Split
-from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import is_finite_number, shown
 
 Range = tuple[float, float]
@@ -21,8 +21,8 @@ class Challenge(ABC):
     """Name of what it is measured by in `seastar_gym.evaluation.measures`; "": the time until success."""
 
     @abstractmethod
-    def swimming(self, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any) -> Swimming:
-        """The task of so many robots. how: Actions and decision period, see `Swimming`."""
+    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> Swimming:
+        """The task of so many robots. options: Of the environment, as far as a task leaves them open."""
 
 
 def require_range(name: str, value: object, unit: str, zero_allowed: bool = False) -> None:

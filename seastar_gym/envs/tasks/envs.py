@@ -5,9 +5,8 @@ from typing import Literal
 from gymnasium.vector import AutoresetMode
 
 from seastar_gym.envs.commands import Actions
+from seastar_gym.envs.options import Plain, SwimOptions, read
 from seastar_gym.envs.seastar_swim import RenderMode, SeastarSwimEnv
-from seastar_gym.envs.swimming import Swimming
-from seastar_gym.envs.task import Plain, make_scene, read
 from seastar_gym.envs.tasks.challenge import Challenge
 from seastar_gym.envs.tasks.fail_blind import FailBlind
 from seastar_gym.envs.tasks.miswired import Miswired
@@ -47,20 +46,6 @@ def read_challenge(task: Challenge | Plain | str) -> Challenge:
 def name_of(challenge: Challenge | None) -> str | None:
     """Name of a challenge; None for waypoints, or where it has no name."""
     return next((name for name, known in CHALLENGES.items() if known == challenge), None)
-
-
-def make_task(
-    challenge: Challenge,
-    n_robots: int,
-    threads: int | None,
-    split: Split,
-    actions: Actions,
-    fidelity: Fidelity | None,
-    decision_period: float | None,
-) -> Swimming:
-    """The task of so many of the chapter's robots, for the arguments see `SeastarTaskEnv`."""
-    scene = make_scene(None, fidelity, decision_period)
-    return challenge.swimming(scene, n_robots, threads, split, actions=actions, decision_period=decision_period)
 
 
 class SeastarTaskEnv(SeastarSwimEnv):
@@ -116,7 +101,8 @@ class SeastarTaskEnv(SeastarSwimEnv):
     ):
         self._set_pictures(render_mode, frames_per_stroke)
         self.challenge = read_challenge(task)
-        self._begin_with(make_task(self.challenge, 1, 1, split, actions, fidelity, decision_period), frames_per_stroke)
+        options = SwimOptions(actions=actions, fidelity=fidelity, decision_period=decision_period)
+        self._begin_with(self.challenge.swimming(options, 1, 1, split), frames_per_stroke)
 
 
 class SeastarTaskVectorEnv(SeastarSwimVectorEnv):
@@ -146,4 +132,5 @@ class SeastarTaskVectorEnv(SeastarSwimVectorEnv):
     ):
         self._set_batch(num_envs, max_episode_steps, render_mode, autoreset_mode)
         self.challenge = read_challenge(task)
-        self._begin_with(make_task(self.challenge, num_envs, threads, split, actions, fidelity, decision_period))
+        options = SwimOptions(actions=actions, fidelity=fidelity, decision_period=decision_period)
+        self._begin_with(self.challenge.swimming(options, num_envs, threads, split))

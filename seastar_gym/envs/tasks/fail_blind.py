@@ -1,13 +1,12 @@
 """`SeastarFailBlind-v0`: limbs that are dead, for a robot that does not see its limbs."""
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from seastar_gym.envs.headings import wrapped
-from seastar_gym.envs.observation import VELOCITY_SCALE
-from seastar_gym.envs.own_numbers import OwnNumbers
+from seastar_gym.envs.layout import VELOCITY_SCALE, Entry
+from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.randomization import LIMB_STRENGTHS
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.scenery import Scenery
@@ -73,9 +72,9 @@ class FailBlind(Challenge):
     def __post_init__(self) -> None:
         require_count("FailBlind.dead", self.dead, 0, MOST_DEAD)
 
-    def swimming(self, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any) -> "FailBlindTask":
+    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> "FailBlindTask":
         """The task of so many robots."""
-        return FailBlindTask(self, scene, n_robots, threads, split, **how)
+        return FailBlindTask(self, options, n_robots, threads, split)
 
 
 MOST_DEAD = 2
@@ -102,17 +101,19 @@ class FailBlindTask(Numbered, SwimTask):
     """Task of robots with dead limbs that see their way alone."""
 
     observes_commands = True
-    own_numbers = OwnNumbers(("vector", "turn"), with_stations=False)
+    entries: tuple[Entry, ...] = ("vector", "pseudoscalar")
+    shows_limbs = False
 
-    def __init__(self, about: FailBlind, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any):
+    def __init__(self, about: FailBlind, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
         self.about = about
         self._hub, self._before = np.zeros((n_robots, 2)), np.zeros(n_robots)  # hub and heading at the last look
         self._way, self._turn = np.zeros((n_robots, 2)), np.zeros(n_robots)  # of the last decision
-        how["observe_actuators"] = False  # wires of dead limbs stay cold
-        SwimTask.__init__(self, scene, n_robots, "random", about.reward, 0.01, True, threads, **how)
+        options = replace(options, path="random", random_heading=True, reward=about.reward)
+        blind = replace(options, observe_actuators=False)  # wires of dead limbs stay cold
+        SwimTask.__init__(self, blind, n_robots, threads)
         self._tells_errors = False  # errors were measured of whole robots
         self._draws = AnyLimbs(about.dead)
-        self.drawn = self._draws.first_values(scene, n_robots)
+        self.drawn = self._draws.first_values(self.scene, n_robots)
         self._number(split)
 
     def _begin(self, robots: Flags) -> None:

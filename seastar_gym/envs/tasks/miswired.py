@@ -1,18 +1,18 @@
 """`SeastarMiswired-v0`: limbs whose two wires may have been swapped."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.scenery import Scenery
 from seastar_gym.envs.swimming import Flags, Floats
 from seastar_gym.envs.task import SwimTask
 from seastar_gym.envs.tasks.challenge import Challenge
 from seastar_gym.envs.tasks.numbered import Numbered, Split
-from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.serial import register_part
 
@@ -74,9 +74,9 @@ class Miswired(Challenge):
         if self.swap_probability > 1.0:
             raise ValueError(f"Miswired.swap_probability must be at most 1, not {self.swap_probability}.")
 
-    def swimming(self, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any) -> "MiswiredTask":
+    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> "MiswiredTask":
         """The task of so many robots."""
-        return MiswiredTask(self, scene, n_robots, threads, split, **how)
+        return MiswiredTask(self, options, n_robots, threads, split)
 
 
 class MiswiredTask(Numbered, SwimTask):
@@ -84,10 +84,11 @@ class MiswiredTask(Numbered, SwimTask):
 
     observes_commands = True
 
-    def __init__(self, about: Miswired, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any):
+    def __init__(self, about: Miswired, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
         self.about = about
-        self.wiring = np.ones((n_robots, scene.robot.n_limbs))
-        SwimTask.__init__(self, scene, n_robots, "random", about.reward, 0.01, True, threads, **how)
+        options = replace(options, path="random", random_heading=True, reward=about.reward)
+        SwimTask.__init__(self, options, n_robots, threads)
+        self.wiring = np.ones((n_robots, self.scene.robot.n_limbs))
         self._number(split)
 
     def _draw(self, robot: int, rng: np.random.Generator, asked: Any) -> None:

@@ -1,12 +1,13 @@
 """`SeastarObstTrap-v0`: a goal behind discs, most of which may form a horseshoe."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.own_numbers import OwnNumbers
+from seastar_gym.envs.layout import Entry
+from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.scenery import Ring, Scenery
 from seastar_gym.envs.swimming import Floats, Score
@@ -14,7 +15,6 @@ from seastar_gym.envs.task import SwimTask
 from seastar_gym.envs.tasks.challenge import Challenge, Range, require_range
 from seastar_gym.envs.tasks.discs import Ways, rims, ways
 from seastar_gym.envs.tasks.numbered import Numbered, Split
-from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_choice, require_count, require_number
 from seastar_gym.scene.serial import register_part
 
@@ -105,9 +105,9 @@ class ObstTrap(Challenge):
         require_choice("ObstTrap.potential", self.potential, get_args(Potential))
         require_number("ObstTrap.touch", self.touch, "1", zero_allowed=True)
 
-    def swimming(self, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any) -> "ObstTrapTask":
+    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> "ObstTrapTask":
         """The task of so many robots."""
-        return ObstTrapTask(self, scene, n_robots, threads, split, **how)
+        return ObstTrapTask(self, options, n_robots, threads, split)
 
 
 N_HORSESHOE = 8
@@ -206,15 +206,16 @@ class ObstTrapTask(Numbered, SwimTask):
     """Task of robots that swim around discs."""
 
     TERMS = (*SwimTask.TERMS, "reward_touch")
-    own_numbers = OwnNumbers(("vector", "scalar") * SEEN)
+    entries: tuple[Entry, ...] = ("vector", "scalar") * SEEN
 
-    def __init__(self, about: ObstTrap, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any):
+    def __init__(self, about: ObstTrap, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
         self.about = about
         self.discs = np.zeros((n_robots, N_HORSESHOE + about.scattered, 3))
         self._is_geodesic = about.potential == "geodesic"
         self._ways = Ways(np.zeros((n_robots, 1, 1)), STEP)
         goal = np.array([[about.distance[0], 0.0]])
-        SwimTask.__init__(self, scene, n_robots, goal, about.reward, 0.01, True, threads, **how)
+        options = replace(options, path=goal, random_heading=True, reward=about.reward)
+        SwimTask.__init__(self, options, n_robots, threads)
         if self._is_geodesic:
             shape = ways(np.zeros((0, 3)), goal[0], 0.0, STEP).lengths.shape
             self._ways = Ways(np.zeros((n_robots, *shape)), STEP)

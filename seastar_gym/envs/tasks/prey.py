@@ -1,17 +1,17 @@
 """`SeastarPrey-v0`: a prey that swims faster than the robot, on a course that comes back."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.scenery import Ring, Scenery
 from seastar_gym.envs.swimming import Flags, Floats, Score, Swimming
 from seastar_gym.envs.tasks.challenge import Challenge, Range, require_range
 from seastar_gym.envs.tasks.course import Courses, Pursuit, draw_course
 from seastar_gym.envs.tasks.numbered import Numbered, Split
-from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count, require_number
 from seastar_gym.scene.serial import register_part
 
@@ -99,9 +99,9 @@ class Prey(Challenge):
         for name in ("progress", "catch", "effort"):
             require_number(f"Prey.{name}", getattr(self, name), "1", zero_allowed=True)
 
-    def swimming(self, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any) -> "PreyTask":
+    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> "PreyTask":
         """The task of so many robots."""
-        return PreyTask(self, scene, n_robots, threads, split, **how)
+        return PreyTask(self, options, n_robots, threads, split)
 
 
 class PreyTask(Numbered, Swimming):
@@ -109,8 +109,8 @@ class PreyTask(Numbered, Swimming):
 
     TERMS = ("reward_progress", "reward_catch", "reward_effort")
 
-    def __init__(self, about: Prey, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any):
-        Swimming.__init__(self, scene, n_robots, threads, random_heading=True, **how)
+    def __init__(self, about: Prey, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
+        Swimming.__init__(self, replace(options, random_heading=True), n_robots, threads)
         self.about, self.waypoint_radius = about, about.catch_radius
         self.catches = np.zeros(n_robots, np.int64)
         self._drawn_courses = np.zeros((n_robots, MOST_PREY, 8))  # around the robot, from time 0 on
@@ -146,10 +146,6 @@ class PreyTask(Numbered, Swimming):
         """Distances of hubs from their prey [m]."""
         away = self.prey()[0] - hub
         return np.hypot(away[:, 0], away[:, 1])
-
-    def waypoints_of(self, robot: int) -> Floats:
-        """None."""
-        return np.zeros((0, 2))
 
     def _targets(self) -> Floats:
         place, velocity = self.prey()

@@ -1,18 +1,18 @@
 """`SeastarPrizes-v0`: prizes of different worth, more than can be reached in time."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.own_numbers import OwnNumbers
+from seastar_gym.envs.layout import Entry
+from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.scenery import Ring, Scenery
 from seastar_gym.envs.swimming import Flags, Floats, Score, Swimming
 from seastar_gym.envs.tasks.challenge import Challenge
 from seastar_gym.envs.tasks.numbered import Numbered, Split
 from seastar_gym.envs.tasks.rounds import best_round, distances, greedy_round
-from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.serial import register_part
 
@@ -91,9 +91,9 @@ class Prizes(Challenge):
         for name in ("gain", "progress", "prize", "effort"):
             require_number(f"Prizes.{name}", getattr(self, name), "1", zero_allowed=True)
 
-    def swimming(self, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any) -> "PrizesTask":
+    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> "PrizesTask":
         """The task of so many robots."""
-        return PrizesTask(self, scene, n_robots, threads, split, **how)
+        return PrizesTask(self, options, n_robots, threads, split)
 
 
 WORTHS = np.array([1.0, 1.0, 2.0, 4.0])
@@ -122,10 +122,10 @@ class PrizesTask(Numbered, Swimming):
     """Task of robots that take prizes."""
 
     TERMS = ("reward_progress", "reward_prize", "reward_effort")
-    own_numbers = OwnNumbers(("vector", "scalar") * N_PRIZES + ("scalar",))
+    entries: tuple[Entry, ...] = (*("vector", "scalar") * N_PRIZES, "scalar")
 
-    def __init__(self, about: Prizes, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any):
-        Swimming.__init__(self, scene, n_robots, threads, random_heading=True, **how)
+    def __init__(self, about: Prizes, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
+        Swimming.__init__(self, replace(options, random_heading=True), n_robots, threads)
         self.about, self.waypoint_radius = about, about.radius
         self.prizes = np.zeros((n_robots, N_PRIZES, 3))
         self.taken = np.zeros(n_robots)
@@ -138,10 +138,6 @@ class PrizesTask(Numbered, Swimming):
     def _begin(self, robots: Flags) -> None:
         self.taken[robots] = 0.0
         self._hub = self.simulator.hub_position()
-
-    def waypoints_of(self, robot: int) -> Floats:
-        """None."""
-        return np.zeros((0, 2))
 
     def _distances(self, hub: Floats) -> Floats:
         """Distances of hubs from the prizes that are left [m], shape (n_robots, N_PRIZES); infinite from others."""

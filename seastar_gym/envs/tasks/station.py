@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.scenery import Ring, Scenery
 from seastar_gym.envs.swimming import Flags, Floats, Score, Swimming
 from seastar_gym.envs.tasks.challenge import Challenge, Range, require_range
@@ -91,9 +92,9 @@ class Station(Challenge):
         for name in ("progress", "nearness", "effort"):
             require_number(f"Station.{name}", getattr(self, name), "1", zero_allowed=True)
 
-    def swimming(self, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any) -> "StationTask":
+    def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> "StationTask":
         """The task of so many robots."""
-        return StationTask(self, scene, n_robots, threads, split, **how)
+        return StationTask(self, options, n_robots, threads, split)
 
 
 FARTHEST_COUNTED = 0.02
@@ -123,11 +124,12 @@ class StationTask(Numbered, Swimming):
     TERMS = ("reward_progress", "reward_distance", "reward_effort")
     observes_commands = True
 
-    def __init__(self, about: Station, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any):
+    def __init__(self, about: Station, options: SwimOptions, n_robots: int, threads: int | None, split: Split):
+        scene, draws = options.modelled, AnyDirection(about.current)
         water = Water() if scene.fluid is None else scene.fluid
         flowing = replace(scene, fluid=replace(water, current=UniformCurrent()))
-        draws = AnyDirection(about.current)
-        Swimming.__init__(self, flowing, n_robots, threads, random_heading=True, draws=draws, **how)
+        options = replace(options, scene=flowing, fidelity=None, random_heading=True)
+        Swimming.__init__(self, options, n_robots, threads, draws=draws)
         self.about, self.scene, self.waypoint_radius = about, scene, about.tolerance
         self.station = np.zeros((n_robots, 2))
         self._distance = np.zeros(n_robots)
@@ -145,10 +147,6 @@ class StationTask(Numbered, Swimming):
         """Distances of hubs from their stations [m]."""
         away = hub - self.station
         return np.hypot(away[:, 0], away[:, 1])
-
-    def waypoints_of(self, robot: int) -> Floats:
-        """None."""
-        return np.zeros((0, 2))
 
     def _targets(self) -> Floats:
         return np.concatenate([self.station, self.station], axis=1)

@@ -24,6 +24,9 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Mirror: TypeAlias = tuple[tuple[int, int], ...]
 
+JUMP = 1e-9
+"""Rotation over the peak angle. A limb that would turn by more at once would jump."""
+
 
 @runtime_checkable
 class Actuator(Protocol):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.envs.commands import command_table
-from seastar_gym.envs.symmetry import memory_mirror, reduce_observations, restore_actions
+from seastar_gym.envs.symmetry import Symmetry
 from seastar_gym.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -51,8 +51,8 @@ class SharesPolicy:
         self, observation: NDArray[Any], state: Any = None, episode_start: Any = None, deterministic: bool = False
     ) -> tuple[NDArray[Any], None]:
         """Commands for observations of shape (size,) or (n, size), and None: the policy has no state."""
-        n_limbs = self.scene.robot.n_limbs
-        reduced, elements = reduce_observations(observation, n_limbs, memory_mirror(self.scene.actuator))
+        symmetry = Symmetry.of(self.scene, "continuous")
+        reduced, elements = symmetry.reduce(observation)
         chosen, _ = self.model.predict(reduced.astype(np.float32), None, None, deterministic)
         commands = chosen if self.table is None else self.table[chosen]
-        return restore_actions(commands, elements, "continuous", n_limbs), None
+        return symmetry.restore(commands, elements), None

@@ -20,7 +20,7 @@ import numpy as np
 import torch
 
 from seastar_gym.controllers.contract import Policy
-from seastar_gym.envs.task import make_scene
+from seastar_gym.envs.options import make_scene
 from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
 from seastar_gym.evaluation.swim import Swim
 from seastar_gym.scene.checks import require_count

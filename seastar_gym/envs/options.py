@@ -1,0 +1,126 @@
+"""Options that all environments share, checked once, and the scene that they mean."""
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path as FilePath
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from seastar_gym.accuracy.certificate import Certificate
+from seastar_gym.envs.commands import Actions
+from seastar_gym.envs.headings import Headings
+from seastar_gym.envs.paths import FARTHEST, make_path
+from seastar_gym.envs.randomization import DomainRandomization
+from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.scene import Scene, SmaWires
+from seastar_gym.scene.checks import as_float, require_flag, require_kind, require_number, shown
+from seastar_gym.scene.numerics import Fidelity
+from seastar_gym.scene.scene_file import load_scene
+from seastar_gym.scene.serial import Part, from_dict
+
+Path = str | ArrayLike
+"""Path by its name, or waypoints [m], shape (n, 2)."""
+Plain = dict[str, Any]
+"""Part of a scene, or of the task, as plain data, see `seastar_gym.scene.serial`."""
+
+Init = TypeVar("Init", bound=Callable[..., None])
+
+
+@dataclass(frozen=True)
+class SwimOptions:
+    """Arguments of the environments, but for pictures; `SeastarSwimEnv` documents them.
+
+    `scene`, `reward`, `randomization` and `headings` may be given as plain data, and are parts then.
+    """
+
+    path: Path = "pentagon"
+    actions: Actions = "limbs"
+    fidelity: Fidelity | None = None
+    scene: Scene | None = None
+    reward: RewardWeights = RewardWeights()
+    waypoint_radius: float = 0.01
+    random_heading: bool = False
+    randomization: DomainRandomization | None = None
+    certificate: Certificate | str | PathLike[str] | None = None
+    error_bars: bool = False
+    decision_period: float | None = None
+    observe_actuators: bool = True
+    headings: Headings | None = None
+
+    def __post_init__(self) -> None:
+        parts = {"scene": Scene, "reward": RewardWeights, "randomization": DomainRandomization, "headings": Headings}
+        for name, kind in parts.items():
+            object.__setattr__(self, name, read(getattr(self, name), kind))
+        object.__setattr__(self, "waypoint_radius", as_float(self.waypoint_radius))
+        require_kind("scene", self.scene, Scene | None, "a Scene")
+        require_kind("reward", self.reward, RewardWeights, "RewardWeights")
+        require_kind("randomization", self.randomization, DomainRandomization | None, "a DomainRandomization or None")
+        require_kind("headings", self.headings, Headings | None, "Headings or None")
+        require_flag("random_heading", self.random_heading)
+        require_flag("observe_actuators", self.observe_actuators)
+        require_number("waypoint_radius", self.waypoint_radius, "m")
+        if self.waypoint_radius > FARTHEST:
+            raise ValueError(f"waypoint_radius must be at most {FARTHEST:g} m, not {shown(self.waypoint_radius)}.")
+        waypoints = make_path(self.path, np.random.default_rng(0))  # refuses a bad path now, not at the first reset
+        if not isinstance(self.path, str):
+            object.__setattr__(self, "path", waypoints)
+        if self.headings is not None:
+            self.headings.of_path(waypoints, np.random.default_rng(0))  # likewise
+
+    @property
+    def modelled(self) -> Scene:
+        """Scene that is simulated, see `make_scene`."""
+        return make_scene(self.scene, self.fidelity, self.decision_period)
+
+    @property
+    def fidelity_of_scene(self) -> Fidelity | None:
+        """Fidelity that is asked for of a scene; None without a scene."""
+        return None if self.scene is None else self.fidelity
+
+
+def with_options(init: Init) -> Init:
+    """Decorator of an `__init__` with `*given` and `**options`, whose signature names all options in their place."""
+    shared = list(inspect.signature(SwimOptions).parameters.values())
+    own = [one for one in inspect.signature(init).parameters.values() if one.name != "options"]
+    at = next(k for k, one in enumerate(own) if one.kind is one.VAR_POSITIONAL)
+    later = [one.replace(kind=one.KEYWORD_ONLY) for one in own[at + 1 :]]
+    init.__signature__ = inspect.Signature([*own[:at], *shared, *later])  # type: ignore[attr-defined]
+    return init
+
+
+def make_scene(
+    scene: Scene | Plain | None, fidelity: Fidelity | None, decision_period: float | None = None
+) -> Scene:
+    """Scene with the nodes and numerics that it names, otherwise with those of `fidelity`, see `Scene.at`.
+
+    Without a scene, it is the chapter's at the fidelity, with wires for decisions that are not strokes.
+
+    decision_period: Time between decisions [s]. None means a stroke.
+    """
+    if scene is None:
+        chapters = Scene().at(fidelity)
+        in_strokes = decision_period is None or decision_period == chapters.actuator.period
+        return chapters if in_strokes else replace(chapters, actuator=SmaWires())
+    scene = read(scene, Scene)
+    require_kind("scene", scene, Scene, "a Scene")
+    return scene.at(fidelity)
+
+
+def scene_at(file: FilePath | None, fidelity: Fidelity) -> Scene | None:
+    """Scene of a file as command lines name it, with its own numerics, or those of `fidelity` where it names none.
+
+    None for no file.
+    """
+    if file is None:
+        return None
+    scene = load_scene(file)
+    return make_scene(scene, None if scene.numerics.named else fidelity)
+
+
+def read(part: Part | Plain, kind: type[Any]) -> Part:
+    """Part that was given as an object or in plain form."""
+    return from_dict(part, kind) if isinstance(part, dict) else part

@@ -1,0 +1,290 @@
+"""`Symmetry`: what a turned or mirrored robot sees, does and can follow; `Recollection`: the same with its past."""
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from seastar_gym.envs.commands import LIMB_COMMANDS, Actions, as_array, choices
+from seastar_gym.envs.layout import HEADINGS, Layout
+from seastar_gym.envs.symmetry.group import (
+    Elements,
+    Group,
+    action_table,
+    axis_of,
+    inverse,
+    is_mirror,
+    limb_order,
+    memory_mirror,
+    move_limbs,
+    n_limbs_of,
+    n_turns_of,
+    read_only,
+    require_group,
+    require_mirror,
+    symmetry_of,
+    transform_commands,
+    turns,
+)
+from seastar_gym.scene import Scene, checks
+from seastar_gym.scene.actuators.actuator import Mirror
+from seastar_gym.scene.checks import require_choice, require_count, require_kind, shown
+
+Floating = NDArray[np.floating[Any]]
+
+BOUNDARY_WIDTH = 1e-6
+"""Angle [rad] from a boundary between two sectors within which a waypoint lies on it. It is far above the rounding of
+observations: not rounding, but the next waypoint chooses the sector of a robot that is aimed along a limb."""
+MOST_PAST = 1000
+"""Largest number of past observations that can be remembered."""
+
+_SWAPPED_LIMB_ACTIONS = np.argmax(-LIMB_COMMANDS[:, None] == LIMB_COMMANDS, axis=1)
+"""Action of a limb after a mirror, by its action before: + and - change places."""
+_SWAPPED_WIRES = {"limbs": [0, 2, 1], "continuous": [1, 0]}
+"""Order of a limb's numbers in a mask after a mirror: + and - change places."""
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """What turns and mirrors of a robot do to its observations, to its actions and to their masks.
+
+    group: Turns and mirrors that there are. mirror: What a mirror does to the numbers of a limb, see `memory_mirror`;
+    () if there are none. layout: Of the observations. actions: Action mode.
+    """
+
+    group: Group
+    mirror: Mirror
+    layout: Layout
+    actions: Actions = "limbs"
+
+    def __post_init__(self) -> None:
+        require_group(self.group)
+        require_mirror(self.mirror)
+        require_kind("layout", self.layout, Layout, "a Layout")
+        require_choice("actions", self.actions, get_args(Actions))
+        n_limbs, of_limb = n_limbs_of(self.group), len(self.mirror)
+        if (n_limbs, of_limb) != (self.layout.n_limbs, self.layout.of_limb):
+            raise ValueError(
+                f"A group of {n_limbs} limbs and a mirror of {of_limb} numbers each do not fit a layout of "
+                f"{self.layout.n_limbs} limbs and {self.layout.of_limb} numbers."
+            )
+
+    @classmethod
+    def of(cls, scene: Scene, actions: Actions = "limbs") -> "Symmetry":
+        """Symmetry of the robot of a scene that swims along waypoints."""
+        mirror = memory_mirror(scene.actuator)
+        return cls(symmetry_of(scene), mirror, Layout(scene.robot.n_limbs, len(mirror)), actions)
+
+    def sectors(self, observations: Floating) -> Elements:
+        """Sectors of the current waypoints, 0 to 2 n_turns - 1, shape (...), in observations of shape (..., size).
+
+        They begin at the mirror's line. A group of turns alone has even ones only, twice as wide, from the x axis on.
+
+        A waypoint on a boundary belongs to the sector on the side of the next waypoint, and where that lies on the same
+        line (or there is none) to the sector anti-clockwise of the boundary. A waypoint at the hub lies in sector 0.
+        """
+        self._require_fit(observations)
+        waypoints = np.asarray(observations[..., self.layout.waypoints], np.float64)
+        current, towards_next = waypoints[..., :2], waypoints[..., 2:]
+        axis, n_turns = axis_of(self.group), n_turns_of(self.group)
+        per_sector = 2 if axis is None else 1
+        width = per_sector * np.pi / n_turns
+        current, towards_next = _from_axis(current, axis), _from_axis(towards_next, axis)
+        angle = np.arctan2(current[..., 1], current[..., 0])
+        boundary = np.rint(angle / width)  # the nearest one
+        on_boundary = np.abs(angle - boundary * width) <= BOUNDARY_WIDTH
+        c, s = np.cos(boundary * width), np.sin(boundary * width)
+        aside = c * towards_next[..., 1] - s * towards_next[..., 0]
+        next_is_right = aside < -BOUNDARY_WIDTH * np.hypot(towards_next[..., 0], towards_next[..., 1])
+        sector = np.where(on_boundary, boundary - next_is_right, np.floor(angle / width))
+        return per_sector * sector.astype(np.intp) % (2 * n_turns)
+
+    def _require_fit(self, observations: Floating) -> None:
+        """ValueError for observations, shape (..., size), of another robot."""
+        size, n_limbs = observations.shape[-1], self.layout.n_limbs
+        if size != self.layout.size:
+            raise ValueError(f"An observation of {size} numbers is not that of a robot of {n_limbs} limbs.")
+
+    def carry(self, observations: Floating, elements: ArrayLike) -> Floating:
+        """Observations of the robots carried by the elements: a fresh array of the same shape and type."""
+        observations, elements = np.asarray(observations), np.asarray(elements, dtype=np.intp)
+        self._require_fit(observations)
+        at, order = self.layout, _vector_order(self.group, self.layout.shows_limbs)
+        if not self.mirror and not at.entries:
+            return self._carry_vectors(observations, elements, order)
+        hub = at.stations_and_hub.stop
+        vectors = np.concatenate([observations[..., at.stations_and_hub], observations[..., at.waypoints]], axis=-1)
+        vectors = self._carry_vectors(vectors, elements, order)
+        of_limbs = self._carry_limbs(observations[..., at.actuators], elements)
+        further = self._carry_further(observations[..., at.further], elements)
+        return np.concatenate([vectors[..., :hub], of_limbs, further, vectors[..., hub:]], axis=-1)
+
+    def _carry_further(self, numbers: Floating, elements: Elements) -> Floating:
+        """Further entries, shape (..., k)."""
+        carried = numbers.copy()
+        pseudoscalars, at = self.layout.begins("pseudoscalar"), self.layout.begins("vector")
+        carried[..., pseudoscalars] *= np.where(is_mirror(elements)[..., None], -1, 1).astype(numbers.dtype)
+        if len(at):
+            pairs = np.stack([numbers[..., at], numbers[..., at + 1]], axis=-1).reshape(*numbers.shape[:-1], -1)
+            unmoved = np.tile(np.arange(len(at)), (2 * n_turns_of(self.group), 1))
+            pairs = self._carry_vectors(pairs, elements, unmoved)
+            carried[..., at], carried[..., at + 1] = pairs[..., ::2], pairs[..., 1::2]
+        return carried
+
+    def _carry_limbs(self, numbers: Floating, elements: Elements) -> Floating:
+        """Numbers of the limbs, shape (..., n_limbs len(mirror)), moved with them and mirrored where the robots are."""
+        if not self.mirror:
+            return numbers
+        of_limbs = numbers.reshape(*numbers.shape[:-1], n_limbs_of(self.group), len(self.mirror))
+        of_limbs = np.take_along_axis(of_limbs, limb_order(self.group)[elements][..., None], axis=-2)
+        index, sign = np.array(self.mirror, dtype=int).T
+        swapped = of_limbs[..., index] * sign.astype(numbers.dtype)
+        return np.where(is_mirror(elements)[..., None, None], swapped, of_limbs).reshape(numbers.shape)
+
+    def _carry_vectors(self, numbers: Floating, elements: Elements, order: NDArray[np.intp]) -> Floating:
+        """Pairs of numbers, turned, mirrored and moved with their limbs by an `order` like that of `_vector_order`."""
+        as_vectors = np.result_type(numbers, np.complex64)  # pairs of numbers as x + iy
+        vectors = np.ascontiguousarray(numbers).view(as_vectors)
+        vectors = np.take_along_axis(vectors, order[elements], axis=-1)
+        vectors *= turns(self.group)[elements][..., None].astype(as_vectors)
+        np.conjugate(vectors, out=vectors, where=is_mirror(elements)[..., None])
+        axis = axis_of(self.group)
+        if axis:
+            vectors *= np.where(is_mirror(elements), np.exp(2j * axis), 1.0)[..., None].astype(as_vectors)
+        return vectors.view(numbers.dtype)
+
+    def reduce(self, observations: Floating) -> tuple[Floating, Elements]:
+        """Observations with the current waypoint brought into sector 0, and the elements that did it."""
+        observations = checks.as_array("observations", observations)
+        if observations.dtype.kind != "f" or not observations.ndim:
+            raise ValueError(f"Observations must be floats, of shape (..., size), not {observations.dtype} values.")
+        elements = self.sectors(observations)
+        return self.carry(observations, elements), elements
+
+    def carry_actions(self, actions: NDArray[Any], elements: ArrayLike) -> NDArray[Any]:
+        """Actions of the robots carried by the elements: shape (..., n_limbs) for "limbs", "continuous", or (...)."""
+        actions, elements, mode = as_array(actions), np.asarray(elements, dtype=np.intp), self.actions
+        self._require_shape(actions, elements)
+        if mode == "continuous":
+            if actions.dtype.kind not in "iuf":
+                raise ValueError(f'With actions="continuous" an action is numbers, not {actions.dtype}.')
+            return transform_commands(actions, elements, self.group)
+        _, n_choices = choices(mode, n_limbs_of(self.group))
+        if actions.dtype.kind not in "iu" or (actions.size and (actions.min() < 0 or actions.max() >= n_choices)):
+            raise ValueError(f'With actions="{mode}" an action is a whole number from 0 to {n_choices - 1}.')
+        if mode != "limbs":
+            return action_table(mode, self.group)[elements, actions]
+        moved = move_limbs(actions, elements, self.group)
+        return np.where(is_mirror(elements)[..., None], _SWAPPED_LIMB_ACTIONS[moved], moved)
+
+    def _require_shape(self, actions: NDArray[Any], elements: Elements) -> None:
+        """ValueError where there is not one action for every element, or one for all."""
+        n_limbs = n_limbs_of(self.group)
+        of_one = (n_limbs,) if self.actions in ("limbs", "continuous") else ()
+        robots = actions.shape[: actions.ndim - len(of_one)]
+        if actions.shape != (*robots, *of_one) or (robots != elements.shape and () not in (robots, elements.shape)):
+            one = f"{n_limbs} numbers" if of_one else "a number"
+            raise ValueError(
+                f'With actions="{self.actions}" an action is {one}, for each of {elements.size} robot(s), not an array '
+                f"of shape {actions.shape}."
+            )
+
+    def restore(self, actions: Any, elements: ArrayLike) -> Any:
+        """Actions of the robots as they are, from those chosen on observations reduced by the elements."""
+        checked, n = as_array(elements), 2 * n_turns_of(self.group)
+        if checked.dtype.kind not in "iu" or (checked.size and (checked.min() < 0 or checked.max() >= n)):
+            raise ValueError(f"elements must be whole numbers from 0 to {n - 1}, not {shown(elements)}.")
+        return self.carry_actions(actions, inverse(checked, self.group))
+
+    def carry_masks(self, masks: NDArray[Any], elements: ArrayLike) -> NDArray[Any]:
+        """Masks of actions of the robots carried by the elements, shape (..., k), as in `seastar_gym.envs.masks`."""
+        masks, elements = np.asarray(masks), np.asarray(elements, dtype=np.intp)
+        if self.actions not in _SWAPPED_WIRES:
+            before = action_table(self.actions, self.group)[inverse(elements, self.group)]
+            return np.take_along_axis(masks, before, axis=-1)
+        of_limbs = np.moveaxis(masks.reshape(*masks.shape[:-1], n_limbs_of(self.group), -1), -1, 0)
+        moved = np.moveaxis(np.stack([move_limbs(one, elements, self.group) for one in of_limbs]), 0, -1)
+        mirrored = np.where(is_mirror(elements)[..., None, None], moved[..., _SWAPPED_WIRES[self.actions]], moved)
+        return mirrored.reshape(*masks.shape)
+
+    def carry_info(self, info: dict[str, Any], elements: Elements) -> dict[str, Any]:
+        """Info with the masks of the robots carried by the elements, if it has any."""
+        if "action_mask" not in info:
+            return info
+        return {**info, "action_mask": self.carry_masks(info["action_mask"], elements)}
+
+
+def _from_axis(vectors: NDArray[np.float64], axis: float | None) -> NDArray[np.float64]:
+    """Vectors, shape (..., 2), in a frame whose x axis is the mirror's line."""
+    if not axis:
+        return vectors
+    c, s = np.cos(axis), np.sin(axis)
+    return np.asarray(vectors @ np.array([[c, -s], [s, c]]))
+
+
+@cache
+def _vector_order(group: Group, shows_limbs: bool) -> NDArray[np.intp]:
+    """Order of vectors, shape (2 n_turns, k): vector i after element g was vector order[g, i] before."""
+    n_limbs, n_turns = n_limbs_of(group), n_turns_of(group)
+    at = Layout(n_limbs, shows_limbs=shows_limbs)
+    n_stations = at.velocities.start // 2
+    stations = np.arange(n_stations).reshape(n_limbs, -1)[limb_order(group)].reshape(2 * n_turns, n_stations)
+    others = np.tile(np.arange(at.hub_velocity.start, at.size, 2) // 2, (2 * n_turns, 1))
+    return read_only(np.concatenate([stations, n_stations + stations, others], axis=1))
+
+
+class Recollection:
+    """What a controller with memory sees: the present observation, and what was most telling of the last ones.
+
+    The limbs of a robot are renamed from one decision to the next as the waypoint moves from sector to sector. Here all
+    past observations are carried by the element of the present one, so that limbs have the same places throughout.
+
+    Of every past observation it keeps the tips of the limbs, the hub's velocity, the numbers of the limbs (last
+    commands among them) and the targets. Where a task shows no limbs, all of every past observation is kept.
+
+    symmetry: Of the robot and what it sees. past: Number of past observations.
+    """
+
+    def __init__(self, symmetry: Symmetry, past: int = 1):
+        require_kind("symmetry", symmetry, Symmetry, "a Symmetry")
+        require_count("past", past, 1, MOST_PAST)
+        self.symmetry, self.layout, self.past = symmetry, symmetry.layout, int(past)
+
+    @cached_property
+    def told(self) -> NDArray[np.intp]:
+        """Places of the numbers that are kept of a past observation."""
+        if not self.layout.shows_limbs:
+            return np.arange(self.layout.size)
+        return np.array([*self.layout.tips, *range(self.layout.hub_velocity.start, self.layout.size)])
+
+    @property
+    def size(self) -> int:
+        """Length of what is shown."""
+        return self.layout.size + self.past * len(self.told)
+
+    def shown(self, observations: NDArray[Any], past: NDArray[Any]) -> tuple[NDArray[np.float32], Elements]:
+        """What is shown of observations, shape (n, size), and the elements that brought their targets into sector 0.
+
+        observations: Present ones, shape (n, layout.size). past: Those before, latest first, (n, past, layout.size).
+        """
+        elements = self.symmetry.sectors(observations)
+        every = np.concatenate([observations[:, None], past], axis=1)
+        reduced = self.symmetry.carry(every, np.repeat(elements[:, None], every.shape[1], axis=1))
+        n = len(observations)
+        shown = np.concatenate([reduced[:, 0], reduced[:, 1:, self.told].reshape(n, -1)], axis=1)
+        return shown.astype(np.float32), elements
+
+
+def reduce_observations(
+    observations: Floating, group: Group, mirror: Mirror = (), with_headings: bool = False
+) -> tuple[Floating, Elements]:
+    """`Symmetry.reduce` by its old name, for one release."""
+    layout = Layout(n_limbs_of(group), len(mirror), HEADINGS if with_headings else ())
+    return Symmetry(group, mirror, layout).reduce(observations)
+
+
+def restore_actions(actions: NDArray[Any], elements: ArrayLike, mode: Actions, group: Group) -> NDArray[Any]:
+    """`Symmetry.restore` by its old name, for one release."""
+    return Symmetry(group, (), Layout(n_limbs_of(group)), mode).restore(actions, elements)
