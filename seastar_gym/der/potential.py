@@ -118,10 +118,10 @@ def hinge_slopes(rods, work, stage, hinge, t, EI_kappa_bar, convex):
     bend = moment(rods, work, hinge, t, EI_kappa_bar)
     tau, inverse_gamma = rods.damping, stage.inverse_gamma
     energy = damped_energy(
-        tau, work.bending, hinge, inverse_gamma, bend, EI_kappa_bar, bending_compliance(rods.along, rods, work, hinge),
+        tau, work.bending, hinge, inverse_gamma, bend, EI_kappa_bar, bending_compliance(rods, work, hinge),
         bending_energy(rods, work, hinge, bend),
     )  # fmt: skip
-    stiffness = damped_stiffness(tau, inverse_gamma, bending_stiffness(rods.along, rods, work, hinge))
+    stiffness = damped_stiffness(tau, inverse_gamma, bending_stiffness(rods, work, hinge))
     damped = damped_stress(tau, work.bending, hinge, inverse_gamma, bend, EI_kappa_bar)
     slope, s = bending_slopes(stiffness, t, damped, convex)
     return energy, slope, s
@@ -156,7 +156,7 @@ def node_slopes(contact, rods, work, stage, node, motion):
         (add_product(diagonal, sx, wx), sx * wy, add_product(diagonal, sy, wy)),
     )
     slopes = add_fluid_inertia(work.added_mass, node, dx, dy, stage.inverse_gamma, slopes)
-    return add_cross_flow(rods.cross_drag, rods, work.normals, node, wx, wy, stage.gamma, stage.inverse_gamma, slopes)
+    return add_cross_flow(rods, work.normals, node, wx, wy, stage.gamma, stage.inverse_gamma, slopes)
 
 
 @kernel
@@ -167,9 +167,9 @@ def coupling(s, outer, inner):
 
 
 @kernel
-def assemble_hub(clamp, rods, work, stage, convex):
+def assemble_hub(rods, work, stage, convex):
     """Root edges, the hub's moments on them, stiffnesses and couplings, into `work`; returns the hub's energy [J]."""
-    begin_body(rods.body, rods, work)
+    begin_body(rods, work)
     n_limbs, edges = rods.n_limbs, rods.nodes_per_limb - 1
     for limb in range(n_limbs):
         edge = edge_geometry(work.q, tail_node(rods, limb * edges), limb * edges + 1)
@@ -178,7 +178,7 @@ def assemble_hub(clamp, rods, work, stage, convex):
         store(work.hub_moment, limb, 0.0)
         store(work.hub_stiffness, limb, 0.0)
         store(work.hub_t, limb, 0.0)
-    if clamp is None:
+    if rods.clamp is None:
         return assemble_hub_hinges(rods, work, stage, convex)
     return assemble_clamps(rods, work, stage, convex)
 
@@ -215,15 +215,15 @@ def inner_edge(work, limb, first, i):
 
 
 @kernel
-def hub_motion(clamp, rods, work, stage, e):
+def hub_motion(rods, work, stage, e):
     """Motion of the hub for root edge e, where a rigid hub's discretisation asks for it, or of its root on a body."""
-    if clamp is None:
+    if rods.clamp is None:
         return Motion(splat(0.0), splat(0.0), splat(0.0), splat(0.0))
-    return tail_motion(rods.body, rods, work, stage, e)
+    return tail_motion(rods, work, stage, e)
 
 
 @kernel
-def join_hub(body, rods, work, stage, limb, convex, motion, energy, hub, D, r, f_tail):
+def join_hub(rods, work, stage, limb, convex, motion, energy, hub, D, r, f_tail):
     """Add a limb's block and right-hand side (D, r) where it starts, and its root edge's pull, to those of the hub.
 
     motion: Motion of the limb's root. hub: (D, r) of the hub. A root on a body has drag and fluid of its own.
@@ -231,7 +231,7 @@ def join_hub(body, rods, work, stage, limb, convex, motion, energy, hub, D, r, f
     Returns the energy [J] and the hub's (D, r).
     """
     D_hub, r_hub = hub
-    if body is None:
+    if rods.body is None:
         return energy, add_symmetric(D_hub, D), (r_hub[0] + r[0] - f_tail[0], r_hub[1] + r[1] - f_tail[1])
     E_r, g, drag = node_slopes(work.contact, rods, work, stage, root_place(rods, limb), motion)
     pull = (g[0] - f_tail[0], g[1] - f_tail[1])
@@ -261,7 +261,7 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
         e = node - 1
         before, motion_before = inner_edge(work, limb, first, i - 1), node_motion(work, stage, node - 1)
         t = half_angle(before, edge, 1.0)
-        natural = natural_moment(rods.along, rods, work, e)
+        natural = natural_moment(rods, work, e)
         E_b, slope_before, s_before = hinge_slopes(rods, work, stage, e, t, natural, convex)
         net_moment, stiffness = slope_before - slope, s_before + s
         E_s, f, K = edge_slopes(
@@ -270,7 +270,7 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
         E_n, g, inertia = node_slopes(work.contact, rods, work, stage, node, motion)
         energy += (E_s + E_n) + E_b
         P = coupling(s_before, edge, before)
-        E_m, g_m, h_m = middle_slopes(rods.middle_drag, rods, work, stage, e, motion_before, motion)
+        E_m, g_m, h_m = middle_slopes(rods, work, stage, e, motion_before, motion)
         energy = add_scalar(rods.middle_drag, energy, E_m)
         f_head, f_tail = push_ends(rods.middle_drag, f, g_m)
         K, K_B = with_middle(rods.middle_drag, K, h_m)
@@ -293,10 +293,10 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
         pivot = smaller(pivot, node_pivot)
         slope, s, edge, motion = slope_before, s_before, before, motion_before
     net_moment, stiffness = load(work.hub_moment, limb) - slope, load(work.hub_stiffness, limb) + s
-    of_hub = hub_motion(rods.clamp, rods, work, stage, first)
+    of_hub = hub_motion(rods, work, stage, first)
     E_s, f, K = edge_slopes(rods, work, stage, first, edge, net_moment, stiffness, convex, of_hub, motion)
     E_n, g, inertia = node_slopes(work.contact, rods, work, stage, first + 1, motion)
-    E_m, g_m, h_m = middle_slopes(rods.middle_drag, rods, work, stage, first, of_hub, motion)
+    E_m, g_m, h_m = middle_slopes(rods, work, stage, first, of_hub, motion)
     energy = add_scalar(rods.middle_drag, energy, E_m)
     f_head, f_tail = push_ends(rods.middle_drag, f, g_m)
     K, K_B = with_middle(rods.middle_drag, K, h_m)
@@ -308,7 +308,7 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
         (r[0] + (g[0] + f_head[0]), r[1] + (g[1] + f_head[1])),
     )
     energy, D_hub, r_hub = join_hub(
-        rods.body, rods, work, stage, limb, convex, of_hub, energy + E_s + E_n, (D_hub, r_hub),
+        rods, work, stage, limb, convex, of_hub, energy + E_s + E_n, (D_hub, r_hub),
         add_symmetric(D_before, K), r_before, f_tail,
     )  # fmt: skip
     return D_hub, r_hub, energy, decrement, pivot
@@ -323,11 +323,11 @@ def factorise(rods, work, stage, convex):
     Returns (Phi, decrement, pivot): the potential [J], gradient^T Hessian^-1 gradient [J], and the smallest pivot,
     which is not positive (or NaN) where the Hessian is not positive definite.
     """
-    energy = assemble_hub(rods.clamp, rods, work, stage, convex)
-    energy = add_contact(rods.contact, rods, work, stage, convex, energy)
+    energy = assemble_hub(rods, work, stage, convex)
+    energy = add_contact(rods, work, stage, convex, energy)
     of_hub = node_motion(work, stage, 0)
     E_n, r_hub, D_hub = node_slopes(work.contact, rods, work, stage, 0, of_hub)
-    E_n, r_hub, D_hub = add_body(rods.body, rods, work, stage, convex, of_hub, E_n, r_hub, D_hub)
+    E_n, r_hub, D_hub = add_body(rods, work, stage, convex, of_hub, E_n, r_hub, D_hub)
     energy += E_n
     decrement, pivot = splat(0.0), splat(np.inf)
     for limb in range(rods.n_limbs):
@@ -337,17 +337,17 @@ def factorise(rods, work, stage, convex):
         energy += limb_energy
         decrement += limb_decrement
         pivot = smaller(pivot, limb_pivot)
-    hub_decrement, hub_pivot = solve_hub(rods.clamp, rods, work, D_hub, r_hub)
+    hub_decrement, hub_pivot = solve_hub(rods, work, D_hub, r_hub)
     return energy, decrement + hub_decrement, smaller(pivot, hub_pivot)
 
 
 @kernel
-def solve_hub(clamp, rods, work, D_hub, r_hub):
+def solve_hub(rods, work, D_hub, r_hub):
     """Eliminate the root nodes and the hub, and solve for them, into work.root_solution.
 
     Returns the part of the Newton decrement [J] and the smallest pivot.
     """
-    if clamp is not None:
+    if rods.clamp is not None:
         return solve_rigid_hub(rods, work, D_hub, r_hub)
     if rods.n_limbs > 1:
         return solve_ring(work, rods.n_limbs, D_hub, r_hub)

@@ -25,12 +25,12 @@ def n_nodes(rods):
 @kernel
 def n_free(rods):
     """Number of places whose coordinates are unknowns: nodes, and the body's angle where there is one."""
-    return n_free_with(rods.body, rods)
+    return n_free_with(rods)
 
 
 @kernel
-def n_free_with(body, rods):
-    if body is None:
+def n_free_with(rods):
+    if rods.body is None:
         return n_nodes(rods)
     return n_nodes(rods) + 1
 
@@ -38,12 +38,12 @@ def n_free_with(body, rods):
 @kernel
 def n_places(rods):
     """Number of places: nodes and, with a body, its angle and the roots of its limbs."""
-    return n_places_with(rods.body, rods)
+    return n_places_with(rods)
 
 
 @kernel
-def n_places_with(body, rods):
-    if body is None:
+def n_places_with(rods):
+    if rods.body is None:
         return n_nodes(rods)
     return n_nodes(rods) + 1 + rods.n_limbs
 
@@ -51,14 +51,14 @@ def n_places_with(body, rods):
 @kernel
 def n_points(rods):
     """Number of places, and of the corners of a body's outline."""
-    return n_points_with(rods.body, rods)
+    return n_points_with(rods)
 
 
 @kernel
-def n_points_with(body, rods):
-    if body is None:
+def n_points_with(rods):
+    if rods.body is None:
         return n_nodes(rods)
-    return n_nodes(rods) + 1 + body.n_arms
+    return n_nodes(rods) + 1 + rods.body.n_arms
 
 
 @kernel
@@ -74,17 +74,17 @@ def root_place(rods, limb):
 
 
 @kernel
-def is_root(body, rods, place):
+def is_root(rods, place):
     """Whether a place is a limb's root on a body."""
-    if body is None:
+    if rods.body is None:
         return False
     return place > n_nodes(rods)
 
 
 @kernel
-def is_angle(body, rods, place):
+def is_angle(rods, place):
     """Whether a place is that of a body's angle, where there is nothing that moves."""
-    if body is None:
+    if rods.body is None:
         return False
     return place == n_nodes(rods)
 
@@ -92,13 +92,13 @@ def is_angle(body, rods, place):
 @kernel
 def tail_node(rods, e):
     """The node where edge e starts: for a root edge the hub, or the limb's root on a body."""
-    return tail_node_with(rods.body, rods, e)
+    return tail_node_with(rods, e)
 
 
 @kernel
-def tail_node_with(body, rods, e):
+def tail_node_with(rods, e):
     edges = rods.nodes_per_limb - 1
-    if body is None:
+    if rods.body is None:
         return 0 if e % edges == 0 else e
     return root_place(rods, e // edges) if e % edges == 0 else e
 
@@ -113,9 +113,9 @@ def hinge_edges(rods, e):
 
 
 @kernel
-def is_clamped(clamp, rods, e):
+def is_clamped(rods, e):
     """Whether hinge e is a clamp of a rigid hub, and no hinge between two edges."""
-    if clamp is None:
+    if rods.clamp is None:
         return False
     return e % (rods.nodes_per_limb - 1) == 0
 

@@ -25,7 +25,7 @@ def frozen(angle: float = 0.0):
     """Memory of the robot at rest, turned."""
     work = make_work(RODS, 1)
     freeze_normals.plain(RODS, work.normals, rows(rotated(ROBOT.nodes(), angle)))
-    freeze_added_mass.plain(RODS.added_mass, RODS, work)
+    freeze_added_mass.plain(RODS, work)
     return work
 
 

@@ -115,15 +115,15 @@ def run(rods, rigid, stage, convex=None):
     kernel_stage = Stage(rows_of(rods, stage.u_hat), rows_of(rods, stage.v_hat), Lanes(stage.gamma),
                          Lanes(1.0 / stage.gamma), False)  # fmt: skip
     work.q[:] = rows_of(rods, stage.first)
-    place_roots.plain(rods.body, rods, work.q)
-    place_roots.plain(rods.body, rods, kernel_stage.q_hat)
-    freeze_body.plain(rods.body, rods, work, kernel_stage, rates_of(stage))
+    place_roots.plain(rods, work.q)
+    place_roots.plain(rods, kernel_stage.q_hat)
+    freeze_body.plain(rods, work, kernel_stage, rates_of(stage))
     freeze_fluid.plain(rods, work)
-    freeze_strains.plain(rods.damping, rods, work, kernel_stage.q_hat)
+    freeze_strains.plain(rods, work, kernel_stage.q_hat)
     natural = rigid.directions + stage.delta_psi
     work.hub_direction[:] = np.stack([np.cos(natural), np.sin(natural)], axis=1).reshape(-1, 1)
     work.q[:] = rows_of(rods, stage.u)
-    place_roots.plain(rods.body, rods, work.q)
+    place_roots.plain(rods, work.q)
     phi, decrement, pivot = plain(factorise.plain(rods, work, kernel_stage, convex))
     everyone = Mask(np.ones(work.q.shape[1], bool))
     take_step.plain(rods, work, everyone, None, Lanes(1.0))
@@ -225,8 +225,8 @@ def settled(rods, rigid, tableau, start, gamma, h):
     stage = Stage(q_hat, v_hat, Lanes(gamma), Lanes(1.0 / gamma), not tableau.stiffly_accurate)
     work.q[:] = rows_of(rods, start.u + gamma * start.v_hat)
     for rows in (work.q, q_hat):
-        place_roots.plain(rods.body, rods, rows)
-    freeze_body.plain(rods.body, rods, work, stage, tuple(map(Lanes, (*start.v_hat[:2], start.v_hat[-1]))))
+        place_roots.plain(rods, rows)
+    freeze_body.plain(rods, work, stage, tuple(map(Lanes, (*start.v_hat[:2], start.v_hat[-1]))))
     freeze_fluid.plain(rods, work)
     work.hub_direction[:] = np.stack([np.cos(rigid.directions), np.sin(rigid.directions)], axis=1).reshape(-1, 1)
     everyone = Mask(np.ones(work.q.shape[1], bool))

@@ -126,19 +126,19 @@ def begun(rods, oracle: Touching, stage: SimpleNamespace):
     """(work, stage) of kernels where the stage's first guess is frozen, and the iterate is at u."""
     work, gamma = make_work(rods, 1), Lanes(stage.gamma)
     q_hat, v_hat = rows_of(rods, stage.u_hat), rows_of(rods, stage.v_hat)
-    move_roots.plain(rods.body, rods, q_hat, v_hat)
+    move_roots.plain(rods, q_hat, v_hat)
     kernel_stage = Stage(q_hat, v_hat, gamma, 1.0 / gamma, oracle.ahead)
     rates = (stage.first - stage.u_hat) / stage.gamma
     work.q[:] = rows_of(rods, stage.first)
-    place_roots.plain(rods.body, rods, work.q)
-    freeze_contact.plain(rods.contact, rods, work, kernel_stage, q_hat)
-    freeze_body.plain(rods.body, rods, work, kernel_stage, tuple(Lanes(rates[k]) for k in (0, 1, -1)))
+    place_roots.plain(rods, work.q)
+    freeze_contact.plain(rods, work, kernel_stage, q_hat)
+    freeze_body.plain(rods, work, kernel_stage, tuple(Lanes(rates[k]) for k in (0, 1, -1)))
     freeze_fluid.plain(rods, work)
-    freeze_strains.plain(rods.damping, rods, work, q_hat)
+    freeze_strains.plain(rods, work, q_hat)
     natural = oracle.directions + stage.delta_psi
     work.hub_direction[:] = np.stack([np.cos(natural), np.sin(natural)], axis=1).reshape(-1, 1)
     work.q[:] = rows_of(rods, stage.u)
-    place_roots.plain(rods.body, rods, work.q)
+    place_roots.plain(rods, work.q)
     return work, kernel_stage
 
 
@@ -160,8 +160,8 @@ def test_potential_and_newton_direction_are_those_of_the_oracle(name, ahead, kin
     work, kernel_stage = begun(rods, oracle, stage)
     energy, decrement, pivot = factorise.plain(rods, work, kernel_stage, None)
     assert n_listed.plain(work) > 0 and np.isfinite(plain(pivot)).all()
-    decrement = solve_coupled.plain(work.contact, rods, work, EVERYONE, decrement)
-    move_along.plain(work.contact, rods, work, EVERYONE, None, Lanes(1.0))
+    decrement = solve_coupled.plain(rods, work, EVERYONE, decrement)
+    move_along.plain(rods, work, EVERYONE, None, Lanes(1.0))
     n = len(stage.u) - 1
     direction = -np.append(work.step[:n, 0], work.step[n, 0] / rods.body.scale[0])
 
@@ -184,8 +184,8 @@ def test_forces_neither_push_nor_turn_robot_and_body_together(name, kind):
     stage = random_stage(oracle, 2e-3, 3, kind)
     stage.first = stage.u
     work, kernel_stage = begun(rods, oracle, stage)
-    begin_body.plain(rods.body, rods, work)
-    energy = add_contact.plain(rods.contact, rods, work, kernel_stage, None, Lanes(0.0))
+    begin_body.plain(rods, work)
+    energy = add_contact.plain(rods, work, kernel_stage, None, Lanes(0.0))
     n = 2 * oracle.star.n_nodes - 2 * N_LIMBS
     force, q = (rows[:n, 0].reshape(-1, 2) for rows in (work.contact.force, work.q))
     assert plain(energy)[0] > 0.0 and not work.contact.force[n + 2 :].any() and n_listed.plain(work) > 0
@@ -211,8 +211,8 @@ def test_nodes_that_entered_a_body_belong_to_the_side_that_they_came_from():
         setattr(stage, at, np.append(moved.ravel(), stage.u[-1]))
     stage.u = stage.first
     work, kernel_stage = begun(rods, oracle, stage)
-    begin_body.plain(rods.body, rods, work)
-    add_contact.plain(rods.contact, rods, work, kernel_stage, None, Lanes(0.0))
+    begin_body.plain(rods, work)
+    add_contact.plain(rods, work, kernel_stage, None, Lanes(0.0))
     force = turned(-stage.u[-1], work.contact.force[2 * node : 2 * node + 2, 0])
     np.testing.assert_allclose(force / np.linalg.norm(force), [-0.005 / 0.0403112887, 0.04 / 0.0403112887], atol=1e-3)
 
@@ -227,12 +227,12 @@ def forces(body: Body, began: np.ndarray, guessed: np.ndarray) -> np.ndarray:
     q_0, still = np.zeros_like(work.q), np.zeros_like(work.q)
     for rows, nodes in ((q_0, began), (work.q, guessed)):
         rows[:n] = nodes.reshape(N_LANES, n).T
-        place_roots.plain(rods.body, rods, rows)
+        place_roots.plain(rods, rows)
     stage = Stage(q_0, still, Lanes(1.0), Lanes(1.0), False)
-    freeze_contact.plain(rods.contact, rods, work, stage, q_0)
+    freeze_contact.plain(rods, work, stage, q_0)
     work.q[:n] *= 0.8
-    begin_body.plain(rods.body, rods, work)
-    add_contact.plain(rods.contact, rods, work, stage, None, Lanes(0.0))
+    begin_body.plain(rods, work)
+    add_contact.plain(rods, work, stage, None, Lanes(0.0))
     return work.contact.force[:n].T.reshape(began.shape)
 
 
@@ -289,7 +289,7 @@ def test_steps_whose_ends_are_in_the_body_are_seen_in_their_own_robot(name):
         work = make_work(rods, 1)
         work.q[:], q_0 = rows_of(rods, end), rows_of(rods, start)
         for rows in (work.q, q_0):
-            place_roots.plain(rods.body, rods, rows)
+            place_roots.plain(rods, rows)
         stage = Stage(q_0, q_0, Lanes(1.0), Lanes(1.0), False)
-        found = plain(those_uncrossed.plain(rods.contact, rods, work, stage, q_0, EVERYONE))
+        found = plain(those_uncrossed.plain(rods, work, stage, q_0, EVERYONE))
         assert found.all() == good and found.any() == good

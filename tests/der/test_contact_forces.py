@@ -29,7 +29,7 @@ EVERYONE = Mask(np.ones(N_LANES, bool))
 def energy(touching, q=None) -> np.ndarray:
     work, own = touching.work, touching.work.q.copy()
     work.q[:] = own if q is None else q
-    found = plain(add_contact.plain(touching.rods.contact, touching.rods, work, touching.stage, None, Lanes(0.0)))
+    found = plain(add_contact.plain(touching.rods, work, touching.stage, None, Lanes(0.0)))
     work.q[:] = own
     return found
 
@@ -97,7 +97,7 @@ def test_edges_cross_where_each_cuts_the_other_and_not_at_their_ends():
 
 
 def test_without_contact_nothing_is_added():
-    assert add_contact.plain(None, None, None, None, None, 3.0) == 3.0
-    assert add_contact_energy.plain(None, None, None, None, 3.0) == 3.0
+    assert add_contact.plain(None, None, None, None, 3.0) == 3.0
+    assert add_contact_energy.plain(None, None, None, 3.0) == 3.0
     assert plain(contact_force.plain(None, 1)) == (0.0, 0.0)
     assert those_apart.plain(None, EVERYONE) is EVERYONE

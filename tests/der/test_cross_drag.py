@@ -59,4 +59,4 @@ def test_a_straight_limb_has_the_one_coefficient_along_and_the_other_across(disc
 
 
 def test_without_such_drag_slopes_stay_what_they_are():
-    assert add_cross_flow.plain(None, None, None, 1, None, None, None, None, NOTHING) is NOTHING
+    assert add_cross_flow.plain(None, None, 1, None, None, None, None, NOTHING) is NOTHING

@@ -51,7 +51,7 @@ def normals() -> np.ndarray:
 def frozen():
     work = make_work(RODS, 1)
     freeze_normals.plain(RODS, work.normals, rows(Q))
-    freeze_added_mass.plain(RODS.added_mass, RODS, work)
+    freeze_added_mass.plain(RODS, work)
     return work
 
 

@@ -24,11 +24,11 @@ MOST_ITERATIONS = 200  # two limbs that touch need some 3 to 8; beyond, the robo
 @kernel
 def add_contact_product(rods, work, p, sign, rows):
     """rows += sign C K C^T p. Both have the nodes' coordinates and, with a body, its angle; roots follow."""
-    carry_roots(rods.body, rods, work, p)
+    carry_roots(rods, work, p)
     for slot in range(n_listed(work)):
         k = load(work.contact.slots, SLOT_ROWS * slot + STIFFNESS)
         add_gap_gradient(rods, work, slot, sign * k * gap(rods, work, slot, p), rows)
-    gather_roots(rods.body, rods, work, rows)
+    gather_roots(rods, work, rows)
 
 
 @kernel
@@ -40,14 +40,14 @@ def dot(rods, a, b):
 
 
 @kernel
-def solve_coupled(contact, rods, work, robots, decrement):
+def solve_coupled(rods, work, robots, decrement):
     """The Newton step of the robots in the mask, node by node into work.contact.x [m], where pairs are listed.
 
     With a body the step of its angle follows [rad].
 
     Returns its decrement [J].
     """
-    if contact is None:
+    if work.contact is None:
         return decrement
     if n_listed(work) == 0:
         return decrement
@@ -88,5 +88,5 @@ def solve_coupled(contact, rods, work, robots, decrement):
             store(Hp, row, add_product(load(r, row), beta, load(Hp, row)))
         running = running & (left > ACCURACY * decrement)
         iterations += 1
-    store(contact.missed, 0, select(running, 1.0, load(contact.missed, 0)))
+    store(work.contact.missed, 0, select(running, 1.0, load(work.contact.missed, 0)))
     return decrement

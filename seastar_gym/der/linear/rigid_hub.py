@@ -68,9 +68,9 @@ def with_arm(body, work, limb, H, x, y, C):
 
 
 @kernel
-def keep_turn(body, rods, work, turn):
+def keep_turn(rods, work, turn):
     """Keep the solution of a body's turn for tail_solution; without a body nobody asks for it."""
-    if body is None:
+    if rods.body is None:
         return
     store(work.root_solution, 2 * rods.n_limbs + 2, turn)
 
@@ -119,7 +119,7 @@ def substitute_rigid_hub(rods, work, turn, turn_d):
     edges, zero = rods.nodes_per_limb - 1, splat(0.0)
     hub = substitute_node(work, 0, turn, turn_d, zero, zero)
     store_pair(work.root_solution, 2 * rods.n_limbs, hub)
-    keep_turn(rods.body, rods, work, turn)
+    keep_turn(rods, work, turn)
     for limb in range(rods.n_limbs):
         root = substitute_node(work, limb * edges + 1, hub[0], hub[1], turn, turn_d)
         store_pair(work.root_solution, 2 * limb, root)

@@ -31,22 +31,22 @@ def substitute_star(rods, work, x):
         for i in range(2, edges + 1):
             before, here = here, substitute_node(work, first + i, here[0], here[1], before[0], before[1])
             store_pair(x, 2 * (first + i), here)
-    store_turn(rods.body, rods, work, x)
+    store_turn(rods, work, x)
 
 
 @kernel
-def store_turn(body, rods, work, x):
+def store_turn(rods, work, x):
     """Write the solution of a body's angle behind those of the nodes; nothing without a body."""
-    if body is None:
+    if rods.body is None:
         return
     store(x, 2 * n_nodes(rods), load(work.root_solution, 2 * rods.n_limbs + 2))
     store(x, 2 * n_nodes(rods) + 1, 0.0)
 
 
 @kernel
-def turn_of(body, rods, r):
+def turn_of(rods, r):
     """What rows have for a body's angle; zero without."""
-    if body is None:
+    if rods.body is None:
         return splat(0.0)
     return load(r, 2 * n_nodes(rods))
 
@@ -64,7 +64,7 @@ def with_torque(body, work, limb, force, torque):
 def solve_again(rods, work, r, x):
     """Write H^-1 r over rows x, H the matrix that was eliminated last; its pivots were kept (more limbs than one)."""
     edges, zero = rods.nodes_per_limb - 1, splat(0.0)
-    r_hub, r_turn = load_pair(r, 0), turn_of(rods.body, rods, r)
+    r_hub, r_turn = load_pair(r, 0), turn_of(rods, r)
     for limb in range(rods.n_limbs):
         first = limb * edges
         r_next, r_second = (zero, zero), (zero, zero)
@@ -74,14 +74,14 @@ def solve_again(rods, work, r, x):
         store_pair(work.ring, RING_ROWS * limb + 7, add(load_pair(r, 2 * (first + 1)), r_next))
         r_hub = add(r_hub, r_second)
         r_turn = with_torque(rods.body, work, limb, r_second, r_turn)
-    solve_hub_again(rods.clamp, rods, work, r_hub, r_turn)
+    solve_hub_again(rods, work, r_hub, r_turn)
     substitute_star(rods, work, x)
 
 
 @kernel
-def solve_hub_again(clamp, rods, work, r_hub, torque):
+def solve_hub_again(rods, work, r_hub, torque):
     """Solve for the root nodes, whose right-hand sides are in work.ring, the hub, and a body's angle (torque)."""
-    if clamp is None:
+    if rods.clamp is None:
         solve_ring_again(work, rods.n_limbs, r_hub)
     else:
         solve_rigid_hub_again(rods, work, r_hub, torque)

@@ -67,7 +67,7 @@ LARGEST_CUT = 0.01  # of the kinetic energy about the rigid motion, a choice; wh
 
 
 @kernel
-def frame_velocity(current, rods, q, v):
+def frame_velocity(rods, q, v):
     """(c_x, c_y): velocity of the frame that a step from (q, v) is judged in [m/s].
 
     That of the fluid at the hub; in vacuum that of the centre of mass; zero where nodes are held in the laboratory.
@@ -79,29 +79,29 @@ def frame_velocity(current, rods, q, v):
         m = load(rods.mass, node)
         mass += m
         v_x, v_y = add_product(v_x, m, load(v, 2 * node)), add_product(v_y, m, load(v, 2 * node + 1))
-    v_x, v_y = add_turning_momentum(rods.body, rods, q, v, (v_x, v_y))
+    v_x, v_y = add_turning_momentum(rods, q, v, (v_x, v_y))
     dragged = load(rods.scales.damped, 0) > 0.0
-    u_x, u_y = fluid_velocity(current, load(q, 0), load(q, 1))
+    u_x, u_y = fluid_velocity(rods.current, load(q, 0), load(q, 1))
     return select(dragged, u_x, v_x / mass), select(dragged, u_y, v_y / mass)
 
 
 @kernel
 def moving_energy(rods, work, q, v, frame):
     """Kinetic energy of the robot, and of fluid that moves along at the normals of the last stage [J]."""
-    energy = add_turning_energy(rods.body, rods, q, v, frame, kinetic_energy(rods, v, frame))
+    energy = add_turning_energy(rods, q, v, frame, kinetic_energy(rods, v, frame))
     energy = add_fluid_energy(work.added_mass, rods, v, frame, energy)
-    return less_edge_fluid_energy(rods.edge_added_mass, rods, work, v, energy)
+    return less_edge_fluid_energy(rods, work, v, energy)
 
 
 @kernel
-def add_work_of_loads(loads, rods, work, q, h, frame, energy):
+def add_work_of_loads(rods, work, q, h, frame, energy):
     """Add the work of dead loads in a step of length h from the state put aside to q [J], as seen from the frame."""
-    if loads is None:
+    if rods.load is None:
         return energy
     for node in range(n_nodes(rods)):
         dx = subtract_product(load(q, 2 * node) - load(work.step, 2 * node), h, frame[0])
         dy = subtract_product(load(q, 2 * node + 1) - load(work.step, 2 * node + 1), h, frame[1])
-        energy += load_power(loads, node, dx, dy)
+        energy += load_power(rods.load, node, dx, dy)
     return energy
 
 
@@ -113,7 +113,7 @@ def set_aside(rods, work, scheme, q, v):
     for row in range(rows):
         store(work.step, row, load(q, row))
         store(work.stage_v, unused + row, load(v, row))
-    place_roots(rods.body, rods, work.step)
+    place_roots(rods, work.step)
 
 
 @kernel
@@ -124,15 +124,15 @@ def put_back(rods, work, scheme, q, v, robots):
     for row in range(rows):
         store(q, row, select(robots, load(work.step, row), load(q, row)))
         store(v, row, select(robots, load(work.stage_v, unused + row), load(v, row)))
-    move_roots(rods.body, rods, q, v)
+    move_roots(rods, q, v)
 
 
 @kernel
-def moved_hub_energy(clamp, rods, work, actuation, start, end):
+def moved_hub_energy(rods, work, actuation, start, end):
     """Energy of hub hinges at their natural angles, once those have moved from `start` to `end` of the interval [J]."""
-    if clamp is not None:
-        moved = moved_clamp_energy(clamp, rods, work, actuation, start, end)
-        return add_moved_energy(rods.along, rods, work, actuation, start, end, moved)
+    if rods.clamp is not None:
+        moved = moved_clamp_energy(rods, work, actuation, start, end)
+        return add_moved_energy(rods, work, actuation, start, end, moved)
     set_natural_hub_angles(rods, work, actuation, start)
     for limb in range(rods.n_limbs):
         store(work.hub_moment, limb, load(work.hub_EI_kappa_bar, limb))
@@ -155,17 +155,17 @@ def allowed_energy(rods, work, scheme, actuation, start, end, q, v, frame):
     if not scheme.dissipative:
         set_natural_hub_angles(rods, work, actuation, start)
         allowed = elastic_energy(rods, work, q)
-        moved = moved_hub_energy(rods.clamp, rods, work, actuation, start, end)
+        moved = moved_hub_energy(rods, work, actuation, start, end)
         at_end = elastic_energy(rods, work, q)
         allowed = select(at_end > allowed, at_end, allowed) + moved
     else:
         set_natural_hub_angles(rods, work, actuation, end)
         allowed = elastic_energy(rods, work, q)
-    return add_contact_energy(rods.contact, rods, work, q, allowed + moving_energy(rods, work, q, v, frame))
+    return add_contact_energy(rods, work, q, allowed + moving_energy(rods, work, q, v, frame))
 
 
 @kernel
-def may_gain(current, added_mass, body, rods, work, stage, phi, robots):
+def may_gain(rods, work, stage, phi, robots):
     """Mask of those among `robots` whose step of implicit Euler might create energy, as far as Newton's method knows.
 
     phi: Phi before Newton's last step [J], which is not less than at its end. There Phi is |v_1 - v_0|^2_M / 2 + U(q_1)
@@ -174,7 +174,7 @@ def may_gain(current, added_mass, body, rods, work, stage, phi, robots):
 
     It is the whole of `robots` in scenes whose fluid gives energy or takes it up, or with a body.
     """
-    if current is None and added_mass is None and body is None:
+    if rods.current is None and rods.added_mass is None and rods.body is None:
         gain = phi - elastic_energy(rods, work, stage.q_hat)
         for node in range(n_nodes(rods)):
             m = load(rods.mass, node)
@@ -184,18 +184,18 @@ def may_gain(current, added_mass, body, rods, work, stage, phi, robots):
                 gain = add_product(gain, m * v_0, change)
             power = load_power(rods.load, node, load(stage.v_hat, 2 * node), load(stage.v_hat, 2 * node + 1))
             gain = subtract_product(gain, stage.gamma, power)
-        gain = less_edge_gain(rods.edge_mass, rods, work, stage, gain)
+        gain = less_edge_gain(rods, work, stage, gain)
         return robots & ~(gain <= 0.0)
     return robots
 
 
 @kernel
-def less_edge_gain(edge_mass, rods, work, stage, gain):
+def less_edge_gain(rods, work, stage, gain):
     """Gain less v_0 mu (v_1 - v_0) of the differences along the edges [J]; unchanged for lumped masses (None)."""
-    if edge_mass is None:
+    if rods.edge_mass is None:
         return gain
     for e in range(n_nodes(rods) - 1):
-        tail, mu = tail_node(rods, e), load(edge_mass, e)
+        tail, mu = tail_node(rods, e), load(rods.edge_mass, e)
         of_tail, of_head = node_motion(work, stage, tail), node_motion(work, stage, e + 1)
         v_x, v_y = edge_vector(stage.v_hat, tail, e + 1)
         gain = subtract_product(gain, mu * v_x, of_head.dx - of_tail.dx)
@@ -204,12 +204,12 @@ def less_edge_gain(edge_mass, rods, work, stage, gain):
 
 
 @kernel
-def less_edge_turn(edge_mass, rods, q, v, spin, turn):
+def less_edge_turn(rods, q, v, spin, turn):
     """(angular momentum, moment of inertia) less those of edges' differences; unchanged for lumped masses (None)."""
-    if edge_mass is None:
+    if rods.edge_mass is None:
         return spin, turn
     for e in range(n_nodes(rods) - 1):
-        tail, mu = tail_node(rods, e), load(edge_mass, e)
+        tail, mu = tail_node(rods, e), load(rods.edge_mass, e)
         rx, ry = edge_vector(q, tail, e + 1)
         vx, vy = edge_vector(v, tail, e + 1)
         spin = subtract_product(spin, mu, rx * vy - ry * vx)
@@ -218,15 +218,15 @@ def less_edge_turn(edge_mass, rods, q, v, spin, turn):
 
 
 @kernel
-def less_edge_fluid_turn(edge_added_mass, rods, work, q, v, spin, turn):
+def less_edge_fluid_turn(rods, work, q, v, spin, turn):
     """(angular momentum, moment of inertia) less those of edges' differences in the fluid that moves along.
 
     Unchanged without consistent added mass (None).
     """
-    if edge_added_mass is None:
+    if rods.edge_added_mass is None:
         return spin, turn
     for e in range(n_nodes(rods) - 1):
-        tail, mu = tail_node(rods, e), load(edge_added_mass, e)
+        tail, mu = tail_node(rods, e), load(rods.edge_added_mass, e)
         nx, ny = load(work.normals, 2 * e), load(work.normals, 2 * e + 1)
         rx, ry = edge_vector(q, tail, e + 1)
         vx, vy = edge_vector(v, tail, e + 1)
@@ -256,7 +256,7 @@ def rigid_motion(rods, work, q, v, frame):
         m = load(rods.mass, node)
         mass += m
         x, y = add_product(x, m, load(q, 2 * node)), add_product(y, m, load(q, 2 * node + 1))
-    x, y = add_mass_moment(rods.body, rods, q, (x, y))
+    x, y = add_mass_moment(rods, q, (x, y))
     x, y = x / mass, y / mass
     p_x, p_y, spin = zero, zero, zero
     # What the motions along x, along y and about the centre of mass have in common: the inertia of a rigid robot.
@@ -271,11 +271,11 @@ def rigid_motion(rods, work, q, v, frame):
         xx, xy, yy = xx + along_x[0], xy + along_x[1], yy + along_y[1]
         x_turn, y_turn, turn = x_turn + about[0], y_turn + about[1], turn + (r_x * about[1] - r_y * about[0])
     hub = (load(q, 0) - x, load(q, 1) - y)
-    v_hub, omega = (load(v, 0) - frame[0], load(v, 1) - frame[1]), spin_rate(rods.body, rods, v)
-    (p_x, p_y), spin = add_spin(rods.body, rods, q, v_hub, omega, hub, (p_x, p_y), spin)
-    (x_turn, y_turn), turn = add_spin(rods.body, rods, q, (-hub[1], hub[0]), one, hub, (x_turn, y_turn), turn)
-    spin, turn = less_edge_turn(rods.edge_mass, rods, q, v, spin, turn)
-    spin, turn = less_edge_fluid_turn(rods.edge_added_mass, rods, work, q, v, spin, turn)
+    v_hub, omega = (load(v, 0) - frame[0], load(v, 1) - frame[1]), spin_rate(rods, v)
+    (p_x, p_y), spin = add_spin(rods, q, v_hub, omega, hub, (p_x, p_y), spin)
+    (x_turn, y_turn), turn = add_spin(rods, q, (-hub[1], hub[0]), one, hub, (x_turn, y_turn), turn)
+    spin, turn = less_edge_turn(rods, q, v, spin, turn)
+    spin, turn = less_edge_fluid_turn(rods, work, q, v, spin, turn)
     # Elimination of x, then y.
     lower, turn_lower = xy / xx, x_turn / xx
     yy, y_turn, turn = yy - lower * xy, y_turn - lower * x_turn, turn - turn_lower * x_turn
@@ -298,8 +298,8 @@ def cut_velocities(rods, q, v, frame, motion, share, robots):
         about_y = vy - frame[1] - (v_y + omega * (load(q, 2 * node) - x))
         store(v, 2 * node, select(robots, add_product(vx, less, about_x), vx))
         store(v, 2 * node + 1, select(robots, add_product(vy, less, about_y), vy))
-    cut_spin(rods.body, rods, v, omega, less, robots)
-    move_roots(rods.body, rods, q, v)
+    cut_spin(rods, v, omega, less, robots)
+    move_roots(rods, q, v)
 
 
 @kernel
@@ -311,7 +311,7 @@ def through_poles(rods, work, q, robots):
     """
     through = robots & ~robots
     for e in range(rods.n_limbs * (rods.nodes_per_limb - 1)):
-        if is_clamped(rods.clamp, rods, e):
+        if is_clamped(rods, e):
             continue
         a, b, side = hinge_edges(rods, e)
         a_0, b_0 = edge_of(rods, work.step, a), edge_of(rods, work.step, b)
@@ -331,36 +331,36 @@ def energy_noise(rods, work, q, h, potential, kinetic):
     mass = load(rods.scales.free_mass, 0)
     edges = rods.n_limbs * (rods.nodes_per_limb - 1)
     length = load(rods.foresight.shortest_edge, 0)
-    stretching, bending = load(rods.stretching.EA_over_l, 0), bending_stiffness(rods.along, rods, work, 0)
+    stretching, bending = load(rods.stretching.EA_over_l, 0), bending_stiffness(rods, work, 0)
     for e in range(1, edges):
         stretching = larger(load(rods.stretching.EA_over_l, e), stretching)
-        bending = larger(bending_stiffness(rods.along, rods, work, e), bending)
+        bending = larger(bending_stiffness(rods, work, e), bending)
     stiffness = edges * (stretching + 4.0 * bending / (length * length))
     limb = (rods.nodes_per_limb - 1) * length
     move = UNITS * (absolute(load(q, 0)) + absolute(load(q, 1)) + limb)
     speed = move / h
     of_positions = move * sqrt(2.0 * stiffness * absolute(potential))
     of_velocities = speed * sqrt(2.0 * mass * kinetic) + 0.5 * mass * speed * speed
-    return add_load_noise(rods.load, rods, move, of_velocities + of_positions + 0.5 * stiffness * move * move)
+    return add_load_noise(rods, move, of_velocities + of_positions + 0.5 * stiffness * move * move)
 
 
 @kernel
-def add_load_noise(loads, rods, move, noise):
-    if loads is None:
+def add_load_noise(rods, move, noise):
+    if rods.load is None:
         return noise
     for row in range(2 * n_nodes(rods)):
-        noise = add_product(noise, move, absolute(load(loads, row)))
+        noise = add_product(noise, move, absolute(load(rods.load, row)))
     return noise
 
 
 @kernel
-def add_held_energy(contact, rods, work, scheme, q, energy):
+def add_held_energy(rods, work, scheme, q, energy):
     """Add what limbs that press each other store at the end of a step, where the scheme gives it back."""
-    if contact is None:
+    if rods.contact is None:
         return energy
     if not scheme.dissipative:
         return energy
-    return add_contact_energy(contact, rods, work, q, energy)
+    return add_contact_energy(rods, work, q, energy)
 
 
 @kernel
@@ -372,7 +372,7 @@ def hold_to_energy(rods, work, scheme, q, v, h, frame, robots, allowed, largest_
     Returns (refused, cut): masks of the robots whose step has to be undone, and of those whose velocities were cut.
     """
     potential, kinetic = elastic_energy(rods, work, q), moving_energy(rods, work, q, v, frame)
-    potential = add_held_energy(rods.contact, rods, work, scheme, q, potential)
+    potential = add_held_energy(rods, work, scheme, q, potential)
     grown = robots & (potential + kinetic > add_product(allowed, ROUNDING, kinetic))
     cut = grown & ~grown
     if any_lane(grown):

@@ -49,13 +49,13 @@ def minimise(rods, work, stage, active, tolerance, iteration_limit):
             regularised += select(indefinite, one, zero)
             continue
         stepping = running & low_enough & (pivot > 0.0)
-        decrement = solve_coupled(work.contact, rods, work, stepping, decrement)
+        decrement = solve_coupled(rods, work, stepping, decrement)
         shortening = running & ~low_enough & (fraction > SHORTEST_STEP) & (iterations > 0.0)
         fraction = select(stepping, one, select(shortening, 0.5 * fraction, fraction))
         if any_lane(shortening):
-            move = move_along(work.contact, rods, work, stepping, shortening, fraction)
+            move = move_along(rods, work, stepping, shortening, fraction)
         else:
-            move = move_along(work.contact, rods, work, stepping, None, fraction)
+            move = move_along(rods, work, stepping, None, fraction)
         best = select(stepping, phi, best)
         expected = select(stepping, decrement, expected)
         count = select(stepping, one, zero)
@@ -83,7 +83,7 @@ def take_step(rods, work, stepping, shortening, fraction):
     scale = step_scale(stepping, shortening, fraction)
     hub = load_pair(work.root_solution, 2 * rods.n_limbs)
     largest = move_node(work, 0, hub, shortening, scale)
-    largest = move_angle(rods.body, rods, work, work.root_solution, 2 * rods.n_limbs + 2, shortening, scale, largest)
+    largest = move_angle(rods, work, work.root_solution, 2 * rods.n_limbs + 2, shortening, scale, largest)
     for limb in range(rods.n_limbs):
         first = limb * edges
         before = tail_solution(rods.body, work, rods.n_limbs, limb, hub)
@@ -92,34 +92,34 @@ def take_step(rods, work, stepping, shortening, fraction):
         for i in range(2, edges + 1):
             before, here = here, substitute_node(work, first + i, here[0], here[1], before[0], before[1])
             largest = larger(largest, move_node(work, first + i, here, shortening, scale))
-    place_roots(rods.body, rods, work.q)
+    place_roots(rods, work.q)
     return sqrt(largest)
 
 
 @kernel
-def move_angle(body, rods, work, solution, row, shortening, scale, largest):
+def move_angle(rods, work, solution, row, shortening, scale, largest):
     """Move a body's angle by `scale` times its step, from a row of solutions [rad].
 
     Returns the largest move squared; unchanged without a body.
     """
-    if body is None:
+    if rods.body is None:
         return largest
-    arc = load(body.scale, 0) * load(solution, row)
+    arc = load(rods.body.scale, 0) * load(solution, row)
     return larger(largest, move_node(work, n_nodes(rods), (arc, splat(0.0)), shortening, scale))
 
 
 @kernel
-def move_along(contact, rods, work, stepping, shortening, fraction):
+def move_along(rods, work, stepping, shortening, fraction):
     """take_step, but where contact is listed along the step of all nodes that coupled.py has found."""
-    if contact is None:
+    if work.contact is None:
         return take_step(rods, work, stepping, shortening, fraction)
     if n_listed(work) == 0:
         return take_step(rods, work, stepping, shortening, fraction)
     scale, largest = step_scale(stepping, shortening, fraction), splat(0.0)
     for node in range(n_nodes(rods)):
-        largest = larger(largest, move_node(work, node, load_pair(contact.x, 2 * node), shortening, scale))
-    largest = move_angle(rods.body, rods, work, contact.x, 2 * n_nodes(rods), shortening, scale, largest)
-    place_roots(rods.body, rods, work.q)
+        largest = larger(largest, move_node(work, node, load_pair(work.contact.x, 2 * node), shortening, scale))
+    largest = move_angle(rods, work, work.contact.x, 2 * n_nodes(rods), shortening, scale, largest)
+    place_roots(rods, work.q)
     return sqrt(largest)
 
 

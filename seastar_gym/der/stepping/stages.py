@@ -49,9 +49,9 @@ def begin_stage(rods, work, scheme, k, q_0, v_0, a, h):
             store(work.v_hat, row, v_hat)
         velocity = add_product(v_hat, share, load(a, k * rows + row))
         store(work.q, row, add_product(q_hat, gamma, velocity))
-    place_roots(rods.body, rods, work.q)
+    place_roots(rods, work.q)
     if k > 0:
-        place_roots(rods.body, rods, work.q_hat)
+        place_roots(rods, work.q_hat)
         return Stage(work.q_hat, work.v_hat, gamma, 1.0 / gamma, not scheme.stiffly_accurate)
     return Stage(q_0, v_0, gamma, 1.0 / gamma, not scheme.stiffly_accurate)
 
@@ -74,25 +74,25 @@ def store_share(a, row, along, squared, robots):
 
 
 @kernel
-def guessed_motion(body, rods, scheme, k, stage, a):
+def guessed_motion(rods, scheme, k, stage, a):
     """(v_x, v_y, omega): first guess of the hub's velocity [m/s] and of a body's angular velocity [rad/s] in a stage.
 
     As begin_stage guesses it, but with a share that the ringing of limbs does not spoil; zeros without a body.
     """
-    if body is None:
+    if rods.body is None:
         return splat(0.0), splat(0.0), splat(0.0)
     rows, row = 2 * n_free(rods), 2 * n_nodes(rods)
     change = stage.gamma * load(a, memory_row(rods, scheme, OF_BODY + k))
     vx = add_product(load(stage.v_hat, 0), change, load(a, k * rows))
     vy = add_product(load(stage.v_hat, 1), change, load(a, k * rows + 1))
     arc = add_product(load(stage.v_hat, row), change, load(a, k * rows + row))
-    return vx, vy, arc * load(body.inverse_scale, 0)
+    return vx, vy, arc * load(rods.body.inverse_scale, 0)
 
 
 @kernel
-def keep_share_of_body(body, rods, work, scheme, k, stage, a, robots):
+def keep_share_of_body(rods, work, scheme, k, stage, a, robots):
     """Keep the share of a body's last accelerations that would have fit its new ones, before they are kept."""
-    if body is None:
+    if rods.body is None:
         return
     rows, angle = 2 * n_free(rods), 2 * n_nodes(rods)
     along, squared = splat(0.0), splat(0.0)
@@ -107,7 +107,7 @@ def keep_share_of_body(body, rods, work, scheme, k, stage, a, robots):
 def end_stage(rods, work, scheme, k, stage, a, robots):
     """Keep velocity and acceleration of a solved stage that is not the last, for the robots in the mask `robots`."""
     rows = 2 * n_free(rods)
-    keep_share_of_body(rods.body, rods, work, scheme, k, stage, a, robots)
+    keep_share_of_body(rods, work, scheme, k, stage, a, robots)
     along, squared = splat(0.0), splat(0.0)
     for row in range(rows):
         velocity, acceleration = stage_motion(work, stage, row)
@@ -123,7 +123,7 @@ def end_stage(rods, work, scheme, k, stage, a, robots):
 def end_step(rods, work, scheme, stage, q_0, v_0, a, h, accepted):
     """After the last stage: write the step's result over the state (q_0, v_0) of the robots in the mask `accepted`."""
     rows, k = 2 * n_free(rods), scheme.n_stages - 1
-    keep_share_of_body(rods.body, rods, work, scheme, k, stage, a, accepted)
+    keep_share_of_body(rods, work, scheme, k, stage, a, accepted)
     along, squared = splat(0.0), splat(0.0)
     for row in range(rows):
         velocity, acceleration = stage_motion(work, stage, row)
@@ -143,7 +143,7 @@ def end_step(rods, work, scheme, stage, q_0, v_0, a, h, accepted):
         store(a, k * rows + row, select(accepted, acceleration, last))
         store(q_0, row, select(accepted, q_1, q))
         store(v_0, row, select(accepted, v_1, v))
-    move_roots(rods.body, rods, q_0, v_0)
+    move_roots(rods, q_0, v_0)
     store_share(a, scheme.n_stages * rows + k, along, squared, accepted)
 
 
@@ -182,14 +182,14 @@ def start_standing(rods, work, stage, frame, robots):
         y = add_product(load(stage.q_hat, 2 * node + 1), stage.gamma, frame[1])
         store(work.q, 2 * node, select(robots, x, load(work.q, 2 * node)))
         store(work.q, 2 * node + 1, select(robots, y, load(work.q, 2 * node + 1)))
-    stop_turning(rods.body, rods, work, stage, robots)
+    stop_turning(rods, work, stage, robots)
 
 
 @kernel
-def stop_turning(body, rods, work, stage, robots):
+def stop_turning(rods, work, stage, robots):
     """Start the angle of a body at q_hat, for the robots in the mask, and its roots with it; nothing without a body."""
-    if body is None:
+    if rods.body is None:
         return
     row = 2 * n_nodes(rods)
     store(work.q, row, select(robots, load(stage.q_hat, row), load(work.q, row)))
-    place_roots(body, rods, work.q)
+    place_roots(rods, work.q)

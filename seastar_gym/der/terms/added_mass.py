@@ -38,36 +38,36 @@ def edge_coefficients(mesh: Mesh, density: float, C_a: float | None) -> NDArray[
 
 
 @kernel
-def freeze_added_mass(added_mass, rods, work):
+def freeze_added_mass(rods, work):
     """Fill work.added_mass, (xx, xy, yy) of every node [kg], from work.normals, in scenes that have it."""
-    if added_mass is None:
+    if rods.added_mass is None:
         return
     for node in range(n_nodes(rods)):
         xx, xy, yy = splat(0.0), splat(0.0), splat(0.0)
         if node == 0:
-            xx, xy, yy = hub_mass(rods.body, added_mass, rods, work, xx, xy, yy)
+            xx, xy, yy = hub_mass(rods, work, xx, xy, yy)
         else:
-            xx, xy, yy = add_half_edge_mass(load(added_mass, 2 * node), work.normals, node - 1, xx, xy, yy)
-            xx, xy, yy = add_half_edge_mass(load(added_mass, 2 * node + 1), work.normals, node, xx, xy, yy)
+            xx, xy, yy = add_half_edge_mass(load(rods.added_mass, 2 * node), work.normals, node - 1, xx, xy, yy)
+            xx, xy, yy = add_half_edge_mass(load(rods.added_mass, 2 * node + 1), work.normals, node, xx, xy, yy)
         store(work.added_mass, 3 * node, xx)
         store(work.added_mass, 3 * node + 1, xy)
         store(work.added_mass, 3 * node + 2, yy)
 
 
 @kernel
-def hub_mass(body, added_mass, rods, work, xx, xy, yy):
+def hub_mass(rods, work, xx, xy, yy):
     """Added mass of the hub [kg]: of half of every root edge; that of a body is its own, and its roots have theirs."""
     edges = rods.nodes_per_limb - 1
-    if body is None:
+    if rods.body is None:
         for e in range(0, rods.n_limbs * edges, edges):
-            xx, xy, yy = add_half_edge_mass(load(added_mass, 2 * e + 2), work.normals, e, xx, xy, yy)
+            xx, xy, yy = add_half_edge_mass(load(rods.added_mass, 2 * e + 2), work.normals, e, xx, xy, yy)
         return xx, xy, yy
     for limb in range(rods.n_limbs):
         e, place = limb * edges, root_place(rods, limb)
-        mass = add_half_edge_mass(load(added_mass, 2 * e + 2), work.normals, e, splat(0.0), splat(0.0), splat(0.0))
+        mass = add_half_edge_mass(load(rods.added_mass, 2 * e + 2), work.normals, e, splat(0.0), splat(0.0), splat(0.0))
         for k in range(3):
             store(work.added_mass, 3 * place + k, mass[k])
-    return body_added_mass(body.added_mass, work)
+    return body_added_mass(rods.body.added_mass, work)
 
 
 @kernel
@@ -134,14 +134,14 @@ def less_edge_fluid_inertia(edge_added_mass, work, stage, e, tail, head, slopes)
 
 
 @kernel
-def less_edge_fluid_energy(edge_added_mass, rods, work, v, energy):
+def less_edge_fluid_energy(rods, work, v, energy):
     """Kinetic energy of the fluid [J] less what velocities that are linear along edges take from lumped masses'."""
-    if edge_added_mass is None:
+    if rods.edge_added_mass is None:
         return energy
     for e in range(n_nodes(rods) - 1):
         dx, dy = edge_vector(v, tail_node(rods, e), e + 1)
         across = add_product(dx * load(work.normals, 2 * e), dy, load(work.normals, 2 * e + 1))
-        energy = subtract_product(energy, 0.5 * load(edge_added_mass, e) * across, across)
+        energy = subtract_product(energy, 0.5 * load(rods.edge_added_mass, e) * across, across)
     return energy
 
 

@@ -206,34 +206,34 @@ def looked_at(work, stage, row):
 def members(rods, work, slot):
     """(i, j, k) of a listed pair: its node, and the ends of its edge."""
     i, e = int(load_number(work.contact.listed, 2 * slot + 1)), int(load_number(work.contact.listed, 2 * slot + 2))
-    j, k = edge_ends(rods.body, rods, e)
+    j, k = edge_ends(rods, e)
     return i, j, k
 
 
 @kernel
-def edge_ends(body, rods, e):
+def edge_ends(rods, e):
     """The places where an edge starts and ends, or a side of a body, which has the number of its corner behind those.
 
     The one corner of a disc is both ends of its side.
     """
-    if body is None:
+    if rods.body is None:
         return tail_node(rods, e), e + 1
     corner = e - (n_nodes(rods) - 1)
     if corner < 0:
         return tail_node(rods, e), e + 1
-    return corner_place(rods, corner), corner_place(rods, (corner + 1) % (body.n_arms - rods.n_limbs))
+    return corner_place(rods, corner), corner_place(rods, (corner + 1) % (rods.body.n_arms - rods.n_limbs))
 
 
 @kernel
-def stiffness_at(body, contact, rods, i, k):
+def stiffness_at(rods, i, k):
     """Stiffness of a pair of node i and an edge that ends at k [N/m], in the robots' rows."""
-    if body is None:
-        return load(contact.stiffness, i)
+    if rods.body is None:
+        return load(rods.contact.stiffness, i)
     if i >= n_nodes(rods):
-        return load(contact.stiffness, k)
+        return load(rods.contact.stiffness, k)
     if k >= n_nodes(rods):
-        return 2.0 * load(contact.stiffness, i)
-    return load(contact.stiffness, i)
+        return 2.0 * load(rods.contact.stiffness, i)
+    return load(rods.contact.stiffness, i)
 
 
 @kernel
@@ -276,12 +276,12 @@ def add_gap_gradient(rods, work, slot, amount, rows):
 
 
 @kernel
-def add_contact(contact, rods, work, stage, convex, energy):
+def add_contact(rods, work, stage, convex, energy):
     """Add contact to the energy of a stage's Phi [J], and leave its forces in work.contact.force [N].
 
     What pushes a body is in the forces on the hub, and in the angle's part of the system.
     """
-    if contact is None:
+    if rods.contact is None:
         return energy
     if n_listed(work) == 0:
         return energy
@@ -295,13 +295,13 @@ def add_contact(contact, rods, work, stage, convex, energy):
         depth = load(work.contact.slots, row + THICKNESS) - g
         depth = select(depth > 0.0, depth, 0.0)
         i, _, head = members(rods, work, slot)
-        k = select(depth > 0.0, stiffness_at(rods.body, contact, rods, i, head), 0.0)
+        k = select(depth > 0.0, stiffness_at(rods, i, head), 0.0)
         twice = add_product(twice, k * depth, depth)
         store(work.contact.slots, row + STIFFNESS, lead * k)
         touching = select(depth > 0.0, 1.0, touching)
         add_gap_gradient(rods, work, slot, k * depth, work.contact.force)
     store(work.contact.touching, 0, touching)
-    push_body_at_roots(rods.body, rods, work, convex, work.contact.force)
+    push_body_at_roots(rods, work, convex, work.contact.force)
     return add_product(energy, 0.5 / lead, twice)
 
 
@@ -322,13 +322,13 @@ def those_apart(contact, robots):
 
 
 @kernel
-def add_contact_energy(contact, rods, work, q, energy):
+def add_contact_energy(rods, work, q, energy):
     """Add that of the pairs that were listed last, at positions q [J]."""
-    if contact is None:
+    if rods.contact is None:
         return energy
     for slot in range(n_listed(work)):
         i, _, head = members(rods, work, slot)
         depth = load(work.contact.slots, SLOT_ROWS * slot + THICKNESS) - gap(rods, work, slot, q)
         depth = select(depth > 0.0, depth, 0.0)
-        energy = add_product(energy, 0.5 * stiffness_at(rods.body, contact, rods, i, head) * depth, depth)
+        energy = add_product(energy, 0.5 * stiffness_at(rods, i, head) * depth, depth)
     return energy

@@ -11,22 +11,22 @@ from seastar_gym.simd.lanes import add_product, any_lane, load, load_number, sel
 
 
 @kernel
-def those_uncrossed(contact, rods, work, stage, q_0, robots):
+def those_uncrossed(rods, work, stage, q_0, robots):
     """Mask of those among `robots` without edges that cross now, or enter a body, and did not when the step began.
 
     Robots whose near pairs did not all fit into the list, or whose Newton step was not found, are left out.
     """
-    if contact is None:
+    if rods.contact is None:
         return robots
     robots = robots & ~(load(work.contact.missed, 0) > 0.0)
     store_step_end(rods, work, stage)
-    for pair in range(contact.n_pairs):
-        right = int(load_number(contact.pairs, 2 * pair))
-        left = int(load_number(contact.pairs, 2 * pair + 1))
+    for pair in range(rods.contact.n_pairs):
+        right = int(load_number(rods.contact.pairs, 2 * pair))
+        left = int(load_number(rods.contact.pairs, 2 * pair + 1))
         doubtful = robots & ~on_their_sides(rods, work.contact.ends, q_0, right, left)
         if any_lane(doubtful):
             robots = robots & ~(doubtful & come_to_cross(rods, work.contact.ends, q_0, right, left))
-    return those_outside(rods.body, contact, rods, work.contact.ends, q_0, robots)
+    return those_outside(rods, work.contact.ends, q_0, robots)
 
 
 @kernel
@@ -37,7 +37,7 @@ def on_their_sides(rods, q_1, q_0, right, left):
     """
     edges = rods.nodes_per_limb - 1
     wx, wy = across_gap(rods, q_0, right, left)
-    high, low = beginnings(rods.body, rods, q_1, right, left, wx, wy)
+    high, low = beginnings(rods, q_1, right, left, wx, wy)
     for i in range(1, edges + 1):
         dx, dy = edge_vector(q_1, 0, right * edges + i)
         x = add_product(dx * wx, dy, wy)
@@ -49,9 +49,9 @@ def on_their_sides(rods, q_1, q_0, right, left):
 
 
 @kernel
-def beginnings(body, rods, q_1, right, left, wx, wy):
+def beginnings(rods, q_1, right, left, wx, wy):
     """Places of two limbs' roots on a body from the hub, along w [m]; without a body nothing to look at."""
-    if body is None:
+    if rods.body is None:
         return splat(-np.inf), splat(np.inf)
     edges = rods.nodes_per_limb - 1
     dx, dy = edge_vector(q_1, 0, tail_node(rods, right * edges))
@@ -91,8 +91,8 @@ def come_to_cross(rods, q_1, q_0, right, left):
 @kernel
 def edges_cross(rods, q, e, f):
     """Mask of the robots whose edges e and f cross: each at a share of itself between 0 and 1, without divisions."""
-    i, head = edge_ends(rods.body, rods, e)
-    j, other_head = edge_ends(rods.body, rods, f)
+    i, head = edge_ends(rods, e)
+    j, other_head = edge_ends(rods, f)
     ex, ey = edge_vector(q, i, head)
     fx, fy = edge_vector(q, j, other_head)
     dx, dy = edge_vector(q, i, j)
@@ -104,44 +104,44 @@ def edges_cross(rods, q, e, f):
 
 
 @kernel
-def those_outside(body, contact, rods, q_1, q_0, robots):
+def those_outside(rods, q_1, q_0, robots):
     """Mask of those among `robots` without nodes in a body at q_1, nor edges through it, that were not so at q_0.
 
     Root edges are left out, which begin at the body. The robots themselves without a body.
     """
-    if body is None:
+    if rods.body is None:
         return robots
-    if contact.n_corners == 0:
+    if rods.contact.n_corners == 0:
         return robots
-    edges, farthest = rods.nodes_per_limb - 1, load(contact.reach, 0)
+    edges, farthest = rods.nodes_per_limb - 1, load(rods.contact.reach, 0)
     for i in range(1, n_nodes(rods)):
         dx, dy = edge_vector(q_1, 0, i)
         doubtful = robots & (add_product(dx * dx, dy, dy) < farthest * farthest)
         if any_lane(doubtful):
-            entered = is_within(contact, rods, q_1, i) & ~is_within(contact, rods, q_0, i)
+            entered = is_within(rods, q_1, i) & ~is_within(rods, q_0, i)
             if i % edges != 1 and edges > 1:
-                entered = entered | come_through(contact, rods, q_1, q_0, i - 1)
+                entered = entered | come_through(rods, q_1, q_0, i - 1)
             robots = robots & ~(doubtful & entered)
     return robots
 
 
 @kernel
-def is_within(contact, rods, q, i):
+def is_within(rods, q, i):
     """Mask of the robots with a node in the body."""
-    if contact.n_corners > 1:
-        return height_over_body(contact, rods, q, i) < 0.0
+    if rods.contact.n_corners > 1:
+        return height_over_body(rods, q, i) < 0.0
     dx, dy = edge_vector(q, corner_place(rods, 0), i)
-    rim = load(contact.rim, 0)
+    rim = load(rods.contact.rim, 0)
     return add_product(dx * dx, dy, dy) < rim * rim
 
 
 @kernel
-def come_through(contact, rods, q_1, q_0, e):
+def come_through(rods, q_1, q_0, e):
     """Mask of the robots with an edge through the body at q_1 that was not so at q_0."""
-    if contact.n_corners == 1:
-        return reaches_disc(contact, rods, q_1, e) & ~reaches_disc(contact, rods, q_0, e)
+    if rods.contact.n_corners == 1:
+        return reaches_disc(rods, q_1, e) & ~reaches_disc(rods, q_0, e)
     through = splat(1.0) < 0.0
-    for side in range(contact.n_corners):
+    for side in range(rods.contact.n_corners):
         f = n_nodes(rods) - 1 + side
         now = edges_cross(rods, q_1, e, f)
         if any_lane(now):
@@ -150,9 +150,9 @@ def come_through(contact, rods, q_1, q_0, e):
 
 
 @kernel
-def reaches_disc(contact, rods, q, e):
+def reaches_disc(rods, q, e):
     """Mask of the robots with an edge whose point nearest to the middle of a disc lies between its ends, and in it."""
-    i, rim = corner_place(rods, 0), load(contact.rim, 0)
+    i, rim = corner_place(rods, 0), load(rods.contact.rim, 0)
     ex, ey = edge_vector(q, e, e + 1)
     dx, dy = edge_vector(q, e, i)
     squared, along = add_product(ex * ex, ey, ey), add_product(dx * ex, dy, ey)

@@ -28,17 +28,17 @@ def coefficients(relaxation_time: float | None) -> NDArray[np.float64] | None:
 
 
 @kernel
-def freeze_strains(relaxation_time, rods, work, q_hat):
+def freeze_strains(rods, work, q_hat):
     """Fill work.tension with EA eps_hat [N] and work.bending with EI kappa_hat [N m], in scenes with damping.
 
     With a rigid hub, also the directions that its clamps had.
     """
-    if relaxation_time is None:
+    if rods.damping is None:
         return
-    freeze_directions(rods.clamp, rods, work, q_hat)
+    freeze_directions(rods, work, q_hat)
     for e in range(n_nodes(rods) - 1):
         store(work.tension, e, tension(rods, e, edge_of(rods, q_hat, e).length))
-        if is_clamped(rods.clamp, rods, e):
+        if is_clamped(rods, e):
             continue
         a, b, side = hinge_edges(rods, e)
         t = half_angle(edge_of(rods, q_hat, a), edge_of(rods, q_hat, b), side)

@@ -95,36 +95,36 @@ def add_half_edge(c, normals, e, wx, wy, gamma, inverse_gamma, slopes):
 
 
 @kernel
-def add_cross_flow(cross_drag, rods, normals, node, wx, wy, gamma, inverse_gamma, slopes):
+def add_cross_flow(rods, normals, node, wx, wy, gamma, inverse_gamma, slopes):
     """Add the drag of flow across a node's edges to its slopes.
 
     Without such drag (None) the slopes are what they were, and the kernel is gone when compiled.
     """
-    if cross_drag is None:
+    if rods.cross_drag is None:
         return slopes
-    if node == 0 or is_root(rods.body, rods, node):
-        return add_hub_cross_flow(rods.body, cross_drag, rods, normals, node, wx, wy, gamma, inverse_gamma, slopes)
-    inner, outer = load(cross_drag, 2 * node), load(cross_drag, 2 * node + 1)
+    if node == 0 or is_root(rods, node):
+        return add_hub_cross_flow(rods, normals, node, wx, wy, gamma, inverse_gamma, slopes)
+    inner, outer = load(rods.cross_drag, 2 * node), load(rods.cross_drag, 2 * node + 1)
     slopes = add_half_edge(inner, normals, node - 1, wx, wy, gamma, inverse_gamma, slopes)
     return add_half_edge(outer, normals, node, wx, wy, gamma, inverse_gamma, slopes)
 
 
 @kernel
-def add_hub_cross_flow(body, cross_drag, rods, normals, node, wx, wy, gamma, inverse_gamma, slopes):
+def add_hub_cross_flow(rods, normals, node, wx, wy, gamma, inverse_gamma, slopes):
     """Add the drag of flow across half of all root edges at the hub, or across half of one at its root on a body."""
     edges = rods.nodes_per_limb - 1
-    if body is None:
+    if rods.body is None:
         for e in range(0, rods.n_limbs * edges, edges):
-            slopes = add_half_edge(load(cross_drag, 2 * e + 2), normals, e, wx, wy, gamma, inverse_gamma, slopes)
+            slopes = add_half_edge(load(rods.cross_drag, 2 * e + 2), normals, e, wx, wy, gamma, inverse_gamma, slopes)
         return slopes
     if node == 0:
         return slopes
     e = (node - root_place(rods, 0)) * edges
-    return add_half_edge(load(cross_drag, 2 * e + 2), normals, e, wx, wy, gamma, inverse_gamma, slopes)
+    return add_half_edge(load(rods.cross_drag, 2 * e + 2), normals, e, wx, wy, gamma, inverse_gamma, slopes)
 
 
 @kernel
-def middle_slopes(middle_drag, rods, work, stage, e, tail, head):
+def middle_slopes(rods, work, stage, e, tail, head):
     """(potential, force on either end, Hessian block) of the drag in the middle of edge e; zeros without (None).
 
     With s = w_tail + w_head, twice the velocity of the middle, the potential is gamma c |s|^3/3, c an eighth of the
@@ -132,7 +132,7 @@ def middle_slopes(middle_drag, rods, work, stage, e, tail, head):
     c (|s| 1 + s s^T/|s|)/gamma stands at both ends and couples them. tail, head: Motions of the ends.
     """
     zero = splat(0.0)
-    if middle_drag is None:
+    if rods.middle_drag is None:
         return zero, (zero, zero), (zero, zero, zero)
     return middle_drag_slopes(
         rods, work.normals, e, tail.wx + head.wx, tail.wy + head.wy, stage.gamma, stage.inverse_gamma

@@ -19,9 +19,9 @@ from seastar_gym.simd.lanes import add_product, load, splat, sqrt, store, subtra
 def freeze_fluid(rods, work):
     """Fill work.normals, work.added_mass and work.current at the iterate, in scenes that have them."""
     freeze_normals(rods, work.normals, work.q)
-    freeze_added_mass(rods.added_mass, rods, work)
-    freeze_current(rods.current, rods, work)
-    freeze_turning_mass(rods.body, rods, work)
+    freeze_added_mass(rods, work)
+    freeze_current(rods, work)
+    freeze_turning_mass(rods, work)
 
 
 @kernel
@@ -37,12 +37,12 @@ def freeze_normals(rods, normals, q):
 
 
 @kernel
-def freeze_current(current, rods, work):
+def freeze_current(rods, work):
     """Fill work.current with the velocity of the fluid at the nodes [m/s], in scenes with a current."""
-    if current is None:
+    if rods.current is None:
         return
     for node in range(n_places(rods)):
-        u_x, u_y = current_velocity(current, load(work.q, 2 * node), load(work.q, 2 * node + 1))
+        u_x, u_y = current_velocity(rods.current, load(work.q, 2 * node), load(work.q, 2 * node + 1))
         store(work.current, 2 * node, u_x)
         store(work.current, 2 * node + 1, u_y)
 
@@ -56,32 +56,32 @@ def fluid_velocity(current, x, y):
 
 
 @kernel
-def add_work_of_current(current, rods, work, v, h, frame, energy):
+def add_work_of_current(rods, work, v, h, frame, energy):
     """Add what drag takes from the fluid's motion in a step that ends with velocities v [J].
 
     Its power, as seen from a frame that moves with the velocity c, is (drag on the robot at w = v - u) (u - c).
     """
-    if current is None:
+    if rods.current is None:
         return energy
     power, zero = splat(0.0), splat(0.0)
     for node in range(n_places(rods)):
-        if is_angle(rods.body, rods, node):
+        if is_angle(rods, node):
             continue
         wx, wy = relative(work.current, node, load(v, 2 * node), load(v, 2 * node + 1))
         _, c_speed, _ = drag_slopes(load(rods.drag, node), wx, wy)
         slopes = (zero, (c_speed * wx, c_speed * wy), (zero, zero, zero))
-        _, (fx, fy), _ = add_cross_flow(rods.cross_drag, rods, work.normals, node, wx, wy, 1.0, 1.0, slopes)
+        _, (fx, fy), _ = add_cross_flow(rods, work.normals, node, wx, wy, 1.0, 1.0, slopes)
         power = subtract_product(power, fx, load(work.current, 2 * node) - frame[0])
         power = subtract_product(power, fy, load(work.current, 2 * node + 1) - frame[1])
-    power = add_power_on_strips(rods.body, rods, work, v, frame, power)
-    power = add_power_in_middle(rods.middle_drag, rods, work, v, frame, power)
+    power = add_power_on_strips(rods, work, v, frame, power)
+    power = add_power_in_middle(rods, work, v, frame, power)
     return add_product(energy, h, power)
 
 
 @kernel
-def add_power_in_middle(middle_drag, rods, work, v, frame, power):
+def add_power_in_middle(rods, work, v, frame, power):
     """Add the power that drag in the middle of edges takes from the fluid's motion [W]."""
-    if middle_drag is None:
+    if rods.middle_drag is None:
         return power
     for e in range(n_nodes(rods) - 1):
         a, b = tail_node(rods, e), e + 1

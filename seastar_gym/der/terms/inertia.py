@@ -69,15 +69,15 @@ def kinetic_energy(rods, v, frame):
     for node in range(n_nodes(rods)):
         vx, vy = load(v, 2 * node) - frame[0], load(v, 2 * node + 1) - frame[1]
         total = add_product(total, 0.5 * load(rods.mass, node), vx * vx + vy * vy)
-    return less_edge_energy(rods.edge_mass, rods, v, total)
+    return less_edge_energy(rods, v, total)
 
 
 @kernel
-def less_edge_energy(edge_mass, rods, v, energy):
+def less_edge_energy(rods, v, energy):
     """Kinetic energy less mu |v_head - v_tail|^2/2 of the edges [J]; unchanged for lumped masses (None)."""
-    if edge_mass is None:
+    if rods.edge_mass is None:
         return energy
     for e in range(n_nodes(rods) - 1):
         dx, dy = edge_vector(v, tail_node(rods, e), e + 1)
-        energy = subtract_product(energy, 0.5 * load(edge_mass, e), add_product(dx * dx, dy, dy))
+        energy = subtract_product(energy, 0.5 * load(rods.edge_mass, e), add_product(dx * dx, dy, dy))
     return energy
