@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.der.rods import Rods
-from seastar_gym.der.stepping.limits import Limits
+from seastar_gym.der.stepping.scales import Limits
 from seastar_gym.model.limits import make_limits
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene import Scene

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from seastar_gym.der.stepping.limits import Limits
+from seastar_gym.der.stepping.scales import Limits
 from seastar_gym.scene.numerics import ADAPTATION, MOST_ITERATIONS, MOST_ITERATIONS_PER_STEP
 from seastar_gym.scene.per_robot import of_robot
 from seastar_gym.scene.scene import Scene

@@ -3,7 +3,7 @@
 from operator import itemgetter
 
 from seastar_gym.der.rods import Rods
-from seastar_gym.der.stepping import foresight, scales
+from seastar_gym.der.stepping import scales
 from seastar_gym.der.terms import (
     added_mass,
     along,
@@ -53,7 +53,6 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         at_nodes, in_middle = drag.simpson_coefficients(mesh, water.density, C_along)
         across, across_middle = drag.simpson_cross_coefficients(mesh, water.density, C_d, C_t)
     stretched = stretching.coefficients(mesh)
-    seen_ahead = foresight.coefficients(mesh, stretched, robot.density)
     mass = inertia.coefficients(mesh, robot.density)
     weight = gravity.coefficients(mesh, robot.density, water.density, scene.gravity)
     loads = load.total(load.coefficients(mesh, scene.loads), weight)
@@ -66,9 +65,15 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         mass, at_nodes = on_body.mass(mass), on_body.drag(mesh, at_nodes)
         loads = on_body.loads(loads)
     inertia.hold(mass, scene.held_nodes)
+    n_free = robot.n_nodes + robot.has_body
     return Rods(
         n_limbs=mesh.n_limbs,
-        nodes_per_limb=mesh.nodes_per_limb,
+        edges_per_limb=mesh.nodes_per_limb - 1,
+        n_edges=len(mesh.l),
+        n_nodes=len(mesh.dl),
+        n_free=n_free,
+        n_places=len(at_nodes),
+        n_points=n_free if on_body is None else n_free + on_body.coefficients.n_arms,
         stretching=stretched,
         bending=with_joints(
             bending.coefficients(mesh, gregory=continuum), [limb.joint_stiffness for limb in limbs]
@@ -90,10 +95,7 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         contact=None
         if touch is None
         else contact.coefficients(mesh, robot.limbs_that_may_touch(), touch.modulus, touch.opening_angle, rim),
-        foresight=seen_ahead,
-        scales=scales.coefficients(
-            mesh, stretched, seen_ahead, robot.density, water.density, C_d, mass, scene.held_nodes
-        ),
+        scales=scales.coefficients(mesh, stretched, robot.density, water.density, C_d, mass, scene.held_nodes),
         body=None if on_body is None else on_body.coefficients,
     )
 

@@ -19,7 +19,7 @@ from seastar_gym.command import run_command
 from seastar_gym.der.energy import elastic_energy
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import make_work
-from seastar_gym.der.stepping import foresight
+from seastar_gym.der.stepping import foresight, scales
 from seastar_gym.der.stepping.newton import ROUNDING, take_step
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stages import begin_stage, end_step
@@ -176,8 +176,8 @@ def drawn_stages(draw: Draw, rng: np.random.Generator, discretisation: Discretis
     return Stages(
         move, phi, hub_t, without_setbacks(move, phi, pivot),
         each(limb), each(edge), each(modulus / density * (gamma / edge) ** 2), each(slenderness),
-        each(rods.foresight.energy[0] / foresight.PREDICTABLE_STRAIN),
-        each(rods.scales.damped[0] / rods.foresight.energy[0]),
+        each(rods.scales.predictable[0] / scales.PREDICTABLE_STRAIN),
+        each(rods.scales.damped[0] / rods.scales.predictable[0]),
         (found - allowed) / allowed,
     )  # fmt: skip
 
@@ -200,7 +200,7 @@ def sample(
 
 def curvature_rate(stages: Stages) -> Floats:
     """curvature_rate gamma^2 of foresight.py [1], shape (n, 1)."""
-    rate = stages.stiffness * np.minimum(1.0, stages.slenderness**2 / foresight.SLENDER)
+    rate = stages.stiffness * np.minimum(1.0, stages.slenderness**2 / scales.SLENDER)
     return rate[:, None]
 
 
@@ -229,7 +229,7 @@ def decisions(stages: Stages) -> Decisions:
     limb, edge, rate = stages.limb[:, None], stages.edge[:, None], curvature_rate(stages)
     foreseen = move**2 * (foresight.CURVATURE + rate) / edge
     asked = (foreseen < move) & (foreseen < LARGEST_TOLERANCE * limb) & (following > ROUNDED * limb)
-    small = stages.phi[:, :-1] <= foresight.PREDICTABLE_STRAIN * stages.strain_energy[:, None]
+    small = stages.phi[:, :-1] <= scales.PREDICTABLE_STRAIN * stages.strain_energy[:, None]
     chosen = stages.sound[:, :-1] & asked & small
 
     def those(numbers: NDArray[Any]) -> Any:
@@ -254,7 +254,7 @@ def curvatures_of_light_edges(seen: Decisions) -> Floats:
 
 def excesses_of_stiff_edges(seen: Decisions) -> Floats:
     """Curvatures over what is allowed, where edges are so slender and stiff that their rate decides."""
-    slender = (seen.slenderness**2 > foresight.SLENDER) & (seen.rate > STIFF)
+    slender = (seen.slenderness**2 > scales.SLENDER) & (seen.rate > STIFF)
     return seen.excess[before_poles(seen, 0, foresight.EASY - 1) & slender]
 
 
@@ -294,7 +294,7 @@ def gains(stages: Stages, low: float, high: float) -> Floats:
     """
     converged = stages.sound[:, -1] & (stages.move[:, -1] < 1e-9 * stages.limb)
     last = np.argmax(stages.move < 1e-8 * stages.limb[:, None], axis=1)
-    unit = foresight.PREDICTABLE_STRAIN * stages.strain_energy * stages.damped
+    unit = scales.PREDICTABLE_STRAIN * stages.strain_energy * stages.damped
     phi = np.take_along_axis(stages.phi, last[:, None], axis=1)[:, 0] / np.where(unit > 0.0, unit, np.nan)
     return stages.gained[converged & (phi > low) & (phi <= high)]
 
@@ -334,7 +334,7 @@ def measure(n: int, seed: int = 0, discretisation: Discretisation = "chapter") -
         ranked("next step over the one foreseen", 1.0, excesses_after(ordinary, 0, easy)),
         ranked("CURVATURE: next step l/d^2, light edges", foresight.CURVATURE, curvatures_of_light_edges(ordinary)),
         ranked("curvature_rate: over the one foreseen, stiff edges", 1.0, excesses_of_stiff_edges(decisions(long))),
-        Row("SLENDER that thick stiff edges need", f"{foresight.SLENDER:g}", thick_and_stiff(ordinary).sum(), need),
+        Row("SLENDER that thick stiff edges need", f"{scales.SLENDER:g}", thick_and_stiff(ordinary).sum(), need),
         ranked("LATE: third step's, without it", foresight.LATE, late_excesses(ordinary)),
     ]
     for k in range(1, ITERATIONS):

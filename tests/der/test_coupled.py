@@ -8,7 +8,7 @@ from seastar_gym.der.linear.star_solution import solve_again, substitute_star
 from seastar_gym.der.potential import factorise
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
-from slopes import plain
+from slopes import NO_WORK, plain
 from touching import touching_limbs
 
 EVERYONE = np.ones(N_LANES, bool)
@@ -70,7 +70,7 @@ def test_dot_is_the_product_of_rows_robot_by_robot():
 
 def test_without_contact_the_decrement_is_the_stars():
     one = Lanes(1.0)
-    assert solve_coupled.plain(None, None, None, one) is one
+    assert solve_coupled.plain(None, NO_WORK, None, one) is one
 
 
 def test_few_iterations_solve_it_as_exactly_as_a_step_of_5_ms_allows(monkeypatch):

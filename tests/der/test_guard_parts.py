@@ -9,21 +9,20 @@ from seastar_gym import Scene, Seastar, UniformCurrent, Water
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.guard import (
     add_held_energy,
-    cut_velocities,
     energy_noise,
     frame_velocity,
     hold_to_energy,
     may_gain,
-    rigid_motion,
     through_poles,
 )
+from seastar_gym.der.stepping.rigid_motion import cut_velocities, rigid_motion
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.der.terms.contact import add_contact_energy
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
-from slopes import nodes, plain, rotated, rows
+from slopes import NO_RODS, nodes, plain, rotated, rows
 from stages import turn_limbs
 from touching import touching_limbs
 
@@ -130,17 +129,17 @@ def test_a_step_may_gain_energy_where_what_newton_knows_does_not_rule_it_out(loa
 
 
 def test_with_a_body_or_in_fluid_that_moves_or_moves_along_any_step_may_gain():
-    assert may_gain.plain(None, None, None, None, EVERYONE) is EVERYONE
-    assert may_gain.plain(None, None, None, None, EVERYONE) is EVERYONE
-    assert may_gain.plain(None, None, None, None, EVERYONE) is EVERYONE
+    for named in ("current", "added_mass", "body"):
+        rods = NO_RODS._replace(**{named: object()})
+        assert may_gain.plain(rods, None, None, None, EVERYONE) is EVERYONE
 
 
 def test_what_limbs_that_press_each_other_store_counts_where_the_scheme_gives_it_back():
     touching = touching_limbs()
-    args = touching.rods.contact, touching.rods, touching.work
+    args = touching.rods, touching.work
     stored = plain(add_contact_energy.plain(*args, touching.work.q, Lanes(2.0)))
     assert np.all(stored > 2.0)
     for name, scheme in SCHEMES.items():
         found = plain(add_held_energy.plain(*args, scheme, touching.work.q, Lanes(2.0)))
         np.testing.assert_array_equal(found, stored if name == "implicit-euler" else 2.0)
-    assert add_held_energy.plain(None, None, SCHEMES["sdirk2"], None, 2.0) == 2.0
+    assert add_held_energy.plain(NO_RODS, None, SCHEMES["sdirk2"], None, 2.0) == 2.0

@@ -235,7 +235,7 @@ def energy_noise(simulator: Simulator, robot: int, energy: float, h: float) -> f
     """
     rods = make_rods(simulator.scene, robot if simulator.scene.n_robots else 0)
     masses = rods.mass[rods.mass > 0.0]
-    length, mass = float(rods.foresight.shortest_edge[0]), float(masses[masses < 1e9 * masses.min()].sum())
+    length, mass = float(rods.scales.shortest_edge[0]), float(masses[masses < 1e9 * masses.min()].sum())
     stretching, bending = rods.stretching.EA_over_l.max(), rods.bending.EI_over_dl.max()
     stiffness = (len(rods.mass) - 1) * float(stretching + 4.0 * bending / length**2)
     move = 10.0 * EPSILON * (float(np.abs(simulator.positions[robot]).max()) + rods.nodes_per_limb * length)

@@ -5,7 +5,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from seastar_gym.der.stepping.foresight import CURVATURE, EASY, FORESEEABLE_T, LATE, SLENDER
+from seastar_gym.der.stepping.foresight import CURVATURE, EASY, FORESEEABLE_T, LATE
+from seastar_gym.der.stepping.scales import SLENDER
 from seastar_gym.simd.lanes import N_LANES
 from studies.speed import foresight as study
 

@@ -11,7 +11,6 @@ H of the star's step.
 """
 
 from seastar_gym.der.linear.star_solution import solve_again, substitute_star
-from seastar_gym.der.star import n_free
 from seastar_gym.der.terms.body import carry_roots, gather_roots
 from seastar_gym.der.terms.contact import SLOT_ROWS, STIFFNESS, add_gap_gradient, gap, n_listed
 from seastar_gym.simd.compilation import kernel
@@ -34,7 +33,7 @@ def add_contact_product(rods, work, p, sign, rows):
 @kernel
 def dot(rods, a, b):
     total = splat(0.0)
-    for row in range(2 * n_free(rods)):
+    for row in range(2 * rods.n_free):
         total = add_product(total, load(a, row), load(b, row))
     return total
 
@@ -47,14 +46,11 @@ def solve_coupled(rods, work, robots, decrement):
 
     Returns its decrement [J].
     """
-    if work.contact is None:
+    if work.contact is None or n_listed(work) == 0:
         return decrement
-    if n_listed(work) == 0:
-        return decrement
-    x, r, z, p, Hp, w = (
-        work.contact.x, work.contact.r, work.contact.z, work.contact.p, work.contact.Hp, work.contact.w,
-    )  # fmt: skip
-    rows = 2 * n_free(rods)
+    contact = work.contact
+    x, r, z, p, Hp, w = contact.x, contact.r, contact.z, contact.p, contact.Hp, contact.w
+    rows = 2 * rods.n_free
     zero = splat(0.0)
     substitute_star(rods, work, x)
     running = robots & (load(work.contact.touching, 0) > 0.0)

@@ -17,7 +17,7 @@ velocity that it extrapolates to, so that its B is the difference of b over the 
 
 from seastar_gym.der.motion import node_motion
 from seastar_gym.der.potential import node_slopes
-from seastar_gym.der.star import n_nodes, root_place
+from seastar_gym.der.star import root_place
 from seastar_gym.der.terms.body import place_roots, root_motion, tail_motion
 from seastar_gym.der.terms.body_forces import add_body, add_turning_rate, begin_turning, end_turning
 from seastar_gym.der.terms.drag import middle_slopes
@@ -49,15 +49,15 @@ def move_as_a_whole(rods, work, stage, robots):
     """
     zero = splat(0.0)
     fx, fy, xx, xy, yy = zero, zero, zero, zero, zero
-    for node in range(n_nodes(rods)):
-        _, gradient, hessian = node_slopes(None, rods, work, stage, node, node_motion(work, stage, node))
+    for node in range(rods.n_nodes):
+        _, gradient, hessian = node_slopes(rods, work, stage, node, node_motion(work, stage, node), (zero, zero))
         fx, fy = fx + gradient[0], fy + gradient[1]
         xx, xy, yy = xx + hessian[0], xy + hessian[1], yy + hessian[2]
     fx, fy, xx, xy, yy = add_roots(rods, work, stage, fx, fy, xx, xy, yy)
     fx, fy, xx, xy, yy = add_middles(rods, work, stage, fx, fy, xx, xy, yy)
     determinant = xx * yy - xy * xy
     dx, dy = (yy * fx - xy * fy) / determinant, (xx * fy - xy * fx) / determinant
-    for node in range(n_nodes(rods)):
+    for node in range(rods.n_nodes):
         x, y = load(work.q, 2 * node), load(work.q, 2 * node + 1)
         store(work.q, 2 * node, select(robots, x - dx, x))
         store(work.q, 2 * node + 1, select(robots, y - dy, y))
@@ -74,7 +74,7 @@ def add_roots(rods, work, stage, fx, fy, xx, xy, yy):
     fx, fy = add_turning_rate(rods, work, stage, (fx, fy))
     for limb in range(rods.n_limbs):
         motion = root_motion(rods, work, stage, limb)
-        _, g, h = node_slopes(None, rods, work, stage, root_place(rods, limb), motion)
+        _, g, h = node_slopes(rods, work, stage, root_place(rods, limb), motion, (zero, zero))
         fx, fy, xx, xy, yy = fx + g[0], fy + g[1], xx + h[0], xy + h[1], yy + h[2]
     return fx, fy, xx, xy, yy
 
@@ -84,7 +84,7 @@ def add_middles(rods, work, stage, fx, fy, xx, xy, yy):
     """Add the drag in the middle of edges to the residual and slope of a move of the whole robot."""
     if rods.middle_drag is None:
         return fx, fy, xx, xy, yy
-    for e in range(n_nodes(rods) - 1):
+    for e in range(rods.n_edges):
         tail, head = tail_motion(rods, work, stage, e), node_motion(work, stage, e + 1)
         _, g, h = middle_slopes(rods, work, stage, e, tail, head)
         fx, fy = fx + 2.0 * g[0], fy + 2.0 * g[1]

@@ -8,7 +8,6 @@ from seastar_gym.der.geometry import larger
 from seastar_gym.der.linear.coupled import solve_coupled
 from seastar_gym.der.linear.star_matrix import load_pair, store_pair, substitute_node
 from seastar_gym.der.potential import factorise
-from seastar_gym.der.star import n_nodes
 from seastar_gym.der.stepping.foresight import foreseeable_length, predictable
 from seastar_gym.der.terms.body import place_roots, tail_solution
 from seastar_gym.der.terms.contact import n_listed
@@ -79,14 +78,14 @@ def take_step(rods, work, stepping, shortening, fraction):
 
     Returns the largest node move [m].
     """
-    edges = rods.nodes_per_limb - 1
+    edges = rods.edges_per_limb
     scale = step_scale(stepping, shortening, fraction)
     hub = load_pair(work.root_solution, 2 * rods.n_limbs)
     largest = move_node(work, 0, hub, shortening, scale)
     largest = move_angle(rods, work, work.root_solution, 2 * rods.n_limbs + 2, shortening, scale, largest)
     for limb in range(rods.n_limbs):
         first = limb * edges
-        before = tail_solution(rods.body, work, rods.n_limbs, limb, hub)
+        before = tail_solution(rods, work, limb, hub)
         here = load_pair(work.root_solution, 2 * limb)
         largest = larger(largest, move_node(work, first + 1, here, shortening, scale))
         for i in range(2, edges + 1):
@@ -105,20 +104,18 @@ def move_angle(rods, work, solution, row, shortening, scale, largest):
     if rods.body is None:
         return largest
     arc = load(rods.body.scale, 0) * load(solution, row)
-    return larger(largest, move_node(work, n_nodes(rods), (arc, splat(0.0)), shortening, scale))
+    return larger(largest, move_node(work, rods.n_nodes, (arc, splat(0.0)), shortening, scale))
 
 
 @kernel
 def move_along(rods, work, stepping, shortening, fraction):
     """take_step, but where contact is listed along the step of all nodes that coupled.py has found."""
-    if work.contact is None:
-        return take_step(rods, work, stepping, shortening, fraction)
-    if n_listed(work) == 0:
+    if work.contact is None or n_listed(work) == 0:
         return take_step(rods, work, stepping, shortening, fraction)
     scale, largest = step_scale(stepping, shortening, fraction), splat(0.0)
-    for node in range(n_nodes(rods)):
+    for node in range(rods.n_nodes):
         largest = larger(largest, move_node(work, node, load_pair(work.contact.x, 2 * node), shortening, scale))
-    largest = move_angle(rods, work, work.contact.x, 2 * n_nodes(rods), shortening, scale, largest)
+    largest = move_angle(rods, work, work.contact.x, 2 * rods.n_nodes, shortening, scale, largest)
     place_roots(rods, work.q)
     return sqrt(largest)
 

@@ -2,7 +2,6 @@
 
 from typing import Any, NamedTuple
 
-from seastar_gym.der.star import n_free, n_nodes
 from seastar_gym.der.terms.body import move_roots, place_roots
 from seastar_gym.simd.compilation import inlined_kernel, kernel
 from seastar_gym.simd.lanes import add_product, load, load_number, select, splat, sqrt, store
@@ -29,14 +28,14 @@ LAST_STEP, SIZE, OF_BODY = 0, 1, 2
 @kernel
 def memory_row(rods, scheme, which):
     """Row of `a` where a step leaves LAST_STEP or SIZE for the next."""
-    return (2 * n_free(rods) + 1) * scheme.n_stages + which
+    return (2 * rods.n_free + 1) * scheme.n_stages + which
 
 
 @inlined_kernel
 def begin_stage(rods, work, scheme, k, q_0, v_0, a, h):
     """Stage k of a step; the iterate starts at (13.10) plus a share of what the last acceleration adds."""
     gamma = load_number(scheme.a, k * scheme.n_stages + k) * h
-    rows = 2 * n_free(rods)
+    rows = 2 * rods.n_free
     share = gamma * load(a, scheme.n_stages * rows + k)
     for row in range(rows):
         q_hat, v_hat = load(q_0, row), load(v_0, row)
@@ -81,7 +80,7 @@ def guessed_motion(rods, scheme, k, stage, a):
     """
     if rods.body is None:
         return splat(0.0), splat(0.0), splat(0.0)
-    rows, row = 2 * n_free(rods), 2 * n_nodes(rods)
+    rows, row = 2 * rods.n_free, 2 * rods.n_nodes
     change = stage.gamma * load(a, memory_row(rods, scheme, OF_BODY + k))
     vx = add_product(load(stage.v_hat, 0), change, load(a, k * rows))
     vy = add_product(load(stage.v_hat, 1), change, load(a, k * rows + 1))
@@ -94,7 +93,7 @@ def keep_share_of_body(rods, work, scheme, k, stage, a, robots):
     """Keep the share of a body's last accelerations that would have fit its new ones, before they are kept."""
     if rods.body is None:
         return
-    rows, angle = 2 * n_free(rods), 2 * n_nodes(rods)
+    rows, angle = 2 * rods.n_free, 2 * rods.n_nodes
     along, squared = splat(0.0), splat(0.0)
     for row in (0, 1, angle):
         _, acceleration = stage_motion(work, stage, row)
@@ -106,7 +105,7 @@ def keep_share_of_body(rods, work, scheme, k, stage, a, robots):
 @kernel
 def end_stage(rods, work, scheme, k, stage, a, robots):
     """Keep velocity and acceleration of a solved stage that is not the last, for the robots in the mask `robots`."""
-    rows = 2 * n_free(rods)
+    rows = 2 * rods.n_free
     keep_share_of_body(rods, work, scheme, k, stage, a, robots)
     along, squared = splat(0.0), splat(0.0)
     for row in range(rows):
@@ -122,7 +121,7 @@ def end_stage(rods, work, scheme, k, stage, a, robots):
 @inlined_kernel
 def end_step(rods, work, scheme, stage, q_0, v_0, a, h, accepted):
     """After the last stage: write the step's result over the state (q_0, v_0) of the robots in the mask `accepted`."""
-    rows, k = 2 * n_free(rods), scheme.n_stages - 1
+    rows, k = 2 * rods.n_free, scheme.n_stages - 1
     keep_share_of_body(rods, work, scheme, k, stage, a, accepted)
     along, squared = splat(0.0), splat(0.0)
     for row in range(rows):
@@ -150,7 +149,7 @@ def end_step(rods, work, scheme, stage, q_0, v_0, a, h, accepted):
 @kernel
 def forget_accelerations(rods, scheme, a, robots):
     """Robots whose step did not converge start the next one without a prediction, which may be far off or infinite."""
-    for row in range((2 * n_free(rods) + 1) * scheme.n_stages):
+    for row in range((2 * rods.n_free + 1) * scheme.n_stages):
         store(a, row, select(robots, 0.0, load(a, row)))
 
 
@@ -162,7 +161,7 @@ def step_error(rods, work, stage, a, h, last_h):
     that is the difference to the last step's over the time between the two middles.
     """
     largest = splat(0.0)
-    for node in range(n_free(rods)):
+    for node in range(rods.n_free):
         squared = splat(0.0)
         for row in range(2 * node, 2 * node + 2):
             _, acceleration = stage_motion(work, stage, row)
@@ -177,19 +176,12 @@ def start_standing(rods, work, stage, frame, robots):
     """Start the iterate of the robots in the mask at q_hat, carried on by the frame: Phi is finite there, and no
     velocity about it leads it astray.
     """
-    for node in range(n_nodes(rods)):
+    for node in range(rods.n_nodes):
         x = add_product(load(stage.q_hat, 2 * node), stage.gamma, frame[0])
         y = add_product(load(stage.q_hat, 2 * node + 1), stage.gamma, frame[1])
         store(work.q, 2 * node, select(robots, x, load(work.q, 2 * node)))
         store(work.q, 2 * node + 1, select(robots, y, load(work.q, 2 * node + 1)))
-    stop_turning(rods, work, stage, robots)
-
-
-@kernel
-def stop_turning(rods, work, stage, robots):
-    """Start the angle of a body at q_hat, for the robots in the mask, and its roots with it; nothing without a body."""
-    if rods.body is None:
-        return
-    row = 2 * n_nodes(rods)
-    store(work.q, row, select(robots, load(stage.q_hat, row), load(work.q, row)))
-    place_roots(rods, work.q)
+    if rods.body is not None:
+        row = 2 * rods.n_nodes
+        store(work.q, row, select(robots, load(stage.q_hat, row), load(work.q, row)))
+        place_roots(rods, work.q)

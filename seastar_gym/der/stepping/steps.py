@@ -83,9 +83,7 @@ def try_step(rods, work, scheme, actuation, q, v, a, step, active, limits, repor
     if not any_lane(guarded):
         end_step(rods, work, scheme, stage, q, v, a, step.h, accepted)
         return good, accepted, error_rate
-    refused = end_guarded_step(
-        rods, work, scheme, actuation, q, v, a, step, stage, accepted, guarded, limits, report
-    )
+    refused = end_guarded_step(rods, work, scheme, actuation, q, v, a, step, stage, accepted, guarded, limits, report)
     return good & ~refused, accepted & ~refused, error_rate
 
 
@@ -131,7 +129,7 @@ def those_that_may_gain(rods, work, stage, phi, robots):
     are meant whose potential leaves room for it.
     """
     energetic = phi > load(rods.scales.damped, 0)
-    predictable = robots & energetic & (phi <= load(rods.foresight.energy, 0))
+    predictable = robots & energetic & (phi <= load(rods.scales.predictable, 0))
     if any_lane(predictable):
         gaining = may_gain(rods, work, stage, phi, predictable)
         energetic = (energetic & ~predictable) | gaining

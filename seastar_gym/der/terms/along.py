@@ -87,8 +87,9 @@ def stiffening(along, delta):
 
 
 @kernel
-def stiffening_rate(along, delta):
-    """d(ln f)/d(delta) of a limb that is turned by delta [1/rad]; 0 where actuators act at the hub only (None)."""
+def stiffening_rate(rods, delta):
+    """d(ln f)/d(delta) of a limb that is turned by delta [1/rad]; 0 where actuators act at the hub only."""
+    along = rods.along
     if along is None:
         return 0.0 * delta
     middle, slope, inverse_peak = load(along.middle, 0), load(along.slope, 0), load(along.inverse_peak, 0)
@@ -115,15 +116,13 @@ def turned_at_hub(rods, limb, delta):
     """What of a limb's rotation turns its clamp: all of it where actuators act at the hub only (None)."""
     if rods.along is None:
         return delta
-    return load(rods.along.share, limb * (rods.nodes_per_limb - 1)) * delta
+    return load(rods.along.share, limb * rods.edges_per_limb) * delta
 
 
 @kernel
 def set_natural_curvature(rods, work, actuation, fraction):
     """Fill work.stiffening and work.EI_kappa_bar at `fraction` (lanes) of an interval, where actuators act along."""
-    if rods.along is None:
-        return
-    edges = rods.nodes_per_limb - 1
+    edges = rods.edges_per_limb
     for limb in range(rods.n_limbs):
         delta = turned(actuation, limb, fraction)
         f = stiffening(rods.along, delta)
@@ -140,7 +139,7 @@ def bending_stiffness(rods, work, hinge):
     EI_over_dl = load(rods.bending.EI_over_dl, hinge)
     if rods.along is None:
         return EI_over_dl
-    return EI_over_dl * load(work.stiffening, ALONG_ROWS * (hinge // (rods.nodes_per_limb - 1)) + STIFFER)
+    return EI_over_dl * load(work.stiffening, ALONG_ROWS * (hinge // rods.edges_per_limb) + STIFFER)
 
 
 @kernel
@@ -149,7 +148,7 @@ def bending_compliance(rods, work, hinge):
     dl_over_EI = load(rods.bending.dl_over_EI, hinge)
     if rods.along is None:
         return dl_over_EI
-    return dl_over_EI * load(work.stiffening, ALONG_ROWS * (hinge // (rods.nodes_per_limb - 1)) + SOFTER)
+    return dl_over_EI * load(work.stiffening, ALONG_ROWS * (hinge // rods.edges_per_limb) + SOFTER)
 
 
 @kernel
@@ -169,7 +168,7 @@ def add_moved_energy(rods, work, actuation, start, end, energy):
     if rods.along is None:
         return energy
     set_natural_curvature(rods, work, actuation, end)
-    edges = rods.nodes_per_limb - 1
+    edges = rods.edges_per_limb
     for limb in range(rods.n_limbs):
         before, after = turned(actuation, limb, start), turned(actuation, limb, end)
         f = larger(stiffening(rods.along, before), stiffening(rods.along, after))

@@ -27,12 +27,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.der.geometry import rotation
+from seastar_gym.der.geometry import convex_part, rotation
 from seastar_gym.der.mesh import Mesh
 from seastar_gym.der.motion import Motion, node_motion, relative
-from seastar_gym.der.star import n_nodes, root_place
+from seastar_gym.der.star import root_place, tail_node
 from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.lanes import N_LANES, add_product, load, select, splat, store, subtract_product
+from seastar_gym.simd.lanes import N_LANES, add_product, load, splat, store, subtract_product
 from seastar_gym.simd.rows import aligned_rows
 
 Floats = NDArray[np.float64]
@@ -144,7 +144,7 @@ def memory(body: Body | None, n_limbs: int, n_stages: int) -> BodyWork | None:
 @kernel
 def angle(rods, q):
     """theta [rad], or its rate from rows of velocities."""
-    return load(q, 2 * n_nodes(rods)) * load(rods.body.inverse_scale, 0)
+    return load(q, 2 * rods.n_nodes) * load(rods.body.inverse_scale, 0)
 
 
 @kernel
@@ -186,12 +186,9 @@ def move_roots(rods, q, v):
 @kernel
 def tail_motion(rods, work, stage, e):
     """Motion of the node where edge e starts, see star.tail_node."""
-    edges = rods.nodes_per_limb - 1
-    if rods.body is None:
-        return node_motion(work, stage, 0 if e % edges == 0 else e)
-    if e % edges == 0:
-        return root_motion(rods, work, stage, e // edges)
-    return node_motion(work, stage, e)
+    if rods.body is not None and e % rods.edges_per_limb == 0:
+        return root_motion(rods, work, stage, e // rods.edges_per_limb)
+    return node_motion(work, stage, tail_node(rods, e))
 
 
 @kernel
@@ -200,7 +197,7 @@ def root_motion(rods, work, stage, limb):
     place, row = root_place(rods, limb), HAT * limb
     vx = (load(work.q, 2 * place) - load(work.body.hat, row)) * stage.inverse_gamma
     vy = (load(work.q, 2 * place + 1) - load(work.body.hat, row + 1)) * stage.inverse_gamma
-    wx, wy = relative(work.current, place, vx, vy)
+    wx, wy = relative(work, place, vx, vy)
     return Motion(vx - load(work.body.hat, row + 2), vy - load(work.body.hat, row + 3), wx, wy)
 
 
@@ -258,11 +255,11 @@ def add_to_system(work, x, y, stiffness, residual):
 
 
 @kernel
-def tail_solution(body, work, n_limbs, limb, hub):
+def tail_solution(rods, work, limb, hub):
     """Solution of the node where a limb starts, from that of the hub (x, y) and that of the angle, if there is one."""
-    if body is None:
+    if rods.body is None:
         return hub
-    turn = load(work.root_solution, 2 * n_limbs + 2)
+    turn = load(work.root_solution, 2 * rods.n_limbs + 2)
     x, y = load(work.body.arm, 2 * limb), load(work.body.arm, 2 * limb + 1)
     return subtract_product(hub[0], turn, y), add_product(hub[1], turn, x)
 
@@ -272,7 +269,7 @@ def carry_roots(rods, work, p):
     """Extend rows of a direction of the unknowns, the angle [rad], to roots and corners, which it carries along."""
     if rods.body is None:
         return
-    turn = load(p, 2 * n_nodes(rods))
+    turn = load(p, 2 * rods.n_nodes)
     for k in range(rods.body.n_arms):
         place = root_place(rods, 0) + k
         x, y = load(work.body.arm, 2 * k), load(work.body.arm, 2 * k + 1)
@@ -285,7 +282,7 @@ def gather_roots(rods, work, rows):
     """Move what rows have at roots and corners to the hub and, as a torque, to the angle: the transpose of carry."""
     if rods.body is None:
         return
-    angle_row = 2 * n_nodes(rods)
+    angle_row = 2 * rods.n_nodes
     for k in range(rods.body.n_arms):
         x, y = load(work.body.arm, 2 * k), load(work.body.arm, 2 * k + 1)
         row = 2 * (root_place(rods, 0) + k)
@@ -307,8 +304,7 @@ def push_body_at_roots(rods, work, convex, force):
         row = 2 * (root_place(rods, 0) + k)
         x, y = load(work.body.arm, 2 * k), load(work.body.arm, 2 * k + 1)
         curvature = add_product(add_product(curvature, load(force, row), x), load(force, row + 1), y)
-    curvature = select(convex, select(curvature > 0.0, curvature, 0.0), curvature)
-    angle_row = 2 * n_nodes(rods)
+    angle_row = 2 * rods.n_nodes
     store(force, angle_row, 0.0)
     gather_roots(rods, work, force)
-    add_to_system(work, splat(0.0), splat(0.0), curvature, -load(force, angle_row))
+    add_to_system(work, splat(0.0), splat(0.0), convex_part(convex, curvature), -load(force, angle_row))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from seastar_gym.der.geometry import edge_vector
-from seastar_gym.der.star import corner_place, n_nodes, n_points, tail_node
+from seastar_gym.der.star import corner_place, tail_node
 from seastar_gym.der.terms.contact import edge_ends
 from seastar_gym.der.terms.near_pairs import across_gap, height_over_body
 from seastar_gym.simd.compilation import kernel
@@ -35,42 +35,33 @@ def on_their_sides(rods, q_1, q_0, right, left):
 
     The line goes through the hub; with a body, anywhere between the limbs and their roots.
     """
-    edges = rods.nodes_per_limb - 1
+    edges = rods.edges_per_limb
     wx, wy = across_gap(rods, q_0, right, left)
-    high, low = beginnings(rods, q_1, right, left, wx, wy)
+    high, low = splat(-np.inf), splat(np.inf)
+    if rods.body is not None:
+        high = place_along(q_1, tail_node(rods, right * edges), wx, wy)
+        low = place_along(q_1, tail_node(rods, left * edges), wx, wy)
     for i in range(1, edges + 1):
-        dx, dy = edge_vector(q_1, 0, right * edges + i)
-        x = add_product(dx * wx, dy, wy)
-        dx, dy = edge_vector(q_1, 0, left * edges + i)
-        y = add_product(dx * wx, dy, wy)
+        x = place_along(q_1, right * edges + i, wx, wy)
+        y = place_along(q_1, left * edges + i, wx, wy)
         high = select(high > x, high, x)
         low = select(low < y, low, y)
-    return apart(rods.body, high, low)
+    if rods.body is not None:
+        return high < low
+    return (high < 0.0) & (low > 0.0)
 
 
 @kernel
-def beginnings(rods, q_1, right, left, wx, wy):
-    """Places of two limbs' roots on a body from the hub, along w [m]; without a body nothing to look at."""
-    if rods.body is None:
-        return splat(-np.inf), splat(np.inf)
-    edges = rods.nodes_per_limb - 1
-    dx, dy = edge_vector(q_1, 0, tail_node(rods, right * edges))
-    hx, hy = edge_vector(q_1, 0, tail_node(rods, left * edges))
-    return add_product(dx * wx, dy, wy), add_product(hx * wx, hy, wy)
-
-
-@kernel
-def apart(body, high, low):
-    """Mask of the robots whose limbs end before the hub and begin behind it; with a body, before each other."""
-    if body is None:
-        return (high < 0.0) & (low > 0.0)
-    return high < low
+def place_along(q, node, wx, wy):
+    """Place of a node from the hub, along w [m]."""
+    dx, dy = edge_vector(q, 0, node)
+    return add_product(dx * wx, dy, wy)
 
 
 @kernel
 def store_step_end(rods, work, stage):
     """Fill work.contact.ends with the positions at the end of the step [m]."""
-    for row in range(2 * n_points(rods)):
+    for row in range(2 * rods.n_points):
         q = load(work.q, row)
         store(work.contact.ends, row, 2.0 * q - load(stage.q_hat, row) if stage.ahead else q)
 
@@ -78,7 +69,7 @@ def store_step_end(rods, work, stage):
 @kernel
 def come_to_cross(rods, q_1, q_0, right, left):
     """Mask of the robots with edges of two limbs that cross at q_1 and did not at q_0."""
-    edges = rods.nodes_per_limb - 1
+    edges = rods.edges_per_limb
     crossed = splat(1.0) < 0.0
     for e in range(right * edges, right * edges + edges):
         for f in range(left * edges, left * edges + edges):
@@ -109,12 +100,10 @@ def those_outside(rods, q_1, q_0, robots):
 
     Root edges are left out, which begin at the body. The robots themselves without a body.
     """
-    if rods.body is None:
+    if rods.body is None or rods.contact.n_corners == 0:
         return robots
-    if rods.contact.n_corners == 0:
-        return robots
-    edges, farthest = rods.nodes_per_limb - 1, load(rods.contact.reach, 0)
-    for i in range(1, n_nodes(rods)):
+    edges, farthest = rods.edges_per_limb, load(rods.contact.reach, 0)
+    for i in range(1, rods.n_nodes):
         dx, dy = edge_vector(q_1, 0, i)
         doubtful = robots & (add_product(dx * dx, dy, dy) < farthest * farthest)
         if any_lane(doubtful):
@@ -142,7 +131,7 @@ def come_through(rods, q_1, q_0, e):
         return reaches_disc(rods, q_1, e) & ~reaches_disc(rods, q_0, e)
     through = splat(1.0) < 0.0
     for side in range(rods.contact.n_corners):
-        f = n_nodes(rods) - 1 + side
+        f = rods.n_edges + side
         now = edges_cross(rods, q_1, e, f)
         if any_lane(now):
             through = through | (now & ~edges_cross(rods, q_0, e, f))

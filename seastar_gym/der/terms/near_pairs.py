@@ -3,7 +3,7 @@
 import numpy as np
 
 from seastar_gym.der.geometry import edge_vector
-from seastar_gym.der.star import corner_place, n_nodes, n_points, root_place, tail_node
+from seastar_gym.der.star import corner_place, root_direction, root_place, tail_node
 from seastar_gym.der.terms.contact import (
     N_X,
     N_Y,
@@ -43,7 +43,7 @@ def freeze_contact(rods, work, stage, q_0):
         return
     moved = splat(0.0)
     carried_x, carried_y = moved, moved  # with the hub
-    for node in range(n_nodes(rods)):
+    for node in range(rods.n_nodes):
         x, y = looked_at(work, stage, 2 * node), looked_at(work, stage, 2 * node + 1)
         store(work.contact.ends, 2 * node, x)
         store(work.contact.ends, 2 * node + 1, y)
@@ -72,7 +72,7 @@ def freeze_contact(rods, work, stage, q_0):
     list_at_body(rods, work, stage, q_0, reach)
     if n_listed(work) == 0:
         store(work.contact.touching, 0, 0.0)
-        for row in range(2 * n_points(rods)):
+        for row in range(2 * rods.n_points):
             store(work.contact.force, row, 0.0)
 
 
@@ -95,7 +95,7 @@ def view_roots(rods, work, stage, q_0, carried_x, carried_y, moved):
 @kernel
 def view_limbs(rods, work, q_0, right, left):
     """Look at two limbs and their roots along the gap between them, and across it; keep it in work.contact.seen."""
-    edges = rods.nodes_per_limb - 1
+    edges = rods.edges_per_limb
     wx, wy = across_gap(rods, q_0, right, left)
     for limb in (right, left):
         view_node(work, tail_node(rods, limb * edges), wx, wy)
@@ -105,26 +105,17 @@ def view_limbs(rods, work, q_0, right, left):
 
 @kernel
 def across_gap(rods, q, right, left):
-    """Unit vector from one limb to another."""
-    return direction_across(rods, q, right, left)
-
-
-@kernel
-def direction_across(rods, q, right, left):
-    """From the right limb to the left: along the difference of their directions and across their sum.
+    """Unit vector from the right limb to the left: along the difference of their directions and across their sum.
 
     On a body, where there is no right and no left, from the middle of one limb to that of the other.
     """
-    edges = rods.nodes_per_limb - 1
     if rods.body is None:
-        ax, ay = edge_vector(q, tail_node(rods, right * edges), right * edges + 1)
-        bx, by = edge_vector(q, tail_node(rods, left * edges), left * edges + 1)
-        a, b = 1.0 / sqrt(add_product(ax * ax, ay, ay)), 1.0 / sqrt(add_product(bx * bx, by, by))
-        ax, ay, bx, by = a * ax, a * ay, b * bx, b * by
+        ax, ay = root_direction(rods, q, right)
+        bx, by = root_direction(rods, q, left)
         wx, wy = bx - ax - (ay + by), by - ay + (ax + bx)
         scale = 1.0 / sqrt(add_product(wx * wx, wy, wy))
         return scale * wx, scale * wy
-    wx, wy = splat(0.0), splat(0.0)
+    edges, wx, wy = rods.edges_per_limb, splat(0.0), splat(0.0)
     for i in range(1, edges + 1):
         x, y = edge_vector(q, right * edges + i, left * edges + i)
         wx, wy = wx + x, wy + y
@@ -138,7 +129,7 @@ def may_touch(rods, work, reach, limb, other, side):
     """(near, end): the mask of the robots with no strip of width `reach` between the nodes of a limb and the edges of
     another, which begin at the hub or a body, and how far the limb comes towards the other.
     """
-    edges = rods.nodes_per_limb - 1
+    edges = rods.edges_per_limb
     end, begin = splat(-np.inf), -side * load(work.contact.seen, 2 * tail_node(rods, other * edges))
     for i in range(1, edges + 1):
         own = -side * load(work.contact.seen, 2 * (limb * edges + i))
@@ -162,7 +153,7 @@ def list_pairs(rods, work, stage, q_0, reach, limb, other, side, end, robots):
 
     end, robots: How far the limb comes towards the other, and in whom it may touch it, as may_touch saw it.
     """
-    edges = rods.nodes_per_limb - 1
+    edges = rods.edges_per_limb
     ends, seen = work.contact.ends, work.contact.seen
     for e in range(other * edges, other * edges + edges):
         j, k = tail_node(rods, e), e + 1
@@ -184,30 +175,20 @@ def list_pairs(rods, work, stage, q_0, reach, limb, other, side, end, robots):
                 dx, dy = edge_vector(ends, j, i)
                 s = add_product(dx * ex, dy, ey) * inverse
                 g = add_product(dx * nx, dy, ny)
-                facing = facing & (s > -OVERHANG) & (s < last_share(rods.body, edges, e))
+                facing = facing & (s > -OVERHANG) & (s < last_share(rods, e))
                 if any_lane(facing):
-                    list_pair_on(rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing)
+                    # Limbs that begin at one point have sides that they keep; those on a body may go round tips.
+                    if rods.body is None:
+                        list_pair(rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing)
+                    else:
+                        list_pair_on_its_side(rods, work, stage, q_0, i, e, s, facing)
 
 
 @kernel
-def last_share(body, edges, e):
+def last_share(rods, e):
     """Share of an edge up to which it meets nodes; on a body tips are round, and meet those in front of them, too."""
-    if body is None:
-        return splat(1.0 + OVERHANG)
-    return splat(np.inf if e % edges == edges - 1 else 1.0 + OVERHANG)
-
-
-@kernel
-def list_pair_on(rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing):
-    """List node i and edge e if they are near each other in any of the robots in the mask `facing`.
-
-    Limbs that begin at one point have sides that they keep. Those on a body may go round each other's tips: there a
-    node belongs to the side of an edge on which it was when the step began, if it was beside it.
-    """
-    if rods.body is None:
-        list_pair(rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing)
-    else:
-        list_pair_on_its_side(rods, work, stage, q_0, i, e, s, facing)
+    edges = rods.edges_per_limb
+    return splat(np.inf if rods.body is not None and e % edges == edges - 1 else 1.0 + OVERHANG)
 
 
 @kernel
@@ -290,13 +271,11 @@ def list_at_body(rods, work, stage, q_0, reach):
 
     Root edges are left out, which begin at the body.
     """
-    if rods.body is None:
+    if rods.body is None or rods.contact.n_corners == 0:
         return
-    if rods.contact.n_corners == 0:
-        return
-    ends, edges = work.contact.ends, rods.nodes_per_limb - 1
+    ends, edges = work.contact.ends, rods.edges_per_limb
     farthest = load(rods.contact.reach, 0) + reach
-    for i in range(1, n_nodes(rods)):
+    for i in range(1, rods.n_nodes):
         dx, dy = edge_vector(ends, 0, i)
         robots = add_product(dx * dx, dy, dy) < farthest * farthest
         if any_lane(robots):
@@ -320,14 +299,14 @@ def list_node_at_disc(rods, work, stage, q_0, i, robots):
     g, g_0 = size - rim, sqrt(add_product(dx * dx, dy, dy)) - rim
     near = robots & (size > 0.0) & (g_0 > -d) & (g < MARGIN * d + absolute(g - g_0))
     if any_lane(near):
-        put_on_list(rods, work, stage, i, n_nodes(rods) - 1, nx, ny, splat(0.0), d + rim, near)
+        put_on_list(rods, work, stage, i, rods.n_edges, nx, ny, splat(0.0), d + rim, near)
 
 
 @kernel
 def height_over_side(rods, q, i, side):
     """Distance of a node from the line through a side of a polygon [m], positive outside."""
     j = corner_place(rods, side)
-    ex, ey = edge_vector(q, j, corner_place(rods, (side + 1) % rods.contact.n_corners))
+    ex, ey = edge_vector(q, j, corner_place(rods, side + 1))
     dx, dy = edge_vector(q, j, i)
     return subtract_product(ey * dx, ex, dy) / sqrt(add_product(ex * ex, ey, ey))
 
@@ -351,13 +330,13 @@ def list_node_at_sides(rods, work, stage, q_0, i, robots):
     ends, d = work.contact.ends, load(rods.contact.thickness, i)
     height = height_over_body(rods, q_0, i)
     for side in range(rods.contact.n_corners):
-        j, k = corner_place(rods, side), corner_place(rods, (side + 1) % rods.contact.n_corners)
+        j, k = corner_place(rods, side), corner_place(rods, side + 1)
         ex, ey = edge_vector(ends, j, k)
         dx, dy = edge_vector(ends, j, i)
         inverse = 1.0 / add_product(ex * ex, ey, ey)
         s = add_product(dx * ex, dy, ey) * inverse
         # The next side begins at the corner k; who is before it and beyond this one stands at the corner.
-        fx, fy = edge_vector(ends, k, corner_place(rods, (side + 2) % rods.contact.n_corners))
+        fx, fy = edge_vector(ends, k, corner_place(rods, side + 2))
         hx, hy = edge_vector(ends, k, i)
         beyond = (s > 1.0) & (add_product(hx * fx, hy, fy) < 0.0)
         beside = robots & (beyond | ((s >= 0.0) & (s <= 1.0))) & (height > -d)
@@ -371,7 +350,7 @@ def list_node_at_sides(rods, work, stage, q_0, i, robots):
             near = beside & (beyond | (over > 0.0) | (over >= height)) & (g < MARGIN * d + absolute(g - g_0))
             if any_lane(near):
                 s = select(s < 1.0, s, 1.0)
-                put_on_list(rods, work, stage, i, n_nodes(rods) - 1 + side, nx, ny, s, d, near)
+                put_on_list(rods, work, stage, i, rods.n_edges + side, nx, ny, s, d, near)
 
 
 @kernel
