@@ -29,8 +29,8 @@ def direction(rods, work, q, q_0, gamma, ahead, convex, result):
     h, mask = splat(gamma), load(borrow(convex), 0) > 0.0
     stage = Stage(memory.q_hat, memory.v_hat, h, 1.0 / h, ahead)
     freeze_fluid(rods_rows, memory)
-    freeze_contact(rods_rows.contact, rods_rows, memory, stage, borrow(q_0))
-    freeze_strains(rods_rows.damping, rods_rows, memory, memory.q_hat)
+    freeze_contact(rods_rows, memory, stage, borrow(q_0))
+    freeze_strains(rods_rows, memory, memory.q_hat)
     for row in range(q.shape[0]):
         store(memory.q, row, load(borrow(q), row))
     if any_lane(mask):
@@ -38,9 +38,9 @@ def direction(rods, work, q, q_0, gamma, ahead, convex, result):
     else:
         phi, decrement, pivot = factorise(rods_rows, memory, stage, None)
     store(out, 0, phi)
-    store(out, 1, solve_coupled(memory.contact, rods_rows, memory, h > 0.0, decrement))
+    store(out, 1, solve_coupled(rods_rows, memory, h > 0.0, decrement))
     store(out, 2, pivot)
-    store(out, 3, move_along(memory.contact, rods_rows, memory, h > 0.0, h < 0.0, splat(1.0)))
+    store(out, 3, move_along(rods_rows, memory, h > 0.0, h < 0.0, splat(1.0)))
 
 
 def robot_and_star(n_limbs=5, nodes_per_limb=10, hub="rigid", fluid=True):

@@ -1,9 +1,14 @@
-"""Coefficients of one robot of a scene for the kernels. Every term is one line."""
+"""Coefficients of one robot of a scene for the kernels, and limits of its solver. Every term is one line."""
 
+import math
+from collections.abc import Sequence
 from operator import itemgetter
+
+import numpy as np
 
 from seastar_gym.der.rods import Rods
 from seastar_gym.der.stepping import scales
+from seastar_gym.der.stepping.scales import Limits
 from seastar_gym.der.terms import (
     added_mass,
     along,
@@ -20,11 +25,11 @@ from seastar_gym.der.terms import (
 )
 from seastar_gym.model.body import body_rim, make_body
 from seastar_gym.model.currents import current_rows
-from seastar_gym.model.joints import with_joints
 from seastar_gym.model.mesh import make_mesh
 from seastar_gym.scene.along import AlongLimb, Stiffening
 from seastar_gym.scene.fluid import Water
-from seastar_gym.scene.per_robot import chosen
+from seastar_gym.scene.numerics import ADAPTATION, MOST_ITERATIONS, MOST_ITERATIONS_PER_STEP
+from seastar_gym.scene.per_robot import chosen, of_robot
 from seastar_gym.scene.scene import Scene
 from seastar_gym.scene.shape import natural_hub_angle
 
@@ -108,3 +113,35 @@ def limb_actuation(scene: Scene, index: int, natural_turn: list[float]) -> along
     spread, hot = robot.along or AlongLimb(share=0.0), robot.stiffening or Stiffening(ratio=1.0)
     shares = spread.hinge_shares(robot.nodes_per_limb)
     return along.coefficients(natural_turn, shares, float(actuator.peak_angle), hot.ratio, hot.middle, hot.width)
+
+
+def with_joints(hinges: bending.Bending, stiffnesses: Sequence[float | None]) -> bending.Bending:
+    """Bending with joints of these stiffnesses [N m/rad], springs at the hub in a row with the clamps; None for none.
+
+    Exact for small turns; a joint and its clamp share larger ones as the clamp alone does, K (1 - cos(turn)).
+    """
+    EI_over_dl, dl_over_EI = hinges.EI_over_dl.copy(), hinges.dl_over_EI.copy()
+    roots = np.arange(len(stiffnesses)) * (len(EI_over_dl) // len(stiffnesses))
+    for root, stiffness in zip(roots.tolist(), stiffnesses, strict=True):
+        if stiffness is not None:
+            dl_over_EI[root] += 1.0 / stiffness
+            EI_over_dl[root] = 1.0 / dl_over_EI[root]
+    return hinges._replace(EI_over_dl=EI_over_dl, dl_over_EI=dl_over_EI)
+
+
+def make_limits(scene: Scene, index: int = 0) -> Limits:
+    """Tolerances and limits of the solver for robot `index` of a scene.
+
+    The largest error of a step per second follows from the tolerance of the path, as was measured, see ADAPTATION.
+    """
+    numerics, length = scene.numerics, of_robot(scene.robot.limb_length, index)
+    speed, tolerance = length / scene.actuator.period, numerics.path_tolerance
+    error_rate = 0.0 if tolerance is None else speed * (tolerance / ADAPTATION[0]) ** ADAPTATION[1]
+    n_steps = math.ceil(scene.actuator.period / numerics.step)
+    return Limits(
+        tolerance=np.array([numerics.newton_tolerance * length]),
+        max_iterations=numerics.max_iterations,
+        most_iterations=MOST_ITERATIONS + MOST_ITERATIONS_PER_STEP * n_steps,
+        adaptive=tolerance is not None,
+        error_rate=np.array([error_rate]),
+    )

@@ -23,8 +23,7 @@ from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stages import begin_stage, end_stage, end_step
 from seastar_gym.der.stepping.stroke import advance
 from seastar_gym.der.terms.hub import set_natural_hub_angles
-from seastar_gym.model.limits import make_limits
-from seastar_gym.model.rods import make_rods
+from seastar_gym.model.rods import make_limits, make_rods
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.simd.compilation import entry_point, inlined_kernel
 from seastar_gym.simd.lanes import any_lane, borrow, load, load_number, select, splat, store

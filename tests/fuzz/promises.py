@@ -13,8 +13,7 @@ from momenta import turned
 from seastar_gym import Numerics, Scene, Simulator, SolverStatus, State, StrokeReport, UniformCurrent
 from seastar_gym.der.rods import Rods
 from seastar_gym.der.stepping.schemes import SCHEMES
-from seastar_gym.model.limits import make_limits
-from seastar_gym.model.rods import make_rods
+from seastar_gym.model.rods import make_limits, make_rods
 from seastar_gym.scene.per_robot import side_by_side
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator.report import MEASURED_IF_ASKED

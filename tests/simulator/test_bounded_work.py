@@ -6,8 +6,8 @@ import pytest
 from hubs import TEN
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State, StrokeReport
 from seastar_gym.der.stepping.report import STEPS
-from seastar_gym.model import limits as module
-from seastar_gym.model.limits import make_limits
+from seastar_gym.model import rods as module
+from seastar_gym.model.rods import make_limits
 
 SCHEMES = ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint", "adaptive"]
 SHORTEST = 4096  # of an interval
