@@ -21,7 +21,7 @@ FAST = Scene(numerics=Numerics.preset("fast"))
 PATH = np.array([[0.03, 0.0]])
 MADE_BY_THE_PACKAGE = {
     "CertifiedSetting", "Episode", "Estimate", "Layout", "Outcome", "Promise", "Score", "Swim", "Tally",
-    "Actuator", "Executor", "Mirrored", "Policy", "StatefulActuator", "Challenge", "Numbered", "Swimming",
+    "Actuator", "ActuatorBase", "Executor", "Policy", "Challenge", "Numbered", "Swimming",
 }  # fmt: skip
 """Records that functions return, protocols, and bases of classes of one's own."""
 UNCALLED = {*MADE_BY_THE_PACKAGE, "Here", "RayTasks", "SlurmArrays", "measured_over"}

@@ -15,7 +15,7 @@ from seastar_gym.envs.symmetry.memory import MOST_PAST
 from seastar_gym.envs.task import scene_observation_size
 from seastar_gym.envs.tasks.envs import CHALLENGES
 from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.heating import Mirror
+from seastar_gym.scene.actuators.actuator import Mirror
 from seastar_gym.scene.checks import is_whole_number, require_count, require_kind, shown
 from seastar_gym.version import __version__
 

@@ -22,7 +22,7 @@ from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.stations import N_STATIONS, body_heading, node_weights, of_beginning
 from seastar_gym.envs.task import make_scene
 from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.actuator import Recalled
+from seastar_gym.scene.actuators.actuator import complete
 from seastar_gym.scene.checks import require_count, require_kind, require_number
 from seastar_gym.simulator import Simulator, State
 from seastar_gym.simulator.simulator import MAX_THREADS
@@ -89,7 +89,7 @@ def state_of(observations: NDArray[np.float32], scene: Scene) -> State:
         positions=robot.limb_length * np.concatenate([zero, nodes], axis=1),
         velocities=VELOCITY_SCALE * (hub_velocity + np.concatenate([zero, velocities], axis=1)),
         time=np.zeros(n),
-        actuators=actuator.recall(seen) if isinstance(actuator, Recalled) else None,
+        actuators=complete(actuator).recall(seen),
     )
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.actuator import Actuator, StatefulActuator
+from seastar_gym.scene.actuators.actuator import ActuatorBase, complete
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.numerics import MAX_STEPS
 from seastar_gym.scene.per_robot import batch_size
@@ -22,7 +22,7 @@ def checked_decision_period(seconds: float | None, scene: Scene) -> float:
             f"decision_period must be from {SHORTEST * step:.4g} to {MAX_STEPS * step:.4g} s, with steps of "
             f"{step:.4g} s, not {seconds:.4g} s."
         )
-    if not _can_begin_anew(actuator, float(seconds)):
+    if not _can_begin_anew(complete(actuator), float(seconds)):
         raise ValueError(
             f"decision_period must be at least {actuator.period:.4g} s, the period of this {type(actuator).__name__}: "
             f"limbs would jump at a new command after {seconds:.4g} s. Use an actuator with memory, such as SmaWires."
@@ -30,9 +30,9 @@ def checked_decision_period(seconds: float | None, scene: Scene) -> float:
     return float(seconds)
 
 
-def _can_begin_anew(actuator: Actuator, seconds: float) -> bool:
+def _can_begin_anew(actuator: ActuatorBase, seconds: float) -> bool:
     """Whether new commands that come after a time [s] find limbs at rest, or turn them on from where they are."""
-    if not isinstance(actuator, StatefulActuator):
+    if not actuator.has_memory:
         return seconds >= actuator.period * (1.0 - JUMP)
     n_robots = batch_size(actuator)
     shape = (1,) if n_robots is None else (n_robots, 1)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions, command_table
-from seastar_gym.scene.actuators.actuator import Actuator, Deaf
+from seastar_gym.scene.actuators.actuator import Actuator, complete
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -20,7 +20,7 @@ Mask = NDArray[np.bool_]
 
 def can_be_masked(actuator: Actuator) -> bool:
     """Whether an actuator ever has wires that cannot be heated."""
-    return isinstance(actuator, Deaf) and actuator.can_be_deaf
+    return complete(actuator).can_be_deaf
 
 
 def action_masks(actions: Actions, deaf: Mask) -> Mask:

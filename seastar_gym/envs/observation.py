@@ -17,7 +17,7 @@ index                 meaning                                           unit
 with m = 9 n_limbs stations in the order {1,1}..{1,9}, {2,1}.. (m = 45 for five limbs: 186 numbers). On the last leg the
 next waypoint is the current one. Distances of waypoints are not clipped.
 
-If actuators have a memory (a `StatefulActuator`), the numbers of its `observe` for limb 1, limb 2, .. stand before the
+If actuators have a memory (`has_memory`), the numbers of its `observe` for limb 1, limb 2, .. stand before the
 waypoints, which are always the last four numbers; an environment may leave the memory out. `Layout` names all these
 places.
 
@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.envs.stations import N_STATIONS
 from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.actuator import StatefulActuator
+from seastar_gym.scene.actuators.actuator import complete
 from seastar_gym.scene.checks import require_count, require_flag, require_limbs
 from seastar_gym.simd.compilation import entry_point, kernel
 from seastar_gym.simd.lanes import add_product, borrow, load, load_number, select, splat, sqrt, store
@@ -94,9 +94,8 @@ def _layout(n_limbs: int, n_remembered: int, with_headings: bool) -> Layout:
 
 def scene_layout(scene: Scene, observe_actuators: bool = True, with_headings: bool = False) -> Layout:
     """Layout for the robot of a scene, with the memory of its actuators or without, with asked headings or without."""
-    actuator, n_limbs = scene.actuator, scene.robot.n_limbs
-    seen = observe_actuators and isinstance(actuator, StatefulActuator)
-    remembered = actuator.observe(actuator.rest).shape[-1] if seen else 0  # type: ignore[attr-defined]
+    actuator, n_limbs = complete(scene.actuator), scene.robot.n_limbs
+    remembered = actuator.observe(actuator.rest).shape[-1] if observe_actuators else 0
     return layout(n_limbs, remembered * n_limbs, with_headings)
 
 

@@ -39,8 +39,7 @@ from seastar_gym.envs.reward import pulses_of
 from seastar_gym.envs.scenery import NOTHING, Scenery
 from seastar_gym.envs.stations import stations_of
 from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.actuator import Deaf
-from seastar_gym.scene.actuators.heating import Mirror
+from seastar_gym.scene.actuators.actuator import Mirror, complete
 from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.checks import require_flag
 from seastar_gym.simd.rows import to_rows
@@ -286,7 +285,8 @@ class Swimming(ABC):
 
     def warmth(self) -> Floats | None:
         """Contractions or temperatures of wires + and -, 0 to 1, shape (n_robots, n_limbs, 2); None without wires."""
-        if not isinstance(self.scene.actuator, Deaf):
+        actuator = complete(self.scene.actuator)
+        if actuator.deaf_wires(actuator.rest) is None:
             return None
         numbers = self.simulator.observe_actuators()
         return np.clip(numbers.reshape(self.n_robots, self.scene.robot.n_limbs, -1)[..., :2], 0.0, 1.0)

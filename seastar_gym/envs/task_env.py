@@ -12,7 +12,7 @@ from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.spec import PlainSpec
 from seastar_gym.envs.swimming import Swimming
 from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.heating import Mirror
+from seastar_gym.scene.actuators.actuator import Mirror
 from seastar_gym.scene.checks import shown
 from seastar_gym.simulator import Simulator
 

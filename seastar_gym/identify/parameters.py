@@ -1,7 +1,6 @@
 """Parameters: positive numbers of a scene, read and replaced by name."""
 
 from collections.abc import Sequence
-from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -9,14 +8,12 @@ from numpy.typing import NDArray
 
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_finite, is_finite_number, require_kind, require_texts, shown
-from seastar_gym.scene.per_robot import numbers_of, with_numbers
+from seastar_gym.scene.per_robot import MISSING, at, numbers_of, with_numbers
 
 Floats = NDArray[np.float64]
 
 COUNTS = (int, "int", int | Any)
 """Types of fields that are counts, which nobody fits."""
-UNKNOWN = ...
-"""What a name stands for that the scene has not."""
 
 
 def get_parameter(scene: Scene, name: str) -> float:
@@ -30,17 +27,12 @@ def get_parameter(scene: Scene, name: str) -> float:
 
 
 def _found(scene: Scene, name: str) -> Any:
-    """What a name stands for; UNKNOWN for nothing, and for counts."""
-    first, *rest = name.split(".")
-    value: Any = getattr(scene, first) if first in ("robot", "fluid", "actuator", "contact") else UNKNOWN
-    for step in rest:
-        if isinstance(value, tuple) and step.isdigit() and int(step) < len(value):
-            value = value[int(step)]
-        else:
-            own = fields(value) if is_dataclass(value) else ()
-            known = step in {field.name for field in own if field.type not in COUNTS}
-            value = getattr(value, step) if known else UNKNOWN
-    return value
+    """What a name stands for; MISSING for nothing, and for counts."""
+    owner, _, last = name.rpartition(".")
+    field = getattr(at(scene, owner), "__dataclass_fields__", {}).get(last)
+    is_count = field is not None and getattr(field.type, "__origin__", field.type) in COUNTS
+    known = name.split(".")[0] in ("robot", "fluid", "actuator", "contact") and not is_count
+    return at(scene, name) if known else MISSING
 
 
 def _why_not(scene: Scene, name: str, value: Any) -> str:
@@ -59,7 +51,7 @@ def with_parameters(scene: Scene, names: Sequence[str], values: Sequence[float] 
     require_kind("scene", scene, Scene, "a Scene")
     require_texts("names", names)
     for name in names:
-        if "." not in name or _found(scene, name) is UNKNOWN:
+        if "." not in name or _found(scene, name) is MISSING:
             raise ValueError(f"{shown(name)} is no number of this scene, such as fluid.drag_coefficient.")
     numbers = as_finite("values", values, (len(names),))
     if numbers.ndim != 1:

@@ -1,15 +1,14 @@
 """`AlongLimb` and `Stiffening`: actuators that act on limbs along their length, on natural curvature and stiffness."""
 
 from dataclasses import dataclass
-from functools import partial
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.checks import is_finite_number, require_number, require_numbers, shown
+from seastar_gym.scene.checks import require_numbers, shown
 from seastar_gym.scene.limb import Profile, along, as_tuple
-from seastar_gym.scene.per_robot import Numbers, require_each
+from seastar_gym.scene.number import Numbers, check_numbers, not_negative, positive, within
 from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
@@ -28,12 +27,11 @@ class AlongLimb:
         spaced points from hub to tip, linear in between. Only their ratios count.
     """
 
-    PER_ROBOT: ClassVar = ("share",)
-    share: Numbers = 1.0
+    share: Annotated[Numbers, within(0.0, 1.0)] = 1.0
     profile: Profile = 1.0
 
     def __post_init__(self) -> None:
-        require_each(self, "share", _require_share)
+        check_numbers(self)
         require_numbers("A profile along a limb", as_tuple(self.profile), "1")
         points = tuple(map(float, as_tuple(self.profile)))
         bend = sum(points) - 0.5 * (points[0] + points[-1]) * (len(points) > 1) if points else 0.0
@@ -63,11 +61,6 @@ class AlongLimb:
         return np.asarray(shares)
 
 
-def _require_share(name: str, value: float) -> None:
-    if not is_finite_number(value) or not 0.0 <= value <= 1.0:
-        raise ValueError(f"{name} must be from 0 to 1, not {shown(value)}.")
-
-
 @register_part
 @dataclass(frozen=True)
 class Stiffening:
@@ -83,15 +76,12 @@ class Stiffening:
     width: Width of the rise, in activation: S is about 1/(1 + exp(-(a - middle)/width)).
     """
 
-    PER_ROBOT: ClassVar = ("ratio",)
-    ratio: Numbers = 2.68
-    middle: float = 0.5
-    width: float = 0.15
+    ratio: Annotated[Numbers, positive("1")] = 2.68
+    middle: Annotated[float, not_negative("1")] = 0.5
+    width: Annotated[float, positive("1")] = 0.15
 
     def __post_init__(self) -> None:
-        require_each(self, "ratio", partial(require_number, unit="1"))
-        require_number("middle", self.middle, "1", zero_allowed=True)
-        require_number("width", self.width, "1")
+        check_numbers(self)
         if not (np.min(self.ratio) >= 1e-3 and np.max(self.ratio) <= 1e3):
             raise ValueError(f"The ratio of bending stiffnesses must be from 0.001 to 1000, not {shown(self.ratio)}.")
         if self.middle > 1.0 or not 0.02 <= self.width <= 100.0:

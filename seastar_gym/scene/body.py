@@ -1,14 +1,13 @@
 """`Body`: a rigid body between the limbs of a robot, and `Attachment`: where and how a limb is clamped to it."""
 
 from dataclasses import dataclass
-from functools import partial
-from typing import Any, ClassVar
+from typing import Annotated, Any
 
 import numpy as np
 
-from seastar_gym.scene.checks import is_finite_number, require_finite, require_number, shown
+from seastar_gym.scene.checks import is_finite_number, require_number, shown
+from seastar_gym.scene.number import Numbers, check_numbers, finite, not_negative, positive
 from seastar_gym.scene.outline import Outline, Points, is_convex
-from seastar_gym.scene.per_robot import Numbers, require_each
 from seastar_gym.scene.serial import register_part
 
 GIVEN_DRAG = ("drag_along", "drag_across", "drag_turning")
@@ -24,14 +23,12 @@ class Attachment:
         from x.
     """
 
-    x: float
-    y: float
-    direction: float
+    x: Annotated[float, finite("m", "An attachment's ")]
+    y: Annotated[float, finite("m", "An attachment's ")]
+    direction: Annotated[float, finite("rad", "An attachment's ")]
 
     def __post_init__(self) -> None:
-        for name, unit in (("x", "m"), ("y", "m"), ("direction", "rad")):
-            require_finite(f"An attachment's {name}", getattr(self, name), unit)
-            object.__setattr__(self, name, float(getattr(self, name)))
+        check_numbers(self)
 
 
 @register_part
@@ -66,32 +63,24 @@ class Body:
     Flow at the body is that at the hub. Fluid that moves along with the body is that of an ellipse about the hub.
     """
 
-    PER_ROBOT: ClassVar = ("height", "mass", "inertia", "drag_coefficient", *GIVEN_DRAG, *GIVEN_FLUID)
-    radius: float = 0.0
+    radius: Annotated[float, not_negative("m", "A body's ")] = 0.0
     outline: Points = ()
-    height: Numbers = 0.01
-    mass: Numbers | None = None
-    inertia: Numbers | None = None
+    height: Annotated[Numbers, positive("m")] = 0.01
+    mass: Annotated[Numbers | None, not_negative("kg")] = None
+    inertia: Annotated[Numbers | None, not_negative("kg m^2")] = None
     centre_of_mass: tuple[float, float] | None = None
-    drag_coefficient: Numbers | None = None
-    drag_along: Numbers | None = None
-    drag_across: Numbers | None = None
-    drag_turning: Numbers | None = None
-    added_mass_along: Numbers | None = None
-    added_mass_across: Numbers | None = None
-    added_mass_turning: Numbers | None = None
+    drag_coefficient: Annotated[Numbers | None, not_negative("1")] = None
+    drag_along: Annotated[Numbers | None, not_negative("1")] = None
+    drag_across: Annotated[Numbers | None, not_negative("1")] = None
+    drag_turning: Annotated[Numbers | None, not_negative("1")] = None
+    added_mass_along: Annotated[Numbers | None, not_negative("1")] = None
+    added_mass_across: Annotated[Numbers | None, not_negative("1")] = None
+    added_mass_turning: Annotated[Numbers | None, not_negative("1")] = None
     attachments: tuple[Attachment, ...] = ()
 
     def __post_init__(self) -> None:
-        not_negative = partial(require_number, zero_allowed=True)
-        not_negative("A body's radius", self.radius, "m")
-        object.__setattr__(self, "radius", float(self.radius))
+        check_numbers(self)
         self._check_outline()
-        require_each(self, "height", partial(require_number, unit="m"))
-        dimensionless = dict.fromkeys(("drag_coefficient", *GIVEN_DRAG, *GIVEN_FLUID), "1")
-        for name, unit in {"mass": "kg", "inertia": "kg m^2", **dimensionless}.items():
-            if getattr(self, name) is not None:
-                require_each(self, name, partial(not_negative, unit=unit))
         centre = self.centre_of_mass
         if centre is not None and not _is_point(centre):
             raise ValueError(f"centre_of_mass must be two finite numbers (x, y) [m], not {shown(centre)}.")

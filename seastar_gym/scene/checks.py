@@ -78,6 +78,12 @@ def require_finite(name: str, value: float, unit: str) -> None:
         raise ValueError(f"{name} must be a finite number [{unit}], not {shown(value)}.")
 
 
+def require_within(name: str, value: float, low: float, high: float) -> None:
+    """Refuse what is no number from `low` to `high`."""
+    if not is_finite_number(value) or not low <= value <= high:
+        raise ValueError(f"{name} must be from {low:g} to {high:g}, not {shown(value)}.")
+
+
 def require_error(error: object) -> None:
     """Refuse what is no error that can be asked for."""
     if not is_finite_number(error) or error <= 0.0:  # type: ignore[operator]

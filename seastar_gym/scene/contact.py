@@ -1,11 +1,9 @@
 """`Contact`: forces between limbs that touch each other or a body."""
 
 from dataclasses import dataclass
-from functools import partial
-from typing import ClassVar
+from typing import Annotated
 
-from seastar_gym.scene.checks import require_number
-from seastar_gym.scene.per_robot import Numbers, require_each
+from seastar_gym.scene.number import Numbers, check_numbers, positive
 from seastar_gym.scene.serial import register_part
 
 
@@ -24,11 +22,8 @@ class Contact:
         roots, and must leave its rim at more than half the angle.
     """
 
-    PER_ROBOT: ClassVar = ("modulus",)
-    modulus: Numbers | None = None
-    opening_angle: float = 0.3
+    modulus: Annotated[Numbers | None, positive("Pa")] = None
+    opening_angle: Annotated[float, positive("rad")] = 0.3
 
     def __post_init__(self) -> None:
-        if self.modulus is not None:
-            require_each(self, "modulus", partial(require_number, unit="Pa"))
-        require_number("opening_angle", self.opening_angle, "rad")
+        check_numbers(self)

@@ -2,14 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import Any, ClassVar
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.checks import as_floats, is_finite_number, require_finite, require_number, shown
-from seastar_gym.scene.per_robot import Numbers, require_each
+from seastar_gym.scene.checks import as_floats, is_finite_number, require_number, shown
+from seastar_gym.scene.number import Numbers, check_numbers, finite, positive
 from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
@@ -27,9 +26,8 @@ class UniformCurrent:
     Numbers that differ from robot to robot must be numpy arrays of shape (n_robots,), since a tuple could be a vector.
     """
 
-    PER_ROBOT: ClassVar = ("u_x", "u_y")
-    u_x: Numbers = 0.0
-    u_y: Numbers = 0.0
+    u_x: Annotated[Numbers, finite("m/s")] = 0.0
+    u_y: Annotated[Numbers, finite("m/s")] = 0.0
 
     def __post_init__(self) -> None:
         if type(self.u_x) in (tuple, list):
@@ -37,8 +35,7 @@ class UniformCurrent:
                 "UniformCurrent takes u_x and u_y [m/s], or a numpy array of each with a number for every robot, not "
                 f"the vector {shown(self.u_x)}."
             )
-        require_each(self, "u_x", partial(require_finite, unit="m/s"))
-        require_each(self, "u_y", partial(require_finite, unit="m/s"))
+        check_numbers(self)
 
 
 @register_part
@@ -52,13 +49,11 @@ class ShearCurrent:
     direction: Direction of the flow [rad], anti-clockwise from x.
     """
 
-    PER_ROBOT: ClassVar = ("rate", "direction")
-    rate: Numbers
-    direction: Numbers = 0.0
+    rate: Annotated[Numbers, finite("1/s")]
+    direction: Annotated[Numbers, finite("rad")] = 0.0
 
     def __post_init__(self) -> None:
-        require_each(self, "rate", partial(require_finite, unit="1/s"))
-        require_each(self, "direction", partial(require_finite, unit="rad"))
+        check_numbers(self)
 
 
 @register_part
@@ -71,17 +66,13 @@ class Vortex:
     core_radius: r_c [m], the radius at which the velocity is largest.
     """
 
-    PER_ROBOT: ClassVar = ("circulation", "x", "y", "core_radius")
-    circulation: Numbers
-    x: Numbers = 0.0
-    y: Numbers = 0.0
-    core_radius: Numbers = 0.05
+    circulation: Annotated[Numbers, finite("m^2/s")]
+    x: Annotated[Numbers, finite("m")] = 0.0
+    y: Annotated[Numbers, finite("m")] = 0.0
+    core_radius: Annotated[Numbers, positive("m")] = 0.05
 
     def __post_init__(self) -> None:
-        require_each(self, "circulation", partial(require_finite, unit="m^2/s"))
-        require_each(self, "x", partial(require_finite, unit="m"))
-        require_each(self, "y", partial(require_finite, unit="m"))
-        require_each(self, "core_radius", partial(require_number, unit="m"))
+        check_numbers(self)
 
 
 @register_part
@@ -97,15 +88,14 @@ class GridCurrent:
     """
 
     corner: tuple[float, float]
-    spacing: float
+    spacing: Annotated[float, positive("m")]
     velocities: tuple[tuple[tuple[float, float], ...], ...]
 
     def __post_init__(self) -> None:
         if not isinstance(self.corner, tuple | list) or list(map(is_finite_number, self.corner)) != [True, True]:
             raise ValueError(f"corner must be two finite numbers [m], not {shown(self.corner)}.")
         object.__setattr__(self, "corner", tuple(float(x) for x in self.corner))
-        require_number("spacing", self.spacing, "m")
-        object.__setattr__(self, "spacing", float(self.spacing))
+        check_numbers(self)
         rows: Any = _checked_velocities(self.velocities).tolist()
         object.__setattr__(self, "velocities", tuple(tuple(map(tuple, row)) for row in rows))
 

@@ -1,14 +1,14 @@
 """`Water`: the fluid around the robot."""
 
 from dataclasses import dataclass
-from functools import partial
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 
-from seastar_gym.scene.checks import require_number, shown
+from seastar_gym.scene.checks import shown
 from seastar_gym.scene.currents import AnyCurrent
-from seastar_gym.scene.per_robot import Numbers, batch_size, require_each
+from seastar_gym.scene.number import Numbers, check_numbers, not_negative
+from seastar_gym.scene.per_robot import batch_size
 from seastar_gym.scene.serial import register_part
 
 
@@ -27,26 +27,20 @@ class Water:
         the fluid that it displaces; 1 for a round limb. None means no added mass, as in the chapter.
     """
 
-    PER_ROBOT: ClassVar = ("density", "drag_coefficient", "tangential_drag_coefficient", "added_mass_coefficient")
-    density: Numbers = 1000.0
-    drag_coefficient: Numbers = 1.0
-    tangential_drag_coefficient: Numbers | None = None
+    density: Annotated[Numbers, not_negative("kg/m^3")] = 1000.0
+    drag_coefficient: Annotated[Numbers, not_negative("1")] = 1.0
+    tangential_drag_coefficient: Annotated[Numbers | None, not_negative("1")] = None
     current: AnyCurrent | None = None
-    added_mass_coefficient: Numbers | None = None
+    added_mass_coefficient: Annotated[Numbers | None, not_negative("1")] = None
 
     def __post_init__(self) -> None:
-        not_negative = partial(require_number, zero_allowed=True)
-        require_each(self, "density", partial(not_negative, unit="kg/m^3"))
-        require_each(self, "drag_coefficient", partial(not_negative, unit="1"))
+        check_numbers(self)
         if self.tangential_drag_coefficient is not None:
-            require_each(self, "tangential_drag_coefficient", partial(not_negative, unit="1"))
             batch_size(self)
             if np.any(np.greater(self.tangential_drag_coefficient, self.drag_coefficient)):
                 raise ValueError(
                     "tangential_drag_coefficient must not exceed drag_coefficient, that of flow across a limb: "
                     f"{shown(self.tangential_drag_coefficient)} is more than {shown(self.drag_coefficient)}."
                 )
-        if self.added_mass_coefficient is not None:
-            require_each(self, "added_mass_coefficient", partial(not_negative, unit="1"))
         if not isinstance(self.current, AnyCurrent | None):
             raise ValueError(f"current must be a current such as UniformCurrent(u_x=0.001), not {shown(self.current)}.")

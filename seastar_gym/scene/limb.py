@@ -2,14 +2,13 @@
 
 import math
 from dataclasses import dataclass
-from functools import partial
-from typing import ClassVar, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.checks import is_finite_number, require_finite, require_number, require_numbers, shown
-from seastar_gym.scene.per_robot import Numbers, PerRobot, require_each
+from seastar_gym.scene.checks import is_finite_number, require_numbers, shown
+from seastar_gym.scene.number import Numbers, PerRobot, check_numbers, declared, finite, positive
 from seastar_gym.scene.serial import register_part
 
 Profile = float | tuple[float, ...]
@@ -32,37 +31,26 @@ class Limb:
     Numbers that differ from robot to robot must be numpy arrays of shape (n_robots,), since a tuple is a profile.
     """
 
-    PER_ROBOT: ClassVar = ("length", "radius", "youngs_modulus", "natural_curvature", "joint_stiffness")
     direction: float | None = None
-    length: Numbers | None = None
-    radius: Profile | Numbers | None = None
-    youngs_modulus: Profile | Numbers | None = None
-    natural_curvature: Numbers = 0.0
-    joint_stiffness: Numbers | None = None
+    length: Annotated[Numbers | None, positive("m", "A limb's ")] = None
+    radius: Annotated[Profile | Numbers | None, positive("m", "A limb's ")] = None
+    youngs_modulus: Annotated[Profile | Numbers | None, positive("Pa", "A limb's ")] = None
+    natural_curvature: Annotated[Numbers, finite("1/m")] = 0.0
+    joint_stiffness: Annotated[Numbers | None, positive("N m/rad", "A limb's ")] = None
 
     def __post_init__(self) -> None:
         if self.direction is not None and not (is_finite_number(self.direction) and 0 <= self.direction < 2 * math.pi):
             raise ValueError(
                 f"A limb's direction must be from 0 to below 2 pi [rad], for all robots, not {shown(self.direction)}."
             )
-        if self.length is not None:
-            require_each(self, "length", partial(_require_positive, unit="m"))
-        require_each(self, "natural_curvature", partial(require_finite, unit="1/m"))
-        if self.joint_stiffness is not None:
-            require_each(self, "joint_stiffness", partial(_require_positive, unit="N m/rad"))
-        for name, profile, unit in (("radius", self.radius, "m"), ("youngs_modulus", self.youngs_modulus, "Pa")):
-            if profile is None:
+        check_numbers(self)
+        for name, profile in (("radius", self.radius), ("youngs_modulus", self.youngs_modulus)):
+            if not isinstance(profile, tuple) or isinstance(profile, PerRobot):
                 continue
-            if isinstance(profile, PerRobot) or not isinstance(profile, tuple):
-                require_each(self, name, partial(_require_positive, unit=unit))
-                continue
+            unit = declared(Limb)[name].number.unit
             require_numbers(f"A limb's {name}", profile, unit)
             if not profile or min(profile) <= 0.0:
                 raise ValueError(f"A limb's {name} must be positive all along it [{unit}], not {shown(profile)}.")
-
-
-def _require_positive(name: str, value: float, unit: str) -> None:
-    require_number(f"A limb's {name}", value, unit)
 
 
 class LimbShape(NamedTuple):

@@ -1,16 +1,10 @@
 """`Numerics`: scheme, step and tolerances of time stepping, chosen by value or by preset."""
 
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple, get_args
+from typing import Annotated, Literal, NamedTuple, get_args
 
-from seastar_gym.scene.checks import (
-    is_finite_number,
-    require_choice,
-    require_count,
-    require_flag,
-    require_number,
-    shown,
-)
+from seastar_gym.scene.checks import require_choice, require_flag, shown
+from seastar_gym.scene.number import check_numbers, positive, whole, within
 from seastar_gym.scene.robot import NODES, Discretisation
 from seastar_gym.scene.serial import register_part
 
@@ -47,25 +41,20 @@ class Numerics:
     """
 
     scheme: SchemeName = "implicit-euler"
-    step: float = 3e-3
-    newton_tolerance: float = 1e-8
-    max_iterations: int = 60
-    path_tolerance: float | None = None
+    step: Annotated[float, positive("s")] = 3e-3
+    newton_tolerance: Annotated[float, positive("limb lengths")] = 1e-8
+    max_iterations: Annotated[int, whole(2, 10_000)] = 60
+    path_tolerance: Annotated[float | None, within(0.001, 0.02)] = None
     named: bool = field(default=True, kw_only=True, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         require_flag("named", self.named)
         require_choice("scheme", self.scheme, get_args(SchemeName))
-        require_number("step", self.step, "s")
-        require_number("newton_tolerance", self.newton_tolerance, "limb lengths")
-        require_count("max_iterations", self.max_iterations, 2, 10_000)
+        check_numbers(self)
         if self.newton_tolerance > 1e-2:
             raise ValueError(f"newton_tolerance must be at most 0.01 limb lengths, not {shown(self.newton_tolerance)}.")
-        if self.path_tolerance is not None:
-            if not is_finite_number(self.path_tolerance) or not 1e-3 <= self.path_tolerance <= 0.02:
-                raise ValueError(f"path_tolerance must be from 0.001 to 0.02, not {shown(self.path_tolerance)}.")
-            if self.scheme != "implicit-midpoint":
-                raise ValueError(f'path_tolerance needs the scheme "implicit-midpoint", not {shown(self.scheme)}.')
+        if self.path_tolerance is not None and self.scheme != "implicit-midpoint":
+            raise ValueError(f'path_tolerance needs the scheme "implicit-midpoint", not {shown(self.scheme)}.')
         if not self.named and self not in (DEFAULT, Numerics()):  # the latter in older files
             object.__setattr__(self, "named", True)
 

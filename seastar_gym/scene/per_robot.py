@@ -1,45 +1,21 @@
-"""Numbers of a scene that may differ from robot to robot in a batch.
+"""Numbers of a scene that may differ from robot to robot in a batch: those that a part declares as `Numbers`.
 
-A part of a scene lists their names in `PER_ROBOT`. Each is one number for all robots, or an array of shape (n_robots,).
-Arrays are kept as tuples (`PerRobot`), so that parts are frozen, hashable and equal by value.
+Each is one number for all robots, or an array of shape (n_robots,). Arrays are kept as tuples (`PerRobot`), so that
+parts are frozen, hashable and equal by value.
 """
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
-from seastar_gym.scene.checks import as_float, shown
+from seastar_gym.scene.number import Numbers, PerRobot, declared
 
 Part = TypeVar("Part")
 
-Numbers: TypeAlias = float | Any
-"""Number for all robots, or an array or tuple of shape (n_robots,) with one for each.
-
-Typed as Any for the latter, so that code for the scene of one robot may read a float.
-"""
-
-
-class PerRobot(tuple[float, ...]):
-    """Numbers of each robot, shape (n_robots,). Plain tuples may be something else, such as profiles along a limb."""
-
-    __slots__ = ()
-
-
-def require_each(part: Any, name: str, check: Callable[[str, float], None]) -> None:
-    """Check a number of a part, or the number of each robot, and store them as a float or as PerRobot."""
-    value = getattr(part, name)
-    if not isinstance(value, np.ndarray | tuple):
-        check(name, value)
-        object.__setattr__(part, name, as_float(value))
-        return
-    numbers = value.tolist() if isinstance(value, np.ndarray) else list(value)
-    if not isinstance(numbers, list) or not numbers or isinstance(numbers[0], list):
-        raise ValueError(f"{name} must be a number, or one for every robot of shape (n_robots,), not {shown(value)}.")
-    for number in numbers:
-        check(name, number)
-    object.__setattr__(part, name, PerRobot(map(as_float, numbers)))
+MISSING = ...
+"""What a name stands for that a part has not."""
 
 
 def column(numbers: Numbers, n_axes: int = 1) -> Any:
@@ -57,14 +33,19 @@ def numbers_of(part: Any) -> dict[str, Any]:
 
     Values are None for what is not modelled.
     """
-    found = {}
+    found, free = {}, _free(part)
     for name, value in _contents(part).items():
-        if name in getattr(part, "PER_ROBOT", ()):
+        if name in free:
             if not _is_profile(value):
                 found[name] = value
         else:
             found.update({f"{name}.{inner}": number for inner, number in numbers_of(value).items()})
     return found
+
+
+def _free(part: Any) -> set[str]:
+    """Names of fields whose numbers may differ from robot to robot."""
+    return {name for name, each in declared(part.__class__).items() if each.is_per_robot}
 
 
 def _contents(part: Any) -> dict[str, Any]:
@@ -77,6 +58,24 @@ def _contents(part: Any) -> dict[str, Any]:
 
 def _is_profile(value: Any) -> bool:
     return isinstance(value, tuple) and not isinstance(value, PerRobot)
+
+
+def at(part: Any, name: str) -> Any:
+    """What stands in a part at a name such as "robot.limbs.0.length"; MISSING for nothing."""
+    for step in name.split("."):
+        if isinstance(part, tuple):
+            part = part[int(step)] if step.isdigit() and int(step) < len(part) else MISSING
+        else:
+            own = dataclasses.fields(part) if dataclasses.is_dataclass(part) else ()
+            part = getattr(part, step) if step in {field.name for field in own if field.init} else MISSING
+    return part
+
+
+def unit_of(part: Any, name: str) -> str | None:
+    """Unit of the number that stands in a part at a name; None if it declares none."""
+    owner, _, last = name.rpartition(".")
+    known = declared(at(part, owner).__class__).get(last)
+    return None if known is None else known.number.unit
 
 
 def with_numbers(part: Part, numbers: dict[str, Any]) -> Part:
@@ -122,7 +121,7 @@ def frame_of(part: Any) -> Any:
     Of such values it keeps only whether they are None. Scenes of equal frames run the same code on memory of the same
     shape.
     """
-    contents, free = _contents(part), getattr(part, "PER_ROBOT", ())
+    contents, free = _contents(part), _free(part)
     if not contents:
         return part
     is_free = {name: name in free and not _is_profile(value) for name, value in contents.items()}

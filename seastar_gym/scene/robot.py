@@ -6,16 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from operator import itemgetter
-from typing import Any, ClassVar, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.scene.along import AlongLimb, Stiffening
 from seastar_gym.scene.body import Body
-from seastar_gym.scene.checks import require_choice, require_count, require_limbs, require_number, shown
+from seastar_gym.scene.checks import MOST_LIMBS, require_choice, require_number, shown
 from seastar_gym.scene.limb import Limb, LimbShape, as_tuple
-from seastar_gym.scene.per_robot import Numbers, batch_size, chosen, require_each
+from seastar_gym.scene.number import Numbers, check_numbers, not_negative, positive, whole
+from seastar_gym.scene.per_robot import batch_size, chosen
 from seastar_gym.scene.serial import register_part
 from seastar_gym.scene.shape import limbs_that_may_touch, rest_positions, turn_per_hinge
 from seastar_gym.scene.symmetry import PointGroup, point_group
@@ -60,31 +61,23 @@ class Seastar:
     have one hub hinge; straight limbs with hub_hinge="turning" then form a plain rod.
     """
 
-    PER_ROBOT: ClassVar = ("limb_length", "rod_radius", "youngs_modulus", "density", "relaxation_time")
-    n_limbs: int = 5
-    nodes_per_limb: int | Any = None  # a number once it is constructed
-    limb_length: Numbers = 0.1
-    rod_radius: Numbers = 1.6e-3
-    youngs_modulus: Numbers = 1e6
-    density: Numbers = 1000.0
+    n_limbs: Annotated[int, whole(1, MOST_LIMBS)] = 5
+    nodes_per_limb: Annotated[int | Any, whole(2, 10_000)] = None  # a number once it is constructed
+    limb_length: Annotated[Numbers, positive("m")] = 0.1
+    rod_radius: Annotated[Numbers, positive("m")] = 1.6e-3
+    youngs_modulus: Annotated[Numbers, positive("Pa")] = 1e6
+    density: Annotated[Numbers, positive("kg/m^3")] = 1000.0
     hub_hinge: HubHinge = "opening"
     limbs: tuple[Limb, ...] = ()
-    relaxation_time: Numbers | None = None
+    relaxation_time: Annotated[Numbers | None, not_negative("s")] = None
     discretisation: Discretisation | Any = None  # a choice once it is constructed
     along: AlongLimb | None = None
     stiffening: Stiffening | None = None
     body: Body | None = None
 
     def __post_init__(self) -> None:
-        require_limbs(self.n_limbs)
         self._fill_in_resolution()
-        require_count("nodes_per_limb", self.nodes_per_limb, 2, 10_000)
-        require_each(self, "limb_length", partial(require_number, unit="m"))
-        require_each(self, "rod_radius", partial(require_number, unit="m"))
-        require_each(self, "youngs_modulus", partial(require_number, unit="Pa"))
-        require_each(self, "density", partial(require_number, unit="kg/m^3"))
-        if self.relaxation_time is not None:
-            require_each(self, "relaxation_time", partial(require_number, unit="s", zero_allowed=True))
+        check_numbers(self)
         require_choice("hub_hinge", self.hub_hinge, get_args(HubHinge))
         if self.discretisation == "continuum" and self.hub_hinge != "opening":
             raise ValueError(

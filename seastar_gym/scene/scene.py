@@ -1,8 +1,8 @@
 """`Scene`: robot, fluid, actuator, contact and numerics of a simulation.
 
 Each part checks itself, and a `Scene` checks the parts together. What cannot be modelled is refused with a ValueError
-that says why in one sentence. Numbers listed in a part's `PER_ROBOT` may be arrays of shape (n_robots,), one for each
-robot of a batch.
+that says why in one sentence. Those of the type `Numbers` may be arrays of shape (n_robots,), one for each robot
+of a batch.
 """
 
 import math
@@ -15,7 +15,7 @@ from typing import Any, cast, get_args
 
 import numpy as np
 
-from seastar_gym.scene.actuators.actuator import Actuator, StatefulActuator, check_actuator, is_actuator
+from seastar_gym.scene.actuators.actuator import Actuator, check_actuator, complete, is_actuator
 from seastar_gym.scene.actuators.pulse import SmaPulse
 from seastar_gym.scene.along import AlongLimb
 from seastar_gym.scene.at_rest import touching_at_rest
@@ -221,7 +221,7 @@ class Scene:
         limit = 0.5 * (math.pi - widest)
         if robot.hub_hinge == "turning":
             # Without memory, only some commands reach the limit, and the simulator refuses those.
-            limit *= 1.0 - 1e-12 if isinstance(self.actuator, StatefulActuator) else 1.0 + 1e-12
+            limit *= 1.0 - 1e-12 if complete(self.actuator).has_memory else 1.0 + 1e-12
             if peak > limit:
                 raise ValueError(
                     f'With hub_hinge="turning" the natural opening angle must stay above zero: for {robot.n_limbs} '

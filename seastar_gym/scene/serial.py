@@ -19,7 +19,7 @@ from typing import Any, ClassVar, TypeVar, get_origin, get_type_hints
 import numpy as np
 
 from seastar_gym.scene.checks import as_typed, shown
-from seastar_gym.scene.per_robot import PerRobot
+from seastar_gym.scene.number import PerRobot
 from seastar_gym.scene.unnamed import Unnamed
 
 VERSION = 1

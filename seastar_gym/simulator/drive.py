@@ -1,13 +1,10 @@
 """`Drive`: the actuators of a batch of robots, from commands, which are checked here, to rotations of limbs."""
 
-import math
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.actuator import Actuator, Deaf, StatefulActuator, stroke_at
-from seastar_gym.scene.actuators.heating import Heated
+from seastar_gym.scene.actuators.actuator import Actuator, complete, stroke_at
 from seastar_gym.scene.checks import as_floats, shown
 from seastar_gym.scene.per_robot import column
 from seastar_gym.simulator.schedule import SAME_TIME, interval_times
@@ -45,11 +42,9 @@ class Drive:
 
     def set_actuator(self, actuator: Actuator) -> None:
         """Continue with an actuator that differs only in numbers that may differ from robot to robot."""
-        self._actuator = actuator
-        self._stateful = actuator if isinstance(actuator, StatefulActuator) else None
-        self._heated = actuator if isinstance(actuator, Heated) else None
+        self._actuator = complete(actuator)
         self._intervals: dict[tuple[float, float, bool], tuple[Floats, Floats]] = {}
-        rest = self._stateful.rest if self._stateful else np.zeros(0)
+        rest = self._actuator.rest
         self.at_rest = np.broadcast_to(rest, (*self.strengths.shape, rest.shape[-1]))
 
     @property
@@ -60,7 +55,7 @@ class Drive:
     @property
     def heating_power(self) -> float:
         """Electric power of a heated wire [W], NaN if the actuator does not say it."""
-        return self._heated.heating_power if self._heated else math.nan
+        return self._actuator.heating_power
 
     def begin(self, duration: float, commands: Floats | None) -> tuple[Floats, Floats, Floats]:
         """Begin an interval [s] with these commands, or with those under way if they are None.
@@ -73,13 +68,11 @@ class Drive:
             self._refuse_jump(commands)
             self.commands, self.phase = commands, 0.0
         self.times, curve = self._interval(duration, commands is not None)
-        self._given, self._before = self.commands, self.state
-        self.heating_time = np.full(len(self.state), math.nan)
-        if self._heated:
-            self.heating_time = self._heated.seconds_heated(self.times, self._given, self.state).sum(axis=1)
-        if self._stateful is None:
+        self._given, self._before, self._after = self.commands, self.state, self.state
+        self.heating_time = self._actuator.seconds_heated(self.times, self._given, self.state).sum(axis=1)
+        if not self._actuator.has_memory:
             return self.times, self._given * self.strengths, curve
-        turned, self._after = self._stateful.respond(self.times, self._given, self.state)
+        turned, self._after = self._actuator.respond(self.times, self._given, self.state)
         return self.times, self.strengths, turned
 
     def _refuse_jump(self, commands: Floats) -> None:
@@ -87,8 +80,8 @@ class Drive:
         if self.phase == 0.0:
             return
         now, then = self.rotations(), np.zeros_like(commands)
-        if self._stateful is not None:
-            then = self.strengths * self._stateful.respond(np.zeros(1), commands, self.state)[0][0]
+        if self._actuator.has_memory:
+            then = self.strengths * self._actuator.respond(np.zeros(1), commands, self.state)[0][0]
         jumps = np.abs(then - now) > JUMP * column(self._actuator.peak_angle)
         if jumps.any():
             robot, limb = np.argwhere(jumps)[0]
@@ -106,30 +99,31 @@ class Drive:
                 self._intervals.clear()
             corners = self._actuator.corners if is_new or self.phase > 0.0 else (0.0,)
             times = interval_times(corners, self._step, self.phase, duration)
-            curve = np.zeros(0) if self._stateful else stroke_at(self._actuator, times)
+            curve = np.zeros(0) if self._actuator.has_memory else stroke_at(self._actuator, times)
             self._intervals[key] = times, curve[:, :, None] if curve.ndim > 1 else curve
         return self._intervals[key]
 
     def advance(self, end: int) -> None:
         """Bring the actuators to the time step `end` of the present interval."""
         if end == len(self.times) - 1:
-            self.state = self._after if self._stateful else self.state
-        elif self._stateful is not None:
-            self.state = self._stateful.respond(self.times[: end + 1], self._given, self._before)[1]
+            self.state = self._after
+        elif self._actuator.has_memory:
+            self.state = self._actuator.respond(self.times[: end + 1], self._given, self._before)[1]
         is_over = self.times[end] >= self.longest - SAME_TIME * self._step
         self.phase = 0.0 if is_over else float(self.times[end])
         self.commands = np.zeros_like(self._given) if is_over else self._given
 
     def observe(self) -> Floats:
         """State as numbers of order one, shape (n_robots, k), limb after limb; k = 0 without memory."""
-        seen = self.state if self._stateful is None else self._stateful.observe(self.state)
+        seen = self._actuator.observe(self.state)
         return seen.reshape(len(seen), -1)
 
     def deaf_wires(self) -> NDArray[np.bool_]:
         """Wires that cannot be heated now, shape (n_robots, n_limbs, 2)."""
-        if isinstance(self._actuator, Deaf):
-            return self._actuator.deaf_wires(self.state)
-        must_wait = self._stateful is None and bool(self.rotations().any())
+        known = self._actuator.deaf_wires(self.state)
+        if known is not None:
+            return known
+        must_wait = not self._actuator.has_memory and bool(self.rotations().any())
         return np.full((*self.strengths.shape, 2), must_wait)
 
     def checked_strengths(self, strengths: ArrayLike) -> Floats:
@@ -142,8 +136,8 @@ class Drive:
     def rotations(self) -> Floats:
         """Rotations of limbs between two intervals [rad], shape (n_robots, n_limbs)."""
         now = np.full(1, self.phase)
-        if self._stateful is not None:
-            return self.strengths * self._stateful.respond(now, self.commands, self.state)[0][0]
+        if self._actuator.has_memory:
+            return self.strengths * self._actuator.respond(now, self.commands, self.state)[0][0]
         return self.commands * self.strengths * column(stroke_at(self._actuator, now)[0])
 
     def put_at_rest(self, chosen: NDArray[np.bool_]) -> None:

@@ -104,7 +104,7 @@ class Simulator:
         return self._batch.v
 
     def set_scene(self, scene: Scene, mask: ArrayLike | None = None) -> None:
-        """Continue with a scene that differs only in numbers that may differ from robot to robot (`PER_ROBOT`).
+        """Continue with a scene that differs only in numbers that may differ from robot to robot (`Numbers`).
 
         mask: Robots whose numbers have changed, shape (n_robots,), all if None.
         """

@@ -5,7 +5,7 @@ An axis has the name of a number of the scene ("robot.limb_length", "numerics.st
 """
 
 import math
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, is_dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import as_finite, is_finite_number, require_count, require_flag, require_kind, shown
+from seastar_gym.scene.per_robot import MISSING, at
 
 Floats = NDArray[np.float64]
 
@@ -98,12 +99,7 @@ def require_known(scene: Scene, name: str) -> None:
     """ValueError unless an axis of this name can change the scene."""
     if name in (*PARTS, "fidelity", "gait", "controller"):
         return
-    first, *rest = name.split(".")
-    value: Any = getattr(scene, first) if first in PARTS and rest else None
-    for step in rest[:-1]:
-        value = value[int(step)] if isinstance(value, tuple) and step.isdigit() and int(step) < len(value) else (
-            getattr(value, step, None)
-        )  # fmt: skip
-    known = rest and is_dataclass(value) and rest[-1] in {each.name for each in fields(value) if each.init}
+    owner, _, _ = name.rpartition(".")
+    known = owner.split(".")[0] in PARTS and is_dataclass(at(scene, owner)) and at(scene, name) is not MISSING
     if not known:
         raise ValueError(f"{shown(name)} is nothing that a sweep can vary in this scene, such as robot.limb_length.")

@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from scipy.stats import qmc
 
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_count, require_seed, shown
+from seastar_gym.scene.number import check_numbers, whole
 from seastar_gym.scene.per_robot import numbers_of, with_numbers
 from seastar_gym.sweep.axes import Axis, Choices, Range, require_known
 from seastar_gym.sweep.cells import Cell
@@ -47,11 +48,11 @@ class Sweep:
     scene: Scene
     axes: tuple[Axis, ...]
     gait: Any = "straight"
-    settling: int = 2
-    measured: int = 8
-    samples: int = 0
+    settling: Annotated[int, whole(0, 1_000_000)] = 2
+    measured: Annotated[int, whole(1, 1_000_000)] = 8
+    samples: Annotated[int, whole(0, MOST_NUMBERS)] = 0
     seed: int = 0
-    robots: int = 256
+    robots: Annotated[int, whole(1, 1_000_000)] = 256
     course: Course = Course()
 
     def __post_init__(self) -> None:
@@ -64,10 +65,7 @@ class Sweep:
             raise ValueError(f"Every axis may be named once, not {shown(names)}.")
         if {"gait", "controller"} <= set(names):
             raise ValueError("Robots follow a gait or a controller: take one of these axes.")
-        require_count("samples", self.samples, 0, MOST_NUMBERS)
-        require_count("settling", self.settling, 0, 1_000_000)
-        require_count("measured", self.measured, 1, 1_000_000)
-        require_count("robots", self.robots, 1, 1_000_000)
+        check_numbers(self)
         require_seed(self.seed)
         self._check_axes()
         self._check_ends(next(self.frames()))

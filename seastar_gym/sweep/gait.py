@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from seastar_gym import gaits
 from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.actuator import StatefulActuator
+from seastar_gym.scene.actuators.actuator import complete
 from seastar_gym.scene.checks import as_floats, shown
 
 DECISION = 0.1
@@ -43,7 +43,7 @@ def gait_of(what: str | ArrayLike, scene: Scene) -> Gait:
             raise ValueError(f"A gait needs rows of commands of {n_limbs} limbs, not {shown(what)}.")
         return Gait(_rows(commands))
     if what in TIMED:
-        if not isinstance(scene.actuator, StatefulActuator):
+        if not complete(scene.actuator).has_memory:
             raise ValueError(f'The gait "{what}" heats limbs in the middle of strokes: use an actuator like SmaWires.')
         return Gait(_rows(TIMED[what](n_limbs)), DECISION)
     return Gait(_rows(STROKES[what](n_limbs) if what in STROKES else _stroke(what, n_limbs)))

@@ -10,18 +10,11 @@ import pyarrow as pa
 import pyarrow.parquet
 
 from seastar_gym.files import write_atomically
+from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import require_file
+from seastar_gym.scene.per_robot import unit_of
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS, swim
-
-OF_SCENE = {
-    "limb_length": "m", "length": "m", "rod_radius": "m", "radius": "m", "youngs_modulus": "Pa", "density": "kg/m^3",
-    "relaxation_time": "s", "natural_curvature": "1/m", "peak_angle": "rad", "heating_time": "s", "cooling_time": "s",
-    "period": "s", "time_constant": "s", "heating_power": "W", "step": "s", "newton_tolerance": "limb lengths",
-    "n_limbs": "1", "nodes_per_limb": "1", "drag_coefficient": "1", "tangential_drag_coefficient": "1",
-    "added_mass_coefficient": "1", "path_tolerance": "1", "max_iterations": "1", "direction": "rad",
-}  # fmt: skip
-"""Units of numbers of a scene, by the last word of their names."""
 
 
 def part_of(cell: Cell) -> bytes:
@@ -30,14 +23,14 @@ def part_of(cell: Cell) -> bytes:
     arrays = [pa.array([column] * cell.n_robots if name in dict(cell.frame.labels) else column)
               for name, column in columns.items()]  # fmt: skip
     schema = pa.schema(
-        [_field(name, array) for name, array in zip(columns, arrays, strict=True)],
+        [_field(name, array, cell.frame.scene) for name, array in zip(columns, arrays, strict=True)],
         {"seastar_gym": cell.frame.text, "cell": cell.name},
     )
     return to_parquet(pa.Table.from_arrays(arrays, schema=schema))
 
 
-def _field(name: str, array: Any) -> Any:
-    unit = (UNITS | OF_CONTROLLERS).get(name) or OF_SCENE.get(name.rpartition(".")[2])
+def _field(name: str, array: Any, scene: Scene) -> Any:
+    unit = (UNITS | OF_CONTROLLERS).get(name) or unit_of(scene, name)
     return pa.field(name, array.type, metadata={"unit": unit} if unit else None)
 
 

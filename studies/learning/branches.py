@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.actuator import Deaf
+from seastar_gym.scene.actuators.actuator import complete
 from seastar_gym.simulator import Simulator, State
 
 Floats = NDArray[np.float64]
@@ -40,9 +40,10 @@ class Branches:
 
     def deaf_wires(self, states: State) -> NDArray[np.bool_]:
         """Wires that cannot be heated now, shape (n_robots, n_limbs, 2)."""
-        actuator = self.scene.actuator
-        assert isinstance(actuator, Deaf) and states.actuators is not None
-        return actuator.deaf_wires(states.actuators)
+        assert states.actuators is not None
+        known = complete(self.scene.actuator).deaf_wires(states.actuators)
+        assert known is not None
+        return known
 
     def swim(self, states: State, commands: Floats) -> Interval:
         """One interval with commands, shape (n_robots, n_limbs)."""

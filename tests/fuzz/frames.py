@@ -20,7 +20,7 @@ from seastar_gym import (
     Vortex,
     Water,
 )
-from seastar_gym.scene.actuators.actuator import Mirrored, mirrored
+from seastar_gym.scene.actuators.actuator import complete, mirrored
 
 Floats = np.ndarray
 
@@ -117,7 +117,7 @@ def mirrored_limb(limb: Limb) -> Limb:
 
 def mirrored_actuators(remembered: Floats, scene: Scene) -> Floats:
     """As the actuator says, if it remembers anything."""
-    return mirrored(scene.actuator, remembered) if isinstance(scene.actuator, Mirrored) else remembered
+    return mirrored(complete(scene.actuator), remembered) if remembered.shape[-1] else remembered
 
 
 # --- currents --------------------------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 # ruff: noqa: C408 - what is given reads as a call
 from collections.abc import Callable
+from functools import partial
 from random import Random
 from typing import Any
 
@@ -124,12 +125,6 @@ def assert_taken_or_refused(make: Callable[[], Any], where: str) -> bool:
     return False
 
 
-def check_odd_part(name: str, argument: str, value: Callable[[], Any]) -> None:
-    """Make it with one odd argument."""
-    make, arguments = PARTS[name]
-    assert_taken_or_refused(lambda: make(**{**arguments, argument: value()}), f"{name}({argument}={value()!r})")
-
-
 # --- what has a state, and must lose nothing by a refusal -------------------------------------------------------------
 
 SIMULATOR = Simulator(Scene(numerics=FAST), 2, threads=1)
@@ -142,6 +137,8 @@ SIMULATOR_CALLS: Calls = {
                          dict(duration=0.2, commands=None, parts=2)),
     "reset": (SIMULATOR.reset, dict(mask=[True, False], heading=0.1)),
     "set_state": (SIMULATOR.set_state, dict(state=SIMULATOR.get_state())),
+    "State": (lambda **fields: SIMULATOR.set_state(SIMULATOR.get_state()._replace(**fields)),
+              SIMULATOR.get_state()._asdict()),
     "set_limb_strengths": (SIMULATOR.set_limb_strengths, dict(strengths=np.ones(5))),
     "set_scene": (SIMULATOR.set_scene, dict(scene=Scene(numerics=FAST), mask=[True, True])),
 }  # fmt: skip
@@ -162,12 +159,6 @@ def check_odd_call(name: str, argument: str, value: Callable[[], Any]) -> None:
     assert np.isfinite(SIMULATOR.positions).all() and np.isfinite(SIMULATOR.time).all(), where
 
 
-def check_odd_state(field: str, value: Callable[[], Any]) -> None:
-    """Set a state with one odd field."""
-    state = SIMULATOR.get_state()._replace(**{field: value()})
-    assert_taken_or_refused(lambda: SIMULATOR.set_state(state), f"State({field}={value()!r})")
-
-
 ENV = SeastarSwimEnv(fidelity="fast", path="line")
 VECTOR_ENV = SeastarSwimVectorEnv(2, fidelity="fast", path="line", threads=1)
 ENV_CALLS: Calls = {
@@ -175,8 +166,9 @@ ENV_CALLS: Calls = {
     for env, actions in ((ENV, [0, 1, 0, 0, 2]), (VECTOR_ENV, [[0, 1, 0, 0, 2]] * 2))
     for name, call, arguments in (
         ("reset", env.reset, dict(seed=1, options={"path": "line"})),
-        ("reset to path", lambda path, env=env: env.reset(options={"path": path}), dict(path="line")),
-        ("reset by mask", lambda mask, env=env: env.reset(options={"reset_mask": mask}), dict(mask=[True, False])),
+        ("reset to path", partial(lambda env, path: env.reset(options={"path": path}), env), dict(path="line")),
+        ("reset by mask", partial(lambda env, mask: env.reset(options={"reset_mask": mask}), env),
+         dict(mask=[True, False])),
         ("step", env.step, dict(**{"action" if env is ENV else "actions": np.array(actions)})),
     )
 }

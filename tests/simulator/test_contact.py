@@ -232,9 +232,6 @@ def test_a_long_limb_meets_one_beyond_its_neighbour():
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
-        (lambda: Contact(modulus=0.0), "modulus"),
-        (lambda: Contact(modulus=np.nan), "modulus"),
-        (lambda: Contact(opening_angle=-0.1), "opening_angle"),
         (lambda: Scene(TEN, contact=True), "contact"),
         (lambda: Scene(TEN, contact=Contact(opening_angle=1.3)), "touch at rest"),
         (lambda: Scene(robot=Seastar(n_limbs=1), actuator=SmaPulse(peak_angle=0.0), contact=Contact()), "half a turn"),

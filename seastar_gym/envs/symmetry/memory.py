@@ -17,7 +17,7 @@ from seastar_gym.envs.stations import N_STATIONS
 from seastar_gym.envs.symmetry.group import Elements, Group, n_limbs_of, require_group, require_mirror
 from seastar_gym.envs.symmetry.observations import sectors, transform_observations
 from seastar_gym.envs.symmetry.wrappers import kind_of
-from seastar_gym.scene.actuators.heating import Mirror
+from seastar_gym.scene.actuators.actuator import Mirror
 from seastar_gym.scene.checks import require_count, require_kind
 
 if TYPE_CHECKING:

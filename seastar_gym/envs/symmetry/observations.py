@@ -21,7 +21,7 @@ from seastar_gym.envs.symmetry.group import (
     require_mirror,
     turns,
 )
-from seastar_gym.scene.actuators.heating import Mirror
+from seastar_gym.scene.actuators.actuator import Mirror
 from seastar_gym.scene.checks import as_array, require_flag, require_kind
 
 BOUNDARY_WIDTH = 1e-6

@@ -5,8 +5,7 @@ from collections.abc import Iterable, Iterator
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization
 from seastar_gym.envs.symmetry.group import Group
 from seastar_gym.scene import Scene
-from seastar_gym.scene.actuators.actuator import Actuator, Mirrored, StatefulActuator, is_actuator
-from seastar_gym.scene.actuators.heating import Mirror
+from seastar_gym.scene.actuators.actuator import Actuator, Mirror, complete, is_actuator
 from seastar_gym.scene.checks import require_kind, shown
 from seastar_gym.scene.symmetry import SAME, PointGroup
 
@@ -45,9 +44,8 @@ def memory_mirror(actuator: Actuator) -> Mirror:
     """What a mirror does to the numbers that are observed of a limb's actuator; empty without memory."""
     if not is_actuator(actuator):
         raise ValueError(f"actuator must be an actuator, such as SmaWires, not {shown(actuator)}.")
-    if not isinstance(actuator, StatefulActuator) or not isinstance(actuator, Mirrored):
-        return ()
-    return actuator.mirror[: actuator.observe(actuator.rest).shape[-1]]
+    known = complete(actuator)
+    return (known.mirror or ())[: known.observe(known.rest).shape[-1]]
 
 
 def _asymmetries(scene: Scene, drawn: Iterable[str]) -> Iterator[str]:
@@ -59,7 +57,7 @@ def _asymmetries(scene: Scene, drawn: Iterable[str]) -> Iterator[str]:
         )
     if len(set(scene.limb_strengths)) > 1:
         yield "its limbs are not equally strong"
-    if isinstance(scene.actuator, StatefulActuator) and not isinstance(scene.actuator, Mirrored):
+    if complete(scene.actuator).mirror is None:
         yield "its actuators remember what they did, and do not say what a mirror makes of it (`mirror`)"
     if any(node != 0 for node in scene.held_nodes):
         yield "nodes of limbs are held"

@@ -18,7 +18,7 @@ from seastar_gym.envs.symmetry.masks import transform_masks
 from seastar_gym.envs.symmetry.observations import reduce_observations
 from seastar_gym.envs.symmetry.scenes import memory_mirror, require_symmetry, symmetry_of
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.scene.actuators.heating import Mirror
+from seastar_gym.scene.actuators.actuator import Mirror
 from seastar_gym.scene.checks import require_kind
 
 if TYPE_CHECKING:

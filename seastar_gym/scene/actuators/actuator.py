@@ -3,24 +3,26 @@
 A command is a number in [-1, 1] per limb, given at the beginning of an interval of time. It makes the actuator rotate
 the limb by delta_psi [rad], positive anti-clockwise. A stroke is the interval of one period.
 
-An actuator may say more of itself, and works without: how long its wires are heated (`heating.Heated`, otherwise energy
-is unknown), what a mirror makes of its memory (`Mirrored`, otherwise its scene has no symmetry), and which wires cannot
-be heated now (`Deaf`, otherwise all can).
+`Actuator` is what a class has to have. What else may be asked of one is in `ActuatorBase`, with the answers of an
+actuator that says nothing: no memory, energy that is not known, and wires that can always be heated. A class of one's
+own may say more, derived from that base or not.
 
 Where numbers of an actuator differ from robot to robot (see per_robot.py), curves have one more axis, shape
 (*t.shape, n_robots), and commands the shape (n_robots, n_limbs). Durations are equal for all robots of a batch.
 """
 
-from typing import Protocol, runtime_checkable
+import math
+from typing import Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.scene.actuators.heating import Mirror
 from seastar_gym.scene.checks import shown
-from seastar_gym.scene.per_robot import Numbers
+from seastar_gym.scene.number import Numbers
 
 Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Mirror: TypeAlias = tuple[tuple[int, int], ...]
 
 
 @runtime_checkable
@@ -49,15 +51,36 @@ class Actuator(Protocol):
         ...
 
 
-@runtime_checkable
-class StatefulActuator(Actuator, Protocol):
-    """Actuator with memory: the rotation of a limb depends on its earlier commands, too.
+class ActuatorBase(Actuator):
+    """Base of actuators, with the answers of one that remembers nothing and says no more than it has to.
 
-    rest: State of an actuator at rest, shape (n_state,), or (n_robots, 1, n_state).
+    has_memory: Whether the rotation of a limb depends on its earlier commands, too: whether the class has `respond`.
+    rest: State of an actuator at rest, shape (n_state,), or (n_robots, 1, n_state); n_state is 0 without memory.
+    mirror: (index, sign) for each number of the state: number k of the mirrored limb is sign times number `index` of
+        the limb. The same holds for the numbers of `observe`. None: it is not known.
+    heating_power: Electric power of a heated wire [W]; NaN: it is not known.
+    can_be_deaf: Whether there ever are wires that cannot be heated.
     """
 
     @property
-    def rest(self) -> Floats: ...
+    def has_memory(self) -> bool:
+        return type(self).respond is not ActuatorBase.respond
+
+    @property
+    def rest(self) -> Floats:
+        return np.zeros(0)
+
+    @property
+    def mirror(self) -> Mirror | None:
+        return None if self.has_memory else ()
+
+    @property
+    def heating_power(self) -> float:
+        return math.nan
+
+    @property
+    def can_be_deaf(self) -> bool:
+        return False
 
     def respond(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
         """Rotations during an interval [rad], shape (len(t), *S), and the state at t[-1], shape (*S, n_state).
@@ -68,52 +91,59 @@ class StatefulActuator(Actuator, Protocol):
         commands: Commands of any shape S.
         state: State at t[0], shape (*S, n_state).
         """
-        ...
+        raise NotImplementedError(f"{type(self).__name__} has no memory.")
 
     def observe(self, state: Floats) -> Floats:
         """State as numbers of order one that are zero at rest, shape (..., k): of the first k numbers of the state."""
-        ...
+        return state
+
+    def recall(self, numbers: Floats) -> Floats | None:
+        """State of which these numbers, shape (..., k), are observed, the rest as at rest; None: it is not known."""
+        return None
+
+    def seconds_heated(self, t: Floats, commands: Floats, state: Floats) -> Floats:
+        """Time for which the wires of each limb are heated from t[0] to t[-1] [s], shape S; NaN: it is not known.
+
+        Arguments as in `respond`.
+        """
+        return np.full_like(commands, math.nan)
+
+    def deaf_wires(self, state: Floats) -> Mask | None:
+        """Wires for + and - that cannot be heated now, shape (*S, 2); None: it is not known.
+
+        state: Shape (*S, n_state).
+        """
+        return None
 
 
-@runtime_checkable
-class Mirrored(Protocol):
-    """Actuator that says what a mirror makes of its memory.
+class Adapted(ActuatorBase):
+    """Actuator of a class that is not derived from `ActuatorBase`, with the base's answers where it has none."""
 
-    mirror: (index, sign) for each number of the state: number k of the mirrored limb is sign times number `index` of
-        the limb. The same holds for the numbers of `observe`.
-    """
+    def __init__(self, own: Actuator):
+        self.own = own
 
     @property
-    def mirror(self) -> Mirror: ...
+    def has_memory(self) -> bool:
+        return all(hasattr(self.own, name) for name in ("rest", "respond", "observe"))
 
 
-@runtime_checkable
-class Deaf(Protocol):
-    """Actuator that says which wires cannot be heated now.
-
-    can_be_deaf: Whether there ever are such wires.
-    """
-
-    @property
-    def can_be_deaf(self) -> bool: ...
-
-    def deaf_wires(self, state: Floats) -> NDArray[np.bool_]:
-        """Whether commands to the wires for + and - would be ignored, shape (*S, 2). state: Shape (*S, n_state)."""
-        ...
+def _own_or_base(name: str) -> property:
+    return property(lambda self: getattr(self.own if hasattr(self.own, name) else super(Adapted, self), name))
 
 
-@runtime_checkable
-class Recalled(Protocol):
-    """Actuator whose state follows from the numbers of its `observe`."""
-
-    def recall(self, numbers: Floats) -> Floats:
-        """State of which these numbers, shape (..., k), are observed, shape (..., n_state). The rest is as at rest."""
-        ...
+for _name in {name for kind in (Actuator, ActuatorBase) for name in vars(kind) if not name.startswith("_")}:
+    if _name not in vars(Adapted):
+        setattr(Adapted, _name, _own_or_base(_name))
 
 
-def mirrored(actuator: Mirrored, numbers: Floats) -> Floats:
+def complete(actuator: Actuator) -> ActuatorBase:
+    """Actuator that answers everything that may be asked of one."""
+    return actuator if isinstance(actuator, ActuatorBase) else Adapted(actuator)  # type: ignore[abstract]
+
+
+def mirrored(actuator: ActuatorBase, numbers: Floats) -> Floats:
     """Numbers of `state` or `observe` of limbs, shape (..., k), as a mirror shows them."""
-    index, sign = np.array(actuator.mirror[: numbers.shape[-1]], dtype=int).reshape(-1, 2).T
+    index, sign = np.array((actuator.mirror or ())[: numbers.shape[-1]], dtype=int).reshape(-1, 2).T
     return numbers[..., index] * sign
 
 
@@ -135,7 +165,8 @@ def check_actuator(actuator: Actuator) -> None:
     corners, period = np.asarray(actuator.corners, dtype=float), actuator.period
     if corners.ndim != 1 or len(corners) < 2 or not np.isfinite(corners).all() or (np.diff(corners) <= 0.0).any():
         raise ValueError(f"An actuator's corners must be increasing times [s], not {shown(actuator.corners)}.")
-    last = period if isinstance(actuator, StatefulActuator) and period in corners else corners[-1]
+    has_memory = complete(actuator).has_memory
+    last = period if has_memory and period in corners else corners[-1]
     if corners[0] != 0.0 or last != period:
         raise ValueError(
             f"An actuator's corners must go from 0 to its period ({shown(period)} s), not {shown(actuator.corners)}."
@@ -146,5 +177,5 @@ def check_actuator(actuator: Actuator) -> None:
     peak = np.asarray(actuator.peak_angle, dtype=float)
     if not np.isfinite(peak).all() or (np.abs(angles).max(axis=0) > peak * (1.0 + 1e-12)).any():
         raise ValueError(f"An actuator's peak_angle must be its largest angle, not {shown(actuator.peak_angle)} rad.")
-    if angles[0].any() or (angles[-1].any() and not isinstance(actuator, StatefulActuator)):
+    if angles[0].any() or (angles[-1].any() and not has_memory):
         raise ValueError("An actuator's curve must begin and end a stroke at 0 rad: otherwise limbs would jump.")

@@ -1,9 +1,10 @@
-"""Heat that actuators are given: how long their wires are heated, and at what electric power."""
-
-from typing import Protocol, runtime_checkable
+"""Heat that actuators are given, how long and at what electric power, and pairs of wires that are heated."""
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from seastar_gym.scene.actuators.actuator import ActuatorBase, Mirror
+from seastar_gym.scene.per_robot import batch_size
 
 Floats = NDArray[np.float64]
 
@@ -17,24 +18,6 @@ water. A pulse of 0.1 s costs 0.76 J.
 """
 
 
-@runtime_checkable
-class Heated(Protocol):
-    """Actuator that says how long its wires are heated. The energy that others need is unknown (NaN).
-
-    heating_power: Electric power of a heated wire [W].
-    """
-
-    @property
-    def heating_power(self) -> float: ...
-
-    def seconds_heated(self, t: Floats, commands: Floats, state: Floats) -> Floats:
-        """Time for which the wires of each limb are heated from t[0] to t[-1] [s], shape S.
-
-        Arguments as in `StatefulActuator.respond`. Actuators without memory have states of shape (*S, 0).
-        """
-        ...
-
-
 def share_of_pulse(t: Floats, commands: Floats, heating_time: float) -> Floats:
     """Time heated from t[0] to t[-1] [s], shape of `commands`, of a pulse that a command scales as a whole.
 
@@ -44,34 +27,49 @@ def share_of_pulse(t: Floats, commands: Floats, heating_time: float) -> Floats:
     return np.abs(commands) * (end - begin)
 
 
-# --- pairs of wires --------------------------------------------------------------------------------------------------
-
 SPENT = 1e-12
 """Share of the heating time that rounding may leave of a pulse."""
-Mirror = tuple[tuple[int, int], ...]
-MIRRORED_WIRES: Mirror = ((1, 1), (0, 1))
-"""What a mirror does to numbers of a limb's two wires: they change places, see `actuator.mirrored`."""
 
 
-def pulse_left(t: Floats, commands: Floats, left: Floats, heating_time: float) -> Floats:
-    """Time for which every wire is heated from t[0] on [s], shape (*S, 2).
+class WirePair(ActuatorBase):
+    """Two wires per limb, one for each direction of rotation.
 
-    Commands that are new at t[0] = 0 heat the wire of their sign; the other goes on with what is left of its pulse.
-
-    t: Times since the commands were given [s]. commands: Shape S. left: The same before these commands, shape (*S, 2).
+    Numbers of the state come in pairs, (+, -). The last pair is the time for which either wire is heated [s], so that a
+    command heats the wire of its sign for a fraction of the heating time (pulse width), and the other goes on with what
+    is left of its pulse.
     """
-    if t[0] > 0.0:
-        return left
-    wanted = heating_time * np.stack([np.maximum(commands, 0.0), np.maximum(-commands, 0.0)], axis=-1)
-    return np.where(wanted > 0.0, wanted, left)
 
+    heating_time: float
 
-def left_after(duration: float, left: Floats, heating_time: float) -> Floats:
-    """What is left of pulses after a while [s], shape of `left`."""
-    after = left - duration
-    return np.where(after > SPENT * heating_time, after, 0.0)
+    @property
+    def mirror(self) -> Mirror:
+        """What a mirror does to the state: the wires change places, see `actuator.mirrored`."""
+        return tuple((k ^ 1, 1) for k in range(self.rest.shape[-1]))
 
+    def delta_psi(self, t: ArrayLike) -> Floats:
+        """Rotation by command 1 at time t [s] of a stroke that begins at rest [rad]. t may have any shape."""
+        t, n_robots = np.asarray(t, dtype=float), batch_size(self)
+        from_start = np.append(0.0, t.ravel())
+        if n_robots is None:
+            return self.respond(from_start, np.ones(()), self.rest)[0][1:].reshape(t.shape)
+        rest = np.broadcast_to(self.rest, (n_robots, 1, self.rest.shape[-1]))
+        return self.respond(from_start, np.ones((n_robots, 1)), rest)[0][1:].reshape(*t.shape, n_robots)
 
-def seconds_of_wires(duration: float, left: Floats) -> Floats:
-    """Time for which both wires together are heated within a while [s], shape S, if `left` (*S, 2) is left."""
-    return np.minimum(left, duration).sum(axis=-1)
+    def _left(self, t: Floats, commands: Floats, state: Floats) -> Floats:
+        """Time for which every wire is heated from t[0] on [s], shape (*S, 2).
+
+        Commands that are new at t[0] = 0 heat the wire of their sign.
+        """
+        if t[0] > 0.0:
+            return state[..., -2:]
+        wanted = self.heating_time * np.stack([np.maximum(commands, 0.0), np.maximum(-commands, 0.0)], axis=-1)
+        return np.where(wanted > 0.0, wanted, state[..., -2:])
+
+    def _left_after(self, duration: float | Floats, left: Floats) -> Floats:
+        """What is left of pulses after a while [s], shape of `left`."""
+        after = left - duration
+        return np.where(after > SPENT * self.heating_time, after, 0.0)
+
+    def seconds_heated(self, t: Floats, commands: Floats, state: Floats) -> Floats:
+        """Time for which the wires of each limb are heated from t[0] to t[-1] [s], shape of `commands`."""
+        return np.asarray(np.minimum(self._left(t, commands, state), t[-1] - t[0]).sum(axis=-1))

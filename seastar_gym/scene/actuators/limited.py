@@ -1,17 +1,15 @@
 """`Limited`: an actuator with a largest angle and a largest rate of rotation."""
 
-import math
 from dataclasses import dataclass
-from functools import partial
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seastar_gym.scene.actuators.actuator import Actuator, StatefulActuator, is_actuator, stroke_at
-from seastar_gym.scene.actuators.heating import Heated, Mirror
-from seastar_gym.scene.checks import require_number, shown
-from seastar_gym.scene.per_robot import Numbers, batch_size, column, require_each
+from seastar_gym.scene.actuators.actuator import Actuator, ActuatorBase, Mirror, complete, is_actuator, stroke_at
+from seastar_gym.scene.checks import shown
+from seastar_gym.scene.number import Numbers, check_numbers, positive
+from seastar_gym.scene.per_robot import batch_size, column
 from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
@@ -19,7 +17,7 @@ Floats = NDArray[np.float64]
 
 @register_part
 @dataclass(frozen=True)
-class Limited:
+class Limited(ActuatorBase):
     """Actuator that follows another one's curve within a largest angle and a largest rate of rotation.
 
     actuator: Actuator to follow, one without memory.
@@ -30,18 +28,14 @@ class Limited:
     [rad]. Between time steps the rotation is linear.
     """
 
-    PER_ROBOT: ClassVar = ("largest_angle", "largest_rate")
     actuator: Actuator
-    largest_angle: Numbers | None = None
-    largest_rate: Numbers | None = None
+    largest_angle: Annotated[Numbers | None, positive("rad")] = None
+    largest_rate: Annotated[Numbers | None, positive("rad/s")] = None
 
     def __post_init__(self) -> None:
-        if not is_actuator(self.actuator) or isinstance(self.actuator, StatefulActuator):
+        if not is_actuator(self.actuator) or complete(self.actuator).has_memory:
             raise ValueError(f"Limited follows an actuator without memory, not {shown(self.actuator)}.")
-        if self.largest_angle is not None:
-            require_each(self, "largest_angle", partial(require_number, unit="rad"))
-        if self.largest_rate is not None:
-            require_each(self, "largest_rate", partial(require_number, unit="rad/s"))
+        check_numbers(self)
         batch_size(self)
 
     @property
@@ -73,7 +67,7 @@ class Limited:
     @property
     def heating_power(self) -> float:
         """Electric power of the followed actuator [W], NaN if it does not say it."""
-        return self.actuator.heating_power if isinstance(self.actuator, Heated) else math.nan
+        return complete(self.actuator).heating_power
 
     def delta_psi(self, t: ArrayLike) -> Floats:
         """Rotation by command 1 at time t [s] of a stroke that begins at rest [rad]. t may have any shape."""
@@ -84,7 +78,7 @@ class Limited:
         return np.asarray(turned[np.searchsorted(times, t), :, 0])
 
     def respond(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
-        """Rotations and state as in `StatefulActuator`, exact if the followed curve is linear between the times t."""
+        """Rotations and state as in `ActuatorBase`, exact if the followed curve is linear between the times t."""
         curve, peak, rate = stroke_at(self.actuator, t), column(self.peak_angle), column(self.largest_rate)
         wanted = curve.reshape(*curve.shape, *(1,) * (1 + commands.ndim - curve.ndim)) * commands
         wanted = np.clip(wanted, -peak, peak)
@@ -107,6 +101,4 @@ class Limited:
 
     def seconds_heated(self, t: Floats, commands: Floats, state: Floats) -> Floats:
         """Time for which limbs are heated from t[0] to t[-1] [s], shape of `commands`: as of the followed actuator."""
-        if not isinstance(self.actuator, Heated):
-            return np.full_like(commands, np.nan)
-        return self.actuator.seconds_heated(t, commands, state)
+        return complete(self.actuator).seconds_heated(t, commands, state)

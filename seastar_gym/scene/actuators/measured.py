@@ -1,17 +1,17 @@
 """`MeasuredCurve`: an actuator given by measured angles at times."""
 
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.scene.actuators.actuator import ActuatorBase
 from seastar_gym.scene.actuators.heating import WIRE_POWER, share_of_pulse
 from seastar_gym.scene.checks import require_number, require_numbers, shown
 from seastar_gym.scene.csv_rows import read_numbers
-from seastar_gym.scene.per_robot import Numbers, require_each
+from seastar_gym.scene.number import Numbers, check_numbers, not_negative
 from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 @register_part
 @dataclass(frozen=True)
-class MeasuredCurve:
+class MeasuredCurve(ActuatorBase):
     """Actuator with a measured curve of rotation, linear between samples and equal in every stroke.
 
     times: Increasing times [s], from 0 to the period. No time step straddles a sample, so samples closer than the step
@@ -30,15 +30,13 @@ class MeasuredCurve:
     heating_power: Electric power of a heated wire [W], an assumption, see `heating.WIRE_POWER`.
     """
 
-    PER_ROBOT: ClassVar = ("scale",)
     times: tuple[float, ...]
     angles: tuple[float, ...]
-    scale: Numbers = 1.0
-    heating_power: float = WIRE_POWER
+    scale: Annotated[Numbers, not_negative("1")] = 1.0
+    heating_power: Annotated[float, not_negative("W")] = WIRE_POWER
 
     def __post_init__(self) -> None:
-        require_each(self, "scale", partial(require_number, unit="1", zero_allowed=True))
-        require_number("heating_power", self.heating_power, "W", zero_allowed=True)
+        check_numbers(self)
         require_numbers("times", self.times, "s")
         require_numbers("angles", self.angles, "rad")
         if len(self.times) != len(self.angles) or len(self.times) < 2:

@@ -2,15 +2,14 @@
 
 import math
 from dataclasses import dataclass
-from functools import partial
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.scene.actuators.actuator import ActuatorBase
 from seastar_gym.scene.actuators.heating import WIRE_POWER, share_of_pulse
-from seastar_gym.scene.checks import require_number
-from seastar_gym.scene.per_robot import Numbers, require_each
+from seastar_gym.scene.number import Numbers, check_numbers, not_negative, positive
 from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
@@ -47,7 +46,7 @@ class HeatingAndCooling:
 
 @register_part
 @dataclass(frozen=True)
-class SmaPulse(HeatingAndCooling):
+class SmaPulse(HeatingAndCooling, ActuatorBase):
     """Actuator of Fig. 13.5b: rotation rises linearly while the alloy is heated and falls linearly while it cools.
 
     peak_angle: Largest rotation [rad].
@@ -56,17 +55,13 @@ class SmaPulse(HeatingAndCooling):
     heating_power: Electric power of a heated wire [W], an assumption, see `heating.WIRE_POWER`.
     """
 
-    PER_ROBOT: ClassVar = ("peak_angle",)
-    peak_angle: Numbers = math.pi / 5
-    heating_time: float = 0.1
-    cooling_time: float = 0.9
-    heating_power: float = WIRE_POWER
+    peak_angle: Annotated[Numbers, not_negative("rad")] = math.pi / 5
+    heating_time: Annotated[float, positive("s")] = 0.1
+    cooling_time: Annotated[float, positive("s")] = 0.9
+    heating_power: Annotated[float, not_negative("W")] = WIRE_POWER
 
     def __post_init__(self) -> None:
-        require_each(self, "peak_angle", partial(require_number, unit="rad", zero_allowed=True))
-        require_number("heating_time", self.heating_time, "s")
-        require_number("cooling_time", self.cooling_time, "s")
-        require_number("heating_power", self.heating_power, "W", zero_allowed=True)
+        check_numbers(self)
 
     def delta_psi(self, t: ArrayLike) -> Floats:
         """Rotation by command 1 at time t [s] of a stroke [rad]. t may have any shape."""

@@ -20,15 +20,15 @@ curve is from its fit. The repeated pulse of any period follows from them, warm 
 
 import math
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import ClassVar, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from seastar_gym.scene.actuators.heating import MIRRORED_WIRES, SPENT, WIRE_POWER, Mirror, left_after
-from seastar_gym.scene.checks import is_whole_number, require_number, shown
-from seastar_gym.scene.per_robot import Numbers, batch_size, column, require_each
+from seastar_gym.scene.actuators.heating import SPENT, WIRE_POWER, WirePair
+from seastar_gym.scene.checks import as_floats, is_whole_number, shown
+from seastar_gym.scene.number import Numbers, check_numbers, not_negative, positive
+from seastar_gym.scene.per_robot import batch_size, column
 from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
@@ -66,7 +66,7 @@ move them.
 
 @register_part
 @dataclass(frozen=True)
-class SmaLimb:
+class SmaLimb(WirePair):
     """Actuator of two wires per limb that heat, cool and recover their shape as measured. Defaults: `preset(0)`.
 
     The state of a limb is (theta_+, theta_-, w_+, w_-, r_+, r_-): temperatures above the water [widths of the
@@ -89,29 +89,19 @@ class SmaLimb:
     heating_power: Electric power of a heated wire [W], an assumption, see `heating.WIRE_POWER`.
     """
 
-    PER_ROBOT: ClassVar = ("peak_angle", "rise", "middle", "time_constant", "rest_curvature", "curvature_change")
-    peak_angle: Numbers = math.pi / 5
-    rise: Numbers = MEASURED[0].rise
-    middle: Numbers = MEASURED[0].middle
-    time_constant: Numbers = MEASURED[0].time_constant
-    heating_time: float = MEASURED[0].heating_time
-    delay: float = MEASURED[0].delay
-    period: float = 1.0
-    rest_curvature: Numbers = MEASURED[0].rest_curvature
-    curvature_change: Numbers = MEASURED[0].curvature_change
-    heating_power: float = WIRE_POWER
+    peak_angle: Annotated[Numbers, not_negative("rad")] = math.pi / 5
+    rise: Annotated[Numbers, positive("widths of the transformation")] = MEASURED[0].rise
+    middle: Annotated[Numbers, positive("widths of the transformation")] = MEASURED[0].middle
+    time_constant: Annotated[Numbers, positive("s")] = MEASURED[0].time_constant
+    heating_time: Annotated[float, positive("s")] = MEASURED[0].heating_time
+    delay: Annotated[float, not_negative("s")] = MEASURED[0].delay
+    period: Annotated[float, positive("s")] = 1.0
+    rest_curvature: Annotated[Numbers, not_negative("1/m")] = MEASURED[0].rest_curvature
+    curvature_change: Annotated[Numbers, not_negative("1/m")] = MEASURED[0].curvature_change
+    heating_power: Annotated[float, not_negative("W")] = WIRE_POWER
 
     def __post_init__(self) -> None:
-        require_each(self, "peak_angle", partial(require_number, unit="rad", zero_allowed=True))
-        for name in ("rise", "middle"):
-            require_each(self, name, partial(require_number, unit="widths of the transformation"))
-        for name in ("rest_curvature", "curvature_change"):
-            require_each(self, name, partial(require_number, unit="1/m", zero_allowed=True))
-        require_each(self, "time_constant", partial(require_number, unit="s"))
-        for name in ("heating_time", "period"):
-            require_number(name, getattr(self, name), "s")
-        require_number("delay", self.delay, "s", zero_allowed=True)
-        require_number("heating_power", self.heating_power, "W", zero_allowed=True)
+        check_numbers(self)
         batch_size(self)
         slowest, fastest = np.max(self.time_constant), np.min(self.time_constant)
         if not 1e-9 * slowest <= self.heating_time <= 100.0 * fastest:
@@ -144,7 +134,8 @@ class SmaLimb:
             )
         period = min(1.0, 1.0 / FREQUENCIES[liquid_metal][0]) if period is None else period
         if limb_length is not None:
-            peak_angle = np.multiply(MEASURED[liquid_metal].curvature_change, limb_length)
+            change = MEASURED[liquid_metal].curvature_change
+            peak_angle = np.multiply(change, as_floats("limb_length", limb_length))
         return replace(cls(peak_angle, period=period), **MEASURED[liquid_metal]._asdict())
 
     @property
@@ -158,11 +149,6 @@ class SmaLimb:
     def rest(self) -> Floats:
         """State at rest, shape (6,)."""
         return np.zeros(6)
-
-    @property
-    def mirror(self) -> Mirror:
-        """What a mirror does to the state: the wires change places, see `actuator.mirrored`."""
-        return (*MIRRORED_WIRES, (3, 1), (2, 1), (5, 1), (4, 1))
 
     def share(self, temperature: Floats, n_axes: int = 2) -> Floats:
         """Share of their shape that wires of a temperature [widths] have recovered.
@@ -178,17 +164,8 @@ class SmaLimb:
         change = column(self.curvature_change, n_axes) * self.share(temperature, n_axes)
         return np.asarray(column(self.rest_curvature, n_axes) - change)
 
-    def delta_psi(self, t: ArrayLike) -> Floats:
-        """Rotation by command 1 at time t [s] of a stroke that begins at rest [rad]. t may have any shape."""
-        t, n_robots = np.asarray(t, dtype=float), batch_size(self)
-        from_start = np.append(0.0, t.ravel())
-        if n_robots is None:
-            return self.respond(from_start, np.ones(()), self.rest)[0][1:].reshape(t.shape)
-        rest = np.broadcast_to(self.rest, (n_robots, 1, 6))
-        return self.respond(from_start, np.ones((n_robots, 1)), rest)[0][1:].reshape(*t.shape, n_robots)
-
     def temperatures(self, t: Floats, commands: Floats, state: Floats) -> Floats:
-        """Temperatures of the wires [widths], shape (len(t), *S, 2). Arguments as in `StatefulActuator.respond`."""
+        """Temperatures of the wires [widths], shape (len(t), *S, 2). Arguments as in `respond`."""
         waiting, left = self._pulse(t, commands, state)
         since, tau = (t - t[0]).reshape(-1, *(1,) * left.ndim), column(self.time_constant, 2)
         heated = np.clip(since - waiting, 0.0, left)
@@ -197,22 +174,19 @@ class SmaLimb:
         return np.asarray(state[..., :2] * np.exp(-since / tau) + lifted * np.exp(-cooled / tau))
 
     def respond(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
-        """Rotations and state as in `StatefulActuator`, exact at all times t."""
+        """Rotations and state as in `ActuatorBase`, exact at all times t."""
         temperature, duration = self.temperatures(t, commands, state), t[-1] - t[0]
         share = self.share(temperature)
         waiting, left = self._pulse(t, commands, state)
-        left = left_after(np.maximum(duration - waiting, 0.0), left, self.heating_time)
+        left = self._left_after(np.maximum(duration - waiting, 0.0), left)
         waiting = np.where(waiting - duration > SPENT * self.delay, waiting - duration, 0.0)
         turned = column(self.peak_angle) * (share[..., 0] - share[..., 1])
         return turned, np.concatenate([temperature[-1], waiting, left], axis=-1)
 
     def _pulse(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
         """Time from t[0] until every wire is heated, and time for which it is heated then [s], shape (*S, 2) each."""
-        waiting, left = state[..., 2:4], state[..., 4:]
-        if t[0] > 0.0:
-            return waiting, left
-        wanted = self.heating_time * np.stack([np.maximum(commands, 0.0), np.maximum(-commands, 0.0)], axis=-1)
-        return np.where((wanted > 0.0) & (left == 0.0), self.delay, waiting), np.where(wanted > 0.0, wanted, left)
+        left = self._left(t, commands, state)
+        return np.where((left > 0.0) & (state[..., 4:] == 0.0), self.delay, state[..., 2:4]), left
 
     def observe(self, state: Floats) -> Floats:
         """Temperatures over the middle of the transformation, shape (..., 2)."""

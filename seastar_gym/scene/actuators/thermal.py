@@ -24,23 +24,16 @@ effective numbers, not those of one alloy.
 
 import math
 from dataclasses import dataclass
-from functools import partial
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from seastar_gym.scene.actuators.heating import (
-    MIRRORED_WIRES,
-    WIRE_POWER,
-    Mirror,
-    left_after,
-    pulse_left,
-    seconds_of_wires,
-)
+from seastar_gym.scene.actuators.heating import WIRE_POWER, WirePair
 from seastar_gym.scene.actuators.pulse import HeatingAndCooling
-from seastar_gym.scene.checks import require_finite, require_number, shown
-from seastar_gym.scene.per_robot import Numbers, batch_size, column, require_each
+from seastar_gym.scene.checks import shown
+from seastar_gym.scene.number import Numbers, check_numbers, finite, not_negative, positive
+from seastar_gym.scene.per_robot import batch_size, column
 from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
@@ -51,7 +44,7 @@ REACHED = 1e-9
 
 @register_part
 @dataclass(frozen=True)
-class ThermalSma(HeatingAndCooling):
+class ThermalSma(HeatingAndCooling, WirePair):
     """Actuator of two shape memory alloy wires per limb, with heat and hysteresis.
 
     The state of a limb is (T_+, T_-, xi_+, xi_-, r_+, r_-): temperatures [deg C], austenite fractions [1] and the time
@@ -74,31 +67,21 @@ class ThermalSma(HeatingAndCooling):
     TEMPERATURES: ClassVar = (
         "water_temperature", "martensite_finish", "austenite_start", "martensite_start", "austenite_finish",
     )  # fmt: skip
-    PER_ROBOT: ClassVar = ("peak_angle", "time_constant", "steady_rise", *TEMPERATURES, "largest_temperature")
-    peak_angle: Numbers = math.pi / 5
-    heating_time: float = 0.1
-    cooling_time: float = 0.9
-    time_constant: Numbers = 0.42
-    steady_rise: Numbers = 220.0
-    water_temperature: Numbers = 20.0
-    austenite_start: Numbers = 23.5
-    austenite_finish: Numbers = 70.5
-    martensite_start: Numbers = 56.0
-    martensite_finish: Numbers = 21.5
-    largest_temperature: Numbers | None = None
-    heating_power: float = WIRE_POWER
+    peak_angle: Annotated[Numbers, not_negative("rad")] = math.pi / 5
+    heating_time: Annotated[float, positive("s")] = 0.1
+    cooling_time: Annotated[float, positive("s")] = 0.9
+    time_constant: Annotated[Numbers, positive("s")] = 0.42
+    steady_rise: Annotated[Numbers, positive("K")] = 220.0
+    water_temperature: Annotated[Numbers, finite("deg C")] = 20.0
+    austenite_start: Annotated[Numbers, finite("deg C")] = 23.5
+    austenite_finish: Annotated[Numbers, finite("deg C")] = 70.5
+    martensite_start: Annotated[Numbers, finite("deg C")] = 56.0
+    martensite_finish: Annotated[Numbers, finite("deg C")] = 21.5
+    largest_temperature: Annotated[Numbers | None, finite("deg C")] = None
+    heating_power: Annotated[float, not_negative("W")] = WIRE_POWER
 
     def __post_init__(self) -> None:
-        require_each(self, "peak_angle", partial(require_number, unit="rad", zero_allowed=True))
-        for name, unit in (("heating_time", "s"), ("cooling_time", "s")):
-            require_number(name, getattr(self, name), unit)
-        for name, unit in (("time_constant", "s"), ("steady_rise", "K")):
-            require_each(self, name, partial(require_number, unit=unit))
-        for name in self.TEMPERATURES:
-            require_each(self, name, partial(require_finite, unit="deg C"))
-        require_number("heating_power", self.heating_power, "W", zero_allowed=True)
-        if self.largest_temperature is not None:
-            require_each(self, "largest_temperature", partial(require_finite, unit="deg C"))
+        check_numbers(self)
         batch_size(self)
         if self.heating_time / 100.0 > np.min(self.time_constant):
             raise ValueError("heating_time must be at most 100 time constants, after which nothing changes any more.")
@@ -121,21 +104,8 @@ class ThermalSma(HeatingAndCooling):
         water = column(self.water_temperature)
         return np.stack(np.broadcast_arrays(water, water, 0.0, 0.0, 0.0, 0.0), axis=-1)
 
-    @property
-    def mirror(self) -> Mirror:
-        """What a mirror does to the state: the wires change places, see `actuator.mirrored`."""
-        return (*MIRRORED_WIRES, (3, 1), (2, 1), (5, 1), (4, 1))
-
-    def delta_psi(self, t: ArrayLike) -> Floats:
-        """Rotation by command 1 at time t [s] of a stroke that begins at rest [rad]. t may have any shape."""
-        t, n_robots = np.asarray(t, dtype=float), batch_size(self)
-        from_start = np.append(0.0, t.ravel())
-        if n_robots is None:
-            return self.respond(from_start, np.ones(()), self.rest)[0][1:].reshape(t.shape)
-        return self.respond(from_start, np.ones((n_robots, 1)), self.rest)[0][1:].reshape(*t.shape, n_robots)
-
     def respond(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
-        """Rotations and state as in `StatefulActuator`, exact at all times t."""
+        """Rotations and state as in `ActuatorBase`, exact at all times t."""
         heated, t = self._left(t, commands, state), t - t[0]
         tau, cold = column(self.time_constant, 2), column(self.water_temperature, 2)
         hot = cold + column(self.steady_rise, 2)
@@ -152,12 +122,11 @@ class ThermalSma(HeatingAndCooling):
         temperature[early] = np.where(is_heated, hot + (start - hot) * decay[early], temperature[early])
         austenite[early] = self.transform(temperature[early], np.where(is_heated, before, after))
         turned = column(self.peak_angle) * (austenite[..., 0] - austenite[..., 1])
-        left = left_after(t[-1], heated, self.heating_time)
+        left = self._left_after(t[-1], heated)
         return turned, np.concatenate([temperature[-1], austenite[-1], left], axis=-1)
 
     def _left(self, t: Floats, commands: Floats, state: Floats) -> Floats:
-        """Time for which every wire is heated from t[0] on [s], shape (*S, 2)."""
-        left = pulse_left(t, commands, state[..., 4:], self.heating_time)
+        left = super()._left(t, commands, state)
         return left if self.largest_temperature is None else np.minimum(left, self._time_to_limit(state[..., :2]))
 
     def _time_to_limit(self, temperature: Floats) -> Floats:
@@ -200,7 +169,3 @@ class ThermalSma(HeatingAndCooling):
             return np.zeros((*state.shape[:-1], 2), dtype=bool)
         limit, water = column(self.largest_temperature, 2), column(self.water_temperature, 2)
         return np.asarray(state[..., :2] >= limit - REACHED * (limit - water))
-
-    def seconds_heated(self, t: Floats, commands: Floats, state: Floats) -> Floats:
-        """Time for which the wires of each limb are heated from t[0] to t[-1] [s], shape of `commands`."""
-        return seconds_of_wires(t[-1] - t[0], self._left(t, commands, state))

@@ -2,22 +2,15 @@
 
 import math
 from dataclasses import dataclass
-from functools import partial
-from typing import ClassVar
+from typing import Annotated
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from seastar_gym.scene.actuators.heating import (
-    MIRRORED_WIRES,
-    WIRE_POWER,
-    Mirror,
-    left_after,
-    pulse_left,
-    seconds_of_wires,
-)
-from seastar_gym.scene.checks import require_flag, require_number
-from seastar_gym.scene.per_robot import Numbers, column, require_each
+from seastar_gym.scene.actuators.heating import WIRE_POWER, WirePair
+from seastar_gym.scene.checks import require_flag
+from seastar_gym.scene.number import Numbers, check_numbers, not_negative, positive
+from seastar_gym.scene.per_robot import column
 from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]
@@ -29,7 +22,7 @@ COLD = 1e-9
 
 @register_part
 @dataclass(frozen=True)
-class SmaWires:
+class SmaWires(WirePair):
     """Actuator of two wires per limb, + and -, that contract linearly while they are heated and relax while they cool.
 
     A wire's contraction x rises by 1/heating_time while it is heated, up to 1, and falls by 1/cooling_time otherwise,
@@ -53,23 +46,19 @@ class SmaWires:
     heating_power: Electric power of a heated wire [W], an assumption, see `heating.WIRE_POWER`.
     """
 
-    PER_ROBOT: ClassVar = ("peak_angle",)
-    peak_angle: Numbers = math.pi / 5
-    heating_time: float = 0.1
-    cooling_time: float = 0.9
-    period: float = None  # type: ignore[assignment]  # a number after __post_init__
+    peak_angle: Annotated[Numbers, not_negative("rad")] = math.pi / 5
+    heating_time: Annotated[float, positive("s")] = 0.1
+    cooling_time: Annotated[float, positive("s")] = 0.9
+    period: Annotated[float, positive("s")] = None  # type: ignore[assignment]  # a number after __post_init__
     deaf: bool = False
-    heating_power: float = WIRE_POWER
+    heating_power: Annotated[float, not_negative("W")] = WIRE_POWER
 
     def __post_init__(self) -> None:
-        require_each(self, "peak_angle", partial(require_number, unit="rad", zero_allowed=True))
-        for name in ("heating_time", "cooling_time"):
-            require_number(name, getattr(self, name), "s")
+        check_numbers(self)
         if self.period is None:
             object.__setattr__(self, "period", self.heating_time + self.cooling_time)
-        require_number("period", self.period, "s")
+            check_numbers(self)  # which refuses a sum beyond all floats
         require_flag("deaf", self.deaf)
-        require_number("heating_power", self.heating_power, "W", zero_allowed=True)
 
     @property
     def corners(self) -> tuple[float, ...]:
@@ -83,26 +72,16 @@ class SmaWires:
         """State at rest, shape (4,)."""
         return np.zeros(4)
 
-    @property
-    def mirror(self) -> Mirror:
-        """What a mirror does to the state, see `actuator.mirrored`."""
-        return (*MIRRORED_WIRES, (3, 1), (2, 1))
-
-    def delta_psi(self, t: ArrayLike) -> Floats:
-        """Rotation by command 1 at time t [s] since it was given at rest [rad]. t may have any shape."""
-        contraction = self._contraction(np.asarray(t, dtype=float), np.zeros(()), np.full((), self.heating_time))
-        return np.multiply.outer(contraction, self.peak_angle)
-
     def respond(self, t: Floats, commands: Floats, state: Floats) -> tuple[Floats, Floats]:
-        """Rotations and state as in `StatefulActuator`, exact at all times t."""
+        """Rotations and state as in `ActuatorBase`, exact at all times t."""
         since, left = t - t[0], self._left(t, commands, state)
         contraction = self._contraction(since.reshape(-1, *(1,) * left.ndim), state[..., :2], left)
         turned = column(self.peak_angle) * (contraction[..., 0] - contraction[..., 1])
-        return turned, np.concatenate([contraction[-1], left_after(since[-1], left, self.heating_time)], axis=-1)
+        return turned, np.concatenate([contraction[-1], self._left_after(since[-1], left)], axis=-1)
 
     def _left(self, t: Floats, commands: Floats, state: Floats) -> Floats:
         heard = np.where(self.deaf_wires(state)[..., 0], 0.0, commands) if self.deaf else commands
-        return pulse_left(t, heard, state[..., 2:], self.heating_time)
+        return super()._left(t, heard, state)
 
     def _contraction(self, since: Floats, before: Floats, left: Floats) -> Floats:
         """Contraction of wires after times `since` [s], from the one `before`, if they are heated for `left` [s]."""
@@ -129,7 +108,3 @@ class SmaWires:
         """Wires that cannot be heated now, shape (..., 2): both of a deaf limb until both are cold, otherwise none."""
         warm = (state[..., :2] > COLD).any(axis=-1) | (state[..., 2:] > 0.0).any(axis=-1)
         return np.stack([warm & self.deaf, warm & self.deaf], axis=-1)
-
-    def seconds_heated(self, t: Floats, commands: Floats, state: Floats) -> Floats:
-        """Time for which the wires of each limb are heated from t[0] to t[-1] [s], shape of `commands`."""
-        return seconds_of_wires(t[-1] - t[0], self._left(t, commands, state))

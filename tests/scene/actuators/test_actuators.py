@@ -11,7 +11,7 @@ from refusals import assert_refused
 from seastar_gym import Limited, MeasuredCurve, Numerics, Scene, Seastar, Simulator, SmaPulse, ThermalSma
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import SymmetryReduction
-from seastar_gym.scene.actuators.actuator import Actuator, StatefulActuator
+from seastar_gym.scene.actuators.actuator import Actuator, complete
 
 NUMERICS = Numerics("implicit-midpoint", 0.01)
 SAMPLED_PULSE = MeasuredCurve((0.0, 0.1, 1.0), (0.0, np.pi / 5, 0.0))
@@ -206,10 +206,7 @@ def test_what_a_robot_remembers_does_not_depend_on_its_neighbours():
     assert together.positions[9].tobytes() == alone.positions[0].tobytes()
 
 
-@pytest.mark.parametrize("arguments", [{"largest_angle": 0.0}, {"largest_rate": -1.0}, {"largest_rate": np.inf}])
-def test_limits_are_positive_numbers(arguments):
-    with pytest.raises(ValueError, match=next(iter(arguments))):
-        Limited(SmaPulse(), **arguments)
+def test_what_has_a_memory_is_not_limited():
     with pytest.raises(ValueError, match="without memory"):
         Limited(SLOW)
 
@@ -277,10 +274,28 @@ class Remembering(Triangle):
 
 
 def test_a_scene_takes_any_actuator_that_says_what_it_does():
-    assert isinstance(Triangle(), Actuator) and not isinstance(Triangle(), StatefulActuator)
+    assert isinstance(Triangle(), Actuator) and not complete(Triangle()).has_memory
     found = swim(Scene(actuator=Triangle(), numerics=NUMERICS))
     expected = swim(Scene(actuator=MeasuredCurve(Triangle.corners, (0.0, 0.3, 0.0)), numerics=NUMERICS))
     assert found.positions.tobytes() == expected.positions.tobytes()
+
+
+def test_what_an_actuator_of_ones_own_does_not_say_is_not_known():
+    plain, remembering = complete(Triangle()), complete(Remembering())
+    assert not plain.has_memory and plain.mirror == () and plain.rest.shape == (0,)
+    assert remembering.has_memory and remembering.mirror is None and remembering.rest.shape == (1,)
+    for actuator in (plain, remembering):
+        assert actuator.peak_angle == 0.3 and actuator.corners == Triangle.corners and not actuator.can_be_deaf
+        assert np.isnan(actuator.heating_power) and actuator.recall(np.ones(1)) is None
+        assert np.isnan(actuator.seconds_heated(np.ones(2), np.ones(5), np.ones((5, 1)))).all()
+        assert actuator.deaf_wires(np.ones((5, 1))) is None
+
+
+def test_what_an_actuator_of_ones_own_says_is_heeded():
+    says = {"mirror": ((0, -1),), "heating_power": 2.0, "seconds_heated": lambda self, t, c, s: np.full(c.shape, t[-1])}
+    simulator = Simulator(Scene(actuator=type("Saying", (Remembering,), says)(), numerics=NUMERICS), 2)
+    assert complete(simulator.scene.actuator).mirror == ((0, -1),)
+    np.testing.assert_allclose(simulator.stroke(np.ones((2, 5))).energy, 2.0 * 5 * 0.6)
 
 
 @pytest.mark.parametrize(

