@@ -56,7 +56,8 @@ def robot_and_star(n_limbs=5, nodes_per_limb=10, hub="rigid", fluid=True):
 
 
 def rods_of(robot: Seastar, fluid: bool = True) -> Rods:
-    return make_rods(Scene(robot=robot, fluid=Water() if fluid else None, actuator=SmaPulse(peak_angle=0.1)))
+    pulse = SmaPulse(peak_angle=0.1 if robot.n_limbs > 1 else 0.0)  # one limb has nothing to turn against
+    return make_rods(Scene(robot=robot, fluid=Water() if fluid else None, actuator=pulse))
 
 
 def turn_limbs(work: Work, star: Star, delta_psi: np.ndarray) -> None:
