@@ -30,11 +30,8 @@ try:
     from stable_baselines3 import PPO
     from stable_baselines3.common.logger import configure
 
-    from agents.evaluate import evaluate
     from agents.learner_file import resume
     from agents.ppo import make_model, make_training_env, require_device
-    from agents.report.charts import Curve, read_progress
-    from agents.report.page import Remarks
     from agents.training import efficiency
     from agents.training.box import put_in_the_box
     from agents.training.folder import export, held, is_unbegun, recorded, resume_command, write_config
@@ -47,6 +44,9 @@ try:
     from seastar_gym.controllers.contract import Policy, actions_of, require_fit
     from seastar_gym.controllers.learned import load as load_policy
     from seastar_gym.controllers.scripted import scripted
+    from seastar_gym.evaluation.comparison import evaluate
+    from seastar_gym.evaluation.report.charts import Curve, read_progress
+    from seastar_gym.evaluation.report.page import Remarks
     from seastar_gym.scene import Scene
 except ModuleNotFoundError as missing:
     sys.exit(f'train.py needs {missing.name}: pip install "seastar-gym[train]".')
@@ -139,7 +139,7 @@ def describe(options: Options, folder: Path, trained: int, watch: Watch) -> Rema
         commands=[
             *config_of(folder)["commands"],
             f"tensorboard --logdir {shlex.quote(str(folder))}",
-            f"python -m agents.evaluate --agents {policy} pentagon {physics} --report{timed}",
+            f"seastar evaluate --agents {policy} pentagon {physics} --report --video --out runs/evaluate{timed}",
             f"{resume_command(folder)} --strokes {2 * trained}",
         ],
         curves=[Curve.of("learned", read_progress(folder))],

@@ -6,4 +6,4 @@ Controllers, evaluation and the adapter of Stable-Baselines3 are in the package,
 from seastar_gym.extras import is_command, require_extra
 
 if is_command():  # the learner does without most of these, in other people's programs
-    require_extra("The agents", "train", "imageio", "matplotlib", "plotly", "rich", "tyro")
+    require_extra("The agents", "train", "imageio", "matplotlib", "plotly", "tyro")

@@ -19,7 +19,7 @@ from seastar_gym.command import run_command
 from seastar_gym.controllers.learned import SHIPPED, LearnedPolicy, load
 from seastar_gym.envs.task import make_scene
 from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
-from seastar_gym.evaluation.swim import TIME_LIMIT, Swim, decisions_in
+from seastar_gym.evaluation.swim import TIME_LIMIT, Swim
 from seastar_gym.files import write_atomically
 from seastar_gym.scene.numerics import Fidelity
 
@@ -41,18 +41,14 @@ class Swims(NamedTuple):
 def measure(policy: LearnedPolicy, threads: int | None = None) -> dict[Fidelity, Swims]:
     """Swims of a policy at every fidelity, with its own time between decisions."""
     period = policy.description.decision_period
-    limit = decisions_in(TIME_LIMIT, period)
     found = {}
     for fidelity in FIDELITIES:
         scene = make_scene(None, fidelity, period)
-        (pentagon,) = swim_many(
-            "learned", policy, "pentagon", 1, scene, max_strokes=limit, threads=threads, decision_period=period
-        )
-        paths = HELD_OUT_PATHS if fidelity in CHEAP else 0
-        held_out = [] if not paths else swim_many(
-            "learned", policy, "random", paths, scene, max_strokes=limit, seed=HELD_OUT_SEED, threads=threads,
-            decision_period=period,
-        )  # fmt: skip
+        how: dict[str, Any] = {"threads": threads, "decision_period": period}
+        (pentagon,) = swim_many("learned", policy, "pentagon", 1, scene, **how)
+        held_out = list[Swim]()
+        if fidelity in CHEAP:
+            held_out = swim_many("learned", policy, "random", HELD_OUT_PATHS, scene, seed=HELD_OUT_SEED, **how)
         found[fidelity] = Swims(pentagon, held_out)
     return found
 

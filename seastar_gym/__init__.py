@@ -8,7 +8,8 @@ from typing import Any
 
 from gymnasium.envs.registration import register
 
-from seastar_gym.certification.measure import certify
+from seastar_gym.accuracy.certificate import Certificate
+from seastar_gym.accuracy.measure import certify
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.randomization import DomainRandomization, LogUniform, Normal, Uniform
@@ -28,7 +29,6 @@ from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.scene.along import AlongLimb, Stiffening
 from seastar_gym.scene.body import Attachment, Body
-from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
 from seastar_gym.scene.limb import Limb

@@ -36,6 +36,15 @@ def ended_by_disk(failure: OSError) -> int:
     return 2 if failure.errno is None else 1
 
 
+def answered(work: Callable[[], int | None]) -> int:
+    """Exit code of a command's work: 2, after a sentence, where it refuses what it was given or lacks a module."""
+    try:
+        return work() or 0
+    except (ValueError, ImportError, FileNotFoundError) as refusal:
+        print(refusal, file=sys.stderr)
+        return 2
+
+
 def run_command(main: Callable[[], int | None]) -> NoReturn:
     """Run a command line and exit with its code, or as `ended_by_disk` where it cannot write or read a file."""
     try:

@@ -29,8 +29,8 @@ from studies.parser import study_parser
 
 ROOMS = {
     "seastar_gym/envs": "tests/envs", "seastar_gym/controllers": "tests/controllers",
-    "seastar_gym/sweep": "tests/sweep", "seastar_gym/certification": "tests/certify",
-    "seastar_gym/scene/certificate.py": "tests/certify", "seastar_gym/identify": "tests/identify",
+    "seastar_gym/sweep": "tests/sweep", "seastar_gym/accuracy": "tests/accuracy",
+    "seastar_gym/identify": "tests/identify",
 }  # fmt: skip
 """Rooms, or single files, and the folders of their tests."""
 KERNELS = "simd.compilation"
@@ -45,8 +45,8 @@ SWAPS: dict[type, tuple[str, str]] = {
 EXACTLY = "A distance that is exactly the limit does not happen."
 SHADE = "Nobody sees a 255th of a colour."
 EQUIVALENT: dict[tuple[str, str], str] = {
-    ("seastar_gym/certification/measure.py",
-     "for k, ((nodes, numerics), hub) in enumerate(zip(settings, swum[len(NODES) :], strict=False), start=1):"):
+    ("seastar_gym/accuracy/measure.py",
+     "for k, (each, space, in_time) in enumerate(zip(settings, swum.space, swum.time, strict=False), start=1):"):
         "There are as many swims as settings.",
     ("seastar_gym/envs/rendering.py", "PLANNED: Colour = (190, 199, 208)"): SHADE,
     ("seastar_gym/envs/rendering.py", "WATER: Colour = (250, 253, 254)"): SHADE,

@@ -20,11 +20,11 @@ NAMES = re.compile(r"^<!-- site: names (\S+) (.*) -->$", re.MULTILINE)
 FAST = Scene(numerics=Numerics.preset("fast"))
 PATH = np.array([[0.03, 0.0]])
 MADE_BY_THE_PACKAGE = {
-    "CertifiedSetting", "Episode", "Estimate", "Layout", "Outcome", "Promise", "Score", "Swim", "Tally",
+    "Setting", "Episode", "Episodes", "Estimate", "Layout", "Outcome", "Score", "Swim", "Tally",
     "Actuator", "ActuatorBase", "Executor", "Policy", "Challenge", "Numbered", "Swimming",
 }  # fmt: skip
 """Records that functions return, protocols, and bases of classes of one's own."""
-UNCALLED = {*MADE_BY_THE_PACKAGE, "Here", "RayTasks", "SlurmArrays", "measured_over"}
+UNCALLED = {*MADE_BY_THE_PACKAGE, "Here", "RayTasks", "SlurmArrays", "chapters_certificate"}
 """What takes no arguments, or needs Ray or submitit, is not called either."""
 
 
@@ -154,9 +154,7 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         "thrifty_gait": dict(decision_period=0.1, n_limbs=5),
         "turning_wave": dict(decision_period=0.1),
         "load_scene": dict(file=None),
-        "cheapest": dict(error=0.05, any_gait=False, discretisation=None, nodes_per_limb=None),
-        "measured_over": {},
-        "promise": dict(setting="fast"),
+        "timed_certificate": dict(decision_period=0.2),
         "make_path": dict(path="random", rng=rng(0)),
         "layout": dict(n_limbs=5, n_remembered=0, with_headings=False),
         "Recollection": dict(group=5, mirror=(), past=1),
@@ -178,6 +176,7 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         "Budget": dict(depth=2, beam=2, coasting=0.0),
         "OpenLoopPolicy": dict(commands=np.zeros((1, 5)), actions="limbs", decision_period=None),
         "RandomPolicy": dict(rng=rng(0), actions="limbs", n_limbs=5),
+        "rollout": dict(env=env(), policy=straight(), seeds=0, options=None, until=1, record=["time"], on_step=None),
         "swim": dict(agent="a", policy=straight(), env=gym.make("SeastarSwim-v0", scene=FAST, path=PATH).unwrapped,
                      max_strokes=1, seed=0, reset_options=None, watch=None),
         "swim_many": dict(agent="a", policy=straight(), path=PATH, n_swims=1, scene=FAST, max_strokes=1,

@@ -13,13 +13,13 @@ import pytest
 
 from refusals import assert_refused
 from seastar_gym.benchmark.command import publish
-from seastar_gym.benchmark.measures import SECONDS
 from seastar_gym.benchmark.results import Entry
 from seastar_gym.controllers.learned import load, save
 from seastar_gym.evaluation.films import film
 from seastar_gym.evaluation.many import HELD_OUT_SEED
+from seastar_gym.evaluation.measures import SECONDS
 from seastar_gym.evaluation.pictures import draw_traces
-from seastar_gym.evaluation.results import write_csv
+from seastar_gym.evaluation.results import results, write_csv
 from seastar_gym.evaluation.swim import Swim
 from seastar_gym.files import beside, is_left_behind, part_name, read_json, write_atomically, write_json
 from seastar_gym.identify.measurement import Measurement
@@ -125,7 +125,7 @@ ENTRY = Entry(
     "SeastarSwim-v0", "a", "", SECONDS.name, "s", "less", [HELD_OUT_SEED], [1.0], [True], [1.0], [1]
 )  # fmt: skip
 WRITERS = {
-    "evaluation.csv": lambda file: write_csv(swims(), file),
+    "evaluation.csv": lambda file: write_csv(results(swims()), file),
     "traces.png": lambda file: draw_traces(swims(), 0.01, file),
     "film.gif": filmed,
     "film.mp4": filmed,

@@ -14,7 +14,7 @@ from fuzz.sentences import INNER, LONGEST
 from odd_values import ODD
 
 ROOT = Path(__file__).parents[1]
-FUNCTIONS = ("watch", "make", "function")
+FUNCTIONS = ("watch", "on_step", "make", "function")
 """Arguments that are functions of the caller's: what they raise is theirs."""
 UNUSED = ("state", "episode_start", "deterministic", "info")
 """Arguments that are there for the form alone, at most of the calls."""

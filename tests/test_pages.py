@@ -15,7 +15,7 @@ from stable_baselines3 import PPO
 import documented
 import seastar_gym
 from seastar_gym import Certificate, Numerics, Scene
-from seastar_gym.certification import command, endurance, measure
+from seastar_gym.accuracy import command, endurance, measure
 from seastar_gym.envs import paths
 from seastar_gym.evaluation import many
 

@@ -2,15 +2,13 @@
 
 import hashlib
 from pathlib import Path
-from typing import Any
-
-import gymnasium as gym
 
 from agents.cards import training_facts
-from seastar_gym.benchmark.episodes import swim_episodes
-from seastar_gym.benchmark.measures import measure_of
 from seastar_gym.controllers.learned import LearnedPolicy
-from seastar_gym.evaluation.many import HELD_OUT_SEED, mean_with_interval
+from seastar_gym.evaluation.many import HELD_OUT_SEED
+from seastar_gym.evaluation.measures import measure_of
+from seastar_gym.evaluation.statistics import mean_with_interval
+from seastar_gym.evaluation.tasks import env_of, swim_episodes
 from seastar_gym.files import write_atomically
 from seastar_gym.scene.numerics import Fidelity
 
@@ -29,7 +27,7 @@ def card(id: str, policy: LearnedPolicy, file: Path) -> str:
     if "told the way" in str(policy.training.get("learner")):
         told = " Its training's reward measured the way around all discs, `ObstTrap(potential=\"geodesic\")`."
     past = f" and the most telling numbers of the last {about.past}" if about.past else ""
-    env: Any = gym.make(id, disable_env_checker=True).unwrapped
+    env = env_of(id)
     measure = measure_of(env)
     return f"""# Model card: {file.stem}
 
@@ -61,9 +59,8 @@ is better. Other agents stand in docs/tasks.md.
 
 
 def _row(id: str, policy: LearnedPolicy, fidelity: Fidelity) -> str:
-    env: Any = gym.make(id, disable_env_checker=True).unwrapped
     swum = swim_episodes(id, policy, list(range(HELD_OUT_SEED, HELD_OUT_SEED + EPISODES)), fidelity=fidelity)
-    mean, low, high = mean_with_interval(measure_of(env).of(swum))
+    mean, low, high = mean_with_interval(measure_of(env_of(id)).of(swum))
     return f"| `{fidelity}` | {mean:.3g} ({low:.3g} to {high:.3g}) | {swum.success.sum()} of {EPISODES} |"
 
 

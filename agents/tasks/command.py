@@ -23,9 +23,9 @@ from agents.tasks.card import write_card
 from agents.tasks.learning import LEARNERS, train
 from agents.training.folder import versions_and_machine
 from seastar_gym import TASKS, SmaPulse
-from seastar_gym.benchmark.episodes import swim_episodes
 from seastar_gym.controllers import learned
 from seastar_gym.controllers.learned import LearnedPolicy, load, save
+from seastar_gym.evaluation.tasks import swim_episodes
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
 

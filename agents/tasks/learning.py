@@ -12,9 +12,9 @@ from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_model
 from seastar_gym import TASKS
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
-from seastar_gym.benchmark.episodes import make_batch
 from seastar_gym.envs.symmetry import VectorMemory, VectorSymmetryReduction
 from seastar_gym.envs.tasks.obst_trap import ObstTrap
+from seastar_gym.evaluation.tasks import make_batch
 from seastar_gym.scene.numerics import Fidelity
 
 Batch = gym.vector.VectorEnv[Any, Any, Any]

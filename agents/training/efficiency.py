@@ -3,8 +3,8 @@
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from agents.report.page import ResultsTable
 from agents.training.options import faults_of
+from seastar_gym.evaluation.report.page import ResultsTable
 from seastar_gym.evaluation.swim import Swim
 from seastar_gym.files import read_json, write_json
 from seastar_gym.scene.checks import require_number

@@ -19,10 +19,10 @@ from stable_baselines3 import PPO
 
 import seastar_gym
 from agents.ppo import policy_of
-from agents.report.charts import read_progress
 from agents.training import efficiency
 from agents.training.options import CONFIG, Options, config_of
 from seastar_gym.controllers.learned import save as save_policy
+from seastar_gym.evaluation.report.charts import read_progress
 from seastar_gym.files import PART, is_left_behind, is_part_of, write_json
 
 

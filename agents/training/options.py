@@ -81,8 +81,8 @@ class Options(Lengths):
     out: Path | None = None
     """Folder of the run; by default a folder in runs/ named after the time."""
     ship: bool = False
-    """Make the trained policy the one in the box, the default of agents.evaluate, unless that one needs fewer strokes
-    on held-out random paths."""
+    """Make the trained policy the one in the box, the default of `seastar evaluate`, unless that one needs fewer
+    strokes on held-out random paths."""
     ship_anyway: bool = False
     """Confirm --ship for a worse policy, or for that of a --quick run."""
     resume: Path | None = None

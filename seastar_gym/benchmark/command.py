@@ -19,13 +19,13 @@ from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
 from seastar_gym.benchmark import page
-from seastar_gym.benchmark.jobs import Answer, Job, answers, env_of
-from seastar_gym.benchmark.measures import measure_of
+from seastar_gym.benchmark.jobs import Answer, Job, answers
 from seastar_gym.benchmark.results import Entry, merged, read, write
 from seastar_gym.command import INTERRUPTED, command_parser
 from seastar_gym.controllers.roster import HELP
 from seastar_gym.evaluation.many import HELD_OUT_SEED
-from seastar_gym.evaluation.tasks import require_task, task_ids
+from seastar_gym.evaluation.measures import measure_of
+from seastar_gym.evaluation.tasks import env_of, held_out, require_task, task_ids
 from seastar_gym.executors.options import add_options, executor_of
 from seastar_gym.files import write_atomically
 from seastar_gym.scene.checks import require_count
@@ -75,7 +75,7 @@ def entry_of(found: Sequence[Answer]) -> Entry:
     rows = {seed: row for each in found for seed, row in zip(each.job.seeds, each.rows, strict=True)}
     seeds = sorted(rows)
     columns: dict[str, Any] = {name: [rows[seed][name] for seed in seeds] for name in rows[seeds[0]]}
-    measure = measure_of(env_of(job.task, job.fidelity))
+    measure = measure_of(env_of(job.task, **held_out(job.task, job.fidelity)))
     return Entry(
         job.task, policies_of(job.agent)[0], job.fidelity or "", measure.name, measure.unit, measure.better,
         seeds=seeds, **columns,
@@ -101,7 +101,7 @@ def require_measures(entries: Sequence[Entry]) -> None:
     """ValueError where results of others name a task that this package has not, or another measure than its own."""
     for task in {entry.task for entry in entries}:
         require_task(task)
-        measure = measure_of(env_of(task, None))
+        measure = measure_of(env_of(task, **held_out(task)))
         for entry in entries:
             if entry.task == task and (entry.measure, entry.unit, entry.better) != measure[:3]:
                 raise ValueError(

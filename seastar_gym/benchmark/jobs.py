@@ -4,12 +4,12 @@ import json
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-import gymnasium as gym
 import numpy as np
 
-from seastar_gym.benchmark.episodes import Episodes, held_out, swim_episodes
-from seastar_gym.benchmark.measures import measure_of
 from seastar_gym.controllers.roster import load_agent
+from seastar_gym.evaluation.measures import measure_of
+from seastar_gym.evaluation.rollout import Episodes
+from seastar_gym.evaluation.tasks import env_of, held_out, swim_episodes
 from seastar_gym.executors import KNOWN_FAILURES, Executor, sentence_of
 from seastar_gym.scene.numerics import Fidelity
 
@@ -44,16 +44,10 @@ class Answer(NamedTuple):
     is_lost: bool = False
 
 
-def env_of(task: str, fidelity: Fidelity | None) -> Any:
-    """Environment of a task, of one robot, on its held-out split."""
-    arguments = held_out(task) | ({} if fidelity is None else {"fidelity": fidelity})
-    return gym.make(task, disable_env_checker=True, **arguments).unwrapped
-
-
 def swim_job(job: Job) -> bytes:
     """Rows of a job, or the sentence of an agent that does not fit, as JSON."""
     try:
-        env = env_of(job.task, job.fidelity)
+        env = env_of(job.task, **held_out(job.task, job.fidelity))
         policy = load_agent(job.policy, env, job.seeds[0])
         swum = swim_episodes(
             job.task, policy, list(job.seeds), fidelity=job.fidelity, max_decisions=job.decisions, threads=job.threads

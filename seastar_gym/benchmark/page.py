@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.benchmark.results import Entry, best_means, relative
-from seastar_gym.evaluation.many import mean_with_interval
-from seastar_gym.evaluation.statistics import Estimate, profile
+from seastar_gym.evaluation.statistics import Estimate, mean_with_interval, profile
 from seastar_gym.files import save_figure
 
 Floats = NDArray[np.float64]
@@ -66,7 +65,7 @@ def common(entries: Sequence[Entry]) -> tuple[list[str], dict[str, Floats]]:
 
 def overall(scores: Mapping[str, Floats]) -> str:
     """Table in Markdown of the relative scores over all tasks, best agent first."""
-    found = {agent: Estimate(*mean_with_interval(of_agent.ravel())) for agent, of_agent in scores.items()}
+    found = {agent: mean_with_interval(of_agent.ravel()) for agent, of_agent in scores.items()}
     lines = ["| agent | relative score |", "|---|---:|"]
     for agent, mean in sorted(found.items(), key=lambda pair: -pair[1].mean):
         lines.append(f"| {plain(agent)} | {_fine(mean)} |")

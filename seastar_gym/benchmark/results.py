@@ -9,8 +9,8 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.evaluation.many import HELD_OUT_SEED, mean_with_interval
-from seastar_gym.evaluation.statistics import Estimate
+from seastar_gym.evaluation.many import HELD_OUT_SEED
+from seastar_gym.evaluation.statistics import Estimate, mean_with_interval
 from seastar_gym.files import read_json, write_atomically
 from seastar_gym.scene.checks import is_finite_number, is_whole_number
 from seastar_gym.scene.numerics import Fidelity
@@ -77,8 +77,8 @@ class Entry:
 
     def estimate(self) -> Estimate:
         """Mean of the scores, failures among them, with its interval over episodes."""
-        mean, *ends = mean_with_interval(np.array(self.scores))
-        return Estimate(mean, *ends) if len(self.scores) > 1 else Estimate(mean, np.nan, np.nan)
+        found = mean_with_interval(self.scores)
+        return found if len(self.scores) > 1 else Estimate(found.mean, np.nan, np.nan)
 
     @property
     def success_rate(self) -> float:

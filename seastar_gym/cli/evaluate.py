@@ -1,86 +1,148 @@
 """Compares agents on a path: a table and, with --out, evaluation.csv and a picture of the traces.
 
-In a checkout, `python -m agents.evaluate` adds videos and a report with playbacks.
+--video writes a film of every agent into that folder, --report a page with all results and with playbacks of the swims.
+
+With --sets, agents swim many paths, nominal and disturbed: a table of means with confidence intervals and, with --out,
+a CSV file of them. For registered tasks, see `seastar benchmark`.
 """
 
 import argparse
+import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import get_args
+from typing import TYPE_CHECKING, get_args
 
-from seastar_gym.command import command_parser
-from seastar_gym.controllers.contract import actions_of
-from seastar_gym.controllers.roster import DEFAULTS, HELP, fitting_agents
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.task import make_scene, scene_at
+from seastar_gym.command import answered, command_parser
+from seastar_gym.controllers.contract import Policy
+from seastar_gym.controllers.learned import LearnedPolicy
+from seastar_gym.controllers.roster import DEFAULTS, HELP, fitting_agents, load_agents
+from seastar_gym.envs.task import scene_at
+from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
-from seastar_gym.evaluation.pictures import draw_traces
-from seastar_gym.evaluation.results import as_text, write_csv
-from seastar_gym.evaluation.swim import TIME_LIMIT, Swim, decisions_in, swim
+from seastar_gym.evaluation.results import Row, write_csv
+from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in
+from seastar_gym.evaluation.trials import SETS, as_text, trials
 from seastar_gym.extras import require_extra
-from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.checks import require_count, require_number
 from seastar_gym.scene.numerics import Fidelity
 
-RADIUS = 0.01
-"""Radius of the waypoints [m]."""
+if TYPE_CHECKING:
+    from seastar_gym.evaluation.report.page import Remarks
+
+OF_TRIALS = ("learned", "greedy", "pentagon")
+"""Agents of trials unless others are named."""
 
 
 def parser() -> argparse.ArgumentParser:
     """Parser of the options."""
-    default = "(default: %(default)s)"
+    default, flag = "(default: %(default)s)", argparse.BooleanOptionalAction
     found = command_parser("seastar evaluate", __doc__)
-    found.add_argument("--agents", nargs="+", help=f"{HELP} {DEFAULTS}")
+    found.add_argument("--agents", nargs="+", help=f"{HELP} {DEFAULTS}; with --sets: {' '.join(OF_TRIALS)}")
     found.add_argument("--path", default="pentagon", help=f"{PATH_HELP} {default}")
-    found.add_argument("--fidelity", choices=get_args(Fidelity), default="balanced", help=f"accuracy {default}")
+    found.add_argument(
+        "--fidelity", nargs="+", choices=get_args(Fidelity), default=["balanced"],
+        help="accuracy, several with --sets (default: balanced)",
+    )  # fmt: skip
     found.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the chapter's)")
     found.add_argument("--decision-period", type=float, help="time between decisions [s] (default: a stroke of 1 s)")
-    found.add_argument("--seconds", type=float, default=TIME_LIMIT, help=f"time limit [s] {default}")
-    found.add_argument("--random-heading", action="store_true", help="turn the robot at random at the start")
+    limit = found.add_mutually_exclusive_group()
+    limit.add_argument("--seconds", type=float, default=TIME_LIMIT, help=f"time limit [s] {default}")
+    limit.add_argument("--max-strokes", type=int, help="time limit [decisions]")
+    found.add_argument("--waypoint-radius", type=float, default=0.01, help=f"radius of the waypoints [m] {default}")
+    found.add_argument("--random-heading", action=flag, default=False, help="turn the robot at random at the start")
     found.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn at random {default}")
-    found.add_argument("--out", type=Path, help="folder for evaluation.csv and traces.png")
+    found.add_argument("--out", type=Path, help="folder for evaluation.csv and traces.png; with --sets a CSV file")
+    found.add_argument("--video", action=flag, default=False, help="write a video of every agent")
+    found.add_argument("--report", action=flag, default=False, help="write report.html, one page with all of it")
+    report = found.add_argument_group("what the report shows, too")
+    report.add_argument("--runs", nargs="+", type=Path, default=[], help="trainings (default: those of learned agents)")
+    report.add_argument("--trials", type=Path, help="CSV file that --sets wrote")
+    report.add_argument(
+        "--bound", type=Path, default=Path("docs/bound.json"), help=f"results of studies.learning.bound {default}"
+    )
+    many = found.add_argument_group("many swims")
+    many.add_argument("--sets", nargs="+", choices=SETS, help="named paths; random paths or the pentagon, disturbed")
+    many.add_argument("--swims", type=int, default=1000, help=f"number of random paths of every set {default}")
+    many.add_argument("--num-threads", type=int, help="threads of the simulator (default: one for every processor)")
     return found
 
 
-def evaluated(options: argparse.Namespace) -> list[Swim]:
-    """Swims of the agents, in their order."""
+def require_sound(options: argparse.Namespace) -> None:
+    """ValueError, with one sentence, where something in the options is wrong."""
     require_number("--seconds", options.seconds, "s")
+    require_number("--waypoint-radius", options.waypoint_radius, "m")
+    require_count("--swims", options.swims, 1, 1_000_000)
     if options.decision_period is not None:
         require_number("--decision-period", options.decision_period, "s")
-    if options.out is not None:
-        require_extra("Pictures", "studies", "matplotlib")
-    path = load_path(options.path)
-    own = scene_at(options.scene, options.fidelity)
-    n_limbs = (own or make_scene(None, options.fidelity, options.decision_period)).robot.n_limbs
-    agents, left_out = fitting_agents(options.agents, options.seed, options.fidelity, options.decision_period, own)
+    if options.max_strokes is not None and options.max_strokes < 1:
+        raise ValueError(f"--max-strokes must be at least 1, not {options.max_strokes}.")
+    if options.sets is None and len(options.fidelity) > 1:
+        raise ValueError("Several fidelities are for --sets: name one.")
+    if (options.video or options.report) and (options.out is None or options.sets is not None):
+        raise ValueError("A video or a report needs a folder, --out, and a path, no --sets.")
+
+
+def limit_of(options: argparse.Namespace) -> int:
+    """Time limit [decisions]."""
+    return options.max_strokes or decisions_in(options.seconds, options.decision_period)
+
+
+def compared(options: argparse.Namespace, command: str) -> None:
+    """Let the agents swim the path. command: What was typed."""
+    require_sound(options)
+    (fidelity,) = options.fidelity
+    path, own = load_path(options.path), scene_at(options.scene, fidelity)
+    agents, left_out = fitting_agents(options.agents, options.seed, fidelity, options.decision_period, own)
     print("".join(f"{sentence}\n" for sentence in left_out), end="", file=sys.stderr)
-    limit, swims = decisions_in(options.seconds, options.decision_period), []
-    for name, policy in agents.items():
-        env = SeastarSwimEnv(
-            path=path,
-            actions=actions_of(policy, n_limbs),
-            fidelity=options.fidelity if own is None else None,
-            scene=own,
-            decision_period=options.decision_period,
-            random_heading=options.random_heading,
-        )
-        swims.append(swim(name, policy, env, max_strokes=limit, seed=options.seed))
-        env.close()
-    return swims
+    evaluate(
+        agents, path, seed=options.seed, max_strokes=limit_of(options), waypoint_radius=options.waypoint_radius,
+        scene=own, decision_period=options.decision_period, out=options.out, video=options.video,
+        report=remarks(agents, options, command) if options.report else None,
+        fidelity=fidelity if own is None else None, random_heading=options.random_heading,
+    )  # fmt: skip
+
+
+def remarks(agents: Mapping[str, Policy], options: argparse.Namespace, command: str) -> "Remarks":
+    """Remarks of the report: how the agents were trained, and how the report was made."""
+    require_extra("Reports", "report", "plotly")
+    from seastar_gym.evaluation.report.charts import Curve, read_progress
+    from seastar_gym.evaluation.report.page import Remarks, read_bound, trials_table
+
+    trainings = {name: one.training for name, one in agents.items() if isinstance(one, LearnedPolicy)}
+    progress = {name: how["progress"] for name, how in trainings.items() if "progress" in how}
+    if options.runs:
+        progress = {folder.name: read_progress(folder) for folder in options.runs}
+    commands = dict.fromkeys(command for how in trainings.values() for command in how.get("commands", ()))
+    swum = f'Computed at fidelity "{options.fidelity[0]}".' if options.scene is None else f"Swum in {options.scene}."
+    return Remarks(
+        title=f"Evaluation: {options.path}",
+        sentences=[swum],
+        commands=[*commands, command],
+        curves=[Curve.of(name, rows) for name, rows in progress.items()],
+        tables=[] if options.trials is None else [trials_table(options.trials)],
+        bound=read_bound(options.bound) if options.bound.exists() else None,
+    )
+
+
+def swum_often(options: argparse.Namespace) -> None:
+    """Let the agents swim the sets."""
+    require_sound(options)
+    rows, period = list[Row](), options.decision_period
+    for fidelity in options.fidelity:
+        agents = load_agents(options.agents or OF_TRIALS, options.seed, fidelity, period)
+        rows += trials(
+            agents, options.sets, options.swims, fidelity=fidelity, seed=options.seed, decision_period=period,
+            threads=options.num_threads, max_strokes=limit_of(options),
+        )  # fmt: skip
+    print(as_text(rows, period))
+    if options.out is not None:
+        write_csv(rows, options.out)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
-    options = parser().parse_args(arguments)
-    try:
-        swims = evaluated(options)
-    except (ValueError, ImportError, FileNotFoundError) as bad_input:
-        print(bad_input, file=sys.stderr)
-        return 2
-    print(as_text(swims))
-    if options.out is not None:
-        options.out.mkdir(parents=True, exist_ok=True)
-        write_csv(swims, options.out / "evaluation.csv")
-        draw_traces(swims, RADIUS, options.out / "traces.png")
-        print(f"Written to {options.out}: evaluation.csv, traces.png")
-    return 0
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    options = parser().parse_args(given)
+    command = shlex.join(["seastar", "evaluate", *given])
+    return answered(lambda: compared(options, command) if options.sets is None else swum_often(options))

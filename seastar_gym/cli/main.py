@@ -24,7 +24,7 @@ COMMANDS = {
     "benchmark": Command("seastar_gym.benchmark.command", "measure agents on registered tasks over ten seeds"),
     "data": Command("seastar_gym.data.command", "write Minari datasets of agents on registered tasks"),
     "train": Command("seastar_gym.cli.train", "train a policy, in a checkout of the repository"),
-    "certify": Command("seastar_gym.certification.command", "measure what speed costs a scene in accuracy"),
+    "certify": Command("seastar_gym.accuracy.command", "measure what speed costs a scene in accuracy"),
     "sweep": Command("seastar_gym.sweep.command", "simulate thousands of designs, here or on a cluster"),
     "identify": Command("seastar_gym.identify.command", "fit numbers of a scene to measured trajectories"),
 }

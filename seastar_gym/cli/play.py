@@ -5,7 +5,6 @@ word per decision, and --film writes what is seen.
 """
 
 import argparse
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from seastar_gym.cli.keys import Steering, known_keys, typed
 from seastar_gym.cli.played import PlayedEnv
 from seastar_gym.cli.screen import Show, rate, screen
 from seastar_gym.cli.swim import outcome, show_all
-from seastar_gym.command import command_parser
+from seastar_gym.command import answered, command_parser
 from seastar_gym.envs.canvas import import_pygame
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.scene.checks import require_number
@@ -115,9 +114,4 @@ def play(options: argparse.Namespace) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
     options = parser().parse_args(arguments)
-    try:
-        print(play(options))
-    except (ValueError, ImportError, FileNotFoundError) as bad_input:
-        print(bad_input, file=sys.stderr)
-        return 2
-    return 0
+    return answered(lambda: print(play(options)))

@@ -6,21 +6,20 @@ environment, as that has been made; otherwise it swims along --path. Without opt
 """
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, get_args
 
 import gymnasium as gym
 
-from seastar_gym.benchmark.episodes import require_seen
 from seastar_gym.cli.screen import Show, rate, screen
-from seastar_gym.command import command_parser
+from seastar_gym.command import answered, command_parser
 from seastar_gym.controllers.contract import Policy, actions_in
 from seastar_gym.controllers.roster import HELP, load_agent
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
+from seastar_gym.evaluation.rollout import rollout
 from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in
-from seastar_gym.evaluation.tasks import make_task
+from seastar_gym.evaluation.tasks import make_task, require_seen
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.scene_file import load_scene
@@ -101,15 +100,14 @@ def show_episode(
     env: gym.Env[Any, Any], policy: Policy, show: Show, seed: int, limit: int | None = None
 ) -> dict[str, Any]:
     """Show one episode, for `limit` decisions at most; returns the last info."""
-    observation, info = env.reset(seed=seed)
-    state, begins, decisions = None, [True], 0
-    over = not show_all(env, show)
-    while not over and (limit is None or decisions < limit):
-        action, state = policy.predict(observation, state=state, episode_start=begins, deterministic=True)
-        observation, _, terminated, truncated, info = env.step(action)
-        begins, decisions = [False], decisions + 1
-        over = not show_all(env, show) or terminated or truncated
-    return info
+    last: dict[str, Any] = {}
+
+    def look(info: dict[str, Any]) -> bool:
+        last.update(info)
+        return not show_all(env, show)
+
+    rollout(env, policy, seeds=seed, until=limit, on_step=look)
+    return last
 
 
 def show_all(env: gym.Env[Any, Any], show: Show) -> bool:
@@ -130,9 +128,4 @@ def outcome(env: Any, info: dict[str, Any]) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
     options = parser().parse_args(arguments)
-    try:
-        print(watch(options))
-    except (ValueError, ImportError, FileNotFoundError) as bad_input:
-        print(bad_input, file=sys.stderr)
-        return 2
-    return 0
+    return answered(lambda: print(watch(options)))

@@ -5,7 +5,7 @@ A dataset is called TASK/LABEL-v0. Episodes have the seeds 0, 1, ... of the spli
 """
 
 import argparse
-import inspect
+import itertools
 import os
 import shlex
 import sys
@@ -13,17 +13,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, get_args
 
-import gymnasium as gym
 import numpy as np
-from gymnasium.envs.registration import load_env_creator
 
-from seastar_gym.benchmark.episodes import require_seen
-from seastar_gym.command import command_parser
+from seastar_gym.command import answered, command_parser
 from seastar_gym.controllers.contract import Policy, actions_in
 from seastar_gym.controllers.roster import HELP, load_agent
 from seastar_gym.controllers.scripted import RandomPolicy
 from seastar_gym.data.dataset import record, require_new, summary, write
-from seastar_gym.evaluation.tasks import require_task
+from seastar_gym.evaluation.tasks import env_of, parameters_of, require_seen, require_task
 from seastar_gym.extras import require_extra
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
@@ -66,7 +63,7 @@ def recorded(task: str, agent: str, options: argparse.Namespace, command: str) -
     arguments: dict[str, Any] = {} if options.fidelity is None else {"fidelity": options.fidelity}
     if options.random_paths:
         arguments |= _random_paths(task)
-    env: Any = gym.make(task, disable_env_checker=True, **arguments).unwrapped
+    env = env_of(task, **arguments)
     policy = _load(name, env, options.seed)
     require_seen(policy, env)
     arguments["actions"] = actions_in(policy, env.actions, env.scene.robot.n_limbs)
@@ -77,9 +74,7 @@ def recorded(task: str, agent: str, options: argparse.Namespace, command: str) -
 
 def _random_paths(task: str) -> dict[str, Any]:
     """Arguments for random paths and headings."""
-    entry: Any = gym.spec(task).entry_point
-    creator: Any = load_env_creator(entry) if isinstance(entry, str) else entry
-    if "path" not in inspect.signature(creator).parameters:
+    if "path" not in parameters_of(task):
         raise ValueError(f"{task} has no paths: leave --random-paths out.")
     return {"path": "random", "random_heading": True}
 
@@ -91,27 +86,27 @@ def _load(name: str, env: Any, seed: int) -> Policy:
     return load_agent(name, env, seed)
 
 
+def record_all(options: argparse.Namespace, command: str) -> int:
+    """Record every agent on every task; returns the exit code, 2 where nothing was recorded."""
+    require_extra("Datasets", "data", "minari", "h5py")
+    require_count("--episodes", options.episodes, 1, 1_000_000)
+    for task in options.tasks:
+        require_task(task)
+    write_to(options.out)
+    done = 0
+    for task, agent in itertools.product(options.tasks, options.agents):
+        try:
+            line = recorded(task, agent, options, command)
+        except (ValueError, FileNotFoundError) as unfit:
+            print(f"{agent} is not recorded on {task}: {unfit}", file=sys.stderr)
+            continue
+        print(line, flush=True)
+        done += 1
+    return 0 if done else 2
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """The command line; returns the exit code."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     options = parser().parse_args(given)
-    done = 0
-    try:
-        require_extra("Datasets", "data", "minari", "h5py")
-        require_count("--episodes", options.episodes, 1, 1_000_000)
-        for task in options.tasks:
-            require_task(task)
-        write_to(options.out)
-        for task in options.tasks:
-            for agent in options.agents:
-                try:
-                    line = recorded(task, agent, options, shlex.join(["seastar", "data", *given]))
-                except (ValueError, FileNotFoundError) as unfit:
-                    print(f"{agent} is not recorded on {task}: {unfit}", file=sys.stderr)
-                    continue
-                print(line, flush=True)
-                done += 1
-    except (ValueError, ImportError) as bad_input:
-        print(bad_input, file=sys.stderr)
-        return 2
-    return 0 if done else 2
+    return answered(lambda: record_all(options, shlex.join(["seastar", "data", *given])))

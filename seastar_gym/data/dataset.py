@@ -10,42 +10,19 @@ Minari keeps datasets below MINARI_DATASETS_PATH, or ~/.minari/datasets.
 """
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from numpy.typing import NDArray
 
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.data.recorder import Episode, Recorder
+from seastar_gym.evaluation.rollout import rollout
 from seastar_gym.version import __version__
 
 AT_ONCE = 128
 """Robots that swim side by side."""
-Act = Callable[[NDArray[np.float32], dict[str, Any]], Any]
-"""Function that gives actions of all robots for their observations and infos."""
-
-
-def by_policy(policy: Policy, n_robots: int) -> Act:
-    """Most probable actions of a policy, whose episodes begin with the first call."""
-    state: Any = None
-    begins = np.ones(n_robots, bool)
-
-    def act(observations: NDArray[np.float32], info: dict[str, Any]) -> Any:
-        nonlocal state, begins
-        actions, state = policy.predict(observations, state=state, episode_start=begins, deterministic=True)
-        begins = np.zeros(n_robots, bool)
-        return actions
-
-    return act
-
-
-def swim_once(batch: gym.vector.VectorEnv[Any, Any, Any], recorder: Recorder, act: Act, seeds: list[int]) -> None:
-    """Swim until every robot has finished an episode. batch: The recorder, or what is wrapped around it."""
-    observations, info = batch.reset(seed=seeds)  # type: ignore[arg-type]
-    while not recorder.n_finished.all():
-        observations, _, _, _, info = batch.step(act(observations, info))
 
 
 def record(task: str, policy: Policy, n_episodes: int, seed: int = 0, **arguments: Any) -> list[Episode]:
@@ -59,7 +36,7 @@ def record(task: str, policy: Policy, n_episodes: int, seed: int = 0, **argument
         recorder = Recorder(
             gym.make_vec(task, num_envs=len(seeds), vectorization_mode="vector_entry_point", **arguments)
         )
-        swim_once(recorder, recorder, by_policy(policy, len(seeds)), seeds)
+        rollout(recorder, policy, seeds=seeds)
         found += recorder.episodes(only_first=True)
         recorder.close()
     return found

@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
-from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from seastar_gym.evaluation.rollout import require_next_step
 from seastar_gym.scene.checks import require_kind
 
 if TYPE_CHECKING:
@@ -45,9 +45,7 @@ class Recorder(_VectorWrapper):
     def __init__(self, env: gym.vector.VectorEnv[Any, Any, Any]):
         require_kind("env", env, gym.vector.VectorEnv, "a batch, as gym.make_vec gives it")
         super().__init__(env)
-        mode = env.metadata.get("autoreset_mode")
-        if mode is not AutoresetMode.NEXT_STEP:
-            raise ValueError(f"A recorder needs autoreset_mode=AutoresetMode.NEXT_STEP, not {mode}.")
+        require_next_step("A recorder", env)
         self._rows: list[tuple[Any, ...]] = []  # what one step returned, and its actions
         self._infos: list[dict[str, NDArray[Any]]] = []
         self._begin = np.zeros(env.num_envs, np.int64)  # row of the first observation of the present episode

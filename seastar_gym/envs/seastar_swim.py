@@ -9,10 +9,12 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.accuracy.certificate import Certificate
+from seastar_gym.accuracy.info import warn_uncertified
 from seastar_gym.envs.commands import Actions, to_commands
+from seastar_gym.envs.decisions import unless_strokes
 from seastar_gym.envs.frame import Frame, frames_of
 from seastar_gym.envs.headings import Headings
-from seastar_gym.envs.promises import warn_uncertified
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.rendering import Renderer, renderer_of
 from seastar_gym.envs.reward import RewardWeights
@@ -20,7 +22,6 @@ from seastar_gym.envs.swimming import Outcome, Swimming
 from seastar_gym.envs.task import Path, Plain, SwimTask, make_scene
 from seastar_gym.envs.task_env import TaskEnv, checked_options
 from seastar_gym.scene import Scene
-from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.checks import require_choice, require_count, require_seed
 from seastar_gym.scene.numerics import Fidelity
 
@@ -181,7 +182,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     not say it.
     Errors from `path_error` to `time_error` were measured before, over sequences of commands that docs/accuracy.md
     names; among those of `path_error` are the straight swim and the pentagon. They belong to the robot's resolution and
-    the numerics (see `seastar_gym.scene.fidelity`), and are NaN for other robots and scenes than the chapter's, unless
+    the numerics (see `seastar_gym.accuracy`), and are NaN for other robots and scenes than the chapter's, unless
     a `certificate` has them, and for what was not measured. Where decisions are no strokes, they are those of
     `SmaWires` at whole seconds, over random commands and random seconds that are repeated; there `info` has them for
     the chapter's robot alone, at a fidelity and with decisions of 0.1 to 0.5 s, and no `batch_real_time_factor`. That
@@ -258,7 +259,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
             modelled, 1, path, reward, waypoint_radius, random_heading, 1, randomization, certificate, error_bars,
             actions, decision_period, observe_actuators, headings,
         )  # fmt: skip
-        warn_uncertified(modelled, None if scene is None else fidelity, task.certificate, decision_period)
+        timed = unless_strokes(decision_period, modelled)
+        warn_uncertified(modelled, None if scene is None else fidelity, task.certificate, timed)
         self._begin_with(task, frames_per_stroke)
 
     def _set_pictures(self, render_mode: RenderMode | None, frames_per_stroke: int | None) -> None:

@@ -19,8 +19,10 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.accuracy.certificate import Certificate
+from seastar_gym.accuracy.info import errors_in_info
 from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.decisions import checked_decision_period
+from seastar_gym.envs.decisions import checked_decision_period, unless_strokes
 from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.masks import action_masks, can_be_masked, masked_limbs
 from seastar_gym.envs.observation import (
@@ -33,14 +35,12 @@ from seastar_gym.envs.observation import (
     with_more,
 )
 from seastar_gym.envs.own_numbers import NO_MORE, OwnNumbers
-from seastar_gym.envs.promises import in_strokes, promised
 from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization, drawn_scene
 from seastar_gym.envs.reward import pulses_of
 from seastar_gym.envs.scenery import NOTHING, Scenery
 from seastar_gym.envs.stations import stations_of
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Mirror, complete
-from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.checks import require_flag
 from seastar_gym.simd.rows import to_rows
 from seastar_gym.simulator import Simulator, SolverStatus, StrokeReport
@@ -114,8 +114,7 @@ class Swimming(ABC):
         require_flag("random_heading", random_heading)
         require_flag("observe_actuators", observe_actuators)
         self.decision_period = checked_decision_period(decision_period, scene)
-        self._has_promises = True
-        self._in_strokes = in_strokes(scene, self.decision_period)
+        self._tells_errors = True
         self.actions: Actions = actions
         self.observe_actuators = observe_actuators
         self._can_be_masked = can_be_masked(scene.actuator)
@@ -125,8 +124,8 @@ class Swimming(ABC):
         self.simulator = Simulator(drawn_scene(scene, self.drawn), n_robots, threads, error_bars, effort)
         self._error_bars, self._effort = error_bars, effort
         self.certificate = certificate
-        self._promise = self.simulator.scene, self._promise_of(self.simulator.scene)
-        self._promised_names = tuple(self._promise[1])
+        self._measured = self.simulator.scene, self._errors_of(self.simulator.scene)
+        self._names_of_errors = tuple(self._measured[1])
         peak = np.max(self.simulator.scene.actuator.peak_angle)  # before the first draw the largest that may be drawn
         if scene.robot.hub_hinge == "turning" and 2 * peak >= scene.robot.opening_angle * (1 - 1e-9):
             raise ValueError(
@@ -340,22 +339,22 @@ class Swimming(ABC):
             "hub_position": hub.copy(),
             **self._goal_facts(hub),
             **({"action_mask": self.action_masks().astype(np.int8)} if self._can_be_masked else {}),
-            **(self._promised() if self._has_promises else {}),
+            **(self._errors() if self._tells_errors else {}),
             **({"error_estimate": self.simulator.error_estimate} if self._error_bars else {}),
             **{name: values.copy() for name, values in self.drawn.items()},
         }
 
-    def _promise_of(self, scene: Scene) -> dict[str, float]:
-        return promised(scene, self.certificate, None if self._in_strokes else self.decision_period)
+    def _errors_of(self, scene: Scene) -> dict[str, float]:
+        return errors_in_info(scene, self.certificate, unless_strokes(self.decision_period, self.scene))
 
-    def _promised(self) -> dict[str, Floats]:
+    def _errors(self) -> dict[str, Floats]:
         """Measured errors and speed, shape (n_robots,) each; NaN for robots with weak limbs."""
         simulator = self.simulator
-        if simulator.scene is not self._promise[0]:
-            self._promise = simulator.scene, self._promise_of(simulator.scene)
+        if simulator.scene is not self._measured[0]:
+            self._measured = simulator.scene, self._errors_of(simulator.scene)
         strong = (simulator.limb_strengths == 1.0).all(axis=1)
-        known = self._promise[1]
-        return {name: np.where(strong, known.get(name, np.nan), np.nan) for name in self._promised_names}
+        known = self._measured[1]
+        return {name: np.where(strong, known.get(name, np.nan), np.nan) for name in self._names_of_errors}
 
 
 def _messages(status: NDArray[np.int64]) -> NDArray[Any]:

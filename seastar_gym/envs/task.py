@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.accuracy.certificate import Certificate
+from seastar_gym.accuracy.info import read_certificate
 from seastar_gym.envs.commands import Actions
-from seastar_gym.envs.decisions import checked_decision_period
+from seastar_gym.envs.decisions import checked_decision_period, unless_strokes
 from seastar_gym.envs.headings import AskedHeadings, Headings
 from seastar_gym.envs.observation import scene_layout
 from seastar_gym.envs.paths import FARTHEST, cross_track_error, make_path
-from seastar_gym.envs.promises import read_certificate
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.reward import RewardWeights, reward_terms
 from seastar_gym.envs.swimming import Flags, Floats, Outcome, Score, Swimming
 from seastar_gym.scene import Scene, SmaWires
-from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.checks import as_float, require_number, shown
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.scene_file import load_scene
@@ -116,10 +116,10 @@ class SwimTask(Swimming):
             self.TERMS = (*self.TERMS, "reward_heading")
         self.headings = headings
         self._asked = None if headings is None else AskedHeadings(headings, n_robots)
-        known = read_certificate(certificate, scene, checked_decision_period(decision_period, scene))
+        timed = unless_strokes(checked_decision_period(decision_period, scene), scene)
         super().__init__(
             scene, n_robots, threads, random_heading=random_heading, draws=randomization,
-            certificate=known, error_bars=error_bars, actions=actions,
+            certificate=read_certificate(certificate, scene, timed), error_bars=error_bars, actions=actions,
             decision_period=decision_period, observe_actuators=observe_actuators, effort=effort,
         )  # fmt: skip
         self.randomization = randomization

@@ -12,13 +12,15 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from seastar_gym.accuracy.certificate import Certificate
+from seastar_gym.accuracy.info import warn_uncertified
 from seastar_gym.envs.batch_attributes import BatchAttributes
 from seastar_gym.envs.batch_info import Info, of_some, with_masks
 from seastar_gym.envs.batch_pictures import BatchPictures, Picture
 from seastar_gym.envs.buffers import Buffers, require_buffers
 from seastar_gym.envs.commands import Actions, as_array, to_commands
+from seastar_gym.envs.decisions import unless_strokes
 from seastar_gym.envs.headings import Headings
-from seastar_gym.envs.promises import warn_uncertified
 from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.seastar_swim import FRAMES_PER_SECOND
@@ -26,7 +28,6 @@ from seastar_gym.envs.swimming import Swimming
 from seastar_gym.envs.task import Path, Plain, SwimTask, make_scene
 from seastar_gym.envs.task_env import checked_options
 from seastar_gym.scene import Scene
-from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.checks import require_choice, require_count, require_seed, shown
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator.simulator import MAX_ROBOTS
@@ -94,7 +95,8 @@ class SeastarSwimVectorEnv(BatchAttributes, gym.vector.VectorEnv[Observations, A
             modelled, num_envs, path, reward, waypoint_radius, random_heading, threads, randomization, certificate,
             error_bars, actions, decision_period, observe_actuators, headings,
         )  # fmt: skip
-        warn_uncertified(modelled, None if scene is None else fidelity, task.certificate, decision_period)
+        timed = unless_strokes(decision_period, modelled)
+        warn_uncertified(modelled, None if scene is None else fidelity, task.certificate, timed)
         self._begin_with(task)
 
     def _set_batch(

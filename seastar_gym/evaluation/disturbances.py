@@ -5,6 +5,7 @@ observations and positions are carried back. So every robot of a batch has a cur
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,8 @@ from numpy.typing import NDArray
 from seastar_gym.controllers.greedy import turned
 from seastar_gym.envs.observation import VELOCITY_SCALE, scene_layout
 from seastar_gym.envs.stations import heading_of
-from seastar_gym.envs.task import Outcome, SwimTask
+from seastar_gym.envs.swimming import Flags, Outcome
+from seastar_gym.envs.task import SwimTask
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.per_robot import column
 
@@ -53,49 +55,58 @@ DISTURBANCES = {
 }
 
 
-class DisturbedTask:
-    """Task whose robots are disturbed; positions are those in the world, where the waypoints stand still."""
+class DisturbedTask(SwimTask):
+    """Task whose robots are disturbed; positions are those in the world, where the waypoints stand still.
 
-    def __init__(self, task: SwimTask, disturbance: Disturbance, rng: np.random.Generator):
-        self.task, self.disturbance, self._rng = task, disturbance, rng
-        robots, n_limbs = np.arange(task.n_robots), task.simulator.scene.robot.n_limbs
+    rng: Draws noise and lost strokes. what, how: Arguments of `SwimTask`.
+    """
+
+    def __init__(self, disturbance: Disturbance, rng: np.random.Generator, *what: Any, **how: Any):
+        super().__init__(*what, **how)
+        self.disturbance, self._rng = disturbance, rng
+        robots, n_limbs = np.arange(self.n_robots), self.scene.robot.n_limbs
         angles = 2.0 * np.pi / CURRENT_DIRECTIONS * robots
         self._current = disturbance.current * np.stack([np.cos(angles), np.sin(angles)], axis=1)
         left = np.where(robots[:, None] % n_limbs == np.arange(n_limbs), 1.0 - disturbance.weakness, 1.0)
-        task.simulator.set_limb_strengths(task.simulator.limb_strengths * left)
-        self._carried = np.zeros((task.n_robots, 2))
+        self.simulator.set_limb_strengths(self.simulator.limb_strengths * left)
+        self._carried = np.zeros((self.n_robots, 2))
 
-    def reset(self, generators: list[np.random.Generator]) -> None:
-        """Begin an episode of every robot, at rest in the world."""
-        self.task.reset(np.ones(self.task.n_robots, bool), generators)
-        state = self.task.simulator.get_state()
-        self.task.simulator.set_state(state._replace(velocities=state.velocities - self._current[:, None]))
-        self._carried[:] = 0.0
+    def reset(self, robots: Flags, generators: list[np.random.Generator], asked: Any = None) -> None:
+        """Begin an episode of the robots in a mask, at rest in the world where it is that of all."""
+        super().reset(robots, generators, asked)
+        if robots.all():  # a state is put into all robots
+            state = self.simulator.get_state()
+            self.simulator.set_state(state._replace(velocities=state.velocities - self._current[:, None]))
+        self._carried[robots] = 0.0
 
-    def hub_position(self) -> Floats:
-        """Positions of the hubs in the world [m], shape (n_robots, 2)."""
-        return self.task.simulator.hub_position() + self._carried
+    def facts(self, hub: Floats | None = None) -> dict[str, NDArray[Any]]:
+        """What is known of every robot now, with its place in the world."""
+        facts = super().facts(hub)
+        return facts | {"hub_position": facts["hub_position"] + self._carried}
 
     def observe(self) -> NDArray[np.float32]:
         """Observations of the disturbed robots, shape (n_robots, size)."""
-        seen, scene = self.task.observe(), self.task.simulator.scene
-        at = scene_layout(scene)
+        seen = super().observe()
+        at = scene_layout(self.scene)
         if self.disturbance.current > 0.0:
-            axes = heading_of(self.task.simulator)
+            axes = heading_of(self.simulator)
             seen[:, at.hub_velocity] += turned(self._current, -axes) / VELOCITY_SCALE
         if self.disturbance.noise > 0.0:
             n_places = 1 + seen[:, at.positions].shape[1] // 2
             error = self._rng.normal(0.0, self.disturbance.noise, (len(seen), n_places, 2))
-            error /= column(scene.robot.limb_length, 2)
+            error /= column(self.scene.robot.limb_length, 2)
             seen[:, at.positions] += (error[:, 1:] - error[:, :1]).reshape(len(seen), -1)
             seen[:, at.waypoints] -= np.tile(error[:, 0], 2)
         return seen
 
     def step(self, commands: Floats) -> Outcome:
-        """One decision of every robot; returns its outcome, with the commands that were followed and not lost."""
+        """One decision of every robot; returns its outcome, with the commands that were followed and not lost.
+
+        Robots whose solver gave up stay where they are: their swims are as long as those of others who do not arrive.
+        """
         lost = self._rng.random(len(commands)) < self.disturbance.lost
-        commands = np.where(lost[:, None], 0.0, commands)
-        drift = self._current * self.task.decision_period
-        self.task.waypoints -= drift[:, None]
+        drift = self._current * self.decision_period
+        self.waypoints -= drift[:, None]
         self._carried += drift
-        return self.task.step(commands)
+        outcome = super().step(np.where(lost[:, None], 0.0, commands))
+        return outcome._replace(terminated=outcome.info["is_success"])

@@ -1,17 +1,14 @@
-"""Pictures and videos of swims. matplotlib is imported where something is drawn."""
+"""Pictures of swims. matplotlib is imported where something is drawn."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.evaluation import films
 from seastar_gym.evaluation.swim import Swim
 from seastar_gym.files import save_figure
 
@@ -116,18 +113,3 @@ def _draw_trace(axes: Axes, swim: Swim, number: int) -> None:
     axes.plot(*dots.T, color=colour, linestyle="", marker="o", markersize=width + 2.0, zorder=level)
     marker = "o" if swim.finished else "X"
     axes.plot(*hub[-1], color=colour, marker=marker, markersize=9, markeredgecolor="w", zorder=level + 0.5)
-
-
-@contextmanager
-def film(file: Path) -> Generator[Callable[[SeastarSwimEnv], None], None, None]:
-    """An MP4 video of an episode: call what it gives with an environment, after its reset and after every stroke.
-
-    The environment's render_mode is "rgb_array_list", its frames_per_stroke FRAMES_PER_STROKE.
-    """
-    with films.film(file, FPS) as add:
-
-        def add_stroke(env: SeastarSwimEnv) -> None:
-            for frame in env.render() or ():
-                add(frame)
-
-        yield add_stroke

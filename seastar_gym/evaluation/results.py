@@ -1,15 +1,36 @@
-"""Results of an evaluation: a row of numbers for every swim, as text and as CSV."""
+"""Results of swims: a row of numbers for each, their means with intervals, and tables of them, as text and as CSV."""
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from seastar_gym.evaluation.statistics import Estimate, mean_with_interval
 from seastar_gym.evaluation.swim import Swim
 from seastar_gym.files import beside
 
+Row = dict[str, str | int | float | None]
+
 MM = 1000.0
 """Millimetres in a metre."""
+
+OF_SWIMS: dict[str, Callable[[Swim], int | float | None]] = {
+    "strokes_to_finish": lambda done: done.strokes if done.finished else None,
+    "simulated_time_s": lambda done: float(done.time[-1]),
+    "waypoints_reached": lambda done: done.waypoints_reached,
+    "waypoints": lambda done: len(done.waypoints),
+    "mean_cross_track_error_mm": lambda done: MM * float(done.cross_track_errors.mean()),
+    "largest_cross_track_error_mm": lambda done: MM * float(done.cross_track_errors.max()),
+    "limbs_heated_per_metre": lambda done: done.heated_per_metre,
+    "heating_time_s": lambda done: done.seconds_heated,
+    "energy_per_metre_J": lambda done: done.joules_per_metre,
+}
+"""Measures of a swim, by the names of the CSV; None where there is no number, as for an unfinished swim."""
+MEANS = (
+    "strokes_to_finish", "mean_cross_track_error_mm", "limbs_heated_per_metre", "simulated_time_s",
+    "energy_per_metre_J",
+)  # fmt: skip
+"""Those whose means tell of many swims, besides the rate of success."""
 
 COLUMNS = {
     "agent": "agent",
@@ -24,33 +45,28 @@ COLUMNS = {
 """Titles of the printed columns, by the names of the CSV's."""
 
 
-def results(swims: Sequence[Swim]) -> list[dict[str, str | int | float | None]]:
-    """Rows of the table, by the names of the CSV; None where there is no number, as for an unfinished swim."""
-    return [
-        {
-            "agent": done.agent,
-            "strokes_to_finish": done.strokes if done.finished else None,
-            "simulated_time_s": float(done.time[-1]),
-            "waypoints_reached": done.waypoints_reached,
-            "waypoints": len(done.waypoints),
-            "mean_cross_track_error_mm": MM * float(done.cross_track_errors.mean()),
-            "largest_cross_track_error_mm": MM * float(done.cross_track_errors.max()),
-            "limbs_heated_per_metre": done.heated_per_metre,
-            "heating_time_s": done.seconds_heated,
-            "energy_per_metre_J": done.joules_per_metre,
-        }
-        for done in swims
-    ]
+def results(swims: Sequence[Swim]) -> list[Row]:
+    """Rows of the table, by the names of the CSV."""
+    return [{"agent": done.agent, **{name: of(done) for name, of in OF_SWIMS.items()}} for done in swims]
 
 
-def in_words(swims: Sequence[Swim]) -> list[dict[str, str | int | float | None]]:
+def statistics(swims: Sequence[Swim]) -> dict[str, Estimate]:
+    """Mean measures of a set of swims, by name, with intervals; strokes and seconds are those of finished swims."""
+    finished = [done for done in swims if done.finished]
+    found = {"success_rate": mean_with_interval([done.finished for done in swims])}
+    for name in MEANS:
+        values = map(OF_SWIMS[name], finished if name == "simulated_time_s" else swims)
+        found[name] = mean_with_interval([value for value in values if value is not None])
+    return found
+
+
+def in_words(swims: Sequence[Swim]) -> list[Row]:
     """Rows of `results` with the waypoints reached in words."""
     return [{**row, "waypoints_reached": f"{row['waypoints_reached']} of {row['waypoints']}"} for row in results(swims)]
 
 
-def write_csv(swims: Sequence[Swim], file: Path) -> None:
-    """Write the rows of `results` as CSV."""
-    rows = results(swims)
+def write_csv(rows: Sequence[Mapping[str, Any]], file: Path) -> None:
+    """Write rows with the same names as CSV."""
     with beside(file) as part, part.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.DictWriter(stream, fieldnames=list(rows[0]))
         writer.writeheader()
@@ -59,8 +75,9 @@ def write_csv(swims: Sequence[Swim], file: Path) -> None:
 
 def as_text(swims: Sequence[Swim]) -> str:
     """Table of the results, for a terminal."""
-    rows = [[number(row[name]) for name in COLUMNS] for row in in_words(swims)]
-    return text_table(list(COLUMNS.values()), rows)
+    unit = {done.counted_in for done in swims}
+    titles = [title if unit == {"strokes"} else title.replace("strokes", "decisions") for title in COLUMNS.values()]
+    return text_table(titles, [[number(row[name]) for name in COLUMNS] for row in in_words(swims)])
 
 
 def text_table(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

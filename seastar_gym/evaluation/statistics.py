@@ -1,7 +1,7 @@
-"""Statistics of strokes to finish, over seeds of the training and paths."""
+"""Means and their intervals by bootstrap, over swims, episodes, paths, and seeds of trainings."""
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,6 +10,8 @@ from scipy.stats import bootstrap, spearmanr, trim_mean
 Floats = NDArray[np.float64]
 
 CONFIDENCE, RESAMPLES = 0.95, 2000
+ENDS = (50.0 * (1.0 - CONFIDENCE), 100.0 - 50.0 * (1.0 - CONFIDENCE))
+"""Percentiles at the ends of an interval."""
 
 
 class Estimate(NamedTuple):
@@ -21,6 +23,16 @@ class Estimate(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.mean:.1f}" + ("" if np.isnan(self.low) else f" [{self.low:.1f}, {self.high:.1f}]")
+
+
+def mean_with_interval(values: ArrayLike) -> Estimate:
+    """Mean of values and the ends of its bootstrap confidence interval; NaN where there are no values."""
+    values = np.asarray(values, float)
+    if len(values) == 0:
+        return Estimate(np.nan, np.nan, np.nan)
+    if np.ptp(values) == 0.0:
+        return Estimate(*[float(values[0])] * 3)
+    return Estimate(float(values.mean()), *_bootstrapped((values,), np.mean, batch=100))
 
 
 def interquartile_mean(values: ArrayLike) -> float:
@@ -45,11 +57,30 @@ def estimate(scores: ArrayLike) -> Estimate:
         found: Floats = trim_mean(np.concatenate(paths, axis=axis), 0.25, axis=axis)
         return found
 
+    return Estimate(mean, *_bootstrapped(tuple(scores.T), of_all, vectorized=True))
+
+
+def _bootstrapped(samples: tuple[Floats, ...], statistic: Callable[..., Any], **how: Any) -> tuple[float, float]:
+    """Ends of the interval of a statistic of samples, each of which is drawn anew."""
     found = bootstrap(
-        tuple(scores.T), of_all, confidence_level=CONFIDENCE, n_resamples=RESAMPLES, method="percentile",
-        vectorized=True, rng=np.random.default_rng(0),
+        samples, statistic, confidence_level=CONFIDENCE, n_resamples=RESAMPLES, method="percentile",
+        rng=np.random.default_rng(0), **how,
     ).confidence_interval  # fmt: skip
-    return Estimate(mean, float(found.low), float(found.high))
+    return float(found.low), float(found.high)
+
+
+def crossed_interval(seeds: Sequence[Floats]) -> tuple[float, float]:
+    """Ends of the interval of the mean that holds for other seeds and other episodes. seeds: Scores of each seed.
+
+    All seeds swim the same episodes, so that a bootstrap draws seeds, and episodes for all of them alike.
+    """
+    most = min(map(len, seeds))
+    values = np.array([of_seed[:most] for of_seed in seeds])
+    rng, (n_seeds, n_episodes) = np.random.default_rng(0), values.shape
+    drawn_seeds = rng.multinomial(n_seeds, np.full(n_seeds, 1.0 / n_seeds), RESAMPLES) / n_seeds
+    drawn_episodes = rng.multinomial(n_episodes, np.full(n_episodes, 1.0 / n_episodes), RESAMPLES) / n_episodes
+    low, high = np.percentile(((drawn_seeds @ values) * drawn_episodes).sum(axis=1), ENDS)
+    return float(low), float(high)
 
 
 def rank_correlation(one: Sequence[float], other: Sequence[float]) -> float:
@@ -69,6 +100,5 @@ def profile(scores: ArrayLike, levels: ArrayLike) -> tuple[Floats, Floats, Float
     shares = (scores[..., None] >= levels).mean(axis=(0, 1))
     drawn = rng.integers(n_seeds, size=(RESAMPLES, n_seeds, n_tasks))
     reached = np.take_along_axis(scores[None], drawn, axis=1)[..., None] >= levels
-    tail = 50.0 * (1.0 - CONFIDENCE)
-    low, high = np.percentile(reached.mean(axis=(1, 2)), [tail, 100.0 - tail], axis=0)
+    low, high = np.percentile(reached.mean(axis=(1, 2)), ENDS, axis=0)
     return shares, low, high

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from seastar_gym.controllers.contract import Policy, require_fit, require_policy
 from seastar_gym.envs.paths import cross_track_error, path_length
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.evaluation.rollout import MOST_DECISIONS, Episodes, Info, rollout
 from seastar_gym.scene.checks import require_callable, require_count, require_kind
 
 Floats = NDArray[np.float64]
-MOST_DECISIONS = 1_000_000_000
-"""Most decisions of a swim."""
 TIME_LIMIT = 400.0
 """Time after which a swim that is evaluated ends, unless another limit is given [s]."""
+RECORDED = ("hub_position", "waypoint_index", "time", "limbs_heated", "heating_time", "energy", "solver_message")
+"""Entries of info that make a `Swim`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,26 +149,34 @@ def swim(
     assert env.observation_space.shape is not None
     n_seen, challenge = env.observation_space.shape[0], getattr(env, "challenge", None)
     require_fit(policy, env.scene, env.actions, env.decision_period, n_seen, challenge)
-    observation, info = env.reset(seed=seed, options=reset_options)
-    infos = [info]
-    state, over = None, False
-    if watch is not None:
-        watch(env)
-    while not over and len(infos) <= max_strokes:
-        begins = np.array([len(infos) == 1])
-        action, state = policy.predict(observation, state=state, episode_start=begins, deterministic=True)
-        observation, _, over, _, info = env.step(action)
-        infos.append(info)
+
+    def look(info: Info) -> None:
         if watch is not None:
             watch(env)
+
+    found = rollout(
+        env, policy, seeds=seed, options=reset_options, until=max_strokes, record=RECORDED, on_step=look
+    )  # fmt: skip
+    (done,) = swims_of(agent, found)
+    return done
+
+
+def swims_of(agent: str, found: Episodes) -> list[Swim]:
+    """Swims of an agent, from episodes along waypoints in which RECORDED was kept."""
+    return [_swim_of(agent, found, robot) for robot in range(len(found.decisions))]
+
+
+def _swim_of(agent: str, found: Episodes, robot: int) -> Swim:
+    end = found.decisions[robot] + 1
+    of = {name: values[:end, robot].copy() for name, values in found.entries.items()}
     return Swim(
         agent=agent,
-        waypoints=env.waypoints,
-        hub=np.array([info["hub_position"] for info in infos]),
-        waypoint_index=np.array([info["waypoint_index"] for info in infos]),
-        time=np.array([info["time"] for info in infos]),
-        limbs_heated=np.array([info["limbs_heated"] for info in infos[1:]], dtype=np.int64),
-        heating_time=np.array([info["heating_time"] for info in infos[1:]], dtype=np.float64),
-        energy=np.array([info["energy"] for info in infos[1:]], dtype=np.float64),
-        solver_message=infos[-1]["solver_message"] or None,
+        waypoints=found.waypoints[robot],
+        hub=of["hub_position"],
+        waypoint_index=of["waypoint_index"],
+        time=of["time"],
+        limbs_heated=of["limbs_heated"][1:],
+        heating_time=of["heating_time"][1:],
+        energy=of["energy"][1:],
+        solver_message=str(of["solver_message"][-1]) or None,
     )

@@ -1,8 +1,20 @@
-"""Registered environments of this package, by id."""
+"""Registered environments of this package, by id, and episodes that an agent swims in them, one for each seed."""
 
+import inspect
 from typing import Any
 
 import gymnasium as gym
+from gymnasium.envs.registration import load_env_creator
+
+from seastar_gym.controllers.contract import Policy, actions_in, require_fit
+from seastar_gym.controllers.greedy import Searcher
+from seastar_gym.envs.task import scene_observation_size
+from seastar_gym.envs.tasks.numbered import Split
+from seastar_gym.evaluation.rollout import Batch, Episodes, rollout
+from seastar_gym.scene.numerics import Fidelity
+
+RECORDED = ("time", "distance", "catches", "taken")
+"""Entries of info that measures need, where a task has them."""
 
 
 def task_ids() -> list[str]:
@@ -21,3 +33,66 @@ def make_task(task: str, **arguments: Any) -> gym.Env[Any, Any]:
     require_task(task)
     env: gym.Env[Any, Any] = gym.make(task, disable_env_checker=True, **arguments)
     return env
+
+
+def parameters_of(task: str) -> set[str]:
+    """Names of the arguments of a task's environment."""
+    entry: Any = gym.spec(task).entry_point
+    return set(inspect.signature(load_env_creator(entry) if isinstance(entry, str) else entry).parameters)
+
+
+def held_out(task: str, fidelity: Fidelity | None = None, split: Split = "test") -> dict[str, Any]:
+    """Arguments that keep a task to the episodes of a split, where it has splits; by default those that no training
+    draws. fidelity: None means the task's own."""
+    return ({"split": split} if "split" in parameters_of(task) else {}) | (
+        {} if fidelity is None else {"fidelity": fidelity}
+    )
+
+
+def env_of(task: str, **arguments: Any) -> Any:
+    """Environment of a task, of one robot, without wrappers."""
+    return gym.make(task, disable_env_checker=True, **arguments).unwrapped
+
+
+def make_batch(task: str, n: int, /, threads: int | None = None, **arguments: Any) -> Batch:
+    """Batch of a task, the native one where there is one. threads: Of the native one; None means one per processor."""
+    if gym.spec(task).vector_entry_point is None:
+        return gym.make_vec(task, n, vectorization_mode="sync", **arguments)
+    return gym.make_vec(task, n, vectorization_mode="vector_entry_point", threads=threads, **arguments)
+
+
+def require_seen(policy: Policy, env: Any) -> None:
+    """ValueError where an agent cannot know what a task shows, or cannot drive its robot."""
+    n_seen, n_known = env.observation_space.shape[0], scene_observation_size(env.scene)
+    if isinstance(policy, Searcher) and n_seen != n_known:
+        raise ValueError(f"It reads observations of {n_known} numbers, the task shows {n_seen}.")
+    actions = actions_in(policy, env.actions, env.scene.robot.n_limbs)
+    require_fit(policy, env.scene, actions, env.decision_period, n_seen, getattr(env, "challenge", None))
+
+
+def swim_episodes(
+    task: str,
+    policy: Policy,
+    seeds: list[int],
+    *,
+    fidelity: Fidelity | None = None,
+    max_decisions: int | None = None,
+    threads: int | None = None,
+    split: Split = "test",
+) -> Episodes:
+    """Episodes with these seeds, each to its end, with deterministic actions.
+
+    fidelity: None means the task's own. max_decisions: None means the time limit of the task. threads: Of the
+    simulator; None means one per processor. split: Where a task has splits, the one whose episodes are swum.
+    """
+    arguments = held_out(task, fidelity, split)
+    plain = env_of(task, **arguments)
+    require_seen(policy, plain)
+    mode = actions_in(policy, plain.actions, plain.scene.robot.n_limbs)
+    limit = max_decisions or gym.spec(task).max_episode_steps
+    if limit is None:
+        raise ValueError(f"The task {task!r} has no time limit.")
+    batch = make_batch(task, len(seeds), threads, actions=mode, max_episode_steps=limit, **arguments)
+    episodes = rollout(batch, policy, seeds=seeds, record=RECORDED)
+    batch.close()
+    return episodes._replace(limit=limit * plain.decision_period)

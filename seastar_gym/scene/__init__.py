@@ -1,8 +1,8 @@
 """Description of what is simulated: robot, fluid, actuator, contact and numerics, joined in a `Scene`.
 
 All parts are frozen dataclasses in SI units. Their annotations declare units and bounds of numbers (`number.py`),
-`checks.py` refuses bad values, `per_robot.py` allows numbers that differ from robot to robot, `serial.py` writes scenes
-to plain data, and `fidelity.py` knows the measured errors of numerics.
+`checks.py` refuses bad values, `per_robot.py` allows numbers that differ from robot to robot, and `serial.py` writes
+scenes to plain data.
 """
 
 from seastar_gym.scene.actuators.limited import Limited

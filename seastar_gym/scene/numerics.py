@@ -72,20 +72,20 @@ ADAPTATION = (0.04, 2.0)
 """Constants (c, p): steps with an error rate of (tolerance/c)^p limb lengths per stroke keep the path's tolerance."""
 
 
-class Setting(NamedTuple):
-    """Resolution of a robot, see `Seastar`, and numerics: what errors depend on."""
+class Resolution(NamedTuple):
+    """Discretisation and nodes per limb, see `Seastar`, and numerics: what errors of a scene depend on."""
 
     discretisation: Discretisation
     nodes_per_limb: int
     numerics: Numerics
 
 
-PRESETS: dict[Fidelity, Setting] = {
-    "fast": Setting("continuum", 7, Numerics("implicit-midpoint", 5e-3, newton_tolerance=1e-5)),
-    "balanced": Setting("continuum", NODES["continuum"], Numerics("implicit-midpoint", 5e-3, newton_tolerance=1e-5)),
-    "accurate": Setting("continuum", 19, Numerics("implicit-midpoint", 1e-3, newton_tolerance=1e-6)),
-    "reference": Setting("continuum", 37, Numerics("implicit-midpoint", 0.3e-3)),
-    "chapter": Setting("chapter", NODES["chapter"], Numerics("implicit-euler", 3e-3)),
+PRESETS: dict[Fidelity, Resolution] = {
+    "fast": Resolution("continuum", 7, Numerics("implicit-midpoint", 5e-3, newton_tolerance=1e-5)),
+    "balanced": Resolution("continuum", NODES["continuum"], Numerics("implicit-midpoint", 5e-3, newton_tolerance=1e-5)),
+    "accurate": Resolution("continuum", 19, Numerics("implicit-midpoint", 1e-3, newton_tolerance=1e-6)),
+    "reference": Resolution("continuum", 37, Numerics("implicit-midpoint", 0.3e-3)),
+    "chapter": Resolution("chapter", NODES["chapter"], Numerics("implicit-euler", 3e-3)),
 }
 """Chosen from the front that `python -m studies.accuracy` measures."""
 

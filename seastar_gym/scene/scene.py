@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from operator import itemgetter
 from os import PathLike
-from typing import Any, cast, get_args
+from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from seastar_gym.scene.actuators.pulse import SmaPulse
 from seastar_gym.scene.along import AlongLimb
 from seastar_gym.scene.at_rest import touching_at_rest
 from seastar_gym.scene.body import Body
-from seastar_gym.scene.certified import Certified, as_certificate
 from seastar_gym.scene.checks import (
     is_finite_number,
     require_choice,
@@ -30,13 +29,15 @@ from seastar_gym.scene.checks import (
     shown,
 )
 from seastar_gym.scene.contact import Contact
-from seastar_gym.scene.fidelity import NOT_MEASURED, cheapest
 from seastar_gym.scene.fluid import Water
-from seastar_gym.scene.numerics import DEFAULT, DEFAULT_FIDELITY, MAX_STEPS, PRESETS, Fidelity, Numerics, SchemeName
+from seastar_gym.scene.numerics import DEFAULT, DEFAULT_FIDELITY, MAX_STEPS, PRESETS, Fidelity, Numerics
 from seastar_gym.scene.per_robot import batch_size, chosen
-from seastar_gym.scene.robot import Discretisation, Seastar
+from seastar_gym.scene.robot import Seastar
 from seastar_gym.scene.serial import from_dict, register_part, to_dict
 from seastar_gym.scene.shape import cross_at_rest, n_hub_hinges, natural_hub_angle, turn_per_hinge
+
+if TYPE_CHECKING:
+    from seastar_gym.accuracy import Certificate
 
 
 @register_part
@@ -252,7 +253,7 @@ class Scene:
         """The chapter's robot and water with the nodes per limb, discretisation and numerics of a fidelity.
 
         "fast", "balanced", "accurate" and "reference" are of the continuum, "chapter" is the chapter's discretisation.
-        `seastar_gym.scene.fidelity.promise` returns the measured errors and speed of each.
+        `seastar_gym.accuracy.chapters_certificate().of(scene)` returns the measured errors and speed of each.
         """
         require_choice("fidelity", fidelity, get_args(Fidelity))
         discretisation, nodes_per_limb, numerics = PRESETS[fidelity]
@@ -285,7 +286,7 @@ class Scene:
         error: float,
         any_gait: bool = False,
         robot: Seastar | None = None,
-        certificate: Certified | str | PathLike[str] | None = None,
+        certificate: "Certificate | str | PathLike[str] | None" = None,
     ) -> "Scene":
         """Scene at the fastest measured setting whose path error is at most `error`.
 
@@ -295,27 +296,21 @@ class Scene:
         any_gait: Require it for the repetition of any command, too, which is harder.
         robot: The robot. Nodes per limb and a discretisation that it names are kept, others are chosen.
         certificate: `Certificate` of the scene, or the file of one, whose errors are those of any gait. It lapses where
-            the robot or the version of the package differs. None means the package's table, which is of the chapter's
+            the robot or the version of the package differs. None means the package's own, which is of the chapter's
             robot and water.
         """
-        if not isinstance(robot, Seastar | None):
-            raise ValueError(f"robot must be a Seastar or None, not {shown(robot)}.")
-        if certificate is not None:
-            require_flag("any_gait", any_gait)
-            return cast(Scene, as_certificate(certificate).kept_by(error, robot))
-        if robot is not None and not _is_chapters(robot):
-            raise ValueError(NOT_MEASURED.format(shown(robot)))
-        best = cheapest(error, any_gait, *(() if robot is None else robot.named_resolution))
-        numerics = Numerics(
-            cast(SchemeName, best.scheme), best.step, best.newton_tolerance, path_tolerance=best.path_tolerance
-        )
-        discretisation = cast(Discretisation, best.discretisation)
-        return cls(Seastar(nodes_per_limb=best.nodes_per_limb, discretisation=discretisation), numerics=numerics)
+        from seastar_gym.accuracy import as_certificate, chapters_certificate  # these are made of scenes
+
+        require_flag("any_gait", any_gait)
+        known = chapters_certificate() if certificate is None else as_certificate(certificate)
+        classes = known.promised + known.repeated(tuple(known.settings[0].errors)) if any_gait else known.promised
+        return known.for_error(error, classes, robot)
 
     @property
     def is_chapters(self) -> bool:
         """Whether all is the chapter's except numerics, nodes per limb and discretisation."""
-        return _is_chapters(self.robot) and self == Scene(self.robot, numerics=self.numerics)
+        robot = Seastar(nodes_per_limb=self.robot.nodes_per_limb, discretisation=self.robot.discretisation)
+        return self == Scene(robot, numerics=self.numerics)
 
     def to_dict(self) -> dict[str, Any]:
         """Scene as plain data for JSON, see serial.py. ValueError if it could not be read back."""
@@ -334,11 +329,6 @@ class Scene:
     def of_robot(self, index: int) -> "Scene":
         """Scene of one robot of a batch."""
         return chosen(self, itemgetter(index))
-
-
-def _is_chapters(robot: Seastar) -> bool:
-    """Whether a robot is the chapter's except for its nodes per limb and its discretisation."""
-    return robot == Seastar(nodes_per_limb=robot.nodes_per_limb, discretisation=robot.discretisation)
 
 
 def _has_sound_body(robot: Seastar) -> bool:

@@ -5,12 +5,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.controllers.contract import actions_of, require_fit
+from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.task import SwimTask
+from seastar_gym.evaluation.rollout import TaskBatch, rollout
 from seastar_gym.scene import Scene
 from seastar_gym.scene.per_robot import with_numbers
 from seastar_gym.simulator import Simulator
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.frames import Frame
-from seastar_gym.sweep.piloted import steer
+from seastar_gym.sweep.pilots import Pilot
 
 Floats = NDArray[np.float64]
 
@@ -42,6 +46,14 @@ OF_CONTROLLERS = {"time": "s", "waypoints": "1"}
 
 time: Time until the last waypoint is reached; NaN if it is not. waypoints: Number of waypoints reached.
 """
+
+RADIUS = 0.01
+"""Radius of waypoints [m]."""
+OF_EPISODES = (
+    "time", "waypoint_index", "hub_position", "energy", "work", "peak_moment", "smallest_opening_angle",
+    "newton_iterations", "solver_status",
+)  # fmt: skip
+"""Entries of info that the columns of controllers are made of."""
 
 
 def units_of(frame: Frame) -> dict[str, str]:
@@ -103,13 +115,50 @@ def repeat(scene: Scene, frame: Frame, n_robots: int) -> dict[str, NDArray[Any]]
         iterations, energy = iterations + report.newton_iterations, energy + report.energy
         work, moment = work + report.work, np.maximum(moment, report.peak_moment)
     way = (simulator.hub_position() - hub) @ [1.0, 1.0j] * np.exp(-1j * heading)
-    turn = simulator.heading() - heading
     speed = np.abs(way) / (swum.measured * interval)
+    return {
+        **ways(scene, speed, way, simulator.heading() - heading), "energy": energy, "work": work, "peak_moment": moment,
+        "smallest_opening_angle": angle, "newton_iterations": iterations, "status": status,
+    }  # fmt: skip
+
+
+def steer(scene: Scene, frame: Scene, pilot: Pilot, n_robots: int) -> dict[str, NDArray[Any]]:
+    """Columns of results of robots side by side that a controller steers, up to the last waypoint or the time limit.
+
+    frame: Scene that the controller knows.
+    """
+    n_limbs, policy, waypoints = scene.robot.n_limbs, pilot.policy(frame), np.array(pilot.waypoints)
+    actions = actions_of(policy, n_limbs)
+    require_fit(policy, scene, actions, pilot.decision_period)
+    task = SwimTask(
+        scene, n_robots, waypoints, RewardWeights(), RADIUS, False, 1, actions=actions,
+        decision_period=pilot.decision_period, effort=True,
+    )  # fmt: skip
+    headings: list[Floats] = []
+    swum = rollout(
+        TaskBatch(task), policy, seeds=0, until=pilot.decisions, record=OF_EPISODES,
+        on_step=lambda info: headings.append(task.heading()),
+    )  # fmt: skip
+    begin, end = headings[0], np.array(headings)[swum.decisions, np.arange(n_robots)]
+    reached, time = swum.last("waypoint_index"), swum.last("time")
+    lengths = np.cumsum([0.0, *np.hypot(*np.diff(waypoints, axis=0, prepend=0.0).T)])
+    way = swum.last("hub_position") @ [1.0, 1.0j] * np.exp(-1j * begin)
+    return {
+        **ways(scene, lengths[reached] / time, way, end - begin),
+        "energy": swum.total("energy"), "work": swum.total("work"),
+        "peak_moment": swum.of("peak_moment", 0.0).max(axis=0),
+        "smallest_opening_angle": np.fmin.reduce(swum.of("smallest_opening_angle"), axis=0),
+        "newton_iterations": swum.total("newton_iterations"),
+        "time": np.where(reached == len(waypoints), time, np.nan), "waypoints": reached.astype(np.float64),
+        "status": swum.last("solver_status").astype(np.float64),
+    }  # fmt: skip
+
+
+def ways(scene: Scene, speed: Floats, way: NDArray[np.complex128], turn: Floats) -> dict[str, Floats]:
+    """Columns of where robots swam. way: Of the hub, in the body frame of the beginning [m]. turn: On it [rad]."""
     with np.errstate(divide="ignore"):
         strokes = 1.0 / (speed * scene.actuator.period)
     return {
         "speed": speed, "strokes_per_metre": strokes, "ahead": way.real, "aside": way.imag,
-        "turn": turn - 2.0 * np.pi * np.rint(turn / (2.0 * np.pi)), "energy": energy,
-        "work": work, "peak_moment": moment, "smallest_opening_angle": angle, "newton_iterations": iterations,
-        "status": status,
+        "turn": turn - 2.0 * np.pi * np.rint(turn / (2.0 * np.pi)),
     }  # fmt: skip

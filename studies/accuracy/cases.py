@@ -1,17 +1,13 @@
-"""Swims of the accuracy study: command sequences, the simulated swim, and its error against another."""
+"""Command sequences of the accuracy study."""
 
 import itertools
-from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.envs.paths import path_length
 from seastar_gym.gaits import PAIRS, STRAIGHT, pentagon_gait
-from seastar_gym.scene import Scene
-from seastar_gym.scene.numerics import Setting
-from seastar_gym.simulator import Simulator, SolverStatus
 
 Floats = NDArray[np.float64]
 Kind = Literal["straight", "pair", "pentagon", "random", "slow", "gait"]
@@ -40,38 +36,6 @@ class Cases:
     def first(self, n: int) -> "Cases":
         """The sequences of the first n robots."""
         return Cases(self.names[:n], self.kinds[:n], self.commands[:, :n])
-
-
-class Swim(NamedTuple):
-    """Paths of robots, and the solver's work on them.
-
-    hub: Hub positions after every stroke [m], shape (n_strokes, n_robots, 2).
-    heading: Headings after every stroke [rad], shape (n_strokes, n_robots).
-    iterations, steps: Newton iterations and time steps per stroke, averaged over strokes and robots.
-    rejections: Number of time steps rejected because of their estimated error, over all strokes and robots.
-    halvings: Number of time steps halved because Newton did not converge, over all strokes and robots.
-    failed: Number of robots that the solver failed on.
-    """
-
-    hub: Floats
-    heading: Floats
-    iterations: float
-    steps: float
-    rejections: int
-    halvings: int
-    failed: int
-
-
-class Errors(NamedTuple):
-    """Errors of every robot against another swim of the same commands, shape (n_robots,).
-
-    path, end: Largest and last distance of the hub from the other path, as fractions of a path's length.
-    heading: Largest difference of the heading [rad].
-    """
-
-    path: Floats
-    heading: Floats
-    end: Floats
 
 
 def repeated(names: list[str], kinds: list[Kind], commands: Floats) -> Cases:
@@ -148,47 +112,3 @@ def joined(*cases: Cases) -> Cases:
     names = tuple(name for each in cases for name in each.names)
     kinds = tuple(kind for each in cases for kind in each.kinds)
     return Cases(names, kinds, np.concatenate([each.commands for each in cases], axis=1))
-
-
-def scene_of(setting: Setting, physics: Scene = Scene()) -> Scene:
-    """Scene of a robot, a fluid and an actuator, by default the chapter's, at a setting."""
-    discretisation, nodes_per_limb, numerics = setting
-    robot = replace(physics.robot, discretisation=discretisation, nodes_per_limb=nodes_per_limb)
-    return replace(physics, robot=robot, numerics=numerics)
-
-
-def swim(cases: Cases, scene: Scene, threads: int | None = 1) -> Swim:
-    """Simulate all robots from rest through their commands."""
-    simulator = Simulator(scene, len(cases), threads)
-    hub, heading, reports = [], [], []
-    for commands in cases.commands:
-        reports.append(simulator.stroke(commands))
-        hub.append(simulator.hub_position())
-        heading.append(simulator.heading())
-    return Swim(
-        np.array(hub),
-        np.array(heading),
-        iterations=float(np.mean([report.newton_iterations for report in reports])),
-        steps=float(np.mean([report.steps for report in reports])),
-        rejections=int(np.sum([report.rejections for report in reports])),
-        halvings=int(np.sum([report.halvings for report in reports])),
-        failed=int(np.count_nonzero(reports[-1].status != SolverStatus.CONVERGED)),
-    )
-
-
-def hub_path_lengths(hub: Floats) -> Floats:
-    """Lengths of the hubs' paths from the origin, measured at the ends of strokes [m], shape (n_robots,)."""
-    return path_length(np.zeros(2), np.moveaxis(hub, 0, 1))
-
-
-def errors(swum: Swim, exact: Swim, lengths: Floats | None = None) -> Errors:
-    """Errors of a swim against another; infinite for all robots if one failed.
-
-    lengths: Lengths of paths [m], shape (n_robots,), of which the errors are fractions. None means those of `exact`.
-    """
-    if swum.failed:
-        return Errors(*np.full((3, swum.hub.shape[1]), np.inf))
-    distance = np.linalg.norm(swum.hub - exact.hub, axis=-1)
-    turn = np.angle(np.exp(1j * (swum.heading - exact.heading)))
-    length = hub_path_lengths(exact.hub) if lengths is None else lengths
-    return Errors(distance.max(axis=0) / length, np.abs(turn).max(axis=0), distance[-1] / length)

@@ -1,7 +1,7 @@
 """Do the error bars of a running simulation cover, and are they sharp?
 
 The chapter's robot and six others swim ten strokes from rest with error bars, with sequences of every class of
-`seastar_gym.certification.commands`, drawn anew. The true error is the hub's distance, at the end of every stroke, from
+`seastar_gym.accuracy.commands`, drawn anew. The true error is the hub's distance, at the end of every stroke, from
 that of the same robot with 73 nodes per limb and the implicit midpoint rule at 0.25 ms. A stroke is covered where its
 true error is at most the estimate. From the calibration's seed comes the factor that would cover 95 % of the strokes of
 each robot; with the factors that the package has, the sequences of another seed tell the coverage, the class with the
@@ -13,7 +13,6 @@ Writes the numbers as JSON, a page with the tables, and a picture.
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,11 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from seastar_gym.certification.commands import CLASSES, draw_classes
-from seastar_gym.certification.measure import SHORT, swim
+from seastar_gym.accuracy.commands import CLASSES, draw_classes
+from seastar_gym.accuracy.measure import SHORT, swim
+from seastar_gym.accuracy.setting import at
 from seastar_gym.command import run_command
 from seastar_gym.scene import Numerics, Scene, Seastar, Water, relaxation_time
-from seastar_gym.scene.numerics import PRESETS, Setting
+from seastar_gym.scene.numerics import PRESETS, Resolution
 from seastar_gym.simulator import Simulator
 from seastar_gym.simulator.error_bars import factor
 from studies.kept import keep
@@ -45,20 +45,20 @@ ROBOTS: dict[str, Scene] = {
     "silicone": Scene(Seastar(relaxation_time=relaxation_time(0.1, 10.0))),
 }
 FIDELITIES = ("fast", "balanced", "accurate")
-SETTINGS: dict[str, Setting] = {
+SETTINGS: dict[str, Resolution] = {
     "fast": PRESETS["fast"],
     "balanced": PRESETS["balanced"],
     "accurate": PRESETS["accurate"],
-    "adapted to 1 %": Setting(
+    "adapted to 1 %": Resolution(
         "continuum", 12, Numerics("implicit-midpoint", 5e-3, newton_tolerance=1e-5, path_tolerance=0.01)
     ),
-    "sdirk2, 20 ms": Setting("continuum", 10, Numerics("sdirk2", 20e-3, 1e-6)),
-    "sdirk3, 20 ms": Setting("continuum", 10, Numerics("sdirk3", 20e-3, 1e-6)),
-    "implicit-euler, 3 ms": Setting("continuum", 10, Numerics("implicit-euler", 3e-3)),
+    "sdirk2, 20 ms": Resolution("continuum", 10, Numerics("sdirk2", 20e-3, 1e-6)),
+    "sdirk3, 20 ms": Resolution("continuum", 10, Numerics("sdirk3", 20e-3, 1e-6)),
+    "implicit-euler, 3 ms": Resolution("continuum", 10, Numerics("implicit-euler", 3e-3)),
     "chapter": PRESETS["chapter"],
-    "chapter, midpoint 5 ms": Setting("chapter", 10, Numerics("implicit-midpoint", 5e-3, 1e-6)),
+    "chapter, midpoint 5 ms": Resolution("chapter", 10, Numerics("implicit-midpoint", 5e-3, 1e-6)),
 }  # fmt: skip
-TRUE = Setting("continuum", 73, SHORT)
+TRUE = Resolution("continuum", 73, SHORT)
 """What stands for the continuum: twice the edges of the finest twin, half its steps."""
 LEVEL = 0.95
 """Share of strokes that estimates are to cover."""
@@ -86,26 +86,14 @@ class Row(NamedTuple):
     error: float
 
 
-def at(scene: Scene, setting: Setting) -> Scene:
-    """Scene at a resolution and numerics."""
-    robot = replace(scene.robot, nodes_per_limb=setting.nodes_per_limb, discretisation=setting.discretisation)
-    return replace(scene, robot=robot, numerics=setting.numerics)
-
-
-def swim_with_bars(scene: Scene, commands: Floats) -> tuple[Floats, Floats]:
-    """Hub [m], shape (STROKES, n, 2), and error estimates [m], shape (STROKES, n), at ends of strokes from rest."""
-    simulator = Simulator(scene, commands.shape[1], threads=1, error_bars=True)
-    hub, estimates = [], []
-    for each in commands:
-        estimates.append(simulator.stroke(each).error_estimate)
-        hub.append(simulator.hub_position())
-    return np.array(hub), np.array(estimates)
-
-
 def true_and_estimated(scene: Scene, commands: Floats, exact: Floats) -> tuple[Floats, Floats]:
-    """True and estimated errors [m], shape (STROKES, n) each. A robot whose solver fails is not covered."""
-    hub, estimates = swim_with_bars(scene, commands)
-    return np.fmax(np.linalg.norm(hub - exact, axis=-1), SMALLEST), np.nan_to_num(estimates)
+    """True and estimated errors [m], shape (STROKES, n) each. A robot whose solver fails is not covered.
+
+    exact: Hub [m], shape (STROKES, n, 2), at ends of strokes from rest.
+    """
+    swum = swim(scene, commands, error_bars=True)
+    true = np.linalg.norm(swum.hub - exact, axis=-1)
+    return np.fmax(np.nan_to_num(true, nan=np.inf), SMALLEST), np.nan_to_num(swum.error_estimate)
 
 
 def by_class(covered: NDArray[np.bool_]) -> dict[str, float]:
@@ -120,7 +108,7 @@ def measure(names: tuple[str, ...], samples: int, seeds: tuple[int, int], bar: A
     for name in names:
         scene = ROBOTS[name]
         drawn = [draw_classes(samples, scene.robot.n_limbs, seed) for seed in seeds]
-        exact = [swim(at(scene, TRUE), commands) for commands in drawn]
+        exact = [swim(at(scene, TRUE), commands).hub for commands in drawn]
         for setting, numbers in SETTINGS.items():
             swum = at(scene, numbers)
             (true, estimate), held_out = (
@@ -145,7 +133,7 @@ def judged(robot: str, setting: str, needed: float, true: Floats, estimate: Floa
     )  # fmt: skip
 
 
-def cost(setting: Setting, n_robots: int = 64, strokes: int = 4) -> float:
+def cost(setting: Resolution, n_robots: int = 64, strokes: int = 4) -> float:
     """Processor time with error bars over that without, for random commands, each the best of some strokes."""
     best = []
     for error_bars in (False, True):

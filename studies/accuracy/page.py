@@ -4,14 +4,17 @@ Every error is one that `info` has: `path_error` or `gait_error` is the bound, `
 the median beside it.
 """
 
-import json
+from dataclasses import replace
 from typing import get_args
 
-from seastar_gym.scene.fidelity import TIMED_PRESETS, Promise, TimedPromise, promise, timed_promise
+from seastar_gym.accuracy import Setting, chapters_certificate, timed_certificate
+from seastar_gym.scene import Scene, SmaWires
 from seastar_gym.scene.numerics import Fidelity
 from studies.accuracy.tables import two_digits
 
 IN_README: tuple[Fidelity, ...] = ("fast", "balanced", "reference")
+PERIODS = (0.5, 0.2, 0.1)
+"""Times between decisions [s] that were measured."""
 PERIOD = 0.2
 """Time between decisions [s] of the column of commands in time."""
 PURPOSES: dict[Fidelity, str] = {
@@ -31,16 +34,25 @@ def pair(bound: float, typical: float) -> str:
     return f"{percent(bound)} ({percent(typical)})"
 
 
-def cells(known: Promise | TimedPromise) -> list[str]:
-    """Errors of random and of repeated commands."""
-    return [pair(known.path_error, known.typical_error), pair(known.gait_error, known.typical_gait_error)]
-
-
-def in_time(name: Fidelity) -> TimedPromise:
-    """Errors of a preset where commands come in time."""
-    known = timed_promise(name, PERIOD)
+def preset(name: Fidelity) -> Setting:
+    """Errors of a preset in strokes."""
+    known = chapters_certificate().of(Scene.preset(name))
     assert known is not None
     return known
+
+
+def in_time(name: Fidelity, period: float = PERIOD) -> Setting:
+    """Errors of a preset where commands come in time. period: Time between decisions [s]."""
+    certificate = timed_certificate(period)
+    assert certificate is not None
+    known = certificate.of(replace(Scene.preset(name), actuator=SmaWires()))
+    assert known is not None
+    return known
+
+
+def cells(known: Setting) -> list[str]:
+    """Errors of random and of repeated commands."""
+    return [pair(known.errors[name], known.typical[name]) for name in ("random", "repeated")]
 
 
 def markdown(head: list[str], rows: list[list[str]], n_texts: int = 1) -> str:
@@ -55,7 +67,7 @@ ERRORS = ["random, every 1 s", "repeated, every 1 s", f"random, every {PERIOD:g}
 def errors() -> str:
     """Largest and, in brackets, typical errors and speeds of some presets."""
     rows = [
-        [f"`{name}`", *cells(promise(name)), *cells(in_time(name)), f"{promise(name).speed:,.0f}"] for name in IN_README
+        [f"`{name}`", *cells(preset(name)), *cells(in_time(name)), f"{preset(name).speed:,.0f}"] for name in IN_README
     ]
     return markdown(["fidelity", *ERRORS, "x real time"], rows)
 
@@ -63,7 +75,7 @@ def errors() -> str:
 def choosing() -> str:
     """Largest and, in brackets, typical errors and speeds of all presets, by what they are for."""
     rows = [
-        [why, f'`fidelity="{name}"`', *cells(promise(name)), *cells(in_time(name)), f"{promise(name).speed:,.0f}"]
+        [why, f'`fidelity="{name}"`', *cells(preset(name)), *cells(in_time(name)), f"{preset(name).speed:,.0f}"]
         for name, why in PURPOSES.items()
     ]
     return markdown(["you are", "take", *ERRORS, "x real time"], rows, 2)
@@ -73,36 +85,35 @@ def presets() -> str:
     """Numerics of all presets, and their errors by part and by commands."""
     rows = []
     for name in get_args(Fidelity):
-        row = promise(name)
+        row = preset(name)
         nodes = f"{row.nodes_per_limb}{'' if row.discretisation == 'continuum' else ', chapter' + chr(39) + 's'}"
         scheme = row.scheme.replace("-", " ").replace("euler", "Euler")
         rows.append([
             f"`{name}`", nodes, f"{scheme}, {1e3 * row.step:g} ms", f"{row.newton_tolerance:.0e}",
             percent(row.space_error), percent(row.time_error),
-            f"**{percent(row.path_error)}** ({percent(row.typical_error)})",
-            pair(row.gait_error, row.typical_gait_error), pair(row.slow_error, row.typical_slow_error),
-            percent(row.straight_error), f"{row.speed:,.0f}",
+            f"**{percent(row.errors['random'])}** ({percent(row.typical['random'])})",
+            pair(row.errors["repeated"], row.typical["repeated"]), pair(row.errors["small"], row.typical["small"]),
+            percent(row.errors["straight"]), f"{row.speed:,.0f}",
         ])  # fmt: skip
     head = ["fidelity", "N", "scheme and step", "Newton tolerance", "space", "time", "path error", "gaits", "slow"]
     return markdown([*head, "straight", "x real time"], rows)
 
 
-def timed(periods: tuple[float, ...] = (0.5, 0.2, 0.1)) -> str:
+def timed(periods: tuple[float, ...] = PERIODS) -> str:
     """Errors of all presets for times between decisions [s], of random commands and then of repeated seconds."""
     rows = []
     for name in get_args(Fidelity):
-        found = [cells(known) for known in (timed_promise(name, period) for period in periods) if known is not None]
+        found = [cells(in_time(name, period)) for period in periods]
         rows.append([f"`{name}`", *(each[k] for k in (0, 1) for each in found)])
     columns = [f"{what}, {period:g} s" for what in ("random", "repeated") for period in periods]
     return markdown(["fidelity", *columns], rows)
 
 
-def timed_paths() -> str:
+def timed_paths(periods: tuple[float, ...] = PERIODS) -> str:
     """Shortest, median and longest paths [mm] of commands in time."""
-    stored = json.loads(TIMED_PRESETS.read_text(encoding="utf-8"))["paths"]
+    stored = [certificate.measured_over["paths"] for certificate in map(timed_certificate, periods) if certificate]
     kinds = {"random": "random commands", "repeated": "repeated seconds"}
     rows = [
-        [name, *(", ".join(f"{length:g}" for length in each[kind]) for each in stored.values())]
-        for kind, name in kinds.items()
+        [name, *(", ".join(f"{length:g}" for length in each[kind]) for each in stored)] for kind, name in kinds.items()
     ]
-    return markdown(["", *(f"every {period} s" for period in stored)], rows)
+    return markdown(["", *(f"every {period:g} s" for period in periods)], rows)

@@ -89,7 +89,7 @@ def _draw_settings(axes: Axes, rows: Sequence[Row], column: Column) -> None:
         ("continuum", OURS, "our discretisation"),
         ("chapter", CHAPTERS, "the chapter's"),
     ):
-        mine = [row for row in rows if row.setting.discretisation == discretisation]
+        mine = [row for row in rows if row.resolution.discretisation == discretisation]
         x, y = [_speed(row, column) for row in mine], [PERCENT * row.total(column) for row in mine]
         axes.plot(x, y, "o", ms=3.6, mew=0, alpha=0.35, color=colour)
         best = front(mine, lambda row: row.promise(column), lambda row: _speed(row, column))
@@ -102,7 +102,7 @@ def _mark_presets(axes: Axes, rows: Sequence[Row], column: Column, left: bool) -
     """Mark the presets, with their names on the left or on the lower right."""
     from matplotlib.patheffects import withStroke
 
-    by_setting = {row.setting: row for row in rows}
+    by_setting = {row.resolution: row for row in rows}
     for name, setting in presets().items():
         row = by_setting[setting]
         x, y = _speed(row, column), PERCENT * row.promise(column)
@@ -146,13 +146,13 @@ def convergence(found: Study) -> Figure:
     from matplotlib.ticker import NullLocator
 
     figure, (time, space) = subplots(1, 2, figsize=(11.5, 4.9))
-    fixed = [row for row in found.rows if row.resolution[1] == 10 and row.setting.numerics.path_tolerance is None]
-    tightest_last = sorted(fixed, key=lambda row: -row.setting.numerics.newton_tolerance)
+    fixed = [row for row in found.rows if row.mesh[1] == 10 and row.resolution.numerics.path_tolerance is None]
+    tightest_last = sorted(fixed, key=lambda row: -row.resolution.numerics.newton_tolerance)
     for discretisation, line in (("chapter", ":"), ("continuum", "-")):
         rows = {
-            (row.setting.numerics.scheme, row.setting.numerics.step): row
+            (row.resolution.numerics.scheme, row.resolution.numerics.step): row
             for row in tightest_last
-            if row.setting.discretisation == discretisation
+            if row.resolution.discretisation == discretisation
         }
         for kind, colour in list(COLOURS.items())[:4]:
             mine = [(h, row) for (scheme, h), row in rows.items() if scheme == kind]
@@ -167,9 +167,9 @@ def convergence(found: Study) -> Figure:
     time.xaxis.set_minor_locator(NullLocator())
     as_numbers(time.xaxis)
     as_percent(time.yaxis)
-    nodes = sorted({row.resolution[1] for row in found.rows})
+    nodes = sorted({row.mesh[1] for row in found.rows})
     for discretisation, colour, name in (("chapter", CHAPTERS, "the chapter's"), ("continuum", OURS, "ours")):
-        by_nodes = {row.resolution[1]: row.space for row in found.rows if row.setting.discretisation == discretisation}
+        by_nodes = {row.mesh[1]: row.space for row in found.rows if row.resolution.discretisation == discretisation}
         edges = np.array(sorted(n for n in by_nodes if by_nodes[n].path > 0.0))
         for column, line, what in (("path", "-", "worst path"), ("gait", "--", "gaits"), ("straight", ":", "straight")):
             values = [PERCENT * getattr(by_nodes[n], column) for n in edges]

@@ -24,12 +24,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import beta
 
-from seastar_gym.certification import commands, measure
-from seastar_gym.certification.commands import CLASSES, draw_classes
+from seastar_gym.accuracy import Certificate, chapters_certificate, measure
+from seastar_gym.accuracy.certificate import CLASSES_VERSION
+from seastar_gym.accuracy.commands import CLASSES, draw_classes
+from seastar_gym.accuracy.setting import resolved
 from seastar_gym.command import run_command
 from seastar_gym.scene import Numerics, Scene
-from seastar_gym.scene.certificate import Certificate, resolved
-from seastar_gym.scene.fidelity import promise
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__
 from studies.accuracy.error_bars import ROBOTS
@@ -74,30 +74,32 @@ def table_checks() -> list[Check]:
     """Checks of fidelities of the chapter's robot: of random commands, of gaits, and of small ones, by the table."""
     checks = []
     for name in PRESETS:
-        row = promise(name)
-        path = dict.fromkeys(("random ternary", "random continuous"), row.path_error)
-        gaits = dict.fromkeys((each for each in CLASSES if each not in path), max(row.path_error, row.gait_error))
-        checks.append(Check(name, Scene.preset(name), gaits | path | {"small": row.slow_error}))
+        scene = Scene.preset(name)
+        known = chapters_certificate().of(scene)
+        assert known is not None
+        path = dict.fromkeys(("random ternary", "random continuous"), known.errors["random"])
+        gaits = dict.fromkeys((each for each in CLASSES if each not in path), known.error(("random", "repeated")))
+        checks.append(Check(name, scene, gaits | path | {"small": known.errors["small"]}))
     return checks
 
 
-def whole_errors(hub: Floats, limit: Floats, limb_length: float) -> Floats:
-    """Largest distances of hubs from those of the limit, as fractions of the limit's path, shape (n,)."""
-    distances = np.linalg.norm(hub - limit, axis=-1).max(axis=0)
-    return np.where(np.isnan(distances), np.inf, distances) / measure.path_lengths(limit, limb_length)
+def whole_errors(scene: Scene, swum: Sequence[measure.Swims], limit: measure.Swims) -> Floats:
+    """Largest distances of hubs from those of the limit, as fractions of the limit's path, shape (len(swum), n)."""
+    lengths = measure.path_lengths(scene, limit.hub)
+    return np.array([measure.errors(each, limit, lengths).path for each in swum])
 
 
 def exceedances(scene: Scene, checks: Sequence[Check], samples: int, seed: int) -> dict[str, dict[str, int]]:
     """Number of fresh sequences, by check and class, whose error exceeds the promised one."""
     drawn, nodes = draw_classes(samples, scene.robot.n_limbs, seed), measure.MANY_NODES
-    limb_length = float(np.max(scene.robot.limb_length))
     screen, *swum = measure.swim_all([resolved(scene, nodes, SCREEN), *(each.scene for each in checks)], drawn)
-    errors = np.array([whole_errors(hub, screen, limb_length) for hub in swum])
     bounds = np.array([each.bounds(samples) for each in checks])
+    errors = whole_errors(scene, swum, screen)
     near = (errors > CLOSE * bounds).any(axis=0)
     if near.any():
         (limit,) = measure.swim_all([resolved(scene, nodes, measure.SHORT)], drawn[:, near])
-        errors[:, near] = [whole_errors(hub[:, near], limit, limb_length) for hub in swum]
+        few = [measure.Swims(*(array[:, near] for array in each)) for each in swum]
+        errors[:, near] = whole_errors(scene, few, limit)
     beyond = (errors > bounds).reshape(len(checks), len(CLASSES), samples).sum(axis=2)
     return {
         check.name: dict(zip(CLASSES, row.tolist(), strict=True)) for check, row in zip(checks, beyond, strict=True)
@@ -172,7 +174,7 @@ def _cells(found: dict[str, Any]) -> list[tuple[str, dict[tuple[str, str], int]]
 
 def read_results(file: Path, samples: int) -> dict[str, Any]:
     """Results in the file, or empty ones; ValueError if it has those of other sequences or another version."""
-    wanted = {"samples": samples, "seed": SEED, "classes": commands.VERSION, "version": __version__}
+    wanted = {"samples": samples, "seed": SEED, "classes": CLASSES_VERSION, "version": __version__}
     if not file.is_file():
         about = "Written by python -m studies.accuracy.promises; exceedances are numbers of sequences."
         command = f"python -m studies.accuracy.promises --samples {samples}"

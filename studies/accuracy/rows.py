@@ -8,9 +8,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.accuracy.measure import Errors
 from seastar_gym.scene import Numerics
-from seastar_gym.scene.numerics import Setting
-from studies.accuracy.cases import Cases, Errors
+from seastar_gym.scene.numerics import Resolution
+from studies.accuracy.cases import Cases
 
 Floats = NDArray[np.float64]
 
@@ -21,7 +22,7 @@ UNSEEN = 1.5
 """Promised over measured error of gaits and slow swims.
 
 Of 64 random gaits that the study did not use, the worst erred by 1.3 times the largest error of the 40 that it did, see
-tests/scene/test_fidelity.py. Errors of other swims are largest for the pairs, which are all measured.
+tests/accuracy/test_shipped.py. Errors of other swims are largest for the pairs, which are all measured.
 """
 
 Column = Literal["path", "straight", "pair", "pentagon", "random", "slow", "gait", "heading", "end"]
@@ -53,7 +54,7 @@ def figures(batches: Sequence[Cases], found: Sequence[Errors]) -> Figures:
     """Largest errors of all batches."""
     kinds = np.array([kind for batch in batches for kind in batch.kinds])
     names = np.array([name for batch in batches for name in batch.names])
-    path, heading, end = (np.concatenate(column) for column in zip(*found, strict=True))
+    path, end, heading = (np.concatenate(column) for column in zip(*found, strict=True))
     gait = kinds == "gait"
     main = ~gait & (kinds != "slow")
 
@@ -105,7 +106,7 @@ class Row:
     typical: Medians of the sum of both errors.
     """
 
-    setting: Setting
+    resolution: Resolution
     space: Figures
     time: Figures
     iterations: float
@@ -119,14 +120,14 @@ class Row:
     typical: Figures = Figures()
 
     @property
-    def resolution(self) -> tuple[str, int]:
+    def mesh(self) -> tuple[str, int]:
         """Discretisation and nodes per limb."""
-        return self.setting.discretisation, self.setting.nodes_per_limb
+        return self.resolution.discretisation, self.resolution.nodes_per_limb
 
     @property
     def label(self) -> str:
         """Scheme and step as a reader sees them, such as "sdirk2 20 ms"."""
-        numerics = self.setting.numerics
+        numerics = self.resolution.numerics
         adapted = numerics.path_tolerance
         how = "" if adapted is None else f", adapted to {100 * adapted:g} %"
         return f"{numerics.scheme} {1e3 * numerics.step:g} ms{how}"
@@ -149,16 +150,12 @@ class Study:
     """Results of the study.
 
     rows: One row per setting.
-    others: Rows of the second table by the name of its physics.
-    refused: Why a physics of the second table was left out, by its name.
     doubt: Errors of the limit itself, by what they are from.
     distances: Distances of the straight swim and the pairs after ten strokes in the limit [m], by name.
     first_stroke: Hub x of the straight swim after one stroke in the limit [m].
     """
 
     rows: list[Row]
-    others: dict[str, list[Row]]
-    refused: dict[str, str]
     doubt: dict[str, Figures]
     distances: dict[str, float]
     first_stroke: float
@@ -186,13 +183,13 @@ def promised(rows: Sequence[Row]) -> list[Row]:
         more = [
             each.space
             for each in rows
-            if each.setting.discretisation == row.setting.discretisation
-            and each.setting.nodes_per_limb >= row.setting.nodes_per_limb
+            if each.resolution.discretisation == row.resolution.discretisation
+            and each.resolution.nodes_per_limb >= row.resolution.nodes_per_limb
         ]
         finer = [
             each.time
             for each in rows
-            if each.resolution == row.resolution and no_coarser(each.setting.numerics, row.setting.numerics)
+            if each.mesh == row.mesh and no_coarser(each.resolution.numerics, row.resolution.numerics)
         ]
         found.append(replace(row, sure_space=at_least([row.space, *more]), sure_time=at_least([row.time, *finer])))
     return found
@@ -219,8 +216,8 @@ def any_gait_front(rows: Iterable[Row]) -> list[Row]:
 
 def fronts(rows: Sequence[Row]) -> list[Row]:
     """For every resolution, rows on the front of the path error or of the worse of path and gait, fastest first."""
-    chosen: dict[Setting, Row] = {}
-    for resolution in dict.fromkeys(row.resolution for row in rows):
-        mine = [row for row in rows if row.resolution == resolution]
-        chosen |= {row.setting: row for row in (*path_front(mine), *any_gait_front(mine))}
+    chosen: dict[Resolution, Row] = {}
+    for mesh in dict.fromkeys(row.mesh for row in rows):
+        mine = [row for row in rows if row.mesh == mesh]
+        chosen |= {row.resolution: row for row in (*path_front(mine), *any_gait_front(mine))}
     return sorted(chosen.values(), key=lambda row: -row.speed)

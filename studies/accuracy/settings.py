@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 from typing import get_args
 
-from seastar_gym.scene import Numerics, Scene, Seastar, Water
-from seastar_gym.scene.numerics import PRESETS, Fidelity, SchemeName, Setting
+from seastar_gym.scene import Numerics
+from seastar_gym.scene.numerics import PRESETS, Fidelity, Resolution, SchemeName
 from seastar_gym.scene.robot import Discretisation
-from studies.speed.terms import SILICONE
 
 MS = 1e-3
 """Seconds per millisecond."""
@@ -21,12 +20,7 @@ ADAPTED = (0.02, 0.01, 0.005)
 """Path tolerances of the settings with adapted steps."""
 LARGEST_ADAPTED = 5 * MS
 """Largest adapted time step [s]."""
-PHYSICS: dict[str, Scene] = {
-    "drag along limbs": Scene(fluid=Water(tangential_drag_coefficient=0.1)),
-    "silicone": Scene(Seastar(relaxation_time=SILICONE)),
-}
-"""Scenes of the second table: a tenth of the drag along limbs, and the damping of a soft silicone."""
-Resolution = tuple[Discretisation, int]
+Mesh = tuple[Discretisation, int]
 """Discretisation and nodes per limb N."""
 
 
@@ -41,11 +35,10 @@ class Plan:
     fine: Time step [s] of the swims that stand for infinitely short steps, with fewer nodes than `limit`. The chapter's
         discretisation with more than `finest` nodes, whose error is one of space, has four times that.
     opinion: Nodes per limb and time step [s] with which SDIRK3 gives a second opinion.
-    resolutions: Resolutions that are measured.
+    meshes: Discretisations and nodes per limb that are measured.
     shortest: Shortest time step of the settings [s].
     finest: Most nodes per limb with which settings are measured at all tolerances, and adapted steps.
     rounds: Rounds of timing.
-    n_others, limit_of_others, fine_of_others: Random sequences, limit and fine step [s] of the second table.
     """
 
     n_random: int = 51
@@ -55,26 +48,22 @@ class Plan:
     limit: tuple[int, float] = (73, 0.1 * MS)
     fine: float = 0.05 * MS
     opinion: tuple[int, float] = (37, 0.1 * MS)
-    resolutions: tuple[Resolution, ...] = (
+    meshes: tuple[Mesh, ...] = (
         *(("continuum", n) for n in (6, 7, 8, 10, 12, 13, 19, 37)), *(("chapter", n) for n in (10, 37, 73)),
     )  # fmt: skip
     shortest: float = 0.1 * MS
     finest: int = 19
     rounds: int = 3
-    n_others: int = 16
-    limit_of_others: tuple[int, float] = (37, 0.1 * MS)
-    fine_of_others: float = 0.1 * MS
 
 
 QUICK = Plan(
     n_random=6, n_slow=2, n_gaits=2, side=(1, 0), limit=(37, 0.4 * MS), fine=0.4 * MS, opinion=(10, 1 * MS),
-    resolutions=(("continuum", 7), ("continuum", 10), ("chapter", 10)), shortest=2 * MS, rounds=1, n_others=2,
-    limit_of_others=(19, 1 * MS), fine_of_others=1 * MS,
+    meshes=(("continuum", 7), ("continuum", 10), ("chapter", 10)), shortest=2 * MS, rounds=1,
 )  # fmt: skip
 
 
-def presets() -> dict[str, Setting]:
-    """Settings of the presets by name."""
+def presets() -> dict[str, Resolution]:
+    """Resolutions of the presets by name."""
     return {name: PRESETS[name] for name in get_args(Fidelity)}
 
 
@@ -85,15 +74,15 @@ def tolerances(step: float) -> tuple[float, ...]:
     return (1e-6, 1e-7) if step >= 1 * MS else (1e-8,)
 
 
-def settings(plan: Plan) -> list[Setting]:
+def settings(plan: Plan) -> list[Resolution]:
     """All settings that are measured, and the presets whatever the plan leaves out."""
-    found = [Setting(*resolution, each) for resolution in plan.resolutions for each in _numerics(plan, resolution)]
+    found = [Resolution(*mesh, each) for mesh in plan.meshes for each in _numerics(plan, mesh)]
     return list(dict.fromkeys([*found, *presets().values()]))
 
 
-def _numerics(plan: Plan, resolution: Resolution) -> list[Numerics]:
-    """Numerics that are measured with a resolution: fewer with many nodes, which are dear."""
-    discretisation, nodes = resolution
+def _numerics(plan: Plan, mesh: Mesh) -> list[Numerics]:
+    """Numerics that are measured with a mesh: fewer with many nodes, which are dear."""
+    discretisation, nodes = mesh
     shortest = max(plan.shortest, 0.1 * MS if nodes == 10 else 0.3 * MS if discretisation == "continuum" else 1 * MS)
     fixed = [
         Numerics(scheme, step * MS, tolerance)
@@ -104,11 +93,3 @@ def _numerics(plan: Plan, resolution: Resolution) -> list[Numerics]:
     ]
     adapted = [Numerics("implicit-midpoint", LARGEST_ADAPTED, 1e-7, path_tolerance=tolerance) for tolerance in ADAPTED]
     return fixed + (adapted if nodes <= plan.finest else [])
-
-
-def settings_of_others() -> list[Setting]:
-    """The few settings of the second table."""
-    some = (Numerics("sdirk2", 20 * MS, 1e-6), Numerics("implicit-midpoint", 5 * MS, 1e-6),
-            Numerics("implicit-midpoint", 1 * MS, 1e-7))  # fmt: skip
-    nodes: tuple[Resolution, ...] = (("continuum", 7), ("continuum", 10), ("continuum", 19), ("chapter", 10))
-    return [Setting(*resolution, numerics) for resolution in nodes for numerics in some]

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.accuracy.measure import Progress
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Scene
 from seastar_gym.simulator import Simulator
@@ -15,7 +16,7 @@ from studies.accuracy.cases import random_sequences
 Floats = NDArray[np.float64]
 
 
-def measure_speeds(scenes: Sequence[Scene], rounds: int, bar: Any, n_robots: int = 32) -> Floats:
+def measure_speeds(scenes: Sequence[Scene], rounds: int, progress: Progress, n_robots: int = 32) -> Floats:
     """Real-time factors on one core for mixed commands and for the straight swim, shape (len(scenes), 2).
 
     Every round times all settings once, after the first stroke from rest. The best round counts, because other work of
@@ -25,7 +26,7 @@ def measure_speeds(scenes: Sequence[Scene], rounds: int, bar: Any, n_robots: int
     workloads = [mixed, np.broadcast_to(STRAIGHT, mixed.shape)]
     best = np.full((len(scenes), 2), np.inf)
     simulators: dict[tuple[int, int], tuple[Simulator, Any]] = {}
-    for _ in range(rounds):
+    for turn in range(rounds):
         for k, scene in enumerate(scenes):
             for w, commands in enumerate(workloads):
                 if (k, w) not in simulators:
@@ -38,6 +39,6 @@ def measure_speeds(scenes: Sequence[Scene], rounds: int, bar: Any, n_robots: int
                 for command in commands[1:]:
                     simulator.stroke(command)
                 best[k, w] = min(best[k, w], time.thread_time() - start)
-            bar.update()
+            progress((turn + (k + 1) / len(scenes)) / rounds)
     simulated = n_robots * (len(mixed) - 1) * Scene().actuator.period
     return simulated / best

@@ -3,8 +3,8 @@
 Errors are against the continuum: infinitely many nodes per limb and infinitely short steps. The error of space is that
 of N nodes with short steps against the continuum. The error of time is that of the setting against short steps with the
 same nodes. Their sum is what can be promised, because where they cancel it is by luck. Writes `accuracy.csv`, the
-summary `accuracy.md` and two pictures. `--store` also writes the table of `seastar_gym.scene.fidelity`, from which
-`Scene.for_error` and the presets take their errors and speeds.
+summary `accuracy.md` and two pictures. `--store` also writes the table of `seastar_gym.accuracy.chapter`, from which
+`Scene.for_error` and `info` take their errors and speeds.
 
 The error is the hub's distance from the other path at the ends of strokes, as a fraction of that path's length. Times
 are processor times of one thread, the best of several rounds, for a batch of random commands.
@@ -12,62 +12,38 @@ are processor times of one thread, the best of several rounds, for a batch of ra
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from rich.console import Console
-from tqdm import tqdm
 
+from seastar_gym.accuracy.chapter import STROKES
+from seastar_gym.accuracy.command import progress_bar
+from seastar_gym.accuracy.setting import at
 from seastar_gym.gaits import PAIRS
-from seastar_gym.scene import Scene, fidelity
-from studies.accuracy.cases import (
-    Cases,
-    gaits,
-    joined,
-    pentagon,
-    random_gaits,
-    random_sequences,
-    scene_of,
-    slow_sequences,
-    swims,
-)
-from studies.accuracy.convergence import converge, measure, n_groups, second_opinion
+from seastar_gym.scene import Scene
+from studies.accuracy.cases import Cases, gaits, joined, pentagon, random_gaits, random_sequences, slow_sequences, swims
+from studies.accuracy.convergence import measured, rows_of, second_opinion
 from studies.accuracy.rows import Row, Study, promised
-from studies.accuracy.settings import PHYSICS, QUICK, Plan, presets, settings, settings_of_others
+from studies.accuracy.settings import QUICK, Plan, presets, settings
 from studies.accuracy.speeds import measure_speeds
-from studies.accuracy.tables import TABLE_WIDTH, as_markdown, as_tables, facts, store, store_typical, write_csv
+from studies.accuracy.tables import as_markdown, store, store_typical, write_csv
 from studies.parser import study_parser
 
 
 def study(plan: Plan, progress: bool = True) -> Study:
     """Run the whole study; drawing is left to the caller."""
     rng = np.random.default_rng(0)
-    batches = [sequences(plan, rng), pentagon(*plan.side)]
-    mine = settings(plan)
-    resolutions = list(dict.fromkeys((each.discretisation, each.nodes_per_limb) for each in mine))
-
-    def bar(what: str, total: int) -> Any:
-        return tqdm(total=total, desc=what, disable=not progress, unit="swim")
-
-    with bar("converging", n_groups(batches) * (1 + len(resolutions))) as each:
-        exact = converge(batches, plan, resolutions, each)
+    batches, mine = [sequences(plan, rng), pentagon(*plan.side)], settings(plan)
     few = joined(swims(), random_sequences(min(11, plan.n_random), rng))
-    with bar("second opinion", 4 * n_groups([few])) as each:
-        doubt = second_opinion(few, plan, each)
-    with bar("errors", n_groups(batches) * len(mine)) as each:
-        rows = measure(batches, exact, mine, each)
-    others: dict[str, list[Row]] = {}
-    refused: dict[str, str] = {}
-    for name, physics in PHYSICS.items():
-        try:
-            others[name] = study_other(name, physics, plan, bar)
-        except ValueError as refusal:  # of a scene that cannot be modelled
-            refused[name] = str(refusal)
-    with bar("speeds", plan.rounds * len(rows)) as each:
-        rows = with_speeds(rows, Scene(), plan, each)
-    hub = exact.limit[0].hub
+    with progress_bar("second opinion", progress) as report:
+        doubt = second_opinion(few, plan, report)
+    found = []
+    for batch in batches:
+        with progress_bar(f"errors of {len(batch)} swims", progress) as report:
+            found.append(measured(batch, plan, mine, report))
+    rows = with_speeds(rows_of(batches, found, mine), plan, progress)
+    hub = found[0].limit.hub
     distances = dict(zip(("straight", *PAIRS), np.hypot(*hub[-1, :5].T).tolist(), strict=True))
-    return Study(rows, others, refused, doubt, distances, float(hub[0, 0, 0]))
+    return Study(rows, doubt, distances, float(hub[0, 0, 0]))
 
 
 def sequences(plan: Plan, rng: np.random.Generator) -> Cases:
@@ -78,28 +54,15 @@ def sequences(plan: Plan, rng: np.random.Generator) -> Cases:
 
 def typical_rows(plan: Plan) -> list[Row]:
     """Rows of the presets, for their medians: without speeds, and without the pentagon, which is one sequence."""
-    batches, mine = [sequences(plan, np.random.default_rng(0))], list(presets().values())
-    resolutions = [(each.discretisation, each.nodes_per_limb) for each in mine]
-    with tqdm(total=n_groups(batches) * (1 + len(resolutions) + len(mine)), unit="swim") as each:
-        return measure(batches, converge(batches, plan, resolutions, each), mine, each)
+    cases, mine = sequences(plan, np.random.default_rng(0)), list(presets().values())
+    with progress_bar("medians") as report:
+        return rows_of([cases], [measured(cases, plan, mine, report)], mine)
 
 
-def study_other(name: str, physics: Scene, plan: Plan, bar: Any) -> list[Row]:
-    """Rows of the few settings of the second table for other physics. ValueError if its scene cannot be modelled."""
-    cases = joined(swims(), random_sequences(plan.n_others, np.random.default_rng(0)))
-    mine = settings_of_others()
-    resolutions = list(dict.fromkeys((each.discretisation, each.nodes_per_limb) for each in mine))
-    plan = replace(plan, limit=plan.limit_of_others, fine=plan.fine_of_others)
-    with bar(name, n_groups([cases]) * (1 + len(resolutions) + len(mine))) as each:
-        exact = converge([cases], plan, resolutions, each, physics)
-        rows = measure([cases], exact, mine, each, physics)
-    with bar(f"{name}, speeds", plan.rounds * len(rows)) as each:
-        return with_speeds(rows, physics, plan, each)
-
-
-def with_speeds(rows: list[Row], physics: Scene, plan: Plan, bar: Any) -> list[Row]:
+def with_speeds(rows: list[Row], plan: Plan, progress: bool) -> list[Row]:
     """Rows with their speeds and promises."""
-    speeds = measure_speeds([scene_of(row.setting, physics) for row in rows], plan.rounds, bar)
+    with progress_bar("speeds", progress) as report:
+        speeds = measure_speeds([at(Scene(), row.resolution) for row in rows], plan.rounds, report)
     timed = zip(rows, speeds, strict=True)
     return promised([replace(row, speed=float(mixed), straight_speed=float(alone)) for row, (mixed, alone) in timed])
 
@@ -128,13 +91,8 @@ def main() -> None:
     write_csv(found, options.out / "accuracy.csv")
     (options.out / "accuracy.md").write_text(as_markdown(found), encoding="utf-8")
     pictures = accuracy_pictures.draw_all(found, options.out)
-    console = Console()
-    console.width = max(console.width, TABLE_WIDTH)
-    for table in as_tables(found):
-        console.print(table)
-    for fact in facts(found):
-        console.print(fact)
+    print(as_markdown(found))
     if options.store:
         store(found)
-        console.print(f"Stored: {fidelity.PRESETS}")
-    console.print(f"Written: {', '.join(str(path) for path in (options.out / 'accuracy.csv', *pictures))}")
+        print(f"Stored: {STROKES}")
+    print(f"Written: {', '.join(str(path) for path in (options.out / 'accuracy.csv', *pictures))}")

@@ -1,32 +1,32 @@
 """Tables of the accuracy study, among them the one that comes with the package."""
 
 import csv
-import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
-from rich.table import Table
-
-from seastar_gym.scene import fidelity
+from seastar_gym.accuracy import Certificate, Setting, chapter
+from seastar_gym.accuracy.certificate import CLASSES_VERSION
+from seastar_gym.accuracy.measure import machine
+from seastar_gym.accuracy.setting import physics
+from seastar_gym.scene import Scene
+from seastar_gym.version import __version__
 from studies.accuracy.cases import STROKES, gaits
 from studies.accuracy.rows import UNSEEN, Column, Figures, Row, Study, fronts, path_front
 from studies.accuracy.settings import Plan, presets
-from studies.speed.timing import machine
 
 LARGEST_DOUBT = 3e-4
 """Largest path error of the limit itself, of each kind, with which results are stored."""
-TABLE_WIDTH = 160
-"""Width of the printed table [characters]."""
 
 
 def summary(found: Study) -> list[tuple[str, Row]]:
     """Presets, by name, and the front of the path error, fastest first."""
     names = {setting: name for name, setting in presets().items()}
-    chosen = {row.setting: row for row in path_front(found.rows)}
-    chosen.update({row.setting: row for row in found.rows if row.setting in names})
-    return [(names.get(row.setting, ""), row) for row in sorted(chosen.values(), key=lambda row: -row.speed)]
+    chosen = {row.resolution: row for row in path_front(found.rows)}
+    chosen.update({row.resolution: row for row in found.rows if row.resolution in names})
+    return [(names.get(row.resolution, ""), row) for row in sorted(chosen.values(), key=lambda row: -row.speed)]
 
 
 COLUMNS = (
@@ -37,10 +37,10 @@ COLUMNS = (
 
 def as_cells(name: str, row: Row) -> tuple[str, ...]:
     """Cells of one line of the summary; errors in per cent, speed as real-time factor."""
-    space, time, entry = row.sure_space.path, row.sure_time.path, as_promise(row)
-    total = [entry[f"{kind}_error"] for kind in ("path", "gait", "slow", "straight")]
+    space, time = row.sure_space.path, row.sure_time.path
+    total = as_setting(row).errors.values()
     return (
-        name, nodes_of(row), row.label, f"{row.setting.numerics.newton_tolerance:.0e}",
+        name, nodes_of(row), row.label, f"{row.resolution.numerics.newton_tolerance:.0e}",
         *(f"{two_digits(100 * error):g} %" if error else "-" for error in (space, time, *total)),
         f"{two_digits(row.speed):,.0f}",
     )  # fmt: skip
@@ -48,7 +48,7 @@ def as_cells(name: str, row: Row) -> tuple[str, ...]:
 
 def nodes_of(row: Row) -> str:
     """Nodes per limb, and whose discretisation if not the continuum's."""
-    discretisation, nodes = row.resolution
+    discretisation, nodes = row.mesh
     return str(nodes) if discretisation == "continuum" else f"{nodes}, chapter's"
 
 
@@ -69,40 +69,14 @@ def facts(found: Study) -> list[str]:
     return [
         f"Limit: {1e3 * found.first_stroke:.4f} mm after one stroke straight on, and after ten {distances} mm.",
         f"Error of the limit itself, worst path: {doubts}.",
-        *(f"Left out is {name}: {why}" for name, why in found.refused.items()),
     ]
 
 
 def as_markdown(found: Study) -> str:
     """Summary in Markdown."""
-    tables = [(summary(found), ""), *((_unnamed(rows), name) for name, rows in found.others.items())]
-    lines = []
-    for table, name in tables:
-        lines += [f"{name.capitalize()}:", ""] if name else []
-        lines += [f"| {' | '.join(COLUMNS)} |", "|---|---:|---|---:|" + "---:|" * (len(COLUMNS) - 4)]
-        lines += [f"| {' | '.join(as_cells(preset, row))} |" for preset, row in table]
-        lines.append("")
-    return "\n".join([*lines, *facts(found), f"Speeds: one core of {machine()}."]) + "\n"
-
-
-def as_tables(found: Study) -> list[Table]:
-    """Summary for the terminal: the chapter's robot, then other physics."""
-    head = f"Errors against the continuum, worst cases; speed on one core ({machine()})"
-    others = [_as_table(name.capitalize(), _unnamed(rows)) for name, rows in found.others.items()]
-    return [_as_table(head, summary(found)), *others]
-
-
-def _unnamed(rows: Sequence[Row]) -> list[tuple[str, Row]]:
-    return [("", row) for row in rows]
-
-
-def _as_table(title: str, lines: Iterable[tuple[str, Row]]) -> Table:
-    table = Table(title=title)
-    for column in COLUMNS:
-        table.add_column(column, justify="left" if column in ("preset", "scheme and step") else "right")
-    for name, row in lines:
-        table.add_row(*as_cells(name, row), style="bold" if name else "")
-    return table
+    lines = [f"| {' | '.join(COLUMNS)} |", "|---|---:|---|---:|" + "---:|" * (len(COLUMNS) - 4)]
+    lines += [f"| {' | '.join(as_cells(preset, row))} |" for preset, row in summary(found)]
+    return "\n".join([*lines, "", *facts(found), f"Speeds: one core of {machine()}."]) + "\n"
 
 
 COSTS = ("iterations", "steps", "rejections", "halvings", "speed", "straight_speed")
@@ -119,61 +93,64 @@ def write_csv(found: Study, path: Path) -> None:
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow([
-            "physics", "discretisation", "nodes_per_limb", "scheme", "step_s", "newton_tolerance", "path_tolerance",
+            "discretisation", "nodes_per_limb", "scheme", "step_s", "newton_tolerance", "path_tolerance",
             *(f"space_{name}" for name in names), *(f"time_{name}" for name in names),
             *(f"promise_{name.replace('heading', 'heading_deg')}" for name in columns), *COSTS,
         ])  # fmt: skip
-        for physics, row in [("chapter", row) for row in found.rows] + [
-            (name, row) for name, rows in found.others.items() for row in rows
-        ]:
-            n = row.setting.numerics
+        for row in found.rows:
+            n = row.resolution.numerics
             key = [n.scheme, n.step, n.newton_tolerance, "" if n.path_tolerance is None else n.path_tolerance]
             sums = [row.promise(column) for column in columns]
             costs = [getattr(row, name) for name in COSTS]
-            writer.writerow([physics, *row.resolution, *key, *map(_cell, (*row.space, *row.time, *sums, *costs))])
+            writer.writerow([*row.mesh, *key, *map(_cell, (*row.space, *row.time, *sums, *costs))])
 
 
 def _cell(value: Any) -> Any:
     return float(f"{value:.5g}") if isinstance(value, float) else value
 
 
-def as_promise(row: Row) -> dict[str, Any]:
-    """Fields of a `fidelity.Promise` from a row: errors rounded upwards to two digits, speed rounded to two digits."""
-    n = row.setting.numerics
+def up(error: float) -> float:
+    """Error rounded upwards to two digits."""
+    return two_digits(error, up=True)
 
-    def up(error: float) -> float:
-        return two_digits(error, up=True)
 
+def as_setting(row: Row) -> Setting:
+    """Setting of a row: errors rounded upwards to two digits, speed rounded to two digits."""
+    discretisation, nodes_per_limb, numerics = row.resolution
     space, time = up(row.sure_space.path), up(row.sure_time.path)
-    return {
-        "discretisation": row.setting.discretisation,
-        "nodes_per_limb": row.setting.nodes_per_limb,
-        "scheme": n.scheme,
-        "step": n.step,
-        "newton_tolerance": n.newton_tolerance,
-        "path_tolerance": n.path_tolerance,
-        "space_error": space,
-        "time_error": time,
-        "path_error": float(f"{space + time:.6g}"),
-        **{f"{kind}_error": up(row.promise(kind)) for kind in ("gait", "slow", "straight", "heading", "end")},
-        "speed": two_digits(row.speed),
-        **as_typical(row),
-    }
+    return Setting(
+        nodes_per_limb, numerics.scheme, numerics.step, numerics.newton_tolerance,
+        errors={
+            "random": float(f"{space + time:.6g}"), "repeated": up(row.promise("gait")),
+            "small": up(row.promise("slow")), "straight": up(row.promise("straight")),
+        },
+        typical=as_typical(row), space_error=space, time_error=time, speed=two_digits(row.speed),
+        heading_error=up(row.promise("heading")), end_error=up(row.promise("end")),
+        path_tolerance=numerics.path_tolerance, discretisation=discretisation,
+    )  # fmt: skip
 
 
 def as_typical(row: Row) -> dict[str, float]:
-    """Fields of a `fidelity.Promise` that are medians, rounded upwards to two digits."""
+    """Median errors by class, rounded upwards to two digits; that of the straight swim, which is one, is its error.
+
+    {} where some class was not measured.
+    """
     found = row.typical
-    kinds = {"typical_error": found.random, "typical_gait_error": found.gait, "typical_slow_error": found.slow}
-    return {name: two_digits(error, up=True) for name, error in kinds.items()}
+    kinds = {"random": found.random, "repeated": found.gait, "small": found.slow, "straight": row.promise("straight")}
+    return {} if any(map(math.isnan, kinds.values())) else {name: up(error) for name, error in kinds.items()}
 
 
-def store_typical(rows: Sequence[Row], path: Path = fidelity.PRESETS) -> None:
-    """Write medians of presets into the package's table and keep its bounds and speeds."""
-    table, by_setting = json.loads(path.read_text(encoding="utf-8")), {row.setting: row for row in rows}
-    for name, setting in presets().items():
-        table["presets"][name] |= as_typical(by_setting[setting])
-    path.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
+def store_typical(rows: Sequence[Row], path: Path = chapter.STROKES) -> None:
+    """Write medians of presets into the package's certificate and keep its bounds and speeds."""
+    certificate, by_resolution = Certificate.load(path), {row.resolution: row for row in rows}
+
+    def told(setting: Setting) -> Setting:
+        row = by_resolution.get(setting.resolution)
+        if row is None or setting.resolution not in presets().values():
+            return setting
+        return replace(setting, typical=as_typical(row) | {"straight": setting.errors["straight"]})
+
+    replace(certificate, settings=tuple(map(told, certificate.settings))).save(path)
 
 
 def measured_over(plan: Plan) -> dict[str, Any]:
@@ -181,6 +158,7 @@ def measured_over(plan: Plan) -> dict[str, Any]:
     n = plan.n_random
     sure = f"{1.0 - 0.95**n:.2f}"
     return {
+        "command": "python -m studies.accuracy --store",
         "strokes": STROKES,
         "path_error": {"straight": 1, "pairs of Fig. 13.8": 4, "pentagon": 1, "random, ternary and continuous": n},
         "gait_error": {
@@ -194,20 +172,20 @@ def measured_over(plan: Plan) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def store(found: Study, path: Path = fidelity.PRESETS) -> None:
-    """Write the package's table; ValueError if the limit is in doubt."""
+def store(found: Study, path: Path = chapter.STROKES) -> None:
+    """Write the package's certificate, presets first; ValueError if the limit is in doubt."""
     for name, doubt in found.doubt.items():
         if not doubt.path <= LARGEST_DOUBT:
             raise ValueError(
                 f"The limit is in doubt by {doubt.path:.1e} of the path ({name}), and {LARGEST_DOUBT:.0e} is allowed: "
                 "nothing is stored."
             )
-    by_setting = {row.setting: row for row in found.rows}
-    table = {
-        "about": "Written by python -m studies.accuracy --store; read by seastar_gym.scene.fidelity.",
-        "machine": machine(),
-        "measured_over": measured_over(Plan()),
-        "presets": {name: as_promise(by_setting[setting]) for name, setting in presets().items()},
-        "settings": [as_promise(row) for row in fronts(found.rows)],
-    }
-    path.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
+    by_resolution = {row.resolution: row for row in found.rows}
+    first = {each: by_resolution[each] for each in presets().values()}
+    rows = first | {row.resolution: row for row in fronts(found.rows)}
+    settings = {resolution: as_setting(row) for resolution, row in rows.items()}
+    Certificate(
+        physics(Scene()), tuple(settings.values()), ("random",), ("random", "repeated"), Plan().n_random,
+        limit_error=up(settings[presets()["reference"]].space_error / 3.0), classes=CLASSES_VERSION,
+        version=__version__, machine=machine(), measured_over=measured_over(Plan()),
+    ).save(path)  # fmt: skip

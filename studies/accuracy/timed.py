@@ -11,30 +11,30 @@ with steps of 0.2 ms, that of time the rest, against the same nodes. `--store` w
 promise in `info`, bounds and medians.
 """
 
-import json
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
-from seastar_gym.certification.measure import GROUP
+from seastar_gym.accuracy import Certificate, Setting, chapter
+from seastar_gym.accuracy.certificate import CLASSES_VERSION
+from seastar_gym.accuracy.command import progress_bar
+from seastar_gym.accuracy.measure import Progress, machine, measure, path_lengths, swim_all
+from seastar_gym.accuracy.setting import at, physics
 from seastar_gym.command import run_command
 from seastar_gym.scene import Numerics, Scene, SmaWires
-from seastar_gym.scene.fidelity import TIMED_PRESETS
-from seastar_gym.scene.numerics import Fidelity
-from seastar_gym.simulator import Simulator
-from studies.accuracy.page import timed
-from studies.accuracy.tables import two_digits
+from seastar_gym.scene.numerics import PRESETS, Fidelity, Resolution
+from seastar_gym.version import __version__
+from studies.accuracy.page import PERIODS, timed
+from studies.accuracy.tables import two_digits, up
 from studies.parser import study_parser
 
 Floats = NDArray[np.float64]
 
-PERIODS = (0.5, 0.2, 0.1)
-"""Times between decisions [s]."""
+SCENE = replace(Scene(), actuator=SmaWires())
 SECONDS = 10
 SAMPLES, SEED = 60, 0
 """Sequences of either kind for each time between decisions. With the confidence 95 %, at most 5 % of all others exceed
@@ -68,109 +68,76 @@ def sequences(period: float, plan: Plan, rng: np.random.Generator) -> Floats:
     return commands
 
 
-def swim(scene: Scene, commands: Floats, period: float) -> Floats:
-    """Hubs at whole seconds [m], shape (seconds, n, 2). commands: Shape (n_decisions, n, 5). period: [s]."""
-    parts = []
-    for begin in range(0, commands.shape[1], GROUP):
-        some = commands[:, begin : begin + GROUP]
-        simulator, hub = Simulator(scene, some.shape[1], threads=1), []
-        for k, each in enumerate(some, start=1):
-            simulator.advance(period, each)
-            if k % round(1.0 / period) == 0:
-                hub.append(simulator.hub_position())
-        parts.append(np.array(hub))
-    return np.concatenate(parts, axis=1)
-
-
-def scene_at(nodes: int, numerics: Numerics, like: Scene) -> Scene:
-    """Robot with wires, with so many nodes per limb, these numerics and the discretisation of another."""
-    return replace(like, robot=replace(like.robot, nodes_per_limb=nodes), numerics=numerics, actuator=SmaWires())
-
-
-def way(hub: Floats) -> Floats:
-    """Lengths of paths from the origin at whole seconds [m], shape (n,)."""
-    return np.asarray(np.linalg.norm(np.diff(hub, axis=0, prepend=0.0), axis=-1).sum(axis=0))
-
-
-def path_lengths(hub: Floats, limb_length: float) -> Floats:
-    """Lengths of paths at whole seconds, at least those of a hub that swims at SLOWEST [m], shape (n,)."""
-    return np.fmax(way(hub), SLOWEST * limb_length * len(hub))
+def drawn(period: float, plan: Plan) -> Floats:
+    """Sequences of the study."""
+    return sequences(period, plan, np.random.default_rng([SEED, round(1000 * period)]))
 
 
 def paths(period: float, plan: Plan) -> dict[str, list[float]]:
     """Shortest, median and longest path [mm] at "fast" of random commands and of repeated seconds."""
-    fast = Scene.preset("fast")
-    commands = sequences(period, plan, np.random.default_rng([SEED, round(1000 * period)]))
-    length = 1e3 * way(swim(scene_at(fast.robot.nodes_per_limb, fast.numerics, fast), commands, period))
-    kinds = {"random": length[: plan.samples], "repeated": length[plan.samples :]}
+    (swum,) = swim_all([at(SCENE, PRESETS["fast"])], drawn(period, plan), period=period)
+    random, repeated = np.split(1e3 * path_lengths(SCENE, swum.hub, 0.0), 2)
+    kinds = {"random": random, "repeated": repeated}
     return {name: [two_digits(float(end)) for end in np.percentile(some, (0, 50, 100))] for name, some in kinds.items()}
 
 
-def summary(space: Floats, time: Floats, samples: int) -> dict[str, float]:
-    """Fields of a `TimedPromise` of errors of space and of time, shape (2 samples,), random commands first."""
-    largest = {"space_error": space[:samples].max(), "time_error": time[:samples].max()}
-    gaits, both = slice(samples, None), space + time
-    return {
-        **largest, "gait_error": space[gaits].max() + time[gaits].max(),
-        "typical_error": np.median(both[:samples]), "typical_gait_error": np.median(both[gaits]),
-    }  # fmt: skip
+def setting(resolution: Resolution, space: Floats, time: Floats) -> Setting:
+    """Setting of errors of space and of time, of random and then of as many repeated commands; rounded upwards."""
+    discretisation, nodes_per_limb, numerics = resolution
+    (random, repeated), (in_time, repeated_in_time) = np.split(space, 2), np.split(time, 2)
+    of_space, of_time = up(random.max()), up(in_time.max())
+    medians = np.median(random + in_time), np.median(repeated + repeated_in_time)
+    return Setting(
+        nodes_per_limb, numerics.scheme, numerics.step, numerics.newton_tolerance,
+        errors={"random": of_space + of_time, "repeated": up(repeated.max() + repeated_in_time.max())},
+        typical={name: up(float(each)) for name, each in zip(("random", "repeated"), medians, strict=True)},
+        space_error=of_space, time_error=of_time, discretisation=discretisation,
+    )  # fmt: skip
 
 
-def errors(period: float, plan: Plan, progress: Any) -> dict[str, dict[str, float]]:
-    """Errors of every preset, for a time between decisions [s]."""
-    commands = sequences(period, plan, np.random.default_rng([SEED, round(1000 * period)]))
-    limit = swim(scene_at(plan.nodes, plan.short, Scene.preset("fast")), commands, period)
-    progress()
-    lengths = path_lengths(limit, Scene().robot.limb_length)
-
-    def distance(hub: Floats, other: Floats) -> Floats:
-        return np.asarray(np.linalg.norm(hub - other, axis=-1).max(axis=0) / lengths)
-
-    found: dict[str, dict[str, float]] = {}
-    for name in plan.presets:
-        preset = Scene.preset(name)
-        fine = swim(scene_at(preset.robot.nodes_per_limb, plan.short, preset), commands, period)
-        hub = swim(scene_at(preset.robot.nodes_per_limb, preset.numerics, preset), commands, period)
-        found[name] = summary(distance(fine, limit), distance(hub, fine), plan.samples)
-        progress()
-    return found
+def errors(period: float, plan: Plan, progress: Progress) -> dict[str, Setting]:
+    """Settings of all presets, for a time between decisions [s]."""
+    resolutions = [PRESETS[name] for name in plan.presets]
+    limit, shortest = Resolution("continuum", plan.nodes, plan.short), SLOWEST * plan.seconds
+    found = measure(SCENE, resolutions, limit, lambda *_: plan.short, drawn(period, plan), progress, period, shortest)
+    settings = zip(plan.presets, found.space, found.time, strict=True)
+    return {name: setting(PRESETS[name], space.path, time.path) for name, space, time in settings}
 
 
-def study(plan: Plan) -> dict[str, Any]:
-    """Run the study; returns its results as plain data, errors rounded upwards to two digits."""
+def study(period: float, plan: Plan) -> Certificate:
+    """Errors of all presets for a time between decisions [s]."""
     began = time.process_time()
-    with tqdm(total=len(PERIODS) * (1 + len(plan.presets)), unit="set") as bar:
-        found = {period: errors(period, plan, bar.update) for period in PERIODS}
-    return {
-        "about": "Written by python -m studies.accuracy.timed --store; read by seastar_gym.scene.fidelity.",
-        "measured_over": {
+    with progress_bar(f"every {period:g} s") as progress:
+        settings = tuple(errors(period, plan, progress).values())
+    return Certificate(
+        physics(SCENE), settings, ("random",), ("random", "repeated"), plan.samples,
+        limit_error=up(min(each.space_error for each in settings) / 3.0), classes=CLASSES_VERSION,
+        version=__version__, machine=machine(), decision_period=period,
+        measured_over={
+            "command": "python -m studies.accuracy.timed --store",
             "seconds": plan.seconds, "random": plan.samples, "a repeated second": plan.samples,
             "shortest path": f"{SLOWEST:g} limb lengths per second",
             "limit": f"{plan.nodes} nodes per limb, {1e3 * plan.short.step:g} ms",
+            "paths": paths(period, plan), "processor_seconds": round(time.process_time() - began),
         },
-        "paths": {f"{period:g}": paths(period, plan) for period in PERIODS},
-        "processor_seconds": round(time.process_time() - began),
-        "presets": {
-            name: {f"{period:g}": {what: two_digits(one, up=True) for what, one in found[period][name].items()}
-                   for period in PERIODS} for name in plan.presets
-        },
-    }  # fmt: skip
+    )  # fmt: skip
 
 
 def main() -> None:
     """Command line: run the study and print its table."""
     parser = study_parser("studies.accuracy.timed", __doc__)
     parser.add_argument("--quick", action="store_true", help="simulate fewer swims and presets")
-    parser.add_argument("--store", action="store_true", help="write the table that comes with the package")
-    parser.add_argument("--out", type=Path, default=Path("runs/timed_errors.json"), help="file (default: %(default)s)")
+    parser.add_argument("--store", action="store_true", help="write the certificates that come with the package")
+    parser.add_argument("--out", type=Path, default=Path("runs/timed_errors"), help="folder (default: %(default)s)")
     options = parser.parse_args()
     if options.quick and options.store:
         parser.error("--store needs the whole study, not --quick.")
-    results = study(QUICK if options.quick else Plan())
-    file = TIMED_PRESETS if options.store else options.out
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
-    print(timed() if options.store else json.dumps(results["presets"], indent=1))
+    for period in PERIODS:
+        certificate = study(period, QUICK if options.quick else Plan())
+        certificate.save(chapter.file_of(period, chapter.FOLDER if options.store else options.out))
+        print(*(f"{period:g} s: {each}: {each.errors}" for each in certificate.settings), sep="\n")
+    if options.store:
+        print(timed())
 
 
 if __name__ == "__main__":

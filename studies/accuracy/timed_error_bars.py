@@ -7,18 +7,17 @@ distance from that with 73 nodes per limb and steps of 0.25 ms is at most the es
 Prints a table: the share of decisions that are covered, and the median of estimate over true error.
 """
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from seastar_gym.accuracy.measure import swim
+from seastar_gym.accuracy.setting import at
 from seastar_gym.command import run_command
-from seastar_gym.scene import Scene, SmaWires
-from seastar_gym.scene.numerics import Setting
-from seastar_gym.simulator import Simulator
+from seastar_gym.scene.numerics import Resolution
 from studies.accuracy import timed
-from studies.accuracy.error_bars import FIDELITIES, SETTINGS, SMALLEST, TRUE, at
+from studies.accuracy.error_bars import FIDELITIES, SETTINGS, SMALLEST, TRUE
+from studies.accuracy.page import PERIODS
 from studies.parser import study_parser
 from studies.style import PERCENT
 
@@ -28,26 +27,17 @@ SAMPLES, SEED = 8, 7
 """Sequences of either kind for each time between decisions, and their seed; the tables of errors have seed 0."""
 
 
-def swim(setting: Setting, commands: Floats, period: float, error_bars: bool) -> tuple[Floats, Floats]:
-    """Hub [m], shape (n_decisions, n, 2), and error estimates [m], shape (n_decisions, n), at ends of decisions."""
-    scene = replace(at(Scene(), setting), actuator=SmaWires())
-    simulator = Simulator(scene, commands.shape[1], threads=1, error_bars=error_bars)
-    hub, estimates = [], []
-    for each in commands:
-        estimates.append(simulator.advance(period, each).error_estimate)
-        hub.append(simulator.hub_position())
-    return np.array(hub), np.array(estimates)
-
-
-def measure(period: float, plan: timed.Plan, true: Setting = TRUE, seed: int = SEED) -> dict[str, tuple[float, float]]:
+def measure(
+    period: float, plan: timed.Plan, true: Resolution = TRUE, seed: int = SEED
+) -> dict[str, tuple[float, float]]:
     """Coverage and median of estimate over true error, by preset, for a time between decisions [s]."""
     commands = timed.sequences(period, plan, np.random.default_rng([seed, round(1000 * period)]))
-    exact, _ = swim(true, commands, period, error_bars=False)
+    exact = swim(at(timed.SCENE, true), commands, period).hub
     found = {}
     for name in FIDELITIES:
-        hub, estimate = swim(SETTINGS[name], commands, period, error_bars=True)
-        error = np.fmax(np.linalg.norm(hub - exact, axis=-1), SMALLEST)
-        found[name] = float(np.mean(error <= estimate)), float(np.median(estimate / error))
+        swum = swim(at(timed.SCENE, SETTINGS[name]), commands, period, error_bars=True)
+        error = np.fmax(np.linalg.norm(swum.hub - exact, axis=-1), SMALLEST)
+        found[name] = float(np.mean(error <= swum.error_estimate)), float(np.median(swum.error_estimate / error))
     return found
 
 
@@ -65,7 +55,7 @@ def main() -> None:
     parser = study_parser("studies.accuracy.timed_error_bars", __doc__)
     parser.add_argument("--samples", type=int, default=SAMPLES, help="sequences of either kind (default: %(default)s)")
     plan = timed.Plan(samples=parser.parse_args().samples)
-    print(table({period: measure(period, plan) for period in tqdm(timed.PERIODS, unit="period")}))
+    print(table({period: measure(period, plan) for period in tqdm(PERIODS, unit="period")}))
 
 
 if __name__ == "__main__":

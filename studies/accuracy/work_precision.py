@@ -2,7 +2,7 @@
 
 The chapter's robot, one of silicone, one with thermal actuators, one whose limbs touch, and ones of three and of twelve
 limbs swim ten strokes from rest, with sequences of every class of commands of full amplitude
-(`seastar_gym.certification.commands`). The error is the hub's largest distance, at the ends of strokes, from its path
+(`seastar_gym.accuracy.commands`). The error is the hub's largest distance, at the ends of strokes, from its path
 with 73 nodes per limb of the continuum's discretisation and the implicit midpoint rule at 0.125 ms, over the length of
 that path: the whole error, which is smaller than the promised sum of space and time where the two cancel. The straight
 swim of the chapter's robot stands beside, with four published codes.
@@ -20,15 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from seastar_gym.certification import measure
-from seastar_gym.certification.commands import CLASSES, PROMISED, draw_classes
+from seastar_gym.accuracy.commands import CLASSES, PROMISED, draw_classes
+from seastar_gym.accuracy.measure import errors, path_lengths, swim
+from seastar_gym.accuracy.setting import at
 from seastar_gym.command import run_command
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Contact, Numerics, Scene, Seastar, SmaPulse
 from seastar_gym.scene.actuators.thermal import ThermalSma
-from seastar_gym.scene.numerics import PRESETS, Setting
+from seastar_gym.scene.numerics import PRESETS, Resolution
 from seastar_gym.simulator import Simulator
-from studies.accuracy.cases import scene_of
 from studies.accuracy.settings import MS
 from studies.accuracy.work_precision_page import as_page, draw
 from studies.parser import study_parser
@@ -46,18 +46,18 @@ PROBLEMS: dict[str, Scene] = {
     "twelve limbs": Scene(Seastar(12), actuator=SmaPulse(0.25)),
 }
 """Scenes. Hub hinges of the chapter's discretisation allow three and twelve limbs no larger peak angles."""
-SETTINGS: tuple[Setting, ...] = (
+SETTINGS: tuple[Resolution, ...] = (
     *PRESETS.values(),
-    *(Setting("continuum", n, Numerics("sdirk2", 20 * MS, 1e-6)) for n in (7, 10)),
-    *(Setting("continuum", n, Numerics("implicit-midpoint", 5 * MS, 1e-5)) for n in (10, 19)),
-    *(Setting("continuum", n, Numerics("implicit-midpoint", 2 * MS, 1e-7)) for n in (10, 13)),
-    Setting("chapter", 10, Numerics("implicit-euler", 10 * MS)),
-    *(Setting("chapter", 10, Numerics("implicit-midpoint", h * MS, 1e-7)) for h in (5, 1)),
-    *(Setting("chapter", n, Numerics("implicit-midpoint", 1 * MS, 1e-7)) for n in (19, 37)),
+    *(Resolution("continuum", n, Numerics("sdirk2", 20 * MS, 1e-6)) for n in (7, 10)),
+    *(Resolution("continuum", n, Numerics("implicit-midpoint", 5 * MS, 1e-5)) for n in (10, 19)),
+    *(Resolution("continuum", n, Numerics("implicit-midpoint", 2 * MS, 1e-7)) for n in (10, 13)),
+    Resolution("chapter", 10, Numerics("implicit-euler", 10 * MS)),
+    *(Resolution("chapter", 10, Numerics("implicit-midpoint", h * MS, 1e-7)) for h in (5, 1)),
+    *(Resolution("chapter", n, Numerics("implicit-midpoint", 1 * MS, 1e-7)) for n in (19, 37)),
 )
 """Settings of both discretisations, the presets first."""
-LIMIT = Setting("continuum", 73, Numerics("implicit-midpoint", 0.125 * MS, 1e-9))
-HALF = Setting("continuum", 37, Numerics("implicit-midpoint", 0.25 * MS, 1e-9))
+LIMIT = Resolution("continuum", 73, Numerics("implicit-midpoint", 0.125 * MS, 1e-9))
+HALF = Resolution("continuum", 37, Numerics("implicit-midpoint", 0.25 * MS, 1e-9))
 """What stands for the continuum, and twice its edges and steps: its own error is a third of their difference."""
 SAMPLES, SEED = 2, 7
 """Sequences per class, and their seed."""
@@ -83,12 +83,6 @@ def cost(scene: Scene) -> float:
     return min(times[1:]) / BATCH
 
 
-def errors(hub: Floats, limit: Floats, limb_length: float) -> Floats:
-    """Largest distances from the limit over the lengths of its paths; infinite where the solver failed."""
-    distances = np.linalg.norm(hub - limit, axis=-1).max(axis=0)
-    return np.where(np.isnan(distances), np.inf, distances) / measure.path_lengths(limit, limb_length)
-
-
 def finite(number: float) -> float | None:
     """Number as JSON has it: none where the solver failed."""
     return float(number) if np.isfinite(number) else None
@@ -99,12 +93,12 @@ def examine(physics: Scene, straight: bool) -> dict[str, Any]:
     commands = draw_sequences(physics.robot.n_limbs)
     if straight:
         commands = np.concatenate([commands, np.tile(STRAIGHT, (len(commands), 1, 1))], axis=1)
-    limb_length = float(np.max(physics.robot.limb_length))
-    limit, half = (measure.swim(scene_of(each, physics), commands) for each in (LIMIT, HALF))
+    limit, half = (swim(at(physics, each), commands) for each in (LIMIT, HALF))
+    lengths = path_lengths(physics, limit.hub)
     rows = []
     for setting in SETTINGS:
-        scene = scene_of(setting, physics)
-        found = errors(measure.swim(scene, commands), limit, limb_length)
+        scene = at(physics, setting)
+        found = errors(swim(scene, commands), limit, lengths).path
         own = found[:-1] if straight else found
         rows.append({
             "discretisation": setting.discretisation, "nodes_per_limb": setting.nodes_per_limb,
@@ -117,8 +111,8 @@ def examine(physics: Scene, straight: bool) -> dict[str, Any]:
         })  # fmt: skip
     return {
         "sequences": commands.shape[1] - straight,
-        "limit_error": float((errors(half, limit, limb_length) / 3.0).max()),
-        **({"straight_distance": float(np.hypot(*limit[-1, -1]))} if straight else {}),
+        "limit_error": float((errors(half, limit, lengths).path / 3.0).max()),
+        **({"straight_distance": float(np.hypot(*limit.hub[-1, -1]))} if straight else {}),
         "settings": rows,
     }  # fmt: skip
 

@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from seastar_gym.accuracy.measure import path_lengths
 from seastar_gym.gaits import PAIRS, STRAIGHT
+from seastar_gym.scene import Scene
 from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simulator import Simulator
-from studies.accuracy.cases import hub_path_lengths
 from studies.continuum.scenes import NAMES, scene
 from studies.kept import keep, rounded
 from studies.parser import study_parser
@@ -74,7 +75,7 @@ def swim(name: str, discretisation: Discretisation, nodes_per_limb: int, lumped:
 
 def error(hub: Floats, reference: Floats) -> float:
     """Largest distance of the hub from the reference over the length of its path, of all commands the worst."""
-    return float((np.linalg.norm(hub - reference, axis=-1).max(axis=0) / hub_path_lengths(reference)).max())
+    return float((np.linalg.norm(hub - reference, axis=-1).max(axis=0) / path_lengths(Scene(), reference)).max())
 
 
 def order(errors: Floats, nodes: tuple[int, ...] = NODES) -> float:

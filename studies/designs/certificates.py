@@ -13,10 +13,10 @@ from typing import Any
 
 from tqdm import tqdm
 
-from seastar_gym.certification.measure import SAMPLES, certify
+from seastar_gym.accuracy import Certificate
+from seastar_gym.accuracy.measure import SAMPLES, certify
 from seastar_gym.command import run_command
 from seastar_gym.scene import Scene, SmaPulse
-from seastar_gym.scene.certificate import Certificate
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.frames import Swim, frame_with
 from seastar_gym.sweep.swimming import swim

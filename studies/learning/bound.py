@@ -16,19 +16,18 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import tyro
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from agents.names import AgentNames
 from seastar_gym.command import run_command
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.greedy import Displacements, measure_gaits
 from seastar_gym.controllers.planner import Branching
-from seastar_gym.controllers.roster import load_agents
+from seastar_gym.controllers.roster import HELP, load_agents
 from seastar_gym.envs.commands import Actions, command_table
 from seastar_gym.envs.paths import LINE_LENGTH, make_path
 from seastar_gym.envs.reward import RewardWeights
@@ -135,7 +134,7 @@ class Options:
     """Width of the beam search round the pentagon, over pairs of limbs [states]."""
     only_pentagon: bool = False
     """Search only the pentagon, print the number of strokes found, and write nothing."""
-    agents: AgentNames = ("learned",)
+    agents: Annotated[tuple[str, ...], tyro.conf.arg(help=HELP)] = ("learned",)
     out: Path = Path("docs/bound.json")
     """File of the results. The picture has the same name with the suffix .png."""
 

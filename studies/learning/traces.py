@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from seastar_gym.command import run_command
-from seastar_gym.controllers.contract import actions_of
 from seastar_gym.controllers.roster import load_agents
-from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.pictures import draw_traces
-from seastar_gym.evaluation.swim import Swim, swim
+from seastar_gym.evaluation.swim import Swim
 from studies.kept import keep
 from studies.parser import study_parser
 from studies.provenance import provenance
@@ -30,11 +29,7 @@ UNIT = 1e-5
 
 def swims(max_strokes: int = MOST_STROKES) -> list[Swim]:
     """The agents' swims at `balanced`."""
-    found = []
-    for name, policy in load_agents(AGENTS).items():
-        env = SeastarSwimEnv(path="pentagon", actions=actions_of(policy, 5), waypoint_radius=RADIUS)
-        found.append(swim(name, policy, env, max_strokes=max_strokes, seed=0))
-    return found
+    return evaluate(load_agents(AGENTS), max_strokes=max_strokes, waypoint_radius=RADIUS, say=lambda text: None)
 
 
 def as_data(found: list[Swim]) -> dict[str, Any]:

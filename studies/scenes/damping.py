@@ -23,12 +23,14 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
+from seastar_gym.accuracy.measure import Swims, errors, path_lengths, swim
+from seastar_gym.accuracy.setting import at
 from seastar_gym.command import run_command
 from seastar_gym.gaits import PAIRS
 from seastar_gym.scene import Numerics, Scene, Seastar
-from seastar_gym.scene.numerics import SchemeName, Setting
+from seastar_gym.scene.numerics import Resolution, SchemeName
 from seastar_gym.simulator import Simulator
-from studies.accuracy.cases import Cases, Swim, errors, joined, random_sequences, scene_of, swim, swims
+from studies.accuracy.cases import Cases, joined, random_sequences, swims
 from studies.kept import keep, rounded
 from studies.parser import study_parser
 from studies.provenance import provenance
@@ -102,14 +104,14 @@ class Study:
 
 def scene(numerics: Numerics, tau: float | None) -> Scene:
     """The chapter's robot with a relaxation time tau [s]."""
-    return scene_of(Setting("continuum", 10, numerics), Scene(Seastar(relaxation_time=tau)))
+    return at(Scene(Seastar(relaxation_time=tau)), Resolution("continuum", 10, numerics))
 
 
-def timed(cases: Cases, numerics: Numerics, tau: float | None) -> tuple[Swim, float]:
+def timed(cases: Cases, numerics: Numerics, tau: float | None) -> tuple[Swims, float]:
     """Swim with a relaxation time tau [s], and its real-time factor."""
-    swim(cases.first(1), scene(numerics, tau))  # compiles the kernels for this scene outside the timing
+    swim(scene(numerics, tau), cases.first(1).commands)  # compiles the kernels for this scene outside the timing
     start = time.thread_time()
-    swum = swim(cases, scene(numerics, tau))
+    swum = swim(scene(numerics, tau), cases.commands)
     return swum, len(cases) * len(cases.commands) / (time.thread_time() - start)
 
 
@@ -125,15 +127,16 @@ def study(plan: Plan, progress: bool = True) -> Study:
         for material, tau in MATERIALS.items():
             found = []
             for scheme, step in plan.converged:
-                found.append(swim(cases, scene(Numerics(scheme, step, 1e-11), tau), threads=None))
+                found.append(swim(scene(Numerics(scheme, step, 1e-11), tau), cases.commands))
                 bar.update()
             # The midpoint rule is the more accurate reference for undamped rods.
             exact = found[-1]
-            agreement[material] = float(errors(found[0], exact).path.max())
+            lengths = path_lengths(Scene(), exact.hub)
+            agreement[material] = float(errors(found[0], exact, lengths).path.max())
             pairs[material] = pair_distances(tau, plan.nodes)
             for scheme, h in settings:
                 swum, speed = timed(cases, Numerics(scheme, 1e-3 * h, TOLERANCE), tau)
-                rows.append(Row(material, scheme, 1e-3 * h, float(errors(swum, exact).path.max()), speed))
+                rows.append(Row(material, scheme, 1e-3 * h, float(errors(swum, exact, lengths).path.max()), speed))
                 bar.update()
     return Study(rows, agreement, pairs, ringing)
 

@@ -4,7 +4,6 @@ Draws both side by side, at the same simulated time, until the faster one has ar
 """
 
 import argparse
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from seastar_gym.controllers.learned import in_the_box, load
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.films import Picture, shrunk, write_gif
+from seastar_gym.evaluation.rollout import Info, rollout
 from studies.parser import study_parser
 
 BETWEEN = 0.4
@@ -26,34 +26,26 @@ REST = 20
 """Frames for which the film rests on its end."""
 
 
-def frames(policy: Policy, per_decision: int, **arguments: Any) -> Iterator[Picture]:
-    """Pictures of a swim round the pentagon every BETWEEN seconds, and that of its end.
+def frames(policy: Policy, per_decision: int, most: int | None = None, **arguments: Any) -> list[Picture]:
+    """Pictures of a swim round the pentagon every BETWEEN seconds, `most` of them at most, and that of its end.
 
     per_decision: Number of parts of BETWEEN/2 in a decision.
     """
     env = SeastarSwimEnv(render_mode="rgb_array_list", frames_per_stroke=per_decision, **arguments)
-    observation, _ = env.reset(seed=0)
-    env.render()  # the first picture is of the robot at rest
-    state, is_over, drawn = None, False, 0
-    while not is_over:
-        action, state = policy.predict(observation, state, deterministic=True)
-        observation, _, is_over, _, _ = env.step(action)
-        for picture in env.render() or []:
-            drawn += 1
-            if drawn % 2 == 0:
-                yield shrunk(picture)
+    drawn = list[Picture]()
+
+    def look(info: Info) -> bool:
+        drawn.extend(map(shrunk, env.render() or []))
+        return most is not None and len(drawn) > 2 * most
+
+    rollout(env, policy, seeds=0, on_step=look)
     env.close()
-    yield shrunk(picture)
+    return [*drawn[2::2], drawn[-1]][:most]  # the first picture is of the robot at rest
 
 
-def side_by_side(left: Iterator[Picture], right: Iterator[Picture], most: int | None = None) -> list[Picture]:
-    """Pictures beside each other, until the swim on the right is over."""
-    film = []
-    for k, (one, other) in enumerate(zip(left, right, strict=False)):
-        if most is not None and k >= most:
-            break
-        film.append(np.concatenate([one, other], axis=1))
-    return film
+def side_by_side(left: list[Picture], right: list[Picture]) -> list[Picture]:
+    """Pictures beside each other, until one of the swims is over."""
+    return [np.concatenate(both, axis=1) for both in zip(left, right, strict=False)]
 
 
 def main() -> None:
@@ -68,11 +60,11 @@ def main() -> None:
         parser.error(f"decisions must take a whole number of {BETWEEN / 2:g} s, not {options.decision_period:g} s.")
     policy = load(in_the_box(options.decision_period))
     gait = scripted("pentagon", policy.actions)
-    chapter = frames(gait, round(2 / BETWEEN), actions=gait.actions, fidelity="balanced")
     # As `seastar swim` shows it, and at the same fidelity as the other.
     timed = {"fidelity": "balanced", "decision_period": policy.decision_period}
-    learned = frames(policy, parts, actions=policy.actions, **timed)
-    film = side_by_side(chapter, learned, options.frames)
+    learned = frames(policy, parts, options.frames, actions=policy.actions, **timed)
+    chapter = frames(gait, round(2 / BETWEEN), len(learned), actions=gait.actions, fidelity="balanced")
+    film = side_by_side(chapter, learned)
     write_gif(film + [film[-1]] * REST, options.out, FPS)
     print(f"Written: {options.out}, {len(film)} frames of {BETWEEN} s.")
 

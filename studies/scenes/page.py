@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.report.playback import RecordingEnv
 from seastar_gym.command import run_command
 from seastar_gym.controllers.learned import in_the_box, load
 from seastar_gym.envs.rendering import limb_nodes
 from seastar_gym.envs.stations import heading_of
+from seastar_gym.evaluation.playback import RecordingEnv
 from seastar_gym.evaluation.swim import swim
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Scene

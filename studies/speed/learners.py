@@ -19,9 +19,9 @@ import torch
 
 from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_model, make_training_env
+from seastar_gym.accuracy.measure import machine
 from seastar_gym.command import run_command
 from studies.parser import study_parser
-from studies.speed.timing import machine
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "examples" / "single_file_ppo.py"
 OURS = Hyperparameters()

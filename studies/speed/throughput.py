@@ -16,6 +16,7 @@ from rich.console import Console
 from rich.table import Table
 from tqdm import tqdm
 
+from seastar_gym.accuracy.measure import machine
 from seastar_gym.command import run_command
 from seastar_gym.scene import Numerics, Scene, Seastar
 from studies.parser import study_parser
@@ -24,7 +25,6 @@ from studies.speed.parts import part_seconds
 from studies.speed.peak import peak_gigaflops, peak_speedup
 from studies.speed.process import FIRST_STROKE, TIMED, environment_share, memory_per_robot, process_seconds
 from studies.speed.strokes import cost_over_nodes, exponent, iteration_seconds, real_time_factors, threads_speedup
-from studies.speed.timing import machine
 from studies.style import CYCLE, FAINT, INK, subplots
 
 CHAPTER = 1.0

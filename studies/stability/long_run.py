@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rich.table import Table
 from tqdm import tqdm
 
-from seastar_gym.certification.endurance import LONG, energy_growths
+from seastar_gym.accuracy.endurance import LONG, energy_growths
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator

@@ -9,9 +9,9 @@ from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.randomization import LIMB_STRENGTHS
 from seastar_gym.envs.stations import body_heading
 from seastar_gym.envs.tasks.fail_blind import MOST_DEAD
+from seastar_gym.evaluation.rollout import Info
 from seastar_gym.simulator import Simulator, State
 from studies.tasks.ahead import Ahead, Robots
-from studies.tasks.episodes import Info
 from studies.tasks.greedy import Actions, Floats, Floats32, route
 from studies.tasks.hypotheses import Guess
 

@@ -16,7 +16,9 @@ from typing import Any
 
 import numpy as np
 
+from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.greedy import turned
+from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.tasks.challenge import Challenge
 from seastar_gym.envs.tasks.course import Courses, Pursuit
@@ -26,11 +28,12 @@ from seastar_gym.envs.tasks.obst_trap import ObstTrap
 from seastar_gym.envs.tasks.prey import LOOK_AHEAD, Prey
 from seastar_gym.envs.tasks.prizes import Prizes
 from seastar_gym.envs.tasks.station import Station
+from seastar_gym.evaluation.rollout import Batch, Info
 from seastar_gym.simulator import State
 from studies.tasks.ahead import Ahead, Odometer, Robots, few_commands
 from studies.tasks.blind import BlindPlanner, FailureGuess, LimbsKnown
-from studies.tasks.episodes import Agent, Batch, Info
-from studies.tasks.greedy import Actions, Floats, Floats32, Greedy, GreedyOnRoute, Rest, length, route
+from studies.tasks.episodes import Agent
+from studies.tasks.greedy import Actions, Floats, Floats32, Greedy, GreedyOnRoute, length, route
 from studies.tasks.hypotheses import Guess
 from studies.tasks.rounds import BestRound, MostPerMetre, PlannedMostPerMetre
 from studies.tasks.trap import ClearGreedy, ClearPlanner, all_discs, discs_by_the_prior, discs_so_far
@@ -242,7 +245,9 @@ def is_swum(name: str, challenge: Challenge) -> bool:
     return name == "rest" or name in MAKERS[type(challenge)]
 
 
-def make_controller(name: str, batch: Batch) -> Agent:
+def make_controller(name: str, batch: Batch) -> Agent | Policy:
     """Controller of the robots of a batch."""
     robots: Any = Robots(batch)
-    return Rest(robots) if name == "rest" else MAKERS[type(robots.inner.challenge)][name](robots)
+    if name == "rest":
+        return scripted("rest", robots.inner.actions)
+    return MAKERS[type(robots.inner.challenge)][name](robots)

@@ -10,23 +10,24 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 import tyro
-from numpy.typing import NDArray
 
 from seastar_gym import TASKS
 from seastar_gym.command import run_command
+from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import load
+from seastar_gym.controllers.scripted import scripted
 from seastar_gym.data.command import name_of, write_to
-from seastar_gym.data.dataset import summary, swim_once, write
+from seastar_gym.data.dataset import summary, write
 from seastar_gym.data.recorder import Episode, Recorder
+from seastar_gym.evaluation.tasks import make_batch
 from seastar_gym.extras import require_extra
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
 from studies.tasks.controllers import make_controller
-from studies.tasks.episodes import Agent, Batch, Info, make_batch
+from studies.tasks.episodes import Agent, rollout_of
 
 QUALITIES = ("random", "greedy", "learned")
 
@@ -57,35 +58,22 @@ class Options:
                 raise ValueError(f"Unknown {kind} {min(unknown)!r}: choose of {', '.join(known)}.")
 
 
-class Random:
-    """Agent that draws actions uniformly."""
-
-    def __init__(self, batch: Batch, seed: int):
-        self._space = batch.action_space
-        self._space.seed(seed)
-
-    def act(self, observations: NDArray[np.float32], info: Info) -> NDArray[np.int64]:
-        """Actions of all robots."""
-        return np.asarray(self._space.sample())
-
-
-def agent_of(quality: str, id: str, recorder: Recorder, options: Options) -> tuple[Batch, Agent]:
-    """Agent of a quality, and the batch that it sees."""
+def agent_of(quality: str, id: str, recorder: Recorder, options: Options) -> Agent | Policy:
+    """Agent of a quality."""
     if quality == "random":
-        return recorder, Random(recorder, options.seed)
+        return scripted("random", TASKS[id][1], rng=np.random.default_rng(options.seed))
     if quality == "greedy":
-        return recorder, make_controller("greedy", recorder)
+        return make_controller("greedy", recorder)
     from agents.tasks.command import file_of
-    from studies.tasks.learning import Trained
 
-    return recorder, cast(Agent, Trained(load(file_of(id))))
+    return load(file_of(id))
 
 
 def record(id: str, quality: str, options: Options) -> list[Episode]:
     """Episodes of a task, each from its reset to its end."""
-    recorder = Recorder(make_batch(id, options.episodes, "train", options.fidelity, options.num_threads))
-    batch, agent = agent_of(quality, id, recorder, options)
-    swim_once(batch, recorder, agent.act, list(range(options.episodes)))
+    batch = make_batch(id, options.episodes, options.num_threads, split="train", fidelity=options.fidelity)
+    recorder = Recorder(batch)
+    rollout_of(recorder, agent_of(quality, id, recorder, options), seeds=list(range(options.episodes)))
     recorder.close()
     return recorder.episodes(only_first=True)
 

@@ -4,7 +4,7 @@ The agent "adaptive", which remembers, swims the first held-out episode, or "pla
 has a picture every BETWEEN seconds of the robot's time and shows FPS of them a second.
 """
 
-from collections.abc import Iterator
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +13,12 @@ import numpy as np
 from seastar_gym import TASKS
 from seastar_gym.command import run_command
 from seastar_gym.evaluation.films import Picture, shrunk, write_gif
+from seastar_gym.evaluation.rollout import Info
+from seastar_gym.evaluation.tasks import make_batch
 from studies.parser import study_parser
 from studies.tasks.ahead import Robots
 from studies.tasks.controllers import CONTROLLERS, is_swum, make_controller
-from studies.tasks.episodes import make_batch
+from studies.tasks.episodes import rollout_of
 
 BETWEEN = 2.0
 """Simulated time between two pictures [s]."""
@@ -38,22 +40,24 @@ def swimmer(batch: Any) -> str:
     return "adaptive" if is_swum("adaptive", Robots(batch).inner.challenge) else "planner"
 
 
-def pictures(id: str, agent_name: str | None, longest: float = LONGEST, instance: int = 0) -> Iterator[Picture]:
+def pictures(id: str, agent_name: str | None, longest: float = LONGEST, instance: int = 0) -> list[Picture]:
     """Pictures of an episode; agent_name: None means `swimmer`. longest: Simulated time [s]."""
-    batch: Any = make_batch(id, 1, "test", "fast", 1, render_mode="rgb_array")
+    batch: Any = make_batch(id, 1, 1, split="test", fidelity="fast", render_mode="rgb_array")
     decision_period = TASKS[id][2]
-    every = round(BETWEEN / decision_period)
-    agent = make_controller(agent_name or swimmer(batch), batch)
-    observations, info = batch.reset(seed=0, options={"instance": np.array([instance])})
-    yield shrunk(batch.render()[0])
-    for decision in range(1, round(longest / decision_period) + 1):
-        observations, _, terminated, truncated, info = batch.step(agent.act(observations, info))
-        is_over = bool(terminated[0] | truncated[0])
-        if decision % every == 0 or is_over:
-            yield shrunk(batch.render()[0])
-        if is_over:
-            break
+    every, numbers, film = round(BETWEEN / decision_period), itertools.count(), list[Picture]()
+
+    def look(info: Info) -> None:
+        if next(numbers) % every == 0:
+            film.append(shrunk(batch.render()[0]))
+
+    found = rollout_of(
+        batch, make_controller(agent_name or swimmer(batch), batch), look, seeds=0,
+        options={"instance": np.array([instance])}, until=round(longest / decision_period),
+    )  # fmt: skip
+    if found.decisions[0] % every:
+        film.append(shrunk(batch.render()[0]))
     batch.close()
+    return film
 
 
 def main() -> None:
@@ -67,7 +71,7 @@ def main() -> None:
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     for id in options.ids:
-        film = list(pictures(id, options.agent, options.seconds, options.instance))
+        film = pictures(id, options.agent, options.seconds, options.instance)
         write_gif(film + film[-1:] * REST, options.out / file_name(id), FPS)
         print(f"Written: {options.out / file_name(id)}, {len(film)} pictures.", flush=True)
 

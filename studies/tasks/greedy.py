@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.evaluation.rollout import Info
 from studies.tasks.ahead import Robots
-from studies.tasks.episodes import Info
 
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
@@ -17,17 +17,6 @@ WAYPOINT_RADIUS = 0.01
 def length(vectors: Floats) -> Floats:
     """Length over the last axis."""
     return np.asarray(np.hypot(vectors[..., 0], vectors[..., 1]))
-
-
-class Rest:
-    """Agent that heats nothing."""
-
-    def __init__(self, robots: Robots):
-        self._actions = np.zeros(robots.n, np.int64)
-
-    def act(self, observations: Floats32, info: Info) -> Actions:
-        """Number of the command that heats no limb."""
-        return self._actions
 
 
 class Greedy:

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.evaluation.rollout import Info
 from studies.tasks.ahead import Odometer, Robots
-from studies.tasks.episodes import Info
 from studies.tasks.greedy import Actions, Floats, Floats32, length, route
 
 ERROR_OF_PLACE, ERROR_OF_TURN = 0.002, 0.02

@@ -2,36 +2,20 @@
 
 from typing import Any
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 from stable_baselines3.common.utils import LinearSchedule
 
 from agents.tasks.learning import LEARNERS, Learner, hyperparameters, make_learning_env, new_model
 from seastar_gym import TASKS
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
+from seastar_gym.evaluation.rollout import Episodes
 from seastar_gym.scene.numerics import Fidelity
-from studies.tasks.episodes import Episodes, swim
+from studies.tasks.episodes import swim
 
 RECURRENT = "RecurrentPPO"
 ALL_LEARNERS = {**LEARNERS, RECURRENT: Learner(symmetric=False)}
 """Learners by name. A network with a state of its own cannot have its limbs renamed from one decision to the next, so
 it learns without the symmetry."""
-
-
-class Trained:
-    """Agent that asks a learner."""
-
-    def __init__(self, model: Any):
-        self._model, self._state = model, None
-        self._begins: NDArray[np.bool_] | None = None
-
-    def act(self, observations: NDArray[np.float32], info: dict[str, Any]) -> NDArray[np.int64]:
-        """Most probable actions of all robots."""
-        begins = np.ones(len(observations), bool) if self._begins is None else self._begins
-        actions, self._state = self._model.predict(observations, self._state, begins, deterministic=True)
-        self._begins = np.zeros(len(observations), bool)
-        return np.asarray(actions)
 
 
 def _recurrent(id: str, env: BatchVecEnv, seed: int) -> Any:
@@ -67,4 +51,4 @@ def train(id: str, name: str, seed: int, decisions: int, fidelity: Fidelity, thr
 
 def evaluate(id: str, name: str, model: Any, n_episodes: int, fidelity: Fidelity, threads: int | None) -> Episodes:
     """Held-out episodes of a learner."""
-    return swim(id, lambda batch: Trained(model), n_episodes, fidelity, threads, ALL_LEARNERS[name].wrap)
+    return swim(id, lambda batch: model, n_episodes, fidelity, threads, ALL_LEARNERS[name].wrap)

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from seastar_gym.evaluation.statistics import crossed_interval
 from seastar_gym.files import write_atomically
 from studies.provenance import footer
 from studies.style import CYCLE, FAINT, as_numbers, subplots
-from studies.tasks.rows import MORE_IS_BETTER, ORDER, Row, interval, rows_of
+from studies.tasks.rows import MORE_IS_BETTER, ORDER, Row, rows_of
 from studies.tasks.verdicts import verdicts
 
 UNITS = {
@@ -91,7 +92,7 @@ def table(row: Row, has_cell: Callable[[str, str], bool] = lambda id, agent: Tru
     lines = [f"## {row.id}", "", f"{UNITS[row.challenge].capitalize()}.", ""]
     lines += ["| agent | mean | 95 % interval | episodes | means of seeds |", "|---|---:|---|---:|---|"]
     for agent, seeds in row.in_order:
-        low, high = interval(seeds)
+        low, high = crossed_interval(seeds)
         each = ", ".join(f"{values.mean():.3g}" for values in seeds) if len(seeds) > 1 else ""
         n_episodes = min(map(len, seeds))
         lines.append(f"| {agent} | {row.mean(agent):.3g} | {low:.3g} to {high:.3g} | {n_episodes} | {each} |")
@@ -128,7 +129,7 @@ def draw(rows: Sequence[Row], file: Path) -> None:
 def _draw_row(axes: Any, row: Row) -> None:
     names = [agent for agent, _ in row.in_order]
     for place, (agent, seeds) in enumerate(row.in_order):
-        mean, (low, high) = row.mean(agent), interval(seeds)
+        mean, (low, high) = row.mean(agent), crossed_interval(seeds)
         colour = CYCLE[0] if agent.startswith(("PPO", "Rec", "in the box")) else FAINT
         axes.plot([low, high], [place, place], color=colour, lw=2.5, solid_capstyle="butt")
         axes.plot(mean, place, "o", color=colour, ms=5)

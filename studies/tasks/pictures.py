@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from seastar_gym.command import run_command
+from seastar_gym.evaluation.tasks import make_batch
 from studies.parser import study_parser
 from studies.tasks.controllers import make_controller
-from studies.tasks.episodes import make_batch
+from studies.tasks.episodes import rollout_of
 
 SHOWN: dict[str, tuple[str, str, int] | tuple[str, str, int, int]] = {
     "miswired": ("SeastarMiswired-v0", "adaptive", 120),
@@ -29,17 +30,11 @@ SHOWN: dict[str, tuple[str, str, int] | tuple[str, str, int, int]] = {
 
 def picture(id: str, controller: str, strokes: int, instance: int = 0) -> NDArray[np.uint8]:
     """Picture of a held-out episode of a task after so many strokes, or before its end."""
-    batch = make_batch(id, 1, "test", "fast", 1, render_mode="rgb_array")
-    agent: Any = make_controller(controller, batch)
-    observations, info = batch.reset(seed=0, options={"instance": instance})
-    pictures: Any = batch.render()
-    for _ in range(strokes):
-        observations, _, terminated, truncated, info = batch.step(agent.act(observations, info))
-        pictures = batch.render()
-        if terminated[0] or truncated[0]:
-            break
+    batch: Any = make_batch(id, 1, 1, split="test", fidelity="fast", render_mode="rgb_array")
+    rollout_of(batch, make_controller(controller, batch), seeds=0, options={"instance": instance}, until=strokes)
+    (drawn,) = batch.render()
     batch.close()
-    return np.asarray(pictures[0])
+    return np.asarray(drawn)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -5,8 +5,8 @@ import numpy as np
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.tasks.prizes import Prizes
 from seastar_gym.envs.tasks.rounds import best_round, distances
+from seastar_gym.evaluation.rollout import Info
 from studies.tasks.ahead import Ahead, Robots
-from studies.tasks.episodes import Info
 from studies.tasks.greedy import Actions, Floats, Floats32, Greedy, length
 
 SPEED_IN_STROKES, SPEED_IN_TIME = 0.0043, 0.0075

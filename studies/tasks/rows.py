@@ -1,14 +1,15 @@
 """Results of the tasks, the bound, and which tasks are kept."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.evaluation.many import CONFIDENCE, RESAMPLES
+from seastar_gym.envs.tasks.envs import CHALLENGES
+from seastar_gym.evaluation.measures import measure_of_challenge
 
-MORE_IS_BETTER = ("prey", "fast-prey", "prizes", "fast-prizes")
+MORE_IS_BETTER = tuple(name for name, each in CHALLENGES.items() if measure_of_challenge(each).better == "more")
 ORDER = ("rest", "greedy", "planner", "adaptive", "prior", "informed", "turn, then swim", "PPO", "PPO, memory",
          "PPO, told the way", "RecurrentPPO", "in the box")  # fmt: skip
 """Agents from top to bottom."""
@@ -68,21 +69,6 @@ class Row(NamedTuple):
     def is_kept(self) -> bool:
         """Whether the task has headroom that PPO does not take."""
         return self.headroom >= HEADROOM and self.left >= LEFT
-
-
-def interval(seeds: Sequence[NDArray[np.float64]]) -> tuple[float, float]:
-    """Ends of the interval of the mean that holds for other seeds and other episodes.
-
-    All seeds swim the same episodes, so that a bootstrap draws seeds, and episodes for all of them alike.
-    """
-    most = min(map(len, seeds))
-    values = np.array([of_seed[:most] for of_seed in seeds])
-    rng, (n_seeds, n_episodes) = np.random.default_rng(0), values.shape
-    drawn_seeds = rng.multinomial(n_seeds, np.full(n_seeds, 1.0 / n_seeds), RESAMPLES) / n_seeds
-    drawn_episodes = rng.multinomial(n_episodes, np.full(n_episodes, 1.0 / n_episodes), RESAMPLES) / n_episodes
-    tail = 50.0 * (1.0 - CONFIDENCE)
-    low, high = np.percentile(((drawn_seeds @ values) * drawn_episodes).sum(axis=1), [tail, 100.0 - tail])
-    return float(low), float(high)
 
 
 def rows_of(results: Mapping[str, Any], ids: Mapping[str, str]) -> list[Row]:

@@ -23,13 +23,15 @@ from agents.tasks.command import file_of
 from seastar_gym import TASKS
 from seastar_gym.controllers.learned import load
 from seastar_gym.envs.tasks.envs import CHALLENGES
+from seastar_gym.evaluation.measures import measure_of_challenge
+from seastar_gym.evaluation.rollout import Episodes
 from seastar_gym.files import write_atomically
 from seastar_gym.scene.numerics import Fidelity
 from studies.provenance import provenance
 from studies.tasks import heading
 from studies.tasks.controllers import CONTROLLERS, is_swum, make_controller
-from studies.tasks.episodes import Episodes, measure, swim
-from studies.tasks.learning import ALL_LEARNERS, Trained, evaluate, train
+from studies.tasks.episodes import swim
+from studies.tasks.learning import ALL_LEARNERS, evaluate, train
 from studies.tasks.page import write_page
 
 IDS: dict[str, str] = {id: about[0] for id, about in TASKS.items()} | {heading.ID: "heading"}
@@ -92,7 +94,7 @@ def swum(id: str, agent: str, seed: int, options: Options) -> Episodes:
         return swim(id, lambda batch: make_controller(agent, batch), options.episodes, fidelity, threads)
     if agent == IN_THE_BOX:
         policy = load(file_of(id))
-        return swim(id, lambda batch: Trained(policy), options.episodes, fidelity, threads)
+        return swim(id, lambda batch: policy, options.episodes, fidelity, threads)
     model = train(id, agent, seed, options.decisions, fidelity, threads)
     return evaluate(id, agent, model, options.episodes, fidelity, threads)
 
@@ -102,7 +104,7 @@ def cell(id: str, agent: str, seed: int, options: Options) -> dict[str, Any]:
     began = time.process_time()
     done = swum(id, agent, seed, options)
     return {
-        "measure": np.round(measure(IDS[id], done), 4).tolist(),
+        "measure": np.round(measure_of_challenge(CHALLENGES.get(IDS[id])).of(done), 4).tolist(),
         "return": np.round(done.returns, 3).tolist(),
         "success": done.success.tolist(),
         "processor_seconds": round(time.process_time() - began),

@@ -19,8 +19,8 @@ from seastar_gym.envs.tasks.obst_trap import (
     draw_horseshoe,
     draw_kind,
 )
+from seastar_gym.evaluation.rollout import Info
 from studies.tasks.ahead import Ahead, Robots
-from studies.tasks.episodes import Info
 from studies.tasks.greedy import Actions, Floats, Floats32, Greedy, length
 
 CLEAR = 0.008

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from seastar_gym.evaluation.many import mean_with_interval
+from seastar_gym.evaluation.statistics import mean_with_interval
 from studies.style import FAINT, INK, new_figure
 from studies.worked_example.robots import DEVIATIONS, nominal_values
 from studies.worked_example.tables import of_seeds

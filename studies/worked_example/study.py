@@ -26,7 +26,7 @@ import torch
 import tyro
 
 from seastar_gym import Certificate, DomainRandomization, Scene, Uniform, certify
-from seastar_gym.certification.measure import machine
+from seastar_gym.accuracy.measure import machine
 from seastar_gym.files import write_atomically
 from seastar_gym.identify import Measurement, get_parameter, identify, with_parameters
 from seastar_gym.scene.checks import require_count, require_number

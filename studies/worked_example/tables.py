@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.evaluation.many import Interval, mean_with_interval
+from seastar_gym.evaluation.statistics import mean_with_interval
 from seastar_gym.files import write_atomically
 from studies.worked_example.robots import DEVIATIONS, NOISE, nominal_values
 
@@ -33,7 +33,7 @@ def saved(runs: Mapping[str, Any], name: str, what: str) -> Floats:
     return of_seeds(one, what) - of_seeds(other, what)
 
 
-def shown(interval: Interval) -> str:
+def shown(interval: tuple[float, float, float]) -> str:
     """A mean with its interval."""
     mean, low, high = interval
     return f"{mean:.1f} [{low:.1f}, {high:.1f}]"

@@ -15,7 +15,7 @@ from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.evaluation.many import mean_with_interval
+from seastar_gym.evaluation.statistics import mean_with_interval
 from seastar_gym.evaluation.swim import swim
 from studies.learning.in_time import study, trainings
 from studies.learning.in_time.shares import ChosenCommands, SharesPolicy, shares_of_pairs
@@ -38,7 +38,7 @@ def small(monkeypatch):
     monkeypatch.setattr(trainings, "TRAININGS", learners | {"later": later})
     monkeypatch.setattr(study, "TRAININGS", learners | {"later": later})
     monkeypatch.setattr(trainings, "SAC_SETTINGS", trainings.SAC_SETTINGS | {"learning_starts": 16, "batch_size": 16})
-    monkeypatch.setattr(study, "TIME_LIMIT", 2.0)
+    monkeypatch.setattr("seastar_gym.evaluation.many.TIME_LIMIT", 2.0)
 
 
 def test_the_trainings_of_the_study_are_valid_and_differ():

@@ -15,12 +15,12 @@ from agents.tasks.command import RECIPES, file_of, main
 from agents.tasks.learning import LEARNERS, hyperparameters, make_learning_env
 from refusals import assert_refused
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
-from seastar_gym.benchmark.episodes import make_batch, require_seen, swim_episodes
 from seastar_gym.controllers.learned import TASKS, load, save
 from seastar_gym.controllers.roster import load_agent, task_of
 from seastar_gym.envs.symmetry import VectorMemory
 from seastar_gym.envs.tasks.prey import Prey
 from seastar_gym.evaluation.swim import swim
+from seastar_gym.evaluation.tasks import make_batch, require_seen, swim_episodes
 from seastar_gym.scene.checks import shown
 
 IDS = list(RECIPES)

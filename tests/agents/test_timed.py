@@ -6,13 +6,10 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
-from rich.console import Console
 
 from agents import learner_file
-from agents.evaluate import evaluate
 from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_model, make_training_env, policy_of
-from agents.results import results_table
 from agents.trials import main as trials_main
 from refusals import assert_refused
 from seastar_gym import Limited, Numerics, Scene, Simulator, SmaPulse, SmaWires, ThermalSma
@@ -27,8 +24,9 @@ from seastar_gym.envs import symmetry
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import make_scene
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.evaluation.many import swim_many
-from seastar_gym.evaluation.swim import decisions_in, swim
+from seastar_gym.evaluation.comparison import evaluate
+from seastar_gym.evaluation.results import as_text
+from seastar_gym.evaluation.swim import swim
 from seastar_gym.gaits import in_time, lagged_gait, straight_gait, thrifty_gait, turning_wave
 
 PERIODS = (0.5, 0.2, 0.1)
@@ -91,7 +89,6 @@ def test_gaits_in_time_round_the_pentagon(gait):
         {"script": scripted(gait, decision_period=0.5)},
         decision_period=0.5,
         fidelity="fast",
-        console=Console(quiet=True),
     )
     assert done.finished and done.time[-1] == pytest.approx(0.5 * done.strokes)
     assert done.time[-1] < (120 if gait == "lagged-pentagon" else 260)
@@ -121,16 +118,6 @@ def test_an_agent_for_other_decisions_is_refused():
     for period in (1.0, 0.2):
         with assert_refused("every 0.5 s", f"every {period:g} s"):
             swim("a", scripted("lagged", decision_period=0.5), SeastarSwimEnv(decision_period=period), max_strokes=1)
-
-
-def test_many_timed_swims_are_those_one_by_one():
-    policy, scene = scripted("lagged", decision_period=0.5), make_scene(None, "fast", 0.5)
-    arguments = {"max_strokes": decisions_in(10.0, 0.5), "threads": 1, "decision_period": 0.5}
-    one, other = swim_many("lagged", policy, "line", 2, scene, **arguments)
-    alone = swim("lagged", policy, SeastarSwimEnv("line", scene=scene, decision_period=0.5), max_strokes=20)
-    for name in ("hub", "time", "limbs_heated", "heating_time", "energy"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
-        np.testing.assert_array_equal(getattr(one, name), getattr(alone, name))
 
 
 # Search
@@ -275,6 +262,5 @@ def test_a_swim_is_counted_in_decisions_unless_they_take_a_second():
         env = SeastarSwimEnv([[0.02, 0.0]], decision_period=period, fidelity="fast")
         done = swim("straight", scripted("straight", decision_period=period), env, max_strokes=30)
         assert done.counted_in == word and done.result == f"{done.strokes} {word}"
-        printed = [column.header.plain for column in results_table([done]).columns[1:]]
-        assert printed[0].split()[0] == word
+        assert as_text([done]).split()[0] == word
         assert replace(done, waypoints=np.ones((7, 2))).result == "1 of 7 waypoints"

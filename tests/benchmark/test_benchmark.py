@@ -13,11 +13,9 @@ import numpy as np
 import pytest
 
 from refusals import assert_refused
-from seastar_gym import TASKS, Scene, __version__
+from seastar_gym import Scene, __version__
 from seastar_gym.benchmark import page
 from seastar_gym.benchmark.command import main
-from seastar_gym.benchmark.episodes import require_seen, swim_episodes
-from seastar_gym.benchmark.measures import MEASURES, SECONDS, measure_of
 from seastar_gym.benchmark.results import MOST, Entry, best_means, merged, read, relative, write
 from seastar_gym.command import INTERRUPTED
 from seastar_gym.controllers import GreedyPolicy, load, load_agent, scripted
@@ -25,8 +23,8 @@ from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.tasks.station import Station
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.many import HELD_OUT_SEED
-from seastar_gym.evaluation.swim import swim
-from seastar_gym.evaluation.tasks import task_ids
+from seastar_gym.evaluation.measures import MEASURES, SECONDS, measure_of
+from seastar_gym.evaluation.tasks import make_batch, require_seen, swim_episodes, task_ids
 from seastar_gym.executors import Outcome
 from seastar_gym.executors.here import Here
 
@@ -75,15 +73,6 @@ def test_tasks_are_the_registered_ids_of_this_package(tasks):
     assert not any(id.startswith("CartPole") for id in task_ids())
 
 
-def test_an_episode_of_a_batch_is_that_of_one_robot(tasks):
-    swum = swim_episodes(SHORT, scripted("straight"), [3, 4])
-    alone = gym.make(SHORT).unwrapped
-    done = swim("straight", scripted("straight"), alone, max_strokes=30, seed=4)
-    assert swum.decisions[1] == done.strokes and bool(swum.success[1]) == done.finished
-    assert swum.last("time")[1] == pytest.approx(done.time[-1])
-    assert SECONDS.of(swum)[1] == (done.time[-1] if done.finished else 30.0)
-
-
 def test_returns_are_sums_of_rewards(tasks):
     swum = swim_episodes(SHORT, scripted("4+,1-"), [7])
     env, total = gym.make(SHORT), 0.0
@@ -107,14 +96,6 @@ def test_a_task_of_another_measure_without_a_batch_is_swum_on_its_held_out_split
     swum = swim_episodes(OTHER, scripted("rest"), [0, 1])
     side = np.hypot(*env.reset(seed=0)[0][182:184]) * 100.0
     np.testing.assert_allclose(MEASURES[Station].of(swum), side, rtol=1e-3)
-
-
-@pytest.mark.parametrize("id", TASKS)
-def test_every_task_is_measured_by_what_it_asks_for(id):
-    """Prey that is caught, worth of prizes, the distance from the station, otherwise the time until all is done."""
-    challenge = TASKS[id][0].removeprefix("fast-")
-    wanted = {each.__name__.lower(): measure for each, measure in MEASURES.items()}.get(challenge, SECONDS)
-    assert measure_of(gym.make(id, fidelity="fast").unwrapped) is wanted
 
 
 def test_an_agent_that_cannot_see_is_refused_before_the_first_decision():
@@ -395,7 +376,5 @@ def test_what_cannot_be_measured_is_said_in_a_sentence(arguments, words, tmp_pat
 
 
 def test_the_native_batch_is_taken_where_there_is_one(tasks):
-    from seastar_gym.benchmark.episodes import make_batch
-
     assert isinstance(make_batch(SHORT, 2), SeastarSwimVectorEnv)
     assert isinstance(make_batch(OTHER, 2, split="test"), gym.vector.SyncVectorEnv)

@@ -78,14 +78,13 @@ def test_a_model_is_given_to_the_command_lines(trained, tmp_path, capsys):
 
 @pytest.fixture
 def short_trials(monkeypatch):
-    """agents.trials on one path, for three strokes."""
-    monkeypatch.setattr(trials, "NOMINAL", ("line",))
-    defaults = {**trials.swim_many.__kwdefaults__, "max_strokes": 3}
-    monkeypatch.setattr(trials.swim_many, "__kwdefaults__", defaults)
+    """Trials on one path."""
+    monkeypatch.setattr("seastar_gym.evaluation.trials.NOMINAL", ("line",))
 
 
 def rows_of_trials(agent, file):
-    command = ["--agents", agent, "--sets", "nominal", "--fidelity", "fast", "--out", str(file), "--num-threads", "1"]
+    command = ["--agents", agent, "--sets", "nominal", "--fidelity", "fast", "--out", str(file)]
+    command += ["--num-threads", "1", "--max-strokes", "3"]
     assert trials.main(command) == 0
     with file.open(newline="", encoding="utf-8") as stream:
         return [row["agent"] for row in csv.DictReader(stream)]

@@ -9,8 +9,9 @@ import seastar_gym  # noqa: F401
 from refusals import assert_refused
 from seastar_gym import VectorSymmetryReduction
 from seastar_gym.controllers import load
-from seastar_gym.data.dataset import by_policy, record, summary
+from seastar_gym.data.dataset import record, summary
 from seastar_gym.data.recorder import Recorder
+from seastar_gym.evaluation.rollout import rollout
 
 SHORT = {"actions": "pairs", "fidelity": "fast", "max_episode_steps": 3}
 TASK = "SeastarSwim-v0"
@@ -86,20 +87,11 @@ def test_actions_are_copied():
     assert batch.episodes()[0].actions.tolist() == [3, 4, 5]
 
 
-def test_a_policy_with_a_memory_begins_with_the_first_call():
-    class Counting:
-        def predict(self, observation, state=None, episode_start=None, deterministic=False):
-            assert deterministic
-            count = np.where(episode_start, 0, state if state is not None else -9) + 1
-            return count, count
-
-    act = by_policy(Counting(), 2)
-    assert [act(np.zeros((2, 1)), {}).tolist() for _ in range(3)] == [[1, 1], [2, 2], [3, 3]]
-
-
 @pytest.mark.parametrize("mode", [AutoresetMode.SAME_STEP, AutoresetMode.DISABLED])
 def test_other_resets_are_refused(mode):
     with assert_refused("A recorder needs autoreset_mode=AutoresetMode.NEXT_STEP"):
         recorder(autoreset_mode=mode)
+    with assert_refused("A rollout needs autoreset_mode=AutoresetMode.NEXT_STEP"):
+        rollout(gym.make_vec(TASK, 1, vectorization_mode="vector_entry_point", autoreset_mode=mode), load())
     with assert_refused("leave reset_mask out"):
         recorder().reset(options={"reset_mask": np.array([True, False])})

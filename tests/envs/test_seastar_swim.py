@@ -25,16 +25,16 @@ from seastar_gym import (
     SolverStatus,
     Uniform,
 )
-from seastar_gym.envs import promises
+from seastar_gym.accuracy import chapters_certificate
+from seastar_gym.accuracy.info import NAMES
 from seastar_gym.envs.paths import PATHS, cross_track_error, shortest_way
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.scene.fidelity import promise
 
 STRAIGHT = np.array([0, 1, 0, 0, 2])
 REST = np.zeros(5, int)
 FACTS = {
-    "time", "hub_position", "waypoint_index", "distance", "cross_track_error", *promises.NAMES,
+    "time", "hub_position", "waypoint_index", "distance", "cross_track_error", *NAMES,
 }  # fmt: skip
 OF_A_STROKE = {
     "is_success", "limbs_heated", "heating_time", "energy", "energy_per_metre", "newton_iterations", "solver_status",
@@ -118,12 +118,13 @@ def test_spaces_follow_the_robot(n_limbs, nodes_per_limb):
 @pytest.mark.parametrize("fidelity", ["fast", "chapter"])
 def test_info_tells_what_was_measured_of_the_fidelity(fidelity):
     _, info = SeastarSwimEnv(fidelity=fidelity).reset(seed=0)
-    known = promise(fidelity)
-    for name in promises.IN_TIME:
-        assert info[name] == getattr(known, name), name
+    known = chapters_certificate().of(Scene.preset(fidelity))
+    assert (info["path_error"], info["gait_error"]) == (known.errors["random"], known.errors["repeated"])
+    assert (info["typical_error"], info["typical_gait_error"]) == (known.typical["random"], known.typical["repeated"])
+    assert (info["space_error"], info["time_error"]) == (known.space_error, known.time_error)
     assert info["batch_real_time_factor"] == known.speed
     assert info["typical_error"] < info["path_error"] and info["typical_gait_error"] < info["gait_error"]
-    assert known.path_error == pytest.approx(info["space_error"] + info["time_error"], rel=1e-5)
+    assert info["path_error"] == pytest.approx(info["space_error"] + info["time_error"], rel=1e-5)
 
 
 @pytest.mark.parametrize("scene", [Scene(Seastar(youngs_modulus=2e6)), Scene(fluid=None), Scene(Seastar(5, 9))])

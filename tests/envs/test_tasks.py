@@ -27,8 +27,8 @@ from seastar_gym import (
     SymmetryReduction,
     VectorSymmetryReduction,
 )
+from seastar_gym.accuracy.info import NAMES
 from seastar_gym.envs.own_numbers import places_of
-from seastar_gym.envs.promises import NAMES
 from seastar_gym.envs.reward import pulses_of
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import limb_order, observed_mirror, sectors, transform_actions, transform_commands

@@ -3,6 +3,7 @@
 import copy
 import pickle
 import re
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
@@ -13,12 +14,12 @@ from gymnasium.vector import AutoresetMode
 import seastar_gym
 from refusals import assert_refused
 from seastar_gym import Limited, MeasuredCurve, Numerics, RewardWeights, Scene, Seastar, SmaPulse, SmaWires, ThermalSma
+from seastar_gym.accuracy import chapters_certificate, timed_certificate
+from seastar_gym.accuracy.info import IN_TIME, NAMES
 from seastar_gym.envs.commands import to_commands
 from seastar_gym.envs.masks import action_masks
-from seastar_gym.envs.promises import IN_TIME, NAMES
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.scene.fidelity import promise, timed_promise
 from seastar_gym.scene.numerics import MAX_STEPS
 from seastar_gym.simulator.schedule import SHORTEST
 
@@ -187,9 +188,14 @@ def test_what_is_no_decision_period_is_refused(period):
 @pytest.mark.parametrize("fidelity", ["fast", "reference"])
 def test_errors_of_timed_commands_are_promised_to_wires(fidelity, period):
     info = SeastarSwimEnv(fidelity=fidelity, decision_period=period).reset(seed=0)[1]
-    known = timed_promise(fidelity, period)
+    known = timed_certificate(period).of(replace(Scene.preset(fidelity), actuator=SmaWires()))
+    told = {
+        "path_error": known.errors["random"], "gait_error": known.errors["repeated"],
+        "typical_error": known.typical["random"], "typical_gait_error": known.typical["repeated"],
+        "space_error": known.space_error, "time_error": known.time_error,
+    }  # fmt: skip
     for name in IN_TIME:
-        assert info[name] == getattr(known, name) > 0.0, name
+        assert info[name] == told[name] > 0.0, name
     assert info["path_error"] == info["space_error"] + info["time_error"]
     assert info["typical_error"] < info["path_error"] and info["typical_gait_error"] < info["gait_error"]
     assert "batch_real_time_factor" not in info
@@ -203,9 +209,13 @@ def test_weak_limbs_are_promised_nothing_in_time():
 
 
 def test_between_measured_times_the_larger_error_is_promised_and_outside_none():
-    between, ends = timed_promise("fast", 0.3), [timed_promise("fast", period) for period in (0.2, 0.5)]
-    assert between.time_error == max(one.time_error for one in ends)
-    assert timed_promise("fast", 0.09) is None and timed_promise("fast", 0.6) is None
+    for k, between in enumerate(timed_certificate(0.3).settings):
+        ends = [timed_certificate(period).settings[k] for period in (0.2, 0.5)]
+        assert {each.resolution for each in ends} == {between.resolution}
+        assert between.time_error == max(one.time_error for one in ends)
+        assert between.errors["repeated"] == max(one.errors["repeated"] for one in ends)
+        assert between.errors["random"] == between.space_error + between.time_error
+    assert timed_certificate(0.09) is None and timed_certificate(0.6) is None
     assert not set(NAMES) & set(SeastarSwimEnv(fidelity="fast", decision_period=0.05).reset(seed=0)[1])
 
 
@@ -215,8 +225,8 @@ def test_other_robots_and_wires_are_promised_nothing_in_time(scene):
 
 
 def test_strokes_keep_their_promises():
-    info, known = SeastarSwimEnv(fidelity="fast").reset(seed=0)[1], promise("fast")
-    assert (info["path_error"], info["gait_error"]) == (known.path_error, known.gait_error)
+    info, known = SeastarSwimEnv(fidelity="fast").reset(seed=0)[1], chapters_certificate().of(Scene.preset("fast"))
+    assert (info["path_error"], info["gait_error"]) == (known.errors["random"], known.errors["repeated"])
 
 
 # Heat

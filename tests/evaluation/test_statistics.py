@@ -31,3 +31,31 @@ def test_a_profile_is_the_share_of_scores_that_reach_a_level():
     assert (low <= share).all() and (share <= high).all()
     assert low[1] < 0.6 and high[1] > 0.9 and low[0] == high[0] == 1.0  # the second task does not vary
     assert low[2] == high[2] == 0.5
+
+
+def test_an_interval_is_wide_where_seeds_or_episodes_differ():
+    rng = np.random.default_rng(0)
+    of_seeds, of_episodes = rng.normal(size=(10, 1)), rng.normal(size=(1, 40))
+    for drawn in (of_seeds, of_episodes):
+        low, high = statistics.crossed_interval(list(drawn + np.zeros((10, 40))))
+        assert low < drawn.mean() < high
+        assert high - low == pytest.approx(2.0 * 1.96 * drawn.std() / drawn.size**0.5, rel=0.1)
+    assert statistics.crossed_interval([np.ones(16), np.ones(64)]) == (1.0, 1.0)  # the first episodes are the same ones
+
+
+@pytest.mark.parametrize("draw", ["normal", "exponential"])
+def test_an_interval_covers_the_mean_as_often_as_it_says(draw):
+    """The mean of 40 draws, 500 times: 95 % of the intervals, 93 % for skewed draws; one too narrow by 40 %: 76 %."""
+    draws = getattr(np.random.default_rng(0), draw)(size=(500, 40))
+    _, low, high = np.array([statistics.mean_with_interval(values) for values in draws]).T
+    mean = {"normal": 0.0, "exponential": 1.0}[draw]
+    covered = np.mean((low <= mean) & (mean <= high))
+    assert 0.90 < covered < 0.97
+    assert np.mean(high - low) == pytest.approx(2.0 * 1.96 / np.sqrt(40), rel=0.08)
+
+
+def test_a_mean_lies_in_its_interval_and_a_constant_needs_none():
+    low, high = statistics.mean_with_interval(np.random.default_rng(0).normal(size=400))[1:]
+    assert low < 0.0 < high and high - low == pytest.approx(2 * 1.96 / 20, rel=0.15)
+    assert statistics.mean_with_interval(np.full(5, 3.0)) == (3.0, 3.0, 3.0)
+    assert np.isnan(statistics.mean_with_interval(np.zeros(0))).all()

@@ -41,9 +41,9 @@ from seastar_gym import (
     Water,
     relaxation_time,
 )
+from seastar_gym.accuracy import chapters_certificate, timed_certificate
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.scene.fidelity import promise
 
 Calls = dict[str, tuple[Callable[..., Any], dict[str, Any]]]
 
@@ -89,7 +89,11 @@ PARTS: Calls = {
     "Numerics.preset": (Numerics.preset, dict(fidelity="fast")),
     "Scene.preset": (Scene.preset, dict(fidelity="fast")),
     "Scene.for_error": (Scene.for_error, dict(error=0.1, any_gait=True, robot=None, certificate=None)),
-    "promise": (promise, dict(setting="fast")),
+    "chapters_certificate().for_error": (
+        chapters_certificate().for_error, dict(error=0.1, classes=("random",), robot=None)
+    ),
+    "chapters_certificate().of": (chapters_certificate().of, dict(scene=Scene.preset("fast"))),
+    "timed_certificate": (timed_certificate, dict(decision_period=0.2)),
     "relaxation_time": (relaxation_time, dict(loss_factor=0.1, frequency=10.0)),
     "Scene": (Scene, dict(robot=Seastar(), fluid=Water(), actuator=SmaPulse(), numerics=FAST, held_nodes=(0,),
                           loads=((1, 0.0, 1e-3),), limb_strengths=(1.0,) * 5, contact=Contact())),

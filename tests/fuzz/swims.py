@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from seastar_gym import DomainRandomization, Limited, Scene, SmaLimb, SmaPulse, SmaWires, ThermalSma, Uniform
+from seastar_gym.accuracy import chapters_certificate
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.scene.fidelity import promise
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator
 
@@ -46,7 +46,8 @@ def check_preset(fidelity: Fidelity, seed: int) -> None:
     """A preset's path errs by no more than is promised of it, and of the reference."""
     commands = ternary_commands(seed)
     errors = path_errors(hub_paths(fidelity, commands), hub_paths("reference", commands))
-    promised = promise(fidelity).path_error + promise("reference").path_error
+    known = [chapters_certificate().of(Scene.preset(name)) for name in (fidelity, "reference")]
+    promised = sum(each.errors["random"] for each in known)
     assert errors.max() <= promised, f"{fidelity} errs by {errors.max():.4f}, promised are {promised:.4f}"
 
 

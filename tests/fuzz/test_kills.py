@@ -22,9 +22,9 @@ import pytest
 pytest.importorskip("tensorboard", reason="train.py writes its log for TensorBoard")
 
 import train
-from agents.report.charts import read_progress
 from seastar_gym.controllers import learned as policies
 from seastar_gym.controllers.learner_zip import load
+from seastar_gym.evaluation.report.charts import read_progress
 
 DRIVER = Path(__file__).with_name("killed_training.py")
 STROKES, BETWEEN = 512, 128

@@ -23,11 +23,11 @@ from seastar_gym import (
     ThermalSma,
     Uniform,
 )
-from seastar_gym.certification.commands import STROKES, draw_classes
-from seastar_gym.certification.measure import SHORT, swim
+from seastar_gym.accuracy.commands import STROKES, draw_classes
+from seastar_gym.accuracy.measure import SHORT, swim
+from seastar_gym.accuracy.setting import resolved
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.scene.certificate import resolved
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator import batch as module
 from seastar_gym.simulator import error_bars
@@ -97,7 +97,7 @@ def test_only_error_bars_have_a_twin(monkeypatch, wanted):
 @pytest.mark.parametrize("fidelity", ["fast", "balanced"])
 def test_the_estimate_covers_the_true_error_and_is_not_vacuous(fidelity):
     scene, commands = Scene.preset(fidelity), draw_classes(2, 5, seed=77)
-    exact = swim(resolved(scene, 37, replace(SHORT, step=0.5e-3)), commands)
+    exact = swim(resolved(scene, 37, replace(SHORT, step=0.5e-3)), commands).hub
     simulator, ratios = Simulator(scene, commands.shape[1], 1, error_bars=True), []
     for k in range(STROKES):
         estimate = simulator.stroke(commands[k]).error_estimate

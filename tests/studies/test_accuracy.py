@@ -1,7 +1,6 @@
-"""The accuracy study: its errors against closed forms, its promises against errors that cancel, and its files."""
+"""The accuracy study: its sequences, its promises against errors that cancel, and its files."""
 
 import csv
-import json
 import shutil
 from dataclasses import replace
 
@@ -9,9 +8,12 @@ import numpy as np
 import pytest
 
 from seastar_gym import Numerics, Scene
+from seastar_gym.accuracy import Certificate, chapter
+from seastar_gym.accuracy.measure import Errors, Swims, errors, path_lengths
+from seastar_gym.accuracy.measure import swim as swim_commands
+from seastar_gym.accuracy.setting import at
 from seastar_gym.gaits import PAIRS, STRAIGHT
-from seastar_gym.scene.fidelity import PRESETS, Promise
-from seastar_gym.scene.numerics import Setting
+from seastar_gym.scene.numerics import Resolution
 from seastar_gym.simulator import Simulator
 from studies.accuracy import convergence
 from studies.accuracy import rows as accuracy_rows
@@ -20,18 +22,11 @@ from studies.accuracy import tables as accuracy_tables
 from studies.accuracy.cases import (
     SLOW,
     Cases,
-    Errors,
-    Swim,
-    errors,
     gaits,
-    hub_path_lengths,
-    joined,
     pentagon,
     random_gaits,
     random_sequences,
-    scene_of,
     slow_sequences,
-    swim,
     swims,
     symmetric_form,
 )
@@ -40,14 +35,17 @@ from studies.accuracy.settings import MS, Plan, presets, settings
 
 TINY = Plan(
     n_random=2, n_slow=1, n_gaits=1, side=(1, 0), limit=(13, 5 * MS), fine=5 * MS, opinion=(4, 5 * MS),
-    resolutions=(("continuum", 10), ("chapter", 4)), shortest=10 * MS, rounds=1, n_others=1,
-    limit_of_others=(7, 5 * MS), fine_of_others=5 * MS,
+    meshes=(("continuum", 10), ("chapter", 4)), shortest=10 * MS, rounds=1,
 )  # fmt: skip
 KINDS = ("path", "straight", "pair", "pentagon", "random", "slow", "gait", "heading", "end")
 
 
 def ten(numerics: Numerics, discretisation: str = "chapter", nodes: int = 10) -> Scene:
-    return scene_of(Setting(discretisation, nodes, numerics))
+    return at(Scene(), Resolution(discretisation, nodes, numerics))
+
+
+def swim(cases: Cases, scene: Scene) -> Swims:
+    return swim_commands(scene, cases.commands)
 
 
 def same(error: float) -> Figures:
@@ -60,7 +58,7 @@ def row(
 ) -> Row:  # fmt: skip
     numerics = Numerics(scheme, step, tolerance, path_tolerance=path_tolerance)
     costs = {"iterations": 100.0, "steps": 50.0, "rejections": 0, "halvings": 0, "speed": speed}
-    return Row(Setting(discretisation, nodes, numerics), same(space), same(time), **costs)
+    return Row(Resolution(discretisation, nodes, numerics), same(space), same(time), **costs)
 
 
 # Cases
@@ -124,58 +122,16 @@ def test_a_scene_of_a_setting_is_the_physics_with_its_resolution_and_numerics():
 # Errors
 
 
-def swum(hub, heading=None) -> Swim:
-    hub = np.asarray(hub, float)
-    return Swim(hub, np.zeros(hub.shape[:2]) if heading is None else np.asarray(heading, float), 1.0, 1.0, 0, 0, 0)
-
-
-def test_path_error_is_the_largest_distance_over_the_length_of_the_converged_path():
-    exact = swum([[[3.0, 4.0]], [[3.0, 9.0]]])
-    assert hub_path_lengths(exact.hub) == pytest.approx([10.0])
-    off = errors(swum([[[3.0, 4.5]], [[3.0, 9.1]]]), exact)
-    assert off.path == pytest.approx([0.05]) and off.end == pytest.approx([0.01])
-
-
-def test_space_and_time_of_the_same_length_bound_the_whole_error():
-    """Of a path of its own, the error of time of a robot that swims too far would be too small."""
-    limit, fine, coarse = (swum([[[length, 0.0]]]) for length in (1.0, 2.0, 2.5))
-    lengths = hub_path_lengths(limit.hub)
-    parts = errors(fine, limit).path + errors(coarse, fine, lengths).path
-    assert errors(coarse, limit).path == pytest.approx(parts.tolist())
-    assert parts == pytest.approx([1.5])
-
-
-def test_heading_error_knows_that_a_turn_is_a_turn():
-    hub = [[[1.0, 0.0]]]
-    assert errors(swum(hub, [[3.1]]), swum(hub, [[-3.1]])).heading == pytest.approx([2.0 * np.pi - 6.2])
-
-
-def test_a_failed_robot_makes_every_error_infinite():
-    hub = [[[1.0, 0.0]]]
-    assert np.isinf(np.array(errors(swum(hub)._replace(failed=1), swum(hub)))).all()
-
-
 def test_heading_is_what_a_robot_was_turned_by():
     simulator = Simulator(ten(Numerics()), 3)
     simulator.reset(heading=[0.0, 0.4, -2.5])
     np.testing.assert_allclose(simulator.heading(), [0.0, 0.4, -2.5], atol=1e-12)
 
 
-def test_groups_swim_as_the_whole_batch_does():
-    cases = joined(swims(), random_sequences(7, np.random.default_rng(5)))
-    scene = ten(Numerics("sdirk2", 20 * MS))
-    whole, groups = swim(cases, scene), convergence.in_groups(cases, 8)
-    assert [len(group) for group in groups] == [8, 4]
-    parts = convergence.together([swim(group, scene) for group in groups])
-    np.testing.assert_array_equal(parts.hub, whole.hub)
-    assert parts.iterations == pytest.approx(whole.iterations)
-    assert parts.steps == pytest.approx(whole.steps) == 50.0
-
-
 def test_figures_leave_gaits_and_slow_swims_out_of_the_path_error():
     cases = Cases(("a", "b", "c", "d"), ("straight", "random", "gait", "slow"), np.zeros((1, 4, 5)))
     path = np.array([0.1, 0.2, 0.3, 0.4])
-    found = accuracy_rows.figures([cases], [Errors(path, np.radians(path), 0.5 * path)])
+    found = accuracy_rows.figures([cases], [Errors(path, 0.5 * path, np.radians(path))])
     assert (found.path, found.worst, found.straight, found.random) == (0.2, "b", 0.1, 0.2)
     assert (found.gait, found.worst_gait, found.slow, found.pair) == (0.3, "c", 0.4, 0.0)
     assert (found.heading, found.end) == (pytest.approx(0.2), 0.1)
@@ -184,7 +140,7 @@ def test_figures_leave_gaits_and_slow_swims_out_of_the_path_error():
 @pytest.mark.slow
 def test_limit_is_that_of_the_continuum():
     """34.360 mm after ten strokes straight on, 28.189, 34.360, 39.355 and 32.282 mm of the pairs, to 1e-4."""
-    found = swim(swims(), scene_of(convergence.tight("continuum", *Plan().limit)), threads=None)
+    found = swim(swims(), at(Scene(), convergence.tight(*Plan().limit)))
     distances = np.hypot(*found.hub[-1].T)
     np.testing.assert_allclose(1e3 * distances, [34.360, 28.189, 34.360, 39.355, 32.282], rtol=1e-4)
 
@@ -195,7 +151,7 @@ def test_two_schemes_of_different_kind_agree_on_the_converged_straight_swim():
     straight = swims().first(1)
     sdirk3 = swim(straight, ten(Numerics("sdirk3", 0.02 * MS, 1e-12)))
     midpoint = swim(straight, ten(Numerics("implicit-midpoint", 0.01 * MS, 1e-12)))
-    assert errors(midpoint, sdirk3).path[0] < 1e-5
+    assert errors(midpoint, sdirk3, path_lengths(Scene(), sdirk3.hub)).path[0] < 1e-5
     for found in (sdirk3, midpoint):
         assert found.hub[0, 0, 0] == pytest.approx(4.91276e-3, rel=1e-5)
         assert found.hub[-1, 0, 0] == pytest.approx(38.4133e-3, rel=1e-5)
@@ -249,15 +205,15 @@ def test_front_keeps_what_no_other_setting_beats():
     steps = ((1, 0.1, 9e3), (2, 0.2, 8e3), (3, 0.05, 7e3), (4, 0.05, 6e3))
     rows = [row(step=s, time=e, space=0.0, speed=v) for s, e, v in steps]
     best = accuracy_rows.front(rows, lambda each: each.total("path"), lambda each: each.speed)
-    assert [each.setting.numerics.step for each in best] == [1, 3]
+    assert [each.resolution.numerics.step for each in best] == [1, 3]
     failed = [row(time=np.inf)]
     assert accuracy_rows.front(failed, lambda each: each.total("path"), lambda each: each.speed) == []
 
 
-def test_every_resolution_has_a_front_of_its_own():
+def test_every_mesh_has_a_front_of_its_own():
     fast, dear = row(nodes=7, space=0.01, speed=9e3), row(nodes=19, space=0.02, speed=1e3)
-    assert [each.setting for each in accuracy_rows.fronts(accuracy_rows.promised([dear, fast]))] == [
-        fast.setting, dear.setting,
+    assert [each.resolution for each in accuracy_rows.fronts(accuracy_rows.promised([dear, fast]))] == [
+        fast.resolution, dear.resolution,
     ]  # fmt: skip
 
 
@@ -278,8 +234,8 @@ def found():
 
 
 def test_study_measures_every_setting_in_time_and_space(found):
-    assert [each.setting for each in found.rows] == settings(TINY)
-    assert {("continuum", 10), ("chapter", 4)} <= {each.resolution for each in found.rows}
+    assert [each.resolution for each in found.rows] == settings(TINY)
+    assert {("continuum", 10), ("chapter", 4)} <= {each.mesh for each in found.rows}
     for each in found.rows:
         assert 0.0 < each.time.path < 1.0 and 0.0 <= each.space.path < 1.0
         assert each.speed > 0.0 and each.straight_speed > 0.0
@@ -296,7 +252,7 @@ def test_study_knows_its_limit_and_the_doubt_about_it(found):
 
 def test_presets_and_the_chapters_steps_are_among_the_settings():
     measured = settings(Plan())
-    chapter = {Setting("chapter", 10, Numerics("implicit-euler", 20 * MS, 1e-6))}
+    chapter = {Resolution("chapter", 10, Numerics("implicit-euler", 20 * MS, 1e-6))}
     assert {*presets().values()} | chapter <= set(measured)
     assert len(measured) == len(set(measured))
 
@@ -304,9 +260,8 @@ def test_presets_and_the_chapters_steps_are_among_the_settings():
 def test_tables_and_csv_are_written(found, tmp_path):
     accuracy_tables.write_csv(found, tmp_path / "a.csv")
     rows = list(csv.DictReader((tmp_path / "a.csv").read_text().splitlines()))
-    others = sum(map(len, found.others.values()))
-    assert len(rows) == len(found.rows) + others
-    some = {"physics", "scheme", "step_s", "nodes_per_limb", "space_path", "time_gait", "promise_heading_deg", "speed"}
+    assert len(rows) == len(found.rows)
+    some = {"scheme", "step_s", "nodes_per_limb", "space_path", "time_gait", "promise_heading_deg", "speed"}
     assert some <= set(rows[0])
     assert float(rows[0]["time_path"]) == pytest.approx(found.rows[0].time.path, rel=1e-4)
     assert float(rows[0]["promise_path"]) == pytest.approx(found.rows[0].promise("path"), rel=1e-4)
@@ -314,13 +269,7 @@ def test_tables_and_csv_are_written(found, tmp_path):
     assert all(line.count("|") == len(accuracy_tables.COLUMNS) + 1 for line in lines if line.startswith("|"))
     for name in presets():
         assert any(line.startswith(f"| {name} |") for line in lines)
-    assert accuracy_tables.as_tables(found)[0].row_count == len(accuracy_tables.summary(found))
-    assert set(found.others) == {"drag along limbs", "silicone"} and not found.refused
-
-
-def test_physics_that_a_scene_refuses_are_left_out_with_a_reason(found):
-    lines = accuracy_tables.as_markdown(replace(found, others={}, refused={"honey": "Too thick."}))
-    assert "Left out is honey: Too thick." in lines
+    assert sum(line.startswith("| ") for line in lines) == 1 + len(accuracy_tables.summary(found))
 
 
 def test_pictures_are_drawn(found, tmp_path):
@@ -332,33 +281,34 @@ def test_pictures_are_drawn(found, tmp_path):
 
 def test_what_is_stored_can_be_promised(found, tmp_path):
     sure = replace(found, doubt=dict.fromkeys(found.doubt, same(1e-6)))
-    accuracy_tables.store(sure, tmp_path / "presets.json")
-    stored = json.loads((tmp_path / "presets.json").read_text())
-    assert list(stored["presets"]) == list(presets())
-    by_setting = {each.setting: each for each in found.rows}
-    for entry in (*stored["presets"].values(), *stored["settings"]):
-        kept = Promise(**entry)
-        numerics = Numerics(kept.scheme, kept.step, kept.newton_tolerance, path_tolerance=kept.path_tolerance)
-        measured = by_setting[Setting(kept.discretisation, kept.nodes_per_limb, numerics)]
-        assert measured.total("path") <= kept.path_error * (1 + 1e-5)
-        assert kept.path_error <= 1.11 * measured.promise("path") + 1e-12
-        assert kept.path_error == pytest.approx(kept.space_error + kept.time_error, rel=1e-5)
-        assert measured.typical.random <= kept.typical_error <= 1.11 * kept.path_error
-        assert measured.typical.gait <= kept.typical_gait_error <= kept.gait_error
-    speeds = [entry["speed"] for entry in stored["settings"]]
+    accuracy_tables.store(sure, tmp_path / "strokes.json")
+    stored = Certificate.load(tmp_path / "strokes.json")
+    assert [each.resolution for each in stored.settings[: len(presets())]] == list(presets().values())
+    assert stored.limit_error >= stored.settings[3].space_error / 3.0
+    by_resolution = {each.resolution: each for each in found.rows}
+    for kept in stored.settings:
+        measured = by_resolution[kept.resolution]
+        path_error = kept.errors["random"]
+        assert measured.total("path") <= path_error * (1 + 1e-5)
+        assert path_error <= 1.11 * measured.promise("path") + 1e-12
+        assert path_error == pytest.approx(kept.space_error + kept.time_error, rel=1e-5)
+        assert measured.typical.random <= kept.typical["random"] <= 1.11 * path_error
+        assert measured.typical.gait <= kept.typical["repeated"] <= kept.errors["repeated"]
+    speeds = [each.speed for each in stored.settings[len(presets()) :]]
     assert speeds == sorted(speeds, reverse=True)
 
 
 def test_medians_are_stored_beside_bounds_and_speeds_that_stay(found, tmp_path):
-    file = tmp_path / "presets.json"
-    shutil.copy(PRESETS, file)
+    file = tmp_path / "strokes.json"
+    shutil.copy(chapter.STROKES, file)
     accuracy_tables.store_typical(found.rows, file)
-    before, after = (json.loads(each.read_text(encoding="utf-8")) for each in (PRESETS, file))
-    by_setting = {each.setting: each for each in found.rows}
-    for name, setting in presets().items():
-        typical = accuracy_tables.as_typical(by_setting[setting])
-        assert before["presets"][name] | typical == after["presets"][name] and "typical_error" in typical
-    assert after["settings"] == before["settings"] and after["machine"] == before["machine"]
+    before, after = Certificate.load(chapter.STROKES), Certificate.load(file)
+    by_resolution, n = {each.resolution: each for each in found.rows}, len(presets())
+    for old, new in zip(before.settings[:n], after.settings[:n], strict=True):
+        typical = accuracy_tables.as_typical(by_resolution[old.resolution])
+        assert replace(old, typical=new.typical) == new
+        assert new.typical == typical | {"straight": old.errors["straight"]}
+    assert after.settings[n:] == before.settings[n:] and after.machine == before.machine
 
 
 def test_medians_are_of_the_sum_of_both_errors():
@@ -372,8 +322,8 @@ def test_medians_are_of_the_sum_of_both_errors():
 def test_a_study_whose_limit_is_in_doubt_is_not_stored(found, tmp_path):
     doubtful = replace(found, doubt={"space, from 37 and 73 nodes": same(4e-4)})
     with pytest.raises(ValueError, match=r"in doubt by 4.0e-04 of the path \(space.*nothing is stored"):
-        accuracy_tables.store(doubtful, tmp_path / "presets.json")
-    assert not (tmp_path / "presets.json").exists()
+        accuracy_tables.store(doubtful, tmp_path / "strokes.json")
+    assert not (tmp_path / "strokes.json").exists()
 
 
 def test_quick_studies_cannot_be_stored(monkeypatch, capsys):

@@ -9,7 +9,8 @@ import pytest
 if find_spec("pyarrow") is None:
     pytest.skip("the extra sweep is not installed", allow_module_level=True)
 
-from seastar_gym.scene.certificate import Certificate, CertifiedSetting, physics
+from seastar_gym.accuracy import Certificate, Setting
+from seastar_gym.accuracy.setting import physics
 from seastar_gym.version import __version__
 from studies.designs import certificates
 from studies.designs.certificates import CLASS, NODES, STEPS, WINNERS, certificate_of, scene_of
@@ -21,7 +22,7 @@ ROWS = json.loads((DOCS / "designs.json").read_text(encoding="utf-8"))
 def made(scene, samples):
     """A certificate that nobody measured."""
     settings = tuple(
-        CertifiedSetting(
+        Setting(
             nodes, "implicit-midpoint", step, 1e-6, {CLASS: 0.01 * nodes}, {CLASS: 0.005 * nodes}, 0.0, 0.0, 1.0, 1.0
         )
         for nodes, step in zip(NODES, STEPS, strict=True)

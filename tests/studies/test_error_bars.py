@@ -1,9 +1,11 @@
 """The study of error bars: its shares against closed forms, and its page."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from seastar_gym.certification.commands import CLASSES, STROKES
+from seastar_gym.accuracy.commands import CLASSES, STROKES
 from studies.accuracy import error_bars as study
 
 N = 2 * len(CLASSES)
@@ -20,7 +22,8 @@ def test_a_row_has_the_share_of_covered_strokes_and_the_class_with_the_lowest():
 
 def test_a_robot_whose_solver_fails_is_not_covered(monkeypatch):
     hub = np.zeros((STROKES, N, 2))
-    monkeypatch.setattr(study, "swim_with_bars", lambda scene, commands: (hub, np.full((STROKES, N), np.nan)))
+    swum = SimpleNamespace(hub=hub, error_estimate=np.full((STROKES, N), np.nan))
+    monkeypatch.setattr(study, "swim", lambda scene, commands, error_bars: swum)
     true, estimate = study.true_and_estimated(None, None, hub + 1e-5)
     assert study.judged("a robot", "fast", np.inf, true, estimate).coverage == 0.0
 

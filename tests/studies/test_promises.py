@@ -2,14 +2,14 @@
 
 import json
 import sys
-from dataclasses import replace
 
 import pytest
 
 from refusals import assert_refused
 from seastar_gym import Certificate, Numerics, Scene, Seastar
-from seastar_gym.certification import measure
-from seastar_gym.certification.commands import CLASSES
+from seastar_gym.accuracy import measure
+from seastar_gym.accuracy.commands import CLASSES, draw_classes
+from seastar_gym.accuracy.setting import resolved
 from studies.accuracy import promises
 
 ROBOT = "short, L = 5 cm"
@@ -56,12 +56,12 @@ def test_screening_with_longer_steps_changes_no_count(certificate, monkeypatch):
     assert sum(sum(row.values()) for row in screened.values()) > 0
     monkeypatch.setattr(promises, "CLOSE", -1.0)
     assert promises.exceedances(certificate.scene, checks, 4, seed=2) == screened
-    setting = certificate.at(certificate.settings[-1])
-    errors = {name: 0.6 * error for name, error in certificate.settings[-1].errors.items()}
-    shares = measure.exceeded(
-        replace(certificate, settings=(replace(certificate.settings[-1], errors=errors),)), setting, 4, seed=2
-    )
-    assert {name: count / 4 for name, count in screened[checks[-1].name].items()} == shares
+    last = checks[-1]
+    exact = resolved(certificate.scene, measure.MANY_NODES, measure.SHORT)
+    limit, swum = measure.swim_all([exact, last.scene], draw_classes(4, 5, 2))
+    errors = measure.errors(swum, limit, measure.path_lengths(exact, limit.hub)).path.reshape(len(CLASSES), 4)
+    beyond = {name: int((each > last.errors[name]).sum()) for name, each in zip(CLASSES, errors, strict=True)}
+    assert screened[last.name] == beyond
 
 
 def test_what_is_promised_for_nothing_is_exceeded_by_all(certificate):

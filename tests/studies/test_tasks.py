@@ -13,6 +13,7 @@ from seastar_gym.envs.tasks.discs import rims
 from seastar_gym.envs.tasks.envs import SeastarTaskVectorEnv
 from seastar_gym.envs.tasks.obst_trap import draw_discs
 from seastar_gym.envs.tasks.prey import Prey
+from seastar_gym.evaluation.measures import SECONDS, measure_of_challenge
 from studies.tasks import heading, pictures
 from studies.tasks import study as module
 from studies.tasks.ahead import Ahead, Odometer, Robots, few_commands
@@ -27,10 +28,10 @@ from studies.tasks.controllers import (
     on_its_course,
     straight_on,
 )
-from studies.tasks.episodes import Episodes, measure, swim
+from studies.tasks.episodes import swim
 from studies.tasks.page import table, write_page
 from studies.tasks.rounds import BestRound, MostPerMetre
-from studies.tasks.rows import Row, interval, rows_of
+from studies.tasks.rows import Row, rows_of
 from studies.tasks.study import Options, has_cell, main, study
 from studies.tasks.trap import SEEN, Belief, all_discs, discs_so_far, horseshoes_to, way, with_clearance
 from studies.tasks.verdicts import verdicts
@@ -51,7 +52,7 @@ KINDS = (
 
 @pytest.mark.parametrize("id, name", [cell for cell in itertools.product(KINDS, CONTROLLERS) if has_cell(*cell)])
 def test_every_controller_swims_every_kind_of_task(id, name, monkeypatch):
-    monkeypatch.setattr("studies.tasks.episodes.SETTLED", 0.0)
+    monkeypatch.setattr("seastar_gym.evaluation.measures.SETTLED", 0.0)
     robots = []
 
     def make(env):
@@ -60,8 +61,8 @@ def test_every_controller_swims_every_kind_of_task(id, name, monkeypatch):
         return make_controller(name, env)
 
     done = swim(id, make, 2, "fast", 1)
-    assert done.time.shape == (3, 2) and np.isfinite(done.returns).all()
-    assert np.isfinite(measure(module.IDS[id], done)).all()
+    assert done.of("time").shape == (3, 2) and np.isfinite(done.returns).all()
+    assert np.isfinite(measure_of_challenge(robots[0].challenge).of(done)).all()
     assert robots[0]._task.instance.tolist() == [0, 1] and robots[0]._task.split == "test"
 
 
@@ -69,7 +70,7 @@ def test_random_paths_with_random_headings_are_swum_by_rules(monkeypatch):
     monkeypatch.setattr(heading, "LIMIT", 1.0)
     for agent in heading.RULES:
         done = heading.swum(agent, 0, 0, 2, "fast", 1)
-        assert done.time[-1].tolist() == [1.0, 1.0] and measure("heading", done).tolist() == [1.0, 1.0]
+        assert done.last("time").tolist() == [1.0, 1.0] and SECONDS.of(done).tolist() == [1.0, 1.0]
 
 
 def test_the_wiring_is_found_by_what_limbs_do():
@@ -287,22 +288,7 @@ def test_few_commands_heat_two_limbs_at_most():
     assert len(np.unique(commands, axis=0)) == 51
 
 
-# Measures and verdicts
-
-
-def episodes(**changes):
-    time = np.array([[10.0, 10.0], [20.0, np.nan], [40.0, np.nan]])
-    success = np.array([False, True])
-    done = Episodes(time, 0.001 * time, time / 10.0, time / 5.0, success, returns=np.zeros(2), limit=400.0)
-    return done._replace(**changes)
-
-
-def test_measures_are_those_of_finished_and_unfinished_episodes():
-    assert measure("miswired", episodes()).tolist() == [400.0, 10.0]
-    assert measure("prey", episodes()).tolist() == [4.0, 1.0]
-    assert measure("prizes", episodes()).tolist() == [8.0, 2.0]
-    assert measure("station", episodes(distance=0.001 * np.array([[9.0, 1], [8, 1], [2, 3]]), time=np.array(
-        [[10.0, 10], [20, 20], [40, 40]]))).tolist() == pytest.approx([2.0, 3.0])  # fmt: skip
+# Verdicts
 
 
 def test_agents_are_compared_over_the_episodes_that_all_have_swum():
@@ -328,16 +314,6 @@ def test_a_task_is_kept_where_ppo_leaves_a_third_of_what_the_bound_gains_over_gr
 def test_no_bound_is_below_a_learner():
     found = row("prey", greedy=1.0, informed=2.0, PPO=1.5, PPO_memory=4.0)
     assert found.bound == "PPO, memory" and found.left == pytest.approx(2.5 / 3.0)
-
-
-def test_an_interval_is_wide_where_seeds_or_episodes_differ():
-    rng = np.random.default_rng(0)
-    of_seeds, of_episodes = rng.normal(size=(10, 1)), rng.normal(size=(1, 40))
-    for drawn in (of_seeds, of_episodes):
-        low, high = interval(list(drawn + np.zeros((10, 40))))
-        assert low < drawn.mean() < high
-        assert high - low == pytest.approx(2.0 * 1.96 * drawn.std() / drawn.size**0.5, rel=0.1)
-    assert interval([np.ones(16), np.ones(64)]) == (1.0, 1.0)  # the first episodes are the same ones
 
 
 def test_no_rule_that_is_told_more_swims_worse():

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from seastar_gym import Numerics, Scene, Seastar
-from seastar_gym.certification.commands import PROMISED
-from seastar_gym.scene.numerics import PRESETS, Setting
+from seastar_gym.accuracy.commands import PROMISED
+from seastar_gym.scene.numerics import PRESETS, Resolution
 from studies.accuracy import work_precision as study
 from studies.accuracy import work_precision_page as page
 
@@ -18,20 +18,13 @@ def test_settings_are_all_presets_and_more_and_every_problem_can_swim_them():
     assert len(set(study.SETTINGS)) == len(study.SETTINGS)
     for physics in study.PROBLEMS.values():
         for setting in (*study.SETTINGS, study.LIMIT, study.HALF):
-            study.scene_of(setting, physics)
+            study.at(physics, setting)
 
 
 def test_sequences_are_of_full_amplitude():
     drawn = study.draw_sequences(3)
     assert drawn.shape == (10, study.SAMPLES * len(PROMISED), 3)
     assert (np.abs(drawn).max(axis=(0, 2)) > 0.1).all()
-
-
-def test_an_error_is_a_share_of_the_path_and_infinite_where_the_solver_failed():
-    limit = np.cumsum(np.full((10, 2, 2), [0.003, 0.004]), axis=0)
-    hub = limit + [0.0, 0.001]
-    hub[3, 1] = np.nan
-    np.testing.assert_allclose(study.errors(hub, limit, 0.1), [0.02, np.inf])
 
 
 def row(ms: float, error: float, discretisation: str = "continuum", preset: str | None = None) -> dict:
@@ -58,13 +51,13 @@ def test_largest_errors_are_told_of_robots_whose_worst_sequences_have_a_limit():
 @pytest.fixture
 def small(monkeypatch):
     """One problem beside the chapter's, and settings of a moment."""
-    settings = (*PRESETS.values(), Setting("continuum", 5, Numerics("sdirk2", 2e-2, 1e-6)))
+    settings = (*PRESETS.values(), Resolution("continuum", 5, Numerics("sdirk2", 2e-2, 1e-6)))
     fast = {name: each._replace(nodes_per_limb=5, numerics=Numerics("sdirk2", 2e-2, 1e-6 * (k + 1)))
             for k, (name, each) in enumerate(PRESETS.items())}  # fmt: skip
     monkeypatch.setattr(study, "PRESETS", fast)
     monkeypatch.setattr(study, "SETTINGS", (*fast.values(), settings[-1]))
-    monkeypatch.setattr(study, "LIMIT", Setting("continuum", 9, Numerics("implicit-midpoint", 5e-3, 1e-6)))
-    monkeypatch.setattr(study, "HALF", Setting("continuum", 5, Numerics("implicit-midpoint", 1e-2, 1e-6)))
+    monkeypatch.setattr(study, "LIMIT", Resolution("continuum", 9, Numerics("implicit-midpoint", 5e-3, 1e-6)))
+    monkeypatch.setattr(study, "HALF", Resolution("continuum", 5, Numerics("implicit-midpoint", 1e-2, 1e-6)))
     monkeypatch.setattr(study, "SAMPLES", 1)
     monkeypatch.setattr(study, "PROBLEMS", {"chapter's robot": Scene(), "short": Scene(Seastar(limb_length=0.05))})
 

@@ -10,7 +10,7 @@ import pytest
 from agents.hyperparameters import Hyperparameters
 from refusals import assert_refused
 from seastar_gym import Certificate, DomainRandomization, Numerics, Scene, Uniform
-from seastar_gym.certification import endurance, measure
+from seastar_gym.accuracy import endurance, measure
 from seastar_gym.identify import Measurement
 from seastar_gym.identify.parameters import get_parameter
 from studies.worked_example import robots, study, tables, trainings

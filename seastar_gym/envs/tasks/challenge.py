@@ -18,7 +18,7 @@ class Challenge(ABC):
     """Base of all challenges."""
 
     NAME: ClassVar[str] = ""
-    """Name of what it is measured by in `seastar_gym.benchmark.measures`; "": the time until success."""
+    """Name of what it is measured by in `seastar_gym.evaluation.measures`; "": the time until success."""
 
     @abstractmethod
     def swimming(self, scene: Scene, n_robots: int, threads: int | None, split: Split, **how: Any) -> Swimming:

@@ -110,7 +110,7 @@ class FailBlindTask(Numbered, SwimTask):
         self._way, self._turn = np.zeros((n_robots, 2)), np.zeros(n_robots)  # of the last decision
         how["observe_actuators"] = False  # wires of dead limbs stay cold
         SwimTask.__init__(self, scene, n_robots, "random", about.reward, 0.01, True, threads, **how)
-        self._has_promises = False  # errors were measured of whole robots
+        self._tells_errors = False  # errors were measured of whole robots
         self._draws = AnyLimbs(about.dead)
         self.drawn = self._draws.first_values(scene, n_robots)
         self._number(split)

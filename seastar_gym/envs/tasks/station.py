@@ -131,7 +131,7 @@ class StationTask(Numbered, Swimming):
         self.about, self.scene, self.waypoint_radius = about, scene, about.tolerance
         self.station = np.zeros((n_robots, 2))
         self._distance = np.zeros(n_robots)
-        self._has_promises = False  # errors were measured in still water
+        self._tells_errors = False  # errors were measured in still water
         self._number(split)
 
     def _draw(self, robot: int, rng: np.random.Generator, asked: Any) -> None:

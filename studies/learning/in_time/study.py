@@ -26,7 +26,7 @@ from seastar_gym.command import run_command
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.envs.task import make_scene
 from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
-from seastar_gym.evaluation.swim import TIME_LIMIT, Swim, decisions_in
+from seastar_gym.evaluation.swim import Swim
 from seastar_gym.files import write_atomically
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
@@ -68,8 +68,8 @@ class Options:
 def swims_of(policy: Policy, path: str, n_swims: int, fidelity: Fidelity, decision_period: float) -> list[Swim]:
     """Swims of a policy; path: "random" means the held-out paths."""
     return swim_many(
-        "learned", policy, path, n_swims, make_scene(None, fidelity, decision_period), threads=1,
-        max_strokes=decisions_in(TIME_LIMIT, decision_period), seed=HELD_OUT_SEED, decision_period=decision_period,
+        "learned", policy, path, n_swims, make_scene(None, fidelity, decision_period), threads=1, seed=HELD_OUT_SEED,
+        decision_period=decision_period,
     )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from seastar_gym.envs.paths import make_path, path_length
 from seastar_gym.envs.reward import PULSE
-from seastar_gym.evaluation.many import mean_with_interval
+from seastar_gym.evaluation.statistics import mean_with_interval
 from seastar_gym.scene.actuators.wires import SmaWires
 
 Runs = Mapping[str, Any]

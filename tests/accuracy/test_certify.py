@@ -14,15 +14,17 @@ import pytest
 
 import seastar_gym
 from refusals import assert_refused
-from seastar_gym import Body, Certificate, Contact, Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires
-from seastar_gym.certification import command, commands, measure
-from seastar_gym.envs.promises import REPEATED
+from seastar_gym import Body, Certificate, Contact, Numerics, Scene, Seastar, SmaPulse, SmaWires
+from seastar_gym.accuracy import command, commands, measure, timed_certificate
+from seastar_gym.accuracy.certificate import _digest
+from seastar_gym.accuracy.setting import resolved
 from seastar_gym.envs.spec import PlainSpec
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
-from seastar_gym.scene.certificate import _digest, resolved
 
 SMALL_ROBOT = Seastar(limb_length=0.08)
 SCENE = Scene(SMALL_ROBOT)
+REPEATED = ("repeated ternary", "alternating ternary")
+"""Classes of a certificate's commands that `gait_error` is of."""
 SAMPLES = 2
 
 
@@ -67,10 +69,9 @@ def test_a_typical_error_is_the_median_of_a_class(certificate):
 def test_errors_bound_those_of_the_sequences_they_were_measured_on(certificate):
     drawn = commands.draw_classes(SAMPLES, 5, 0)
     limit = measure.swim(resolved(SCENE, 33, measure.SHORT), drawn)
-    lengths = measure.path_lengths(limit, 0.08)
+    lengths = measure.path_lengths(SCENE, limit.hub)
     for each in certificate.settings:
-        hub = measure.swim(certificate.at(each), drawn)
-        errors = np.linalg.norm(hub - limit, axis=-1).max(axis=0) / lengths
+        errors = measure.errors(measure.swim(certificate.at(each), drawn), limit, lengths).path
         for name, found in zip(commands.CLASSES, errors.reshape(-1, SAMPLES), strict=True):
             assert found.max() <= each.errors[name] * 1.05, (str(each), name)
 
@@ -125,13 +126,13 @@ def test_settings_that_gather_energy_over_long_swims_are_not_chosen(certificate)
 
 def test_the_function_the_command_and_the_modules_have_names_of_their_own():
     code = (
-        "import seastar_gym.certification.measure as measure, seastar_gym\n"
+        "import seastar_gym.accuracy.measure as measure, seastar_gym\n"
         "try:\n    import seastar_gym.certify\n"
         "except ImportError as refusal:\n    print(refusal)\n"
         "assert seastar_gym.certify is measure.certify"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert "modules are in seastar_gym.certification" in done.stdout
+    assert "modules are in seastar_gym.accuracy" in done.stdout
     command = [sys.executable, "-m", "seastar_gym.certify", "-h"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout.startswith("usage: seastar certify [-h]")
@@ -165,19 +166,19 @@ def test_a_scene_for_an_error_is_refused_where_the_certificate_has_lapsed(certif
         Scene.for_error(0.9, certificate="not there.json")
 
 
-def test_the_share_of_fresh_sequences_that_exceed_an_error_is_counted(certificate):
-    shares = measure.exceeded(certificate, certificate.at(certificate.settings[3]), 4, seed=1)
-    assert set(shares) == set(commands.CLASSES) and all(0.0 <= share <= 1.0 for share in shares.values())
-    nothing = tuple(replace(each, errors=dict.fromkeys(commands.CLASSES, 0.0)) for each in certificate.settings)
-    none_kept = replace(certificate, settings=nothing)
-    assert set(measure.exceeded(none_kept, certificate.at(certificate.settings[3]), 2, seed=1).values()) == {1.0}
-    with assert_refused("not measured"):
-        measure.exceeded(certificate, replace(SCENE, numerics=Numerics("sdirk3", 1e-3)), 2, seed=1)
-
-
 def test_a_certificate_is_read_back_as_it_was_written(certificate, tmp_path):
     certificate.save(tmp_path / "mine.json")
     assert Certificate.load(tmp_path / "mine.json") == certificate
+
+
+def test_a_file_without_the_entries_that_were_added_is_read_as_it_was(certificate, tmp_path):
+    def older(data):
+        del data["decision_period"], data["measured_over"]
+        for each in data["settings"]:
+            del each["path_tolerance"], each["discretisation"]
+            assert len(each) == 10
+
+    assert Certificate.load(changed(certificate, tmp_path, older)) == certificate
 
 
 def changed(certificate, folder, change, sign=True):
@@ -331,6 +332,14 @@ def test_a_certificate_is_of_strokes(certificate):
             assert np.all(info["gait_error"] == wired.settings[0].error(REPEATED))
 
 
+def test_a_certificate_of_decisions_is_of_no_strokes():
+    scene, timed = replace(Scene.preset("fast"), actuator=SmaWires()), timed_certificate(0.2)
+    with assert_refused("errors of decisions every 0.2 s, none of strokes of 1 s"):
+        gym.make("SeastarSwim-v0", scene=scene, certificate=timed)
+    info = gym.make("SeastarSwim-v0", scene=scene, certificate=timed, decision_period=0.2).reset(seed=0)[1]
+    assert info["gait_error"] == timed.of(scene).errors["repeated"] and "batch_real_time_factor" not in info
+
+
 def test_wires_of_the_chapters_robot_need_no_certificate_in_time_and_others_are_told_of_error_bars():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -354,32 +363,11 @@ def test_scenes_without_one_answer_are_refused():
         seastar_gym.certify(Scene(), samples=1)
 
 
-@pytest.mark.parametrize("n_limbs", [1, 2, 3, 5, 12])
-def test_classes_are_drawn_for_any_number_of_limbs(n_limbs):
-    drawn = commands.draw_classes(4, n_limbs, 0)
-    assert drawn.shape == (commands.STROKES, 4 * len(commands.CLASSES), n_limbs)
-    assert np.abs(drawn).max() <= 1.0
-    np.testing.assert_array_equal(drawn, commands.draw_classes(4, n_limbs, 0))
-    classes = dict(zip(commands.CLASSES, np.split(drawn, len(commands.CLASSES), axis=1), strict=True))
-    assert np.isin(classes["random ternary"], (-1, 0, 1)).all()
-    assert classes["random ternary"].any(axis=-1).all()
-    assert (classes["repeated continuous"] == classes["repeated continuous"][0]).all()
-    assert (classes["alternating ternary"] == classes["alternating ternary"][[0, 1] * 5]).all()
-    assert (np.count_nonzero(classes["opposed neighbours"], axis=-1) == min(2, n_limbs)).all()
-    assert np.abs(classes["small"]).max() <= 0.1
-
-
 def test_confidence_is_that_of_the_largest_of_so_many_samples(certificate):
     assert replace(certificate, samples=100_000).samples == 100_000
     with assert_refused("samples"):
         replace(certificate, samples=100_001)
     assert replace(certificate, samples=60).confidence() == pytest.approx(0.954, abs=1e-3)
-
-
-def test_failed_robots_have_no_bound():
-    assert measure._rounded(np.inf) == np.inf
-    assert measure._rounded(0.0123) == 0.013
-    assert measure._rounded(0.012) == 0.012
 
 
 def test_the_command_writes_certificate_and_picture(few_settings, tmp_path, monkeypatch, capsys):
@@ -428,22 +416,3 @@ def test_the_command_writes_certificate_and_picture(few_settings, tmp_path, monk
     file_of_scene.write_text("{", encoding="utf-8")
     with pytest.raises(ValueError, match=r"mine\.json is no scene: .*Expecting"):
         command.load_scene(file_of_scene)
-
-
-def test_a_speed_is_the_simulated_time_of_all_robots_over_processor_time_the_best_of_three_strokes(monkeypatch):
-    times = iter([0.0, 3.0, 3.0, 5.0, 5.0, 9.0])
-    monkeypatch.setattr(measure.time, "thread_time", lambda: next(times))
-    scene = resolved(replace(SCENE, actuator=SmaPulse(0.3, 0.1, 0.4)), 5, Numerics("sdirk2", 2e-2, 1e-6))
-    assert measure.speed(scene, np.zeros((commands.STROKES, 6, scene.robot.n_limbs))) == 6 * 0.5 / 2.0
-
-
-def test_swims_of_many_groups_are_those_of_one_batch(monkeypatch):
-    monkeypatch.setattr(measure, "GROUP", 5)
-    drawn, scene = commands.draw_classes(2, 5, 1), resolved(SCENE, 5, Numerics("sdirk2", 2e-2, 1e-6))
-    shares = []
-    (swum,) = measure.swim_all([scene], drawn, shares.append)
-    np.testing.assert_array_equal(swum, measure.swim(scene, drawn))
-    assert shares[-1] == pytest.approx(1.0)
-    simulator = Simulator(scene, drawn.shape[1])
-    simulator.stroke(drawn[0])
-    np.testing.assert_array_equal(swum[0], simulator.hub_position())

@@ -29,9 +29,11 @@ def velocity(scene: Scene, places: Floats) -> Floats:
     return np.stack([np.broadcast_to(each.numbers, places.shape[:-1]) for each in found], axis=-1)
 
 
-def with_the_water(scene: Scene, n_robots: int, threads: int | None = None) -> Simulator:
+def with_the_water(
+    scene: Scene, n_robots: int, threads: int | None = None, error_bars: bool = False
+) -> Simulator:
     """Robots at rest in the water: with the hub at the origin, and with the velocity of the water there."""
-    simulator = Simulator(scene, n_robots, threads)
+    simulator = Simulator(scene, n_robots, threads, error_bars)
     if _current(scene) is not None:
         state = simulator.get_state()
         simulator.set_state(state._replace(velocities=state.velocities + velocity(scene, np.zeros(2))))

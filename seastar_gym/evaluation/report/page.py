@@ -14,17 +14,16 @@ from typing import Any
 import numpy as np
 import plotly.offline
 
-from agents.report.charts import Curve, curves_figure, paths_figure, speeds_figure, to_html
-from agents.report.playback import UNIT, Playback
-from seastar_gym.evaluation.results import number
+from seastar_gym.evaluation.playback import UNIT, Playback
+from seastar_gym.evaluation.report.charts import Curve, curves_figure, paths_figure, speeds_figure, to_html
+from seastar_gym.evaluation.results import COLUMNS, Row, in_words, number
 from seastar_gym.evaluation.swim import Swim
+from seastar_gym.evaluation.trials import COLUMNS as TRIALS
+from seastar_gym.evaluation.trials import as_shown, read_trials
 from seastar_gym.files import read_json, write_atomically
 from seastar_gym.scene.checks import is_finite_number
-from seastar_gym.scene.csv_rows import Row as CsvRow
-from seastar_gym.scene.csv_rows import read_rows
 
 PAGE = Path(__file__).parent / "page.html"
-Row = Mapping[str, str | int | float | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,14 +53,17 @@ class Remarks:
 
 def write_report(
     file: Path,
-    table: ResultsTable,
+    path: Any,
     swims: Sequence[Swim],
     playbacks: Sequence[Playback],
     waypoint_radius: float,
-    baselines: Mapping[str, int],
     remarks: Remarks,
 ) -> None:
-    """Write the page. waypoint_radius: [m]. baselines: Strokes round the pentagon, to be drawn beside the curves."""
+    """Write the page. waypoint_radius: [m]. Beside the curves stand strokes of others round the pentagon."""
+    table, curves = ResultsTable("Results", COLUMNS, in_words(swims)), {curve.name for curve in remarks.curves}
+    is_pentagon = isinstance(path, str) and path == "pentagon"
+    finished = [done for done in swims if is_pentagon and done.finished and done.agent not in curves]
+    baselines = {done.agent: done.strokes for done in finished}
     sections = [
         _section(table.title, table_html(table)),
         _section("Playback", PLAYER),
@@ -109,33 +111,9 @@ def _side(name: str) -> str:
     return ' class="words"' if name in ("agent", "path", "disturbance", "fidelity") else ""
 
 
-TRIALS = {
-    "path": "path",
-    "disturbance": "disturbance",
-    "agent": "agent",
-    "fidelity": "fidelity",
-    "swims": "swims",
-    "success_rate": "success [%]",
-    "strokes_to_finish": "strokes or decisions to finish",
-    "simulated_time_s": "time to finish [s]",
-    "mean_cross_track_error_mm": "mean cross-track error [mm]",
-    "limbs_heated_per_metre": "limbs heated per metre [1/m]",
-    "energy_per_metre_J": "energy per metre [J/m]",
-}
-"""Columns of the table of trials, as agents.trials names them."""
-MEASURED = (
-    "success_rate", "strokes_to_finish", "simulated_time_s", "mean_cross_track_error_mm", "limbs_heated_per_metre",
-    "energy_per_metre_J",
-)  # fmt: skip
-"""Those with confidence intervals."""
-
-
-def read_trials(file: Path) -> ResultsTable:
-    """The CSV that agents.trials wrote. ValueError: it is none."""
-    names, *lines = read_rows(file) or [CsvRow(str(file), ())]
-    if not lines or not set(TRIALS) <= set(names.fields):
-        raise ValueError(f"{file} is not what agents.trials writes.")
-    rows = [_trial(names, line) for line in lines]
+def trials_table(file: Path) -> ResultsTable:
+    """Table of the CSV of trials. ValueError: it is none."""
+    rows = [as_shown(row) for row in read_trials(file)]
     return ResultsTable("Trials, with 95 % confidence intervals", TRIALS, rows)
 
 
@@ -149,27 +127,6 @@ def read_bound(file: Path) -> dict[str, Any]:
             if sound and {len(row) for row in rows} == {len(directions)}:
                 return dict(found)
     raise ValueError(f"{file} is no result of studies.learning.bound.")
-
-
-def _trial(names: CsvRow, line: CsvRow) -> Row:
-    if len(line.fields) != len(names.fields):
-        raise line.refused(f"the line must have {len(names.fields)} fields, as the first one, not {len(line.fields)}")
-    row = dict(zip(names.fields, line.fields, strict=True))
-    measured = [name + end for name in MEASURED for end in ("", "_low", "_high")]
-    numbers = {name: _float_or_none(row[name], line) for name in measured if name in row}
-    rates = {name: 100.0 * value for name, value in numbers.items() if "rate" in name and value is not None}
-    return {**{name: row[name] for name in TRIALS}, **numbers, **rates}
-
-
-def _float_or_none(text: str, line: CsvRow) -> float | None:
-    """A measured number, None for "nan": no swim arrived."""
-    try:
-        value = float(text)
-    except ValueError:
-        raise line.refused(f"{text!r} is no number") from None
-    if np.isinf(value):
-        raise line.refused(f"{text!r} is no finite number")
-    return None if np.isnan(value) else value
 
 
 def _cell(row: Row, name: str) -> str:

@@ -17,14 +17,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.certificate import CLASSES_VERSION
-
 Floats = NDArray[np.float64]
 Draw = Callable[[np.random.Generator, int, int], Floats]
 """Commands of n sequences for a number of limbs, from a generator, shape (STROKES, n, n_limbs)."""
 
-VERSION = CLASSES_VERSION
-"""Version of the classes: another one makes certificates lapse."""
 STROKES = 10
 SMALL = 0.1
 """Share of the amplitude of small commands."""

@@ -2,7 +2,7 @@
 
 The scene is a Python file that defines `scene`, a JSON file as `Scene.to_dict` writes it, or none for the chapter's. A
 file of Python is executed. Errors are those of the hub's path in space, in time and in sum, over classes of commands
-that are listed in seastar_gym/certification/commands.py, against swims with 37 nodes per limb and steps of 0.25 ms:
+that are listed in seastar_gym/accuracy/commands.py, against swims with 37 nodes per limb and steps of 0.25 ms:
 the largest of a class, and the typical one, which is the median.
 
 Writes a certificate (JSON), and a picture of error over speed where matplotlib is installed. `Certificate.load(file)`
@@ -12,13 +12,14 @@ reads it, `certificate.for_error(0.01)` is the scene at the fastest setting that
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
-from seastar_gym.certification.measure import SAMPLES, certify
+from seastar_gym.accuracy.certificate import Certificate
+from seastar_gym.accuracy.measure import SAMPLES, Progress, certify
 from seastar_gym.extras import require_extra
 from seastar_gym.files import save_figure, write_json
-from seastar_gym.scene.certificate import Certificate
 from seastar_gym.scene.checks import require_error
 from seastar_gym.scene.scene_file import load_scene
 
@@ -71,6 +72,20 @@ def require_writable(option: str, file: Path | None) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
 
 
+@contextmanager
+def progress_bar(what: str = "", shown: bool = True) -> Iterator[Progress]:
+    """Bar of the share of some work that is done."""
+    from tqdm import tqdm
+
+    bar_format = "{l_bar}{bar}| {elapsed}<{remaining}"
+    with tqdm(total=100, unit="%", desc=what, disable=not shown, bar_format=bar_format) as bar:
+
+        def progress(share: float) -> None:
+            bar.update(100.0 * share - bar.n)
+
+        yield progress
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit code."""
     parser = argparse.ArgumentParser(
@@ -97,13 +112,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             require_writable(name, getattr(options, name))
         if options.out.suffix == ".png":
             raise ValueError(f"{options.out} is where the picture goes: give --out a file such as certificate.json.")
-        from tqdm import tqdm
-
-        with tqdm(total=100, unit="%", bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as bar:
-
-            def progress(share: float) -> None:
-                bar.update(100.0 * share - bar.n)
-
+        with progress_bar() as progress:
             certificate = certify(scene, options.samples, options.seed, progress)
         certificate.save(options.out)
         print(as_text(certificate))

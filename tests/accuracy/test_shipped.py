@@ -5,119 +5,142 @@ import subprocess
 import sys
 from collections.abc import Iterable
 from dataclasses import replace
-from pathlib import Path
 from typing import get_args
 
 import numpy as np
 import pytest
 
-from seastar_gym import Contact, Numerics, Scene, Seastar, SmaPulse, Water
-from seastar_gym.certification.commands import draw_classes
-from seastar_gym.certification.endurance import energy_growth
-from seastar_gym.certification.measure import path_lengths
-from seastar_gym.certification.measure import swim as certified_swim
-from seastar_gym.scene import fidelity
-from seastar_gym.scene.fidelity import Promise, cheapest, promise, promises
+from refusals import assert_refused
+from seastar_gym import Certificate, Contact, Numerics, Scene, Seastar, SmaPulse, Water
+from seastar_gym.accuracy import Setting, chapters_certificate
+from seastar_gym.accuracy.chapter import FOLDER
+from seastar_gym.accuracy.commands import draw_classes
+from seastar_gym.accuracy.endurance import energy_growth
+from seastar_gym.accuracy.measure import Swims, errors, path_lengths, swim_all
+from seastar_gym.accuracy.measure import swim as swim_commands
 from seastar_gym.scene.numerics import PRESETS, Fidelity
 from studies.accuracy.cases import (
     Cases,
-    errors,
     gaits,
     joined,
     pentagon,
     random_gaits,
     random_sequences,
     slow_sequences,
-    swim,
     swims,
 )
 from studies.accuracy.settings import Plan
 from studies.accuracy.tables import measured_over
 
 NAMES = get_args(Fidelity)
+TABLE = chapters_certificate()
+SETTINGS = TABLE.settings[len(NAMES) :]
+"""Settings of the table that are on its front; the presets, which come first, need not be."""
 UNSEEN = random_sequences(24, np.random.default_rng(20_261_121))
 """Random commands that the study did not use: it draws from the seeds 0 and 1."""
+
+
+def known(scene: str | Scene) -> Setting:
+    """Errors of a preset or a scene."""
+    found = TABLE.of(Scene.preset(scene) if isinstance(scene, str) else scene)
+    assert found is not None
+    return found
+
+
+def path_error(scene: str | Scene) -> float:
+    return known(scene).errors["random"]
+
+
+def swim(cases: Cases, scene: Scene) -> Swims:
+    return swim_all([scene], cases.commands)[0]
+
+
+def path_errors(swum: Swims, exact: Swims) -> np.ndarray:
+    return errors(swum, exact, path_lengths(FAST, exact.hub)).path
 
 
 # The table
 
 
 def test_table_comes_with_the_package_and_is_complete():
-    assert Path(fidelity.__file__).parent == fidelity.PRESETS.parent
-    stored = json.loads(fidelity.PRESETS.read_text(encoding="utf-8"))
-    assert list(stored["presets"]) == list(NAMES)
-    assert fidelity.machine() == stored["machine"] != ""
-    for row in promises():
-        assert 0.0 < row.path_error < 0.6 and 0.0 < row.straight_error < 0.6
-        assert min(row.gait_error, row.slow_error, row.end_error, row.heading_error, row.time_error) > 0.0
+    assert [each.resolution for each in TABLE.settings[: len(NAMES)]] == [PRESETS[name] for name in NAMES]
+    assert len({each.resolution for each in TABLE.settings}) == len(TABLE.settings) > 100
+    assert TABLE.machine != "" and TABLE.scene.is_chapters
+    for row in TABLE.settings:
+        assert 0.0 < row.errors["random"] < 0.6 and 0.0 < row.errors["straight"] < 0.6
+        assert min(row.errors["repeated"], row.errors["small"], row.time_error) > 0.0
+        assert min(row.end_error, row.heading_error) > 0.0
         assert row.speed > 5.0
 
 
+@pytest.mark.parametrize("file", sorted(FOLDER.iterdir()), ids=lambda file: file.stem)
+def test_what_comes_with_the_package_is_a_certificate_file_as_any_other(file, tmp_path):
+    Certificate.load(file).save(tmp_path / "again.json")
+    assert (tmp_path / "again.json").read_bytes() == file.read_bytes()
+
+
 def test_the_table_says_over_which_commands_it_was_measured_and_with_which_confidence():
-    stored = fidelity.measured_over()
+    stored = TABLE.measured_over
     assert stored == json.loads(json.dumps(measured_over(Plan())))
     assert "0.93 confidence" in stored["confidence"] and stored["path_error"]["random, ternary and continuous"] == 51
+    assert TABLE.samples == 51 and TABLE.confidence() == pytest.approx(0.93, abs=5e-3)
 
 
 def test_a_path_error_is_the_sum_of_space_and_time():
     """Never their difference, although they cancel in some swims."""
-    for row in (*map(promise, NAMES), *promises()):
-        assert row.path_error == pytest.approx(row.space_error + row.time_error, rel=1e-5)
-        assert max(row.end_error, row.straight_error) <= 1.1 * row.path_error  # all are rounded upwards
+    for row in TABLE.settings:
+        assert row.errors["random"] == pytest.approx(row.space_error + row.time_error, rel=1e-5)
+        assert max(row.end_error, row.errors["straight"]) <= 1.1 * row.errors["random"]  # all are rounded upwards
 
 
-def test_promises_are_of_the_presets_as_they_are():
+def test_errors_are_of_the_presets_as_they_are():
     """If this fails, presets were changed without `python -m studies.accuracy --store`."""
     for name in NAMES:
-        row, (discretisation, nodes_per_limb, numerics) = promise(name), PRESETS[name]
-        assert (row.discretisation, row.nodes_per_limb) == (discretisation, nodes_per_limb)
-        assert (row.scheme, row.step) == (numerics.scheme, numerics.step)
-        assert (row.newton_tolerance, row.path_tolerance) == (numerics.newton_tolerance, numerics.path_tolerance)
-        assert promise(Scene.preset(name)) == row
+        assert known(name).resolution == PRESETS[name] and known(name).typical
+        assert TABLE.at(known(name)) == Scene.preset(name)
 
 
 def test_presets_keep_what_their_names_say():
-    assert promise("fast").path_error <= 0.03
-    assert promise("balanced").path_error <= 0.012
-    assert promise("accurate").path_error <= 0.004
-    assert promise("reference").path_error <= 0.0015
-    speeds = [promise(name).speed for name in ("fast", "balanced", "accurate", "reference")]
+    assert path_error("fast") <= 0.03
+    assert path_error("balanced") <= 0.012
+    assert path_error("accurate") <= 0.004
+    assert path_error("reference") <= 0.0015
+    speeds = [known(name).speed for name in ("fast", "balanced", "accurate", "reference")]
     assert speeds == sorted(speeds, reverse=True)
-    assert promise("fast").speed > promise("chapter").speed
-    assert promise("chapter").path_error > 0.2
+    assert known("fast").speed > known("chapter").speed
+    assert path_error("chapter") > 0.2
 
 
 def test_the_chapters_ten_nodes_are_far_off_the_continuum_and_no_step_mends_that():
     """12 % on the straight swim and 26 % on the worst path, where ours are within a per cent."""
-    ten = [row for row in promises() if row.nodes_per_limb == 10]
+    ten = [row for row in TABLE.settings if row.nodes_per_limb == 10]
     assert min(row.space_error for row in ten if row.discretisation == "chapter") > 0.2
     assert max(row.space_error for row in ten if row.discretisation == "continuum") < 0.01
 
 
 def test_space_errors_fall_with_the_nodes():
     for discretisation in ("chapter", "continuum"):
-        by_nodes = {row.nodes_per_limb: row.space_error for row in promises() if row.discretisation == discretisation}
+        by_nodes = {
+            row.nodes_per_limb: row.space_error for row in TABLE.settings if row.discretisation == discretisation
+        }
         falling = [by_nodes[n] for n in sorted(by_nodes)]
         assert falling == sorted(falling, reverse=True) and len(falling) >= 3
 
 
-def test_no_stored_setting_is_worse_than_another_of_its_resolution_in_everything():
-    def figures(row: Promise) -> tuple[float, ...]:
-        return -row.speed, row.path_error, row.gait_error
+def test_no_stored_setting_is_worse_than_another_of_its_mesh_in_everything():
+    def figures(row: Setting) -> tuple[float, ...]:
+        return -row.speed, row.errors["random"], row.errors["repeated"]
 
-    def resolution(row: Promise) -> tuple[str, int]:
-        return row.discretisation, row.nodes_per_limb
-
-    for row in promises():
-        alike = [each for each in promises() if resolution(each) == resolution(row)]
+    for row in SETTINGS:
+        alike = [each for each in TABLE.settings if each.resolution[:2] == row.resolution[:2]]
         better = [each for each in alike if all(np.array(figures(each)) < figures(row))]
         assert not better, f"{better[0]} beats {row}"
 
 
-@pytest.mark.parametrize("setting", ["exact", "", Numerics(), None])
-def test_what_is_no_preset_and_no_scene_is_refused(setting):
-    with pytest.raises(ValueError, match=r"^(A preset is one of|promise needs the name of a preset or a Scene).*\.$"):
-        promise(setting)
+@pytest.mark.parametrize("setting", ["fast", "", Numerics(), None])
+def test_what_is_no_scene_is_refused(setting):
+    with assert_refused("scene must be a Scene"):
+        TABLE.of(setting)
 
 
 FAST = Scene.preset("fast")
@@ -135,9 +158,9 @@ OTHERS = [
 
 @pytest.mark.parametrize("scene", OTHERS)
 def test_another_robot_or_fluid_is_promised_nothing_and_the_sentence_names_a_way(scene):
-    assert fidelity.measured(scene) is None
-    with pytest.raises(ValueError, match=r"^Errors were measured for the chapter's robot.*seastar_gym\.certify.*\.$"):
-        promise(scene)
+    assert TABLE.of(scene) is None
+    with assert_refused("The certificate is of the chapter's robot in the chapter's water", "seastar_gym.certify"):
+        TABLE.require_valid(scene)
 
 
 @pytest.mark.parametrize(
@@ -149,9 +172,12 @@ def test_another_robot_or_fluid_is_promised_nothing_and_the_sentence_names_a_way
     ],
 )
 def test_the_chapters_robot_at_a_setting_that_was_not_measured_is_promised_nothing(scene):
-    assert fidelity.measured(scene) is None
-    with pytest.raises(ValueError, match=r"^Nothing was measured, so nothing can be promised.*\.$"):
-        promise(scene)
+    assert TABLE.of(scene) is None
+    TABLE.require_valid(scene)
+
+
+def test_no_error_depends_on_the_limit_of_iterations():
+    assert TABLE.of(replace(FAST, numerics=replace(FAST.numerics, max_iterations=50))) == known("fast")
 
 
 # Choice by error
@@ -163,17 +189,16 @@ WANTED = [0.2, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005]
 @pytest.mark.parametrize("error", WANTED)
 def test_for_error_picks_the_fastest_setting_that_keeps_the_error(error, any_gait):
     scene = Scene.for_error(error, any_gait)
-    chosen = promise(scene)
+    chosen, classes = known(scene), ("random", "repeated")[: 1 + any_gait]
     assert scene.is_chapters and scene.numerics.named
-    assert chosen.speed == cheapest(error, any_gait).speed
-    assert max(chosen.path_error, chosen.gait_error if any_gait else 0.0) <= error
-    for row in promises():
+    assert chosen.error(classes) <= error
+    for row in TABLE.settings:
         if row.speed > chosen.speed:
-            assert max(row.path_error, row.gait_error if any_gait else 0.0) > error
+            assert row.error(classes) > error
 
 
 def test_a_smaller_error_is_never_faster():
-    speeds = [promise(Scene.for_error(error)).speed for error in np.logspace(-0.5, -2.5, 40)]
+    speeds = [known(Scene.for_error(error)).speed for error in np.logspace(-0.5, -2.5, 40)]
     assert speeds == sorted(speeds, reverse=True)
 
 
@@ -181,7 +206,7 @@ def test_a_smaller_error_is_never_faster():
 def test_for_error_of_a_robot_keeps_its_resolution(robot):
     scene = Scene.for_error(0.02, robot=robot)
     assert scene.robot == robot
-    assert promise(scene).path_error <= 0.02
+    assert path_error(scene) <= 0.02
 
 
 def test_for_error_refuses_ten_of_the_chapters_nodes_what_none_of_their_steps_can_keep():
@@ -191,8 +216,13 @@ def test_for_error_refuses_ten_of_the_chapters_nodes_what_none_of_their_steps_ca
 
 @pytest.mark.parametrize("robot", [Seastar(youngs_modulus=2e6), Seastar(n_limbs=3), "seastar", 10])
 def test_for_error_refuses_another_robot(robot):
-    with pytest.raises(ValueError, match=r"^(Errors were measured for the chapter's|robot must be a Seastar).*\.$"):
+    with pytest.raises(ValueError, match=r"^(The certificate is of the chapter's|robot must be a Seastar).*\.$"):
         Scene.for_error(0.01, robot=robot)
+
+
+def test_for_error_refuses_hub_hinges_that_were_not_measured():
+    with assert_refused('hub_hinge="opening"'):
+        Scene.for_error(0.9, robot=Seastar(discretisation="chapter", hub_hinge="turning"))
 
 
 def test_for_error_refuses_numbers_of_nodes_that_were_not_measured():
@@ -202,7 +232,7 @@ def test_for_error_refuses_numbers_of_nodes_that_were_not_measured():
 
 @pytest.mark.parametrize("any_gait", [False, True])
 def test_for_error_refuses_what_the_table_cannot_promise_and_names_the_best(any_gait):
-    best = min(max(row.path_error, row.gait_error if any_gait else 0.0) for row in promises())
+    best = min(row.error(("random", "repeated")[: 1 + any_gait]) for row in TABLE.settings)
     with pytest.raises(ValueError, match=r"^No measured setting keeps .*: the best, .* keeps .* %\.$") as refusal:
         Scene.for_error(0.9 * best, any_gait)
     assert f"{100 * best:g} %" in str(refusal.value)
@@ -215,10 +245,14 @@ def test_an_error_that_is_no_positive_number_is_refused(error):
         Scene.for_error(error)
 
 
-def test_reading_a_promise_compiles_and_simulates_nothing():
-    code = "import sys; from seastar_gym.scene.fidelity import promise; print(promise('fast').path_error)"
+def test_reading_an_error_compiles_and_simulates_nothing():
+    code = (
+        "from seastar_gym.accuracy import chapters_certificate\n"
+        "from seastar_gym.scene import Scene\n"
+        "print(chapters_certificate().of(Scene.preset('fast')).errors['random'])"
+    )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
-    assert float(found.stdout) == promise("fast").path_error
+    assert float(found.stdout) == path_error("fast")
 
 
 # The promise, kept
@@ -228,7 +262,7 @@ def test_reading_a_promise_compiles_and_simulates_nothing():
 def reference():
     """Swims at fidelity "reference": unseen random commands with the pairs, and the pentagon."""
     batches = [joined(swims(), UNSEEN), pentagon(2, 1)]
-    return batches, [swim(batch, Scene.preset("reference"), threads=None) for batch in batches]
+    return batches, [swim(batch, Scene.preset("reference")) for batch in batches]
 
 
 @pytest.mark.parametrize("name", ["fast", "balanced", "accurate", "chapter"])
@@ -236,19 +270,19 @@ def test_runs_at_a_fidelity_and_at_reference_differ_by_no_more_than_promised(nam
     """Whole and continuous commands alike; the reference's own promise is part of the difference."""
     batches, exact = reference
     for batch, reference_swim in zip(batches, exact, strict=True):
-        off = errors(swim(batch, Scene.preset(name), threads=None), reference_swim)
-        allowed = promise(name).path_error + promise("reference").path_error
-        assert off.path.max() <= allowed
+        off = path_errors(swim(batch, Scene.preset(name)), reference_swim)
+        allowed = path_error(name) + path_error("reference")
+        assert off.max() <= allowed
         # The worst is not far below, or the promise would be worth little.
         if batch is batches[0]:
-            assert off.path.max() > allowed / 4.0
+            assert off.max() > allowed / 4.0
 
 
 @pytest.mark.parametrize("error", [0.05, 0.01])
 def test_for_error_keeps_the_error_on_unseen_commands(error, reference):
     batches, exact = reference
-    found = swim(batches[0], Scene.for_error(error), threads=None)
-    assert errors(found, exact[0]).path.max() <= error + promise("reference").path_error
+    found = swim(batches[0], Scene.for_error(error))
+    assert path_errors(found, exact[0]).max() <= error + path_error("reference")
 
 
 def unseen_cases() -> Cases:
@@ -260,16 +294,16 @@ def unseen_cases() -> Cases:
     return joined(random_sequences(88, rng), alone, gaits(), slow_sequences(24, rng))
 
 
-def promised_errors(row: Promise, kinds: Iterable[str]) -> np.ndarray:
+def promised_errors(row: Setting, kinds: Iterable[str]) -> np.ndarray:
     """Error that is promised of every sequence."""
-    return np.array([{"gait": row.gait_error, "slow": row.slow_error}.get(kind, row.path_error) for kind in kinds])
+    return np.array([row.errors[{"gait": "repeated", "slow": "small"}.get(kind, "random")] for kind in kinds])
 
 
 @pytest.fixture(scope="module")
 def unseen():
     """Unseen sequences and their swims at fidelity "reference"."""
     cases = unseen_cases()
-    return cases, swim(cases, Scene.preset("reference"), threads=None)
+    return cases, swim(cases, Scene.preset("reference"))
 
 
 @pytest.mark.slow
@@ -278,8 +312,8 @@ def test_promises_hold_on_200_sequences_that_the_study_did_not_use(name, unseen)
     cases, exact = unseen
     assert len(cases) == 200
     scene = Scene.preset(name) if isinstance(name, str) else Scene.for_error(name)
-    off = errors(swim(cases, scene, threads=None), exact).path
-    allowed = promised_errors(promise(scene), cases.kinds) + promised_errors(promise("reference"), cases.kinds)
+    off = path_errors(swim(cases, scene), exact)
+    allowed = promised_errors(known(scene), cases.kinds) + promised_errors(known("reference"), cases.kinds)
     broken = [(cases.names[k], off[k], allowed[k]) for k in np.flatnonzero(off > allowed)]
     assert not broken
 
@@ -287,9 +321,9 @@ def test_promises_hold_on_200_sequences_that_the_study_did_not_use(name, unseen)
 @pytest.mark.slow
 @pytest.mark.parametrize("error", [0.1, 0.03])
 def test_for_error_of_any_gait_keeps_it_whatever_command_is_repeated(error):
-    exact = swim(gaits(), Scene.preset("reference"), threads=None)
-    found = swim(gaits(), Scene.for_error(error, any_gait=True), threads=None)
-    assert errors(found, exact).path.max() <= error + promise("reference").gait_error
+    exact = swim(gaits(), Scene.preset("reference"))
+    found = swim(gaits(), Scene.for_error(error, any_gait=True))
+    assert path_errors(found, exact).max() <= error + known("reference").errors["repeated"]
 
 
 @pytest.mark.parametrize("name", ["fast", "balanced"])
@@ -297,10 +331,9 @@ def test_newtons_tolerance_does_not_drown_slow_swims(name):
     """Its displacements are absolute, and a tenth of the amplitude swims a hundredth of the way."""
     scene, commands = Scene.preset(name), draw_classes(8, 5, 77)
     slow = np.concatenate([commands[:, -8:], 0.1 * commands[:, 24:32], 0.1 * np.tile(np.eye(5), (10, 1, 1))], axis=1)
-    exact = certified_swim(replace(scene, numerics=replace(scene.numerics, newton_tolerance=1e-10)), slow)
-    hub = certified_swim(scene, slow)
-    errors_of_tolerance = np.linalg.norm(hub - exact, axis=-1).max(axis=0) / path_lengths(exact, 0.1)
-    assert 1e-4 < errors_of_tolerance.max() < 0.05 < promise(name).slow_error / 4.0
+    exact = swim_commands(replace(scene, numerics=replace(scene.numerics, newton_tolerance=1e-10)), slow)
+    errors_of_tolerance = path_errors(swim_commands(scene, slow), exact)
+    assert 1e-4 < errors_of_tolerance.max() < 0.05 < known(name).errors["small"] / 4.0
 
 
 # Long swims

@@ -5,10 +5,14 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from seastar_gym.benchmark.episodes import Episodes, Floats
+from seastar_gym.envs.tasks.challenge import Challenge
 from seastar_gym.envs.tasks.prey import Prey
 from seastar_gym.envs.tasks.prizes import Prizes
 from seastar_gym.envs.tasks.station import Station
+from seastar_gym.evaluation.rollout import Episodes, Floats
+
+SETTLED = 30.0
+"""Time after which distances from a station count [s]."""
 
 
 class Measure(NamedTuple):
@@ -30,18 +34,18 @@ def seconds_to_success(episodes: Episodes) -> Floats:
 
 def catches(episodes: Episodes) -> Floats:
     """Prey caught."""
-    return episodes.last("catches")
+    return episodes.last("catches").astype(float)
 
 
 def mean_distance(episodes: Episodes) -> Floats:
-    """Mean distance from the station [mm] once 30 s have passed."""
-    settled = np.where(episodes.of("time") > 30.0, episodes.of("distance"), np.nan)
+    """Mean distance from the station [mm] once SETTLED has passed."""
+    settled = np.where(episodes.of("time") > SETTLED, episodes.of("distance"), np.nan)
     return np.asarray(1000.0 * np.nanmean(settled, axis=0))
 
 
 def prizes(episodes: Episodes) -> Floats:
     """Worth of the prizes taken."""
-    return episodes.last("taken")
+    return episodes.last("taken").astype(float)
 
 
 SECONDS = Measure("time until done", "s", "less", seconds_to_success)
@@ -55,4 +59,9 @@ MEASURES: dict[type[Any], Measure] = {
 
 def measure_of(env: Any) -> Measure:
     """Measure of the task of an environment."""
-    return MEASURES.get(type(getattr(env, "challenge", None)), SECONDS)
+    return measure_of_challenge(getattr(env, "challenge", None))
+
+
+def measure_of_challenge(challenge: Challenge | None) -> Measure:
+    """Measure of a challenge; None for waypoints."""
+    return MEASURES.get(type(challenge), SECONDS)

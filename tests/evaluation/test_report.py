@@ -7,17 +7,18 @@ import shutil
 
 import numpy as np
 import pytest
-from rich.console import Console
 
-from agents.evaluate import evaluate, main
-from agents.report.charts import Curve, curves_figure, read_progress, speeds_figure, to_html
-from agents.report.page import MEASURED, Remarks, ResultsTable, read_trials, table_html
-from agents.report.playback import UNIT, RecordingEnv
+from agents.evaluate import main
 from refusals import assert_refused
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.evaluation.comparison import evaluate
+from seastar_gym.evaluation.playback import UNIT, RecordingEnv
+from seastar_gym.evaluation.report.charts import Curve, curves_figure, read_progress, speeds_figure, to_html
+from seastar_gym.evaluation.report.page import Remarks, ResultsTable, table_html, trials_table
 from seastar_gym.evaluation.results import COLUMNS, number
 from seastar_gym.evaluation.swim import swim
+from seastar_gym.evaluation.trials import MEASURED
 from seastar_gym.scene import Scene
 
 MM = 1000.0
@@ -54,7 +55,7 @@ def evaluated(tmp_path_factory):
             curves=[Curve.of("straight", PROGRESS)],
             bound={"fidelity": "fast", "directions_deg": [0, 18, 36], "mm_per_stroke": {"straight": [3.7, 3.0, 3.5]}},
         ),
-        console=Console(quiet=True),
+        say=lambda text: None,
     )
     return folder, swims
 
@@ -133,10 +134,10 @@ def test_trials_are_shown_with_their_confidence_intervals(tmp_path):
     measured = [name + end for name in MEASURED for end in ("", "_low", "_high")]
     header = ["path", "disturbance", "agent", "fidelity", "swims", *measured]
     row = ["random", "none", "a", "fast", 1000]
-    row += [0.9951, 0.9912, 0.9983, 160.04, 159, 161, 80.02, 79.5, 80.5]
-    row += ["nan", "nan", "nan", 423, 400, 450, 300, 290, 310]
+    row += [0.9951, 0.9912, 0.9983, 160.04, 159, 161, "nan", "nan", "nan"]
+    row += [423, 400, 450, 80.02, 79.5, 80.5, 300, 290, 310]
     (tmp_path / "trials.csv").write_text("\n".join(",".join(map(str, line)) for line in (header, row)) + "\n")
-    table = read_trials(tmp_path / "trials.csv")
+    table = trials_table(tmp_path / "trials.csv")
     cells = re.findall(r'data-name="(\w+)">(.*?)</td>', table_html(table))
     assert {name: re.sub("<.*?>", "", cell) for name, cell in cells} == {
         "path": "random", "disturbance": "none", "agent": "a", "fidelity": "fast", "swims": "1000",
@@ -146,13 +147,13 @@ def test_trials_are_shown_with_their_confidence_intervals(tmp_path):
         "simulated_time_s": "80.0 [79.5, 80.5]", "energy_per_metre_J": "300.0 [290.0, 310.0]",
     }  # fmt: skip
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")
-    with pytest.raises(ValueError, match=r"other.csv is not what agents.trials writes"):
-        read_trials(tmp_path / "other.csv")
+    with pytest.raises(ValueError, match=r"other.csv is not what trials write"):
+        trials_table(tmp_path / "other.csv")
     for place, field, words in ((9, "x", "line 2: 'x' is no number"), (8, "9,9", "line 2: the line must have 23")):
         wrong = [*row[:place], field, *row[place + 1 :]]
         (tmp_path / "other.csv").write_text("\n".join(",".join(map(str, line)) for line in (header, wrong)) + "\n")
         with assert_refused(words):
-            read_trials(tmp_path / "other.csv")
+            trials_table(tmp_path / "other.csv")
 
 
 def test_every_column_of_trials_is_text_not_markup(tmp_path):
@@ -163,12 +164,12 @@ def test_every_column_of_trials_is_text_not_markup(tmp_path):
     evil = '"<img src=x onerror=alert(1)>"'
     row = [*[evil] * 5, *["1.0"] * len(measured), *[evil] * 10]
     (tmp_path / "trials.csv").write_text(",".join(header) + "\n" + ",".join(row) + "\n")
-    assert "<img" not in table_html(read_trials(tmp_path / "trials.csv"))
+    assert "<img" not in table_html(trials_table(tmp_path / "trials.csv"))
     rows = [{"agent": "a", "agent_low": "<img>", "agent_high": "<img>"}]
     assert "<img" not in table_html(ResultsTable("Trials", {"agent": "agent"}, rows))
     (tmp_path / "trials.csv").write_text(",".join(header) + "\n" + ",".join(["inf" if f == "1.0" else f for f in row]))
     with assert_refused("'inf' is no finite number"):
-        read_trials(tmp_path / "trials.csv")
+        trials_table(tmp_path / "trials.csv")
 
 
 @pytest.mark.parametrize(
@@ -254,7 +255,8 @@ def test_command_line_writes_the_report_with_the_curves_of_runs(tmp_path, capsys
     assert "report.html" in capsys.readouterr().out
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert '"name":"run"' in page and '"name":"learned"' not in page
-    assert "python train.py" in page and "python -m agents.evaluate --agents learned straight" in page
+    assert "python train.py" in page
+    assert "seastar evaluate --video --out runs/evaluate --agents learned straight" in page
 
 
 def test_a_folder_without_a_run_is_answered_with_one_sentence(tmp_path, capsys):

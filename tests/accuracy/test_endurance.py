@@ -8,12 +8,12 @@ import pytest
 
 from currents import CURRENTS, velocity
 from seastar_gym import Body, Numerics, Scene, Seastar, Simulator, UniformCurrent
-from seastar_gym.certification import commands, endurance, measure, water
-from seastar_gym.scene.certificate import CertifiedSetting, resolved
+from seastar_gym.accuracy import commands, endurance, measure, water
+from seastar_gym.accuracy.setting import Setting, resolved
 
 SCENE = Scene(Seastar(limb_length=0.08))
 EULER = Numerics("implicit-euler", 1e-2, 1e-6)
-SETTING = CertifiedSetting(7, "implicit-euler", 5e-3, 1e-6, {"small": 0.1}, {"small": 0.05}, 0.0, 0.0, 1.0, 1.0)
+SETTING = Setting(7, "implicit-euler", 5e-3, 1e-6, {"small": 0.1}, {"small": 0.05}, 0.0, 0.0, 1.0, 1.0)
 
 
 def in_water(current, scene=SCENE):
@@ -114,10 +114,10 @@ def test_a_uniform_current_is_a_translation(body):
     before = two.get_state()
     water.kinetic_energy(two)
     np.testing.assert_array_equal(two.velocities, before.velocities)
-    hub, in_current = (measure.swim(scene, drawn) for scene in (still, moving))
+    hub, in_current = (measure.swim(scene, drawn).hub for scene in (still, moving))
     np.testing.assert_allclose(in_current - np.arange(1, 11)[:, None, None] * [0.05, -0.02], hub, atol=1e-7)
-    lengths = measure.path_lengths(in_current, 0.1, water.carried(moving, in_current))
-    np.testing.assert_allclose(lengths, measure.path_lengths(hub, 0.1), atol=1e-7)
+    lengths = measure.path_lengths(moving, in_current)
+    np.testing.assert_allclose(lengths, measure.path_lengths(still, hub), atol=1e-7)
     assert endurance.energy_growth(moving) == pytest.approx(endurance.energy_growth(still), rel=1e-3)
 
 
@@ -125,15 +125,15 @@ def test_errors_are_divided_by_the_way_through_the_water():
     """A robot at rest in a current goes nowhere; one that swims has the same errors as in still water."""
     hub = np.arange(1, 11)[:, None, None] * np.array([0.05, 0.0])
     in_current = in_water(UniformCurrent(0.05))
-    assert measure.path_lengths(hub, 0.1, water.carried(in_current, hub))[0] == pytest.approx(1e-4)
-    assert measure.path_lengths(hub, 0.1, water.carried(SCENE, hub))[0] == pytest.approx(0.5)
+    assert measure.path_lengths(in_current, hub)[0] == pytest.approx(0.8e-4)
+    assert measure.path_lengths(SCENE, hub)[0] == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("kind", ["vortex", "grid"])
 def test_a_current_that_differs_from_place_to_place_carries_the_hub(kind):
     """A robot that does nothing is carried by the water at its hub, nearly, and goes little way through it."""
     scene = resolved(in_water(CURRENTS[kind]), 5, Numerics("sdirk2", 2e-2, 1e-6))
-    hub = measure.swim(scene, np.zeros((10, 1, 5)))
-    over_ground = measure.path_lengths(hub, 0.08)[0]
-    through_the_water = measure.path_lengths(hub, 0.08, water.carried(scene, hub))[0]
+    hub = measure.swim(scene, np.zeros((10, 1, 5))).hub
+    over_ground = measure.path_lengths(SCENE, hub)[0]
+    through_the_water = measure.path_lengths(scene, hub)[0]
     assert through_the_water < 0.2 * over_ground

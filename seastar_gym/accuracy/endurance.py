@@ -9,8 +9,8 @@ robot off.
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.certification.commands import CLASSES, STROKES
-from seastar_gym.certification.water import kinetic_energy, with_the_water
+from seastar_gym.accuracy.commands import CLASSES, STROKES
+from seastar_gym.accuracy.water import kinetic_energy, with_the_water
 from seastar_gym.scene import Scene
 
 Floats = NDArray[np.float64]

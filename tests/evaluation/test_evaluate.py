@@ -1,7 +1,6 @@
 """Evaluation: the measures of a swim, and the table, CSV, picture and videos made of them."""
 
 import csv
-import io
 import subprocess
 import sys
 from dataclasses import replace
@@ -11,9 +10,8 @@ import imageio.v3 as imageio
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
-from rich.console import Console
 
-from agents.evaluate import evaluate, main
+from agents.evaluate import main
 from seastar_gym import Scene, Seastar
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import LearnedPolicy, save
@@ -21,13 +19,14 @@ from seastar_gym.controllers.roster import load_agents
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.paths import PENTAGON_SIDE, make_path
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.films import CLOSING_SECONDS
 from seastar_gym.evaluation.pictures import COLOURS, FPS, FRAMES_PER_STROKE
-from seastar_gym.evaluation.swim import Swim, swim
+from seastar_gym.evaluation.swim import Swim
 
 ROOT = Path(__file__).resolve().parents[2]
 SHORT = [[0.02, 0.0]]
-EASY = {"fidelity": "fast", "waypoint_radius": 2e-3, "console": Console(quiet=True)}
+EASY = {"fidelity": "fast", "waypoint_radius": 2e-3, "say": lambda text: None}
 
 
 def made_up_swim(hub, waypoint_index, waypoints=((0.1, 0.0), (0.1, 0.1)), limbs_heated=None):
@@ -89,29 +88,9 @@ def test_unknown_energy_is_no_number():
     assert unknown.joules_per_metre is None and unknown.seconds_heated is None
 
 
-class Recorder:
-    """A policy that writes down what it is asked."""
-
-    def __init__(self):
-        self.asked = []
-
-    def predict(self, observation, state=None, episode_start=None, deterministic=False):
-        self.asked.append((state, bool(episode_start[0]), deterministic))
-        return np.array([0, 1, 0, 0, 2]), len(self.asked)
-
-
-def test_a_policy_gets_its_state_back_and_hears_of_the_start_once():
-    recorder = Recorder()
-    done = swim("recorder", recorder, SeastarSwimEnv(fidelity="fast"), max_strokes=3, seed=0)
-    assert recorder.asked == [(None, True, True), (1, False, True), (2, False, True)]
-    assert done.strokes == 3
-    np.testing.assert_array_equal(done.time, [0.0, 1.0, 2.0, 3.0])
-    np.testing.assert_array_equal(done.limbs_heated, [2, 2, 2])
-
-
 def test_the_scripted_pentagon_rounds_the_pentagon():
     traced = make_path("pentagon", np.random.default_rng(0)) * (0.14356 / PENTAGON_SIDE)  # by the scripted gait
-    (done,) = evaluate({"script": scripted("pentagon")}, traced, fidelity="balanced", console=Console(quiet=True))
+    (done,) = evaluate({"script": scripted("pentagon")}, traced, fidelity="balanced")
     assert done.waypoints_reached == 5
     assert 240 <= done.strokes <= 242  # it enters the last waypoint's radius before it stops
     assert done.cross_track_errors.mean() < 1e-3
@@ -148,10 +127,10 @@ def test_a_path_may_come_with_the_reset():
 def written(tmp_path_factory):
     """Folder, swims and printed text of an evaluation of one agent that finishes and one that does not."""
     folder = tmp_path_factory.mktemp("evaluation")
-    console = Console(width=80, file=io.StringIO())
+    said = []
     agents = {"straight": scripted("straight"), "2-,5+": scripted("2-,5+")}
-    swims = evaluate(agents, SHORT, max_strokes=8, out=folder, **EASY | {"console": console})
-    return folder, swims, console.file.getvalue()
+    swims = evaluate(agents, SHORT, max_strokes=8, out=folder, **EASY | {"say": said.append})
+    return folder, swims, "\n".join(said)
 
 
 def test_csv_holds_the_measures(written):
@@ -266,19 +245,9 @@ def test_what_cannot_be_evaluated_is_refused(agents, more, complaint):
 # The command line
 
 
-def test_command_line_evaluates_scripted_agents(tmp_path, capsys):
-    path = tmp_path / "path.csv"
-    path.write_text("0.01, 0.0\n0.02, 0.0\n")
-    arguments = ["--agents", "straight", "2-,5+", "--path", str(path), "--fidelity", "fast", "--no-video"]
-    assert main([*arguments, "--max-strokes", "5", "--out", str(tmp_path / "out")]) == 0
-    printed = capsys.readouterr().out
-    assert "straight" in printed
-    assert "of 2" in printed
-    assert {file.name for file in (tmp_path / "out").iterdir()} == {"evaluation.csv", "traces.png"}
-
-
 def test_the_policy_in_the_box_and_scripted_agents_are_evaluated_without_torch():
-    code = "import sys, agents.evaluate as e; e.fitting_agents(['pentagon', 'random', 'learned']); print(*sys.modules)"
+    code = "import sys, seastar_gym.cli.evaluate as e; e.fitting_agents(['pentagon', 'random', 'learned'])"
+    code += "; print(*sys.modules)"
     answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     loaded = set(answer.stdout.split())
     assert "seastar_gym.controllers.scripted" in loaded
@@ -331,12 +300,27 @@ def test_bad_input_is_answered_with_one_sentence(tmp_path, capsys, arguments, co
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("arguments", [["--max-strokes", "0"], ["--waypoint-radius", "-1"], ["--fidelity", "none"]])
-def test_options_out_of_range_are_refused(arguments, capsys):
+@pytest.mark.parametrize(
+    "arguments, complaint",
+    [
+        (["--max-strokes", "0"], "--max-strokes must be at least 1"),
+        (["--waypoint-radius", "-1"], "--waypoint-radius must be"),
+        (["--fidelity", "fast", "balanced"], "Several fidelities are for --sets"),
+        (["--sets", "nominal"], "needs a folder, --out, and a path, no --sets"),
+        (["--sets", "nominal", "--no-video", "--swims", "0"], "--swims must be"),
+    ],
+)
+def test_options_out_of_range_are_refused(arguments, complaint, capsys):
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert complaint in said and said.count("\n") == 1
+
+
+@pytest.mark.parametrize("arguments", [["--fidelity", "none"], ["--sets"], ["--max-strokes", "2", "--seconds", "3"]])
+def test_options_that_are_none_end_with_the_usage(arguments, capsys):
     with pytest.raises(SystemExit) as refusal:
         main(arguments)
-    assert refusal.value.code == 2
-    assert "Traceback" not in capsys.readouterr().err
+    assert refusal.value.code == 2 and capsys.readouterr().err.startswith("usage: seastar evaluate")
 
 
 def test_models_go_by_the_names_of_their_files(monkeypatch, tmp_path):

@@ -1,0 +1,11 @@
+"""What speed costs a scene in accuracy: settings with their measured errors, and the certificates that hold them.
+
+`certify(scene)` and `python -m seastar_gym.certify` measure them of any scene (measure.py, command.py); those of the
+chapter's robot come with the package (chapter.py).
+"""
+
+from seastar_gym.accuracy.certificate import Certificate, as_certificate
+from seastar_gym.accuracy.chapter import chapters_certificate, timed_certificate
+from seastar_gym.accuracy.setting import Setting
+
+__all__ = ["Certificate", "Setting", "as_certificate", "chapters_certificate", "timed_certificate"]

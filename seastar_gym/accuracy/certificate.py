@@ -1,0 +1,229 @@
+"""`Certificate`: measured errors of one scene, written by `python -m seastar_gym.certify`.
+
+A certificate is a JSON file. It lapses where the scene's physics or the version of the package differ: then it is
+refused with a sentence. The file has a digest of its content, so that errors stay those of their scene.
+"""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from seastar_gym.accuracy.setting import Setting, at, is_measured, physics, require_measured
+from seastar_gym.files import write_atomically
+from seastar_gym.scene import Numerics, Scene, Seastar
+from seastar_gym.scene.checks import (
+    is_whole_number,
+    require_count,
+    require_error,
+    require_kind,
+    require_number,
+    require_texts,
+    shown,
+)
+from seastar_gym.version import __version__
+
+FORMAT = 3
+"""Version of the file's form."""
+CLASSES_VERSION = 1
+"""Version of the classes of commands, see commands.py. Errors of another are of others: certificates lapse."""
+MOST_SAMPLES = 100_000
+"""Most sequences of a class that can be asked for."""
+REPEATED = ("repeated", "alternating")
+"""Beginnings of the names of classes whose commands are repeated."""
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Errors of some settings for one scene.
+
+    scene: The scene; its nodes per limb, discretisation and numerics do not count.
+    settings: Measured settings.
+    promised: Classes of commands over which `for_error` promises; the others are there to be read.
+    actions: Those of them that an environment's actions can make.
+    samples: Sequences per class. With n of them, at most a share s of all sequences of a class errs by more than the
+        largest that was measured, with the confidence 1 - (1 - s)^n.
+    limit_error: Error of the swims that stand for the continuum, estimated from half as many edges. `certify` adds it
+        to all errors.
+    classes, version, machine: Version of the classes of commands, of the package, and where speeds were measured.
+    decision_period: Time between decisions [s] of wires (`SmaWires`). Errors are then of whole seconds in place of
+        strokes. None means strokes.
+    measured_over: What else there is to tell of the commands, as plain data.
+    """
+
+    scene: Scene
+    settings: tuple[Setting, ...]
+    promised: tuple[str, ...]
+    actions: tuple[str, ...]
+    samples: int
+    limit_error: float
+    classes: int
+    version: str
+    machine: str
+    decision_period: float | None = None
+    measured_over: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.scene, Scene):
+            raise ValueError(f"scene must be a Scene, not {shown(self.scene)}.")
+        if not self.settings or not all(isinstance(each, Setting) for each in self.settings):
+            raise ValueError(f"settings must be some Settings, not {shown(self.settings)}.")
+        known = set(self.settings[0].errors)
+        if any(set(each.errors) != known for each in self.settings):
+            raise ValueError("settings must have errors of the same classes of commands.")
+        for name in ("promised", "actions"):
+            some = getattr(self, name)
+            if not some or not known.issuperset(some):
+                raise ValueError(f"{name} must be some of {', '.join(sorted(known))}, not {shown(some)}.")
+        require_count("samples", self.samples, 2, MOST_SAMPLES)
+        require_measured("limit_error", self.limit_error)
+        if self.decision_period is not None:
+            require_number("decision_period", self.decision_period, "s")
+        if not is_whole_number(self.classes) or not isinstance(self.version, str) or not isinstance(self.machine, str):
+            raise ValueError("classes must be a whole number, and version and machine must be words.")
+
+    def confidence(self, share: float = 0.05) -> float:
+        """Confidence that at most this share of all sequences of a class errs by more than the error of the class."""
+        return 1.0 - (1.0 - share) ** self.samples
+
+    def require_version(self) -> None:
+        """ValueError where the certificate has lapsed with the version of the package or of the classes of commands."""
+        if self.version != __version__:
+            raise ValueError(
+                f"The certificate is of version {self.version} of seastar_gym, not of this one, {__version__}: certify "
+                "the scene again."
+            )
+        if self.classes != CLASSES_VERSION:
+            raise ValueError(
+                f"The certificate is of version {self.classes} of the classes of commands, not of this one, "
+                f"{CLASSES_VERSION}: certify the scene again."
+            )
+
+    def require_valid(self, scene: Scene) -> None:
+        """ValueError where the certificate has lapsed: for another scene or version of the package."""
+        self.require_version()
+        if physics(scene) != physics(self.scene):
+            own = "the chapter's robot in the chapter's water" if self.scene.is_chapters else "another scene"
+            raise ValueError(
+                f"The certificate is of {own}, which differs in more than numerics and nodes per limb: certify this "
+                "one with python -m seastar_gym.certify."
+            )
+
+    def of(self, scene: Scene) -> Setting | None:
+        """The setting of a scene, None where it was not measured."""
+        require_kind("scene", scene, Scene, "a Scene")
+        numerics = replace(scene.numerics, max_iterations=Numerics.max_iterations)  # no error depends on the limit
+        wanted = scene.robot.discretisation, scene.robot.nodes_per_limb, numerics
+        known = next((each for each in self.settings if each.resolution == wanted), None)
+        return known if known is not None and self.at(known) == replace(scene, numerics=numerics) else None
+
+    def at(self, setting: Setting) -> Scene:
+        """The scene at a setting."""
+        return at(self.scene, setting.resolution)
+
+    def repeated(self, classes: tuple[str, ...]) -> tuple[str, ...]:
+        """Those of some classes whose commands are repeated."""
+        return tuple(name for name in classes if name.startswith(REPEATED))
+
+    def for_error(
+        self, error: float, classes: tuple[str, ...] | None = None, robot: Seastar | None = None
+    ) -> Scene:
+        """The scene at the fastest setting whose error is at most `error`; ValueError for none, and if it has lapsed.
+
+        Settings that gather energy over long swims are left out.
+
+        error: Of the hub's path, as a fraction of its length. classes: Classes of commands, `promised` if None.
+        robot: Robot that is to be the certificate's, and to keep the resolution that it names. None chooses it.
+        """
+        self.require_version()
+        require_error(error)
+        require_kind("robot", robot, Seastar | None, "a Seastar or None")
+        asked = self.promised if classes is None else classes
+        require_texts("classes", asked)
+        if unknown := sorted(set(asked) - set(self.settings[0].errors)):
+            known = ", ".join(self.settings[0].errors)
+            raise ValueError(f"Classes of commands are {known}, not {', '.join(map(str, unknown))}.")
+        enduring = [each for each in self._of_resolution(robot) if each.endures]
+        if not enduring:
+            raise ValueError("Every measured setting of this scene gathers energy over long swims.")
+        for setting in sorted(enduring, key=lambda each: -each.speed):
+            if setting.error(asked) <= error:
+                return self.at(setting)
+        best = min(enduring, key=lambda each: each.error(asked))
+        raise ValueError(
+            f"No measured setting keeps the path error below {100 * error:g} %: the best, {best}, keeps "
+            f"{100 * best.error(asked):g} %."
+        )
+
+    def _of_resolution(self, robot: Seastar | None) -> tuple[Setting, ...]:
+        """Settings with the resolution that a robot names; ValueError for another robot, and if there are none."""
+        if robot is None:
+            return self.settings
+        self.require_valid(replace(self.scene, robot=robot))
+        discretisation, nodes = robot.named_resolution
+        alike = [each for each in self.settings if discretisation in (None, each.discretisation)]
+        found = tuple(each for each in alike if nodes in (None, each.nodes_per_limb))
+        if not found or robot.hub_hinge != "opening":
+            measured = ", ".join(str(n) for n in sorted({each.nodes_per_limb for each in alike}))
+            raise ValueError(
+                f"Errors were measured with {measured or 'no'} nodes per limb for "
+                f'discretisation={shown(robot.discretisation)} and hub_hinge="opening", not with {shown(nodes)}.'
+            )
+        return found
+
+    def save(self, file: Path | str) -> None:
+        """Write the certificate as JSON, all at once."""
+        data = {
+            "format": FORMAT, **{name: getattr(self, name) for name in self.__dataclass_fields__},
+            "scene": self.scene.to_dict(), "settings": [_as_data(each) for each in self.settings],
+        }  # fmt: skip
+        signed = {"digest": _digest(data), **data}
+        write_atomically(file, (json.dumps(signed, indent=1) + "\n").encode())
+
+    @classmethod
+    def load(cls, file: Path | str) -> "Certificate":
+        """Read a certificate. ValueError for a file that is none, and for one that was changed since it was written."""
+        try:
+            text = Path(file).read_text(encoding="utf-8")
+        except (OSError, ValueError) as unread:
+            raise ValueError(f"A certificate cannot be read from {shown(str(file))}.") from unread
+        try:
+            return cls(**_read(json.loads(text)))
+        except RecursionError as deep:
+            raise ValueError(f"{file} is no certificate: it is nested too deeply.") from deep
+        except (AttributeError, KeyError, TypeError, ValueError) as damaged:
+            raise ValueError(f"{file} is no certificate: {str(damaged).rstrip('.')}.") from damaged
+
+
+def as_certificate(certificate: Certificate | str | PathLike[str]) -> Certificate:
+    """Certificate of an object or a file; ValueError for anything else."""
+    if isinstance(certificate, str | PathLike):
+        return Certificate.load(Path(certificate))
+    if not isinstance(certificate, Certificate):
+        raise ValueError(f"certificate must be a Certificate or a file of one, not {shown(certificate)}.")
+    return certificate
+
+
+def _read(data: dict[str, Any]) -> dict[str, Any]:
+    """Arguments of a certificate from its file's content. ValueError where that was changed."""
+    if data.get("format") != FORMAT:
+        raise ValueError(f"its form is {shown(data.get('format'))}, not {FORMAT}: certify the scene again")
+    if data.pop("digest") != _digest(data):
+        raise ValueError("its content was changed since it was measured, as its digest tells: certify the scene again")
+    del data["format"]
+    found: dict[str, Any] = {"scene": Scene.from_dict(data.pop("scene"))}
+    found |= {name: tuple(data.pop(name)) for name in ("promised", "actions")}
+    return {**found, "settings": tuple(Setting(**each) for each in data.pop("settings")), **data}
+
+
+def _as_data(setting: Setting) -> dict[str, Any]:
+    """A setting as plain data, without what was not measured."""
+    return {name: value for name, value in asdict(setting).items() if is_measured(value)}
+
+
+def _digest(data: dict[str, Any]) -> str:
+    """Digest of the content of a file, whatever the order of its entries."""
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()

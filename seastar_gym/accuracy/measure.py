@@ -1,0 +1,263 @@
+"""Errors of space and time of any scene.
+
+Sequences of all classes of commands (commands.py) are swum with every resolution and numerics of SETTINGS, with the
+same nodes and very short steps, and with many nodes and very short steps: the last stand for the continuum. The error
+of space is that of few nodes with short steps against many nodes; that of time is that of a setting against short steps
+with the same nodes; both are largest distances of the hub at ends of strokes, as fractions of the length of the hub's
+path through the water. The sum of the two bounds the whole error, also where they cancel. Long swims tell which
+settings gather energy (endurance.py).
+"""
+
+import os
+import platform
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.accuracy.certificate import CLASSES_VERSION, MOST_SAMPLES, Certificate
+from seastar_gym.accuracy.commands import ACTIONS, CLASSES, PROMISED, STROKES, draw_classes
+from seastar_gym.accuracy.endurance import energy_growth
+from seastar_gym.accuracy.setting import Setting, at, physics
+from seastar_gym.accuracy.water import carried, velocity, with_the_water
+from seastar_gym.scene import Numerics, Scene
+from seastar_gym.scene.checks import require_count, require_seed, shown
+from seastar_gym.scene.numerics import Resolution
+from seastar_gym.scene.robot import Discretisation
+from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simulator import Simulator
+from seastar_gym.version import __version__
+
+Floats = NDArray[np.float64]
+Progress = Callable[[float], None]
+"""Called with the share of the work that is done, from 0 to 1."""
+
+NODES = (7, 10, 13, 19)
+MANY_NODES = 37
+"""Nodes per limb of settings, and of the swims that stand for the continuum."""
+NUMERICS = (
+    Numerics("sdirk2", 20e-3, 1e-6),
+    Numerics("implicit-midpoint", 5e-3, 1e-6),
+    Numerics("implicit-midpoint", 2e-3, 1e-7),
+    Numerics("implicit-midpoint", 1e-3, 1e-7),
+)
+SHORT = Numerics("implicit-midpoint", 0.25e-3, 1e-9)
+"""Numerics that stand for infinitely short steps."""
+SAMPLES = 60
+"""Sequences per class: with the confidence 95 %, at most 5 % of all sequences of a class exceed the largest error."""
+GROUP = 32
+"""Robots that are swum together."""
+SHARE_OF_SWIMS = 0.8
+"""Part of the work that swims of sequences are, about; the rest are long swims and speeds."""
+SHORTEST_PATH = 1e-3
+"""Errors of paths that are shorter than this many limb lengths are fractions of that. It is for robots that stay where
+they are. A floor within what robots swim would make other errors of all: ten strokes of the chapter's robot are 0.05 to
+0.7 limb lengths long, and the largest error of a class is found on a path of an ordinary length."""
+
+
+class Swims(NamedTuple):
+    """Swims of some robots from rest in the water, at the ends of strokes or decisions; arrays over these and robots.
+
+    hub: Positions of hubs [m], shape (strokes, n, 2); NaN once the solver failed.
+    heading: What robots were turned by [rad].
+    error_estimate [m], newton_iterations, steps, rejections, halvings: See `StrokeReport`.
+    """
+
+    hub: Floats
+    heading: Floats
+    error_estimate: Floats
+    newton_iterations: Floats
+    steps: Floats
+    rejections: Floats
+    halvings: Floats
+
+
+class Errors(NamedTuple):
+    """Errors of swims against others of the same commands, shape (n,) each; inf where the solver failed.
+
+    path, end: Largest and last distance of the hub from the other path, as fractions of a path's length.
+    heading: Largest difference of the heading [rad].
+    """
+
+    path: Floats
+    end: Floats
+    heading: Floats
+
+
+class Measured(NamedTuple):
+    """Swims of some resolutions, and their errors of space and of time, in this order.
+
+    limit: Swims that stand for the continuum.
+    """
+
+    limit: Swims
+    swims: list[Swims]
+    space: list[Errors]
+    time: list[Errors]
+
+
+def certify(scene: Scene, samples: int = SAMPLES, seed: int = 0, progress: Progress | None = None) -> Certificate:
+    """Measure errors and speeds of a scene's settings: some minutes on two cores.
+
+    scene: Any scene for one robot. Its nodes per limb, discretisation and numerics do not matter.
+    samples: Sequences per class of commands. seed: Seed of the sequences. progress: Called as the work goes on.
+    """
+    if not isinstance(scene, Scene):
+        raise ValueError(f"certify needs a Scene, not {shown(scene)}.")
+    if scene.n_robots is not None:
+        raise ValueError("A scene with numbers of each robot has no one certificate: certify scene.of_robot(0), say.")
+    if scene.held_nodes or scene.loads:
+        raise ValueError("Held and loaded nodes belong to one mesh, so a scene with some cannot be certified.")
+    if float(np.max(scene.actuator.peak_angle)) == 0.0 or (scene.limb_strengths and not any(scene.limb_strengths)):
+        raise ValueError("Nothing moves this robot: its peak angle, or the strength of all limbs, is zero.")
+    require_count("samples", samples, 2, MOST_SAMPLES)
+    require_seed(seed)
+    commands = draw_classes(samples, scene.robot.n_limbs, seed)
+    settings = [Resolution("continuum", nodes, numerics) for nodes in NODES for numerics in NUMERICS]
+    report = (lambda share: None) if progress is None else progress
+    limit = Resolution("continuum", MANY_NODES, SHORT)
+    swum = measure(
+        scene, settings, limit, lambda *_: SHORT, commands, lambda share: report(SHARE_OF_SWIMS * share)
+    )
+    of_limit = swum.space[-1].path / 3.0  # of second order in the edges, which are half as long as those of most nodes
+    found = []
+    for k, (each, space, in_time) in enumerate(zip(settings, swum.space, swum.time, strict=True), start=1):
+        _, nodes, numerics = each
+        of_space = space.path + of_limit
+        found.append(
+            Setting(
+                nodes, numerics.scheme, numerics.step, numerics.newton_tolerance,
+                errors=by_class(of_space + in_time.path, samples),
+                typical=by_class(of_space + in_time.path, samples, np.median),
+                space_error=_promised(of_space, samples),
+                time_error=_promised(in_time.path, samples),
+                speed=_rounded(speed(at(scene, each), commands)),
+                energy_growth=_rounded(energy_growth(at(scene, each))),
+            )
+        )  # fmt: skip
+        report(SHARE_OF_SWIMS + (1.0 - SHARE_OF_SWIMS) * k / len(settings))
+    return Certificate(
+        physics(scene), tuple(found), PROMISED, ACTIONS, samples, limit_error=_promised(of_limit, samples),
+        classes=CLASSES_VERSION, version=__version__, machine=machine(),
+    )  # fmt: skip
+
+
+def measure(
+    scene: Scene,
+    resolutions: Sequence[Resolution],
+    limit: Resolution,
+    short: Callable[[Discretisation, int], Numerics],
+    commands: Floats,
+    progress: Progress | None = None,
+    period: float | None = None,
+    shortest: float = SHORTEST_PATH,
+) -> Measured:
+    """Errors of a scene at some resolutions, of space and of time, sequence by sequence.
+
+    limit: What stands for the continuum. short: Numerics that stand for infinitely short steps with a discretisation
+    and nodes per limb. commands: Shape (strokes, n, n_limbs). period: Time between decisions [s]; errors are then of
+    whole seconds. None means strokes. shortest: Of a path whose errors are fractions of its length [limb lengths].
+    """
+    meshes = [each[:2] for each in resolutions]
+    fine = [Resolution(*mesh, short(*mesh)) for mesh in dict.fromkeys(meshes)]
+    exact, *swum = swim_all([at(scene, each) for each in (limit, *fine, *resolutions)], commands, progress, period)
+    lengths = path_lengths(scene, exact.hub, shortest)
+    converged = {each[:2]: found for each, found in zip(fine, swum, strict=False)}
+    space = {mesh: errors(found, exact, lengths) for mesh, found in converged.items()}
+    swims = swum[len(fine) :]
+    time = [errors(each, converged[mesh], lengths) for each, mesh in zip(swims, meshes, strict=True)]
+    return Measured(exact, swims, [space[mesh] for mesh in meshes], time)
+
+
+def errors(swum: Swims, exact: Swims, lengths: Floats) -> Errors:
+    """Errors of swims against others. lengths: Of paths [m], shape (n,), of which errors are fractions.
+
+    With the same lengths for space and time, no swim errs by more than the sum of the two.
+    """
+    distance = np.linalg.norm(swum.hub - exact.hub, axis=-1)
+    turn = np.abs(np.angle(np.exp(1j * (swum.heading - exact.heading)))).max(axis=0)
+    failed = np.isnan(distance).any(axis=0)
+    found = distance.max(axis=0) / lengths, distance[-1] / lengths, turn
+    return Errors(*(np.where(failed, np.inf, each) for each in found))
+
+
+def machine() -> str:
+    """Machine that speeds are measured on: cores, architecture, lanes and Python."""
+    return f"{os.cpu_count()} cores, {platform.machine()}, {N_LANES} lanes, Python {platform.python_version()}"
+
+
+def swim(scene: Scene, commands: Floats, period: float | None = None, error_bars: bool = False) -> Swims:
+    """Swims by commands, shape (n_strokes, n, n_limbs), or by decisions every so many seconds."""
+    simulator, rows = with_the_water(scene, commands.shape[1], threads=1, error_bars=error_bars), []
+    for each in commands:
+        report = simulator.stroke(each) if period is None else simulator.advance(period, each)
+        hub = np.where((report.status > 0)[:, None], np.nan, simulator.hub_position())
+        counts = (getattr(report, name) for name in Swims._fields[2:])
+        rows.append(Swims(hub, simulator.heading(), *counts))
+    return Swims(*map(np.array, zip(*rows, strict=True)))
+
+
+def swim_all(
+    scenes: Sequence[Scene], commands: Floats, progress: Progress | None = None, period: float | None = None
+) -> list[Swims]:
+    """Swims of all sequences with every scene, on all processors, the dearest first.
+
+    period: Time between decisions [s]; swims are then told at whole seconds. None means strokes.
+    """
+    every = 1 if period is None else round(1.0 / period)
+    groups = [commands[:, k : k + GROUP] for k in range(0, commands.shape[1], GROUP)]
+    jobs = [(scene, group) for scene in scenes for group in groups]
+    cost = [scene.robot.nodes_per_limb * group[0].size / scene.numerics.step for scene, group in jobs]
+    velocity(scenes[0], np.zeros(2))  # not first in a thread
+    order, done = sorted(range(len(jobs)), key=lambda k: -cost[k]), 0.0
+    found: dict[int, Swims] = {}
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for k, swum in zip(order, pool.map(lambda k: swim(*jobs[k], period), order), strict=True):
+            found[k] = Swims(*(each[every - 1 :: every] for each in swum))
+            done += cost[k]
+            if progress is not None:
+                progress(done / sum(cost))
+    parts = [[found[k + each] for each in range(len(groups))] for k in range(0, len(jobs), len(groups))]
+    return [Swims(*(np.concatenate(each, axis=1) for each in zip(*some, strict=True))) for some in parts]
+
+
+def path_lengths(scene: Scene, hub: Floats, shortest: float = SHORTEST_PATH) -> Floats:
+    """Lengths of paths through a scene's water from the origin [m], shape (n,), at least `shortest` [limb lengths].
+
+    hub: At the ends of strokes [m], shape (strokes, n, 2). How far the water carries it is no way swum.
+    """
+    steps = np.diff(hub, axis=0, prepend=0.0) - carried(scene, hub)
+    return np.fmax(np.linalg.norm(steps, axis=-1).sum(axis=0), shortest * float(np.max(scene.robot.limb_length)))
+
+
+def by_class(errors: Floats, samples: int, of: Callable[..., Floats] = np.max) -> dict[str, float]:
+    """Largest error of every class, or another number `of` its errors, rounded upwards to two digits."""
+    found = of(errors.reshape(len(CLASSES), samples), axis=1)
+    return {name: _rounded(float(error)) for name, error in zip(CLASSES, found, strict=True)}
+
+
+def speed(scene: Scene, commands: Floats, strokes: int = 3) -> float:
+    """Simulated time over processor time of a batch on one core, the best of some strokes."""
+    simulator, best = Simulator(scene, min(64, commands.shape[1]), threads=1), np.inf
+    for k in range(strokes):
+        begin = time.thread_time()
+        simulator.stroke(commands[k % STROKES, : simulator.n_robots])
+        best = min(best, time.thread_time() - begin)
+    return float(scene.actuator.period * simulator.n_robots / best)
+
+
+def _promised(errors: Floats, samples: int) -> float:
+    """Largest error of all promised classes, rounded upwards."""
+    found = by_class(errors, samples)
+    return max(found[name] for name in PROMISED)
+
+
+def _rounded(number: float, digits: int = 2) -> float:
+    """Rounded upwards, so that a promise is not less than what was measured."""
+    if not np.isfinite(number) or number <= 0.0:
+        return number
+    unit = 10.0 ** (np.floor(np.log10(number)) - digits + 1)
+    return float(f"{np.ceil(number / unit - 1e-9) * unit:.{digits}g}")

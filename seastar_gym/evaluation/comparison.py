@@ -1,0 +1,119 @@
+"""Comparison of agents on a path: a table, also as CSV, a picture of the traces, a video of each, and a report."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from seastar_gym.controllers.contract import Policy, actions_of
+from seastar_gym.controllers.learned import LearnedPolicy
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.task import make_scene
+from seastar_gym.evaluation.films import film
+from seastar_gym.evaluation.pictures import FPS, FRAMES_PER_STROKE, draw_traces
+from seastar_gym.evaluation.playback import Playback, RecordingEnv
+from seastar_gym.evaluation.results import as_text, results, write_csv
+from seastar_gym.evaluation.swim import TIME_LIMIT, Swim, decisions_in, swim
+from seastar_gym.extras import require_extra
+from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import shown
+
+if TYPE_CHECKING:
+    from seastar_gym.evaluation.report.page import Remarks
+
+
+def evaluate(
+    agents: Mapping[str, Policy],
+    path: Any = "pentagon",
+    *,
+    seed: int | None = 0,
+    reset_options: dict[str, Any] | None = None,
+    max_strokes: int | None = None,
+    waypoint_radius: float = 0.01,
+    scene: Scene | None = None,
+    decision_period: float | None = None,
+    out: Path | str | None = None,
+    video: bool = True,
+    report: Remarks | None = None,
+    say: Callable[[str], None] = print,
+    **environment: Any,
+) -> list[Swim]:
+    """Let every agent swim the path and print the table; returns the swims in the order of the agents.
+
+    agents: Policies by name, see `Policy`.
+    path: Name of a path, or waypoints [m], shape (n, 2).
+    seed, reset_options: Seed and options of every agent's `reset`.
+    max_strokes: Time limit [decisions]; by default that of 400 s. waypoint_radius: Radius of the waypoints [m].
+    scene: Robot, actuators, fluid and numerics; by default the chapter's robot in water.
+    decision_period: Time between decisions [s]. None means a stroke.
+    out: Folder for evaluation.csv, traces.png and, with `video`, an MP4 of every agent; nothing is written if None.
+    report: Remarks for report.html, a page with the results and playbacks of the swims; it is not written if None.
+    say: Function that prints a text.
+    environment: Further arguments of `SeastarSwimEnv`, such as fidelity and random_heading.
+    """
+    if not agents:
+        raise ValueError("There is nothing to evaluate: name at least one agent.")
+    max_strokes = decisions_in(TIME_LIMIT, decision_period) if max_strokes is None else max_strokes
+    if max_strokes < 1:
+        raise ValueError(f"max_strokes must be at least 1, not {shown(max_strokes)}.")
+    folder = None if out is None else Path(out)
+    videos = {} if folder is None or not video else _video_files(agents, folder)
+    if folder is not None:
+        require_extra("Pictures", "studies", "matplotlib")
+        folder.mkdir(parents=True, exist_ok=True)
+    environment |= {
+        "path": path, "waypoint_radius": waypoint_radius, "scene": scene, "decision_period": decision_period
+    }  # fmt: skip
+    episode = {"seed": seed, "reset_options": reset_options, "max_strokes": max_strokes}
+    swims, playbacks = list[Swim](), list[Playback]()
+    for name, policy in agents.items():
+        swum, playback = _swim_once(name, policy, environment, episode, videos.get(name), report is not None)
+        swims.append(swum)
+        playbacks += [] if playback is None else [playback]
+    say(as_text(swims))
+    swum_in = scene or make_scene(None, None, decision_period)
+    for done, policy in zip(swims, agents.values(), strict=True):
+        differences = policy.differences(swum_in) if isinstance(policy, LearnedPolicy) else None
+        for remark in filter(None, (done.solver_message, differences)):
+            say(f"{done.agent}: {remark}")
+    if folder is not None:
+        write_csv(results(swims), folder / "evaluation.csv")
+        draw_traces(swims, waypoint_radius, folder / "traces.png")
+        files = ["evaluation.csv", "traces.png", *(file.name for file in videos.values())]
+        if report is not None:
+            from seastar_gym.evaluation.report.page import write_report
+
+            write_report(folder / "report.html", path, swims, playbacks, waypoint_radius, report)
+            files.append("report.html")
+        say(f"Written to {folder}: {', '.join(files)}")
+    return swims
+
+
+def _swim_once(
+    name: str, policy: Policy, environment: dict[str, Any], episode: dict[str, Any], video: Path | None, record: bool
+) -> tuple[Swim, Playback | None]:
+    """Swim of an agent, filmed if there is a file for the video, and its playback if `record` asks for one."""
+    scene = make_scene(environment["scene"], None, environment["decision_period"])
+    environment = {"actions": actions_of(policy, scene.robot.n_limbs), **environment}
+    if video is None and not record:
+        return swim(name, policy, SeastarSwimEnv(**environment), **episode), None
+    env = RecordingEnv(film=video is not None, frames_per_stroke=FRAMES_PER_STROKE, **environment)
+    with film(video, FPS) if video is not None else nullcontext(lambda picture: None) as add:
+
+        def watch(env: SeastarSwimEnv) -> None:
+            for picture in env.render() or ():
+                add(picture)
+
+        swum = swim(name, policy, env, **episode, watch=watch)
+    env.close()
+    return swum, env.playback(name)
+
+
+def _video_files(agents: Mapping[str, Policy], folder: Path) -> dict[str, Path]:
+    files = {name: folder / (re.sub(r"[^\w.,+-]+", "_", name) + ".mp4") for name in agents}
+    if len(set(files.values())) < len(files):
+        raise ValueError("The names of two agents make the same file name: give them names that differ in more.")
+    return files

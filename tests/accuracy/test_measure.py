@@ -1,0 +1,119 @@
+"""The measurer of errors: commands, swims, errors of space and of time, and speeds."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires
+from seastar_gym.accuracy import commands, measure
+from seastar_gym.accuracy.setting import at, resolved
+from seastar_gym.scene.numerics import Resolution
+
+SCENE = Scene(Seastar(limb_length=0.08))
+
+
+@pytest.mark.parametrize("n_limbs", [1, 2, 3, 5, 12])
+def test_classes_are_drawn_for_any_number_of_limbs(n_limbs):
+    drawn = commands.draw_classes(4, n_limbs, 0)
+    assert drawn.shape == (commands.STROKES, 4 * len(commands.CLASSES), n_limbs)
+    assert np.abs(drawn).max() <= 1.0
+    np.testing.assert_array_equal(drawn, commands.draw_classes(4, n_limbs, 0))
+    classes = dict(zip(commands.CLASSES, np.split(drawn, len(commands.CLASSES), axis=1), strict=True))
+    assert np.isin(classes["random ternary"], (-1, 0, 1)).all()
+    assert classes["random ternary"].any(axis=-1).all()
+    assert (classes["repeated continuous"] == classes["repeated continuous"][0]).all()
+    assert (classes["alternating ternary"] == classes["alternating ternary"][[0, 1] * 5]).all()
+    assert (np.count_nonzero(classes["opposed neighbours"], axis=-1) == min(2, n_limbs)).all()
+    assert np.abs(classes["small"]).max() <= 0.1
+
+
+def test_failed_robots_have_no_bound():
+    assert measure._rounded(np.inf) == np.inf
+    assert measure._rounded(0.0123) == 0.013
+    assert measure._rounded(0.012) == 0.012
+
+
+def test_a_speed_is_the_simulated_time_of_all_robots_over_processor_time_the_best_of_three_strokes(monkeypatch):
+    times = iter([0.0, 3.0, 3.0, 5.0, 5.0, 9.0])
+    monkeypatch.setattr(measure.time, "thread_time", lambda: next(times))
+    scene = resolved(replace(SCENE, actuator=SmaPulse(0.3, 0.1, 0.4)), 5, Numerics("sdirk2", 2e-2, 1e-6))
+    assert measure.speed(scene, np.zeros((commands.STROKES, 6, scene.robot.n_limbs))) == 6 * 0.5 / 2.0
+
+
+def test_swims_of_many_groups_are_those_of_one_batch(monkeypatch):
+    monkeypatch.setattr(measure, "GROUP", 5)
+    drawn, scene = commands.draw_classes(2, 5, 1), resolved(SCENE, 5, Numerics("sdirk2", 2e-2, 1e-6))
+    shares = []
+    (swum,) = measure.swim_all([scene], drawn, shares.append)
+    alone = measure.swim(scene, drawn)
+    np.testing.assert_array_equal(swum.hub, alone.hub)
+    for each, other in zip(swum, alone, strict=True):
+        np.testing.assert_allclose(each, other, rtol=1e-9, atol=1e-12)
+    assert shares[-1] == pytest.approx(1.0)
+    simulator = Simulator(scene, drawn.shape[1])
+    simulator.stroke(drawn[0])
+    np.testing.assert_array_equal(swum.hub[0], simulator.hub_position())
+
+
+def swims(hub, heading=None):
+    """Swims with these hubs [m], shape (strokes, n, 2), and headings [rad]."""
+    hub = np.asarray(hub, float)
+    zeros = np.zeros(hub.shape[:2])
+    return measure.Swims(hub, zeros if heading is None else np.asarray(heading, float), *[zeros] * 5)
+
+
+def test_path_error_is_the_largest_distance_over_the_length_of_the_converged_path():
+    exact = swims([[[3.0, 4.0]], [[3.0, 9.0]]])
+    lengths = measure.path_lengths(SCENE, exact.hub)
+    assert lengths == pytest.approx([10.0])
+    off = measure.errors(swims([[[3.0, 4.5]], [[3.0, 9.1]]]), exact, lengths)
+    assert off.path == pytest.approx([0.05]) and off.end == pytest.approx([0.01])
+
+
+def test_space_and_time_of_the_same_length_bound_the_whole_error():
+    """Of a path of its own, the error of time of a robot that swims too far would be too small."""
+    limit, fine, coarse = (swims([[[length, 0.0]]]) for length in (1.0, 2.0, 2.5))
+    lengths = measure.path_lengths(SCENE, limit.hub)
+    parts = measure.errors(fine, limit, lengths).path + measure.errors(coarse, fine, lengths).path
+    assert measure.errors(coarse, limit, lengths).path == pytest.approx(parts.tolist())
+    assert parts == pytest.approx([1.5])
+
+
+def test_heading_error_knows_that_a_turn_is_a_turn():
+    hub = [[[1.0, 0.0]]]
+    off = measure.errors(swims(hub, [[3.1]]), swims(hub, [[-3.1]]), np.ones(1))
+    assert off.heading == pytest.approx([2.0 * np.pi - 6.2])
+
+
+def test_errors_are_infinite_of_the_robots_whose_solver_failed():
+    limit = np.cumsum(np.full((10, 2, 2), [0.003, 0.004]), axis=0)
+    hub = limit + [0.0, 0.001]
+    hub[3, 1] = np.nan
+    found = measure.errors(swims(hub), swims(limit), measure.path_lengths(SCENE, limit))
+    np.testing.assert_allclose(found.path, [0.02, np.inf])
+    assert np.isinf([found.end[1], found.heading[1]]).all()
+
+
+def test_space_and_time_are_errors_against_many_nodes_and_short_steps():
+    """Settings with one mesh have one error of space; the limit has none, nor has a setting of short steps in time."""
+    short, coarse = Numerics("implicit-midpoint", 5e-3, 1e-8), Numerics("sdirk2", 2e-2, 1e-6)
+    some = [Resolution("continuum", n, each) for n, each in ((5, coarse), (9, coarse), (5, short))]
+    drawn = commands.draw_classes(1, 5, 3)
+    found = measure.measure(SCENE, some, Resolution("continuum", 9, short), lambda *_: short, drawn)
+    np.testing.assert_array_equal(found.space[0].path, found.space[2].path)
+    assert not found.space[1].path.any() and not found.time[2].path.any()
+    lengths = measure.path_lengths(SCENE, found.limit.hub)
+    whole = measure.errors(found.swims[0], found.limit, lengths).path
+    assert (whole <= found.space[0].path + found.time[0].path + 1e-12).all() and whole.max() > 1e-3
+
+
+def test_decisions_are_told_at_whole_seconds(monkeypatch):
+    scene = at(replace(SCENE, actuator=SmaWires()), Resolution("continuum", 5, Numerics("sdirk2", 2e-2, 1e-6)))
+    drawn = np.random.default_rng(0).uniform(-1.0, 1.0, (4, 2, 5))
+    (swum,) = measure.swim_all([scene], drawn, period=0.5)
+    np.testing.assert_array_equal(swum.hub, measure.swim(scene, drawn, 0.5).hub[[1, 3]])
+    simulator = Simulator(scene, 2)
+    simulator.advance(0.5, drawn[0])
+    simulator.advance(0.5, drawn[1])
+    np.testing.assert_array_equal(swum.hub[0], simulator.hub_position())
