@@ -1,4 +1,4 @@
-"""Tables of docs/environments.md: ids from Gymnasium's registry, contracts from docstrings."""
+"""Tables of docs/environments.md: ids from Gymnasium's registry, contracts from docstrings; and the leaderboard's."""
 
 import importlib
 import inspect
@@ -10,7 +10,9 @@ from gymnasium import spaces
 from gymnasium.envs.registration import EnvSpec
 
 import seastar_gym
+from seastar_gym.benchmark import page, results
 from seastar_gym.envs.tasks.envs import CHALLENGES
+from studies.frame import DOCS, Study
 
 DEEPER = re.compile(r"^#", re.MULTILINE)
 
@@ -70,3 +72,13 @@ def contract(documented: type[Any]) -> str:
     head, title, arguments = (inspect.getdoc(documented) or "").partition("## Arguments\n")
     text = head + title + re.sub(r"^(\w+): ", r"- **\1**: ", arguments, flags=re.MULTILINE)
     return DEEPER.sub("##", text)
+
+
+STUDY = Study(
+    "contracts",
+    tables={
+        "contracts": lambda _: contracts(),
+        "environments": lambda _: registered(),
+        "leaderboard": lambda _: page.table(results.read(DOCS / "leaderboard" / "results.json")),
+    },
+)

@@ -21,11 +21,11 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from seastar_gym.command import run_command
-from studies.parser import study_parser
+from studies.frame import Results, Study, require_known
 
 ROOMS = {
     "seastar_gym/envs": "tests/envs", "seastar_gym/controllers": "tests/controllers",
@@ -309,20 +309,30 @@ def study(checkout: Path, rooms: dict[str, str], count: int, seed: int, seconds:
     return {"seed": seed, "count": count, **counts, "share_killed": round(share, 4), "mutants": found}
 
 
-def main() -> None:
-    """Command line: draw mutants and say which survive."""
-    parser = study_parser("studies.mutants", __doc__)
-    parser.add_argument("--count", type=int, default=100, help="number of mutants (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="which are drawn (default: %(default)s)")
-    parser.add_argument("--rooms", nargs="*", choices=ROOMS, default=list(ROOMS), help="rooms (default: all)")
-    parser.add_argument("--seconds", type=float, default=600.0, help="time limit of a mutant (default: %(default)s)")
-    parser.add_argument("--out", type=Path, default=Path("runs/mutants"), help="folder (default: %(default)s)")
-    options = parser.parse_args()
+@dataclass(frozen=True)
+class Options:
+    """Which mutants are drawn."""
+
+    count: int = 100
+    """Number of mutants."""
+    seed: int = 0
+    """Which are drawn."""
+    rooms: tuple[str, ...] = tuple(ROOMS)
+    """Rooms."""
+    seconds: float = 600.0
+    """Time limit of a mutant."""
+    out: Path = Path("runs/mutants")
+    """Folder of the files, or the file of the numbers."""
+
+    def __post_init__(self) -> None:
+        require_known("room", self.rooms, ROOMS)
+
+
+def run(options: Options, results: Results) -> None:
+    """Draw mutants and say which survive."""
     rooms = {room: ROOMS[room] for room in options.rooms}
-    found = study(Path.cwd(), rooms, options.count, options.seed, options.seconds, options.out)
-    (options.out / "mutants.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    print(json.dumps({name: value for name, value in found.items() if name != "mutants"}))
+    results.update(study(Path.cwd(), rooms, options.count, options.seed, options.seconds, options.out))
+    print(json.dumps({name: value for name, value in results.items() if name != "mutants"}))
 
 
-if __name__ == "__main__":
-    run_command(main)
+STUDY = Study("mutants", run, Options, "mutants.json")

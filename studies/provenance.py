@@ -51,12 +51,23 @@ COMMANDS = {
 """Commands of files that were written before studies recorded them."""
 
 
+FINAL = dict.fromkeys(
+    (
+        "damping.json", "damping.png", "fidelities.json", "fidelities.png", "gaits.json", "gaits_directions.png",
+        "gaits_front.png", "gaits_lag.png", "pentagon_from_rest.json", "pentagon_reheated.json",
+    ),
+    "0e818f3",
+)  # fmt: skip
+"""Files of docs/ that are final, and the last commit that has the code of their study."""
+
+
 def footer(results: Mapping[str, Any], file: str) -> str:
     """Line in Markdown that says how the results in a file were made, and what the run did not record.
 
     file: Name of the file beside the page.
     """
     said = f"*Numbers: [{file}]({file}), made by `{results.get('command', COMMANDS.get(file))}`"
+    said += f" at commit {FINAL[file]}" if file in FINAL else ""
     versions = results.get("versions", {})
     if versions:
         said += f", with {', '.join(f'{name} {version}' for name, version in versions.items())}"

@@ -58,7 +58,7 @@ def test_the_sources_keep_their_contracts(sources):
         ("seastar_gym/envs/reward.py", "seastar_gym.controllers.scripted"),
         ("seastar_gym/controllers/scripted.py", "seastar_gym.evaluation.swim"),
         ("seastar_gym/evaluation/swim.py", "agents.ppo"),
-        ("agents/ppo.py", "studies.parser"),
+        ("agents/ppo.py", "studies.frame"),
         ("seastar_gym/scene/checks.py", "seastar_gym.scene.limb"),
         ("seastar_gym/simulator/clock.py", "seastar_gym.simulator.simulator"),
         ("seastar_gym/der/terms/stretching.py", "seastar_gym.der.terms.damping"),

@@ -13,6 +13,7 @@ Writes the numbers as JSON, a page with the tables, and a picture.
 import math
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,14 +24,12 @@ from tqdm import tqdm
 from seastar_gym.accuracy.commands import CLASSES, draw_classes
 from seastar_gym.accuracy.measure import SHORT, swim
 from seastar_gym.accuracy.setting import at
-from seastar_gym.command import run_command
 from seastar_gym.scene import Numerics, Scene, Seastar, Water, relaxation_time
 from seastar_gym.scene.numerics import PRESETS, Resolution
 from seastar_gym.simulator import Simulator
 from seastar_gym.simulator.error_bars import factor
-from studies.kept import keep
-from studies.parser import study_parser
-from studies.provenance import footer, provenance
+from studies.frame import Results, Study
+from studies.provenance import footer
 from studies.style import FAINT, INK, PERCENT, subplots
 
 Floats = NDArray[np.float64]
@@ -240,27 +239,34 @@ def draw(rows: list[Row], path: Path) -> None:
     figure.savefig(path, dpi=130)
 
 
-def main() -> None:
-    """Command line: measure, write page and picture, print the tables."""
-    parser = study_parser("studies.accuracy.error_bars", __doc__)
-    default = "(default: %(default)s)"
-    parser.add_argument("--samples", type=int, default=SAMPLES, help=f"sequences per class {default}")
-    parser.add_argument("--seeds", type=int, nargs=2, default=(1000, 3000), help=f"calibration and test {default}")
-    parser.add_argument("--out", type=Path, default=Path("docs/error_bars.md"), help=f"page to write {default}")
-    options = parser.parse_args()
+@dataclass(frozen=True)
+class Options:
+    """Coverage and sharpness of error bars."""
+
+    samples: int = SAMPLES
+    """Sequences per class."""
+    seeds: tuple[int, int] = (1000, 3000)
+    """Of calibration and test."""
+    out: Path = Path("docs/error_bars.md")
+    """Folder of the files, or the page."""
+
+
+def run(options: Options, results: Results) -> str | None:
+    """Measure all robots."""
     with tqdm(total=len(ROBOTS), unit="robot") as bar:
-        rows = measure(tuple(ROBOTS), options.samples, tuple(options.seeds), bar)
+        rows = measure(tuple(ROBOTS), options.samples, options.seeds, bar)
     costs = {name: round(cost(setting), 3) for name, setting in SETTINGS.items()}
-    about = provenance("python -m studies.accuracy.error_bars")
-    results = {**about, "samples": options.samples, "costs": costs, "rows": [row._asdict() for row in rows]}
-    page = as_markdown(results)
-    keep(results, options.out.with_suffix(".json"))
-    options.out.write_text(page, encoding="utf-8")
-    draw(rows, options.out.with_suffix(".png"))
-    print(page)
-    if not all(math.isfinite(row.needed) for row in rows):
-        raise SystemExit("The solver failed on a robot, see the table.")
+    results.update(samples=options.samples, costs=costs, rows=[row._asdict() for row in rows])
+    failed = not all(math.isfinite(row.needed) for row in rows)
+    return "The solver failed on a robot, see the table." if failed else None
 
 
-if __name__ == "__main__":
-    run_command(main)
+STUDY = Study(
+    "accuracy.error_bars",
+    run,
+    Options,
+    "error_bars.json",
+    pictures={"error_bars.png": lambda results, file: draw(rows_of(results), file)},
+    pages={"error_bars.md": as_markdown},
+    drawn=("error_bars.png",),
+)

@@ -14,9 +14,10 @@ swum with the short steps. Results are written after every robot, and a robot wh
 again.
 """
 
-import json
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
@@ -28,13 +29,11 @@ from seastar_gym.accuracy import Certificate, chapters_certificate, measure
 from seastar_gym.accuracy.certificate import CLASSES_VERSION
 from seastar_gym.accuracy.commands import CLASSES, draw_classes
 from seastar_gym.accuracy.setting import resolved
-from seastar_gym.command import run_command
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__
 from studies.accuracy.error_bars import ROBOTS
-from studies.parser import study_parser
-from studies.provenance import provenance
+from studies.frame import Results, Study, require_known
 
 Floats = NDArray[np.float64]
 
@@ -172,42 +171,33 @@ def _cells(found: dict[str, Any]) -> list[tuple[str, dict[tuple[str, str], int]]
     return [(kind, some) for kind, some in kinds if some]
 
 
-def read_results(file: Path, samples: int) -> dict[str, Any]:
-    """Results in the file, or empty ones; ValueError if it has those of other sequences or another version."""
-    wanted = {"samples": samples, "seed": SEED, "classes": CLASSES_VERSION, "version": __version__}
-    if not file.is_file():
-        about = "Written by python -m studies.accuracy.promises; exceedances are numbers of sequences."
-        command = f"python -m studies.accuracy.promises --samples {samples}"
-        return {"about": about, **provenance(command), **wanted, "robots": {}}
-    results: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-    if {key: results.get(key) for key in wanted} != wanted:
-        raise ValueError(f"{file} has results of other sequences or another version: give another --out.")
-    return results
+@dataclass(frozen=True)
+class Options:
+    """Exceedances of certified errors."""
+
+    samples: int = SAMPLES
+    """Fresh sequences per class."""
+    robots: tuple[str, ...] = tuple(ROBOTS)
+    """Robots."""
+    certificates: Path = Path("runs/certificates")
+    """Folder of certificates."""
+    out: Path = Path("docs")
+    """Folder of the files, or the file of the numbers."""
+
+    def __post_init__(self) -> None:
+        require_known("robot", self.robots, ROBOTS)
 
 
-def main() -> None:
-    """Command line: examine the robots that are missing in the results, and print the table."""
-    parser = study_parser("studies.accuracy.promises", __doc__)
-    default = "(default: %(default)s)"
-    parser.add_argument("--samples", type=int, default=SAMPLES, help=f"fresh sequences per class {default}")
-    parser.add_argument("--robots", nargs="*", default=list(ROBOTS), choices=list(ROBOTS), metavar="ROBOT",
-                        help=f"robots: {', '.join(ROBOTS)} (default: all)")  # fmt: skip
-    parser.add_argument("--certificates", type=Path, default=Path("runs/certificates"),
-                        help=f"folder of certificates {default}")  # fmt: skip
-    parser.add_argument("--out", type=Path, default=Path("docs/promises.json"), help=f"file of the results {default}")
-    options = parser.parse_args()
-    try:
-        results = read_results(options.out, options.samples)
-    except ValueError as wrong:
-        raise SystemExit(str(wrong)) from wrong
-    for name in options.robots:
-        if name not in results["robots"]:
-            results["robots"][name] = examine(name, options.certificates, options.samples)
-            options.out.parent.mkdir(parents=True, exist_ok=True)
-            options.out.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
-            print(f"{name}: {results['robots'][name]['seconds']} s", flush=True)
+def run(options: Options, results: Results) -> None:
+    """Examine the robots that are missing. ValueError where the file is of other sequences or another version."""
+    wanted = {"samples": options.samples, "seed": SEED, "classes": CLASSES_VERSION, "version": __version__}
+    results.read()
+    if results and {key: results.get(key) for key in wanted} != wanted:
+        raise ValueError(f"{results.file} has results of other sequences or another version: give another --out.")
+    results.update(wanted)
+    cells = {("robots", name): partial(examine, name, options.certificates, options.samples) for name in options.robots}
+    results.fill(cells, lambda found: f"{found['seconds']} s")
     print(summary(results))
 
 
-if __name__ == "__main__":
-    run_command(main)
+STUDY = Study("accuracy.promises", run, Options, "promises.json", tables={"promises": table})

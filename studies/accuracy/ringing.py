@@ -13,16 +13,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.command import run_command
 from seastar_gym.gaits import PAIRS
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene import Numerics, Scene, Seastar
 from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simulator import Simulator
 from studies.accuracy.cases import STROKES
-from studies.kept import keep, rounded
-from studies.parser import study_parser
-from studies.provenance import provenance
+from studies.frame import Study
+from studies.kept import rounded
 from studies.style import COLOURS, DPI, INK, MM, MS, PERCENT, as_percent, subplots
 
 if TYPE_CHECKING:
@@ -216,16 +214,10 @@ def smoothed(values: Floats, time: Floats, window: float = 0.03) -> Floats:
     return np.sqrt(np.convolve(values**2, np.ones(n), mode="same") / ones)
 
 
-def main() -> None:
-    """Command line: measure and write the files."""
-    parser = study_parser("studies.accuracy.ringing", __doc__)
-    parser.add_argument("--out", type=Path, default=Path("docs"), help="folder (default: %(default)s)")
-    options = parser.parse_args()
-    results = {**provenance("python -m studies.accuracy.ringing"), **measure()}
-    keep(results, options.out / "ringing.json")
-    draw(results, options.out / "ringing.png")
-    print(table(results))
-
-
-if __name__ == "__main__":
-    run_command(main)
+STUDY = Study(
+    "accuracy.ringing",
+    lambda _, results: results.update(measure()),
+    file="ringing.json",
+    pictures={"ringing.png": draw},
+    tables={"ringing": table},
+)

@@ -10,7 +10,7 @@ The error is the hub's distance from the other path at the ends of strokes, as a
 are processor times of one thread, the best of several rounds, for a batch of random commands.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,16 +20,20 @@ from seastar_gym.accuracy.command import progress_bar
 from seastar_gym.accuracy.setting import at
 from seastar_gym.gaits import PAIRS
 from seastar_gym.scene import Scene
+from studies.accuracy import page
 from studies.accuracy.cases import Cases, gaits, joined, pentagon, random_gaits, random_sequences, slow_sequences, swims
 from studies.accuracy.convergence import measured, rows_of, second_opinion
-from studies.accuracy.rows import Row, Study, promised
+from studies.accuracy.pictures import draw_all
+from studies.accuracy.rows import Row, promised
+from studies.accuracy.rows import Study as Found
 from studies.accuracy.settings import QUICK, Plan, presets, settings
 from studies.accuracy.speeds import measure_speeds
 from studies.accuracy.tables import as_markdown, store, store_typical, write_csv
-from studies.parser import study_parser
+from studies.frame import Results, Study
+from studies.pages import show
 
 
-def study(plan: Plan, progress: bool = True) -> Study:
+def study(plan: Plan, progress: bool = True) -> Found:
     """Run the whole study; drawing is left to the caller."""
     rng = np.random.default_rng(0)
     batches, mine = [sequences(plan, rng), pentagon(*plan.side)], settings(plan)
@@ -43,7 +47,7 @@ def study(plan: Plan, progress: bool = True) -> Study:
     rows = with_speeds(rows_of(batches, found, mine), plan, progress)
     hub = found[0].limit.hub
     distances = dict(zip(("straight", *PAIRS), np.hypot(*hub[-1, :5].T).tolist(), strict=True))
-    return Study(rows, doubt, distances, float(hub[0, 0, 0]))
+    return Found(rows, doubt, distances, float(hub[0, 0, 0]))
 
 
 def sequences(plan: Plan, rng: np.random.Generator) -> Cases:
@@ -67,32 +71,48 @@ def with_speeds(rows: list[Row], plan: Plan, progress: bool) -> list[Row]:
     return promised([replace(row, speed=float(mixed), straight_speed=float(alone)) for row, (mixed, alone) in timed])
 
 
-def main() -> None:
-    """Command line: run the study, write its files and print its table."""
-    parser = study_parser("studies.accuracy", __doc__)
-    parser.add_argument("--quick", action="store_true", help="run fewer settings and swims, in under a minute")
-    parser.add_argument(
-        "--out", type=Path, default=Path("runs/accuracy"), help="folder for tables and pictures (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--store", action="store_true", help="also write the table of errors and speeds that comes with the package"
-    )
-    parser.add_argument("--typical", action="store_true", help="measure and store the medians of the presets alone")
-    options = parser.parse_args()
+@dataclass(frozen=True)
+class Options:
+    """Errors and speeds of the chapter's robot."""
+
+    quick: bool = False
+    """Run fewer settings and swims, in under a minute."""
+    out: Path = Path("runs/accuracy")
+    """Folder for tables and pictures."""
+    store: bool = False
+    """Also write the table of errors and speeds that comes with the package."""
+    typical: bool = False
+    """Measure and store the medians of the presets alone."""
+
+    def __post_init__(self) -> None:
+        if self.quick and self.store:
+            raise ValueError("--store needs the whole study, not --quick.")
+
+
+def run(options: Options, _: Results) -> None:
+    """Run the study, write its files and print its table."""
     if options.typical:
         store_typical(typical_rows(Plan()))
         return
-    if options.quick and options.store:
-        parser.error("--store needs the whole study, not --quick.")
-    from studies.accuracy import pictures as accuracy_pictures
-
     found = study(QUICK if options.quick else Plan())
     options.out.mkdir(parents=True, exist_ok=True)
     write_csv(found, options.out / "accuracy.csv")
     (options.out / "accuracy.md").write_text(as_markdown(found), encoding="utf-8")
-    pictures = accuracy_pictures.draw_all(found, options.out)
-    print(as_markdown(found))
+    drawn = draw_all(found, options.out)
+    show(as_markdown(found))
     if options.store:
         store(found)
         print(f"Stored: {STROKES}")
-    print(f"Written: {', '.join(str(path) for path in (options.out / 'accuracy.csv', *pictures))}")
+    print(f"Written: {', '.join(str(path) for path in (options.out / 'accuracy.csv', *drawn))}")
+
+
+STUDY = Study(
+    "accuracy",
+    run,
+    Options,
+    tables={
+        name: lambda _, name=name: getattr(page, name)()  # type: ignore[misc]
+        for name in ("errors", "choosing", "presets", "timed", "timed_paths")
+    },
+    drawn=("convergence.png", "work_precision.png"),
+)

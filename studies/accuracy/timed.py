@@ -12,7 +12,7 @@ promise in `info`, bounds and medians.
 """
 
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple, get_args
 
@@ -24,13 +24,13 @@ from seastar_gym.accuracy.certificate import CLASSES_VERSION
 from seastar_gym.accuracy.command import progress_bar
 from seastar_gym.accuracy.measure import Progress, machine, measure, path_lengths, swim_all
 from seastar_gym.accuracy.setting import at, physics
-from seastar_gym.command import run_command
 from seastar_gym.scene import Numerics, Scene, SmaWires
 from seastar_gym.scene.numerics import PRESETS, Fidelity, Resolution
 from seastar_gym.version import __version__
 from studies.accuracy.page import PERIODS, timed
 from studies.accuracy.tables import two_digits, up
-from studies.parser import study_parser
+from studies.frame import Results, Study
+from studies.pages import show
 
 Floats = NDArray[np.float64]
 
@@ -123,22 +123,30 @@ def study(period: float, plan: Plan) -> Certificate:
     )  # fmt: skip
 
 
-def main() -> None:
-    """Command line: run the study and print its table."""
-    parser = study_parser("studies.accuracy.timed", __doc__)
-    parser.add_argument("--quick", action="store_true", help="simulate fewer swims and presets")
-    parser.add_argument("--store", action="store_true", help="write the certificates that come with the package")
-    parser.add_argument("--out", type=Path, default=Path("runs/timed_errors"), help="folder (default: %(default)s)")
-    options = parser.parse_args()
-    if options.quick and options.store:
-        parser.error("--store needs the whole study, not --quick.")
+@dataclass(frozen=True)
+class Options:
+    """Errors of the presets in time."""
+
+    quick: bool = False
+    """Simulate fewer swims and presets."""
+    store: bool = False
+    """Write the certificates that come with the package."""
+    out: Path = Path("runs/timed_errors")
+    """Folder of the certificates."""
+
+    def __post_init__(self) -> None:
+        if self.quick and self.store:
+            raise ValueError("--store needs the whole study, not --quick.")
+
+
+def run(options: Options, _: Results) -> None:
+    """Run the study, and print its table."""
     for period in PERIODS:
         certificate = study(period, QUICK if options.quick else Plan())
         certificate.save(chapter.file_of(period, chapter.FOLDER if options.store else options.out))
         print(*(f"{period:g} s: {each}: {each.errors}" for each in certificate.settings), sep="\n")
     if options.store:
-        print(timed())
+        show(timed())
 
 
-if __name__ == "__main__":
-    run_command(main)
+STUDY = Study("accuracy.timed", run, Options)

@@ -7,18 +7,20 @@ distance from that with 73 nodes per limb and steps of 0.25 ms is at most the es
 Prints a table: the share of decisions that are covered, and the median of estimate over true error.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 from seastar_gym.accuracy.measure import swim
 from seastar_gym.accuracy.setting import at
-from seastar_gym.command import run_command
 from seastar_gym.scene.numerics import Resolution
 from studies.accuracy import timed
 from studies.accuracy.error_bars import FIDELITIES, SETTINGS, SMALLEST, TRUE
 from studies.accuracy.page import PERIODS
-from studies.parser import study_parser
+from studies.frame import Results, Study
+from studies.pages import show
 from studies.style import PERCENT
 
 Floats = NDArray[np.float64]
@@ -50,13 +52,18 @@ def table(found: dict[float, dict[str, tuple[float, float]]]) -> str:
     return "\n".join(lines)
 
 
-def main() -> None:
-    """Command line: measure and print the table."""
-    parser = study_parser("studies.accuracy.timed_error_bars", __doc__)
-    parser.add_argument("--samples", type=int, default=SAMPLES, help="sequences of either kind (default: %(default)s)")
-    plan = timed.Plan(samples=parser.parse_args().samples)
-    print(table({period: measure(period, plan) for period in tqdm(PERIODS, unit="period")}))
+@dataclass(frozen=True)
+class Options:
+    """Coverage of error bars in time."""
+
+    samples: int = SAMPLES
+    """Sequences of either kind."""
 
 
-if __name__ == "__main__":
-    run_command(main)
+def run(options: Options, _: Results) -> None:
+    """Measure and print the table."""
+    plan = timed.Plan(samples=options.samples)
+    show(table({period: measure(period, plan) for period in tqdm(PERIODS, unit="period")}))
+
+
+STUDY = Study("accuracy.timed_error_bars", run, Options)

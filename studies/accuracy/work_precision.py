@@ -11,19 +11,16 @@ Times are processor times of one thread per robot and stroke, the best of severa
 picture and the numbers (JSON). A robot whose numbers are in the file is not swum again.
 """
 
-import json
 import time
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from seastar_gym.accuracy.commands import CLASSES, PROMISED, draw_classes
 from seastar_gym.accuracy.measure import errors, path_lengths, swim
 from seastar_gym.accuracy.setting import at
-from seastar_gym.command import run_command
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Contact, Numerics, Scene, Seastar, SmaPulse
 from seastar_gym.scene.actuators.thermal import ThermalSma
@@ -31,8 +28,7 @@ from seastar_gym.scene.numerics import PRESETS, Resolution
 from seastar_gym.simulator import Simulator
 from studies.accuracy.settings import MS
 from studies.accuracy.work_precision_page import as_page, draw
-from studies.parser import study_parser
-from studies.provenance import provenance
+from studies.frame import InDocs, Results, Study
 from studies.speed.terms import SILICONE
 
 Floats = NDArray[np.float64]
@@ -117,31 +113,24 @@ def examine(physics: Scene, straight: bool) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def main() -> None:
-    """Command line: examine the problems that are missing in the file, write page and picture."""
-    parser = study_parser("studies.accuracy.work_precision", __doc__)
-    parser.add_argument(
-        "--out", type=Path, default=Path("docs/work_precision.md"),
-        help="page to write; numbers and picture stand beside it (default: %(default)s)",
-    )  # fmt: skip
-    options = parser.parse_args()
-    file = options.out.with_suffix(".json")
-    about = provenance("python -m studies.accuracy.work_precision")
-    results: dict[str, Any] = about | {"file": file.name, "problems": {}}
-    if file.is_file():
-        results = json.loads(file.read_text(encoding="utf-8"))
-        if {name: results.get(name) for name in about} != about:
-            raise SystemExit(f"{file} has numbers of another machine or version: give another --out.")
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    for name, physics in tqdm(PROBLEMS.items(), unit="problem"):
-        if name not in results["problems"]:
-            results["problems"][name] = examine(physics, straight=physics.is_chapters)
-            file.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
-    picture = options.out.with_name(f"{options.out.stem}_problems.png")
-    draw(results, picture)
-    options.out.write_text(as_page(results, picture.name), encoding="utf-8")
-    print(f"Written: {options.out}, {file}, {picture}")
+def run(_: InDocs, results: Results) -> None:
+    """Examine the problems that are missing. ValueError where the file is of another machine or version."""
+    results.read()
+    if results and {name: results.get(name) for name in results.about} != results.about:
+        raise ValueError(f"{results.file} has numbers of another machine or version: give another --out.")
+    results["file"] = "work_precision.json"
+    cells = {
+        ("problems", name): partial(examine, physics, straight=physics.is_chapters)
+        for name, physics in PROBLEMS.items()
+    }
+    results.fill(cells, lambda found: f"{len(found)} rows")
 
 
-if __name__ == "__main__":
-    run_command(main)
+PICTURE = "work_precision_problems.png"
+STUDY = Study(
+    "accuracy.work_precision",
+    run,
+    file="work_precision.json",
+    pictures={PICTURE: draw},
+    pages={"work_precision.md": lambda results: as_page(results, PICTURE)},
+)

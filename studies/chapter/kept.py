@@ -9,7 +9,7 @@ from seastar_gym import gaits
 from seastar_gym.scene import Scene
 from studies.chapter.pictures import PENTAGON_TIMES
 from studies.chapter.statements import PAIRS, stroke_motion
-from studies.chapter.swims import MM, SETTINGS, Floats, Swim
+from studies.chapter.swims import MM, QUICK, SETTINGS, Floats, Swim
 from studies.kept import rounded
 
 UNIT = 1e-6
@@ -42,7 +42,8 @@ def as_data(swim: Swim, times: Sequence[float] = ()) -> dict[str, Any]:
 
 def from_data(kept: Mapping[str, Any], commands: Floats) -> Swim:
     """A swim of which the hub is known, and all nodes at some times; other nodes and velocities are NaN."""
-    setting = next(each for each in SETTINGS if each.label == kept["setting"])
+    settings = [each.coarser(step) for each in SETTINGS for step in (0.0, QUICK)]
+    setting = next(each for each in settings if each.label == kept["setting"])
     scene = Scene(setting.robot, numerics=setting.numerics)
     starts = np.arange(len(commands))[:, None] * scene.actuator.period
     time = np.append(0.0, (starts + np.array(kept["times_of_a_stroke_s"])).ravel())

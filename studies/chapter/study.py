@@ -6,7 +6,9 @@ The chapter's statements are printed beside the numbers, and written to `stateme
 of docs/ show is written to `chapter.json`.
 """
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -16,7 +18,7 @@ from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import SmaPulse
 from studies.chapter import pictures
 from studies.chapter.cost import measure_cost
-from studies.chapter.kept import kept, pair_commands, pentagon_commands
+from studies.chapter.kept import kept, pair_commands, pairs_table, pentagon_commands, strokes_table, swims_of
 from studies.chapter.statements import (
     PAIRS,
     Statement,
@@ -27,10 +29,8 @@ from studies.chapter.statements import (
     straight_statements,
     write_csv,
 )
-from studies.chapter.swims import CONTINUUM, LIMIT, SETTINGS, THE_CHAPTERS, swim
-from studies.kept import keep
-from studies.parser import study_parser
-from studies.provenance import provenance
+from studies.chapter.swims import CONTINUUM, LIMIT, QUICK, SETTINGS, THE_CHAPTERS, swim
+from studies.frame import Results, Study
 
 STEPS = np.array([0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0, 40.0]) * 1e-3
 """Time steps of Fig. 13.9 [s]."""
@@ -38,15 +38,15 @@ QUICK_STEPS = np.array([0.3, 1.0, 3.0, 10.0, 20.0, 40.0]) * 1e-3
 """Time steps of Fig. 13.9 in a quick run [s]."""
 
 
-def make_figures(out: Path, quick: bool = False, progress: bool = True) -> list[Statement]:
-    """Compute all swims, write all figures into a folder, and return the statements.
+def make_figures(out: Path, quick: bool = False, progress: bool = True) -> tuple[list[Statement], dict[str, Any]]:
+    """Compute all swims, write the figures that docs/ lacks into a folder; returns the statements and what is kept.
 
     quick: Take 1 ms as converged, and fewer time steps.
     """
     out.mkdir(parents=True, exist_ok=True)
-    *settings, limit = [setting.coarser(1e-3 if quick else 0.0) for setting in (*SETTINGS, LIMIT)]
+    *settings, limit = [setting.coarser(QUICK if quick else 0.0) for setting in (*SETTINGS, LIMIT)]
     steps, seconds = (QUICK_STEPS, 0.01) if quick else (STEPS, 0.5)
-    bar = tqdm(total=4 + 2 * len(steps), unit="part", disable=not progress)
+    bar = tqdm(total=3 + 2 * len(steps), unit="part", disable=not progress)
     actuator = SmaPulse()
     pictures.draw_pulse(actuator, out / "fig_13_5b.png")
 
@@ -58,38 +58,49 @@ def make_figures(out: Path, quick: bool = False, progress: bool = True) -> list[
 
     bar.set_description("pentagon")
     pentagon = [swim(setting, pentagon_commands(), 20) for setting in settings]
-    pictures.draw_pentagon_snapshots(pentagon[-1], pentagon[0], out / "fig_13_2.png")
-    bar.update()
-    pictures.draw_pentagon(pentagon[-1], pentagon[0], out / "fig_13_7a.png")
     pictures.draw_pentagon_signals(pentagon[-1], out / "fig_13_7b.png")
     statements += pentagon_statements(pentagon)
     bar.update()
 
     bar.set_description("pairs")
     pairs = [swim(setting, pair_commands(), 50) for setting in (*settings, limit)]
-    pictures.draw_pairs(pairs[-2], pairs[0], list(PAIRS), out / "fig_13_8.png")
     statements += pair_statements(pairs)
-    made = provenance("python -m studies.chapter" + " --quick" * quick)
-    keep({**made, **kept(straight, pentagon, pairs)}, out / "chapter.json")
     bar.update()
 
     bar.set_description("time steps")
     costs = [measure_cost(robot, steps, seconds, bar.update) for robot in (THE_CHAPTERS, CONTINUUM.robot)]
     pictures.draw_cost(costs, out / "fig_13_9.png")
     bar.close()
-    return statements + cost_statements(costs)
+    return statements + cost_statements(costs), kept(straight, pentagon, pairs)
 
 
-def main() -> None:
-    """Command line: write the figures and statements and print the statements."""
-    parser = study_parser("studies.chapter", __doc__)
-    parser.add_argument(
-        "--quick", action="store_true", help="take 1 ms as converged, and fewer time steps in Fig. 13.9"
-    )
-    parser.add_argument("--out", type=Path, default=Path("runs/chapter"), help="folder (default: %(default)s)")
-    options = parser.parse_args()
-    statements = make_figures(options.out, options.quick)
+@dataclass(frozen=True)
+class Options:
+    """The chapter's figures and statements."""
+
+    quick: bool = False
+    """Take 1 ms as converged, and fewer time steps in Fig. 13.9."""
+    out: Path = Path("runs/chapter")
+    """Folder of the files, or the file of the numbers."""
+
+
+def run(options: Options, results: Results) -> None:
+    """Swim, write the figures and the statements, and print the statements."""
+    statements, found = make_figures(options.out, options.quick)
     write_csv(statements, options.out / "statements.csv")
-    console = Console()
-    console.print(as_table(statements))
-    console.print(f"Written: {', '.join(str(file) for file in sorted(options.out.glob('*.png')))}")
+    Console().print(as_table(statements))
+    results.update(found)
+
+
+STUDY = Study(
+    "chapter",
+    run,
+    Options,
+    "chapter.json",
+    pictures={
+        "fig_13_2.png": lambda found, file: pictures.draw_pentagon_snapshots(*swims_of(found, "pentagon"), file),
+        "fig_13_7a.png": lambda found, file: pictures.draw_pentagon(*swims_of(found, "pentagon"), file),
+        "fig_13_8.png": lambda found, file: pictures.draw_pairs(*swims_of(found, "pairs"), list(PAIRS), file),
+    },
+    tables={"chapter pairs": pairs_table, "chapter strokes": strokes_table},
+)

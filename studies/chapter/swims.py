@@ -31,6 +31,8 @@ class Setting:
         return replace(self, numerics=replace(self.numerics, step=max(step, self.numerics.step)))
 
 
+QUICK = 1e-3
+"""Shortest time steps of a quick run [s]."""
 THE_CHAPTERS = Seastar(discretisation="chapter")
 CONVERGED = Numerics("implicit-midpoint", 0.25e-3)
 CHAPTER = Setting("the chapter's setting", THE_CHAPTERS, Numerics("implicit-euler", 3e-3))

@@ -23,9 +23,9 @@ from seastar_gym.scene import Scene
 from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simulator import Simulator
 from studies.continuum.scenes import NAMES, scene
-from studies.kept import keep, rounded
-from studies.parser import study_parser
-from studies.provenance import footer, provenance
+from studies.frame import InDocs, Results, Study
+from studies.kept import rounded
+from studies.provenance import footer
 from studies.style import DPI, INK, PERCENT, as_percent, subplots
 
 Floats = NDArray[np.float64]
@@ -99,12 +99,12 @@ def measure(names: tuple[str, ...] = NAMES, bar: Any = None) -> list[Row]:
 
 
 def as_data(rows: list[Row]) -> dict[str, Any]:
-    """Rows as plain data, with where they come from."""
+    """Rows as plain data."""
     plain = [
         {**row._asdict(), "errors": [rounded(each) for each in row.errors], "order": round(row.order, 4)}
         for row in rows
     ]
-    return {**provenance("python -m studies.continuum"), "nodes_per_limb": list(NODES), "rows": plain}
+    return {"nodes_per_limb": list(NODES), "rows": plain}
 
 
 def rows_of(results: Mapping[str, Any]) -> list[Row]:
@@ -170,23 +170,22 @@ def draw(rows: list[Row], path: Path) -> None:
     axes.set_xlabel("nodes per limb")
     axes.set_ylabel("largest error of the hub's path")
     axes.set_title("A line per scene, thick lines their geometric mean", color=INK, fontsize=10, loc="left")
-    path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=DPI)
 
 
-def main() -> None:
-    """Command line: measure all scenes, write page and picture, print the table."""
-    parser = study_parser("studies.continuum", __doc__)
-    parser.add_argument(
-        "--out", type=Path, default=Path("docs/continuum.md"), help="page to write (default: %(default)s)"
-    )
-    options = parser.parse_args()
+def run(options: InDocs, results: Results) -> str | None:
+    """Measure all scenes."""
     with tqdm(total=len(NAMES), unit="scene") as bar:
         rows = measure(NAMES, bar)
-    results = as_data(rows)
-    keep(results, options.out.with_suffix(".json"))
-    options.out.write_text(as_markdown(results), encoding="utf-8")
-    draw(rows, options.out.with_suffix(".png"))
-    print(as_markdown(results))
-    if not all(math.isfinite(row.order) for row in rows):
-        raise SystemExit("The solver failed in a scene, see the empty errors.")
+    results.update(as_data(rows))
+    failed = not all(math.isfinite(row.order) for row in rows)
+    return "The solver failed in a scene, see the empty errors." if failed else None
+
+
+STUDY = Study(
+    "continuum",
+    run,
+    file="continuum.json",
+    pictures={"continuum.png": lambda results, file: draw(rows_of(results), file)},
+    pages={"continuum.md": as_markdown},
+)

@@ -7,7 +7,7 @@ theirs.
 """
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +15,12 @@ from tqdm import tqdm
 
 from seastar_gym.accuracy import Certificate
 from seastar_gym.accuracy.measure import SAMPLES, certify
-from seastar_gym.command import run_command
 from seastar_gym.scene import Scene, SmaPulse
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.frames import Swim, frame_with
 from seastar_gym.sweep.swimming import swim
 from studies.designs.space import MEASURED, SETTLING, Body
-from studies.kept import keep
-from studies.parser import study_parser
-from studies.provenance import provenance
+from studies.frame import Results, Study, require_known
 
 Table = dict[str, Any]
 WINNERS = (
@@ -106,13 +103,23 @@ def table(found: Table) -> str:
     return "\n".join(lines)
 
 
-def main() -> None:
-    """Command line: certify the winners and write their errors."""
-    parser = study_parser("studies.designs.certificates", __doc__)
-    parser.add_argument("--out", type=Path, default=Path("runs/certificates"), help="folder (default: %(default)s)")
-    parser.add_argument("--samples", type=int, default=SAMPLES, help="sequences per class (default: %(default)s)")
-    parser.add_argument("--robots", nargs="*", choices=WINNERS, default=WINNERS, help="winners (default: all)")
-    options = parser.parse_args()
+@dataclass(frozen=True)
+class Options:
+    """Certificates of the robots that won."""
+
+    out: Path = Path("runs/certificates")
+    """Folder of the files, or the file of the numbers."""
+    samples: int = SAMPLES
+    """Sequences per class."""
+    robots: tuple[str, ...] = WINNERS
+    """Winners."""
+
+    def __post_init__(self) -> None:
+        require_known("robot", self.robots, WINNERS)
+
+
+def certify_all(options: Options, results: Results) -> None:
+    """Certify robots, and tell their errors once all winners have certificates."""
     rows = json.loads(DESIGNS.read_text(encoding="utf-8"))
     found: Table = {}
 
@@ -127,10 +134,9 @@ def main() -> None:
         return
     for name in set(WINNERS) - set(found):
         add(name)
-    whole = {**provenance("python -m studies.designs.certificates"), "robots": {name: found[name] for name in WINNERS}}
-    keep(whole, options.out / "certificates.json")
-    print(f"Written: {options.out / 'certificates.json'}")
+    results["robots"] = {name: found[name] for name in WINNERS}
 
 
-if __name__ == "__main__":
-    run_command(main)
+STUDY = Study(
+    "designs.certificates", certify_all, Options, "certificates.json", tables={"certificates": table}
+)

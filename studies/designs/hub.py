@@ -5,15 +5,13 @@ limbs at its rim. Limbs keep their shape and stiffness, and lose in density what
 four gaits up to turns, {1-, 2+} to {1-, 5+}. Writes hub.json and hub.png.
 """
 
-import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow.parquet
 
-from seastar_gym.command import run_command
 from seastar_gym.executors import Executor
 from seastar_gym.executors.processes import Processes
 from seastar_gym.scene import Numerics, Scene
@@ -22,8 +20,7 @@ from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.frames import Swim, frame_with
 from seastar_gym.sweep.parts import Parts
 from seastar_gym.sweep.run import run
-from studies.parser import study_parser
-from studies.provenance import provenance
+from studies.frame import Results, Study
 from studies.style import DPI, MM, subplots
 
 Table = dict[str, Any]
@@ -118,17 +115,21 @@ def draw(found: Table, file: Path) -> None:
     figure.savefig(file, dpi=DPI)
 
 
-def main() -> None:
-    """Command line: run the study and write its files."""
-    parser = study_parser("studies.designs.hub", __doc__)
-    parser.add_argument("--out", type=Path, default=Path("runs/hub"), help="folder (default: %(default)s)")
-    parser.add_argument("--workers", type=int, help="processes (default: one per processor)")
-    options = parser.parse_args()
-    found = {**provenance("python -m studies.designs.hub", "pyarrow"), **study(options.out, Processes(options.workers))}
-    (options.out / "hub.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    draw(found, options.out / "hub.png")
-    print(f"Written to {options.out}: hub.json and hub.png.")
+@dataclass(frozen=True)
+class Options:
+    """Mass in the hub or in the limbs."""
+
+    out: Path = Path("runs/hub")
+    """Folder of the files, or the file of the numbers."""
+    workers: int | None = None
+    """Processes; one per processor by default."""
 
 
-if __name__ == "__main__":
-    run_command(main)
+def swim_all(options: Options, results: Results) -> None:
+    """Swim what is missing."""
+    results.update(study(options.out, Processes(options.workers)))
+
+
+STUDY = Study(
+    "designs.hub", swim_all, Options, "hub.json", pictures={"hub.png": draw}, packages=("pyarrow",)
+)

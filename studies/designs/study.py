@@ -7,7 +7,7 @@ kept in folders of OUT, so that the command goes on after an interrupt.
 """
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from seastar_gym.sweep.axes import Choices
 from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.parts import Parts, read_parts
 from seastar_gym.sweep.run import Tally, run
+from studies.designs.pictures import by_work, draw, robots, summary
 from studies.designs.space import (
     BODIES,
     MEASURED,
@@ -32,8 +33,7 @@ from studies.designs.space import (
     inner_half,
     masses,
 )
-from studies.parser import study_parser
-from studies.provenance import provenance
+from studies.frame import Results, Study
 
 Table = dict[str, Any]
 CLEARANCE = 0.1
@@ -159,19 +159,31 @@ def masses_by_taper(mass: Any) -> Table:
     }
 
 
-def main() -> None:
-    """Command line: run the study and write its files."""
-    from studies.designs.pictures import draw, summary
+@dataclass(frozen=True)
+class Options:
+    """Which robot swims fastest."""
 
-    parser = study_parser("studies.designs", __doc__)
-    parser.add_argument("--out", type=Path, default=Path("runs/designs"), help="folder (default: %(default)s)")
-    parser.add_argument("--workers", type=int, help="processes (default: one per processor)")
-    options = parser.parse_args()
+    out: Path = Path("runs/designs")
+    """Folder of the files, or the file of the numbers."""
+    workers: int | None = None
+    """Processes; one per processor by default."""
+
+
+def swim_all(options: Options, results: Results) -> None:
+    """Swim what is missing, and write the scene of the fastest."""
     found, table = study(options.out, Processes(options.workers))
-    found = {**provenance("python -m studies.designs", "pandas", "pyarrow"), **found, "picture": summary(table)}
-    (options.out / "designs.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    results.update(found, picture=summary(table))
     fastest = scene_of(table.loc[table.speed.idxmax()])
     (options.out / "fastest.json").write_text(json.dumps(fastest.to_dict()) + "\n", encoding="utf-8")
-    draw(found, options.out / "designs.png")
-    print(json.dumps({name: what for name, what in found.items() if name != "picture"}, indent=1))
-    print(f"Written to {options.out}: designs.json, designs.png and fastest.json, the scene of the fastest.")
+    print(json.dumps(found, indent=1))
+
+
+STUDY = Study(
+    "designs",
+    swim_all,
+    Options,
+    "designs.json",
+    pictures={"designs.png": draw},
+    tables={"designs robots": robots, "designs by_work": by_work},
+    packages=("pandas", "pyarrow"),
+)

@@ -8,34 +8,30 @@ every training, and a training whose result is already in the file is not repeat
 """
 
 import itertools
-import json
-import shlex
-import sys
-import time
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import torch
-import tyro
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
 from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_model, make_training_env, policy_of
-from seastar_gym.command import run_command
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.task import make_scene
 from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
-from seastar_gym.files import write_atomically
 from seastar_gym.scene.numerics import Fidelity
-from studies.learning.ablations_page import DEFAULT, draw, table
-from studies.provenance import provenance
+from studies.frame import Results, Study, require_known
+from studies.style import CYCLE, FAINT, new_figure
 
+DEFAULT = "whole commands"
+"""Name of the variant without changes."""
 MAX_STROKES = 400
 """Largest number of strokes of an evaluated swim, which is also the score of a robot that does not arrive."""
 
@@ -136,6 +132,58 @@ def learn(variant: Variant, seed: int, options: "Options") -> dict[str, Any]:
     return {"curve": measuring.curve, "pentagon": round(mean_strokes(policy, "pentagon", 1, options))}
 
 
+COLUMNS = 3
+LOW, HIGH = 165.0, 210.0
+"""Strokes that the picture shows."""
+
+
+def final_strokes(runs: Mapping[str, Any]) -> list[float]:
+    """Mean strokes on the held-out paths at the end of the training, for every seed."""
+    return [run["curve"][-1][1] for run in runs.values()]
+
+
+def table(results: Mapping[str, Any]) -> str:
+    """Table in Markdown: mean, best and worst strokes over seeds of every variant, and strokes round the pentagon."""
+    lines = ["| training | held-out paths: mean strokes | pentagon, every seed |", "|---|---:|---|"]
+    for name, runs in results["runs"].items():
+        ends, pentagon = final_strokes(runs), ", ".join(str(run["pentagon"]) for run in runs.values())
+        over_seeds = f" ({min(ends):.1f} to {max(ends):.1f})" if len(ends) > 1 else ""
+        lines.append(f"| {name} | {np.mean(ends):.1f}{over_seeds} | {pentagon} |")
+    return "\n".join(lines)
+
+
+def draw(results: Mapping[str, Any], file: Path) -> None:
+    """Draw the learning curve of every variant beside the default one: mean and range over seeds."""
+    others = [name for name in results["runs"] if name != DEFAULT] or [DEFAULT]
+    rows = -(-(len(others) + 1) // COLUMNS)
+    figure = new_figure(7.0, 0.5 + 2.0 * rows)
+    panels = figure.subplots(rows, COLUMNS, sharex=True, sharey=True, squeeze=False).ravel()
+    for axes, name in zip(panels, others, strict=False):
+        for label, colour in ((DEFAULT, FAINT), (name, CYCLE[0])):
+            _draw_curves(axes, results["runs"].get(label, {}), colour)
+        axes.set(ylim=(LOW, HIGH))
+        axes.set_title(name)
+        axes.tick_params(labelbottom=True)
+        axes.grid(True)
+    for axes in panels[len(others) :]:
+        axes.set_axis_off()
+    panels[len(others)].legend(
+        panels[0].get_lines()[:2], [f"{DEFAULT}:\nnothing changed", "the change in\nthe title"],
+        title="line: mean of the seeds\nband: lowest to highest", alignment="left", loc="center",
+    )  # fmt: skip
+    figure.supxlabel("strokes trained [thousands]")
+    figure.supylabel("strokes to the last waypoint, mean of the held-out paths")
+    figure.savefig(file)
+
+
+def _draw_curves(axes: Any, runs: Mapping[str, Any], colour: str) -> None:
+    curves = np.array([run["curve"] for run in runs.values()])
+    if curves.size:
+        trained, strokes = 1e-3 * curves[0, :, 0], curves[:, :, 1]
+        axes.fill_between(trained, strokes.min(axis=0), strokes.max(axis=0), color=colour, alpha=0.25, lw=0)
+        axes.plot(trained, strokes.mean(axis=0), color=colour)
+
+
 @dataclass(frozen=True)
 class Options:
     """Ablations of the training: trainings that differ from the default one in a single choice, over several seeds."""
@@ -158,52 +206,26 @@ class Options:
     """File of the results. The picture has the same name with the suffix .png."""
 
     def __post_init__(self) -> None:
-        if unknown := set(self.variants) - set(VARIANTS):
-            raise ValueError(f"Unknown variant {min(unknown)!r}: choose of {', '.join(VARIANTS)}.")
+        require_known("variant", self.variants, VARIANTS)
 
 
-def study(options: Options, results: dict[str, Any]) -> None:
-    """Run the trainings that are missing in the results, and write the results after each."""
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    for seed, name in itertools.product(options.seeds, options.variants):
-        runs = results["runs"].setdefault(name, {})
-        if str(seed) in runs:
-            continue
-        began = time.perf_counter()
-        runs[str(seed)] = learn(VARIANTS[name], seed, options)
-        write_atomically(options.out, (json.dumps(results) + "\n").encode())
-        strokes, seconds = runs[str(seed)]["curve"][-1][1], time.perf_counter() - began
-        print(f"{name}, seed {seed}: {strokes:.1f} strokes on held-out paths ({seconds:.0f} s)", flush=True)
-
-
-def read_results(options: Options, command: str) -> dict[str, Any]:
-    """Results in the output file, or empty ones if there is none; ValueError if the file has other settings."""
-    settings = {name: getattr(options, name) for name in ("strokes", "every", "paths", "fidelity")}
-    if not options.out.is_file():
-        return {**provenance(command, "torch", "stable_baselines3"), "settings": settings, "runs": {}}
-    results: Any = json.loads(options.out.read_text(encoding="utf-8"))
-    found = results.get("settings") if isinstance(results, dict) else None
-    if found != settings:
-        of = "something else" if found is None else found
-        raise ValueError(f"{options.out} has results of {of}, not of {settings}: give another --out.")
-    return cast(dict[str, Any], results)
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Command line of the study; returns the exit code."""
+def study(options: Options, results: Results) -> None:
+    """Run the trainings that are missing."""
     torch.set_num_threads(1)
-    given = sys.argv[1:] if arguments is None else arguments
-    try:
-        options = tyro.cli(Options, prog="python -m studies.learning.ablations", args=given)
-        results = read_results(options, shlex.join(["python", "-m", "studies.learning.ablations", *given]))
-    except ValueError as wrong:
-        print(wrong, file=sys.stderr)
-        return 2
-    study(options, results)
-    draw(results, options.out.with_suffix(".png"))
-    print(table(results))
-    return 0
+    cells = {
+        ("runs", name, str(seed)): partial(learn, VARIANTS[name], seed, options)
+        for seed, name in itertools.product(options.seeds, options.variants)
+    }
+    results.fill(cells, lambda found: f"{found['curve'][-1][1]:.1f} strokes on held-out paths")
 
 
-if __name__ == "__main__":
-    run_command(main)
+STUDY = Study(
+    "learning.ablations",
+    study,
+    Options,
+    "ablations.json",
+    settings=lambda options: {name: getattr(options, name) for name in ("strokes", "every", "paths", "fidelity")},
+    pictures={"ablations.png": draw},
+    tables={"ablations": table},
+    packages=("torch", "stable_baselines3"),
+)

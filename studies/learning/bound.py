@@ -10,10 +10,8 @@ without a time limit find; they do not prove that nothing is faster.
 
 import itertools
 import json
-import shlex
-import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -23,7 +21,6 @@ import tyro
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from seastar_gym.command import run_command
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.greedy import Displacements, measure_gaits
 from seastar_gym.controllers.planner import Branching
@@ -34,12 +31,11 @@ from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import action_table
 from seastar_gym.envs.task import make_scene
 from seastar_gym.evaluation.many import swim_many
-from seastar_gym.files import write_atomically
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator, State
-from studies.learning.bound_page import MIXED, draw
-from studies.provenance import provenance
+from studies.frame import Results, Study
+from studies.style import CYCLE, subplots
 
 Floats = NDArray[np.float64]
 Gaits = NDArray[np.intp]
@@ -122,6 +118,28 @@ def _at_rest(scene: Scene) -> State:
 def _keep(states: State, so_far: Gaits, chosen: NDArray[np.intp], n_actions: int) -> tuple[State, Gaits]:
     longer = np.concatenate([so_far[chosen // n_actions], (chosen % n_actions)[:, None]], axis=1)
     return states.of_robots(chosen), longer
+
+
+MIXED = "best periodic gaits, mixed"
+"""Name of the speeds of straight gaits that are swum in turn."""
+
+
+def draw(results: Mapping[str, Any], file: Path) -> None:
+    """Draw the speeds by direction, in the sector of 36 degrees that turns and mirror images repeat."""
+    figure, axes = subplots(figsize=(6.4, 4.4))
+    directions, speeds = results["directions_deg"], dict(results["mm_per_stroke"])
+    axes.plot(directions, speeds.pop(MIXED), label="best mix of straight gaits: every periodic gait of up to four\n"
+              "strokes was tried, and those that do not turn are swum in turn")  # fmt: skip
+    for (name, swum), colour in zip(speeds.items(), CYCLE[1:], strict=False):
+        axes.plot(directions, swum, "o", color=colour, label=f"agent {name}, from rest to a waypoint in that direction")
+    axes.set(
+        xlabel="direction of the swim, from limb 1 [degrees]; 36 is midway between two limbs", xticks=directions,
+        ylabel="speed [mm per stroke]",
+    )  # fmt: skip
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.4 * (high - low))
+    axes.legend(loc="upper right")
+    figure.savefig(file)
 
 
 @dataclass(frozen=True)
@@ -211,22 +229,15 @@ def study(options: Options) -> dict[str, Any]:
     }
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Command line of the study; returns the exit code."""
-    options = tyro.cli(Options, prog="python -m studies.learning.bound", args=arguments)
+def run(options: Options, results: Results) -> None:
+    """Search the pentagon alone, or everything."""
     began = time.perf_counter()
     if options.only_pentagon:
         print(f"Pentagon: {len(search_pentagon(options))} strokes, in {time.perf_counter() - began:.0f} s.")
-        return 0
-    results = study(options)
-    given = sys.argv[1:] if arguments is None else arguments
-    results |= provenance(shlex.join(["python", "-m", "studies.learning.bound", *given]))
-    write_atomically(options.out, (json.dumps(results, indent=1) + "\n").encode())
-    draw(results, options.out.with_suffix(".png"))
+        return
+    results.update(study(options))
     print(json.dumps({key: value for key, value in results.items() if key != "pentagon"}, indent=1))
     print(f"Pentagon: {results['pentagon']['strokes']} strokes. All in {time.perf_counter() - began:.0f} s.")
-    return 0
 
 
-if __name__ == "__main__":
-    run_command(main)
+STUDY = Study("learning.bound", run, Options, "bound.json", pictures={"bound.png": draw})

@@ -4,21 +4,17 @@
 
 Robots swim it for several demanded turns: by the chapter's strokes and by wires every 0.2 s, which turn by a gait and
 then swim by the policy in the box, and by wires every 0.5 s with the planner, or with a policy that was trained on
-random paths with random headings. All do the mirror image of it to the other side. Writes `heading.json`, `heading.png`
-and the table in Markdown.
+random paths with random headings. All do the mirror image of it to the other side. Writes `heading.json` and
+`heading.png`.
 """
 
-import json
-import shlex
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
-import tyro
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
@@ -26,7 +22,6 @@ from stable_baselines3 import PPO
 from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_model
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
-from seastar_gym.command import run_command
 from seastar_gym.controllers import learned
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.planner import Planner
@@ -42,12 +37,11 @@ from seastar_gym.envs.symmetry import (
 )
 from seastar_gym.envs.task import make_scene
 from seastar_gym.evaluation.swim import Swim, decisions_in, swim
-from seastar_gym.files import write_atomically
 from seastar_gym.gaits import turning_wave
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
-from studies.learning.heading_page import draw, table
-from studies.provenance import provenance
+from studies.frame import Study
+from studies.style import CYCLE, DPI, FAINT, subplots
 
 Floats = NDArray[np.float64]
 
@@ -88,6 +82,36 @@ class Reduced:
         return restore_actions(action, element, self.actions, n_limbs), None
 
 
+COLOURS = {"strokes": FAINT, "wires": CYCLE[0], "planner": CYCLE[2], "learned": CYCLE[1]}
+
+
+def table(results: Mapping[str, Any]) -> str:
+    """Table of the results in Markdown. The last column is what the largest turn costs beyond none."""
+    turns = results["turns_deg"]
+    more = f"{turns[-1]:g}° less {turns[0]:g}°"
+    lines = [f"| | {' | '.join(f'{turn:g}°' for turn in turns)} | {more} |", f"| --- |{' ---: |' * (len(turns) + 1)}"]
+    for each in results["swims"].values():
+        for what, unit in (("seconds", "s"), ("joules", "J")):
+            first, last = each[what][0], each[what][-1]
+            numbers = [*each[what], None if first is None or last is None else last - first]
+            cells = ["-" if one is None else f"{one:.0f}" for one in numbers]
+            lines.append(f"| {each['what']} [{unit}] | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def draw(results: Mapping[str, Any], file: Path) -> None:
+    """Time and energy over the demanded turn."""
+    figure, panels = subplots(1, 2, figsize=(8.0, 4.2))
+    for axes, what, label in zip(panels, ("seconds", "joules"), ("time [s]", "electric energy [J]"), strict=True):
+        for name, each in results["swims"].items():
+            numbers = [np.nan if one is None else one for one in each[what]]
+            axes.plot(results["turns_deg"], numbers, "o-", color=COLOURS[name], label=each["what"])
+        axes.set(xlabel="demanded turn [degrees]", ylabel=f"{label} to arrive", xticks=results["turns_deg"])
+        axes.set_ylim(bottom=0.0)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper left", ncols=2)
+    figure.savefig(file, dpi=DPI)
+
+
 @dataclass(frozen=True)
 class Options:
     """Swim to a waypoint with a demanded turn, by strokes, by wires and by a policy that learned it."""
@@ -103,7 +127,7 @@ class Options:
     turns: tuple[float, ...] = TURNS
     """Demanded turns [deg]."""
     out: Path = Path("runs/heading")
-    """Folder of heading.json, heading.png, heading.md and the learner."""
+    """Folder of heading.json, heading.png and the learner."""
 
 
 def train(options: Options) -> PPO:
@@ -177,18 +201,12 @@ def study(options: Options) -> dict[str, Any]:
     }
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line; returns the exit code."""
-    options = tyro.cli(Options, prog="python -m studies.learning.heading", args=arguments)
-    given = sys.argv[1:] if arguments is None else arguments
-    made = provenance(shlex.join(["python", "-m", "studies.learning.heading", *given]), "torch", "stable_baselines3")
-    results = {**made, **study(options)}
-    write_atomically(options.out / "heading.json", (json.dumps(results, indent=1) + "\n").encode())
-    draw(results, options.out / "heading.png")
-    (options.out / "heading.md").write_text(table(results), encoding="utf-8")
-    print(table(results))
-    return 0
-
-
-if __name__ == "__main__":
-    run_command(main)
+STUDY = Study(
+    "learning.heading",
+    lambda options, results: results.update(study(options)),
+    Options,
+    "heading.json",
+    pictures={"heading.png": draw},
+    tables={"heading": table},
+    packages=("torch", "stable_baselines3"),
+)

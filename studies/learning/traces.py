@@ -9,14 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from seastar_gym.command import run_command
 from seastar_gym.controllers.roster import load_agents
 from seastar_gym.evaluation.comparison import evaluate
 from seastar_gym.evaluation.pictures import draw_traces
 from seastar_gym.evaluation.swim import Swim
-from studies.kept import keep
-from studies.parser import study_parser
-from studies.provenance import provenance
+from studies.frame import InDocs, Results, Study
 from studies.style import apply_style
 
 AGENTS = ("learned", "pentagon")
@@ -66,16 +63,10 @@ def draw(results: Mapping[str, Any], file: Path) -> None:
     draw_traces(from_data(results), RADIUS, file)
 
 
-def main() -> None:
-    """Command line: swim, write the files."""
-    parser = study_parser("studies.learning.traces", __doc__)
-    parser.add_argument("--out", type=Path, default=Path("docs"), help="folder (default: %(default)s)")
-    options = parser.parse_args()
-    results = {**provenance("python -m studies.learning.traces"), **as_data(swims())}
-    keep(results, options.out / "pentagon.json")
-    draw(results, options.out / "pentagon.png")
+def run(_: InDocs, results: Results) -> None:
+    """Swim."""
+    results.update(as_data(swims()))
     print(", ".join(f"{each.agent}: {each.result}" for each in from_data(results)))
 
 
-if __name__ == "__main__":
-    run_command(main)
+STUDY = Study("learning.traces", run, file="pentagon.json", pictures={"pentagon.png": draw})

@@ -8,9 +8,8 @@ in the same way. `--swims` swims the chapter's robot with the measured limbs.
 Prints tables and writes `limbs.json` and `limbs.png`. Takes about ten seconds on one core, with `--models` a minute.
 """
 
-import json
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +18,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from seastar_gym.command import run_command
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.pulse import pulse
+from studies.frame import Results, Study
 from studies.measurements.curves import PHASES, Curve, read_curves
 from studies.measurements.fit import Fit, fit, predict
 from studies.measurements.model import MODELS
@@ -35,8 +34,6 @@ from studies.measurements.swims import (
     policies,
     round_the_pentagon,
 )
-from studies.parser import study_parser
-from studies.provenance import provenance
 
 CHOSEN = "delay"
 """The model of `SmaLimb`."""
@@ -159,19 +156,24 @@ def study_policies(console: Console) -> dict[str, Any]:
     return found
 
 
-def main() -> None:
-    """Command line."""
-    parser = study_parser("studies.measurements.limbs", __doc__)
-    parser.add_argument("--out", type=Path, default=Path("docs"), metavar="FOLDER", help="folder of the results")
-    parser.add_argument("--models", action="store_true", help="also compare the other models")
-    parser.add_argument("--swims", action="store_true", help="also swim with the measured limbs (two minutes)")
-    options = parser.parse_args()
-    options.out.mkdir(parents=True, exist_ok=True)
+@dataclass(frozen=True)
+class Options:
+    """Fits of measured limbs, and predictions."""
+
+    out: Path = Path("docs")
+    """Folder of the files, or the file of the numbers."""
+    models: bool = False
+    """Also compare the other models."""
+    swims: bool = False
+    """Also swim with the measured limbs (two minutes)."""
+
+
+def run(options: Options, results: Results) -> None:
+    """Fit and predict, compare models and swim as far as it is asked for; prints tables."""
     console, curves = Console(), read_curves()
     _, figures = study_model(CHOSEN, curves)
     print_fits(console, figures, curves)
-    command = "python -m studies.measurements.limbs" + " --models" * options.models + " --swims" * options.swims
-    results: dict[str, Any] = {**provenance(command, "scipy"), "model": CHOSEN, "fits": figures}
+    results.update(model=CHOSEN, fits=figures)
     if options.models:
         all_models = {name: summary(study_model(name, curves)[1]) for name in MODELS}
         columns = ("model", f"curves below {AIM}", "error", "AIC", "between", "beyond")
@@ -180,9 +182,8 @@ def main() -> None:
     if options.swims:
         results["gaits"], results["swims"] = list(GAITS), study_swims(console)
         results["strokes_round_the_pentagon"] = study_policies(console)
-    (options.out / "limbs.json").write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
-    draw(results, options.out / "limbs.png")
 
 
-if __name__ == "__main__":
-    run_command(main)
+STUDY = Study(
+    "measurements.limbs", run, Options, "limbs.json", pictures={"limbs.png": draw}, packages=("scipy",)
+)

@@ -3,20 +3,19 @@
 Draws both side by side, at the same simulated time, until the faster one has arrived, and writes an animated GIF.
 """
 
-import argparse
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from seastar_gym.command import run_command
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import in_the_box, load
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.films import Picture, shrunk, write_gif
 from seastar_gym.evaluation.rollout import Info, rollout
-from studies.parser import study_parser
+from studies.frame import Results, Study
 
 BETWEEN = 0.4
 """Simulated time between two frames [s]."""
@@ -48,16 +47,23 @@ def side_by_side(left: list[Picture], right: list[Picture]) -> list[Picture]:
     return [np.concatenate(both, axis=1) for both in zip(left, right, strict=False)]
 
 
-def main() -> None:
-    """Command line: draw and write the film."""
-    parser: argparse.ArgumentParser = study_parser("studies.scenes.film", __doc__)
-    parser.add_argument("--decision-period", type=float, default=0.2, help="of the policy on the right [s]")
-    parser.add_argument("--frames", type=int, default=None, help="largest number of frames")
-    parser.add_argument("--out", type=Path, default=Path("docs/swim.gif"), help="file (default: %(default)s)")
-    options = parser.parse_args()
+@dataclass(frozen=True)
+class Options:
+    """Film of two robots round the pentagon."""
+
+    decision_period: float = 0.2
+    """Of the policy on the right [s]."""
+    frames: int | None = None
+    """Largest number of frames."""
+    out: Path = Path("docs/swim.gif")
+    """File."""
+
+
+def run(options: Options, _: Results) -> None:
+    """Draw and write the film."""
     parts = round(2 * options.decision_period / BETWEEN)
     if not np.isclose(parts * BETWEEN, 2 * options.decision_period) or parts == 0:
-        parser.error(f"decisions must take a whole number of {BETWEEN / 2:g} s, not {options.decision_period:g} s.")
+        raise ValueError(f"decisions must take a whole number of {BETWEEN / 2:g} s, not {options.decision_period:g} s.")
     policy = load(in_the_box(options.decision_period))
     gait = scripted("pentagon", policy.actions)
     # As `seastar swim` shows it, and at the same fidelity as the other.
@@ -69,5 +75,4 @@ def main() -> None:
     print(f"Written: {options.out}, {len(film)} frames of {BETWEEN} s.")
 
 
-if __name__ == "__main__":
-    run_command(main)
+STUDY = Study("scenes.film", run, Options)

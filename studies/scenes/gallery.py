@@ -5,7 +5,6 @@ time of a stroke of random commands relative to that of the default scene. Scene
 other work of the machine affects all of them alike, and the median over strokes counts.
 """
 
-import json
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.command import run_command
 from seastar_gym.scene import Contact, Numerics, Scene, Seastar
 from seastar_gym.scene.actuators.limited import Limited
 from seastar_gym.scene.actuators.measured import MeasuredCurve
@@ -23,8 +21,8 @@ from seastar_gym.scene.actuators.pulse import SmaPulse
 from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.limb import Limb
 from seastar_gym.simulator import Simulator
-from studies.parser import study_parser
-from studies.provenance import footer, provenance
+from studies.frame import Results, Study
+from studies.provenance import footer
 from studies.style import INK, subplots
 
 Floats = NDArray[np.float64]
@@ -191,23 +189,24 @@ def measured(rounds: int = ROUNDS, n_robots: int = ROBOTS) -> dict[str, Any]:
     shown = exhibits()
     found = zip(shown, *measure_costs(shown, rounds, n_robots), strict=True)
     scenes = {one.name: {"cost": round(cost, 3), "iterations_per_step": round(each, 3)} for one, cost, each in found}
-    return {**provenance("python -m studies.scenes.gallery"), "scenes": scenes}
+    return {"scenes": scenes}
 
 
-def main() -> None:
-    """Command line: write the gallery and print its page."""
-    parser = study_parser("studies.scenes.gallery", __doc__)
-    parser.add_argument("--out", type=Path, default=Path("docs"), help="folder of the page (default: %(default)s)")
-    parser.add_argument("--draw-only", action="store_true", help="draw the pictures, measure nothing")
-    options = parser.parse_args()
+@dataclass(frozen=True)
+class Options:
+    """Pictures and costs of scenes."""
+
+    out: Path = Path("docs")
+    """Folder of the files, or the file of the numbers."""
+    draw_only: bool = False
+    """Draw the pictures, measure nothing."""
+
+
+def run(options: Options, results: Results) -> None:
+    """Draw the pictures, and measure the costs if they are asked for."""
     draw_all(options.out)
-    if options.draw_only:
-        return
-    results = measured()
-    (options.out / "gallery.json").write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
-    (options.out / "gallery.md").write_text(page(results), encoding="utf-8")
-    print(page(results))
+    if not options.draw_only:
+        results.update(measured())
 
 
-if __name__ == "__main__":
-    run_command(main)
+STUDY = Study("scenes.gallery", run, Options, "gallery.json", pages={"gallery.md": page})

@@ -5,17 +5,16 @@ page, which follows paths that its reader draws: from each of the two straight g
 each of ten directions. Symmetry turns them to all headings.
 """
 
-import argparse
 import base64
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.command import run_command
 from seastar_gym.controllers.learned import in_the_box, load
 from seastar_gym.envs.rendering import limb_nodes
 from seastar_gym.envs.stations import heading_of
@@ -25,7 +24,7 @@ from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.simulator import Simulator
-from studies.parser import study_parser
+from studies.frame import Results, Study
 
 Floats = NDArray[np.float64]
 
@@ -151,15 +150,20 @@ def record(fidelity: Fidelity = "balanced", most: int | None = None) -> dict[str
     }
 
 
-def main() -> None:
-    """Command line: record the swims and write the page."""
-    parser: argparse.ArgumentParser = study_parser("studies.scenes.page", __doc__)
-    parser.add_argument("--decisions", type=int, default=None, help="largest number of decisions of a recorded swim")
-    parser.add_argument("--out", type=Path, default=Path("docs/swim.html"), help="file (default: %(default)s)")
-    options = parser.parse_args()
+@dataclass(frozen=True)
+class Options:
+    """The page that swims."""
+
+    decisions: int | None = None
+    """Largest number of decisions of a recorded swim."""
+    out: Path = Path("docs/swim.html")
+    """File."""
+
+
+def run(options: Options, _: Results) -> None:
+    """Record the swims and write the page."""
     options.out.write_text(page(record(most=options.decisions)), encoding="utf-8")
     print(f"Written: {options.out}, {options.out.stat().st_size / 1e3:.0f} kB.")
 
 
-if __name__ == "__main__":
-    run_command(main)
+STUDY = Study("scenes.page", run, Options)

@@ -8,17 +8,16 @@ A richer model gains little. With latent heat, a smooth transformation, natural 
 the same way, the root mean square difference was 5.3 % at best; with this model it is 6 to 7 %.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from seastar_gym.command import run_command
 from seastar_gym.scene.actuators.pulse import SmaPulse
 from seastar_gym.scene.actuators.thermal import ThermalSma
-from studies.parser import study_parser
+from studies.frame import Results, Study
 from studies.style import subplots
 
 Floats = NDArray[np.float64]
@@ -92,15 +91,19 @@ def draw(actuator: ThermalSma, file: Path) -> None:
     figure.savefig(file)
 
 
-def main() -> None:
-    """Command line: print the fit and the defaults, and draw the default actuator."""
-    parser = study_parser("studies.scenes.thermal", __doc__)
-    parser.add_argument("--picture", type=Path, metavar="FILE", help="also draw the default actuator into this file")
-    options = parser.parse_args()
+@dataclass(frozen=True)
+class Options:
+    """Fit of the thermal actuator."""
+
+    picture: Path | None = None
+    """File into which the default actuator is drawn, too."""
+
+
+def run(options: Options, _: Results) -> None:
+    """Print the fit and the defaults, and draw the default actuator."""
     print(describe("fitted", fit()), describe("default", ThermalSma()), sep="\n")
     if options.picture is not None:
         draw(ThermalSma(), options.picture)
 
 
-if __name__ == "__main__":
-    run_command(main)
+STUDY = Study("scenes.thermal", run, Options)

@@ -1,1 +1,1 @@
-"""Measurements of speed: real-time factors, shares of time, operation counts, and the cost of terms and safeguards."""
+"""Measurements of speed: real-time factors, shares of time, operation counts, and the cost of terms."""

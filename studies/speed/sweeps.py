@@ -12,11 +12,11 @@ import statistics
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from seastar_gym.command import run_command
 from seastar_gym.executors import Executor
 from seastar_gym.executors.here import Here
 from seastar_gym.executors.processes import Processes
@@ -27,8 +27,7 @@ from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.parts import Parts, part_of
 from seastar_gym.sweep.run import run
-from studies.parser import study_parser
-from studies.provenance import provenance
+from studies.frame import Results, Study
 
 require_extra("Sweeps", "sweep", "pyarrow")
 
@@ -142,20 +141,21 @@ def table(found: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def main() -> None:
-    """Command line: measure and print."""
-    parser = study_parser("studies.speed.sweeps", __doc__)
-    parser.add_argument("--out", type=Path, help="JSON file for the figures")
-    parser.add_argument("--quick", action="store_true", help="fewer cells")
-    options = parser.parse_args()
-    found = provenance("python -m studies.speed.sweeps")
-    found |= measure(4 if options.quick else 10, 64 if options.quick else 256, 10, (1, 2))
-    found[f"reckoned: {NODES} such nodes"] = reckon(found, 2)
-    text = json.dumps(found, indent=1)
-    print(text)
-    if options.out is not None:
-        options.out.write_text(text + "\n", encoding="utf-8")
+@dataclass(frozen=True)
+class Options:
+    """Speed of sweeps."""
+
+    out: Path = Path("runs/sweeps")
+    """Folder of the files, or the file of the numbers."""
+    quick: bool = False
+    """Fewer cells."""
 
 
-if __name__ == "__main__":
-    run_command(main)
+def run_cells(options: Options, results: Results) -> None:
+    """Measure, and reckon a cluster."""
+    results.update(measure(4 if options.quick else 10, 64 if options.quick else 256, 10, (1, 2)))
+    results[f"reckoned: {NODES} such nodes"] = reckon(results, 2)
+    print(json.dumps(results, indent=1))
+
+
+STUDY = Study("speed.sweeps", run_cells, Options, "sweeps.json", tables={"sweeps": table})

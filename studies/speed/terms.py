@@ -14,14 +14,13 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from seastar_gym.command import run_command
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import AlongLimb, Body, Contact, Limb, Numerics, Scene, Seastar, Stiffening, relaxation_time
 from seastar_gym.scene.currents import GridCurrent, ShearCurrent, UniformCurrent, Vortex
 from seastar_gym.scene.fluid import Water
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator import Simulator
-from studies.parser import study_parser
+from studies.frame import Results, Study
 
 PRESSING = np.array([1.0, -1.0, 0.0, 0.0, 0.0])
 """Command that presses limbs 1 and 2 together."""
@@ -149,25 +148,30 @@ def as_table(costs: list[Cost]) -> Table:
     return table
 
 
-def main() -> None:
-    """Command line: measure the costs, print them and write them as CSV."""
-    parser = study_parser("studies.speed.terms", __doc__)
-    parser.add_argument("--rounds", type=int, default=40, help="strokes of every scene (default: %(default)s)")
-    parser.add_argument("--out", type=Path, default=Path("runs/terms"), help="folder for CSV (default: %(default)s)")
-    arguments = parser.parse_args()
-    costs = measure(scenes(), arguments.rounds)
+@dataclass(frozen=True)
+class Options:
+    """Cost of each term of a scene."""
+
+    rounds: int = 40
+    """Strokes of every scene."""
+    out: Path = Path("runs/terms")
+    """Folder for the CSV."""
+
+
+def run(options: Options, _: Results) -> None:
+    """Measure the costs, print them and write them as CSV."""
+    costs = measure(scenes(), options.rounds)
     touching = {THE_CHAPTERS: Scene(), "contact, a pair of limbs pressed together": Scene(contact=Contact())}
     touching = {name: in_ten_nodes(scene) for name, scene in touching.items()}
-    costs += measure(touching, arguments.rounds, PRESSING)[1:]
+    costs += measure(touching, options.rounds, PRESSING)[1:]
     Console().print(as_table(costs))
-    arguments.out.mkdir(parents=True, exist_ok=True)
+    options.out.mkdir(parents=True, exist_ok=True)
     rows = [{**asdict(cost), "low": cost.quartiles[0], "high": cost.quartiles[1]} for cost in costs]
     names = ["name", "iterations", "seconds", "per_iteration", "low", "high", "per_stroke"]
-    with (arguments.out / "terms.csv").open("w", newline="") as file:
+    with (options.out / "terms.csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, names, extrasaction="ignore")
         writer.writeheader()
         writer.writerows(rows)
 
 
-if __name__ == "__main__":
-    run_command(main)
+STUDY = Study("speed.terms", run, Options)

@@ -17,9 +17,8 @@ from rich.table import Table
 from tqdm import tqdm
 
 from seastar_gym.accuracy.measure import machine
-from seastar_gym.command import run_command
 from seastar_gym.scene import Numerics, Scene, Seastar
-from studies.parser import study_parser
+from studies.frame import Results, Study
 from studies.speed.operations import count_operations, flops
 from studies.speed.parts import part_seconds
 from studies.speed.peak import peak_gigaflops, peak_speedup
@@ -172,22 +171,24 @@ def draw(curves: dict[str, list[tuple[int, float]]], path: Path) -> None:
     figure.savefig(path)
 
 
-def main() -> None:
-    """Command line: measure, write the files and print the table."""
-    parser = study_parser("studies.speed.throughput", __doc__)
-    parser.add_argument("--quick", action="store_true", help="measure for a fifth of the time, with more noise")
-    parser.add_argument(
-        "--out", type=Path, default=Path("runs/throughput"), help="folder for CSV and picture (default: %(default)s)"
-    )
-    options = parser.parse_args()
+@dataclass(frozen=True)
+class Options:
+    """Speed of the simulator on this machine."""
+
+    quick: bool = False
+    """Measure for a fifth of the time, with more noise."""
+    out: Path = Path("runs/throughput")
+    """Folder for CSV and picture."""
+
+
+def run(options: Options, _: Results) -> None:
+    """Measure, write the files and print the table."""
     figures, curves = measure(0.2 if options.quick else 1.0)
     options.out.mkdir(parents=True, exist_ok=True)
     write_csv(figures, curves, options.out / "throughput.csv")
     draw(curves, options.out / "throughput.png")
-    console = Console()
-    console.print(as_table(figures))
-    console.print(f"Written: {options.out / 'throughput.csv'}, {options.out / 'throughput.png'}")
+    Console().print(as_table(figures))
+    print(f"Written: {options.out / 'throughput.csv'}, {options.out / 'throughput.png'}")
 
 
-if __name__ == "__main__":
-    run_command(main)
+STUDY = Study("speed.throughput", run, Options, drawn=("throughput.png",))

@@ -37,13 +37,6 @@ DASHES: dict[str, Any] = {"color": MARK, "linewidth": 1.6, "linestyle": (0, (4, 
 DPI = 120
 
 
-def draw_atlas(
-    cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], scheme: str, folder: Path
-) -> list[Path]:
-    """Write three pictures with one map per sweep each: what the solver needed, Newton iterations, and error."""
-    return [draw(cells, sweeps, steps, scheme, folder / f"stability_{what}.png") for what in DRAWN]
-
-
 def draw(cells: Sequence[Cell], sweeps: Sequence[Sweep], steps: Sequence[float], scheme: str, file: Path) -> Path:
     """Write the picture that a file's name ends with, such as stability_needs.png; returns the file."""
     return DRAWN[file.stem.rpartition("_")[2]](cells, sweeps, steps, NAMES[scheme], file)

@@ -7,7 +7,6 @@ converge, Newton iterations per step, and the error of the hub's path.
 
 `--long` simulates 10,000 strokes of random commands by 256 robots instead. `--growth` measures by how much the kinetic
 energy of 17 gaits grows over 200 strokes of the implicit midpoint rule, with some nodes, steps and stiffnesses.
-`--cost` measures what the solver's safeguards cost a robot that does not need them.
 """
 
 import csv
@@ -17,26 +16,23 @@ import os
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.table import Table
 from tqdm import tqdm
 
 from seastar_gym.scene.numerics import SchemeName
 from studies.chapter import ISSUES_FROM, REAL_TIME_FROM
-from studies.kept import keep, rounded
-from studies.parser import study_parser
-from studies.provenance import provenance
-from studies.speed.hardening import SETTINGS, cost_table, measure_cost
+from studies.frame import Results, Study
+from studies.kept import rounded
 from studies.stability.cases import QUICK_STEPS, STEPS, SWEEPS, Sweep, format_value, quick_sweeps
 from studies.stability.cells import Cell, commands_of, converged_displacements, run_cell, stroke_duration
 from studies.stability.long_run import growth_table, long_run, long_table
+from studies.stability.pictures import draw as draw_cells
 
 Floats = NDArray[np.float64]
 
@@ -119,20 +115,6 @@ def _errors(cells: list[Cell], sweep: Sweep) -> str:
     return ", ".join(f"{100 * error:.2g}" if math.isfinite(error) else "-" for error in errors) + " %"
 
 
-def as_table(rows: Sequence[Sequence[str]]) -> Table:
-    """Summary for a terminal of 100 columns or more."""
-    title = "Stability: one stroke per robot, time steps from 10 µs to 1 s"
-    table = Table(title=title, box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
-    table.add_column(SUMMARY[0])
-    for name, column in zip(SUMMARY[1:], list(zip(*rows, strict=True))[1:], strict=True):
-        table.add_column(name, justify="right", width=max(map(len, [*name.split(), *column])))
-    for row in rows[:-1]:
-        table.add_row(*row)
-    table.add_section()
-    table.add_row(*rows[-1])
-    return table
-
-
 def as_markdown(rows: Sequence[Sequence[str]]) -> str:
     """Summary as a table in Markdown."""
     lines = [SUMMARY, ["---", *["---:"] * (len(SUMMARY) - 1)], *rows]
@@ -146,10 +128,10 @@ KEPT = (
 """What pictures and summary show of a cell."""
 
 
-def as_data(cells: Iterable[Cell], command: str, scheme: SchemeName) -> dict[str, Any]:
-    """Cells as plain data, with where they come from; None where a cell has no number, and for vacuum."""
+def as_data(cells: Iterable[Cell], scheme: SchemeName) -> dict[str, Any]:
+    """Cells as plain data; None where a cell has no number, and for vacuum."""
     rows = [[_plain(getattr(cell, name)) for name in KEPT] for cell in cells]
-    return {**provenance(command), "scheme": scheme, "columns": list(KEPT), "cells": rows}
+    return {"scheme": scheme, "columns": list(KEPT), "cells": rows}
 
 
 def _plain(value: Any) -> Any:
@@ -178,19 +160,24 @@ def write_csv(cells: Iterable[Cell], file: Path) -> None:
             writer.writerow(["vacuum" if n == "value" and cell.value is None else getattr(cell, n) for n in names])
 
 
-def main() -> None:
-    """Command line: run the atlas, the long run or the measurement of cost, and print its table."""
-    parser = study_parser("studies.stability", __doc__)
-    parser.add_argument("--quick", action="store_true", help="run a coarser grid, in a fraction of the time")
-    parser.add_argument("--scheme", choices=get_args(SchemeName), default="implicit-euler", metavar="SCHEME",
-                        help="scheme of the atlas: %(choices)s (default: %(default)s)")  # fmt: skip
-    parser.add_argument("--long", action="store_true", help="simulate a long run of random commands instead")
-    parser.add_argument("--growth", action="store_true", help="measure the energy that long swims gather instead")
-    parser.add_argument("--cost", action="store_true", help="measure the cost of the safeguards instead")
-    parser.add_argument(
-        "--out", type=Path, default=Path("runs/stability"), help="folder for tables and pictures (default: %(default)s)"
-    )
-    options = parser.parse_args()
+@dataclass(frozen=True)
+class Options:
+    """Robustness and accuracy of the solver over time steps."""
+
+    quick: bool = False
+    """Run a coarser grid, in a fraction of the time."""
+    scheme: SchemeName = "implicit-euler"
+    """Scheme of the atlas."""
+    long: bool = False
+    """Simulate a long run of random commands instead."""
+    growth: bool = False
+    """Measure the energy that long swims gather instead."""
+    out: Path = Path("runs/stability")
+    """Folder of the files, or the file of the numbers."""
+
+
+def run(options: Options, results: Results) -> None:
+    """Run the atlas or a long run, and print its table."""
     console = Console()
     if options.long:
         console.print(long_table(long_run(1000 if options.quick else 10_000)))
@@ -198,22 +185,38 @@ def main() -> None:
     if options.growth:
         console.print(growth_table())
         return
-    if options.cost:
-        console.print(cost_table([measure_cost(numerics) for numerics in SETTINGS]))
-        return
-    from studies.stability.pictures import draw_atlas
-
     sweeps, steps = (quick_sweeps(), QUICK_STEPS) if options.quick else (SWEEPS, STEPS)
     start = time.perf_counter()
     cells = atlas(sweeps, steps, options.scheme)
     options.out.mkdir(parents=True, exist_ok=True)
-    rows = summarise(cells, sweeps)
-    files = [options.out / "stability.csv", options.out / "stability.json"]
-    write_csv(cells, files[0])
-    command = "python -m studies.stability" + " --quick" * options.quick
-    command += f" --scheme {options.scheme}" * (options.scheme != "implicit-euler")
-    keep(as_data(cells, command, options.scheme), files[1])
-    files += draw_atlas(cells, sweeps, steps, options.scheme, options.out)
-    console.print(as_table(rows))
-    names = ", ".join(one.name for one in files)
-    console.print(f"{time.perf_counter() - start:.0f} s. Written to {options.out}: {names}")
+    write_csv(cells, options.out / "stability.csv")
+    results.update(as_data(cells, options.scheme))
+    console.print(f"{time.perf_counter() - start:.0f} s. Written, too: {options.out / 'stability.csv'}")
+
+
+def sweeps_of(cells: Sequence[Cell]) -> list[Sweep]:
+    """The sweeps that cells are of, with their values."""
+    values = {one.name: tuple(dict.fromkeys(cell.value for cell in cells if cell.sweep == one.name)) for one in SWEEPS}
+    return [replace(one, values=values[one.name]) for one in SWEEPS if values[one.name]]
+
+
+def draw(results: Mapping[str, Any], file: Path) -> None:
+    """Draw a picture from plain data: the one that the file's name ends with, such as stability_needs.png."""
+    cells = from_data(results)
+    draw_cells(cells, sweeps_of(cells), list(dict.fromkeys(cell.step for cell in cells)), results["scheme"], file)
+
+
+def table(results: Mapping[str, Any]) -> str:
+    """The summary in Markdown, from plain data."""
+    cells = from_data(results)
+    return as_markdown(summarise(cells, sweeps_of(cells)))
+
+
+STUDY = Study(
+    "stability",
+    run,
+    Options,
+    "stability.json",
+    pictures={f"stability_{name}.png": draw for name in ("needs", "iterations", "error")},
+    tables={"stability": table},
+)

@@ -6,16 +6,12 @@ The learned policy is the one in the box. A dataset that is there is not made ag
 stopped. Read them with MINARI_DATASETS_PATH=OUT, under the names TASK/random-v0, TASK/greedy-v0 and TASK/learned-v0.
 """
 
-import sys
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import tyro
 
 from seastar_gym import TASKS
-from seastar_gym.command import run_command
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import load
 from seastar_gym.controllers.scripted import scripted
@@ -26,6 +22,7 @@ from seastar_gym.evaluation.tasks import make_batch
 from seastar_gym.extras import require_extra
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
+from studies.frame import Results, Study
 from studies.tasks.controllers import make_controller
 from studies.tasks.episodes import Agent, rollout_of
 
@@ -98,17 +95,10 @@ def make_datasets(options: Options) -> None:
             print(f"{name}: {summary(episodes)}", flush=True)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line; returns the exit code."""
-    try:
-        options = tyro.cli(Options, prog="python -m studies.tasks.data", args=arguments)
-        require_extra("Datasets", "data", "minari", "h5py")
-        make_datasets(options)
-    except (ValueError, ModuleNotFoundError) as wrong:
-        print(wrong, file=sys.stderr)
-        return 2
-    return 0
+def run(options: Options, _: Results) -> None:
+    """Write the datasets that are missing."""
+    require_extra("Datasets", "data", "minari", "h5py")
+    make_datasets(options)
 
 
-if __name__ == "__main__":
-    run_command(main)
+STUDY = Study("tasks.data", run, Options)

@@ -5,17 +5,17 @@ has a picture every BETWEEN seconds of the robot's time and shows FPS of them a 
 """
 
 import itertools
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from seastar_gym import TASKS
-from seastar_gym.command import run_command
 from seastar_gym.evaluation.films import Picture, shrunk, write_gif
 from seastar_gym.evaluation.rollout import Info
 from seastar_gym.evaluation.tasks import make_batch
-from studies.parser import study_parser
+from studies.frame import Results, Study, require_known
 from studies.tasks.ahead import Robots
 from studies.tasks.controllers import CONTROLLERS, is_swum, make_controller
 from studies.tasks.episodes import rollout_of
@@ -60,15 +60,28 @@ def pictures(id: str, agent_name: str | None, longest: float = LONGEST, instance
     return film
 
 
-def main() -> None:
-    """Command line: write the films."""
-    parser = study_parser("studies.tasks.films", __doc__)
-    parser.add_argument("--ids", nargs="*", default=list(TASKS), choices=list(TASKS), metavar="ID", help="environments")
-    parser.add_argument("--agent", choices=CONTROLLERS, help="who swims (default: adaptive, or planner)")
-    parser.add_argument("--seconds", type=float, default=LONGEST, help="longest film, simulated (default: %(default)s)")
-    parser.add_argument("--instance", type=int, default=0, help="number of the episode (default: %(default)s)")
-    parser.add_argument("--out", type=Path, default=Path("docs/gallery"), help="folder (default: %(default)s)")
-    options = parser.parse_args()
+@dataclass(frozen=True)
+class Options:
+    """Films of the tasks."""
+
+    ids: tuple[str, ...] = tuple(TASKS)
+    """Environments."""
+    agent: str | None = None
+    """Who swims; "adaptive", or "planner", by default."""
+    seconds: float = LONGEST
+    """Longest film, simulated [s]."""
+    instance: int = 0
+    """Number of the episode."""
+    out: Path = Path("docs/gallery")
+    """Folder."""
+
+    def __post_init__(self) -> None:
+        require_known("task", self.ids, TASKS)
+        require_known("agent", [self.agent] if self.agent else [], CONTROLLERS)
+
+
+def run(options: Options, _: Results) -> None:
+    """Write the films."""
     options.out.mkdir(parents=True, exist_ok=True)
     for id in options.ids:
         film = pictures(id, options.agent, options.seconds, options.instance)
@@ -76,5 +89,4 @@ def main() -> None:
         print(f"Written: {options.out / file_name(id)}, {len(film)} pictures.", flush=True)
 
 
-if __name__ == "__main__":
-    run_command(main)
+STUDY = Study("tasks.films", run, Options)

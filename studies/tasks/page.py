@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from seastar_gym.evaluation.statistics import crossed_interval
-from seastar_gym.files import write_atomically
 from studies.provenance import footer
 from studies.style import CYCLE, FAINT, as_numbers, subplots
 from studies.tasks.rows import MORE_IS_BETTER, ORDER, Row, rows_of
@@ -168,12 +167,3 @@ def _pictures(folder: Path, challenges: Iterable[str]) -> str:
         "\n".join(["\n`python -m studies.tasks.pictures` draws an episode of each:\n", "| | |", "|---|---|", *rows])
         + "\n"
     )
-
-
-def write_page(
-    results: Mapping[str, Any], ids: Mapping[str, str], out: Path, has_cell: Callable[[str, str], bool]
-) -> None:
-    """Write the page and the picture beside the results. has_cell: See `table`."""
-    picture = out.with_suffix(".png")
-    draw(rows_of(results, ids), picture)
-    write_atomically(out.with_suffix(".md"), page(results, ids, picture, has_cell).encode())

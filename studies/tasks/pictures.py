@@ -3,17 +3,14 @@
 python -m studies.tasks.pictures
 """
 
-from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from seastar_gym.command import run_command
 from seastar_gym.evaluation.tasks import make_batch
-from studies.parser import study_parser
+from studies.frame import InDocs, Results, Study
 from studies.tasks.controllers import make_controller
 from studies.tasks.episodes import rollout_of
 
@@ -37,17 +34,13 @@ def picture(id: str, controller: str, strokes: int, instance: int = 0) -> NDArra
     return np.asarray(drawn)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Command line; returns the exit code."""
-    parser = study_parser("studies.tasks.pictures", __doc__)
-    parser.add_argument("--out", type=Path, default=Path("docs/tasks"), help="folder (default: %(default)s)")
-    options = parser.parse_args(arguments)
-    options.out.mkdir(parents=True, exist_ok=True)
+def run(options: InDocs, _: Results) -> None:
+    """Draw the pictures into the folder tasks."""
+    folder = options.out / "tasks"
+    folder.mkdir(parents=True, exist_ok=True)
     for name, shown in SHOWN.items():
-        Image.fromarray(picture(*shown)).save(options.out / f"{name}.png", optimize=True)
+        Image.fromarray(picture(*shown)).save(folder / f"{name}.png", optimize=True)
         print(name, flush=True)
-    return 0
 
 
-if __name__ == "__main__":
-    run_command(main)
+STUDY = Study("tasks.pictures", run)

@@ -8,16 +8,13 @@ the file with as many episodes is not repeated, so the study can be broken off a
 """
 
 import itertools
-import json
-import sys
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
-import tyro
 
 from agents.tasks.command import file_of
 from seastar_gym import TASKS
@@ -25,14 +22,14 @@ from seastar_gym.controllers.learned import load
 from seastar_gym.envs.tasks.envs import CHALLENGES
 from seastar_gym.evaluation.measures import measure_of_challenge
 from seastar_gym.evaluation.rollout import Episodes
-from seastar_gym.files import write_atomically
 from seastar_gym.scene.numerics import Fidelity
-from studies.provenance import provenance
+from studies.frame import DOCS, Results, Study, require_known
 from studies.tasks import heading
 from studies.tasks.controllers import CONTROLLERS, is_swum, make_controller
 from studies.tasks.episodes import swim
 from studies.tasks.learning import ALL_LEARNERS, evaluate, train
-from studies.tasks.page import write_page
+from studies.tasks.page import draw, page
+from studies.tasks.rows import rows_of
 
 IDS: dict[str, str] = {id: about[0] for id, about in TASKS.items()} | {heading.ID: "heading"}
 """Name of the challenge of every id."""
@@ -64,14 +61,8 @@ class Options:
     """File of the results. The page and the picture have the same name with the suffixes .md and .png."""
 
     def __post_init__(self) -> None:
-        for kind, asked, known in (("task", self.ids, IDS), ("agent", self.agents, AGENTS)):
-            if unknown := set(asked) - set(known):
-                raise ValueError(f"Unknown {kind} {min(unknown)!r}: choose of {', '.join(known)}.")
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """What all cells of a file have in common."""
-        return {name: getattr(self, name) for name in ("decisions", "fidelity")}
+        require_known("task", self.ids, IDS)
+        require_known("agent", self.agents, AGENTS)
 
 
 def has_cell(id: str, agent: str) -> bool:
@@ -111,41 +102,25 @@ def cell(id: str, agent: str, seed: int, options: Options) -> dict[str, Any]:
     }
 
 
-def read_cells(options: Options) -> dict[str, Any]:
-    """Results in the output file, or empty ones; ValueError if they were made with other settings."""
-    if not options.out.is_file():
-        return {"settings": options.settings, "cells": {}}
-    results: Any = json.loads(options.out.read_text(encoding="utf-8"))
-    if results.get("settings") != options.settings:
-        raise ValueError(f"{options.out} has results of {results.get('settings')}, not of {options.settings}.")
-    return cast(dict[str, Any], results)
+def study(options: Options, results: Results) -> None:
+    """Swim the cells that are missing."""
+    cells = {
+        ("cells", f"{id}, {agent}, {seed}"): partial(cell, id, agent, seed, options)
+        for seed, id, agent in itertools.product(options.seeds, options.ids, options.agents)
+        if has_cell(id, agent) and (agent in ALL_LEARNERS or seed == options.seeds[0])
+    }
+    results.fill(
+        cells, lambda found: f"{np.mean(found['measure']):.2f}", lambda found: len(found["measure"]) >= options.episodes
+    )
 
 
-def study(options: Options) -> dict[str, Any]:
-    """Swim the cells that are missing, and write the results after each."""
-    for seed, id, agent in itertools.product(options.seeds, options.ids, options.agents):
-        name = f"{id}, {agent}, {seed}"
-        before = read_cells(options)["cells"].get(name, {"measure": ()})["measure"]
-        again = agent not in ALL_LEARNERS and seed != options.seeds[0]
-        if again or len(before) >= options.episodes or not has_cell(id, agent):
-            continue
-        found = cell(id, agent, seed, options)
-        results = read_cells(options)  # another process may have written meanwhile
-        results |= provenance("python -m studies.tasks", "torch", "stable_baselines3")
-        results["cells"][name] = found
-        options.out.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(options.out, (json.dumps(results) + "\n").encode())
-        print(f"{name}: {np.mean(found['measure']):.2f} ({found['processor_seconds']} s)", flush=True)
-    return read_cells(options)
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Command line of the study; returns the exit code."""
-    try:
-        options = tyro.cli(Options, prog="python -m studies.tasks", args=arguments)
-        results = study(options)
-    except ValueError as wrong:
-        print(wrong, file=sys.stderr)
-        return 2
-    write_page(results, IDS, options.out, has_cell)
-    return 0
+STUDY = Study(
+    "tasks",
+    study,
+    Options,
+    "tasks.json",
+    settings=lambda options: {name: getattr(options, name) for name in ("decisions", "fidelity")},
+    pictures={"tasks.png": lambda results, file: draw(rows_of(results, IDS), file)},
+    pages={"tasks.md": lambda results: page(results, IDS, DOCS / "tasks.png", has_cell)},
+    packages=("torch", "stable_baselines3"),
+)

@@ -9,8 +9,7 @@ Speeds are kept in the folder RUNS, so the study goes on where it was interrupte
 `validation.json` and `validation.png`.
 """
 
-import json
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, get_args
 
@@ -19,9 +18,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from seastar_gym.files import write_atomically
-from studies.parser import study_parser
-from studies.provenance import provenance
+from studies.frame import Results, Study
 from studies.validation import laws
 from studies.validation.inference import MODEL, SCATTER, Score, effective, hindsight, one_speed, predict, score, weights
 from studies.validation.luck import other_fours, scores
@@ -148,49 +145,53 @@ def as_json(
     }  # fmt: skip
 
 
-def add_laws(file: Path, conditions: list[Condition]) -> None:
-    """Write the laws of one constant into results that are there."""
-    results = json.loads(file.read_text(encoding="utf-8"))
-    results["laws"] = laws.law_scores(conditions, training(conditions), other_fours(conditions, FOURS))
-    write_atomically(file, (json.dumps(results, indent=1) + "\n").encode())
+@dataclass(frozen=True)
+class Options:
+    """Unknowns from four speeds, and predictions of the others."""
+
+    samples: int = SAMPLES
+    """Samples of the unknowns."""
+    variants: tuple[Variant, ...] = VARIANTS
+    """Parts to leave out."""
+    only_laws: bool = False
+    """Add the laws of one constant to the results that are there."""
+    runs: Path = Path("runs/validation")
+    """Folder of speeds."""
+    out: Path = Path("docs")
+    """Folder of the files, or the file of the numbers."""
 
 
-def main() -> None:
-    """Command line: simulate, weigh, predict, and leave parts out."""
-    parser = study_parser("studies.validation", __doc__)
-    parser.add_argument("--samples", type=int, default=SAMPLES, help="samples of the unknowns (default: %(default)s)")
-    parser.add_argument(
-        "--variants", nargs="*", metavar="PART", choices=VARIANTS, default=list(VARIANTS),
-        help="parts to leave out (default: all)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--only-laws", action="store_true", help="add the laws of one constant to the results that are there"
-    )
-    parser.add_argument("--runs", type=Path, default=Path("runs/validation"), help="folder of speeds")
-    parser.add_argument("--out", type=Path, default=Path("docs"), help="folder of results (default: %(default)s)")
-    arguments = parser.parse_args()
-    console, conditions, values = Console(), read_speeds(), samples(arguments.samples)
-    if arguments.only_laws:
-        add_laws(arguments.out / "validation.json", conditions)
+def run(options: Options, results: Results) -> None:
+    """Simulate, weigh, predict, and leave parts out."""
+    console, conditions, values = Console(), read_speeds(), samples(options.samples)
+    if options.only_laws:
+        results.read()
+        results["laws"] = laws.law_scores(conditions, training(conditions), other_fours(conditions, FOURS))
         return
-    simulated = simulate(conditions, "full", arguments.samples, arguments.runs, console)
+    simulated = simulate(conditions, "full", options.samples, options.runs, console)
     analyses = {"full": analyse(simulated, conditions)}
-    fewer = min(OF_VARIANTS, arguments.samples)
-    if arguments.variants:
+    fewer = min(OF_VARIANTS, options.samples)
+    if options.variants:
         analyses[SAME_SAMPLES] = analyse(simulated[:fewer], conditions)
-    for variant in arguments.variants:
-        of_variant = simulate(conditions, variant, fewer, arguments.runs, console)
+    for variant in options.variants:
+        of_variant = simulate(conditions, variant, fewer, options.runs, console)
         analyses[variant] = analyse(of_variant, conditions)
     print_tables(console, analyses, values)
-    result = as_json(analyses, conditions, values)
-    result["discretisation"] = discretisation(simulated, conditions, arguments.runs)
-    console.print(f"Twice as many edges and steps change speeds by {100 * result['discretisation']:.1f} % on average.")
+    results.update(as_json(analyses, conditions, values))
+    off = results["discretisation"] = discretisation(simulated, conditions, options.runs)
+    console.print(f"Twice as many edges and steps change speeds by {100 * off:.1f} % on average.")
     console.print(f"Half the predictions are within {100 * analyses['full']['score'].median:.1f} %.")
     console.print(f"The mean of the four speeds is {100 * analyses['full']['one speed']:.1f} % off.")
     console.print(f"Best of all samples, if told all speeds: {100 * analyses['full']['hindsight']:.1f} % off.")
-    console.print(f"Best known: {result['best_known']}, sweeps: {result['sweeps']}")
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    result = {**provenance("python -m studies.validation", "scipy"), **result}
-    console.print(laws.table(result), markup=False)
-    (arguments.out / "validation.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    draw(result, arguments.out / "validation.png")
+    console.print(f"Best known: {results['best_known']}, sweeps: {results['sweeps']}")
+
+
+STUDY = Study(
+    "validation",
+    run,
+    Options,
+    "validation.json",
+    pictures={"validation.png": draw},
+    tables={"validation": laws.table},
+    packages=("scipy",),
+)

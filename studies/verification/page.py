@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from rich.table import Table
 
 
 @dataclass(frozen=True)
@@ -72,13 +71,3 @@ def as_page(sections: Sequence[Section]) -> str:
         lines += ["| quantity | reference | ours | difference |", "|---|---:|---:|---:|"]
         lines += [f"| {' | '.join(as_cells(row))} |" for row in section.rows]
     return "\n".join(lines) + "\n"
-
-
-def as_table(section: Section) -> Table:
-    """Section as a table for the terminal; rows outside their bound are red."""
-    table = Table("quantity", title=section.title, title_justify="left")
-    for column in ("reference", "ours", "difference"):
-        table.add_column(column, justify="right", no_wrap=True)
-    for row in section.rows:
-        table.add_row(*as_cells(row), style="" if row.holds else "red")
-    return table

@@ -5,16 +5,17 @@ Two published codes computed the chapter's straight swim. Validation would need 
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
-from rich.console import Console
 from tqdm import tqdm
 
-from studies.parser import study_parser
+from studies.frame import Results, Study
+from studies.pages import show
 from studies.verification.drag import quadratic_drag
 from studies.verification.elastica import elastica
 from studies.verification.frequencies import natural_frequencies
-from studies.verification.page import Section, as_page, as_table
+from studies.verification.page import Section, as_page
 from studies.verification.published import published_codes
 from studies.verification.waves import bending_waves
 
@@ -28,17 +29,23 @@ SECTIONS: dict[str, Callable[[], Section]] = {
 """Sections of the page by name, in their order."""
 
 
-def main() -> None:
-    """Command line: compute all sections, write the page and print its tables."""
-    parser = study_parser("studies.verification", __doc__)
-    parser.add_argument(
-        "--out", type=Path, default=Path("docs/verification.md"), help="page to write (default: %(default)s)"
-    )
-    options = parser.parse_args()
+@dataclass(frozen=True)
+class Options:
+    """Exact solutions and published codes."""
+
+    out: Path = Path("docs/verification.md")
+    """Page to write."""
+
+
+def run(options: Options, _: Results) -> str | None:
+    """Compute all sections, write the page and show it."""
     sections = [section() for section in tqdm(SECTIONS.values(), unit="section")]
     options.out.parent.mkdir(parents=True, exist_ok=True)
     options.out.write_text(as_page(sections), encoding="utf-8")
-    console = Console()
-    for section in sections:
-        console.print(as_table(section))
-    console.print(f"Written: {options.out}")
+    show(as_page(sections))
+    print(f"Written: {options.out}")
+    outside = [row.quantity for section in sections for row in section.rows if not row.holds]
+    return f"Outside of their bounds: {'; '.join(outside)}." if outside else None
+
+
+STUDY = Study("verification", run, Options)

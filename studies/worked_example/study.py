@@ -7,33 +7,28 @@ are not those that its maker has written down. The fit finds its numbers with in
 train at. Policies are trained on the numbers written down, on the same with the fitted cooling time, on all fitted ones
 and on draws from the intervals, and swim on the robot as it was built: held-out random paths and the pentagon.
 
-The folder of the results has the two CSV files of the tracking, the certificate, results.json and results.png; the
-tables are put on the page. Results are written after every step, and a step whose result is already there is not
-repeated.
+The folder of the results has the two CSV files of the tracking, the certificate, results.json and results.png. Results
+are written after every step, and a step whose result is already there is not repeated.
 """
 
 import itertools
-import json
-import shlex
-import sys
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
+import numpy as np
 import torch
-import tyro
 
 from seastar_gym import Certificate, DomainRandomization, Scene, Uniform, certify
-from seastar_gym.accuracy.measure import machine
-from seastar_gym.files import write_atomically
 from seastar_gym.identify import Measurement, get_parameter, identify, with_parameters
 from seastar_gym.scene.checks import require_count, require_number
 from seastar_gym.version import __version__
+from studies.frame import Results, Study
 from studies.worked_example.pictures import draw
 from studies.worked_example.robots import FITTED, NOMINAL, built, tracked
-from studies.worked_example.tables import as_markdown, put_on_page
+from studies.worked_example.tables import as_markdown
 from studies.worked_example.trainings import Belief, scores, train
 
 TRACKING, COMMANDS, CERTIFICATE, RESULTS = "tracking.csv", "commands.csv", "certificate.json", "results.json"
@@ -60,8 +55,6 @@ class Options:
     """Number of held-out random paths."""
     out: Path = Path("docs/worked_example")
     """Folder of the results."""
-    page: Path | None = Path("docs/from_measurements.md")
-    """Page that the tables are put on; None for no page."""
 
     def __post_init__(self) -> None:
         for name, least in (("tracked", 1), ("samples", 2), ("strokes", 1), ("paths", 1)):
@@ -126,57 +119,32 @@ def beliefs(options: Options, results: dict[str, Any]) -> dict[str, Belief]:
     }
 
 
-def fill(options: Options, results: dict[str, Any]) -> None:
-    """Do the steps that are missing, and write the results after each."""
-    if "fit" not in results:
-        results["fit"] = fit(options)
-        write(options, results)
-    if "certificate" not in results:
-        results["certificate"] = certified(options, results)
-        write(options, results)
-    for seed, (name, belief) in itertools.product(options.seeds, beliefs(options, results).items()):
-        runs = results["runs"].setdefault(name, {})
-        if str(seed) in runs:
-            continue
-        policy, seconds = train(belief, seed, options.strokes)
-        runs[str(seed)] = {"processor_seconds": round(seconds, 1), **scores(policy, belief, options.paths)}
-        write(options, results)
-        times = runs[str(seed)]["random"]
-        print(f"{name}, seed {seed}: {sum(times) / len(times):.1f} s, trained in {seconds:.0f} s", flush=True)
-
-
-def write(options: Options, results: dict[str, Any]) -> None:
-    """Write the results so far."""
-    write_atomically(options.out / RESULTS, (json.dumps(results) + "\n").encode())
-
-
-def read_results(options: Options, command: str) -> dict[str, Any]:
-    """Results in the folder, or empty ones if it has none; ValueError if they were made with other settings."""
-    file = options.out / RESULTS
-    if not file.is_file():
-        return {"command": command, "machine": machine(), "settings": options.settings, "runs": {}}
-    results: Any = json.loads(file.read_text(encoding="utf-8"))
-    if results.get("settings") != options.settings:
-        raise ValueError(
-            f"{file} has results of {results.get('settings')}, not of {options.settings}: give another --out."
-        )
-    return cast(dict[str, Any], results)
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Command line of the study; returns the exit code."""
+def study(options: Options, results: Results) -> None:
+    """Do the steps that are missing."""
     torch.set_num_threads(1)
-    given = sys.argv[1:] if arguments is None else arguments
-    try:
-        options = tyro.cli(Options, prog="python -m studies.worked_example", args=given)
-        options.out.mkdir(parents=True, exist_ok=True)
-        results = read_results(options, shlex.join(["python", "-m", "studies.worked_example", *given]))
-        fill(options, results)
-        draw(results, (options.out / RESULTS).with_suffix(".png"))
-        print(as_markdown(results))
-        if options.page is not None:
-            put_on_page(results, options.page)
-    except ValueError as wrong:
-        print(wrong, file=sys.stderr)
-        return 2
-    return 0
+    options.out.mkdir(parents=True, exist_ok=True)
+    results.fill({("fit",): partial(fit, options)}, lambda found: f"{found['root_mean_square_m']:.2g} m")
+    results.fill({("certificate",): partial(certified, options, results)}, lambda found: found["setting"])
+    cells = {
+        ("runs", name, str(seed)): partial(trained, belief, seed, options)
+        for seed, (name, belief) in itertools.product(options.seeds, beliefs(options, results).items())
+    }
+    results.fill(cells, lambda found: f"{np.mean(found['random']):.1f} s")
+
+
+def trained(belief: Belief, seed: int, options: Options) -> dict[str, Any]:
+    """Train a policy, and swim with it."""
+    policy, seconds = train(belief, seed, options.strokes)
+    return {"processor_seconds": round(seconds, 1), **scores(policy, belief, options.paths)}
+
+
+STUDY = Study(
+    "worked_example",
+    study,
+    Options,
+    RESULTS,
+    home="worked_example",
+    settings=lambda options: options.settings,
+    pictures={"results.png": draw},
+    tables={"worked_example": as_markdown},
+)

@@ -1,14 +1,12 @@
 """Tables of the worked example, in Markdown."""
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.evaluation.statistics import mean_with_interval
-from seastar_gym.files import write_atomically
 from studies.worked_example.robots import DEVIATIONS, NOISE, nominal_values
 
 Floats = NDArray[np.float64]
@@ -123,17 +121,3 @@ def as_markdown(results: Mapping[str, Any]) -> str:
             "![Numbers that were fitted, and times of the policies](worked_example/results.png)",
         ]
     )
-
-
-BEGIN, END = "<!-- results: python -m studies.worked_example -->", "<!-- end of results -->"
-"""What the results stand between on a page."""
-
-
-def put_on_page(results: Mapping[str, Any], page: Path) -> None:
-    """Replace the results on a page; ValueError if it has no place for them."""
-    text = page.read_text(encoding="utf-8")
-    before, begin, rest = text.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not (begin and end):
-        raise ValueError(f"{page} has no lines {BEGIN} and {END} between which the results could stand.")
-    write_atomically(page, f"{before}{BEGIN}\n\n{as_markdown(results)}\n\n{END}{after}".encode())

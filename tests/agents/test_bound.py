@@ -11,11 +11,11 @@ from seastar_gym.controllers.scripted import to_actions
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.symmetry import action_table
 from seastar_gym.gaits import pair_gait
+from studies.command import main
 from studies.learning.bound import (
     all_directions,
     distinct_gaits,
     draw,
-    main,
     measure,
     mixed_speed,
     search_path,
@@ -64,7 +64,7 @@ def test_the_path_search_visits_all_waypoints_or_says_that_it_did_not():
 
 def test_the_pentagon_alone_can_be_searched_at_any_fidelity_and_nothing_is_written(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert main(["--only-pentagon", "--pentagon-beam", "1"]) == 0
+    assert main(["learning.bound", "--only-pentagon", "--pentagon-beam", "1"]) == 0
     strokes = int(capsys.readouterr().out.split()[1])
     assert 145 < strokes < 180 and not list(tmp_path.iterdir())
 
@@ -72,7 +72,7 @@ def test_the_pentagon_alone_can_be_searched_at_any_fidelity_and_nothing_is_writt
 @pytest.mark.slow
 def test_the_study_writes_numbers_and_a_picture(tmp_path):
     file = tmp_path / "bound.json"
-    assert main(["--pentagon-beam", "1", "--agents", "greedy", "--out", str(file)]) == 0
+    assert main(["learning.bound", "--pentagon-beam", "1", "--agents", "greedy", "--out", str(file)]) == 0
     results = json.loads(file.read_text(encoding="utf-8"))
     assert results["fastest_gaits"][0]["searched"] == 30
     assert len(results["pentagon"]["gait"]) == results["pentagon"]["strokes"] > 150

@@ -17,9 +17,10 @@ from seastar_gym.envs.task import make_scene
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.evaluation.statistics import mean_with_interval
 from seastar_gym.evaluation.swim import swim
+from studies.command import main
 from studies.learning.in_time import study, trainings
 from studies.learning.in_time.shares import ChosenCommands, SharesPolicy, shares_of_pairs
-from studies.learning.in_time.study import Options, main
+from studies.learning.in_time.study import Options
 from studies.learning.in_time.tables import as_markdown, pulses_per_metre
 from studies.learning.in_time.trainings import TRAININGS, Training, learn
 
@@ -69,19 +70,11 @@ def test_pages_beside_the_study_quote_its_mean_of_ten_seeds(page):
     assert f"{seconds['fast'].mean():.1f}" in text
 
 
-def test_a_seed_that_was_missing_stands_in_its_place(small, tmp_path):
-    out = tmp_path / "in_time.json"
-    command = ["--trainings", "pairs", "--paths", "2", "--again", "fast"]
-    command += ["--networks", str(tmp_path), "--out", str(out)]
-    for seed in ("1", "0"):
-        assert main([*command, "--seeds", seed]) == 0
-    assert list(json.loads(out.read_text())["runs"]["pairs"]) == ["0", "1"]
-
-
 def test_every_learner_is_measured_and_none_twice(small, tmp_path, capsys):
     out = tmp_path / "in_time.json"
     names = ("pairs", "shares", "gaussian", "sac", "td3", "later")
-    command = ["--trainings", *names, "--paths", "2", "--again", "fast", "--networks", str(tmp_path), "--out", str(out)]
+    command = ["learning.in_time", "--trainings", *names, "--paths", "2", "--again", "fast"]
+    command += ["--networks", str(tmp_path), "--out", str(out)]
     assert main([*command, "--seeds", "0"]) == 0
     first = json.loads(out.read_text())
     for name in names:
@@ -92,7 +85,7 @@ def test_every_learner_is_measured_and_none_twice(small, tmp_path, capsys):
     assert out.with_suffix(".png").is_file()
     capsys.readouterr()
     assert main([*command, "--seeds", "0", "1", "--trainings", "pairs"]) == 0
-    assert "seed 0" not in capsys.readouterr().out
+    assert ", 0: " not in capsys.readouterr().out
     again = json.loads(out.read_text())
     assert again["runs"]["pairs"].keys() == {"0", "1"} and again["runs"]["pairs"]["0"] == first["runs"]["pairs"]["0"]
 
@@ -165,10 +158,6 @@ def test_pulses_per_metre_are_those_of_the_path():
     assert pulses_per_metre([0.76 * 0.7185 * 300.0]) == pytest.approx(300.0, rel=1e-6)
 
 
-def test_what_is_unknown_or_of_other_settings_is_refused(tmp_path, capsys):
+def test_an_unknown_training_is_refused():
     with pytest.raises(ValueError, match="Unknown training 'faster'"):
         Options(trainings=("faster",))
-    out = tmp_path / "in_time.json"
-    out.write_text(json.dumps({"settings": {"paths": 1}, "runs": {}}))
-    assert main(["--out", str(out)]) == 2
-    assert "give another --out" in capsys.readouterr().err

@@ -30,14 +30,14 @@ from seastar_gym.evaluation.swim import swim
 from seastar_gym.gaits import in_time, lagged_gait, straight_gait, thrifty_gait, turning_wave
 
 PERIODS = (0.5, 0.2, 0.1)
-FAST = Numerics.preset("fast")
+FAST, SDIRK3 = Numerics.preset("fast"), Numerics("sdirk3", 1e-2, 1e-6)
 PLUS_MINUS = straight_gait()[0]  # {2+, 5-}
 SMALL = {"num_envs": 8, "rollout": 8, "batch_size": 32, "epochs": 1, "hidden": (8,), "max_episode_time": 5.0}
 
 
-def speed_and_turn(gait, decision_period, seconds=6):
+def speed_and_turn(gait, decision_period, seconds=6, scene=None):
     """Speed [m/s] and rate of turning [deg/s] over the last seconds, by fidelity "fast"."""
-    simulator = Simulator(make_scene(None, "fast", 0.5), 1, 1)
+    simulator = Simulator(scene or make_scene(None, "fast", 0.5), 1, 1)
     for second in range(2 * seconds):
         if second == seconds:
             hub, heading = simulator.hub_position(), simulator.heading()
@@ -76,6 +76,16 @@ def test_lagged_pairs_swim_farther_and_thrifty_ones_with_less_heat():
     thrifty, _ = speed_and_turn(thrifty_gait(0.5), 0.5)
     assert lagged > 2.0 * together and thrifty > 2.0 * together
     assert abs(turn) < 1e-3
+
+
+def test_lagged_pairs_swim_as_fast_whatever_scheme_step_and_nodes():
+    """But for the chapter's discretisation, in which the rods are other ones."""
+    plain = make_scene(None, "fast", 0.5)
+    fine = replace(plain, robot=replace(plain.robot, nodes_per_limb=37))
+    others = [replace(plain, numerics=each) for each in (SDIRK3, Numerics("implicit-euler", 1e-3, 1e-6))]
+    speeds = [speed_and_turn(lagged_gait(0.1), 0.1, 4, scene)[0] for scene in (plain, fine, *others)]
+    assert max(speeds) < 1.05 * min(speeds)
+    assert speed_and_turn(lagged_gait(0.1), 0.1, 4, make_scene(None, "chapter", 0.5))[0] > 0.5 * min(speeds)
 
 
 def test_the_wave_turns_on_the_spot():

@@ -135,10 +135,10 @@ def test_values_of_rewarded_actions_are_higher():
 
 
 def test_the_tasks_have_datasets_of_three_qualities_by_one_command(tmp_path, monkeypatch, capsys):
-    from studies.tasks.data import main as make
+    from studies.command import main as make
 
     monkeypatch.setenv("MINARI_DATASETS_PATH", "")
-    arguments = ["--ids", "SeastarPrey-v0", "--episodes", "2", "--out", str(tmp_path)]
+    arguments = ["tasks.data", "--ids", "SeastarPrey-v0", "--episodes", "2", "--out", str(tmp_path)]
     assert make(arguments) == 0
     names = [f"SeastarPrey/{quality}-v0" for quality in ("random", "greedy", "learned")]
     assert set(names) <= set(minari.list_local_datasets())

@@ -1,4 +1,4 @@
-"""When the last Newton step is left out: every condition alone; `studies.speed.foresight` measures the constants."""
+"""When the last Newton step is left out: every condition alone."""
 
 from types import SimpleNamespace
 

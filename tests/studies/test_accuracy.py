@@ -15,7 +15,7 @@ from seastar_gym.accuracy.setting import at
 from seastar_gym.gaits import PAIRS, STRAIGHT
 from seastar_gym.scene.numerics import Resolution
 from seastar_gym.simulator import Simulator
-from studies.accuracy import convergence
+from studies.accuracy import convergence, timed
 from studies.accuracy import rows as accuracy_rows
 from studies.accuracy import study as accuracy
 from studies.accuracy import tables as accuracy_tables
@@ -326,8 +326,7 @@ def test_a_study_whose_limit_is_in_doubt_is_not_stored(found, tmp_path):
     assert not (tmp_path / "strokes.json").exists()
 
 
-def test_quick_studies_cannot_be_stored(monkeypatch, capsys):
-    monkeypatch.setattr("sys.argv", ["accuracy", "--quick", "--store"])
-    with pytest.raises(SystemExit):
-        accuracy.main()
-    assert "--store needs the whole study" in capsys.readouterr().err
+@pytest.mark.parametrize("module", [accuracy, timed])
+def test_quick_studies_cannot_be_stored(module):
+    with pytest.raises(ValueError, match="--store needs the whole study"):
+        module.Options(quick=True, store=True)

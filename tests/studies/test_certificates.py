@@ -1,6 +1,7 @@
 """The certificates of the fastest designs: of the robots of the table, kept, and told on the page."""
 
 import json
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -12,6 +13,7 @@ if find_spec("pyarrow") is None:
 from seastar_gym.accuracy import Certificate, Setting
 from seastar_gym.accuracy.setting import physics
 from seastar_gym.version import __version__
+from studies.command import main
 from studies.designs import certificates
 from studies.designs.certificates import CLASS, NODES, STEPS, WINNERS, certificate_of, scene_of
 
@@ -60,12 +62,12 @@ def test_some_robots_leave_the_numbers_of_all_in_place(tmp_path, monkeypatch, ca
     """The file is written when the last robot has its certificate, in the order of the winners."""
     monkeypatch.setattr(certificates, "certify", lambda scene, samples, progress: made(scene, samples))
     monkeypatch.setattr(certificates, "told", lambda certificate: {"samples": certificate.samples})
+    monkeypatch.setattr(certificates, "STUDY", replace(certificates.STUDY, tables={}))
     kept = tmp_path / "certificates.json"
     kept.write_text("whole")
 
     def run(*robots):
-        monkeypatch.setattr("sys.argv", ["certificates", "--samples", "3", "--out", str(tmp_path), "--robots", *robots])
-        certificates.main()
+        assert main(["designs.certificates", "--samples", "3", "--out", str(tmp_path), "--robots", *robots]) == 0
 
     run(*WINNERS[1:])
     assert kept.read_text() == "whole" and "too: fastest." in capsys.readouterr().out

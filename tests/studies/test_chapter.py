@@ -11,7 +11,7 @@ import pytest
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse
 from seastar_gym.gaits import STRAIGHT, pentagon_gait
 from studies.chapter import cost, kept, pictures, statements, swims
-from studies.chapter.study import make_figures
+from studies.chapter.study import STUDY, make_figures
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 COARSE = replace(swims.CHAPTER, numerics=Numerics("implicit-euler", 10e-3))
@@ -210,7 +210,8 @@ def test_snapshots_show_actuated_limbs_in_blue(pentagon, tmp_path):
 
 @pytest.mark.slow
 def test_the_study_writes_every_figure(tmp_path):
-    rows = make_figures(tmp_path, quick=True, progress=False)
+    rows, found = make_figures(tmp_path, quick=True, progress=False)
+    STUDY.write(found, tmp_path)
     names = {"13_2", "13_5b", "13_6", "13_7a", "13_7b", "13_8", "13_9"}
     assert {file.name for file in tmp_path.glob("*.png")} == {f"fig_{name}.png" for name in names}
     for file in tmp_path.glob("*.png"):

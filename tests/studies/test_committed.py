@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
@@ -15,14 +16,16 @@ from seastar_gym.envs.task import make_scene
 from seastar_gym.evaluation.tasks import task_ids
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.version import __version__
-from studies import committed
 from studies.accuracy.tables import two_digits
-from studies.committed import BLOCK, PICTURES, UNCOVERED, filled, is_drawn_so, main, pages, table
+from studies.command import all_studies
 from studies.learning.bound import MEASURED, MM, SETTLING
-from studies.provenance import footer, machine, provenance
+from studies.pages import BLOCK, check, draw, filled, is_drawn_so, pages, tables, told
+from studies.provenance import FINAL, footer, machine, provenance
 from studies.scenes.page import UNIT, transitions
 
 DOCS = Path(__file__).parents[2] / "docs"
+STUDIES = list(all_studies())
+PICTURES = {name: study for study in told(DOCS, STUDIES) for name in study.pictures if not study.home}
 
 
 def read(name):
@@ -49,37 +52,37 @@ def test_the_fastest_gaits_swim_as_fast_as_bound_json_says(period):
 
 @pytest.mark.parametrize("name", PICTURES)
 def test_pictures_are_those_of_their_numbers(name):
-    """`python -m studies.committed` draws them again. fidelities.png and others are written by studies, too."""
-    pytest.importorskip("matplotlib")
-    assert is_drawn_so(DOCS, name)
+    """`python -m studies --draw` draws them again."""
+    assert is_drawn_so(DOCS, PICTURES[name], name)
 
 
 def test_another_number_makes_another_picture(tmp_path):
     """The comparison tells a curve that moved by one per cent."""
-    pytest.importorskip("matplotlib")
     shutil.copy(DOCS / "bound.png", tmp_path)
     results = read("bound.json")
     results["mm_per_stroke"]["learned"] = [1.01 * speed for speed in results["mm_per_stroke"]["learned"]]
     (tmp_path / "bound.json").write_text(json.dumps(results), encoding="utf-8")
-    assert not is_drawn_so(tmp_path, "bound.png")
+    assert not is_drawn_so(tmp_path, PICTURES["bound.png"], "bound.png")
 
 
 def test_pages_say_what_their_numbers_say():
-    """`python -m studies.committed` fills them again."""
-    assert [file.name for file, text in pages(DOCS) if file.read_text(encoding="utf-8") != text] == []
+    """`python -m studies --draw` fills them again."""
+    assert [file.name for file, text in pages(DOCS, STUDIES) if file.read_text(encoding="utf-8") != text] == []
 
 
 def test_a_number_that_was_changed_by_hand_is_noticed():
     page = (DOCS / "results.md").read_text(encoding="utf-8")
     assert "| discount 0.95 | 181.3 " in page
     changed = page.replace("| discount 0.95 | 181.3 ", "| discount 0.95 | 161.3 ")
-    assert filled(DOCS, changed) == page
+    assert filled(changed, tables(DOCS, STUDIES)) == page
 
 
-def test_every_picture_is_covered_or_has_a_command():
-    pictures = {file.name for file in DOCS.glob("*.png")}
-    assert pictures == PICTURES.keys() | UNCOVERED.keys()
-    assert not PICTURES.keys() & UNCOVERED.keys()
+def test_every_picture_is_made_of_its_numbers_or_by_a_study_or_is_final():
+    drawn = {name for study in STUDIES for name in study.drawn}
+    final = {name for name in FINAL if name.endswith(".png")}
+    assert {file.name for file in DOCS.glob("*.png")} == PICTURES.keys() | drawn | final
+    assert len(PICTURES) == sum(len(study.pictures) for study in told(DOCS, STUDIES) if not study.home)
+    assert not (PICTURES.keys() & drawn or (PICTURES.keys() | drawn) & final)
 
 
 def test_every_file_of_numbers_has_a_footer():
@@ -102,22 +105,22 @@ def test_the_page_of_environments_holds_every_contract():
 
 def test_a_table_of_no_study_is_refused():
     with pytest.raises(ValueError, match="No table is called 'luck'"):
-        table(DOCS, "luck")
+        filled("<!-- made: luck -->\n<!-- end -->", tables(DOCS, STUDIES))
 
 
-def test_the_command_fills_pages_and_names_what_is_stale(tmp_path, monkeypatch, capsys):
-    """A page with an empty block is stale, and is not after the command."""
+def test_stale_pages_are_named_and_filled(tmp_path, capsys):
+    """A page with an empty block is stale, and is not after it was filled; blocks of other studies stay."""
     for file in [*DOCS.glob("*.json"), DOCS / "results.md"]:
         shutil.copy(file, tmp_path)
     page = tmp_path / "results.md"
     page.write_text(BLOCK.sub(r"\1\4", page.read_text(encoding="utf-8")), encoding="utf-8")
-    monkeypatch.setattr(committed, "PICTURES", {})
-    monkeypatch.setattr(committed, "whole_pages", lambda docs: {})
-    monkeypatch.setattr("sys.argv", ["committed", "--docs", str(tmp_path), "--check"])
-    assert main() == 1 and capsys.readouterr().out == "results.md\n"
-    monkeypatch.setattr("sys.argv", ["committed", "--docs", str(tmp_path)])
-    assert main() == 0
+    alone = [replace(study, pictures={}, pages={}) for study in STUDIES]
+    assert check(tmp_path, alone) == 1 and capsys.readouterr().out == "results.md\n"
+    draw(tmp_path, [study for study in alone if study.name == "learning.bound"])
+    assert "made: ablations -->\n<!-- end" in page.read_text(encoding="utf-8") and check(tmp_path, alone) == 1
+    draw(tmp_path, alone)
     assert page.read_text(encoding="utf-8") == (DOCS / "results.md").read_text(encoding="utf-8")
+    assert check(tmp_path, alone) == 0
 
 
 def test_footers_say_command_versions_and_machine_and_what_is_not_known():

@@ -36,7 +36,7 @@ def test_the_page_and_the_picture_show_every_robot(tmp_path):
     ]  # fmt: skip
     results = {"samples": 6, "costs": dict.fromkeys(study.SETTINGS, 4.0), "rows": [row._asdict() for row in rows]}
     assert study.rows_of(results) == rows
-    page = study.as_markdown({**study.provenance("python -m studies.accuracy.error_bars"), **results})
+    page = study.as_markdown(results)
     for robot in study.ROBOTS:
         assert page.count(f"| {robot} |") == len(study.FIDELITIES)
     for setting in study.SETTINGS:

@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from seastar_gym.scene.actuators.sma_limb import FREQUENCIES, MEASURED
+from studies.command import main
 from studies.measurements import limbs
 from studies.measurements.curves import read_curves
 from studies.measurements.fit import fit, predict
@@ -69,9 +70,8 @@ def test_richer_models_fit_better_than_newtons_cooling_alone():
 
 
 @pytest.mark.slow
-def test_the_study_writes_its_figures_and_picture(tmp_path, monkeypatch):
-    monkeypatch.setattr("sys.argv", ["limbs", "--out", str(tmp_path)])
-    limbs.main()
+def test_the_study_writes_its_figures_and_picture(tmp_path):
+    assert main(["measurements.limbs", "--out", str(tmp_path)]) == 0
     found = json.loads((tmp_path / "limbs.json").read_text())
     errors = np.concatenate([one["errors"] for one in found["fits"].values()])
     assert errors.size == 48 and np.sum(errors < limbs.AIM) == 36

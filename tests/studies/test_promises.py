@@ -1,16 +1,15 @@
 """Promised errors are held against fresh sequences, class by class, and every exceedance is counted."""
 
 import json
-import sys
 
 import pytest
 
-from refusals import assert_refused
 from seastar_gym import Certificate, Numerics, Scene, Seastar
 from seastar_gym.accuracy import measure
 from seastar_gym.accuracy.commands import CLASSES, draw_classes
 from seastar_gym.accuracy.setting import resolved
 from studies.accuracy import promises
+from studies.command import main
 
 ROBOT = "short, L = 5 cm"
 
@@ -86,20 +85,18 @@ def test_a_robot_that_is_done_is_not_swum_again(few_settings, tmp_path, monkeypa
     monkeypatch.setattr(measure, "SAMPLES", 2)
     monkeypatch.setattr(measure.certify, "__defaults__", (2, 0, None))
     out, folder = tmp_path / "promises.json", tmp_path / "certificates"
-    command = ["promises", "--samples", "2", "--robots", ROBOT, "--certificates", str(folder), "--out", str(out)]
-    monkeypatch.setattr(sys, "argv", command)
-    promises.main()
+    command = ["accuracy.promises", "--samples", "2", "--robots", ROBOT]
+    command += ["--certificates", str(folder), "--out", str(out)]
+    assert main(command) == 0
     (file,) = folder.iterdir()
     assert Certificate.load(file).samples == 2
     first = json.loads(out.read_text())
     assert set(first["robots"]) == {ROBOT} and first["robots"][ROBOT]["certified"] == 2
-    assert f"| {ROBOT} |" in capsys.readouterr().out
-    monkeypatch.setattr(promises, "examine", None)
-    promises.main()
+    assert ROBOT in capsys.readouterr().out
+    monkeypatch.setattr(promises, "examine", lambda *_: pytest.fail("swum again"))
+    assert main(command) == 0
     assert json.loads(out.read_text()) == first
-    monkeypatch.setattr(sys, "argv", [*command, "--samples", "3"])
-    with pytest.raises(SystemExit, match="give another --out"):
-        promises.main()
+    assert main([*command, "--samples", "3"]) == 2 and "give another --out" in capsys.readouterr().err
 
 
 @pytest.mark.slow
@@ -110,7 +107,7 @@ def test_certified_errors_hold_on_fresh_sequences_of_every_class(tmp_path):
     assert sum(count > 3 for count in counts) <= 0.1 * len(counts)
 
 
-def test_results_of_another_version_are_not_mixed(tmp_path):
-    (tmp_path / "old.json").write_text(json.dumps({"samples": 2, "version": "0.0.1"}))
-    with assert_refused("another version"):
-        promises.read_results(tmp_path / "old.json", 2)
+def test_results_of_another_version_are_not_mixed(tmp_path, capsys):
+    (tmp_path / "promises.json").write_text(json.dumps({"samples": 2, "version": "0.0.1"}))
+    assert main(["accuracy.promises", "--samples", "2", "--out", str(tmp_path)]) == 2
+    assert "another version" in capsys.readouterr().err

@@ -8,8 +8,6 @@ if find_spec("pyarrow") is None:
     pytest.skip("the extra sweep is not installed", allow_module_level=True)
 
 from seastar_gym.executors.here import Here
-from seastar_gym.executors.processes import Processes
-from studies.speed.sweep_memory import PLANS, grid, growth, planned
 from studies.speed.sweeps import cluster, disk_wait, overhead, reckon, seconds_per_cell, sweep_of
 
 
@@ -40,22 +38,3 @@ def test_a_cluster_is_as_fast_as_its_workers_until_one_process_cannot_give_more(
     assert small["strokes per second"] == 10_000.0 and small["nodes kept busy"] == 1.0
     enough = cluster(10_000.0, 2, 1e-3, round(small["strokes of a cell that keeps all nodes busy"]))
     assert enough["nodes kept busy"] == 64.0
-
-
-def test_planning_a_grid_holds_the_same_for_any_number_of_cells():
-    few, many = planned("grid of three axes", 1_000, 500), planned("grid of three axes", 1_000_000, 2_000)
-    assert grid(1_000_000).n_cells == 1_000_000
-    assert many < few + 1.0 < 10.0
-
-
-@pytest.mark.parametrize("plan", PLANS)
-def test_planning_holds_less_than_a_kilobyte_for_ten_cells(plan):
-    assert planned(plan, 100_000, 200) < 10.0 + 100_000 / 10 / 1000
-
-
-@pytest.mark.slow
-def test_a_sweep_of_a_hundred_thousand_cells_does_not_grow(tmp_path):
-    found = growth(100_000, Processes(2), tmp_path)
-    print(found)
-    assert found[-1][0] >= 100_000
-    assert found[-1][1] < found[0][1] + 20.0

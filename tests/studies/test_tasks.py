@@ -14,6 +14,7 @@ from seastar_gym.envs.tasks.envs import SeastarTaskVectorEnv
 from seastar_gym.envs.tasks.obst_trap import draw_discs
 from seastar_gym.envs.tasks.prey import Prey
 from seastar_gym.evaluation.measures import SECONDS, measure_of_challenge
+from studies.command import main
 from studies.tasks import heading, pictures
 from studies.tasks import study as module
 from studies.tasks.ahead import Ahead, Odometer, Robots, few_commands
@@ -29,10 +30,10 @@ from studies.tasks.controllers import (
     straight_on,
 )
 from studies.tasks.episodes import swim
-from studies.tasks.page import table, write_page
+from studies.tasks.page import page, table
 from studies.tasks.rounds import BestRound, MostPerMetre
 from studies.tasks.rows import Row, rows_of
-from studies.tasks.study import Options, has_cell, main, study
+from studies.tasks.study import Options, has_cell
 from studies.tasks.trap import SEEN, Belief, all_discs, discs_so_far, horseshoes_to, way, with_clearance
 from studies.tasks.verdicts import verdicts
 
@@ -372,20 +373,19 @@ def test_the_study_goes_on_where_it_was_broken_off(tmp_path, monkeypatch):
 
     monkeypatch.setattr(module, "cell", cell)
     out = tmp_path / "tasks.json"
-    some = Options(ids=("SeastarPrey-v0",), agents=("rest", "greedy", "PPO"), seeds=(0,), episodes=1, out=out)
-    study(some)
+    shared = ["tasks", "--ids", "SeastarPrey-v0", "--out", str(out)]
+    assert main([*shared, "--agents", "rest", "greedy", "PPO", "--seeds", "0", "--episodes", "1"]) == 0
     assert [agent for _, agent, _ in swum] == ["rest", "greedy", "PPO"]
-    arguments = ["--ids", "SeastarPrey-v0", "--out", str(out), "--agents", "greedy"]
+    arguments = [*shared, "--agents", "greedy"]
     assert main([*arguments, "PPO", "--episodes", "1", "--seeds", "0", "1"]) == 0
     assert swum[3:] == [("SeastarPrey-v0", "PPO", 1)]  # who does not learn swims once
-    cells = json.loads(some.out.read_text())["cells"]
+    cells = json.loads(out.read_text())["cells"]
     assert list(cells) == [f"SeastarPrey-v0, {name}" for name in ("rest, 0", "greedy, 0", "PPO, 0", "PPO, 1")]
-    assert json.loads(some.out.read_text())["versions"]["torch"]
+    assert json.loads(out.read_text())["versions"]["torch"]
     assert main([*arguments, "--episodes", "2", "--seeds", "0"]) == 0
     assert swum[4:] == [("SeastarPrey-v0", "greedy", 0)]  # one episode is fewer than two
-    page = some.out.with_suffix(".md").read_text()
-    assert "## SeastarPrey-v0" in page and some.out.with_suffix(".png").is_file()
-    (found,) = rows_of(json.loads(some.out.read_text()), module.IDS)
+    assert "## SeastarPrey-v0" in out.with_suffix(".md").read_text() and out.with_suffix(".png").is_file()
+    (found,) = rows_of(json.loads(out.read_text()), module.IDS)
     assert [values.tolist() for values in found.agents["PPO"]] == [[3.0], [4.0]]
 
 
@@ -394,25 +394,20 @@ def test_the_page_shows_the_pictures_that_there_are(tmp_path):
     for id in ("SeastarPrey-v0", "SeastarPreyTimed-v0", "SeastarStation-v0"):
         results["cells"][f"{id}, greedy, 0"] = {"measure": [1.0, 2.0]}
     (tmp_path / "tasks").mkdir()
-    out = tmp_path / "page.json"
-    write_page(results, module.IDS, out, has_cell)
-    assert "studies.tasks.pictures" not in out.with_suffix(".md").read_text()
+    picture = tmp_path / "page.png"
+    assert "studies.tasks.pictures" not in page(results, module.IDS, picture, has_cell)
     Image.fromarray(np.zeros((2, 2, 3), np.uint8)).save(tmp_path / "tasks" / "prey.png")
-    write_page(results, module.IDS, out, has_cell)
-    assert "| ![prey](tasks/prey.png) |  |" in out.with_suffix(".md").read_text()
+    assert "| ![prey](tasks/prey.png) |  |" in page(results, module.IDS, picture, has_cell)
 
 
 def test_a_picture_shows_an_episode_of_every_task(tmp_path, monkeypatch):
     monkeypatch.setattr(pictures, "SHOWN", {"prizes": ("SeastarPrizes-v0", "greedy", 2)})
-    assert pictures.main(["--out", str(tmp_path)]) == 0
-    with Image.open(tmp_path / "prizes.png") as drawn:
+    assert main(["tasks.pictures", "--out", str(tmp_path)]) == 0
+    with Image.open(tmp_path / "tasks" / "prizes.png") as drawn:
         assert drawn.size == (960, 720)
 
 
-def test_other_settings_and_unknown_names_are_refused(tmp_path, capsys):
-    out = tmp_path / "tasks.json"
-    out.write_text(json.dumps({"settings": {"decisions": 1}, "cells": {}}))
-    assert main(["--out", str(out)]) == 2 and "has results of" in capsys.readouterr().err
+def test_unknown_names_are_refused():
     with assert_refused("Unknown agent 'nobody'"):
         Options(agents=("nobody",))
     with assert_refused("Unknown task 'SeastarSwim-v0'"):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from studies.command import main
 from studies.validation import laws, simulate, study
 from studies.validation.inference import LEVEL, SPREAD, effective, predict, quantiles, score, weights
 from studies.validation.luck import other_fours
@@ -166,12 +167,11 @@ def test_the_committed_laws_are_those_of_the_committed_speeds():
     assert (root_f_dk["error"], root_f_dk["fours"][1]) == pytest.approx((0.162, 0.173), abs=5e-4)
 
 
-def test_laws_are_added_to_results_that_are_there(tmp_path, monkeypatch):
-    file = tmp_path / "validation.json"
-    file.write_text('{"samples": 512, "laws": []}', encoding="utf-8")
-    monkeypatch.setattr("sys.argv", ["validation", "--only-laws", "--out", str(tmp_path)])
-    study.main()
-    results = json.loads(file.read_text(encoding="utf-8"))
+def test_laws_are_added_to_results_that_are_there(tmp_path):
+    kept = json.loads((DOCS / "validation.json").read_text(encoding="utf-8"))
+    (tmp_path / "validation.json").write_text(json.dumps(kept | {"laws": []}), encoding="utf-8")
+    assert main(["validation", "--only-laws", "--out", str(tmp_path)]) == 0
+    results = json.loads((tmp_path / "validation.json").read_text(encoding="utf-8"))
     assert results["samples"] == 512 and len(results["laws"]) == 13
 
 
@@ -182,8 +182,7 @@ def test_the_command_writes_its_page(tmp_path, monkeypatch):
     for module in (simulate, study):
         monkeypatch.setattr(module, "speeds", invented)
     arguments = ["validation", "--samples", "64", "--variants", "ramp", "--runs", str(tmp_path), "--out", str(tmp_path)]
-    monkeypatch.setattr("sys.argv", arguments)
-    study.main()
+    assert main(arguments) == 0
     found = json.loads((tmp_path / "validation.json").read_text(encoding="utf-8"))
     assert found["discretisation"] == 0.0 and len(found["laws"]) == 13
     assert set(found["models"]) == {"full", study.SAME_SAMPLES, "ramp"} and len(found["speeds_mm_per_s"]) == 37

@@ -1,7 +1,6 @@
 """The work-precision study measures whole errors and says which setting is worth its time."""
 
 import json
-import sys
 
 import numpy as np
 import pytest
@@ -11,6 +10,7 @@ from seastar_gym.accuracy.commands import PROMISED
 from seastar_gym.scene.numerics import PRESETS, Resolution
 from studies.accuracy import work_precision as study
 from studies.accuracy import work_precision_page as page
+from studies.command import main
 
 
 def test_settings_are_all_presets_and_more_and_every_problem_can_swim_them():
@@ -62,19 +62,18 @@ def small(monkeypatch):
     monkeypatch.setattr(study, "PROBLEMS", {"chapter's robot": Scene(), "short": Scene(Seastar(limb_length=0.05))})
 
 
-def test_page_and_picture_are_written_and_nothing_is_measured_twice(small, tmp_path, monkeypatch):
+def test_page_and_picture_are_written_and_nothing_is_measured_twice(small, tmp_path, monkeypatch, capsys):
     out = tmp_path / "page.md"
-    monkeypatch.setattr(sys, "argv", ["work_precision", "--out", str(out)])
-    study.main()
+    command = ["accuracy.work_precision", "--out", str(out)]
+    assert main(command) == 0
     found = json.loads(out.with_suffix(".json").read_text())
     assert set(found["problems"]) == {"chapter's robot", "short"}
     assert found["machine"] in out.read_text() and found["versions"]["numba"] in out.read_text()
     for name in PRESETS:
         assert f"| `{name}` |" in out.read_text()
     assert (tmp_path / "page_problems.png").stat().st_size > 20_000
-    monkeypatch.setattr(study, "examine", None)
-    study.main()
+    monkeypatch.setattr(study, "examine", lambda *_, **__: pytest.fail("measured twice"))
+    assert main(command) == 0
     found["versions"]["numba"] = "0.1"
     out.with_suffix(".json").write_text(json.dumps(found))
-    with pytest.raises(SystemExit, match="another machine or version"):
-        study.main()
+    assert main(command) == 2 and "another machine or version" in capsys.readouterr().err

@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,10 +12,11 @@ from seastar_gym import Certificate, DomainRandomization, Numerics, Scene, Unifo
 from seastar_gym.accuracy import endurance, measure
 from seastar_gym.identify import Measurement
 from seastar_gym.identify.parameters import get_parameter
+from studies.command import main
 from studies.worked_example import robots, study, tables, trainings
 from studies.worked_example.pictures import draw
 from studies.worked_example.robots import DEVIATIONS, FITTED, NOMINAL, built, tracked
-from studies.worked_example.study import Options, beliefs, main
+from studies.worked_example.study import Options, beliefs
 
 TINY = Hyperparameters(num_envs=8, rollout=8, batch_size=32, epochs=1, hidden=(8,), max_episode_time=10.0)
 
@@ -82,27 +82,6 @@ def test_results_say_what_does_not_look_good():
     assert "slower, in 3 of 3 seeds" in tables.verdict(found, "fitted")
 
 
-def test_tables_are_put_on_a_page_in_place_of_earlier_ones(tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text(f"Before.\n\n{tables.BEGIN}\nearlier ones\n{tables.END}\n\nAfter.\n")
-    for _ in range(2):
-        tables.put_on_page(results(), page)
-    text = page.read_text()
-    assert text.startswith("Before.") and text.endswith("After.\n") and "earlier ones" not in text
-    assert text.count(tables.as_markdown(results())) == 1
-    page.write_text("Nothing.")
-    with assert_refused("has no lines"):
-        tables.put_on_page(results(), page)
-
-
-def test_the_page_has_the_committed_results():
-    folder = Path(__file__).parents[2] / "docs"
-    page, file = folder / "from_measurements.md", folder / "worked_example" / "results.json"
-    assert tables.BEGIN in page.read_text(encoding="utf-8")
-    if file.is_file():
-        assert tables.as_markdown(json.loads(file.read_text())) in page.read_text(encoding="utf-8")
-
-
 def test_a_camera_sees_hub_and_tips_of_the_scene_that_is_fitted(monkeypatch):
     coarse = built(5, Numerics("implicit-midpoint", 0.02, 1e-6))
     monkeypatch.setattr(robots, "NOMINAL", replace(NOMINAL, robot=replace(NOMINAL.robot, nodes_per_limb=7)))
@@ -134,9 +113,7 @@ def small(monkeypatch):
 @pytest.mark.filterwarnings("ignore:Errors of this scene:UserWarning")
 def test_the_way_goes_from_a_camera_to_swims_and_is_not_gone_twice(small, tmp_path, capsys):
     command = ["--tracked", "3", "--samples", "2", "--error", "0.9", "--strokes", "64", "--paths", "2"]
-    page = tmp_path / "page.md"
-    page.write_text(f"{tables.BEGIN}\n{tables.END}\n")
-    command += ["--out", str(tmp_path), "--page", str(page)]
+    command = ["worked_example", *command, "--out", str(tmp_path)]
     assert main([*command, "--seeds", "0"]) == 0
     found = json.loads((tmp_path / "results.json").read_text())
 
@@ -169,11 +146,10 @@ def test_the_way_goes_from_a_camera_to_swims_and_is_not_gone_twice(small, tmp_pa
     assert {name: set(runs) for name, runs in found["runs"].items()} == {name: {"0"} for name in tables.WORDS}
     assert found["runs"]["drawn"]["0"]["random"] == [2.0, 2.0]  # no robot arrives that soon
     assert (tmp_path / "results.png").stat().st_size > 10_000
-    assert tables.as_markdown(found) in page.read_text()
+    assert "Machine: " in capsys.readouterr().out
 
-    capsys.readouterr()
     assert main([*command, "--seeds", "0"]) == 0
-    assert "seed 0" not in capsys.readouterr().out
+    assert ", 0: " not in capsys.readouterr().out
     assert main([*command, "--strokes", "128"]) == 2
     assert "give another --out" in capsys.readouterr().err
 

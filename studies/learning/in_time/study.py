@@ -10,30 +10,25 @@ its model.zip.
 """
 
 import itertools
-import json
-import shlex
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 import torch
-import tyro
 
-from seastar_gym.command import run_command
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.envs.task import make_scene
 from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
 from seastar_gym.evaluation.swim import Swim
-from seastar_gym.files import write_atomically
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
+from studies.frame import Results, Study, require_known
 from studies.learning.in_time.pictures import draw
 from studies.learning.in_time.tables import as_markdown
 from studies.learning.in_time.trainings import TRAININGS, learn
-from studies.provenance import provenance
 
 
 @dataclass(frozen=True)
@@ -58,8 +53,7 @@ class Options:
     """File of the results. The picture has the same name with the suffix .png."""
 
     def __post_init__(self) -> None:
-        if unknown := set(self.trainings) - set(TRAININGS):
-            raise ValueError(f"Unknown training {min(unknown)!r}: choose of {', '.join(TRAININGS)}.")
+        require_known("training", self.trainings, TRAININGS)
         require_count("paths", self.paths, 1, 10_000)
         if self.decisions is not None:
             require_count("decisions", self.decisions, 1, 10**9)
@@ -99,47 +93,29 @@ def result(name: str, seed: int, options: Options) -> dict[str, Any]:
     }
 
 
-def study(options: Options, results: dict[str, Any]) -> None:
-    """Run the trainings that are missing in the results, and write the results after each."""
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    for name, seed in itertools.product(options.trainings, options.seeds):
-        runs = results["runs"].setdefault(name, {})
-        if str(seed) in runs:
-            continue
-        found = runs[str(seed)] = result(name, seed, options)
-        results["runs"][name] = runs = dict(sorted(runs.items(), key=lambda run: int(run[0])))
-        write_atomically(options.out, (json.dumps(results, indent=1) + "\n").encode())
-        pentagon = ", ".join(f"{one['seconds']:g} s at {fidelity}" for fidelity, one in found["pentagon"].items())
-        print(f"{name}, seed {seed}: {pentagon}; held-out {found['held_out']['seconds']:.1f} s", flush=True)
-
-
-def read_results(options: Options, command: str) -> dict[str, Any]:
-    """Results in the output file, or empty ones if there is none; ValueError if the file has other settings."""
-    settings = {name: getattr(options, name) for name in ("decisions", "fidelity", "paths")}
-    if not options.out.is_file():
-        return {**provenance(command, "torch", "stable_baselines3"), "settings": settings, "runs": {}}
-    results: Any = json.loads(options.out.read_text(encoding="utf-8"))
-    found = results.get("settings") if isinstance(results, dict) else None
-    if found != settings:
-        raise ValueError(f"{options.out} has results of {found}, not of {settings}: give another --out.")
-    return cast(dict[str, Any], results)
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Command line of the study; returns the exit code."""
+def study(options: Options, results: Results) -> None:
+    """Run the trainings that are missing."""
     torch.set_num_threads(1)
-    given = sys.argv[1:] if arguments is None else arguments
-    try:
-        options = tyro.cli(Options, prog="python -m studies.learning.in_time", args=given)
-        results = read_results(options, shlex.join(["python", "-m", "studies.learning.in_time", *given]))
-        study(options, results)
-    except (ValueError, OSError) as wrong:
-        print(wrong, file=sys.stderr)
-        return 2
-    draw(results["runs"], options.out.with_suffix(".png"))
-    print(as_markdown(results["runs"]))
-    return 0
+    cells = {
+        ("runs", name, str(seed)): partial(result, name, seed, options)
+        for name, seed in itertools.product(options.trainings, options.seeds)
+    }
+    results.fill(cells, told)
 
 
-if __name__ == "__main__":
-    run_command(main)
+def told(found: dict[str, Any]) -> str:
+    """Times of a policy."""
+    pentagon = ", ".join(f"{one['seconds']:g} s at {fidelity}" for fidelity, one in found["pentagon"].items())
+    return f"{pentagon}; held-out {found['held_out']['seconds']:.1f} s"
+
+
+STUDY = Study(
+    "learning.in_time",
+    study,
+    Options,
+    "in_time.json",
+    settings=lambda options: {name: getattr(options, name) for name in ("decisions", "fidelity", "paths")},
+    pictures={"in_time.png": lambda results, file: draw(results["runs"], file)},
+    tables={"in_time": lambda results: as_markdown(results["runs"])},
+    packages=("torch", "stable_baselines3"),
+)

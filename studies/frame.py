@@ -1,0 +1,140 @@
+"""What a study is, the numbers that it keeps, and what is drawn and told from them.
+
+A study is a module with `STUDY = Study(...)`. `python -m studies NAME` runs it, and `studies.NAME` is that module, or
+its room, whose module is `study`.
+"""
+
+import json
+import time
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from studies.kept import keep
+
+DOCS = Path(__file__).parents[1] / "docs"
+
+
+@dataclass(frozen=True)
+class InDocs:
+    """Options of a study that has no others."""
+
+    out: Path = Path("docs")
+    """Folder of the files, or the file of the numbers."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study: what it runs, what it keeps, and what follows from the numbers that it keeps.
+
+    name: As the command has it: the module's without "studies." and ".study".
+    run: Computes and fills the results; returns a sentence if something failed. None: there is nothing to run.
+    options: Dataclass of the options. One of them may be `out`: the folder of the files, or the file of the numbers.
+    file: Name of the file of the numbers, which docs/ has as well; empty for none.
+    home: Folder in docs/ of what the study keeps there.
+    settings: What all numbers of a file have in common. A study that tells it goes on with the file that is there.
+    pictures: By their names, how they are drawn from the numbers into a file.
+    tables: By the names that pages give them, tables in Markdown.
+    pages: By their names, whole pages in Markdown.
+    drawn: Names of pictures in docs/ that only a run draws.
+    packages: Packages whose versions count, beside those of every study.
+    """
+
+    name: str
+    run: Callable[[Any, "Results"], str | None] | None = None
+    options: type[Any] = InDocs
+    file: str = ""
+    home: str = ""
+    settings: Callable[[Any], Mapping[str, Any]] | None = None
+    pictures: Mapping[str, Callable[[Any, Path], None]] = field(default_factory=dict)
+    tables: Mapping[str, Callable[[Any], str]] = field(default_factory=dict)
+    pages: Mapping[str, Callable[[Any], str]] = field(default_factory=dict)
+    drawn: tuple[str, ...] = ()
+    packages: tuple[str, ...] = ()
+
+    def place(self, out: Path, name: str) -> Path:
+        """Where a file of the study goes: into the folder `out`, or beside the file `out`, by its name."""
+        return out.with_name(name.replace(Path(self.file).stem, out.stem)) if out.suffix else out / name
+
+    def write(self, results: Any, out: Path) -> list[Path]:
+        """Draw the pictures and write the whole pages; returns their files."""
+        for name, draw in self.pictures.items():
+            draw(results, self.place(out, name))
+        for name, text in self.pages.items():
+            self.place(out, name).write_text(text(results), encoding="utf-8")
+        return [self.place(out, name) for name in (*self.pictures, *self.pages)]
+
+
+class Results(dict[str, Any]):
+    """Numbers of a study, which begin with those of its file if the study resumes.
+
+    about: Command, machine and versions, which head the file. file: None for numbers that are not kept.
+    """
+
+    def __init__(self, about: Mapping[str, Any], file: Path | None = None, settings: Mapping[str, Any] | None = None):
+        super().__init__()
+        self.about, self.file = about, file
+        if settings is not None:
+            self["settings"] = dict(settings)
+            self.read()
+
+    def read(self) -> None:
+        """Take what is in the file, if there is one; ValueError if it has other settings."""
+        if self.file is None or not self.file.is_file():
+            return
+        kept, settings = json.loads(self.file.read_text(encoding="utf-8")), self.get("settings")
+        found = kept.get("settings") if isinstance(kept, dict) else None
+        if found != settings:
+            of = "something else" if found is None else found
+            raise ValueError(f"{self.file} has results of {of}, not of {settings}: give another --out.")
+        self.update(kept)
+
+    def save(self) -> None:
+        """Write the file."""
+        if self.file is not None:
+            keep({**self.about, **self}, self.file)
+
+    def fill(
+        self,
+        cells: Mapping[Any, Callable[[], Any]],
+        tell: Callable[[Any], str],
+        is_done: Callable[[Any], bool] = lambda _: True,
+    ) -> None:
+        """Compute the cells that are missing, and write the file after each. Several processes may fill one file.
+
+        Cells whose names are numbers of seeds stand in that order, others as they come.
+
+        cells: How to compute a cell, by its keys from the outermost to its own. tell: What is printed of a new one.
+        is_done: Whether a cell that is there counts.
+        """
+        for (*keys, name), compute in cells.items():
+            self.read()
+            if name in self.row(keys) and is_done(self.row(keys)[name]):
+                continue
+            began, found = time.perf_counter(), compute()
+            self.read()
+            self.update(self.about)
+            row = self.row(keys) | {name: found}
+            self.row(keys).clear()
+            self.row(keys).update(sorted(row.items(), key=seed))
+            self.save()
+            print(f"{', '.join([*keys[1:], name])}: {tell(found)} ({time.perf_counter() - began:.0f} s)", flush=True)
+
+    def row(self, keys: Sequence[str]) -> dict[str, Any]:
+        """Cells that have these keys in common."""
+        row: dict[str, Any] = self
+        for key in keys:
+            row = row.setdefault(key, {})
+        return row
+
+
+def require_known(kind: str, asked: Collection[str], known: Collection[str]) -> None:
+    """ValueError where an unknown name is asked for. kind: What is named, in the singular."""
+    if unknown := set(asked) - set(known):
+        raise ValueError(f"Unknown {kind} {min(unknown)!r}: choose of {', '.join(known)}.")
+
+
+def seed(cell: tuple[str, Any]) -> int:
+    """Number of a cell that is named by its seed; 0 for others."""
+    return int(cell[0]) if cell[0].isdecimal() else 0
