@@ -16,7 +16,7 @@ def momenta(rods: Rods, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.nd
     spin = cross(q, v) @ rods.mass
     if rods.edge_mass is not None:
         tails = np.arange(len(rods.edge_mass))
-        tails[:: rods.nodes_per_limb - 1] = 0
+        tails[:: rods.edges_per_limb] = 0
         spin -= cross(q[:, 1:] - q[:, tails], v[:, 1:] - v[:, tails]) @ rods.edge_mass
     return np.einsum("n,rnd->rd", rods.mass, v), spin
 
@@ -28,7 +28,7 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def bodied_momenta(simulator: Simulator) -> tuple[np.ndarray, float]:
     """Momentum [kg m/s] and angular momentum about the origin [kg m^2/s] of a robot with a body."""
     rods, q, v = simulator.coefficients.rods(0), simulator.positions[0], simulator.velocities[0]
-    mass, omega, n = rods.mass[: len(q)], simulator.spin()[0], rods.nodes_per_limb - 1
+    mass, omega, n = rods.mass[: len(q)], simulator.spin()[0], rods.edges_per_limb
     S_x, S_y = turned(rods.body.moment, simulator.orientation()[0])
     turning = omega * np.array([-S_y, S_x])
     roots = root_places(simulator.scene.robot, q[None, 0], simulator.orientation())[0]

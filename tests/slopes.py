@@ -5,8 +5,12 @@ from typing import Any
 
 import numpy as np
 
+from seastar_gym.der.rods import Rods, Work
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
+
+NO_RODS, NO_WORK = (bundle(*[None] * len(bundle._fields)) for bundle in (Rods, Work))
+"""Bundles of scenes that name nothing."""
 
 
 def slope(f: Callable[[Any], Any], x: Any, step: float) -> np.ndarray:

@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 import oracle
 from continuum_oracle import Continuum
@@ -14,12 +15,14 @@ from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import Rods, Work, make_work
 from seastar_gym.der.stepping.newton import move_along
 from seastar_gym.der.stepping.stages import Stage
+from seastar_gym.der.terms.body import freeze_body, move_roots, place_roots
 from seastar_gym.der.terms.damping import freeze_strains
 from seastar_gym.der.terms.fluid import freeze_fluid
 from seastar_gym.der.terms.near_pairs import freeze_contact
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.compilation import entry_point
 from seastar_gym.simd.lanes import N_LANES, any_lane, borrow, load, splat, store
+from seastar_gym.simd.numpy_lanes import Lanes
 
 
 @entry_point
@@ -29,8 +32,8 @@ def direction(rods, work, q, q_0, gamma, ahead, convex, result):
     h, mask = splat(gamma), load(borrow(convex), 0) > 0.0
     stage = Stage(memory.q_hat, memory.v_hat, h, 1.0 / h, ahead)
     freeze_fluid(rods_rows, memory)
-    freeze_contact(rods_rows.contact, rods_rows, memory, stage, borrow(q_0))
-    freeze_strains(rods_rows.damping, rods_rows, memory, memory.q_hat)
+    freeze_contact(rods_rows, memory, stage, borrow(q_0))
+    freeze_strains(rods_rows, memory, memory.q_hat)
     for row in range(q.shape[0]):
         store(memory.q, row, load(borrow(q), row))
     if any_lane(mask):
@@ -38,9 +41,9 @@ def direction(rods, work, q, q_0, gamma, ahead, convex, result):
     else:
         phi, decrement, pivot = factorise(rods_rows, memory, stage, None)
     store(out, 0, phi)
-    store(out, 1, solve_coupled(memory.contact, rods_rows, memory, h > 0.0, decrement))
+    store(out, 1, solve_coupled(rods_rows, memory, h > 0.0, decrement))
     store(out, 2, pivot)
-    store(out, 3, move_along(memory.contact, rods_rows, memory, h > 0.0, h < 0.0, splat(1.0)))
+    store(out, 3, move_along(rods_rows, memory, h > 0.0, h < 0.0, splat(1.0)))
 
 
 def robot_and_star(n_limbs=5, nodes_per_limb=10, hub="rigid", fluid=True):
@@ -53,7 +56,8 @@ def robot_and_star(n_limbs=5, nodes_per_limb=10, hub="rigid", fluid=True):
 
 
 def rods_of(robot: Seastar, fluid: bool = True) -> Rods:
-    return make_rods(Scene(robot=robot, fluid=Water() if fluid else None, actuator=SmaPulse(peak_angle=0.1)))
+    pulse = SmaPulse(peak_angle=0.1 if robot.n_limbs > 1 else 0.0)  # one limb has nothing to turn against
+    return make_rods(Scene(robot=robot, fluid=Water() if fluid else None, actuator=pulse))
 
 
 def turn_limbs(work: Work, star: Star, delta_psi: np.ndarray) -> None:
@@ -80,6 +84,26 @@ class RandomStages:
 
     def data(self, lane: int):
         return self.q_hat[lane], self.v_hat[lane], self.gamma, self.delta_psi[lane], self.frozen[lane]
+
+    def phi(self, lane: int) -> float:
+        return oracle.incremental_potential(self.star, self.q[lane], *self.data(lane))
+
+    def gradient(self, lane: int) -> np.ndarray:
+        return oracle.incremental_gradient(self.star, self.q[lane], *self.data(lane))
+
+    def assert_step(self, found: SimpleNamespace, lane: int, hessian: np.ndarray, accuracy: float) -> None:
+        """Newton's direction and its decrement are those of a Hessian."""
+        gradient = self.gradient(lane)
+        direction = np.linalg.solve(hessian, gradient.ravel()).reshape(-1, 2)
+        assert found.decrement[lane] == pytest.approx(np.sum(gradient * direction), rel=accuracy)
+        size = np.abs(direction).max()
+        np.testing.assert_allclose(found.direction[lane], direction, rtol=0.0, atol=accuracy * size)
+
+    def assert_agree(self, found: SimpleNamespace, accuracy: float = 1e-11) -> None:
+        """Potential, Newton's direction and its decrement are those of the oracle in every lane."""
+        for lane in range(N_LANES):
+            assert found.phi[lane] == pytest.approx(self.phi(lane), rel=1e-12)
+            self.assert_step(found, lane, self.hessian(lane), accuracy)
 
     def hessian(self, lane: int) -> np.ndarray:
         q_hat, _, gamma, delta_psi, frozen = self.data(lane)
@@ -144,3 +168,44 @@ def random_shape(star: Star, bend: float, stretch: float, rng: np.random.Generat
             step = length * np.array([np.cos(angle), np.sin(angle)])
             q[star.node(limb, i)] = q[star.node(limb, i - 1)] + step
     return q
+
+
+# Robots with a body, whose unknowns u are their nodes, flat, and the angle [rad]
+
+
+def unknown_rows(rods: Rods, u: np.ndarray) -> np.ndarray:
+    """Unknowns of every robot as rows; roots and corners left out."""
+    n = len(u) - 1
+    rows = np.zeros((n + 2 + 2 * rods.body.n_arms, N_LANES))
+    rows[:n], rows[n] = u[:-1, None], u[-1] * rods.body.scale[0]
+    return rows
+
+
+def unknowns(rods: Rods, rows: np.ndarray) -> np.ndarray:
+    """Those of the first robot."""
+    n = 2 * rods.n_nodes
+    return np.append(rows[:n, 0], rows[n, 0] / rods.body.scale[0])
+
+
+def begun_on_body(rods: Rods, directions: np.ndarray, stage: SimpleNamespace, ahead: bool) -> tuple[Work, Stage]:
+    """(work, stage) of kernels where the first guess of a stage is frozen, and the iterate is at its u.
+
+    stage: u, u_hat, v_hat and first, unknowns; gamma [s]; delta_psi, rotations of limbs [rad]. directions: Of limbs at
+        rest [rad].
+    """
+    work, gamma = make_work(rods, 1), Lanes(stage.gamma)
+    q_hat, v_hat = unknown_rows(rods, stage.u_hat), unknown_rows(rods, stage.v_hat)
+    move_roots.plain(rods, q_hat, v_hat)
+    begun = Stage(q_hat, v_hat, gamma, 1.0 / gamma, ahead)
+    rates = (stage.first - stage.u_hat) / stage.gamma
+    work.q[:] = unknown_rows(rods, stage.first)
+    place_roots.plain(rods, work.q)
+    freeze_contact.plain(rods, work, begun, q_hat)
+    freeze_body.plain(rods, work, begun, tuple(Lanes(rates[k]) for k in (0, 1, -1)))
+    freeze_fluid.plain(rods, work)
+    freeze_strains.plain(rods, work, q_hat)
+    natural = directions + stage.delta_psi
+    work.hub_direction[:] = np.stack([np.cos(natural), np.sin(natural)], axis=1).reshape(-1, 1)
+    work.q[:] = unknown_rows(rods, stage.u)
+    place_roots.plain(rods, work.q)
+    return work, begun

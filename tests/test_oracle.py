@@ -31,10 +31,12 @@ def difference_quotients(function: Callable[[Array], Any], x: Array, delta: floa
     return np.array([(function(x + move) - function(x - move)) / (2.0 * delta) for move in moves])
 
 
-def assert_derivative(function: Callable[[Array], Any], derivative: Array, x: Array, delta: float = 1e-7) -> None:
-    """Assert that ``derivative`` holds the derivatives of ``function`` at x to 1e-6 of the largest of them."""
+def assert_derivative(
+    function: Callable[[Array], Any], derivative: Array, x: Array, delta: float = 1e-7, share: float = 1e-6
+) -> None:
+    """Assert that ``derivative`` holds the derivatives of ``function`` at x to a share of the largest of them."""
     expected = difference_quotients(function, x, delta).reshape(derivative.shape)
-    np.testing.assert_allclose(derivative, expected, rtol=0.0, atol=1e-6 * np.abs(expected).max())
+    np.testing.assert_allclose(derivative, expected, rtol=0.0, atol=share * np.abs(expected).max())
 
 
 def turn(x: Array, angle: float) -> Array:

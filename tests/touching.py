@@ -36,5 +36,5 @@ def touching_limbs(
     still = np.zeros((5, N_LANES))
     set_natural_hub_angles.plain(rods, work, Actuation(still, still), Lanes(1.0))
     stage = Stage(work.q_hat, work.v_hat, Lanes(gamma), Lanes(1.0 / gamma), ahead)
-    freeze_contact.plain(rods.contact, rods, work, stage, rows(q_0))
+    freeze_contact.plain(rods, work, stage, rows(q_0))
     return SimpleNamespace(rods=rods, work=work, stage=stage, q_0=rows(q_0))

@@ -21,50 +21,37 @@ def hinge_energy(rods, work, e, first, second, side, EI_kappa_bar):
 
 
 @kernel
-def rigid_hub_energy(clamp, rods, work, q):
-    """Energy of the clamps of a rigid hub [J]; 0 where limbs are joined by hinges (None)."""
-    if clamp is None:
-        return splat(0.0)
-    return clamp_energy(rods, work, q)
-
-
-@kernel
-def hub_hinge_energy(clamp, rods, work, q, limb, edge):
-    """Energy of the hub hinge from a limb, whose root edge is given, to the next one [J]; 0 with a rigid hub."""
-    if clamp is not None:
-        return splat(0.0)
-    edges = rods.nodes_per_limb - 1
-    root = limb * edges
-    next_root = edge_of(rods, q, (root + edges) % (rods.n_limbs * edges))
+def hub_hinge_energy(rods, work, q, limb, edge):
+    """Energy of the hub hinge from a limb, whose root edge is given, to the next one [J]."""
+    root = limb * rods.edges_per_limb
+    next_root = edge_of(rods, q, (root + rods.edges_per_limb) % rods.n_edges)
     return hinge_energy(rods, work, root, edge, next_root, rods.hub.side, load(work.hub_EI_kappa_bar, limb))
 
 
 @kernel
 def elastic_energy(rods, work, q):
     """Stretching and bending energy (13.14) at the natural hub angles in `work` [J]."""
-    total = rigid_hub_energy(rods.clamp, rods, work, q)
-    edges = rods.nodes_per_limb - 1
+    total = splat(0.0) if rods.clamp is None else clamp_energy(rods, work, q)
+    edges = rods.edges_per_limb
     for limb in range(rods.n_limbs):
         root = limb * edges
         edge = edge_of(rods, q, root)
-        hinge = hub_hinge_energy(rods.clamp, rods, work, q, limb, edge)
+        hinge = hub_hinge_energy(rods, work, q, limb, edge) if rods.clamp is None else splat(0.0)
         total += stretching_energy(rods, root, tension(rods, root, edge.length)) + hinge
         for e in range(root + 1, root + edges):
             before, edge = edge, edge_of(rods, q, e)
-            hinge = hinge_energy(rods, work, e, before, edge, 1.0, natural_moment(rods.along, rods, work, e))
+            hinge = hinge_energy(rods, work, e, before, edge, 1.0, natural_moment(rods, work, e))
             total += stretching_energy(rods, e, tension(rods, e, edge.length)) + hinge
     return total
 
 
 @kernel
-def add_hub_hinge_moments(clamp, rods, work, q, moments):
-    """Add dU/d(delta) of the hub hinges [N m], of every limb's rotation delta; nothing with a rigid hub.
+def add_hub_hinge_moments(rods, work, q, moments):
+    """Add dU/d(delta) of the hub hinges [N m], of every limb's rotation delta.
 
     The natural angle of the hinge from limb j to limb j + 1 grows with the rotation of j + 1 and falls with that of j.
     """
-    if clamp is not None:
-        return
-    edges = rods.nodes_per_limb - 1
+    edges = rods.edges_per_limb
     for limb in range(rods.n_limbs):
         after = (limb + 1) % rods.n_limbs
         t = half_angle(edge_of(rods, q, limb * edges), edge_of(rods, q, after * edges), rods.hub.side)
@@ -76,19 +63,17 @@ def add_hub_hinge_moments(clamp, rods, work, q, moments):
 
 
 @kernel
-def add_moments_along(along, rods, work, actuation, q, moments):
+def add_moments_along(rods, work, actuation, q, moments):
     """Add dU/d(delta) of the hinges within limbs [N m], where actuators bend or stiffen them."""
-    if along is None:
-        return
-    edges = rods.nodes_per_limb - 1
+    edges = rods.edges_per_limb
     for limb in range(rods.n_limbs):
         delta, total, edge = load(actuation.delta_psi_start, limb), splat(0.0), edge_of(rods, q, limb * edges)
-        rate = stiffening_rate(along, delta)
+        rate = stiffening_rate(rods, delta)
         for e in range(limb * edges + 1, (limb + 1) * edges):
             before, edge = edge, edge_of(rods, q, e)
-            bend = moment(rods, work, e, half_angle(before, edge, 1.0), natural_moment(along, rods, work, e))
-            natural = natural_tangent(along, e, delta)
-            total = subtract_product(total, load(along.share, e) * bend, add_product(1.0, natural, natural))
+            bend = moment(rods, work, e, half_angle(before, edge, 1.0), natural_moment(rods, work, e))
+            natural = natural_tangent(rods.along, e, delta)
+            total = subtract_product(total, load(rods.along.share, e) * bend, add_product(1.0, natural, natural))
             total = add_product(total, rate, bending_energy(rods, work, e, bend))
         store(moments, limb, load(moments, limb) + total)
 
@@ -102,9 +87,12 @@ def fill_moments(rods, work, actuation, q, moments):
     set_natural_hub_angles(rods, work, actuation, splat(0.0))
     for limb in range(rods.n_limbs):
         store(moments, limb, 0.0)
-    add_clamp_moments(rods.clamp, rods, work, actuation, q, moments)
-    add_hub_hinge_moments(rods.clamp, rods, work, q, moments)
-    add_moments_along(rods.along, rods, work, actuation, q, moments)
+    if rods.clamp is None:
+        add_hub_hinge_moments(rods, work, q, moments)
+    else:
+        add_clamp_moments(rods, work, actuation, q, moments)
+    if rods.along is not None:
+        add_moments_along(rods, work, actuation, q, moments)
 
 
 @entry_point
@@ -112,9 +100,9 @@ def energies(rods, work, actuation, q, v, elastic, kinetic):
     """Fill `elastic` (13.14) and `kinetic` [J], shape (1, N_LANES), at the rotations `actuation.delta_psi_end`."""
     rods, work, actuation = borrow(rods), borrow(work), borrow(actuation)
     q, v = borrow(q), borrow(v)
-    move_roots(rods.body, rods, q, v)
+    move_roots(rods, q, v)
     set_natural_hub_angles(rods, work, actuation, splat(1.0))
     store(borrow(elastic), 0, elastic_energy(rods, work, q))
     still = (splat(0.0), splat(0.0))
     total = kinetic_energy(rods, v, still)
-    store(borrow(kinetic), 0, add_turning_energy(rods.body, rods, q, v, still, total))
+    store(borrow(kinetic), 0, add_turning_energy(rods, q, v, still, total))

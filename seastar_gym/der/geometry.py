@@ -34,6 +34,18 @@ def larger(a, b):
 
 
 @kernel
+def positive_part(x):
+    """x where it is positive, else 0."""
+    return select(x > 0.0, x, 0.0)
+
+
+@kernel
+def convex_part(convex, x):
+    """A second slope, of which robots in the mask `convex` (None for none) take the positive part."""
+    return select(convex, positive_part(x), x)
+
+
+@kernel
 def edge_vector(q, tail, head):
     """e = x_head - x_tail [m]."""
     return load(q, 2 * head) - load(q, 2 * tail), load(q, 2 * head + 1) - load(q, 2 * tail + 1)

@@ -19,11 +19,11 @@ class Motion(NamedTuple):
 
 
 @kernel
-def relative(current, node, vx, vy):
-    """Velocity of a node relative to the fluid at rest (None) or in motion."""
-    if current is None:
+def relative(work, node, vx, vy):
+    """Velocity of a node relative to the fluid, which is at rest or has a current."""
+    if work.current is None:
         return vx, vy
-    return vx - load(current, 2 * node), vy - load(current, 2 * node + 1)
+    return vx - load(work.current, 2 * node), vy - load(work.current, 2 * node + 1)
 
 
 @kernel
@@ -33,5 +33,5 @@ def node_motion(work, stage, node):
     vx = (qx - load(stage.q_hat, 2 * node)) * stage.inverse_gamma
     vy = (qy - load(stage.q_hat, 2 * node + 1)) * stage.inverse_gamma
     dx, dy = vx - load(stage.v_hat, 2 * node), vy - load(stage.v_hat, 2 * node + 1)
-    wx, wy = relative(work.current, node, vx, vy)
+    wx, wy = relative(work, node, vx, vy)
     return Motion(dx, dy, wx, wy)

@@ -27,7 +27,7 @@ full one, with its quadratic convergence, is used wherever its pivots allow it.
 
 import numpy as np
 
-from seastar_gym.der.geometry import EDGE_ROWS, edge_geometry, half_angle
+from seastar_gym.der.geometry import EDGE_ROWS, convex_part, edge_geometry, half_angle
 from seastar_gym.der.linear.rigid_hub import solve_rigid_hub
 from seastar_gym.der.linear.star_matrix import (
     add_symmetric,
@@ -38,7 +38,7 @@ from seastar_gym.der.linear.star_matrix import (
     solve_ring,
     store_root,
 )
-from seastar_gym.der.motion import Motion, node_motion
+from seastar_gym.der.motion import node_motion
 from seastar_gym.der.star import load_root_edge, root_place, tail_node
 from seastar_gym.der.terms.added_mass import add_fluid_inertia, less_edge_fluid_inertia
 from seastar_gym.der.terms.along import bending_compliance, bending_stiffness, natural_moment
@@ -48,14 +48,7 @@ from seastar_gym.der.terms.body_forces import add_body, pass_to_hub
 from seastar_gym.der.terms.clamp import assemble_clamps
 from seastar_gym.der.terms.contact import add_contact, contact_force
 from seastar_gym.der.terms.damping import damped_energy, damped_stiffness, damped_stress
-from seastar_gym.der.terms.drag import (
-    add_cross_flow,
-    add_scalar,
-    drag_slopes,
-    middle_slopes,
-    push_ends,
-    with_middle,
-)
+from seastar_gym.der.terms.drag import add_cross_flow, add_middle_drag, drag_slopes
 from seastar_gym.der.terms.inertia import less_edge_inertia
 from seastar_gym.der.terms.load import load_power, nodal_load
 from seastar_gym.der.terms.stretching import stretching_energy, tension
@@ -70,8 +63,8 @@ def edge_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex, tail,
     tail, head: Motions of its ends.
     """
     slopes = elastic_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex)
-    slopes = less_edge_inertia(rods.edge_mass, stage, e, tail, head, slopes)
-    return less_edge_fluid_inertia(rods.edge_added_mass, work, stage, e, tail, head, slopes)
+    slopes = less_edge_inertia(rods, stage, e, tail, head, slopes)
+    return less_edge_fluid_inertia(rods, work, stage, e, tail, head, slopes)
 
 
 @kernel
@@ -83,18 +76,18 @@ def elastic_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex):
     ux, uy = edge.ux, edge.uy
     T = tension(rods, e, edge.length)
     natural = splat(0.0)
-    pull = damped_stress(rods.damping, work.tension, e, stage.inverse_gamma, T, natural) * edge.length
-    across = select(convex, positive_part(pull), pull) + stiffness
+    pull = damped_stress(rods, work.tension, e, stage.inverse_gamma, T, natural) * edge.length
+    across = convex_part(convex, pull) + stiffness
     mu = select(convex, 0.0, net_moment)
     twice_mu = mu + mu
-    stretching = damped_stiffness(rods.damping, stage.inverse_gamma, load(rods.stretching.EA_over_l, e))
+    stretching = damped_stiffness(rods, stage.inverse_gamma, load(rods.stretching.EA_over_l, e))
     difference = stretching * edge.squared - across
     isotropic = across * edge.inverse
     wx = add_product(difference * ux, twice_mu, uy)
     wy = subtract_product(difference * uy, twice_mu, ux)
     return (
         damped_energy(
-            rods.damping,
+            rods,
             work.tension,
             e,
             stage.inverse_gamma,
@@ -116,26 +109,20 @@ def elastic_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex):
 def hinge_slopes(rods, work, stage, hinge, t, EI_kappa_bar, convex):
     """(E_b, slope, s): energy of a hinge and its first and second slope in phi, with damping."""
     bend = moment(rods, work, hinge, t, EI_kappa_bar)
-    tau, inverse_gamma = rods.damping, stage.inverse_gamma
+    inverse_gamma = stage.inverse_gamma
     energy = damped_energy(
-        tau, work.bending, hinge, inverse_gamma, bend, EI_kappa_bar, bending_compliance(rods.along, rods, work, hinge),
+        rods, work.bending, hinge, inverse_gamma, bend, EI_kappa_bar, bending_compliance(rods, work, hinge),
         bending_energy(rods, work, hinge, bend),
     )  # fmt: skip
-    stiffness = damped_stiffness(tau, inverse_gamma, bending_stiffness(rods.along, rods, work, hinge))
-    damped = damped_stress(tau, work.bending, hinge, inverse_gamma, bend, EI_kappa_bar)
+    stiffness = damped_stiffness(rods, inverse_gamma, bending_stiffness(rods, work, hinge))
+    damped = damped_stress(rods, work.bending, hinge, inverse_gamma, bend, EI_kappa_bar)
     slope, s = bending_slopes(stiffness, t, damped, convex)
     return energy, slope, s
 
 
 @kernel
-def positive_part(x):
-    """x where it is positive, else 0."""
-    return select(x > 0.0, x, 0.0)
-
-
-@kernel
-def node_slopes(contact, rods, work, stage, node, motion):
-    """(energy, gradient, Hessian) of a node's inertia, drag and load, and of what contact pushes it (or None)."""
+def node_slopes(rods, work, stage, node, motion, push):
+    """(energy, gradient, Hessian) of a node's inertia, drag and load, and of a force that pushes it, (x, y) [N]."""
     dx, dy, wx, wy = motion
     m = load(rods.mass, node)
     m_over_gamma = m * stage.inverse_gamma
@@ -143,20 +130,17 @@ def node_slopes(contact, rods, work, stage, node, motion):
     c_over_speed *= stage.inverse_gamma
     sx, sy = c_over_speed * wx, c_over_speed * wy
     diagonal = (m_over_gamma + c_speed) * stage.inverse_gamma
-    Fx, Fy = nodal_load(rods.load, node)
-    push_x, push_y = contact_force(contact, node)
+    Fx, Fy = nodal_load(rods, node)
     slopes = (
-        add_product(
-            0.5 * m * add_product(dx * dx, dy, dy), stage.gamma, potential - load_power(rods.load, node, dx, dy)
-        ),
+        add_product(0.5 * m * add_product(dx * dx, dy, dy), stage.gamma, potential - load_power(rods, node, dx, dy)),
         (
-            add_product(c_speed * wx, m_over_gamma, dx) - Fx - push_x,
-            add_product(c_speed * wy, m_over_gamma, dy) - Fy - push_y,
+            add_product(c_speed * wx, m_over_gamma, dx) - Fx - push[0],
+            add_product(c_speed * wy, m_over_gamma, dy) - Fy - push[1],
         ),
         (add_product(diagonal, sx, wx), sx * wy, add_product(diagonal, sy, wy)),
     )
-    slopes = add_fluid_inertia(work.added_mass, node, dx, dy, stage.inverse_gamma, slopes)
-    return add_cross_flow(rods.cross_drag, rods, work.normals, node, wx, wy, stage.gamma, stage.inverse_gamma, slopes)
+    slopes = add_fluid_inertia(work, node, dx, dy, stage.inverse_gamma, slopes)
+    return add_cross_flow(rods, work.normals, node, wx, wy, stage.gamma, stage.inverse_gamma, slopes)
 
 
 @kernel
@@ -167,10 +151,10 @@ def coupling(s, outer, inner):
 
 
 @kernel
-def assemble_hub(clamp, rods, work, stage, convex):
+def assemble_hub(rods, work, stage, convex):
     """Root edges, the hub's moments on them, stiffnesses and couplings, into `work`; returns the hub's energy [J]."""
-    begin_body(rods.body, rods, work)
-    n_limbs, edges = rods.n_limbs, rods.nodes_per_limb - 1
+    begin_body(rods, work)
+    n_limbs, edges = rods.n_limbs, rods.edges_per_limb
     for limb in range(n_limbs):
         edge = edge_geometry(work.q, tail_node(rods, limb * edges), limb * edges + 1)
         for k in range(EDGE_ROWS):
@@ -178,7 +162,7 @@ def assemble_hub(clamp, rods, work, stage, convex):
         store(work.hub_moment, limb, 0.0)
         store(work.hub_stiffness, limb, 0.0)
         store(work.hub_t, limb, 0.0)
-    if clamp is None:
+    if rods.clamp is None:
         return assemble_hub_hinges(rods, work, stage, convex)
     return assemble_clamps(rods, work, stage, convex)
 
@@ -186,7 +170,7 @@ def assemble_hub(clamp, rods, work, stage, convex):
 @kernel
 def assemble_hub_hinges(rods, work, stage, convex):
     """Hub hinges and their couplings, into `work`; returns the hinges' energy [J]."""
-    n_limbs, edges = rods.n_limbs, rods.nodes_per_limb - 1
+    n_limbs, edges = rods.n_limbs, rods.edges_per_limb
     energy = splat(0.0)
     for a in range(n_limbs):
         b = a + 1 if a + 1 < n_limbs else 0
@@ -215,15 +199,7 @@ def inner_edge(work, limb, first, i):
 
 
 @kernel
-def hub_motion(clamp, rods, work, stage, e):
-    """Motion of the hub for root edge e, where a rigid hub's discretisation asks for it, or of its root on a body."""
-    if clamp is None:
-        return Motion(splat(0.0), splat(0.0), splat(0.0), splat(0.0))
-    return tail_motion(rods.body, rods, work, stage, e)
-
-
-@kernel
-def join_hub(body, rods, work, stage, limb, convex, motion, energy, hub, D, r, f_tail):
+def join_hub(rods, work, stage, limb, convex, motion, energy, hub, D, r, f_tail):
     """Add a limb's block and right-hand side (D, r) where it starts, and its root edge's pull, to those of the hub.
 
     motion: Motion of the limb's root. hub: (D, r) of the hub. A root on a body has drag and fluid of its own.
@@ -231,9 +207,10 @@ def join_hub(body, rods, work, stage, limb, convex, motion, energy, hub, D, r, f
     Returns the energy [J] and the hub's (D, r).
     """
     D_hub, r_hub = hub
-    if body is None:
+    if rods.body is None:
         return energy, add_symmetric(D_hub, D), (r_hub[0] + r[0] - f_tail[0], r_hub[1] + r[1] - f_tail[1])
-    E_r, g, drag = node_slopes(work.contact, rods, work, stage, root_place(rods, limb), motion)
+    place = root_place(rods, limb)
+    E_r, g, drag = node_slopes(rods, work, stage, place, motion, contact_force(work, place))
     pull = (g[0] - f_tail[0], g[1] - f_tail[1])
     D, r = add_symmetric(D, drag), (r[0] + pull[0], r[1] + pull[1])
     pass_to_hub(rods, work, limb, convex, D, r, pull)
@@ -247,7 +224,7 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
     Returns the hub's block and right-hand side (D_hub, r_hub), updated, the limb's part of Phi and of the Newton
     decrement [J], and its smallest pivot.
     """
-    edges = rods.nodes_per_limb - 1
+    edges = rods.edges_per_limb
     first = limb * edges
     zero = splat(0.0)
     energy, decrement, pivot = zero, zero, splat(np.inf)
@@ -261,19 +238,14 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
         e = node - 1
         before, motion_before = inner_edge(work, limb, first, i - 1), node_motion(work, stage, node - 1)
         t = half_angle(before, edge, 1.0)
-        natural = natural_moment(rods.along, rods, work, e)
+        natural = natural_moment(rods, work, e)
         E_b, slope_before, s_before = hinge_slopes(rods, work, stage, e, t, natural, convex)
         net_moment, stiffness = slope_before - slope, s_before + s
-        E_s, f, K = edge_slopes(
-            rods, work, stage, e, edge, net_moment, stiffness, convex, motion_before, motion
-        )
-        E_n, g, inertia = node_slopes(work.contact, rods, work, stage, node, motion)
+        E_s, f, K = edge_slopes(rods, work, stage, e, edge, net_moment, stiffness, convex, motion_before, motion)
+        E_n, g, inertia = node_slopes(rods, work, stage, node, motion, contact_force(work, node))
         energy += (E_s + E_n) + E_b
         P = coupling(s_before, edge, before)
-        E_m, g_m, h_m = middle_slopes(rods.middle_drag, rods, work, stage, e, motion_before, motion)
-        energy = add_scalar(rods.middle_drag, energy, E_m)
-        f_head, f_tail = push_ends(rods.middle_drag, f, g_m)
-        K, K_B = with_middle(rods.middle_drag, K, h_m)
+        energy, f_head, f_tail, K, K_B = add_middle_drag(rods, work, stage, e, motion_before, motion, energy, f, K)
         D_1 = (D_before[0] + K[0] + 2.0 * P[0], D_before[1] + K[1] + (P[1] + P[2]), D_before[2] + K[2] + 2.0 * P[3])
         K_P = (K_B[0] + P[0], K_B[1] + P[1], K_B[1] + P[2], K_B[2] + P[3])
         D, B, D_before, r, r_before, part, node_pivot = eliminate_node(
@@ -293,13 +265,10 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
         pivot = smaller(pivot, node_pivot)
         slope, s, edge, motion = slope_before, s_before, before, motion_before
     net_moment, stiffness = load(work.hub_moment, limb) - slope, load(work.hub_stiffness, limb) + s
-    of_hub = hub_motion(rods.clamp, rods, work, stage, first)
+    of_hub = motion if rods.clamp is None else tail_motion(rods, work, stage, first)  # hub hinges do not ask for it
     E_s, f, K = edge_slopes(rods, work, stage, first, edge, net_moment, stiffness, convex, of_hub, motion)
-    E_n, g, inertia = node_slopes(work.contact, rods, work, stage, first + 1, motion)
-    E_m, g_m, h_m = middle_slopes(rods.middle_drag, rods, work, stage, first, of_hub, motion)
-    energy = add_scalar(rods.middle_drag, energy, E_m)
-    f_head, f_tail = push_ends(rods.middle_drag, f, g_m)
-    K, K_B = with_middle(rods.middle_drag, K, h_m)
+    E_n, g, inertia = node_slopes(rods, work, stage, first + 1, motion, contact_force(work, first + 1))
+    energy, f_head, f_tail, K, K_B = add_middle_drag(rods, work, stage, first, of_hub, motion, energy, f, K)
     store_root(
         work,
         limb,
@@ -308,7 +277,7 @@ def sweep_limb(rods, work, stage, limb, convex, D_hub, r_hub):
         (r[0] + (g[0] + f_head[0]), r[1] + (g[1] + f_head[1])),
     )
     energy, D_hub, r_hub = join_hub(
-        rods.body, rods, work, stage, limb, convex, of_hub, energy + E_s + E_n, (D_hub, r_hub),
+        rods, work, stage, limb, convex, of_hub, energy + E_s + E_n, (D_hub, r_hub),
         add_symmetric(D_before, K), r_before, f_tail,
     )  # fmt: skip
     return D_hub, r_hub, energy, decrement, pivot
@@ -323,11 +292,11 @@ def factorise(rods, work, stage, convex):
     Returns (Phi, decrement, pivot): the potential [J], gradient^T Hessian^-1 gradient [J], and the smallest pivot,
     which is not positive (or NaN) where the Hessian is not positive definite.
     """
-    energy = assemble_hub(rods.clamp, rods, work, stage, convex)
-    energy = add_contact(rods.contact, rods, work, stage, convex, energy)
+    energy = assemble_hub(rods, work, stage, convex)
+    energy = add_contact(rods, work, stage, convex, energy)
     of_hub = node_motion(work, stage, 0)
-    E_n, r_hub, D_hub = node_slopes(work.contact, rods, work, stage, 0, of_hub)
-    E_n, r_hub, D_hub = add_body(rods.body, rods, work, stage, convex, of_hub, E_n, r_hub, D_hub)
+    E_n, r_hub, D_hub = node_slopes(rods, work, stage, 0, of_hub, contact_force(work, 0))
+    E_n, r_hub, D_hub = add_body(rods, work, stage, convex, of_hub, E_n, r_hub, D_hub)
     energy += E_n
     decrement, pivot = splat(0.0), splat(np.inf)
     for limb in range(rods.n_limbs):
@@ -337,17 +306,17 @@ def factorise(rods, work, stage, convex):
         energy += limb_energy
         decrement += limb_decrement
         pivot = smaller(pivot, limb_pivot)
-    hub_decrement, hub_pivot = solve_hub(rods.clamp, rods, work, D_hub, r_hub)
+    hub_decrement, hub_pivot = solve_hub(rods, work, D_hub, r_hub)
     return energy, decrement + hub_decrement, smaller(pivot, hub_pivot)
 
 
 @kernel
-def solve_hub(clamp, rods, work, D_hub, r_hub):
+def solve_hub(rods, work, D_hub, r_hub):
     """Eliminate the root nodes and the hub, and solve for them, into work.root_solution.
 
     Returns the part of the Newton decrement [J] and the smallest pivot.
     """
-    if clamp is not None:
+    if rods.clamp is not None:
         return solve_rigid_hub(rods, work, D_hub, r_hub)
     if rods.n_limbs > 1:
         return solve_ring(work, rods.n_limbs, D_hub, r_hub)

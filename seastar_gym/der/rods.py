@@ -9,7 +9,6 @@ import numpy as np
 
 from seastar_gym.der.geometry import EDGE_ROWS
 from seastar_gym.der.linear.star_matrix import NODE_ROWS, RING_ROWS, ROOT_ROWS
-from seastar_gym.der.stepping.foresight import Foresight
 from seastar_gym.der.stepping.scales import Scales
 from seastar_gym.der.terms import body, contact
 from seastar_gym.der.terms.along import ALONG_ROWS, Along
@@ -26,7 +25,9 @@ from seastar_gym.simd.rows import aligned_rows
 class Rods(NamedTuple):
     """Coefficients of a star of rods, term by term; each is described in the file of its term.
 
-    n_limbs, nodes_per_limb: Numbers of limbs, and of nodes of a limb with the hub.
+    n_limbs, edges_per_limb, n_edges, n_nodes: Numbers of limbs, of edges of a limb and of all, and of nodes.
+    n_free: Number of places whose coordinates are unknowns: nodes, and a body's angle. n_places: Of places: those, and
+        the roots of limbs on a body. n_points: Of those places, and of the corners of a body's outline.
     stretching, bending, hub: Coefficients of edges, hinges and hub hinges.
     clamp: Rigid hub; edge_mass, edge_added_mass: What consistent masses take from lumped ones [kg]; middle_drag,
         middle_cross_drag: Drag in the middle of edges, and that of flow across [kg/m]; per edge. All are those of the
@@ -37,11 +38,16 @@ class Rods(NamedTuple):
     damping: Relaxation time tau [s], one row. current: How the fluid moves.
     load: Constant force per coordinate [N]. contact: Who may touch whom.
     body: A body between the limbs. With one, `mass`, `drag` and `load` have rows for all places, see star.py.
-    foresight, scales: Scales of the robot that decide what Newton's method and the guard look at.
+    scales: Scales of the robot that decide what Newton's method and the guard look at.
     """
 
     n_limbs: int
-    nodes_per_limb: int
+    edges_per_limb: int
+    n_edges: int
+    n_nodes: int
+    n_free: int
+    n_places: int
+    n_points: int
     stretching: Stretching
     bending: Bending
     hub: Hub
@@ -59,7 +65,6 @@ class Rods(NamedTuple):
     current: Current | None
     load: np.ndarray | None
     contact: contact.Contact | None
-    foresight: Foresight
     scales: Scales
     body: Body | None
 
@@ -122,10 +127,7 @@ class Work(NamedTuple):
 
 def make_work(rods: Rods, n_stages: int) -> Work:
     """Zeroed memory for one lane group of such rods and a scheme of `n_stages` stages."""
-    n_limbs, n_edges = rods.n_limbs, rods.n_limbs * (rods.nodes_per_limb - 1)
-    n_nodes = n_edges + 1
-    n_places = n_nodes if rods.body is None else n_nodes + 1 + n_limbs
-    n_free, n_points = (n_nodes, n_nodes) if rods.body is None else (n_nodes + 1, n_nodes + 1 + rods.body.n_arms)
+    n_limbs, n_edges, n_nodes, n_points = rods.n_limbs, rods.n_edges, rods.n_nodes, rods.n_points
 
     def rows(count):
         return aligned_rows(count, N_LANES)
@@ -150,13 +152,13 @@ def make_work(rods: Rods, n_stages: int) -> Work:
         hub_hat=None if rods.clamp is None or rods.damping is None else rows(2 * n_limbs),
         stiffening=None if rods.along is None else rows(ALONG_ROWS * n_limbs),
         EI_kappa_bar=None if rods.along is None else rows(n_edges),
-        stage_v=rows(2 * n_free * n_stages),
+        stage_v=rows(2 * rods.n_free * n_stages),
         normals=None if rods.cross_drag is None and rods.added_mass is None else rows(2 * n_nodes),
-        current=None if rods.current is None else rows(2 * n_places),
-        added_mass=None if rods.added_mass is None else rows(3 * n_places),
+        current=None if rods.current is None else rows(2 * rods.n_places),
+        added_mass=None if rods.added_mass is None else rows(3 * rods.n_places),
         pivots=None if rods.contact is None else rows(2 * n_nodes),
         root_pivots=None if rods.contact is None else rows(2 * (n_limbs + 1)),
-        contact=contact.memory(rods.contact, n_limbs, rods.nodes_per_limb, n_points),
+        contact=contact.memory(rods.contact, n_limbs, rods.edges_per_limb, n_points),
         tension=None if rods.damping is None else rows(n_edges),
         bending=None if rods.damping is None else rows(n_edges),
         body=body.memory(rods.body, n_limbs, n_stages),

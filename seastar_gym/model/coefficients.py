@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.der.rods import Rods
-from seastar_gym.der.stepping.limits import Limits
-from seastar_gym.model.limits import make_limits
-from seastar_gym.model.rods import make_rods
+from seastar_gym.der.stepping.scales import Limits
+from seastar_gym.model.rods import make_limits, make_rods
 from seastar_gym.scene import Scene
 from seastar_gym.scene.per_robot import frame_of, of_robot
 from seastar_gym.simd.lanes import N_LANES

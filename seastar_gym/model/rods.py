@@ -1,9 +1,14 @@
-"""Coefficients of one robot of a scene for the kernels. Every term is one line."""
+"""Coefficients of one robot of a scene for the kernels, and limits of its solver. Every term is one line."""
 
+import math
+from collections.abc import Sequence
 from operator import itemgetter
 
+import numpy as np
+
 from seastar_gym.der.rods import Rods
-from seastar_gym.der.stepping import foresight, scales
+from seastar_gym.der.stepping import scales
+from seastar_gym.der.stepping.scales import Limits
 from seastar_gym.der.terms import (
     added_mass,
     along,
@@ -20,11 +25,11 @@ from seastar_gym.der.terms import (
 )
 from seastar_gym.model.body import body_rim, make_body
 from seastar_gym.model.currents import current_rows
-from seastar_gym.model.joints import with_joints
 from seastar_gym.model.mesh import make_mesh
 from seastar_gym.scene.along import AlongLimb, Stiffening
 from seastar_gym.scene.fluid import Water
-from seastar_gym.scene.per_robot import chosen
+from seastar_gym.scene.numerics import ADAPTATION, MOST_ITERATIONS, MOST_ITERATIONS_PER_STEP
+from seastar_gym.scene.per_robot import chosen, of_robot
 from seastar_gym.scene.scene import Scene
 from seastar_gym.scene.shape import natural_hub_angle
 
@@ -53,7 +58,6 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         at_nodes, in_middle = drag.simpson_coefficients(mesh, water.density, C_along)
         across, across_middle = drag.simpson_cross_coefficients(mesh, water.density, C_d, C_t)
     stretched = stretching.coefficients(mesh)
-    seen_ahead = foresight.coefficients(mesh, stretched, robot.density)
     mass = inertia.coefficients(mesh, robot.density)
     weight = gravity.coefficients(mesh, robot.density, water.density, scene.gravity)
     loads = load.total(load.coefficients(mesh, scene.loads), weight)
@@ -66,9 +70,15 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         mass, at_nodes = on_body.mass(mass), on_body.drag(mesh, at_nodes)
         loads = on_body.loads(loads)
     inertia.hold(mass, scene.held_nodes)
+    n_free = robot.n_nodes + robot.has_body
     return Rods(
         n_limbs=mesh.n_limbs,
-        nodes_per_limb=mesh.nodes_per_limb,
+        edges_per_limb=mesh.nodes_per_limb - 1,
+        n_edges=len(mesh.l),
+        n_nodes=len(mesh.dl),
+        n_free=n_free,
+        n_places=len(at_nodes),
+        n_points=n_free if on_body is None else n_free + on_body.coefficients.n_arms,
         stretching=stretched,
         bending=with_joints(
             bending.coefficients(mesh, gregory=continuum), [limb.joint_stiffness for limb in limbs]
@@ -90,10 +100,7 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         contact=None
         if touch is None
         else contact.coefficients(mesh, robot.limbs_that_may_touch(), touch.modulus, touch.opening_angle, rim),
-        foresight=seen_ahead,
-        scales=scales.coefficients(
-            mesh, stretched, seen_ahead, robot.density, water.density, C_d, mass, scene.held_nodes
-        ),
+        scales=scales.coefficients(mesh, stretched, robot.density, water.density, C_d, mass, scene.held_nodes),
         body=None if on_body is None else on_body.coefficients,
     )
 
@@ -106,3 +113,35 @@ def limb_actuation(scene: Scene, index: int, natural_turn: list[float]) -> along
     spread, hot = robot.along or AlongLimb(share=0.0), robot.stiffening or Stiffening(ratio=1.0)
     shares = spread.hinge_shares(robot.nodes_per_limb)
     return along.coefficients(natural_turn, shares, float(actuator.peak_angle), hot.ratio, hot.middle, hot.width)
+
+
+def with_joints(hinges: bending.Bending, stiffnesses: Sequence[float | None]) -> bending.Bending:
+    """Bending with joints of these stiffnesses [N m/rad], springs at the hub in a row with the clamps; None for none.
+
+    Exact for small turns; a joint and its clamp share larger ones as the clamp alone does, K (1 - cos(turn)).
+    """
+    EI_over_dl, dl_over_EI = hinges.EI_over_dl.copy(), hinges.dl_over_EI.copy()
+    roots = np.arange(len(stiffnesses)) * (len(EI_over_dl) // len(stiffnesses))
+    for root, stiffness in zip(roots.tolist(), stiffnesses, strict=True):
+        if stiffness is not None:
+            dl_over_EI[root] += 1.0 / stiffness
+            EI_over_dl[root] = 1.0 / dl_over_EI[root]
+    return hinges._replace(EI_over_dl=EI_over_dl, dl_over_EI=dl_over_EI)
+
+
+def make_limits(scene: Scene, index: int = 0) -> Limits:
+    """Tolerances and limits of the solver for robot `index` of a scene.
+
+    The largest error of a step per second follows from the tolerance of the path, as was measured, see ADAPTATION.
+    """
+    numerics, length = scene.numerics, of_robot(scene.robot.limb_length, index)
+    speed, tolerance = length / scene.actuator.period, numerics.path_tolerance
+    error_rate = 0.0 if tolerance is None else speed * (tolerance / ADAPTATION[0]) ** ADAPTATION[1]
+    n_steps = math.ceil(scene.actuator.period / numerics.step)
+    return Limits(
+        tolerance=np.array([numerics.newton_tolerance * length]),
+        max_iterations=numerics.max_iterations,
+        most_iterations=MOST_ITERATIONS + MOST_ITERATIONS_PER_STEP * n_steps,
+        adaptive=tolerance is not None,
+        error_rate=np.array([error_rate]),
+    )

@@ -415,29 +415,17 @@ def subtract_product(typing_context, c, a, b):
     return _product_sum((c, a, b), negate=True)
 
 
-def _mask_reduction(bits_test):
-    def codegen(context, builder, sig, args):
-        bits = builder.bitcast(args[0], ir.IntType(N_LANES))
-        return bits_test(builder, bits, ir.IntType(N_LANES))
-
-    return codegen
-
-
 @intrinsic
 def any_lane(typing_context, condition):
     """True if the mask holds for at least one robot."""
     if condition != mask:
         return None
-    return types.boolean(mask), _mask_reduction(lambda b, bits, i: b.icmp_unsigned("!=", bits, ir.Constant(i, 0)))
 
+    def codegen(context, builder, sig, args):
+        bits = ir.IntType(N_LANES)
+        return builder.icmp_unsigned("!=", builder.bitcast(args[0], bits), ir.Constant(bits, 0))
 
-@intrinsic
-def all_lanes(typing_context, condition):
-    """True if the mask holds for every robot."""
-    if condition != mask:
-        return None
-    full = 2**N_LANES - 1
-    return types.boolean(mask), _mask_reduction(lambda b, bits, i: b.icmp_unsigned("==", bits, ir.Constant(i, full)))
+    return types.boolean(mask), codegen
 
 
 if config.DISABLE_JIT:

@@ -22,7 +22,6 @@ add_product     add_product(c, a, b) -> Lanes: c + a b, rounded once; two of the
 subtract_product
                 subtract_product(c, a, b) -> Lanes: c - a b, likewise
 any_lane        any_lane(mask) -> bool
-all_lanes       all_lanes(mask) -> bool
 
 Results are those of the machine code to the last bit, but for products in sums: before Python 3.13, which brings
 `math.fma`, they are rounded twice. Whatever lanes cannot do raises a TypeError, as it would not compile; rows that do
@@ -39,7 +38,7 @@ import numpy as np
 
 FUNCTIONS = (
     "borrow", "load", "store", "load_number", "store_number", "load_at", "splat", "select", "sqrt", "floor",
-    "absolute", "add_product", "subtract_product", "any_lane", "all_lanes",
+    "absolute", "add_product", "subtract_product", "any_lane",
 )  # fmt: skip
 """Names of the functions of the interface."""
 
@@ -128,7 +127,7 @@ class Mask:
         return Mask(~self.robots)
 
     def __bool__(self) -> bool:
-        raise TypeError("A mask holds for some robots and not for others: ask any_lane or all_lanes.")
+        raise TypeError("A mask holds for some robots and not for others: ask any_lane.")
 
     def __eq__(self, other: object) -> Any:
         raise TypeError("Masks are not compared: use & | ~.")
@@ -244,7 +243,3 @@ def subtract_product(c, a, b):
 
 def any_lane(condition):
     return bool(np.any(_mask(condition)))
-
-
-def all_lanes(condition):
-    return bool(np.all(_mask(condition)))

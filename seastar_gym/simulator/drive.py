@@ -1,9 +1,11 @@
-"""`Drive`: the actuators of a batch of robots, from commands to rotations of limbs."""
+"""`Drive`: the actuators of a batch of robots, from commands, which are checked here, to rotations of limbs."""
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import JUMP, Actuator, complete, stroke_at
+from seastar_gym.scene.checks import as_floats, shown
 from seastar_gym.scene.per_robot import column
 from seastar_gym.simulator.schedule import SAME_TIME, interval_times
 
@@ -53,11 +55,11 @@ class Drive:
         """Electric power of a heated wire [W], NaN if the actuator does not say it."""
         return self._actuator.heating_power
 
-    def begin(self, duration: float, commands: Floats | None) -> tuple[Floats, Floats]:
+    def begin(self, duration: float, commands: Floats | None) -> tuple[Floats, Floats, Floats]:
         """Begin an interval [s] with these commands, or with those under way if they are None.
 
-        Limbs rotate by the returned peaks, shape (n_robots, n_limbs), times the returned shape [rad]: at the times of
-        the steps, shape (n_times,), (n_times, n_robots, 1) where a curve differs from robot to robot, or with memory
+        Returns `times`, and the peaks, shape (n_robots, n_limbs), and the shape [rad] by whose product limbs rotate: at
+        these times, shape (n_times,), (n_times, n_robots, 1) where a curve differs from robot to robot, or with memory
         (n_times, n_robots, n_limbs).
         """
         if commands is not None:
@@ -67,9 +69,9 @@ class Drive:
         self._given, self._before, self._after = self.commands, self.state, self.state
         self.heating_time = self._actuator.seconds_heated(self.times, self._given, self.state).sum(axis=1)
         if not self._actuator.has_memory:
-            return self._given * self.strengths, curve
+            return self.times, self._given * self.strengths, curve
         turned, self._after = self._actuator.respond(self.times, self._given, self.state)
-        return self.strengths, turned
+        return self.times, self.strengths, turned
 
     def _refuse_jump(self, commands: Floats) -> None:
         """ValueError if limbs cannot begin anew from where they are."""
@@ -122,6 +124,13 @@ class Drive:
         must_wait = not self._actuator.has_memory and bool(self.rotations().any())
         return np.full((*self.strengths.shape, 2), must_wait)
 
+    def checked_strengths(self, strengths: ArrayLike) -> Floats:
+        """A copy of the shape of `strengths`; ValueError for what are no shares from 0 to 1 of robots and limbs."""
+        array, wanted = as_floats("limb_strengths", strengths), self.strengths.shape
+        if array.shape not in ((), wanted[1:], wanted) or not ((array >= 0.0) & (array <= 1.0)).all():
+            raise ValueError(f"limb_strengths must be numbers from 0 to 1 of shape {wanted[1:]} or {wanted}.")
+        return np.broadcast_to(array, wanted).copy()
+
     def rotations(self) -> Floats:
         """Rotations of limbs between two intervals [rad], shape (n_robots, n_limbs)."""
         now = np.full(1, self.phase)
@@ -140,3 +149,32 @@ class Drive:
         """Put all actuators into a state, see `State`: shapes of `state` and `commands`, and (n_robots,)."""
         self.state, self.phase = state.copy(), float(phase.max())
         self.commands = np.where(phase[:, None] > 0.0, commands, 0.0)
+
+
+def checked_commands(commands: ArrayLike, scene: Scene, strengths: Floats, name: str = "commands") -> Floats:
+    """Commands as an array of the shape of `strengths`, (n_robots, n_limbs). ValueError if one cannot be followed."""
+    array = as_floats(name, commands)
+    if array.shape != strengths.shape:
+        raise ValueError(f"{name} must have shape (n_robots, n_limbs) = {strengths.shape}, not {array.shape}.")
+    good = np.abs(array) <= 1.0
+    if not good.all():
+        robot, limb = np.argwhere(~good)[0]
+        raise ValueError(
+            f"{name} must be numbers in [-1, 1]; robot {robot} has {shown(array[robot, limb])} for limb {limb + 1}."
+        )
+    if scene.robot.hub_hinge == "turning":
+        _check_turning_hub(strengths * array, scene)
+    return array
+
+
+def _check_turning_hub(shares: Floats, scene: Scene) -> None:
+    """ValueError if limbs turned by these shares of the peak angle, shape (n_robots, n_limbs), close a hub hinge."""
+    turn = column(scene.actuator.peak_angle) * (np.roll(shares, -1, axis=1) - shares)
+    angle = np.array([limb.gap for limb in scene.robot.limb_shapes()]) + turn
+    closed = np.minimum(angle, 2.0 * np.pi - angle) < 1e-9
+    if closed.any():
+        robot, limb = np.argwhere(closed)[0]
+        raise ValueError(
+            f'With hub_hinge="turning" the command of robot {robot} closes the hub hinge between limbs {limb + 1} '
+            f'and {(limb + 1) % shares.shape[1] + 1}, where its curvature is infinite: use hub_hinge="opening".'
+        )

@@ -11,6 +11,9 @@ from seastar_gym.scene.numerics import MAX_STEPS, SHORTEST
 SAME_TIME = 1e-9
 """Fraction of a step. A shorter remainder before a corner is rounding of the division, not a step."""
 
+ROUNDING = 1e-12
+"""Fraction of a time. An end of a step that is no nearer to it is the next one."""
+
 
 def require_duration(duration: float, step: float) -> None:
     """Refuse the length of an interval [s] if it is no time, or too short or too long for steps of this length [s]."""
@@ -52,3 +55,9 @@ def interval_times(corners: Sequence[float], step: float, begin: float, duration
     first = int(np.searchsorted(times, begin + same, side="right"))
     on_grid = begin - times[first - 1] <= same
     return times[first - 1 :] if on_grid else np.append(begin, times[first:])
+
+
+def ends_of_parts(times: np.ndarray, parts: int) -> np.ndarray:
+    """Steps with which about equal parts of an interval end, whose steps end at these times [s] since it began."""
+    wanted = times[-1] * np.arange(1, parts + 1) / parts
+    return np.unique(np.clip(np.searchsorted(times, wanted * (1.0 - ROUNDING)), 1, len(times) - 1))

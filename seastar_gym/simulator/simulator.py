@@ -3,6 +3,7 @@
 import os
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,20 +20,16 @@ from seastar_gym.simd.rows import write_rows
 from seastar_gym.simulator.batch import Batch
 from seastar_gym.simulator.body_frame import best_fit_heading, root_places
 from seastar_gym.simulator.clock import Clock
-from seastar_gym.simulator.commands import checked_commands
-from seastar_gym.simulator.drive import Drive
+from seastar_gym.simulator.drive import Drive, checked_commands
 from seastar_gym.simulator.error_bars import ErrorBars, twin_scene
 from seastar_gym.simulator.lock import BROKEN_OFF, StrokeLock
 from seastar_gym.simulator.report import StrokeReport, make_report
-from seastar_gym.simulator.schedule import require_duration
+from seastar_gym.simulator.schedule import ends_of_parts, require_duration
 from seastar_gym.simulator.state import State, checked_state
 
 Floats = NDArray[np.float64]
 
 MAX_ROBOTS, MAX_THREADS = 100_000_000, 4096
-
-ROUNDING = 1e-12
-"""Fraction of a time. An end of a step that is no nearer to it is the next one."""
 
 
 class Before(NamedTuple):
@@ -232,14 +229,11 @@ class Simulator:
 
         strengths: Shape (n_limbs,) or (n_robots, n_limbs), or one number for all limbs.
         """
-        array = as_floats("limb_strengths", strengths)
-        wanted = self._drive.strengths.shape
-        if array.shape not in ((), wanted[1:], wanted) or not ((array >= 0.0) & (array <= 1.0)).all():
-            raise ValueError(f"limb_strengths must be numbers from 0 to 1 of shape {wanted[1:]} or {wanted}.")
+        checked = self._drive.checked_strengths(strengths)
         with self._lock.change():
-            self._drive.strengths = np.broadcast_to(array, wanted).copy()
+            self._drive.strengths = checked
             if self._bars is not None:
-                self._bars.twin.set_limb_strengths(array)
+                self._bars.twin.set_limb_strengths(checked)
 
     @property
     def positions(self) -> Floats:
@@ -346,13 +340,11 @@ class Simulator:
         require_count("parts", parts, 1, MAX_STEPS)
         with self._whole_interval(duration, commands) as interval:
             times = self._batch.times - self._batch.times[0]
-            wanted = times[-1] * np.arange(1, parts + 1) / parts
-            ends = np.unique(np.clip(np.searchsorted(times, wanted * (1.0 - ROUNDING)), 1, len(times) - 1))
-            begin = 0
-            for end in ends:
+            for begin, end in pairwise([0, *ends_of_parts(times, parts)]):
                 self._batch.advance(begin, end)
-                begin = end
-                self._show(end)
+                self._clock.show(self._batch.covered())
+                self._drive.advance(end)
+                self._batch.show_rotations(end)
                 self._lock.pause()
                 yield float(times[end])
                 self._lock.resume(interval)
@@ -390,17 +382,10 @@ class Simulator:
             raise
 
     def _begin_interval(self, duration: float, commands: Floats | None) -> None:
-        peaks, shape = self._drive.begin(duration, commands)
-        self._batch.begin(self._drive.times, peaks, shape)
+        self._batch.begin(*self._drive.begin(duration, commands))
         self._clock.begin(duration)
         if self._bars is not None:
             self._bars.twin.advance(duration, commands)
-
-    def _show(self, end: int) -> None:
-        """Bring clock, actuators and rotations to the time step `end` of the interval."""
-        self._clock.show(self._batch.covered())
-        self._drive.advance(end)
-        self._batch.show_rotations(end)
 
     def _end_interval(self) -> StrokeReport:
         rows = self._batch.end()

@@ -92,10 +92,10 @@ def count_operations(scene: Scene, folder: Path = FOLDER) -> dict[str, Counter[s
 
     stage = counting(begin_stage)(rods, work, scheme, 0, *state, a, h)
     counting(set_natural_hub_angles)(rods, work, actuation, Counted(1.0))
-    counted("hub hinges", lambda: counting(assemble_hub)(rods.clamp, rods, work, stage, None))
+    counted("hub hinges", lambda: counting(assemble_hub)(rods, work, stage, None))
     counted("limbs", limbs)
     unit = (Counted(1.0), Counted(0.0), Counted(1.0))
-    counted("ring", lambda: counting(solve_hub)(rods.clamp, rods, work, unit, unit[:2]))
+    counted("ring", lambda: counting(solve_hub)(rods, work, unit, unit[:2]))
     counted("substitution", lambda: counting(take_step)(rods, work, Mask(True), Mask(False), Counted(1.0)))
     parts["iteration"] = sum(parts.values(), Counter())
     counted("step", step)

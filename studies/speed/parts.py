@@ -25,12 +25,12 @@ def repeat_part(rods, work, q_0, v_0, step, part, n):
     seen = zero
     for _ in range(n):
         if part == 0:
-            seen += assemble_hub(rows.clamp, rows, memory, stage, None)
+            seen += assemble_hub(rows, memory, stage, None)
         elif part == 1:
             for limb in range(rods.n_limbs):
                 seen += sweep_limb(rows, memory, stage, limb, None, (zero, zero, zero), (zero, zero))[2]
         elif part == 2:
-            seen += solve_hub(rows.clamp, rows, memory, (one, zero, one), (one, zero))[1]
+            seen += solve_hub(rows, memory, (one, zero, one), (one, zero))[1]
         else:
             seen += take_step(rows, memory, seen < 0.0, None, zero)
     return any_lane(seen > 0.0)

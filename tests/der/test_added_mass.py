@@ -5,12 +5,12 @@ import pytest
 
 from seastar_gym import Scene, Seastar, Water
 from seastar_gym.der.rods import make_work
-from seastar_gym.der.terms.added_mass import add_fluid_energy, add_fluid_inertia, freeze_added_mass, momentum
+from seastar_gym.der.terms.added_mass import add_fluid_energy, add_fluid_inertia, fluid_momentum, freeze_added_mass
 from seastar_gym.der.terms.fluid import freeze_normals
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes
-from slopes import gradient, plain, rotated, rows, symmetric
+from slopes import NO_RODS, NO_WORK, gradient, plain, rotated, rows, symmetric
 
 ROBOT = Seastar(nodes_per_limb=4)
 WATER = Water(1000.0, added_mass_coefficient=0.7)
@@ -24,15 +24,15 @@ AT_HOME = Lanes(0.0), Lanes(0.0)
 def frozen(angle: float = 0.0):
     """Memory of the robot at rest, turned."""
     work = make_work(RODS, 1)
-    freeze_normals.plain(RODS, work.normals, rows(rotated(ROBOT.nodes(), angle)))
-    freeze_added_mass.plain(RODS.added_mass, RODS, work)
+    freeze_normals.plain(RODS, work, rows(rotated(ROBOT.nodes(), angle)))
+    freeze_added_mass.plain(RODS, work)
     return work
 
 
 def energy(work, velocities: np.ndarray, frame=(0.0, 0.0)) -> float:
     """Kinetic energy of the fluid [J], as seen from a frame that moves with a velocity."""
     v = rows(np.broadcast_to(velocities, (ROBOT.n_nodes, 2)))
-    return float(plain(add_fluid_energy.plain(work.added_mass, RODS, v, frame, Lanes(0.0)))[0])
+    return float(plain(add_fluid_energy.plain(RODS, work, v, frame, Lanes(0.0)))[0])
 
 
 def test_all_edges_together_weigh_on_their_nodes_what_they_drag_along():
@@ -43,7 +43,7 @@ def test_all_edges_together_weigh_on_their_nodes_what_they_drag_along():
 def test_a_limb_that_slides_along_itself_moves_no_fluid():
     """Limb 1 lies along x: its nodes have mass across, in y, alone."""
     np.testing.assert_allclose(frozen().added_mass[6:9, 0], [0.0, 0.0, OF_AN_EDGE], rtol=1e-12, atol=1e-20)
-    assert plain(momentum.plain(frozen().added_mass, 2, Lanes(0.3), Lanes(0.0)))[0][0] == pytest.approx(0.0, abs=1e-20)
+    assert plain(fluid_momentum.plain(frozen(), 2, Lanes(0.3), Lanes(0.0)))[0][0] == pytest.approx(0.0, abs=1e-20)
 
 
 def test_a_star_of_five_limbs_moves_the_same_fluid_in_every_direction():
@@ -63,12 +63,12 @@ def test_seen_from_a_frame_that_moves_along_fluid_is_at_rest():
 
 def test_inertia_has_the_derivatives_of_its_energy_and_a_mass_that_is_never_negative():
     gamma, node = 0.01, 7
-    mass = frozen(0.4).added_mass[:, :1]
+    work = NO_WORK._replace(added_mass=frozen(0.4).added_mass[:, :1])
     q = gamma * np.random.default_rng(1).standard_normal((2, 20))
 
     def slopes(q):
         d = map(Lanes, q / gamma)
-        found = add_fluid_inertia.plain(mass, node, *d, Lanes(1.0 / gamma), NOTHING)
+        found = add_fluid_inertia.plain(work, node, *d, Lanes(1.0 / gamma), NOTHING)
         return plain(found[0]), np.array(plain(found[1])), symmetric(found[2])
 
     _, force, hessian = slopes(q)
@@ -79,5 +79,5 @@ def test_inertia_has_the_derivatives_of_its_energy_and_a_mass_that_is_never_nega
 
 
 def test_without_added_mass_slopes_and_energy_stay_what_they_are():
-    assert add_fluid_inertia.plain(None, 1, None, None, None, NOTHING) is NOTHING
-    assert add_fluid_energy.plain(None, None, None, None, 3.0) == 3.0
+    assert add_fluid_inertia.plain(NO_WORK, 1, None, None, None, NOTHING) is NOTHING
+    assert add_fluid_energy.plain(NO_RODS, NO_WORK, None, None, 3.0) == 3.0

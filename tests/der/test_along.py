@@ -113,7 +113,7 @@ def test_energy_changes_with_the_rotation_as_the_moments_and_the_stiffness_say()
 
 def test_what_moving_natural_curvature_stores_is_the_energy_of_the_hinges_left_behind():
     work = memory(0.0 * END)
-    moved = plain(add_moved_energy.plain(RODS.along, RODS, work, actuation(BEGIN, END), Lanes(0.0), Lanes(1.0), 0.0))
+    moved = plain(add_moved_energy.plain(RODS, work, actuation(BEGIN, END), Lanes(0.0), Lanes(1.0), 0.0))
     begin, end = STAR.at(BEGIN), STAR.at(END)
     expected = sum(
         0.5 * max(f) / f[1] * EI * dl * (oracle.curvature(b, dl) - oracle.curvature(a, dl)) ** 2

@@ -16,12 +16,12 @@ from seastar_gym.der.stepping.newton import minimise, take_step
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.der.terms.body import freeze_body, place_roots
-from seastar_gym.der.terms.damping import freeze_strains
 from seastar_gym.der.terms.fluid import freeze_fluid
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
 from slopes import gradient, plain
+from stages import begun_on_body, unknown_rows, unknowns
 
 UNEVEN = Body(
     outline=((0.03, -0.01), (0.02, 0.02), (-0.02, 0.015), (-0.025, -0.02)), mass=4e-3, centre_of_mass=(4e-3, -3e-3),
@@ -37,6 +37,7 @@ SCENES = {
     "weight": {"body": UNEVEN, "fluid": Water(950.0), "gravity": (1.0, -9.81)},
 }
 N_LIMBS, N = 3, 3
+EVERYONE = Mask(np.ones(N_LANES, bool))
 
 
 def make(body, fluid, relaxation_time=None, gravity=None):
@@ -95,41 +96,12 @@ def turned_limbs(rigid, rng):
     return np.concatenate(nodes)
 
 
-def rows_of(rods, u):
-    """Unknowns as rows for kernels, roots left out."""
-    n = len(u) - 1
-    rows = np.zeros((n + 2 + 2 * N_LIMBS, 1))
-    rows[:n, 0], rows[n, 0] = u[:-1], u[-1] * rods.body.scale[0]
-    return rows
-
-
-def rates_of(stage):
-    """The first guess's velocity of the hub and angular velocity."""
-    rates = (stage.first - stage.u_hat) / stage.gamma
-    return tuple(map(Lanes, (rates[0], rates[1], rates[-1])))
-
-
 def run(rods, rigid, stage, convex=None):
     """(Phi, decrement, pivot, Newton direction in the unknowns) by the kernels."""
-    work = make_work(rods, 1)
-    kernel_stage = Stage(rows_of(rods, stage.u_hat), rows_of(rods, stage.v_hat), Lanes(stage.gamma),
-                         Lanes(1.0 / stage.gamma), False)  # fmt: skip
-    work.q[:] = rows_of(rods, stage.first)
-    place_roots.plain(rods.body, rods, work.q)
-    place_roots.plain(rods.body, rods, kernel_stage.q_hat)
-    freeze_body.plain(rods.body, rods, work, kernel_stage, rates_of(stage))
-    freeze_fluid.plain(rods, work)
-    freeze_strains.plain(rods.damping, rods, work, kernel_stage.q_hat)
-    natural = rigid.directions + stage.delta_psi
-    work.hub_direction[:] = np.stack([np.cos(natural), np.sin(natural)], axis=1).reshape(-1, 1)
-    work.q[:] = rows_of(rods, stage.u)
-    place_roots.plain(rods.body, rods, work.q)
+    work, kernel_stage = begun_on_body(rods, rigid.directions, stage, ahead=False)
     phi, decrement, pivot = plain(factorise.plain(rods, work, kernel_stage, convex))
-    everyone = Mask(np.ones(work.q.shape[1], bool))
-    take_step.plain(rods, work, everyone, None, Lanes(1.0))
-    n = len(stage.u) - 1
-    direction = -np.append(work.step[:n, 0], work.step[n, 0] / rods.body.scale[0])
-    return phi[0], decrement[0], pivot[0], direction
+    take_step.plain(rods, work, EVERYONE, None, Lanes(1.0))
+    return phi[0], decrement[0], pivot[0], -unknowns(rods, work.step)
 
 
 @pytest.mark.parametrize("name, gamma", [*((name, 1e-2) for name in SCENES), ("uneven body", 1e-3)])
@@ -156,7 +128,7 @@ def test_a_regularised_matrix_is_positive_definite_however_limbs_press(seed):
     stage.u[2:-1] *= 0.7  # compressed by a third
     _, _, pivot, _ = run(rods, rigid, stage)
     assert not pivot > 0.0
-    _, decrement, pivot, _ = run(rods, rigid, stage, Mask(np.ones(N_LANES, bool)))
+    _, decrement, pivot, _ = run(rods, rigid, stage, EVERYONE)
     assert pivot > 0.0 and decrement > 0.0
 
 
@@ -221,19 +193,17 @@ def test_in_vacuum_a_step_leaves_the_oracle_s_minimum_by_a_move_of_the_whole_rob
 def settled(rods, rigid, tableau, start, gamma, h):
     """Where the first stage of a step in vacuum ends, by the kernels."""
     work = make_work(rods, tableau.n_stages)
-    q_hat, v_hat = rows_of(rods, start.u), rows_of(rods, start.v_hat)
+    q_hat, v_hat = unknown_rows(rods, start.u), unknown_rows(rods, start.v_hat)
     stage = Stage(q_hat, v_hat, Lanes(gamma), Lanes(1.0 / gamma), not tableau.stiffly_accurate)
-    work.q[:] = rows_of(rods, start.u + gamma * start.v_hat)
+    work.q[:] = unknown_rows(rods, start.u + gamma * start.v_hat)
     for rows in (work.q, q_hat):
-        place_roots.plain(rods.body, rods, rows)
-    freeze_body.plain(rods.body, rods, work, stage, tuple(map(Lanes, (*start.v_hat[:2], start.v_hat[-1]))))
+        place_roots.plain(rods, rows)
+    freeze_body.plain(rods, work, stage, tuple(map(Lanes, (*start.v_hat[:2], start.v_hat[-1]))))
     freeze_fluid.plain(rods, work)
     work.hub_direction[:] = np.stack([np.cos(rigid.directions), np.sin(rigid.directions)], axis=1).reshape(-1, 1)
-    everyone = Mask(np.ones(work.q.shape[1], bool))
-    minimise.plain(rods, work, stage, everyone, Lanes(1e-13), Lanes(60.0))
-    settle_momentum.plain(rods, work, tableau, 0, stage, q_hat, v_hat, Lanes(h), everyone)
-    n = len(start.u) - 1
-    return np.append(work.q[:n, 0], work.q[n, 0] / rods.body.scale[0])
+    minimise.plain(rods, work, stage, EVERYONE, Lanes(1e-13), Lanes(60.0))
+    settle_momentum.plain(rods, work, tableau, 0, stage, q_hat, v_hat, Lanes(h), EVERYONE)
+    return unknowns(rods, work.q)
 
 
 @pytest.mark.parametrize("turns", [0.0, 1e-9, 0.3, 3.1, 3.2, -7.0, 100.0, -1e4])

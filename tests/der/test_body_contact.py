@@ -13,16 +13,15 @@ from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.newton import move_along
 from seastar_gym.der.stepping.stages import Stage
-from seastar_gym.der.terms.body import begin_body, freeze_body, move_roots, place_roots
+from seastar_gym.der.terms.body import begin_body, place_roots
 from seastar_gym.der.terms.contact import add_contact, n_listed
 from seastar_gym.der.terms.crossing import those_uncrossed
-from seastar_gym.der.terms.damping import freeze_strains
-from seastar_gym.der.terms.fluid import freeze_fluid
 from seastar_gym.der.terms.near_pairs import freeze_contact
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
 from slopes import gradient, plain, slope
+from stages import begun_on_body, unknown_rows, unknowns
 
 ANGLE, N_LIMBS, N, LENGTH = 0.3, 3, 4, 0.06
 UNEVEN = Body(
@@ -115,33 +114,6 @@ def pressed(oracle: Touching, u: np.ndarray) -> set[str]:
     return {"corner" if pair.i >= n else "side" if pair.k >= n else "limb" for pair in pairs}
 
 
-def rows_of(rods, u: np.ndarray) -> np.ndarray:
-    n = len(u) - 1
-    rows = np.zeros((n + 2 + 2 * rods.body.n_arms, N_LANES))
-    rows[:n], rows[n] = u[:-1, None], u[-1] * rods.body.scale[0]
-    return rows
-
-
-def begun(rods, oracle: Touching, stage: SimpleNamespace):
-    """(work, stage) of kernels where the stage's first guess is frozen, and the iterate is at u."""
-    work, gamma = make_work(rods, 1), Lanes(stage.gamma)
-    q_hat, v_hat = rows_of(rods, stage.u_hat), rows_of(rods, stage.v_hat)
-    move_roots.plain(rods.body, rods, q_hat, v_hat)
-    kernel_stage = Stage(q_hat, v_hat, gamma, 1.0 / gamma, oracle.ahead)
-    rates = (stage.first - stage.u_hat) / stage.gamma
-    work.q[:] = rows_of(rods, stage.first)
-    place_roots.plain(rods.body, rods, work.q)
-    freeze_contact.plain(rods.contact, rods, work, kernel_stage, q_hat)
-    freeze_body.plain(rods.body, rods, work, kernel_stage, tuple(Lanes(rates[k]) for k in (0, 1, -1)))
-    freeze_fluid.plain(rods, work)
-    freeze_strains.plain(rods.damping, rods, work, q_hat)
-    natural = oracle.directions + stage.delta_psi
-    work.hub_direction[:] = np.stack([np.cos(natural), np.sin(natural)], axis=1).reshape(-1, 1)
-    work.q[:] = rows_of(rods, stage.u)
-    place_roots.plain(rods.body, rods, work.q)
-    return work, kernel_stage
-
-
 CASES = [
     ("disc", False, "side", None),
     ("disc", True, "corner", None),
@@ -157,13 +129,12 @@ def test_potential_and_newton_direction_are_those_of_the_oracle(name, ahead, kin
     """Slopes of the potential by differences; the Hessian of contact is in the coupled step alone."""
     rods, oracle = make(name, ahead, relaxation_time)
     stage = random_stage(oracle, 2e-3, 1, kind)
-    work, kernel_stage = begun(rods, oracle, stage)
+    work, kernel_stage = begun_on_body(rods, oracle.directions, stage, oracle.ahead)
     energy, decrement, pivot = factorise.plain(rods, work, kernel_stage, None)
     assert n_listed.plain(work) > 0 and np.isfinite(plain(pivot)).all()
-    decrement = solve_coupled.plain(work.contact, rods, work, EVERYONE, decrement)
-    move_along.plain(work.contact, rods, work, EVERYONE, None, Lanes(1.0))
-    n = len(stage.u) - 1
-    direction = -np.append(work.step[:n, 0], work.step[n, 0] / rods.body.scale[0])
+    decrement = solve_coupled.plain(rods, work, EVERYONE, decrement)
+    move_along.plain(rods, work, EVERYONE, None, Lanes(1.0))
+    direction = -unknowns(rods, work.step)
 
     def phi(u):
         return oracle.phi(u, stage.u_hat, stage.v_hat, stage.gamma, stage.delta_psi, stage.first)
@@ -183,9 +154,9 @@ def test_forces_neither_push_nor_turn_robot_and_body_together(name, kind):
     rods, oracle = make(name)
     stage = random_stage(oracle, 2e-3, 3, kind)
     stage.first = stage.u
-    work, kernel_stage = begun(rods, oracle, stage)
-    begin_body.plain(rods.body, rods, work)
-    energy = add_contact.plain(rods.contact, rods, work, kernel_stage, None, Lanes(0.0))
+    work, kernel_stage = begun_on_body(rods, oracle.directions, stage, oracle.ahead)
+    begin_body.plain(rods, work)
+    energy = add_contact.plain(rods, work, kernel_stage, None, Lanes(0.0))
     n = 2 * oracle.star.n_nodes - 2 * N_LIMBS
     force, q = (rows[:n, 0].reshape(-1, 2) for rows in (work.contact.force, work.q))
     assert plain(energy)[0] > 0.0 and not work.contact.force[n + 2 :].any() and n_listed.plain(work) > 0
@@ -210,9 +181,9 @@ def test_nodes_that_entered_a_body_belong_to_the_side_that_they_came_from():
         moved = turned(stage.u[-1], nodes) + stage.u[:2]
         setattr(stage, at, np.append(moved.ravel(), stage.u[-1]))
     stage.u = stage.first
-    work, kernel_stage = begun(rods, oracle, stage)
-    begin_body.plain(rods.body, rods, work)
-    add_contact.plain(rods.contact, rods, work, kernel_stage, None, Lanes(0.0))
+    work, kernel_stage = begun_on_body(rods, oracle.directions, stage, oracle.ahead)
+    begin_body.plain(rods, work)
+    add_contact.plain(rods, work, kernel_stage, None, Lanes(0.0))
     force = turned(-stage.u[-1], work.contact.force[2 * node : 2 * node + 2, 0])
     np.testing.assert_allclose(force / np.linalg.norm(force), [-0.005 / 0.0403112887, 0.04 / 0.0403112887], atol=1e-3)
 
@@ -227,12 +198,12 @@ def forces(body: Body, began: np.ndarray, guessed: np.ndarray) -> np.ndarray:
     q_0, still = np.zeros_like(work.q), np.zeros_like(work.q)
     for rows, nodes in ((q_0, began), (work.q, guessed)):
         rows[:n] = nodes.reshape(N_LANES, n).T
-        place_roots.plain(rods.body, rods, rows)
+        place_roots.plain(rods, rows)
     stage = Stage(q_0, still, Lanes(1.0), Lanes(1.0), False)
-    freeze_contact.plain(rods.contact, rods, work, stage, q_0)
+    freeze_contact.plain(rods, work, stage, q_0)
     work.q[:n] *= 0.8
-    begin_body.plain(rods.body, rods, work)
-    add_contact.plain(rods.contact, rods, work, stage, None, Lanes(0.0))
+    begin_body.plain(rods, work)
+    add_contact.plain(rods, work, stage, None, Lanes(0.0))
     return work.contact.force[:n].T.reshape(began.shape)
 
 
@@ -287,9 +258,9 @@ def test_steps_whose_ends_are_in_the_body_are_seen_in_their_own_robot(name):
     for end, start, good in ((outside, outside, True), (inside, outside, False), (through, outside, False),
                              (inside, inside, True), (outside, inside, True)):  # fmt: skip
         work = make_work(rods, 1)
-        work.q[:], q_0 = rows_of(rods, end), rows_of(rods, start)
+        work.q[:], q_0 = unknown_rows(rods, end), unknown_rows(rods, start)
         for rows in (work.q, q_0):
-            place_roots.plain(rods.body, rods, rows)
+            place_roots.plain(rods, rows)
         stage = Stage(q_0, q_0, Lanes(1.0), Lanes(1.0), False)
-        found = plain(those_uncrossed.plain(rods.contact, rods, work, stage, q_0, EVERYONE))
+        found = plain(those_uncrossed.plain(rods, work, stage, q_0, EVERYONE))
         assert found.all() == good and found.any() == good

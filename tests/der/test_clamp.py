@@ -61,7 +61,7 @@ def eliminated(rods: Rods, q: np.ndarray, start: np.ndarray, v_hat: np.ndarray) 
     work.q[:], work.q_hat[:], work.v_hat[:] = rows(start), rows(start), rows(v_hat)
     stage = Stage(work.q_hat, work.v_hat, Lanes(GAMMA), Lanes(1.0 / GAMMA), False)
     freeze_fluid.plain(rods, work)
-    freeze_strains.plain(rods.damping, rods, work, work.q_hat)
+    freeze_strains.plain(rods, work, work.q_hat)
     work.q[:] = rows(q)
     return work, tuple(plain(one)[0] for one in factorise.plain(rods, work, stage, None))
 
@@ -147,7 +147,7 @@ def test_limbs_that_turn_as_a_whole_are_no_effort():
 def test_what_moved_natural_directions_store_is_the_energy_of_the_robot_left_behind():
     work = memory()
     turned = Actuation(0.0 * TURNS, TURNS)
-    moved = plain(moved_clamp_energy.plain(RODS.clamp, RODS, work, turned, Lanes(0.0), Lanes(1.0)))
+    moved = plain(moved_clamp_energy.plain(RODS, work, turned, Lanes(0.0), Lanes(1.0)))
     assert moved[0] == pytest.approx(plain(clamp_energy.plain(RODS, memory(), rows(ROBOT.nodes())))[0], rel=1e-12)
 
 

@@ -20,7 +20,7 @@ from seastar_gym.der.terms.near_pairs import OVERHANG
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
-from slopes import plain, rows, slope
+from slopes import NO_RODS, NO_WORK, plain, rows, slope
 from touching import touching_limbs
 
 EVERYONE = Mask(np.ones(N_LANES, bool))
@@ -29,7 +29,7 @@ EVERYONE = Mask(np.ones(N_LANES, bool))
 def energy(touching, q=None) -> np.ndarray:
     work, own = touching.work, touching.work.q.copy()
     work.q[:] = own if q is None else q
-    found = plain(add_contact.plain(touching.rods.contact, touching.rods, work, touching.stage, None, Lanes(0.0)))
+    found = plain(add_contact.plain(touching.rods, work, touching.stage, None, Lanes(0.0)))
     work.q[:] = own
     return found
 
@@ -77,12 +77,12 @@ def test_robots_apart_have_no_forces_whoever_touches_beside_them():
     found = energy(touching)
     assert not found[:2].any() and np.all(found[2:] > 0.0)
     assert not touching.work.contact.force[:, :2].any()
-    np.testing.assert_array_equal(plain(those_apart.plain(touching.work.contact, EVERYONE)), np.arange(N_LANES) < 2)
+    np.testing.assert_array_equal(plain(those_apart.plain(touching.work, EVERYONE)), np.arange(N_LANES) < 2)
 
 
 def test_where_the_stage_is_asked_and_where_the_state_ends_is_the_same_energy_without_looking_ahead():
     touching = touching_limbs()
-    args = touching.rods.contact, touching.rods, touching.work, touching.work.q, Lanes(0.0)
+    args = touching.rods, touching.work, touching.work.q, Lanes(0.0)
     np.testing.assert_allclose(plain(add_contact_energy.plain(*args)), energy(touching), rtol=1e-9)
 
 
@@ -97,7 +97,7 @@ def test_edges_cross_where_each_cuts_the_other_and_not_at_their_ends():
 
 
 def test_without_contact_nothing_is_added():
-    assert add_contact.plain(None, None, None, None, None, 3.0) == 3.0
-    assert add_contact_energy.plain(None, None, None, None, 3.0) == 3.0
-    assert plain(contact_force.plain(None, 1)) == (0.0, 0.0)
-    assert those_apart.plain(None, EVERYONE) is EVERYONE
+    assert add_contact.plain(NO_RODS, NO_WORK, None, None, 3.0) == 3.0
+    assert add_contact_energy.plain(NO_RODS, NO_WORK, None, 3.0) == 3.0
+    assert plain(contact_force.plain(NO_WORK, 1)) == (0.0, 0.0)
+    assert those_apart.plain(NO_WORK, EVERYONE) is EVERYONE

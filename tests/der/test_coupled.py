@@ -8,7 +8,7 @@ from seastar_gym.der.linear.star_solution import solve_again, substitute_star
 from seastar_gym.der.potential import factorise
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
-from slopes import plain
+from slopes import NO_WORK, plain
 from touching import touching_limbs
 
 EVERYONE = np.ones(N_LANES, bool)
@@ -20,7 +20,7 @@ def steps(touching, robots=EVERYONE):
     _, alone, _ = factorise.plain(rods, work, touching.stage, None)
     star = np.zeros_like(work.q)
     substitute_star.plain(rods, work, star)
-    together = solve_coupled.plain(work.contact, rods, work, Mask(robots), alone)
+    together = solve_coupled.plain(rods, work, Mask(robots), alone)
     return star, work.contact.x.copy(), plain(alone), plain(together)
 
 
@@ -70,7 +70,7 @@ def test_dot_is_the_product_of_rows_robot_by_robot():
 
 def test_without_contact_the_decrement_is_the_stars():
     one = Lanes(1.0)
-    assert solve_coupled.plain(None, None, None, None, one) is one
+    assert solve_coupled.plain(None, NO_WORK, None, one) is one
 
 
 def test_few_iterations_solve_it_as_exactly_as_a_step_of_5_ms_allows(monkeypatch):
@@ -89,7 +89,7 @@ def test_few_iterations_solve_it_as_exactly_as_a_step_of_5_ms_allows(monkeypatch
         return product
 
     monkeypatch.setitem(solve_coupled.plain.__globals__, "dot", noted)
-    decrement = plain(solve_coupled.plain(work.contact, rods, work, Mask(EVERYONE), alone))
+    decrement = plain(solve_coupled.plain(rods, work, Mask(EVERYONE), alone))
     assert not work.contact.missed.any() and len(left) < 20
     assert np.any(left[-2] > 1e-10 * decrement)
     assert 1e-11 < (left[-1] / decrement).max() < 1e-10
@@ -106,5 +106,5 @@ def test_whoever_does_not_arrive_in_200_iterations_is_missed(monkeypatch):
         return Lanes(1.0)
 
     monkeypatch.setitem(solve_coupled.plain.__globals__, "dot", never_less)
-    solve_coupled.plain(work.contact, rods, work, Mask(EVERYONE), alone)
+    solve_coupled.plain(rods, work, Mask(EVERYONE), alone)
     assert work.contact.missed.all() and len(iterations) == 1 + 200

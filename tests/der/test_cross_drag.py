@@ -7,7 +7,7 @@ from seastar_gym import Scene, Seastar, Water
 from seastar_gym.der.terms.drag import add_cross_flow, add_half_edge, drag_slopes
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.numpy_lanes import Lanes
-from slopes import gradient, plain, symmetric
+from slopes import NO_RODS, gradient, plain, symmetric
 
 C, GAMMA = 0.4, 0.01
 ANGLE = 0.6
@@ -51,12 +51,10 @@ def test_a_straight_limb_has_the_one_coefficient_along_and_the_other_across(disc
     for flow, coefficient in (((0.2, 0.0), 0.3), ((0.0, 0.2), 1.2)):
         _, c_speed, _ = drag_slopes.plain(Lanes(rods.drag[node]), *map(Lanes, flow))
         start = (Lanes(0.0), (c_speed * flow[0], c_speed * flow[1]), NOTHING[2])
-        _, force, _ = add_cross_flow.plain(
-            rods.cross_drag, rods, normals, node, *map(Lanes, flow), Lanes(1.0), Lanes(1.0), start
-        )
+        _, force, _ = add_cross_flow.plain(rods, normals, node, *map(Lanes, flow), Lanes(1.0), Lanes(1.0), start)
         size = share * 0.5 * 1000.0 * coefficient * 2.0 * 1.6e-3 * (0.1 / 3) * 0.2**2
         np.testing.assert_allclose(np.hypot(*plain(force)), size, rtol=1e-12)
 
 
 def test_without_such_drag_slopes_stay_what_they_are():
-    assert add_cross_flow.plain(None, None, None, 1, None, None, None, None, NOTHING) is NOTHING
+    assert add_cross_flow.plain(NO_RODS, None, 1, None, None, None, None, NOTHING) is NOTHING

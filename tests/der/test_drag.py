@@ -5,7 +5,7 @@ import numpy as np
 from seastar_gym.der.motion import relative
 from seastar_gym.der.terms.drag import drag_slopes
 from seastar_gym.simd.numpy_lanes import Lanes
-from slopes import gradient, plain
+from slopes import NO_WORK, gradient, plain
 
 C = 0.37
 FLOWS = np.random.default_rng(0).standard_normal((2, 60))
@@ -46,6 +46,6 @@ def test_still_water_takes_nothing_and_is_finite():
 
 
 def test_a_node_that_drifts_with_the_current_feels_none():
-    current = np.array([[0.2], [0.1], [-0.4], [0.3]])
-    np.testing.assert_array_equal(plain(relative.plain(current, 1, Lanes(-0.4), Lanes(0.3))), np.zeros((2, 1)))
-    assert plain(relative.plain(None, 1, Lanes(-0.4), Lanes(0.3))) == (-0.4, 0.3)
+    flowing = NO_WORK._replace(current=np.array([[0.2], [0.1], [-0.4], [0.3]]))
+    np.testing.assert_array_equal(plain(relative.plain(flowing, 1, Lanes(-0.4), Lanes(0.3))), np.zeros((2, 1)))
+    assert plain(relative.plain(NO_WORK, 1, Lanes(-0.4), Lanes(0.3))) == (-0.4, 0.3)

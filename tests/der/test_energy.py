@@ -96,7 +96,7 @@ def test_the_moment_that_resists_an_actuator_is_the_slope_of_the_energy_in_its_r
     q = rows(robot.nodes() + 2e-3 * rng.standard_normal((robot.n_nodes, 2)))
     if robot.has_body:
         q = np.vstack([q, np.full((1, N_LANES), 2e-3), np.zeros((1 + 2 * robot.n_limbs, N_LANES))])
-        place_roots.plain(rods.body, rods, q)
+        place_roots.plain(rods, q)
     work, turns = make_work(rods, 1), rng.uniform(-0.2, 0.2, robot.n_limbs)
 
     def actuation(turns):

@@ -13,12 +13,11 @@ from seastar_gym.der.stepping.foresight import (
     EASY,
     FORESEEABLE_T,
     LATE,
-    PREDICTABLE_STRAIN,
-    SLENDER,
     foreseeable_length,
     largest_hub_t,
     predictable,
 )
+from seastar_gym.der.stepping.scales import PREDICTABLE_STRAIN, SLENDER
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes

@@ -83,8 +83,8 @@ def worked(rods, work, q, v, frame, result):
     rows, memory, out, h = borrow(rods), borrow(work), borrow(result), splat(0.01)
     seen_from = (load(borrow(frame), 0), load(borrow(frame), 1))
     freeze_fluid(rows, memory)
-    store(out, 0, add_work_of_current(rows.current, rows, memory, borrow(v), h, seen_from, splat(0.0)))
-    store(out, 1, add_work_of_loads(rows.load, rows, memory, borrow(q), h, seen_from, splat(0.0)))
+    store(out, 0, add_work_of_current(rows, memory, borrow(v), h, seen_from, splat(0.0)))
+    store(out, 1, add_work_of_loads(rows, memory, borrow(q), h, seen_from, splat(0.0)))
 
 
 @numba.njit(error_model="numpy")

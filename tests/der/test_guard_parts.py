@@ -9,21 +9,20 @@ from seastar_gym import Scene, Seastar, UniformCurrent, Water
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.guard import (
     add_held_energy,
-    cut_velocities,
     energy_noise,
     frame_velocity,
     hold_to_energy,
     may_gain,
-    rigid_motion,
     through_poles,
 )
+from seastar_gym.der.stepping.rigid_motion import cut_velocities, rigid_motion
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.der.terms.contact import add_contact_energy
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
-from slopes import nodes, plain, rotated, rows
+from slopes import NO_RODS, nodes, plain, rotated, rows
 from stages import turn_limbs
 from touching import touching_limbs
 
@@ -40,9 +39,9 @@ def motion_of(v: np.ndarray):
 
 def test_a_robot_is_judged_as_its_water_sees_it_and_in_vacuum_as_its_own_centre_of_mass_does():
     stream = make_rods(Scene(ROBOT, Water(current=UniformCurrent(0.3, -0.2))))
-    found = plain(frame_velocity.plain(stream.current, stream, rows(Q), rows(V)))
+    found = plain(frame_velocity.plain(stream, rows(Q), rows(V)))
     np.testing.assert_allclose([found[0][0], found[1][0]], [0.3, -0.2])
-    alone = plain(frame_velocity.plain(None, RODS, rows(Q), rows(V)))
+    alone = plain(frame_velocity.plain(RODS, rows(Q), rows(V)))
     np.testing.assert_allclose([alone[0][0], alone[1][0]], RODS.mass @ V / RODS.mass.sum(), rtol=1e-12)
 
 
@@ -124,23 +123,23 @@ def test_a_step_may_gain_energy_where_what_newton_knows_does_not_rule_it_out(loa
     stage = Stage(rows(Q), rows(v_0), Lanes(h), Lanes(1.0 / h), False)
     above = np.arange(N_LANES) % 2 == 0
     phi = Lanes(least + np.where(above, 1e-9, -1e-9) * abs(least))
-    found = plain(may_gain.plain(None, None, None, rods, work, stage, phi, EVERYONE))
+    found = plain(may_gain.plain(rods, work, stage, phi, EVERYONE))
     np.testing.assert_array_equal(found, above)
-    assert not plain(may_gain.plain(None, None, None, rods, work, stage, phi, ~EVERYONE)).any()
+    assert not plain(may_gain.plain(rods, work, stage, phi, ~EVERYONE)).any()
 
 
 def test_with_a_body_or_in_fluid_that_moves_or_moves_along_any_step_may_gain():
-    assert may_gain.plain(object(), None, None, None, None, None, None, EVERYONE) is EVERYONE
-    assert may_gain.plain(None, object(), None, None, None, None, None, EVERYONE) is EVERYONE
-    assert may_gain.plain(None, None, object(), None, None, None, None, EVERYONE) is EVERYONE
+    for named in ("current", "added_mass", "body"):
+        rods = NO_RODS._replace(**{named: object()})
+        assert may_gain.plain(rods, None, None, None, EVERYONE) is EVERYONE
 
 
 def test_what_limbs_that_press_each_other_store_counts_where_the_scheme_gives_it_back():
     touching = touching_limbs()
-    args = touching.rods.contact, touching.rods, touching.work
+    args = touching.rods, touching.work
     stored = plain(add_contact_energy.plain(*args, touching.work.q, Lanes(2.0)))
     assert np.all(stored > 2.0)
     for name, scheme in SCHEMES.items():
         found = plain(add_held_energy.plain(*args, scheme, touching.work.q, Lanes(2.0)))
         np.testing.assert_array_equal(found, stored if name == "implicit-euler" else 2.0)
-    assert add_held_energy.plain(None, None, None, SCHEMES["sdirk2"], None, 2.0) == 2.0
+    assert add_held_energy.plain(NO_RODS, None, SCHEMES["sdirk2"], None, 2.0) == 2.0

@@ -11,8 +11,7 @@ from seastar_gym.der.stepping.interval import FALLBACK_AFTER, cover_interval
 from seastar_gym.der.stepping.report import REPORT_ROWS
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.steps import MOST_HALVINGS, SMALLEST_FRACTION, TURNABLE
-from seastar_gym.model.limits import make_limits
-from seastar_gym.model.rods import make_rods
+from seastar_gym.model.rods import make_limits, make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
 from slopes import plain, rows

@@ -8,7 +8,6 @@ import pytest
 from seastar_gym import Scene, Seastar
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.interval import cover_interval, note_hub_angles
-from seastar_gym.der.stepping.limits import Limits
 from seastar_gym.der.stepping.report import (
     COVERED,
     HALVINGS,
@@ -18,6 +17,7 @@ from seastar_gym.der.stepping.report import (
     SMALLEST_HUB_T,
     STEPS,
 )
+from seastar_gym.der.stepping.scales import Limits
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stages import LAST_STEP, SIZE, memory_row
 from seastar_gym.der.stepping.steps import Step, end_guarded_step, solve_stages, try_step

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from seastar_gym import Numerics, Scene, Seastar, UniformCurrent, Water
-from seastar_gym.der.geometry import edge_geometry
+from seastar_gym.der.geometry import edge_geometry, positive_part
 from seastar_gym.der.motion import node_motion
-from seastar_gym.der.potential import coupling, elastic_slopes, node_slopes, positive_part
+from seastar_gym.der.potential import coupling, elastic_slopes, node_slopes
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.der.terms.load import load_power, nodal_load
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
-from slopes import gradient, plain, symmetric
+from slopes import NO_RODS, gradient, plain, symmetric
 
 GAMMA, NODE, EDGE = 0.01, 5, 4
 ROBOT = Seastar(nodes_per_limb=4, relaxation_time=4e-3)
@@ -40,9 +40,8 @@ def test_a_node_has_the_slopes_of_its_inertia_drag_and_load(rods):
 
     def slopes(q):
         work.q[2 * NODE : 2 * NODE + 2] = q
-        energy, force, hessian = node_slopes.plain(
-            work.contact, rods, work, stage, NODE, node_motion.plain(work, stage, NODE)
-        )
+        motion, push = node_motion.plain(work, stage, NODE), (Lanes(0.0), Lanes(0.0))
+        energy, force, hessian = node_slopes.plain(rods, work, stage, NODE, motion, push)
         return plain(energy), np.array(plain(force)), symmetric(hessian)
 
     q = GAMMA * RNG.standard_normal((2, N_LANES))
@@ -94,7 +93,7 @@ def test_positive_part_is_zero_for_what_is_not_positive():
 
 
 def test_a_load_has_its_power_and_none_is_none():
-    assert plain(nodal_load.plain(EVERYTHING.load, NODE)) == (1e-3, -2e-3)
-    assert plain(load_power.plain(EVERYTHING.load, NODE, Lanes(3.0), Lanes(1.0))) == pytest.approx(1e-3)
-    assert plain(nodal_load.plain(None, NODE)) == (0.0, 0.0)
-    assert plain(load_power.plain(None, NODE, Lanes(3.0), Lanes(1.0))) == 0.0
+    assert plain(nodal_load.plain(EVERYTHING, NODE)) == (1e-3, -2e-3)
+    assert plain(load_power.plain(EVERYTHING, NODE, Lanes(3.0), Lanes(1.0))) == pytest.approx(1e-3)
+    assert plain(nodal_load.plain(NO_RODS, NODE)) == (0.0, 0.0)
+    assert plain(load_power.plain(NO_RODS, NODE, Lanes(3.0), Lanes(1.0))) == 0.0

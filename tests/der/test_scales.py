@@ -16,9 +16,9 @@ RODS = make_rods(Scene(THICK, Water(900.0, 1.5)))
 def test_drag_takes_more_than_a_step_creates_up_to_a_share_of_the_predictable_energy():
     """Drag of a limb that moves by its length over its inertia: 1/2 rho_f C_d 2 r l/(rho A)."""
     share = 0.5 * 900.0 * 1.5 * 2.0 * 2e-3 * 0.08 / (1200.0 * AREA)
-    assert share > 1.0 and RODS.scales.damped == pytest.approx(RODS.foresight.energy)
+    assert share > 1.0 and RODS.scales.damped == pytest.approx(RODS.scales.predictable)
     thin_water = make_rods(Scene(THICK, Water(9.0, 1.5))).scales
-    assert thin_water.damped == pytest.approx(float(RODS.foresight.energy[0]) * 0.01 * share)
+    assert thin_water.damped == pytest.approx(float(RODS.scales.predictable[0]) * 0.01 * share)
 
 
 def test_edges_are_stiffer_than_inertia_by_the_square_of_their_number_and_of_the_speed_of_sound_over_their_length():

@@ -18,8 +18,7 @@ from seastar_gym.der.stepping.stages import (
     store_share,
 )
 from seastar_gym.der.terms.hub import Actuation
-from seastar_gym.model.limits import make_limits
-from seastar_gym.model.rods import make_rods
+from seastar_gym.model.rods import make_limits, make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
 from slopes import plain, rows

@@ -50,8 +50,8 @@ def normals() -> np.ndarray:
 
 def frozen():
     work = make_work(RODS, 1)
-    freeze_normals.plain(RODS, work.normals, rows(Q))
-    freeze_added_mass.plain(RODS.added_mass, RODS, work)
+    freeze_normals.plain(RODS, work, rows(Q))
+    freeze_added_mass.plain(RODS, work)
     return work
 
 
@@ -63,7 +63,7 @@ def test_drag_across_is_that_of_the_halves_of_a_nodes_edges_by_their_own_radii(n
         for e in edges_of(node)
     )
     _, force, _ = add_cross_flow.plain(
-        RODS.cross_drag, RODS, frozen().normals, node, *map(Lanes, w), Lanes(1.0), Lanes(1.0), NOTHING
+        RODS, frozen().normals, node, *map(Lanes, w), Lanes(1.0), Lanes(1.0), NOTHING
     )
     np.testing.assert_allclose([x[0] for x in plain(force)], expected, rtol=1e-12)
 

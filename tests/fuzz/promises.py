@@ -13,8 +13,7 @@ from momenta import turned
 from seastar_gym import Numerics, Scene, Simulator, SolverStatus, State, StrokeReport, UniformCurrent
 from seastar_gym.der.rods import Rods
 from seastar_gym.der.stepping.schemes import SCHEMES
-from seastar_gym.model.limits import make_limits
-from seastar_gym.model.rods import make_rods
+from seastar_gym.model.rods import make_limits, make_rods
 from seastar_gym.scene.per_robot import side_by_side
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator.report import MEASURED_IF_ASKED
@@ -235,7 +234,7 @@ def energy_noise(simulator: Simulator, robot: int, energy: float, h: float) -> f
     """
     rods = make_rods(simulator.scene, robot if simulator.scene.n_robots else 0)
     masses = rods.mass[rods.mass > 0.0]
-    length, mass = float(rods.foresight.shortest_edge[0]), float(masses[masses < 1e9 * masses.min()].sum())
+    length, mass = float(rods.scales.shortest_edge[0]), float(masses[masses < 1e9 * masses.min()].sum())
     stretching, bending = rods.stretching.EA_over_l.max(), rods.bending.EI_over_dl.max()
     stiffness = (len(rods.mass) - 1) * float(stretching + 4.0 * bending / length**2)
     move = 10.0 * EPSILON * (float(np.abs(simulator.positions[robot]).max()) + rods.nodes_per_limb * length)

@@ -6,7 +6,7 @@ import pytest
 from seastar_gym import GridCurrent, Numerics, Scene, Seastar, ShearCurrent, SmaPulse, UniformCurrent, Vortex
 from seastar_gym.der.terms.current import current_velocity
 from seastar_gym.model.currents import current_rows
-from seastar_gym.model.limits import make_limits
+from seastar_gym.model.rods import make_limits
 from seastar_gym.scene.numerics import ADAPTATION, MOST_ITERATIONS, MOST_ITERATIONS_PER_STEP
 from seastar_gym.simd.numpy_lanes import Lanes
 from slopes import plain

@@ -10,11 +10,13 @@ from refusals import assert_refused
 from seastar_gym import Attachment, Body, Contact, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.scene.shape import rest_positions
+from strokes import finished
 
 PEAK = 0.8
 DISC = Body(radius=0.02, attachments=tuple(
     Attachment(0.02 * math.cos(a), 0.02 * math.sin(a), a + 1.0) for a in (0.0, 2.0 * math.pi / 3.0, 4.0 * math.pi / 3.0)
 ))  # fmt: skip
+
 PLATE = Body.rectangle(0.06, 0.03, attachments=(Attachment(0.03, 0.0, 0.6), Attachment(-0.03, 0.0, 0.6 + math.pi)))
 ROBOTS = {
     "disc": Seastar(3, 7, 0.06, limbs=(Limb(natural_curvature=45.0),) * 3, body=DISC),
@@ -40,17 +42,6 @@ def heights(simulator: Simulator) -> np.ndarray:
     return np.array([robot.body.shape.height_over(each).min() for each in of_robots])
 
 
-def swum(simulator: Simulator, commands: np.ndarray, parts: int = 50) -> tuple[np.ndarray, np.ndarray]:
-    """(heights after every part of a stroke, status)."""
-    stroke, found = simulator.stroke_in_parts(commands, parts), []
-    while True:
-        try:
-            next(stroke)
-        except StopIteration as end:
-            return np.array(found), end.value.status
-        found.append(heights(simulator))
-
-
 def commands(name: str) -> np.ndarray:
     """Of four robots; of the second, all limbs are turned onto the body."""
     each = np.array([[1.0, 0.0, 0.0], [1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [0.5, 1.0, -1.0]])
@@ -72,8 +63,10 @@ def test_limbs_would_be_turned_into_the_body(name):
 def test_pressed_limbs_stay_outside_of_the_body(name, scheme):
     simulator = Simulator(scene(name, scheme, 5e-3, Water()), 4)
     for _ in range(2):
-        found, status = swum(simulator, commands(name))
-        assert (status == 0).all()
+        stroke = simulator.stroke_in_parts(commands(name), 50)
+        found, report = finished(stroke, lambda time: heights(simulator))
+        found = np.array(found)
+        assert (report.status == 0).all()
         assert found.min() > 0.0 and found[:, :3].min() < 1.6e-3
 
 

@@ -6,8 +6,9 @@ import pytest
 from hubs import TEN
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State, StrokeReport
 from seastar_gym.der.stepping.report import STEPS
-from seastar_gym.model import limits as module
-from seastar_gym.model.limits import make_limits
+from seastar_gym.model import rods as module
+from seastar_gym.model.rods import make_limits
+from strokes import finished
 
 SCHEMES = ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint", "adaptive"]
 SHORTEST = 4096  # of an interval
@@ -28,13 +29,12 @@ def swimmers(scene: Scene, n_robots: int = 11, speed: float = 0.0) -> tuple[Simu
 
 def in_parts(simulator: Simulator, commands: np.ndarray, parts: int) -> tuple[np.ndarray, StrokeReport]:
     """(time steps of the robots in every part, report)."""
-    stroke, steps = simulator.stroke_in_parts(commands, parts), [np.zeros(simulator.n_robots)]
-    while True:
-        try:
-            next(stroke)
-        except StopIteration as finished:
-            return np.diff(steps, axis=0), finished.value
-        steps.append(simulator._batch.report[:, STEPS].reshape(-1)[: simulator.n_robots].copy())
+
+    def steps(time: float) -> np.ndarray:
+        return simulator._batch.report[:, STEPS].reshape(-1)[: simulator.n_robots].copy()
+
+    seen, report = finished(simulator.stroke_in_parts(commands, parts), steps)
+    return np.diff([np.zeros(simulator.n_robots), *seen], axis=0), report
 
 
 def test_error_control_and_halvings_together_keep_the_shortest_step_and_the_bound():

@@ -10,6 +10,7 @@ from hubs import TEN
 from refusals import assert_refused
 from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 from seastar_gym.model.rods import make_rods
+from strokes import finished
 
 COMMANDS = np.array(list(itertools.product([-1.0, 0.0, 1.0], repeat=5)))
 CLOSING = COMMANDS[((COMMANDS == 1.0) & (np.roll(COMMANDS, -1, axis=1) == -1.0)).any(axis=1)]
@@ -51,14 +52,9 @@ def crossings(positions: np.ndarray, n_limbs: int = 5, pairs: list[tuple[int, in
 
 def crossed_on_the_way(simulator: Simulator, commands: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray]:
     """(robots that crossed at some time of a stroke, status)."""
-    crossed = np.zeros(simulator.n_robots, dtype=bool)
     stroke = simulator.stroke_in_parts(commands, parts)
-    while True:
-        try:
-            next(stroke)
-        except StopIteration as end:
-            return crossed, end.value.status
-        crossed |= crossings(simulator.positions) > 0
+    crossed, report = finished(stroke, lambda time: crossings(simulator.positions) > 0)
+    return np.any(crossed, axis=0), report.status
 
 
 def worst_commands(rng: np.random.Generator, repeated: np.ndarray = CLOSING) -> np.ndarray:

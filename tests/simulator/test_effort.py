@@ -7,6 +7,7 @@ import pytest
 
 from seastar_gym import AlongLimb, Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires
 from seastar_gym.scene.actuators.actuator import Actuator
+from strokes import finished
 
 PEAK, HEATING = 0.3, 0.1
 COMMAND = [[1.0, -1.0, 0.0, 0.5, 0.0]]
@@ -77,14 +78,8 @@ def test_who_asks_for_the_effort_changes_no_bit_and_who_does_not_is_told_nothing
 def test_pauses_copies_and_company_change_no_bit_of_the_effort():
     whole, parts = swimmer(), swimmer()
     copied, crowd = pickle.loads(pickle.dumps(whole)), Simulator(whole.scene, 11, 3, effort=True)
-    paused = parts.stroke_in_parts(COMMAND, 7)
-    while True:
-        try:
-            next(paused)
-        except StopIteration as ended:
-            found = [ended.value]
-            break
-    found += [copied.stroke(COMMAND), crowd.stroke(np.repeat(COMMAND, 11, axis=0))]
+    _, in_parts = finished(parts.stroke_in_parts(COMMAND, 7))
+    found = [in_parts, copied.stroke(COMMAND), crowd.stroke(np.repeat(COMMAND, 11, axis=0))]
     expected = whole.stroke(COMMAND)
     for report in found:
         assert (report.work == expected.work[0]).all() and (report.peak_moment == expected.peak_moment[0]).all()

@@ -32,17 +32,11 @@ from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator import batch as module
 from seastar_gym.simulator import error_bars
 from seastar_gym.simulator import simulator as simulator_module
+from strokes import assert_same, finished
 
 FAST = Scene.preset("fast")
 N_ROBOTS = N_LANES + 3
 COMMANDS = np.random.default_rng(0).integers(-1, 2, (4, N_ROBOTS, 5)).astype(float)
-
-
-def assert_same(simulator: Simulator, other: Simulator) -> None:
-    """To the last bit, with the estimates."""
-    for one, wanted in zip(simulator.get_state(), other.get_state(), strict=True):
-        np.testing.assert_array_equal(one, wanted)
-    np.testing.assert_array_equal(simulator.error_estimate, other.error_estimate)
 
 
 def swimmers(scene: Scene = FAST, n_strokes: int = 1, threads: int = 1) -> Simulator:
@@ -156,13 +150,9 @@ def test_strokes_in_parts_have_the_same_estimates(parts):
     simulator, other = swimmers(), swimmers()
     generator, wanted = simulator.stroke_in_parts(COMMANDS[1], parts), other.stroke(COMMANDS[1])
     before = simulator.error_estimate
-    while True:
-        try:
-            next(generator)
-            np.testing.assert_array_equal(simulator.error_estimate, before)
-        except StopIteration as finished:
-            np.testing.assert_array_equal(finished.value.error_estimate, wanted.error_estimate)
-            break
+    seen, report = finished(generator, lambda time: simulator.error_estimate)
+    np.testing.assert_array_equal(seen, [before] * parts)
+    np.testing.assert_array_equal(report.error_estimate, wanted.error_estimate)
     assert_same(simulator, other)
 
 

@@ -22,6 +22,7 @@ from seastar_gym.scene import Numerics
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator import batch as module
 from seastar_gym.simulator.clock import Clock
+from strokes import assert_same
 
 FAST = Numerics.preset("fast")
 N_ROBOTS = 20 * N_LANES + 1
@@ -34,14 +35,6 @@ def swimmers(threads: int = 1, scene: Scene = Scene(numerics=FAST)) -> Simulator
     simulator = Simulator(scene, N_ROBOTS, threads)
     simulator.stroke(COMMANDS[0])
     return simulator
-
-
-def assert_same(simulator: Simulator, other: Simulator) -> None:
-    """To the last bit, with what the actuators do now."""
-    for one, wanted in zip(simulator.get_state(), other.get_state(), strict=True):
-        np.testing.assert_array_equal(one, wanted)
-    np.testing.assert_array_equal(simulator.elastic_energy(), other.elastic_energy())
-    np.testing.assert_array_equal(simulator.failed, other.failed)
 
 
 def interrupt() -> None:

@@ -19,11 +19,11 @@ from seastar_gym import (
     SmaLimb,
     SmaPulse,
     SmaWires,
-    State,
     ThermalSma,
     Water,
 )
 from seastar_gym.simulator.schedule import interval_times, step_times
+from strokes import assert_same, ternary
 
 FAST = Scene.preset("fast")
 TIGHT = replace(FAST, numerics=Numerics("implicit-midpoint", 0.01, newton_tolerance=1e-11))
@@ -41,19 +41,8 @@ LEFT_RIGHT = np.array([[0.0, 1.0, 0.0, 0.0, -1.0]])
 HALF = np.array([[0.3, 0.5, 0.0, -0.7, -1.0]])
 
 
-def ternary(n_strokes: int, n_robots: int, seed: int = 0) -> np.ndarray:
-    return np.random.default_rng(seed).integers(-1, 2, (n_strokes, n_robots, 5)).astype(float)
-
-
 def scene_with(actuator, scene: Scene = FAST) -> Scene:
     return replace(scene, actuator=actuator)
-
-
-def assert_same(simulator: Simulator, other: Simulator) -> None:
-    """To the last bit, with what is under way."""
-    for name, one, wanted in zip(State._fields, simulator.get_state(), other.get_state(), strict=True):
-        np.testing.assert_array_equal(one, wanted, err_msg=name)
-    np.testing.assert_array_equal(simulator.elastic_energy(), other.elastic_energy())
 
 
 # --- strokes ---------------------------------------------------------------------------------------------------------

@@ -20,6 +20,7 @@ from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SolverSta
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator.report import MEASURED_IF_ASKED
+from strokes import finished, ternary
 
 SCHEMES = ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
 EPSILON = np.finfo(float).eps
@@ -34,11 +35,6 @@ def rattled(simulator: Simulator, speed: float, shift: float = 0.0, seed: int = 
     velocities = speed * rng.standard_normal(state.velocities.shape)
     simulator.set_state(State(state.positions + shifts, velocities, state.time))
     return simulator
-
-
-def random_commands(n_robots: int, n_strokes: int, seed: int = 0, n_limbs: int = 5) -> np.ndarray:
-    """Commands of the chapter, shape (n_strokes, n_robots, n_limbs)."""
-    return np.random.default_rng(seed).integers(-1, 2, (n_strokes, n_robots, n_limbs)).astype(float)
 
 
 def is_finite(simulator: Simulator) -> bool:
@@ -91,7 +87,7 @@ def scenes(draw: st.DrawFn, schemes: list[str] = SCHEMES, most_limbs: int = 12, 
 @given(scenes(), st.sampled_from([0.0, 0.01, 0.1, 1.0, 10.0, 100.0]), st.floats(0.0, 0.3), st.integers(0, 1000))
 def test_any_scene_from_any_state_arrives_or_says_that_it_did_not(scene, speed, shift, seed):
     simulator = rattled(Simulator(scene, 4, threads=1), speed, shift, seed)
-    for commands in random_commands(4, 2, seed, scene.robot.n_limbs):
+    for commands in ternary(2, 4, seed, scene.robot.n_limbs):
         assert_told(simulator, simulator.stroke(commands))
 
 
@@ -105,10 +101,10 @@ def test_no_step_that_has_not_converged_is_accepted(scene, speed, seed):
         robot.n_limbs, robot.nodes_per_limb, robot.limb_length, robot.rod_radius, robot.youngs_modulus, robot.density,
         drag_coefficient=0.0 if fluid is None else fluid.drag_coefficient, hub_hinge=robot.hub_hinge,
     )  # fmt: skip
-    commands, before = random_commands(2, 1, seed, robot.n_limbs)[0], simulator.get_state()
+    commands, before = ternary(1, 2, seed, robot.n_limbs)[0], simulator.get_state()
     stroke = simulator.stroke_in_parts(commands, 4)
     time, after = next(stroke), simulator.get_state()
-    *_, report = drained(stroke)
+    _, report = finished(stroke)
     for k in np.flatnonzero((report.halvings == 0) & (report.energy_cuts == 0) & (after.time > 0.0)):
         h, delta_psi = scene.numerics.step, commands[k] * scene.actuator.delta_psi(time)
         assert time == pytest.approx(h)
@@ -117,16 +113,6 @@ def test_no_step_that_has_not_converged_is_accepted(scene, speed, seed):
         hessian = oracle.incremental_hessian(star, after.positions[k], before.positions[k], h, delta_psi)
         move = np.linalg.norm(oracle.descent(hessian, gradient), axis=1).max()
         assert move < 100.0 * scene.numerics.newton_tolerance * robot.limb_length
-
-
-def drained(stroke) -> list:
-    """The pauses of a stroke in parts, and its report."""
-    found = []
-    while True:
-        try:
-            found.append(next(stroke))
-        except StopIteration as finished:
-            return [*found, finished.value]
 
 
 # The cases that end in NaN, or are known to be hard
@@ -152,7 +138,7 @@ def opposed(n_limbs: int = 5) -> np.ndarray:
 )
 def test_hard_cases_arrive(robot, step, speed, scheme):
     simulator = rattled(Simulator(Scene(robot, numerics=Numerics(scheme, step)), 4), speed)
-    for commands in random_commands(4, 3):
+    for commands in ternary(3, 4):
         commands[0] = opposed()
         report = simulator.stroke(commands)
         assert not report.status.any()
@@ -171,7 +157,7 @@ def test_a_number_that_is_none_ends_its_own_robots_stroke_and_touches_no_other(s
     n_robots, ill = N_LANES + 2, 1
     scene, others = Scene(TEN, numerics=Numerics(scheme, 0.02)), np.arange(N_LANES + 2) != 1
     well, sick = Simulator(scene, n_robots), Simulator(scene, n_robots)
-    commands = random_commands(n_robots, 3)
+    commands = ternary(3, n_robots)
     for simulator in (well, sick):
         simulator.stroke(commands[0])
     hub = sick.hub_position()[ill]
@@ -200,7 +186,7 @@ def test_robots_in_trouble_move_to_the_same_bits_alone_in_a_batch_and_on_two_thr
     for k, single in enumerate(singles):
         single.set_state(state.of_robots(slice(k, k + 1)))
     halvings = 0
-    for command in random_commands(n_robots, 2):
+    for command in ternary(2, n_robots):
         reports = [batch.stroke(command) for batch in batches]
         alone = [single.stroke(command[k : k + 1]) for k, single in enumerate(singles)]
         halvings += reports[0].halvings.sum()
@@ -247,7 +233,7 @@ def test_linear_momentum_stays_to_rounding_at_any_tolerance_and_stiffness(scheme
         numerics = Numerics(scheme, 0.27, newton_tolerance=tolerance)
         simulator = rattled(Simulator(Scene(robot, None, SmaPulse(0.2, 0.54, 0.54), numerics), 4), 0.1, 0.1)
         before, _ = kept(simulator)
-        report = simulator.stroke(random_commands(4, 1, n_limbs=n_limbs)[0])
+        report = simulator.stroke(ternary(1, 4, n_limbs=n_limbs)[0])
         arrived = report.status == SolverStatus.CONVERGED
         after, _ = kept(simulator)
         size = 0.1 * make_rods(simulator.scene).mass.sum()
@@ -282,7 +268,7 @@ def test_50_strokes_turn_and_mirror_with_their_commands_to_a_multiple_of_roundin
     for twin in robots[3:]:
         nudge = 1e-16 * rng.standard_normal(at_rest.positions.shape)
         twin.set_state(at_rest._replace(positions=at_rest.positions + nudge))
-    for commands in random_commands(EIGHT, 50):
+    for commands in ternary(50, EIGHT):
         carried = commands, np.roll(commands, 1, axis=1), -commands[:, mirror], *[commands] * 4
         for simulator, command in zip(robots, carried, strict=True):
             assert not simulator.stroke(command).status.any()

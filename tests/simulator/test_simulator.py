@@ -14,6 +14,7 @@ from hubs import TEN, robot_with
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SolverStatus, State, StrokeReport, Water
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator.report import MEASURED_IF_ASKED
+from strokes import assert_same_bits, finished
 
 ROOT = Path(__file__).resolve().parents[2]
 SCHEMES = ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
@@ -43,11 +44,6 @@ def set_motion(simulator: Simulator, velocities: np.ndarray) -> None:
     """Keep positions and time, and give the robots other velocities [m/s]."""
     state = simulator.get_state()
     simulator.set_state(state._replace(velocities=velocities))
-
-
-def assert_same_bits(one: State, other: State) -> None:
-    for name, a, b in zip(State._fields, one, other, strict=True):
-        np.testing.assert_array_equal(a, b, err_msg=name)
 
 
 # Robots at rest
@@ -245,23 +241,13 @@ def test_any_lane_width_gives_the_same_bits(tmp_path, width):
 # Bits: parts, states, pickles
 
 
-def finish(parts):
-    """Times at which a stroke in parts paused, and its report."""
-    times = []
-    while True:
-        try:
-            times.append(next(parts))
-        except StopIteration as finished:
-            return times, finished.value
-
-
 @pytest.mark.parametrize("scheme", EVERY_WAY)
 @pytest.mark.parametrize("parts", [1, 2, 7, 10, 100])
 def test_a_stroke_in_parts_gives_the_same_bits_as_a_whole_one(scheme, parts):
     whole, cut = Simulator(scene_of(scheme), 3), Simulator(scene_of(scheme), 3)
     for command in random_commands(3):
         report = whole.stroke(command)
-        times, cut_report = finish(cut.stroke_in_parts(command, parts))
+        times, cut_report = finished(cut.stroke_in_parts(command, parts))
         assert len(times) == parts and times[-1] == 1.0
         np.testing.assert_allclose(times, np.arange(1, parts + 1) / parts, atol=0.01)
         assert_same_bits(whole.get_state(), cut.get_state())
@@ -272,7 +258,7 @@ def test_a_stroke_in_parts_gives_the_same_bits_as_a_whole_one(scheme, parts):
 def test_a_stroke_of_any_length_pauses_after_equal_times():
     numerics = Numerics("implicit-midpoint", 1e-29)
     simulator = Simulator(Scene(TEN, actuator=SmaPulse(0.1, 1e-28, 9e-28), numerics=numerics))
-    times, _ = finish(simulator.stroke_in_parts(np.zeros((1, 5)), 10))
+    times, _ = finished(simulator.stroke_in_parts(np.zeros((1, 5)), 10))
     np.testing.assert_allclose(times, 1e-28 * np.arange(1, 11), rtol=1e-9, atol=0.0)
 
 
@@ -351,7 +337,7 @@ def test_a_simulator_pickled_within_a_stroke_knows_its_actuation():
     parts = simulator.stroke_in_parts(STRAIGHT, 10)
     next(parts)
     assert pickle.loads(pickle.dumps(simulator)).elastic_energy() == simulator.elastic_energy()
-    finish(parts)
+    finished(parts)
 
 
 def test_energies_within_a_stroke_do_not_depend_on_the_batch_to_the_last_bit():
@@ -395,18 +381,15 @@ def test_adapted_steps_are_short_where_the_swim_is_hard_and_long_where_it_is_eas
 )
 def test_smallest_opening_angle_is_that_of_the_limbs_during_the_stroke(hub, peak):
     scene = Scene(robot_with(hub), actuator=SmaPulse(peak), numerics=Numerics("implicit-euler", 0.01))
-    simulator, smallest = Simulator(scene), []
-    parts = simulator.stroke_in_parts([[1.0, -1.0, 0.0, 0.3, 0.0]], 100)
-    while True:
-        try:
-            next(parts)
-        except StopIteration as finished:
-            report = finished.value
-            break
+    simulator = Simulator(scene)
+
+    def opening(time):
         roots = simulator.positions[0, 1::9] - simulator.positions[0, 0]
         after = np.roll(roots, -1, axis=0)
         cross, dot = roots[:, 0] * after[:, 1] - roots[:, 1] * after[:, 0], np.sum(roots * after, axis=1)
-        smallest.append(np.arctan2(cross, dot).min())
+        return np.arctan2(cross, dot).min()
+
+    smallest, report = finished(simulator.stroke_in_parts([[1.0, -1.0, 0.0, 0.3, 0.0]], 100), opening)
     assert report.smallest_opening_angle[0] == pytest.approx(min(smallest), abs=1e-4)
     assert (report.smallest_opening_angle[0] < 0.0) == (peak == 0.9)
 
@@ -452,7 +435,7 @@ def test_nodes_are_within_the_tolerance_as_a_rule_and_nowhere_far_beyond_it(sche
         parts = simulator.stroke_in_parts(random_commands(n_robots, seed=1)[0], 2)
         next(parts)
         ends[tolerance] = simulator.positions
-        finish(parts)
+        finished(parts)
     for tolerance in (1e-6, 1e-8):
         error = np.linalg.norm(ends[tolerance] - ends[1e-13], axis=2).max(axis=1) / (tolerance * 0.1)
         assert np.median(error) < 1.0 and error.max() < 100.0
@@ -526,7 +509,7 @@ def test_time_of_a_robot_that_fails_within_a_stroke_is_that_of_its_state_and_sta
     times = []
     for _ in range(2):
         commands = np.repeat(STRAIGHT, 2, axis=0)
-        report = simulator.stroke(commands) if how == "whole" else finish(simulator.stroke_in_parts(commands, 4))[1]
+        report = simulator.stroke(commands) if how == "whole" else finished(simulator.stroke_in_parts(commands, 4))[1]
         assert report.status.tolist() == [0, 1]
         times.append((simulator.time[1], report.covered[1]))
     assert times[0][1] > 0.0 and times[1][1] == 0.0

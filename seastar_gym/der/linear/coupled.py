@@ -11,7 +11,6 @@ H of the star's step.
 """
 
 from seastar_gym.der.linear.star_solution import solve_again, substitute_star
-from seastar_gym.der.star import n_free
 from seastar_gym.der.terms.body import carry_roots, gather_roots
 from seastar_gym.der.terms.contact import SLOT_ROWS, STIFFNESS, add_gap_gradient, gap, n_listed
 from seastar_gym.simd.compilation import kernel
@@ -24,37 +23,34 @@ MOST_ITERATIONS = 200  # two limbs that touch need some 3 to 8; beyond, the robo
 @kernel
 def add_contact_product(rods, work, p, sign, rows):
     """rows += sign C K C^T p. Both have the nodes' coordinates and, with a body, its angle; roots follow."""
-    carry_roots(rods.body, rods, work, p)
+    carry_roots(rods, work, p)
     for slot in range(n_listed(work)):
         k = load(work.contact.slots, SLOT_ROWS * slot + STIFFNESS)
         add_gap_gradient(rods, work, slot, sign * k * gap(rods, work, slot, p), rows)
-    gather_roots(rods.body, rods, work, rows)
+    gather_roots(rods, work, rows)
 
 
 @kernel
 def dot(rods, a, b):
     total = splat(0.0)
-    for row in range(2 * n_free(rods)):
+    for row in range(2 * rods.n_free):
         total = add_product(total, load(a, row), load(b, row))
     return total
 
 
 @kernel
-def solve_coupled(contact, rods, work, robots, decrement):
+def solve_coupled(rods, work, robots, decrement):
     """The Newton step of the robots in the mask, node by node into work.contact.x [m], where pairs are listed.
 
     With a body the step of its angle follows [rad].
 
     Returns its decrement [J].
     """
-    if contact is None:
+    if work.contact is None or n_listed(work) == 0:
         return decrement
-    if n_listed(work) == 0:
-        return decrement
-    x, r, z, p, Hp, w = (
-        work.contact.x, work.contact.r, work.contact.z, work.contact.p, work.contact.Hp, work.contact.w,
-    )  # fmt: skip
-    rows = 2 * n_free(rods)
+    contact = work.contact
+    x, r, z, p, Hp, w = contact.x, contact.r, contact.z, contact.p, contact.Hp, contact.w
+    rows = 2 * rods.n_free
     zero = splat(0.0)
     substitute_star(rods, work, x)
     running = robots & (load(work.contact.touching, 0) > 0.0)
@@ -88,5 +84,5 @@ def solve_coupled(contact, rods, work, robots, decrement):
             store(Hp, row, add_product(load(r, row), beta, load(Hp, row)))
         running = running & (left > ACCURACY * decrement)
         iterations += 1
-    store(contact.missed, 0, select(running, 1.0, load(contact.missed, 0)))
+    store(work.contact.missed, 0, select(running, 1.0, load(work.contact.missed, 0)))
     return decrement

@@ -24,55 +24,43 @@ from seastar_gym.simd.lanes import add_product, load, select, splat, store, subt
 
 
 @kernel
-def turn_stiffnesses(body, relaxation_time, work, limb):
+def turn_stiffnesses(rods, work, limb):
     """C of a limb's clamp, of elasticity and of damping [N m]; a body has one turn, which meets both."""
     C = load(work.hub_coupling, CLAMP_ROWS * limb + ELASTIC)
-    if relaxation_time is None:
+    if rods.damping is None:
         return C, splat(0.0)
-    if body is None:
-        return C, load(work.hub_coupling, CLAMP_ROWS * limb + VISCOUS)
-    return C + load(work.hub_coupling, CLAMP_ROWS * limb + VISCOUS), splat(0.0)
+    C_d = load(work.hub_coupling, CLAMP_ROWS * limb + VISCOUS)
+    if rods.body is None:
+        return C, C_d
+    return C + C_d, splat(0.0)
 
 
 @kernel
-def dummy(body, relaxation_time):
-    """What the turn of damping has on the diagonal at first: without damping, or with none of it, it is no unknown."""
-    if relaxation_time is None:
-        return splat(1.0)
-    if body is not None:
-        return splat(1.0)
-    return select(load(relaxation_time, 0) > 0.0, splat(0.0), 1.0)
+def begin_turn(rods, work):
+    """(B, D, r): the hub's coupling with its turns, their block and right-hand side, before limbs add theirs.
+
+    Where there is no damping, or none of it, its turn is no unknown.
+    """
+    zero, dummy = splat(0.0), splat(1.0)
+    if rods.body is not None:
+        x, y, stiffness, residual = load_coupling(work.body.system, 0)
+        return (x, zero, y, zero), (stiffness, zero, dummy), (residual, zero)
+    if rods.damping is not None:
+        dummy = select(load(rods.damping, 0) > 0.0, zero, dummy)
+    return (zero, zero, zero, zero), (zero, zero, dummy), (zero, zero)
 
 
 @kernel
-def begin_turn(body, relaxation_time, work):
-    """(B, D, r): the hub's coupling with its turns, their block and right-hand side, before limbs add theirs."""
-    zero = splat(0.0)
-    if body is None:
-        return (zero, zero, zero, zero), (zero, zero, dummy(body, relaxation_time)), (zero, zero)
-    x, y, stiffness, residual = load_coupling(work.body.system, 0)
-    return (x, zero, y, zero), (stiffness, zero, dummy(body, relaxation_time)), (residual, zero)
-
-
-@kernel
-def with_arm(body, work, limb, H, x, y, C):
+def with_arm(rods, work, limb, H, x, y, C):
     """(x, y, C) of a root node's coupling with the turn, and of the limb's part of the turn's stiffness.
 
     On a body its root is carried along by the turn: H J more, and 2 J.t more of C, t = -(x, y) the root's own coupling.
     """
-    if body is None:
+    if rods.body is None:
         return x, y, C
     a_x, a_y = load(work.body.arm, 2 * limb), load(work.body.arm, 2 * limb + 1)
     carried = 2.0 * subtract_product(x * a_y, y, a_x)
     return x + subtract_product(H[1] * a_x, H[0], a_y), y + subtract_product(H[3] * a_x, H[2], a_y), C + carried
-
-
-@kernel
-def keep_turn(body, rods, work, turn):
-    """Keep the solution of a body's turn for tail_solution; without a body nobody asks for it."""
-    if body is None:
-        return
-    store(work.root_solution, 2 * rods.n_limbs + 2, turn)
 
 
 @kernel
@@ -81,18 +69,18 @@ def solve_rigid_hub(rods, work, D_hub, r_hub):
 
     Returns the part of the Newton decrement and the smallest pivot.
     """
-    edges, zero = rods.nodes_per_limb - 1, splat(0.0)
+    edges, zero = rods.edges_per_limb, splat(0.0)
     nothing = (zero, zero, zero, zero)
-    B_hub, D_turn, r_turn = begin_turn(rods.body, rods.damping, work)
+    B_hub, D_turn, r_turn = begin_turn(rods, work)
     decrement, pivot = zero, splat(np.inf)
     for limb in range(rods.n_limbs):
         D, H, r = load_root(work, limb)
         edge = load_root_edge(work, limb)
-        C, C_d = turn_stiffnesses(rods.body, rods.damping, work, limb)
+        C, C_d = turn_stiffnesses(rods, work, limb)
         # grad theta = (-u_y, u_x) in the root node, its opposite in the hub.
         x, y, x_d, y_d = C * edge.uy, -C * edge.ux, C_d * edge.uy, -C_d * edge.ux
         B_hub = (B_hub[0] - x, B_hub[1] - x_d, B_hub[2] - y, B_hub[3] - y_d)
-        x, y, C = with_arm(rods.body, work, limb, H, x, y, C)
+        x, y, C = with_arm(rods, work, limb, H, x, y, C)
         D_turn = (D_turn[0] + C, D_turn[1], D_turn[2] + C_d)
         D_hub, B_hub, D_turn, r_hub, r_turn, part, root_pivot = eliminate_node(
             work, limb * edges + 1, D, H, (x, x_d, y, y_d), r, D_hub, B_hub, D_turn, r_hub, r_turn
@@ -116,10 +104,11 @@ def solve_rigid_hub(rods, work, D_hub, r_hub):
 @kernel
 def substitute_rigid_hub(rods, work, turn, turn_d):
     """Solutions of the hub and of the root nodes, into work.root_solution, from those of the hub's turns."""
-    edges, zero = rods.nodes_per_limb - 1, splat(0.0)
+    edges, zero = rods.edges_per_limb, splat(0.0)
     hub = substitute_node(work, 0, turn, turn_d, zero, zero)
     store_pair(work.root_solution, 2 * rods.n_limbs, hub)
-    keep_turn(rods.body, rods, work, turn)
+    if rods.body is not None:  # for tail_solution
+        store(work.root_solution, 2 * rods.n_limbs + 2, turn)
     for limb in range(rods.n_limbs):
         root = substitute_node(work, limb * edges + 1, hub[0], hub[1], turn, turn_d)
         store_pair(work.root_solution, 2 * limb, root)

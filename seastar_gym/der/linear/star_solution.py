@@ -11,7 +11,6 @@ from seastar_gym.der.linear.star_matrix import (
     substitute_node,
     substitute_ring,
 )
-from seastar_gym.der.star import n_nodes
 from seastar_gym.der.terms.body import tail_solution
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, splat, store, subtract_product
@@ -20,42 +19,25 @@ from seastar_gym.simd.lanes import add_product, load, splat, store, subtract_pro
 @kernel
 def substitute_star(rods, work, x):
     """Write the solution of the eliminated system over rows x, node by node, then a body's angle [rad]."""
-    edges = rods.nodes_per_limb - 1
+    edges = rods.edges_per_limb
     hub = load_pair(work.root_solution, 2 * rods.n_limbs)
     store_pair(x, 0, hub)
     for limb in range(rods.n_limbs):
         first = limb * edges
-        before = tail_solution(rods.body, work, rods.n_limbs, limb, hub)
+        before = tail_solution(rods, work, limb, hub)
         here = load_pair(work.root_solution, 2 * limb)
         store_pair(x, 2 * (first + 1), here)
         for i in range(2, edges + 1):
             before, here = here, substitute_node(work, first + i, here[0], here[1], before[0], before[1])
             store_pair(x, 2 * (first + i), here)
-    store_turn(rods.body, rods, work, x)
+    if rods.body is not None:
+        store(x, 2 * rods.n_nodes, load(work.root_solution, 2 * rods.n_limbs + 2))
+        store(x, 2 * rods.n_nodes + 1, 0.0)
 
 
 @kernel
-def store_turn(body, rods, work, x):
-    """Write the solution of a body's angle behind those of the nodes; nothing without a body."""
-    if body is None:
-        return
-    store(x, 2 * n_nodes(rods), load(work.root_solution, 2 * rods.n_limbs + 2))
-    store(x, 2 * n_nodes(rods) + 1, 0.0)
-
-
-@kernel
-def turn_of(body, rods, r):
-    """What rows have for a body's angle; zero without."""
-    if body is None:
-        return splat(0.0)
-    return load(r, 2 * n_nodes(rods))
-
-
-@kernel
-def with_torque(body, work, limb, force, torque):
-    """A torque with that of a force at a limb's root; unchanged without a body."""
-    if body is None:
-        return torque
+def with_torque(work, limb, force, torque):
+    """A torque on a body with that of a force at a limb's root."""
     x, y = load(work.body.arm, 2 * limb), load(work.body.arm, 2 * limb + 1)
     return subtract_product(add_product(torque, x, force[1]), y, force[0])
 
@@ -63,8 +45,10 @@ def with_torque(body, work, limb, force, torque):
 @kernel
 def solve_again(rods, work, r, x):
     """Write H^-1 r over rows x, H the matrix that was eliminated last; its pivots were kept (more limbs than one)."""
-    edges, zero = rods.nodes_per_limb - 1, splat(0.0)
-    r_hub, r_turn = load_pair(r, 0), turn_of(rods.body, rods, r)
+    edges, zero = rods.edges_per_limb, splat(0.0)
+    r_hub, torque = load_pair(r, 0), zero
+    if rods.body is not None:
+        torque = load(r, 2 * rods.n_nodes)
     for limb in range(rods.n_limbs):
         first = limb * edges
         r_next, r_second = (zero, zero), (zero, zero)
@@ -73,24 +57,19 @@ def solve_again(rods, work, r, x):
             r_next, r_second = eliminate_again(work, node, add(load_pair(r, 2 * node), r_next), r_second, (zero, zero))
         store_pair(work.ring, RING_ROWS * limb + 7, add(load_pair(r, 2 * (first + 1)), r_next))
         r_hub = add(r_hub, r_second)
-        r_turn = with_torque(rods.body, work, limb, r_second, r_turn)
-    solve_hub_again(rods.clamp, rods, work, r_hub, r_turn)
+        if rods.body is not None:
+            torque = with_torque(work, limb, r_second, torque)
+    if rods.clamp is None:
+        solve_ring_again(work, rods.n_limbs, r_hub)
+    else:
+        solve_rigid_hub_again(rods, work, r_hub, torque)
     substitute_star(rods, work, x)
 
 
 @kernel
-def solve_hub_again(clamp, rods, work, r_hub, torque):
-    """Solve for the root nodes, whose right-hand sides are in work.ring, the hub, and a body's angle (torque)."""
-    if clamp is None:
-        solve_ring_again(work, rods.n_limbs, r_hub)
-    else:
-        solve_rigid_hub_again(rods, work, r_hub, torque)
-
-
-@kernel
 def solve_rigid_hub_again(rods, work, r_hub, torque):
-    """solve_hub_again where the hub is rigid; without a body its turns have no right-hand side of their own."""
-    edges, zero = rods.nodes_per_limb - 1, splat(0.0)
+    """Solve for the root nodes, whose right-hand sides are in work.ring, a rigid hub, and a body's angle (torque)."""
+    edges, zero = rods.edges_per_limb, splat(0.0)
     r_turn = (torque, zero)
     for limb in range(rods.n_limbs):
         r = load_pair(work.ring, RING_ROWS * limb + 7)

@@ -24,14 +24,8 @@ energy; 0.02 % did up to PREDICTABLE_STRAIN, 0.1 % up to ten times and 0.5 % up 
 more than 100 radii feel more of the curvature of drag, about l rho_f C_d/(pi r rho_m), than CURVATURE allows for.
 """
 
-from typing import NamedTuple
-
-import numpy as np
-
 from seastar_gym.der.geometry import larger
-from seastar_gym.der.mesh import Mesh, mean
 from seastar_gym.der.terms.contact import those_apart
-from seastar_gym.der.terms.stretching import Stretching
 from seastar_gym.simd.compilation import inlined_kernel, kernel
 from seastar_gym.simd.lanes import load, select, splat
 
@@ -39,30 +33,6 @@ CURVATURE = 40.0  # for light edges, the step after one of size d is below this 
 EASY = 3.0  # Newton steps: a stage that took more is not predictable
 LATE = 10.0  # times CURVATURE for the last of the easy steps
 FORESEEABLE_T = 4.0  # larger values of tan(phi/2) are too near its pole for that
-SLENDER = 5000.0  # square of an edge's length over its radius: slenderer edges do not curve the potential more
-PREDICTABLE_STRAIN = 1e-3  # over EA times the length of all limbs: more energy strains or moves a robot violently
-
-
-class Foresight(NamedTuple):
-    """Scales of a robot that decide what is predictable, one row each.
-
-    shortest_edge: Smallest natural length of an edge [m].
-    curvature_rate: How fast the foreseeable length shrinks with the step [1/s^2].
-    energy: Potential [J] up to which Newton steps are predictable.
-    """
-
-    shortest_edge: np.ndarray
-    curvature_rate: np.ndarray
-    energy: np.ndarray
-
-
-def coefficients(mesh: Mesh, stretching: Stretching, density: float) -> Foresight:
-    """Scales of a robot, from its shortest, thinnest and stiffest edges."""
-    shortest, thinnest = float(mesh.root_edges.min()), min(map(min, mesh.radius_at_nodes))
-    slenderness = min(1.0, (shortest / thinnest) ** 2 / SLENDER)
-    rate = max(map(max, mesh.modulus_at_nodes)) / (density * shortest**2) * slenderness
-    energy = PREDICTABLE_STRAIN * mean(stretching.EA) * mesh.n_limbs * mean(mesh.limb_lengths)
-    return Foresight(np.array([shortest]), np.array([rate]), np.array([energy]))
 
 
 @inlined_kernel
@@ -73,8 +43,8 @@ def predictable(rods, work, iterations, setbacks, phi, move, tolerated):
     Potential before the step [J]. move: Largest node move of the step [m]. tolerated: Tolerance times the foreseeable
     length [m^2].
     """
-    easy = (setbacks <= 0.0) & (iterations <= EASY) & (phi <= load(rods.foresight.energy, 0))
-    easy = those_apart(work.contact, easy)
+    easy = (setbacks <= 0.0) & (iterations <= EASY) & (phi <= load(rods.scales.predictable, 0))
+    easy = those_apart(work, easy)
     late = select(iterations < EASY, splat(1.0), LATE)
     foreseen = late * move * move <= tolerated
     return easy & foreseen & (largest_hub_t(rods, work) < FORESEEABLE_T)
@@ -87,8 +57,8 @@ def foreseeable_length(rods, stage):
     Turning an edge stretches it, and the tension that this makes moves nodes the farther, the stiffer the edges are
     against the nodes' inertia.
     """
-    rate = load(rods.foresight.curvature_rate, 0)
-    return load(rods.foresight.shortest_edge, 0) / (CURVATURE + rate * stage.gamma * stage.gamma)
+    rate = load(rods.scales.curvature_rate, 0)
+    return load(rods.scales.shortest_edge, 0) / (CURVATURE + rate * stage.gamma * stage.gamma)
 
 
 @kernel

@@ -40,18 +40,12 @@ over at no such cost.
 from seastar_gym.der.energy import elastic_energy
 from seastar_gym.der.geometry import edge_vector, half_angle, larger
 from seastar_gym.der.motion import node_motion
-from seastar_gym.der.star import edge_of, hinge_edges, is_clamped, n_free, n_nodes, n_places, tail_node
-from seastar_gym.der.terms.added_mass import add_fluid_energy, add_fluid_momentum, less_edge_fluid_energy
+from seastar_gym.der.star import edge_of, hinge_edges, is_clamped, tail_node
+from seastar_gym.der.stepping.rigid_motion import cut_velocities, rigid_motion
+from seastar_gym.der.terms.added_mass import add_fluid_energy, less_edge_fluid_energy
 from seastar_gym.der.terms.along import add_moved_energy, bending_stiffness
 from seastar_gym.der.terms.body import move_roots, place_roots
-from seastar_gym.der.terms.body_forces import (
-    add_mass_moment,
-    add_spin,
-    add_turning_energy,
-    add_turning_momentum,
-    cut_spin,
-    spin_rate,
-)
+from seastar_gym.der.terms.body_forces import add_turning_energy, add_turning_momentum
 from seastar_gym.der.terms.clamp import moved_clamp_energy
 from seastar_gym.der.terms.contact import add_contact_energy
 from seastar_gym.der.terms.fluid import fluid_velocity
@@ -67,7 +61,7 @@ LARGEST_CUT = 0.01  # of the kinetic energy about the rigid motion, a choice; wh
 
 
 @kernel
-def frame_velocity(current, rods, q, v):
+def frame_velocity(rods, q, v):
     """(c_x, c_y): velocity of the frame that a step from (q, v) is judged in [m/s].
 
     That of the fluid at the hub; in vacuum that of the centre of mass; zero where nodes are held in the laboratory.
@@ -75,64 +69,64 @@ def frame_velocity(current, rods, q, v):
     mass, v_x, v_y = splat(0.0), splat(0.0), splat(0.0)
     if rods.scales.held:
         return v_x, v_y
-    for node in range(n_nodes(rods)):
+    for node in range(rods.n_nodes):
         m = load(rods.mass, node)
         mass += m
         v_x, v_y = add_product(v_x, m, load(v, 2 * node)), add_product(v_y, m, load(v, 2 * node + 1))
-    v_x, v_y = add_turning_momentum(rods.body, rods, q, v, (v_x, v_y))
+    v_x, v_y = add_turning_momentum(rods, q, v, (v_x, v_y))
     dragged = load(rods.scales.damped, 0) > 0.0
-    u_x, u_y = fluid_velocity(current, load(q, 0), load(q, 1))
+    u_x, u_y = fluid_velocity(rods, load(q, 0), load(q, 1))
     return select(dragged, u_x, v_x / mass), select(dragged, u_y, v_y / mass)
 
 
 @kernel
 def moving_energy(rods, work, q, v, frame):
     """Kinetic energy of the robot, and of fluid that moves along at the normals of the last stage [J]."""
-    energy = add_turning_energy(rods.body, rods, q, v, frame, kinetic_energy(rods, v, frame))
-    energy = add_fluid_energy(work.added_mass, rods, v, frame, energy)
-    return less_edge_fluid_energy(rods.edge_added_mass, rods, work, v, energy)
+    energy = add_turning_energy(rods, q, v, frame, kinetic_energy(rods, v, frame))
+    energy = add_fluid_energy(rods, work, v, frame, energy)
+    return less_edge_fluid_energy(rods, work, v, energy)
 
 
 @kernel
-def add_work_of_loads(loads, rods, work, q, h, frame, energy):
+def add_work_of_loads(rods, work, q, h, frame, energy):
     """Add the work of dead loads in a step of length h from the state put aside to q [J], as seen from the frame."""
-    if loads is None:
+    if rods.load is None:
         return energy
-    for node in range(n_nodes(rods)):
+    for node in range(rods.n_nodes):
         dx = subtract_product(load(q, 2 * node) - load(work.step, 2 * node), h, frame[0])
         dy = subtract_product(load(q, 2 * node + 1) - load(work.step, 2 * node + 1), h, frame[1])
-        energy += load_power(loads, node, dx, dy)
+        energy += load_power(rods, node, dx, dy)
     return energy
 
 
 @kernel
 def set_aside(rods, work, scheme, q, v):
     """Copy the state into memory that a step's last stage leaves unused."""
-    rows = 2 * n_free(rods)
+    rows = 2 * rods.n_free
     unused = rows * (scheme.n_stages - 1)
     for row in range(rows):
         store(work.step, row, load(q, row))
         store(work.stage_v, unused + row, load(v, row))
-    place_roots(rods.body, rods, work.step)
+    place_roots(rods, work.step)
 
 
 @kernel
 def put_back(rods, work, scheme, q, v, robots):
     """Undo a step of the robots in the mask."""
-    rows = 2 * n_free(rods)
+    rows = 2 * rods.n_free
     unused = rows * (scheme.n_stages - 1)
     for row in range(rows):
         store(q, row, select(robots, load(work.step, row), load(q, row)))
         store(v, row, select(robots, load(work.stage_v, unused + row), load(v, row)))
-    move_roots(rods.body, rods, q, v)
+    move_roots(rods, q, v)
 
 
 @kernel
-def moved_hub_energy(clamp, rods, work, actuation, start, end):
+def moved_hub_energy(rods, work, actuation, start, end):
     """Energy of hub hinges at their natural angles, once those have moved from `start` to `end` of the interval [J]."""
-    if clamp is not None:
-        moved = moved_clamp_energy(clamp, rods, work, actuation, start, end)
-        return add_moved_energy(rods.along, rods, work, actuation, start, end, moved)
+    if rods.clamp is not None:
+        moved = moved_clamp_energy(rods, work, actuation, start, end)
+        return add_moved_energy(rods, work, actuation, start, end, moved)
     set_natural_hub_angles(rods, work, actuation, start)
     for limb in range(rods.n_limbs):
         store(work.hub_moment, limb, load(work.hub_EI_kappa_bar, limb))
@@ -140,7 +134,7 @@ def moved_hub_energy(clamp, rods, work, actuation, start, end):
     energy = splat(0.0)
     for limb in range(rods.n_limbs):
         moved = load(work.hub_EI_kappa_bar, limb) - load(work.hub_moment, limb)
-        dl_over_EI = load(rods.bending.dl_over_EI, limb * (rods.nodes_per_limb - 1))
+        dl_over_EI = load(rods.bending.dl_over_EI, limb * rods.edges_per_limb)
         energy = add_product(energy, 0.5 * dl_over_EI * moved, moved)
     return energy
 
@@ -155,17 +149,17 @@ def allowed_energy(rods, work, scheme, actuation, start, end, q, v, frame):
     if not scheme.dissipative:
         set_natural_hub_angles(rods, work, actuation, start)
         allowed = elastic_energy(rods, work, q)
-        moved = moved_hub_energy(rods.clamp, rods, work, actuation, start, end)
+        moved = moved_hub_energy(rods, work, actuation, start, end)
         at_end = elastic_energy(rods, work, q)
         allowed = select(at_end > allowed, at_end, allowed) + moved
     else:
         set_natural_hub_angles(rods, work, actuation, end)
         allowed = elastic_energy(rods, work, q)
-    return add_contact_energy(rods.contact, rods, work, q, allowed + moving_energy(rods, work, q, v, frame))
+    return add_contact_energy(rods, work, q, allowed + moving_energy(rods, work, q, v, frame))
 
 
 @kernel
-def may_gain(current, added_mass, body, rods, work, stage, phi, robots):
+def may_gain(rods, work, stage, phi, robots):
     """Mask of those among `robots` whose step of implicit Euler might create energy, as far as Newton's method knows.
 
     phi: Phi before Newton's last step [J], which is not less than at its end. There Phi is |v_1 - v_0|^2_M / 2 + U(q_1)
@@ -174,132 +168,33 @@ def may_gain(current, added_mass, body, rods, work, stage, phi, robots):
 
     It is the whole of `robots` in scenes whose fluid gives energy or takes it up, or with a body.
     """
-    if current is None and added_mass is None and body is None:
-        gain = phi - elastic_energy(rods, work, stage.q_hat)
-        for node in range(n_nodes(rods)):
-            m = load(rods.mass, node)
-            for row in range(2 * node, 2 * node + 2):
-                v_0 = load(stage.v_hat, row)
-                change = (load(work.q, row) - load(stage.q_hat, row)) * stage.inverse_gamma - v_0
-                gain = add_product(gain, m * v_0, change)
-            power = load_power(rods.load, node, load(stage.v_hat, 2 * node), load(stage.v_hat, 2 * node + 1))
-            gain = subtract_product(gain, stage.gamma, power)
-        gain = less_edge_gain(rods.edge_mass, rods, work, stage, gain)
-        return robots & ~(gain <= 0.0)
-    return robots
+    if rods.current is not None or rods.added_mass is not None or rods.body is not None:
+        return robots
+    gain = phi - elastic_energy(rods, work, stage.q_hat)
+    for node in range(rods.n_nodes):
+        m = load(rods.mass, node)
+        for row in range(2 * node, 2 * node + 2):
+            v_0 = load(stage.v_hat, row)
+            change = (load(work.q, row) - load(stage.q_hat, row)) * stage.inverse_gamma - v_0
+            gain = add_product(gain, m * v_0, change)
+        power = load_power(rods, node, load(stage.v_hat, 2 * node), load(stage.v_hat, 2 * node + 1))
+        gain = subtract_product(gain, stage.gamma, power)
+    gain = less_edge_gain(rods, work, stage, gain)
+    return robots & ~(gain <= 0.0)
 
 
 @kernel
-def less_edge_gain(edge_mass, rods, work, stage, gain):
+def less_edge_gain(rods, work, stage, gain):
     """Gain less v_0 mu (v_1 - v_0) of the differences along the edges [J]; unchanged for lumped masses (None)."""
-    if edge_mass is None:
+    if rods.edge_mass is None:
         return gain
-    for e in range(n_nodes(rods) - 1):
-        tail, mu = tail_node(rods, e), load(edge_mass, e)
+    for e in range(rods.n_edges):
+        tail, mu = tail_node(rods, e), load(rods.edge_mass, e)
         of_tail, of_head = node_motion(work, stage, tail), node_motion(work, stage, e + 1)
         v_x, v_y = edge_vector(stage.v_hat, tail, e + 1)
         gain = subtract_product(gain, mu * v_x, of_head.dx - of_tail.dx)
         gain = subtract_product(gain, mu * v_y, of_head.dy - of_tail.dy)
     return gain
-
-
-@kernel
-def less_edge_turn(edge_mass, rods, q, v, spin, turn):
-    """(angular momentum, moment of inertia) less those of edges' differences; unchanged for lumped masses (None)."""
-    if edge_mass is None:
-        return spin, turn
-    for e in range(n_nodes(rods) - 1):
-        tail, mu = tail_node(rods, e), load(edge_mass, e)
-        rx, ry = edge_vector(q, tail, e + 1)
-        vx, vy = edge_vector(v, tail, e + 1)
-        spin = subtract_product(spin, mu, rx * vy - ry * vx)
-        turn = subtract_product(turn, mu, rx * rx + ry * ry)
-    return spin, turn
-
-
-@kernel
-def less_edge_fluid_turn(edge_added_mass, rods, work, q, v, spin, turn):
-    """(angular momentum, moment of inertia) less those of edges' differences in the fluid that moves along.
-
-    Unchanged without consistent added mass (None).
-    """
-    if edge_added_mass is None:
-        return spin, turn
-    for e in range(n_nodes(rods) - 1):
-        tail, mu = tail_node(rods, e), load(edge_added_mass, e)
-        nx, ny = load(work.normals, 2 * e), load(work.normals, 2 * e + 1)
-        rx, ry = edge_vector(q, tail, e + 1)
-        vx, vy = edge_vector(v, tail, e + 1)
-        arm = subtract_product(rx * ny, ry, nx)
-        spin = subtract_product(spin, mu * arm, add_product(vx * nx, vy, ny))
-        turn = subtract_product(turn, mu * arm, arm)
-    return spin, turn
-
-
-@kernel
-def momentum_of(added_mass, rods, node, vx, vy):
-    """Momentum of a node at the velocity (vx, vy) [kg m/s], with that of the fluid it carries along."""
-    m = load(rods.mass, node)
-    return add_fluid_momentum(added_mass, node, vx, vy, (m * vx, m * vy))
-
-
-@kernel
-def rigid_motion(rods, work, q, v, frame):
-    """(x, y, v_x, v_y, omega, energy): the motion of a rigid robot with the same momentum and angular momentum.
-
-    x, y: Centre of mass [m]. v_x, v_y: Its velocity, as seen from the frame [m/s]. omega: Angular velocity [rad/s].
-    energy: Its kinetic energy there. Momenta and energy are those of robot and fluid that moves along.
-    """
-    zero, one = splat(0.0), splat(1.0)
-    mass, x, y = zero, zero, zero
-    for node in range(n_nodes(rods)):
-        m = load(rods.mass, node)
-        mass += m
-        x, y = add_product(x, m, load(q, 2 * node)), add_product(y, m, load(q, 2 * node + 1))
-    x, y = add_mass_moment(rods.body, rods, q, (x, y))
-    x, y = x / mass, y / mass
-    p_x, p_y, spin = zero, zero, zero
-    # What the motions along x, along y and about the centre of mass have in common: the inertia of a rigid robot.
-    xx, xy, yy, x_turn, y_turn, turn = zero, zero, zero, zero, zero, zero
-    for node in range(n_places(rods)):
-        r_x, r_y = load(q, 2 * node) - x, load(q, 2 * node + 1) - y
-        p = momentum_of(work.added_mass, rods, node, load(v, 2 * node) - frame[0], load(v, 2 * node + 1) - frame[1])
-        along_x = momentum_of(work.added_mass, rods, node, one, zero)
-        along_y = momentum_of(work.added_mass, rods, node, zero, one)
-        about = momentum_of(work.added_mass, rods, node, -r_y, r_x)
-        p_x, p_y, spin = p_x + p[0], p_y + p[1], spin + (r_x * p[1] - r_y * p[0])
-        xx, xy, yy = xx + along_x[0], xy + along_x[1], yy + along_y[1]
-        x_turn, y_turn, turn = x_turn + about[0], y_turn + about[1], turn + (r_x * about[1] - r_y * about[0])
-    hub = (load(q, 0) - x, load(q, 1) - y)
-    v_hub, omega = (load(v, 0) - frame[0], load(v, 1) - frame[1]), spin_rate(rods.body, rods, v)
-    (p_x, p_y), spin = add_spin(rods.body, rods, q, v_hub, omega, hub, (p_x, p_y), spin)
-    (x_turn, y_turn), turn = add_spin(rods.body, rods, q, (-hub[1], hub[0]), one, hub, (x_turn, y_turn), turn)
-    spin, turn = less_edge_turn(rods.edge_mass, rods, q, v, spin, turn)
-    spin, turn = less_edge_fluid_turn(rods.edge_added_mass, rods, work, q, v, spin, turn)
-    # Elimination of x, then y.
-    lower, turn_lower = xy / xx, x_turn / xx
-    yy, y_turn, turn = yy - lower * xy, y_turn - lower * x_turn, turn - turn_lower * x_turn
-    y_left, spin_left = p_y - lower * p_x, spin - turn_lower * p_x
-    turn_lower = y_turn / yy
-    omega = (spin_left - turn_lower * y_left) / (turn - turn_lower * y_turn)
-    v_y = (y_left - y_turn * omega) / yy
-    v_x = (p_x - xy * v_y - x_turn * omega) / xx
-    return x, y, v_x, v_y, omega, 0.5 * (p_x * v_x + p_y * v_y + spin * omega)
-
-
-@kernel
-def cut_velocities(rods, q, v, frame, motion, share, robots):
-    """Keep `share` of the velocities of the robots in the mask about a rigid motion that is seen from the frame."""
-    x, y, v_x, v_y, omega, _ = motion
-    less = share - 1.0
-    for node in range(n_nodes(rods)):
-        vx, vy = load(v, 2 * node), load(v, 2 * node + 1)
-        about_x = vx - frame[0] - (v_x - omega * (load(q, 2 * node + 1) - y))
-        about_y = vy - frame[1] - (v_y + omega * (load(q, 2 * node) - x))
-        store(v, 2 * node, select(robots, add_product(vx, less, about_x), vx))
-        store(v, 2 * node + 1, select(robots, add_product(vy, less, about_y), vy))
-    cut_spin(rods.body, rods, v, omega, less, robots)
-    move_roots(rods.body, rods, q, v)
 
 
 @kernel
@@ -310,8 +205,8 @@ def through_poles(rods, work, q, robots):
     beyond the pole where cos((phi + beta - alpha)/2) < 0; written in half-angle tangents, without their cosines.
     """
     through = robots & ~robots
-    for e in range(rods.n_limbs * (rods.nodes_per_limb - 1)):
-        if is_clamped(rods.clamp, rods, e):
+    for e in range(rods.n_edges):
+        if is_clamped(rods, e):
             continue
         a, b, side = hinge_edges(rods, e)
         a_0, b_0 = edge_of(rods, work.step, a), edge_of(rods, work.step, b)
@@ -329,38 +224,31 @@ def energy_noise(rods, work, q, h, potential, kinetic):
     Held nodes have a huge mass and no velocity.
     """
     mass = load(rods.scales.free_mass, 0)
-    edges = rods.n_limbs * (rods.nodes_per_limb - 1)
-    length = load(rods.foresight.shortest_edge, 0)
-    stretching, bending = load(rods.stretching.EA_over_l, 0), bending_stiffness(rods.along, rods, work, 0)
+    edges = rods.n_edges
+    length = load(rods.scales.shortest_edge, 0)
+    stretching, bending = load(rods.stretching.EA_over_l, 0), bending_stiffness(rods, work, 0)
     for e in range(1, edges):
         stretching = larger(load(rods.stretching.EA_over_l, e), stretching)
-        bending = larger(bending_stiffness(rods.along, rods, work, e), bending)
+        bending = larger(bending_stiffness(rods, work, e), bending)
     stiffness = edges * (stretching + 4.0 * bending / (length * length))
-    limb = (rods.nodes_per_limb - 1) * length
+    limb = rods.edges_per_limb * length
     move = UNITS * (absolute(load(q, 0)) + absolute(load(q, 1)) + limb)
     speed = move / h
     of_positions = move * sqrt(2.0 * stiffness * absolute(potential))
     of_velocities = speed * sqrt(2.0 * mass * kinetic) + 0.5 * mass * speed * speed
-    return add_load_noise(rods.load, rods, move, of_velocities + of_positions + 0.5 * stiffness * move * move)
-
-
-@kernel
-def add_load_noise(loads, rods, move, noise):
-    if loads is None:
-        return noise
-    for row in range(2 * n_nodes(rods)):
-        noise = add_product(noise, move, absolute(load(loads, row)))
+    noise = of_velocities + of_positions + 0.5 * stiffness * move * move
+    if rods.load is not None:
+        for row in range(2 * rods.n_nodes):
+            noise = add_product(noise, move, absolute(load(rods.load, row)))
     return noise
 
 
 @kernel
-def add_held_energy(contact, rods, work, scheme, q, energy):
+def add_held_energy(rods, work, scheme, q, energy):
     """Add what limbs that press each other store at the end of a step, where the scheme gives it back."""
-    if contact is None:
+    if rods.contact is None or not scheme.dissipative:
         return energy
-    if not scheme.dissipative:
-        return energy
-    return add_contact_energy(contact, rods, work, q, energy)
+    return add_contact_energy(rods, work, q, energy)
 
 
 @kernel
@@ -372,7 +260,7 @@ def hold_to_energy(rods, work, scheme, q, v, h, frame, robots, allowed, largest_
     Returns (refused, cut): masks of the robots whose step has to be undone, and of those whose velocities were cut.
     """
     potential, kinetic = elastic_energy(rods, work, q), moving_energy(rods, work, q, v, frame)
-    potential = add_held_energy(rods.contact, rods, work, scheme, q, potential)
+    potential = add_held_energy(rods, work, scheme, q, potential)
     grown = robots & (potential + kinetic > add_product(allowed, ROUNDING, kinetic))
     cut = grown & ~grown
     if any_lane(grown):

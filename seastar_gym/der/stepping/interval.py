@@ -26,7 +26,7 @@ GROWTH_MARGIN = 5.0  # how far below the limit a doubled step's error rate has t
 def note_hub_angles(rods, q, robots, report):
     """Keep the smallest tan(phi/2) of the hub hinges of the robots in the mask, but for gaps of more than pi."""
     smallest = load(report, SMALLEST_HUB_T)
-    edges = rods.nodes_per_limb - 1
+    edges = rods.edges_per_limb
     last = rods.n_limbs - 1
     first = edge_geometry(q, tail_node(rods, last * edges), last * edges + 1)
     for limb in range(rods.n_limbs):

@@ -17,7 +17,7 @@ velocity that it extrapolates to, so that its B is the difference of b over the 
 
 from seastar_gym.der.motion import node_motion
 from seastar_gym.der.potential import node_slopes
-from seastar_gym.der.star import n_nodes, root_place
+from seastar_gym.der.star import root_place
 from seastar_gym.der.terms.body import place_roots, root_motion, tail_motion
 from seastar_gym.der.terms.body_forces import add_body, add_turning_rate, begin_turning, end_turning
 from seastar_gym.der.terms.drag import middle_slopes
@@ -35,9 +35,9 @@ def settle_momentum(rods, work, scheme, k, stage, q_0, v_0, h, robots):
     """
     unsettled = robots & (load(rods.scales.unsettled_rate, 0) * stage.gamma * stage.gamma > LOST)
     if any_lane(unsettled):
-        begin_turning(rods.body, rods, work, scheme, k, q_0, v_0, h)
+        begin_turning(rods, work, scheme, k, q_0, v_0, h)
         move_as_a_whole(rods, work, stage, unsettled)
-        end_turning(rods.body, rods, work, k, stage)
+        end_turning(rods, work, k, stage)
 
 
 @kernel
@@ -49,44 +49,44 @@ def move_as_a_whole(rods, work, stage, robots):
     """
     zero = splat(0.0)
     fx, fy, xx, xy, yy = zero, zero, zero, zero, zero
-    for node in range(n_nodes(rods)):
-        _, gradient, hessian = node_slopes(None, rods, work, stage, node, node_motion(work, stage, node))
+    for node in range(rods.n_nodes):
+        _, gradient, hessian = node_slopes(rods, work, stage, node, node_motion(work, stage, node), (zero, zero))
         fx, fy = fx + gradient[0], fy + gradient[1]
         xx, xy, yy = xx + hessian[0], xy + hessian[1], yy + hessian[2]
-    fx, fy, xx, xy, yy = add_roots(rods.body, rods, work, stage, fx, fy, xx, xy, yy)
-    fx, fy, xx, xy, yy = add_middles(rods.middle_drag, rods, work, stage, fx, fy, xx, xy, yy)
+    fx, fy, xx, xy, yy = add_roots(rods, work, stage, fx, fy, xx, xy, yy)
+    fx, fy, xx, xy, yy = add_middles(rods, work, stage, fx, fy, xx, xy, yy)
     determinant = xx * yy - xy * xy
     dx, dy = (yy * fx - xy * fy) / determinant, (xx * fy - xy * fx) / determinant
-    for node in range(n_nodes(rods)):
+    for node in range(rods.n_nodes):
         x, y = load(work.q, 2 * node), load(work.q, 2 * node + 1)
         store(work.q, 2 * node, select(robots, x - dx, x))
         store(work.q, 2 * node + 1, select(robots, y - dy, y))
-    place_roots(rods.body, rods, work.q)
+    place_roots(rods, work.q)
 
 
 @kernel
-def add_roots(body, rods, work, stage, fx, fy, xx, xy, yy):
+def add_roots(rods, work, stage, fx, fy, xx, xy, yy):
     """Add a body, and the fluid at its limbs' roots, to the residual and slope of a move of the whole robot."""
-    if body is None:
+    if rods.body is None:
         return fx, fy, xx, xy, yy
     of_hub, zero = node_motion(work, stage, 0), splat(0.0)
-    _, (fx, fy), (xx, xy, yy) = add_body(body, rods, work, stage, None, of_hub, zero, (fx, fy), (xx, xy, yy))
-    fx, fy = add_turning_rate(body, rods, work, stage, (fx, fy))
+    _, (fx, fy), (xx, xy, yy) = add_body(rods, work, stage, None, of_hub, zero, (fx, fy), (xx, xy, yy))
+    fx, fy = add_turning_rate(rods, work, stage, (fx, fy))
     for limb in range(rods.n_limbs):
         motion = root_motion(rods, work, stage, limb)
-        _, g, h = node_slopes(None, rods, work, stage, root_place(rods, limb), motion)
+        _, g, h = node_slopes(rods, work, stage, root_place(rods, limb), motion, (zero, zero))
         fx, fy, xx, xy, yy = fx + g[0], fy + g[1], xx + h[0], xy + h[1], yy + h[2]
     return fx, fy, xx, xy, yy
 
 
 @kernel
-def add_middles(middle_drag, rods, work, stage, fx, fy, xx, xy, yy):
+def add_middles(rods, work, stage, fx, fy, xx, xy, yy):
     """Add the drag in the middle of edges to the residual and slope of a move of the whole robot."""
-    if middle_drag is None:
+    if rods.middle_drag is None:
         return fx, fy, xx, xy, yy
-    for e in range(n_nodes(rods) - 1):
-        tail, head = tail_motion(rods.body, rods, work, stage, e), node_motion(work, stage, e + 1)
-        _, g, h = middle_slopes(middle_drag, rods, work, stage, e, tail, head)
+    for e in range(rods.n_edges):
+        tail, head = tail_motion(rods, work, stage, e), node_motion(work, stage, e + 1)
+        _, g, h = middle_slopes(rods, work, stage, e, tail, head)
         fx, fy = fx + 2.0 * g[0], fy + 2.0 * g[1]
         xx, xy, yy = xx + 4.0 * h[0], xy + 4.0 * h[1], yy + 4.0 * h[2]
     return fx, fy, xx, xy, yy

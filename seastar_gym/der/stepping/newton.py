@@ -8,7 +8,6 @@ from seastar_gym.der.geometry import larger
 from seastar_gym.der.linear.coupled import solve_coupled
 from seastar_gym.der.linear.star_matrix import load_pair, store_pair, substitute_node
 from seastar_gym.der.potential import factorise
-from seastar_gym.der.star import n_nodes
 from seastar_gym.der.stepping.foresight import foreseeable_length, predictable
 from seastar_gym.der.terms.body import place_roots, tail_solution
 from seastar_gym.der.terms.contact import n_listed
@@ -49,13 +48,13 @@ def minimise(rods, work, stage, active, tolerance, iteration_limit):
             regularised += select(indefinite, one, zero)
             continue
         stepping = running & low_enough & (pivot > 0.0)
-        decrement = solve_coupled(work.contact, rods, work, stepping, decrement)
+        decrement = solve_coupled(rods, work, stepping, decrement)
         shortening = running & ~low_enough & (fraction > SHORTEST_STEP) & (iterations > 0.0)
         fraction = select(stepping, one, select(shortening, 0.5 * fraction, fraction))
         if any_lane(shortening):
-            move = move_along(work.contact, rods, work, stepping, shortening, fraction)
+            move = move_along(rods, work, stepping, shortening, fraction)
         else:
-            move = move_along(work.contact, rods, work, stepping, None, fraction)
+            move = move_along(rods, work, stepping, None, fraction)
         best = select(stepping, phi, best)
         expected = select(stepping, decrement, expected)
         count = select(stepping, one, zero)
@@ -79,47 +78,45 @@ def take_step(rods, work, stepping, shortening, fraction):
 
     Returns the largest node move [m].
     """
-    edges = rods.nodes_per_limb - 1
+    edges = rods.edges_per_limb
     scale = step_scale(stepping, shortening, fraction)
     hub = load_pair(work.root_solution, 2 * rods.n_limbs)
     largest = move_node(work, 0, hub, shortening, scale)
-    largest = move_angle(rods.body, rods, work, work.root_solution, 2 * rods.n_limbs + 2, shortening, scale, largest)
+    largest = move_angle(rods, work, work.root_solution, 2 * rods.n_limbs + 2, shortening, scale, largest)
     for limb in range(rods.n_limbs):
         first = limb * edges
-        before = tail_solution(rods.body, work, rods.n_limbs, limb, hub)
+        before = tail_solution(rods, work, limb, hub)
         here = load_pair(work.root_solution, 2 * limb)
         largest = larger(largest, move_node(work, first + 1, here, shortening, scale))
         for i in range(2, edges + 1):
             before, here = here, substitute_node(work, first + i, here[0], here[1], before[0], before[1])
             largest = larger(largest, move_node(work, first + i, here, shortening, scale))
-    place_roots(rods.body, rods, work.q)
+    place_roots(rods, work.q)
     return sqrt(largest)
 
 
 @kernel
-def move_angle(body, rods, work, solution, row, shortening, scale, largest):
+def move_angle(rods, work, solution, row, shortening, scale, largest):
     """Move a body's angle by `scale` times its step, from a row of solutions [rad].
 
     Returns the largest move squared; unchanged without a body.
     """
-    if body is None:
+    if rods.body is None:
         return largest
-    arc = load(body.scale, 0) * load(solution, row)
-    return larger(largest, move_node(work, n_nodes(rods), (arc, splat(0.0)), shortening, scale))
+    arc = load(rods.body.scale, 0) * load(solution, row)
+    return larger(largest, move_node(work, rods.n_nodes, (arc, splat(0.0)), shortening, scale))
 
 
 @kernel
-def move_along(contact, rods, work, stepping, shortening, fraction):
+def move_along(rods, work, stepping, shortening, fraction):
     """take_step, but where contact is listed along the step of all nodes that coupled.py has found."""
-    if contact is None:
-        return take_step(rods, work, stepping, shortening, fraction)
-    if n_listed(work) == 0:
+    if work.contact is None or n_listed(work) == 0:
         return take_step(rods, work, stepping, shortening, fraction)
     scale, largest = step_scale(stepping, shortening, fraction), splat(0.0)
-    for node in range(n_nodes(rods)):
-        largest = larger(largest, move_node(work, node, load_pair(contact.x, 2 * node), shortening, scale))
-    largest = move_angle(rods.body, rods, work, contact.x, 2 * n_nodes(rods), shortening, scale, largest)
-    place_roots(rods.body, rods, work.q)
+    for node in range(rods.n_nodes):
+        largest = larger(largest, move_node(work, node, load_pair(work.contact.x, 2 * node), shortening, scale))
+    largest = move_angle(rods, work, work.contact.x, 2 * rods.n_nodes, shortening, scale, largest)
+    place_roots(rods, work.q)
     return sqrt(largest)
 
 

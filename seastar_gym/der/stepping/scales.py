@@ -1,4 +1,4 @@
-"""Scales of a robot that decide which steps the guard and the balance of momentum look at."""
+"""Scales of a robot that decide what Newton's method, the guard and the balance of momentum look at."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -6,14 +6,19 @@ from typing import NamedTuple
 import numpy as np
 
 from seastar_gym.der.mesh import Mesh, mean
-from seastar_gym.der.stepping.foresight import Foresight
 from seastar_gym.der.terms.drag import drag_per_length
 from seastar_gym.der.terms.stretching import Stretching
+
+SLENDER = 5000.0  # square of an edge's length over its radius: slenderer edges do not curve the potential more
+PREDICTABLE_STRAIN = 1e-3  # over EA times the length of all limbs: more energy strains or moves a robot violently
 
 
 class Scales(NamedTuple):
     """One row each, but for `held`.
 
+    shortest_edge: Smallest natural length of an edge [m].
+    curvature_rate: How fast the foreseeable length shrinks with the step [1/s^2], see foresight.py.
+    predictable: Potential [J] up to which Newton steps are predictable, see foresight.py.
     damped: Potential [J] up to which drag takes more energy than an unregularised step may create, see guard.py; zero
         without drag.
     unsettled_rate: How much stiffer edges are than inertia, the more the longer the step [1/s^2], see momentum.py.
@@ -21,6 +26,9 @@ class Scales(NamedTuple):
     held: Whether nodes are held, so that no frame but the laboratory's will do.
     """
 
+    shortest_edge: np.ndarray
+    curvature_rate: np.ndarray
+    predictable: np.ndarray
     damped: np.ndarray
     unsettled_rate: np.ndarray
     free_mass: np.ndarray
@@ -30,22 +38,47 @@ class Scales(NamedTuple):
 def coefficients(
     mesh: Mesh,
     stretching: Stretching,
-    foresight: Foresight,
     density: float,
     fluid_density: float,
     C_d: float,
     mass: np.ndarray,
     held_nodes: Sequence[int],
 ) -> Scales:
-    """Scales of a robot in a fluid (density or drag coefficient zero: vacuum), from its masses per node [kg], too."""
+    """Scales of a robot in a fluid (density or drag coefficient zero: vacuum), from its shortest, thinnest and stiffest
+    edges, and its masses per node [kg].
+    """
+    shortest, thinnest = float(mesh.root_edges.min()), min(map(min, mesh.radius_at_nodes))
+    slenderness = min(1.0, (shortest / thinnest) ** 2 / SLENDER)
+    rate = max(map(max, mesh.modulus_at_nodes)) / (density * shortest**2) * slenderness
+    length = mean(mesh.limb_lengths)
+    energy = PREDICTABLE_STRAIN * mean(stretching.EA) * mesh.n_limbs * length
     area = mesh.per_node(lambda r: np.pi * r**2)
     broadside = mean(mesh.per_node(lambda r: drag_per_length(fluid_density, C_d, r)))
-    length, energy = mean(mesh.limb_lengths), float(foresight.energy[0])
     stiffness_over_mass = float((stretching.EA_over_l / (density * area * mesh.dl)[1:]).max())
     edges = mesh.nodes_per_limb - 1
     return Scales(
+        shortest_edge=np.array([shortest]),
+        curvature_rate=np.array([rate]),
+        predictable=np.array([energy]),
         damped=np.array([energy * min(1.0, broadside * length / (density * mean(area)))]),
         unsettled_rate=np.array([stiffness_over_mass * edges**2 if broadside > 0.0 else np.inf]),
         free_mass=np.array([np.delete(mass, held_nodes).sum()]),
         held=bool(held_nodes),
     )
+
+
+class Limits(NamedTuple):
+    """Tolerances and bounds of the solution of a stroke, that a scene names.
+
+    tolerance: Largest displacement of a node in the last Newton update [m], one row.
+    max_iterations: Newton steps of a stage before its time step is halved.
+    most_iterations: Newton steps of a stroke before the robot has failed.
+    adaptive: Whether time steps are adapted to their error.
+    error_rate: Largest error per time [m/s], one row.
+    """
+
+    tolerance: np.ndarray
+    max_iterations: int
+    most_iterations: int
+    adaptive: bool
+    error_rate: np.ndarray

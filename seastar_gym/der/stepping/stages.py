@@ -2,7 +2,6 @@
 
 from typing import Any, NamedTuple
 
-from seastar_gym.der.star import n_free, n_nodes
 from seastar_gym.der.terms.body import move_roots, place_roots
 from seastar_gym.simd.compilation import inlined_kernel, kernel
 from seastar_gym.simd.lanes import add_product, load, load_number, select, splat, sqrt, store
@@ -29,14 +28,14 @@ LAST_STEP, SIZE, OF_BODY = 0, 1, 2
 @kernel
 def memory_row(rods, scheme, which):
     """Row of `a` where a step leaves LAST_STEP or SIZE for the next."""
-    return (2 * n_free(rods) + 1) * scheme.n_stages + which
+    return (2 * rods.n_free + 1) * scheme.n_stages + which
 
 
 @inlined_kernel
 def begin_stage(rods, work, scheme, k, q_0, v_0, a, h):
     """Stage k of a step; the iterate starts at (13.10) plus a share of what the last acceleration adds."""
     gamma = load_number(scheme.a, k * scheme.n_stages + k) * h
-    rows = 2 * n_free(rods)
+    rows = 2 * rods.n_free
     share = gamma * load(a, scheme.n_stages * rows + k)
     for row in range(rows):
         q_hat, v_hat = load(q_0, row), load(v_0, row)
@@ -49,9 +48,9 @@ def begin_stage(rods, work, scheme, k, q_0, v_0, a, h):
             store(work.v_hat, row, v_hat)
         velocity = add_product(v_hat, share, load(a, k * rows + row))
         store(work.q, row, add_product(q_hat, gamma, velocity))
-    place_roots(rods.body, rods, work.q)
+    place_roots(rods, work.q)
     if k > 0:
-        place_roots(rods.body, rods, work.q_hat)
+        place_roots(rods, work.q_hat)
         return Stage(work.q_hat, work.v_hat, gamma, 1.0 / gamma, not scheme.stiffly_accurate)
     return Stage(q_0, v_0, gamma, 1.0 / gamma, not scheme.stiffly_accurate)
 
@@ -74,27 +73,27 @@ def store_share(a, row, along, squared, robots):
 
 
 @kernel
-def guessed_motion(body, rods, scheme, k, stage, a):
+def guessed_motion(rods, scheme, k, stage, a):
     """(v_x, v_y, omega): first guess of the hub's velocity [m/s] and of a body's angular velocity [rad/s] in a stage.
 
     As begin_stage guesses it, but with a share that the ringing of limbs does not spoil; zeros without a body.
     """
-    if body is None:
+    if rods.body is None:
         return splat(0.0), splat(0.0), splat(0.0)
-    rows, row = 2 * n_free(rods), 2 * n_nodes(rods)
+    rows, row = 2 * rods.n_free, 2 * rods.n_nodes
     change = stage.gamma * load(a, memory_row(rods, scheme, OF_BODY + k))
     vx = add_product(load(stage.v_hat, 0), change, load(a, k * rows))
     vy = add_product(load(stage.v_hat, 1), change, load(a, k * rows + 1))
     arc = add_product(load(stage.v_hat, row), change, load(a, k * rows + row))
-    return vx, vy, arc * load(body.inverse_scale, 0)
+    return vx, vy, arc * load(rods.body.inverse_scale, 0)
 
 
 @kernel
-def keep_share_of_body(body, rods, work, scheme, k, stage, a, robots):
+def keep_share_of_body(rods, work, scheme, k, stage, a, robots):
     """Keep the share of a body's last accelerations that would have fit its new ones, before they are kept."""
-    if body is None:
+    if rods.body is None:
         return
-    rows, angle = 2 * n_free(rods), 2 * n_nodes(rods)
+    rows, angle = 2 * rods.n_free, 2 * rods.n_nodes
     along, squared = splat(0.0), splat(0.0)
     for row in (0, 1, angle):
         _, acceleration = stage_motion(work, stage, row)
@@ -106,8 +105,8 @@ def keep_share_of_body(body, rods, work, scheme, k, stage, a, robots):
 @kernel
 def end_stage(rods, work, scheme, k, stage, a, robots):
     """Keep velocity and acceleration of a solved stage that is not the last, for the robots in the mask `robots`."""
-    rows = 2 * n_free(rods)
-    keep_share_of_body(rods.body, rods, work, scheme, k, stage, a, robots)
+    rows = 2 * rods.n_free
+    keep_share_of_body(rods, work, scheme, k, stage, a, robots)
     along, squared = splat(0.0), splat(0.0)
     for row in range(rows):
         velocity, acceleration = stage_motion(work, stage, row)
@@ -122,8 +121,8 @@ def end_stage(rods, work, scheme, k, stage, a, robots):
 @inlined_kernel
 def end_step(rods, work, scheme, stage, q_0, v_0, a, h, accepted):
     """After the last stage: write the step's result over the state (q_0, v_0) of the robots in the mask `accepted`."""
-    rows, k = 2 * n_free(rods), scheme.n_stages - 1
-    keep_share_of_body(rods.body, rods, work, scheme, k, stage, a, accepted)
+    rows, k = 2 * rods.n_free, scheme.n_stages - 1
+    keep_share_of_body(rods, work, scheme, k, stage, a, accepted)
     along, squared = splat(0.0), splat(0.0)
     for row in range(rows):
         velocity, acceleration = stage_motion(work, stage, row)
@@ -143,14 +142,14 @@ def end_step(rods, work, scheme, stage, q_0, v_0, a, h, accepted):
         store(a, k * rows + row, select(accepted, acceleration, last))
         store(q_0, row, select(accepted, q_1, q))
         store(v_0, row, select(accepted, v_1, v))
-    move_roots(rods.body, rods, q_0, v_0)
+    move_roots(rods, q_0, v_0)
     store_share(a, scheme.n_stages * rows + k, along, squared, accepted)
 
 
 @kernel
 def forget_accelerations(rods, scheme, a, robots):
     """Robots whose step did not converge start the next one without a prediction, which may be far off or infinite."""
-    for row in range((2 * n_free(rods) + 1) * scheme.n_stages):
+    for row in range((2 * rods.n_free + 1) * scheme.n_stages):
         store(a, row, select(robots, 0.0, load(a, row)))
 
 
@@ -162,7 +161,7 @@ def step_error(rods, work, stage, a, h, last_h):
     that is the difference to the last step's over the time between the two middles.
     """
     largest = splat(0.0)
-    for node in range(n_free(rods)):
+    for node in range(rods.n_free):
         squared = splat(0.0)
         for row in range(2 * node, 2 * node + 2):
             _, acceleration = stage_motion(work, stage, row)
@@ -177,19 +176,12 @@ def start_standing(rods, work, stage, frame, robots):
     """Start the iterate of the robots in the mask at q_hat, carried on by the frame: Phi is finite there, and no
     velocity about it leads it astray.
     """
-    for node in range(n_nodes(rods)):
+    for node in range(rods.n_nodes):
         x = add_product(load(stage.q_hat, 2 * node), stage.gamma, frame[0])
         y = add_product(load(stage.q_hat, 2 * node + 1), stage.gamma, frame[1])
         store(work.q, 2 * node, select(robots, x, load(work.q, 2 * node)))
         store(work.q, 2 * node + 1, select(robots, y, load(work.q, 2 * node + 1)))
-    stop_turning(rods.body, rods, work, stage, robots)
-
-
-@kernel
-def stop_turning(body, rods, work, stage, robots):
-    """Start the angle of a body at q_hat, for the robots in the mask, and its roots with it; nothing without a body."""
-    if body is None:
-        return
-    row = 2 * n_nodes(rods)
-    store(work.q, row, select(robots, load(stage.q_hat, row), load(work.q, row)))
-    place_roots(body, rods, work.q)
+    if rods.body is not None:
+        row = 2 * rods.n_nodes
+        store(work.q, row, select(robots, load(stage.q_hat, row), load(work.q, row)))
+        place_roots(rods, work.q)

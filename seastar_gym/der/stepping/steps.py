@@ -83,9 +83,7 @@ def try_step(rods, work, scheme, actuation, q, v, a, step, active, limits, repor
     if not any_lane(guarded):
         end_step(rods, work, scheme, stage, q, v, a, step.h, accepted)
         return good, accepted, error_rate
-    refused = end_guarded_step(
-        rods, work, scheme, actuation, q, v, a, step, stage, accepted, guarded, limits, report
-    )
+    refused = end_guarded_step(rods, work, scheme, actuation, q, v, a, step, stage, accepted, guarded, limits, report)
     return good & ~refused, accepted & ~refused, error_rate
 
 
@@ -100,18 +98,18 @@ def solve_stages(rods, work, scheme, actuation, q, v, a, step, active, limits, r
     tolerance = load(limits.tolerance, 0)
     for k in range(scheme.n_stages):
         stage = begin_stage(rods, work, scheme, k, q, v, a, step.h)
-        freeze_contact(rods.contact, rods, work, stage, q)
-        freeze_body(rods.body, rods, work, stage, guessed_motion(rods.body, rods, scheme, k, stage, a))
+        freeze_contact(rods, work, stage, q)
+        freeze_body(rods, work, stage, guessed_motion(rods, scheme, k, stage, a))
         if any_lane(step.retrying):
-            start_standing(rods, work, stage, frame_velocity(rods.current, rods, q, v), step.retrying)
+            start_standing(rods, work, stage, frame_velocity(rods, q, v), step.retrying)
         freeze_fluid(rods, work)
         set_natural_hub_angles(rods, work, actuation, step.start + load_number(scheme.c, k) * step.size)
-        freeze_strains(rods.damping, rods, work, stage.q_hat)
+        freeze_strains(rods, work, stage.q_hat)
         left = limits.most_iterations - load(report, NEWTON_ITERATIONS)
         most, good = select(left < step.iteration_limit, left, step.iteration_limit), good & (left > 0.0)
         good, phi, iterations, regularised, backtracks = minimise(rods, work, stage, good, tolerance, most)
         settle_momentum(rods, work, scheme, k, stage, q, v, step.h, good)
-        good = those_uncrossed(rods.contact, rods, work, stage, q, good)
+        good = those_uncrossed(rods, work, stage, q, good)
         guarded = guarded | (regularised + backtracks > 0.0)
         if scheme.dissipative:
             guarded = guarded | those_that_may_gain(rods, work, stage, phi, good & ~guarded)
@@ -131,9 +129,9 @@ def those_that_may_gain(rods, work, stage, phi, robots):
     are meant whose potential leaves room for it.
     """
     energetic = phi > load(rods.scales.damped, 0)
-    predictable = robots & energetic & (phi <= load(rods.foresight.energy, 0))
+    predictable = robots & energetic & (phi <= load(rods.scales.predictable, 0))
     if any_lane(predictable):
-        gaining = may_gain(rods.current, rods.added_mass, rods.body, rods, work, stage, phi, predictable)
+        gaining = may_gain(rods, work, stage, phi, predictable)
         energetic = (energetic & ~predictable) | gaining
     return energetic
 
@@ -145,13 +143,13 @@ def end_guarded_step(rods, work, scheme, actuation, q, v, a, step, stage, accept
     Returns the mask of the robots whose step was refused and undone.
     """
     set_aside(rods, work, scheme, q, v)
-    frame = frame_velocity(rods.current, rods, q, v)
+    frame = frame_velocity(rods, q, v)
     allowed = allowed_energy(rods, work, scheme, actuation, step.start, step.start + step.size, q, v, frame)
     end_step(rods, work, scheme, stage, q, v, a, step.h, accepted)
     largest_cut = select(step.iteration_limit > MOST_HALVINGS * limits.max_iterations, splat(1.0), LARGEST_CUT)
-    allowed = add_work_of_current(rods.current, rods, work, v, step.h, frame, allowed)
-    allowed = add_work_of_loads(rods.load, rods, work, q, step.h, frame, allowed)
-    allowed = add_work_on_body(rods.body, rods, work, work.step, q, v, step.h, frame, allowed)
+    allowed = add_work_of_current(rods, work, v, step.h, frame, allowed)
+    allowed = add_work_of_loads(rods, work, q, step.h, frame, allowed)
+    allowed = add_work_on_body(rods, work, work.step, q, v, step.h, frame, allowed)
     refused, cut = hold_to_energy(rods, work, scheme, q, v, step.h, frame, guarded, allowed, largest_cut)
     turnable = guarded & (step.iteration_limit <= TURNABLE * limits.max_iterations)
     refused = refused | through_poles(rods, work, q, turnable)

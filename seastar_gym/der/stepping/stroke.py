@@ -72,7 +72,7 @@ def advance(rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shap
     for group in range(q.shape[0]):
         q_rows, v_rows, a_rows, peak_rows = borrow(q[group]), borrow(v[group]), borrow(a[group]), borrow(peaks[group])
         failed_rows, report_rows = borrow(failed[group]), borrow(report[group])
-        move_roots(rods_rows.body, rods_rows, q_rows, v_rows)
+        move_roots(rods_rows, q_rows, v_rows)
         status = load(failed_rows, 0)
         alive = status < 1.0
         for k in range(times.shape[0] - 1):

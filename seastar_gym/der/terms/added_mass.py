@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.der.geometry import edge_vector
 from seastar_gym.der.mesh import Mesh
-from seastar_gym.der.star import n_nodes, n_places, root_place, tail_node
+from seastar_gym.der.star import root_place, tail_node
 from seastar_gym.der.terms.body_forces import body_added_mass
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, splat, store, subtract_product
@@ -38,36 +38,36 @@ def edge_coefficients(mesh: Mesh, density: float, C_a: float | None) -> NDArray[
 
 
 @kernel
-def freeze_added_mass(added_mass, rods, work):
+def freeze_added_mass(rods, work):
     """Fill work.added_mass, (xx, xy, yy) of every node [kg], from work.normals, in scenes that have it."""
-    if added_mass is None:
+    if rods.added_mass is None:
         return
-    for node in range(n_nodes(rods)):
+    for node in range(rods.n_nodes):
         xx, xy, yy = splat(0.0), splat(0.0), splat(0.0)
         if node == 0:
-            xx, xy, yy = hub_mass(rods.body, added_mass, rods, work, xx, xy, yy)
+            xx, xy, yy = hub_mass(rods, work, xx, xy, yy)
         else:
-            xx, xy, yy = add_half_edge_mass(load(added_mass, 2 * node), work.normals, node - 1, xx, xy, yy)
-            xx, xy, yy = add_half_edge_mass(load(added_mass, 2 * node + 1), work.normals, node, xx, xy, yy)
+            xx, xy, yy = add_half_edge_mass(load(rods.added_mass, 2 * node), work.normals, node - 1, xx, xy, yy)
+            xx, xy, yy = add_half_edge_mass(load(rods.added_mass, 2 * node + 1), work.normals, node, xx, xy, yy)
         store(work.added_mass, 3 * node, xx)
         store(work.added_mass, 3 * node + 1, xy)
         store(work.added_mass, 3 * node + 2, yy)
 
 
 @kernel
-def hub_mass(body, added_mass, rods, work, xx, xy, yy):
+def hub_mass(rods, work, xx, xy, yy):
     """Added mass of the hub [kg]: of half of every root edge; that of a body is its own, and its roots have theirs."""
-    edges = rods.nodes_per_limb - 1
-    if body is None:
-        for e in range(0, rods.n_limbs * edges, edges):
-            xx, xy, yy = add_half_edge_mass(load(added_mass, 2 * e + 2), work.normals, e, xx, xy, yy)
+    edges = rods.edges_per_limb
+    if rods.body is None:
+        for e in range(0, rods.n_edges, edges):
+            xx, xy, yy = add_half_edge_mass(load(rods.added_mass, 2 * e + 2), work.normals, e, xx, xy, yy)
         return xx, xy, yy
     for limb in range(rods.n_limbs):
         e, place = limb * edges, root_place(rods, limb)
-        mass = add_half_edge_mass(load(added_mass, 2 * e + 2), work.normals, e, splat(0.0), splat(0.0), splat(0.0))
+        mass = add_half_edge_mass(load(rods.added_mass, 2 * e + 2), work.normals, e, splat(0.0), splat(0.0), splat(0.0))
         for k in range(3):
             store(work.added_mass, 3 * place + k, mass[k])
-    return body_added_mass(body.added_mass, work)
+    return body_added_mass(rods, work)
 
 
 @kernel
@@ -79,47 +79,39 @@ def add_half_edge_mass(m, normals, e, xx, xy, yy):
 
 
 @kernel
-def momentum(added_mass, node, vx, vy):
+def fluid_momentum(work, node, vx, vy):
     """Momentum of the fluid that a node of velocity (vx, vy) carries along [kg m/s]."""
-    xx, xy, yy = load(added_mass, 3 * node), load(added_mass, 3 * node + 1), load(added_mass, 3 * node + 2)
+    m, row = work.added_mass, 3 * node
+    xx, xy, yy = load(m, row), load(m, row + 1), load(m, row + 2)
     return add_product(xx * vx, xy, vy), add_product(xy * vx, yy, vy)
 
 
 @kernel
-def add_fluid_momentum(added_mass, node, vx, vy, p):
-    """Add the momentum of the fluid that a node of velocity (vx, vy) carries along to its own [kg m/s]."""
-    if added_mass is None:
-        return p
-    px, py = momentum(added_mass, node, vx, vy)
-    return p[0] + px, p[1] + py
-
-
-@kernel
-def add_fluid_inertia(added_mass, node, dx, dy, inverse_gamma, slopes):
+def add_fluid_inertia(work, node, dx, dy, inverse_gamma, slopes):
     """Add a node's |d|^2/2 in its added mass, d = v - v_hat, to its (energy, gradient, Hessian) in q."""
-    if added_mass is None:
+    if work.added_mass is None:
         return slopes
     energy, (fx, fy), (xx, xy, yy) = slopes
-    px, py = momentum(added_mass, node, dx, dy)
+    px, py = fluid_momentum(work, node, dx, dy)
     squared = inverse_gamma * inverse_gamma
     return (
         add_product(energy, 0.5, add_product(px * dx, py, dy)),
         (add_product(fx, px, inverse_gamma), add_product(fy, py, inverse_gamma)),
         (
-            add_product(xx, load(added_mass, 3 * node), squared),
-            add_product(xy, load(added_mass, 3 * node + 1), squared),
-            add_product(yy, load(added_mass, 3 * node + 2), squared),
+            add_product(xx, load(work.added_mass, 3 * node), squared),
+            add_product(xy, load(work.added_mass, 3 * node + 1), squared),
+            add_product(yy, load(work.added_mass, 3 * node + 2), squared),
         ),
     )
 
 
 @kernel
-def less_edge_fluid_inertia(edge_added_mass, work, stage, e, tail, head, slopes):
-    """(E, f, K) of an edge less mu ((d_head - d_tail) n)^2/2; unchanged where no such mass is named (None)."""
-    if edge_added_mass is None:
+def less_edge_fluid_inertia(rods, work, stage, e, tail, head, slopes):
+    """(E, f, K) of an edge less mu ((d_head - d_tail) n)^2/2; unchanged where no such mass is named."""
+    if rods.edge_added_mass is None:
         return slopes
     energy, (fx, fy), (xx, xy, yy) = slopes
-    mu = load(edge_added_mass, e)
+    mu = load(rods.edge_added_mass, e)
     nx, ny = load(work.normals, 2 * e), load(work.normals, 2 * e + 1)
     dx, dy = head.dx - tail.dx, head.dy - tail.dy
     across = add_product(dx * nx, dy, ny)
@@ -134,28 +126,28 @@ def less_edge_fluid_inertia(edge_added_mass, work, stage, e, tail, head, slopes)
 
 
 @kernel
-def less_edge_fluid_energy(edge_added_mass, rods, work, v, energy):
+def less_edge_fluid_energy(rods, work, v, energy):
     """Kinetic energy of the fluid [J] less what velocities that are linear along edges take from lumped masses'."""
-    if edge_added_mass is None:
+    if rods.edge_added_mass is None:
         return energy
-    for e in range(n_nodes(rods) - 1):
+    for e in range(rods.n_edges):
         dx, dy = edge_vector(v, tail_node(rods, e), e + 1)
         across = add_product(dx * load(work.normals, 2 * e), dy, load(work.normals, 2 * e + 1))
-        energy = subtract_product(energy, 0.5 * load(edge_added_mass, e) * across, across)
+        energy = subtract_product(energy, 0.5 * load(rods.edge_added_mass, e) * across, across)
     return energy
 
 
 @kernel
-def add_fluid_energy(added_mass, rods, v, frame, energy):
+def add_fluid_energy(rods, work, v, frame, energy):
     """Add the kinetic energy of the fluid that moves along [J], at the normals of the last stage.
 
     frame: Velocity of the frame that it is seen from [m/s].
     """
-    if added_mass is None:
+    if rods.added_mass is None:
         return energy
     total = splat(0.0)
-    for node in range(n_places(rods)):
+    for node in range(rods.n_places):
         vx, vy = load(v, 2 * node) - frame[0], load(v, 2 * node + 1) - frame[1]
-        px, py = momentum(added_mass, node, vx, vy)
+        px, py = fluid_momentum(work, node, vx, vy)
         total = add_product(total, 0.5, add_product(px * vx, py, vy))
     return energy + total

@@ -87,8 +87,9 @@ def stiffening(along, delta):
 
 
 @kernel
-def stiffening_rate(along, delta):
-    """d(ln f)/d(delta) of a limb that is turned by delta [1/rad]; 0 where actuators act at the hub only (None)."""
+def stiffening_rate(rods, delta):
+    """d(ln f)/d(delta) of a limb that is turned by delta [1/rad]; 0 where actuators act at the hub only."""
+    along = rods.along
     if along is None:
         return 0.0 * delta
     middle, slope, inverse_peak = load(along.middle, 0), load(along.slope, 0), load(along.inverse_peak, 0)
@@ -111,69 +112,67 @@ def turned(actuation, limb, fraction):
 
 
 @kernel
-def turned_at_hub(along, rods, limb, delta):
+def turned_at_hub(rods, limb, delta):
     """What of a limb's rotation turns its clamp: all of it where actuators act at the hub only (None)."""
-    if along is None:
+    if rods.along is None:
         return delta
-    return load(along.share, limb * (rods.nodes_per_limb - 1)) * delta
+    return load(rods.along.share, limb * rods.edges_per_limb) * delta
 
 
 @kernel
-def set_natural_curvature(along, rods, work, actuation, fraction):
+def set_natural_curvature(rods, work, actuation, fraction):
     """Fill work.stiffening and work.EI_kappa_bar at `fraction` (lanes) of an interval, where actuators act along."""
-    if along is None:
-        return
-    edges = rods.nodes_per_limb - 1
+    edges = rods.edges_per_limb
     for limb in range(rods.n_limbs):
         delta = turned(actuation, limb, fraction)
-        f = stiffening(along, delta)
+        f = stiffening(rods.along, delta)
         store(work.stiffening, ALONG_ROWS * limb + STIFFER, f)
         store(work.stiffening, ALONG_ROWS * limb + SOFTER, 1.0 / f)
         for hinge in range(limb * edges + 1, (limb + 1) * edges):
             EI_over_dl = f * load(rods.bending.EI_over_dl, hinge)
-            store(work.EI_kappa_bar, hinge, 2.0 * EI_over_dl * natural_tangent(along, hinge, delta))
+            store(work.EI_kappa_bar, hinge, 2.0 * EI_over_dl * natural_tangent(rods.along, hinge, delta))
 
 
 @kernel
-def bending_stiffness(along, rods, work, hinge):
+def bending_stiffness(rods, work, hinge):
     """EI/dl of a hinge, or K of a clamp, now [N m]."""
     EI_over_dl = load(rods.bending.EI_over_dl, hinge)
-    if along is None:
+    if rods.along is None:
         return EI_over_dl
-    return EI_over_dl * load(work.stiffening, ALONG_ROWS * (hinge // (rods.nodes_per_limb - 1)) + STIFFER)
+    return EI_over_dl * load(work.stiffening, ALONG_ROWS * (hinge // rods.edges_per_limb) + STIFFER)
 
 
 @kernel
-def bending_compliance(along, rods, work, hinge):
+def bending_compliance(rods, work, hinge):
     """dl/EI of a hinge now [1/(N m)]."""
     dl_over_EI = load(rods.bending.dl_over_EI, hinge)
-    if along is None:
+    if rods.along is None:
         return dl_over_EI
-    return dl_over_EI * load(work.stiffening, ALONG_ROWS * (hinge // (rods.nodes_per_limb - 1)) + SOFTER)
+    return dl_over_EI * load(work.stiffening, ALONG_ROWS * (hinge // rods.edges_per_limb) + SOFTER)
 
 
 @kernel
-def natural_moment(along, rods, work, hinge):
+def natural_moment(rods, work, hinge):
     """Natural moment EI kappa_bar of a hinge within a limb now [N m]."""
-    if along is None:
+    if rods.along is None:
         return load(rods.bending.EI_kappa_bar, hinge)
     return load(work.EI_kappa_bar, hinge)
 
 
 @kernel
-def add_moved_energy(along, rods, work, actuation, start, end, energy):
+def add_moved_energy(rods, work, actuation, start, end, energy):
     """Add the energy of hinges at their natural angles, once those moved from `start` to `end` of the interval [J].
 
     At the larger stiffness of the two. Leaves in `work` what is natural at `end`.
     """
-    if along is None:
+    if rods.along is None:
         return energy
-    set_natural_curvature(along, rods, work, actuation, end)
-    edges = rods.nodes_per_limb - 1
+    set_natural_curvature(rods, work, actuation, end)
+    edges = rods.edges_per_limb
     for limb in range(rods.n_limbs):
         before, after = turned(actuation, limb, start), turned(actuation, limb, end)
-        f = larger(stiffening(along, before), stiffening(along, after))
+        f = larger(stiffening(rods.along, before), stiffening(rods.along, after))
         for hinge in range(limb * edges + 1, (limb + 1) * edges):
-            moved = natural_tangent(along, hinge, after) - natural_tangent(along, hinge, before)
+            moved = natural_tangent(rods.along, hinge, after) - natural_tangent(rods.along, hinge, before)
             energy = add_product(energy, 2.0 * f * load(rods.bending.EI_over_dl, hinge) * moved, moved)
     return energy

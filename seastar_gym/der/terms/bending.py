@@ -83,13 +83,13 @@ def n_hub_hinges(n_limbs: int) -> int:
 @kernel
 def moment(rods, work, hinge, t, EI_kappa_bar):
     """Bending moment EI (kappa - kappa_bar) [N m] of a hinge whose half angle has the tangent t."""
-    return add_product(-EI_kappa_bar, 2.0 * bending_stiffness(rods.along, rods, work, hinge), t)
+    return add_product(-EI_kappa_bar, 2.0 * bending_stiffness(rods, work, hinge), t)
 
 
 @kernel
 def bending_energy(rods, work, hinge, moment):
     """Bending energy E_b [J] of a hinge under a moment [N m]."""
-    return 0.5 * bending_compliance(rods.along, rods, work, hinge) * moment * moment
+    return 0.5 * bending_compliance(rods, work, hinge) * moment * moment
 
 
 @kernel

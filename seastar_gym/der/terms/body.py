@@ -27,12 +27,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.der.geometry import rotation
+from seastar_gym.der.geometry import convex_part, rotation
 from seastar_gym.der.mesh import Mesh
 from seastar_gym.der.motion import Motion, node_motion, relative
-from seastar_gym.der.star import n_nodes, root_place
+from seastar_gym.der.star import root_place, tail_node
 from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.lanes import N_LANES, add_product, load, select, splat, store, subtract_product
+from seastar_gym.simd.lanes import N_LANES, add_product, load, splat, store, subtract_product
 from seastar_gym.simd.rows import aligned_rows
 
 Floats = NDArray[np.float64]
@@ -142,9 +142,9 @@ def memory(body: Body | None, n_limbs: int, n_stages: int) -> BodyWork | None:
 
 
 @kernel
-def angle(body, rods, q):
+def angle(rods, q):
     """theta [rad], or its rate from rows of velocities."""
-    return load(q, 2 * n_nodes(rods)) * load(body.inverse_scale, 0)
+    return load(q, 2 * rods.n_nodes) * load(rods.body.inverse_scale, 0)
 
 
 @kernel
@@ -155,27 +155,27 @@ def turned(c, s, rows, k):
 
 
 @kernel
-def place_roots(body, rods, q):
+def place_roots(rods, q):
     """Put the roots of the limbs, and corners, where hub and angle say [m], in scenes with a body."""
-    if body is None:
+    if rods.body is None:
         return
-    c, s = rotation(angle(body, rods, q))
-    for k in range(body.n_arms):
-        x, y = turned(c, s, body.arm, k)
+    c, s = rotation(angle(rods, q))
+    for k in range(rods.body.n_arms):
+        x, y = turned(c, s, rods.body.arm, k)
         place = root_place(rods, 0) + k
         store(q, 2 * place, load(q, 0) + x)
         store(q, 2 * place + 1, load(q, 1) + y)
 
 
 @kernel
-def move_roots(body, rods, q, v):
+def move_roots(rods, q, v):
     """Put roots and corners where hub and angle say [m], with the velocities of there [m/s], in scenes with a body."""
-    if body is None:
+    if rods.body is None:
         return
-    c, s = rotation(angle(body, rods, q))
-    omega = angle(body, rods, v)
-    for k in range(body.n_arms):
-        x, y = turned(c, s, body.arm, k)
+    c, s = rotation(angle(rods, q))
+    omega = angle(rods, v)
+    for k in range(rods.body.n_arms):
+        x, y = turned(c, s, rods.body.arm, k)
         place = root_place(rods, 0) + k
         store(q, 2 * place, load(q, 0) + x)
         store(q, 2 * place + 1, load(q, 1) + y)
@@ -184,14 +184,11 @@ def move_roots(body, rods, q, v):
 
 
 @kernel
-def tail_motion(body, rods, work, stage, e):
+def tail_motion(rods, work, stage, e):
     """Motion of the node where edge e starts, see star.tail_node."""
-    edges = rods.nodes_per_limb - 1
-    if body is None:
-        return node_motion(work, stage, 0 if e % edges == 0 else e)
-    if e % edges == 0:
-        return root_motion(rods, work, stage, e // edges)
-    return node_motion(work, stage, e)
+    if rods.body is not None and e % rods.edges_per_limb == 0:
+        return root_motion(rods, work, stage, e // rods.edges_per_limb)
+    return node_motion(work, stage, tail_node(rods, e))
 
 
 @kernel
@@ -200,28 +197,28 @@ def root_motion(rods, work, stage, limb):
     place, row = root_place(rods, limb), HAT * limb
     vx = (load(work.q, 2 * place) - load(work.body.hat, row)) * stage.inverse_gamma
     vy = (load(work.q, 2 * place + 1) - load(work.body.hat, row + 1)) * stage.inverse_gamma
-    wx, wy = relative(work.current, place, vx, vy)
+    wx, wy = relative(work, place, vx, vy)
     return Motion(vx - load(work.body.hat, row + 2), vy - load(work.body.hat, row + 3), wx, wy)
 
 
 @kernel
-def freeze_body(body, rods, work, stage, guess):
+def freeze_body(rods, work, stage, guess):
     """What a stage takes from its first guess, into work.body.frozen and hat, in scenes with a body.
 
     guess: Velocity of the hub [m/s] and angular velocity [rad/s]; the place is that of the iterate.
     """
-    if body is None:
+    if rods.body is None:
         return
     vx, vy, omega = guess
-    c, s = rotation(angle(body, rods, work.q))
-    omega_hat = angle(body, rods, stage.v_hat)
+    c, s = rotation(angle(rods, work.q))
+    omega_hat = angle(rods, stage.v_hat)
     squared = omega * omega
-    sx, sy = turned(c, s, body.moment, 0)
+    sx, sy = turned(c, s, rods.body.moment, 0)
     frozen = (c, s, omega, vx, vy, -sy, sx, squared * sx, squared * sy)
     for k in range(9):
         store(work.body.frozen, k, frozen[k])
     for limb in range(rods.n_limbs):
-        x, y = turned(c, s, body.arm, limb)
+        x, y = turned(c, s, rods.body.arm, limb)
         row = HAT * limb
         store(work.body.hat, row, load(work.q, 0) + subtract_product(x, stage.gamma, subtract_product(vx, omega, y)))
         store(work.body.hat, row + 1, load(work.q, 1) + subtract_product(y, stage.gamma, add_product(vy, omega, x)))
@@ -233,15 +230,15 @@ def freeze_body(body, rods, work, stage, guess):
 
 
 @kernel
-def begin_body(body, rods, work):
+def begin_body(rods, work):
     """Turn the arms as the iterate has them, and begin the part of the system that belongs to the angle."""
-    if body is None:
+    if rods.body is None:
         return
-    c, s = rotation(angle(body, rods, work.q))
+    c, s = rotation(angle(rods, work.q))
     store(work.body.turn, 0, c)
     store(work.body.turn, 1, s)
-    for k in range(body.n_arms):
-        x, y = turned(c, s, body.arm, k)
+    for k in range(rods.body.n_arms):
+        x, y = turned(c, s, rods.body.arm, k)
         store(work.body.arm, 2 * k, x)
         store(work.body.arm, 2 * k + 1, y)
     for row in range(SYSTEM):
@@ -258,22 +255,22 @@ def add_to_system(work, x, y, stiffness, residual):
 
 
 @kernel
-def tail_solution(body, work, n_limbs, limb, hub):
+def tail_solution(rods, work, limb, hub):
     """Solution of the node where a limb starts, from that of the hub (x, y) and that of the angle, if there is one."""
-    if body is None:
+    if rods.body is None:
         return hub
-    turn = load(work.root_solution, 2 * n_limbs + 2)
+    turn = load(work.root_solution, 2 * rods.n_limbs + 2)
     x, y = load(work.body.arm, 2 * limb), load(work.body.arm, 2 * limb + 1)
     return subtract_product(hub[0], turn, y), add_product(hub[1], turn, x)
 
 
 @kernel
-def carry_roots(body, rods, work, p):
+def carry_roots(rods, work, p):
     """Extend rows of a direction of the unknowns, the angle [rad], to roots and corners, which it carries along."""
-    if body is None:
+    if rods.body is None:
         return
-    turn = load(p, 2 * n_nodes(rods))
-    for k in range(body.n_arms):
+    turn = load(p, 2 * rods.n_nodes)
+    for k in range(rods.body.n_arms):
         place = root_place(rods, 0) + k
         x, y = load(work.body.arm, 2 * k), load(work.body.arm, 2 * k + 1)
         store(p, 2 * place, subtract_product(load(p, 0), turn, y))
@@ -281,12 +278,12 @@ def carry_roots(body, rods, work, p):
 
 
 @kernel
-def gather_roots(body, rods, work, rows):
+def gather_roots(rods, work, rows):
     """Move what rows have at roots and corners to the hub and, as a torque, to the angle: the transpose of carry."""
-    if body is None:
+    if rods.body is None:
         return
-    angle_row = 2 * n_nodes(rods)
-    for k in range(body.n_arms):
+    angle_row = 2 * rods.n_nodes
+    for k in range(rods.body.n_arms):
         x, y = load(work.body.arm, 2 * k), load(work.body.arm, 2 * k + 1)
         row = 2 * (root_place(rods, 0) + k)
         f_x, f_y = load(rows, row), load(rows, row + 1)
@@ -298,17 +295,16 @@ def gather_roots(body, rods, work, rows):
 
 
 @kernel
-def push_body_at_roots(body, rods, work, convex, force):
+def push_body_at_roots(rods, work, convex, force):
     """Move forces at roots and corners [N] to the hub, and their torque into the angle's part of the system."""
-    if body is None:
+    if rods.body is None:
         return
     curvature = splat(0.0)
-    for k in range(body.n_arms):
+    for k in range(rods.body.n_arms):
         row = 2 * (root_place(rods, 0) + k)
         x, y = load(work.body.arm, 2 * k), load(work.body.arm, 2 * k + 1)
         curvature = add_product(add_product(curvature, load(force, row), x), load(force, row + 1), y)
-    curvature = select(convex, select(curvature > 0.0, curvature, 0.0), curvature)
-    angle_row = 2 * n_nodes(rods)
+    angle_row = 2 * rods.n_nodes
     store(force, angle_row, 0.0)
-    gather_roots(body, rods, work, force)
-    add_to_system(work, splat(0.0), splat(0.0), curvature, -load(force, angle_row))
+    gather_roots(rods, work, force)
+    add_to_system(work, splat(0.0), splat(0.0), convex_part(convex, curvature), -load(force, angle_row))

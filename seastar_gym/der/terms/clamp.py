@@ -27,9 +27,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seastar_gym.der.geometry import edge_vector, rotation, tangent
+from seastar_gym.der.geometry import convex_part, rotation, tangent
 from seastar_gym.der.mesh import Mesh
-from seastar_gym.der.star import load_root_edge, tail_node
+from seastar_gym.der.star import load_root_edge, root_direction
 from seastar_gym.der.terms.along import bending_stiffness, stiffening_rate, turned, turned_at_hub
 from seastar_gym.der.terms.body import add_to_system, angle
 from seastar_gym.simd.compilation import kernel
@@ -58,43 +58,39 @@ def coefficients(mesh: Mesh, directions: Sequence[float]) -> Clamp:
 @kernel
 def clamp_stiffness(rods, work, limb):
     """K_j [N m]."""
-    return bending_stiffness(rods.along, rods, work, limb * (rods.nodes_per_limb - 1))
+    return bending_stiffness(rods, work, limb * rods.edges_per_limb)
 
 
 @kernel
-def set_natural_directions(clamp, rods, work, actuation, fraction):
-    """Fill work.hub_direction with n_j at `fraction` (lanes) of an interval, in scenes with a rigid hub."""
-    if clamp is None:
-        return
+def set_natural_directions(rods, work, actuation, fraction):
+    """Fill work.hub_direction with n_j at `fraction` (lanes) of an interval."""
     for limb in range(rods.n_limbs):
-        t = tangent(0.5 * turned_at_hub(rods.along, rods, limb, turned(actuation, limb, fraction)))
+        t = tangent(0.5 * turned_at_hub(rods, limb, turned(actuation, limb, fraction)))
         scale = 1.0 / add_product(1.0, t, t)
         c, s = subtract_product(1.0, t, t) * scale, 2.0 * t * scale
-        x, y = load(clamp.direction, 2 * limb), load(clamp.direction, 2 * limb + 1)
+        x, y = load(rods.clamp.direction, 2 * limb), load(rods.clamp.direction, 2 * limb + 1)
         store(work.hub_direction, 2 * limb, subtract_product(c * x, s, y))
         store(work.hub_direction, 2 * limb + 1, add_product(s * x, c, y))
 
 
 @kernel
-def freeze_directions(clamp, rods, work, q_hat):
+def freeze_directions(rods, work, q_hat):
     """Fill work.hub_hat with the directions of the root edges at q_hat, in scenes with a rigid hub and damping."""
-    if clamp is None:
+    if rods.clamp is None:
         return
     for limb in range(rods.n_limbs):
-        e = limb * (rods.nodes_per_limb - 1)
-        ex, ey = edge_vector(q_hat, tail_node(rods, e), e + 1)
-        inverse = 1.0 / sqrt(add_product(ex * ex, ey, ey))
-        tx, ty = on_body(rods.body, rods, q_hat, ex * inverse, ey * inverse)
+        x, y = root_direction(rods, q_hat, limb)
+        tx, ty = on_body(rods, q_hat, x, y)
         store(work.hub_hat, 2 * limb, tx)
         store(work.hub_hat, 2 * limb + 1, ty)
 
 
 @kernel
-def on_body(body, rods, q, x, y):
+def on_body(rods, q, x, y):
     """A direction as it is seen from a body, which keeps it when it turns; unchanged without one."""
-    if body is None:
+    if rods.body is None:
         return x, y
-    c, s = rotation(angle(body, rods, q))
+    c, s = rotation(angle(rods, q))
     return add_product(c * x, s, y), subtract_product(c * y, s, x)
 
 
@@ -113,11 +109,16 @@ def orientation(S_x, S_y):
 
 
 @kernel
-def hub_orientation(body, rods, q, S_x, S_y):
-    """(cos Phi, sin Phi) of the hub: that of a body at q, or the one that makes the energy least."""
-    if body is None:
+def hub_orientation(rods, q, S_x, S_y):
+    """(cos Phi, sin Phi) of the hub: that of a body at q, or the one that makes the energy least.
+
+    q: None for a body that has not turned.
+    """
+    if rods.body is None:
         return orientation(S_x, S_y)
-    return rotation(angle(body, rods, q))
+    if q is None:
+        return splat(1.0), splat(0.0)
+    return rotation(angle(rods, q))
 
 
 @kernel
@@ -140,13 +141,13 @@ def sum_of_turns(rods, work):
 
 
 @kernel
-def energy_of_turns(body, rods, work, q):
+def energy_of_turns(rods, work, q):
     """E [J] of root edges turned by (c, s) in work.hub_turn, two rows per limb, from their natural directions.
 
     q: Where a body's orientation is found, or None for a body that has not turned.
     """
     S_x, S_y = sum_of_turns(rods, work)
-    p_x, p_y = turn_of_hub(q, body, rods, S_x, S_y)
+    p_x, p_y = hub_orientation(rods, q, S_x, S_y)
     total = splat(0.0)
     for limb in range(rods.n_limbs):
         c, s = load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1)
@@ -155,28 +156,11 @@ def energy_of_turns(body, rods, work, q):
 
 
 @kernel
-def turn_of_hub(q, body, rods, S_x, S_y):
-    """hub_orientation, or (1, 0) for a body that has not turned (q is None)."""
-    if q is None:
-        return unturned(body, S_x, S_y)
-    return hub_orientation(body, rods, q, S_x, S_y)
-
-
-@kernel
-def unturned(body, S_x, S_y):
-    if body is None:
-        return orientation(S_x, S_y)
-    return splat(1.0), splat(0.0)
-
-
-@kernel
 def turn_clamps(rods, work, q):
     """Fill work.hub_turn with what root edges at q are turned by from the natural directions in `work`."""
     for limb in range(rods.n_limbs):
-        e = limb * (rods.nodes_per_limb - 1)
-        ex, ey = edge_vector(q, tail_node(rods, e), e + 1)
-        inverse = 1.0 / sqrt(add_product(ex * ex, ey, ey))
-        c, s = turn_from(work.hub_direction, limb, ex * inverse, ey * inverse)
+        x, y = root_direction(rods, q, limb)
+        c, s = turn_from(work.hub_direction, limb, x, y)
         store(work.hub_turn, 2 * limb, c)
         store(work.hub_turn, 2 * limb + 1, s)
 
@@ -185,40 +169,38 @@ def turn_clamps(rods, work, q):
 def clamp_energy(rods, work, q):
     """E [J] at the natural directions in `work`."""
     turn_clamps(rods, work, q)
-    return energy_of_turns(rods.body, rods, work, q)
+    return energy_of_turns(rods, work, q)
 
 
 @kernel
-def add_clamp_moments(clamp, rods, work, actuation, q, moments):
+def add_clamp_moments(rods, work, actuation, q, moments):
     """Add dE/d(delta) of the clamps [N m], of every limb's rotation delta, at the natural directions in `work`.
 
     With stiffness f K, f that of along.py, a clamp has -share M_j + E_j d(ln f)/d(delta), E_j its part of E.
     """
-    if clamp is None:
-        return
     turn_clamps(rods, work, q)
     S_x, S_y = sum_of_turns(rods, work)
-    p_x, p_y = hub_orientation(rods.body, rods, q, S_x, S_y)
+    p_x, p_y = hub_orientation(rods, q, S_x, S_y)
     for limb in range(rods.n_limbs):
         K, c, s = clamp_stiffness(rods, work, limb), load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1)
-        moment = turned_at_hub(rods.along, rods, limb, K * subtract_product(s * p_x, c, p_y))
-        rate = stiffening_rate(rods.along, load(actuation.delta_psi_start, limb))
+        moment = turned_at_hub(rods, limb, K * subtract_product(s * p_x, c, p_y))
+        rate = stiffening_rate(rods, load(actuation.delta_psi_start, limb))
         stiffer = add_product(-moment, rate, turned_energy(K, c, s, p_x, p_y))
         store(moments, limb, load(moments, limb) + stiffer)
 
 
 @kernel
-def moved_clamp_energy(clamp, rods, work, actuation, start, end):
+def moved_clamp_energy(rods, work, actuation, start, end):
     """Energy of a robot at its natural directions, once those have moved from `start` to `end` of the interval [J]."""
-    set_natural_directions(clamp, rods, work, actuation, start)
+    set_natural_directions(rods, work, actuation, start)
     for row in range(2 * rods.n_limbs):
         store(work.hub_turn, row, load(work.hub_direction, row))
-    set_natural_directions(clamp, rods, work, actuation, end)
+    set_natural_directions(rods, work, actuation, end)
     for limb in range(rods.n_limbs):
         c, s = turn_from(work.hub_direction, limb, load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1))
         store(work.hub_turn, 2 * limb, c)
         store(work.hub_turn, 2 * limb + 1, s)
-    return energy_of_turns(rods.body, rods, work, None)
+    return energy_of_turns(rods, work, None)
 
 
 @kernel
@@ -228,15 +210,9 @@ def assemble_clamps(rods, work, stage, convex):
     Returns E [J], with that of damping.
     """
     energy = add_clamps(rods, work, work.hub_direction, splat(1.0), convex, ELASTIC)
-    return add_clamp_damping(rods.damping, rods, work, stage, convex, energy)
-
-
-@kernel
-def add_clamp_damping(relaxation_time, rods, work, stage, convex, energy):
-    """Add what damps the clamps, in scenes with damping, to their energy [J] and their slopes."""
-    if relaxation_time is None:
+    if rods.damping is None:
         return energy
-    ratio = load(relaxation_time, 0) * stage.inverse_gamma
+    ratio = load(rods.damping, 0) * stage.inverse_gamma
     return energy + add_clamps(rods, work, work.hub_hat, ratio, convex, VISCOUS)
 
 
@@ -254,33 +230,20 @@ def add_clamps(rods, work, directions, ratio, convex, column):
         S_x, S_y = add_product(S_x, K, c), add_product(S_y, K, s)
         store(work.hub_turn, 2 * limb, c)
         store(work.hub_turn, 2 * limb + 1, s)
-    p_x, p_y = assembled_orientation(rods.body, work, S_x, S_y)
+    if rods.body is None:
+        p_x, p_y = orientation(S_x, S_y)
+    else:
+        p_x, p_y = load(work.body.turn, 0), load(work.body.turn, 1)
     energy = splat(0.0)
     for limb in range(rods.n_limbs):
         K = ratio * clamp_stiffness(rods, work, limb)
         c, s = load(work.hub_turn, 2 * limb), load(work.hub_turn, 2 * limb + 1)
         energy += turned_energy(K, c, s, p_x, p_y)
-        C = K * add_product(c * p_x, s, p_y)
-        C = select(convex, select(C > 0.0, C, 0.0), C)
+        C = convex_part(convex, K * add_product(c * p_x, s, p_y))
         moment = K * subtract_product(s * p_x, c, p_y)
         store(work.hub_moment, limb, load(work.hub_moment, limb) + moment)
         store(work.hub_stiffness, limb, load(work.hub_stiffness, limb) + C)
         store(work.hub_coupling, CLAMP_ROWS * limb + column, C)
-        push_body(rods.body, work, moment)
+        if rods.body is not None:  # without one, moments cancel
+            add_to_system(work, splat(0.0), splat(0.0), splat(0.0), -moment)
     return energy
-
-
-@kernel
-def assembled_orientation(body, work, S_x, S_y):
-    """hub_orientation by the iterate."""
-    if body is None:
-        return orientation(S_x, S_y)
-    return load(work.body.turn, 0), load(work.body.turn, 1)
-
-
-@kernel
-def push_body(body, work, moment):
-    """Add what a root edge's moment leaves of a body's residual [N m]; nothing without a body, where they cancel."""
-    if body is None:
-        return
-    add_to_system(work, splat(0.0), splat(0.0), splat(0.0), -moment)

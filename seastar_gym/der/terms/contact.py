@@ -34,9 +34,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seastar_gym.der.geometry import edge_vector
+from seastar_gym.der.geometry import edge_vector, positive_part
 from seastar_gym.der.mesh import Mesh
-from seastar_gym.der.star import corner_place, n_nodes, n_points, tail_node
+from seastar_gym.der.star import corner_place, tail_node
 from seastar_gym.der.terms.body import push_body_at_roots
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import N_LANES, add_product, load, load_number, select, splat, store, subtract_product
@@ -150,11 +150,10 @@ def coefficients(
     )
 
 
-def memory(contact: Contact | None, n_limbs: int, nodes_per_limb: int, n_points: int) -> ContactWork | None:
+def memory(contact: Contact | None, n_limbs: int, edges: int, n_points: int) -> ContactWork | None:
     """Zeroed memory for the contact of one lane group, where robots list the pairs they have in common once."""
     if contact is None:
         return None
-    edges = nodes_per_limb - 1
     short = edges <= SHORT_CHAIN
     near_edges = edges if short else MOST_NEAR_EDGES
     share = 2 * contact.n_pairs * edges * near_edges
@@ -206,34 +205,31 @@ def looked_at(work, stage, row):
 def members(rods, work, slot):
     """(i, j, k) of a listed pair: its node, and the ends of its edge."""
     i, e = int(load_number(work.contact.listed, 2 * slot + 1)), int(load_number(work.contact.listed, 2 * slot + 2))
-    j, k = edge_ends(rods.body, rods, e)
+    j, k = edge_ends(rods, e)
     return i, j, k
 
 
 @kernel
-def edge_ends(body, rods, e):
+def edge_ends(rods, e):
     """The places where an edge starts and ends, or a side of a body, which has the number of its corner behind those.
 
     The one corner of a disc is both ends of its side.
     """
-    if body is None:
+    if rods.body is None or e < rods.n_edges:
         return tail_node(rods, e), e + 1
-    corner = e - (n_nodes(rods) - 1)
-    if corner < 0:
-        return tail_node(rods, e), e + 1
-    return corner_place(rods, corner), corner_place(rods, (corner + 1) % (body.n_arms - rods.n_limbs))
+    corner = e - rods.n_edges
+    return corner_place(rods, corner), corner_place(rods, corner + 1)
 
 
 @kernel
-def stiffness_at(body, contact, rods, i, k):
+def stiffness_at(rods, i, k):
     """Stiffness of a pair of node i and an edge that ends at k [N/m], in the robots' rows."""
-    if body is None:
-        return load(contact.stiffness, i)
-    if i >= n_nodes(rods):
-        return load(contact.stiffness, k)
-    if k >= n_nodes(rods):
-        return 2.0 * load(contact.stiffness, i)
-    return load(contact.stiffness, i)
+    if rods.body is not None:
+        if i >= rods.n_nodes:
+            return load(rods.contact.stiffness, k)
+        if k >= rods.n_nodes:
+            return 2.0 * load(rods.contact.stiffness, i)
+    return load(rods.contact.stiffness, i)
 
 
 @kernel
@@ -276,59 +272,57 @@ def add_gap_gradient(rods, work, slot, amount, rows):
 
 
 @kernel
-def add_contact(contact, rods, work, stage, convex, energy):
+def add_contact(rods, work, stage, convex, energy):
     """Add contact to the energy of a stage's Phi [J], and leave its forces in work.contact.force [N].
 
     What pushes a body is in the forces on the hub, and in the angle's part of the system.
     """
-    if contact is None:
-        return energy
-    if n_listed(work) == 0:
+    if rods.contact is None or n_listed(work) == 0:
         return energy
     lead = lead_of(stage)
-    for row in range(2 * n_points(rods)):
+    for row in range(2 * rods.n_points):
         store(work.contact.force, row, 0.0)
     touching, twice = splat(0.0), splat(0.0)
     for slot in range(n_listed(work)):
         row = SLOT_ROWS * slot
         g = add_product(load(work.contact.slots, row + OFFSET), lead, gap(rods, work, slot, work.q))
         depth = load(work.contact.slots, row + THICKNESS) - g
-        depth = select(depth > 0.0, depth, 0.0)
+        depth = positive_part(depth)
         i, _, head = members(rods, work, slot)
-        k = select(depth > 0.0, stiffness_at(rods.body, contact, rods, i, head), 0.0)
+        k = select(depth > 0.0, stiffness_at(rods, i, head), 0.0)
         twice = add_product(twice, k * depth, depth)
         store(work.contact.slots, row + STIFFNESS, lead * k)
         touching = select(depth > 0.0, 1.0, touching)
         add_gap_gradient(rods, work, slot, k * depth, work.contact.force)
     store(work.contact.touching, 0, touching)
-    push_body_at_roots(rods.body, rods, work, convex, work.contact.force)
+    push_body_at_roots(rods, work, convex, work.contact.force)
     return add_product(energy, 0.5 / lead, twice)
 
 
 @kernel
-def contact_force(contact, node):
-    """Force of contact on a node [N]; zero, and gone when compiled, in scenes without contact (None)."""
-    if contact is None:
+def contact_force(work, node):
+    """Force of contact on a node [N]; zero, and gone when compiled, in scenes without contact."""
+    if work.contact is None:
         return splat(0.0), splat(0.0)
-    return load(contact.force, 2 * node), load(contact.force, 2 * node + 1)
+    return load(work.contact.force, 2 * node), load(work.contact.force, 2 * node + 1)
 
 
 @kernel
-def those_apart(contact, robots):
+def those_apart(work, robots):
     """Mask of those among `robots` that did not touch when their slopes were last computed."""
-    if contact is None:
+    if work.contact is None:
         return robots
-    return robots & ~(load(contact.touching, 0) > 0.0)
+    return robots & ~(load(work.contact.touching, 0) > 0.0)
 
 
 @kernel
-def add_contact_energy(contact, rods, work, q, energy):
+def add_contact_energy(rods, work, q, energy):
     """Add that of the pairs that were listed last, at positions q [J]."""
-    if contact is None:
+    if rods.contact is None:
         return energy
     for slot in range(n_listed(work)):
         i, _, head = members(rods, work, slot)
         depth = load(work.contact.slots, SLOT_ROWS * slot + THICKNESS) - gap(rods, work, slot, q)
-        depth = select(depth > 0.0, depth, 0.0)
-        energy = add_product(energy, 0.5 * stiffness_at(rods.body, contact, rods, i, head) * depth, depth)
+        depth = positive_part(depth)
+        energy = add_product(energy, 0.5 * stiffness_at(rods, i, head) * depth, depth)
     return energy

@@ -3,7 +3,7 @@
 import numpy as np
 
 from seastar_gym.der.geometry import edge_vector
-from seastar_gym.der.star import corner_place, n_nodes, n_points, tail_node
+from seastar_gym.der.star import corner_place, tail_node
 from seastar_gym.der.terms.contact import edge_ends
 from seastar_gym.der.terms.near_pairs import across_gap, height_over_body
 from seastar_gym.simd.compilation import kernel
@@ -11,22 +11,22 @@ from seastar_gym.simd.lanes import add_product, any_lane, load, load_number, sel
 
 
 @kernel
-def those_uncrossed(contact, rods, work, stage, q_0, robots):
+def those_uncrossed(rods, work, stage, q_0, robots):
     """Mask of those among `robots` without edges that cross now, or enter a body, and did not when the step began.
 
     Robots whose near pairs did not all fit into the list, or whose Newton step was not found, are left out.
     """
-    if contact is None:
+    if rods.contact is None:
         return robots
     robots = robots & ~(load(work.contact.missed, 0) > 0.0)
     store_step_end(rods, work, stage)
-    for pair in range(contact.n_pairs):
-        right = int(load_number(contact.pairs, 2 * pair))
-        left = int(load_number(contact.pairs, 2 * pair + 1))
+    for pair in range(rods.contact.n_pairs):
+        right = int(load_number(rods.contact.pairs, 2 * pair))
+        left = int(load_number(rods.contact.pairs, 2 * pair + 1))
         doubtful = robots & ~on_their_sides(rods, work.contact.ends, q_0, right, left)
         if any_lane(doubtful):
             robots = robots & ~(doubtful & come_to_cross(rods, work.contact.ends, q_0, right, left))
-    return those_outside(rods.body, contact, rods, work.contact.ends, q_0, robots)
+    return those_outside(rods, work.contact.ends, q_0, robots)
 
 
 @kernel
@@ -35,42 +35,33 @@ def on_their_sides(rods, q_1, q_0, right, left):
 
     The line goes through the hub; with a body, anywhere between the limbs and their roots.
     """
-    edges = rods.nodes_per_limb - 1
+    edges = rods.edges_per_limb
     wx, wy = across_gap(rods, q_0, right, left)
-    high, low = beginnings(rods.body, rods, q_1, right, left, wx, wy)
+    high, low = splat(-np.inf), splat(np.inf)
+    if rods.body is not None:
+        high = place_along(q_1, tail_node(rods, right * edges), wx, wy)
+        low = place_along(q_1, tail_node(rods, left * edges), wx, wy)
     for i in range(1, edges + 1):
-        dx, dy = edge_vector(q_1, 0, right * edges + i)
-        x = add_product(dx * wx, dy, wy)
-        dx, dy = edge_vector(q_1, 0, left * edges + i)
-        y = add_product(dx * wx, dy, wy)
+        x = place_along(q_1, right * edges + i, wx, wy)
+        y = place_along(q_1, left * edges + i, wx, wy)
         high = select(high > x, high, x)
         low = select(low < y, low, y)
-    return apart(rods.body, high, low)
+    if rods.body is not None:
+        return high < low
+    return (high < 0.0) & (low > 0.0)
 
 
 @kernel
-def beginnings(body, rods, q_1, right, left, wx, wy):
-    """Places of two limbs' roots on a body from the hub, along w [m]; without a body nothing to look at."""
-    if body is None:
-        return splat(-np.inf), splat(np.inf)
-    edges = rods.nodes_per_limb - 1
-    dx, dy = edge_vector(q_1, 0, tail_node(rods, right * edges))
-    hx, hy = edge_vector(q_1, 0, tail_node(rods, left * edges))
-    return add_product(dx * wx, dy, wy), add_product(hx * wx, hy, wy)
-
-
-@kernel
-def apart(body, high, low):
-    """Mask of the robots whose limbs end before the hub and begin behind it; with a body, before each other."""
-    if body is None:
-        return (high < 0.0) & (low > 0.0)
-    return high < low
+def place_along(q, node, wx, wy):
+    """Place of a node from the hub, along w [m]."""
+    dx, dy = edge_vector(q, 0, node)
+    return add_product(dx * wx, dy, wy)
 
 
 @kernel
 def store_step_end(rods, work, stage):
     """Fill work.contact.ends with the positions at the end of the step [m]."""
-    for row in range(2 * n_points(rods)):
+    for row in range(2 * rods.n_points):
         q = load(work.q, row)
         store(work.contact.ends, row, 2.0 * q - load(stage.q_hat, row) if stage.ahead else q)
 
@@ -78,7 +69,7 @@ def store_step_end(rods, work, stage):
 @kernel
 def come_to_cross(rods, q_1, q_0, right, left):
     """Mask of the robots with edges of two limbs that cross at q_1 and did not at q_0."""
-    edges = rods.nodes_per_limb - 1
+    edges = rods.edges_per_limb
     crossed = splat(1.0) < 0.0
     for e in range(right * edges, right * edges + edges):
         for f in range(left * edges, left * edges + edges):
@@ -91,8 +82,8 @@ def come_to_cross(rods, q_1, q_0, right, left):
 @kernel
 def edges_cross(rods, q, e, f):
     """Mask of the robots whose edges e and f cross: each at a share of itself between 0 and 1, without divisions."""
-    i, head = edge_ends(rods.body, rods, e)
-    j, other_head = edge_ends(rods.body, rods, f)
+    i, head = edge_ends(rods, e)
+    j, other_head = edge_ends(rods, f)
     ex, ey = edge_vector(q, i, head)
     fx, fy = edge_vector(q, j, other_head)
     dx, dy = edge_vector(q, i, j)
@@ -104,45 +95,43 @@ def edges_cross(rods, q, e, f):
 
 
 @kernel
-def those_outside(body, contact, rods, q_1, q_0, robots):
+def those_outside(rods, q_1, q_0, robots):
     """Mask of those among `robots` without nodes in a body at q_1, nor edges through it, that were not so at q_0.
 
     Root edges are left out, which begin at the body. The robots themselves without a body.
     """
-    if body is None:
+    if rods.body is None or rods.contact.n_corners == 0:
         return robots
-    if contact.n_corners == 0:
-        return robots
-    edges, farthest = rods.nodes_per_limb - 1, load(contact.reach, 0)
-    for i in range(1, n_nodes(rods)):
+    edges, farthest = rods.edges_per_limb, load(rods.contact.reach, 0)
+    for i in range(1, rods.n_nodes):
         dx, dy = edge_vector(q_1, 0, i)
         doubtful = robots & (add_product(dx * dx, dy, dy) < farthest * farthest)
         if any_lane(doubtful):
-            entered = is_within(contact, rods, q_1, i) & ~is_within(contact, rods, q_0, i)
+            entered = is_within(rods, q_1, i) & ~is_within(rods, q_0, i)
             if i % edges != 1 and edges > 1:
-                entered = entered | come_through(contact, rods, q_1, q_0, i - 1)
+                entered = entered | come_through(rods, q_1, q_0, i - 1)
             robots = robots & ~(doubtful & entered)
     return robots
 
 
 @kernel
-def is_within(contact, rods, q, i):
+def is_within(rods, q, i):
     """Mask of the robots with a node in the body."""
-    if contact.n_corners > 1:
-        return height_over_body(contact, rods, q, i) < 0.0
+    if rods.contact.n_corners > 1:
+        return height_over_body(rods, q, i) < 0.0
     dx, dy = edge_vector(q, corner_place(rods, 0), i)
-    rim = load(contact.rim, 0)
+    rim = load(rods.contact.rim, 0)
     return add_product(dx * dx, dy, dy) < rim * rim
 
 
 @kernel
-def come_through(contact, rods, q_1, q_0, e):
+def come_through(rods, q_1, q_0, e):
     """Mask of the robots with an edge through the body at q_1 that was not so at q_0."""
-    if contact.n_corners == 1:
-        return reaches_disc(contact, rods, q_1, e) & ~reaches_disc(contact, rods, q_0, e)
+    if rods.contact.n_corners == 1:
+        return reaches_disc(rods, q_1, e) & ~reaches_disc(rods, q_0, e)
     through = splat(1.0) < 0.0
-    for side in range(contact.n_corners):
-        f = n_nodes(rods) - 1 + side
+    for side in range(rods.contact.n_corners):
+        f = rods.n_edges + side
         now = edges_cross(rods, q_1, e, f)
         if any_lane(now):
             through = through | (now & ~edges_cross(rods, q_0, e, f))
@@ -150,9 +139,9 @@ def come_through(contact, rods, q_1, q_0, e):
 
 
 @kernel
-def reaches_disc(contact, rods, q, e):
+def reaches_disc(rods, q, e):
     """Mask of the robots with an edge whose point nearest to the middle of a disc lies between its ends, and in it."""
-    i, rim = corner_place(rods, 0), load(contact.rim, 0)
+    i, rim = corner_place(rods, 0), load(rods.contact.rim, 0)
     ex, ey = edge_vector(q, e, e + 1)
     dx, dy = edge_vector(q, e, i)
     squared, along = add_product(ex * ex, ey, ey), add_product(dx * ex, dy, ey)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.der.geometry import half_angle
-from seastar_gym.der.star import edge_of, hinge_edges, is_clamped, n_nodes
+from seastar_gym.der.star import edge_of, hinge_edges, is_clamped
 from seastar_gym.der.terms.bending import moment
 from seastar_gym.der.terms.clamp import freeze_directions
 from seastar_gym.der.terms.stretching import tension
@@ -28,17 +28,17 @@ def coefficients(relaxation_time: float | None) -> NDArray[np.float64] | None:
 
 
 @kernel
-def freeze_strains(relaxation_time, rods, work, q_hat):
+def freeze_strains(rods, work, q_hat):
     """Fill work.tension with EA eps_hat [N] and work.bending with EI kappa_hat [N m], in scenes with damping.
 
     With a rigid hub, also the directions that its clamps had.
     """
-    if relaxation_time is None:
+    if rods.damping is None:
         return
-    freeze_directions(rods.clamp, rods, work, q_hat)
-    for e in range(n_nodes(rods) - 1):
+    freeze_directions(rods, work, q_hat)
+    for e in range(rods.n_edges):
         store(work.tension, e, tension(rods, e, edge_of(rods, q_hat, e).length))
-        if is_clamped(rods.clamp, rods, e):
+        if is_clamped(rods, e):
             continue
         a, b, side = hinge_edges(rods, e)
         t = half_angle(edge_of(rods, q_hat, a), edge_of(rods, q_hat, b), side)
@@ -46,26 +46,26 @@ def freeze_strains(relaxation_time, rods, work, q_hat):
 
 
 @kernel
-def damped_stress(relaxation_time, hat, row, inverse_gamma, stress, natural):
+def damped_stress(rods, hat, row, inverse_gamma, stress, natural):
     """Tension or moment with its viscous part; stress + natural is EA eps or EI kappa."""
-    if relaxation_time is None:
+    if rods.damping is None:
         return stress
-    ratio = load(relaxation_time, 0) * inverse_gamma
+    ratio = load(rods.damping, 0) * inverse_gamma
     return add_product(stress, ratio, stress + natural - load(hat, row))
 
 
 @kernel
-def damped_energy(relaxation_time, hat, row, inverse_gamma, stress, natural, compliance, energy):
+def damped_energy(rods, hat, row, inverse_gamma, stress, natural, compliance, energy):
     """Energy with gamma R; compliance: l/EA or dl/EI."""
-    if relaxation_time is None:
+    if rods.damping is None:
         return energy
-    ratio = load(relaxation_time, 0) * inverse_gamma
+    ratio = load(rods.damping, 0) * inverse_gamma
     change = stress + natural - load(hat, row)
     return add_product(energy, 0.5 * ratio * compliance, change * change)
 
 
 @kernel
-def damped_stiffness(relaxation_time, inverse_gamma, stiffness):
-    if relaxation_time is None:
+def damped_stiffness(rods, inverse_gamma, stiffness):
+    if rods.damping is None:
         return stiffness
-    return add_product(stiffness, load(relaxation_time, 0) * inverse_gamma, stiffness)
+    return add_product(stiffness, load(rods.damping, 0) * inverse_gamma, stiffness)

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.der.mesh import Mesh
-from seastar_gym.der.star import is_root, root_place
+from seastar_gym.der.star import root_place
 from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.lanes import absolute, add_product, load, select, splat, sqrt
+from seastar_gym.simd.lanes import absolute, add_product, load, select, sqrt
 
 Floats = NDArray[np.float64]
 
@@ -95,45 +95,39 @@ def add_half_edge(c, normals, e, wx, wy, gamma, inverse_gamma, slopes):
 
 
 @kernel
-def add_cross_flow(cross_drag, rods, normals, node, wx, wy, gamma, inverse_gamma, slopes):
-    """Add the drag of flow across a node's edges to its slopes.
-
-    Without such drag (None) the slopes are what they were, and the kernel is gone when compiled.
-    """
-    if cross_drag is None:
+def add_cross_flow(rods, normals, node, wx, wy, gamma, inverse_gamma, slopes):
+    """Add the drag of flow across a node's edges to its slopes; without such drag it is gone when compiled."""
+    if rods.cross_drag is None:
         return slopes
-    if node == 0 or is_root(rods.body, rods, node):
-        return add_hub_cross_flow(rods.body, cross_drag, rods, normals, node, wx, wy, gamma, inverse_gamma, slopes)
-    inner, outer = load(cross_drag, 2 * node), load(cross_drag, 2 * node + 1)
+    if node == 0 or (rods.body is not None and node > rods.n_nodes):
+        return add_hub_cross_flow(rods, normals, node, wx, wy, gamma, inverse_gamma, slopes)
+    inner, outer = load(rods.cross_drag, 2 * node), load(rods.cross_drag, 2 * node + 1)
     slopes = add_half_edge(inner, normals, node - 1, wx, wy, gamma, inverse_gamma, slopes)
     return add_half_edge(outer, normals, node, wx, wy, gamma, inverse_gamma, slopes)
 
 
 @kernel
-def add_hub_cross_flow(body, cross_drag, rods, normals, node, wx, wy, gamma, inverse_gamma, slopes):
+def add_hub_cross_flow(rods, normals, node, wx, wy, gamma, inverse_gamma, slopes):
     """Add the drag of flow across half of all root edges at the hub, or across half of one at its root on a body."""
-    edges = rods.nodes_per_limb - 1
-    if body is None:
-        for e in range(0, rods.n_limbs * edges, edges):
-            slopes = add_half_edge(load(cross_drag, 2 * e + 2), normals, e, wx, wy, gamma, inverse_gamma, slopes)
+    edges = rods.edges_per_limb
+    if rods.body is None:
+        for e in range(0, rods.n_edges, edges):
+            slopes = add_half_edge(load(rods.cross_drag, 2 * e + 2), normals, e, wx, wy, gamma, inverse_gamma, slopes)
         return slopes
     if node == 0:
         return slopes
     e = (node - root_place(rods, 0)) * edges
-    return add_half_edge(load(cross_drag, 2 * e + 2), normals, e, wx, wy, gamma, inverse_gamma, slopes)
+    return add_half_edge(load(rods.cross_drag, 2 * e + 2), normals, e, wx, wy, gamma, inverse_gamma, slopes)
 
 
 @kernel
-def middle_slopes(middle_drag, rods, work, stage, e, tail, head):
-    """(potential, force on either end, Hessian block) of the drag in the middle of edge e; zeros without (None).
+def middle_slopes(rods, work, stage, e, tail, head):
+    """(potential, force on either end, Hessian block) of the drag in the middle of edge e.
 
     With s = w_tail + w_head, twice the velocity of the middle, the potential is gamma c |s|^3/3, c an eighth of the
     middle's own coefficient. So s has the slopes of a node's w, each end feels the force c |s| s, and the block
     c (|s| 1 + s s^T/|s|)/gamma stands at both ends and couples them. tail, head: Motions of the ends.
     """
-    zero = splat(0.0)
-    if middle_drag is None:
-        return zero, (zero, zero), (zero, zero, zero)
     return middle_drag_slopes(
         rods, work.normals, e, tail.wx + head.wx, tail.wy + head.wy, stage.gamma, stage.inverse_gamma
     )
@@ -151,36 +145,25 @@ def middle_drag_slopes(rods, normals, e, sx, sy, gamma, inverse_gamma):
         (c_speed * sx, c_speed * sy),
         (add_product(diagonal, hx, sx), hx * sy, add_product(diagonal, hy, sy)),
     )
-    return add_middle_cross_flow(rods.middle_cross_drag, normals, e, sx, sy, gamma, inverse_gamma, slopes)
-
-
-@kernel
-def add_middle_cross_flow(middle_cross_drag, normals, e, sx, sy, gamma, inverse_gamma, slopes):
-    """Add the drag of flow across edge e in its middle; unchanged without such drag (None)."""
-    if middle_cross_drag is None:
+    if rods.middle_cross_drag is None:
         return slopes
-    return add_half_edge(load(middle_cross_drag, e), normals, e, sx, sy, gamma, inverse_gamma, slopes)
+    return add_half_edge(load(rods.middle_cross_drag, e), normals, e, sx, sy, gamma, inverse_gamma, slopes)
 
 
 @kernel
-def add_scalar(middle_drag, total, amount):
-    """total + amount, in scenes with drag in the middle of edges."""
-    if middle_drag is None:
-        return total
-    return total + amount
+def add_middle_drag(rods, work, stage, e, tail, head, energy, f, K):
+    """Add the drag in the middle of edge e to an energy [J], and to the edge's gradient f and Hessian K.
 
-
-@kernel
-def with_middle(middle_drag, K, h):
-    """(K + h, K - h): what an edge of Hessian K adds to the blocks of its ends, and takes from that between them."""
-    if middle_drag is None:
-        return K, K
-    return (K[0] + h[0], K[1] + h[1], K[2] + h[2]), (K[0] - h[0], K[1] - h[1], K[2] - h[2])
-
-
-@kernel
-def push_ends(middle_drag, f, g):
-    """(f + g, f - g): what an edge of gradient f adds to that of its head, and takes from that of its tail."""
-    if middle_drag is None:
-        return f, f
-    return (f[0] + g[0], f[1] + g[1]), (f[0] - g[0], f[1] - g[1])
+    Returns the energy, the gradients in head and, turned round, in tail, the Hessian of either end, and, turned round,
+    that between them.
+    """
+    if rods.middle_drag is None:
+        return energy, f, f, K, K
+    potential, g, h = middle_slopes(rods, work, stage, e, tail, head)
+    return (
+        energy + potential,
+        (f[0] + g[0], f[1] + g[1]),
+        (f[0] - g[0], f[1] - g[1]),
+        (K[0] + h[0], K[1] + h[1], K[2] + h[2]),
+        (K[0] - h[0], K[1] - h[1], K[2] - h[2]),
+    )

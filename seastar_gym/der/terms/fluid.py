@@ -6,7 +6,7 @@ the potential stays one that is minimised, with an exact Hessian.
 
 from seastar_gym.der.geometry import edge_vector
 from seastar_gym.der.motion import relative
-from seastar_gym.der.star import is_angle, n_nodes, n_places, tail_node
+from seastar_gym.der.star import tail_node
 from seastar_gym.der.terms.added_mass import freeze_added_mass
 from seastar_gym.der.terms.body_forces import add_power_on_strips, freeze_turning_mass
 from seastar_gym.der.terms.current import current_velocity
@@ -18,75 +18,75 @@ from seastar_gym.simd.lanes import add_product, load, splat, sqrt, store, subtra
 @kernel
 def freeze_fluid(rods, work):
     """Fill work.normals, work.added_mass and work.current at the iterate, in scenes that have them."""
-    freeze_normals(rods, work.normals, work.q)
-    freeze_added_mass(rods.added_mass, rods, work)
-    freeze_current(rods.current, rods, work)
-    freeze_turning_mass(rods.body, rods, work)
+    freeze_normals(rods, work, work.q)
+    freeze_added_mass(rods, work)
+    freeze_current(rods, work)
+    freeze_turning_mass(rods, work)
 
 
 @kernel
-def freeze_normals(rods, normals, q):
-    """Fill `normals` with the unit normals of the edges at q, in scenes that have them."""
-    if normals is None:
+def freeze_normals(rods, work, q):
+    """Fill work.normals with the unit normals of the edges at q, in scenes that have them."""
+    if work.normals is None:
         return
-    for e in range(n_nodes(rods) - 1):
+    for e in range(rods.n_edges):
         ex, ey = edge_vector(q, tail_node(rods, e), e + 1)
         inverse = 1.0 / sqrt(add_product(ex * ex, ey, ey))
-        store(normals, 2 * e, -ey * inverse)
-        store(normals, 2 * e + 1, ex * inverse)
+        store(work.normals, 2 * e, -ey * inverse)
+        store(work.normals, 2 * e + 1, ex * inverse)
 
 
 @kernel
-def freeze_current(current, rods, work):
+def freeze_current(rods, work):
     """Fill work.current with the velocity of the fluid at the nodes [m/s], in scenes with a current."""
-    if current is None:
+    if rods.current is None:
         return
-    for node in range(n_places(rods)):
-        u_x, u_y = current_velocity(current, load(work.q, 2 * node), load(work.q, 2 * node + 1))
+    for node in range(rods.n_places):
+        u_x, u_y = current_velocity(rods.current, load(work.q, 2 * node), load(work.q, 2 * node + 1))
         store(work.current, 2 * node, u_x)
         store(work.current, 2 * node + 1, u_y)
 
 
 @kernel
-def fluid_velocity(current, x, y):
-    """(u_x, u_y) [m/s] of the fluid, in motion or at rest (None), at (x, y) [m]."""
-    if current is None:
+def fluid_velocity(rods, x, y):
+    """(u_x, u_y) [m/s] of the fluid, in motion or at rest, at (x, y) [m]."""
+    if rods.current is None:
         return splat(0.0), splat(0.0)
-    return current_velocity(current, x, y)
+    return current_velocity(rods.current, x, y)
 
 
 @kernel
-def add_work_of_current(current, rods, work, v, h, frame, energy):
+def add_work_of_current(rods, work, v, h, frame, energy):
     """Add what drag takes from the fluid's motion in a step that ends with velocities v [J].
 
     Its power, as seen from a frame that moves with the velocity c, is (drag on the robot at w = v - u) (u - c).
     """
-    if current is None:
+    if rods.current is None:
         return energy
     power, zero = splat(0.0), splat(0.0)
-    for node in range(n_places(rods)):
-        if is_angle(rods.body, rods, node):
+    for node in range(rods.n_places):
+        if rods.body is not None and node == rods.n_nodes:  # a body's angle
             continue
-        wx, wy = relative(work.current, node, load(v, 2 * node), load(v, 2 * node + 1))
+        wx, wy = relative(work, node, load(v, 2 * node), load(v, 2 * node + 1))
         _, c_speed, _ = drag_slopes(load(rods.drag, node), wx, wy)
         slopes = (zero, (c_speed * wx, c_speed * wy), (zero, zero, zero))
-        _, (fx, fy), _ = add_cross_flow(rods.cross_drag, rods, work.normals, node, wx, wy, 1.0, 1.0, slopes)
+        _, (fx, fy), _ = add_cross_flow(rods, work.normals, node, wx, wy, 1.0, 1.0, slopes)
         power = subtract_product(power, fx, load(work.current, 2 * node) - frame[0])
         power = subtract_product(power, fy, load(work.current, 2 * node + 1) - frame[1])
-    power = add_power_on_strips(rods.body, rods, work, v, frame, power)
-    power = add_power_in_middle(rods.middle_drag, rods, work, v, frame, power)
+    power = add_power_on_strips(rods, work, v, frame, power)
+    power = add_power_in_middle(rods, work, v, frame, power)
     return add_product(energy, h, power)
 
 
 @kernel
-def add_power_in_middle(middle_drag, rods, work, v, frame, power):
+def add_power_in_middle(rods, work, v, frame, power):
     """Add the power that drag in the middle of edges takes from the fluid's motion [W]."""
-    if middle_drag is None:
+    if rods.middle_drag is None:
         return power
-    for e in range(n_nodes(rods) - 1):
+    for e in range(rods.n_edges):
         a, b = tail_node(rods, e), e + 1
-        ax, ay = relative(work.current, a, load(v, 2 * a), load(v, 2 * a + 1))
-        bx, by = relative(work.current, b, load(v, 2 * b), load(v, 2 * b + 1))
+        ax, ay = relative(work, a, load(v, 2 * a), load(v, 2 * a + 1))
+        bx, by = relative(work, b, load(v, 2 * b), load(v, 2 * b + 1))
         _, (fx, fy), _ = middle_drag_slopes(rods, work.normals, e, ax + bx, ay + by, 1.0, 1.0)
         u_x = load(work.current, 2 * a) - frame[0] + (load(work.current, 2 * b) - frame[0])
         u_y = load(work.current, 2 * a + 1) - frame[1] + (load(work.current, 2 * b + 1) - frame[1])

@@ -38,23 +38,24 @@ def coefficients(angles: Sequence[float], turning: bool) -> Hub:
 @kernel
 def set_natural_hub_angles(rods, work, actuation, fraction):
     """Natural state at `fraction` (lanes) of an interval: of the hub's hinges or clamps, and of limbs bent along."""
-    set_natural_curvature(rods.along, rods, work, actuation, fraction)
-    set_natural_moments(rods.clamp, rods, work, actuation, fraction)
-    set_natural_directions(rods.clamp, rods, work, actuation, fraction)
+    if rods.along is not None:
+        set_natural_curvature(rods, work, actuation, fraction)
+    if rods.clamp is None:
+        set_natural_moments(rods, work, actuation, fraction)
+    else:
+        set_natural_directions(rods, work, actuation, fraction)
 
 
 @kernel
-def set_natural_moments(clamp, rods, work, actuation, fraction):
+def set_natural_moments(rods, work, actuation, fraction):
     """Natural moments of the hub hinges at `fraction` (lanes) of an interval, (13.13).
 
     The hinge from limb j to limb j + 1 has the natural angle hub_angle_j + delta_psi_{j+1} - delta_psi_j.
     """
-    if clamp is not None:
-        return
     for a in range(rods.n_limbs):
         b = (a + 1) % rods.n_limbs
         start = load(actuation.delta_psi_start, b) - load(actuation.delta_psi_start, a)
         end = load(actuation.delta_psi_end, b) - load(actuation.delta_psi_end, a)
         angle = load(rods.hub.angle, a) + add_product(start, fraction, end - start)
-        natural_moment = 2.0 * load(rods.bending.EI_over_dl, a * (rods.nodes_per_limb - 1)) * tangent(0.5 * angle)
+        natural_moment = 2.0 * load(rods.bending.EI_over_dl, a * rods.edges_per_limb) * tangent(0.5 * angle)
         store(work.hub_EI_kappa_bar, a, natural_moment)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.der.geometry import edge_vector
 from seastar_gym.der.mesh import Mesh
-from seastar_gym.der.star import n_nodes, tail_node
+from seastar_gym.der.star import tail_node
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, splat, subtract_product
 
@@ -46,12 +46,12 @@ MOST_TAKEN = 0.9
 
 
 @kernel
-def less_edge_inertia(edge_mass, stage, e, tail, head, slopes):
-    """(E, f, K) of an edge less mu |d_head - d_tail|^2/2, d = v - v_hat; unchanged for lumped masses (None)."""
-    if edge_mass is None:
+def less_edge_inertia(rods, stage, e, tail, head, slopes):
+    """(E, f, K) of an edge less mu |d_head - d_tail|^2/2, d = v - v_hat; unchanged for lumped masses."""
+    if rods.edge_mass is None:
         return slopes
     energy, (fx, fy), (xx, xy, yy) = slopes
-    mu = load(edge_mass, e)
+    mu = load(rods.edge_mass, e)
     dx, dy = head.dx - tail.dx, head.dy - tail.dy
     mu_over_gamma = mu * stage.inverse_gamma
     stiffness = mu_over_gamma * stage.inverse_gamma
@@ -66,18 +66,18 @@ def less_edge_inertia(edge_mass, stage, e, tail, head, slopes):
 def kinetic_energy(rods, v, frame):
     """Kinetic energy [J] as seen from a frame that moves with the velocity `frame` [m/s]."""
     total = splat(0.0)
-    for node in range(n_nodes(rods)):
+    for node in range(rods.n_nodes):
         vx, vy = load(v, 2 * node) - frame[0], load(v, 2 * node + 1) - frame[1]
         total = add_product(total, 0.5 * load(rods.mass, node), vx * vx + vy * vy)
-    return less_edge_energy(rods.edge_mass, rods, v, total)
+    return less_edge_energy(rods, v, total)
 
 
 @kernel
-def less_edge_energy(edge_mass, rods, v, energy):
+def less_edge_energy(rods, v, energy):
     """Kinetic energy less mu |v_head - v_tail|^2/2 of the edges [J]; unchanged for lumped masses (None)."""
-    if edge_mass is None:
+    if rods.edge_mass is None:
         return energy
-    for e in range(n_nodes(rods) - 1):
+    for e in range(rods.n_edges):
         dx, dy = edge_vector(v, tail_node(rods, e), e + 1)
-        energy = subtract_product(energy, 0.5 * load(edge_mass, e), add_product(dx * dx, dy, dy))
+        energy = subtract_product(energy, 0.5 * load(rods.edge_mass, e), add_product(dx * dx, dy, dy))
     return energy

@@ -29,16 +29,16 @@ def coefficients(mesh: Mesh, loads: Sequence[tuple[int, float, float]]) -> Float
 
 
 @kernel
-def nodal_load(loads, node):
-    """Dead load on a node [N]; zero, and gone when compiled, in scenes without loads (None)."""
-    if loads is None:
+def nodal_load(rods, node):
+    """Dead load on a node [N]; zero, and gone when compiled, in scenes without loads."""
+    if rods.load is None:
         return splat(0.0), splat(0.0)
-    return load(loads, 2 * node), load(loads, 2 * node + 1)
+    return load(rods.load, 2 * node), load(rods.load, 2 * node + 1)
 
 
 @kernel
-def load_power(loads, node, vx, vy):
+def load_power(rods, node, vx, vy):
     """Power of a node's dead load at a velocity (vx, vy) [W]."""
-    if loads is None:
+    if rods.load is None:
         return splat(0.0)
-    return add_product(load(loads, 2 * node) * vx, load(loads, 2 * node + 1), vy)
+    return add_product(load(rods.load, 2 * node) * vx, load(rods.load, 2 * node + 1), vy)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from seastar_gym.der.geometry import edge_vector
-from seastar_gym.der.star import corner_place, n_nodes, n_points, root_place, tail_node
+from seastar_gym.der.star import corner_place, root_direction, root_place, tail_node
 from seastar_gym.der.terms.contact import (
     N_X,
     N_Y,
@@ -37,13 +37,13 @@ OUT_OF_TOUCH = 1e300  # [m]
 
 
 @kernel
-def freeze_contact(contact, rods, work, stage, q_0):
+def freeze_contact(rods, work, stage, q_0):
     """List who may touch whom in this stage, in scenes with contact; q_0: positions where the step began."""
-    if contact is None:
+    if rods.contact is None:
         return
     moved = splat(0.0)
     carried_x, carried_y = moved, moved  # with the hub
-    for node in range(n_nodes(rods)):
+    for node in range(rods.n_nodes):
         x, y = looked_at(work, stage, 2 * node), looked_at(work, stage, 2 * node + 1)
         store(work.contact.ends, 2 * node, x)
         store(work.contact.ends, 2 * node + 1, y)
@@ -53,35 +53,35 @@ def freeze_contact(contact, rods, work, stage, q_0):
         dx, dy = dx - carried_x, dy - carried_y
         squared = add_product(dx * dx, dy, dy)
         moved = select(squared > moved, squared, moved)
-    moved = view_roots(rods.body, rods, work, stage, q_0, carried_x, carried_y, moved)
+    moved = view_roots(rods, work, stage, q_0, carried_x, carried_y, moved)
     # Whoever is farther apart than that could not have come near on the way.
-    reach = add_product(MARGIN * load(contact.widest, 0), 2.0, sqrt(moved))
+    reach = add_product(MARGIN * load(rods.contact.widest, 0), 2.0, sqrt(moved))
     store_number(work.contact.listed, 0, 0.0)
     store(work.contact.missed, 0, 0.0)
     store(work.contact.own, 0, 0.0)
-    for pair in range(contact.n_pairs):
-        right = int(load_number(contact.pairs, 2 * pair))
-        left = int(load_number(contact.pairs, 2 * pair + 1))
+    for pair in range(rods.contact.n_pairs):
+        right = int(load_number(rods.contact.pairs, 2 * pair))
+        left = int(load_number(rods.contact.pairs, 2 * pair + 1))
         view_limbs(rods, work, q_0, right, left)
         near, end = may_touch(rods, work, reach, right, left, -1.0)
         if any_lane(near):
-            list_pairs(contact, rods, work, stage, q_0, reach, right, left, -1.0, end, near)
+            list_pairs(rods, work, stage, q_0, reach, right, left, -1.0, end, near)
         near, end = may_touch(rods, work, reach, left, right, 1.0)
         if any_lane(near):
-            list_pairs(contact, rods, work, stage, q_0, reach, left, right, 1.0, end, near)
-    list_at_body(rods.body, contact, rods, work, stage, q_0, reach)
+            list_pairs(rods, work, stage, q_0, reach, left, right, 1.0, end, near)
+    list_at_body(rods, work, stage, q_0, reach)
     if n_listed(work) == 0:
         store(work.contact.touching, 0, 0.0)
-        for row in range(2 * n_points(rods)):
+        for row in range(2 * rods.n_points):
             store(work.contact.force, row, 0.0)
 
 
 @kernel
-def view_roots(body, rods, work, stage, q_0, carried_x, carried_y, moved):
+def view_roots(rods, work, stage, q_0, carried_x, carried_y, moved):
     """Look at roots and corners of a body, as freeze_contact does at nodes; returns the largest move squared [m^2]."""
-    if body is None:
+    if rods.body is None:
         return moved
-    for k in range(body.n_arms):
+    for k in range(rods.body.n_arms):
         place = root_place(rods, 0) + k
         x, y = looked_at(work, stage, 2 * place), looked_at(work, stage, 2 * place + 1)
         store(work.contact.ends, 2 * place, x)
@@ -95,7 +95,7 @@ def view_roots(body, rods, work, stage, q_0, carried_x, carried_y, moved):
 @kernel
 def view_limbs(rods, work, q_0, right, left):
     """Look at two limbs and their roots along the gap between them, and across it; keep it in work.contact.seen."""
-    edges = rods.nodes_per_limb - 1
+    edges = rods.edges_per_limb
     wx, wy = across_gap(rods, q_0, right, left)
     for limb in (right, left):
         view_node(work, tail_node(rods, limb * edges), wx, wy)
@@ -105,26 +105,17 @@ def view_limbs(rods, work, q_0, right, left):
 
 @kernel
 def across_gap(rods, q, right, left):
-    """Unit vector from one limb to another."""
-    return direction_across(rods.body, rods, q, right, left)
-
-
-@kernel
-def direction_across(body, rods, q, right, left):
-    """From the right limb to the left: along the difference of their directions and across their sum.
+    """Unit vector from the right limb to the left: along the difference of their directions and across their sum.
 
     On a body, where there is no right and no left, from the middle of one limb to that of the other.
     """
-    edges = rods.nodes_per_limb - 1
-    if body is None:
-        ax, ay = edge_vector(q, tail_node(rods, right * edges), right * edges + 1)
-        bx, by = edge_vector(q, tail_node(rods, left * edges), left * edges + 1)
-        a, b = 1.0 / sqrt(add_product(ax * ax, ay, ay)), 1.0 / sqrt(add_product(bx * bx, by, by))
-        ax, ay, bx, by = a * ax, a * ay, b * bx, b * by
+    if rods.body is None:
+        ax, ay = root_direction(rods, q, right)
+        bx, by = root_direction(rods, q, left)
         wx, wy = bx - ax - (ay + by), by - ay + (ax + bx)
         scale = 1.0 / sqrt(add_product(wx * wx, wy, wy))
         return scale * wx, scale * wy
-    wx, wy = splat(0.0), splat(0.0)
+    edges, wx, wy = rods.edges_per_limb, splat(0.0), splat(0.0)
     for i in range(1, edges + 1):
         x, y = edge_vector(q, right * edges + i, left * edges + i)
         wx, wy = wx + x, wy + y
@@ -138,7 +129,7 @@ def may_touch(rods, work, reach, limb, other, side):
     """(near, end): the mask of the robots with no strip of width `reach` between the nodes of a limb and the edges of
     another, which begin at the hub or a body, and how far the limb comes towards the other.
     """
-    edges = rods.nodes_per_limb - 1
+    edges = rods.edges_per_limb
     end, begin = splat(-np.inf), -side * load(work.contact.seen, 2 * tail_node(rods, other * edges))
     for i in range(1, edges + 1):
         own = -side * load(work.contact.seen, 2 * (limb * edges + i))
@@ -157,12 +148,12 @@ def view_node(work, node, wx, wy):
 
 
 @kernel
-def list_pairs(contact, rods, work, stage, q_0, reach, limb, other, side, end, robots):
+def list_pairs(rods, work, stage, q_0, reach, limb, other, side, end, robots):
     """List the nodes of a limb that are near edges of another, which has it on its left (side 1) or right (-1).
 
     end, robots: How far the limb comes towards the other, and in whom it may touch it, as may_touch saw it.
     """
-    edges = rods.nodes_per_limb - 1
+    edges = rods.edges_per_limb
     ends, seen = work.contact.ends, work.contact.seen
     for e in range(other * edges, other * edges + edges):
         j, k = tail_node(rods, e), e + 1
@@ -184,34 +175,24 @@ def list_pairs(contact, rods, work, stage, q_0, reach, limb, other, side, end, r
                 dx, dy = edge_vector(ends, j, i)
                 s = add_product(dx * ex, dy, ey) * inverse
                 g = add_product(dx * nx, dy, ny)
-                facing = facing & (s > -OVERHANG) & (s < last_share(rods.body, edges, e))
+                facing = facing & (s > -OVERHANG) & (s < last_share(rods, e))
                 if any_lane(facing):
-                    list_pair_on(rods.body, contact, rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing)
+                    # Limbs that begin at one point have sides that they keep; those on a body may go round tips.
+                    if rods.body is None:
+                        list_pair(rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing)
+                    else:
+                        list_pair_on_its_side(rods, work, stage, q_0, i, e, s, facing)
 
 
 @kernel
-def last_share(body, edges, e):
+def last_share(rods, e):
     """Share of an edge up to which it meets nodes; on a body tips are round, and meet those in front of them, too."""
-    if body is None:
-        return splat(1.0 + OVERHANG)
-    return splat(np.inf if e % edges == edges - 1 else 1.0 + OVERHANG)
+    edges = rods.edges_per_limb
+    return splat(np.inf if rods.body is not None and e % edges == edges - 1 else 1.0 + OVERHANG)
 
 
 @kernel
-def list_pair_on(body, contact, rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing):
-    """List node i and edge e if they are near each other in any of the robots in the mask `facing`.
-
-    Limbs that begin at one point have sides that they keep. Those on a body may go round each other's tips: there a
-    node belongs to the side of an edge on which it was when the step began, if it was beside it.
-    """
-    if body is None:
-        list_pair(contact, rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing)
-    else:
-        list_pair_on_its_side(contact, rods, work, stage, q_0, i, e, s, facing)
-
-
-@kernel
-def list_pair_on_its_side(contact, rods, work, stage, q_0, i, e, s, facing):
+def list_pair_on_its_side(rods, work, stage, q_0, i, e, s, facing):
     """List node i and edge e on a body, where the node is beside the edge or, at a tip, in front of it.
 
     The side is that of the step's beginning, if the node was beside the edge then, or at most the edge's length behind.
@@ -237,30 +218,30 @@ def list_pair_on_its_side(contact, rods, work, stage, q_0, i, e, s, facing):
     ux, uy = edge_vector(q_0, k, i)
     g_0 = select(in_front, sqrt(add_product(ux * ux, uy, uy)), absolute(g_0))
     s = select(s > 0.0, select(s < 1.0, s, 1.0), 0.0)
-    tail = load(contact.thickness, j)
-    d = load(contact.thickness, i) + add_product(tail, s, load(contact.thickness, k) - tail)
+    tail = load(rods.contact.thickness, j)
+    d = load(rods.contact.thickness, i) + add_product(tail, s, load(rods.contact.thickness, k) - tail)
     near = facing & (g < MARGIN * d + absolute(g - g_0))
     if any_lane(near):
-        put_on_list(contact, rods, work, stage, i, e, nx, ny, s, d, near)
+        put_on_list(rods, work, stage, i, e, nx, ny, s, d, near)
 
 
 @kernel
-def list_pair(contact, rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing):
+def list_pair(rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing):
     """List node i and edge e if they are near each other in any of the robots in the mask `facing`."""
     j, k = tail_node(rods, e), e + 1
     ex, ey = edge_vector(q_0, j, k)
     dx, dy = edge_vector(q_0, j, i)
     g_0 = side * subtract_product(ex * dy, ey, dx) / sqrt(add_product(ex * ex, ey, ey))
     s = select(s > 0.0, select(s < 1.0, s, 1.0), 0.0)
-    tail = load(contact.thickness, j)
-    d = load(contact.thickness, i) + add_product(tail, s, load(contact.thickness, k) - tail)
+    tail = load(rods.contact.thickness, j)
+    d = load(rods.contact.thickness, i) + add_product(tail, s, load(rods.contact.thickness, k) - tail)
     near = facing & (g_0 > -d) & (g < MARGIN * d + absolute(g - g_0))
     if any_lane(near):
-        put_on_list(contact, rods, work, stage, i, e, nx, ny, s, d, near)
+        put_on_list(rods, work, stage, i, e, nx, ny, s, d, near)
 
 
 @kernel
-def put_on_list(contact, rods, work, stage, i, e, nx, ny, s, d, near):
+def put_on_list(rods, work, stage, i, e, nx, ny, s, d, near):
     """List node i and edge e for the robots in the mask: normal (nx, ny), share s of the edge, thickness d [m]."""
     # Every robot has a share of the list of its own, so that nobody takes another's place.
     own = load(work.contact.own, 0)
@@ -285,34 +266,32 @@ def put_on_list(contact, rods, work, stage, i, e, nx, ny, s, d, near):
 
 
 @kernel
-def list_at_body(body, contact, rods, work, stage, q_0, reach):
+def list_at_body(rods, work, stage, q_0, reach):
     """List the nodes of limbs that are near a body, and the edges that are near its corners, in scenes with a body.
 
     Root edges are left out, which begin at the body.
     """
-    if body is None:
+    if rods.body is None or rods.contact.n_corners == 0:
         return
-    if contact.n_corners == 0:
-        return
-    ends, edges = work.contact.ends, rods.nodes_per_limb - 1
-    farthest = load(contact.reach, 0) + reach
-    for i in range(1, n_nodes(rods)):
+    ends, edges = work.contact.ends, rods.edges_per_limb
+    farthest = load(rods.contact.reach, 0) + reach
+    for i in range(1, rods.n_nodes):
         dx, dy = edge_vector(ends, 0, i)
         robots = add_product(dx * dx, dy, dy) < farthest * farthest
         if any_lane(robots):
-            if contact.n_corners == 1:
-                list_node_at_disc(contact, rods, work, stage, q_0, i, robots)
+            if rods.contact.n_corners == 1:
+                list_node_at_disc(rods, work, stage, q_0, i, robots)
             else:
-                list_node_at_sides(contact, rods, work, stage, q_0, i, robots)
+                list_node_at_sides(rods, work, stage, q_0, i, robots)
             if i % edges != 1 and edges > 1:
-                for corner in range(contact.n_corners):
-                    list_corner(contact, rods, work, stage, q_0, corner, i - 1, robots)
+                for corner in range(rods.contact.n_corners):
+                    list_corner(rods, work, stage, q_0, corner, i - 1, robots)
 
 
 @kernel
-def list_node_at_disc(contact, rods, work, stage, q_0, i, robots):
+def list_node_at_disc(rods, work, stage, q_0, i, robots):
     """List a node at the rim of a disc, in the direction in which it stands from the middle."""
-    j, rim, d = corner_place(rods, 0), load(contact.rim, 0), load(contact.thickness, i)
+    j, rim, d = corner_place(rods, 0), load(rods.contact.rim, 0), load(rods.contact.thickness, i)
     dx, dy = edge_vector(work.contact.ends, j, i)
     size = sqrt(add_product(dx * dx, dy, dy))
     nx, ny = dx / size, dy / size
@@ -320,44 +299,44 @@ def list_node_at_disc(contact, rods, work, stage, q_0, i, robots):
     g, g_0 = size - rim, sqrt(add_product(dx * dx, dy, dy)) - rim
     near = robots & (size > 0.0) & (g_0 > -d) & (g < MARGIN * d + absolute(g - g_0))
     if any_lane(near):
-        put_on_list(contact, rods, work, stage, i, n_nodes(rods) - 1, nx, ny, splat(0.0), d + rim, near)
+        put_on_list(rods, work, stage, i, rods.n_edges, nx, ny, splat(0.0), d + rim, near)
 
 
 @kernel
-def height_over_side(contact, rods, q, i, side):
+def height_over_side(rods, q, i, side):
     """Distance of a node from the line through a side of a polygon [m], positive outside."""
     j = corner_place(rods, side)
-    ex, ey = edge_vector(q, j, corner_place(rods, (side + 1) % contact.n_corners))
+    ex, ey = edge_vector(q, j, corner_place(rods, side + 1))
     dx, dy = edge_vector(q, j, i)
     return subtract_product(ey * dx, ex, dy) / sqrt(add_product(ex * ex, ey, ey))
 
 
 @kernel
-def height_over_body(contact, rods, q, i):
+def height_over_body(rods, q, i):
     """Largest of the heights of a node over the sides of a polygon [m]: negative inside."""
     height = splat(-np.inf)
-    for side in range(contact.n_corners):
-        here = height_over_side(contact, rods, q, i, side)
+    for side in range(rods.contact.n_corners):
+        here = height_over_side(rods, q, i, side)
         height = select(here > height, here, height)
     return height
 
 
 @kernel
-def list_node_at_sides(contact, rods, work, stage, q_0, i, robots):
+def list_node_at_sides(rods, work, stage, q_0, i, robots):
     """List a node at the side of a polygon beside which it stands, or at the corner at the side's end.
 
     Inside, it belongs to the sides outside of which it was when the step began, or to the one that it was nearest to.
     """
-    ends, d = work.contact.ends, load(contact.thickness, i)
-    height = height_over_body(contact, rods, q_0, i)
-    for side in range(contact.n_corners):
-        j, k = corner_place(rods, side), corner_place(rods, (side + 1) % contact.n_corners)
+    ends, d = work.contact.ends, load(rods.contact.thickness, i)
+    height = height_over_body(rods, q_0, i)
+    for side in range(rods.contact.n_corners):
+        j, k = corner_place(rods, side), corner_place(rods, side + 1)
         ex, ey = edge_vector(ends, j, k)
         dx, dy = edge_vector(ends, j, i)
         inverse = 1.0 / add_product(ex * ex, ey, ey)
         s = add_product(dx * ex, dy, ey) * inverse
         # The next side begins at the corner k; who is before it and beyond this one stands at the corner.
-        fx, fy = edge_vector(ends, k, corner_place(rods, (side + 2) % contact.n_corners))
+        fx, fy = edge_vector(ends, k, corner_place(rods, side + 2))
         hx, hy = edge_vector(ends, k, i)
         beyond = (s > 1.0) & (add_product(hx * fx, hy, fy) < 0.0)
         beside = robots & (beyond | ((s >= 0.0) & (s <= 1.0))) & (height > -d)
@@ -366,16 +345,16 @@ def list_node_at_sides(contact, rods, work, stage, q_0, i, robots):
             nx, ny = select(beyond, hx / size, ey * scale), select(beyond, hy / size, -ex * scale)
             # A corner's distance is the same from either side, so that a mirrored robot lists the same pairs.
             kx, ky = edge_vector(q_0, k, i)
-            g, over = add_product(hx * nx, hy, ny), height_over_side(contact, rods, q_0, i, side)
+            g, over = add_product(hx * nx, hy, ny), height_over_side(rods, q_0, i, side)
             g_0 = select(beyond, sqrt(add_product(kx * kx, ky, ky)), over)
             near = beside & (beyond | (over > 0.0) | (over >= height)) & (g < MARGIN * d + absolute(g - g_0))
             if any_lane(near):
                 s = select(s < 1.0, s, 1.0)
-                put_on_list(contact, rods, work, stage, i, n_nodes(rods) - 1 + side, nx, ny, s, d, near)
+                put_on_list(rods, work, stage, i, rods.n_edges + side, nx, ny, s, d, near)
 
 
 @kernel
-def list_corner(contact, rods, work, stage, q_0, corner, e, robots):
+def list_corner(rods, work, stage, q_0, corner, e, robots):
     """List a corner of a body at an edge of a limb beside which it stands, on the side on which the step began."""
     i, j, k = corner_place(rods, corner), e, e + 1
     ex, ey = edge_vector(work.contact.ends, j, k)
@@ -392,9 +371,9 @@ def list_corner(contact, rods, work, stage, q_0, corner, e, robots):
     g_0 = subtract_product(fx * hy, fy, hx) / sqrt(add_product(fx * fx, fy, fy))
     side = select(g_0 > 0.0, scale, -scale)
     nx, ny = -ey * side, ex * side
-    g, rim = add_product(dx * nx, dy, ny), load(contact.rim, 0)
-    tail = load(contact.thickness, j)
-    d = add_product(tail, s, load(contact.thickness, k) - tail)
+    g, rim = add_product(dx * nx, dy, ny), load(rods.contact.rim, 0)
+    tail = load(rods.contact.thickness, j)
+    d = add_product(tail, s, load(rods.contact.thickness, k) - tail)
     near = facing & (g - rim < MARGIN * d + absolute(g - absolute(g_0)))
     if any_lane(near):
-        put_on_list(contact, rods, work, stage, i, e, nx, ny, s, d + rim, near)
+        put_on_list(rods, work, stage, i, e, nx, ny, s, d + rim, near)
