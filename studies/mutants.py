@@ -59,6 +59,18 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ("seastar_gym/identify/covariance.py", "remembered = REMEMBERED * (times[-1] - times[1])"):
         "Every time is there for x and for y.",
     ("seastar_gym/envs/tasks/obst_trap.py", "touches = self.clearance(hub) <= 0.0"): EXACTLY,
+    ("seastar_gym/envs/waypoint_labels.py", "same_place = 2e-09 + 1e-6 * float(np.ptp(path, axis=0).max())"): EXACTLY,
+    ("seastar_gym/envs/swimming.py",
+     'if scene.robot.hub_hinge == "turning" and 2 * peak >= scene.robot.opening_angle * (1 - 2e-09):'): EXACTLY,
+    ("seastar_gym/envs/commands.py", "return seconds > actuator.period * (1.0 - JUMP)"): EXACTLY,
+    ("seastar_gym/envs/tasks/rounds.py", "among = np.flatnonzero(brought > most - 1e-9)"): EXACTLY,
+    ("seastar_gym/envs/tasks/miswired.py",
+     "return np.where(self.wiring[..., None] < 1.0, of_wires[..., ::-1], of_wires)"): "Wiring is -1 or 1.",
+    ("seastar_gym/sweep/designs.py", "return np.zeros((1, 1))"): "No range reads the columns.",
+    ("seastar_gym/controllers/planner.py", "first = np.zeros((len(current), 2), np.int64)"):
+        "The first decision replaces it.",
+    ("seastar_gym/accuracy/water.py", "rows = to_rows(water.reshape(simulator.n_robots, -2))"):
+        "Any negative length is the one that numpy finds.",
 }  # fmt: skip
 """Reasons why mutants, (file, line after the change), behave as the original does."""
 PRELOADED = ("numba", "pyarrow.dataset", "scipy.optimize", "scipy.stats")

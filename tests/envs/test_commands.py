@@ -40,6 +40,11 @@ def test_pairs_table_lists_rest_and_every_plus_minus_pair_once(n_limbs):
     assert len({tuple(row) for row in table}) == len(table) == 1 + n_limbs * (n_limbs - 1)
 
 
+def test_a_table_of_too_many_commands_is_refused_before_it_is_made():
+    with pytest.raises(ValueError, match=r"3\^9 = 19,683 actions for 9 limbs"):
+        command_table("joint", 9)
+
+
 def test_tables_cannot_be_changed():
     """Every environment reads the same one."""
     table = command_table("pairs", 5)

@@ -31,6 +31,13 @@ def observations_of(simulator: Simulator, targets: np.ndarray) -> np.ndarray:
     return out.transpose(0, 2, 1).reshape(-1, out.shape[1])[: simulator.n_robots]
 
 
+def test_a_layout_knows_where_the_tips_are():
+    env = SeastarSwimEnv(random_heading=False, fidelity="fast")
+    observation, _ = env.reset(seed=0)
+    tips = env.scene.robot.nodes()[env.scene.robot.nodes_per_limb - 1 :: env.scene.robot.nodes_per_limb - 1]
+    np.testing.assert_allclose(observation[env.layout.tips].reshape(5, 2), tips / 0.1, atol=1e-6)
+
+
 def expected_observation(robot: Seastar, q: np.ndarray, v: np.ndarray, waypoint, following) -> np.ndarray:
     """The table once more, with complex numbers: x + iy turned by exp(-i angle)."""
     rest, seen_q, seen_v = (at_stations(x, robot)[1:] @ [1.0, 1j] for x in (robot.nodes(), q, v))

@@ -64,6 +64,23 @@ def test_the_legend_names_as_many_colours_as_there_is_room_for(size, most):
     assert all(named) == (size == LARGEST)
 
 
+@pytest.mark.parametrize("width", range(360, 800, 40))
+def test_the_legend_leaves_a_gap_behind_what_stands_left_of_it(width, monkeypatch):
+    renderer = renderer_of(size=(width, 360))
+    renderer.draw(frame_of())
+    strokes, write, note_ends = [], renderer._canvas.write, []
+    monkeypatch.setattr(renderer._canvas, "stroke", lambda points, colour, width: strokes.append(points[0, 0]))
+    monkeypatch.setattr(renderer._canvas, "write", lambda text, *given: _noted(note_ends, text, write(text, *given)))
+    renderer._write_footer("a note")
+    assert all(x >= note_ends[0] + renderer._text_height for x in strokes[3:])
+
+
+def _noted(ends, text, end):
+    if text == "a note":
+        ends.append(end)
+    return end
+
+
 def test_the_scale_bar_has_a_tick_at_either_end(monkeypatch):
     strokes, renderer = [], renderer_of()
     renderer.draw(frame_of())

@@ -27,6 +27,7 @@ from seastar_gym import (
 )
 from seastar_gym.accuracy import chapters_certificate
 from seastar_gym.accuracy.info import NAMES
+from seastar_gym.envs import rendering
 from seastar_gym.envs.paths import PATHS, cross_track_error, shortest_way
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -582,7 +583,9 @@ def no_display(monkeypatch):
 
 
 @pytest.mark.parametrize("render_mode", ["rgb_array", "rgb_array_list", "human"])
-def test_being_watched_changes_no_bit(render_mode, no_display):
+def test_being_watched_changes_no_bit(render_mode, no_display, monkeypatch):
+    shown, show = [], rendering.Renderer.show
+    monkeypatch.setattr(rendering.Renderer, "show", lambda *given, fps: shown.append(fps) or show(*given, fps))
     watched, alone = fast(render_mode=render_mode, frames_per_stroke=3), fast()
     pictures, actions = [], [STRAIGHT, [1, 2, 0, 1, 0]]
     for env in (watched, alone):
@@ -598,7 +601,7 @@ def test_being_watched_changes_no_bit(render_mode, no_display):
         case "rgb_array_list":
             assert [len(frames) for frames in pictures] == [4, 3]  # the first with that of the reset
         case "human":
-            assert pictures == [None]
+            assert pictures == [None] and shown
     watched.close()
     watched.close()
 

@@ -431,6 +431,15 @@ def test_a_resting_robot_is_carried_by_the_current():
     assert 0.9 < drift @ flow / (flow @ flow) < 1.0 and abs(drift[0] * flow[1] - drift[1] * flow[0]) < 1e-9
 
 
+def test_the_picture_of_a_station_has_its_current_as_the_way_of_20_seconds_from_the_lower_left():
+    env = SeastarTaskEnv(task="station", fidelity="fast")
+    _, info = env.reset(seed=1)
+    flow = np.array([info["fluid.current.u_x"], info["fluid.current.u_y"]])
+    ((start, end),) = env._task.scenery(0).arrows
+    np.testing.assert_allclose(start, info["station"] - 0.12)
+    np.testing.assert_allclose(end - start, 20.0 * flow)
+
+
 def test_a_station_is_no_waypoint():
     env = SeastarTaskEnv(task="station", fidelity="fast")
     env.reset(seed=0)

@@ -29,6 +29,7 @@ from seastar_gym import (
     Water,
 )
 from seastar_gym.identify import Measurement, get_parameter, identify, synthetic, trajectory, with_parameters
+from seastar_gym.identify import command as its_command
 from seastar_gym.identify.command import TRUTH, draw, main
 from seastar_gym.identify.fit import Residuals
 from seastar_gym.identify.trajectories import trajectories
@@ -156,6 +157,13 @@ def test_the_command_line_fits_files(measurement, tmp_path, monkeypatch, capsys)
     assert "actuator.peak_angle = " in capsys.readouterr().out
 
 
+def test_the_command_line_fits_simulated_data_with_known_parameters(monkeypatch, capsys):
+    monkeypatch.setattr(its_command, "synthetic", lambda scene, truth: synthetic(scene, truth, n_strokes=1))
+    assert main(["--synthetic", "--fit", "actuator.peak_angle", "--step", "0.02"]) == 0
+    told = capsys.readouterr().out
+    assert told.startswith("truth: ") and "actuator.peak_angle = " in told
+
+
 def test_the_command_line_fits_a_scene_of_ones_own_and_writes_it(tmp_path, monkeypatch, capsys):
     robot = Seastar(nodes_per_limb=4, n_limbs=3)
     scene = Scene(robot, numerics=Numerics("implicit-midpoint", 0.02, newton_tolerance=1e-6))
@@ -253,6 +261,17 @@ def test_a_number_that_cannot_be_fitted_as_it_is_says_what_to_do(name, words):
     scene = Scene(robot, actuator=MeasuredCurve((0.0, 0.1, 1.0), (0.0, 0.5, 0.0)))
     with assert_refused(words):
         get_parameter(scene, name)
+
+
+@pytest.mark.parametrize("name", ["fluid.nothing", "gravity"])
+def test_what_is_no_number_of_a_scene_cannot_be_set(name):
+    with assert_refused(f"'{name}' is no number of this scene"):
+        with_parameters(SCENE, [name], [1.0])
+
+
+def test_more_times_than_a_measurement_may_have_are_refused():
+    with assert_refused("1 strokes at 2e+07 Hz are more than 10,000,000 times."):
+        synthetic(SCENE, {}, n_strokes=1, rate=2e7)
 
 
 def test_a_truth_that_the_scene_has_not_is_refused():

@@ -12,7 +12,8 @@ from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.sweep.axes import Choices, Range
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.designs import Sweep
-from seastar_gym.sweep.swimming import scene_of, swim
+from seastar_gym.sweep.gait import gait_of
+from seastar_gym.sweep.swimming import scene_of, swim, ways
 
 FAST = Scene.preset("fast")
 LENGTH = Range("robot.limb_length", 0.05, 0.15)
@@ -92,6 +93,16 @@ def test_parts_fidelities_and_gaits_are_choices_of_frames():
     assert {frame.scene.robot.nodes_per_limb for frame in frames} == {7, 12}
     assert frames[-1].scene.numerics == Numerics.preset("balanced")
     assert frames[-1].gait.commands == ((0.0, 1.0, 0.0, -1.0),)
+
+
+def test_a_gait_of_signs_turns_the_limbs_that_it_names():
+    assert gait_of("1+,3-", FAST).commands == ((1.0, 0.0, -1.0, 0.0, 0.0),)
+
+
+def test_a_turn_is_the_short_way_round():
+    way, turn = np.zeros(4, complex), np.array([0.4, 3.0, 3.5, -7.0])
+    found = ways(FAST, np.ones(4), way, turn)["turn"]
+    np.testing.assert_allclose(found, [0.4, 3.0, 3.5 - 2.0 * np.pi, 2.0 * np.pi - 7.0])
 
 
 def test_a_cell_is_named_by_all_that_its_results_depend_on():
