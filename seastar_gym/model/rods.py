@@ -70,7 +70,7 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         mass, at_nodes = on_body.mass(mass), on_body.drag(mesh, at_nodes)
         loads = on_body.loads(loads)
     inertia.hold(mass, scene.held_nodes)
-    n_free = robot.n_nodes + robot.has_body
+    n_free = len(mesh.dl) + robot.has_body
     return Rods(
         n_limbs=mesh.n_limbs,
         edges_per_limb=mesh.nodes_per_limb - 1,

@@ -389,7 +389,7 @@ def in_subprocess(code: str, **environment: str) -> subprocess.CompletedProcess[
 
 @pytest.mark.parametrize("width", ["3", "eight", ""])
 def test_an_impossible_width_is_refused_with_one_sentence(width):
-    answer = in_subprocess("import seastar_gym", SEASTAR_LANES=width)
+    answer = in_subprocess("from seastar_gym import Simulator", SEASTAR_LANES=width)
     assert answer.returncode == 1
     last = answer.stderr.strip().splitlines()[-1]
     assert last == f"ValueError: SEASTAR_LANES={width!r} is not a lane width: use 2, 4, 8 or 16."
