@@ -15,16 +15,19 @@ import operator
 import pickle
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import llvmlite
 import numba
 import numpy as np
 from numba.core import ir, types
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache, UserWideCacheLocator
+from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.core.compiler_machinery import FunctionPass, register_pass
+from numba.core.compiler_machinery import FunctionPass, LoweringPass, register_pass
 from numba.core.ir_utils import get_definition, guard
 from numba.core.registry import CPUDispatcher
+from numba.core.typed_passes import NativeLowering
 from numba.core.untyped_passes import RewriteSemanticConstants
 
 from seastar_gym.simd.lanes import N_LANES
@@ -91,10 +94,57 @@ class _Compiler(CompilerBase):
         return [passes]
 
 
+class _Part(JITCodeLibrary):
+    """Code that compiled code alone calls.
+
+    What it is linked into optimises it and turns it into machine code. By itself it would be both for nothing.
+    """
+
+    def _optimize_final_module(self):
+        pass
+
+    def _finalize_final_module(self):
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    def get_pointer_to_function(self, name):
+        return 0
+
+    @property
+    def codegen(self):
+        """There is no machine code that an environment of Python's could be given to."""
+        return SimpleNamespace(set_env=lambda name, environment: None)
+
+
+@register_pass(mutates_CFG=False, analysis_only=False)
+class _AsPart(LoweringPass):
+    """Has a kernel lowered into a `_Part`."""
+
+    _name = "as_part"
+
+    def __init__(self):
+        LoweringPass.__init__(self)
+
+    def run_pass(self, state):
+        state.library = _Part(state.targetctx.codegen(), state.func_id.func_qualname)
+        return True
+
+
+class _KernelCompiler(_Compiler):
+    """The same, for kernels that only compiled code calls."""
+
+    def define_pipelines(self):
+        (passes,) = super().define_pipelines()
+        lowering = [kind for kind, _ in passes.passes].index(NativeLowering)
+        passes.add_pass_after(_AsPart, passes.passes[lowering - 1][0])
+        passes.finalize()
+        return [passes]
+
+
 # error_model="numpy": divisions follow IEEE instead of raising; failure is a status, not an exception.
 STRICT = {"error_model": "numpy", "nogil": True, "pipeline_class": _Compiler}
 # Without wrappers for Python, which would be a third of the compilation.
-BLOCK = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **STRICT}
+BLOCK = {**STRICT, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": _KernelCompiler}
 
 
 class Kernel(CPUDispatcher):
