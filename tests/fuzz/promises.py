@@ -237,11 +237,11 @@ def energy_noise(simulator: Simulator, robot: int, energy: float, h: float) -> f
     length, mass = float(rods.scales.shortest_edge[0]), float(masses[masses < 1e9 * masses.min()].sum())
     stretching, bending = rods.stretching.EA_over_l.max(), rods.bending.EI_over_dl.max()
     stiffness = (len(rods.mass) - 1) * float(stretching + 4.0 * bending / length**2)
-    move = 10.0 * EPSILON * (float(np.abs(simulator.positions[robot]).max()) + rods.nodes_per_limb * length)
+    move = 10.0 * EPSILON * (float(np.abs(simulator.positions[robot]).max()) + (rods.edges_per_limb + 1) * length)
     if simulator.scene.held_nodes:
-        move += PUT_BACK * rods.nodes_per_limb * length
+        move += PUT_BACK * (rods.edges_per_limb + 1) * length
     curvature = max(stiffness, mass / h**2)
-    left = simulator.scene.numerics.newton_tolerance * rods.nodes_per_limb * length
+    left = simulator.scene.numerics.newton_tolerance * (rods.edges_per_limb + 1) * length
     of_rounding = move * math.sqrt(2.0 * curvature) * math.sqrt(energy) + 0.5 * curvature * move**2
     return of_rounding + 0.5 * stiffness * left**2
 
