@@ -22,6 +22,26 @@ Typed as Any for the latter, so that code for the scene of one robot may read a 
 """
 
 
+class Unnamed:
+    """Mark of a value that nobody named, so that a fidelity may choose it; until then it is that of "balanced".
+
+    It compares and computes like any other, and is None in plain data.
+    """
+
+
+class UnnamedCount(Unnamed, int):
+    """Whole number that nobody named."""
+
+
+class UnnamedChoice(Unnamed, str):
+    """Choice that nobody named."""
+
+
+def is_named(value: Any) -> bool:
+    """Whether somebody named a value."""
+    return value is not None and not isinstance(value, Unnamed)
+
+
 class PerRobot(tuple[float, ...]):
     """Numbers of each robot, shape (n_robots,). Plain tuples may be something else, such as profiles along a limb."""
 

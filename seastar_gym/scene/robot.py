@@ -15,12 +15,20 @@ from seastar_gym.scene.along import AlongLimb, Stiffening
 from seastar_gym.scene.body import Body
 from seastar_gym.scene.checks import MOST_LIMBS, require_choice, require_number, shown
 from seastar_gym.scene.limb import Limb, LimbShape, as_tuple
-from seastar_gym.scene.number import Numbers, check_numbers, not_negative, positive, whole
+from seastar_gym.scene.number import (
+    Numbers,
+    UnnamedChoice,
+    UnnamedCount,
+    check_numbers,
+    is_named,
+    not_negative,
+    positive,
+    whole,
+)
 from seastar_gym.scene.per_robot import batch_size, chosen
 from seastar_gym.scene.serial import register_part
 from seastar_gym.scene.shape import limbs_that_may_touch, rest_positions, turn_per_hinge
 from seastar_gym.scene.symmetry import PointGroup, point_group
-from seastar_gym.scene.unnamed import UnnamedChoice, UnnamedCount, is_named
 
 HubHinge = Literal["opening", "turning"]
 Discretisation = Literal["chapter", "continuum"]

@@ -18,7 +18,6 @@ import numpy as np
 from seastar_gym.scene.actuators.actuator import Actuator, check_actuator, complete, is_actuator
 from seastar_gym.scene.actuators.pulse import SmaPulse
 from seastar_gym.scene.along import AlongLimb
-from seastar_gym.scene.at_rest import touching_at_rest
 from seastar_gym.scene.body import Body
 from seastar_gym.scene.checks import (
     is_finite_number,
@@ -116,6 +115,8 @@ class Scene:
         if self.robot.body is not None and self.robot.has_body:
             self._check_contact_with_body(self.robot.body, self.contact)
             return
+        from seastar_gym.scene.at_rest import touching_at_rest
+
         robot, pairs = self.robot, self.robot.limbs_that_may_touch()
         if not pairs:
             raise ValueError("Contact is modelled between limbs less than half a turn apart, and this robot has none.")
@@ -132,6 +133,8 @@ class Scene:
                 )
 
     def _check_contact_with_body(self, body: Body, contact: Contact) -> None:
+        from seastar_gym.scene.at_rest import touching_at_rest
+
         robot, pairs = self.robot, self.robot.limbs_that_may_touch()
         for index in range(batch_size(robot) or 1):
             limbs = robot.limb_shapes(index)

@@ -19,8 +19,7 @@ from typing import Any, ClassVar, TypeVar, get_origin, get_type_hints
 import numpy as np
 
 from seastar_gym.scene.checks import as_typed, shown
-from seastar_gym.scene.number import PerRobot
-from seastar_gym.scene.unnamed import Unnamed
+from seastar_gym.scene.number import PerRobot, Unnamed
 
 VERSION = 1
 """Version of the plain form."""

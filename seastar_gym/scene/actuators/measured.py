@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from seastar_gym.scene.actuators.actuator import ActuatorBase
 from seastar_gym.scene.actuators.heating import WIRE_POWER, share_of_pulse
 from seastar_gym.scene.checks import require_number, require_numbers, shown
-from seastar_gym.scene.csv_rows import read_numbers
 from seastar_gym.scene.number import Numbers, check_numbers, not_negative
 from seastar_gym.scene.serial import register_part
 
@@ -59,6 +58,8 @@ class MeasuredCurve(ActuatorBase):
         """
         if not Path(file).is_file():
             raise FileNotFoundError(f"There is no measured curve at {file}: give the path of a CSV file.")
+        from seastar_gym.scene.csv_rows import read_numbers
+
         times, angles = zip(*read_numbers(file, "a time [s] and an angle [rad]", 2), strict=True)
         try:
             return cls(times=times, angles=angles)
@@ -78,6 +79,8 @@ class MeasuredCurve(ActuatorBase):
         """
         require_number("period", period, "s")
         require_number("limb_length", limb_length, "m")
+        from seastar_gym.scene.csv_rows import read_numbers
+
         lines = read_numbers(file, "a phase [1] and a curvature [1/m]", 2)
         phases, curvatures = np.array([line for line in lines if line[0] != 1.0] or lines).T
         if phases[0] != 0.0 or phases[-1] >= 1.0 or (np.diff(phases) <= 0.0).any():
