@@ -115,7 +115,6 @@ class Scene:
         if self.robot.body is not None and self.robot.has_body:
             self._check_contact_with_body(self.robot.body, self.contact)
             return
-        from seastar_gym.scene.at_rest import touching_at_rest
 
         robot, pairs = self.robot, self.robot.limbs_that_may_touch()
         if not pairs:
