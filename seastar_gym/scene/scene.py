@@ -132,7 +132,7 @@ class Scene:
                 )
 
     def _check_contact_with_body(self, body: Body, contact: Contact) -> None:
-        from seastar_gym.scene.at_rest import touching_at_rest
+        from seastar_gym.scene.at_rest import touching_at_rest  # few scenes need it
 
         robot, pairs = self.robot, self.robot.limbs_that_may_touch()
         for index in range(batch_size(robot) or 1):

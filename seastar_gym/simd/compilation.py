@@ -131,7 +131,7 @@ class _AsPart(LoweringPass):
 
 
 class _KernelCompiler(_Compiler):
-    """The same, for kernels that only compiled code calls."""
+    """Compiler of kernels, which only compiled code calls: each is lowered into a `_Part`."""
 
     def define_pipelines(self):
         (passes,) = super().define_pipelines()

@@ -58,7 +58,7 @@ class MeasuredCurve(ActuatorBase):
         """
         if not Path(file).is_file():
             raise FileNotFoundError(f"There is no measured curve at {file}: give the path of a CSV file.")
-        from seastar_gym.scene.csv_rows import read_numbers
+        from seastar_gym.scene.csv_rows import read_numbers  # only files need it
 
         times, angles = zip(*read_numbers(file, "a time [s] and an angle [rad]", 2), strict=True)
         try:
@@ -79,7 +79,7 @@ class MeasuredCurve(ActuatorBase):
         """
         require_number("period", period, "s")
         require_number("limb_length", limb_length, "m")
-        from seastar_gym.scene.csv_rows import read_numbers
+        from seastar_gym.scene.csv_rows import read_numbers  # only files need it
 
         lines = read_numbers(file, "a phase [1] and a curvature [1/m]", 2)
         phases, curvatures = np.array([line for line in lines if line[0] != 1.0] or lines).T
