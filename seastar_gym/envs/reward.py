@@ -1,12 +1,13 @@
 """The reward: a sum of named terms, and the route along which progress counts."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.envs.paths import shortest_way
-from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.number import check_numbers, not_negative, within
 from seastar_gym.scene.serial import register_part
 
 PULSE = 0.1
@@ -25,25 +26,22 @@ class RewardWeights:
     heading: Reward per radian by which there is less left to turn [1/rad], where headings are asked for.
     """
 
-    progress: float = 200.0
+    progress: Annotated[float, not_negative("1")] = 200.0
     """Reward per metre by which the rewarded route to the last waypoint became shorter [1/m]. One stroke of the best
     gaits, about 5 mm, earns about 1."""
-    waypoint: float = 1.0
+    waypoint: Annotated[float, not_negative("1")] = 1.0
     """Reward per waypoint reached."""
-    effort: float = 0.01
+    effort: Annotated[float, not_negative("1")] = 0.01
     """Price of heating one wire for PULSE = 0.1 s, as a stroke of the chapter does; shorter heating costs its share."""
-    aim: float = 0.7
+    aim: Annotated[float, within(0.0, 1.0)] = 0.7
     """Distance from a waypoint's centre, as a fraction of its radius, at which the rewarded route passes it, 0 to 1. A
     route at 1 only touches the circle, so that no stroke need ever end within it."""
-    heading: float = 8.0
+    heading: Annotated[float, not_negative("1")] = 8.0
     """Reward per radian by which there is less left to turn [1/rad], where headings are asked for. A second of the
     turning wave, 0.19 rad, earns about as much as a second of the lagged pairs, 7.3 mm."""
 
     def __post_init__(self) -> None:
-        for weight in fields(self):
-            require_number(f"RewardWeights.{weight.name}", getattr(self, weight.name), "1", zero_allowed=True)
-        if self.aim > 1.0:
-            raise ValueError(f"RewardWeights.aim must be at most 1, the waypoint's radius, not {self.aim!r}.")
+        check_numbers(self, "RewardWeights.")
 
     def way_to_next(
         self, hub: ArrayLike, current: ArrayLike, following: ArrayLike, waypoint_radius: float

@@ -84,6 +84,13 @@ def require_within(name: str, value: float, low: float, high: float) -> None:
         raise ValueError(f"{name} must be from {low:g} to {high:g}, not {shown(value)}.")
 
 
+def require_range(name: str, value: object, unit: str, zero_allowed: bool = False) -> None:
+    """Refuse what is not a smallest and a largest number above zero. unit: Unit in the sentence."""
+    pair = isinstance(value, tuple) and len(value) == 2 and all(map(is_finite_number, value))
+    if not pair or not (0.0 <= value[0] <= value[1]) or (value[0] == 0.0 and not zero_allowed):  # type: ignore[index]
+        raise ValueError(f"{name} must be the smallest and the largest number [{unit}], not {shown(value)}.")
+
+
 def require_error(error: object) -> None:
     """Refuse what is no error that can be asked for."""
     if not is_finite_number(error) or error <= 0.0:  # type: ignore[operator]

@@ -13,13 +13,23 @@ from typing import Any, NamedTuple, TypeAlias, get_args, get_origin, get_type_hi
 
 import numpy as np
 
-from seastar_gym.scene.checks import as_float, require_count, require_finite, require_number, require_within, shown
+from seastar_gym.scene.checks import (
+    as_float,
+    require_count,
+    require_finite,
+    require_number,
+    require_range,
+    require_within,
+    shown,
+)
 
 Numbers: TypeAlias = float | Any
 """Number for all robots, or an array or tuple of shape (n_robots,) with one for each.
 
 Typed as Any for the latter, so that code for the scene of one robot may read a float.
 """
+Range: TypeAlias = tuple[float, float]
+"""Smallest and largest number of a uniform draw."""
 
 
 class Unnamed:
@@ -76,6 +86,11 @@ def finite(unit: str, whose: str = "") -> Number:
     return Number(unit, partial(require_finite, unit=unit), whose)
 
 
+def ranging(unit: str, zero_allowed: bool = False) -> Number:
+    """A `Range` of positive numbers."""
+    return Number(unit, partial(require_range, unit=unit, zero_allowed=zero_allowed))
+
+
 def within(low: float, high: float) -> Number:
     """Ratio from `low` to `high`."""
     return Number("1", partial(require_within, low=low, high=high))
@@ -109,10 +124,10 @@ def declared(kind: Hashable) -> dict[str, Declared]:
     return {name: each for name, each in found.items() if isinstance(each.number, Number)}
 
 
-def check_numbers(part: Any) -> None:
+def check_numbers(part: Any, whose: str = "") -> None:
     """Refuse numbers of a part that are not as it declares, and store those of each robot as `PerRobot`.
 
-    Profiles along a limb are left to the part.
+    Profiles along a limb are left to the part. whose: Beginning of the names in sentences, such as "Prey.".
     """
     for name, (number, is_per_robot, is_optional, may_be_profile) in declared(part.__class__).items():
         value = getattr(part, name)
@@ -122,7 +137,7 @@ def check_numbers(part: Any) -> None:
             value = _of_robots(name, value)
             object.__setattr__(part, name, value)
         for one in value if isinstance(value, PerRobot) else (value,):
-            number.require(f"{number.whose}{name}", one)
+            number.require(f"{whose or number.whose}{name}", one)
 
 
 def _of_robots(name: str, value: Any) -> PerRobot:

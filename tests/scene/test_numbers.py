@@ -14,17 +14,24 @@ from seastar_gym import (
     Attachment,
     Body,
     Contact,
+    FailBlind,
     GridCurrent,
     Limb,
     Limited,
     MeasuredCurve,
+    Miswired,
     Numerics,
+    ObstTrap,
+    Prey,
+    Prizes,
+    RewardWeights,
     Scene,
     Seastar,
     ShearCurrent,
     SmaLimb,
     SmaPulse,
     SmaWires,
+    Station,
     Stiffening,
     ThermalSma,
     UniformCurrent,
@@ -42,6 +49,8 @@ POSITIVE = {
     Stiffening: "ratio width", SmaPulse: "heating_time cooling_time", SmaWires: "heating_time cooling_time period",
     SmaLimb: "rise middle time_constant heating_time period", Limited: "largest_angle largest_rate",
     ThermalSma: "heating_time cooling_time time_constant steady_rise", Numerics: "step newton_tolerance",
+    ObstTrap: "longest_way", Prey: "robot_speed catch_radius", Prizes: "side radius seconds robot_speed",
+    Station: "tolerance",
 }  # fmt: skip
 NOT_NEGATIVE = {
     Seastar: "relaxation_time", Body: "radius mass inertia drag_coefficient drag_along drag_across drag_turning "
@@ -49,15 +58,24 @@ NOT_NEGATIVE = {
     Water: "density drag_coefficient tangential_drag_coefficient added_mass_coefficient",
     SmaWires: "peak_angle heating_power", SmaLimb: "peak_angle delay rest_curvature curvature_change heating_power",
     ThermalSma: "peak_angle heating_power", MeasuredCurve: "scale heating_power",
+    RewardWeights: "progress waypoint effort heading", ObstTrap: "touch", Prey: "epicycle progress catch effort",
+    Prizes: "gain progress prize effort", Station: "progress nearness effort",
 }  # fmt: skip
 FINITE = {
     Limb: "natural_curvature", Attachment: "x y direction", UniformCurrent: "u_x u_y", ShearCurrent: "rate direction",
     Vortex: "circulation x y", ThermalSma: "water_temperature austenite_start austenite_finish martensite_start "
     "martensite_finish largest_temperature",
 }  # fmt: skip
-WITHIN = {(AlongLimb, "share"): (0.0, 1.0), (Numerics, "path_tolerance"): (1e-3, 0.02)}
+RANGES = {Prey: "speed radius", Station: "current distance", ObstTrap: "distance"}
+WITHIN = {
+    (AlongLimb, "share"): (0.0, 1.0), (Numerics, "path_tolerance"): (1e-3, 0.02), (RewardWeights, "aim"): (0.0, 1.0),
+    (Miswired, "swap_probability"): (0.0, 1.0),
+}  # fmt: skip
 NODES = 2, 10_000
-WHOLE = {(Seastar, "n_limbs"): (1, 12), (Seastar, "nodes_per_limb"): NODES, (Numerics, "max_iterations"): NODES}
+WHOLE = {
+    (Seastar, "n_limbs"): (1, 12), (Seastar, "nodes_per_limb"): NODES, (Numerics, "max_iterations"): NODES,
+    (FailBlind, "dead"): (0, 2), (ObstTrap, "scattered"): (0, 20), (Prey, "wanted"): (1, 1_000_000),
+}  # fmt: skip
 PARTS = {
     Attachment: Attachment(0.0, 0.0, 0.0), ShearCurrent: ShearCurrent(1.0), Vortex: Vortex(1.0), GridCurrent: WAVES,
     Limited: Limited(SmaPulse()), MeasuredCurve: CURVE, Numerics: Numerics("implicit-midpoint"),
@@ -79,8 +97,8 @@ def refuse(kind, name, values, *words):
 
 
 def test_every_number_that_is_declared_is_tried():
-    tried = {*each_of(POSITIVE), *each_of(NOT_NEGATIVE), *each_of(FINITE), *WITHIN, *WHOLE}
-    package = [kind for kind in KINDS.values() if kind.__module__.startswith("seastar_gym.scene")]
+    tried = {*each_of(POSITIVE), *each_of(NOT_NEGATIVE), *each_of(FINITE), *each_of(RANGES), *WITHIN, *WHOLE}
+    package = [kind for kind in KINDS.values() if kind.__module__.startswith(("seastar_gym.scene", "seastar_gym.envs"))]
     assert tried == {(kind, name) for kind in package for name in declared(kind)}
 
 
@@ -98,6 +116,13 @@ def test_quantities_that_may_be_zero_are_not_negative(kind, name):
 @pytest.mark.parametrize("kind, name", each_of(FINITE))
 def test_quantities_of_any_sign_are_finite(kind, name):
     refuse(kind, name, NOT_A_NUMBER[:-1], "finite", f"[{declared(kind)[name].number.unit}]")
+
+
+@pytest.mark.parametrize("kind, name", each_of(RANGES))
+def test_ranges_are_a_smallest_and_a_largest_number(kind, name):
+    zero = [] if kind is Station else [(0.0, 1.0)]
+    odd = [(0.2, 0.1), (-0.1, 0.1), (0.1, math.nan), (0.1,), *zero, *NOT_A_NUMBER]
+    refuse(kind, name, odd, f"{kind.__name__}.{name}", "the smallest and the largest", declared(kind)[name].number.unit)
 
 
 @pytest.mark.parametrize("kind, name", WITHIN)

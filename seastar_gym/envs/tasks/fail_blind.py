@@ -1,6 +1,7 @@
 """`SeastarFailBlind-v0`: limbs that are dead, for a robot that does not see its limbs."""
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -15,8 +16,10 @@ from seastar_gym.envs.task import SwimTask
 from seastar_gym.envs.tasks.challenge import Challenge
 from seastar_gym.envs.tasks.numbered import Numbered, Split
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import require_count
+from seastar_gym.scene.number import whole
 from seastar_gym.scene.serial import register_part
+
+MOST_DEAD = 2
 
 
 @register_part
@@ -66,18 +69,13 @@ class FailBlind(Challenge):
     reward: Weights of the reward's terms.
     """
 
-    dead: int = 2
+    dead: Annotated[int, whole(0, MOST_DEAD)] = 2
     reward: RewardWeights = RewardWeights()
-
-    def __post_init__(self) -> None:
-        require_count("FailBlind.dead", self.dead, 0, MOST_DEAD)
 
     def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> "FailBlindTask":
         """The task of so many robots."""
         return FailBlindTask(self, options, n_robots, threads, split)
 
-
-MOST_DEAD = 2
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """`SeastarMiswired-v0`: limbs whose two wires may have been swapped."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from seastar_gym.envs.swimming import Flags, Floats
 from seastar_gym.envs.task import SwimTask
 from seastar_gym.envs.tasks.challenge import Challenge
 from seastar_gym.envs.tasks.numbered import Numbered, Split
-from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.number import within
 from seastar_gym.scene.serial import register_part
 
 
@@ -66,13 +66,8 @@ class Miswired(Challenge):
     reward: Weights of the reward's terms.
     """
 
-    swap_probability: float = 0.5
+    swap_probability: Annotated[float, within(0.0, 1.0)] = 0.5
     reward: RewardWeights = RewardWeights()
-
-    def __post_init__(self) -> None:
-        require_number("Miswired.swap_probability", self.swap_probability, "1", zero_allowed=True)
-        if self.swap_probability > 1.0:
-            raise ValueError(f"Miswired.swap_probability must be at most 1, not {self.swap_probability}.")
 
     def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> "MiswiredTask":
         """The task of so many robots."""

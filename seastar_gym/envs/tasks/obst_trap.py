@@ -1,7 +1,7 @@
 """`SeastarObstTrap-v0`: a goal behind discs, most of which may form a horseshoe."""
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +12,11 @@ from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.scenery import Ring, Scenery
 from seastar_gym.envs.swimming import Floats, Score
 from seastar_gym.envs.task import SwimTask
-from seastar_gym.envs.tasks.challenge import Challenge, Range, require_range
+from seastar_gym.envs.tasks.challenge import Challenge
 from seastar_gym.envs.tasks.discs import Ways, rims, ways
 from seastar_gym.envs.tasks.numbered import Numbered, Split
-from seastar_gym.scene.checks import require_choice, require_count, require_number
+from seastar_gym.scene.checks import require_choice
+from seastar_gym.scene.number import Range, not_negative, positive, ranging, whole
 from seastar_gym.scene.serial import register_part
 
 Potential = Literal["straight", "geodesic"]
@@ -87,23 +88,20 @@ class ObstTrap(Challenge):
     reward: Weights of the other terms.
     """
 
-    distance: Range = (0.45, 0.6)
-    scattered: int = 3
-    longest_way: float = 0.85
+    distance: Annotated[Range, ranging("m")] = (0.45, 0.6)
+    scattered: Annotated[int, whole(0, 20)] = 3
+    longest_way: Annotated[float, positive("m")] = 0.85
     potential: Potential = "straight"
-    touch: float = 20.0
+    touch: Annotated[float, not_negative("1")] = 20.0
     reward: RewardWeights = RewardWeights()
 
     def __post_init__(self) -> None:
-        require_range("ObstTrap.distance", self.distance, "m")
+        Challenge.__post_init__(self)
         nearest, farthest = self.distance
         if nearest < NEAREST_GOAL or farthest > FARTHEST_GOAL:
             bounds = f"{NEAREST_GOAL} to {FARTHEST_GOAL} m"
             raise ValueError(f"ObstTrap.distance must lie from {bounds}, not {self.distance}.")
-        require_count("ObstTrap.scattered", self.scattered, 0, 20)
-        require_number("ObstTrap.longest_way", self.longest_way, "m")
         require_choice("ObstTrap.potential", self.potential, get_args(Potential))
-        require_number("ObstTrap.touch", self.touch, "1", zero_allowed=True)
 
     def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> "ObstTrapTask":
         """The task of so many robots."""

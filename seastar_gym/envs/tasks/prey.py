@@ -1,7 +1,7 @@
 """`SeastarPrey-v0`: a prey that swims faster than the robot, on a course that comes back."""
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.scenery import Ring, Scenery
 from seastar_gym.envs.swimming import Flags, Floats, Score, Swimming
-from seastar_gym.envs.tasks.challenge import Challenge, Range, require_range
+from seastar_gym.envs.tasks.challenge import Challenge
 from seastar_gym.envs.tasks.course import Courses, Pursuit, draw_course
 from seastar_gym.envs.tasks.numbered import Numbered, Split
-from seastar_gym.scene.checks import require_count, require_number
+from seastar_gym.scene.number import Range, not_negative, positive, ranging, whole
 from seastar_gym.scene.serial import register_part
 
 LOOK_AHEAD = 10.0
@@ -77,27 +77,15 @@ class Prey(Challenge):
     progress, catch, effort: Weights of the reward's terms.
     """
 
-    NAME: ClassVar[str] = "prey"
-
-    speed: Range = (0.006, 0.008)
-    radius: Range = (0.12, 0.2)
-    epicycle: float = 0.2
-    robot_speed: float = 0.004
-    catch_radius: float = 0.02
-    wanted: int = 3
-    progress: float = 50.0
-    catch: float = 10.0
-    effort: float = 0.01
-
-    def __post_init__(self) -> None:
-        require_range("Prey.speed", self.speed, "m/s")
-        require_range("Prey.radius", self.radius, "m")
-        require_number("Prey.epicycle", self.epicycle, "1", zero_allowed=True)
-        require_number("Prey.catch_radius", self.catch_radius, "m")
-        require_number("Prey.robot_speed", self.robot_speed, "m/s")
-        require_count("Prey.wanted", self.wanted, 1, 1_000_000)
-        for name in ("progress", "catch", "effort"):
-            require_number(f"Prey.{name}", getattr(self, name), "1", zero_allowed=True)
+    speed: Annotated[Range, ranging("m/s")] = (0.006, 0.008)
+    radius: Annotated[Range, ranging("m")] = (0.12, 0.2)
+    epicycle: Annotated[float, not_negative("1")] = 0.2
+    robot_speed: Annotated[float, positive("m/s")] = 0.004
+    catch_radius: Annotated[float, positive("m")] = 0.02
+    wanted: Annotated[int, whole(1, 1_000_000)] = 3
+    progress: Annotated[float, not_negative("1")] = 50.0
+    catch: Annotated[float, not_negative("1")] = 10.0
+    effort: Annotated[float, not_negative("1")] = 0.01
 
     def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> "PreyTask":
         """The task of so many robots."""

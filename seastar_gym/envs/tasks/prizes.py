@@ -1,7 +1,7 @@
 """`SeastarPrizes-v0`: prizes of different worth, more than can be reached in time."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from seastar_gym.envs.swimming import Flags, Floats, Score, Swimming
 from seastar_gym.envs.tasks.challenge import Challenge
 from seastar_gym.envs.tasks.numbered import Numbered, Split
 from seastar_gym.envs.tasks.rounds import best_round, distances, greedy_round
-from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.number import not_negative, positive
 from seastar_gym.scene.serial import register_part
 
 
@@ -76,20 +76,14 @@ class Prizes(Challenge):
     progress, prize, effort: Weights of the reward's terms.
     """
 
-    side: float = 0.7
-    radius: float = 0.015
-    seconds: float = 200.0
-    robot_speed: float = 0.004
-    gain: float = 0.4
-    progress: float = 2.0
-    prize: float = 5.0
-    effort: float = 0.01
-
-    def __post_init__(self) -> None:
-        for name, unit in (("side", "m"), ("radius", "m"), ("seconds", "s"), ("robot_speed", "m/s")):
-            require_number(f"Prizes.{name}", getattr(self, name), unit)
-        for name in ("gain", "progress", "prize", "effort"):
-            require_number(f"Prizes.{name}", getattr(self, name), "1", zero_allowed=True)
+    side: Annotated[float, positive("m")] = 0.7
+    radius: Annotated[float, positive("m")] = 0.015
+    seconds: Annotated[float, positive("s")] = 200.0
+    robot_speed: Annotated[float, positive("m/s")] = 0.004
+    gain: Annotated[float, not_negative("1")] = 0.4
+    progress: Annotated[float, not_negative("1")] = 2.0
+    prize: Annotated[float, not_negative("1")] = 5.0
+    effort: Annotated[float, not_negative("1")] = 0.01
 
     def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> "PrizesTask":
         """The task of so many robots."""

@@ -1,7 +1,7 @@
 """`SeastarStation-v0`: a place to keep in a current that shows in the velocities."""
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from seastar_gym.envs.options import SwimOptions
 from seastar_gym.envs.scenery import Ring, Scenery
 from seastar_gym.envs.swimming import Flags, Floats, Score, Swimming
-from seastar_gym.envs.tasks.challenge import Challenge, Range, require_range
+from seastar_gym.envs.tasks.challenge import Challenge
 from seastar_gym.envs.tasks.numbered import Numbered, Split
 from seastar_gym.scene import Scene, UniformCurrent, Water
-from seastar_gym.scene.checks import require_number
+from seastar_gym.scene.number import Range, not_negative, positive, ranging
 from seastar_gym.scene.serial import register_part
 
 ARROW = 20.0
@@ -76,21 +76,12 @@ class Station(Challenge):
     progress, nearness, effort: Weights of the reward's terms.
     """
 
-    NAME: ClassVar[str] = "station"
-
-    current: Range = (0.001, 0.0025)
-    distance: Range = (0.0, 0.05)
-    tolerance: float = 0.002
-    progress: float = 200.0
-    nearness: float = 100.0
-    effort: float = 0.01
-
-    def __post_init__(self) -> None:
-        require_range("Station.current", self.current, "m/s", zero_allowed=True)
-        require_range("Station.distance", self.distance, "m", zero_allowed=True)
-        require_number("Station.tolerance", self.tolerance, "m")
-        for name in ("progress", "nearness", "effort"):
-            require_number(f"Station.{name}", getattr(self, name), "1", zero_allowed=True)
+    current: Annotated[Range, ranging("m/s", zero_allowed=True)] = (0.001, 0.0025)
+    distance: Annotated[Range, ranging("m", zero_allowed=True)] = (0.0, 0.05)
+    tolerance: Annotated[float, positive("m")] = 0.002
+    progress: Annotated[float, not_negative("1")] = 200.0
+    nearness: Annotated[float, not_negative("1")] = 100.0
+    effort: Annotated[float, not_negative("1")] = 0.01
 
     def swimming(self, options: SwimOptions, n_robots: int, threads: int | None, split: Split) -> "StationTask":
         """The task of so many robots."""
