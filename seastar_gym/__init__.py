@@ -10,117 +10,50 @@ from seastar_gym.envs import TASKS as TASKS
 from seastar_gym.envs import TIME_LIMIT as TIME_LIMIT
 from seastar_gym.envs import TIMED as TIMED
 from seastar_gym.lazy import lazily
-from seastar_gym.version import __version__
-
-__all__ = [
-    "AlongLimb",
-    "Attachment",
-    "Body",
-    "Certificate",
-    "Contact",
-    "DomainRandomization",
-    "FailBlind",
-    "GridCurrent",
-    "Headings",
-    "Limb",
-    "Limited",
-    "LogUniform",
-    "MeasuredCurve",
-    "Miswired",
-    "Normal",
-    "Numerics",
-    "ObstTrap",
-    "Prey",
-    "Prizes",
-    "RewardWeights",
-    "Scene",
-    "Seastar",
-    "ShearCurrent",
-    "Simulator",
-    "SmaLimb",
-    "SmaPulse",
-    "SmaWires",
-    "SolverStatus",
-    "State",
-    "Station",
-    "Stiffening",
-    "StrokeReport",
-    "SymmetryReduction",
-    "ThermalSma",
-    "Uniform",
-    "UniformCurrent",
-    "VectorSymmetryReduction",
-    "Vortex",
-    "Water",
-    "__version__",
-    "certify",
-    "register_part",
-    "relaxation_time",
-]
 
 if TYPE_CHECKING:
-    from seastar_gym.accuracy.certificate import Certificate
-    from seastar_gym.accuracy.measure import certify
-    from seastar_gym.envs.headings import Headings
-    from seastar_gym.envs.randomization import DomainRandomization, LogUniform, Normal, Uniform
-    from seastar_gym.envs.reward import RewardWeights
-    from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
-    from seastar_gym.envs.tasks.fail_blind import FailBlind
-    from seastar_gym.envs.tasks.miswired import Miswired
-    from seastar_gym.envs.tasks.obst_trap import ObstTrap
-    from seastar_gym.envs.tasks.prey import Prey
-    from seastar_gym.envs.tasks.prizes import Prizes
-    from seastar_gym.envs.tasks.station import Station
-    from seastar_gym.scene import (
-        AlongLimb,
-        Attachment,
-        Body,
-        Contact,
-        GridCurrent,
-        Limb,
-        Limited,
-        MeasuredCurve,
-        Numerics,
-        Scene,
-        Seastar,
-        ShearCurrent,
-        SmaLimb,
-        SmaPulse,
-        SmaWires,
-        Stiffening,
-        ThermalSma,
-        UniformCurrent,
-        Vortex,
-        Water,
-        relaxation_time,
-    )
-    from seastar_gym.scene.serial import register_part
-    from seastar_gym.simulator import Simulator, SolverStatus, State, StrokeReport
+    from seastar_gym.accuracy.certificate import Certificate as Certificate
+    from seastar_gym.accuracy.measure import certify as certify
+    from seastar_gym.envs.headings import Headings as Headings
+    from seastar_gym.envs.randomization import DomainRandomization as DomainRandomization
+    from seastar_gym.envs.randomization import LogUniform as LogUniform
+    from seastar_gym.envs.randomization import Normal as Normal
+    from seastar_gym.envs.randomization import Uniform as Uniform
+    from seastar_gym.envs.reward import RewardWeights as RewardWeights
+    from seastar_gym.envs.symmetry import SymmetryReduction as SymmetryReduction
+    from seastar_gym.envs.symmetry import VectorSymmetryReduction as VectorSymmetryReduction
+    from seastar_gym.envs.tasks.fail_blind import FailBlind as FailBlind
+    from seastar_gym.envs.tasks.miswired import Miswired as Miswired
+    from seastar_gym.envs.tasks.obst_trap import ObstTrap as ObstTrap
+    from seastar_gym.envs.tasks.prey import Prey as Prey
+    from seastar_gym.envs.tasks.prizes import Prizes as Prizes
+    from seastar_gym.envs.tasks.station import Station as Station
+    from seastar_gym.scene import AlongLimb as AlongLimb
+    from seastar_gym.scene import Attachment as Attachment
+    from seastar_gym.scene import Body as Body
+    from seastar_gym.scene import Contact as Contact
+    from seastar_gym.scene import GridCurrent as GridCurrent
+    from seastar_gym.scene import Limb as Limb
+    from seastar_gym.scene import Limited as Limited
+    from seastar_gym.scene import MeasuredCurve as MeasuredCurve
+    from seastar_gym.scene import Numerics as Numerics
+    from seastar_gym.scene import Scene as Scene
+    from seastar_gym.scene import Seastar as Seastar
+    from seastar_gym.scene import ShearCurrent as ShearCurrent
+    from seastar_gym.scene import SmaLimb as SmaLimb
+    from seastar_gym.scene import SmaPulse as SmaPulse
+    from seastar_gym.scene import SmaWires as SmaWires
+    from seastar_gym.scene import Stiffening as Stiffening
+    from seastar_gym.scene import ThermalSma as ThermalSma
+    from seastar_gym.scene import UniformCurrent as UniformCurrent
+    from seastar_gym.scene import Vortex as Vortex
+    from seastar_gym.scene import Water as Water
+    from seastar_gym.scene import relaxation_time as relaxation_time
+    from seastar_gym.scene.serial import register_part as register_part
+    from seastar_gym.simulator import Simulator as Simulator
+    from seastar_gym.simulator import SolverStatus as SolverStatus
+    from seastar_gym.simulator import State as State
+    from seastar_gym.simulator import StrokeReport as StrokeReport
+    from seastar_gym.version import __version__ as __version__
 else:
-    __getattr__, __dir__ = lazily(
-        __name__,
-        {
-            **dict.fromkeys(__all__, "scene"),  # but for these
-            "Certificate": "accuracy.certificate",
-            "DomainRandomization": "envs.randomization",
-            "FailBlind": "envs.tasks.fail_blind",
-            "Headings": "envs.headings",
-            "LogUniform": "envs.randomization",
-            "Miswired": "envs.tasks.miswired",
-            "Normal": "envs.randomization",
-            "ObstTrap": "envs.tasks.obst_trap",
-            "Prey": "envs.tasks.prey",
-            "Prizes": "envs.tasks.prizes",
-            "RewardWeights": "envs.reward",
-            "Simulator": "simulator",
-            "SolverStatus": "simulator",
-            "State": "simulator",
-            "Station": "envs.tasks.station",
-            "StrokeReport": "simulator",
-            "SymmetryReduction": "envs.symmetry",
-            "Uniform": "envs.randomization",
-            "VectorSymmetryReduction": "envs.symmetry",
-            "certify": "accuracy.measure",
-            "register_part": "scene.serial",
-        },
-    )
+    __all__, __getattr__, __dir__ = lazily(__name__)

@@ -137,17 +137,20 @@ def test_what_needs_no_compiler_loads_none(code, most):
 
 
 def test_names_of_the_package_are_those_of_its_modules():
-    """What type checkers see, what is there when it is asked for, and what `dir` says are the same."""
+    """What type checkers see, what is there when asked for, what `dir` says and what the site tells are the same."""
     import seastar_gym
     from seastar_gym import controllers
     from seastar_gym.envs import symmetry
 
+    reference = runpy.run_path(str(ROOT / "docs" / "_extensions" / "reference.py"))
     for package in (seastar_gym, controllers, symmetry):
         (block,) = (node for node in ast.parse(Path(package.__file__).read_text()).body if isinstance(node, ast.If))
         for line in block.body:
             for alias in line.names:
                 assert getattr(package, alias.name) is getattr(importlib.import_module(line.module), alias.name)
                 assert alias.name in package.__all__
+        told = re.findall(r"py:(?:class|function)} [\w.]+\.(\w+)", reference["public"](package.__name__))
+        assert told == [name for name in package.__all__ if callable(getattr(package, name))]
         assert all(hasattr(package, name) for name in package.__all__) and {*package.__all__} <= {*dir(package)}
         with pytest.raises(AttributeError, match=f"module '{package.__name__}' has no attribute 'nothing'"):
             package.nothing  # noqa: B018

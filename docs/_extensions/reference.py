@@ -13,7 +13,7 @@ HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
 def public(package: str) -> str:
     """Reference of the names that a package exports, in its order."""
     return "\n\n".join(
-        described(node, package, 6) for _, node in (defined(module, name) for module, name in exported(package)) if node
+        described(node, package, 6) for _, node in (defined(package, name) for name in exported(package)) if node
     )
 
 
@@ -29,26 +29,15 @@ def parsed(module: str) -> ast.Module:
     return ast.parse(file.read_text(encoding="utf-8"))
 
 
-def exported(package: str) -> list[tuple[str, str]]:
-    """(module, name) of every name in `__all__`, from where it is imported."""
-    body = parsed(package).body
-    origin = {
-        alias.asname or alias.name: node.module or ""
-        for node in body
-        if isinstance(node, ast.ImportFrom)
-        for alias in node.names
-    }
-    (names,) = (
-        ast.literal_eval(node.value)
-        for node in body
-        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
-    )
-    return [defined(origin.get(name, package), name)[:1] + (name,) for name in names]
+def exported(package: str) -> list[str]:
+    """Names that a package imports below `if TYPE_CHECKING:`, see seastar_gym/lazy.py."""
+    (block,) = (node for node in parsed(package).body if isinstance(node, ast.If))
+    return sorted(alias.name for node in block.body if isinstance(node, ast.ImportFrom) for alias in node.names)
 
 
 def defined(module: str, name: str) -> tuple[str, Definition | None]:
     """The module in which a class or function is defined, and its definition; None for anything else."""
-    for node in parsed(module).body:
+    for node in ast.walk(parsed(module)):
         if isinstance(node, Definition) and node.name == name:
             return module, node
         if isinstance(node, ast.ImportFrom) and node.module and any(alias.name == name for alias in node.names):

@@ -12,36 +12,17 @@ They need numpy and safetensors. What an agent of one's own must have is in `con
 
 from typing import TYPE_CHECKING
 
-from seastar_gym.controllers.learned import LearnedPolicy, in_the_box, load
 from seastar_gym.lazy import lazily
 
-__all__ = [
-    "GreedyPolicy",
-    "LearnedPolicy",
-    "Planner",
-    "Policy",
-    "in_the_box",
-    "load",
-    "load_agent",
-    "load_agents",
-    "scripted",
-]
-
 if TYPE_CHECKING:
-    from seastar_gym.controllers.contract import Policy
-    from seastar_gym.controllers.greedy import GreedyPolicy
-    from seastar_gym.controllers.planner import Planner
-    from seastar_gym.controllers.roster import load_agent, load_agents
-    from seastar_gym.controllers.scripted import scripted
+    from seastar_gym.controllers.contract import Policy as Policy
+    from seastar_gym.controllers.greedy import GreedyPolicy as GreedyPolicy
+    from seastar_gym.controllers.learned import LearnedPolicy as LearnedPolicy
+    from seastar_gym.controllers.learned import in_the_box as in_the_box
+    from seastar_gym.controllers.learned import load as load
+    from seastar_gym.controllers.planner import Planner as Planner
+    from seastar_gym.controllers.roster import load_agent as load_agent
+    from seastar_gym.controllers.roster import load_agents as load_agents
+    from seastar_gym.controllers.scripted import scripted as scripted
 else:
-    __getattr__, __dir__ = lazily(
-        __name__,
-        {
-            "GreedyPolicy": "greedy",
-            "Planner": "planner",
-            "Policy": "contract",
-            "load_agent": "roster",
-            "load_agents": "roster",
-            "scripted": "scripted",
-        },
-    )
+    __all__, __getattr__, __dir__ = lazily(__name__)

@@ -23,49 +23,26 @@ A `Symmetry` knows the group, the layout and the actions of a robot. Its methods
 
 from typing import TYPE_CHECKING
 
-from seastar_gym.envs.symmetry.group import (
-    action_table,
-    compose,
-    inverse,
-    limb_order,
-    memory_mirror,
-    symmetry_of,
-    transform_commands,
-    turns,
-)
-from seastar_gym.envs.symmetry.symmetry import Recollection, Symmetry, reduce_observations, restore_actions
 from seastar_gym.lazy import lazily
 
-__all__ = [
-    "Recollection",
-    "Symmetry",
-    "SymmetryReduction",
-    "VectorMemory",
-    "VectorSymmetryReduction",
-    "action_table",
-    "compose",
-    "inverse",
-    "limb_order",
-    "memory_mirror",
-    "observed_mirror",
-    "reduce_observations",
-    "require_symmetry",
-    "restore_actions",
-    "symmetry_in",
-    "symmetry_of",
-    "transform_commands",
-    "turns",
-]
-
 if TYPE_CHECKING:
-    from seastar_gym.envs.symmetry.wrappers import (
-        SymmetryReduction,
-        VectorMemory,
-        VectorSymmetryReduction,
-        observed_mirror,
-        require_symmetry,
-        symmetry_in,
-    )
+    from seastar_gym.envs.symmetry.group import action_table as action_table
+    from seastar_gym.envs.symmetry.group import compose as compose
+    from seastar_gym.envs.symmetry.group import inverse as inverse
+    from seastar_gym.envs.symmetry.group import limb_order as limb_order
+    from seastar_gym.envs.symmetry.group import memory_mirror as memory_mirror
+    from seastar_gym.envs.symmetry.group import symmetry_of as symmetry_of
+    from seastar_gym.envs.symmetry.group import transform_commands as transform_commands
+    from seastar_gym.envs.symmetry.group import turns as turns
+    from seastar_gym.envs.symmetry.symmetry import Recollection as Recollection
+    from seastar_gym.envs.symmetry.symmetry import Symmetry as Symmetry
+    from seastar_gym.envs.symmetry.symmetry import reduce_observations as reduce_observations
+    from seastar_gym.envs.symmetry.symmetry import restore_actions as restore_actions
+    from seastar_gym.envs.symmetry.wrappers import SymmetryReduction as SymmetryReduction
+    from seastar_gym.envs.symmetry.wrappers import VectorMemory as VectorMemory
+    from seastar_gym.envs.symmetry.wrappers import VectorSymmetryReduction as VectorSymmetryReduction
+    from seastar_gym.envs.symmetry.wrappers import observed_mirror as observed_mirror
+    from seastar_gym.envs.symmetry.wrappers import require_symmetry as require_symmetry
+    from seastar_gym.envs.symmetry.wrappers import symmetry_in as symmetry_in
 else:
-    _of_wrappers = {name for name in __all__ if name not in globals()}
-    __getattr__, __dir__ = lazily(__name__, dict.fromkeys(_of_wrappers, "wrappers"))
+    __all__, __getattr__, __dir__ = lazily(__name__)
