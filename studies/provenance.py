@@ -51,13 +51,15 @@ COMMANDS = {
 """Commands of files that were written before studies recorded them."""
 
 
-FINAL = dict.fromkeys(
-    (
-        "damping.json", "damping.png", "fidelities.json", "fidelities.png", "gaits.json", "gaits_directions.png",
-        "gaits_front.png", "gaits_lag.png", "pentagon_from_rest.json", "pentagon_reheated.json",
-    ),
-    "0e818f3",
-)  # fmt: skip
+FINAL = {
+    file: commit
+    for commit, files in {
+        "0e818f3": "damping.json damping.png fidelities.json fidelities.png gaits.json gaits_directions.png "
+        "gaits_front.png gaits_lag.png pentagon_from_rest.json pentagon_reheated.json",
+        "9cd3be4": "ablations.json ablations.png hub.json hub.png ringing.json ringing.png",
+    }.items()
+    for file in files.split()
+}
 """Files of docs/ that are final, and the last commit that has the code of their study."""
 
 

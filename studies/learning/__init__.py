@@ -1,4 +1,4 @@
-"""Ablations of the training, trainings in time, and the fastest swims that offline searches find."""
+"""Trainings in time, and the fastest swims that offline searches find."""
 
 from seastar_gym.extras import require_extra
 

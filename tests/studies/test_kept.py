@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 
-from studies.accuracy import ringing
 from studies.chapter import kept as chapter
 from studies.chapter.swims import CHAPTER, swim
 from studies.kept import as_json, keep, rounded
@@ -50,9 +49,3 @@ def test_ways_round_the_pentagon_come_back():
         assert (after.agent, after.strokes, after.result) == (before.agent, 3, before.result)
         np.testing.assert_allclose(after.hub, before.hub, atol=traces.UNIT)
         np.testing.assert_allclose(after.waypoints, before.waypoints, atol=1e-6)
-
-
-def test_the_table_of_ringing_has_a_row_for_every_setting():
-    row = {"chapter": 1.234, "continuum": -0.5}
-    text = ringing.table({"percent_after_ten_strokes": dict.fromkeys(ringing.COMPARED, row)})
-    assert text.count("| 1.23 % | -0.50 % |") == len(ringing.COMPARED) == len(text.splitlines()) - 2
