@@ -25,8 +25,8 @@ class Hyperparameters:
     """Hyperparameters of PPO and of its training environment.
 
     Scores are mean strokes on held-out random paths after 98,304 strokes of training, where policies choose from all
-    243 commands (`python -m studies.learning.ablations` at commit 9cd3be4); the default training scores 174. They are means
-    over three seeds that differ by up to 4 strokes, so smaller differences say nothing.
+    243 commands (`python -m studies.learning.ablations` at commit 9cd3be4); the default training scores 174. They are
+    means over three seeds that differ by up to 4 strokes, so smaller differences say nothing.
     """
 
     actions: Discrete = "pairs"

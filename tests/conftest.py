@@ -1,6 +1,7 @@
 """Options and settings that every test shares."""
 
 import os
+import shutil
 import signal
 
 import pytest
@@ -31,3 +32,29 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if item.get_closest_marker("slow"):
             item.add_marker(pytest.mark.skip(reason="slow: runs with --slow"))
+
+
+@pytest.fixture(scope="session")
+def open_offline():
+    """Opens a file in Debian's chromium, or whichever is installed, offline: (file, width, height, ...) -> page.
+
+    The page's `complaints` are what it said in the console, its `requests` the addresses that it asked for.
+    """
+    playwright = pytest.importorskip("playwright.sync_api", reason='needs playwright: pip install -e ".[browser]"')
+    program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if program is None:
+        pytest.skip("no chromium is installed: apt install chromium")
+
+    def opened(file, width=1366, height=768, **more):
+        page = browser.new_context(viewport={"width": width, "height": height}, offline=True, **more).new_page()
+        page.complaints, page.requests = [], []
+        page.on("console", lambda message: page.complaints.append(message.text))
+        page.on("pageerror", lambda error: page.complaints.append(str(error)))
+        page.on("request", lambda request: page.requests.append(request.url))
+        page.goto(file.as_uri())
+        return page
+
+    with playwright.sync_playwright() as running:
+        browser = running.chromium.launch(executable_path=program)
+        yield opened
+        browser.close()

@@ -3,7 +3,6 @@
 import csv
 import json
 import re
-import shutil
 
 import numpy as np
 import pytest
@@ -268,30 +267,11 @@ def test_a_folder_without_a_run_is_answered_with_one_sentence(tmp_path, capsys):
 # In a browser
 
 
-@pytest.fixture(scope="module")
-def browser():
-    """Debian's chromium, or whichever is installed."""
-    playwright = pytest.importorskip("playwright.sync_api", reason='needs playwright: pip install -e ".[browser]"')
-    program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if program is None:
-        pytest.skip("no chromium is installed: apt install chromium")
-    with playwright.sync_playwright() as running:
-        browser = running.chromium.launch(executable_path=program)
-        yield browser
-        browser.close()
-
-
 class Watched:
-    """A page of the browser, offline, and what it complained about or asked for."""
+    """A report in the browser, and what it complained about or asked for."""
 
-    def __init__(self, browser, file, width=1366, height=768):
-        context = browser.new_context(viewport={"width": width, "height": height}, offline=True)
-        self.page = context.new_page()
-        self.complaints, self.requests = [], []
-        self.page.on("console", lambda message: self.complaints.append(message.text))
-        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        self.page.on("request", lambda request: self.requests.append(request.url))
-        self.page.goto(file.as_uri())
+    def __init__(self, page):
+        self.page, self.complaints, self.requests = page, page.complaints, page.requests
 
     def choose(self, agent):
         self.page.get_by_role("radio", name=agent).click()
@@ -309,8 +289,8 @@ class Watched:
 
 
 @pytest.fixture(scope="module")
-def page(browser, evaluated):
-    watched = Watched(browser, evaluated[0] / "report.html")
+def page(open_offline, evaluated):
+    watched = Watched(open_offline(evaluated[0] / "report.html"))
     yield watched
     watched.page.context.close()
 
@@ -379,8 +359,8 @@ def test_it_plays_to_the_end_and_begins_again(opened, evaluated):
     assert int(opened.page.locator("#time").input_value()) < 3 * straight.strokes
 
 
-def test_a_phone_sees_every_column(browser, evaluated):
-    watched = Watched(browser, evaluated[0] / "report.html", 390, 844)
+def test_a_phone_sees_every_column(open_offline, evaluated):
+    watched = Watched(open_offline(evaluated[0] / "report.html", 390, 844))
     cells = watched.page.locator("tbody tr").first.locator("td")
     assert cells.count() == len(COLUMNS)
     for place in range(cells.count()):
@@ -391,8 +371,8 @@ def test_a_phone_sees_every_column(browser, evaluated):
 
 
 @pytest.mark.parametrize("size", [(1366, 768), (390, 844)], ids=["laptop", "phone"])
-def test_it_fits_the_screen_with_equal_scales(browser, evaluated, size):
-    watched = Watched(browser, evaluated[0] / "report.html", *size)
+def test_it_fits_the_screen_with_equal_scales(open_offline, evaluated, size):
+    watched = Watched(open_offline(evaluated[0] / "report.html", *size))
     watched.page.wait_for_selector("#paths .main-svg")
     assert watched.page.evaluate("document.documentElement.scrollWidth") <= size[0]
     watched.page.wait_for_selector("#speeds .main-svg")

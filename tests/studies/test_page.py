@@ -2,7 +2,6 @@
 
 import base64
 import re
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -91,30 +90,11 @@ def test_the_committed_page_is_of_this_template():
 # In a browser
 
 
-@pytest.fixture(scope="module")
-def browser():
-    playwright = pytest.importorskip("playwright.sync_api", reason='needs playwright: pip install -e ".[browser]"')
-    program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if program is None:
-        pytest.skip("no chromium is installed: apt install chromium")
-    with playwright.sync_playwright() as running:
-        browser = running.chromium.launch(executable_path=program)
-        yield browser
-        browser.close()
-
-
 @pytest.fixture
-def opened(browser, file, request):
-    width, height = getattr(request, "param", (1366, 768))
-    context = browser.new_context(viewport={"width": width, "height": height}, offline=True, reduced_motion="reduce")
-    tab = context.new_page()
-    tab.complaints, tab.asked = [], []
-    tab.on("console", lambda message: tab.complaints.append(message.text))
-    tab.on("pageerror", lambda error: tab.complaints.append(str(error)))
-    tab.on("request", lambda asked: tab.asked.append(asked.url))
-    tab.goto(file.as_uri())
+def opened(open_offline, file, request):
+    tab = open_offline(file, *getattr(request, "param", ()), reduced_motion="reduce")
     yield tab
-    context.close()
+    tab.context.close()
 
 
 def planned(tab):
@@ -127,7 +107,7 @@ def planned(tab):
 
 def test_it_opens_offline_without_a_complaint(opened, file):
     assert opened.complaints == []
-    assert [url for url in opened.asked if not url.startswith("data:")] == [file.as_uri()]
+    assert [url for url in opened.requests if not url.startswith("data:")] == [file.as_uri()]
 
 
 def test_the_slider_moves_the_robot_where_the_recording_has_it(opened, data):
