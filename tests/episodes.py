@@ -44,7 +44,7 @@ def assert_same_infos(found: dict, expected: dict) -> None:
     """Equal values and types wherever the sub-environments' infos have a value."""
     for key in [key for key in expected if key.startswith("_")]:
         name, mask = key.removeprefix("_"), expected[key]
-        assert np.all(found[key][mask]), name
+        np.testing.assert_array_equal(found[key], mask, err_msg=name)
         if name in ("final_obs", "solver_message"):
             for one, other in zip(found[name][mask], expected[name][mask], strict=True):
                 np.testing.assert_array_equal(one, other)

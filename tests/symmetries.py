@@ -1,6 +1,12 @@
-"""Symmetries of robots as tests want them."""
+"""Symmetries of robots as tests want them, from their definitions, and swims in worlds that are carried by them."""
 
+from dataclasses import replace
+
+import numpy as np
+
+from seastar_gym import Numerics, SymmetryReduction
 from seastar_gym.envs.layout import Layout
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import Symmetry
 from seastar_gym.envs.symmetry.group import n_limbs_of
 
@@ -8,3 +14,37 @@ from seastar_gym.envs.symmetry.group import n_limbs_of
 def symmetry_for(group, mirror=(), mode="limbs", entries=()):
     """Symmetry of a robot with this group and numbers of its limbs, whose tasks show these entries."""
     return Symmetry(group, mirror, Layout(n_limbs_of(group), len(mirror), entries), mode)
+
+
+def turns_and_axis(group):
+    return (group, 0.0) if isinstance(group, int) else (group.n_turns, group.axis)
+
+
+def matrix(element, group):
+    """Of an element of a group, or of that of a regular polygon of so many limbs, from its definition."""
+    n_turns, axis = turns_and_axis(group)
+    k = (element + 1) // 2
+    c, s = np.cos(2 * np.pi * k / n_turns), np.sin(2 * np.pi * k / n_turns)
+    turn = np.array([[c, s], [-s, c]])
+    if element % 2 == 0:
+        return turn
+    c, s = np.cos(2 * axis), np.sin(2 * axis)
+    return np.array([[c, s], [s, -c]]) @ turn
+
+
+def elements_of(group):
+    n_turns, axis = turns_and_axis(group)
+    return np.arange(0, 2 * n_turns, 2 if axis is None else 1)
+
+
+def reduced_swim(scene, randomization, carry, actions, **arguments):
+    """Rewards and reduced observations of the same reduced actions, in a world carried by a matrix."""
+    path = np.array([[0.02, 0.013], [-0.03, 0.02], [0.02, -0.03]]) @ carry.T
+    scene = replace(scene, numerics=Numerics.preset("fast"))
+    env = SymmetryReduction(SeastarSwimEnv(path, "pairs", scene=scene, randomization=randomization, **arguments))
+    seen, rewards = [env.reset(seed=0)[0]], []
+    for action in actions:
+        observation, reward, *_ = env.step(action)
+        seen.append(observation)
+        rewards.append(reward)
+    return np.array(rewards), np.array(seen)

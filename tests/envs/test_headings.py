@@ -1,13 +1,10 @@
 """Headings at waypoints: asked, met, seen, rewarded, carried by symmetry, drawn and refused."""
 
-import copy
 import math
-import pickle
 
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode
 
 from episodes import both, swim_together
@@ -20,8 +17,7 @@ from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.stations import body_heading
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.gaits import turning_wave
-from seastar_gym.scene.numerics import Numerics
-from symmetries import symmetry_for
+from symmetries import matrix, reduced_swim, symmetry_for
 
 ID = "SeastarSwimHeading-v0"
 AT = Layout(5, 2, HEADINGS)
@@ -160,16 +156,6 @@ def test_the_batch_has_the_bits_of_single_environments(mode, asked):
     swim_together(*both(ID, 3, mode, **arguments), 7)
 
 
-@pytest.mark.parametrize("asked", ["along", "random", 0.1, (1 / 3, 0.1, -2.0)])
-def test_it_comes_back_from_its_spec_and_from_a_pickle(asked):
-    env = gym.make(ID, fidelity="fast", path=CORNERS, headings=Headings(asked, 1 / 3))
-    again = gym.make(EnvSpec.from_json(env.spec.to_json()))
-    assert again.unwrapped.headings == env.unwrapped.headings == Headings(asked, 1 / 3)
-    first, _ = env.reset(seed=3)
-    for other in (again, pickle.loads(pickle.dumps(env)), copy.deepcopy(env)):
-        np.testing.assert_array_equal(other.reset(seed=3)[0], first)
-
-
 def test_numbers_stay_finite():
     env = gym.make(ID, fidelity="fast", headings=Headings("random"), path="random")
     env.reset(seed=0)
@@ -183,33 +169,19 @@ def test_numbers_stay_finite():
 # Symmetry
 
 
-def matrix(element):
-    k, c, s = (element + 1) // 2, *(f(2 * np.pi * ((element + 1) // 2) / 5) for f in (np.cos, np.sin))
-    return (np.diag([1.0, -1.0]) if element % 2 else np.eye(2)) @ [[c, s], [-s, c]] if k else np.eye(2)
-
-
 def test_a_carried_robot_is_asked_for_the_carried_turns():
     """The same reduced actions see and earn the same in a world that is turned or mirrored."""
-    path, asked = np.array([[0.02, 0.013], [-0.03, 0.02], [0.02, -0.03]]), np.array([0.1, -1.0, 3.0])
-    scene = Scene(Seastar(5, 4), actuator=SmaWires(), numerics=Numerics.preset("fast"))
-    actions = np.random.default_rng(0).integers(0, 21, 6)
+    scene, actions = Scene(Seastar(5, 4), actuator=SmaWires()), np.random.default_rng(0).integers(0, 21, 6)
 
     def swum(element):
-        sign = -1.0 if element % 2 else 1.0
-        env = SymmetryReduction(SeastarSwimEnv(
-            path @ matrix(element).T, "pairs", scene=scene, decision_period=0.5, headings=Headings(tuple(sign * asked)),
-        ))  # fmt: skip
-        seen, rewards = [env.reset(seed=0)[0]], []
-        for action in actions:
-            observation, reward, *_ = env.step(action)
-            seen.append(observation)
-            rewards.append(reward)
-        return np.array(seen), np.array(rewards)
+        asked = np.array([0.1, -1.0, 3.0]) * (-1.0 if element % 2 else 1.0)
+        more = {"decision_period": 0.5, "headings": Headings(tuple(asked))}
+        return reduced_swim(scene, None, matrix(element, 5), actions, **more)
 
-    seen, rewards = swum(0)
+    rewards, seen = swum(0)
     assert np.ptp(seen[:, AT.headings], axis=0).min() > 1e-3
     for element in range(1, 10):
-        its_seen, its_rewards = swum(element)
+        its_rewards, its_seen = swum(element)
         np.testing.assert_allclose(its_seen, seen, rtol=0.0, atol=2e-5)
         np.testing.assert_allclose(its_rewards, rewards, rtol=0.0, atol=1e-6)
 

@@ -45,6 +45,7 @@ ARGUMENTS = {
     "decisions": {"decision_period": 0.2, "observe_actuators": False, "fidelity": "fast"},
     "continuous": {"actions": "continuous", "decision_period": np.float64(0.3), "fidelity": "fast"},
     "headings": {"headings": Headings((0.1, 1 / 3, 0.0, 1.0, 2.0)), "fidelity": "fast"},
+    "one heading": {"headings": Headings(0.1, 1 / 3), "fidelity": "fast"},
     "plain": {
         "headings": to_dict(Headings("random")),
         "scene": SCENE.to_dict(),

@@ -43,7 +43,7 @@ from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.actuators.actuator import mirrored
-from symmetries import symmetry_for
+from symmetries import elements_of, matrix, reduced_swim, symmetry_for, turns_and_axis
 
 N_LIMBS = (3, 4, 5, 7, 8)
 MODES = ("limbs", "joint", "pairs", "continuous")
@@ -52,14 +52,6 @@ ROUNDING = 2e-6  # of float32 observations of order one
 
 def observations_of(n_limbs, n=50, dtype=np.float64, seed=0):
     return np.random.default_rng(seed).normal(size=(n, Layout(n_limbs).size)).astype(dtype)
-
-
-def matrix(element, n_limbs):
-    """Of an element, from its definition."""
-    k = (element + 1) // 2
-    c, s = np.cos(2 * np.pi * k / n_limbs), np.sin(2 * np.pi * k / n_limbs)
-    turn = np.array([[c, s], [-s, c]])
-    return turn if element % 2 == 0 else np.diag([1.0, -1.0]) @ turn
 
 
 def random_actions(mode, n_limbs, n, seed=1):
@@ -77,32 +69,41 @@ def direction(observations):
 
 # The group
 
+FAST = Numerics.preset("fast")
+STAR = Seastar(4, 4)
+WIDE = tuple(Attachment(x, y, math.atan2(y, 0.3 * x)) for x, y in ((0.03, -0.015), (0.03, 0.015), (-0.03, 0.015),
+                                                                   (-0.03, -0.015)))  # fmt: skip
+SWIRL = tuple(Attachment(0.02 * math.cos(a), 0.02 * math.sin(a), a + 0.5) for a in np.arange(4) * math.pi / 2.0)
+LESSER = {
+    "all bent": (Scene(replace(STAR, limbs=(Limb(natural_curvature=9.0),) * 4)), 4, None),
+    "one longer": (Scene(replace(STAR, limbs=(Limb(), Limb(length=0.07), Limb(), Limb()))), 1, 0.5 * math.pi),
+    "two bent": (Scene(replace(STAR, limbs=(Limb(natural_curvature=9.0), Limb(natural_curvature=-9.0)) * 2)), 2,
+                 0.25 * math.pi),
+    "rectangle": (Scene(replace(STAR, body=Body.rectangle(0.06, 0.03, attachments=WIDE))), 2, 0.0),
+    "swirl": (Scene(replace(STAR, body=Body(radius=0.02, attachments=SWIRL))), 4, None),
+    "lopsided": (Scene(replace(STAR, body=Body(radius=0.02, centre_of_mass=(4e-3, 0.0)))), 1, 0.0),
+    "plate in water": (Scene(replace(STAR, body=Body.rectangle(0.04, 0.04, drag_along=0.3))), 2, 0.0),
+}  # fmt: skip
+"""Scene, its number of turns, and the direction of its mirror's line."""
+GROUPS = LESSER | {f"{n} limbs": (Scene(Seastar(n, 4)), n, 0.0) for n in N_LIMBS}
 
-@pytest.mark.parametrize("n_limbs", N_LIMBS)
-def test_elements_multiply_as_their_matrices(n_limbs):
-    for first in range(2 * n_limbs):
-        for second in range(2 * n_limbs):
-            product = symmetry.compose(second, first, n_limbs)
-            np.testing.assert_allclose(
-                matrix(product, n_limbs), matrix(second, n_limbs) @ matrix(first, n_limbs), atol=1e-12
-            )
 
-
-@pytest.mark.parametrize("n_limbs", N_LIMBS)
-def test_inverse_undoes(n_limbs):
-    elements = np.arange(2 * n_limbs)
-    undone = symmetry.inverse(elements, n_limbs)
-    np.testing.assert_array_equal(symmetry.compose(undone, elements, n_limbs), 0)
-    np.testing.assert_array_equal(symmetry.compose(elements, undone, n_limbs), 0)
-
-
-@pytest.mark.parametrize("n_limbs", N_LIMBS)
-def test_limbs_go_where_the_rest_shape_goes(n_limbs):
-    """Carrying every node of the rest shape by the matrix gives the rest shape with its limbs in `limb_order`."""
-    tips = Seastar(n_limbs=n_limbs, nodes_per_limb=2).nodes()[1:]
-    for element in range(2 * n_limbs):
-        carried = tips @ matrix(element, n_limbs).T
-        np.testing.assert_allclose(carried[symmetry.limb_order(n_limbs)[element]], tips, atol=1e-15)
+@pytest.mark.parametrize("name", GROUPS)
+def test_the_group_is_found_from_limbs_body_and_attachments(name):
+    """Its elements carry the rest shape onto itself with its limbs in their order, and multiply as their matrices."""
+    scene, n_turns, axis = GROUPS[name]
+    group = symmetry.symmetry_of(scene)
+    assert (n_turns, axis) == pytest.approx(turns_and_axis(group), abs=1e-12)
+    nodes, elements = scene.robot.nodes()[1:].reshape(scene.robot.n_limbs, -1, 2), elements_of(group)
+    undone = symmetry.inverse(elements, group)
+    np.testing.assert_array_equal(symmetry.compose(undone, elements, group), 0)
+    np.testing.assert_array_equal(symmetry.compose(elements, undone, group), 0)
+    for element in elements:
+        carried = nodes @ matrix(element, group).T
+        np.testing.assert_allclose(carried[symmetry.limb_order(group)[element]], nodes, atol=1e-15)
+        for other in elements:
+            product = matrix(symmetry.compose(other, element, group), group)
+            np.testing.assert_allclose(product, matrix(other, group) @ matrix(element, group), atol=1e-12)
 
 
 def test_old_names_do_the_same_for_one_release():
@@ -125,46 +126,37 @@ def test_what_does_not_fit_together_is_no_symmetry(group, mirror, at):
 # Observations
 
 
-@pytest.mark.parametrize("n_limbs", N_LIMBS)
-def test_every_vector_is_carried_by_the_matrix_and_moves_with_its_limb(n_limbs):
-    observations = observations_of(n_limbs, n=2 * n_limbs)
-    carried = symmetry_for(n_limbs).carry(observations, np.arange(2 * n_limbs))
-    for element in range(2 * n_limbs):
-        before, after = (one[element].reshape(-1, 2) for one in (observations, carried))
-        expected = before @ matrix(element, n_limbs).T
+@pytest.mark.parametrize("name", GROUPS)
+def test_every_vector_is_carried_by_the_matrix_and_moves_with_its_limb(name):
+    scene = GROUPS[name][0]
+    group, n_limbs = symmetry.symmetry_of(scene), scene.robot.n_limbs
+    elements, order = elements_of(group), symmetry.limb_order(group)
+    observations = observations_of(n_limbs, n=len(elements))
+    carried = symmetry_for(group).carry(observations, elements)
+    for element, before, after in zip(elements, observations, carried, strict=True):
+        before, after = before.reshape(-1, 2), after.reshape(-1, 2)
+        expected = before @ matrix(element, group).T
         n_stations = (len(expected) - 3) // 2
-        order = symmetry.limb_order(n_limbs)[element]
         for block in (slice(0, n_stations), slice(n_stations, 2 * n_stations)):
             limbs = expected[block].reshape(n_limbs, -1, 2)
-            np.testing.assert_allclose(after[block].reshape(n_limbs, -1, 2), limbs[order], atol=1e-14)
+            np.testing.assert_allclose(after[block].reshape(n_limbs, -1, 2), limbs[order[element]], atol=1e-14)
         np.testing.assert_allclose(after[2 * n_stations :], expected[2 * n_stations :], atol=1e-14)
 
 
-@pytest.mark.parametrize("n_limbs", N_LIMBS)
-@pytest.mark.parametrize("dtype, atol", [(np.float64, 1e-13), (np.float32, ROUNDING)])
-def test_reduced_waypoints_lie_in_sector_zero(n_limbs, dtype, atol):
-    reduced, elements = symmetry_for(n_limbs).reduce(observations_of(n_limbs, 500, dtype=dtype))
-    assert reduced.dtype == dtype
-    assert set(elements) == set(range(2 * n_limbs))
-    assert direction(reduced).min() >= -atol
-    assert direction(reduced).max() <= np.pi / n_limbs + atol
-
-
-@pytest.mark.parametrize("n_limbs", N_LIMBS)
-def test_reduced_observations_are_restored_by_the_inverse(n_limbs):
-    observations = observations_of(n_limbs)
-    reduced, elements = symmetry_for(n_limbs).reduce(observations)
-    restored = symmetry_for(n_limbs).carry(reduced, symmetry.inverse(elements, n_limbs))
-    np.testing.assert_allclose(restored, observations, atol=1e-14)
-
-
-@pytest.mark.parametrize("n_limbs", N_LIMBS)
-def test_reduction_does_not_tell_carried_robots_apart(n_limbs):
-    observations = observations_of(n_limbs)
-    reduced, _ = symmetry_for(n_limbs).reduce(observations)
-    for element in range(2 * n_limbs):
-        carried = symmetry_for(n_limbs).carry(observations, element * np.ones(len(observations), int))
-        np.testing.assert_allclose(symmetry_for(n_limbs).reduce(carried)[0], reduced, atol=1e-13)
+@pytest.mark.parametrize("name", GROUPS)
+@pytest.mark.parametrize("dtype, atol", [(np.float64, 1e-12), (np.float32, ROUNDING)])
+def test_reduced_waypoints_lie_in_sector_zero_and_carried_robots_are_not_told_apart(name, dtype, atol):
+    scene, n_turns, axis = GROUPS[name]
+    group, observations = symmetry.symmetry_of(scene), observations_of(scene.robot.n_limbs, 500, dtype)
+    reduced, elements = symmetry_for(group).reduce(observations)
+    assert reduced.dtype == dtype and set(elements) == set(elements_of(group))
+    width = (2.0 if axis is None else 1.0) * np.pi / n_turns
+    assert ((direction(reduced) - (axis or 0.0) + atol) % (2.0 * np.pi)).max() <= width + 2.0 * atol
+    restored = symmetry_for(group).carry(reduced, symmetry.inverse(elements, group))
+    np.testing.assert_allclose(restored, observations, atol=1e-14 if dtype is np.float64 else ROUNDING)
+    for element in elements_of(group) if dtype is np.float64 else ():
+        carried = symmetry_for(group).carry(observations, np.full(500, element))
+        np.testing.assert_allclose(symmetry_for(group).reduce(carried)[0], reduced, atol=1e-12)
 
 
 def test_element_zero_changes_no_bit_and_shares_no_memory():
@@ -259,11 +251,13 @@ def test_action_maps_are_a_group_action(mode, n_limbs):
             np.testing.assert_array_equal(carry(carry(actions, first), second), at_once)
 
 
+@pytest.mark.parametrize("group", [5, *(symmetry.symmetry_of(scene) for scene, *_ in LESSER.values())], ids=str)
 @pytest.mark.parametrize("mode", MODES)
-def test_restored_actions_are_those_before_the_reduction(mode):
-    actions, elements = random_actions(mode, 5, 100), np.random.default_rng(3).integers(0, 10, 100)
-    reduced = symmetry_for(5, mode=mode).carry_actions(actions, elements)
-    np.testing.assert_array_equal(symmetry_for(5, mode=mode).restore(reduced, elements), actions)
+def test_restored_actions_are_those_before_the_reduction(mode, group):
+    actions = random_actions(mode, 5 if group == 5 else 4, 100)
+    elements = np.random.default_rng(3).choice(elements_of(group), 100)
+    reduced = symmetry_for(group, mode=mode).carry_actions(actions, elements)
+    np.testing.assert_array_equal(symmetry_for(group, mode=mode).restore(reduced, elements), actions)
 
 
 @pytest.mark.parametrize("action", [-1, 243, 0.5])
@@ -482,8 +476,6 @@ def test_the_wrapper_of_a_batch_refuses_actions_of_another_number_of_robots(mode
 
 # Which scenes are symmetric
 
-FAST = Numerics.preset("fast")
-STAR = Seastar(4, 4)
 TAPERED = replace(STAR, limbs=(Limb(length=0.09, radius=(2e-3, 1e-3)),) * 4)
 EVERYTHING = Scene(
     replace(STAR, relaxation_time=1e-3),
@@ -525,32 +517,26 @@ ASYMMETRIC = {
 """Scene, draws, and words of the refusal."""
 
 
-def reduced_swim(scene, randomization, element, actions):
-    """Rewards and reduced observations of the same reduced actions, in a world carried by the element."""
-    n_limbs = scene.robot.n_limbs
-    path = np.array([[0.02, 0.013], [-0.03, 0.02], [0.02, -0.03]]) @ matrix(element, n_limbs).T
-    scene = replace(scene, numerics=FAST)
-    env = SymmetryReduction(SeastarSwimEnv(path, "pairs", scene=scene, randomization=randomization))
-    seen, rewards = [env.reset(seed=0)[0]], []
-    for action in actions:
-        observation, reward, *_ = env.step(action)
-        seen.append(observation)
-        rewards.append(reward)
-    return np.array(rewards), np.array(seen)
-
-
 def pairs_for(scene, n):
     return random_actions("pairs", scene.robot.n_limbs, n)
 
 
-@pytest.mark.parametrize("name, draws", [*((name, None) for name in SYMMETRIC), ("five limbs", DRAWS)])
-def test_in_every_accepted_scene_the_world_may_be_turned_and_mirrored(name, draws):
+@pytest.mark.parametrize(
+    "scene, draws, n",
+    [
+        *(pytest.param(scene, None, 5, id=name) for name, scene in SYMMETRIC.items()),
+        pytest.param(SYMMETRIC["five limbs"], DRAWS, 5, id="draws"),
+        *(pytest.param(LESSER[name][0], None, 4, id=name) for name in ("all bent", "one longer")),
+        *(pytest.param(LESSER[name][0], None, 4, id=name, marks=pytest.mark.slow) for name in ("rectangle", "swirl")),
+    ],
+)
+def test_in_every_accepted_scene_the_world_may_be_turned_and_mirrored(scene, draws, n):
     """The same reduced actions then earn the same rewards."""
-    scene, actions = SYMMETRIC[name], pairs_for(SYMMETRIC[name], 5)
-    rewards, seen = reduced_swim(scene, draws, 0, actions)
-    assert name == "held hub" or np.ptp(rewards) > 0.01
-    for element in range(1, 2 * scene.robot.n_limbs):
-        its_rewards, its_seen = reduced_swim(scene, draws, element, actions)
+    group, actions = symmetry.symmetry_of(scene), pairs_for(scene, n)
+    rewards, seen = reduced_swim(scene, draws, np.eye(2), actions)
+    assert scene.held_nodes or np.ptp(rewards) > 0.01
+    for element in elements_of(group)[1:]:
+        its_rewards, its_seen = reduced_swim(scene, draws, matrix(element, group), actions)
         np.testing.assert_allclose(its_rewards, rewards, rtol=0.0, atol=1e-6)
         np.testing.assert_allclose(its_seen, seen, rtol=0.0, atol=2e-5)
 
@@ -571,103 +557,8 @@ def test_a_refusal_has_its_reason_in_the_swim(name, monkeypatch):
     scene, randomization, _ = ASYMMETRIC[name]
     actions = pairs_for(scene, 5)
     monkeypatch.setattr(symmetry.wrappers, "require_symmetry", lambda *_: None)
-    swims = [reduced_swim(scene, randomization, element, actions)[0] for element in range(8)]
+    swims = [reduced_swim(scene, randomization, matrix(element, 4), actions)[0] for element in range(8)]
     assert np.ptp(swims, axis=0).max() > 1e-3
-
-
-# Lesser groups
-
-WIDE = tuple(Attachment(x, y, math.atan2(y, 0.3 * x)) for x, y in ((0.03, -0.015), (0.03, 0.015), (-0.03, 0.015),
-                                                                   (-0.03, -0.015)))  # fmt: skip
-SWIRL = tuple(Attachment(0.02 * math.cos(a), 0.02 * math.sin(a), a + 0.5) for a in np.arange(4) * math.pi / 2.0)
-LESSER = {
-    "all bent": (Scene(replace(STAR, limbs=(Limb(natural_curvature=9.0),) * 4)), 4, None),
-    "one longer": (Scene(replace(STAR, limbs=(Limb(), Limb(length=0.07), Limb(), Limb()))), 1, 0.5 * math.pi),
-    "two bent": (Scene(replace(STAR, limbs=(Limb(natural_curvature=9.0), Limb(natural_curvature=-9.0)) * 2)), 2,
-                 0.25 * math.pi),
-    "rectangle": (Scene(replace(STAR, body=Body.rectangle(0.06, 0.03, attachments=WIDE))), 2, 0.0),
-    "swirl": (Scene(replace(STAR, body=Body(radius=0.02, attachments=SWIRL))), 4, None),
-    "lopsided": (Scene(replace(STAR, body=Body(radius=0.02, centre_of_mass=(4e-3, 0.0)))), 1, 0.0),
-    "plate in water": (Scene(replace(STAR, body=Body.rectangle(0.04, 0.04, drag_along=0.3))), 2, 0.0),
-}  # fmt: skip
-"""Scene, its number of turns, and the direction of its mirror's line."""
-
-
-def matrix_in(group, element):
-    """Of an element of a group, from its definition."""
-    k = (element + 1) // 2
-    c, s = np.cos(2 * np.pi * k / group.n_turns), np.sin(2 * np.pi * k / group.n_turns)
-    turn = np.array([[c, s], [-s, c]])
-    if element % 2 == 0:
-        return turn
-    c, s = np.cos(2 * group.axis), np.sin(2 * group.axis)
-    return np.array([[c, s], [s, -c]]) @ turn
-
-
-def elements_of(group):
-    return range(0, 2 * group.n_turns, 2 if group.axis is None else 1)
-
-
-@pytest.mark.parametrize("name", LESSER)
-def test_the_group_is_found_from_limbs_body_and_attachments(name):
-    """Its elements carry the rest shape onto itself with its limbs in their order, and multiply as their matrices."""
-    scene, n_turns, axis = LESSER[name]
-    group = symmetry.symmetry_of(scene)
-    assert group.n_turns == n_turns and group.axis == (None if axis is None else pytest.approx(axis, abs=1e-12))
-    nodes = scene.robot.nodes()[1:].reshape(4, -1, 2)
-    for element in elements_of(group):
-        carried = nodes @ matrix_in(group, element).T
-        np.testing.assert_allclose(carried[symmetry.limb_order(group)[element]], nodes, atol=1e-12)
-        assert symmetry.compose(element, symmetry.inverse(element, group), group) == 0
-        for other in elements_of(group):
-            product = matrix_in(group, symmetry.compose(other, element, group))
-            np.testing.assert_allclose(product, matrix_in(group, other) @ matrix_in(group, element), atol=1e-12)
-
-
-@pytest.mark.parametrize("name", LESSER)
-def test_lesser_groups_bring_waypoints_into_their_sector_and_do_not_tell_carried_robots_apart(name):
-    group, observations = symmetry.symmetry_of(LESSER[name][0]), observations_of(4, 300)
-    reduced, elements = symmetry_for(group).reduce(observations)
-    assert set(elements) == set(elements_of(group))
-    width = (2.0 if group.axis is None else 1.0) * np.pi / group.n_turns
-    assert ((direction(reduced) - (group.axis or 0.0)) % (2.0 * np.pi)).max() <= width + 1e-12
-    for element in elements_of(group):
-        carried = symmetry_for(group).carry(observations, np.full(300, element))
-        tips, its_tips = (one[:, :72].reshape(300, 4, 9, 2)[:, :, -1] for one in (observations, carried))
-        order = symmetry.limb_order(group)[element]
-        np.testing.assert_allclose(its_tips, (tips @ matrix_in(group, element).T)[:, order], atol=1e-12)
-        np.testing.assert_allclose(symmetry_for(group).reduce(carried)[0], reduced, atol=1e-12)
-    for mode in MODES:
-        actions = random_actions(mode, 4, 300)
-        carried = symmetry_for(group, mode=mode).carry_actions(actions, elements)
-        back = symmetry_for(group, mode=mode).restore(carried, elements)
-        np.testing.assert_array_equal(back, actions)
-
-
-@pytest.mark.parametrize(
-    "name", ["all bent", "one longer", *(pytest.param(name, marks=pytest.mark.slow) for name in ("rectangle", "swirl"))]
-)
-def test_a_lesser_group_leaves_the_swim_as_it_is(name):
-    """The same reduced actions earn the same in a world that is turned and mirrored by an element."""
-    scene, actions = LESSER[name][0], pairs_for(LESSER[name][0], 4)
-    group, path = symmetry.symmetry_of(scene), np.array([[0.02, 0.013], [-0.03, 0.02], [0.02, -0.03]])
-
-    def swim_in(element):
-        env = SeastarSwimEnv(path @ matrix_in(group, element).T, "pairs", scene=replace(scene, numerics=FAST))
-        env = SymmetryReduction(env)
-        seen, rewards = [env.reset(seed=0)[0]], []
-        for action in actions:
-            observation, reward, *_ = env.step(action)
-            seen.append(observation)
-            rewards.append(reward)
-        return np.array(rewards), np.array(seen)
-
-    rewards, seen = swim_in(0)
-    assert np.ptp(rewards) > 0.01
-    for element in elements_of(group)[1:]:
-        its_rewards, its_seen = swim_in(element)
-        np.testing.assert_allclose(its_rewards, rewards, rtol=0.0, atol=1e-6)
-        np.testing.assert_allclose(its_seen, seen, rtol=0.0, atol=2e-5)
 
 
 def test_an_ellipse_of_fluid_leaves_a_polygon_what_suits_its_axes():

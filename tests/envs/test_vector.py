@@ -9,7 +9,7 @@ import pytest
 from gymnasium.utils.env_match import check_environments_match
 from gymnasium.vector import AutoresetMode
 
-from episodes import assert_same_infos, assert_same_steps, both, break_robot, swim_together
+from episodes import assert_same_infos, assert_same_steps, both, break_robot
 from refusals import assert_refused
 from seastar_gym import DomainRandomization, Numerics, RewardWeights, Scene, Seastar, SolverStatus, Uniform
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
@@ -79,11 +79,6 @@ def test_a_batch_without_autoreset_gives_the_bits_of_single_environments():
         found = batch.step(actions)
         assert_same_steps(found, singles.step(actions))
         over = found[2] | found[3]
-
-
-@pytest.mark.parametrize("actions", ["joint", "pairs"])
-def test_table_actions_give_the_bits_of_single_environments(actions):
-    swim_together(*both(ID, 4, actions=actions, max_episode_steps=3), 5)
 
 
 def test_gymnasiums_comparison_of_environments_passes():
@@ -226,20 +221,6 @@ def test_a_reset_of_some_robots_leaves_the_others_alone():
 # Infos
 
 
-@pytest.mark.parametrize("autoreset_mode", [NEXT_STEP, SAME_STEP])
-def test_masks_say_which_infos_count_as_those_of_single_environments_do(autoreset_mode):
-    batch, singles = both(ID, 3, autoreset_mode, path=SHORT_PATH, waypoint_radius=0.003)
-    rng = np.random.default_rng(0)
-    batch.reset(seed=0)
-    singles.reset(seed=0)
-    for _ in range(10):
-        actions = np.where(rng.random((3, 1)) < 0.5, [0, 1, 0, 0, 2], 0)
-        found, expected = batch.step(actions)[4], singles.step(actions)[4]
-        for name, mask in expected.items():
-            if name.startswith("_"):
-                np.testing.assert_array_equal(found[name], mask, err_msg=name)
-
-
 @pytest.mark.parametrize("autoreset_mode", [NEXT_STEP, SAME_STEP, DISABLED])
 def test_infos_have_the_same_names_types_and_shapes_always(autoreset_mode):
     """On a reset of all robots and of some, on steps, over the ends of episodes, and where the solver gives up."""
@@ -268,14 +249,6 @@ def test_every_robot_has_its_own_promise():
     batch.simulator.set_limb_strengths([[1.0] * 5, [0.5] * 5, [1.0] * 5])
     info = batch.step(np.ones((3, 5), int))[4]
     assert np.isnan(info["path_error"]).tolist() == [False, True, False]
-
-
-def test_a_robots_smallest_opening_angle_does_not_depend_on_its_neighbours():
-    batch, singles = both(ID, N_LANES)
-    batch.reset(seed=0)
-    singles.reset(seed=0)
-    actions = np.random.default_rng(0).integers(0, 3, (N_LANES, 5))
-    assert_same_infos(batch.step(actions)[4], singles.step(actions)[4])
 
 
 # What a vector environment of Gymnasium offers
@@ -432,8 +405,16 @@ def test_the_first_reset_is_of_all_robots():
 @pytest.mark.parametrize(
     "actions",
     [
-        np.zeros((3, 5)), np.full((3, 5), np.nan), np.zeros((2, 5), int), np.zeros(5, int), np.full((3, 5), 3), None,
-        [[0, 1], [0]], [[10**400] * 5] * 3, np.zeros((3, 5), bool), "up",
+        np.zeros((3, 5)),
+        np.full((3, 5), np.nan),
+        np.zeros((2, 5), int),
+        np.zeros(5, int),
+        np.full((3, 5), 3),
+        None,
+        [[0, 1], [0]],
+        [[10**400] * 5] * 3,
+        np.zeros((3, 5), bool),
+        "up",
     ],
     ids=str,
 )
