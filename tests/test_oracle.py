@@ -244,8 +244,10 @@ def test_drag_force_and_its_jacobian_are_derivatives(star):
     assert not oracle.drag_jacobian(Star(), np.zeros_like(Star().rest)).any()
 
 
-def test_damping_has_its_slopes_where_nothing_hides_them():
-    star = with_all_terms(nodes_per_limb=4, **SOFT)
+@pytest.mark.parametrize(
+    "star", [with_all_terms(nodes_per_limb=4, **SOFT), *(Star(3, 3, hub_hinge=h, relaxation_time=4e-3) for h in HUBS)]
+)
+def test_damping_has_its_slopes_where_nothing_hides_them(star):
     q_hat = shaken(star, 1e-3)
     q = q_hat + 1e-3 * random_velocities(star)
     _, gradient, hessian = oracle.damping_potential(star, q, q_hat, 0.01)

@@ -9,7 +9,7 @@ import oracle
 from continuum_oracle import Continuum
 from currents import CURRENTS, velocity
 from oracle import Star
-from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, Water
+from seastar_gym import Scene, Seastar, SmaPulse, Water
 from seastar_gym.model.rods import make_rods
 from stages import RandomStages, random_shape, robot_and_star
 from test_oracle import assert_derivative
@@ -46,16 +46,6 @@ def test_potential_and_newton_direction_in_a_fluid_are_those_of_the_oracle(
     stages.assert_agree(stages.run(make_rods(Scene(robot, water, SmaPulse(0.1)))), 1e-11 if n_limbs > 3 else 1e-10)
 
 
-@pytest.mark.parametrize("hub_hinge", ["opening", "turning"])
-def test_the_oracles_damping_has_the_slopes_of_its_potential(hub_hinge):
-    star, rng = Star(3, 3, hub_hinge=hub_hinge, relaxation_time=TAU), np.random.default_rng(4)
-    q_hat = random_shape(star, 0.3, 0.02, rng)
-    q = q_hat + 1e-3 * rng.standard_normal(q_hat.shape)
-    _, gradient, hessian = oracle.damping_potential(star, q, q_hat, 0.01)
-    assert_derivative(lambda x: oracle.damping_potential(star, x, q_hat, 0.01)[0], gradient, q)
-    assert_derivative(lambda x: oracle.damping_potential(star, x, q_hat, 0.01)[1], hessian, q)
-
-
 @pytest.mark.parametrize("hub, current, along", OF_HUBS)
 def test_the_oracles_drag_in_a_fluid_is_the_slope_of_its_potential(hub, current, along):
     _, _, star = robot_water_and_star(hub, current, along, nodes_per_limb=3)
@@ -64,20 +54,3 @@ def test_the_oracles_drag_in_a_fluid_is_the_slope_of_its_potential(hub, current,
     force, jacobian = oracle.drag_force(star, v, frozen), oracle.drag_jacobian(star, v, frozen)
     assert_derivative(lambda x: -oracle.drag_potential(star, x, frozen), force, v, 1e-6, 1e-7)
     assert_derivative(lambda x: oracle.drag_force(star, x, frozen), jacobian.T, v, 1e-6, 1e-7)
-
-
-@pytest.mark.parametrize("hub, current, along", OF_HUBS)
-def test_a_step_in_a_fluid_is_the_oracles(hub, current, along):
-    h = 0.01
-    robot, water, star = robot_water_and_star(hub, current, along, nodes_per_limb=4)
-    numerics = Numerics("implicit-euler", h, newton_tolerance=1e-13)
-    simulator = Simulator(Scene(robot, water, SmaPulse(0.3, 2.0 * h, 2.0 * h), numerics))
-    rng = np.random.default_rng(3)
-    q, v = random_shape(star, 0.05, 1e-3, rng), 0.02 * rng.standard_normal((star.n_nodes, 2))
-    command = rng.uniform(-1.0, 1.0, 5)
-    simulator.set_state((q[None], v[None], np.zeros(1)))
-    stroke = simulator.stroke_in_parts(command[None], 4)
-    next(stroke)
-    q, v = oracle.step(star, q, v, 0.0, h, command, "implicit-euler", peak_angle=0.3, heating_time=0.02)
-    np.testing.assert_allclose(simulator.positions[0], q, rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(simulator.velocities[0], v, rtol=0.0, atol=1e-10)

@@ -6,7 +6,7 @@ import pytest
 import oracle
 from continuum_oracle import Continuum
 from hubs import HUBS, TEN
-from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, Water
+from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from stages import RandomStages, random_shape, robot_and_star, rods_of
@@ -151,39 +151,6 @@ def test_elastic_energy_within_a_stroke_is_that_of_the_present_actuation():
 # Steps
 
 TIGHT = 1e-13
-
-
-def short_stroke(scheme: str, robot: Seastar, fluid: bool, h: float) -> Scene:
-    """Two steps of heating and two of cooling."""
-    return Scene(
-        robot=robot,
-        fluid=Water() if fluid else None,
-        actuator=SmaPulse(peak_angle=0.3, heating_time=2.0 * h, cooling_time=2.0 * h),
-        numerics=Numerics(scheme, h, newton_tolerance=TIGHT),
-    )
-
-
-@pytest.mark.parametrize("scheme", oracle.TABLEAUS)
-@pytest.mark.parametrize(
-    "n_limbs, nodes_per_limb, hub, fluid",
-    [(5, 10, "opening", True), (5, 3, "turning", True), (4, 4, "opening", False), (3, 2, "opening", True)],
-)
-def test_four_steps_from_a_moving_bent_robot_are_those_of_the_oracle(scheme, n_limbs, nodes_per_limb, hub, fluid):
-    """With the rigid hub: tests/simulator/test_continuum_steps.py."""
-    h = 0.01
-    robot, star = robot_and_star(n_limbs, nodes_per_limb, hub, fluid)
-    simulator = Simulator(short_stroke(scheme, robot, fluid, h))
-    rng = np.random.default_rng(3)
-    q, v = random_shape(star, 0.05, 1e-3, rng), 0.02 * rng.standard_normal((star.n_nodes, 2))
-    commands = rng.uniform(-1.0, 1.0, n_limbs)
-    simulator.set_state((q[None], v[None], np.zeros(1)))
-    report = simulator.stroke(commands[None])
-    for k in range(4):
-        pulse = {"peak_angle": 0.3, "heating_time": 2.0 * h, "cooling_time": 2.0 * h}
-        q, v = oracle.step(star, q, v, k * h, h, commands, scheme, **pulse)
-    assert report.status[0] == 0 and report.halvings[0] == 0
-    np.testing.assert_allclose(simulator.positions[0], q, rtol=0.0, atol=1e-11 * robot.limb_length)
-    np.testing.assert_allclose(simulator.velocities[0], v, rtol=0.0, atol=1e-9 * np.abs(v).max())
 
 
 @pytest.mark.parametrize("hub", HUBS)

@@ -15,7 +15,9 @@ N = 3
 def batches():
     """Two equal batches, whose episodes end after two strokes."""
     made = [
-        gym.make_vec("SeastarSwim-v0", N, vectorization_mode="vector_entry_point", fidelity="fast", max_episode_steps=2)
+        gym.make_vec(
+            "SeastarSwim-v0", N, vectorization_mode="vector_entry_point", fidelity="fast", max_episode_steps=2
+        )
         for _ in range(2)
     ]
     for batch in made:

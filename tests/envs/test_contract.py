@@ -65,7 +65,9 @@ def test_the_memory_of_actuators_is_that_of_the_table(actuator, n):
     assert ("+, -" in row) == (n > 1)
     at = Layout.of(Scene(actuator=actuator))
     assert at.actuators == slice(182, 182 + 5 * n) and (n != 2 or f"has {at.size} numbers" in section("Observation"))
-    assert f"{Layout.of(Scene(actuator=SmaWires()), entries=HEADINGS).size} with headings" in section("Observation")
+    assert f"{Layout.of(Scene(actuator=SmaWires()), entries=HEADINGS).size} with headings" in section(
+        "Observation"
+    )
 
 
 def test_the_reward_has_the_terms_and_weights_of_the_table():

@@ -1,5 +1,7 @@
-"""Steps of the continuum's discretisation are those of its dense oracle, in every scene that it has terms for."""
+"""Steps are those of the dense oracles, in every scene that they have terms for."""
 
+from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,8 @@ from currents import CURRENTS, velocity
 from oracle import Array, Star
 from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 from seastar_gym.model.rods import make_rods
+from seastar_gym.scene.robot import HubHinge
+from stages import random_shape
 
 H, PEAK = 0.01, 0.3
 PULSE = {"peak_angle": PEAK, "heating_time": 2.0 * H, "cooling_time": 2.0 * H}
@@ -36,12 +40,20 @@ def shaped(
         curvatures=curvatures, **terms,
     )  # fmt: skip
     own = tuple(Limb(*limb, curvature) for limb, curvature in zip(limbs, curvatures, strict=True))
-    return Seastar(len(limbs), nodes_per_limb, limbs=own, discretisation="continuum"), star
+    return Seastar(len(limbs), nodes_per_limb, limbs=own, relaxation_time=terms.get("relaxation_time")), star
 
 
 def alike(n_limbs: int, nodes_per_limb: int, **terms: Any) -> tuple[Seastar, Star]:
     """A robot of equal limbs for the kernels and for the oracle."""
-    return Seastar(n_limbs, nodes_per_limb, discretisation="continuum"), Continuum(n_limbs, nodes_per_limb, **terms)
+    own = {name: terms[name] for name in ("relaxation_time",) if name in terms}
+    return Seastar(n_limbs, nodes_per_limb, **own), Continuum(n_limbs, nodes_per_limb, **terms)
+
+
+def hinged(hub: HubHinge, n_limbs: int, nodes_per_limb: int, **terms: Any) -> tuple[Seastar, Star]:
+    """A robot of the chapter's discretisation for the kernels and for the oracle."""
+    own = {name: terms[name] for name in ("relaxation_time",) if name in terms}
+    robot = Seastar(n_limbs, nodes_per_limb, hub_hinge=hub, discretisation="chapter", **own)
+    return robot, Star(n_limbs, nodes_per_limb, hub_hinge=hub, **terms)
 
 
 def make_scene(robot: Seastar, fluid: Water | None = Water(), scheme: str = "implicit-euler", **parts: Any) -> Scene:
@@ -54,7 +66,8 @@ def moving(star: Star, seed: int = 3) -> tuple[Array, Array, Array]:
     """Positions and velocities of a bent robot that moves, and its command; held nodes are at rest."""
     rng = np.random.default_rng(seed)
     free = star.free.reshape(-1, 2)
-    q = star.rest + 2e-5 * free * rng.standard_normal(star.rest.shape)
+    bent = star.rest if star.clamps else random_shape(star, 0.05, 1e-3, rng)
+    q = bent + 2e-5 * free * rng.standard_normal(star.rest.shape)
     return q, 0.02 * free * rng.standard_normal(q.shape), rng.uniform(-1.0, 1.0, star.n_limbs)
 
 
@@ -94,82 +107,66 @@ def test_rest_shape_and_coefficients_are_those_of_the_oracle(curvatures):
     np.testing.assert_allclose(hinges[:, 1:].ravel(), star.hinge_EI / star.hinge_dl, rtol=1e-13)
 
 
-# Steps of robots in water
+# Steps
 
-
-@pytest.mark.parametrize("scheme", oracle.TABLEAUS)
-def test_four_steps_of_the_plain_robot_are_those_of_the_oracle(scheme):
-    robot, star = alike(5, 10)
-    assert_steps_agree(make_scene(robot, scheme=scheme), star)
-
-
-@pytest.mark.parametrize("n_limbs, nodes_per_limb", [(1, 5), (2, 4), (3, 2), (5, 3), (12, 4)])
-def test_four_steps_with_other_numbers_of_limbs_and_nodes_are_those_of_the_oracle(n_limbs, nodes_per_limb):
-    robot, star = alike(n_limbs, nodes_per_limb)
-    assert_steps_agree(make_scene(robot, scheme="implicit-midpoint"), star)
-
-
-@pytest.mark.parametrize("fluid", [None, Water()])
-@pytest.mark.parametrize("n_limbs", [2, 4])
-def test_four_steps_of_unlike_limbs_are_those_of_the_oracle(n_limbs, fluid):
-    robot, star = shaped(UNLIKE[:n_limbs], 5, (0.0,) * n_limbs, drag_coefficient=1.0 if fluid else 0.0)
-    # The energy guard cuts what the implicit midpoint lets an undamped robot gain, and the oracle has no guard.
-    assert_steps_agree(make_scene(robot, fluid, "sdirk2"), star)
-
-
+CURVED = (2.0, -1.0, 3.0, -4.0)
 HELD = {"held_nodes": (0, 1, 2)}
 PULLED = {"loads": ((4, 2e-4, -1e-4), (7, 0.0, 3e-4)), "gravity": (1.0, -9.81)}
+EVERY = {**ACROSS, **MASS}
 
 
-@pytest.mark.parametrize("parts", [HELD, PULLED, HELD | PULLED], ids=["held", "pulled", "both"])
-def test_four_steps_of_a_robot_held_or_pulled_are_those_of_the_oracle(parts):
-    robot, star = alike(5, 4, fluid_density=900.0, **parts)
-    assert_steps_agree(make_scene(robot, Water(900.0), "implicit-midpoint", **parts), star)
+def flowing(current: str) -> dict[str, Any]:
+    """The oracle's current."""
+    return {"current": lambda places: velocity(current, places)}
 
 
-@pytest.mark.parametrize("scheme", ["implicit-euler", "implicit-midpoint"])
-@pytest.mark.parametrize("current", CURRENTS)
-def test_a_step_in_a_current_is_the_oracles(current, scheme):
-    robot, star = alike(5, 4, current=lambda places: velocity(current, places))
-    assert_steps_agree(make_scene(robot, Water(current=CURRENTS[current]), scheme), star, n_steps=1)
+def cases() -> Iterator[Any]:
+    """Robot and star, scheme, steps, and the fluid and other parts of the scene."""
+
+    def case(name: str, twins: tuple[Seastar, Star], scheme: str, n_steps: int = 4, **parts: Any) -> Any:
+        return pytest.param(twins, scheme, n_steps, parts, id=f"{name}-{scheme}")
+
+    for scheme in oracle.TABLEAUS:
+        yield case("plain", alike(5, 10), scheme)
+        for hub, *shape in (("opening", 5, 10), ("turning", 5, 3), ("opening", 3, 2)):
+            yield case(f"{hub}-{shape}", hinged(hub, *shape), scheme)
+        yield case("opening-vacuum", hinged("opening", 4, 4, drag_coefficient=0.0), scheme, fluid=None)
+    for shape in ((1, 5), (2, 4), (3, 2), (5, 3), (12, 4)):
+        yield case(f"{shape}", alike(*shape), "implicit-midpoint")
+    for n in (2, 4):
+        # The energy guard cuts what the implicit midpoint lets an undamped robot gain, and the oracle has no guard.
+        yield case(f"{n} unlike", shaped(UNLIKE[:n], 5, (0.0,) * n), "sdirk2")
+        yield case(f"{n} unlike-vacuum", shaped(UNLIKE[:n], 5, (0.0,) * n, drag_coefficient=0.0), "sdirk2", fluid=None)
+    for name, parts in {"held": HELD, "pulled": PULLED, "both": HELD | PULLED}.items():
+        twins = alike(5, 4, fluid_density=900.0, **parts)
+        yield case(name, twins, "implicit-midpoint", fluid=Water(900.0), **parts)
+    for scheme in ("implicit-euler", "implicit-midpoint"):
+        for n in (1, 4):
+            yield case(f"{n} curved", shaped(UNLIKE[:n], 5, CURVED[:n]), scheme)
+        for name, current in CURRENTS.items():
+            yield case(name, alike(5, 4, **flowing(name)), scheme, 1, fluid=Water(current=current))
+    for name, terms in {"drag": ACROSS, "mass": MASS, "drag and mass": EVERY}.items():
+        yield case(name, alike(5, 4, **terms), "implicit-euler", 1, fluid=Water(**terms))
+        yield case(f"{name}-unlike", shaped(UNLIKE, 4, (0.0,) * 4, **terms), "implicit-euler", 1, fluid=Water(**terms))
+    for scheme in ("implicit-euler", "sdirk2", "implicit-midpoint"):
+        for shape in ((1, 5), (2, 4), (5, 2), (5, 5)):
+            yield case(f"damped-{shape}", alike(*shape, relaxation_time=TAU), scheme)
+    for name, along in (("uniform", 0.0), ("shear", 0.02), ("vortex", 0.1), ("grid", 1.3)):
+        terms = {"drag_coefficient": 1.3, "tangential_drag_coefficient": along, **MASS}
+        fluid, more = Water(950.0, **terms, current=CURRENTS[name]), {"fluid_density": 950.0, "relaxation_time": TAU}
+        for make in (alike, partial(hinged, "opening")):
+            twins = make(5, 4, **terms, **more, **flowing(name))
+            yield case(f"every term-{name}-{type(twins[1]).__name__}", twins, "implicit-euler", 1, fluid=fluid)
+    for name in ("shear", "vortex"):
+        twins = shaped(UNLIKE, 5, CURVED, fluid_density=900.0, relaxation_time=TAU, **EVERY, **PULLED, **flowing(name))
+        fluid = Water(900.0, **EVERY, current=CURRENTS[name])
+        yield case(f"every term-{name}-unlike", twins, "implicit-euler", 1, fluid=fluid, **PULLED)
 
 
-# Steps with the terms that a robot and its fluid may have
-
-
-@pytest.mark.parametrize("scheme", ["implicit-euler", "implicit-midpoint"])
-@pytest.mark.parametrize("n_limbs", [1, 4])
-def test_four_steps_of_curved_limbs_are_those_of_the_oracle(n_limbs, scheme):
-    robot, star = shaped(UNLIKE[:n_limbs], 5, (2.0, -1.0, 3.0, -4.0)[:n_limbs])
-    assert_steps_agree(make_scene(robot, scheme=scheme), star)
-
-
-@pytest.mark.parametrize("terms", [ACROSS, MASS, ACROSS | MASS], ids=["drag", "mass", "both"])
-@pytest.mark.parametrize("unlike", [False, True])
-def test_a_step_with_drag_and_mass_across_limbs_is_the_oracles(unlike, terms):
-    robot, star = shaped(UNLIKE, 4, (0.0,) * 4, **terms) if unlike else alike(5, 4, **terms)
-    assert_steps_agree(make_scene(robot, Water(**terms)), star, n_steps=1)
-
-
-@pytest.mark.parametrize("scheme", ["implicit-euler", "sdirk2", "implicit-midpoint"])
-@pytest.mark.parametrize("n_limbs, nodes_per_limb", [(1, 5), (2, 4), (5, 2), (5, 5)])
-def test_four_steps_with_damping_are_those_of_the_oracle(n_limbs, nodes_per_limb, scheme):
-    star = Continuum(n_limbs, nodes_per_limb, relaxation_time=TAU)
-    robot = Seastar(n_limbs, nodes_per_limb, relaxation_time=TAU, discretisation="continuum")
-    assert_steps_agree(make_scene(robot, scheme=scheme), star)
-
-
-@pytest.mark.parametrize("current", ["shear", "vortex"])
-def test_a_step_with_every_term_is_the_oracles(current):
-    limbs, curvatures, parts = UNLIKE, (2.0, -1.0, 3.0, -4.0), {"loads": PULLED["loads"], "gravity": (1.0, -9.81)}
-    fluid = {**ACROSS, **MASS}
-    _, star = shaped(
-        limbs, 5, curvatures, fluid_density=900.0, current=lambda places: velocity(current, places),
-        relaxation_time=TAU, **fluid, **parts,
-    )  # fmt: skip
-    own = tuple(Limb(*limb, curvature) for limb, curvature in zip(limbs, curvatures, strict=True))
-    robot = Seastar(4, 5, limbs=own, relaxation_time=TAU, discretisation="continuum")
-    assert_steps_agree(make_scene(robot, Water(900.0, **fluid, current=CURRENTS[current]), **parts), star, n_steps=1)
+@pytest.mark.parametrize("twins, scheme, n_steps, parts", [*cases()])
+def test_steps_are_those_of_the_oracle(twins, scheme, n_steps, parts):
+    robot, star = twins
+    assert_steps_agree(make_scene(robot, scheme=scheme, **parts), star, n_steps)
 
 
 def test_limbs_that_touch_push_each_other_as_the_oracle_says():
