@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from refusals import assert_refused
-from seastar_gym import Limited, MeasuredCurve, Numerics, Scene, Seastar, Simulator, SmaPulse, ThermalSma
+from seastar_gym import Limited, MeasuredCurve, Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires, ThermalSma
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import SymmetryReduction
 from seastar_gym.scene.actuators.actuator import Actuator, complete
@@ -166,30 +166,6 @@ def test_a_slow_limb_goes_on_from_where_the_last_stroke_left_it():
     assert not np.any([turn[1:] for turn in turns])
 
 
-def test_a_state_with_actuators_that_remember_continues_to_the_same_bits():
-    scene = Scene(actuator=SLOW, numerics=NUMERICS)
-    first, second = swim(scene), Simulator(scene, 3)
-    second.set_state(first.get_state())
-    third = pickle.loads(pickle.dumps(first))
-    assert second.elastic_energy().tobytes() == first.elastic_energy().tobytes() == third.elastic_energy().tobytes()
-    for simulator in (first, second, third):
-        simulator.stroke(COMMANDS[0])
-    assert first.positions.tobytes() == second.positions.tobytes() == third.positions.tobytes()
-    first.reset(np.array([True, False, False]))
-    assert not first.actuators[0].any() and first.actuators[1].any()
-
-
-def test_a_stroke_in_parts_gives_the_same_bits_and_the_state_in_between():
-    scene = Scene(actuator=SLOW, numerics=NUMERICS)
-    whole, parts = Simulator(scene, 3), Simulator(scene, 3)
-    for command in COMMANDS[:2]:
-        whole.stroke(command)
-        seen = [parts.actuators.copy() for _ in parts.stroke_in_parts(command, 7)]
-        assert (np.ptp(seen, axis=0)[command != 0.0] > 0.05).all()
-    assert whole.positions.tobytes() == parts.positions.tobytes()
-    assert whole.actuators.tobytes() == parts.actuators.tobytes()
-
-
 def test_a_stroke_left_half_way_is_forgotten():
     simulator = Simulator(Scene(actuator=SLOW, numerics=NUMERICS), 2)
     stroke = simulator.stroke_in_parts(np.ones((2, 5)), 4)
@@ -197,13 +173,6 @@ def test_a_stroke_left_half_way_is_forgotten():
     assert simulator.actuators.all()
     stroke.close()
     assert not simulator.actuators.any() and simulator.elastic_energy()[0] < 1e-20
-
-
-def test_what_a_robot_remembers_does_not_depend_on_its_neighbours():
-    scene = Scene(actuator=SLOW, numerics=NUMERICS)
-    commands = np.random.default_rng(1).integers(-1, 2, (3, 11, 5)).astype(float)
-    together, alone = swim(scene, commands), swim(scene, commands[:, 9:10])
-    assert together.positions[9].tobytes() == alone.positions[0].tobytes()
 
 
 def test_what_has_a_memory_is_not_limited():
@@ -358,6 +327,9 @@ def test_a_missing_file_of_a_curve_is_said_in_one_sentence(tmp_path):
         partial(ThermalSma, cooling_time=1e308),
         partial(SmaPulse, heating_time=5e-324),
         partial(SmaPulse, cooling_time=1e308),
+        partial(SmaWires, heating_time=5e-324),
+        partial(SmaWires, cooling_time=1e308),
+        partial(SmaWires, heating_time=1e-300, cooling_time=1e-300),
     ],
     ids=str,
 )

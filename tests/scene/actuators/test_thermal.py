@@ -104,14 +104,6 @@ def test_the_other_wire_turns_the_other_way_while_the_first_is_still_warm():
     assert turned[1] == pytest.approx(actuator.peak_angle * (after[2] - after[3])) and turned[1] < -0.3
 
 
-def test_every_robot_turns_as_its_own_wires_do():
-    each = ThermalSma(peak_angle=np.array([0.5, 0.6]), water_temperature=np.array([20.0, 21.0]))
-    alone = [ThermalSma(peak_angle=0.5), ThermalSma(peak_angle=0.6, water_temperature=21.0)]
-    t = np.array([[0.0, 0.05], [0.2, 1.0]])
-    np.testing.assert_array_equal(each.delta_psi(t), np.stack([one.delta_psi(t) for one in alone], axis=-1))
-    assert each.delta_psi(t)[1, 0].min() > 0.1 and ThermalSma().peak_angle == SmaPulse().peak_angle
-
-
 def test_robots_swim_and_cool_down_and_are_cold_after_a_reset():
     simulator = Simulator(SCENE, 2)
     for _ in range(2):
@@ -122,11 +114,7 @@ def test_robots_swim_and_cool_down_and_are_cold_after_a_reset():
     assert state.actuators[0, 1, 0] > 25.0 and state.actuators[0, 4, 1] > 25.0 and state.actuators[0, 1, 1] == 20.0
     assert state.actuators[0, 1, 0] > state.actuators[1, 1, 0] > 20.0  # half the pulse, less heat
     assert simulator.hub_position()[0, 0] > 5e-3
-    other = Simulator(SCENE, 2)
-    other.set_state(state)
-    for each in (simulator, other):
-        each.stroke(np.zeros((2, 5)))
-    assert simulator.positions.tobytes() == other.positions.tobytes()
+    simulator.stroke(np.zeros((2, 5)))
     simulator.reset(np.array([True, False]))
     np.testing.assert_array_equal(simulator.actuators[0], np.tile(ThermalSma().rest, (5, 1)))
     assert simulator.actuators[1, 1, 0] > 20.0
@@ -190,33 +178,6 @@ def test_a_limit_that_is_never_reached_changes_no_bit():
         rest = np.tile(one.rest, (4, 1))
         for seen, wanted in zip(other.respond(t, commands, rest), one.respond(t, commands, rest), strict=True):
             np.testing.assert_array_equal(seen, wanted)
-
-
-def test_every_robot_has_a_limit_of_its_own():
-    each = ThermalSma(largest_temperature=np.array([30.0, 50.0]))
-    _, state = each.respond(np.array([0.0, 0.02]), np.ones((2, 1)), np.broadcast_to(each.rest, (2, 1, 6)))
-    alone = ThermalSma(largest_temperature=30.0)
-    _, alone = alone.respond(np.array([0.0, 0.02]), np.ones(1), np.tile(alone.rest, (1, 1)))
-    np.testing.assert_array_equal(state[0], alone)
-    assert state[1, 0, 0] > state[0, 0, 0]
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_pieces_of_an_interval_are_the_whole(seed):
-    rng = np.random.default_rng(seed)
-    for actuator in (ThermalSma(), ThermalSma(largest_temperature=60.0)):
-        state = np.tile(actuator.rest, (5, 1))
-        for _ in range(3):
-            cuts, commands, start = np.sort(rng.uniform(0.0, 0.5, 4)), rng.uniform(-1.0, 1.0, 5), state
-            whole, after = actuator.respond(np.append(0.0, cuts), commands, start)
-            heated = 0.0
-            for k, t in enumerate(pairwise([0.0, *cuts])):
-                heated = heated + actuator.seconds_heated(np.array(t), commands, state)
-                turned, state = actuator.respond(np.array(t), commands, state)
-                np.testing.assert_allclose(turned[-1], whole[k + 1], atol=1e-12)
-            np.testing.assert_allclose(state, after, atol=1e-11)
-            expected = actuator.seconds_heated(np.append(0.0, cuts), commands, start)
-            np.testing.assert_allclose(heated, expected, atol=1e-12)
 
 
 @pytest.mark.parametrize(

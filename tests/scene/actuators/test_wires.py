@@ -1,13 +1,11 @@
-"""Two wires per limb: their linear heating and cooling, what they remember, and what a mirror makes of it."""
+"""Two wires per limb: their linear heating and cooling, and what they remember."""
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from refusals import assert_refused
 from seastar_gym import Limited, SmaPulse, SmaWires, ThermalSma
-from seastar_gym.scene.actuators.actuator import check_actuator, mirrored
+from seastar_gym.scene.actuators.actuator import check_actuator
 
 WIRES = SmaWires()
 PEAK = WIRES.peak_angle
@@ -25,13 +23,6 @@ def march(wires: SmaWires, given: list[tuple[float, float]], until: float, dt: f
         x = np.clip(x + dt * np.where(heated, 1.0 / wires.heating_time, -1.0 / wires.cooling_time), 0.0, 1.0)
         left = left - dt
     return x
-
-
-def respond_in_pieces(actuator, cuts, commands, state):
-    """State after pieces that end at the increasing times `cuts` since the commands were given."""
-    for begin, end in zip([0.0, *cuts], cuts, strict=False):
-        _, state = actuator.respond(np.array([begin, end]), commands, state)
-    return state
 
 
 @pytest.mark.parametrize("heating, cooling", [(0.1, 0.9), (1 / 7, 6 / 7), (0.3, 0.1)])
@@ -55,26 +46,6 @@ def test_wires_heat_and_cool_as_a_march_of_tiny_steps(seed):
         _, state = WIRES.respond(np.array([0.0, gap]), np.full((), c), state)
         t += gap
     np.testing.assert_allclose(state[:2], march(WIRES, given_at, t), atol=1e-9)
-
-
-@given(
-    st.lists(st.floats(1e-3, 1.2), min_size=1, max_size=6, unique=True),
-    st.floats(-1.0, 1.0),
-    st.tuples(*(st.floats(0.0, 1.0) for _ in range(2)), *(st.floats(0.0, 0.1) for _ in range(2))),
-)
-@pytest.mark.parametrize("deaf", [False, True])
-def test_pieces_are_the_whole(deaf, cuts, command, state):
-    wires, cuts, c, start = SmaWires(deaf=deaf), sorted(cuts), np.full((), command), np.array(state)
-    whole, after = wires.respond(np.array([0.0, *cuts]), c, start)
-    np.testing.assert_allclose(respond_in_pieces(wires, cuts, c, start), after, atol=SMALL)
-    heated, state, turned = 0.0, start, [whole[0]]
-    for begin, end in zip([0.0, *cuts], cuts, strict=False):
-        t = np.array([begin, end])
-        heated += wires.seconds_heated(t, c, state)
-        angles, state = wires.respond(t, c, state)
-        turned.append(angles[-1])
-    np.testing.assert_allclose(turned, whole, atol=SMALL)
-    np.testing.assert_allclose(heated, wires.seconds_heated(np.array([0.0, cuts[-1]]), c, start), atol=SMALL)
 
 
 def test_a_warm_wire_is_heated_on_and_stays_contracted_when_it_is_full():
@@ -106,30 +77,6 @@ def test_a_deaf_limb_ignores_commands_until_both_wires_are_cold():
     np.testing.assert_allclose(deaf.seconds_heated(np.array([0.0, 1.0]), commands, states), [0.0, 1e-3, 0.1])
     turned, _ = deaf.respond(np.array([0.0, 0.009]), commands, states)
     np.testing.assert_allclose(turned[1] / PEAK, [0.2 - 0.01, -0.01 + 0.008 / 0.9, -0.09], atol=SMALL)
-
-
-MIRRORED = {
-    "wires": WIRES,
-    "deaf": SmaWires(deaf=True),
-    "thermal": ThermalSma(),
-    "hot": ThermalSma(largest_temperature=50.0),
-    "limited": Limited(SmaPulse(), 0.5, 2.0),
-}
-
-
-@pytest.mark.parametrize("actuator", MIRRORED.values(), ids=MIRRORED)
-def test_a_mirrored_limb_turns_the_other_way(actuator):
-    rng, t = np.random.default_rng(0), np.array([0.0, 0.03, 0.1, 0.4])
-    state = np.broadcast_to(actuator.rest, (50, 5, len(actuator.rest)))
-    for begin in (0.0, 0.0, 0.4):
-        commands = rng.uniform(-1.0, 1.0, (50, 5))
-        seen = mirrored(actuator, state)
-        turned, state = actuator.respond(begin + t, commands, state)
-        other, after = actuator.respond(begin + t, -commands, seen)
-        np.testing.assert_array_equal(other, -turned)
-        np.testing.assert_array_equal(after, mirrored(actuator, state))
-        np.testing.assert_array_equal(actuator.observe(after), mirrored(actuator, actuator.observe(state)))
-        np.testing.assert_array_equal(mirrored(actuator, after), state)
 
 
 def test_heating_is_counted_in_seconds():
@@ -164,8 +111,3 @@ def test_corners_are_those_of_the_wire_whatever_the_period(period):
 def test_wires_that_cannot_be_are_refused(change):
     with assert_refused(next(iter(change))):
         SmaWires(**change)
-
-
-@pytest.mark.parametrize("heating, cooling", [(5e-324, 0.9), (0.1, 1e308), (1e-300, 1e-300)])
-def test_extreme_times_warn_of_nothing(heating, cooling):
-    assert np.isfinite(SmaWires(0.5, heating, cooling).delta_psi([0.0, 1e-3, 1e307])).all()
