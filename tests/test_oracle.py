@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 import oracle
 from continuum_oracle import Continuum, ContinuumShaped
 from oracle import Array, Star
+from unlike import DIFFERENT, robot_and_star
 
 HUBS = ("opening", "turning")
 STRAIGHT = (0.0, 1.0, 0.0, 0.0, -1.0)
@@ -216,22 +217,20 @@ def test_total_mass_and_added_mass_are_those_of_the_chapter():
 # Derivatives
 
 
-@pytest.mark.parametrize("soft", [{}, SOFT], ids=["stiff", "soft"])
-@pytest.mark.parametrize(
-    "star",
-    [
-        *(partial(Star, nodes_per_limb=6, hub_hinge=hinge) for hinge in HUBS),
-        partial(Continuum, 5, 4),
-        partial(unlike_limbs, 5),
-    ],
-    ids=[*HUBS, "continuum", "unlike"],
-)
-def test_elastic_gradient_and_hessian_are_derivatives(star, soft):
-    star = star(**soft)
-    q = shaken(star)
-    gradient, hessian = oracle.elastic_gradient(star, q, DELTA_PSI), oracle.elastic_hessian(star, q, DELTA_PSI)
-    assert_derivative(lambda x: oracle.elastic_energy(star, x, DELTA_PSI), gradient, q)
-    assert_derivative(lambda x: oracle.elastic_gradient(star, x, DELTA_PSI), hessian, q)
+ELASTIC = [
+    *(Star(nodes_per_limb=6, hub_hinge=hinge, **soft) for hinge in HUBS for soft in ({}, SOFT)),
+    *(Continuum(5, 4, **soft) for soft in ({}, SOFT)),
+    unlike_limbs(5),
+    *(robot_and_star(name, 3)[1] for name in DIFFERENT),
+]
+
+
+@pytest.mark.parametrize("star", ELASTIC)
+def test_elastic_gradient_and_hessian_are_derivatives(star):
+    q, delta_psi = shaken(star), DELTA_PSI[: star.n_limbs]
+    gradient, hessian = oracle.elastic_gradient(star, q, delta_psi), oracle.elastic_hessian(star, q, delta_psi)
+    assert_derivative(lambda x: oracle.elastic_energy(star, x, delta_psi), gradient, q)
+    assert_derivative(lambda x: oracle.elastic_gradient(star, x, delta_psi), hessian, q)
     np.testing.assert_allclose(hessian, hessian.T, rtol=0.0, atol=1e-12 * np.abs(hessian).max())
 
 

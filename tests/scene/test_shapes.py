@@ -4,54 +4,18 @@ import numpy as np
 import pytest
 
 import oracle
-from oracle import Shaped, Star
-from seastar_gym import Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, UniformCurrent, Water
+from oracle import Star
+from seastar_gym import Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import SymmetryReduction
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene.shape import rest_positions
 from studies.verification.frequencies import fitted_frequency
 from studies.verification.unactuated import let_pass, pause
+from unlike import DIFFERENT, robot_and_star
 
 CLAMP = (0, 1)
 """Held nodes: the limb is then clamped in the middle of its root edge, see studies/verification/unactuated.py."""
-
-DIFFERENT = {
-    "one limb": ([(0.0, 0.08, (2e-3, 1e-3), (1e6, 2e6), 5.0)], "opening"),
-    "two limbs at an angle": (
-        [(0.0, 0.1, (2e-3, 1e-3), (1e6, 1e6), 0.0), (2.0, 0.05, (1e-3, 1e-3), (2e6, 1e6), -6.0)],
-        "opening",
-    ),
-    "two limbs in line": (
-        [(0.0, 0.1, (2e-3, 1.6e-3), (1e6, 1e6), 0.0), (np.pi, 0.1, (1.6e-3, 1.6e-3), (1e6, 1e6), 3.0)],
-        "turning",
-    ),
-    "a gap wider than pi": (
-        [(angle, 0.1 + 0.02 * angle, (1.6e-3, 1e-3), (1e6, 1e6), 2.0 - angle) for angle in (0.0, 1.0, 2.2)],
-        "opening",
-    ),
-    "four limbs, turning": (
-        [(angle, 0.1, (1.6e-3, 1e-3 + 1e-4 * angle), (1e6, 1.5e6), 0.0) for angle in (0.0, 1.2, 3.0, 4.9)],
-        "turning",
-    ),
-    "five unlike limbs": (
-        [(1.1 * j, 0.06 + 0.01 * j, (2e-3, 1e-3 + 2e-4 * j), (1e6, 8e5), 3.0 * (-1) ** j) for j in range(5)],
-        "opening",
-    ),
-}
-
-
-def robot_and_star(name: str, nodes_per_limb: int = 4, **fluid: float) -> tuple[Seastar, Shaped]:
-    limbs, hub = DIFFERENT[name]
-    own = tuple(Limb(*limb) for limb in limbs)
-    robot = Seastar(len(limbs), nodes_per_limb, hub_hinge=hub, limbs=own, discretisation="chapter")
-    directions, lengths, radii, moduli, curvatures = zip(*limbs, strict=True)
-    star = Shaped(
-        len(limbs), nodes_per_limb, hub_hinge=hub, directions=directions, lengths=lengths, radii=radii, moduli=moduli,
-        curvatures=curvatures, **fluid,
-    )  # fmt: skip
-    return robot, star
-
 
 @pytest.mark.parametrize("name", DIFFERENT)
 def test_rest_shape_and_coefficients_are_those_of_the_oracle(name):
@@ -80,22 +44,6 @@ def test_drag_and_mass_across_tapered_limbs_are_those_of_the_oracle(name):
         np.testing.assert_allclose(found.reshape(-1, 2), expected, rtol=1e-13)
 
 
-@pytest.mark.parametrize("name", ["one limb", "four limbs, turning", "five unlike limbs"])
-def test_a_step_of_a_tapered_robot_in_such_a_fluid_is_the_oracles(name):
-    h = 0.01
-    robot, star = robot_and_star(name, **ACROSS)
-    numerics = Numerics("implicit-euler", h, newton_tolerance=1e-13)
-    water = Water(**ACROSS, current=UniformCurrent())
-    simulator, rng = Simulator(Scene(robot, water, SmaPulse(0.0, 2.0 * h, 2.0 * h), numerics)), np.random.default_rng(3)
-    q, v = star.rest + 1e-4 * rng.standard_normal(star.rest.shape), 0.1 * rng.standard_normal(star.rest.shape)
-    simulator.set_state((q[None], v[None], np.zeros(1)))
-    stroke = simulator.stroke_in_parts(np.zeros((1, star.n_limbs)), 4)
-    next(stroke)
-    q, v = oracle.step(star, q, v, 0.0, h, np.zeros(star.n_limbs), "implicit-euler", peak_angle=0.0)
-    np.testing.assert_allclose(simulator.positions[0], q, rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(simulator.velocities[0], v, rtol=0.0, atol=1e-10)
-
-
 @pytest.mark.parametrize("name", DIFFERENT)
 def test_a_robot_of_any_shape_rests_without_energy(name):
     robot, star = robot_and_star(name)
@@ -103,45 +51,6 @@ def test_a_robot_of_any_shape_rests_without_energy(name):
     simulator = Simulator(Scene(robot, actuator=SmaPulse(0.0), numerics=Numerics(step=0.1)))
     simulator.stroke(np.zeros((1, robot.n_limbs)))
     np.testing.assert_allclose(simulator.positions[0], robot.nodes(), atol=1e-12)
-
-
-@pytest.mark.parametrize("scheme", ["implicit-euler", "implicit-midpoint"])
-@pytest.mark.parametrize("name", DIFFERENT)
-def test_four_steps_from_a_moving_bent_robot_are_those_of_the_oracle(name, scheme):
-    """Potential, gradient and Hessian at once: a step ends where the oracle's gradient vanishes, by Newton's method."""
-    h, peak = 0.01, 0.0 if name == "one limb" else 0.1
-    robot, star = robot_and_star(name)
-    simulator = Simulator(
-        Scene(robot, actuator=SmaPulse(peak, 2 * h, 2 * h), numerics=Numerics(scheme, h, newton_tolerance=1e-13))
-    )
-    rng = np.random.default_rng(3)
-    q = star.rest + 2e-5 * rng.standard_normal(star.rest.shape)
-    v = 0.02 * rng.standard_normal(q.shape)
-    commands = rng.uniform(-1.0, 1.0, star.n_limbs)
-    simulator.set_state((q[None], v[None], np.zeros(1)))
-    assert simulator.elastic_energy()[0] == pytest.approx(oracle.elastic_energy(star, q, 0 * commands), rel=1e-10)
-    report = simulator.stroke(commands[None])
-    for k in range(4):
-        q, v = oracle.step(
-            star, q, v, k * h, h, commands, scheme, peak_angle=peak, heating_time=2 * h, cooling_time=2 * h
-        )
-    assert report.status[0] == 0 and report.halvings[0] == 0 and report.newton_iterations[0] < 30
-    np.testing.assert_allclose(simulator.positions[0], q, rtol=0.0, atol=1e-12)
-
-
-@pytest.mark.parametrize("name", DIFFERENT)
-def test_the_oracles_gradient_and_hessian_are_the_derivatives_of_its_energy(name):
-    _, star = robot_and_star(name, nodes_per_limb=3)
-    rng = np.random.default_rng(0)
-    q = star.rest + 1e-3 * rng.standard_normal(star.rest.shape)
-    direction = rng.standard_normal(q.shape)
-    delta_psi, eps = 0.1 * rng.standard_normal(star.n_limbs), 1e-6
-    ends = [q + eps * direction, q - eps * direction]
-    slope = np.subtract(*(oracle.elastic_energy(star, x, delta_psi) for x in ends)) / (2 * eps)
-    assert np.sum(oracle.elastic_gradient(star, q, delta_psi) * direction) == pytest.approx(slope, rel=1e-6)
-    change = np.subtract(*(oracle.elastic_gradient(star, x, delta_psi) for x in ends)).ravel() / (2 * eps)
-    found = oracle.elastic_hessian(star, q, delta_psi) @ direction.ravel()
-    np.testing.assert_allclose(found, change, atol=1e-5 * np.abs(change).max())
 
 
 def numbers(bundle) -> list:

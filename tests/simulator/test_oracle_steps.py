@@ -11,10 +11,11 @@ import oracle
 from continuum_oracle import Continuum, ContinuumShaped
 from currents import CURRENTS, velocity
 from oracle import Array, Star
-from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
+from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, UniformCurrent, Water
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene.robot import HubHinge
 from stages import random_shape
+from unlike import DIFFERENT, robot_and_star
 
 H, PEAK = 0.01, 0.3
 PULSE = {"peak_angle": PEAK, "heating_time": 2.0 * H, "cooling_time": 2.0 * H}
@@ -66,7 +67,7 @@ def moving(star: Star, seed: int = 3) -> tuple[Array, Array, Array]:
     """Positions and velocities of a bent robot that moves, and its command; held nodes are at rest."""
     rng = np.random.default_rng(seed)
     free = star.free.reshape(-1, 2)
-    bent = star.rest if star.clamps else random_shape(star, 0.05, 1e-3, rng)
+    bent = random_shape(star, 0.05, 1e-3, rng) if type(star) is Star else star.rest
     q = bent + 2e-5 * free * rng.standard_normal(star.rest.shape)
     return q, 0.02 * free * rng.standard_normal(q.shape), rng.uniform(-1.0, 1.0, star.n_limbs)
 
@@ -131,6 +132,11 @@ def cases() -> Iterator[Any]:
         for hub, *shape in (("opening", 5, 10), ("turning", 5, 3), ("opening", 3, 2)):
             yield case(f"{hub}-{shape}", hinged(hub, *shape), scheme)
         yield case("opening-vacuum", hinged("opening", 4, 4, drag_coefficient=0.0), scheme, fluid=None)
+    for name in DIFFERENT:
+        for scheme in ("implicit-euler", "implicit-midpoint"):
+            yield case(name, robot_and_star(name), scheme)
+        fluid = Water(**EVERY, current=UniformCurrent())
+        yield case(f"{name} in a fluid", robot_and_star(name, **EVERY), "implicit-euler", 1, fluid=fluid)
     for shape in ((1, 5), (2, 4), (3, 2), (5, 3), (12, 4)):
         yield case(f"{shape}", alike(*shape), "implicit-midpoint")
     for n in (2, 4):
