@@ -26,7 +26,6 @@ from seastar_gym.scene.per_robot import side_by_side
 from seastar_gym.simd.lanes import N_LANES
 
 SCHEMES = ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
-EVERY_TERM = Water(tangential_drag_coefficient=0.1, current=UniformCurrent(0.1, -0.05), added_mass_coefficient=1.0)
 KINDS = ("at rest", "shifted", "coinciding", "fast", "crossed", "crumpled", "far out", "no number")
 
 
@@ -92,28 +91,24 @@ def brief(scheme: str, step: float, robot: Seastar = TEN, **terms) -> Scene:
     return Scene(robot, actuator=pulse, numerics=numerics, **terms)
 
 
+ROBOTS = {
+    "plain": {},
+    "touching": {"contact": Contact()},
+    "every term": {
+        "robot": Seastar(n_limbs=4, nodes_per_limb=6, relaxation_time=1e-4),
+        "fluid": Water(tangential_drag_coefficient=0.1, current=UniformCurrent(0.1, -0.05), added_mass_coefficient=1.0),
+        "contact": Contact(),
+        "loads": ((7, 1e-3, 2e-3),),
+    },
+}
+
+
+@pytest.mark.parametrize("name", ROBOTS)
 @pytest.mark.parametrize("scheme", SCHEMES)
 @settings(derandomize=True, max_examples=10)
 @given(kinds=KINDS_OF_A_GROUP, step=st.sampled_from([1e-3, 5e-3, 0.02]), seed=st.integers(0, 1000))
-def test_a_robot_moves_alike_in_nasty_company(scheme, kinds, step, seed):
-    assert_alike_in_company(brief(scheme, step), kinds, seed)
-
-
-@pytest.mark.parametrize("scheme", SCHEMES)
-@settings(derandomize=True, max_examples=10)
-@given(kinds=KINDS_OF_A_GROUP, step=st.sampled_from([1e-3, 5e-3, 0.02]), seed=st.integers(0, 1000))
-def test_a_robot_whose_limbs_touch_moves_alike_in_nasty_company(scheme, kinds, step, seed):
-    assert_alike_in_company(brief(scheme, step, contact=Contact()), kinds, seed)
-
-
-@pytest.mark.parametrize("scheme", SCHEMES)
-@settings(derandomize=True, max_examples=5)
-@given(kinds=KINDS_OF_A_GROUP, step=st.sampled_from([1e-3, 5e-3, 0.02]), seed=st.integers(0, 1000))
-def test_a_robot_of_every_term_moves_alike_in_nasty_company(scheme, kinds, step, seed):
-    robot = Seastar(n_limbs=4, nodes_per_limb=6, relaxation_time=1e-4)
-    loads = ((7, 1e-3, 2e-3),)
-    scene = brief(scheme, step, robot=robot, fluid=EVERY_TERM, contact=Contact(), loads=loads)
-    assert_alike_in_company(scene, kinds, seed)
+def test_a_robot_moves_alike_in_nasty_company(name, scheme, kinds, step, seed):
+    assert_alike_in_company(brief(scheme, step, **ROBOTS[name]), kinds, seed)
 
 
 def test_a_neighbours_listed_pairs_take_no_place_from_a_robot_with_long_chains():

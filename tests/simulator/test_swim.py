@@ -9,6 +9,7 @@ from momenta import momenta
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, Water
 from seastar_gym.model.rods import make_rods
 from stages import robot_and_star
+from studies.verification.published import published_swim
 
 CHAPTER = Seastar(discretisation="chapter")
 SCHEMES = ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"]
@@ -141,29 +142,18 @@ def test_adapted_steps_keep_the_loosest_tolerance_with_the_longest_steps():
 
 # Other codes
 
-PUBLISHED_HUB_X = {
-    # time [s]: hub x [m] of dismech-rods in its planar mode, of DDG_Tutorial_Fast's 2d_curve
-    0.01: (1.461746457414e-04, 1.461746457414e-04),
-    0.10: (4.998152229393e-03, 4.998152232297e-03),
-    0.50: (1.483099680202e-02, 1.483099635702e-02),
-    1.00: (4.544118750321e-03, 4.544119890300e-03),
-}
-"""Outputs of two published C++ codes of the chapter's authors' groups, as in tests/test_oracle.py.
-
-Straight swim {2+,5-} from rest, implicit Euler, h = 10 ms, ramp taken at the end of a step, drag (13.8), hub hinges by
-their turning angle, Newton to a force residual of 1e-8: hence their own disagreement of 3e-7.
-"""
 PUBLISHED_DISTANCE = 36.28272e-3
-"""Hub x [m] of both codes after ten such strokes."""
+"""Hub x [m] of both codes after ten strokes."""
 
 
 def test_first_stroke_with_a_turning_hub_is_that_of_two_published_codes():
+    """Their own disagreement is 3e-7: Newton to a force residual of 1e-8."""
     simulator = swimmer("implicit-euler", 0.01, robot=robot_with("turning"), newton_tolerance=1e-11)
     found = {}
     for time in simulator.stroke_in_parts(STRAIGHT, 100):
         found[round(time, 2)] = simulator.hub_position()[0]
-    for time, figures in PUBLISHED_HUB_X.items():
-        np.testing.assert_allclose(found[time][0], figures, rtol=4e-7)
+    for time, *figures in np.transpose(published_swim())[:10]:
+        np.testing.assert_allclose(found[round(time, 2)][0], figures, rtol=4e-7)
     assert max(abs(y) for _, y in found.values()) < 1e-13
 
 
@@ -298,33 +288,20 @@ def limbs_of(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("hub", HUBS)
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_commanding_the_next_limb_turns_the_swim_by_72_degrees(scheme, hub):
-    robot = robot_with(hub)
-    ends = []
-    for shift in (0, 1):
-        simulator = Simulator(Scene(robot, actuator=SmaPulse(0.5), numerics=Numerics(scheme, 0.01)), 8)
-        for commands in random_commands(8):
-            simulator.stroke(np.roll(commands, shift, axis=1))
-        ends.append(simulator.positions)
-    hub, limbs = limbs_of(ends[0])
-    expected = turned(np.concatenate([hub, np.roll(limbs, 1, axis=1).reshape(8, -1, 2)], axis=1), FIFTH_OF_TURN)
-    assert np.abs(ends[0] - robot.nodes()).max() > 1e-3
-    np.testing.assert_allclose(ends[1], expected, rtol=0.0, atol=1e-13)
-
-
-@pytest.mark.parametrize("hub", HUBS)
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_the_mirrored_command_mirrors_the_swim(scheme, hub):
+def test_commanding_the_next_limb_turns_the_swim_by_72_degrees_and_mirrored_commands_mirror_it(scheme, hub):
     robot, mirror = robot_with(hub), [0, 4, 3, 2, 1]
-    ends = []
-    for mirrored in (False, True):
-        simulator = Simulator(Scene(robot, actuator=SmaPulse(0.5), numerics=Numerics(scheme, 0.01)), 8)
-        for commands in random_commands(8):
-            simulator.stroke(-commands[:, mirror] if mirrored else commands)
-        ends.append(simulator.positions)
-    hub, limbs = limbs_of(ends[0])
+    simulators = [Simulator(Scene(robot, actuator=SmaPulse(0.5), numerics=Numerics(scheme, 0.01)), 8) for _ in range(3)]
+    for commands in random_commands(8):
+        carried = commands, np.roll(commands, 1, axis=1), -commands[:, mirror]
+        for simulator, its_commands in zip(simulators, carried, strict=True):
+            simulator.stroke(its_commands)
+    plain, next_limb, mirrored = (simulator.positions for simulator in simulators)
+    hub, limbs = limbs_of(plain)
+    expected = turned(np.concatenate([hub, np.roll(limbs, 1, axis=1).reshape(8, -1, 2)], axis=1), FIFTH_OF_TURN)
+    assert np.abs(plain - robot.nodes()).max() > 1e-3
+    np.testing.assert_allclose(next_limb, expected, rtol=0.0, atol=1e-13)
     expected = np.concatenate([hub, limbs[:, mirror].reshape(8, -1, 2)], axis=1) * [1.0, -1.0]
-    np.testing.assert_allclose(ends[1], expected, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(mirrored, expected, rtol=0.0, atol=1e-13)
 
 
 def test_the_water_is_the_same_everywhere_and_in_every_direction():
