@@ -104,7 +104,9 @@ def test_a_file_from_before_fidelities_chose_nodes_says_what_it_said():
 
 
 def test_every_part_of_the_package_is_in_the_table():
-    """A new part is not forgotten: of every registered kind some scene of the tables has one."""
+    """A new part is not forgotten: of every registered kind some scene of the tables has one, and every field of it."""
+    fields = {field.name for field in dataclasses.fields(Scene)}
+    assert {"actuator"}.union(*PARTS.values()) == fields
     assert all(hasattr(seastar_gym, name) for name in seastar_gym.__all__)  # parts are registered where they are loaded
     scenes = [Scene(actuator=actuator) for actuator in ACTUATORS.values()] + [Scene(**part) for part in PARTS.values()]
     seen = {kind for scene in scenes for kind in KINDS if f'"kind": "{kind}"' in json.dumps(scene.to_dict())}
