@@ -1,12 +1,14 @@
 """Whatever is drawn, strokes end, robots keep their bits in any company, and what is conserved stays."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from random import Random
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
-from fuzz import promises
+from fuzz.promises import PROMISES, TAME_PROMISES
 from fuzz.scenes import (
     BENT,
     COMPILED,
@@ -19,6 +21,7 @@ from fuzz.scenes import (
     TOUCHED_BODY,
     Case,
     Draw,
+    Terms,
     draw_case,
     draw_parts,
     drawn,
@@ -34,59 +37,6 @@ def test_a_scene_is_accepted_or_refused_in_one_sentence(terms, seed):
         draw_parts(draw, terms)
     except ValueError as refusal:
         assert_one_sentence(refusal)
-
-
-@drawn(40)
-def test_strokes_end_finite_or_with_a_failure_that_is_told_and_in_bounded_work(terms, seed):
-    promises.check_strokes_end(draw_case(Random(seed), terms))
-
-
-@drawn(40)
-def test_a_robot_has_the_same_bits_alone_and_beside_robots_in_trouble(terms, seed):
-    promises.check_bits_alone(draw_case(Random(seed), terms))
-
-
-@drawn(15)
-def test_a_robot_has_the_same_bits_in_every_lane_and_batch(terms, seed):
-    promises.check_bits_in_other_lanes(draw_case(Random(seed), terms))
-
-
-@drawn(5)
-def test_a_robot_has_the_same_bits_on_any_number_of_threads(terms, seed):
-    promises.check_bits_on_threads(draw_case(Random(seed), terms))
-
-
-@drawn(15)
-def test_a_stroke_in_parts_and_a_state_that_is_set_again_go_on_to_the_same_bits(terms, seed):
-    promises.check_bits_in_parts(draw_case(Random(seed), terms))
-
-
-@drawn(15)
-def test_a_state_that_is_set_again_within_a_stroke_goes_on_to_the_same_bits(terms, seed):
-    promises.check_bits_of_pieces(draw_case(Random(seed), terms))
-
-
-@drawn(30, [PLAIN, CONTACT])
-def test_free_robots_in_vacuum_keep_their_momentum(terms, seed):
-    promises.check_momentum(draw_case(Random(seed), terms))
-
-
-@drawn(30, [PLAIN])
-def test_implicit_euler_without_commands_creates_no_energy(terms, seed):
-    promises.check_energy(draw_case(Random(seed), terms))
-
-
-@drawn(25, [PLAIN, CONTACT, FLUID])
-def test_a_robot_swims_alike_turned_mirrored_and_elsewhere(terms, seed):
-    promises.check_frames(draw_case(Random(seed), terms, wild=False))
-
-
-@drawn(80, [FLUID])
-def test_a_robot_swims_alike_seen_from_a_moving_frame(terms, seed):
-    promises.check_moving_frame(draw_case(Random(seed), terms, wild=False))
-
-
-# --- combinations that no other test has ------------------------------------------------------------------------------
 
 
 def in_water(case: Case) -> Case:
@@ -105,57 +55,53 @@ def limited(case: Case) -> Case:
     return case._replace(scene=replace(case.scene, actuator=actuator), state=case.state._replace(actuators=None))
 
 
-def check_everything(case: Case) -> None:
-    promises.check_strokes_end(case)
-    promises.check_bits_alone(case)
-    promises.check_bits_in_other_lanes(case)
+class Trial(NamedTuple):
+    """What is tried: promises by name, of so many cases of these terms, tame ones, changed and slow."""
+
+    promises: tuple[str, ...]
+    count: int
+    terms: Sequence[Terms] = COMPILED
+    wild: bool = True
+    change: Callable[[Case], Case] = lambda case: case
+    slow: bool = False
 
 
-@drawn(10, [CONTACT])
-def test_water_with_contact_and_nothing_else(terms, seed):
-    check_everything(in_water(draw_case(Random(seed), terms)))
+EVERYWHERE = ("strokes end", "bits alone", "bits in other lanes")
+TRIALS = {
+    "strokes end finite or with a failure that is told and in bounded work": Trial(("strokes end",), 40),
+    "a robot has the same bits alone and beside robots in trouble": Trial(("bits alone",), 40),
+    "in every lane and batch": Trial(("bits in other lanes",), 15),
+    "on any number of threads": Trial(("bits on threads",), 5),
+    "in parts and from a state that is set again": Trial(("bits in parts",), 15),
+    "from a state that is set again within a stroke": Trial(("bits of pieces",), 15),
+    "free robots in vacuum keep their momentum": Trial(("momentum",), 30, [PLAIN, CONTACT]),
+    "implicit euler without commands creates no energy": Trial(("energy",), 30, [PLAIN]),
+    "alike turned, mirrored and elsewhere": Trial(("frames",), 25, [PLAIN, CONTACT, FLUID], wild=False),
+    "alike seen from a moving frame": Trial(("moving frame",), 80, [FLUID], wild=False),
+    "water with contact and nothing else": Trial(EVERYWHERE, 10, [CONTACT], change=in_water),
+    "contact in vacuum": Trial(EVERYWHERE, 10, [CONTACT], change=in_vacuum),
+    "chapter-like robots with contact": Trial(EVERYWHERE, 15, [CONTACT], wild=False, change=in_water),
+    "robots with numbers of their own": Trial(EVERYWHERE, 15, [terms for terms in COMPILED if OWN in terms]),
+    "all terms with limited actuators": Trial(EVERYWHERE, 20, [EVERYTHING], change=limited, slow=True),
+    "all terms with numbers of each robot": Trial(EVERYWHERE, 20, [frozenset(TERMS)], slow=True),
+    "limbs on a body, and limbs that bend": Trial(EVERYWHERE, 15, [TOUCHED_BODY, BENT], slow=True),
+    "free robots with a body keep their momentum": Trial(("momentum",), 30, [TOUCHED_BODY], slow=True),
+    "they swim alike in every frame": Trial(("frames",), 10, [TOUCHED_BODY, BENT], wild=False, slow=True),
+}
 
 
-@drawn(10, [CONTACT])
-def test_contact_in_vacuum(terms, seed):
-    check_everything(in_vacuum(draw_case(Random(seed), terms)))
+@pytest.mark.parametrize(
+    "trial", [pytest.param(trial, id=name, marks=[pytest.mark.slow] * trial.slow) for name, trial in TRIALS.items()]
+)
+def test_promises_are_kept(trial):
+    @drawn(trial.count, trial.terms)
+    def kept(terms, seed):
+        case = trial.change(draw_case(Random(seed), terms, wild=trial.wild))
+        for name in trial.promises:
+            (PROMISES | TAME_PROMISES)[name](case)
+
+    kept()
 
 
-@drawn(15, [CONTACT])
-def test_chapter_like_robots_with_contact(terms, seed):
-    check_everything(in_water(draw_case(Random(seed), terms, wild=False)))
-
-
-@drawn(15, [terms for terms in COMPILED if OWN in terms])
-def test_robots_with_numbers_of_their_own_are_isolated(terms, seed):
-    check_everything(draw_case(Random(seed), terms))
-
-
-@pytest.mark.slow
-@drawn(20, [EVERYTHING])
-def test_all_terms_with_limited_actuators(terms, seed):
-    check_everything(limited(draw_case(Random(seed), terms)))
-
-
-@pytest.mark.slow
-@drawn(20, [frozenset(TERMS)])
-def test_all_terms_with_numbers_of_each_robot(terms, seed):
-    check_everything(draw_case(Random(seed), terms))
-
-
-@pytest.mark.slow
-@drawn(15, [TOUCHED_BODY, BENT])
-def test_limbs_on_a_body_and_limbs_that_bend_along_their_length(terms, seed):
-    check_everything(draw_case(Random(seed), terms))
-
-
-@pytest.mark.slow
-@drawn(30, [TOUCHED_BODY])
-def test_free_robots_with_a_body_keep_their_momentum(terms, seed):
-    promises.check_momentum(draw_case(Random(seed), terms))
-
-
-@pytest.mark.slow
-@drawn(10, [TOUCHED_BODY, BENT])
-def test_they_swim_alike_turned_mirrored_and_elsewhere(terms, seed):
-    promises.check_frames(draw_case(Random(seed), terms, wild=False))
+def test_every_promise_is_tried():
+    assert {name for trial in TRIALS.values() for name in trial.promises} == {*PROMISES, *TAME_PROMISES}
