@@ -56,7 +56,7 @@ FINAL = {
     for commit, files in {
         "0e818f3": "damping.json damping.png fidelities.json fidelities.png gaits.json gaits_directions.png "
         "gaits_front.png gaits_lag.png pentagon_from_rest.json pentagon_reheated.json",
-        "9cd3be4": "ablations.json ablations.png hub.json hub.png ringing.json ringing.png",
+        "9cd3be4": "ablations.json ablations.png ringing.json ringing.png",
     }.items()
     for file in files.split()
 }
