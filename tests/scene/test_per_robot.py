@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 from seastar_gym import (
+    AlongLimb,
+    Body,
+    Contact,
     Limb,
     Limited,
     MeasuredCurve,
@@ -17,12 +20,14 @@ from seastar_gym import (
     ShearCurrent,
     Simulator,
     SmaPulse,
+    Stiffening,
     ThermalSma,
     UniformCurrent,
     Vortex,
     Water,
 )
 from seastar_gym.simd.lanes import N_LANES
+from strokes import assert_same_bits
 
 N_ROBOTS = N_LANES + 3
 FAST = Numerics("sdirk2", 20e-3)
@@ -45,18 +50,6 @@ def strokes(simulator: Simulator, commands: np.ndarray) -> np.ndarray:
 COMMANDS = np.random.default_rng(0).uniform(-1.0, 1.0, (2, N_ROBOTS, 5))
 
 
-def test_every_robot_swims_as_it_would_alone():
-    scene = varied()
-    batch = Simulator(scene, N_ROBOTS, threads=2)
-    positions = strokes(batch, COMMANDS)
-    energies = batch.elastic_energy()
-    for robot in range(N_ROBOTS):
-        alone = Simulator(scene.of_robot(robot))
-        np.testing.assert_array_equal(strokes(alone, COMMANDS[:, robot : robot + 1])[0], positions[robot])
-        assert alone.elastic_energy()[0] == energies[robot]
-    assert len({tuple(hub) for hub in positions[:, 0]}) == N_ROBOTS
-
-
 SPREAD = np.linspace(0.7, 1.2, N_ROBOTS)
 LENGTHS = Seastar(limb_length=0.1 * SPREAD)
 THERMAL = ThermalSma(0.6 * SPREAD, 0.1, 0.9, 0.4 * SPREAD, 220.0 / SPREAD, 15.0 * SPREAD, 24.0 * SPREAD, 70.0 * SPREAD,
@@ -75,19 +68,29 @@ UNEVEN = Seastar(3, 10, 0.1 * SPREAD, limbs=(
 ))  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "scene",
-    [*(Scene(LENGTHS, actuator=actuator, numerics=FAST) for actuator in ACTUATORS.values()),
-     Scene(UNEVEN, actuator=SmaPulse(0.3), numerics=FAST)],
-    ids=[*ACTUATORS, "limbs"],
-)  # fmt: skip
-def test_robots_of_different_sizes_and_actuators_swim_as_they_would_alone(scene):
-    batch, commands = Simulator(scene, N_ROBOTS), COMMANDS[..., : scene.robot.n_limbs]
+ALONG = Seastar(3, 5, along=AlongLimb(np.linspace(0.2, 1.0, N_ROBOTS)), stiffening=Stiffening(1.0 + SPREAD))
+SCENES = {
+    "numbers": varied(),
+    **{name: Scene(LENGTHS, actuator=actuator, numerics=FAST) for name, actuator in ACTUATORS.items()},
+    "limbs": Scene(UNEVEN, actuator=SmaPulse(0.3), numerics=FAST),
+    "contact": Scene(contact=Contact(np.geomspace(1e4, 1e6, N_ROBOTS)), numerics=Numerics.preset("fast")),
+    "bodies": Scene(Seastar(4, 5, body=Body.rectangle(0.06, 0.03, mass=0.03 * SPREAD)), numerics=FAST),
+    "along": Scene(ALONG, actuator=SmaPulse(0.6)),
+}
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name == "along")) for name in SCENES])
+def test_every_robot_swims_as_it_would_alone(name):
+    scene = SCENES[name]
+    batch, commands = Simulator(scene, N_ROBOTS, threads=2), COMMANDS[..., : scene.robot.n_limbs].copy()
+    if name == "contact":
+        commands[:] = [1.0, -1.0, 0.0, 1.0, -1.0]  # neighbours meet
     positions = strokes(batch, commands)
-    for robot in range(0, N_ROBOTS, 3):
+    assert len({tuple(hub) for hub in positions[:, 0]}) == N_ROBOTS
+    for robot in range(0, N_ROBOTS, 1 if name == "numbers" else 3):
         alone = Simulator(scene.of_robot(robot))
         np.testing.assert_array_equal(strokes(alone, commands[:, robot : robot + 1])[0], positions[robot])
-        np.testing.assert_array_equal(alone.actuators[0], batch.actuators[robot])
+        assert_same_bits(alone.get_state(), batch.get_state().of_robots(slice(robot, robot + 1)))
         np.testing.assert_array_equal(alone.observe_actuators()[0], batch.observe_actuators()[robot])
         assert alone.elastic_energy()[0] == batch.elastic_energy()[robot]
 

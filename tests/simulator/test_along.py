@@ -181,18 +181,6 @@ def test_a_robot_that_stiffens_violently_gains_no_energy_but_the_actuators():
 # Batches, actuators, refusals
 
 
-@pytest.mark.slow
-def test_robots_of_a_batch_have_shares_and_ratios_of_their_own():
-    shares, ratios = np.array([0.2, 0.5, 1.0]), np.array([1.0, 2.0, 3.0])
-    scene = Scene(Seastar(3, 5, along=AlongLimb(shares), stiffening=Stiffening(ratios)), actuator=SmaPulse(0.6))
-    simulator = Simulator(scene, 3)
-    simulator.stroke(np.tile([1.0, 0.0, -1.0], (3, 1)))
-    for k in range(3):
-        alone = Simulator(scene.of_robot(k))
-        alone.stroke([[1.0, 0.0, -1.0]])
-        np.testing.assert_array_equal(simulator.positions[k], alone.positions[0])
-
-
 def test_wires_bend_a_limb_that_is_still_warm():
     simulator = Simulator(Scene(ALONG, actuator=SmaWires(0.6)))
     simulator.advance(0.15, [[1.0, 0.0, 0.0]])

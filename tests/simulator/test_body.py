@@ -276,18 +276,6 @@ def test_a_state_without_orientation_has_that_of_its_shape():
 
 
 @pytest.mark.slow
-def test_bodies_differ_from_robot_to_robot():
-    masses = np.array([5e-3, 0.05])
-    both = Simulator(Scene(Seastar(4, 5, body=Body.rectangle(0.06, 0.03, mass=masses, attachments=FRAME))), 2)
-    both.advance(0.2, np.tile([1, 0, 0, -1], (2, 1)))
-    for robot, mass in enumerate(masses):
-        own = Seastar(4, 5, body=Body.rectangle(0.06, 0.03, mass=float(mass), attachments=FRAME))
-        simulator = Simulator(Scene(own))
-        simulator.advance(0.2, [[1, 0, 0, -1]])
-        np.testing.assert_array_equal(simulator.positions[0], both.positions[robot])
-        np.testing.assert_array_equal(simulator.orientation()[0], both.orientation()[robot])
-
-
 def test_long_steps_of_violent_commands_end_well():
     """Retried and regularised steps, the guard and its cuts."""
     simulator = Simulator(Scene(FOUR_LIMBS, None, SmaPulse(1.5, 0.02, 0.1), Numerics("implicit-midpoint", 0.02)), 8)

@@ -138,17 +138,6 @@ def test_a_robot_swims_alike_in_any_company():
         np.testing.assert_array_equal(alone.positions[0], together.positions[robot])
 
 
-def test_moduli_of_each_robot():
-    scene = Scene(TEN, contact=Contact(modulus=np.array([1e4, 1e6])))
-    both = Simulator(scene, 2)
-    both.stroke(np.tile(CLOSING[5], (2, 1)))
-    for robot, modulus in enumerate((1e4, 1e6)):
-        alone = Simulator(Scene(TEN, contact=Contact(modulus=modulus)), 1)
-        alone.stroke(CLOSING[5:6])
-        np.testing.assert_array_equal(alone.positions[0], both.positions[robot])
-    assert (both.positions[0] != both.positions[1]).any()
-
-
 @pytest.mark.parametrize("scheme", ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"])
 def test_limbs_push_each_other_alike(scheme):
     """In vacuum nothing but actuators and contact acts, so the momentum stays."""
