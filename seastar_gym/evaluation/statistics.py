@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import bootstrap, spearmanr, trim_mean
+from scipy.stats import bootstrap, trim_mean
 
 Floats = NDArray[np.float64]
 
@@ -81,13 +81,6 @@ def crossed_interval(seeds: Sequence[Floats]) -> tuple[float, float]:
     drawn_episodes = rng.multinomial(n_episodes, np.full(n_episodes, 1.0 / n_episodes), RESAMPLES) / n_episodes
     low, high = np.percentile(((drawn_seeds @ values) * drawn_episodes).sum(axis=1), ENDS)
     return float(low), float(high)
-
-
-def rank_correlation(one: Sequence[float], other: Sequence[float]) -> float:
-    """Spearman's rank correlation of the scores of the same policies in two physics; NaN where one is constant."""
-    if np.ptp(one) == 0.0 or np.ptp(other) == 0.0:
-        return float("nan")
-    return float(spearmanr(one, other).statistic)
 
 
 def profile(scores: ArrayLike, levels: ArrayLike) -> tuple[Floats, Floats, Floats]:

@@ -26,7 +26,6 @@ from seastar_gym.controllers import learned
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.planner import Planner
 from seastar_gym.controllers.turning import TurnThenSwim
-from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.layout import HEADINGS, Layout
 from seastar_gym.envs.options import make_scene
@@ -37,6 +36,7 @@ from seastar_gym.gaits import turning_wave
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 from studies.frame import Study
+from studies.learning.reduced import ReducedPolicy
 from studies.style import CYCLE, DPI, FAINT, subplots
 
 Floats = NDArray[np.float64]
@@ -59,24 +59,10 @@ class Swimmer(NamedTuple):
     make: Callable[[Scene, Headings], Policy]
 
 
-@dataclass(frozen=True)
-class Reduced:
-    """Learner that sees the reduced observations of a scene, as an agent with the observations of an environment."""
-
-    model: PPO
-    scene: Scene
-    decision_period: float
-    actions: Actions = "pairs"
-
-    def predict(
-        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
-    ) -> tuple[Any, Any]:
-        """Action for an observation of one robot, and None."""
-        layout, mirror = Layout.of(self.scene, entries=HEADINGS), memory_mirror(self.scene.actuator)
-        symmetry = Symmetry(self.scene.robot.n_limbs, mirror, layout, self.actions)
-        reduced, element = symmetry.reduce(observation)
-        action, _ = self.model.predict(reduced, deterministic=deterministic)
-        return symmetry.restore(action, element), None
+def reduced(model: PPO, scene: Scene) -> ReducedPolicy:
+    """Learner that sees the reduced observations of a scene with headings, as an agent of an environment."""
+    layout, mirror = Layout.of(scene, entries=HEADINGS), memory_mirror(scene.actuator)
+    return ReducedPolicy(model, Symmetry(scene.robot.n_limbs, mirror, layout, "pairs"))
 
 
 COLOURS = {"strokes": FAINT, "wires": CYCLE[0], "planner": CYCLE[2], "learned": CYCLE[1]}
@@ -156,7 +142,7 @@ def swimmers(model: PPO | None) -> dict[str, Swimmer]:
             decision_period=0.5, headings=headings)),
     }  # fmt: skip
     if model is not None:
-        found["learned"] = Swimmer("wires every 0.5 s: learned", 0.5, lambda scene, _: Reduced(model, scene, 0.5))
+        found["learned"] = Swimmer("wires every 0.5 s: learned", 0.5, lambda scene, _: reduced(model, scene))
     return found
 
 

@@ -19,10 +19,11 @@ from seastar_gym.evaluation.statistics import mean_with_interval
 from seastar_gym.evaluation.swim import swim
 from studies.command import main
 from studies.learning.in_time import study, trainings
-from studies.learning.in_time.shares import ChosenCommands, SharesPolicy, shares_of_pairs
+from studies.learning.in_time.shares import ChosenCommands, shares_of_pairs
 from studies.learning.in_time.study import Options
 from studies.learning.in_time.tables import as_markdown, pulses_per_metre
 from studies.learning.in_time.trainings import TRAININGS, Training, learn
+from studies.learning.reduced import ReducedPolicy
 from symmetries import symmetry_for
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -95,7 +96,7 @@ def test_sac_takes_gradient_steps_on_the_native_batch(small, tmp_path, monkeypat
     taken = []
     monkeypatch.setattr(SAC, "train", lambda model, gradient_steps, batch_size: taken.append(gradient_steps))
     learned = learn("sac", 0, "fast", tmp_path)
-    assert isinstance(learned.policy, SharesPolicy) and len(taken) == 6  # of 8 decisions, 2 come before learning starts
+    assert isinstance(learned.policy, ReducedPolicy) and len(taken) == 6  # of 8 decisions, 2 come before
     done = swim(
         "sac", learned.policy, SeastarSwimEnv(actions="continuous", decision_period=0.5, fidelity="fast"), max_strokes=3
     )
@@ -146,7 +147,8 @@ class Numbers:
 @pytest.mark.parametrize("discrete", [True, False])
 def test_policies_of_shares_are_equivariant(discrete):
     scene, rng = make_scene(None, "fast", 0.5), np.random.default_rng(1)
-    policy = SharesPolicy(Numbers(196, discrete), scene, shares_of_pairs(5, (1.0, 0.6)) if discrete else None)
+    table = shares_of_pairs(5, (1.0, 0.6)) if discrete else None
+    policy = ReducedPolicy(Numbers(196, discrete), symmetry.Symmetry.of(scene, "continuous"), table)
     seen, mirror = rng.normal(size=(50, 196)).astype(np.float32), symmetry.memory_mirror(scene.actuator)
     commands, _ = policy.predict(seen, deterministic=True)
     for element in range(10):

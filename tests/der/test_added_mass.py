@@ -18,7 +18,6 @@ RODS = make_rods(Scene(ROBOT, WATER))
 OF_AN_EDGE = 1000.0 * 0.7 * np.pi * ROBOT.rod_radius**2 * ROBOT.edge_length
 NOTHING = (Lanes(0.0), (Lanes(0.0), Lanes(0.0)), (Lanes(0.0), Lanes(0.0), Lanes(0.0)))
 
-AT_HOME = Lanes(0.0), Lanes(0.0)
 
 
 def frozen(angle: float = 0.0):

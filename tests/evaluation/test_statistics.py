@@ -18,12 +18,6 @@ def test_an_interval_is_of_other_seeds_on_the_same_paths():
     assert np.isnan(statistics.estimate(paths[None]).low)
 
 
-def test_policies_that_keep_their_order_have_rank_correlation_1():
-    assert statistics.rank_correlation([1.0, 2.0, 3.0], [10.0, 11.0, 30.0]) == pytest.approx(1.0)
-    assert statistics.rank_correlation([1.0, 2.0, 3.0], [5.0, 4.0, 1.0]) == pytest.approx(-1.0)
-    assert np.isnan(statistics.rank_correlation([1.0, 2.0], [5.0, 5.0]))
-
-
 def test_a_profile_is_the_share_of_scores_that_reach_a_level():
     scores = np.array([[0.2, 0.9], [0.4, 0.9], [0.6, 0.9], [0.8, 0.9]])
     share, low, high = statistics.profile(scores, [0.0, 0.5, 0.85, 1.0])

@@ -80,7 +80,7 @@ def test_a_learner_behind_the_reduction_does_the_carried_thing():
     )
     hyperparameters = Hyperparameters(num_envs=2, rollout=8, batch_size=16, hidden=(8,))
     model = make_model(BatchVecEnv(VectorSymmetryReduction(env)), hyperparameters, 0)
-    agent, scene = heading.Reduced(model, env.scene, 0.5), env.scene
+    agent, scene = heading.reduced(model, env.scene), env.scene
     seen = np.repeat(np.random.default_rng(0).normal(size=(1, 200)), 10, axis=0).astype(np.float32)
     elements = np.arange(10)
     carried = symmetry_for(5, symmetry.memory_mirror(scene.actuator), entries=HEADINGS).carry(seen, elements)

@@ -1,4 +1,4 @@
-"""Pulse widths: environments in which a learner heats wires for shares of a pulse, and the policies that it learns."""
+"""Pulse widths: environments in which a learner heats wires for shares of a pulse."""
 
 from typing import Any
 
@@ -6,10 +6,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.controllers.contract import Policy
 from seastar_gym.envs.commands import command_table
-from seastar_gym.envs.symmetry import Symmetry
-from seastar_gym.scene import Scene
 
 Floats = NDArray[np.float64]
 
@@ -34,25 +31,3 @@ class ChosenCommands(gym.vector.VectorWrapper):
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """One decision of every robot."""
         return self.env.step(self.table[actions])
-
-
-class SharesPolicy:
-    """Policy with actions="continuous", from the model that a learner behind the symmetry reduction has learned.
-
-    table: Commands that its actions are the numbers of. None means that its actions are commands.
-    """
-
-    actions = "continuous"
-
-    def __init__(self, model: Policy, scene: Scene, table: Floats | None = None):
-        self.model, self.scene, self.table = model, scene, table
-
-    def predict(
-        self, observation: NDArray[Any], state: Any = None, episode_start: Any = None, deterministic: bool = False
-    ) -> tuple[NDArray[Any], None]:
-        """Commands for observations of shape (size,) or (n, size), and None: the policy has no state."""
-        symmetry = Symmetry.of(self.scene, "continuous")
-        reduced, elements = symmetry.reduce(observation)
-        chosen, _ = self.model.predict(reduced.astype(np.float32), None, None, deterministic)
-        commands = chosen if self.table is None else self.table[chosen]
-        return symmetry.restore(commands, elements), None

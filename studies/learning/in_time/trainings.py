@@ -17,8 +17,10 @@ from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers import foreign, learner_zip
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.symmetry import Symmetry
 from seastar_gym.scene.numerics import Fidelity
-from studies.learning.in_time.shares import ChosenCommands, SharesPolicy, shares_of_pairs
+from studies.learning.in_time.shares import ChosenCommands, shares_of_pairs
+from studies.learning.reduced import ReducedPolicy
 
 COMMON = Hyperparameters(discount=0.9, rollout=32, num_envs=64, gae_lambda=0.95)
 """Hyperparameters of the trainings, but for what differs."""
@@ -134,7 +136,8 @@ def _write(training: Training, file: Path, model: BaseAlgorithm) -> None:
 def _read(training: Training, file: Path, env: BatchVecEnv) -> Policy:
     if training.learner == "pairs":
         return learner_zip.load(file)
-    return SharesPolicy(foreign.load_model(file), env.get_attr("scene")[0], getattr(env.env, "table", None))
+    symmetry = Symmetry.of(env.get_attr("scene")[0], "continuous")
+    return ReducedPolicy(foreign.load_model(file), symmetry, getattr(env.env, "table", None))
 
 
 def network_file(folder: Path, name: str, seed: int) -> Path:
