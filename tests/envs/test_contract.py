@@ -8,39 +8,65 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from seastar_gym import Headings, Limited, RewardWeights, Scene, SmaPulse, SmaWires, ThermalSma
+import seastar_gym
+from seastar_gym import (
+    FailBlind,
+    Headings,
+    Limited,
+    Miswired,
+    ObstTrap,
+    Prey,
+    Prizes,
+    RewardWeights,
+    Scene,
+    SmaPulse,
+    SmaWires,
+    Station,
+    ThermalSma,
+)
+from seastar_gym.accuracy.info import NAMES
 from seastar_gym.envs.layout import HEADINGS, VELOCITY_SCALE, Layout
 from seastar_gym.envs.paths import PATHS
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.envs.tasks.envs import CHALLENGES, SeastarTaskEnv, SeastarTaskVectorEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 
-CONTRACT = inspect.getdoc(SeastarSwimEnv)
 TYPES = {"float": float, "int": int, "bool": bool, "str": str}
+CHALLENGED = (Miswired, Prey, Station, FailBlind, ObstTrap, Prizes)
+TASK_IDS = tuple(seastar_gym.TASKS)
 
 
-def section(title: str, text: str = CONTRACT) -> str:
-    """Text of the section whose title begins so."""
-    return re.split(r"^## ", re.split(rf"^## {title}.*$", text, flags=re.MULTILINE)[1], flags=re.MULTILINE)[0]
+def section(title: str, kind: type = SeastarSwimEnv) -> str:
+    """Text of the section of a docstring whose title begins so."""
+    rest = re.split(rf"^## {title}.*$", inspect.getdoc(kind), flags=re.MULTILINE)[1]
+    return re.split(r"^## ", rest, flags=re.MULTILINE)[0]
 
 
-def table(title: str) -> list[dict[str, str]]:
-    """Rows of the section's table, by the titles of the columns."""
-    lines = section(title).splitlines()
-    first = next(number for number, line in enumerate(lines) if line.startswith("|"))
-    lines = list(itertools.takewhile(lambda line: line.startswith("|"), lines[first:]))
-    head, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+def table(title: str, kind: type = SeastarSwimEnv) -> list[dict[str, str]]:
+    """Rows of the section's first table, by the titles of the columns."""
+    lines = itertools.dropwhile(lambda line: not line.startswith("|"), section(title, kind).splitlines())
+    rows = [line.strip("|").split("|") for line in itertools.takewhile(lambda line: line.startswith("|"), lines)]
+    head, _, *rows = [[cell.strip().strip("`") for cell in row] for row in rows]
     return [dict(zip(head, row, strict=True)) for row in rows]
 
 
-def arguments(text: str) -> list[str]:
-    return re.findall(r"^(\w+): ", text, flags=re.MULTILINE)
+def row_of(id: str, kind: type) -> list[str]:
+    """Cells of the row of an id, behind it."""
+    cells = re.search(rf"\| `{id}` +\|(.*)\|$", kind.__doc__, re.MULTILINE)[1].split("|")
+    return [cell.strip().strip("`") for cell in cells]
 
 
-@pytest.mark.parametrize("row", table("Action"), ids=lambda row: row["`actions`"])
+def arguments(kind: type) -> list[str]:
+    """Names of the section of arguments, of which a line may have several."""
+    lines = re.findall(r"^(\w+(?:, \w+)*): ", section("Arguments", kind), flags=re.MULTILINE)
+    return [name for line in lines for name in line.split(", ")]
+
+
+@pytest.mark.parametrize("row", table("Action"), ids=lambda row: row["actions"])
 def test_the_actions_are_those_of_the_table(row):
-    env = SeastarSwimEnv(actions=row["`actions`"].strip("`").strip('"'))
+    env = SeastarSwimEnv(actions=row["actions"].strip('"'))
     named = {name: getattr(gym.spaces, name) for name in ("Box", "Discrete", "MultiDiscrete")} | {"n": 5}
-    assert env.action_space == eval(row["space"].strip("`"), named | {"float32": np.float32})
+    assert env.action_space == eval(row["space"], named | {"float32": np.float32})
     if row["index"] != "-" and isinstance(env.action_space, gym.spaces.Box):
         assert row["range"] == "-1..1" and (env.action_space.low == -1.0).all() and (env.action_space.high == 1.0).all()
         return
@@ -72,7 +98,7 @@ def test_the_memory_of_actuators_is_that_of_the_table(actuator, n):
 
 def test_the_reward_has_the_terms_and_weights_of_the_table():
     weights = RewardWeights()
-    documented = {row["term"].strip("`"): float(row["default weight"].split()[0]) for row in table("Reward")}
+    documented = {row["term"]: float(row["default weight"].split()[0]) for row in table("Reward")}
     expected = {name: getattr(weights, name) for name in ("progress", "waypoint", "effort", "heading")}
     assert documented == {f"reward_{name}": weight for name, weight in expected.items()}
     assert f"within {weights.aim} of its radius" in section("Reward")
@@ -81,7 +107,7 @@ def test_the_reward_has_the_terms_and_weights_of_the_table():
 def test_info_has_the_names_and_types_of_the_table():
     env = SeastarSwimEnv(fidelity="fast", error_bars=True, headings=Headings())
     for info in (env.reset(seed=0)[1], env.step([0, 1, 0, 0, 2])[4]):
-        documented = {row["name"].strip("`"): row["type"] for row in table("Info")}
+        documented = {row["name"]: row["type"] for row in table("Info")}
         assert set(info) == set(documented)
         for name, kind in documented.items():
             if kind == "array (2,)":
@@ -90,13 +116,99 @@ def test_info_has_the_names_and_types_of_the_table():
                 assert type(info[name]) is TYPES[kind], name
 
 
-def test_the_arguments_are_those_of_the_constructors():
-    of_one = list(inspect.signature(SeastarSwimEnv).parameters)
-    assert arguments(section("Arguments")) == of_one
-    of_batch = arguments(section("Arguments", inspect.getdoc(SeastarSwimVectorEnv)))
+@pytest.mark.parametrize(
+    "one, batch", [(SeastarSwimEnv, SeastarSwimVectorEnv), (SeastarTaskEnv, SeastarTaskVectorEnv)]
+)
+def test_the_arguments_are_those_of_the_constructors(one, batch):
+    assert arguments(one) == list(inspect.signature(one).parameters)
     missing = {"frames_per_stroke"}  # a batch draws the ends of strokes
-    assert {*of_one, *of_batch} - missing == set(inspect.signature(SeastarSwimVectorEnv).parameters)
+    assert {*arguments(one), *arguments(batch)} - missing == set(inspect.signature(batch).parameters)
 
 
 def test_every_named_path_is_documented():
     assert all(f'"{name}"' in section("Arguments") for name in PATHS)
+
+
+@pytest.mark.parametrize("id", ["SeastarSwim-v0", "SeastarSwimHeading-v0", *seastar_gym.TIMED])
+def test_ids_are_those_of_the_table(id):
+    period, actions, limit, decisions, actuator = row_of(id, SeastarSwimEnv)
+    env, inner = gym.make(id), gym.make(id).unwrapped
+    assert inner.decision_period == float(period) and f'"{inner.actions}"' == actions
+    assert env.spec.max_episode_steps == int(decisions) == round(float(limit) / float(period))
+    assert type(inner.scene.actuator).__name__ == actuator
+    assert gym.make_vec(id, 2).decision_period == float(period)
+    env.reset(seed=0)
+    assert env.step(env.action_space.sample())[4]["time"] == float(period)
+
+
+def test_the_timed_environments_decide_as_often_as_they_say():
+    timed = {"SeastarSwimTimed-v0": 0.5, "SeastarSwimTimedModerate-v0": 0.2, "SeastarSwimTimedHard-v0": 0.1}
+    assert timed == seastar_gym.TIMED
+
+
+# Tasks
+
+
+@pytest.mark.parametrize("id", TASK_IDS)
+def test_a_task_has_the_numbers_of_the_table(id):
+    task, period, actions, limit, threshold = row_of(id, SeastarTaskEnv)
+    env = gym.make(id, fidelity="fast")
+    inner = env.unwrapped
+    assert CHALLENGES[task.strip('"')] == inner.challenge and f'"{inner.actions}"' == actions
+    assert inner.decision_period == float(period) and env.spec.reward_threshold == float(threshold)
+    assert env.spec.max_episode_steps == round(float(limit) / float(period))
+
+
+@pytest.mark.parametrize("id", TASK_IDS)
+def test_info_of_a_task_is_that_of_the_docstrings(id):
+    env = gym.make(id, fidelity="fast")
+    kind, found = type(env.unwrapped.challenge), env.reset(seed=0)[1]
+    own = {row["name"]: row["type"] for row in table("Info", kind)}
+    common = {row["name"] for row in table("Info")} - {
+        "error_estimate",
+        "heading",
+        "heading_error",
+        "reward_heading",
+    }
+    measured = {*NAMES}
+    if env.unwrapped.decision_period < 1.0:
+        common -= {"batch_real_time_factor"}  # speeds were measured of strokes
+    assert {*own} <= {*found} and {*found} <= common | {*own}
+    without = re.search(r"without (.*?);", " ".join(inspect.getdoc(kind).split()))
+    missing = set(re.findall(r"`(\w+)`", without[1])) if without else set()
+    if without and "measured errors" in without[1]:
+        missing |= measured & common
+    assert common - {*found} == missing
+    for name, type_ in own.items():
+        assert type_.startswith({np.ndarray: "array", int: "int", float: "float"}[type(found[name])]), name
+
+
+@pytest.mark.parametrize("kind", CHALLENGED)
+def test_rewards_of_a_task_are_those_of_the_table(kind):
+    env = SeastarTaskEnv(task=kind(), fidelity="fast")
+    named = {row["term"] for row in table("Reward", kind) if row["term"]}
+    assert named == {name for name in env.reset(seed=0)[1] if name.startswith("reward_")}
+
+
+def places_of(at):
+    """What is seen of the limbs' shape, of their numbers, of what the task shows, and the targets."""
+    return at.stations_and_hub, at.actuators, at.further, at.waypoints
+
+
+@pytest.mark.parametrize("kind", [kind for kind in CHALLENGED if kind is not Prey])
+@pytest.mark.parametrize("column, period", [(0, 1.0), (1, 0.5)])
+def test_the_observation_of_a_task_is_that_of_the_table(kind, column, period):
+    env = SeastarTaskEnv(task=kind(), fidelity="fast", decision_period=period)
+    task = env._task
+    sees_wires = period < 1.0 and env.observe_actuators
+    at = Layout(5, task.observes_commands + 2 * sees_wires, task.entries, task.shows_limbs)
+    cells = [[*row.values()] for row in table("Observation", kind)]
+    places = [row[min(column, len(row) - 4)] for row in cells]
+    documented = [tuple(map(int, place.split(".."))) for place in places if place]
+    assert documented == [(place.start, place.stop - 1) for place in places_of(at) if place.start < place.stop]
+    assert env.observation_space.shape == (at.size,)
+
+
+@pytest.mark.parametrize("kind", CHALLENGED)
+def test_arguments_of_a_challenge_are_those_of_the_docstring(kind):
+    assert arguments(kind) == list(inspect.signature(kind).parameters)

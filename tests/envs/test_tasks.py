@@ -1,9 +1,7 @@
 """Every registered task is what its docstring says, besides what test_conformance.py says of all ids."""
 
 import copy
-import inspect
 import itertools
-import re
 
 import gymnasium as gym
 import numpy as np
@@ -24,8 +22,6 @@ from seastar_gym import (
     SymmetryReduction,
     VectorSymmetryReduction,
 )
-from seastar_gym.accuracy.info import NAMES
-from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import limb_order, symmetry_in, transform_commands
 from seastar_gym.envs.tasks.course import CHASE, Courses, Pursuit, draw_course
@@ -166,16 +162,6 @@ def test_one_robot_can_be_reduced_too(id):
 
 
 @pytest.mark.parametrize("id", IDS)
-def test_the_time_limit_is_that_of_the_table(id):
-    row = re.search(rf"\| `{id}` +\|(.*)\|$", SeastarTaskEnv.__doc__, re.MULTILINE)[1]
-    task, period, actions, limit, threshold = (cell.strip().strip("`") for cell in row.split("|"))
-    env, inner = made(id), made(id).unwrapped
-    assert CHALLENGES[task.strip('"')] == inner.challenge and f'"{inner.actions}"' == actions
-    assert inner.decision_period == float(period) and env.spec.reward_threshold == float(threshold)
-    assert env.spec.max_episode_steps == round(float(limit) / float(period))
-
-
-@pytest.mark.parametrize("id", IDS)
 def test_pictures_show_what_is_hidden(id):
     pytest.importorskip("pygame")
     env = made(id, render_mode="rgb_array")
@@ -248,82 +234,7 @@ def test_prey_that_no_robot_could_meet_are_refused():
         draw_course(np.random.default_rng(0), (9.0, 10.0), (0.5, 1.0), 0.1, Pursuit(1e-3, 1e-3))
 
 
-# Contracts
-
-
-def rows(kind: type, title: str) -> list[list[str]]:
-    """Cells of the table of a section of a docstring."""
-    text = re.split(rf"^## {title}$", inspect.getdoc(kind), flags=re.MULTILINE)[1]
-    lines = [line for line in re.split(r"^## ", text, flags=re.MULTILINE)[0].splitlines() if line.startswith("|")]
-    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
-
-
-@pytest.mark.parametrize("id", IDS)
-def test_info_is_that_of_the_docstrings(id):
-    env = made(id)
-    kind, found = type(env.unwrapped.challenge), env.reset(seed=0)[1]
-    own = {row[0].strip("`"): row[1] for row in rows(kind, "Info")}
-    common = {row[0].strip("`") for row in rows(SeastarSwimEnv, "Info")} - {
-        "error_estimate",
-        "heading",
-        "heading_error",
-        "reward_heading",
-    }
-    measured = {*NAMES}
-    if env.unwrapped.decision_period < 1.0:
-        common -= {"batch_real_time_factor"}  # speeds were measured of strokes
-    assert {*own} <= {*found} and {*found} <= common | {*own}
-    without = re.search(r"without (.*?);", " ".join(inspect.getdoc(kind).split()))
-    missing = set(re.findall(r"`(\w+)`", without[1])) if without else set()
-    if without and "measured errors" in without[1]:
-        missing |= measured & common
-    assert common - {*found} == missing
-    for name, type_ in own.items():
-        assert type_.startswith({np.ndarray: "array", int: "int", float: "float"}[type(found[name])]), name
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_rewards_are_those_of_the_table(kind):
-    env = SeastarTaskEnv(task=kind(), fidelity="fast")
-    named = {row[0].strip("`") for row in rows(kind, "Reward") if row[0]}
-    assert named == {name for name in env.reset(seed=0)[1] if name.startswith("reward_")}
-
-
-def places_of(at):
-    """What is seen of the limbs' shape, of their numbers, of what the task shows, and the targets."""
-    return at.stations_and_hub, at.actuators, at.further, at.waypoints
-
-
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind is not Prey])
-@pytest.mark.parametrize("column, period", [(0, 1.0), (1, 0.5)])
-def test_the_observation_is_that_of_the_table(kind, column, period):
-    env = SeastarTaskEnv(task=kind(), fidelity="fast", decision_period=period)
-    task = env._task
-    sees_wires = period < 1.0 and env.observe_actuators
-    at = Layout(5, task.observes_commands + 2 * sees_wires, task.entries, task.shows_limbs)
-    places = [row[min(column, len(row) - 4)] for row in rows(kind, "Observation")]
-    documented = [tuple(map(int, place.split(".."))) for place in places if place]
-    assert documented == [(place.start, place.stop - 1) for place in places_of(at) if place.start < place.stop]
-    assert env.observation_space.shape == (at.size,)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_arguments_are_those_of_the_docstring(kind):
-    text = re.split(r"^## Arguments$", inspect.getdoc(kind), flags=re.MULTILINE)[1]
-    named = [name for line in re.findall(r"^([\w, ]+): ", text, flags=re.MULTILINE) for name in line.split(", ")]
-    assert named == list(inspect.signature(kind).parameters)
-
-
-def test_arguments_of_the_environments_are_those_of_their_docstrings():
-    def named(text):
-        return [name for line in re.findall(r"^([\w, ]+): ", text, flags=re.MULTILINE) for name in line.split(", ")]
-
-    of_one = inspect.getdoc(SeastarTaskEnv).split("## Arguments")[1]
-    assert named(of_one) == list(inspect.signature(SeastarTaskEnv).parameters)
-    of_batch = named(inspect.getdoc(SeastarTaskVectorEnv).split("## Arguments")[1])
-    assert {*named(of_one), *of_batch} - {"frames_per_stroke"} == set(
-        inspect.signature(SeastarTaskVectorEnv).parameters
-    )
+# Documented numbers
 
 
 def test_documented_numbers_of_prey_are_those_that_are_swum():

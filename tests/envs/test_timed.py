@@ -1,14 +1,11 @@
 """Decisions within a stroke: the timed environments, their actions, masks, heat and pictures."""
 
-import re
 from dataclasses import replace
 
-import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-import seastar_gym
 from episodes import both, swim_together
 from refusals import assert_refused
 from seastar_gym import Limited, MeasuredCurve, Numerics, RewardWeights, Scene, Seastar, SmaPulse, SmaWires, ThermalSma
@@ -20,33 +17,12 @@ from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.numerics import MAX_STEPS, SHORTEST
 
-IDS = {"SeastarSwimTimed-v0": 0.5, "SeastarSwimTimedModerate-v0": 0.2, "SeastarSwimTimedHard-v0": 0.1}
 FAST = Numerics.preset("fast")
 MODES = ("limbs", "joint", "pairs", "continuous")
 DEAF = Scene(actuator=SmaWires(deaf=True), numerics=FAST)
 HOT = Scene(actuator=ThermalSma(largest_temperature=240.0 - 220.0 * np.exp(-0.05 / 0.42)), numerics=FAST)
 """Wires reach the largest temperature after 0.05 s."""
 STRAIGHT = np.array([0, 1, 0, 0, 2])
-
-
-# Registered environments
-
-
-@pytest.mark.parametrize("id", ["SeastarSwim-v0", "SeastarSwimHeading-v0", *IDS])
-def test_ids_are_those_of_the_table(id):
-    row = re.search(rf"\| `{id}` +\|(.*)\|$", SeastarSwimEnv.__doc__, re.MULTILINE)[1]
-    period, actions, limit, decisions, actuator = (cell.strip().strip("`") for cell in row.split("|"))
-    env, inner = gym.make(id), gym.make(id).unwrapped
-    assert inner.decision_period == float(period) and f'"{inner.actions}"' == actions
-    assert env.spec.max_episode_steps == int(decisions) == round(float(limit) / float(period))
-    assert type(inner.scene.actuator).__name__ == actuator
-    assert gym.make_vec(id, 2).decision_period == float(period)
-    env.reset(seed=0)
-    assert env.step(env.action_space.sample())[4]["time"] == float(period)
-
-
-def test_the_table_has_all_timed_environments():
-    assert seastar_gym.TIMED == IDS
 
 
 @pytest.mark.parametrize("actions", MODES)
