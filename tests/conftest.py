@@ -34,6 +34,25 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.skip(reason="slow: runs with --slow"))
 
 
+@pytest.fixture
+def no_display(monkeypatch):
+    """No window can be opened."""
+    pytest.importorskip("pygame").display.quit()
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("SDL_VIDEODRIVER", "no-such-driver")
+
+
+@pytest.fixture
+def dummy_window(monkeypatch):
+    """Windows are opened where nobody sees them."""
+    pygame = pytest.importorskip("pygame")
+    pygame.display.quit()
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    yield
+    pygame.display.quit()
+
+
 @pytest.fixture(scope="session")
 def open_offline():
     """Opens a file in Debian's chromium, or whichever is installed, offline: (file, width, height, ...) -> page.

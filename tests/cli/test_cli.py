@@ -26,26 +26,6 @@ def path(tmp_path):
     return str(file)
 
 
-@pytest.fixture
-def no_display(monkeypatch):
-    import pygame
-
-    pygame.display.quit()
-    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setenv("SDL_VIDEODRIVER", "no-such-driver")
-
-
-@pytest.fixture
-def dummy_window(monkeypatch):
-    import pygame
-
-    pygame.display.quit()
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    yield
-    pygame.display.quit()
-
-
 def frames(file):
     """Pictures of a GIF, shape (n, height, width, 3)."""
     with Image.open(file) as film:

@@ -96,14 +96,6 @@ def is_blue(colour):
     return blue > 150 and blue > red + 100 and blue > green + 50
 
 
-@pytest.fixture
-def dummy_window(monkeypatch):
-    pygame.display.quit()
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    yield
-    pygame.display.quit()
-
-
 @pytest.mark.parametrize("size", [(480, 360), (960, 720), (321, 247)])
 def test_a_picture_is_rgb_of_the_size_asked_for(size):
     picture = renderer_of(size=size).draw(frame_of())

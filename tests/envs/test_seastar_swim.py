@@ -72,11 +72,8 @@ def test_gymnasiums_checker_passes_with_pictures(monkeypatch):
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_gymnasiums_checker_passes_without_a_display(monkeypatch):
+def test_gymnasiums_checker_passes_without_a_display(no_display):
     """It makes the environment with every render mode that it names."""
-    pygame = pytest.importorskip("pygame")
-    pygame.display.quit()
-    monkeypatch.setenv("SDL_VIDEODRIVER", "no-such-driver")
     check_env(gym.make("SeastarSwim-v0", fidelity="fast").unwrapped)
 
 
@@ -573,17 +570,8 @@ def test_reset_options_that_mean_nothing_are_refused_and_the_episode_goes_on(opt
 # Pictures
 
 
-@pytest.fixture
-def no_display(monkeypatch):
-    pygame = pytest.importorskip("pygame")
-    pygame.display.quit()
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    yield
-    pygame.display.quit()
-
-
 @pytest.mark.parametrize("render_mode", ["rgb_array", "rgb_array_list", "human"])
-def test_being_watched_changes_no_bit(render_mode, no_display, monkeypatch):
+def test_being_watched_changes_no_bit(render_mode, dummy_window, monkeypatch):
     shown, show = [], rendering.Renderer.show
     monkeypatch.setattr(rendering.Renderer, "show", lambda *given, fps: shown.append(fps) or show(*given, fps))
     watched, alone = fast(render_mode=render_mode, frames_per_stroke=3), fast()

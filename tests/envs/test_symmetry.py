@@ -11,6 +11,7 @@ from gymnasium.vector import AutoresetMode
 from hypothesis import given
 from hypothesis import strategies as st
 
+from own_actuators import Remembering
 from refusals import assert_refused
 from seastar_gym import (
     Attachment,
@@ -568,21 +569,6 @@ def test_an_ellipse_of_fluid_leaves_a_polygon_what_suits_its_axes():
     assert symmetry.symmetry_of(Scene(robot)) == 6
     group = symmetry.symmetry_of(Scene(robot, Water(added_mass_coefficient=1.0)))
     assert (group.n_turns, group.axis) == (2, 0.0)
-
-
-class Remembering:
-    """Actuator with a memory that does not say what a mirror makes of it."""
-
-    peak_angle, period, corners, rest = 0.3, 1.0, (0.0, 1.0), np.zeros(1)
-
-    def delta_psi(self, t):
-        return 0.3 * np.sin(np.pi * np.asarray(t)) ** 2
-
-    def respond(self, t, commands, state):
-        return np.multiply.outer(self.delta_psi(t), commands), state
-
-    def observe(self, state):
-        return state
 
 
 def test_actuators_that_remember_are_refused_unless_they_say_what_a_mirror_does():

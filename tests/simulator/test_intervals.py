@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from own_actuators import Remembering, Triangle
 from refusals import assert_refused
 from seastar_gym import (
     Body,
@@ -185,28 +186,7 @@ def test_heating_time_and_energy_are_those_of_a_hand_calculation():
     np.testing.assert_allclose(simulator.advance(1.0).heating_time[0], 0.07 + 0.02)
 
 
-class Plain:
-    """An actuator that says no more than it has to."""
-
-    peak_angle, period, corners = 0.3, 0.6, (0.0, 0.2, 0.6)
-
-    def delta_psi(self, t):
-        return np.interp(t, self.corners, (0.0, 0.3, 0.0))
-
-
-class Remembering(Plain):
-    """The same with a memory that does nothing."""
-
-    rest = np.zeros(1)
-
-    def respond(self, t, commands, state):
-        return np.multiply.outer(self.delta_psi(t), commands), state
-
-    def observe(self, state):
-        return state
-
-
-SILENT = {"plain": Plain(), "memory": Remembering(), "limited": Limited(Plain(), 0.2)}
+SILENT = {"plain": Triangle(), "memory": Remembering(), "limited": Limited(Triangle(), 0.2)}
 
 
 @pytest.mark.parametrize("actuator", SILENT.values(), ids=SILENT)

@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+from own_actuators import Remembering, Triangle
 from refusals import assert_refused
 from seastar_gym import Limited, MeasuredCurve, Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires, ThermalSma
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -219,27 +220,6 @@ def test_strengths_of_a_batch_are_shares_too(strengths):
 
 
 # --- any actuator ----------------------------------------------------------------------------------------------------
-
-
-class Triangle:
-    """One that a user might write."""
-
-    peak_angle, period, corners = 0.3, 0.6, (0.0, 0.2, 0.6)
-
-    def delta_psi(self, t):
-        return np.interp(t, self.corners, (0.0, 0.3, 0.0))
-
-
-class Remembering(Triangle):
-    """One with a memory that does not say what a mirror makes of it."""
-
-    rest = np.zeros(1)
-
-    def respond(self, t, commands, state):
-        return np.multiply.outer(self.delta_psi(t), commands), state
-
-    def observe(self, state):
-        return state
 
 
 def test_a_scene_takes_any_actuator_that_says_what_it_does():
