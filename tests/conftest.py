@@ -34,6 +34,20 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.skip(reason="slow: runs with --slow"))
 
 
+@pytest.fixture(scope="module")
+def few_settings():
+    """Certificates are of meshes and steps that take a second."""
+    from seastar_gym.accuracy import measure
+    from seastar_gym.scene import Numerics
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(measure, "NODES", (5, 9))
+        patch.setattr(measure, "MANY_NODES", 17)
+        patch.setattr(measure, "SHORT", Numerics("implicit-midpoint", 1e-3, 1e-8))
+        patch.setattr(measure, "NUMERICS", (Numerics("sdirk2", 2e-2, 1e-6), Numerics("implicit-midpoint", 2e-3, 1e-7)))
+        yield
+
+
 @pytest.fixture
 def no_display(monkeypatch):
     """No window can be opened."""

@@ -37,6 +37,16 @@ def elements_of(group):
     return np.arange(0, 2 * n_turns, 2 if axis is None else 1)
 
 
+def assert_equivariant(policy, seen, mirror=(), entries=(), atol=0.0):
+    """For carried observations of robots of five limbs, shape (n, size), the policy does the carried thing."""
+    symmetry = symmetry_for(5, mirror, policy.actions, entries)
+    actions, _ = policy.predict(seen, deterministic=True)
+    for element in elements_of(5):
+        elements = np.full(len(seen), element)
+        carried, _ = policy.predict(symmetry.carry(seen, elements), deterministic=True)
+        np.testing.assert_allclose(carried, symmetry.carry_actions(actions, elements), rtol=0.0, atol=atol)
+
+
 def reduced_swim(scene, randomization, carry, actions, **arguments):
     """Rewards and reduced observations of the same reduced actions, in a world carried by a matrix."""
     path = np.array([[0.02, 0.013], [-0.03, 0.02], [0.02, -0.03]]) @ carry.T

@@ -29,16 +29,6 @@ SAMPLES = 2
 
 
 @pytest.fixture(scope="module")
-def few_settings():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(measure, "NODES", (5, 9))
-        patch.setattr(measure, "MANY_NODES", 17)
-        patch.setattr(measure, "SHORT", Numerics("implicit-midpoint", 1e-3, 1e-8))
-        patch.setattr(measure, "NUMERICS", (Numerics("sdirk2", 2e-2, 1e-6), Numerics("implicit-midpoint", 2e-3, 1e-7)))
-        yield
-
-
-@pytest.fixture(scope="module")
 def certificate(few_settings):
     return seastar_gym.certify(SCENE, SAMPLES)
 

@@ -23,7 +23,7 @@ from seastar_gym import Numerics, Scene, Seastar, Water
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers import learner_zip
 from seastar_gym.controllers.learner_zip import load
-from symmetries import symmetry_for
+from symmetries import assert_equivariant
 
 FAST = Numerics.preset("fast")
 SMALL = Hyperparameters(num_envs=8, rollout=8, batch_size=32, epochs=2, hidden=(16, 8), max_episode_time=10.0)
@@ -122,13 +122,7 @@ def test_one_observation_gets_the_action_that_it_gets_in_a_batch(learner, file):
 
 
 def test_a_loaded_policy_is_equivariant(learner, file):
-    policy = load(file)
-    observations = observations_of(learner)
-    actions, _ = policy.predict(observations, deterministic=True)
-    for element in range(10):
-        elements = np.full(len(observations), element)
-        carried, _ = policy.predict(symmetry_for(5).carry(observations, elements), deterministic=True)
-        np.testing.assert_array_equal(carried, symmetry_for(5, mode=policy.actions).carry_actions(actions, elements))
+    assert_equivariant(load(file), observations_of(learner))
 
 
 def test_without_deterministic_it_explores(learner, file):

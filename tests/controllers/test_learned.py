@@ -24,7 +24,7 @@ from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.evaluation.swim import swim
-from symmetries import symmetry_for
+from symmetries import assert_equivariant, symmetry_for
 
 ROOT = Path(__file__).resolve().parents[2]
 FAST = Numerics.preset("fast")
@@ -101,12 +101,7 @@ def test_random_actions_follow_the_logits():
 
 
 def test_any_network_behind_the_symmetry_is_equivariant(policy):
-    seen = observations(n=200)
-    actions, _ = policy.predict(seen, deterministic=True)
-    for element in range(10):
-        elements = np.full(len(seen), element)
-        carried, _ = policy.predict(symmetry_for(5).carry(seen, elements), deterministic=True)
-        np.testing.assert_array_equal(carried, symmetry_for(5, mode="joint").carry_actions(actions, elements))
+    assert_equivariant(policy, observations(n=200))
 
 
 # On disk

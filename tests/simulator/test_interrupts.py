@@ -9,6 +9,8 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -203,7 +205,7 @@ def test_whatever_another_thread_asks_in_the_middle_of_a_stroke_is_refused(monke
     assert_same(simulator, other)
 
 
-def break_off(monkeypatch, simulator: Simulator, what: str) -> None:
+def break_off(monkeypatch, what: str, change: Callable[[], Any]) -> None:
     def interrupted(*_):
         raise KeyboardInterrupt
 
@@ -211,13 +213,13 @@ def break_off(monkeypatch, simulator: Simulator, what: str) -> None:
     with monkeypatch.context() as patch:
         patch.setattr(owner, name, interrupted)
         with pytest.raises(KeyboardInterrupt):
-            IN_THE_MIDDLE[what](simulator)
+            change()
 
 
 @pytest.mark.parametrize("what", ["reset", "set_scene"])
 def test_a_change_that_was_broken_off_asks_for_a_reset_which_cures_it(monkeypatch, what):
     simulator = swimmers()
-    break_off(monkeypatch, simulator, what)
+    break_off(monkeypatch, what, lambda: IN_THE_MIDDLE[what](simulator))
     some = np.arange(N_ROBOTS) < 2
     for _ in range(2):
         for refused in (lambda: simulator.stroke(COMMANDS[0]), simulator.get_state, lambda: simulator.reset(some)):
@@ -230,7 +232,7 @@ def test_a_change_that_was_broken_off_asks_for_a_reset_which_cures_it(monkeypatc
 
 def test_a_state_that_is_set_cures_a_reset_that_was_broken_off(monkeypatch):
     simulator, other = swimmers(), swimmers()
-    break_off(monkeypatch, simulator, "reset")
+    break_off(monkeypatch, "reset", lambda: IN_THE_MIDDLE["reset"](simulator))
     simulator.set_state(other.get_state())
     simulator.stroke(COMMANDS[1])
     other.stroke(COMMANDS[1])
@@ -324,23 +326,12 @@ def test_an_interrupted_reset_asks_for_another_which_cures_it(monkeypatch, kind)
     env, fresh = make(kind), make(kind)
     action = env.action_space.sample()
     for what in ("reset", "set_scene"):
-        break_off_reset(monkeypatch, env, what)
+        env.reset(seed=5)
+        break_off(monkeypatch, what, lambda: env.reset(seed=6))
         with pytest.raises(gym.error.ResetNeeded, match=r"interrupted: call reset\(\)"):
             env.step(action)
     np.testing.assert_array_equal(env.reset(seed=1)[0], fresh.reset(seed=1)[0])
     np.testing.assert_array_equal(env.step(action)[0], fresh.step(action)[0])
-
-
-def break_off_reset(monkeypatch, env, what: str) -> None:
-    def interrupted(*_):
-        raise KeyboardInterrupt
-
-    env.reset(seed=5)
-    owner, name = {"reset": (Clock, "set"), "set_scene": (Coefficients, "set_scene")}[what]
-    with monkeypatch.context() as patch:
-        patch.setattr(owner, name, interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            env.reset(seed=6)
 
 
 @KINDS

@@ -14,14 +14,9 @@ from studies.command import main
 ROBOT = "short, L = 5 cm"
 
 
-@pytest.fixture(scope="module")
-def few_settings():
-    """Meshes and steps that take a second."""
+@pytest.fixture(scope="module", autouse=True)
+def screened():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(measure, "NODES", (5, 9))
-        patch.setattr(measure, "MANY_NODES", 17)
-        patch.setattr(measure, "SHORT", Numerics("implicit-midpoint", 1e-3, 1e-8))
-        patch.setattr(measure, "NUMERICS", (Numerics("sdirk2", 2e-2, 1e-6), Numerics("implicit-midpoint", 2e-3, 1e-7)))
         patch.setattr(promises, "SCREEN", Numerics("implicit-midpoint", 1.25e-3, 1e-7))
         yield
 
