@@ -413,35 +413,30 @@ JUNK = st.one_of(
 )  # fmt: skip
 
 
-@given(st.sampled_from(list(places(SMALL))), JUNK)
-@settings(max_examples=400)
-def test_junk_anywhere_is_refused_in_a_sentence_or_is_a_scene(place, junk):
+def assert_read_or_refused(place, change):
+    """Data whose dict or list was changed at a place is a scene that comes back, or is refused in a sentence."""
     data = copy.deepcopy(SMALL)
     inner = data
     for key in place[:-1]:
         inner = inner[key]
-    inner[place[-1]] = junk
+    change(inner, place[-1])
     sentence, scene = "", None
     try:
         scene = Scene.from_dict(data)
     except ValueError as refusal:
         sentence = str(refusal)
     assert again(scene) == scene if scene is not None else sentence.endswith(".") and "\n" not in sentence
+
+
+@given(st.sampled_from(list(places(SMALL))), JUNK)
+@settings(max_examples=400)
+def test_junk_anywhere_is_refused_in_a_sentence_or_is_a_scene(place, junk):
+    assert_read_or_refused(place, lambda inner, key: inner.__setitem__(key, junk))
 
 
 @pytest.mark.parametrize("place", list(places(SMALL)), ids=str)
 def test_what_is_missing_has_its_default_or_is_asked_for(place):
-    data = copy.deepcopy(SMALL)
-    inner = data
-    for key in place[:-1]:
-        inner = inner[key]
-    del inner[place[-1]]
-    sentence, scene = "", None
-    try:
-        scene = Scene.from_dict(data)
-    except ValueError as refusal:
-        sentence = str(refusal)
-    assert again(scene) == scene if scene is not None else sentence.endswith(".") and "\n" not in sentence
+    assert_read_or_refused(place, lambda inner, key: inner.pop(key))
 
 
 def test_a_scene_written_before_a_term_was_known_can_be_read():

@@ -74,33 +74,23 @@ def test_random_paths_with_random_headings_are_swum_by_rules(monkeypatch):
         assert done.last("time").tolist() == [1.0, 1.0] and SECONDS.of(done).tolist() == [1.0, 1.0]
 
 
-def test_the_wiring_is_found_by_what_limbs_do():
-    env = batch("miswired", actions="joint")
-    agent = WiringGuess(Robots(env))
+@pytest.mark.parametrize(
+    "task, make, told, known",
+    [("miswired", WiringGuess, "wiring", 12), ("fail-blind", FailureGuess, "limb_strengths", 8)],
+)
+def test_what_is_hidden_of_limbs_is_found_by_what_they_do_and_do_not_do(task, make, told, known):
+    env = batch(task, actions="joint")
+    agent = make(Robots(env))
+    assert task == "miswired" or agent.hypotheses.shape == (16, 5)
     observations, info = env.reset(seed=0)
     heated = np.zeros((6, 5))
     for _ in range(30):
         actions = agent.act(observations, info)
         heated += np.abs(env.command_table[actions])
         observations, *_, info = env.step(actions)
-    believed = agent.hypotheses[agent.believed]
     well_known = heated > 8  # of limbs that were hardly heated nothing is known
-    assert well_known.sum() > 12 and (believed == info["wiring"])[well_known].mean() > 0.9
-
-
-def test_dead_limbs_are_found_by_what_they_do_not_do():
-    env = batch("fail-blind", actions="joint")
-    agent = FailureGuess(Robots(env))
-    assert agent.hypotheses.shape == (16, 5)
-    observations, info = env.reset(seed=0)
-    heated = np.zeros((6, 5))
-    for _ in range(30):
-        actions = agent.act(observations, info)
-        heated += np.abs(env.command_table[actions])
-        observations, *_, info = env.step(actions)
-    well_known = heated > 8
-    assert well_known.sum() > 8
-    assert (agent.hypotheses[agent.believed] == info["limb_strengths"])[well_known].mean() > 0.9
+    assert well_known.sum() > known
+    assert (agent.hypotheses[agent.believed] == info[told])[well_known].mean() > 0.9
 
 
 def test_live_limbs_alone_are_commanded():
