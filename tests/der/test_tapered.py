@@ -1,6 +1,6 @@
 """Coefficients of limbs that taper, edge by edge and node by node, from the chapter's formulas themselves.
 
-Those of the continuum are made of them, see tests/simulator/test_continuum_steps.py.
+Those of the continuum are made of them, see tests/simulator/test_oracle_steps.py.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Coefficients of rods are the chapter's; those of the continuum: tests/simulator/test_continuum_steps.py."""
+"""Coefficients of rods are the chapter's; those of the continuum: tests/simulator/test_oracle_steps.py."""
 
 import math
 
