@@ -12,8 +12,10 @@ import contextlib
 import functools
 import hashlib
 import operator
+import os
 import pickle
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -278,6 +280,26 @@ class _DigestCache(FunctionCache):
 class _NoCache(NullCache):
     def load_overload(self, sig, target_context):
         return _say_that_it_compiles()
+
+
+def kept_code(name: str, make: Callable[[], bytes]) -> bytes:
+    """Code by name from the disk, beside that of entry points; else what `make` returns, which is left there."""
+    path = Path(_DigestLocator(kept_code, __file__).get_cache_path()) / name
+    try:
+        kept = path.read_bytes()
+    except OSError:
+        kept = b""
+    digest, code = kept[:DIGEST_SIZE], kept[DIGEST_SIZE:]
+    if digest == hashlib.sha256(code).digest():
+        return code
+    _say_that_it_compiles()
+    code = make()
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = path.with_name(f"{name}.{os.getpid()}")
+        part.write_bytes(hashlib.sha256(code).digest() + code)
+        part.replace(path)
+    return code
 
 
 @functools.cache
