@@ -69,7 +69,9 @@ def _add_entry(module: ir.Module, robot: ir.Function) -> str:
     start, swim, end = (entry.append_basic_block(name) for name in ("start", "swim", "end"))
     build = ir.IRBuilder(start)
     block, threads, thread = (
-        build.zext(build.call(ir.Function(module, ir.FunctionType(I32, []), f"llvm.nvvm.read.ptx.sreg.{name}"), []), I64)
+        build.zext(
+            build.call(ir.Function(module, ir.FunctionType(I32, []), f"llvm.nvvm.read.ptx.sreg.{name}"), []), I64
+        )
         for name in ("ctaid.x", "ntid.x", "tid.x")
     )
     index = build.add(build.mul(block, threads), thread)

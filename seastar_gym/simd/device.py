@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import llvmlite.binding as llvm
 import numpy as np
 from llvmlite import ir
-from numba.core import types
+from numba.core import config, types
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import cpu_target
 
@@ -98,6 +98,8 @@ class Program:
     """
 
     def __init__(self, kernels: DeviceKernels, kernel: Any, bundles: dict[str, Any], memory: tuple[str, ...]):
+        if config.DISABLE_JIT:
+            raise RuntimeError('With NUMBA_DISABLE_JIT=1 nothing is compiled, and devices have no code: use "cpu".')
         self._kernels, self._kernel = kernels, kernel
         self.memory = Memory()
         self._operands: list[Operand] = []

@@ -32,7 +32,6 @@ from numba.extending import intrinsic, lower_builtin, register_model
 from seastar_gym.simd import numpy_lanes
 from seastar_gym.simd.width import N_LANES, WIDTH
 
-
 I1, I32, F64 = ir.IntType(1), ir.IntType(32), ir.DoubleType()
 VECTOR = ir.VectorType(F64, WIDTH)
 MASK = ir.VectorType(I1, WIDTH)

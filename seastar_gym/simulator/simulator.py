@@ -82,7 +82,9 @@ class Simulator:
         self._lock = StrokeLock()
         self._bars: ErrorBars | None = None
         if error_bars:
-            self._bars = ErrorBars(Simulator(twin_scene(scene), self.n_robots, self.threads, device=device), self.n_robots)
+            self._bars = ErrorBars(
+                Simulator(twin_scene(scene), self.n_robots, self.threads, device=device), self.n_robots
+            )
         self.set_limb_strengths(scene.limb_strengths or 1.0)
 
     def _make_batch(self, effort: bool) -> Batch:
