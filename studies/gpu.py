@@ -43,7 +43,7 @@ from studies.style import CYCLE, FAINT, subplots
 
 PRESETS: tuple[Fidelity, ...] = ("fast", "balanced", "reference")
 BATCHES = (64, 256, 1024, 4096, 16384, 65536, 262144)
-LONGEST = 12.0
+LONGEST = 6.0
 """Strokes that would take longer than this [s] are left out."""
 N_ROBOTS, N_STROKES = 64, 3
 """Robots that are compared with the processor's, if a scene has no number of its own, and their strokes."""
@@ -77,8 +77,9 @@ def scenes() -> dict[str, Scene]:
         "unequal limbs": Seastar(nodes_per_limb=10, limbs=(Limb(length=0.08), *[Limb()] * 4)),
         "hub hinges": Seastar(nodes_per_limb=10, discretisation="chapter"),
         "limbs in a row on a body": Seastar(
-            nodes_per_limb=10, n_limbs=2, body=Body.rectangle(0.06, 0.03), along=AlongLimb(),
-            attachments=(Attachment(0.02, 0.0, 0.0), Attachment(-0.02, 0.0, np.pi)),
+            nodes_per_limb=10, n_limbs=2, along=AlongLimb(), body=Body.rectangle(
+                0.06, 0.03, attachments=(Attachment(0.02, 0.0, 0.0), Attachment(-0.02, 0.0, np.pi))
+            ),
         ),
     }  # fmt: skip
     for name, robot in robots.items():

@@ -68,12 +68,9 @@ def _add_entry(module: ir.Module, robot: ir.Function) -> str:
         pointer.add_attribute("noalias")
     start, swim, end = (entry.append_basic_block(name) for name in ("start", "swim", "end"))
     build = ir.IRBuilder(start)
-    block, threads, thread = (
-        build.zext(
-            build.call(ir.Function(module, ir.FunctionType(I32, []), f"llvm.nvvm.read.ptx.sreg.{name}"), []), I64
-        )
-        for name in ("ctaid.x", "ntid.x", "tid.x")
-    )
+    names = (f"llvm.nvvm.read.ptx.sreg.{name}" for name in ("ctaid.x", "ntid.x", "tid.x"))
+    registers = [ir.Function(module, ir.FunctionType(I32, []), name) for name in names]
+    block, threads, thread = (build.zext(build.call(register, []), I64) for register in registers)
     index = build.add(build.mul(block, threads), thread)
     build.cbranch(build.icmp_unsigned("<", index, entry.args[-1]), swim, end)
     build = ir.IRBuilder(swim)

@@ -234,7 +234,7 @@ class Batch:
         self.workers.run(swim, map(slice, bounds[:-1], bounds[1:]))
 
     def _shape_of(self, part: slice, begin: int, end: int) -> tuple[Floats, int]:
-        """Rows of the shape from time `begin` to `end`, and number of the limbs that have rows, as kernels take them."""
+        """Rows of the shape from time `begin` to `end` for kernels, and number of the limbs that have rows."""
         if self.shape.ndim == 1:
             return self.shape[begin : end + 1], 0
         rows = np.ascontiguousarray(self.shape[part, begin : end + 1])

@@ -163,7 +163,7 @@ class DeviceBatch(Batch):
         self._coefficients = self.coefficients, self.coefficients.n_changes
 
     def _rows(self, name: str) -> Any:
-        """Rows of all robots on the device by the name of the kernel's argument, shape (n_groups, k, 32), not a copy."""
+        """Rows on the device by the name of the kernel's argument, shape (n_groups, k, 32), not a copy."""
         return self._own[:, self._memory.rows[name]]
 
     def _to_device(self, rows: Floats) -> Any:
