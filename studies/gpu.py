@@ -11,13 +11,12 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.scene import (
     AlongLimb,
     Attachment,
@@ -32,7 +31,7 @@ from seastar_gym.scene import (
     SmaWires,
     ThermalSma,
 )
-from seastar_gym.scene.numerics import Fidelity
+from seastar_gym.scene.numerics import Fidelity, SchemeName
 from seastar_gym.simd import cuda
 from seastar_gym.simulator import Simulator
 from studies.frame import Results, Study, require_known
@@ -43,12 +42,12 @@ from studies.style import CYCLE, FAINT, subplots
 
 PRESETS: tuple[Fidelity, ...] = ("fast", "balanced", "reference")
 BATCHES = (64, 256, 1024, 4096, 16384, 65536, 262144)
-LONGEST = 6.0
-"""Strokes that would take longer than this [s] are left out."""
+LONGEST = 4.0
+"""A batch whose stroke takes longer than this [s] is the largest one."""
 N_ROBOTS, N_STROKES = 64, 3
 """Robots that are compared with the processor's, if a scene has no number of its own, and their strokes."""
 EVERYTHING = "all, a body, bent along, contact"
-LEARNER = {"n_steps": 8, "batch_size": 8192, "n_epochs": 4}
+LEARNER: dict[str, Any] = {"n_steps": 8, "batch_size": 8192, "n_epochs": 4}
 ROBOTS_OF_LEARNER, ROUNDS_OF_LEARNER = 4096, 4
 
 
@@ -57,7 +56,7 @@ def scenes() -> dict[str, Scene]:
     of_terms = scenes_of_terms()
     chapter, everything = of_terms["the chapter's scene"], of_terms[EVERYTHING]
     found = dict(of_terms)
-    for scheme in SCHEMES:
+    for scheme in get_args(SchemeName):
         stepped = Numerics(scheme, 0.005)
         found[f"{scheme}"] = replace(chapter, numerics=stepped)
         found[f"{scheme}, {EVERYTHING}"] = replace(everything, numerics=stepped)
@@ -103,7 +102,8 @@ def compared(name: str, device: str) -> dict[str, Any]:
     scene = scenes()[name]
     n_robots = scene.n_robots or N_ROBOTS
     both = Simulator(scene, n_robots, threads=1), Simulator(scene, n_robots, device=device)
-    differing, seconds = set(), {}
+    differing: set[str] = set()
+    seconds: dict[str, float] = {}
     for commands in commands_of(scene, n_robots, N_STROKES):
         reports = []
         for simulator in both:
@@ -131,7 +131,7 @@ def batches(preset: Fidelity, contact: bool, device: str) -> Iterator[tuple[int,
     scene = replace(Scene.preset(preset), contact=Contact() if contact else None)
     seconds = 0.0
     for n_robots in BATCHES if device == "cuda" else BATCHES[3:4]:
-        if 4.0 * seconds > LONGEST:
+        if seconds > LONGEST:
             return
         simulator = Simulator(scene, n_robots, device=device)
         first, *others = commands_of(scene, n_robots, 3)

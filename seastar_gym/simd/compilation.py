@@ -198,7 +198,7 @@ def source_digest(package: Path = PACKAGE) -> str:
     return digest.hexdigest()[:32]
 
 
-_digest_of_this_process = functools.cache(source_digest)
+digest_of_this_process = functools.cache(source_digest)
 
 
 class _DigestLocator(UserWideCacheLocator):
@@ -207,11 +207,11 @@ class _DigestLocator(UserWideCacheLocator):
     def __init__(self, py_func, py_file):
         super().__init__(py_func, py_file)
         root = Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else Path(self._cache_path).parent
-        self._cache_path = str(root / f"seastar_gym-{_digest_of_this_process()}")
+        self._cache_path = str(root / f"seastar_gym-{digest_of_this_process()}")
 
     def get_source_stamp(self):
         # An entry point may stand outside the package.
-        return _digest_of_this_process(), hashlib.sha256(Path(self._py_file).read_bytes()).hexdigest()
+        return digest_of_this_process(), hashlib.sha256(Path(self._py_file).read_bytes()).hexdigest()
 
 
 class _SoundFile(IndexDataCacheFile):

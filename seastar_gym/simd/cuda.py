@@ -16,6 +16,7 @@ TRIPLE, ARCHITECTURE, VERSION = "nvptx64-nvidia-cuda", "sm_70", "ptx70"  # the o
 THREADS = 64
 """Threads of a block, a choice: 32 to 128 are alike."""
 I32 = ir.IntType(32)
+_LOADED: dict[str, Any] = {}
 
 
 def ptx_of(program: Program, architecture: str = ARCHITECTURE) -> str:
@@ -44,11 +45,13 @@ def arrays() -> Any:
 
 def load(program: Program) -> Any:
     """The program as a function, see `run`."""
-    from cupy.cuda.function import Module
+    if program.key not in _LOADED:
+        from cupy.cuda.function import Module
 
-    module = Module()
-    module.load(kept_code(f"{program.key}-{ARCHITECTURE}.ptx", lambda: ptx_of(program).encode()))
-    return module.get_function(ALL_ROBOTS)
+        module = Module()
+        module.load(kept_code(f"{program.key}-{ARCHITECTURE}.ptx", lambda: ptx_of(program).encode()))
+        _LOADED[program.key] = module.get_function(ALL_ROBOTS)
+    return _LOADED[program.key]
 
 
 def run(code: Any, own: Any, shared: Any, times: Any, shape: Any, n_robots: int) -> None:

@@ -118,17 +118,23 @@ class Program:
             return self._kernels.type_of_rows(not is_own)
         if hasattr(value, "_fields"):
             fields = [self._describe(getattr(value, field), f"{name}.{field}", own) for field in value._fields]
-            return types.BaseTuple.from_types(fields, type(value))
+            return types.containers.BaseTuple.from_types(fields, type(value))
         if value is None:
             return self._kernels.absent
         kind = _type_of_number(value)
         self._operands.append(Operand("constant", kind.cast_python_value(value), kind))
         return kind
 
-    @property
+    @cached_property
     def key(self) -> str:
         """Digest of all that the code depends on."""
-        parts = (compilation.source_digest(), self._kernel.__name__, self._types, self._operands, self.memory.n_rows)
+        parts = (
+            compilation.digest_of_this_process(),
+            self._kernel.__name__,
+            self._types,
+            self._operands,
+            self.memory.n_rows,
+        )
         return hashlib.sha256(repr(parts).encode()).hexdigest()[:32]
 
     @cached_property

@@ -30,7 +30,8 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 from numba.extending import intrinsic, lower_builtin, register_model
 
 from seastar_gym.simd import numpy_lanes
-from seastar_gym.simd.width import N_LANES, WIDTH
+from seastar_gym.simd.width import N_LANES as N_LANES
+from seastar_gym.simd.width import WIDTH as WIDTH
 
 I1, I32, F64 = ir.IntType(1), ir.IntType(32), ir.DoubleType()
 VECTOR = ir.VectorType(F64, WIDTH)

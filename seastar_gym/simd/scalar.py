@@ -4,6 +4,7 @@ It is slow, and there for tests: what this gives to the last bit, a graphics pro
 """
 
 import ctypes
+from functools import partial
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -13,7 +14,7 @@ from llvmlite import ir
 from seastar_gym.simd.compilation import kept_code
 from seastar_gym.simd.device import ALL_ROBOTS, I64, PARAMETERS, Program
 
-_ENGINES: dict[str, Any] = {}
+_LOADED: dict[str, Any] = {}
 
 
 def arrays() -> Any:
@@ -23,23 +24,21 @@ def arrays() -> Any:
 
 def load(program: Program) -> Any:
     """The program as a function, see `run`."""
-    key = f"{program.key}-scalar"
-    if key not in _ENGINES:
+    if program.key not in _LOADED:
         llvm.initialize_native_target()
         llvm.initialize_native_asmprinter()
         features = llvm.get_host_cpu_features().flatten()
         name = llvm.get_host_cpu_name()
         machine = llvm.Target.from_default_triple().create_target_machine(name, features, opt=3, jit=True)
-        code = kept_code(f"{key}-{name}.o", lambda: machine.emit_object(
-            program.code(machine, llvm.get_process_triple(), _add_loop)
-        ))  # fmt: skip
+        made = partial(program.code, machine, llvm.get_process_triple(), _add_loop)
+        code = kept_code(f"{program.key}-{name}.o", lambda: machine.emit_object(made()))
         engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
         engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         engine.finalize_object()
-        _ENGINES[key] = engine
-    pointer = ctypes.c_void_p
-    kinds = [pointer, pointer, pointer, ctypes.c_int64, pointer, ctypes.c_int64, ctypes.c_int64]
-    return ctypes.CFUNCTYPE(None, *kinds)(_ENGINES[key].get_function_address(ALL_ROBOTS))
+        pointer, count = ctypes.c_void_p, ctypes.c_int64
+        kind = ctypes.CFUNCTYPE(None, pointer, pointer, pointer, count, pointer, count, count)
+        _LOADED[program.key] = engine, kind(engine.get_function_address(ALL_ROBOTS))
+    return _LOADED[program.key][1]
 
 
 def run(code: Any, own: Any, shared: Any, times: Any, shape: Any, n_robots: int) -> None:

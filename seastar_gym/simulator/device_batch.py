@@ -48,10 +48,11 @@ class DeviceBatch(Batch):
         super().__init__(scene, n_robots, 1, effort)
         self._n_groups = -(-n_robots // device.N_LANES)
         self._coefficients: Any = None  # those that are on the device, and how often they had been changed
+        self._codes: dict[int, Any] = {}
         self._starts = False
 
     @property
-    def q(self) -> Floats:  # type: ignore[override]
+    def q(self) -> Floats:
         return self._fetched("q")
 
     @q.setter
@@ -59,7 +60,7 @@ class DeviceBatch(Batch):
         self._on_host["q"] = rows
 
     @property
-    def v(self) -> Floats:  # type: ignore[override]
+    def v(self) -> Floats:
         return self._fetched("v")
 
     @v.setter
@@ -110,8 +111,9 @@ class DeviceBatch(Batch):
         times, rotations = self._arrays.asarray(self.times[begin : end + 1]), self._arrays.asarray(shape)
         if n_turning:
             rotations = self._to_device(shape)
-        code = self._device.load(self._program_of(n_turning))
-        self._device.run(code, self._own, self._shared, times, rotations, self.n_robots)
+        if n_turning not in self._codes:
+            self._codes[n_turning] = self._device.load(self._program_of(n_turning))
+        self._device.run(self._codes[n_turning], self._own, self._shared, times, rotations, self.n_robots)
         self._on_device = {"q", "v"}
         for name, kernel_name in OF_INTERVAL.items():
             getattr(self, name)[:] = self._read_device(self._rows(kernel_name))
@@ -142,7 +144,7 @@ class DeviceBatch(Batch):
         """Make the device's memory, with the coefficients of all robots in it."""
         for name in ("q", "v"):
             self._fetched(name)
-        self._memory = self._program_of(0).memory
+        self._memory, self._codes = self._program_of(0).memory, {}
         self._own = self._arrays.zeros((self._n_groups, self._memory.n_rows, device.N_LANES))
         shared = np.zeros(max(self._memory.n_shared, 1))
         one = {"scheme": self._scheme, "fallback": SCHEMES["implicit-euler"]}

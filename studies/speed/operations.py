@@ -19,8 +19,9 @@ from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene import Scene
 from seastar_gym.simd import numpy_lanes
+from seastar_gym.simd.modules import FOLDER
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
-from seastar_gym.simd.plain import FOLDER, PlainKernels
+from seastar_gym.simd.plain import PlainKernels
 from seastar_gym.simulator import Simulator
 
 FLOPS = {"add": 1, "multiply": 1, "fused": 2, "divide": 1, "root": 1}
