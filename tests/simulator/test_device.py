@@ -14,6 +14,9 @@ import pytest
 
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, StrokeReport
 from seastar_gym.simd import cuda
+from seastar_gym.sweep.axes import Choices
+from seastar_gym.sweep.designs import Sweep
+from seastar_gym.sweep.swimming import swim
 from strokes import assert_same, finished
 from studies.gpu import EVERYTHING, compared, scenes
 
@@ -148,11 +151,20 @@ def test_environments_observe_and_are_rewarded_alike(device):
         np.testing.assert_array_equal(ours, theirs)
 
 
+def test_designs_of_a_sweep_swim_alike(device):
+    sweep = Sweep(SMALL, (Choices("robot.youngs_modulus", (0.8e6, 1.0e6, 1.2e6)),), settling=1, measured=1)
+    (cell,) = sweep.cells()
+    ours, theirs = swim(cell), swim(cell, device)
+    assert ours.keys() == theirs.keys() and not ours["status"].any()
+    for name, column in ours.items():
+        np.testing.assert_array_equal(column, theirs[name], err_msg=name)
+
+
 # Refusals
 
 
 def test_a_device_that_is_not_there_is_refused_in_one_sentence():
-    with pytest.raises(ValueError, match="device must be one of 'cpu', 'cuda', 'scalar', not 'tpu'."):
+    with pytest.raises(ValueError, match="device must be one of 'cpu', 'cuda', 'scalar', not 'tpu'"):
         Simulator(SMALL, device="tpu")
     if not has_gpu():
         with pytest.raises(RuntimeError, match=r'^device="cuda" (needs CuPy|finds no GPU).*\.$'):
