@@ -31,6 +31,11 @@ def _kernels() -> DeviceKernels:
     return DeviceKernels()
 
 
+def program_of(scene: Scene) -> Program:
+    """The code of a scene for devices, for limbs that all turn alike: to be looked at, without a device."""
+    return DeviceBatch(scene, scene.n_robots or 1, "scalar", effort=False).program(0)
+
+
 class DeviceBatch(Batch):
     """A batch whose robots are advanced by a device, to the bits of the processor's.
 
@@ -112,13 +117,13 @@ class DeviceBatch(Batch):
         if n_turning:
             rotations = self._to_device(shape)
         if n_turning not in self._codes:
-            self._codes[n_turning] = self._device.load(self._program_of(n_turning))
+            self._codes[n_turning] = self._device.load(self.program(n_turning))
         self._device.run(self._codes[n_turning], self._own, self._shared, times, rotations, self.n_robots)
         self._on_device = {"q", "v"}
         for name, kernel_name in OF_INTERVAL.items():
             getattr(self, name)[:] = self._read_device(self._rows(kernel_name))
 
-    def _program_of(self, n_turning: int) -> Program:
+    def program(self, n_turning: int) -> Program:
         """The code for robots of which 0, 1 or all limbs have a shape of their own."""
         rods, (_, actuation) = self.coefficients.rods(0), self.memory[0]
         work = _kernels()(make_work)(rods, self._scheme.n_stages)
@@ -144,7 +149,7 @@ class DeviceBatch(Batch):
         """Make the device's memory, with the coefficients of all robots in it."""
         for name in ("q", "v"):
             self._fetched(name)
-        self._memory, self._codes = self._program_of(0).memory, {}
+        self._memory, self._codes = self.program(0).memory, {}
         self._own = self._arrays.zeros((self._n_groups, self._memory.n_rows, device.N_LANES))
         shared = np.zeros(max(self._memory.n_shared, 1))
         one = {"scheme": self._scheme, "fallback": SCHEMES["implicit-euler"]}

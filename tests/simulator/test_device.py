@@ -14,6 +14,7 @@ import pytest
 
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, StrokeReport
 from seastar_gym.simd import cuda
+from seastar_gym.simulator.device_batch import program_of
 from seastar_gym.sweep.axes import Choices
 from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.swimming import swim
@@ -72,8 +73,12 @@ def test_states_reports_and_work_are_those_of_the_processor(device):
     for commands in commands_of(3):
         assert_same_reports(*(simulator.stroke(commands) for simulator in both))
         assert_same(*both)
-    np.testing.assert_array_equal(both[1].on_device("positions"), both[0].positions)
-    np.testing.assert_array_equal(both[1].on_device("velocities"), both[0].velocities)
+    for name in ("positions", "velocities"):
+        there = both[1].on_device(name)
+        assert isinstance(there, np.ndarray) == (device == "scalar")
+        np.testing.assert_array_equal(
+            np.from_dlpack(there) if device == "scalar" else there.get(), getattr(both[0], name)
+        )
 
 
 def test_resets_states_and_strengths_reach_the_device(device):
@@ -181,9 +186,7 @@ EXACT = re.compile(r"(neg|abs|mov|selp|min|max|setp\.\w+|cvt\.(rmi|rzi)(\.s64|\.
 
 @pytest.mark.parametrize("scene", [SMALL, scenes()[f"sdirk2, {EVERYTHING}"]], ids=["default", "everything"])
 def test_the_code_for_gpus_rounds_every_operation_by_itself_and_calls_nothing(scene):
-    simulator = Simulator(scene, scene.n_robots or 2, device="scalar")
-    program = simulator._batch._program_of(0)
-    code = cuda.ptx_of(program)
+    code = cuda.ptx_of(program_of(scene))
     found = set(OF_DOUBLES.findall(code))
     assert {"add.rn.f64", "mul.rn.f64", "fma.rn.f64", "div.rn.f64", "sqrt.rn.f64"} <= found
     assert {name for name in found - ROUNDED_TO_NEAREST if not EXACT.fullmatch(name)} == set()
