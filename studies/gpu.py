@@ -276,8 +276,8 @@ def share_of_bandwidth(results: Mapping[str, Any], preset: str, n_robots: str) -
 def speeds(results: Mapping[str, Any]) -> str:
     """Table of speeds: the GPU's largest batch, 4,096 robots on it, and on the processor beside it."""
     lines = [
-        "| scene | largest batch | million steps of robots per second | share of the GPU's bandwidth | 4,096 robots |"
-        " 4,096 on the processor beside it | ratio |",
+        "| scene | robots | million steps per second | share of the GPU's bandwidth | with 4,096 robots |"
+        " on the processor beside it | ratio |",
         "|---|---:|---:|---:|---:|---:|---:|",
     ]
     for name, row in results["speed"].items():
