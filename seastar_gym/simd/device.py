@@ -34,7 +34,10 @@ GIVEN = ("times", "n_intervals", "shape")
 
 
 class DeviceKernels(KernelModules):
-    """The kernels once more, for one robot at a time, with rows of N_LANES robots in memory."""
+    """The kernels once more, for one robot at a time, with rows of N_LANES robots in memory.
+
+    What the robots of a lane group share as they work, such as the list of contacts, each has for itself here.
+    """
 
     def __init__(self) -> None:
         super().__init__({WIDTH: made_module(WIDTH, N_LANES=N_LANES, WIDTH=1), COMPILATION: compilation})
