@@ -170,7 +170,7 @@ def bandwidth() -> float:
     return float(2 * source.nbytes / min(seconds))
 
 
-def decisions(device: str, n_robots: int) -> dict[str, float]:
+def decisions(device: str, n_robots: int = 65536) -> dict[str, float]:
     """Decisions per second of the batch environment at "fast" with random actions."""
     batch = gym.make_vec("SeastarSwim-v0", n_robots, vectorization_mode="vector_entry_point", device=device)
     batch.reset(seed=0)
@@ -229,18 +229,19 @@ class Options:
 
 
 def run(options: Options, results: Results) -> str | None:
-    """Compare all scenes, and measure; what is measured is kept at once."""
+    """Compare all scenes, and measure, but for what is in the file; what is measured is kept at once."""
     names = options.names or tuple(scenes())
     require_known("scene", names, scenes())
     if options.device == "cuda":
         results["gpu"] = gpu()
     context = multiprocessing.get_context("spawn")
-    results["bits"] = {}
+    bits = results.setdefault("bits", {})
+    missing = [name for name in names if name not in bits]
     with ProcessPoolExecutor(options.processes, context) as pool:
-        for name, found in zip(names, pool.map(compared, names, [options.device] * len(names)), strict=True):
-            results["bits"][name] = found
+        for name, found in zip(missing, pool.map(compared, missing, [options.device] * len(missing)), strict=True):
+            bits[name] = found
             print(f"{name}: {'same bits' if found['same'] else found['differing']}, {found['seconds']}", flush=True)
-    results.save()
+            results.save()
     if options.device == "cuda":
         measure(results)
     different = [name for name, found in results["bits"].items() if not found["same"]]
@@ -251,19 +252,23 @@ def measure(results: Results) -> None:
     """Speed of the GPU and of the processor beside it."""
     results["bandwidth"] = rounded(bandwidth())
     results["traffic"] = {preset: traffic(preset) for preset in PRESETS}
-    results["speed"] = {}
+    speed = results.setdefault("speed", {})
     for preset in PRESETS:
         for contact in (False, True):
             for device in ("cuda", "cpu"):
-                row = results["speed"].setdefault(f"{preset}{', contact' * contact}", {}).setdefault(device, {})
+                row = speed.setdefault(f"{preset}{', contact' * contact}", {}).setdefault(device, {})
+                if str(USUAL) in row:
+                    continue
                 for n_robots, found in batches(preset, contact, device):
                     row[str(n_robots)] = found
                     print(preset, "contact" * contact, device, n_robots, found, flush=True)
                 results.save()
-    results["environment"] = {device: decisions(device, 65536) for device in ("cuda", "cpu")}
-    results.save()
-    results["learner"] = {device: learning(device) for device in ("cuda", "cpu")}
-    print(results["environment"], results["learner"], flush=True)
+    for name, measured in (("environment", decisions), ("learner", learning)):
+        for device in ("cuda", "cpu"):
+            if device not in results.setdefault(name, {}):
+                results[name][device] = measured(device)
+                results.save()
+        print(name, results[name], flush=True)
 
 
 def share_of_bandwidth(results: Mapping[str, Any], preset: str, n_robots: str) -> float:
@@ -312,4 +317,11 @@ def draw(results: Mapping[str, Any], path: Path) -> None:
     figure.savefig(path)
 
 
-STUDY = Study("gpu", run, Options, file="gpu.json", pictures={"gpu.png": draw}, tables={"gpu": speeds})
+def settings(options: Options) -> dict[str, Any]:
+    """What all numbers of a file have in common."""
+    return {"device": options.device, "robots": N_ROBOTS, "strokes": N_STROKES}
+
+
+STUDY = Study(
+    "gpu", run, Options, file="gpu.json", settings=settings, pictures={"gpu.png": draw}, tables={"gpu": speeds}
+)
