@@ -285,7 +285,7 @@ def speeds(results: Mapping[str, Any]) -> str:
         " on the processor beside it | ratio |",
         "|---|---:|---:|---:|---:|---:|---:|",
     ]
-    for name, row in results["speed"].items():
+    for name, row in results.get("speed", {}).items():
         of_gpu, beside = row["cuda"], row["cpu"][str(USUAL)]["steps_per_second"]
         largest = max(of_gpu, key=int)
         share = f"{100 * share_of_bandwidth(results, name, largest):.0f} %" if name in results["traffic"] else ""
@@ -299,6 +299,8 @@ def speeds(results: Mapping[str, Any]) -> str:
 
 def draw(results: Mapping[str, Any], path: Path) -> None:
     """Steps per second over the size of the batch."""
+    if "speed" not in results:  # of a machine without a GPU
+        return
     figure, axes = subplots(1, 1, figsize=(6.4, 4.4))
     for preset, colour in zip(PRESETS, CYCLE, strict=False):
         for contact, style in (("", "o-"), (", contact", "o--")):
