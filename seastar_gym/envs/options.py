@@ -50,6 +50,7 @@ class SwimOptions:
     decision_period: float | None = None
     observe_actuators: bool = True
     headings: Headings | None = None
+    device: str = "cpu"
 
     def __post_init__(self) -> None:
         parts = {"scene": Scene, "reward": RewardWeights, "randomization": DomainRandomization, "headings": Headings}

@@ -105,7 +105,9 @@ class Swimming(ABC):
         self.scene = self._drawn_from = scene
         self._draws = draws
         self.drawn = {} if draws is None else draws.first_values(scene, n_robots)
-        self.simulator = Simulator(drawn_scene(scene, self.drawn), n_robots, threads, options.error_bars, effort)
+        self.simulator = Simulator(
+            drawn_scene(scene, self.drawn), n_robots, threads, options.error_bars, effort, options.device
+        )
         self._effort = effort
         self.certificate = read_certificate(options.certificate, scene, unless_strokes(self.decision_period, scene))
         self._measured = self.simulator.scene, self._errors_of(self.simulator.scene)

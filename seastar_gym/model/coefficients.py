@@ -23,6 +23,7 @@ class Coefficients:
     per lane.
 
     are_shared: Whether all lane groups share one set.
+    n_changes: How often `set_scene` has changed them.
     rest: Node positions at rest [m], shape (n_sets, 2 n_nodes, N_LANES). With a body, its angle and the roots of its
         limbs follow, see der/star.py: 2 + 2 n_limbs rows more.
     limb_length: Limb length L of the robot [m], shape (n_sets, 1, N_LANES).
@@ -30,6 +31,7 @@ class Coefficients:
 
     def __init__(self, scene: Scene, n_robots: int):
         self.n_robots = n_robots
+        self.n_changes = 0
         self._make(scene)
 
     def _make(self, scene: Scene) -> None:
@@ -69,6 +71,7 @@ class Coefficients:
         """
         if not isinstance(scene, Scene) or frame_of(scene) != frame_of(self._scene):
             raise ValueError("set_scene needs a scene of the same terms that differs in numbers of each robot alone.")
+        self.n_changes += 1
         if self.are_shared or scene.n_robots != self.n_robots:
             self._make(scene)
             return

@@ -12,8 +12,10 @@ import contextlib
 import functools
 import hashlib
 import operator
+import os
 import pickle
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -196,7 +198,7 @@ def source_digest(package: Path = PACKAGE) -> str:
     return digest.hexdigest()[:32]
 
 
-_digest_of_this_process = functools.cache(source_digest)
+digest_of_this_process = functools.cache(source_digest)
 
 
 class _DigestLocator(UserWideCacheLocator):
@@ -205,11 +207,11 @@ class _DigestLocator(UserWideCacheLocator):
     def __init__(self, py_func, py_file):
         super().__init__(py_func, py_file)
         root = Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else Path(self._cache_path).parent
-        self._cache_path = str(root / f"seastar_gym-{_digest_of_this_process()}")
+        self._cache_path = str(root / f"seastar_gym-{digest_of_this_process()}")
 
     def get_source_stamp(self):
         # An entry point may stand outside the package.
-        return _digest_of_this_process(), hashlib.sha256(Path(self._py_file).read_bytes()).hexdigest()
+        return digest_of_this_process(), hashlib.sha256(Path(self._py_file).read_bytes()).hexdigest()
 
 
 class _SoundFile(IndexDataCacheFile):
@@ -278,6 +280,26 @@ class _DigestCache(FunctionCache):
 class _NoCache(NullCache):
     def load_overload(self, sig, target_context):
         return _say_that_it_compiles()
+
+
+def kept_code(name: str, make: Callable[[], bytes]) -> bytes:
+    """Code by name from the disk, beside that of entry points; else what `make` returns, which is left there."""
+    path = Path(_DigestLocator(kept_code, __file__).get_cache_path()) / name
+    try:
+        kept = path.read_bytes()
+    except OSError:
+        kept = b""
+    digest, code = kept[:DIGEST_SIZE], kept[DIGEST_SIZE:]
+    if digest == hashlib.sha256(code).digest():
+        return code
+    _say_that_it_compiles()
+    code = make()
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = path.with_name(f"{name}.{os.getpid()}")
+        part.write_bytes(hashlib.sha256(code).digest() + code)
+        part.replace(path)
+    return code
 
 
 @functools.cache

@@ -21,10 +21,8 @@ here are those there.
 """
 
 import operator
-import os
 from collections.abc import Callable
 
-import llvmlite.binding
 from llvmlite import ir
 from numba.core import cgutils, config, types
 from numba.core.datamodel import models
@@ -32,32 +30,22 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 from numba.extending import intrinsic, lower_builtin, register_model
 
 from seastar_gym.simd import numpy_lanes
+from seastar_gym.simd.width import N_LANES as N_LANES
+from seastar_gym.simd.width import WIDTH as WIDTH
 
-
-def _lanes_for_this_processor() -> int:
-    """Eight float64 fill an AVX-512 register, four an AVX2 or two NEON registers."""
-    forced = os.environ.get("SEASTAR_LANES")
-    if forced is not None:
-        if forced not in {"2", "4", "8", "16"}:
-            raise ValueError(f"SEASTAR_LANES={forced!r} is not a lane width: use 2, 4, 8 or 16.")
-        return int(forced)
-    return 8 if llvmlite.binding.get_host_cpu_features().get("avx512f", False) else 4
-
-
-N_LANES = _lanes_for_this_processor()
 I1, I32, F64 = ir.IntType(1), ir.IntType(32), ir.DoubleType()
-VECTOR = ir.VectorType(F64, N_LANES)
-MASK = ir.VectorType(I1, N_LANES)
+VECTOR = ir.VectorType(F64, WIDTH)
+MASK = ir.VectorType(I1, WIDTH)
 
 
 class Lanes(types.Type):
     def __init__(self):
-        super().__init__(name=f"Lanes({N_LANES})")
+        super().__init__(name=f"Lanes({WIDTH} of {N_LANES})")
 
 
 class Mask(types.Type):
     def __init__(self):
-        super().__init__(name=f"Mask({N_LANES})")
+        super().__init__(name=f"Mask({WIDTH} of {N_LANES})")
 
 
 lanes = Lanes()
@@ -79,7 +67,7 @@ class _MaskModel(models.PrimitiveModel):
 def _broadcast(builder, vector_type, value):
     undefined = ir.Constant(vector_type, ir.Undefined)
     first = builder.insert_element(undefined, value, ir.Constant(I32, 0))
-    return builder.shuffle_vector(first, undefined, ir.Constant(ir.VectorType(I32, N_LANES), [0] * N_LANES))
+    return builder.shuffle_vector(first, undefined, ir.Constant(ir.VectorType(I32, WIDTH), [0] * WIDTH))
 
 
 def _as_vector(builder, numba_type, value):
@@ -139,7 +127,7 @@ class _Negation(AbstractTemplate):
 
 @lower_builtin(operator.neg, Lanes)
 def _lower_negation(context, builder, sig, args):
-    return builder.fsub(ir.Constant(VECTOR, [-0.0] * N_LANES), args[0])
+    return builder.fsub(ir.Constant(VECTOR, [-0.0] * WIDTH), args[0])
 
 
 def _define_mask_operator(op: Callable, n_args: int, build: Callable) -> None:
@@ -167,7 +155,7 @@ class Rows(types.Type):
 
     def __init__(self, shared):
         self.shared = shared
-        super().__init__(name=f"Rows(shared={shared})")
+        super().__init__(name=f"Rows(shared={shared}, {WIDTH} of {N_LANES})")
 
 
 @register_model(Rows)
@@ -264,26 +252,35 @@ def load(typing_context, rows, row):
     return lanes(rows, types.intp), codegen
 
 
+def _holds_numbers(rows):
+    return isinstance(rows, Rows) and (rows.shared or WIDTH == 1)
+
+
+def _number_pointer(builder, rows, args):
+    row = args[1] if rows.shared else builder.mul(args[1], ir.Constant(args[1].type, N_LANES))
+    return builder.gep(args[0], [row])
+
+
 @intrinsic
 def load_number(typing_context, rows, row):
-    """Row `row` of shared rows, as a plain number."""
-    if not (isinstance(rows, Rows) and rows.shared and isinstance(row, types.Integer)):
+    """Row `row` of shared rows, as a plain number; of any rows where a kernel computes for one robot at a time."""
+    if not (_holds_numbers(rows) and isinstance(row, types.Integer)):
         return None
 
     def codegen(context, builder, sig, args):
-        return builder.load(builder.gep(args[0], [args[1]]))
+        return builder.load(_number_pointer(builder, sig.args[0], args))
 
     return types.float64(rows, types.intp), codegen
 
 
 @intrinsic
 def store_number(typing_context, rows, row, value):
-    """Write a plain number to row `row` of shared rows."""
-    if not (isinstance(rows, Rows) and rows.shared and isinstance(row, types.Integer)):
+    """Write a plain number to row `row` of shared rows; of any rows where a kernel computes for one robot at a time."""
+    if not (_holds_numbers(rows) and isinstance(row, types.Integer)):
         return None
 
     def codegen(context, builder, sig, args):
-        builder.store(args[2], builder.gep(args[0], [args[1]]))
+        builder.store(args[2], _number_pointer(builder, sig.args[0], args))
         return context.get_dummy_value()
 
     return types.void(rows, types.intp, types.float64), codegen
@@ -297,8 +294,8 @@ def load_at(typing_context, rows, row):
 
     def codegen(context, builder, sig, args):
         result = ir.Constant(VECTOR, ir.Undefined)
-        indices = builder.fptosi(args[1], ir.VectorType(ir.IntType(64), N_LANES))
-        for k in range(N_LANES):
+        indices = builder.fptosi(args[1], ir.VectorType(ir.IntType(64), WIDTH))
+        for k in range(WIDTH):
             index = builder.extract_element(indices, ir.Constant(I32, k))
             number = builder.load(builder.gep(args[0], [index]))
             result = builder.insert_element(result, number, ir.Constant(I32, k))
@@ -356,7 +353,7 @@ def _vector_function(name, n_args):
 
     def build(builder, args):
         function_type = ir.FunctionType(VECTOR, [VECTOR] * n_args)
-        function_name = f"llvm.{name}.v{N_LANES}f64"
+        function_name = f"llvm.{name}.v{WIDTH}f64"
         function = builder.module.globals.get(function_name)
         if function is None:
             function = ir.Function(builder.module, function_type, name=function_name)
@@ -397,7 +394,7 @@ def _product_sum(typing_args, negate):
     def codegen(context, builder, sig, args):
         c, a, b = (_as_vector(builder, t, x) for t, x in zip(sig.args, args, strict=True))
         if negate:
-            a = builder.fsub(ir.Constant(VECTOR, [-0.0] * N_LANES), a)
+            a = builder.fsub(ir.Constant(VECTOR, [-0.0] * WIDTH), a)
         return _vector_function("fma", 3)(builder, [a, b, c])
 
     return sig, codegen
@@ -422,7 +419,7 @@ def any_lane(typing_context, condition):
         return None
 
     def codegen(context, builder, sig, args):
-        bits = ir.IntType(N_LANES)
+        bits = ir.IntType(WIDTH)
         return builder.icmp_unsigned("!=", builder.bitcast(args[0], bits), ir.Constant(bits, 0))
 
     return types.boolean(mask), codegen

@@ -7,6 +7,7 @@ Lanes           one float64 per robot, a value: + - * / with lanes and plain num
                 new value; < <= > >= == give a mask, in which NaN is false
 Mask            one truth per robot: & | ~ with masks; neither `if` nor `and` can ask it
 N_LANES         number of robots in a row (here values have any shape: that of the rows they come from, or none)
+WIDTH           number of robots in a value: all of a row, or one where each has a thread, see device.py
 borrow          an array of rows, or a named tuple of such, of numbers and of None, as kernels read it
 load            load(rows, row) -> Lanes: shape (rows, N_LANES), or (rows,) for numbers that all robots share
 store           store(rows, row, lanes or number), in rows that are not shared

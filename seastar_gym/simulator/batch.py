@@ -209,8 +209,9 @@ class Batch:
         """
         write_rows(self.peaks, peaks)
         self.times, self.shape = times, self._shape_rows(shape)
-        self._held = self.q[:, self._held_rows]
-        self.v[:, self._held_rows] = 0.0
+        if self._held_rows.size:
+            self._held = self.q[:, self._held_rows]
+            self.v[:, self._held_rows] = 0.0
         self.a[:] = 0.0  # an interval depends on the state at its beginning only
         self.report[:] = 0.0
         self.report[:, SMALLEST_HUB_T] = np.inf
@@ -222,17 +223,22 @@ class Batch:
 
         def swim(thread: int, part: slice) -> None:
             work, actuation = self.memory[thread]
-            shape = self.shape[begin : end + 1]
-            if self.shape.ndim > 1:
-                shape = np.ascontiguousarray(self.shape[part, begin : end + 1])
+            shape, n_turning = self._shape_of(part, begin, end)
             advance(
                 self.coefficients.rods(part.start), work, self._scheme, SCHEMES["implicit-euler"], actuation,
-                self.q[part], self.v[part], self.a[part], self.peaks[part], times, shape, self.status[part],
-                self.report[part], self.coefficients.limits(part.start), self.effort[part],
+                self.q[part], self.v[part], self.a[part], self.peaks[part], times, shape, n_turning,
+                self.status[part], self.report[part], self.coefficients.limits(part.start), self.effort[part],
             )  # fmt: skip
 
         bounds = self._part_bounds()
         self.workers.run(swim, map(slice, bounds[:-1], bounds[1:]))
+
+    def _shape_of(self, part: slice, begin: int, end: int) -> tuple[Floats, int]:
+        """Rows of the shape from time `begin` to `end` for kernels, and number of the limbs that have rows."""
+        if self.shape.ndim == 1:
+            return self.shape[begin : end + 1], 0
+        rows = np.ascontiguousarray(self.shape[part, begin : end + 1])
+        return rows.reshape(len(rows), -1, N_LANES), rows.shape[2]
 
     def _part_bounds(self) -> NDArray[np.int64]:
         """Lane groups at which one part of the batch ends and the next begins. Coefficients hold for a whole part."""
@@ -256,8 +262,9 @@ class Batch:
 
         With them are work and peak_moment of the actuators, NaN if nobody asks for them.
         """
-        self.q[:, self._held_rows] = self._held
-        self.v[:, self._held_rows] = 0.0
+        if self._held_rows.size:
+            self.q[:, self._held_rows] = self._held
+            self.v[:, self._held_rows] = 0.0
         if self.failed.any():
             self._put_lost_robots_at_rest()
         self.last_hub = self.hub_position()

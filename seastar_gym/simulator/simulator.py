@@ -13,13 +13,14 @@ from seastar_gym.der.rods import Work
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.coefficients import Coefficients
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import as_array, as_floats, require_count, require_flag, shown
+from seastar_gym.scene.checks import as_array, as_floats, require_choice, require_count, require_flag, shown
 from seastar_gym.scene.numerics import MAX_STEPS
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import write_rows
 from seastar_gym.simulator.batch import Batch
 from seastar_gym.simulator.body_frame import best_fit_heading, root_places
 from seastar_gym.simulator.clock import Clock
+from seastar_gym.simulator.device_batch import DEVICES, DeviceBatch
 from seastar_gym.simulator.drive import Drive, checked_commands
 from seastar_gym.simulator.error_bars import ErrorBars, twin_scene
 from seastar_gym.simulator.lock import BROKEN_OFF, StrokeLock
@@ -51,6 +52,8 @@ class Simulator:
     error_bars: Whether to estimate the hub's error by a twin of shorter edges and steps, see error_bars.py. It changes
         no bit of a trajectory, and a stroke takes four to five times as long.
     effort: Whether to measure the work and the largest moment of the actuators. It changes no bit of a trajectory.
+    device: "cpu", "cuda" for a GPU of NVIDIA with a robot in every thread, or "scalar" for its twin on the processor,
+        which is slow and for tests. The device changes no bit of a trajectory either, see device_batch.py.
 
     A stroke, or any interval, that is not completed (Ctrl-C, an exception, a generator that is closed or dropped) is
     undone. While one is under way, other calls that would change the simulator are refused with a RuntimeError.
@@ -58,7 +61,7 @@ class Simulator:
 
     def __init__(
         self, scene: Scene, n_robots: int = 1, threads: int | None = None, error_bars: bool = False,
-        effort: bool = False,
+        effort: bool = False, device: str = "cpu",
     ):  # fmt: skip
         if not isinstance(scene, Scene):
             raise ValueError(f"Simulator needs a Scene, not {shown(scene)}.")
@@ -67,18 +70,27 @@ class Simulator:
             require_count("threads", threads, 1, MAX_THREADS)
         require_flag("error_bars", error_bars)
         require_flag("effort", effort)
+        require_choice("device", device, ("cpu", *DEVICES))
         self.scene = scene
         self.n_robots = int(n_robots)
         available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         self.threads = min(-(-self.n_robots // N_LANES), available if threads is None else int(threads))
-        self._batch = Batch(scene, self.n_robots, self.threads, effort)
+        self.device = device
+        self._batch = self._make_batch(effort)
         self._drive = Drive(scene.actuator, self.n_robots, scene.robot.n_limbs, scene.numerics.step)
         self._clock = Clock(self.n_robots)
         self._lock = StrokeLock()
         self._bars: ErrorBars | None = None
         if error_bars:
-            self._bars = ErrorBars(Simulator(twin_scene(scene), self.n_robots, self.threads), self.n_robots)
+            self._bars = ErrorBars(
+                Simulator(twin_scene(scene), self.n_robots, self.threads, device=device), self.n_robots
+            )
         self.set_limb_strengths(scene.limb_strengths or 1.0)
+
+    def _make_batch(self, effort: bool) -> Batch:
+        if self.device == "cpu":
+            return Batch(self.scene, self.n_robots, self.threads, effort)
+        return DeviceBatch(self.scene, self.n_robots, self.device, effort)
 
     @property
     def coefficients(self) -> Coefficients:
@@ -146,7 +158,7 @@ class Simulator:
     def __getstate__(self) -> dict[str, Any]:
         self._lock.require_intact()
         drive = {name: getattr(self._drive, name) for name in ("state", "strengths", "commands", "phase")}
-        arguments = (self.scene, self.n_robots, self.threads, False, self._batch.effort.size > 0)
+        arguments = (self.scene, self.n_robots, self.threads, False, self._batch.effort.size > 0, self.device)
         rows = self._batch.rows()
         return {"arguments": arguments, "rows": rows, "clock": self._clock, "drive": drive, "bars": self._bars}
 
@@ -244,6 +256,16 @@ class Simulator:
     def velocities(self) -> Floats:
         """Node velocities [m/s], shape (n_robots, n_nodes, 2), a copy."""
         return self._batch.nodes_of(self.v)
+
+    def on_device(self, name: str) -> Any:
+        """Node "positions" [m] or "velocities" [m/s] as an array of the device, shape (n_robots, n_nodes, 2), a copy.
+
+        On "cuda" an array of CuPy, which `torch.from_dlpack` takes as it is; nothing travels to the processor.
+        """
+        require_choice("name", name, ("positions", "velocities"))
+        if isinstance(self._batch, DeviceBatch):
+            return self._batch.nodes_on_device("q" if name == "positions" else "v")
+        return getattr(self, name)
 
     @property
     def time(self) -> Floats:

@@ -19,6 +19,7 @@ with the cells that have none.
 import argparse
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,8 +33,11 @@ from seastar_gym.extras import require_extra
 from seastar_gym.scene import Scene
 from seastar_gym.scene.checks import shown
 from seastar_gym.scene.scene_file import load_scene
+from seastar_gym.simulator.device_batch import DEVICES
 from seastar_gym.sweep.axes import Axis, Range
+from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.designs import Sweep
+from seastar_gym.sweep.parts import part_of
 from seastar_gym.sweep.pilots import Course
 from seastar_gym.sweep.run import Tally, run
 from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS
@@ -66,6 +70,10 @@ def make_parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn {default}")
     parser.add_argument("--robots", type=int, default=256, help=f"designs of a cell at most {default}")
+    parser.add_argument(
+        "--device", choices=("cpu", *DEVICES), default="cpu",
+        help=f"where robots swim, to the same bits: cuda is a GPU, for cells of thousands {default}",
+    )  # fmt: skip
     add_options(parser, "cells", "processes")
     parser.add_argument("--count", action="store_true", help="say how many designs and cells there are, and stop")
     return parser
@@ -112,13 +120,18 @@ def sweep_of(options: argparse.Namespace, axes: tuple[Axis, ...]) -> Sweep:
     )  # fmt: skip
 
 
+def work_of(options: argparse.Namespace) -> Callable[[Cell], bytes]:
+    """What makes a part of a cell, on the device that the options name."""
+    return partial(part_of, device=options.device)
+
+
 def run_sweep(sweep: Sweep, options: argparse.Namespace) -> int:
     """Run the cells of a grid or a Latin hypercube; returns the exit code."""
     print(f"{sweep.n_designs:,} designs in {sweep.n_cells:,} cells.")
     if options.count:
         return 0
     with tqdm(total=sweep.n_cells, unit="cell") as bar:
-        tally = run(sweep.cells(), options.out, executor_of(options), bar_of(sweep.n_cells, bar))
+        tally = run(sweep.cells(), options.out, executor_of(options), bar_of(sweep.n_cells, bar), work_of(options))
     print(as_text(tally, options.out))
     return 1 if tally.problems else 0
 
@@ -136,7 +149,7 @@ def search(sweep: Sweep, options: argparse.Namespace) -> int:
     wanted = Search(options.objective, not options.minimize, options.seed, options.stale_after)
     with tqdm(total=options.optuna, unit="design") as bar:
         study = explore(sweep, wanted, storage, options.optuna, options.out, executor_of(options),
-                        lambda tally: bar.update(tally.designs - bar.n))  # fmt: skip
+                        lambda tally: bar.update(tally.designs - bar.n), work_of(options))  # fmt: skip
     best = study.best_trial
     print(f"Best {options.objective}: {best.value:.6g} {(UNITS | OF_CONTROLLERS)[options.objective]}, {best.params}.")
     return 0

@@ -17,9 +17,9 @@ from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.swimming import OF_CONTROLLERS, UNITS, swim
 
 
-def part_of(cell: Cell) -> bytes:
-    """Parquet file of a cell's results."""
-    columns = {**dict(cell.frame.labels), **cell.numbers, **swim(cell)}
+def part_of(cell: Cell, device: str = "cpu") -> bytes:
+    """Parquet file of a cell's results. device: Where robots swim, see `Simulator`; the results are the same."""
+    columns = {**dict(cell.frame.labels), **cell.numbers, **swim(cell, device)}
     arrays = [pa.array([column] * cell.n_robots if name in dict(cell.frame.labels) else column)
               for name, column in columns.items()]  # fmt: skip
     schema = pa.schema(

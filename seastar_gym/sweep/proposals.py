@@ -17,7 +17,7 @@ import pyarrow.parquet
 from optuna.trial import TrialState
 from sqlalchemy.exc import SQLAlchemyError
 
-from seastar_gym.executors import Executor, Outcome, sentence_of
+from seastar_gym.executors import Executor, Outcome, Work, sentence_of
 from seastar_gym.scene.checks import require_choice, require_count, require_number
 from seastar_gym.sweep.axes import Range
 from seastar_gym.sweep.cells import Cell
@@ -72,13 +72,16 @@ def _texts(sweep: Sweep) -> Iterator[str]:
 
 def explore(
     sweep: Sweep, search: Search, storage: str, designs: int, folder: str | os.PathLike[str], executor: Executor,
-    progress: Progress | None = None,
+    progress: Progress | None = None, work: Work[Cell] = part_of,
 ) -> optuna.Study:  # fmt: skip
-    """Propose and simulate until a study has results of so many designs. Every cell has `sweep.robots` at most."""
+    """Propose and simulate until a study has results of so many designs. Every cell has `sweep.robots` at most.
+
+    work: What makes a part of a cell.
+    """
     require_count("designs", designs, 1, 10_000_000)
     proposals = Proposals(sweep, study_of(sweep, search, storage), search, designs)
     parts, tally = Parts(folder), Tally()
-    for outcome in executor.run(part_of, proposals.cells()):
+    for outcome in executor.run(work, proposals.cells()):
         if outcome.part is None:
             tally.losses += 1
         else:

@@ -61,15 +61,15 @@ def units_of(frame: Frame) -> dict[str, str]:
     return UNITS if frame.pilot is None else UNITS | OF_CONTROLLERS
 
 
-def swim(cell: Cell) -> dict[str, NDArray[Any]]:
-    """Columns of results of a cell's designs, shape (n_robots,) each."""
+def swim(cell: Cell, device: str = "cpu") -> dict[str, NDArray[Any]]:
+    """Columns of results of a cell's designs, shape (n_robots,) each. device: Where robots swim, see `Simulator`."""
     sound = np.ones(cell.n_robots, bool)
     try:
         scene = scene_of(cell, sound)
     except ValueError:
         sound = np.array([_is_sound(cell, k) for k in range(cell.n_robots)])
         scene = scene_of(cell, sound) if sound.any() else cell.frame.scene
-    found = measure(scene, cell, int(sound.sum())) if sound.any() else {}
+    found = measure(scene, cell, int(sound.sum()), device) if sound.any() else {}
     columns: dict[str, NDArray[Any]] = {}
     for name in units_of(cell.frame):
         columns[name] = np.full(cell.n_robots, np.nan)
@@ -91,17 +91,20 @@ def _is_sound(cell: Cell, robot: int) -> bool:
     return True
 
 
-def measure(scene: Scene, cell: Cell, n_robots: int) -> dict[str, NDArray[Any]]:
+def measure(scene: Scene, cell: Cell, n_robots: int, device: str = "cpu") -> dict[str, NDArray[Any]]:
     """Columns of results of robots side by side, NaN where the solver failed."""
     frame, pilot = cell.frame, cell.frame.pilot
-    columns = repeat(scene, frame, n_robots) if pilot is None else steer(scene, frame.scene, pilot, n_robots)
+    if pilot is None:
+        columns = repeat(scene, frame, n_robots, device)
+    else:
+        columns = steer(scene, frame.scene, pilot, n_robots, device)
     status = columns.pop("status")
     return {**{name: np.where(status == 0.0, column, np.nan) for name, column in columns.items()}, "status": status}
 
 
-def repeat(scene: Scene, frame: Frame, n_robots: int) -> dict[str, NDArray[Any]]:
+def repeat(scene: Scene, frame: Frame, n_robots: int, device: str) -> dict[str, NDArray[Any]]:
     """Columns of results of robots side by side that repeat a gait."""
-    simulator, gait, swum = Simulator(scene, n_robots, threads=1, effort=True), frame.gait, frame.swim
+    simulator, gait, swum = Simulator(scene, n_robots, 1, effort=True, device=device), frame.gait, frame.swim
     interval = scene.actuator.period if gait.interval is None else gait.interval
     status, iterations, energy, work, moment = np.zeros((5, n_robots))
     angle = np.full(n_robots, np.inf)
@@ -122,7 +125,7 @@ def repeat(scene: Scene, frame: Frame, n_robots: int) -> dict[str, NDArray[Any]]
     }  # fmt: skip
 
 
-def steer(scene: Scene, frame: Scene, pilot: Pilot, n_robots: int) -> dict[str, NDArray[Any]]:
+def steer(scene: Scene, frame: Scene, pilot: Pilot, n_robots: int, device: str) -> dict[str, NDArray[Any]]:
     """Columns of results of robots side by side that a controller steers, up to the last waypoint or the time limit.
 
     frame: Scene that the controller knows.
@@ -131,7 +134,7 @@ def steer(scene: Scene, frame: Scene, pilot: Pilot, n_robots: int) -> dict[str, 
     actions = actions_of(policy, n_limbs)
     require_fit(policy, scene, actions, pilot.decision_period)
     options = SwimOptions(
-        waypoints, actions, scene=scene, waypoint_radius=RADIUS, decision_period=pilot.decision_period
+        waypoints, actions, scene=scene, waypoint_radius=RADIUS, decision_period=pilot.decision_period, device=device
     )
     task = SwimTask(options, n_robots, 1, effort=True)
     headings: list[Floats] = []

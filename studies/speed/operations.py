@@ -19,12 +19,14 @@ from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene import Scene
 from seastar_gym.simd import numpy_lanes
+from seastar_gym.simd.modules import FOLDER
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
-from seastar_gym.simd.plain import FOLDER, PlainKernels
+from seastar_gym.simd.plain import PlainKernels
 from seastar_gym.simulator import Simulator
 
 FLOPS = {"add": 1, "multiply": 1, "fused": 2, "divide": 1, "root": 1}
-"""Floating-point operations per counted operation; comparisons, selections, loads and stores do not count."""
+"""Floating-point operations per counted operation; comparisons, selections, loads and stores do not count. Of loads,
+those of a robot's own numbers are counted, not those of numbers that all robots share."""
 
 _counts: Counter[str] = Counter()
 
@@ -55,10 +57,21 @@ def _counting_kernels(folder: Path) -> PlainKernels:
     return PlainKernels(
         n_lanes=1,
         folder=folder,
-        load=lambda rows, row: Counted(numpy_lanes.load(rows, row).numbers),
+        load=_load,
+        store=_store,
         load_at=lambda rows, row: Counted(numpy_lanes.load_at(rows, row).numbers),
         splat=Constant,
     )
+
+
+def _load(rows: Any, row: int) -> Counted:
+    _counts["load"] += rows.ndim > 1
+    return Counted(numpy_lanes.load(rows, row).numbers)
+
+
+def _store(rows: Any, row: int, value: Any) -> None:
+    _counts["store"] += 1
+    numpy_lanes.store(rows, row, value)
 
 
 @np.errstate(all="ignore")
@@ -120,3 +133,8 @@ def _moving_robot(scene: Scene, counting: PlainKernels) -> tuple[Any, ...]:
 def flops(counts: Counter[str]) -> int:
     """Number of floating-point operations in a count; a fused product counts as two."""
     return sum(FLOPS.get(kind, 0) * n for kind, n in counts.items())
+
+
+def numbers_moved(counts: Counter[str]) -> int:
+    """Numbers that are read from a robot's memory and written there in a count."""
+    return counts["load"] + counts["store"]

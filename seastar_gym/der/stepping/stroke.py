@@ -6,17 +6,15 @@ from seastar_gym.der.stepping.interval import cover_interval
 from seastar_gym.der.stepping.report import MOMENTS, NEWTON_ITERATIONS, PEAK_MOMENT, WORK
 from seastar_gym.der.terms.body import move_roots
 from seastar_gym.simd.compilation import entry_point, kernel
-from seastar_gym.simd.lanes import absolute, add_product, borrow, load, select, splat, store
+from seastar_gym.simd.lanes import absolute, add_product, borrow, load, load_number, select, splat, store
 
 STUCK, SPENT = 1.0, 3.0  # SolverStatus.NOT_CONVERGED and ITERATION_LIMIT
 
 
 @kernel
-def shape_of_limb(shape, group, k, limb):
-    """Rotation of a limb at time k, see `advance`; one number where all robots turn alike."""
-    if shape.ndim == 1:
-        return shape[k]
-    return load(borrow(shape[group, k]), limb % shape.shape[2])
+def shape_of_limb(shape, n_turning, k, limb):
+    """Rotation of a limb at time k, from the rows of `n_turning` limbs for each time; 0: all robots turn alike."""
+    return load(shape, k if n_turning == 0 else k * n_turning + limb % n_turning)
 
 
 @kernel
@@ -48,8 +46,46 @@ def end_effort(rods, work, actuation, q, robots, effort):
     store(effort, PEAK_MOMENT, select(robots, largest, load(effort, PEAK_MOMENT)))
 
 
+@kernel
+def cover_intervals(
+    rods, work, scheme, fallback, actuation, q, v, a, peaks, times, n_intervals, shape, n_turning, failed, report,
+    limits, effort, asked,
+):  # fmt: skip
+    """Advance a lane group through the intervals between `times`; rows and numbers of one group, see `advance`.
+
+    n_turning: Limbs with a shape of their own: 0, 1 or n_limbs. asked: Whether somebody asks for `effort`.
+    """
+    move_roots(rods, q, v)
+    status = load(failed, 0)
+    alive = status < 1.0
+    for k in range(n_intervals):
+        for limb in range(rods.n_limbs):
+            peak = load(peaks, limb)
+            store(actuation.delta_psi_start, limb, peak * shape_of_limb(shape, n_turning, k, limb))
+            store(actuation.delta_psi_end, limb, peak * shape_of_limb(shape, n_turning, k + 1, limb))
+        if asked and k == 0:
+            begin_effort(rods, work, actuation, q, effort)
+        duration = load_number(times, k + 1) - load_number(times, k)
+        alive = cover_interval(rods, work, scheme, fallback, actuation, q, v, a, duration, alive, limits, report)
+        if asked:
+            end_effort(rods, work, actuation, q, alive, effort)
+    spent = load(report, NEWTON_ITERATIONS) >= limits.most_iterations
+    reason = select(spent, splat(SPENT), splat(STUCK))
+    store(failed, 0, select(alive, splat(0.0), larger(status, reason)))
+
+
+@kernel
+def rows_of(shape, group):
+    """The shape's rows of a lane group, or of all."""
+    if shape.ndim == 1:
+        return borrow(shape)
+    return borrow(shape[group])
+
+
 @entry_point
-def advance(rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shape, failed, report, limits, effort):
+def advance(
+    rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shape, n_turning, failed, report, limits, effort
+):
     """Advance lane groups through the intervals between `times`, in place.
 
     scheme, fallback: Tableaux of the time steps, and of the steps of robots that had to retry often (one stage).
@@ -59,7 +95,8 @@ def advance(rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shap
     peaks: Share of `shape` that every limb follows, shape (n_groups, n_limbs, N_LANES).
     times: Ends of the intervals [s], shape (n_intervals + 1,).
     shape: Rotation of the limbs at those times [rad], shape (n_intervals + 1,) if all limbs turn alike, else
-        (n_groups, n_intervals + 1, n_limbs, N_LANES), or with 1 for n_limbs if those of a robot do.
+        (n_groups, (n_intervals + 1) n_turning, N_LANES), time by time. n_turning: 0, n_limbs, or 1 if those of a
+        robot turn alike.
     failed: 0 for robots that go on, else their SolverStatus, shape (n_groups, 1, N_LANES).
     report: Counts and extremes, added to, shape (n_groups, len(REPORT_ROWS), N_LANES).
     limits: Tolerances and bounds, see limits.py.
@@ -68,26 +105,10 @@ def advance(rods, work, scheme, fallback, actuation, q, v, a, peaks, times, shap
     """
     rods_rows, memory, rotation = borrow(rods), borrow(work), borrow(actuation)
     tableau, fallback_tableau, bounds = borrow(scheme), borrow(fallback), borrow(limits)
-    asked = effort.shape[1] > 0
     for group in range(q.shape[0]):
-        q_rows, v_rows, a_rows, peak_rows = borrow(q[group]), borrow(v[group]), borrow(a[group]), borrow(peaks[group])
-        failed_rows, report_rows = borrow(failed[group]), borrow(report[group])
-        move_roots(rods_rows, q_rows, v_rows)
-        status = load(failed_rows, 0)
-        alive = status < 1.0
-        for k in range(times.shape[0] - 1):
-            for limb in range(rods.n_limbs):
-                peak = load(peak_rows, limb)
-                store(rotation.delta_psi_start, limb, peak * shape_of_limb(shape, group, k, limb))
-                store(rotation.delta_psi_end, limb, peak * shape_of_limb(shape, group, k + 1, limb))
-            if asked and k == 0:
-                begin_effort(rods_rows, memory, rotation, q_rows, borrow(effort[group]))
-            alive = cover_interval(
-                rods_rows, memory, tableau, fallback_tableau, rotation, q_rows, v_rows, a_rows, times[k + 1] - times[k],
-                alive, bounds, report_rows,
-            )  # fmt: skip
-            if asked:
-                end_effort(rods_rows, memory, rotation, q_rows, alive, borrow(effort[group]))
-        spent = load(report_rows, NEWTON_ITERATIONS) >= bounds.most_iterations
-        reason = select(spent, splat(SPENT), splat(STUCK))
-        store(failed_rows, 0, select(alive, splat(0.0), larger(status, reason)))
+        cover_intervals(
+            rods_rows, memory, tableau, fallback_tableau, rotation, borrow(q[group]), borrow(v[group]),
+            borrow(a[group]), borrow(peaks[group]), borrow(times), times.shape[0] - 1, rows_of(shape, group),
+            n_turning, borrow(failed[group]), borrow(report[group]), bounds, borrow(effort[group]),
+            effort.shape[1] > 0,
+        )  # fmt: skip

@@ -39,7 +39,17 @@ from seastar_gym.der.mesh import Mesh
 from seastar_gym.der.star import corner_place, tail_node
 from seastar_gym.der.terms.body import push_body_at_roots
 from seastar_gym.simd.compilation import kernel
-from seastar_gym.simd.lanes import N_LANES, add_product, load, load_number, select, splat, store, subtract_product
+from seastar_gym.simd.lanes import (
+    N_LANES,
+    WIDTH,
+    add_product,
+    load,
+    load_number,
+    select,
+    splat,
+    store,
+    subtract_product,
+)
 from seastar_gym.simd.rows import aligned_rows
 
 SLOT_ROWS = 6
@@ -151,17 +161,17 @@ def coefficients(
 
 
 def memory(contact: Contact | None, n_limbs: int, edges: int, n_points: int) -> ContactWork | None:
-    """Zeroed memory for the contact of one lane group, where robots list the pairs they have in common once."""
+    """Zeroed memory for the contact of one lane group, whose robots list the pairs they have in common once."""
     if contact is None:
         return None
     short = edges <= SHORT_CHAIN
     near_edges = edges if short else MOST_NEAR_EDGES
     share = 2 * contact.n_pairs * edges * near_edges
-    capacity = 2 * contact.n_pairs * edges * min(edges, near_edges * N_LANES)
+    capacity = 2 * contact.n_pairs * edges * min(edges, near_edges * WIDTH)
     at_body = (2 * edges - 1) * n_limbs * contact.n_corners
     near_body = at_body if short else n_limbs * (NEAR_SIDES * edges + MOST_NEAR_EDGES * contact.n_corners)
     share_at_body = min(at_body, near_body)
-    capacity += min(at_body, share_at_body * N_LANES)
+    capacity += min(at_body, share_at_body * WIDTH)
 
     def rows(count: int = 2 * n_points) -> np.ndarray:
         return aligned_rows(count, N_LANES)

@@ -1,0 +1,83 @@
+"""The kernels on a graphics processor of NVIDIA, one robot in every thread; its arrays are CuPy's.
+
+LLVM makes the portable code (PTX) that the processor's own driver turns into machine code, and keeps: no compiler of
+CUDA is needed. What a driver makes of it rounds as we do, see device.py.
+"""
+
+from typing import Any
+
+import llvmlite.binding as llvm
+from llvmlite import ir
+
+from seastar_gym.simd.compilation import kept_code
+from seastar_gym.simd.device import ALL_ROBOTS, I64, PARAMETERS, Program
+
+TRIPLE, ARCHITECTURE, VERSION = "nvptx64-nvidia-cuda", "sm_70", "ptx70"  # the oldest that drivers of today take
+THREADS = 64
+"""Threads of a block, a choice: 32 to 128 are alike."""
+I32 = ir.IntType(32)
+_LOADED: dict[str, Any] = {}
+
+
+def ptx_of(program: Program, architecture: str = ARCHITECTURE) -> str:
+    """The program in PTX, the assembly language of all of NVIDIA's processors."""
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    target = llvm.Target.from_triple(TRIPLE)
+    machine = target.create_target_machine(architecture, f"+{VERSION}", opt=3)
+    return str(machine.emit_assembly(program.code(machine, TRIPLE, _add_entry)))
+
+
+def arrays() -> Any:
+    """The module that makes arrays on the device (CuPy). RuntimeError, in one sentence, without one."""
+    try:
+        import cupy
+
+        cupy.cuda.runtime.getDeviceCount()
+    except ImportError:
+        raise RuntimeError(
+            'device="cuda" needs CuPy: pip install "seastar-gym[gpu]" on a machine with a GPU of NVIDIA.'
+        ) from None
+    except Exception as problem:  # a driver that is missing or too old has several ways to say so
+        raise RuntimeError(f'device="cuda" finds no GPU of NVIDIA: {problem}.') from None
+    return cupy
+
+
+def load(program: Program) -> Any:
+    """The program as a function, see `run`."""
+    if program.key not in _LOADED:
+        from cupy.cuda.function import Module
+
+        module = Module()
+        module.load(kept_code(f"{program.key}-{ARCHITECTURE}.ptx", lambda: ptx_of(program).encode()))
+        _LOADED[program.key] = module.get_function(ALL_ROBOTS)
+    return _LOADED[program.key]
+
+
+def run(code: Any, own: Any, shared: Any, times: Any, shape: Any, n_robots: int) -> None:
+    """Advance robots through the intervals between `times`; arrays as in device.py, changed in place."""
+    import numpy as np
+
+    sizes = (np.int64(times.size - 1), np.int64(shape[0].size), np.int64(n_robots))
+    blocks = -(-n_robots // THREADS)
+    code((blocks,), (THREADS,), (own, shared, times, sizes[0], shape, sizes[1], sizes[2]))
+
+
+def _add_entry(module: ir.Module, robot: ir.Function) -> str:
+    """ALL_ROBOTS(..., n_robots) advances the robot whose number is that of the thread."""
+    entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [*PARAMETERS, I64]), ALL_ROBOTS)
+    entry.calling_convention = "ptx_kernel"
+    for pointer in entry.args[:3] + entry.args[4:5]:
+        pointer.add_attribute("noalias")
+    start, swim, end = (entry.append_basic_block(name) for name in ("start", "swim", "end"))
+    build = ir.IRBuilder(start)
+    names = (f"llvm.nvvm.read.ptx.sreg.{name}" for name in ("ctaid.x", "ntid.x", "tid.x"))
+    registers = [ir.Function(module, ir.FunctionType(I32, []), name) for name in names]
+    block, threads, thread = (build.zext(build.call(register, []), I64) for register in registers)
+    index = build.add(build.mul(block, threads), thread)
+    build.cbranch(build.icmp_unsigned("<", index, entry.args[-1]), swim, end)
+    build = ir.IRBuilder(swim)
+    build.call(robot, [*entry.args[:-1], index])
+    build.branch(end)
+    ir.IRBuilder(end).ret_void()
+    return ALL_ROBOTS

@@ -1,0 +1,189 @@
+"""`DeviceBatch`: a batch of robots in the memory of a device with a thread for each of them, such as a GPU."""
+
+from functools import cache
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.der.rods import make_work
+from seastar_gym.der.stepping.schemes import SCHEMES
+from seastar_gym.der.stepping.stroke import cover_intervals
+from seastar_gym.scene import Scene
+from seastar_gym.simd import cuda, device, scalar
+from seastar_gym.simd.device import DeviceKernels, Program, leaves
+from seastar_gym.simd.lanes import N_LANES
+from seastar_gym.simulator.batch import MOVED, Batch
+
+Floats = NDArray[np.float64]
+
+DEVICES: dict[str, ModuleType] = {"cuda": cuda, "scalar": scalar}
+"""Devices beside the processor's SIMD lanes ("cpu"): GPUs of NVIDIA, and their twin on the processor, for tests."""
+OF_INTERVAL = {"status": "failed", "report": "report", "effort": "effort"}
+"""Arrays of a batch that an interval changes and the host reads, and their names in the kernel."""
+SHARE = device.N_LANES // N_LANES
+"""Lane groups of the processor in one of a device."""
+
+
+@cache
+def _kernels() -> DeviceKernels:
+    return DeviceKernels()
+
+
+def program_of(scene: Scene) -> Program:
+    """The code of a scene for devices, for limbs that all turn alike: to be looked at, without a device."""
+    return DeviceBatch(scene, scene.n_robots or 1, "scalar", effort=False).program(0)
+
+
+class DeviceBatch(Batch):
+    """A batch whose robots are advanced by a device, to the bits of the processor's.
+
+    Positions and velocities stay on the device from one interval to the next. They travel when somebody asks for `q` or
+    `v`, the same numbers in the processor's layout, and back with the next interval, for they may have been changed.
+
+    name: Of the device, see DEVICES.
+    """
+
+    def __init__(self, scene: Scene, n_robots: int, name: str, effort: bool):
+        self._device = DEVICES[name]
+        self._arrays = self._device.arrays()
+        self._on_host: dict[str, Floats] = {}
+        self._on_device: set[str] = set()  # those of q and v whose host's copy is old
+        super().__init__(scene, n_robots, 1, effort)
+        self._n_groups = -(-n_robots // device.N_LANES)
+        self._coefficients: Any = None  # those that are on the device, and how often they had been changed
+        self._codes: dict[int, Any] = {}
+        self._starts = False
+
+    @property
+    def q(self) -> Floats:
+        return self._fetched("q")
+
+    @q.setter
+    def q(self, rows: Floats) -> None:
+        self._on_host["q"] = rows
+
+    @property
+    def v(self) -> Floats:
+        return self._fetched("v")
+
+    @v.setter
+    def v(self, rows: Floats) -> None:
+        self._on_host["v"] = rows
+
+    def _fetched(self, name: str) -> Floats:
+        """Rows of q or v on the host, where they may be changed."""
+        if name in self._on_device:
+            self._on_device.remove(name)
+            self._on_host[name][:] = self._read_device(self._rows(name))
+        return self._on_host[name]
+
+    def hub_position(self) -> Floats:
+        if "q" in self._on_device:
+            return self.read(self._read_device(self._rows("q")[:, :2]))
+        return super().hub_position()
+
+    def nodes_on_device(self, name: str) -> Any:
+        """Node positions [m] ("q") or velocities [m/s] ("v") on the device, shape (n_robots, n_nodes, 2), a copy."""
+        self._put_all()
+        rows = self._rows(name)[:, : self.n_node_rows]
+        return rows.transpose(0, 2, 1).reshape(-1, self.n_node_rows // 2, 2)[: self.n_robots]
+
+    def moved(self) -> dict[str, Any]:
+        rows = {name: self._rows(name).copy() for name in self._on_device}
+        return {name: getattr(self, name).copy() for name in MOVED if name not in rows} | {"on device": rows}
+
+    def put_back(self, moved: dict[str, Any]) -> None:
+        rows = moved["on device"]
+        super().put_back({name: values for name, values in moved.items() if name != "on device"})
+        for name, values in rows.items():
+            self._rows(name)[:] = values
+        self._on_device |= set(rows)
+
+    def begin(self, times: Floats, peaks: Floats, shape: Floats) -> None:
+        super().begin(times, peaks, shape)
+        self._starts = True
+
+    def advance(self, begin: int, end: int) -> None:
+        self._put_all()
+        shape, n_turning = self._shape_of(slice(0, len(self.peaks)), begin, end)
+        for name, kernel_name in {"peaks": "peaks", **OF_INTERVAL}.items():
+            self._rows(kernel_name)[:] = self._to_device(getattr(self, name))
+        if self._starts:
+            self._rows("a")[:] = 0.0
+            self._starts = False
+        times, rotations = self._arrays.asarray(self.times[begin : end + 1]), self._arrays.asarray(shape)
+        if n_turning:
+            rotations = self._to_device(shape)
+        if n_turning not in self._codes:
+            self._codes[n_turning] = self._device.load(self.program(n_turning))
+        self._device.run(self._codes[n_turning], self._own, self._shared, times, rotations, self.n_robots)
+        self._on_device = {"q", "v"}
+        for name, kernel_name in OF_INTERVAL.items():
+            getattr(self, name)[:] = self._read_device(self._rows(kernel_name))
+
+    def program(self, n_turning: int) -> Program:
+        """The code for robots of which 0, 1 or all limbs have a shape of their own."""
+        rods, (_, actuation) = self.coefficients.rods(0), self.memory[0]
+        work = _kernels()(make_work)(rods, self._scheme.n_stages)
+        shape = np.zeros((1, 1) if n_turning else 1)
+        bundles = {
+            "rods": rods, "work": work, "scheme": self._scheme, "fallback": SCHEMES["implicit-euler"],
+            "actuation": actuation, "q": self._on_host["q"][0], "v": self._on_host["v"][0], "a": self.a[0],
+            "peaks": self.peaks[0], "times": np.zeros(1), "n_intervals": 0, "shape": shape, "n_turning": n_turning,
+            "failed": self.status[0], "report": self.report[0], "limits": self.coefficients.limits(0),
+            "effort": self.effort[0], "asked": self.effort.size > 0,
+        }  # fmt: skip
+        return Program(_kernels(), _kernels()(cover_intervals), bundles, ("work", "actuation"))
+
+    def _put_all(self) -> None:
+        """Bring to the device what it has not, or what has changed on the host."""
+        if self._coefficients != (self.coefficients, self.coefficients.n_changes):
+            self._put_coefficients()
+        for name in {"q", "v"} - self._on_device:
+            self._rows(name)[:] = self._to_device(self._on_host[name])
+        self._on_device = {"q", "v"}
+
+    def _put_coefficients(self) -> None:
+        """Make the device's memory, with the coefficients of all robots in it."""
+        for name in ("q", "v"):
+            self._fetched(name)
+        self._memory, self._codes = self.program(0).memory, {}
+        self._own = self._arrays.zeros((self._n_groups, self._memory.n_rows, device.N_LANES))
+        shared = np.zeros(max(self._memory.n_shared, 1))
+        one = {"scheme": self._scheme, "fallback": SCHEMES["implicit-euler"]}
+        for name, numbers in [leaf for bundle, value in one.items() for leaf in leaves(value, bundle)]:
+            shared[self._memory.shared[name]] = numbers
+        groups = range(1 if self.coefficients.are_shared else len(self.peaks))
+        of_groups = [
+            leaves(self.coefficients.rods(k), "rods") + leaves(self.coefficients.limits(k), "limits") for k in groups
+        ]
+        for same in zip(*of_groups, strict=True):
+            name, first = same[0]
+            if name in self._memory.rows:
+                rows = np.stack([numbers for _, numbers in same])
+                self._own[:, self._memory.rows[name]] = self._to_device(rows)
+            else:
+                shared[self._memory.shared[name]] = first
+        self._shared = self._arrays.asarray(shared)
+        self._coefficients = self.coefficients, self.coefficients.n_changes
+
+    def _rows(self, name: str) -> Any:
+        """Rows on the device by the name of the kernel's argument, shape (n_groups, k, 32), not a copy."""
+        return self._own[:, self._memory.rows[name]]
+
+    def _to_device(self, rows: Floats) -> Any:
+        """Rows (n_groups, k, N_LANES) of the host as the device has them."""
+        here, n_rows = self._arrays.asarray(rows), rows.shape[1]
+        padded = self._arrays.zeros((self._n_groups * SHARE, n_rows, N_LANES))
+        padded[: len(rows)] = here
+        beside = padded.reshape(self._n_groups, SHARE, n_rows, N_LANES).transpose(0, 2, 1, 3)
+        return beside.reshape(self._n_groups, n_rows, device.N_LANES)
+
+    def _read_device(self, rows: Any) -> Floats:
+        """Rows of the device as the host has them, (n_groups, k, N_LANES), a copy."""
+        n_rows = rows.shape[1]
+        apart = rows.reshape(self._n_groups, n_rows, SHARE, N_LANES).transpose(0, 2, 1, 3)
+        here = apart.reshape(self._n_groups * SHARE, n_rows, N_LANES)[: len(self.peaks)]
+        return here.get() if hasattr(here, "get") else np.array(here)

@@ -1,0 +1,329 @@
+"""Robots on a GPU: the bits of the processor, speed over the size of the batch, compilation, and a learner.
+
+Every scene is swum on the processor and on the device with the same random commands, and compared to the last bit.
+With `--device scalar` the device's code swims on the processor, and nothing else is measured: for machines without.
+"""
+
+import multiprocessing
+import os
+import time
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, get_args
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.scene import (
+    AlongLimb,
+    Attachment,
+    Body,
+    Contact,
+    Limb,
+    Limited,
+    Numerics,
+    Scene,
+    Seastar,
+    SmaPulse,
+    SmaWires,
+    ThermalSma,
+)
+from seastar_gym.scene.numerics import Fidelity, SchemeName
+from seastar_gym.simd import cuda
+from seastar_gym.simulator import Simulator
+from studies.frame import Results, Study, require_known
+from studies.kept import rounded
+from studies.speed.operations import count_operations, numbers_moved
+from studies.speed.terms import scenes as scenes_of_terms
+from studies.style import CYCLE, FAINT, subplots
+
+PRESETS: tuple[Fidelity, ...] = ("fast", "balanced", "reference")
+BATCHES = (64, 256, 1024, 4096, 16384, 65536, 262144)
+LONGEST = 4.0
+"""A batch whose stroke takes longer than this [s] is the largest one, from USUAL robots on."""
+USUAL = 4096
+N_ROBOTS, N_STROKES = 64, 3
+"""Robots that are compared with the processor's, if a scene has no number of its own, and their strokes."""
+EVERYTHING = "all, a body, bent along, contact"
+LEARNER: dict[str, Any] = {"n_steps": 8, "batch_size": 8192, "n_epochs": 4}
+ROBOTS_OF_LEARNER, ROUNDS_OF_LEARNER = 4096, 4
+
+
+def scenes() -> dict[str, Scene]:
+    """Scenes that are compared, by name: every term, scheme, preset and kind of actuator, and other robots."""
+    of_terms = scenes_of_terms()
+    chapter, everything = of_terms["the chapter's scene"], of_terms[EVERYTHING]
+    found = dict(of_terms)
+    for scheme in get_args(SchemeName):
+        stepped = Numerics(scheme, 0.005)
+        found[f"{scheme}"] = replace(chapter, numerics=stepped)
+        found[f"{scheme}, {EVERYTHING}"] = replace(everything, numerics=stepped)
+    found["adapted steps"] = replace(chapter, numerics=Numerics("implicit-midpoint", 0.005, path_tolerance=0.02))
+    for preset in (*PRESETS, "accurate", "chapter"):
+        found[f"preset {preset}"] = Scene.preset(preset)
+        if preset in PRESETS:
+            found[f"preset {preset}, contact"] = replace(Scene.preset(preset), contact=Contact())
+    actuators = {
+        "wires": SmaWires(), "thermal": ThermalSma(), "limited": Limited(SmaPulse(), 0.5, 3.0),
+        "pulses of each robot": SmaPulse(peak_angle=np.linspace(0.2, 0.5, N_ROBOTS)),
+    }  # fmt: skip
+    found |= {name: replace(chapter, actuator=actuator) for name, actuator in actuators.items()}
+    robots = {
+        "three limbs": Seastar(n_limbs=3, nodes_per_limb=10),
+        "eight limbs in contact": Seastar(n_limbs=8, nodes_per_limb=10),
+        "unequal limbs": Seastar(nodes_per_limb=10, limbs=(Limb(length=0.08), *[Limb()] * 4)),
+        "hub hinges": Seastar(nodes_per_limb=10, discretisation="chapter"),
+        "limbs in a row on a body": Seastar(
+            nodes_per_limb=10, n_limbs=2, along=AlongLimb(), body=Body.rectangle(
+                0.06, 0.03, attachments=(Attachment(0.02, 0.0, 0.0), Attachment(-0.02, 0.0, np.pi))
+            ),
+        ),
+    }  # fmt: skip
+    for name, robot in robots.items():
+        found[name] = Scene(robot, contact=Contact() if "contact" in name else None)
+    held = Scene(Seastar(nodes_per_limb=10), fluid=None, held_nodes=(0, 1), loads=((9, 0.0, 1e-3),))
+    return found | {"held nodes, loads": held, "weak limbs": replace(chapter, limb_strengths=(1.0, 0.5, 0.0, 1.0, 0.8))}
+
+
+def commands_of(scene: Scene, n_robots: int, n_strokes: int) -> NDArray[np.float64]:
+    """Random commands, shape (n_strokes, n_robots, n_limbs); every other robot repeats its first one."""
+    commands = np.random.default_rng(0).uniform(-1.0, 1.0, (n_strokes, n_robots, scene.robot.n_limbs))
+    commands[:, ::2] = commands[0, ::2]
+    return commands
+
+
+def compared(name: str, device: str) -> dict[str, Any]:
+    """How a scene swims on the device: whether all bits are the processor's, and what its code cost.
+
+    seconds: Processor time of the device's first stroke, with all compilation, and that of the processor's own.
+    """
+    scene = scenes()[name]
+    n_robots = scene.n_robots or N_ROBOTS
+    both = Simulator(scene, n_robots, threads=1), Simulator(scene, n_robots, device=device)
+    differing: set[str] = set()
+    seconds: dict[str, float] = {}
+    for commands in commands_of(scene, n_robots, N_STROKES):
+        reports = []
+        for simulator in both:
+            began = time.process_time()
+            reports.append(simulator.stroke(commands))
+            seconds.setdefault(simulator.device, rounded(time.process_time() - began, 3))
+        seen = [
+            {**report._asdict(), **simulator.get_state()._asdict(), "elastic_energy": simulator.elastic_energy()}
+            for simulator, report in zip(both, reports, strict=True)
+        ]
+        differing |= {key for key in seen[0] if not same(seen[0][key], seen[1][key])}
+    failed = int(both[0].failed.sum())
+    return {"same": not differing, "differing": sorted(differing), "failed": failed, "seconds": seconds}
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether two arrays have the same bits; None is like None."""
+    if one is None or other is None:
+        return one is other
+    return bool(np.array_equal(one, other, equal_nan=np.asarray(one).dtype.kind == "f"))
+
+
+def batches(preset: Fidelity, contact: bool, device: str) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Speed of a preset over the size of the batch: steps of robots per second, and seconds of a stroke."""
+    scene = replace(Scene.preset(preset), contact=Contact() if contact else None)
+    seconds = 0.0
+    for n_robots in BATCHES if device == "cuda" else (USUAL,):
+        if seconds > LONGEST and n_robots > USUAL:
+            return
+        simulator = Simulator(scene, n_robots, device=device)
+        first, *others = commands_of(scene, n_robots, 3)
+        simulator.stroke(first)
+        taken, done = [], []
+        for commands in others:
+            began = time.perf_counter()
+            report = simulator.stroke(commands)
+            taken.append(time.perf_counter() - began)
+            done.append((report.steps.sum(), report.newton_iterations.sum()))
+        seconds, (steps, iterations) = min(taken), done[int(np.argmin(taken))]
+        yield n_robots, {
+            "steps_per_second": rounded(steps / seconds), "seconds": rounded(seconds),
+            "iterations_per_step": rounded(iterations / steps), "failed": int(simulator.failed.sum()),
+        }  # fmt: skip
+
+
+def traffic(preset: Fidelity) -> dict[str, float]:
+    """Bytes that a robot's kernels read and write of its own numbers, per Newton iteration and per step beside."""
+    parts = count_operations(Scene.preset(preset))
+    return {name: 8.0 * numbers_moved(parts[name]) for name in ("iteration", "step")}
+
+
+def bandwidth() -> float:
+    """Bytes per second that the GPU copies, read and written."""
+    arrays = cuda.arrays()
+    source = arrays.zeros(2**28)
+    target, seconds = arrays.empty_like(source), []
+    for _ in range(5):
+        arrays.cuda.Device().synchronize()
+        began = time.perf_counter()
+        target[:] = source
+        arrays.cuda.Device().synchronize()
+        seconds.append(time.perf_counter() - began)
+    return float(2 * source.nbytes / min(seconds))
+
+
+def decisions(device: str, n_robots: int = 65536) -> dict[str, float]:
+    """Decisions per second of the batch environment at "fast" with random actions."""
+    batch = gym.make_vec("SeastarSwim-v0", n_robots, vectorization_mode="vector_entry_point", device=device)
+    batch.reset(seed=0)
+    batch.action_space.seed(0)
+    actions = [batch.action_space.sample() for _ in range(4)]
+    batch.step(actions[0])
+    began = time.perf_counter()
+    for action in actions[1:]:
+        batch.step(action)
+    seconds = time.perf_counter() - began
+    batch.close()
+    return {"decisions_per_second": rounded(3 * n_robots / seconds), "robots": n_robots}
+
+
+def learning(device: str) -> dict[str, float]:
+    """Decisions per second of Stable-Baselines3's PPO with its update, on the device's robots."""
+    import torch
+    from stable_baselines3 import PPO
+
+    from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
+
+    batch = gym.make_vec(
+        "SeastarSwim-v0", ROBOTS_OF_LEARNER, vectorization_mode="vector_entry_point", device=device, actions="pairs",
+        autoreset_mode="SameStep",
+    )  # fmt: skip
+    on_gpu = torch.cuda.is_available() and device == "cuda"
+    model = PPO("MlpPolicy", BatchVecEnv(batch), seed=0, device="cuda" if on_gpu else "cpu", **LEARNER)
+    per_round = LEARNER["n_steps"] * ROBOTS_OF_LEARNER
+    model.learn(per_round)
+    began = time.perf_counter()
+    model.learn(ROUNDS_OF_LEARNER * per_round)
+    seconds = time.perf_counter() - began
+    return {"decisions_per_second": rounded(ROUNDS_OF_LEARNER * per_round / seconds), "robots": ROBOTS_OF_LEARNER}
+
+
+def gpu() -> dict[str, Any]:
+    """The GPU: its name, its driver's version, and CuPy's."""
+    arrays = cuda.arrays()
+    runtime = arrays.cuda.runtime
+    name = runtime.getDeviceProperties(0)["name"].decode()
+    return {"name": name, "driver": runtime.driverGetVersion(), "cupy": arrays.__version__}
+
+
+@dataclass(frozen=True)
+class Options:
+    """Robots on a GPU against the processor's."""
+
+    device: str = "cuda"
+    """"cuda", or "scalar", which compares bits alone."""
+    names: tuple[str, ...] = ()
+    """Scenes to compare; all by default."""
+    processes: int = os.cpu_count() or 1
+    """Processes that compare scenes at the same time."""
+    out: Path = Path("runs/gpu")
+    """Folder of the files."""
+
+
+def run(options: Options, results: Results) -> str | None:
+    """Compare all scenes, and measure, but for what is in the file; what is measured is kept at once."""
+    names = options.names or tuple(scenes())
+    require_known("scene", names, scenes())
+    if options.device == "cuda":
+        results["gpu"] = gpu()
+    context = multiprocessing.get_context("spawn")
+    bits = results.setdefault("bits", {})
+    missing = [name for name in names if name not in bits]
+    with ProcessPoolExecutor(options.processes, context) as pool:
+        for name, found in zip(missing, pool.map(compared, missing, [options.device] * len(missing)), strict=True):
+            bits[name] = found
+            print(f"{name}: {'same bits' if found['same'] else found['differing']}, {found['seconds']}", flush=True)
+            results.save()
+    if options.device == "cuda":
+        measure(results)
+    different = [name for name, found in results["bits"].items() if not found["same"]]
+    return f"Other bits than the processor's: {', '.join(different)}." if different else None
+
+
+def measure(results: Results) -> None:
+    """Speed of the GPU and of the processor beside it."""
+    results["bandwidth"] = rounded(bandwidth())
+    results["traffic"] = {preset: traffic(preset) for preset in PRESETS}
+    speed = results.setdefault("speed", {})
+    for preset in PRESETS:
+        for contact in (False, True):
+            for device in ("cuda", "cpu"):
+                row = speed.setdefault(f"{preset}{', contact' * contact}", {}).setdefault(device, {})
+                if str(USUAL) in row:
+                    continue
+                for n_robots, found in batches(preset, contact, device):
+                    row[str(n_robots)] = found
+                    print(preset, "contact" * contact, device, n_robots, found, flush=True)
+                results.save()
+    for name, measured in (("environment", decisions), ("learner", learning)):
+        for device in ("cuda", "cpu"):
+            if device not in results.setdefault(name, {}):
+                results[name][device] = measured(device)
+                results.save()
+        print(name, results[name], flush=True)
+
+
+def share_of_bandwidth(results: Mapping[str, Any], preset: str, n_robots: str) -> float:
+    """Share of the GPU's bandwidth that the kernels' own numbers take, if none of them stays in a cache."""
+    row, bytes_of = results["speed"][preset]["cuda"][n_robots], results["traffic"][preset]
+    per_step = row["iterations_per_step"] * bytes_of["iteration"] + bytes_of["step"]
+    return float(row["steps_per_second"] * per_step / results["bandwidth"])
+
+
+def speeds(results: Mapping[str, Any]) -> str:
+    """Table of speeds: the GPU's largest batch, 4,096 robots on it, and on the processor beside it."""
+    lines = [
+        "| scene | robots | million steps per second | share of the GPU's bandwidth | with 4,096 robots |"
+        " on the processor beside it | ratio |",
+        "|---|---:|---:|---:|---:|---:|---:|",
+    ]
+    for name, row in results.get("speed", {}).items():
+        of_gpu, beside = row["cuda"], row["cpu"][str(USUAL)]["steps_per_second"]
+        largest = max(of_gpu, key=int)
+        share = f"{100 * share_of_bandwidth(results, name, largest):.0f} %" if name in results["traffic"] else ""
+        fastest, usual = (of_gpu[size]["steps_per_second"] for size in (largest, str(min(USUAL, int(largest)))))
+        lines.append(
+            f"| {name} | {int(largest):,} | {fastest / 1e6:.1f} | {share} | {usual / 1e6:.1f} | {beside / 1e6:.2f} "
+            f"| {fastest / beside:.0f} |"
+        )
+    return "\n".join(lines)
+
+
+def draw(results: Mapping[str, Any], path: Path) -> None:
+    """Steps per second over the size of the batch."""
+    if "speed" not in results:  # of a machine without a GPU
+        return
+    figure, axes = subplots(1, 1, figsize=(6.4, 4.4))
+    for preset, colour in zip(PRESETS, CYCLE, strict=False):
+        for contact, style in (("", "o-"), (", contact", "o--")):
+            row = results["speed"][f"{preset}{contact}"]
+            sizes = sorted(row["cuda"], key=int)
+            rates = [row["cuda"][size]["steps_per_second"] for size in sizes]
+            axes.loglog([int(size) for size in sizes], rates, style, color=colour, label=f"{preset}{contact}", ms=4)
+            axes.axhline(row["cpu"][str(USUAL)]["steps_per_second"], color=colour, ls=":", lw=1)
+    axes.set(
+        xlabel="robots in the batch",
+        ylabel="steps of robots per second",
+        title=f"One {results['gpu']['name']}; dotted: the processor beside it",
+    )
+    axes.grid(color=FAINT, lw=0.4)
+    axes.legend()
+    figure.savefig(path)
+
+
+def settings(options: Options) -> dict[str, Any]:
+    """What all numbers of a file have in common."""
+    return {"device": options.device, "robots": N_ROBOTS, "strokes": N_STROKES}
+
+
+STUDY = Study(
+    "gpu", run, Options, file="gpu.json", settings=settings, pictures={"gpu.png": draw}, tables={"gpu": speeds}
+)

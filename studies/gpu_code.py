@@ -1,0 +1,99 @@
+"""Registers that the code for GPUs needs, and what it spills into memory: no GPU is needed, NVIDIA's assembler is.
+
+`pip install -e ".[gpu-check]"` brings it (ptxas). Tests refuse code that needs more than docs/gpu_code.json has.
+"""
+
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, files
+from pathlib import Path
+from typing import Any, get_args
+
+from seastar_gym.scene import Scene
+from seastar_gym.scene.numerics import SchemeName
+from seastar_gym.simd import cuda
+from seastar_gym.simulator.device_batch import program_of
+from studies.frame import Results, Study
+from studies.gpu import EVERYTHING, scenes
+
+ARCHITECTURES = ("sm_80", "sm_90")
+"""NVIDIA's names of the A100's and the H100's instructions."""
+NAMES = ("the chapter's scene", "contact, limbs apart", EVERYTHING, *get_args(SchemeName))
+FACTS = re.compile(
+    r"(\d+) bytes stack frame, (\d+) bytes spill stores, (\d+) bytes spill loads.*?Used (\d+) registers", re.DOTALL
+)
+
+
+def assembler() -> str | None:
+    """Path of ptxas: on the PATH, or from the package of the extra gpu-check; None without."""
+    try:
+        found = [str(file.locate()) for file in files("nvidia-cuda-nvcc") or () if file.name == "ptxas"]
+    except PackageNotFoundError:
+        found = []
+    return shutil.which("ptxas") or next(iter(found), None)
+
+
+def code_of(scene: Scene) -> str:
+    """The code for GPUs (PTX) of a scene whose limbs all turn alike."""
+    return cuda.ptx_of(program_of(scene))
+
+
+def needs(code: str, architecture: str, ptxas: str) -> dict[str, int]:
+    """Registers of a thread, and bytes of its stack and of what it spills."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "swim.ptx")
+        file.write_text(code)
+        command = [ptxas, "-v", "--gpu-name", architecture, str(file), "-o", str(file.with_suffix(".cubin"))]
+        told = subprocess.run(command, capture_output=True, text=True, check=True).stderr
+    return facts(told)
+
+
+def facts(told: str) -> dict[str, int]:
+    """Numbers in what ptxas says. ValueError where it says something else."""
+    found = FACTS.search(told)
+    if found is None:
+        raise ValueError(f"ptxas tells no registers: {told.strip()}")
+    return dict(zip(("stack", "spill_stores", "spill_loads", "registers"), map(int, found.groups()), strict=True))
+
+
+@dataclass(frozen=True)
+class Options:
+    """Registers that the code for GPUs needs."""
+
+    out: Path = Path("runs/gpu_code")
+    """Folder of the file."""
+
+
+def run(_: Options, results: Results) -> str | None:
+    """Compile and assemble the code of some scenes for every architecture."""
+    ptxas = assembler()
+    if ptxas is None:
+        return 'NVIDIA\'s assembler ptxas is not here: pip install "seastar-gym[gpu-check]".'
+    results["needs"] = {}
+    for name in NAMES:
+        code = code_of(scenes()[name])
+        results["needs"][name] = {architecture: needs(code, architecture, ptxas) for architecture in ARCHITECTURES}
+        print(name, results["needs"][name], flush=True)
+    return None
+
+
+def registers(results: Mapping[str, Any]) -> str:
+    """Table of registers and of bytes spilled, by scene and architecture."""
+    lines = [
+        f"| scene | {' | '.join(f'{name}: registers | bytes spilled, read back' for name in ARCHITECTURES)} |",
+        "|---|" + "---:|---:|" * len(ARCHITECTURES),
+    ]
+    for name, row in results["needs"].items():
+        cells = [
+            f"{row[each]['registers']} | {row[each]['spill_stores']}, {row[each]['spill_loads']}"
+            for each in ARCHITECTURES
+        ]
+        lines.append(f"| {name} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+STUDY = Study("gpu_code", run, Options, file="gpu_code.json", tables={"gpu_code": registers})

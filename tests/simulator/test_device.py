@@ -1,0 +1,194 @@
+"""A device with a thread for each robot swims to the processor's bits: its twin "scalar" always, "cuda" with a GPU.
+
+A device's code is that of one mesh, so there are few scenes here: `python -m studies.gpu` has all others.
+"""
+
+import pickle
+import re
+from dataclasses import replace
+
+import gymnasium as gym
+import numba
+import numpy as np
+import pytest
+
+from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, StrokeReport
+from seastar_gym.simd import cuda
+from seastar_gym.simulator.device_batch import program_of
+from seastar_gym.sweep.axes import Choices
+from seastar_gym.sweep.designs import Sweep
+from seastar_gym.sweep.swimming import swim
+from strokes import assert_same, finished
+from studies.gpu import EVERYTHING, compared, scenes
+
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="devices have compiled code alone")
+
+SMALL = Scene(Seastar(nodes_per_limb=4), actuator=SmaPulse(0.4), numerics=Numerics.preset("fast"))
+N_ROBOTS = 35
+"""Robots of a batch: more than one group of a device or a processor, the last of which is not full."""
+
+
+def has_gpu() -> bool:
+    try:
+        cuda.arrays()
+    except RuntimeError:
+        return False
+    return True
+
+
+@pytest.fixture(params=["scalar", pytest.param("cuda", marks=pytest.mark.skipif(not has_gpu(), reason="no GPU"))])
+def device(request):
+    return request.param
+
+
+def commands_of(n_strokes: int, n_robots: int = N_ROBOTS, seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(-1.0, 1.0, (n_strokes, n_robots, 5))
+
+
+def pair(scene: Scene, device: str, **options) -> tuple[Simulator, Simulator]:
+    """On the processor and on the device; with work, so that few codes are compiled."""
+    options["effort"] = True
+    return Simulator(scene, N_ROBOTS, **options), Simulator(scene, N_ROBOTS, device=device, **options)
+
+
+def assert_same_reports(one: StrokeReport, other: StrokeReport) -> None:
+    for name, a, b in zip(StrokeReport._fields, one, other, strict=True):
+        np.testing.assert_array_equal(a, b, err_msg=name)
+
+
+# The same bits
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        f"sdirk2, {EVERYTHING}",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in scenes() if name != f"sdirk2, {EVERYTHING}"),
+    ],
+)
+def test_every_term_scheme_and_actuator_has_the_bits_of_the_processor(name):
+    assert compared(name, "scalar")["same"]
+
+
+def test_states_reports_and_work_are_those_of_the_processor(device):
+    both = pair(SMALL, device, error_bars=True)
+    for commands in commands_of(3):
+        assert_same_reports(*(simulator.stroke(commands) for simulator in both))
+        assert_same(*both)
+    for name in ("positions", "velocities"):
+        there = both[1].on_device(name)
+        assert isinstance(there, np.ndarray) == (device == "scalar")
+        here = there if device == "scalar" else there.get()
+        np.testing.assert_array_equal(here, getattr(both[0], name))
+
+
+def test_resets_states_and_strengths_reach_the_device(device):
+    both, commands = pair(SMALL, device), commands_of(4)
+    mask, heading = np.arange(N_ROBOTS) % 3 == 0, np.linspace(0.0, 1.0, N_ROBOTS)
+    for simulator in both:
+        simulator.stroke(commands[0])
+        simulator.reset(mask, heading)
+        simulator.set_limb_strengths(0.7)
+        simulator.stroke(commands[1])
+    assert_same(*both)
+    other = pickle.loads(pickle.dumps(both[1]))
+    assert other.device == device
+    other.set_state(both[0].get_state())
+    for simulator in (*both, other):
+        simulator.stroke(commands[2])
+    assert_same(*both)
+    assert_same(both[0], other)
+
+
+def test_parts_of_a_stroke_are_the_whole_and_one_that_is_dropped_is_undone(device):
+    (whole, parted), (first, second) = pair(SMALL, device), commands_of(2)
+    for simulator in (whole, parted):
+        simulator.stroke(first)
+    for _ in range(2):  # with the state on the device, and after somebody has looked at it
+        dropped = parted.stroke_in_parts(second, 3)
+        next(dropped)
+        dropped.close()
+        assert_same(whole, parted)
+    report = whole.stroke(second)
+    seen, last = finished(parted.stroke_in_parts(second, 3), lambda _: parted.hub_position())
+    assert_same_reports(report, last)
+    assert_same(whole, parted)
+    assert len({hub.tobytes() for hub in seen}) == 3
+
+
+def test_numbers_of_each_robot_may_change_between_strokes(device):
+    of_each = replace(SMALL, robot=replace(SMALL.robot, youngs_modulus=np.linspace(0.8e6, 1.2e6, N_ROBOTS)))
+    other = replace(of_each, robot=replace(of_each.robot, youngs_modulus=np.linspace(1.2e6, 0.8e6, N_ROBOTS)))
+    both, commands = pair(of_each, device), commands_of(2)
+    for simulator in both:
+        simulator.stroke(commands[0])
+        simulator.set_scene(other, np.arange(N_ROBOTS) % 2 == 0)
+        simulator.stroke(commands[1])
+    assert_same(*both)
+
+
+def test_a_robot_that_fails_fails_alike_and_alone(device):
+    both, commands = pair(SMALL, device), commands_of(2)
+    for simulator in both:
+        state = simulator.get_state()
+        state.velocities[7] = 1e200
+        simulator.set_state(state)
+        report = simulator.stroke(commands[0])
+        assert report.status[7] > 0 and not np.delete(report.status, 7).any()
+        simulator.stroke(commands[1])
+    assert_same(*both)
+
+
+def test_environments_observe_and_are_rewarded_alike(device):
+    batches = [
+        gym.make_vec(
+            "SeastarSwim-v0", 5, vectorization_mode="vector_entry_point", scene=SMALL, actions="pairs",
+            max_episode_steps=3, device=where,
+        )
+        for where in ("cpu", device)
+    ]  # fmt: skip
+    seen = [[batch.reset(seed=3)[0]] for batch in batches]
+    batches[0].action_space.seed(0)
+    for _ in range(5):
+        actions = batches[0].action_space.sample()
+        for batch, arrays in zip(batches, seen, strict=True):
+            arrays += batch.step(actions)[:4]
+    for ours, theirs in zip(*seen, strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+
+
+def test_designs_of_a_sweep_swim_alike(device):
+    sweep = Sweep(SMALL, (Choices("robot.youngs_modulus", (0.8e6, 1.0e6, 1.2e6)),), settling=1, measured=1)
+    (cell,) = sweep.cells()
+    ours, theirs = swim(cell), swim(cell, device)
+    assert ours.keys() == theirs.keys() and not ours["status"].any()
+    for name, column in ours.items():
+        np.testing.assert_array_equal(column, theirs[name], err_msg=name)
+
+
+# Refusals
+
+
+def test_a_device_that_is_not_there_is_refused_in_one_sentence():
+    with pytest.raises(ValueError, match="device must be one of 'cpu', 'cuda', 'scalar', not 'tpu'"):
+        Simulator(SMALL, device="tpu")
+    if not has_gpu():
+        with pytest.raises(RuntimeError, match=r'^device="cuda" (needs CuPy|finds no GPU).*\.$'):
+            Simulator(SMALL, device="cuda")
+
+
+# The code for GPUs, without one
+
+OF_DOUBLES = re.compile(r"^\s+(?:@%p\d+\s+)?([a-z0-9.]*\.f64)\b", re.MULTILINE)
+ROUNDED_TO_NEAREST = {f"{operation}.rn.f64" for operation in ("add", "sub", "mul", "div", "rcp", "fma", "sqrt")}
+EXACT = re.compile(r"(neg|abs|mov|selp|min|max|setp\.\w+|cvt\.(rmi|rzi)(\.s64|\.f64)?|cvt\.rn)\.f64")
+"""Whole numbers become floating-point ones without rounding: none is above 2^53."""
+
+
+@pytest.mark.parametrize("scene", [SMALL, scenes()[f"sdirk2, {EVERYTHING}"]], ids=["default", "everything"])
+def test_the_code_for_gpus_rounds_every_operation_by_itself_and_calls_nothing(scene):
+    code = cuda.ptx_of(program_of(scene))
+    found = set(OF_DOUBLES.findall(code))
+    assert {"add.rn.f64", "mul.rn.f64", "fma.rn.f64", "div.rn.f64", "sqrt.rn.f64"} <= found
+    assert {name for name in found - ROUNDED_TO_NEAREST if not EXACT.fullmatch(name)} == set()
+    assert "call" not in code and ".func" not in code and ".target sm_70" in code

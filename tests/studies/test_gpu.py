@@ -1,0 +1,59 @@
+"""The studies of robots on a GPU, as far as they go without one."""
+
+import json
+
+import pytest
+
+from studies import gpu, gpu_code
+from studies.frame import DOCS
+
+TOLD = """ptxas info    : 0 bytes gmem
+ptxas info    : Compiling entry function 'swim_robots' for 'sm_90'
+ptxas info    : Function properties for swim_robots
+    600 bytes stack frame, 724 bytes spill stores, 1156 bytes spill loads
+ptxas info    : Used 255 registers, used 0 barriers, 600 bytes cumulative stack size
+"""
+
+
+def committed(name: str) -> dict:
+    return json.loads((DOCS / name).read_text(encoding="utf-8"))
+
+
+def test_all_scenes_had_the_bits_of_the_processor_on_the_gpu():
+    bits = committed("gpu.json")["bits"]
+    assert set(bits) == set(gpu.scenes()) and len(bits) >= 40
+    assert all(found["same"] and not found["failed"] for found in bits.values())
+
+
+def test_the_share_of_bandwidth_is_that_of_the_numbers_that_kernels_move():
+    row = {"1024": {"steps_per_second": 5e6, "iterations_per_step": 1.5}}
+    results = {
+        "speed": {"fast": {"cuda": row}},
+        "traffic": {"fast": {"iteration": 2e4, "step": 1e4}},
+        "bandwidth": 1e12,
+    }
+    assert gpu.share_of_bandwidth(results, "fast", "1024") == pytest.approx(0.2)
+
+
+def test_traffic_is_linear_in_the_nodes():
+    few, more, most = (gpu.traffic(preset) for preset in ("fast", "balanced", "reference"))
+    for part in ("iteration", "step"):
+        assert (most[part] - more[part]) / (more[part] - few[part]) == (37 - 12) / (12 - 7)
+
+
+def test_what_the_assembler_tells_is_read():
+    assert gpu_code.facts(TOLD) == {"stack": 600, "spill_stores": 724, "spill_loads": 1156, "registers": 255}
+    with pytest.raises(ValueError, match="ptxas tells no registers: nothing"):
+        gpu_code.facts("nothing")
+
+
+@pytest.mark.skipif(gpu_code.assembler() is None, reason="NVIDIA's assembler is not here: the extra gpu-check has it")
+@pytest.mark.parametrize(
+    "name", ["the chapter's scene", *(pytest.param(name, marks=pytest.mark.slow) for name in gpu_code.NAMES[1:])]
+)
+def test_the_code_spills_no_more_than_before(name):
+    code = gpu_code.code_of(gpu.scenes()[name])
+    for architecture, before in committed("gpu_code.json")["needs"][name].items():
+        now = gpu_code.needs(code, architecture, gpu_code.assembler())
+        for what, number in now.items():
+            assert number <= 1.1 * before[what] + 64, (architecture, what)
