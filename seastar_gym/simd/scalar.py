@@ -4,6 +4,7 @@ It is slow, and there for tests: what this gives to the last bit, a graphics pro
 """
 
 import ctypes
+import hashlib
 from functools import partial
 from typing import Any
 
@@ -31,7 +32,8 @@ def load(program: Program) -> Any:
         name = llvm.get_host_cpu_name()
         machine = llvm.Target.from_default_triple().create_target_machine(name, features, opt=3, jit=True)
         made = partial(program.code, machine, llvm.get_process_triple(), _add_loop)
-        code = kept_code(f"{program.key}-{name}.o", lambda: machine.emit_object(made()))
+        of_processor = hashlib.sha256(features.encode()).hexdigest()[:8]
+        code = kept_code(f"{program.key}-{name}-{of_processor}.o", lambda: machine.emit_object(made()))
         engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
         engine.add_object_file(llvm.ObjectFileRef.from_data(code))
         engine.finalize_object()

@@ -6,6 +6,7 @@ A device's code is that of one mesh, so there are few scenes here: `python -m st
 import pickle
 import re
 from dataclasses import replace
+from typing import get_args
 
 import gymnasium as gym
 import numba
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, StrokeReport
+from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.simd import cuda
 from seastar_gym.simulator.device_batch import program_of
 from seastar_gym.sweep.axes import Choices
@@ -185,7 +187,10 @@ EXACT = re.compile(r"(neg|abs|mov|selp|min|max|setp\.\w+|cvt\.(rmi|rzi)(\.s64|\.
 """Whole numbers become floating-point ones without rounding: none is above 2^53."""
 
 
-@pytest.mark.parametrize("scene", [SMALL, scenes()[f"sdirk2, {EVERYTHING}"]], ids=["default", "everything"])
+CODES = {scheme: replace(SMALL, numerics=Numerics(scheme, 0.005)) for scheme in get_args(SchemeName)}
+
+
+@pytest.mark.parametrize("scene", [*CODES.values(), scenes()[f"sdirk2, {EVERYTHING}"]], ids=[*CODES, "everything"])
 def test_the_code_for_gpus_rounds_every_operation_by_itself_and_calls_nothing(scene):
     code = cuda.ptx_of(program_of(scene))
     found = set(OF_DOUBLES.findall(code))
