@@ -216,7 +216,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     headings: Headings that are asked for at the waypoints, a `Headings`: along the legs, at random, or given angles.
         None asks for none.
     device: Where robots swim: "cpu", or "cuda" for a GPU of NVIDIA, to the same bits, see `Simulator`. It is for
-        batches: one robot swims a hundred times slower there.
+        batches of thousands.
     render_mode: "rgb_array": `render` returns a picture of the end of the decision. "rgb_array_list": `render` returns
         `frames_per_stroke` pictures of the decision. "human": a window shows as many;
         without a display nobody sees them, and a warning says so.
