@@ -75,8 +75,9 @@ EQUIVALENT: dict[tuple[str, str], str] = {
 """Reasons why mutants, (file, line after the change), behave as the original does."""
 PRELOADED = ("numba", "pyarrow.dataset", "scipy.optimize", "scipy.stats")
 """Imported once, for all mutants."""
-ANEW = {"seastar_gym", "studies", "agents", "gymnasium"}
-"""Imported anew from the copy by every mutant; gymnasium keeps a registry of environments."""
+ANEW = {"seastar_gym", "studies", "agents", "gymnasium", "typeguard"}
+"""Imported anew from the copy by every mutant; gymnasium keeps a registry of environments, and pytest warns where it
+meets its plugin typeguard, which the command has imported."""
 Touched = dict[str, dict[str, list[int]]]
 """Lines that a test executes, by test and file."""
 
