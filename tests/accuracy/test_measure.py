@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from declared import assert_declared_as_recorded
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires
 from seastar_gym.accuracy import commands, measure
 from seastar_gym.accuracy.setting import at, resolved
@@ -117,3 +118,7 @@ def test_decisions_are_told_at_whole_seconds(monkeypatch):
     simulator.advance(0.5, drawn[0])
     simulator.advance(0.5, drawn[1])
     np.testing.assert_array_equal(swum.hub[0], simulator.hub_position())
+
+
+def test_defaults_and_constants_are_declared_as_recorded():
+    assert_declared_as_recorded("seastar_gym.accuracy")

@@ -2,6 +2,7 @@
 
 import pytest
 
+from declared import assert_declared_as_recorded
 from seastar_gym import Scene, Seastar
 from seastar_gym.cli.main import main
 from seastar_gym.controllers.roster import AGENTS, load_agent, load_agents
@@ -36,3 +37,7 @@ def test_help_tells_the_names_of_all_agents(capsys):
     text = " ".join(capsys.readouterr().out.replace("│", " ").split())
     assert ", ".join(AGENTS) in text and ", ".join(GAITS) in text
     assert "usage: seastar evaluate" in text and ", ".join(PATHS) in text
+
+
+def test_defaults_and_constants_are_declared_as_recorded():
+    assert_declared_as_recorded("seastar_gym.controllers")

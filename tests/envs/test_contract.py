@@ -8,6 +8,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from declared import assert_declared_as_recorded
 from seastar_gym import Headings, Limited, RewardWeights, Scene, SmaPulse, SmaWires, ThermalSma
 from seastar_gym.envs.layout import HEADINGS, VELOCITY_SCALE, Layout
 from seastar_gym.envs.paths import PATHS
@@ -100,3 +101,7 @@ def test_the_arguments_are_those_of_the_constructors():
 
 def test_every_named_path_is_documented():
     assert all(f'"{name}"' in section("Arguments") for name in PATHS)
+
+
+def test_defaults_and_constants_are_declared_as_recorded():
+    assert_declared_as_recorded("seastar_gym.envs")

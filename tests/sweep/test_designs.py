@@ -6,6 +6,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from declared import assert_declared_as_recorded
 from refusals import assert_refused
 from seastar_gym.scene import Limb, Numerics, Scene, Seastar, SmaPulse
 from seastar_gym.scene.actuators.wires import SmaWires
@@ -207,3 +208,7 @@ def test_a_number_that_not_all_choices_have_is_refused():
 def test_bad_axes_are_refused(make, words):
     with assert_refused(*words):
         make()
+
+
+def test_defaults_and_constants_are_declared_as_recorded():
+    assert_declared_as_recorded("seastar_gym.sweep")
