@@ -30,9 +30,10 @@ def assert_declared_as_recorded(room: str) -> None:
 def declared(room: str) -> dict[str, str]:
     """Defaults and constants of a package by their names, as text, but for classes, functions and paths."""
     package = importlib.import_module(room)
-    names = [name for _, name, _ in pkgutil.walk_packages(package.__path__, f"{room}.") if "__main__" not in name]
+    inside = [name for _, name, _ in pkgutil.walk_packages(package.__path__, f"{room}.") if "__main__" not in name]
+    names = [room, *inside]
     found = {
-        f"{name.removeprefix(room + '.')}.{entry}": repr(value.tolist() if isinstance(value, np.ndarray) else value)
+        f"{name.removeprefix(room).strip('.')}.{entry}": repr(value.tolist() if isinstance(value, np.ndarray) else value)
         for name in names
         for entry, value in _of_module(importlib.import_module(name))
     }

@@ -13,7 +13,7 @@ import pytest
 from refusals import assert_refused
 from seastar_gym import Certificate, Contact, Numerics, Scene, Seastar, SmaPulse, Water
 from seastar_gym.accuracy import Setting, chapters_certificate
-from seastar_gym.accuracy.chapter import FOLDER
+from seastar_gym.accuracy.chapter import FOLDER, file_of
 from seastar_gym.accuracy.commands import draw_classes
 from seastar_gym.accuracy.endurance import energy_growth
 from seastar_gym.accuracy.measure import Swims, errors, path_lengths, swim_all
@@ -354,3 +354,8 @@ def test_nineteen_nodes_gather_energy_with_steps_of_5_ms_but_not_of_half():
     nineteen = replace(scene, robot=replace(scene.robot, nodes_per_limb=19))
     assert energy_growth(nineteen) > 10.0
     assert energy_growth(replace(nineteen, numerics=replace(scene.numerics, step=2.5e-3))) < 1.5
+
+
+def test_errors_in_time_stand_in_a_file_of_their_period(tmp_path):
+    assert file_of(0.5, tmp_path) == tmp_path / "wires_0.5s.json"
+    assert file_of(0.1).is_file() and file_of(0.2).is_file()

@@ -2,6 +2,7 @@
 
 import inspect
 import itertools
+import json
 import re
 
 import gymnasium as gym
@@ -9,11 +10,13 @@ import numpy as np
 import pytest
 
 from declared import assert_declared_as_recorded
-from seastar_gym import Headings, Limited, RewardWeights, Scene, SmaPulse, SmaWires, ThermalSma
+from seastar_gym import TASKS, Headings, Limited, Numerics, RewardWeights, Scene, SmaPulse, SmaWires, ThermalSma
 from seastar_gym.envs.layout import HEADINGS, VELOCITY_SCALE, Layout
+from seastar_gym.envs.options import SwimOptions, scene_at, with_options
 from seastar_gym.envs.paths import PATHS
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.scene.serial import from_dict
 
 CONTRACT = inspect.getdoc(SeastarSwimEnv)
 TYPES = {"float": float, "int": int, "bool": bool, "str": str}
@@ -105,3 +108,41 @@ def test_every_named_path_is_documented():
 
 def test_defaults_and_constants_are_declared_as_recorded():
     assert_declared_as_recorded("seastar_gym.envs")
+
+
+def test_ids_are_declared_as_recorded():
+    limits = {id: spec.max_episode_steps for id, spec in gym.registry.items() if id.startswith("SeastarSwim")}
+    assert limits == {
+        "SeastarSwim-v0": 400, "SeastarSwimContinuous-v0": 400, "SeastarSwimTimed-v0": 400,
+        "SeastarSwimTimedModerate-v0": 1000, "SeastarSwimTimedHard-v0": 2000, "SeastarSwimHeading-v0": 600,
+    }  # fmt: skip
+    assert gym.spec("SeastarSwimContinuous-v0").kwargs == {"actions": "continuous"}
+    heading = gym.spec("SeastarSwimHeading-v0").kwargs
+    assert heading["decision_period"] == 0.5 and heading["actions"] == "pairs"
+    assert from_dict(heading["headings"], Headings) == Headings()
+    for id, (task, actions, period, limit, threshold) in TASKS.items():
+        spec = gym.spec(id)
+        assert spec.max_episode_steps == round(limit / period) and spec.reward_threshold == threshold
+        assert spec.kwargs == {"task": task, "actions": actions, "decision_period": period}
+
+
+def test_a_signature_names_the_shared_options_after_those_before_them():
+    class Made:
+        @with_options
+        def __init__(self, first, *given, last=3, **options):
+            pass
+
+    names = list(inspect.signature(SwimOptions).parameters)
+    found = inspect.signature(Made).parameters
+    assert list(found) == ["first", *names, "last"]
+    assert found["last"].kind is inspect.Parameter.KEYWORD_ONLY and found["path"].default == "pentagon"
+    assert found["first"].kind is inspect.Parameter.POSITIONAL_OR_KEYWORD
+
+
+def test_a_scene_of_a_file_has_its_own_numerics_or_those_of_the_fidelity(tmp_path):
+    assert scene_at(None, "fast") is None
+    (tmp_path / "plain.json").write_text(json.dumps(Scene().to_dict()))
+    assert scene_at(tmp_path / "plain.json", "fast") == Scene.preset("fast")
+    own = Scene(numerics=Numerics("sdirk2", 5e-3))
+    (tmp_path / "own.json").write_text(json.dumps(own.to_dict()))
+    assert scene_at(tmp_path / "own.json", "fast").numerics == own.numerics

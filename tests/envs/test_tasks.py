@@ -29,8 +29,8 @@ from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import limb_order, symmetry_in, transform_commands
 from seastar_gym.envs.tasks.course import CHASE, Courses, Pursuit, draw_course
-from seastar_gym.envs.tasks.discs import rims, ways
-from seastar_gym.envs.tasks.envs import CHALLENGES, SeastarTaskEnv, SeastarTaskVectorEnv
+from seastar_gym.envs.tasks.discs import _grid, rims, ways
+from seastar_gym.envs.tasks.envs import CHALLENGES, SeastarTaskEnv, SeastarTaskVectorEnv, name_of
 from seastar_gym.envs.tasks.obst_trap import FIRST, LAST, draw_discs, draw_horseshoe, draw_kind
 from seastar_gym.envs.tasks.prizes import draw_prizes
 from seastar_gym.envs.tasks.rounds import best_round, distances, greedy_round
@@ -657,6 +657,33 @@ def test_ways_on_the_grid_are_as_long_as_ways_are():
     assert around - 0.004 < ways(disc, goal, 0.01, 0.01)(start)[0] < 1.04 * around
     wall = np.column_stack([np.full(41, 0.25), np.linspace(-0.4, 0.4, 41), np.full(41, 0.02)])
     assert ways(wall, goal, 0.01, 0.01)(start)[0] == np.inf
+
+
+@pytest.mark.parametrize("step", [0.02, 0.01])
+def test_the_grid_fills_its_box_and_every_node_has_sixteen_neighbours(step):
+    grid = _grid(step)
+    corners, along = grid.nodes[[0, -1], [0, -1]], np.diff(grid.nodes, axis=0)
+    np.testing.assert_allclose(corners, [[-0.2, -0.4], [0.8, 0.4]], atol=1e-12)
+    np.testing.assert_allclose(along, np.broadcast_to([step, 0.0], along.shape), atol=1e-12)
+    ends = grid.nodes.reshape(-1, 2)[np.stack([grid.first, grid.last])]
+    np.testing.assert_allclose(grid.length, np.hypot(*(ends[1] - ends[0]).T), atol=1e-12)
+    neighbours = np.bincount(np.concatenate([grid.first, grid.last])).reshape(grid.nodes.shape[:2])
+    assert (neighbours[2:-2, 2:-2] == 16).all() and neighbours[0, 0] == neighbours[-1, -1] == 5
+    sizes, counts = np.unique(np.round((grid.length / step) ** 2), return_counts=True)
+    assert sizes.tolist() == [1.0, 2.0, 5.0] and len(counts) == 3
+
+
+def test_there_is_no_way_to_a_goal_in_a_disc():
+    goal = np.array([0.5, 0.0])
+    found = ways(np.array([[0.5, 0.0, 0.05]]), goal, 0.01, 0.02)
+    assert found.lengths.shape == (51, 41) and (found(np.zeros((1, 2))) == np.inf).all()
+    away = np.array([[9.0, 0.0]])  # beyond the grid, the way to it counts
+    assert ways(np.zeros((0, 3)), goal, 0.01, 0.02)(away)[0] == pytest.approx(8.5, rel=0.01)
+
+
+def test_a_challenge_has_a_name_if_it_is_one_of_those_with_names():
+    assert [name_of(challenge) for challenge in CHALLENGES.values()] == [*CHALLENGES]
+    assert name_of(None) is name_of(Prey(wanted=9)) is None
 
 
 def test_who_is_in_a_disc_swims_to_the_nearest_way_first():
