@@ -13,8 +13,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 RECORDED = Path(__file__).parent / "declared.json"
 
 
@@ -33,7 +31,7 @@ def declared(room: str) -> dict[str, str]:
     inside = [name for _, name, _ in pkgutil.walk_packages(package.__path__, f"{room}.") if "__main__" not in name]
     names = [room, *inside]
     found = {
-        f"{name.removeprefix(room).strip('.')}.{entry}": repr(value.tolist() if isinstance(value, np.ndarray) else value)
+        f"{name.removeprefix(room).strip('.')}.{entry}": repr(getattr(value, "tolist", lambda value=value: value)())
         for name in names
         for entry, value in _of_module(importlib.import_module(name))
     }
