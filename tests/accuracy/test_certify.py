@@ -1,6 +1,7 @@
 """Certificates of scenes: what they measure, promise and refuse, and when they lapse."""
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -416,3 +417,78 @@ def test_the_command_writes_certificate_and_picture(few_settings, tmp_path, monk
     file_of_scene.write_text("{", encoding="utf-8")
     with pytest.raises(ValueError, match=r"mine\.json is no scene: .*Expecting"):
         command.load_scene(file_of_scene)
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        ({"scene": 3}, "scene must be a Scene"),
+        ({"settings": ()}, "settings must be some Settings"),
+        ({"settings": (3,)}, "settings must be some Settings"),
+        ({"promised": ()}, "promised must be some of"),
+        ({"actions": ("of yesterday",)}, "actions must be some of"),
+        ({"samples": 1}, "samples must be a whole number from 2 to 100000"),
+        ({"samples": 100_001}, "samples must be a whole number from 2 to 100000"),
+        ({"limit_error": -1e-9}, "limit_error"),
+        ({"decision_period": 0.0}, "decision_period"),
+        ({"classes": 1.0}, "classes must be a whole number"),
+        ({"version": 3}, "version and machine must be words"),
+        ({"machine": None}, "version and machine must be words"),
+    ],
+)
+def test_what_no_certificate_can_hold_is_refused(certificate, change, words):
+    with assert_refused(words):
+        replace(certificate, **change)
+    first, *others = certificate.settings
+    with assert_refused("settings must have errors of the same classes"):
+        fewer = {name: getattr(first, name) | {"own": 0.1} for name in ("errors", "typical")}
+        replace(certificate, settings=(replace(first, **fewer), *others))
+    assert replace(certificate, samples=2, limit_error=0.0, decision_period=0.1).samples == 2
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        ({"discretisation": "finite"}, "discretisation must be one of"),
+        ({"nodes_per_limb": 1}, "nodes_per_limb must be a whole number from 2 to 10000"),
+        ({"nodes_per_limb": 10_001}, "nodes_per_limb must be a whole number from 2 to 10000"),
+        ({"speed": 0.0}, "speed"),
+        ({"errors": {}}, "errors must be numbers by class"),
+        ({"errors": {"own": -0.1}}, "errors"),
+        ({"typical": {"own": 0.1}}, "errors and typical must have the same classes"),
+        ({"typical": [0.1]}, "typical must be numbers by class"),
+        ({"space_error": math.nan}, "space_error"),
+        ({"time_error": -0.1}, "time_error"),
+        *(({name: -0.1}, name) for name in ("energy_growth", "heading_error", "end_error")),
+    ],
+)
+def test_what_no_setting_can_have_is_refused(certificate, change, words):
+    setting = certificate.settings[0]
+    with assert_refused(words):
+        replace(setting, **change)
+    failed = replace(setting, space_error=math.inf, energy_growth=math.inf, speed=math.nan, typical={})
+    assert math.isnan(failed.typical_error(setting.errors)) and math.isnan(failed.error(()))
+    assert math.isnan(failed.error(("of yesterday",))) and not failed.endures
+    adapted = replace(setting, scheme="implicit-midpoint", step=0.02, path_tolerance=0.01, nodes_per_limb=5)
+    assert str(adapted) == '"implicit-midpoint" at 20 ms adapted to 1 % with 5 nodes per limb'
+
+
+@pytest.mark.parametrize(
+    "scene, words",
+    [
+        (3, "certify needs a Scene, not 3."),
+        (Scene(Seastar(limb_length=np.array([0.1, 0.2]))), "certify scene.of_robot(0), say."),
+        (Scene(held_nodes=(0,)), "belong to one mesh"),
+        (Scene(loads=((1, 0.0, 1.0),)), "belong to one mesh"),
+        (Scene(actuator=SmaPulse(0.0)), "Nothing moves this robot"),
+        (Scene(limb_strengths=(0.0,) * 5), "Nothing moves this robot"),
+    ],
+)
+def test_a_scene_that_has_no_certificate_is_refused(scene, words):
+    with assert_refused(words):
+        seastar_gym.certify(scene)
+
+
+def test_the_confidence_is_that_of_so_many_sequences(certificate):
+    assert replace(certificate, samples=60).confidence() == pytest.approx(1.0 - 0.95**60)
+    assert replace(certificate, samples=2).confidence(0.5) == 0.75
