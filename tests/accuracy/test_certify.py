@@ -492,3 +492,43 @@ def test_a_scene_that_has_no_certificate_is_refused(scene, words):
 def test_the_confidence_is_that_of_so_many_sequences(certificate):
     assert replace(certificate, samples=60).confidence() == pytest.approx(1.0 - 0.95**60)
     assert replace(certificate, samples=2).confidence(0.5) == 0.75
+
+
+MADE = {
+    "speed": 1234.5, "energy_growth": 1.0, "space_error": 0.02, "time_error": 0.003,
+    "errors": {"a": 0.021, "b": 0.05, "small": 0.3}, "typical": {"a": 0.01, "b": 0.004, "small": 0.2},
+}  # fmt: skip
+
+
+def made(certificate):
+    """Certificate of two settings and three classes, with numbers that are easy to read."""
+    coarse, _, fine, _ = (replace(each, **MADE) for each in certificate.settings)
+    slow = replace(fine, speed=99.4, energy_growth=2.0, space_error=0.001)
+    return replace(certificate, settings=(slow, coarse), promised=("a", "b"), actions=("a",), limit_error=0.0005)
+
+
+def test_the_table_of_a_certificate_is_in_columns_fastest_first(certificate):
+    assert command.as_text(made(certificate)).splitlines() == [
+        "setting                                         space     time     sum (typical) actions (typical)"
+        "   small (typical)  x real time",
+        '"sdirk2" at 20 ms with 5 nodes per limb           2 %    0.3 %      5 % (1 %)       2.1 % (1 %)'
+        "        30 % (20 %)          1,234",
+        '"sdirk2" at 20 ms with 9 nodes per limb         0.1 %    0.3 %      5 % (1 %)       2.1 % (1 %)'
+        "        30 % (20 %)             99  gathers energy over long swims, not chosen",
+        "With 10 % confidence, at most 5 % of the sequences of a class exceed its error (2 of each were measured); "
+        "half of them exceed the typical one. The limit errs by 0.05 %.",
+    ]
+
+
+def test_the_picture_of_a_certificate_has_a_line_for_every_number_of_nodes(certificate, tmp_path, monkeypatch):
+    figures = []
+    monkeypatch.setattr(command, "save_figure", lambda figure, file, **options: figures.append((figure, options)))
+    slower = replace(made(certificate).settings[1], speed=10.0, errors=MADE["errors"] | {"b": 0.004})
+    command.draw(replace(made(certificate), settings=(*made(certificate).settings, slower)), tmp_path / "mine.png")
+    ((figure, options),) = figures
+    (axes,) = figure.axes
+    lines = {line.get_label(): line.get_xydata().tolist() for line in axes.lines}
+    assert lines == {"5 nodes per limb": [[10.0, 2.1], [1234.5, 5.0]], "9 nodes per limb": [[99.4, 5.0]]}
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log") and axes.xaxis.get_gridlines()[0].get_visible()
+    assert figure.get_size_inches().tolist() == [6.4, 4.4] and options == {"dpi": 130}
+    assert not axes.get_legend().get_frame_on()

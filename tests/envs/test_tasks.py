@@ -199,6 +199,38 @@ def test_pictures_show_what_is_hidden(id):
     assert not np.array_equal(env.render(), first)
 
 
+def told(id: str, **changes) -> tuple:
+    """Progress, note and labels of a picture, of a task some of whose arrays are others."""
+    env = made(id).unwrapped
+    env.reset(options={"instance": 1})
+    for name, values in changes.items():
+        setattr(env._task, name, np.array(values))
+    scenery = env._task.scenery(0)
+    return scenery.progress, scenery.note, [ring.label for ring in scenery.rings]
+
+
+def test_pictures_tell_in_words_what_is_hidden():
+    whole, current = np.ones((1, 5)), {"fluid.current.u_x": np.array([3e-3]), "fluid.current.u_y": np.array([-4e-3])}
+    assert told("SeastarMiswired-v0", wiring=[[1.0, -1.0, 1.0, -1.0, 1.0]]) == (None, "wires swapped: 2, 4", [])
+    assert told("SeastarMiswired-v0", wiring=whole) == (None, "wires swapped: none", [])
+    env = made("SeastarFailBlind-v0").unwrapped
+    env.reset(options={"instance": 1})
+    env._task.drawn["limb_strengths"] = np.array([[0.0, 1.0, 1.0, 0.0, 1.0]])
+    assert env._task.scenery(0).note == "dead limbs: 1, 4"
+    env._task.drawn["limb_strengths"] = whole
+    assert env._task.scenery(0).note == "dead limbs: none"
+    assert told("SeastarPrey-v0", catches=[3]) == ("3 caught", "", [""])
+    env = made("SeastarStation-v0").unwrapped
+    env.reset(options={"instance": 1})
+    env._task.drawn, env._task._distance = current, np.array([0.0123])
+    assert env._task.scenery(0)[4:] == ("12.3 mm off", "current of 5.0 mm/s")
+    prizes = np.zeros((1, 10, 3))
+    prizes[0, :3, 2] = 4.0, 1.0, 2.0
+    assert told("SeastarPrizes-v0", prizes=prizes, taken=[5.0]) == ("5 taken, 7 left", "", ["4", "1", "2"])
+    assert told("SeastarObstTrap-v0", discs=np.full((1, 11, 3), [0.1, 0.0, 0.2])) == ("touched a disc", "", [])
+    assert told("SeastarObstTrap-v0", discs=np.full((1, 11, 3), [0.1, 0.0, 0.09])) == (None, "", [])
+
+
 @pytest.mark.parametrize(
     "arguments, words",
     [
@@ -766,6 +798,18 @@ def test_the_best_round_is_that_of_all_orders():
         assert np.hypot(*np.diff(ends, axis=0).T).sum() <= way
         assert greedy_round(first, between, worth, way) <= best
     assert best_round(np.ones(2), np.ones((2, 2)), np.ones(2), 0.5) == (0.0, [])
+
+
+def test_of_equal_rounds_the_shortest_is_best_and_greed_takes_worth_per_metre_while_there_is_way():
+    places = np.array([[0.1, 0.0], [0.3, 0.0], [-0.3, 0.0], [0.0, 0.35]])
+    first, between = np.hypot(*places.T), distances(places)
+    assert best_round(first, between, np.array([1.0, 2.0, 3.0, 3.0]), 0.32) == (3.0, [0, 1])
+    assert best_round(first, between, np.array([1.0, 2.0, 3.0, 3.0]), 0.3) in ((3.0, [2]), (3.0, [0, 1]))
+    worth = np.array([1.0, 2.0, 5.0, 9.0])
+    assert greedy_round(first, between, worth, 0.34) == 5.0  # 9 is too far, and 5 is worth most per metre
+    assert greedy_round(first, between, worth, 0.36) == 9.0 and greedy_round(first, between, worth, 0.09) == 0.0
+    assert greedy_round(first, between, np.array([4.0, 2.0, 1.0, 1.0]), 0.3) == 6.0  # all of the way
+    assert distances(places)[0].tolist() == pytest.approx([0.0, 0.2, 0.4, np.hypot(0.1, 0.35)])
 
 
 def test_greed_costs_in_every_draw():

@@ -63,10 +63,18 @@ def test_three_parameters_are_recovered_within_their_intervals_from_data_with_1_
 
 def test_the_picture_of_a_fit_has_residuals_in_millimetres(measurement, tmp_path, monkeypatch):
     figures = []
-    monkeypatch.setattr("seastar_gym.identify.command.save_figure", lambda figure, *_, **__: figures.append(figure))
+    monkeypatch.setattr(its_command, "save_figure", lambda figure, file, **options: figures.append((figure, options)))
     estimate = identify(SCENE, ["actuator.peak_angle"], measurement)
     draw(estimate, measurement, tmp_path / "fit.png")
-    paths, over_time = figures[0].axes
+    ((figure, options),) = figures
+    paths, over_time = figure.axes
+    assert figure.get_size_inches().tolist() == [10.0, 4.2] and options == {"dpi": 120}
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == ["hub", *(f"node {node}" for node in measurement.nodes[1:])]
+    assert len(paths.lines) == len(over_time.lines) - 1 == 2 * len(measurement.nodes)  # and a line at zero
+    assert {line.get_markersize() for line in paths.lines[1::2]} == {3.0} and paths.lines[1].get_alpha() == 0.4
+    np.testing.assert_allclose(paths.lines[0].get_xydata(), 1e3 * (measurement.positions - estimate.residuals)[:, 0])
+    assert over_time.get_title() == f"{1e3 * estimate.root_mean_square:.2f} mm root mean square"
     np.testing.assert_allclose(paths.lines[1].get_xydata(), 1e3 * measurement.positions[:, 0])
     np.testing.assert_allclose(over_time.lines[0].get_ydata(), 1e3 * estimate.residuals[:, 0, 0])
     np.testing.assert_allclose(over_time.lines[1].get_ydata(), 1e3 * estimate.residuals[:, 0, 1])
