@@ -22,7 +22,8 @@ def assert_declared_as_recorded(room: str) -> None:
     if room not in recorded:
         recorded[room] = declared(room)
         RECORDED.write_text(json.dumps(recorded, indent=1, sort_keys=True) + "\n", encoding="utf-8")
-    assert declared(room) == recorded[room]
+    ours, theirs = declared(room).items(), recorded[room].items()
+    assert ours == theirs, f"declared {sorted(ours - theirs)}, recorded {sorted(theirs - ours)}"
 
 
 def declared(room: str) -> dict[str, str]:
