@@ -19,6 +19,7 @@ from seastar_gym import Body, Certificate, Contact, Numerics, Scene, Seastar, Sm
 from seastar_gym.accuracy import command, commands, measure, timed_certificate
 from seastar_gym.accuracy.certificate import _digest
 from seastar_gym.accuracy.setting import resolved
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.spec import PlainSpec
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 
@@ -315,6 +316,9 @@ def test_a_certificate_is_one_or_a_file_of_one():
 def test_a_fidelity_for_an_uncertified_scene_warns_with_the_command_that_measures_it():
     with pytest.warns(UserWarning, match=r"python -m seastar_gym\.certify"):
         gym.make("SeastarSwim-v0", scene=SCENE, fidelity="fast")
+    with pytest.warns(UserWarning, match=r"errors in info are NaN") as told:
+        SeastarSwimEnv(scene=SCENE, fidelity="fast")
+    assert told[0].filename == __file__  # where the environment is made
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         gym.make("SeastarSwim-v0", fidelity="fast")

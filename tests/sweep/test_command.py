@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -14,7 +15,7 @@ from seastar_gym.command import INTERRUPTED
 from seastar_gym.scene import Scene, Seastar
 from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.sweep.axes import Choices, Range
-from seastar_gym.sweep.command import as_text, main
+from seastar_gym.sweep.command import as_text, bar_of, main
 from seastar_gym.sweep.parts import Parts, read_parts
 from seastar_gym.sweep.run import Tally
 from seastar_gym.sweep.text import axis_of
@@ -214,3 +215,16 @@ def test_a_count_is_from_two_to_a_million(text):
     for wrong in ("=1", "x=", "x", "x=1:a", "x=1:2:3:4", "x=:log"):
         with pytest.raises(ValueError, match="is written"):
             axis_of(wrong)
+
+
+def test_progress_tells_rates_and_what_was_lost():
+    told, moved = [], []
+    bar = SimpleNamespace(
+        format_dict={"elapsed": 2.0}, n=1, total=0, update=moved.append,
+        set_postfix_str=lambda text, refresh: told.append((text, refresh)),
+    )  # fmt: skip
+    show = bar_of(10, bar)
+    show(Tally(kept=3, done=4, designs=7, intervals=0))
+    show(Tally(kept=3, done=4, designs=7, intervals=9, losses=2))
+    assert bar.total == 7 and moved == [3, 3]
+    assert told == [("4 designs/s", False), ("4 designs/s, 4 strokes/s, 2 lost", False)]
