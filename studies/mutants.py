@@ -69,6 +69,10 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ("seastar_gym/sweep/designs.py", "return np.zeros((1, 1))"): "No range reads the columns.",
     ("seastar_gym/controllers/planner.py", "first = np.zeros((len(current), 2), np.int64)"):
         "The first decision replaces it.",
+    ("seastar_gym/envs/task.py", "self._way_after = np.zeros((n_robots, 2))  # from waypoint k to the last [m]"):
+        "The last column is read of no path.",
+    ("seastar_gym/envs/rendering.py", "return HEATED_PLUS if command >= 0.0 else HEATED_MINUS"):
+        "A command of zero has another colour.",
     ("seastar_gym/accuracy/water.py", "rows = to_rows(water.reshape(simulator.n_robots, -2))"):
         "Any negative length is the one that numpy finds.",
 }  # fmt: skip
