@@ -183,8 +183,9 @@ def test_the_command_line_fits_a_scene_of_ones_own_and_writes_it(tmp_path, monke
     (tmp_path / "mine.json").write_text(json.dumps(scene.to_dict()))
     monkeypatch.chdir(tmp_path)
     command = ["path.csv", "commands.csv", "--scene", "mine.json", "--out", "fitted.json"]
-    command += ["--fit", "actuator.peak_angle", "--intervals", "intervals.json"]
+    command += ["--fit", "actuator.peak_angle", "--intervals", "intervals.json", "--picture", "fit.png"]
     assert main(command) == 0
+    assert (tmp_path / "fit.png").read_bytes()[16:24] == bytes([0, 0, 4, 176, 0, 0, 1, 248])  # 1200 x 504 pixels
     fitted = load_scene(tmp_path / "fitted.json")
     assert fitted.actuator.peak_angle == pytest.approx(0.5, rel=0.02)
     assert replace(fitted, actuator=scene.actuator) == scene
