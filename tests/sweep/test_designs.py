@@ -1,6 +1,7 @@
 """Designs of a sweep, and the cells that they are simulated in."""
 
 import itertools
+import json
 import tracemalloc
 from dataclasses import replace
 
@@ -121,6 +122,12 @@ def test_a_cell_is_named_by_all_that_its_results_depend_on():
         names(gait=np.full((2, 5), 0.5)),
     ]  # fmt: skip
     assert len({name for each in (first, *others) for name in each}) == 9
+
+
+def test_the_text_that_names_a_cell_has_its_entries_in_order():
+    """So a name does not depend on the order of a scene's fields."""
+    told = json.loads(next(Sweep(FAST, (LENGTH,), samples=1).frames()).text)
+    assert list(told) == sorted(told) and list(told["scene"]["robot"]) == sorted(told["scene"]["robot"])
 
 
 def test_a_new_version_of_the_package_is_another_cell(monkeypatch):
