@@ -73,6 +73,8 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "The last column is read of no path.",
     ("seastar_gym/envs/rendering.py", "return HEATED_PLUS if command >= 0.0 else HEATED_MINUS"):
         "A command of zero has another colour.",
+    ("seastar_gym/envs/symmetry/group.py", "return (2 * k - (first - second) % 2) % (2 * n_turns_of(group))"):
+        "Sums and differences are odd together.",
     ("seastar_gym/accuracy/water.py", "rows = to_rows(water.reshape(simulator.n_robots, -2))"):
         "Any negative length is the one that numpy finds.",
 }  # fmt: skip
