@@ -90,7 +90,8 @@ def told(certificate: Certificate) -> Table:
 def table(found: Table) -> str:
     """Table in Markdown of all robots and settings."""
     lines = [
-        "| robot | setting | error, repeated | median, repeated | error, all classes | energy after 200 strokes | mm/s |",
+        "| robot | setting | error, repeated | median, repeated | error, all classes | energy after 200 strokes "
+        "| mm/s |",
         "|---|---|---:|---:|---:|---:|---:|",
     ]
     for name, robot in found["robots"].items():
