@@ -72,7 +72,8 @@ def test_the_picture_of_a_fit_has_residuals_in_millimetres(measurement, tmp_path
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels == ["hub", *(f"node {node}" for node in measurement.nodes[1:])]
     assert len(paths.lines) == len(over_time.lines) - 1 == 2 * len(measurement.nodes)  # and a line at zero
-    assert {line.get_markersize() for line in paths.lines[1::2]} == {3.0} and paths.lines[1].get_alpha() == 0.4
+    assert {line.get_markersize() for line in (*paths.lines[1::2], *over_time.lines[:-1])} == {3.0}
+    assert paths.lines[1].get_alpha() == 0.4
     np.testing.assert_allclose(paths.lines[0].get_xydata(), 1e3 * (measurement.positions - estimate.residuals)[:, 0])
     assert over_time.get_title() == f"{1e3 * estimate.root_mean_square:.2f} mm root mean square"
     np.testing.assert_allclose(paths.lines[1].get_xydata(), 1e3 * measurement.positions[:, 0])
