@@ -69,14 +69,23 @@ EQUIVALENT: dict[tuple[str, str], str] = {
     ("seastar_gym/sweep/designs.py", "return np.zeros((1, 1))"): "No range reads the columns.",
     ("seastar_gym/controllers/planner.py", "first = np.zeros((len(current), 2), np.int64)"):
         "The first decision replaces it.",
+    ("seastar_gym/envs/task.py", "self._way_after = np.zeros((n_robots, 2))  # from waypoint k to the last [m]"):
+        "The last column is read of no path.",
+    ("seastar_gym/envs/rendering.py", "return HEATED_PLUS if command >= 0.0 else HEATED_MINUS"):
+        "A command of zero has another colour.",
+    ("seastar_gym/envs/symmetry/group.py", "return (2 * k - (first - second) % 2) % (2 * n_turns_of(group))"):
+        "Sums and differences are odd together.",
     ("seastar_gym/accuracy/water.py", "rows = to_rows(water.reshape(simulator.n_robots, -2))"):
         "Any negative length is the one that numpy finds.",
 }  # fmt: skip
 """Reasons why mutants, (file, line after the change), behave as the original does."""
 PRELOADED = ("numba", "pyarrow.dataset", "scipy.optimize", "scipy.stats")
 """Imported once, for all mutants."""
-ANEW = {"seastar_gym", "studies", "agents", "gymnasium"}
-"""Imported anew from the copy by every mutant; gymnasium keeps a registry of environments."""
+ANEW = {"seastar_gym", "studies", "agents", "gymnasium", "typeguard"}
+"""Imported anew from the copy by every mutant; gymnasium keeps a registry of environments, and pytest warns where it
+meets its plugin typeguard, which the command has imported."""
+DECLARED = "declared_as_recorded"
+"""In the names of tests of all that a room declares. They see what an import executes."""
 Touched = dict[str, dict[str, list[int]]]
 """Lines that a test executes, by test and file."""
 
@@ -273,10 +282,11 @@ def asked(mutant: Mutant, tests: str, touched: Touched) -> list[str]:
     of_room = {test: files.get(mutant.file, []) for test, files in touched.items() if test.startswith(f"{tests}/")}
     exact = [test for test, lines in of_room.items() if mutant.line in lines]
     low, high = mutant.scope
-    if not exact and (mutant.line < low or low == 1):
-        exact = [test for test, lines in of_room.items() if any(low <= line <= high for line in lines)]
-    stem = Path(mutant.file).stem
-    return sorted(exact, key=lambda test: (f"test_{stem}.py" not in test, len(touched[test]), test))
+    if mutant.line < low or low == 1:  # such as a constant, or the default of an argument
+        around = [test for test, lines in of_room.items() if any(low <= line <= high for line in lines)]
+        exact = [test for test in of_room if DECLARED in test] + (exact or around)
+    own = f"test_{Path(mutant.file).stem}.py"
+    return sorted({*exact}, key=lambda test: (DECLARED not in test, own not in test, len(touched[test]), test))
 
 
 def verdict(root: Path, mutant: Mutant, tests: str, touched: Touched, seconds: float) -> str:

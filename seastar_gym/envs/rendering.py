@@ -385,6 +385,4 @@ def _warm_colour(warmth: FloatArray) -> Colour:
 
 
 def _sign(command: float) -> str:
-    if command == 0.0:
-        return ""
     return "+" if command > 0.0 else "\u2212"

@@ -56,6 +56,11 @@ class Row(NamedTuple):
         return abs(bound - greedy) / greedy if greedy > 0.0 else np.inf
 
     @property
+    def better(self) -> str:
+        """The headroom in words."""
+        return f"{100.0 * self.headroom:.0f} %" if self.headroom < 10.0 else "more than ten times"
+
+    @property
     def left(self) -> float:
         """Share of the headroom that PPO leaves."""
         return self.left_by("PPO")

@@ -23,10 +23,9 @@ def _summary(rows: Sequence[Row]) -> str:
     lines = ["| task | bound | better than greedy | gap left by PPO | gap left by the policy in the box | kept |"]
     lines.append("|---|---|---:|---:|---:|---|")
     for row in rows:
-        better = f"{100.0 * row.headroom:.0f} %" if row.headroom < 10.0 else "more than ten times"
         left = (f"{100.0 * row.left_by(agent):.0f} %" if agent in row.agents else "" for agent in ("PPO", BOX))
         lines.append(
-            f"| {_name(row)} | {row.bound} | {better} | {' | '.join(left)} | {'yes' if row.is_kept else 'no'} |"
+            f"| {_name(row)} | {row.bound} | {row.better} | {' | '.join(left)} | {'yes' if row.is_kept else 'no'} |"
         )
     return "\n".join(lines)
 

@@ -1,6 +1,7 @@
 """Certificates of scenes: what they measure, promise and refuse, and when they lapse."""
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -18,6 +19,7 @@ from seastar_gym import Body, Certificate, Contact, Numerics, Scene, Seastar, Sm
 from seastar_gym.accuracy import command, commands, measure, timed_certificate
 from seastar_gym.accuracy.certificate import _digest
 from seastar_gym.accuracy.setting import resolved
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.spec import PlainSpec
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 
@@ -304,6 +306,9 @@ def test_a_certificate_is_one_or_a_file_of_one():
 def test_a_fidelity_for_an_uncertified_scene_warns_with_the_command_that_measures_it():
     with pytest.warns(UserWarning, match=r"python -m seastar_gym\.certify"):
         gym.make("SeastarSwim-v0", scene=SCENE, fidelity="fast")
+    with pytest.warns(UserWarning, match=r"errors in info are NaN") as told:
+        SeastarSwimEnv(scene=SCENE, fidelity="fast")
+    assert told[0].filename == __file__  # where the environment is made
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         gym.make("SeastarSwim-v0", fidelity="fast")
@@ -406,3 +411,118 @@ def test_the_command_writes_certificate_and_picture(few_settings, tmp_path, monk
     file_of_scene.write_text("{", encoding="utf-8")
     with pytest.raises(ValueError, match=r"mine\.json is no scene: .*Expecting"):
         command.load_scene(file_of_scene)
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        ({"scene": 3}, "scene must be a Scene"),
+        ({"settings": ()}, "settings must be some Settings"),
+        ({"settings": (3,)}, "settings must be some Settings"),
+        ({"promised": ()}, "promised must be some of"),
+        ({"actions": ("of yesterday",)}, "actions must be some of"),
+        ({"samples": 1}, "samples must be a whole number from 2 to 100000"),
+        ({"samples": 100_001}, "samples must be a whole number from 2 to 100000"),
+        ({"limit_error": -1e-9}, "limit_error"),
+        ({"decision_period": 0.0}, "decision_period"),
+        ({"classes": 1.0}, "classes must be a whole number"),
+        ({"version": 3}, "version and machine must be words"),
+        ({"machine": None}, "version and machine must be words"),
+    ],
+)
+def test_what_no_certificate_can_hold_is_refused(certificate, change, words):
+    with assert_refused(words):
+        replace(certificate, **change)
+    first, *others = certificate.settings
+    with assert_refused("settings must have errors of the same classes"):
+        fewer = {name: getattr(first, name) | {"own": 0.1} for name in ("errors", "typical")}
+        replace(certificate, settings=(replace(first, **fewer), *others))
+    assert replace(certificate, samples=2, limit_error=0.0, decision_period=0.1).samples == 2
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        ({"discretisation": "finite"}, "discretisation must be one of"),
+        ({"nodes_per_limb": 1}, "nodes_per_limb must be a whole number from 2 to 10000"),
+        ({"nodes_per_limb": 10_001}, "nodes_per_limb must be a whole number from 2 to 10000"),
+        ({"speed": 0.0}, "speed"),
+        ({"errors": {}}, "errors must be numbers by class"),
+        ({"errors": {"own": -0.1}}, "errors"),
+        ({"typical": {"own": 0.1}}, "errors and typical must have the same classes"),
+        ({"typical": [0.1]}, "typical must be numbers by class"),
+        ({"space_error": math.nan}, "space_error"),
+        ({"time_error": -0.1}, "time_error"),
+        *(({name: -0.1}, name) for name in ("energy_growth", "heading_error", "end_error")),
+    ],
+)
+def test_what_no_setting_can_have_is_refused(certificate, change, words):
+    setting = certificate.settings[0]
+    with assert_refused(words):
+        replace(setting, **change)
+    failed = replace(setting, space_error=math.inf, energy_growth=math.inf, speed=math.nan, typical={})
+    assert math.isnan(failed.typical_error(setting.errors)) and math.isnan(failed.error(()))
+    assert math.isnan(failed.error(("of yesterday",))) and not failed.endures
+    adapted = replace(setting, scheme="implicit-midpoint", step=0.02, path_tolerance=0.01, nodes_per_limb=5)
+    assert str(adapted) == '"implicit-midpoint" at 20 ms adapted to 1 % with 5 nodes per limb'
+
+
+@pytest.mark.parametrize(
+    "scene, words",
+    [
+        (3, "certify needs a Scene, not 3."),
+        (Scene(Seastar(limb_length=np.array([0.1, 0.2]))), "certify scene.of_robot(0), say."),
+        (Scene(held_nodes=(0,)), "belong to one mesh"),
+        (Scene(loads=((1, 0.0, 1.0),)), "belong to one mesh"),
+        (Scene(actuator=SmaPulse(0.0)), "Nothing moves this robot"),
+        (Scene(limb_strengths=(0.0,) * 5), "Nothing moves this robot"),
+    ],
+)
+def test_a_scene_that_has_no_certificate_is_refused(scene, words):
+    with assert_refused(words):
+        seastar_gym.certify(scene)
+
+
+def test_the_confidence_is_that_of_so_many_sequences(certificate):
+    assert replace(certificate, samples=60).confidence() == pytest.approx(1.0 - 0.95**60)
+    assert replace(certificate, samples=2).confidence(0.5) == 0.75
+
+
+MADE = {
+    "speed": 1234.5, "energy_growth": 1.0, "space_error": 0.02, "time_error": 0.003,
+    "errors": {"a": 0.021, "b": 0.05, "small": 0.3}, "typical": {"a": 0.01, "b": 0.004, "small": 0.2},
+}  # fmt: skip
+
+
+def made(certificate):
+    """Certificate of two settings and three classes, with numbers that are easy to read."""
+    coarse, _, fine, _ = (replace(each, **MADE) for each in certificate.settings)
+    slow = replace(fine, speed=99.4, energy_growth=2.0, space_error=0.001)
+    return replace(certificate, settings=(slow, coarse), promised=("a", "b"), actions=("a",), limit_error=0.0005)
+
+
+def test_the_table_of_a_certificate_is_in_columns_fastest_first(certificate):
+    assert command.as_text(made(certificate)).splitlines() == [
+        "setting                                         space     time     sum (typical) actions (typical)"
+        "   small (typical)  x real time",
+        '"sdirk2" at 20 ms with 5 nodes per limb           2 %    0.3 %      5 % (1 %)       2.1 % (1 %)'
+        "        30 % (20 %)          1,234",
+        '"sdirk2" at 20 ms with 9 nodes per limb         0.1 %    0.3 %      5 % (1 %)       2.1 % (1 %)'
+        "        30 % (20 %)             99  gathers energy over long swims, not chosen",
+        "With 10 % confidence, at most 5 % of the sequences of a class exceed its error (2 of each were measured); "
+        "half of them exceed the typical one. The limit errs by 0.05 %.",
+    ]
+
+
+def test_the_picture_of_a_certificate_has_a_line_for_every_number_of_nodes(certificate, tmp_path, monkeypatch):
+    figures = []
+    monkeypatch.setattr(command, "save_figure", lambda figure, file, **options: figures.append((figure, options)))
+    slower = replace(made(certificate).settings[1], speed=10.0, errors=MADE["errors"] | {"b": 0.004})
+    command.draw(replace(made(certificate), settings=(*made(certificate).settings, slower)), tmp_path / "mine.png")
+    ((figure, options),) = figures
+    (axes,) = figure.axes
+    lines = {line.get_label(): line.get_xydata().tolist() for line in axes.lines}
+    assert lines == {"5 nodes per limb": [[10.0, 2.1], [1234.5, 5.0]], "9 nodes per limb": [[99.4, 5.0]]}
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log") and axes.xaxis.get_gridlines()[0].get_visible()
+    assert figure.get_size_inches().tolist() == [6.4, 4.4] and options == {"dpi": 130}
+    assert not axes.get_legend().get_frame_on()

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from declared import assert_declared_as_recorded
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, SmaWires
 from seastar_gym.accuracy import commands, measure
 from seastar_gym.accuracy.setting import at, resolved
@@ -54,6 +55,24 @@ def test_swims_of_many_groups_are_those_of_one_batch(monkeypatch):
     simulator = Simulator(scene, drawn.shape[1])
     simulator.stroke(drawn[0])
     np.testing.assert_array_equal(swum.hub[0], simulator.hub_position())
+
+
+def test_the_dearest_swims_begin_first_and_progress_is_the_share_of_their_cost(monkeypatch):
+    began, shares = [], []
+
+    def swum(scene, group, period):
+        began.append((scene.robot.nodes_per_limb, scene.numerics.step, group.shape[1]))
+        return measure.Swims(*(np.zeros((len(group), group.shape[1], 2)[: 3 if k == 0 else 2]) for k in range(7)))
+
+    monkeypatch.setattr(measure, "swim", swum)
+    monkeypatch.setattr(measure, "GROUP", 3)
+    monkeypatch.setattr(measure.os, "cpu_count", lambda: 1)
+    scenes = [resolved(SCENE, nodes, Numerics("sdirk2", step)) for nodes, step in ((5, 2e-2), (9, 2e-2), (5, 5e-3))]
+    found = measure.swim_all(scenes, np.zeros((2, 4, 5)), shares.append)
+    assert began == [(5, 5e-3, 3), (9, 2e-2, 3), (5, 5e-3, 1), (5, 2e-2, 3), (9, 2e-2, 1), (5, 2e-2, 1)]
+    costs = np.array([5 * 4 * 3, 9 * 3, 5 * 4, 5 * 3, 9, 5])
+    np.testing.assert_allclose(shares, np.cumsum(costs) / costs.sum())
+    assert [each.hub.shape for each in found] == [(2, 4, 2)] * 3
 
 
 def swims(hub, heading=None):
@@ -117,3 +136,7 @@ def test_decisions_are_told_at_whole_seconds(monkeypatch):
     simulator.advance(0.5, drawn[0])
     simulator.advance(0.5, drawn[1])
     np.testing.assert_array_equal(swum.hub[0], simulator.hub_position())
+
+
+def test_defaults_and_constants_are_declared_as_recorded():
+    assert_declared_as_recorded("seastar_gym.accuracy")

@@ -12,8 +12,8 @@ import pytest
 
 from refusals import assert_refused
 from seastar_gym import Certificate, Contact, Numerics, Scene, Seastar, SmaPulse, Water
-from seastar_gym.accuracy import Setting, chapters_certificate
-from seastar_gym.accuracy.chapter import FOLDER
+from seastar_gym.accuracy import Setting, chapters_certificate, timed_certificate
+from seastar_gym.accuracy.chapter import FOLDER, file_of
 from seastar_gym.accuracy.commands import draw_classes
 from seastar_gym.accuracy.endurance import energy_growth
 from seastar_gym.accuracy.measure import Swims, errors, path_lengths, swim_all
@@ -354,3 +354,24 @@ def test_nineteen_nodes_gather_energy_with_steps_of_5_ms_but_not_of_half():
     nineteen = replace(scene, robot=replace(scene.robot, nodes_per_limb=19))
     assert energy_growth(nineteen) > 10.0
     assert energy_growth(replace(nineteen, numerics=replace(scene.numerics, step=2.5e-3))) < 1.5
+
+
+def test_errors_in_time_stand_in_a_file_of_their_period(tmp_path):
+    assert file_of(0.5, tmp_path) == tmp_path / "wires_0.5s.json"
+    assert file_of(0.1).is_file() and file_of(0.2).is_file()
+
+
+def test_errors_in_time_are_known_of_the_measured_times_and_between_them():
+    for period in (0.1, 0.2, 0.5):
+        assert timed_certificate(period) == timed_certificate(period * (1.0 + 1e-12)) is not None
+        assert timed_certificate(period).settings == Certificate.load(file_of(period)).settings
+    between, around = timed_certificate(0.3), [timed_certificate(period) for period in (0.2, 0.5)]
+    for setting, *others in zip(between.settings, *(each.settings for each in around), strict=True):
+        worst = {name: max(getattr(each, name) for each in others) for name in ("space_error", "time_error")}
+        assert {name: getattr(setting, name) for name in worst} == worst
+        assert setting.errors["random"] == sum(worst.values())
+        assert setting.errors["repeated"] == max(each.errors["repeated"] for each in others)
+        assert setting.typical == {name: max(each.typical[name] for each in others) for name in setting.typical}
+    assert timed_certificate(0.0999) is timed_certificate(0.501) is None
+    with assert_refused("decision_period"):
+        timed_certificate(0.0)

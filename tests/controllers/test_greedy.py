@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from seastar_gym import Numerics, Scene
+from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaWires
 from seastar_gym.controllers import greedy
-from seastar_gym.controllers.greedy import GreedyPolicy, displacement_map, measure_gaits
+from seastar_gym.controllers.greedy import Displacements, GreedyPolicy, displacement_map, measure_gaits
 from seastar_gym.controllers.scripted import to_actions
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import action_table
@@ -73,3 +73,37 @@ def test_a_batch_gets_the_actions_of_single_robots():
     agent = GreedyPolicy(FAST)
     together = agent.predict(observations)[0]
     np.testing.assert_array_equal(together, [agent.predict(one)[0] for one in observations])
+
+
+def test_a_map_in_time_is_measured_over_as_many_seconds_and_kept_by_itself(cache, monkeypatch):
+    calls = []
+
+    def measured(scene, commands, settling, measured, decision_period):
+        calls.append((commands.shape, settling, measured, decision_period))
+        return Displacements(np.full((len(commands), 2), decision_period or 1.0), np.zeros(len(commands)))
+
+    monkeypatch.setattr(greedy, "measure_gaits", measured)
+    wires = Scene(Seastar(3), actuator=SmaWires(0.4), numerics=FAST.numerics)
+    found = {period: displacement_map(wires, "pairs", period).hub[0, 0] for period in (None, 0.5, 0.2, 0.5)}
+    assert found == {None: 1.0, 0.5: 0.5, 0.2: 0.2}
+    assert calls == [((7, 1, 3), 6, 4, None), ((7, 1, 3), 12, 8, 0.5), ((7, 1, 3), 30, 20, 0.2)]
+
+
+def test_a_file_that_is_no_map_is_measured_again(cache):
+    first = displacement_map(FAST)
+    for file in (cache / "seastar-gym").iterdir():
+        file.write_bytes(b"no map")
+    np.testing.assert_array_equal(displacement_map(FAST).hub, first.hub)
+
+
+def test_displacements_are_a_stroke_s_share_in_the_frame_in_which_they_begin():
+    gaits = np.array([[[1.0, 0.0, -1.0, 0.0, 0.0]]])
+    simulator = Simulator(FAST, 1)
+    simulator.stroke(gaits[:, 0])
+    hub, heading = simulator.hub_position(), greedy.heading_of(simulator)
+    simulator.stroke(gaits[:, 0])
+    simulator.stroke(gaits[:, 0])
+    way = (simulator.hub_position() - hub) @ [1.0, 1.0j] * np.exp(-1j * heading) / 2.0
+    found = measure_gaits(FAST, gaits, settling=1, measured=2)
+    np.testing.assert_allclose(found.hub @ [1.0, 1.0j], way, atol=1e-12)
+    np.testing.assert_allclose(found.turn, (greedy.heading_of(simulator) - heading) / 2.0, atol=1e-12)

@@ -17,7 +17,16 @@ import torch
 from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_model, make_training_env, policy_of
 from every_part import ACTUATORS, PARTS
-from seastar_gym import Numerics, Scene, Seastar, SmaPulse, Water
+from seastar_gym import (
+    Miswired,
+    Numerics,
+    Prey,
+    Scene,
+    Seastar,
+    SmaPulse,
+    SmaWires,
+    Water,
+)
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.learned import SHIPPED, LearnedPolicy, load, save
 from seastar_gym.envs.commands import command_table
@@ -326,6 +335,86 @@ def damaged(data: bytes, rng: np.random.Generator, n_first: int | None = None) -
             case 4 if rng.random() < 0.3:
                 del out[place:]
     return bytes(out) or b"\0"
+
+
+# Of a task, with memory
+
+
+WIRES = Scene(actuator=SmaWires(), numerics=FAST)
+TASK = Description(
+    "joint", True, WIRES, (8,), 0.5, "miswired", ((0, -1),), ("vector", "pseudoscalar"), shows_limbs=True, past=2
+)
+
+
+def test_a_policy_with_memory_sees_the_past_in_the_limbs_of_the_present():
+    policy, rng = random_policy(TASK), np.random.default_rng(1)
+    first, second, third = rng.normal(size=(3, 4, TASK.observation_size)).astype(np.float32)
+    state, past = None, np.stack([first, first], axis=1)
+    for present, later in ((first, [first, first]), (second, [second, first]), (third, [third, second])):
+        action, state = policy.predict(present, state, deterministic=True)
+        shown, elements = TASK.recollection.shown(present, past)
+        chosen = policy.logits(shown).argmax(axis=-1)[..., 0]
+        np.testing.assert_array_equal(action, TASK.reduction.restore(chosen, elements))
+        past = np.stack(later, axis=1)
+        np.testing.assert_array_equal(state[0], past)
+    begun, kept = policy.predict(first, state, np.array([True, False, False, True]), True)
+    np.testing.assert_array_equal(kept[0][[0, 3]], np.stack([first, first], axis=1)[[0, 3]])
+    np.testing.assert_array_equal(kept[0][1:3], np.stack([first, third], axis=1)[1:3])
+    np.testing.assert_array_equal(begun[0], policy.predict(first[0], deterministic=True)[0])
+    for wrong in (state[0], (state[0][:2],), (state[0].astype(int),), (state[0], state[0]), ([1.0],)):
+        with pytest.raises(ValueError, match=r"past observations of shape \(4, 2, 194\)\.$"):
+            policy.predict(first, wrong)
+
+
+def test_a_description_of_a_task_survives_its_text_and_shapes_the_network():
+    assert Description.from_json(TASK.to_json()) == TASK
+    size = 182 + 5 + 3 + 4
+    assert TASK.observation_size == size and TASK.input_size == size + 2 * (10 + size - 180)
+    assert TASK.shapes()["0.weight"] == (8, TASK.input_size) and TASK.distributions == (1, 243)
+    bare = Description("limbs", False, Scene(), ())
+    assert (bare.reduction, bare.recollection, bare.input_size) == (None, None, 186)
+    assert bare.shapes() == {"0.weight": (15, 186), "0.bias": (15,)}
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        ({"limb_mirror": ((0, 1, 1),)}, "its limb_mirror has"),
+        ({"limb_mirror": ((0, 2),)}, "its limb_mirror has"),
+        ({"limb_mirror": ((0, 1.0),)}, "its limb_mirror has"),
+        ({"limb_mirror": ((1, 1),)}, "an index of its limb_mirror must be a whole number from 0 to 0"),
+        ({"limb_mirror": ((1, 1), (1, 1))}, "is no mirror, which undoes itself"),
+        ({"limb_mirror": ((1, 1), (0, -1))}, "is no mirror, which undoes itself"),
+        ({"limb_mirror": [(0, 1)]}, "its limb_mirror"),
+        ({"limb_mirror": ((0, 1),) * 1001}, "must be a list of pairs"),
+        ({"limb_mirror": 3}, "must be a list of pairs, not 3"),
+        ({"entries": ("colour",)}, "must be of scalar, turn, vector"),
+        ({"entries": ("scalar",) * 1001}, "must be of scalar, turn, vector"),
+        ({"shows_limbs": 1}, "must be an object with kinds and with_stations"),
+        ({"task": "chess"}, "its task must be one of miswired, prey"),
+        ({"past": 1001}, "its past must be a whole number from 0 to 1000"),
+        ({"symmetry": False}, "without symmetry has no past"),
+        ({"decision_period": -0.5}, "decision_period"),
+        ({"hidden": [8]}, "hidden must be a tuple of widths"),
+    ],
+)
+def test_what_no_policy_of_a_task_can_be_is_refused(change, words):
+    with pytest.raises(ValueError, match=r"\.$") as refusal:
+        TASK._replace(**change).check()
+    assert words.lower() in str(refusal.value).lower()
+    TASK._replace(limb_mirror=((1, -1), (0, -1)), entries=("scalar",) * 1000, past=1000).check()
+
+
+def test_a_policy_of_a_task_fits_that_task_with_any_numbers():
+    policy, n_seen = random_policy(TASK), TASK.observation_size
+    policy.require_fit(TASK.scene, "joint", n_seen, Miswired(0.1))
+    for challenge, other in ((None, "waypoints"), (Prey(), "prey"), (Prey(wanted=1), "Prey")):
+        with pytest.raises(ValueError, match=rf"trained for the task miswired, the environment's is {other}\.$"):
+            policy.require_fit(TASK.scene, "joint", n_seen, challenge)
+    with pytest.raises(ValueError, match=rf"sees {n_seen} numbers of miswired, the environment shows 3: another task"):
+        policy.require_fit(TASK.scene, "joint", 3, Miswired())
+    with pytest.raises(ValueError, match=r"sees 186 numbers of waypoints, the environment shows 3: another task"):
+        random_policy(Description("joint", True, Scene(numerics=FAST), (8,))).require_fit(Scene(), "joint", 3)
 
 
 # In an environment

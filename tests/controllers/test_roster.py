@@ -1,10 +1,18 @@
 """Agents by name: one line adds one, and the command lines tell all names."""
 
-import pytest
+import json.decoder
+from pathlib import Path
 
+import pytest
+from gymnasium.spaces import Discrete
+
+from declared import assert_declared_as_recorded
+from refusals import assert_refused
 from seastar_gym import Scene, Seastar
 from seastar_gym.cli.main import main
-from seastar_gym.controllers.roster import AGENTS, load_agent, load_agents
+from seastar_gym.controllers.contract import actions_in, actions_of
+from seastar_gym.controllers.learned import SHIPPED, in_the_box, of_task
+from seastar_gym.controllers.roster import AGENTS, default_agents, files_of, load_agent, load_agents
 from seastar_gym.controllers.scripted import GAITS, scripted
 from seastar_gym.envs.paths import PATHS
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -36,3 +44,66 @@ def test_help_tells_the_names_of_all_agents(capsys):
     text = " ".join(capsys.readouterr().out.replace("│", " ").split())
     assert ", ".join(AGENTS) in text and ", ".join(GAITS) in text
     assert "usage: seastar evaluate" in text and ", ".join(PATHS) in text
+
+
+def test_defaults_and_constants_are_declared_as_recorded():
+    assert_declared_as_recorded("seastar_gym.controllers")
+
+
+@pytest.mark.parametrize("n_limbs, names", [(5, ("learned", "pentagon")), (4, ("greedy", "straight"))])
+def test_agents_by_default_fit_the_robot(n_limbs, names):
+    assert default_agents(Scene(Seastar(n_limbs))) == names
+
+
+def test_what_a_policy_is_made_of_has_files():
+    box = in_the_box(None)
+    assert files_of("learned") == [box, box.with_suffix(".json")]
+    assert files_of("learned", 0.5) == [in_the_box(0.5), in_the_box(0.5).with_suffix(".json")]
+    assert files_of("runs/mine.safetensors") == [Path("runs/mine.safetensors"), Path("runs/mine.json")]
+    assert files_of("model.zip") == [Path("model.zip")] and files_of("runs/mine") == [Path("runs/mine")]
+    assert [files_of(name) for name in ("greedy", "planner", "straight", "4+,1-")] == [[]] * 4
+    assert files_of("json.decoder:JSONDecoder") == [Path(json.decoder.__file__)]
+    for nothing in ("nowhere_at_all:make", "sys:exit", "nowhere.at_all:make"):
+        with assert_refused("no file has the module"):
+            files_of(nothing)
+
+
+def test_the_policy_in_the_box_is_that_of_the_task_and_the_decisions():
+    assert [in_the_box(period).name for period in (None, 0.5, 0.1)] == [
+        "seastar.safetensors", "seastar-0.5s.safetensors", "seastar-0.1s.safetensors",
+    ]  # fmt: skip
+    of_miswired = SHIPPED.parent / "tasks" / "miswired-0.5s.safetensors"
+    assert in_the_box(0.5, task="miswired") == of_task("miswired", 0.5) == of_miswired
+    assert of_task("miswired", None).name == "miswired.safetensors"
+    assert in_the_box(0.25, task="miswired").name == "seastar-0.25s.safetensors"  # of waypoints, where there is none
+    for wrong in ({"decision_period": -1.0}, {"decision_period": None, "task": 3}):
+        with assert_refused([*wrong][-1]):
+            in_the_box(**wrong)
+
+
+def test_a_policy_says_its_action_mode_or_takes_that_of_the_environment():
+    class Silent:
+        action_space = None
+
+    class InPairs:
+        action_space = Discrete(21)
+
+    class Named:
+        actions = "joint"
+
+    assert [actions_in(policy(), "continuous", 5) for policy in (Silent, InPairs, Named)] == [
+        "continuous", "pairs", "joint",
+    ]  # fmt: skip
+    assert actions_of(Silent(), 5) == "limbs" and actions_of(InPairs(), 5) == "pairs"
+
+
+def test_a_gait_that_does_not_fit_says_so_and_an_unknown_one_what_there_is():
+    with assert_refused("are for five limbs, not 4"):
+        load_agents(["pentagon"], scene=Scene(Seastar(4)))
+    with assert_refused("Unknown scripted agent 'gallop'", "Others are learned, greedy, planner"):
+        load_agents(["gallop"])
+
+
+def test_an_agent_is_named_once():
+    with assert_refused("The agent 'rest' is named twice."):
+        load_agents(["rest", "rest"])

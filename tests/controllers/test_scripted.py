@@ -7,9 +7,9 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 
 from seastar_gym import Numerics, Scene, Simulator
-from seastar_gym.controllers.scripted import GAITS, OpenLoopPolicy, scripted, to_actions
+from seastar_gym.controllers.scripted import GAITS, OpenLoopPolicy, RandomPolicy, scripted, to_actions
 from seastar_gym.envs.commands import action_space, to_commands
-from seastar_gym.gaits import pair_gait, pentagon_gait, straight_gait
+from seastar_gym.gaits import in_time, pair_gait, pentagon_gait, straight_gait, turning_wave
 
 MODES = ["limbs", "joint", "pairs"]
 OBSERVATION = np.zeros(186, np.float32)
@@ -191,3 +191,34 @@ def test_commands_without_an_action_are_refused():
 def test_a_gait_is_a_sequence_of_commands(commands):
     with pytest.raises(ValueError, match="shape"):
         OpenLoopPolicy(commands)
+
+
+def test_continuous_actions_are_shares_for_one_robot_or_many():
+    rng, policy = np.random.default_rng(3), RandomPolicy(np.random.default_rng(3), "continuous", 4)
+    for shape in ((3, 4), (4,)):
+        action, state = policy.predict(np.zeros((*shape[:-1], 7), np.float32))
+        np.testing.assert_array_equal(action, rng.uniform(-1.0, 1.0, shape).astype(np.float32))
+        assert action.dtype == np.float32 and state is None
+    shares = to_actions([[0.5, -0.25]], "continuous", 2)
+    assert shares.dtype == np.float32 and shares.tolist() == [[0.5, -0.25]]
+
+
+def test_gaits_that_turn_are_for_five_limbs_and_decide_as_often_as_asked():
+    np.testing.assert_array_equal(GAITS["wave"](5, 0.2), turning_wave(0.2))
+    np.testing.assert_array_equal(GAITS["pentagon"](5, 0.5), in_time(pentagon_gait(), 0.5))
+    for name in ("pentagon", "wave", "lagged-pentagon"):
+        with pytest.raises(ValueError, match=r"are for five limbs, not 4\.$"):
+            GAITS[name](4, 0.5)
+    assert scripted("rest", n_limbs=3).predict(OBSERVATION)[0].tolist() == [0, 0, 0]
+    modes = [scripted(name, decision_period=0.1).actions for name in ("thrifty", "lagged")]
+    assert modes == ["continuous", "limbs"]
+
+
+def test_a_state_is_the_decisions_of_every_robot():
+    gait = scripted("pentagon")
+    for wrong in (np.zeros(1, int), (np.zeros(2, int),), (np.zeros(1),), (np.zeros(1, int),) * 2, ([0],)):
+        with pytest.raises(ValueError, match=r"decisions made of shape \(1,\)\.$"):
+            gait.predict(OBSERVATION, wrong)
+    for commands in (np.zeros(5), np.zeros((0, 5)), np.zeros((1, 1, 5))):
+        with pytest.raises(ValueError, match=r"commands"):
+            OpenLoopPolicy(commands)

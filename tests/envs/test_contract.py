@@ -2,6 +2,7 @@
 
 import inspect
 import itertools
+import json
 import re
 
 import gymnasium as gym
@@ -9,11 +10,14 @@ import numpy as np
 import pytest
 
 import seastar_gym
+from declared import assert_declared_as_recorded
 from seastar_gym import (
+    TASKS,
     FailBlind,
     Headings,
     Limited,
     Miswired,
+    Numerics,
     ObstTrap,
     Prey,
     Prizes,
@@ -26,10 +30,12 @@ from seastar_gym import (
 )
 from seastar_gym.accuracy.info import NAMES
 from seastar_gym.envs.layout import HEADINGS, VELOCITY_SCALE, Layout
+from seastar_gym.envs.options import SwimOptions, scene_at, with_options
 from seastar_gym.envs.paths import PATHS
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.tasks.envs import CHALLENGES, SeastarTaskEnv, SeastarTaskVectorEnv
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
+from seastar_gym.scene.serial import from_dict
 
 TYPES = {"float": float, "int": int, "bool": bool, "str": str}
 CHALLENGED = (Miswired, Prey, Station, FailBlind, ObstTrap, Prizes)
@@ -212,3 +218,45 @@ def test_the_observation_of_a_task_is_that_of_the_table(kind, column, period):
 @pytest.mark.parametrize("kind", CHALLENGED)
 def test_arguments_of_a_challenge_are_those_of_the_docstring(kind):
     assert arguments(kind) == list(inspect.signature(kind).parameters)
+
+
+def test_defaults_and_constants_are_declared_as_recorded():
+    assert_declared_as_recorded("seastar_gym.envs")
+
+
+def test_ids_are_declared_as_recorded():
+    limits = {id: spec.max_episode_steps for id, spec in gym.registry.items() if id.startswith("SeastarSwim")}
+    assert limits == {
+        "SeastarSwim-v0": 400, "SeastarSwimContinuous-v0": 400, "SeastarSwimTimed-v0": 400,
+        "SeastarSwimTimedModerate-v0": 1000, "SeastarSwimTimedHard-v0": 2000, "SeastarSwimHeading-v0": 600,
+    }  # fmt: skip
+    assert gym.spec("SeastarSwimContinuous-v0").kwargs == {"actions": "continuous"}
+    heading = gym.spec("SeastarSwimHeading-v0").kwargs
+    assert heading["decision_period"] == 0.5 and heading["actions"] == "pairs"
+    assert from_dict(heading["headings"], Headings) == Headings()
+    for id, (task, actions, period, limit, threshold) in TASKS.items():
+        spec = gym.spec(id)
+        assert spec.max_episode_steps == round(limit / period) and spec.reward_threshold == threshold
+        assert spec.kwargs == {"task": task, "actions": actions, "decision_period": period}
+
+
+def test_a_signature_names_the_shared_options_after_those_before_them():
+    class Made:
+        @with_options
+        def __init__(self, first, *given, last=3, **options):
+            pass
+
+    names = list(inspect.signature(SwimOptions).parameters)
+    found = inspect.signature(Made).parameters
+    assert list(found) == ["first", *names, "last"]
+    assert found["last"].kind is inspect.Parameter.KEYWORD_ONLY and found["path"].default == "pentagon"
+    assert found["first"].kind is inspect.Parameter.POSITIONAL_OR_KEYWORD
+
+
+def test_a_scene_of_a_file_has_its_own_numerics_or_those_of_the_fidelity(tmp_path):
+    assert scene_at(None, "fast") is None
+    (tmp_path / "plain.json").write_text(json.dumps(Scene().to_dict()))
+    assert scene_at(tmp_path / "plain.json", "fast") == Scene.preset("fast")
+    own = Scene(numerics=Numerics("sdirk2", 5e-3))
+    (tmp_path / "own.json").write_text(json.dumps(own.to_dict()))
+    assert scene_at(tmp_path / "own.json", "fast").numerics == own.numerics

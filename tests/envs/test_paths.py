@@ -243,11 +243,12 @@ def test_waypoints_of_a_registered_path_are_checked(monkeypatch):
 
 def test_a_longer_path_of_another_robot_leaves_the_way_to_go_as_it_is():
     scene = Scene(Seastar(nodes_per_limb=3))
-    task = SwimTask(SwimOptions([[0.1, 0.0], [0.1, 0.1]], scene=scene), 2, 1)
+    path = [[0.1, 0.0], [0.1, 0.1], [0.3, 0.1]]
+    task = SwimTask(SwimOptions(path, scene=scene), 2, 1)
     generators = [np.random.default_rng(robot) for robot in range(2)]
     task.reset(np.array([True, True]), generators)
     before = task._measure_way_to_go(np.zeros((2, 2)))
-    task.reset(np.array([False, True]), generators, [[0.1, 0.0], [0.1, 0.1], [0.2, 0.1], [0.2, 0.3]])
+    task.reset(np.array([False, True]), generators, [*path, [0.3, 0.3], [0.4, 0.3]])
     after = task._measure_way_to_go(np.zeros((2, 2)))
     assert after[0] == before[0] and after[1] == pytest.approx(before[1] + 0.3)
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from seastar_gym import (
+    Body,
     DomainRandomization,
     LogUniform,
     Normal,
@@ -173,3 +174,24 @@ def test_drawn_strengths_weaken_what_limbs_turn_and_not_what_actuators_are_told(
     for one in (env, plain):
         one.step(np.array([1, 2, 0, 1, 2]))
     np.testing.assert_array_equal(simulator.actuators, plain.unwrapped.simulator.actuators)
+
+
+def test_equal_distributions_are_equal_have_one_hash_and_say_what_they_are():
+    ours, theirs = (DomainRandomization({"fluid.density": Uniform(900.0, 1e3)}) for _ in range(2))
+    other = DomainRandomization({"fluid.density": Uniform(900.0, 2e3)})
+    assert ours == theirs != other and hash(ours) == hash(theirs) != hash(other) and ours != 3
+    assert repr(ours) == "DomainRandomization({'fluid.density': Uniform(low=900.0, high=1000.0)})"
+
+
+@pytest.mark.parametrize(
+    "name, words",
+    [
+        ("robot.body.drag_along", ", since it leaves that out \\(None\\): give it a value there\\."),
+        ("robot.body.radius", ", since it is the same for all robots of a batch\\."),
+        ("robot.colour", ": it has .*fluid\\.density.*limb_strengths\\."),
+    ],
+)
+def test_a_number_that_cannot_be_drawn_says_why(name, words):
+    scene = Scene(Seastar(body=Body(radius=0.02, drag_coefficient=1.0)))
+    with pytest.raises(ValueError, match=f"The scene has no number '{name}' to draw{words}"):
+        DomainRandomization({name: Uniform(0.1, 0.2)}).first_values(scene, 2)

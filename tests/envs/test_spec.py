@@ -24,6 +24,7 @@ from seastar_gym import (
     SymmetryReduction,
     Uniform,
 )
+from seastar_gym.accuracy.chapter import STROKES
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.scene.serial import to_dict
 
@@ -137,3 +138,10 @@ def test_the_arguments_of_the_tables_are_those_of_the_environment():
     told = {name for arguments in ARGUMENTS.values() for name in arguments}
     drawing = {"render_mode", "frames_per_stroke", "certificate"}  # a certificate has tests of its own
     assert told | drawing == set(inspect.signature(SeastarSwimEnv).parameters)
+
+
+def test_a_certificate_by_its_path_is_a_text_in_the_spec(tmp_path):
+    file = tmp_path / "strokes.json"
+    file.write_bytes(STROKES.read_bytes())
+    env = gym.make(ID, fidelity="fast", certificate=file)
+    assert json.loads(env.spec.to_json())["kwargs"]["certificate"] == str(file)

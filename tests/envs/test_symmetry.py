@@ -41,7 +41,13 @@ from seastar_gym.envs.commands import command_table, to_commands
 from seastar_gym.envs.layout import HEADINGS, Layout
 from seastar_gym.envs.masks import action_masks
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
-from seastar_gym.envs.symmetry import SymmetryReduction, VectorSymmetryReduction
+from seastar_gym.envs.symmetry import (
+    Symmetry,
+    SymmetryReduction,
+    VectorSymmetryReduction,
+    require_symmetry,
+    symmetry_in,
+)
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.actuators.actuator import mirrored
 from symmetries import elements_of, matrix, reduced_swim, symmetry_for, turns_and_axis
@@ -550,6 +556,22 @@ def test_a_scene_that_is_not_symmetric_is_refused_with_its_reason(name):
         SymmetryReduction(SeastarSwimEnv(**arguments))
     with assert_refused("symmetry of the regular polygon", words):
         VectorSymmetryReduction(SeastarSwimVectorEnv(2, **arguments))
+
+
+def test_a_refusal_names_the_body_if_there_is_one_and_limbs_of_one_number_are_alike():
+    uneven = replace(STAR, limbs=(Limb(length=0.08), Limb(length=0.07), Limb(), Limb()))
+    with assert_refused("not alike, straight and evenly spread."):
+        require_symmetry(Scene(uneven))
+    with assert_refused("evenly spread around a body of their symmetry."):
+        require_symmetry(Scene(replace(uneven, body=Body(radius=0.02))))
+    require_symmetry(Scene(STAR, limb_strengths=(0.5,) * 4), DRAWS)
+
+
+@pytest.mark.parametrize("mode", ["limbs", "joint", "pairs", "continuous"])
+def test_the_symmetry_of_a_scene_is_that_of_its_environment(mode):
+    for scene in (Scene(STAR), Scene(STAR, actuator=SmaWires(0.4))):
+        found = Symmetry.of(scene, mode)
+        assert found == symmetry_in(SeastarSwimEnv(actions=mode, scene=replace(scene, numerics=FAST)))
 
 
 @pytest.mark.parametrize("name", ASYMMETRIC)

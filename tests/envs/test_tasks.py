@@ -25,8 +25,8 @@ from seastar_gym import (
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import limb_order, symmetry_in, transform_commands
 from seastar_gym.envs.tasks.course import CHASE, Courses, Pursuit, draw_course
-from seastar_gym.envs.tasks.discs import rims, ways
-from seastar_gym.envs.tasks.envs import CHALLENGES, SeastarTaskEnv, SeastarTaskVectorEnv
+from seastar_gym.envs.tasks.discs import _grid, rims, ways
+from seastar_gym.envs.tasks.envs import CHALLENGES, SeastarTaskEnv, SeastarTaskVectorEnv, name_of
 from seastar_gym.envs.tasks.obst_trap import FIRST, LAST, draw_discs, draw_horseshoe, draw_kind
 from seastar_gym.envs.tasks.prizes import draw_prizes
 from seastar_gym.envs.tasks.rounds import best_round, distances, greedy_round
@@ -183,6 +183,38 @@ def test_pictures_show_what_is_hidden(id):
     else:
         task.drawn["fluid.current.u_x"] = task.drawn["fluid.current.u_x"] + 0.002
     assert not np.array_equal(env.render(), first)
+
+
+def told(id: str, **changes) -> tuple:
+    """Progress, note and labels of a picture, of a task some of whose arrays are others."""
+    env = made(id).unwrapped
+    env.reset(options={"instance": 1})
+    for name, values in changes.items():
+        setattr(env._task, name, np.array(values))
+    scenery = env._task.scenery(0)
+    return scenery.progress, scenery.note, [ring.label for ring in scenery.rings]
+
+
+def test_pictures_tell_in_words_what_is_hidden():
+    whole, current = np.ones((1, 5)), {"fluid.current.u_x": np.array([3e-3]), "fluid.current.u_y": np.array([-4e-3])}
+    assert told("SeastarMiswired-v0", wiring=[[1.0, -1.0, 1.0, -1.0, 1.0]]) == (None, "wires swapped: 2, 4", [])
+    assert told("SeastarMiswired-v0", wiring=whole) == (None, "wires swapped: none", [])
+    env = made("SeastarFailBlind-v0").unwrapped
+    env.reset(options={"instance": 1})
+    env._task.drawn["limb_strengths"] = np.array([[0.0, 1.0, 1.0, 0.0, 1.0]])
+    assert env._task.scenery(0).note == "dead limbs: 1, 4"
+    env._task.drawn["limb_strengths"] = whole
+    assert env._task.scenery(0).note == "dead limbs: none"
+    assert told("SeastarPrey-v0", catches=[3]) == ("3 caught", "", [""])
+    env = made("SeastarStation-v0").unwrapped
+    env.reset(options={"instance": 1})
+    env._task.drawn, env._task._distance = current, np.array([0.0123])
+    assert env._task.scenery(0)[4:] == ("12.3 mm off", "current of 5.0 mm/s")
+    prizes = np.zeros((1, 10, 3))
+    prizes[0, :3, 2] = 4.0, 1.0, 2.0
+    assert told("SeastarPrizes-v0", prizes=prizes, taken=[5.0]) == ("5 taken, 7 left", "", ["4", "1", "2"])
+    assert told("SeastarObstTrap-v0", discs=np.full((1, 11, 3), [0.1, 0.0, 0.2])) == ("touched a disc", "", [])
+    assert told("SeastarObstTrap-v0", discs=np.full((1, 11, 3), [0.1, 0.0, 0.09])) == (None, "", [])
 
 
 @pytest.mark.parametrize(
@@ -560,6 +592,33 @@ def test_ways_on_the_grid_are_as_long_as_ways_are():
     assert ways(wall, goal, 0.01, 0.01)(start)[0] == np.inf
 
 
+@pytest.mark.parametrize("step", [0.02, 0.01])
+def test_the_grid_fills_its_box_and_every_node_has_sixteen_neighbours(step):
+    grid = _grid(step)
+    corners, along = grid.nodes[[0, -1], [0, -1]], np.diff(grid.nodes, axis=0)
+    np.testing.assert_allclose(corners, [[-0.2, -0.4], [0.8, 0.4]], atol=1e-12)
+    np.testing.assert_allclose(along, np.broadcast_to([step, 0.0], along.shape), atol=1e-12)
+    ends = grid.nodes.reshape(-1, 2)[np.stack([grid.first, grid.last])]
+    np.testing.assert_allclose(grid.length, np.hypot(*(ends[1] - ends[0]).T), atol=1e-12)
+    neighbours = np.bincount(np.concatenate([grid.first, grid.last])).reshape(grid.nodes.shape[:2])
+    assert (neighbours[2:-2, 2:-2] == 16).all() and neighbours[0, 0] == neighbours[-1, -1] == 5
+    sizes, counts = np.unique(np.round((grid.length / step) ** 2), return_counts=True)
+    assert sizes.tolist() == [1.0, 2.0, 5.0] and len(counts) == 3
+
+
+def test_there_is_no_way_to_a_goal_in_a_disc():
+    goal = np.array([0.5, 0.0])
+    found = ways(np.array([[0.5, 0.0, 0.05]]), goal, 0.01, 0.02)
+    assert found.lengths.shape == (51, 41) and (found(np.zeros((1, 2))) == np.inf).all()
+    away = np.array([[9.0, 0.0]])  # beyond the grid, the way to it counts
+    assert ways(np.zeros((0, 3)), goal, 0.01, 0.02)(away)[0] == pytest.approx(8.5, rel=0.01)
+
+
+def test_a_challenge_has_a_name_if_it_is_one_of_those_with_names():
+    assert [name_of(challenge) for challenge in CHALLENGES.values()] == [*CHALLENGES]
+    assert name_of(None) is name_of(Prey(wanted=9)) is None
+
+
 def test_who_is_in_a_disc_swims_to_the_nearest_way_first():
     disc = np.array([[0.25, 0.0, 0.09]])
     found = ways(disc, np.array([0.5, 0.0]), 0.01, 0.01)
@@ -640,6 +699,18 @@ def test_the_best_round_is_that_of_all_orders():
         assert np.hypot(*np.diff(ends, axis=0).T).sum() <= way
         assert greedy_round(first, between, worth, way) <= best
     assert best_round(np.ones(2), np.ones((2, 2)), np.ones(2), 0.5) == (0.0, [])
+
+
+def test_of_equal_rounds_the_shortest_is_best_and_greed_takes_worth_per_metre_while_there_is_way():
+    places = np.array([[0.1, 0.0], [0.3, 0.0], [-0.3, 0.0], [0.0, 0.35]])
+    first, between = np.hypot(*places.T), distances(places)
+    assert best_round(first, between, np.array([1.0, 2.0, 3.0, 3.0]), 0.32) == (3.0, [0, 1])
+    assert best_round(first, between, np.array([1.0, 2.0, 3.0, 3.0]), 0.3) in ((3.0, [2]), (3.0, [0, 1]))
+    worth = np.array([1.0, 2.0, 5.0, 9.0])
+    assert greedy_round(first, between, worth, 0.34) == 5.0  # 9 is too far, and 5 is worth most per metre
+    assert greedy_round(first, between, worth, 0.36) == 9.0 and greedy_round(first, between, worth, 0.09) == 0.0
+    assert greedy_round(first, between, np.array([4.0, 2.0, 1.0, 1.0]), 0.3) == 6.0  # all of the way
+    assert distances(places)[0].tolist() == pytest.approx([0.0, 0.2, 0.4, np.hypot(0.1, 0.35)])
 
 
 def test_greed_costs_in_every_draw():

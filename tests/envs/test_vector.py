@@ -12,6 +12,7 @@ from gymnasium.vector import AutoresetMode
 from episodes import assert_same_infos, assert_same_steps, both, break_robot
 from refusals import assert_refused
 from seastar_gym import DomainRandomization, Numerics, RewardWeights, Scene, Seastar, SolverStatus, Uniform
+from seastar_gym.envs.batch_pictures import picture_size
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.simd.lanes import N_LANES
 
@@ -334,6 +335,12 @@ def test_pictures_of_many_robots_are_small_and_some_can_be_drawn_alone():
     np.testing.assert_array_equal(batch.render_robots([7])[0], all_of_them[7])
     again = pickle.loads(pickle.dumps(batch))
     np.testing.assert_array_equal(again.render_robots([7])[0], all_of_them[7])
+
+
+@pytest.mark.parametrize("n, width", [(1, 960), (4, 960), (5, 640), (9, 640), (10, 480), (26, 320), (10_000, 320)])
+def test_pictures_fit_on_a_sheet_until_they_are_too_small(n, width):
+    assert picture_size(n) == (width, width * 3 // 4)
+    assert all(size % 4 == 0 for size in picture_size(7 * n))
 
 
 def test_a_batch_without_a_render_mode_warns_and_draws_nothing():

@@ -4,10 +4,13 @@ import json
 import math
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
 
+from declared import assert_declared_as_recorded
 from refusals import assert_refused
 from seastar_gym import (
     AlongLimb,
@@ -31,8 +34,9 @@ from seastar_gym import (
 from seastar_gym.identify import Measurement, get_parameter, identify, synthetic, trajectory, with_parameters
 from seastar_gym.identify import command as its_command
 from seastar_gym.identify.command import TRUTH, draw, main
-from seastar_gym.identify.fit import Residuals
-from seastar_gym.identify.trajectories import trajectories
+from seastar_gym.identify.covariance import uncertainty_of
+from seastar_gym.identify.fit import Residuals, estimate_of
+from seastar_gym.identify.trajectories import batch_of_trajectories, trajectories
 from seastar_gym.scene.per_robot import numbers_of
 from seastar_gym.scene.scene_file import load_scene
 
@@ -59,10 +63,19 @@ def test_three_parameters_are_recovered_within_their_intervals_from_data_with_1_
 
 def test_the_picture_of_a_fit_has_residuals_in_millimetres(measurement, tmp_path, monkeypatch):
     figures = []
-    monkeypatch.setattr("seastar_gym.identify.command.save_figure", lambda figure, *_, **__: figures.append(figure))
+    monkeypatch.setattr(its_command, "save_figure", lambda figure, file, **options: figures.append((figure, options)))
     estimate = identify(SCENE, ["actuator.peak_angle"], measurement)
     draw(estimate, measurement, tmp_path / "fit.png")
-    paths, over_time = figures[0].axes
+    ((figure, options),) = figures
+    paths, over_time = figure.axes
+    assert figure.get_size_inches().tolist() == [10.0, 4.2] and options == {"dpi": 120}
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == ["hub", *(f"node {node}" for node in measurement.nodes[1:])]
+    assert len(paths.lines) == len(over_time.lines) - 1 == 2 * len(measurement.nodes)  # and a line at zero
+    assert {line.get_markersize() for line in (*paths.lines[1::2], *over_time.lines[:-1])} == {3.0}
+    assert paths.lines[1].get_alpha() == 0.4
+    np.testing.assert_allclose(paths.lines[0].get_xydata(), 1e3 * (measurement.positions - estimate.residuals)[:, 0])
+    assert over_time.get_title() == f"{1e3 * estimate.root_mean_square:.2f} mm root mean square"
     np.testing.assert_allclose(paths.lines[1].get_xydata(), 1e3 * measurement.positions[:, 0])
     np.testing.assert_allclose(over_time.lines[0].get_ydata(), 1e3 * estimate.residuals[:, 0, 0])
     np.testing.assert_allclose(over_time.lines[1].get_ydata(), 1e3 * estimate.residuals[:, 0, 1])
@@ -171,8 +184,9 @@ def test_the_command_line_fits_a_scene_of_ones_own_and_writes_it(tmp_path, monke
     (tmp_path / "mine.json").write_text(json.dumps(scene.to_dict()))
     monkeypatch.chdir(tmp_path)
     command = ["path.csv", "commands.csv", "--scene", "mine.json", "--out", "fitted.json"]
-    command += ["--fit", "actuator.peak_angle", "--intervals", "intervals.json"]
+    command += ["--fit", "actuator.peak_angle", "--intervals", "intervals.json", "--picture", "fit.png"]
     assert main(command) == 0
+    assert (tmp_path / "fit.png").read_bytes()[16:24] == bytes([0, 0, 4, 176, 0, 0, 1, 248])  # 1200 x 504 pixels
     fitted = load_scene(tmp_path / "fitted.json")
     assert fitted.actuator.peak_angle == pytest.approx(0.5, rel=0.02)
     assert replace(fitted, actuator=scene.actuator) == scene
@@ -366,3 +380,137 @@ def test_a_synthetic_measurement_has_eight_strokes_25_pictures_a_second_and_a_mi
     assert len(found.commands) == 8 and len(found.time) == 200 and np.ptp(found.time) == pytest.approx(7.96)
     exact = trajectory(found.time, found.nodes, found.commands, scene)
     assert np.std(found.positions - exact) == pytest.approx(1e-3, rel=0.05)
+
+
+def test_intervals_are_students_and_what_is_not_told_is_named():
+    """Two parameters by six numbers: four degrees of freedom. Combinations err by 0.4, which is told, and by 0.6."""
+    turn = np.array([[math.cos(0.32), math.sin(0.32)], [-math.sin(0.32), math.cos(0.32)]])  # 0.95 and 0.31
+    residuals = np.array([0.0, 0.0, 0.0, 0.0, 2.0, 0.0])  # a standard error of one
+    jacobian = np.zeros((6, 2))
+    jacobian[:2] = np.diag([1.0 / 0.4, 1.0 / 0.6]) @ turn
+    shape = (3, 1, 2)
+    data = Measurement(np.arange(3.0), np.zeros(shape), (0,), np.zeros((1, 5)))
+    simulated = SimpleNamespace(
+        names=("a", "b"), guess=np.array([2.0, 3.0]), seen=np.ones(shape, bool), measurement=data,
+        trajectory=lambda x: np.full(shape, 0.5), scenes=lambda x: [SCENE, None],
+    )  # fmt: skip
+    fit = SimpleNamespace(jac=jacobian, fun=residuals, x=np.array([0.1, -0.2]))
+    found = estimate_of(fit, simulated, 0.9)
+    covariance = uncertainty_of(jacobian, residuals, np.repeat(data.time, 2)).covariance
+    half = student.ppf(0.95, 4) * np.sqrt(np.diag(covariance))
+    np.testing.assert_allclose(found.values, [2.0 * math.exp(0.1), 3.0 * math.exp(-0.2)])
+    np.testing.assert_allclose([found.lower, found.upper], found.values * np.exp([-half, half]))
+    assert found.untold == (("a", "b"),) and found.scene is SCENE and (found.residuals == -0.5).all()
+    assert found.root_mean_square == 0.5 and found.report().startswith("residuals: 500 mm root mean square\na = 2.2")
+    assert "Cannot tell a and b apart by these data: measure something else, or fix one." in found.report()
+    alone = found._replace(untold=(("b",),)).report()
+    assert "Cannot tell b from the data: measure something else, or fix it." in alone
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        ({"time": [0.1, 0.0]}, "time must be a row of times"),
+        ({"time": [-0.1, 0.0]}, "time must be a row of times"),
+        ({"time": []}, "time must be a row of times"),
+        ({"time": [[0.0]]}, "time must be a row of times"),
+        ({"commands": [0.0] * 5}, "commands must be numbers of shape"),
+        ({"commands": np.zeros((0, 5))}, "commands must have shape (n_strokes, 5)"),
+        ({"nodes": 3}, "a tuple of whole numbers"),
+        ({"nodes": (-1,)}, "A node must be a whole number from 0 to 15"),
+        ({"nodes": (16,)}, "A node must be a whole number from 0 to 15"),
+        ({"time": [0.0, 1.0 + 1e-8]}, "beyond the last stroke, which ends at 1 s"),
+        ({"scene": 3}, "scene must be a Scene"),
+    ],
+)
+def test_what_is_no_trajectory_is_refused(arguments, words):
+    scene = Scene(Seastar(nodes_per_limb=4), numerics=Numerics("implicit-midpoint", 0.02))
+    whole = {"time": [0.0, 0.0, 1.0], "nodes": (15,), "commands": np.zeros((1, 5)), "scene": scene}
+    assert trajectory(**whole).shape == (3, 1, 2)
+    with assert_refused(words):
+        trajectory(**whole | arguments)
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        ({"nodes": [0]}, "nodes must be a tuple of whole numbers"),
+        ({"nodes": (0.0,)}, "nodes must be a tuple of whole numbers"),
+        ({"time": np.zeros((1, 1))}, "time a single row"),
+        ({"positions": np.full((1, 1, 2), np.nan)}, "do not fit the positions"),
+        ({"positions": np.full((1, 1, 2), 1001.0)}, "within 1000 m"),
+        ({"commands": np.zeros(5)}, "one row per stroke"),
+        ({"commands": np.zeros((0, 5))}, "one row per stroke"),
+        ({"time": np.array([np.inf])}, "Times must be finite, not negative, and in order"),
+        ({"time": np.array([-1e-9])}, "Times must be finite, not negative, and in order"),
+    ],
+)
+def test_what_is_no_measurement_is_refused(change, words):
+    whole = Measurement(np.zeros(1), np.full((1, 1, 2), 1000.0), (0,), np.zeros((1, 5)))
+    with assert_refused(words):
+        replace(whole, **change)
+
+
+def test_a_fit_needs_more_coordinates_than_parameters_of_nodes_that_the_robot_has():
+    scene = Scene(Seastar(nodes_per_limb=4))
+    two = Measurement(np.zeros(1), np.zeros((1, 1, 2)), (15,), np.zeros((1, 5)))
+    assert Residuals(scene, ("fluid.density",), two).seen.sum() == 2
+    with assert_refused("2 coordinates are too few for 2 parameters."):
+        Residuals(scene, ("fluid.density", "robot.density"), two)
+    for wrong in (replace(two, nodes=(16,)), replace(two, commands=np.zeros((1, 4)))):
+        with assert_refused("those of a robot of 5 limbs and 16 nodes"):
+            Residuals(scene, ("fluid.density",), wrong)
+    for names in ("fluid.density", (), None):
+        with assert_refused("parameters must be names of numbers"):
+            identify(scene, names, two)
+
+
+@pytest.mark.parametrize("scene, name", [(3, "fluid.density"), (SCENE, 3), (None, None)])
+def test_a_parameter_is_that_of_a_scene_by_its_name(scene, name):
+    with assert_refused("A Scene and a parameter's name are needed"):
+        get_parameter(scene, name)
+
+
+@pytest.mark.parametrize("values", [[1.0], [[1.0, 2.0]], [1.0, np.nan]])
+def test_values_are_one_for_every_name(values):
+    with assert_refused("values"):
+        with_parameters(SCENE, ["fluid.density", "robot.density"], values)
+
+
+@pytest.mark.parametrize("change", [{"n_strokes": 0}, {"rate": 0.0}, {"noise": -1e-3}, {"seed": -1}, {"truth": []}])
+def test_what_no_measurement_can_be_simulated_with_is_refused(change):
+    with assert_refused(next(iter(change))):
+        synthetic(**{"scene": SCENE, "truth": {}} | change)
+
+
+def test_the_command_takes_a_scene_with_its_own_steps_or_those_it_is_given(tmp_path, monkeypatch):
+    steps = []
+
+    def fitted(scene, names, measurement):
+        steps.append(scene.numerics.step)
+        raise ValueError("enough")
+
+    monkeypatch.setattr(its_command, "identify", fitted)
+    monkeypatch.setattr(its_command, "synthetic", lambda scene, truth: None)
+    (tmp_path / "mine.json").write_text(json.dumps(SCENE.to_dict()))
+    own = ["--synthetic", "--scene", str(tmp_path / "mine.json")]
+    for line in (["--synthetic"], own, [*own, "--step", "0.02"]):
+        assert main(line) == 2
+    assert steps == [0.005, 0.01, 0.02]
+    for line in ([], ["path.csv"]):
+        with pytest.raises(SystemExit):
+            main(line)
+
+
+def test_a_robot_whose_solver_gives_up_has_no_trajectory(monkeypatch):
+    scene = Scene(Seastar(nodes_per_limb=4), numerics=Numerics("implicit-midpoint", 0.02))
+    time, commands = np.array([0.0, 0.5]), np.zeros((1, 5))
+    for failed, lost in (([True, True], [True, True]), ([False, True], [False, True])):
+        monkeypatch.setattr(Simulator, "failed", property(lambda simulator, failed=failed: np.array(failed)))
+        found = batch_of_trajectories(time, (0, 3), commands, [scene, scene])
+        assert found.shape == (2, 2, 2, 2) and np.isnan(found).all(axis=(1, 2, 3)).tolist() == lost
+        assert np.isnan(found).any(axis=(1, 2, 3)).tolist() == lost
+
+
+def test_defaults_and_constants_are_declared_as_recorded():
+    assert_declared_as_recorded("seastar_gym.identify")

@@ -79,10 +79,11 @@ def test_errors_are_told_beside_speeds():
     found = certificates.told(made(scene_of(ROWS["fastest"]), 3))
     coarse, fine = found["7 nodes, 5 ms"], found["19 nodes, 1 ms"]
     assert coarse["repeated_percent"] == 7.0 and fine["repeated_percent"] == 19.0
+    assert coarse["typical_percent"] == 3.5 and fine["typical_percent"] == 9.5
     assert coarse["mm_per_s"] == pytest.approx(ROWS["fastest"]["mm_per_s"]["fast"], rel=0.01)
 
 
 def test_the_table_has_two_settings_of_every_robot():
     found = certificates.told(made(scene_of(ROWS["fastest"]), 3))
     lines = certificates.table({"robots": {"one": found}}).splitlines()
-    assert len(lines) == 4 and lines[2].startswith("| one | 7 nodes, 5 ms | 7 % | 7 % | x 1 | 18.")
+    assert len(lines) == 4 and lines[2].startswith("| one | 7 nodes, 5 ms | 7 % | 3.5 % | 7 % | x 1 | 18.")

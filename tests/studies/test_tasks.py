@@ -324,6 +324,9 @@ def test_a_table_has_every_agent_and_the_verdict():
     assert f"Not swum yet: {missing}." in text
     assert "Bound" not in table(row("prey", greedy=1.0, PPO=3.0))  # a learner alone is no bound
     assert table(row("prizes", greedy=10.0, informed=14.0)).endswith("Bound: informed, 40 % better than greedy.")
+    for nearly_nothing in (0.0, 0.5):
+        text = table(row("prizes", greedy=nearly_nothing, informed=14.0))
+        assert text.endswith("Bound: informed, more than ten times better than greedy.")
 
 
 def test_the_words_of_the_page_follow_from_the_numbers():

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from studies.worked_example.pictures import draw
 from studies.worked_example.robots import DEVIATIONS, FITTED, NOMINAL, built, tracked
 from studies.worked_example.study import Options, beliefs
 
+KEPT = Path(__file__).resolve().parents[2] / Options().out
 TINY = Hyperparameters(num_envs=8, rollout=8, batch_size=32, epochs=1, hidden=(8,), max_episode_time=10.0)
 
 
@@ -159,3 +161,13 @@ def test_options_that_make_no_sense_are_refused():
         Options(samples=1)
     with assert_refused("error"):
         Options(error=0.0)
+
+
+def test_the_committed_certificate_is_that_of_the_fitted_scene_and_of_the_trainings():
+    found = json.loads((KEPT / "results.json").read_text(encoding="utf-8"))
+    certificate = Certificate.load(KEPT / "certificate.json")
+    certificate.require_valid(Scene.from_dict(found["fit"]["scene"]))
+    chosen = certificate.of(certificate.for_error(found["settings"]["error"]))
+    assert str(chosen) == found["certificate"]["setting"] and certificate.samples == found["settings"]["samples"]
+    assert chosen.error(certificate.promised) == found["certificate"]["error"]
+    assert chosen.speed == found["certificate"]["times_real_time"]

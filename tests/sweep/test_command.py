@@ -7,14 +7,17 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from seastar_gym.command import INTERRUPTED
 from seastar_gym.scene import Scene, Seastar
 from seastar_gym.scene.actuators.wires import SmaWires
 from seastar_gym.sweep.axes import Choices, Range
-from seastar_gym.sweep.command import main
+from seastar_gym.sweep.command import as_text, bar_of, main
 from seastar_gym.sweep.parts import Parts, read_parts
+from seastar_gym.sweep.run import Tally
 from seastar_gym.sweep.text import axis_of
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -178,3 +181,50 @@ def test_a_stopped_sweep_goes_on_where_it_was(stop, tmp_path):
     again.send_signal(signal.SIGINT)
     again.communicate(timeout=60)
     assert names < set(Parts(tmp_path).names())
+
+
+def test_what_was_done_is_told_with_what_was_not(tmp_path):
+    tally = Tally(kept=2, done=1, designs=1234, problems={"0123456789": "Lost."})
+    begin = f"New in {tmp_path}: 1,234 designs, cells: 1; there before, cells: 2."
+    assert as_text(tally, tmp_path) == f"{begin} Without result, cells: 1, such as 01234567: Lost."
+    tally = Tally(kept=2, done=1, designs=1234, damaged=[Path("a"), Path("b")])
+    assert as_text(tally, tmp_path) == f"{begin} Damaged before, and simulated again: a, b."
+
+
+@pytest.mark.parametrize("problems, code", [({}, 0), ({"cell": "Lost."}, 1)])
+def test_cells_without_result_are_an_exit_code(problems, code, tmp_path, monkeypatch):
+    monkeypatch.setattr("seastar_gym.sweep.command.run", lambda *_: Tally(problems=problems))
+    assert main(["--out", str(tmp_path), *QUICK]) == code
+
+
+def test_an_interrupt_says_how_to_go_on(tmp_path, monkeypatch, capsys):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("seastar_gym.sweep.command.run", interrupted)
+    assert main(["--out", str(tmp_path), *QUICK]) == INTERRUPTED
+    assert "and the same command goes on" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", ["x=1:2:2", "x=1:2:1000000"])
+def test_a_count_is_from_two_to_a_million(text):
+    assert len(axis_of(text).values) == int(text.rpartition(":")[2])
+    for count in ("1", "1000001", "2.0"):
+        with pytest.raises(ValueError, match="a count from 2 to 1000000"):
+            axis_of(f"x=1:2:{count}")
+    for wrong in ("=1", "x=", "x", "x=1:a", "x=1:2:3:4", "x=:log"):
+        with pytest.raises(ValueError, match="is written"):
+            axis_of(wrong)
+
+
+def test_progress_tells_rates_and_what_was_lost():
+    told, moved = [], []
+    bar = SimpleNamespace(
+        format_dict={"elapsed": 2.0}, n=1, total=0, update=moved.append,
+        set_postfix_str=lambda text, refresh: told.append((text, refresh)),
+    )  # fmt: skip
+    show = bar_of(10, bar)
+    show(Tally(kept=3, done=4, designs=7, intervals=0))
+    show(Tally(kept=3, done=4, designs=7, intervals=9, losses=2))
+    assert bar.total == 7 and moved == [3, 3]
+    assert told == [("4 designs/s", False), ("4 designs/s, 4 strokes/s, 2 lost", False)]

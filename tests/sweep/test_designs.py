@@ -1,19 +1,24 @@
 """Designs of a sweep, and the cells that they are simulated in."""
 
 import itertools
+import json
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from declared import assert_declared_as_recorded
 from refusals import assert_refused
+from seastar_gym.gaits import lagged_gait, thrifty_gait
 from seastar_gym.scene import Limb, Numerics, Scene, Seastar, SmaPulse
 from seastar_gym.scene.actuators.wires import SmaWires
+from seastar_gym.simulator import Simulator
 from seastar_gym.sweep.axes import Choices, Range
 from seastar_gym.sweep.cells import Cell
 from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.gait import gait_of
-from seastar_gym.sweep.swimming import scene_of, swim, ways
+from seastar_gym.sweep.swimming import REFUSED, UNITS, scene_of, swim, ways
 
 FAST = Scene.preset("fast")
 LENGTH = Range("robot.limb_length", 0.05, 0.15)
@@ -119,6 +124,12 @@ def test_a_cell_is_named_by_all_that_its_results_depend_on():
     assert len({name for each in (first, *others) for name in each}) == 9
 
 
+def test_the_text_that_names_a_cell_has_its_entries_in_order():
+    """So a name does not depend on the order of a scene's fields."""
+    told = json.loads(next(Sweep(FAST, (LENGTH,), samples=1).frames()).text)
+    assert list(told) == sorted(told) and list(told["scene"]["robot"]) == sorted(told["scene"]["robot"])
+
+
 def test_a_new_version_of_the_package_is_another_cell(monkeypatch):
     before = next(Sweep(FAST, (LENGTH,), samples=1).cells()).name
     monkeypatch.setattr("seastar_gym.sweep.frames.__version__", "99.0")
@@ -207,3 +218,66 @@ def test_a_number_that_not_all_choices_have_is_refused():
 def test_bad_axes_are_refused(make, words):
     with assert_refused(*words):
         make()
+
+
+def test_defaults_and_constants_are_declared_as_recorded():
+    assert_declared_as_recorded("seastar_gym.sweep")
+
+
+@pytest.mark.parametrize("name, gait", [("lagged", lagged_gait), ("thrifty", thrifty_gait)])
+def test_gaits_in_time_are_those_of_a_tenth_of_a_second(name, gait):
+    wires = Scene(Seastar(6), actuator=SmaWires())
+    found = gait_of(name, wires)
+    np.testing.assert_array_equal(found.commands, gait(0.1, 6))
+    assert found.interval == 0.1 and gait_of("straight", wires).interval is None
+
+
+@pytest.mark.parametrize("text", ["1*", "0+", "6+", "+", "1+2-", "a+", "1+,", "\u00b2+"])
+def test_what_names_no_limb_is_no_gait(text):
+    with assert_refused(f"limbs of 5 such as 1+,2-, not {text!r}"):
+        gait_of(text, FAST)
+
+
+def test_a_range_has_both_ends_and_its_shares_in_between():
+    whole, log = Range("x", 1.0, 100.0), Range("x", 1.0, 100.0, is_log=True)
+    np.testing.assert_allclose(whole.at(np.array([0.0, 0.5, 1.0])), [1.0, 50.5, 100.0])
+    np.testing.assert_allclose(log.at(np.array([0.0, 0.5, 1.0])), [1.0, 10.0, 100.0])
+    assert whole.spaced(1).values == (1.0,) and log.spaced(3).values == pytest.approx((1.0, 10.0, 100.0))
+    for n in (0, 1_000_001):
+        with assert_refused("n must be a whole number from 1 to 1000000"):
+            whole.spaced(n)
+    for name in ("", 3):
+        with assert_refused("The name of an axis must be a text"):
+            Range(name, 0.0, 1.0)
+
+
+def test_a_swim_is_measured_after_it_has_settled():
+    """Columns of repeated strokes are those of a simulator, robot by robot."""
+    lengths = np.array([0.08, 0.1])
+    scene = Scene(Seastar(4, 5, limbs=(Limb(natural_curvature=5.0),) * 4), actuator=SmaWires(), numerics=FAST.numerics)
+    frame = next(Sweep(scene, (), "1+,3-", settling=2, measured=3).frames())
+    found = swim(Cell(frame, {"robot.limb_length": lengths}, 2))
+    for k, length in enumerate(lengths):
+        robot = Simulator(replace(scene, robot=replace(scene.robot, limb_length=length)), effort=True)
+        reports = [robot.stroke([[1.0, 0.0, -1.0, 0.0]]) for _ in range(2)]
+        hub, heading = robot.hub_position(), robot.heading()
+        measured = [robot.stroke([[1.0, 0.0, -1.0, 0.0]]) for _ in range(3)]
+        way = ((robot.hub_position() - hub) @ [1.0, 1.0j] * np.exp(-1j * heading)).item()
+        expected = {
+            "speed": abs(way) / 3.0, "strokes_per_metre": 3.0 / abs(way), "ahead": way.real, "aside": way.imag,
+            "turn": (robot.heading() - heading).item(), "status": 0,
+            **{name: sum(getattr(report, name).item() for report in measured) for name in ("energy", "work")},
+            "peak_moment": max(report.peak_moment.item() for report in measured),
+            "newton_iterations": sum(report.newton_iterations.item() for report in reports + measured),
+            "smallest_opening_angle": min(report.smallest_opening_angle.item() for report in reports + measured),
+        }  # fmt: skip
+        assert {name: values[k] for name, values in found.items()} == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_design_that_a_scene_refuses_costs_itself_alone():
+    frame = next(Sweep(FAST, (LENGTH,), settling=0, measured=1, samples=1).frames())
+    found = swim(Cell(frame, {"robot.limb_length": np.array([0.1, -1.0])}, 2))
+    assert found["status"].tolist() == [0, REFUSED] and found["status"].dtype == np.int64
+    assert np.isnan([found[name][1] for name in UNITS if name != "status"]).all() and found["speed"][0] > 0.0
+    none = swim(Cell(frame, {"robot.limb_length": np.array([-1.0])}, 1))
+    assert none["status"].tolist() == [REFUSED] and np.isnan(none["speed"]).all()

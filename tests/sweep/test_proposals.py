@@ -23,7 +23,7 @@ from seastar_gym.sweep.command import make_parser
 from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.parts import Parts, part_of, read_parts
 from seastar_gym.sweep.pilots import Course
-from seastar_gym.sweep.proposals import Proposals, Search, explore, put_back_stale, study_of
+from seastar_gym.sweep.proposals import Proposals, Search, explore, put_back, put_back_stale, study_of
 from seastar_gym.sweep.run import run
 
 AXES = (
@@ -210,3 +210,10 @@ def test_bad_searches_are_refused(sqlite):
         study_of(Sweep(SWEEP.scene, ()), Search(), sqlite)
     with assert_refused("nowhere"):
         study_of(SWEEP, Search(), "sqlite:////nowhere/study.db")
+
+
+def test_a_proposal_is_put_back_while_it_waits_for_its_result(sqlite):
+    study = study_of(SWEEP, Search(), sqlite)
+    trial = study.ask()
+    assert put_back(study, trial.number) and not put_back(study, trial.number)
+    assert states(study) == [TrialState.FAIL, TrialState.WAITING]

@@ -147,8 +147,10 @@ def test_a_damaged_part_is_named_left_out_and_simulated_again(damage, tmp_path, 
     whole, file = read_parts(tmp_path), Parts(tmp_path).file(first.name)
     sound = file.read_bytes()
     file.write_bytes(damage(sound))
-    with pytest.warns(UserWarning, match=rf"{file} is damaged: .*\. It is left out: the same sweep simulates its cell"):
+    words = rf"{file} is damaged: .*\. It is left out: the same sweep simulates its cell"
+    with pytest.warns(UserWarning, match=words) as told:
         assert read_parts(tmp_path).num_rows == second.n_robots
+    assert [warning.filename for warning in told] == [__file__]  # where the results are asked for
     again = run(iter(cells), tmp_path, Here())
     assert (again.done, again.kept, again.damaged) == (1, 1, [file])
     assert as_text(again, tmp_path).endswith(f"Damaged before, and simulated again: {file}.")

@@ -56,3 +56,15 @@ def test_bad_trajectories_are_refused(tmp_path):
         write_trajectory(tmp_path / "swim.parquet", FAST, STRAIGHT)
     with assert_refused("frames_per_stroke"):
         write_trajectory(tmp_path / "swim.parquet", FAST, [STRAIGHT], frames_per_stroke=0)
+    for commands in (np.zeros((1, 2, 5)), np.zeros((1, 1, 4)), np.zeros((1, 4)), np.zeros((1, 1, 1, 5))):
+        with assert_refused("commands must have shape (n_strokes, 5) or (n_strokes, 1, 5)"):
+            write_trajectory(tmp_path / "swim.parquet", FAST, commands)
+    with assert_refused("frames_per_stroke must be a whole number from 1 to 10000"):
+        write_trajectory(tmp_path / "swim.parquet", FAST, [STRAIGHT], frames_per_stroke=10_001)
+
+
+def test_a_trajectory_has_twenty_frames_a_stroke_and_the_start(tmp_path):
+    write_trajectory(tmp_path / "swim.parquet", FAST, [STRAIGHT])
+    table, n = pyarrow.parquet.read_table(tmp_path / "swim.parquet").to_pydict(), FAST.robot.n_nodes
+    np.testing.assert_allclose(table["time"][::n], np.arange(21) / 20.0, atol=1e-12)
+    assert table["node"][:n] == [*range(n)] and set(table["robot"]) == {0}
