@@ -245,7 +245,7 @@ def in_child(root: Path, arguments: list[str], seconds: float, tracer: Tracer | 
         os.chdir(root)
         os.environ["PYTHONPATH"], sys.dont_write_bytecode = str(root), True
         os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
-        os.environ.pop("PYTEST_ADDOPTS", None)  # other processes would run the tests, unseen by the tracer
+        os.environ["PYTEST_ADDOPTS"] = "--numprocesses=0"  # others would run the tests, unseen by the tracer
         sys.path.insert(0, str(root))
         for name in [name for name in sys.modules if name.partition(".")[0] in ANEW]:
             del sys.modules[name]
