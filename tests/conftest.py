@@ -28,7 +28,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """Processes that run the tests: one for each processor that we may use, and eight at most, for each takes 2 GB."""
+    """Processes that run the tests: one for each processor that we may use, and eight at most, for each takes 3 GB."""
     available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return min(available, 8)
 

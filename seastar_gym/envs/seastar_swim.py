@@ -215,7 +215,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     observe_actuators: Whether observations have the memory of the actuators.
     headings: Headings that are asked for at the waypoints, a `Headings`: along the legs, at random, or given angles.
         None asks for none.
-    device: Where robots swim: "cpu", or "cuda" for a GPU of NVIDIA, to the same bits, see `Simulator`. It is for
+    device: Where robots swim: "cpu", or "cuda" for an NVIDIA GPU, to the same bits, see `Simulator`. It is for
         batches of thousands.
     render_mode: "rgb_array": `render` returns a picture of the end of the decision. "rgb_array_list": `render` returns
         `frames_per_stroke` pictures of the decision. "human": a window shows as many;

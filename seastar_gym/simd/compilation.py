@@ -14,6 +14,7 @@ import hashlib
 import operator
 import os
 import pickle
+import secrets
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -296,9 +297,12 @@ def kept_code(name: str, make: Callable[[], bytes]) -> bytes:
     code = make()
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_name(f"{name}.{os.getpid()}")
-        part.write_bytes(hashlib.sha256(code).digest() + code)
-        part.replace(path)
+        part = path.with_name(f".{name}.{os.getpid()}.{secrets.token_hex(4)}")
+        try:
+            part.write_bytes(hashlib.sha256(code).digest() + code)
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
     return code
 
 

@@ -1,22 +1,25 @@
-"""The kernels on a graphics processor of NVIDIA, one robot in every thread; its arrays are CuPy's.
+"""The kernels on an NVIDIA GPU, one robot per thread; its arrays are CuPy's.
 
 LLVM makes the portable code (PTX) that the processor's own driver turns into machine code, and keeps: no compiler of
 CUDA is needed. What a driver makes of it rounds as we do, see device.py.
 """
 
+from importlib.util import find_spec
 from typing import Any
 
 import llvmlite.binding as llvm
+import numpy as np
 from llvmlite import ir
+from numba.core.compiler_lock import global_compiler_lock
 
 from seastar_gym.simd.compilation import kept_code
 from seastar_gym.simd.device import ALL_ROBOTS, I64, PARAMETERS, Program
 
-TRIPLE, ARCHITECTURE, VERSION = "nvptx64-nvidia-cuda", "sm_70", "ptx70"  # the oldest that drivers of today take
+TRIPLE, ARCHITECTURE, VERSION = "nvptx64-nvidia-cuda", "sm_70", "ptx70"  # old, so that all GPUs of today take it
 THREADS = 64
 """Threads of a block, a choice: 32 to 128 are alike."""
 I32 = ir.IntType(32)
-_LOADED: dict[str, Any] = {}
+_LOADED: dict[tuple[str, int], Any] = {}
 
 
 def ptx_of(program: Program, architecture: str = ARCHITECTURE) -> str:
@@ -29,38 +32,39 @@ def ptx_of(program: Program, architecture: str = ARCHITECTURE) -> str:
 
 
 def arrays() -> Any:
-    """The module that makes arrays on the device (CuPy). RuntimeError, in one sentence, without one."""
+    """The module that makes arrays on the device (CuPy). ValueError without one, or without a GPU."""
+    if find_spec("cupy") is None:
+        raise ValueError('device="cuda" needs CuPy and an NVIDIA GPU: pip install "seastar-gym[gpu]".')
     try:
         import cupy
 
         cupy.cuda.runtime.getDeviceCount()
-    except ImportError:
-        raise RuntimeError(
-            'device="cuda" needs CuPy: pip install "seastar-gym[gpu]" on a machine with a GPU of NVIDIA.'
+    except Exception as problem:  # a driver that is missing or too old, or a fork, has several ways to say so
+        why = str(problem).partition("\n")[0].rstrip(".")
+        raise ValueError(
+            f'device="cuda" finds no NVIDIA GPU ({why}); processes that use one have to be spawned, not forked.'
         ) from None
-    except Exception as problem:  # a driver that is missing or too old has several ways to say so
-        raise RuntimeError(f'device="cuda" finds no GPU of NVIDIA: {problem}.') from None
     return cupy
 
 
+@global_compiler_lock
 def load(program: Program) -> Any:
     """The program as a function, see `run`."""
-    if program.key not in _LOADED:
-        from cupy.cuda.function import Module
+    from cupy.cuda import Device
+    from cupy.cuda.function import Module
 
+    key = program.key, int(Device())
+    if key not in _LOADED:
         module = Module()
         module.load(kept_code(f"{program.key}-{ARCHITECTURE}.ptx", lambda: ptx_of(program).encode()))
-        _LOADED[program.key] = module.get_function(ALL_ROBOTS)
-    return _LOADED[program.key]
+        _LOADED[key] = module.get_function(ALL_ROBOTS)
+    return _LOADED[key]
 
 
 def run(code: Any, own: Any, shared: Any, times: Any, shape: Any, n_robots: int) -> None:
     """Advance robots through the intervals between `times`; arrays as in device.py, changed in place."""
-    import numpy as np
-
-    sizes = (np.int64(times.size - 1), np.int64(shape[0].size), np.int64(n_robots))
-    blocks = -(-n_robots // THREADS)
-    code((blocks,), (THREADS,), (own, shared, times, sizes[0], shape, sizes[1], sizes[2]))
+    n_intervals, per_group, n = np.int64(times.size - 1), np.int64(shape[0].size), np.int64(n_robots)
+    code((-(-n_robots // THREADS),), (THREADS,), (own, shared, times, n_intervals, shape, per_group, n))
 
 
 def _add_entry(module: ir.Module, robot: ir.Function) -> str:

@@ -10,6 +10,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from numba.core.compiler_lock import global_compiler_lock
+
 DER = "seastar_gym.der"
 FOLDER = Path(__file__).parent.parent / "der"
 WIDTH, LANES, COMPILATION = (f"{__package__}.{name}" for name in ("width", "lanes", "compilation"))
@@ -48,21 +50,22 @@ class KernelModules:
     @contextmanager
     def _in_place(self) -> Iterator[None]:
         """Let imports find these modules in place of the compiled ones, and keep those that are found."""
-        own = dict(sys.modules)
-        for name in self._names():
-            del sys.modules[name]
-        sys.modules.update(self._modules)
-        try:
-            yield
-            self._modules.update({name: sys.modules[name] for name in self._names()})
-        finally:
-            for name in self._names():
-                del sys.modules[name]
-            sys.modules.update({name: module for name, module in own.items() if name not in sys.modules})
+        with global_compiler_lock:  # numba imports what its cache names
+            own = dict(sys.modules)
+            try:
+                for name in self._names():
+                    del sys.modules[name]
+                sys.modules.update(self._modules)
+                yield
+                self._modules.update({name: sys.modules[name] for name in self._names()})
+            finally:
+                for name in self._names():
+                    del sys.modules[name]
+                sys.modules.update({name: module for name, module in own.items() if name not in sys.modules})
 
     def _names(self) -> list[str]:
         """Names of the modules, as far as they are loaded, that are there once for every kind of lanes."""
-        return [name for name in sys.modules if name in self._modules or f"{name}.".startswith(f"{DER}.")]
+        return [name for name in list(sys.modules) if name in self._modules or f"{name}.".startswith(f"{DER}.")]
 
 
 def made_module(name: str, **contents: Any) -> ModuleType:

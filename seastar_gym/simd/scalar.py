@@ -11,6 +11,7 @@ from typing import Any
 import llvmlite.binding as llvm
 import numpy as np
 from llvmlite import ir
+from numba.core.compiler_lock import global_compiler_lock
 
 from seastar_gym.simd.compilation import kept_code
 from seastar_gym.simd.device import ALL_ROBOTS, I64, PARAMETERS, Program
@@ -23,6 +24,7 @@ def arrays() -> Any:
     return np
 
 
+@global_compiler_lock
 def load(program: Program) -> Any:
     """The program as a function, see `run`."""
     if program.key not in _LOADED:

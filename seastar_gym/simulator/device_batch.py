@@ -5,6 +5,8 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+from numba.core import config
+from numba.core.compiler_lock import global_compiler_lock
 from numpy.typing import NDArray
 
 from seastar_gym.der.rods import make_work
@@ -19,13 +21,14 @@ from seastar_gym.simulator.batch import MOVED, Batch
 Floats = NDArray[np.float64]
 
 DEVICES: dict[str, ModuleType] = {"cuda": cuda, "scalar": scalar}
-"""Devices beside the processor's SIMD lanes ("cpu"): GPUs of NVIDIA, and their twin on the processor, for tests."""
+"""Devices beside the processor's SIMD lanes ("cpu"): NVIDIA GPUs, and their twin on the processor, for tests."""
 OF_INTERVAL = {"status": "failed", "report": "report", "effort": "effort"}
 """Arrays of a batch that an interval changes and the host reads, and their names in the kernel."""
 SHARE = device.N_LANES // N_LANES
 """Lane groups of the processor in one of a device."""
 
 
+@global_compiler_lock
 @cache
 def _kernels() -> DeviceKernels:
     return DeviceKernels()
@@ -46,6 +49,8 @@ class DeviceBatch(Batch):
     """
 
     def __init__(self, scene: Scene, n_robots: int, name: str, effort: bool):
+        if config.DISABLE_JIT:
+            raise ValueError('With NUMBA_DISABLE_JIT=1 nothing is compiled, and devices have no code: use "cpu".')
         self._device = DEVICES[name]
         self._arrays = self._device.arrays()
         self._on_host: dict[str, Floats] = {}
@@ -73,10 +78,10 @@ class DeviceBatch(Batch):
         self._on_host["v"] = rows
 
     def _fetched(self, name: str) -> Floats:
-        """Rows of q or v on the host, where they may be changed."""
+        """Rows of q or v on the host, where they may be changed until the next interval."""
         if name in self._on_device:
-            self._on_device.remove(name)
             self._on_host[name][:] = self._read_device(self._rows(name))
+            self._on_device.discard(name)
         return self._on_host[name]
 
     def hub_position(self) -> Floats:
@@ -107,19 +112,18 @@ class DeviceBatch(Batch):
 
     def advance(self, begin: int, end: int) -> None:
         self._put_all()
+        self._on_device = {"q", "v"}
         shape, n_turning = self._shape_of(slice(0, len(self.peaks)), begin, end)
         for name, kernel_name in {"peaks": "peaks", **OF_INTERVAL}.items():
             self._rows(kernel_name)[:] = self._to_device(getattr(self, name))
         if self._starts:
             self._rows("a")[:] = 0.0
             self._starts = False
-        times, rotations = self._arrays.asarray(self.times[begin : end + 1]), self._arrays.asarray(shape)
-        if n_turning:
-            rotations = self._to_device(shape)
+        times = self._arrays.asarray(self.times[begin : end + 1])
+        rotations = self._to_device(shape) if n_turning else self._arrays.asarray(shape)
         if n_turning not in self._codes:
             self._codes[n_turning] = self._device.load(self.program(n_turning))
         self._device.run(self._codes[n_turning], self._own, self._shared, times, rotations, self.n_robots)
-        self._on_device = {"q", "v"}
         for name, kernel_name in OF_INTERVAL.items():
             getattr(self, name)[:] = self._read_device(self._rows(kernel_name))
 
@@ -143,30 +147,28 @@ class DeviceBatch(Batch):
             self._put_coefficients()
         for name in {"q", "v"} - self._on_device:
             self._rows(name)[:] = self._to_device(self._on_host[name])
-        self._on_device = {"q", "v"}
 
     def _put_coefficients(self) -> None:
         """Make the device's memory, with the coefficients of all robots in it."""
         for name in ("q", "v"):
             self._fetched(name)
-        self._memory, self._codes = self.program(0).memory, {}
-        self._own = self._arrays.zeros((self._n_groups, self._memory.n_rows, device.N_LANES))
-        shared = np.zeros(max(self._memory.n_shared, 1))
+        memory = self.program(0).memory
+        own = self._arrays.zeros((self._n_groups, memory.n_rows, device.N_LANES))
+        shared = np.zeros(max(memory.n_shared, 1))
         one = {"scheme": self._scheme, "fallback": SCHEMES["implicit-euler"]}
         for name, numbers in [leaf for bundle, value in one.items() for leaf in leaves(value, bundle)]:
-            shared[self._memory.shared[name]] = numbers
+            shared[memory.shared[name]] = numbers
         groups = range(1 if self.coefficients.are_shared else len(self.peaks))
         of_groups = [
             leaves(self.coefficients.rods(k), "rods") + leaves(self.coefficients.limits(k), "limits") for k in groups
         ]
         for same in zip(*of_groups, strict=True):
             name, first = same[0]
-            if name in self._memory.rows:
-                rows = np.stack([numbers for _, numbers in same])
-                self._own[:, self._memory.rows[name]] = self._to_device(rows)
+            if name in memory.rows:
+                own[:, memory.rows[name]] = self._to_device(np.stack([numbers for _, numbers in same]))
             else:
-                shared[self._memory.shared[name]] = first
-        self._shared = self._arrays.asarray(shared)
+                shared[memory.shared[name]] = first
+        self._memory, self._own, self._shared, self._codes = memory, own, self._arrays.asarray(shared), {}
         self._coefficients = self.coefficients, self.coefficients.n_changes
 
     def _rows(self, name: str) -> Any:

@@ -52,8 +52,8 @@ class Simulator:
     error_bars: Whether to estimate the hub's error by a twin of shorter edges and steps, see error_bars.py. It changes
         no bit of a trajectory, and a stroke takes four to five times as long.
     effort: Whether to measure the work and the largest moment of the actuators. It changes no bit of a trajectory.
-    device: "cpu", "cuda" for a GPU of NVIDIA with a robot in every thread, or "scalar" for its twin on the processor,
-        which is slow and for tests. The device changes no bit of a trajectory either, see device_batch.py.
+    device: "cpu", "cuda" for an NVIDIA GPU with one robot per thread, or "scalar" for its twin on the processor, which
+        is slow and for tests. The device changes no bit of a trajectory either, see device_batch.py.
 
     A stroke, or any interval, that is not completed (Ctrl-C, an exception, a generator that is closed or dropped) is
     undone. While one is under way, other calls that would change the simulator are refused with a RuntimeError.
@@ -106,6 +106,7 @@ class Simulator:
     def q(self) -> Floats:
         """Node positions in the kernels' memory [m], shape (n_groups, 2 n_nodes, N_LANES), not a copy.
 
+        Of another device than "cpu" it is a copy that travels back with the next interval: take it anew after each.
         With a body, rows of its orientation and of its limbs' roots follow, see der/star.py.
         """
         return self._batch.q
@@ -260,7 +261,7 @@ class Simulator:
     def on_device(self, name: str) -> Any:
         """Node "positions" [m] or "velocities" [m/s] as an array of the device, shape (n_robots, n_nodes, 2), a copy.
 
-        On "cuda" an array of CuPy, which `torch.from_dlpack` takes as it is; nothing travels to the processor.
+        On "cuda" a CuPy array, which `torch.from_dlpack` takes without another copy.
         """
         require_choice("name", name, ("positions", "velocities"))
         if isinstance(self._batch, DeviceBatch):

@@ -72,7 +72,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--robots", type=int, default=256, help=f"designs of a cell at most {default}")
     parser.add_argument(
         "--device", choices=("cpu", *DEVICES), default="cpu",
-        help=f"where robots swim, to the same bits: cuda is a GPU, for cells of thousands {default}",
+        help=f"where robots swim, to the same bits: cuda is a GPU, with --robots 16384 --workers 1 {default}",
     )  # fmt: skip
     add_options(parser, "cells", "processes")
     parser.add_argument("--count", action="store_true", help="say how many designs and cells there are, and stop")
@@ -121,7 +121,9 @@ def sweep_of(options: argparse.Namespace, axes: tuple[Axis, ...]) -> Sweep:
 
 
 def work_of(options: argparse.Namespace) -> Callable[[Cell], bytes]:
-    """What makes a part of a cell, on the device that the options name."""
+    """What makes a part of a cell, on the device that the options name. ValueError if this machine is to have it."""
+    if options.device != "cpu" and options.executor in ("here", "processes"):
+        DEVICES[options.device].arrays()
     return partial(part_of, device=options.device)
 
 
@@ -130,8 +132,9 @@ def run_sweep(sweep: Sweep, options: argparse.Namespace) -> int:
     print(f"{sweep.n_designs:,} designs in {sweep.n_cells:,} cells.")
     if options.count:
         return 0
+    work = work_of(options)
     with tqdm(total=sweep.n_cells, unit="cell") as bar:
-        tally = run(sweep.cells(), options.out, executor_of(options), bar_of(sweep.n_cells, bar), work_of(options))
+        tally = run(sweep.cells(), options.out, executor_of(options), bar_of(sweep.n_cells, bar), work)
     print(as_text(tally, options.out))
     return 1 if tally.problems else 0
 
@@ -141,6 +144,7 @@ def search(sweep: Sweep, options: argparse.Namespace) -> int:
     require_extra("Searches", "sweep", "optuna")
     from seastar_gym.sweep.proposals import Search, explore
 
+    work = work_of(options)
     options.out.mkdir(parents=True, exist_ok=True)
     for file in options.out.glob("study.db*"):
         if file.is_symlink():  # SQLite writes through links
@@ -149,7 +153,7 @@ def search(sweep: Sweep, options: argparse.Namespace) -> int:
     wanted = Search(options.objective, not options.minimize, options.seed, options.stale_after)
     with tqdm(total=options.optuna, unit="design") as bar:
         study = explore(sweep, wanted, storage, options.optuna, options.out, executor_of(options),
-                        lambda tally: bar.update(tally.designs - bar.n), work_of(options))  # fmt: skip
+                        lambda tally: bar.update(tally.designs - bar.n), work)  # fmt: skip
     best = study.best_trial
     print(f"Best {options.objective}: {best.value:.6g} {(UNITS | OF_CONTROLLERS)[options.objective]}, {best.params}.")
     return 0

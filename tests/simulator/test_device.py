@@ -5,8 +5,10 @@ A device's code is that of one mesh, so there are few scenes here: `python -m st
 
 import pickle
 import re
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import get_args
+from unittest.mock import Mock
 
 import gymnasium as gym
 import numba
@@ -16,8 +18,10 @@ import pytest
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, StrokeReport
 from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.simd import cuda
-from seastar_gym.simulator.device_batch import program_of
+from seastar_gym.simulator import device_batch
+from seastar_gym.simulator.device_batch import DEVICES, DeviceBatch, program_of
 from seastar_gym.sweep.axes import Choices
+from seastar_gym.sweep.command import main as sweep_command
 from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.swimming import swim
 from strokes import assert_same, finished
@@ -33,7 +37,7 @@ N_ROBOTS = 35
 def has_gpu() -> bool:
     try:
         cuda.arrays()
-    except RuntimeError:
+    except ValueError:
         return False
     return True
 
@@ -168,15 +172,52 @@ def test_designs_of_a_sweep_swim_alike(device):
         np.testing.assert_array_equal(column, theirs[name], err_msg=name)
 
 
+def test_first_strokes_in_two_threads_do_not_meet(device, monkeypatch):
+    monkeypatch.setattr(DEVICES[device], "_LOADED", {})
+    device_batch._kernels.__wrapped__.cache_clear()
+    (commands,), whole = commands_of(1), Simulator(SMALL, N_ROBOTS, effort=True)
+    whole.stroke(commands)
+    others = [Simulator(SMALL, N_ROBOTS, effort=True, device=device) for _ in range(2)]
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(lambda simulator: simulator.stroke(commands), others))
+    for other in others:
+        assert_same(whole, other)
+
+
+def test_a_broken_off_read_and_a_full_memory_lose_nothing(device, monkeypatch):
+    both, commands = pair(SMALL, device), commands_of(3)
+    of_each = replace(SMALL, robot=replace(SMALL.robot, youngs_modulus=np.linspace(0.8e6, 1.2e6, N_ROBOTS)))
+    for simulator in both:
+        simulator.stroke(commands[0])
+    with monkeypatch.context() as full:
+        full.setattr(DeviceBatch, "_read_device", Mock(side_effect=KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            both[1].positions  # noqa: B018
+    assert_same(*both)
+    for simulator in both:
+        simulator.stroke(commands[1])
+        simulator.set_scene(of_each)
+    with monkeypatch.context() as full:
+        full.setattr(both[1]._batch, "_arrays", Mock(zeros=Mock(side_effect=MemoryError)))
+        with pytest.raises(MemoryError):
+            both[1].stroke(commands[2])
+    assert_same(*both)
+    for simulator in both:
+        simulator.stroke(commands[2])
+    assert_same(*both)
+
+
 # Refusals
 
 
-def test_a_device_that_is_not_there_is_refused_in_one_sentence():
+def test_a_device_that_is_not_there_is_refused_in_one_sentence(tmp_path, capsys):
     with pytest.raises(ValueError, match="device must be one of 'cpu', 'cuda', 'scalar', not 'tpu'"):
         Simulator(SMALL, device="tpu")
     if not has_gpu():
-        with pytest.raises(RuntimeError, match=r'^device="cuda" (needs CuPy|finds no GPU).*\.$'):
+        with pytest.raises(ValueError, match=r'^device="cuda" (needs CuPy|finds no NVIDIA GPU).*\.$'):
             Simulator(SMALL, device="cuda")
+        assert sweep_command(["robot.n_limbs=3", "--device", "cuda", "--out", str(tmp_path)]) == 2
+        assert capsys.readouterr().err.startswith('device="cuda" ')
 
 
 # The code for GPUs, without one
