@@ -281,8 +281,8 @@ def share_of_bandwidth(results: Mapping[str, Any], preset: str, n_robots: str) -
 def speeds(results: Mapping[str, Any]) -> str:
     """Table of speeds: the GPU's largest batch, 4,096 robots on it, and on the processor beside it."""
     lines = [
-        "| scene | robots | million steps per second | share of the GPU's bandwidth | with 4,096 robots |"
-        " on the processor beside it | ratio |",
+        "| scene | robots on the GPU | million steps per second | share of its bandwidth | with 4,096 robots |"
+        " on the host | ratio |",
         "|---|---:|---:|---:|---:|---:|---:|",
     ]
     for name, row in results.get("speed", {}).items():
@@ -292,7 +292,7 @@ def speeds(results: Mapping[str, Any]) -> str:
         fastest, usual = (of_gpu[size]["steps_per_second"] for size in (largest, str(min(USUAL, int(largest)))))
         lines.append(
             f"| {name} | {int(largest):,} | {fastest / 1e6:.1f} | {share} | {usual / 1e6:.1f} | {beside / 1e6:.2f} "
-            f"| {fastest / beside:.0f} |"
+            f"| {fastest / beside:.1f} |"
         )
     return "\n".join(lines)
 
@@ -312,7 +312,7 @@ def draw(results: Mapping[str, Any], path: Path) -> None:
     axes.set(
         xlabel="robots in the batch",
         ylabel="steps of robots per second",
-        title=f"One {results['gpu']['name']}; dotted: the processor beside it",
+        title=f"One {results['gpu']['name']}; dotted: 16 cores of its host",
     )
     axes.grid(color=FAINT, lw=0.4)
     axes.legend()

@@ -19,7 +19,7 @@ from packaging.version import Version
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-DISTRIBUTION_OF = {"PIL": "pillow", "pygame": "pygame-ce", "yaml": "pyyaml"}  # where the import name does not say it
+DISTRIBUTION_OF = {"cupy": "cupy-cuda13x", "PIL": "pillow", "pygame": "pygame-ce", "yaml": "pyyaml"}  # where the import name does not say it
 # Torch's wheels for CUDA name these; its wheels for the CPU do not.
 ONLY_WITH_CUDA = re.compile(r"(nvidia|cuda|triton)\b")
 
@@ -104,7 +104,7 @@ def test_every_base_dependency_is_imported_by_the_package():
 @pytest.mark.parametrize(
     ("folders", "extras"),
     [
-        (["seastar_gym"], ["render", "studies", "train", "ray", "slurm", "data"]),
+        (["seastar_gym"], ["render", "studies", "train", "ray", "slurm", "data", "gpu"]),
         (["studies"], ["train", "sweep", "test", "data"]),
         (["agents", "train.py"], ["train", "rllib"]),
         (["tests"], ["test", "browser", "ray", "learners"]),

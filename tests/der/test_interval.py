@@ -281,7 +281,9 @@ def test_every_group_follows_its_own_peaks_through_all_intervals_and_says_why_it
     failed, report = np.zeros((2, 1, N_LANES)), np.zeros((2, len(REPORT_ROWS), N_LANES))
     failed[0, 0, -1] = 2.0
     rotation, q = Actuation(*np.zeros((2, 5, N_LANES))), np.arange(2.0)[:, None, None] * np.ones((2, 1, N_LANES))
-    stroke(RODS, None, MIDPOINT, EULER, rotation, q, q, q, peaks, times, shape, failed, report, stroke_limits(), SILENT)
+    rows, n_turning = (shape, 0) if alike else (shape.reshape(2, -1, N_LANES), 5)
+    state = q, q, q, peaks, times, rows, n_turning, failed
+    stroke(RODS, None, MIDPOINT, EULER, rotation, *state, report, stroke_limits(), SILENT)
     assert [group for *_, group in covered] == [0.0, 0.0, 1.0, 1.0]
     np.testing.assert_allclose([duration for *_, duration, _ in covered], [0.1, 0.3, 0.1, 0.3])
     for k, (start, end, *_) in enumerate(covered):

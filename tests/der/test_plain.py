@@ -173,8 +173,8 @@ def test_the_twin_has_every_function_of_lanes_and_says_so():
         for block in file.read_text(encoding="utf-8").split("seastar_gym.simd.lanes import ")[1:]
         for name in block.lstrip("(").split(")" if block.startswith("(") else "\n")[0].replace(",", " ").split()
     }
-    assert used <= {*numpy_lanes.FUNCTIONS, "N_LANES"}
-    for name in (*numpy_lanes.FUNCTIONS, "N_LANES", "Lanes", "Mask"):
+    assert used <= {*numpy_lanes.FUNCTIONS, "N_LANES", "WIDTH"}
+    for name in (*numpy_lanes.FUNCTIONS, "N_LANES", "WIDTH", "Lanes", "Mask"):
         assert re.search(rf"^{name}\s", numpy_lanes.__doc__, flags=re.MULTILINE)
 
 

@@ -85,8 +85,8 @@ def test_the_safeguards_change_no_bit_of_a_stroke_that_needs_none(numerics):
         if safeguarded:
             failed, no_effort = np.zeros((n_groups, 1, lanes)), np.zeros((n_groups, 0, lanes))
             advance(
-                rods, work, scheme, SCHEMES["implicit-euler"], actuation, q, v, a, peaks, times, shape, failed, report,
-                limits, no_effort,
+                rods, work, scheme, SCHEMES["implicit-euler"], actuation, q, v, a, peaks, times, shape, 0, failed,
+                report, limits, no_effort,
             )  # fmt: skip
         else:
             advance_plainly(rods, work, scheme, actuation, q, v, a, peaks, times, shape, report, limits)
