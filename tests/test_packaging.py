@@ -19,7 +19,8 @@ from packaging.version import Version
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-DISTRIBUTION_OF = {"cupy": "cupy-cuda13x", "PIL": "pillow", "pygame": "pygame-ce", "yaml": "pyyaml"}  # where the import name does not say it
+# Where the import name does not say it.
+DISTRIBUTION_OF = {"cupy": "cupy-cuda13x", "PIL": "pillow", "pygame": "pygame-ce", "yaml": "pyyaml"}
 # Torch's wheels for CUDA name these; its wheels for the CPU do not.
 ONLY_WITH_CUDA = re.compile(r"(nvidia|cuda|triton)\b")
 
