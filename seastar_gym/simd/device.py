@@ -10,6 +10,7 @@ Numbers of rows, offsets and switches are constants of the code, so a machine's 
 """
 
 import hashlib
+import re
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -28,6 +29,8 @@ N_LANES = 32
 I64, F64 = ir.IntType(64), ir.DoubleType()
 POINTER = ir.PointerType(F64)
 CONSTANT = {types.int64: I64, types.float64: F64, types.boolean: ir.IntType(8)}  # as numba passes them
+DEFINITION = re.compile(r"^(define .*) \{$", re.MULTILINE)
+"""Head of a function in LLVM's text: llvmlite 0.45 gives the attributes of a function to its result."""
 ROBOT, ALL_ROBOTS = "swim_robot", "swim_robots"
 GIVEN = ("times", "n_intervals", "shape")
 """Arguments of the code that every call has anew; the others are in memory, or constants."""
@@ -154,12 +157,11 @@ class Program:
         module = ir.Module()
         entry = add_entry(module, self._add_robot(module, description))
         joined = _parsed(str(module), triple, machine)
-        joined.link_in(_parsed(str(kernels), triple, machine))
+        # Calls would pass the fifty pointers of rods and work through memory.
+        joined.link_in(_parsed(DEFINITION.sub(r"\1 alwaysinline {", str(kernels)), triple, machine))
         for function in joined.functions:
             if not (function.is_declaration or function.name == entry):
                 function.linkage = "internal"
-                # Calls would pass the fifty pointers of rods and work through memory.
-                function.add_function_attribute("alwaysinline")
         joined.verify()
         options = llvm.create_pipeline_tuning_options(speed_level=3)
         options.loop_vectorization = options.slp_vectorization = False
@@ -173,6 +175,7 @@ class Program:
         callee_type = calls.get_function_type(description.restype, description.argtypes)
         callee = ir.Function(module, callee_type, description.llvm_func_name)
         robot = ir.Function(module, ir.FunctionType(ir.VoidType(), [*PARAMETERS, I64]), ROBOT)
+        robot.attributes.add("alwaysinline")
         own, shared, times, n_intervals, shape, per_group, index = robot.args
         for pointer in (own, shared, times, shape):
             pointer.add_attribute("noalias")
