@@ -85,7 +85,7 @@ REFUSED = {
     "a heading beyond": (lambda: Headings(1.1e6), "Headings.asked must be"),
     "no heading": (lambda: Headings(()), "Headings.asked must be"),
     "half a turn and more": (lambda: Headings(tolerance=3.2), "Headings.tolerance must be at most pi"),
-    "an aim beyond": (lambda: RewardWeights(aim=1.01), "RewardWeights.aim must be at most 1"),
+    "an aim beyond": (lambda: RewardWeights(aim=1.01), "RewardWeights.aim must be from 0 to 1"),
     "a goal too far": (lambda: ObstTrap(distance=(0.45, 0.61)), "ObstTrap.distance must lie from 0.45 to 0.6"),
     "frames without end": (lambda: SeastarSwimEnv(frames_per_stroke=1_000_001), "frames_per_stroke"),
     "no frames": (lambda: SeastarSwimEnv(frames_per_stroke=0), "frames_per_stroke"),
