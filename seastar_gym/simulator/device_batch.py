@@ -42,8 +42,8 @@ def program_of(scene: Scene) -> Program:
 class DeviceBatch(Batch):
     """A batch whose robots are advanced by a device, to the bits of the processor's.
 
-    Positions and velocities stay on the device from one interval to the next. They travel when somebody asks for `q` or
-    `v`, the same numbers in the processor's layout, and back with the next interval, for they may have been changed.
+    Positions and velocities stay on the device from one interval to the next. Whoever asks for `q` or `v` gets a copy
+    in the processor's layout. It travels back with the next interval, because it may have been changed.
 
     name: Of the device, see DEVICES.
     """
