@@ -59,7 +59,6 @@ class DeviceBatch(Batch):
         self._n_groups = -(-n_robots // device.N_LANES)
         self._coefficients: Any = None  # those that are on the device, and how often they had been changed
         self._codes: dict[int, Any] = {}
-        self._starts = False
 
     @property
     def q(self) -> Floats:
@@ -106,19 +105,14 @@ class DeviceBatch(Batch):
             self._rows(name)[:] = values
         self._on_device |= set(rows)
 
-    def begin(self, times: Floats, peaks: Floats, shape: Floats) -> None:
-        super().begin(times, peaks, shape)
-        self._starts = True
-
     def advance(self, begin: int, end: int) -> None:
         self._put_all()
         self._on_device = {"q", "v"}
         shape, n_turning = self._shape_of(slice(0, len(self.peaks)), begin, end)
         for name, kernel_name in {"peaks": "peaks", **OF_INTERVAL}.items():
             self._rows(kernel_name)[:] = self._to_device(getattr(self, name))
-        if self._starts:
+        if begin == 0:
             self._rows("a")[:] = 0.0
-            self._starts = False
         times = self._arrays.asarray(self.times[begin : end + 1])
         rotations = self._to_device(shape) if n_turning else self._arrays.asarray(shape)
         if n_turning not in self._codes:
