@@ -76,9 +76,8 @@ def covered(results: Mapping[str, Any]) -> str:
     if outside:
         where = f"Numbers as built outside their intervals: {', '.join(outside)}."
     return (
-        f"{where} Residuals are {1e3 * found['root_mean_square_m']:.3g} mm root mean square, for a camera with noise of "
-        f"{1e3 * NOISE:g} mm. The rest comes from limbs that differ, which the fit ignores, and from the numerics of its "
-        "scene."
+        f"{where} Residuals are {1e3 * found['root_mean_square_m']:.3g} mm root mean square, the camera's noise is "
+        f"{1e3 * NOISE:g} mm. The rest comes from limbs that differ, which the fit ignores, and from the numerics."
     )
 
 
