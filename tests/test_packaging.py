@@ -106,7 +106,7 @@ def test_every_base_dependency_is_imported_by_the_package():
     ("folders", "extras"),
     [
         (["seastar_gym"], ["render", "studies", "train", "ray", "slurm", "data", "gpu"]),
-        (["studies"], ["train", "sweep", "test", "data"]),
+        (["studies"], ["train", "sweep", "test", "data", "mujoco"]),
         (["agents", "train.py"], ["train", "rllib"]),
         (["tests"], ["test", "browser", "ray", "learners"]),
         (["docs"], ["docs", "learners"]),
