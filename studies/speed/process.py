@@ -6,13 +6,18 @@ import subprocess
 import sys
 import time
 import tracemalloc
+from collections.abc import Callable
+from typing import Any
+from unittest.mock import patch
 
 import gymnasium as gym
 import numpy as np
 
+from seastar_gym.der.stepping import stroke
+from seastar_gym.envs import observation, swimming
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Scene
-from seastar_gym.simulator import Simulator
+from seastar_gym.simulator import Simulator, batch
 
 
 def environment_share(n_robots: int, seconds: float) -> list[float]:
@@ -38,6 +43,40 @@ def environment_share(n_robots: int, seconds: float) -> list[float]:
         env.step(actions)
         shares.append(1.0 - stroke / (time.perf_counter() - start))
     return shares[1:]
+
+
+def step_of_one(id: str, n: int, unwrapped: bool = False) -> tuple[float, float]:
+    """Processor time of a step of one environment beyond its kernels, and in them [s], means of n random steps.
+
+    Kernels are those of the strokes and of the observation, as Python calls them. unwrapped: Without Gymnasium's
+    wrappers.
+    """
+    env: Any = gym.make(
+        f"seastar_gym:{id}", fidelity="fast", max_episode_steps=10**9, path=[[10.0, 0.0], [10.0, 10.0]]
+    )
+    env = env.unwrapped if unwrapped else env
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    actions = [env.action_space.sample() for _ in range(n)]
+    env.step(actions[0])
+    in_kernels = 0.0
+
+    def timed(kernel: Callable[..., None]) -> Callable[..., None]:
+        def call(*arguments: Any) -> None:
+            nonlocal in_kernels
+            start = time.thread_time()
+            kernel(*arguments)
+            in_kernels += time.thread_time() - start
+
+        return call
+
+    advance, observe = timed(stroke.advance), timed(observation.observe)
+    with patch.object(batch, "advance", advance), patch.object(swimming, "observe", observe):
+        start = time.thread_time()
+        for action in actions:
+            env.step(action)
+        whole = time.thread_time() - start
+    return (whole - in_kernels) / n, in_kernels / n
 
 
 def memory_per_robot(scene: Scene, n_robots: int = 512) -> tuple[float, float]:

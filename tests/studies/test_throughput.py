@@ -27,6 +27,12 @@ def test_a_robot_is_small_and_a_stroke_leaves_nothing_behind():
     assert left < 8.0  # B: less than one number per robot
 
 
+@pytest.mark.parametrize("unwrapped", [False, True])
+def test_a_step_of_one_environment_is_its_kernels_and_the_rest(unwrapped):
+    beyond, kernels = process.step_of_one("SeastarSwimTimedModerate-v0", 3, unwrapped)
+    assert beyond > 0.0 and kernels > 0.0
+
+
 def test_table_csv_and_picture_are_written(tmp_path):
     figures = [throughput.median("a", "x", [1.0, 2.0, 3.0]), throughput.Figure("b", 4.0, "s")]
     curves = {
