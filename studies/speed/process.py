@@ -97,13 +97,13 @@ def memory_per_robot(scene: Scene, n_robots: int = 512) -> tuple[float, float]:
 
 
 def process_seconds(code: str, cache: str) -> float:
-    """Time [s] that `code` prints in a fresh interpreter; cache: Folder of numba's cache."""
+    """Time [s] that `code` prints in a fresh interpreter; cache: Folder of numba's cache, the user's own if empty."""
     environment = {**os.environ, "NUMBA_CACHE_DIR": cache}
     output = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     return float(output.stdout)
 
 
-TIMED = "import time; start = time.perf_counter(); {}; print(time.perf_counter() - start)"
+TIMED = "import time; start = time.process_time(); {}; print(time.process_time() - start)"
 FIRST_STROKE = (
     "import seastar_gym as s; "
     "s.Simulator(s.Scene(s.Seastar(nodes_per_limb=10), numerics=s.Numerics())).stroke([[0, 1, 0, 0, -1]])"
