@@ -200,8 +200,9 @@ class Swimming(ABC):
         seen = to_float32(out, self.n_robots)
         if self._is_bare:
             return seen
-        found, at = np.empty((self.n_robots, self.layout.size), np.float32), self.layout
-        found[:, at.stations_and_hub] = seen[:, bare.stations_and_hub if self.shows_limbs else slice(0)]
+        at = self.layout
+        found = np.empty((self.n_robots, at.size), np.float32)
+        found[:, at.stations_and_hub] = seen[:, : at.stations_and_hub.stop]
         found[:, at.actuators], found[:, at.further] = self._remembered(), self._wanted()
         found[:, at.waypoints] = seen[:, bare.waypoints]
         return found
