@@ -26,6 +26,7 @@ COMMANDS = {
     "train": Command("seastar_gym.cli.train", "train a policy, in a checkout of the repository"),
     "certify": Command("seastar_gym.accuracy.command", "measure what speed costs a scene in accuracy"),
     "sweep": Command("seastar_gym.sweep.command", "simulate thousands of designs, here or on a cluster"),
+    "compile": Command("seastar_gym.cli.compile", "compile the simulator before it is needed, as for a container"),
     "identify": Command("seastar_gym.identify.command", "fit numbers of a scene to measured trajectories"),
 }
 

@@ -33,15 +33,40 @@ class Canvas:
         self.size, self.text_height = size, text_height
         self._large = self._pygame.Surface((SUPERSAMPLING * size[0], SUPERSAMPLING * size[1]), depth=32)
         self.picture: pygame.Surface = self._pygame.Surface(size, depth=32)
+        self._kept = self._large
+        self._shows: object = None  # what is kept shows it
+        self._changed: list[pygame.Rect] = []  # where this picture differs from the last, but for what is above
+        self._above: list[pygame.Rect] = []  # where something is painted above what is kept
 
-    def begin(self, background: Colour) -> None:
-        """Fill the picture with a background."""
+    def begin(self, background: Colour, shows: object = None) -> bool:
+        """Begin a picture; returns whether it has what was kept of the last one already.
+
+        shows: What is kept shows. Where it is that of the last picture, what was painted above it is taken away;
+            otherwise, and for None, the picture is filled with the background.
+        """
         self._font = self._new_font()
-        self._large.fill(background)
+        stays = shows is not None and shows == self._shows
+        self._changed, self._above, self._shows = self._above, [], shows
+        if stays:
+            for place in self._changed:
+                self._large.blit(self._kept, place, place)
+        else:
+            self._changed = [self._large.fill(background)]
+        return stays
+
+    def keep(self) -> None:
+        """Keep what is painted so far, if `begin` said what it shows."""
+        if self._shows is not None:
+            self._kept, self._above = self._large.copy(), []
 
     def finish(self) -> None:
-        """Smooth down what was painted to `picture`."""
-        self._pygame.transform.smoothscale(self._large, self.size, self.picture)
+        """Smooth down what was painted to `picture`, where it changed."""
+        for place in _apart([*self._changed, *self._above]):
+            left, top = place.left // SUPERSAMPLING, place.top // SUPERSAMPLING
+            right, bottom = -(-place.right // SUPERSAMPLING), -(-place.bottom // SUPERSAMPLING)
+            small = self._pygame.Rect(left, top, right - left, bottom - top)
+            large = self._large.subsurface([SUPERSAMPLING * number for number in small])
+            self._pygame.transform.smoothscale(large, small.size, self.picture.subsurface(small))
 
     def pixels(self) -> NDArray[np.uint8]:
         """Red, green and blue of the finished picture, shape (height, width, 3), a fresh array."""
@@ -52,7 +77,7 @@ class Canvas:
     def polyline(self, points: FloatArray, colour: Colour, width: int) -> None:
         """Line through points [px], shape (n, 2), as pygame draws it."""
         corners = np.rint(SUPERSAMPLING * points - 0.5).tolist()
-        self._pygame.draw.lines(self._large, colour, False, corners, width * SUPERSAMPLING)
+        self._above.append(self._pygame.draw.lines(self._large, colour, False, corners, width * SUPERSAMPLING))
 
     def stroke(self, points: FloatArray, colour: Colour, width: float) -> None:
         """Thick line through points [px], shape (n, 2), with round joints and ends; width [px].
@@ -60,17 +85,18 @@ class Canvas:
         It is a row of discs: pygame's own thick lines and polygons come out up to a fifth thinner in some directions.
         """
         radius = max(1, round(0.5 * SUPERSAMPLING * width))
-        for centre in np.rint(SUPERSAMPLING * _along(points, 2.0 / SUPERSAMPLING)).tolist():
-            self._pygame.draw.circle(self._large, colour, centre, radius)
+        centres = np.rint(SUPERSAMPLING * _along(points, 2.0 / SUPERSAMPLING)).tolist()
+        discs = [self._pygame.draw.circle(self._large, colour, centre, radius) for centre in centres]
+        self._above.append(discs[0].unionall(discs))
 
     def area(self, corners: FloatArray, colour: Colour) -> None:
         """Filled polygon of corners [px], shape (n, 2)."""
-        self._pygame.draw.polygon(self._large, colour, np.rint(SUPERSAMPLING * corners).tolist())
+        self._above.append(self._pygame.draw.polygon(self._large, colour, np.rint(SUPERSAMPLING * corners).tolist()))
 
     def dot(self, centre: FloatArray, colour: Colour, radius: float) -> None:
         """Disc around a centre [px], shape (2,); radius [px]."""
         x, y = np.rint(SUPERSAMPLING * centre).tolist()
-        self._pygame.draw.circle(self._large, colour, (x, y), round(SUPERSAMPLING * radius))
+        self._above.append(self._pygame.draw.circle(self._large, colour, (x, y), round(SUPERSAMPLING * radius)))
 
     def text_size(self, text: str) -> FloatArray:
         """Width and height of a written text [px], shape (2,)."""
@@ -80,7 +106,7 @@ class Canvas:
         """Write a text with its anchor (0 to 1 from the upper left) at a place [px]; returns the x [px] of its end."""
         written = self._font.render(text, True, colour)
         corner = np.rint(SUPERSAMPLING * np.asarray(place) - np.array(anchor) * written.get_size())
-        self._large.blit(written, corner.tolist())
+        self._above.append(self._large.blit(written, corner.tolist()))
         return (float(corner[0]) + written.get_width()) / SUPERSAMPLING
 
     def _new_font(self) -> pygame.font.Font:
@@ -97,6 +123,17 @@ def _along(points: FloatArray, spacing: float) -> FloatArray:
     arc_length = np.append(0.0, np.cumsum(np.hypot(edges[:, 0], edges[:, 1])))
     stations = np.linspace(0.0, arc_length[-1], 2 + int(arc_length[-1] / spacing))
     return np.column_stack([np.interp(stations, arc_length, points[:, axis]) for axis in (0, 1)])
+
+
+def _apart(places: list[pygame.Rect]) -> list[pygame.Rect]:
+    """Rectangles that do not overlap and cover all of these."""
+    apart: list[pygame.Rect] = []
+    for place in places:
+        while (other := place.collidelist(apart)) >= 0:
+            place = place.union(apart.pop(other))
+        if place.width and place.height:
+            apart.append(place)
+    return apart
 
 
 def mixed(colour: Colour, other: Colour, fraction: float) -> Colour:

@@ -91,15 +91,15 @@ def to_commands(actions: Actions, n_limbs: int, action: object, n_robots: int) -
     if actions == "continuous":
         return _checked_shares(array, (n_robots, n_limbs))
     shape = (n_robots, n_limbs) if actions == "limbs" else (n_robots,)
-    _, n_choices = choices(actions, n_limbs)
+    table = LIMB_COMMANDS if actions == "limbs" else command_table(actions, n_limbs)
     if array.dtype.kind not in "iu" or array.shape != shape:
         raise ValueError(
             f'With actions="{actions}" the actions of {n_robots} robot(s) are whole numbers of shape {shape}, '
             f"not {array.dtype} of shape {array.shape}."
         )
-    if array.size and (array.min() < 0 or array.max() >= n_choices):
-        raise ValueError(f'With actions="{actions}" an action is from 0 to {n_choices - 1}, not {array.tolist()}.')
-    return (LIMB_COMMANDS if actions == "limbs" else command_table(actions, n_limbs))[array]
+    if array.size and (array.min() < 0 or array.max() >= len(table)):
+        raise ValueError(f'With actions="{actions}" an action is from 0 to {len(table) - 1}, not {array.tolist()}.')
+    return np.asarray(table[array])
 
 
 def _checked_shares(array: NDArray[Any], shape: tuple[int, int]) -> NDArray[np.float64]:

@@ -13,15 +13,19 @@ A path of one's own needs no name: environments take arrays of waypoints. With a
     env = gym.make("SeastarSwim-v0", path="zigzag")
 """
 
-from collections.abc import Callable
-from typing import TypeAlias
+import functools
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seastar_gym.scene.checks import require_callable, require_kind, require_unmasked, shown
 
-Waypoints: TypeAlias = NDArray[np.float64]
+Floats: TypeAlias = NDArray[np.float64]
+Point: TypeAlias = Sequence[float]
+Waypoints: TypeAlias = Floats
 MakePath: TypeAlias = Callable[[np.random.Generator], Waypoints]
 
 PATHS: dict[str, MakePath] = {}
@@ -44,6 +48,11 @@ FARTHEST = 1e6
 
 TOUCH_BISECTIONS = 12
 """Bisections of the arc on which a route touches a waypoint's circle: its length errs by less than 1e-6 radii."""
+
+FEW = 8
+"""Largest number of points that are measured one by one: plain numbers then take less time than arrays."""
+DECIDED = 1e-12
+"""Relative size of a slope from which on its sign is the same, whichever library computes the functions in it."""
 
 RANDOM_WAYPOINTS = 5
 RANDOM_LEG = (0.1, 0.2)
@@ -134,6 +143,8 @@ def cross_track_error(position: ArrayLike, start: ArrayLike, end: ArrayLike) -> 
     Beyond an end of the segment, or where the segment is a single point, it is the distance from that end.
     """
     position, start, end = (np.asarray(point, dtype=np.float64) for point in (position, start, end))
+    if _are_few(position, start, end):
+        return _of_each(_cross_track_of_one, position, start, end)
     # Written out by component: the same bits for one robot and for a batch of them.
     leg_x, leg_y = end[..., 0] - start[..., 0], end[..., 1] - start[..., 1]
     away_x, away_y = position[..., 0] - start[..., 0], position[..., 1] - start[..., 1]
@@ -163,6 +174,8 @@ def shortest_way(position: ArrayLike, waypoint: ArrayLike, after: ArrayLike, rad
     at an angle between those of position and `after` that is found by bisection.
     """
     p, w, n = (np.asarray(point, dtype=np.float64) for point in (position, waypoint, after))
+    if _are_few(p, w, n):
+        return _of_each(functools.partial(_way_of_one, radius), p, w, n)
     p_x, p_y, n_x, n_y = p[..., 0] - w[..., 0], p[..., 1] - w[..., 1], n[..., 0] - w[..., 0], n[..., 1] - w[..., 1]
     begin = np.arctan2(p_y, p_x)
     arc = np.remainder(np.arctan2(n_y, n_x) - begin + np.pi, 2.0 * np.pi) - np.pi
@@ -178,6 +191,61 @@ def shortest_way(position: ArrayLike, waypoint: ArrayLike, after: ArrayLike, rad
     straight: NDArray[np.float64] = np.hypot(n_x - p_x, n_y - p_y)
     is_near = cross_track_error(w, p, n) <= radius
     return np.where(is_near, straight, to_p + to_n)
+
+
+def _are_few(*points: Floats) -> bool:
+    """Whether all points have one shape (n, 2) and are so few that arrays take longer than plain numbers."""
+    shape = points[0].shape
+    return len(shape) == 2 and shape[0] <= FEW and all(each.shape == shape for each in points)
+
+
+def _of_each(measure: Callable[..., float], *points: Floats) -> Floats:
+    """A measure of points of shape (n, 2) each, one after the other; shape (n,)."""
+    return np.array(list(map(measure, *(each.tolist() for each in points))), np.float64)
+
+
+def _cross_track_of_one(position: Point, start: Point, end: Point) -> float:
+    """`cross_track_error` in plain numbers, to the same bits."""
+    (x, y), (start_x, start_y), (end_x, end_y) = position, start, end
+    leg_x, leg_y, away_x, away_y = end_x - start_x, end_y - start_y, x - start_x, y - start_y
+    leg_squared = leg_x * leg_x + leg_y * leg_y
+    fraction = (away_x * leg_x + away_y * leg_y) / leg_squared if leg_squared > 0.0 else 0.0
+    fraction = min(max(fraction, 0.0), 1.0)
+    return float(np.hypot(away_x - fraction * leg_x, away_y - fraction * leg_y))
+
+
+def _way_of_one(radius: float, position: Point, waypoint: Point, after: Point) -> float:
+    """`shortest_way` in plain numbers, to the same bits: where the last one depends on the library, it is numpy's."""
+    (x, y), (w_x, w_y), (after_x, after_y) = position, waypoint, after
+    p_x, p_y, n_x, n_y = x - w_x, y - w_y, after_x - w_x, after_y - w_y
+    if _cross_track_of_one(waypoint, position, after) <= radius:
+        return float(np.hypot(n_x - p_x, n_y - p_y))
+    begin = float(np.arctan2(p_y, p_x))
+    arc = float(np.remainder(np.arctan2(n_y, n_x) - begin + np.pi, 2.0 * np.pi)) - np.pi
+    angle = begin + _touch_of_one(p_x, p_y, n_x, n_y, begin, arc, radius) * arc
+    c, s = float(np.cos(angle)), float(np.sin(angle))
+    return float(np.hypot(p_x - radius * c, p_y - radius * s) + np.hypot(n_x - radius * c, n_y - radius * s))
+
+
+def _touch_of_one(p_x: float, p_y: float, n_x: float, n_y: float, begin: float, arc: float, radius: float) -> float:
+    """Share of the arc at which a route from p to n touches a circle about the origin."""
+
+    def slope(angle: float, cos: Any, sin: Any, hypot: Any) -> float:
+        c, s = cos(angle), sin(angle)
+        to_p, to_n = hypot(p_x - radius * c, p_y - radius * s), hypot(n_x - radius * c, n_y - radius * s)
+        grows: float = ((p_x * s - p_y * c) * to_n + (n_x * s - n_y * c) * to_p) * sign
+        return grows
+
+    undecided = DECIDED * (math.hypot(p_x, p_y) + radius) * (math.hypot(n_x, n_y) + radius)
+    sign, middle, half = math.copysign(1.0, arc), 0.5, 0.25
+    for _ in range(TOUCH_BISECTIONS - 1):
+        angle = begin + middle * arc
+        grows = slope(angle, math.cos, math.sin, math.hypot)
+        if not abs(grows) > undecided:
+            grows = slope(angle, np.cos, np.sin, np.hypot)
+        middle += -half if grows > 0.0 else half
+        half *= 0.5
+    return middle
 
 
 def _checked_waypoints(path: ArrayLike) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from seastar_gym.envs.camera import Camera
 from seastar_gym.envs.canvas import Canvas, Colour, mixed
 from seastar_gym.envs.frame import Frame
-from seastar_gym.envs.scenery import Scenery
+from seastar_gym.envs.scenery import NOTHING, Scenery
 from seastar_gym.envs.waypoint_labels import waypoint_labels
 from seastar_gym.envs.window import Window
 from seastar_gym.scene import Seastar
@@ -147,11 +147,7 @@ class Renderer:
         for points in (frame.positions, frame.roots, frame.outline, frame.scenery.points):
             if points is not None and len(points) and not self.camera.sees(points):
                 self.camera = self.camera.widened(points, REFIT_MARGIN * self._limb_length)
-        self._canvas.begin(WATER)
-        self._paint_scenery(frame.scenery)
-        self._paint_planned_path()
-        self._paint_waypoints(frame.waypoint_index)
-        self._paint_headings(frame.waypoint_index)
+        self._paint_background(frame)
         self._paint_trail(frame.trail)
         self._number_waypoints(frame.waypoint_index)
         self._paint_robot(frame)
@@ -160,6 +156,16 @@ class Renderer:
         self._write_header(frame)
         self._write_footer(frame.scenery.note)
         self._canvas.finish()
+
+    def _paint_background(self, frame: Frame) -> None:
+        """Everything below the trail, which stays from picture to picture where there is no scenery."""
+        if self._canvas.begin(WATER, (self.camera, frame.waypoint_index) if frame.scenery is NOTHING else None):
+            return
+        self._paint_scenery(frame.scenery)
+        self._paint_planned_path()
+        self._paint_waypoints(frame.waypoint_index)
+        self._paint_headings(frame.waypoint_index)
+        self._canvas.keep()
 
     def _check(self, frame: Frame) -> None:
         n_limbs, nodes_per_limb = self._limb_nodes.shape

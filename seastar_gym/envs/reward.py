@@ -82,5 +82,6 @@ def pulses_of(heating_time: NDArray[np.float64], commands: NDArray[np.float64]) 
         does not say it: a command then counts as its share of a pulse.
     commands: Shape (n_robots, n_limbs).
     """
-    whole = np.round(heating_time / PULSE, 12)  # sums of tenths of a second are whole pulses again
-    return np.where(np.isnan(heating_time), np.abs(commands).sum(axis=1), whole)
+    whole = (heating_time / PULSE).round(12)  # sums of tenths of a second are whole pulses again
+    unknown = np.isnan(heating_time)
+    return np.where(unknown, np.abs(commands).sum(axis=1), whole) if unknown.any() else np.asarray(whole)

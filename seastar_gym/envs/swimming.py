@@ -110,8 +110,8 @@ class Swimming(ABC):
         )
         self._effort = effort
         self.certificate = read_certificate(options.certificate, scene, unless_strokes(self.decision_period, scene))
-        self._measured = self.simulator.scene, self._errors_of(self.simulator.scene)
-        self._names_of_errors = tuple(self._measured[1])
+        self._names_of_errors = tuple(self._errors_of(self.simulator.scene))
+        self._known: tuple[Any, ...] = None, b"", {}  # scene and strengths of limbs, and the errors of both
         peak = np.max(self.simulator.scene.actuator.peak_angle)  # before the first draw the largest that may be drawn
         if scene.robot.hub_hinge == "turning" and 2 * peak >= scene.robot.opening_angle * (1 - 1e-9):
             raise ValueError(
@@ -158,6 +158,15 @@ class Swimming(ABC):
         bare = Layout.of(self.scene, self.options.observe_actuators, asked + self.entries)
         return replace(bare, of_limb=bare.of_limb + self.observes_commands, shows_limbs=self.shows_limbs)
 
+    @functools.cached_property
+    def _without_more(self) -> Layout:
+        """Layout of what the kernel fills."""
+        return Layout(self.scene.robot.n_limbs)
+
+    @functools.cached_property
+    def _is_bare(self) -> bool:
+        return self.layout == self._without_more
+
     def reset(self, robots: Flags, generators: list[np.random.Generator], asked: Any = None) -> None:
         """Begin a new episode of the robots in a mask, shape (n_robots,).
 
@@ -184,16 +193,19 @@ class Swimming(ABC):
         simulator = self.simulator
         target_rows = to_rows(self._targets())
         own, robot = simulator.coefficients, simulator.scene.robot
-        bare = Layout(robot.n_limbs)
+        bare = self._without_more
         out = np.empty((len(target_rows), bare.size, target_rows.shape[2]))
         places = stations_of(robot)
         observe(own.rest, own.limb_length, simulator.q, simulator.v, places, target_rows, VELOCITY_SCALE, out)
         seen = to_float32(out, self.n_robots)
-        if self.layout == bare:
+        if self._is_bare:
             return seen
-        stations_and_hub = seen[:, bare.stations_and_hub if self.shows_limbs else slice(0)]
-        more = [part.astype(np.float32) for part in (self._remembered(), self._wanted())]
-        return np.hstack([stations_and_hub, *more, seen[:, bare.waypoints]])
+        at = self.layout
+        found = np.empty((self.n_robots, at.size), np.float32)
+        found[:, at.stations_and_hub] = seen[:, : at.stations_and_hub.stop]
+        found[:, at.actuators], found[:, at.further] = self._remembered(), self._wanted()
+        found[:, at.waypoints] = seen[:, bare.waypoints]
+        return found
 
     def _remembered(self) -> Floats:
         """Numbers of the limbs that stand before the targets, shape (n_robots, k), limb after limb."""
@@ -260,13 +272,13 @@ class Swimming(ABC):
         """Advance every robot by one decision."""
         followed = self.followed(commands)
         report = self.simulator.advance(self.decision_period, self._wired(followed))
-        return self._judge(followed, np.count_nonzero(followed != commands, axis=1), report)
+        return self._judge(commands, followed, report)
 
     def step_in_parts(self, commands: Floats, parts: int) -> Generator[float, None, Outcome]:
         """One decision in `parts` parts; yields the time since it began [s] after each, and returns the Outcome."""
         followed = self.followed(commands)
         report = yield from self.simulator.advance_in_parts(self.decision_period, self._wired(followed), parts)
-        return self._judge(followed, np.count_nonzero(followed != commands, axis=1), report)
+        return self._judge(commands, followed, report)
 
     def warmth(self) -> Floats | None:
         """Contractions or temperatures of wires + and -, 0 to 1, shape (n_robots, n_limbs, 2); None without wires."""
@@ -276,20 +288,20 @@ class Swimming(ABC):
         numbers = self.simulator.observe_actuators()
         return np.clip(numbers.reshape(self.n_robots, self.scene.robot.n_limbs, -1)[..., :2], 0.0, 1.0)
 
-    def _judge(self, commands: Floats, masked: NDArray[np.int64], report: StrokeReport) -> Outcome:
-        """Outcome of a decision. commands: Those that were followed. masked: Number of limbs whose command was not."""
+    def _judge(self, commands: Floats, followed: Floats, report: StrokeReport) -> Outcome:
+        """Outcome of a decision. commands: Those that were given. followed: Those that were followed."""
         hub = self.simulator.hub_position()
         self._energy += report.energy
-        self.last_commands = commands
-        score = self._score(hub, pulses_of(report.heating_time, commands))
+        self.last_commands = followed
+        score = self._score(hub, pulses_of(report.heating_time, followed))
         info = {
             **self.facts(hub),
             "is_success": score.success,
-            "limbs_heated": np.count_nonzero(commands, axis=1),
+            "limbs_heated": (followed != 0.0).sum(axis=1),
             "heating_time": report.heating_time,
             "energy": report.energy,
             **({"work": report.work, "peak_moment": report.peak_moment} if self._effort else {}),
-            **({"masked_limbs": masked} if self._can_be_masked else {}),
+            **({"masked_limbs": (followed != commands).sum(axis=1)} if self._can_be_masked else {}),
             "newton_iterations": report.newton_iterations,
             "solver_status": report.status,
             "solver_message": _messages(report.status),
@@ -297,7 +309,7 @@ class Swimming(ABC):
             **score.terms,
         }
         reward = functools.reduce(operator.add, score.terms.values())
-        return Outcome(reward, score.over | (report.status != SolverStatus.CONVERGED), info, commands)
+        return Outcome(reward, score.over | report.status.astype(bool), info, followed)
 
     def first_info(self) -> dict[str, NDArray[Any]]:
         """Info before the first decision, with the names and types of a decision's info."""
@@ -335,17 +347,17 @@ class Swimming(ABC):
 
     def _errors(self) -> dict[str, Floats]:
         """Measured errors and speed, shape (n_robots,) each; NaN for robots with weak limbs."""
-        simulator = self.simulator
-        if simulator.scene is not self._measured[0]:
-            self._measured = simulator.scene, self._errors_of(simulator.scene)
-        strong = (simulator.limb_strengths == 1.0).all(axis=1)
-        known = self._measured[1]
-        return {name: np.where(strong, known.get(name, np.nan), np.nan) for name in self._names_of_errors}
+        scene, strengths = self.simulator.scene, self.simulator.limb_strengths
+        if scene is not self._known[0] or strengths.tobytes() != self._known[1]:
+            known, strong = self._errors_of(scene), (strengths == 1.0).all(axis=1)
+            errors = {name: np.where(strong, known.get(name, np.nan), np.nan) for name in self._names_of_errors}
+            self._known = scene, strengths.tobytes(), errors
+        return {name: values.copy() for name, values in self._known[2].items()}
 
 
 def _messages(status: NDArray[np.int64]) -> NDArray[Any]:
     """Sentences on what to do about each status, shape (n_robots,); empty where the solver converged."""
     messages = np.full(len(status), "", dtype=object)
-    for robot in np.flatnonzero(status != SolverStatus.CONVERGED):
+    for robot in status.nonzero()[0]:
         messages[robot] = SolverStatus(status[robot]).sentence
     return messages

@@ -26,6 +26,7 @@ class SwimTask(Swimming):
             self.TERMS = (*self.TERMS, "reward_heading")
         super().__init__(options, n_robots, threads, draws=options.randomization, effort=effort)
         self.reward, self.waypoint_radius = options.reward, options.waypoint_radius
+        self._robots = np.arange(n_robots)
         self.waypoints = np.zeros((n_robots, 1, 2))
         self._way_after = np.zeros((n_robots, 1))  # from waypoint k to the last [m]
         self.n_waypoints = np.ones(n_robots, np.int64)
@@ -67,10 +68,8 @@ class SwimTask(Swimming):
         return None if self._asked is None else self._asked.of_robot(robot)
 
     def _waypoint(self, k: NDArray[np.int64]) -> Floats:
-        """Waypoint k of every robot [m], the last one beyond the end, the origin at -1; shape (n_robots, 2)."""
-        robots = np.arange(self.n_robots)
-        found = self.waypoints[robots, np.clip(k, 0, self.n_waypoints - 1)]
-        return np.where((k < 0)[:, None], 0.0, found)
+        """Waypoint k of every robot [m], the last one beyond the end; shape (n_robots, 2)."""
+        return np.asarray(self.waypoints[self._robots, np.minimum(k, self.waypoints.shape[1] - 1)])
 
     def _measure_way_to_go(self, hub: Floats) -> Floats:
         """Length [m], shape (n_robots,), of the rewarded route from hub positions [m], shape (n_robots, 2), to the end.
@@ -78,12 +77,14 @@ class SwimTask(Swimming):
         It passes the circle of the current waypoint on the way to the next; from there it leads from centre to centre.
         A route through the centre of the current waypoint would pay for corners that need not be swum.
         """
-        k, robots = self.waypoint_index, np.arange(self.n_robots)
+        k = self.waypoint_index
         to_next = self.reward.way_to_next(hub, self._waypoint(k), self._waypoint(k + 1), self.waypoint_radius)
-        return to_next + self._way_after[robots, np.minimum(k + 1, self.n_waypoints - 1)]
+        return np.asarray(to_next + self._way_after[self._robots, np.minimum(k + 1, self.n_waypoints - 1)])
 
     def _targets(self) -> Floats:
-        return np.concatenate([self._waypoint(self.waypoint_index), self._waypoint(self.waypoint_index + 1)], axis=1)
+        targets = np.empty((self.n_robots, 4))
+        targets[:, :2], targets[:, 2:] = self._waypoint(self.waypoint_index), self._waypoint(self.waypoint_index + 1)
+        return targets
 
     def _wanted(self) -> Floats:
         if self._asked is None:
@@ -131,10 +132,11 @@ class SwimTask(Swimming):
     def _goal_facts(self, hub: Floats) -> dict[str, NDArray[Any]]:
         current = self._waypoint(self.waypoint_index)
         leg = np.minimum(self.waypoint_index, self.n_waypoints - 1)
+        start = np.where((leg == 0)[:, None], 0.0, self._waypoint(np.maximum(leg - 1, 0)))
         return {
             "waypoint_index": self.waypoint_index.copy(),
             "distance": _length(current - hub),
-            "cross_track_error": cross_track_error(hub, self._waypoint(leg - 1), self._waypoint(leg)),
+            "cross_track_error": cross_track_error(hub, start, current),
             "energy_per_metre": self._energy_per_metre(),
             **self._heading_facts(),
         }

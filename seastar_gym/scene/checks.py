@@ -184,6 +184,8 @@ def as_array(name: str, value: object) -> NDArray[Any]:
 def as_floats(name: str, value: object) -> NDArray[np.float64]:
     """Value as an array of floats, of whatever shape. ValueError if it is not made of numbers."""
     array = as_array(name, value)
+    if array.dtype == np.float64:
+        return array.copy()
     if array.dtype.kind not in "biuf":
         raise ValueError(f"{name} must be numbers, not {array.dtype} values.")
     with np.errstate(over="ignore"):  # what no float can hold is infinite, and refused where it must be finite

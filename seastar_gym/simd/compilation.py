@@ -11,11 +11,11 @@ compiled and written anew. What cannot be written is compiled in every process.
 import contextlib
 import functools
 import hashlib
+import logging
 import operator
 import os
 import pickle
 import secrets
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -270,7 +270,7 @@ class _DigestCache(FunctionCache):
         self._cache_file = _SoundFile(self._cache_path, self._impl.filename_base, stamp)
 
     def load_overload(self, sig, target_context):
-        return super().load_overload(sig, target_context) or _say_that_it_compiles()
+        return super().load_overload(sig, target_context) or _say_that_it_compiles("once: later runs find the code")
 
     def save_overload(self, sig, data):
         # OSError: the disk is full, or the folder is gone or no longer ours.
@@ -280,7 +280,7 @@ class _DigestCache(FunctionCache):
 
 class _NoCache(NullCache):
     def load_overload(self, sig, target_context):
-        return _say_that_it_compiles()
+        return _say_that_it_compiles("in every process, as no folder for the code can be written: set NUMBA_CACHE_DIR")
 
 
 def kept_code(name: str, make: Callable[[], bytes]) -> bytes:
@@ -293,7 +293,7 @@ def kept_code(name: str, make: Callable[[], bytes]) -> bytes:
     digest, code = kept[:DIGEST_SIZE], kept[DIGEST_SIZE:]
     if digest == hashlib.sha256(code).digest():
         return code
-    _say_that_it_compiles()
+    _say_that_it_compiles("once: later runs find the code")
     code = make()
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -307,10 +307,11 @@ def kept_code(name: str, make: Callable[[], bytes]) -> bytes:
 
 
 @functools.cache
-def _say_that_it_compiles():
-    """One sentence per process, to whoever sits at a terminal and would wonder why nothing happens."""
-    if sys.stderr is not None and sys.stderr.isatty():
-        print("seastar_gym: compiling the kernels for this kind of scene, about 15 s ...", file=sys.stderr, flush=True)
+def _say_that_it_compiles(how_often):
+    """One sentence per process, at a terminal as in a notebook or a log: nothing else happens meanwhile."""
+    logging.getLogger("seastar_gym").warning(
+        "seastar_gym compiles the simulator for this kind of scene, 10 to 30 s of one core, %s.", how_often
+    )
 
 
 def entry_point(function):

@@ -4,6 +4,7 @@ A bundle is a named tuple of rows, of numbers and of other bundles. Its rows hav
 and (rows, N_LANES) if they differ from robot to robot: `load` reads either.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -18,16 +19,18 @@ SHARED = ("velocities", "pairs")
 
 def to_rows(values: np.ndarray) -> np.ndarray:
     """Numbers of every robot, shape (n_robots, ...), as rows (n_groups, k, N_LANES); lanes left over have zeros."""
-    n_groups = -(-len(values) // N_LANES)
-    padded = np.zeros((n_groups * N_LANES, int(np.prod(values.shape[1:]))))
-    padded[: len(values)] = values.reshape(len(values), -1)
-    return np.ascontiguousarray(padded.reshape(n_groups, N_LANES, -1).transpose(0, 2, 1))
+    rows = np.zeros((-(-len(values) // N_LANES), math.prod(values.shape[1:]), N_LANES))
+    write_rows(rows, values)
+    return rows
 
 
 def write_rows(rows: np.ndarray, values: np.ndarray) -> None:
     """Write numbers of every robot over rows (n_groups, k, N_LANES); lanes left over keep theirs."""
-    groups, lanes = np.divmod(np.arange(len(values)), N_LANES)
-    rows[groups, :, lanes] = values.reshape(len(values), -1)
+    (n_full, n_left), by_robot = divmod(len(values), N_LANES), rows.transpose(0, 2, 1)
+    each = values.reshape(len(values), by_robot.shape[2])
+    by_robot[:n_full] = each[: n_full * N_LANES].reshape(n_full, N_LANES, by_robot.shape[2])
+    if n_left:
+        by_robot[n_full, :n_left] = each[n_full * N_LANES :]
 
 
 def from_rows(rows: np.ndarray, n_robots: int) -> np.ndarray:

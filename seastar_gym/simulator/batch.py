@@ -261,19 +261,19 @@ class Batch:
     def end(self) -> dict[str, Floats]:
         """End an interval: release held nodes, put lost robots at rest. Returns the report's rows, (n_robots,) each.
 
-        With them are work and peak_moment of the actuators, NaN if nobody asks for them.
+        With them are the status, and work and peak_moment of the actuators, NaN if nobody asks for them.
         """
         if self._held_rows.size:
             self.q[:, self._held_rows] = self._held
             self.v[:, self._held_rows] = 0.0
-        if self.failed.any():
+        if self.status.any():
             self._put_lost_robots_at_rest()
         self.last_hub = self.hub_position()
         effort = np.full((2, self.n_robots), np.nan)
         if self.effort.size:
             effort = self.read(self.effort).T[[WORK, PEAK_MOMENT]]
         rows = dict(zip(REPORT_ROWS, self.read(self.report).T, strict=True))
-        return {**rows, "work": effort[0], "peak_moment": effort[1]}
+        return {**rows, "status": self.read(self.status)[:, 0], "work": effort[0], "peak_moment": effort[1]}
 
     def _put_lost_robots_at_rest(self) -> None:
         """Put failed robots whose state is not finite at rest where their hub was last."""

@@ -5,6 +5,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+COUNTED = ("start", "lost", "intervals", "within")
+"""Arrays of a clock."""
+
 
 class Clock:
     """Simulated time of every robot. Equal intervals are counted, so that rounding does not accumulate.
@@ -41,8 +44,9 @@ class Clock:
             self._add(np.asarray(self.intervals * self.duration))
             self.intervals[:] = 0
             self.duration = duration
-        self._add(self.within)
-        self.within[:] = 0.0
+        if self.within.any():
+            self._add(self.within)
+            self.within[:] = 0.0
 
     def _add(self, time: Floats) -> None:
         """Add to the start, and keep what rounding leaves out [s] (Knuth's two-sum), shape (n_robots,)."""
@@ -62,12 +66,12 @@ class Clock:
 
     def copy(self) -> "Clock":
         """A clock of its own that shows the same time."""
-        clock = Clock(len(self.start))
-        clock.put(self)
+        clock = Clock.__new__(Clock)
+        vars(clock).update({name: getattr(self, name).copy() for name in COUNTED}, duration=self.duration)
         return clock
 
     def put(self, other: "Clock") -> None:
         """Show the time of another clock."""
         self.duration = other.duration
-        for name in ("start", "lost", "intervals", "within"):
+        for name in COUNTED:
             getattr(self, name)[:] = getattr(other, name)

@@ -1,5 +1,8 @@
 """`Drive`: the actuators of a batch of robots, from commands, which are checked here, to rotations of limbs."""
 
+import operator
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -36,6 +39,7 @@ class Drive:
         self.times, self.heating_time = np.zeros(1), np.zeros(n_robots)
         self.set_actuator(actuator)
         self.state = self.at_rest.copy()
+        self._turned: tuple[tuple[Any, ...], Floats] = (None,) * 5, self.strengths  # rotations, behind what gives them
         self._before = self._after = self.state  # at the beginning and the end of the present interval
 
     def set_actuator(self, actuator: Actuator) -> None:
@@ -62,24 +66,21 @@ class Drive:
         these times, shape (n_times,), (n_times, n_robots, 1) where a curve differs from robot to robot, or with memory
         (n_times, n_robots, n_limbs).
         """
-        if commands is not None:
-            self._refuse_jump(commands)
-            self.commands, self.phase = commands, 0.0
-        self.times, curve = self._interval(duration, commands is not None)
-        self._given, self._before, self._after = self.commands, self.state, self.state
-        self.heating_time = self._actuator.seconds_heated(self.times, self._given, self.state).sum(axis=1)
-        if not self._actuator.has_memory:
-            return self.times, self._given * self.strengths, curve
-        turned, self._after = self._actuator.respond(self.times, self._given, self.state)
-        return self.times, self.strengths, turned
-
-    def _refuse_jump(self, commands: Floats) -> None:
-        """ValueError if limbs cannot begin anew from where they are."""
-        if self.phase == 0.0:
-            return
-        now, then = self.rotations(), np.zeros_like(commands)
+        given, phase = (self.commands, self.phase) if commands is None else (commands, 0.0)
+        times, turned = self._interval(phase, duration, commands is not None)
+        after = self.state
         if self._actuator.has_memory:
-            then = self.strengths * self._actuator.respond(np.zeros(1), commands, self.state)[0][0]
+            turned, after = self._actuator.respond(times, given, self.state)
+        if commands is not None and self.phase > 0.0:
+            self._refuse_jump(self.strengths * turned[0] if self._actuator.has_memory else np.zeros_like(commands))
+        self.times, self.commands, self.phase = times, given, phase
+        self._given, self._before, self._after = given, self.state, after
+        self.heating_time = self._actuator.seconds_heated(times, given, self.state).sum(axis=1)
+        return times, self.strengths if self._actuator.has_memory else given * self.strengths, turned
+
+    def _refuse_jump(self, then: Floats) -> None:
+        """ValueError if limbs cannot begin anew from where they are. then: Rotations that they would begin with."""
+        now = self.rotations()
         jumps = np.abs(then - now) > JUMP * column(self._actuator.peak_angle)
         if jumps.any():
             robot, limb = np.argwhere(jumps)[0]
@@ -89,14 +90,14 @@ class Drive:
                 f"way ends, in {self.longest - self.phase:.4g} s, or use an actuator with memory such as SmaWires."
             )
 
-    def _interval(self, duration: float, is_new: bool) -> tuple[Floats, Floats]:
+    def _interval(self, phase: float, duration: float, is_new: bool) -> tuple[Floats, Floats]:
         """Ends of the time steps [s] and, unless it takes memory, rotations by command 1 at those times [rad]."""
-        key = self.phase, duration, is_new
+        key = phase, duration, is_new
         if key not in self._intervals:
             if len(self._intervals) >= KNOWN_INTERVALS:
                 self._intervals.clear()
-            corners = self._actuator.corners if is_new or self.phase > 0.0 else (0.0,)
-            times = interval_times(corners, self._step, self.phase, duration)
+            corners = self._actuator.corners if is_new or phase > 0.0 else (0.0,)
+            times = interval_times(corners, self._step, phase, duration)
             curve = np.zeros(0) if self._actuator.has_memory else stroke_at(self._actuator, times)
             self._intervals[key] = times, curve[:, :, None] if curve.ndim > 1 else curve
         return self._intervals[key]
@@ -133,9 +134,16 @@ class Drive:
 
     def rotations(self) -> Floats:
         """Rotations of limbs between two intervals [rad], shape (n_robots, n_limbs)."""
-        now = np.full(1, self.phase)
+        now = self._actuator, self.strengths, self.commands, self.state, self.phase
+        if not all(map(operator.is_, now, self._turned[0])):
+            self._turned = now, self._rotations(np.full(1, self.phase))
+        return self._turned[1]
+
+    def _rotations(self, now: Floats) -> Floats:
         if self._actuator.has_memory:
             return self.strengths * self._actuator.respond(now, self.commands, self.state)[0][0]
+        if self.phase == 0.0:
+            return np.zeros_like(self.strengths)
         return self.commands * self.strengths * column(stroke_at(self._actuator, now)[0])
 
     def put_at_rest(self, chosen: NDArray[np.bool_]) -> None:

@@ -89,19 +89,18 @@ class StrokeReport(NamedTuple):
 
 
 def make_report(
-    status: Floats, rows: Mapping[str, Floats], hub_hinge: str, error_estimate: Floats, heating_time: Floats,
-    power: float,
-) -> StrokeReport:  # fmt: skip
+    rows: Mapping[str, Floats], hub_hinge: str, error_estimate: Floats, heating_time: Floats, power: float
+) -> StrokeReport:
     """Report of an interval from the kernels' numbers, shape (n_robots,) each.
 
     power: Electric power of a heated wire [W].
-    rows: Numbers by name, see REPORT_ROWS in der/stepping/report.py.
+    rows: Numbers by name, as `Batch.end` returns them.
     """
     angle = 2.0 * np.arctan(rows["smallest_hub_t"])
     if hub_hinge == "turning":
         angle += np.pi
     return StrokeReport(
-        status=status.astype(np.int64),
+        status=rows["status"].astype(np.int64),
         covered=rows["covered"],
         smallest_opening_angle=angle,
         error_estimate=error_estimate,

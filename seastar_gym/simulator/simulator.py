@@ -412,11 +412,11 @@ class Simulator:
 
     def _end_interval(self) -> StrokeReport:
         rows = self._batch.end()
-        self._clock.end(self.failed, rows["covered"])
+        failed = rows["status"] > 0.0
+        self._clock.end(failed, rows["covered"])
         self._drive.advance(len(self._batch.times) - 1)
         write_rows(self._batch.rotations, self._drive.rotations())
         if self._bars is not None:
-            self._bars.compare(self.hub_position(), self.failed)
-        status, drive = self._batch.read(self._batch.status)[:, 0], self._drive
-        hub_hinge = self.scene.robot.hub_hinge
-        return make_report(status, rows, hub_hinge, self.error_estimate, drive.heating_time, drive.heating_power)
+            self._bars.compare(self.hub_position(), failed)
+        hub_hinge, drive = self.scene.robot.hub_hinge, self._drive
+        return make_report(rows, hub_hinge, self.error_estimate, drive.heating_time, drive.heating_power)

@@ -6,13 +6,18 @@ import subprocess
 import sys
 import time
 import tracemalloc
+from collections.abc import Callable
+from typing import Any
+from unittest.mock import patch
 
 import gymnasium as gym
 import numpy as np
 
+from seastar_gym.der.stepping import stroke
+from seastar_gym.envs import observation, swimming
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Scene
-from seastar_gym.simulator import Simulator
+from seastar_gym.simulator import Simulator, batch
 
 
 def environment_share(n_robots: int, seconds: float) -> list[float]:
@@ -40,6 +45,40 @@ def environment_share(n_robots: int, seconds: float) -> list[float]:
     return shares[1:]
 
 
+def step_of_one(id: str, n: int, unwrapped: bool = False) -> tuple[float, float]:
+    """Processor time of a step of one environment beyond its kernels, and in them [s], means of n random steps.
+
+    Kernels are those of the strokes and of the observation, as Python calls them. unwrapped: Without Gymnasium's
+    wrappers.
+    """
+    env: Any = gym.make(
+        f"seastar_gym:{id}", fidelity="fast", max_episode_steps=10**9, path=[[10.0, 0.0], [10.0, 10.0]]
+    )
+    env = env.unwrapped if unwrapped else env
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    actions = [env.action_space.sample() for _ in range(n)]
+    env.step(actions[0])
+    in_kernels = 0.0
+
+    def timed(kernel: Callable[..., None]) -> Callable[..., None]:
+        def call(*arguments: Any) -> None:
+            nonlocal in_kernels
+            start = time.thread_time()
+            kernel(*arguments)
+            in_kernels += time.thread_time() - start
+
+        return call
+
+    advance, observe = timed(stroke.advance), timed(observation.observe)
+    with patch.object(batch, "advance", advance), patch.object(swimming, "observe", observe):
+        start = time.thread_time()
+        for action in actions:
+            env.step(action)
+        whole = time.thread_time() - start
+    return (whole - in_kernels) / n, in_kernels / n
+
+
 def memory_per_robot(scene: Scene, n_robots: int = 512) -> tuple[float, float]:
     """Memory of a robot in a batch [KiB], and memory that a stroke leaves allocated per robot [B]."""
     commands = np.tile(STRAIGHT, (n_robots, 1))
@@ -58,13 +97,13 @@ def memory_per_robot(scene: Scene, n_robots: int = 512) -> tuple[float, float]:
 
 
 def process_seconds(code: str, cache: str) -> float:
-    """Time [s] that `code` prints in a fresh interpreter; cache: Folder of numba's cache."""
+    """Time [s] that `code` prints in a fresh interpreter; cache: Folder of numba's cache, the user's own if empty."""
     environment = {**os.environ, "NUMBA_CACHE_DIR": cache}
     output = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     return float(output.stdout)
 
 
-TIMED = "import time; start = time.perf_counter(); {}; print(time.perf_counter() - start)"
+TIMED = "import time; start = time.process_time(); {}; print(time.process_time() - start)"
 FIRST_STROKE = (
     "import seastar_gym as s; "
     "s.Simulator(s.Scene(s.Seastar(nodes_per_limb=10), numerics=s.Numerics())).stroke([[0, 1, 0, 0, -1]])"

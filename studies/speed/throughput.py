@@ -22,7 +22,14 @@ from studies.frame import Results, Study
 from studies.speed.operations import count_operations, flops
 from studies.speed.parts import part_seconds
 from studies.speed.peak import peak_gigaflops, peak_speedup
-from studies.speed.process import FIRST_STROKE, TIMED, environment_share, memory_per_robot, process_seconds
+from studies.speed.process import (
+    FIRST_STROKE,
+    TIMED,
+    environment_share,
+    memory_per_robot,
+    process_seconds,
+    step_of_one,
+)
 from studies.speed.strokes import cost_over_nodes, exponent, iteration_seconds, real_time_factors, threads_speedup
 from studies.style import CYCLE, FAINT, INK, subplots
 
@@ -74,11 +81,7 @@ def measure(seconds: float, progress: bool = True) -> tuple[list[Figure], dict[s
             median("one robot alone, one core", "x real time", real_time_factors(chapter, 1, 1, seconds))
         ],
         "peak": lambda: peak_figures(chapter, seconds),
-        "environment": lambda: [
-            median(
-                "environment's share of a step, preset fast", "%", [100 * s for s in environment_share(512, seconds)]
-            )
-        ],
+        "environment": lambda: environment_figures(seconds),
         "memory": lambda: memory_figures(chapter),
         "start": start_up_figures,
     }
@@ -101,6 +104,20 @@ def measure(seconds: float, progress: bool = True) -> tuple[list[Figure], dict[s
     bar.update()
     bar.close()
     return figures, curves
+
+
+def environment_figures(seconds: float) -> list[Figure]:
+    """What a step of the environments takes beyond the kernels, of a batch and of one robot."""
+    figures = [
+        median("environment's share of a step, preset fast", "%", [100 * s for s in environment_share(512, seconds)])
+    ]
+    for id, what in {"SeastarSwim-v0": "a stroke", "SeastarSwimTimedModerate-v0": "0.2 s"}.items():
+        beyond, kernels = zip(*(step_of_one(id, max(10, int(200 * seconds))) for _ in range(5)), strict=True)
+        figures += [
+            median(f"step of one environment, {what}, beyond its kernels", "ms", [1e3 * s for s in beyond]),
+            median(f"- its kernels, {what}", "ms", [1e3 * s for s in kernels]),
+        ]
+    return figures
 
 
 def peak_figures(scene: Scene, seconds: float) -> list[Figure]:

@@ -4,13 +4,14 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from seastar_gym import Scene, Seastar
-from seastar_gym.cli import play, screen
+from seastar_gym.cli import compile, play, screen
 from seastar_gym.cli.main import COMMANDS, main
 from seastar_gym.controllers import learned
 
@@ -56,6 +57,31 @@ def test_every_command_has_help_under_its_name(command, capsys):
         main([command, "--help"])
     assert ended.value.code == 0
     assert capsys.readouterr().out.startswith(f"usage: seastar {command} ")
+
+
+def test_what_is_compiled_before_is_found_by_another_process(tmp_path, monkeypatch):
+    (tmp_path / "scene.py").write_text("import seastar_gym as s; scene = s.Scene(fluid=None, actuator=s.SmaWires())")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    command = [sys.executable, "-m", "seastar_gym.cli", "compile", "--scene", str(tmp_path / "scene.py"), "--per-robot"]
+    first, second = (subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True) for _ in range(2))
+    assert "seastar_gym compiles" in first.stderr and second.stderr == ""
+    assert str(tmp_path / "cache") in first.stdout and first.stdout.startswith("SeastarSwim-v0: ")
+    swim = (
+        "import gymnasium as gym, numpy as np, seastar_gym as s, sys\n"
+        "given = dict(fluid=None, actuator=s.SmaWires())\n"
+        "env = gym.make('SeastarSwim-v0', scene=s.Scene(**given), fidelity='fast', decision_period=0.2)\n"
+        "env.reset(seed=1), env.step(env.action_space.sample())\n"
+        "stiffness = np.array([1e6, 2e6])\n"
+        "s.Simulator(s.Scene(s.Seastar(youngs_modulus=stiffness), **given), 2).stroke(np.zeros((2, 5)))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", swim], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert "compiles" not in done.stderr
+
+
+def test_code_that_cannot_be_kept_is_not_said_to_be(monkeypatch, capsys):
+    monkeypatch.setattr(compile, "energies", SimpleNamespace(stats=SimpleNamespace(cache_path=None)))
+    assert main(["compile", "--fidelity", "fast"]) == 2
+    assert "set NUMBA_CACHE_DIR" in capsys.readouterr().err
 
 
 def test_a_swim_is_filmed_without_a_display(path, tmp_path, no_display, capsys):

@@ -1,6 +1,5 @@
 """Machine code kept on disk is found again as long as nothing changed, and never once something did."""
 
-import contextlib
 import errno
 import io
 import os
@@ -257,32 +256,30 @@ number(1.0), number(3), number(1j)
 """
 
 
-def said_at_a_terminal(arguments: list[str], environment: dict[str, str]) -> str:
-    """Everything that a process writes to its standard error, which is a terminal."""
-    import pty
-
-    parent, child = pty.openpty()
-    subprocess.run([sys.executable, *arguments], env=environment, stderr=child, check=True)
-    os.close(child)
-    said = b""
-    with contextlib.suppress(OSError):  # all is read
-        while chunk := os.read(parent, 1000):
-            said += chunk
-    os.close(parent)
-    return said.decode()
-
-
-@pytest.mark.skipif(os.name != "posix", reason="needs a pseudo-terminal")
-def test_the_first_compilation_says_so_once_and_at_a_terminal_only(tmp_path):
+def said(tmp_path: Path, cache: str, before: str = "") -> str:
+    """What a process whose standard error is a pipe writes there; before: Code that it runs first."""
     (tmp_path / "mine.py").write_text(NUMBER, encoding="utf-8")
     environment = {**os.environ, "PYTHONPATH": str(PACKAGE.parent)}
-    arguments = ["-c", NUMBERS, str(tmp_path / "cache"), str(tmp_path)]
-    said = said_at_a_terminal(arguments, environment)
-    assert said.count("\n") == 1 and "compiling" in said and "15 s" in said
-    assert said_at_a_terminal(arguments, environment) == ""
-    elsewhere = ["-c", NUMBERS, str(tmp_path / "other"), str(tmp_path)]
-    answer = subprocess.run([sys.executable, *elsewhere], env=environment, capture_output=True, check=True)
-    assert answer.stderr == b""
+    command = [sys.executable, "-c", before + NUMBERS, str(tmp_path / cache), str(tmp_path)]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stderr
+
+
+def test_the_first_compilation_says_so_once_wherever_it_runs(tmp_path):
+    first = said(tmp_path, "cache")
+    assert first.count("\n") == 1 and "compiles" in first and "10 to 30 s" in first
+    assert said(tmp_path, "cache") == ""
+
+
+def test_where_no_code_can_be_kept_the_sentence_says_what_to_do(tmp_path):
+    (tmp_path / "file").write_text("")
+    home = f"import os; os.environ.update(dict.fromkeys(('HOME', 'XDG_CACHE_HOME'), {str(tmp_path / 'file')!r}))\n"
+    for _ in range(2):
+        assert said(tmp_path, "file", home).endswith("set NUMBA_CACHE_DIR.\n")
+
+
+def test_logging_decides_where_the_sentence_goes(tmp_path):
+    silent = "import logging; logging.getLogger('seastar_gym').setLevel('ERROR')\n"
+    assert said(tmp_path, "cache", silent) == ""
 
 
 def test_the_sentence_needs_no_standard_error(fresh, monkeypatch):

@@ -1,5 +1,7 @@
 """Paths visit what their names say, refuse what is no path, and measure distance along and across themselves."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from refusals import assert_refused
 from seastar_gym import Scene, Seastar
 from seastar_gym.envs import paths
 from seastar_gym.envs.options import SwimOptions
-from seastar_gym.envs.paths import PATHS, cross_track_error, make_path, path_length, register_path, shortest_way
+from seastar_gym.envs.paths import FEW, PATHS, cross_track_error, make_path, path_length, register_path, shortest_way
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.task import SwimTask
 
@@ -194,6 +196,17 @@ def test_path_length_takes_leading_batch_axes():
 
 
 # The way through a waypoint's circle
+
+
+def test_few_points_are_measured_to_the_bits_of_many():
+    rng = np.random.default_rng(0)
+    begin, waypoint, after = rng.normal(scale=0.2, size=(3, 40 * FEW, 2))
+    after[::3], begin[::4] = waypoint[::3], 2.0 * waypoint[::4] - after[::4]  # straight ways, and mirrored ones
+    begin[::7] = after[::7]
+    for measure in (cross_track_error, partial(shortest_way, radius=0.02)):
+        many = measure(begin, waypoint, after)
+        few = [measure(*each) for each in zip(*(np.split(part, 40) for part in (begin, waypoint, after)), strict=True)]
+        assert np.concatenate(few).tobytes() == many.tobytes()
 
 
 def test_the_shortest_way_is_the_shortest_of_those_by_any_point_of_the_circle():

@@ -309,6 +309,18 @@ def test_a_new_path_is_drawn_as_by_a_new_renderer():
     np.testing.assert_array_equal(renderer.draw(frame_of()), renderer_of("square").draw(frame_of()))
 
 
+def test_what_is_kept_of_a_picture_shows_in_no_other():
+    """A renderer that has drawn others draws every picture as a new one does."""
+    renderer, far = renderer_of(), frame_of(hub=(0.5, 0.3))
+    scenery = Scenery(rings=(Ring(np.array([0.1, 0.1]), 0.02),), note="a note")
+    frames = [frame_of(), frame_of(command=(1, 0, 0, 0, -1)), frame_of(hub=(0.02, 0.01), trail=((0, 0), (0.02, 0.01)))]
+    frames += [frame_of(waypoint_index=2), far, frame_of(waypoint_index=2), replace(frame_of(), scenery=scenery)]
+    for frame in [*frames, *frames[::-1], frames[0], frames[0]]:
+        picture, new = renderer.draw(frame), renderer_of()
+        new.camera = renderer.camera
+        np.testing.assert_array_equal(picture, new.draw(frame))
+
+
 def test_a_place_visited_twice_carries_both_numbers():
     path = np.concatenate([np.zeros((1, 2)), make_path("figure-eight", np.random.default_rng(0))])
     numbers = [[index + 1 for index in label.indices] for label in waypoint_labels(path)]

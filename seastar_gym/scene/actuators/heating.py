@@ -23,12 +23,13 @@ def share_of_pulse(t: Floats, commands: Floats, heating_time: float) -> Floats:
 
     t: Times since the commands were given [s]. Half a command needs half the heat and counts as half the time.
     """
-    begin, end = np.minimum(t[[0, -1]], heating_time)
-    return np.abs(commands) * (end - begin)
+    return np.abs(commands) * (min(t[-1], heating_time) - min(t[0], heating_time))
 
 
 SPENT = 1e-12
 """Share of the heating time that rounding may leave of a pulse."""
+SIGNS = np.array([1.0, -1.0])
+"""Signs of the commands that heat either wire."""
 
 
 class WirePair(ActuatorBase):
@@ -62,7 +63,7 @@ class WirePair(ActuatorBase):
         """
         if t[0] > 0.0:
             return state[..., -2:]
-        wanted = self.heating_time * np.stack([np.maximum(commands, 0.0), np.maximum(-commands, 0.0)], axis=-1)
+        wanted = self.heating_time * np.maximum(commands[..., None] * SIGNS, 0.0)
         return np.where(wanted > 0.0, wanted, state[..., -2:])
 
     def _left_after(self, duration: float | Floats, left: Floats) -> Floats:

@@ -87,6 +87,8 @@ class SmaWires(WirePair):
         """Contraction of wires after times `since` [s], from the one `before`, if they are heated for `left` [s]."""
         with np.errstate(over="ignore"):  # ramps that are steeper than any float are jumps
             rising = np.minimum(before + since / self.heating_time, 1.0)
+            if len(since) == 1:  # the beginning, where no wire has cooled yet
+                return rising
             most = np.minimum(before + left / self.heating_time, 1.0)
             falling = np.maximum((left + most * self.cooling_time - since) / self.cooling_time, 0.0)
         return np.where(since <= left, rising, falling)
