@@ -259,7 +259,7 @@ def test_masks_are_handed_out_robot_by_robot():
 
 def test_tables_of_timed_swims_count_decisions_and_seconds(tmp_path, capsys):
     command = ["--agents", "rest", "--sets", "nominal", "--decision-period", "0.5", "--fidelity", "fast"]
-    assert trials_main([*command, "--swims", "4", "--num-threads", "1", "--out", str(tmp_path / "trials.csv")]) == 0
+    assert trials_main([*command, "--seconds", "20", "--num-threads", "1", "--out", str(tmp_path / "trials.csv")]) == 0
     printed = capsys.readouterr().out
     assert "decisions" in printed and "of 0.5 s" in printed and "time [s]" in printed and "strokes" not in printed
 
