@@ -52,13 +52,19 @@ def finished(tmp_path_factory):
     return folder
 
 
+@pytest.fixture
+def short_swims(monkeypatch):
+    """Swims that are given up after 20 s: what is measured of them stands in the folder of `finished`."""
+    monkeypatch.setattr("agents.training.options.TIME_LIMIT", 20.0)
+
+
 OWN_ROBOT = """
 from seastar_gym import Scene, Seastar
 scene = Scene(Seastar(nodes_per_limb=7, youngs_modulus=1.1e6))
 """
 
 
-def test_a_robot_of_a_file_is_trained_compared_and_continued(tmp_path, capsys):
+def test_a_robot_of_a_file_is_trained_compared_and_continued(tmp_path, capsys, short_swims):
     file, intervals, folder = tmp_path / "own.py", tmp_path / "intervals.json", tmp_path / "run"
     file.write_text(OWN_ROBOT)
     intervals.write_text('{"robot.youngs_modulus": [9e5, 1.2e6]}')
@@ -245,7 +251,7 @@ def terminated_here(folder):
 
 
 @pytest.mark.parametrize("stopped", [stopped_process, terminated_here])
-def test_ctrl_c_leaves_a_usable_model_and_says_how_to_go_on(tmp_path, stopped):
+def test_ctrl_c_leaves_a_usable_model_and_says_how_to_go_on(tmp_path, stopped, short_swims):
     folder = tmp_path / "stopped"
     code, output = stopped(folder)
     assert code == 130
@@ -437,7 +443,7 @@ def test_a_folder_that_cannot_be_is_refused_in_a_sentence(out, tmp_path, capsys,
         ("replace", 3, errno.ENOSPC),
     ],
 )
-def test_a_disk_that_refuses_is_said_in_a_sentence(call, at, code, tmp_path, capsys, monkeypatch):
+def test_a_disk_that_refuses_is_said_in_a_sentence(call, at, code, tmp_path, capsys, monkeypatch, short_swims):
     calls, done = itertools.count(1), getattr(os, call)
 
     def refuse(*arguments, **options):
@@ -569,7 +575,7 @@ def test_efficiency_that_is_damaged_is_refused(tmp_path):
         efficiency.read(tmp_path)
 
 
-def test_several_seeds_are_runs_of_their_own(tmp_path, capsys):
+def test_several_seeds_are_runs_of_their_own(tmp_path, capsys, short_swims):
     assert train.main([*TINY, "--strokes", "128", "--seeds", "3", "4", "--out", str(tmp_path)]) == 0
     assert {file.name for file in tmp_path.iterdir()} == {"seed_3", "seed_4"}
     trained = [policies.load(tmp_path / f"seed_{seed}" / "policy.safetensors").training["seed"] for seed in (3, 4)]
