@@ -11,6 +11,8 @@ import signal
 import sys
 from pathlib import Path
 
+SECONDS = 20.0
+"""After which swims are given up."""
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT
 
 
@@ -18,6 +20,9 @@ def main() -> int:
     fate, at, folder, *arguments = sys.argv[1:]
     sys.path.insert(0, str(Path(__file__).parents[2]))
     import train  # takes seconds, and touches no file of the folder
+    from agents.training import options
+
+    options.TIME_LIMIT = SECONDS
 
     touches = {"kill": 0, "full": 0}
 

@@ -22,6 +22,7 @@ import pytest
 pytest.importorskip("tensorboard", reason="train.py writes its log for TensorBoard")
 
 import train
+from fuzz.killed_training import SECONDS
 from seastar_gym.controllers import learned as policies
 from seastar_gym.controllers.learner_zip import load
 from seastar_gym.evaluation.report.charts import read_progress
@@ -32,6 +33,13 @@ TINY = shlex.split(
     f"--strokes {STROKES} --save-freq {BETWEEN} --seed 4 --fidelity fast --num-envs 16 --rollout 8 --batch-size 64 "
     "--epochs 2 --hidden 16 16 --max-episode-time 20 --no-video --num-threads 1"
 )
+
+
+@pytest.fixture(scope="module", autouse=True)
+def short_swims():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("agents.training.options.TIME_LIMIT", SECONDS)
+        yield
 
 
 def start(fate, at, folder):
