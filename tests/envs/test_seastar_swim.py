@@ -532,9 +532,8 @@ def test_what_is_no_action_is_refused_and_changes_nothing(action):
 def test_arguments_that_mean_nothing_are_refused_with_a_sentence(arguments, words):
     for make in (SeastarSwimEnv, SeastarSwimVectorEnv):
         if make is SeastarSwimEnv or not {"render_mode", "frames_per_stroke"} & {*arguments}:  # a batch has its own
-            with pytest.raises(ValueError, match=words) as caught:
+            with assert_refused(words):
                 make(**arguments)
-            assert str(caught.value).endswith(".") and "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("name", ["progress", "waypoint", "effort"])
@@ -559,9 +558,8 @@ def test_reset_options_that_mean_nothing_are_refused_and_the_episode_goes_on(opt
     env.reset(seed=0)
     env.step(STRAIGHT)
     before, waypoints = env.simulator.positions, env.waypoints
-    with pytest.raises(ValueError, match=words) as caught:
+    with assert_refused(words):
         env.reset(options=options)
-    assert str(caught.value).endswith(".")
     np.testing.assert_array_equal(env.simulator.positions, before)
     np.testing.assert_array_equal(env.waypoints, waypoints)
     assert env.step(STRAIGHT)[4]["time"] == 2.0

@@ -453,9 +453,8 @@ def test_what_is_no_action_is_refused_and_changes_nothing(actions):
 def test_reset_options_that_mean_nothing_are_refused(options, words):
     batch = native()
     batch.reset(seed=0)
-    with pytest.raises(ValueError, match=words) as caught:
+    with assert_refused(words):
         batch.reset(options=options)
-    assert str(caught.value).endswith(".")
 
 
 def test_a_list_of_seeds_has_one_for_every_robot():
@@ -466,12 +465,11 @@ def test_a_list_of_seeds_has_one_for_every_robot():
 @pytest.mark.parametrize(
     "arguments, words",
     [
-        ({"num_envs": 0}, "whole number"),
-        ({"num_envs": 2.5}, "whole number"),
+        *(({"num_envs": value}, "num_envs must be a whole number") for value in (0, 2.5)),
         *(({"max_episode_steps": value}, "max_episode_steps") for value in (0, -1, np.nan, np.inf, 2.5, True, "4")),
         ({"threads": 0}, "threads"),
-        ({"render_mode": "human"}, "rgb_array"),
-        ({"autoreset_mode": "sometimes"}, "sometimes"),
+        ({"render_mode": "human"}, "The batch draws with render_mode=\"rgb_array\""),
+        ({"autoreset_mode": "sometimes"}, "autoreset_mode must be one of .*sometimes"),
     ],
     ids=str,
 )
