@@ -127,17 +127,6 @@ def test_limbs_that_do_not_meet_swim_as_without_contact():
     np.testing.assert_array_equal(*ends)
 
 
-def test_a_robot_swims_alike_in_any_company():
-    """Who else is in its lane group, and what they touch, changes no bit."""
-    scene = Scene(TEN, numerics=Numerics.preset("balanced"), contact=Contact())
-    together = Simulator(scene, len(CLOSING), threads=2)
-    together.stroke(CLOSING)
-    for robot in (0, 17, 61, len(CLOSING) - 1):
-        alone = Simulator(scene, 1)
-        alone.stroke(CLOSING[robot : robot + 1])
-        np.testing.assert_array_equal(alone.positions[0], together.positions[robot])
-
-
 @pytest.mark.parametrize("scheme", ["implicit-euler", "sdirk2", "sdirk3", "implicit-midpoint"])
 def test_limbs_push_each_other_alike(scheme):
     """In vacuum nothing but actuators and contact acts, so the momentum stays."""
