@@ -18,7 +18,7 @@ from seastar_gym.controllers import learner_zip
 from seastar_gym.controllers.description import Description
 from seastar_gym.controllers.greedy import GreedyPolicy, displacement_map
 from seastar_gym.controllers.learned import LearnedPolicy, load, save
-from seastar_gym.controllers.planner import Budget, Planner, budget_for, state_of
+from seastar_gym.controllers.planner import Budget, Planner, state_of
 from seastar_gym.controllers.scripted import scripted
 from seastar_gym.envs import symmetry
 from seastar_gym.envs.options import make_scene
@@ -159,13 +159,6 @@ def test_the_planner_swims_faster_in_time_than_the_lagged_script():
     planned = swim("planner", planner, env, max_strokes=60)
     lagged = swim("lagged", scripted("lagged", "pairs", decision_period=0.5), env, max_strokes=60)
     assert planned.finished and planned.strokes <= lagged.strokes + 1
-
-
-def test_budgets_follow_the_decision_period():
-    assert budget_for(None) == budget_for(1.0) == Budget()
-    cost = [budget.beam * (budget.depth - 1) for budget in map(budget_for, PERIODS)]
-    assert cost == sorted(cost, reverse=True)
-    assert budget_for(0.3) == budget_for(0.5)
 
 
 def test_the_greedy_map_is_one_of_decisions(tmp_path, monkeypatch):
