@@ -38,7 +38,6 @@ def drawing(name, low, high):
 REFUSED = {
     "goals of two shapes": (lambda: goals(np.zeros((3, 2)), np.zeros(2)), "Goals must have one shape (..., 2)"),
     "goals in space": (lambda: goals(np.zeros(3), np.zeros(3)), "Goals must have one shape (..., 2)"),
-    "goals of an id without": (lambda: GoalForm(gym.make("CartPole-v1")), "GoalForm needs an environment of waypoints"),
     "entries in a list": (lambda: Layout(entries=["scalar"]), "entries must be a tuple of scalar"),
     "an entry of no text": (lambda: Layout(entries=(3,)), "entries must be a tuple of scalar"),
     "an unknown entry": (lambda: Layout(entries=("tensor",)), "entries must be a tuple of scalar"),

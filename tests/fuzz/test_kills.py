@@ -153,31 +153,13 @@ def test_a_run_on_a_full_disk_ends_in_a_sentence_and_continues(seed, tmp_path, t
     assert_continues(tmp_path / "run", ends)
 
 
-@pytest.fixture
-def small_disk(tmp_path):
-    """Mounts a disk of so many bytes; a second call changes its size."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-
-    def mount(size, *options):
-        done = subprocess.run(
-            ["mount", "-t", "tmpfs", *options, "-o", f"{'remount,' if options else ''}size={size}", "tmpfs", folder],
-            capture_output=True, check=False,
-        )  # fmt: skip
-        if done.returncode:
-            pytest.skip("needs the right to mount a small disk")
-        return folder
-
-    yield mount
-    subprocess.run(["umount", folder], check=False, capture_output=True)
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="mounts a small disk")
 @pytest.mark.parametrize("kilobytes", [4, 8, 16, 64, 128, 200, 300, 400, 500, 600, 800, 1200])
 def test_a_run_on_a_disk_that_fills_up_ends_in_a_sentence_and_continues(kilobytes, small_disk, ends):
-    folder = small_disk(kilobytes << 10) / "run"
+    place, grow = small_disk(kilobytes << 10)
+    folder = place / "run"
     assert_one_sentence(start("kill", 0, folder))
     assert_readable(folder)
-    small_disk(256 << 20, "-o", "remount")
+    grow()
     assert_continues(folder, ends)
