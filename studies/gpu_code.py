@@ -16,6 +16,7 @@ from typing import Any, get_args
 from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.simd import cuda
+from seastar_gym.simd.compilation import kept_code
 from seastar_gym.simulator.device_batch import program_of
 from studies.frame import Results, Study
 from studies.gpu import EVERYTHING, scenes
@@ -38,8 +39,9 @@ def assembler() -> str | None:
 
 
 def code_of(scene: Scene) -> str:
-    """The code for GPUs (PTX) of a scene whose limbs all turn alike."""
-    return cuda.ptx_of(program_of(scene))
+    """The code for GPUs (PTX) of a scene whose limbs all turn alike, which is kept on the disk."""
+    program = program_of(scene)
+    return kept_code(f"{program.key}-{cuda.ARCHITECTURE}.ptx", lambda: cuda.ptx_of(program).encode()).decode()
 
 
 def needs(code: str, architecture: str, ptxas: str) -> dict[str, int]:

@@ -10,6 +10,7 @@ not count. Which tests execute which lines is traced once and kept in OUT. Write
 """
 
 import ast
+import gc
 import importlib
 import json
 import os
@@ -237,6 +238,7 @@ class Tracer:
 
 def in_child(root: Path, arguments: list[str], seconds: float, tracer: Tracer | None = None, out: str = "") -> int:
     """Exit code of pytest in a child process, which has all that was imported here; -1 where its time was over."""
+    gc.freeze()  # in the child, a collection would write to every page of what was imported here
     child = os.fork()
     if child == 0:
         import pytest
@@ -257,6 +259,7 @@ def in_child(root: Path, arguments: list[str], seconds: float, tracer: Tracer | 
                 Path(out).write_text(json.dumps(tracer.as_lists()), encoding="utf-8")
         sys.stdout.flush()
         os._exit(int(code))
+    gc.unfreeze()
     return waited_for(child, seconds)
 
 

@@ -3,6 +3,7 @@
 import os
 import shutil
 import signal
+import subprocess
 
 import pytest
 from hypothesis import settings
@@ -72,6 +73,25 @@ def dummy_window(monkeypatch):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     yield
     pygame.display.quit()
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """Function that mounts a small disk; it returns its place, and a function that makes it larger."""
+    mounted = []
+
+    def mount(size):
+        place = tmp_path / f"disk_{len(mounted)}"
+        place.mkdir()
+        command = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(place)]
+        if subprocess.run(command, capture_output=True, check=False).returncode:
+            pytest.skip("mounting a disk needs root")
+        mounted.append(place)
+        return place, lambda: subprocess.run(["mount", "-o", "remount,size=256m", str(place)], check=True)
+
+    yield mount
+    for place in mounted:
+        subprocess.run(["umount", str(place)], check=True)
 
 
 @pytest.fixture(scope="session")

@@ -28,6 +28,16 @@ def gradient(f: Callable[[np.ndarray], Any], x: np.ndarray, step: float) -> np.n
     return np.array([slope(lambda s, unit=unit: f(x + s * unit), 0.0, step) for unit in units])
 
 
+def hessian(f: Callable[[np.ndarray], Any], x: np.ndarray, step: float) -> np.ndarray:
+    """Second derivatives of f in all entries of x, by central differences. f: Of many x at once, its leading axis."""
+    moves = step * np.eye(x.size).reshape(x.size, *x.shape)
+    i, j = np.triu_indices(x.size)
+    corners = [np.asarray(f(x + a * moves[i] + b * moves[j])) for a in (1.0, -1.0) for b in (1.0, -1.0)]
+    found = np.empty((x.size, x.size))
+    found[i, j] = found[j, i] = (corners[0] - corners[1] - corners[2] + corners[3]) / (4.0 * step**2)
+    return found
+
+
 def plain(result: Any) -> Any:
     """What a kernel returned, as arrays in place of lanes and masks."""
     if isinstance(result, tuple):

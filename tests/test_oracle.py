@@ -372,7 +372,7 @@ def test_a_scheme_converges_with_the_order_it_claims(make, scheme, order):
             q, v = oracle.step(star, q, v, k * h, h, (0.2, -0.2, 0.1), scheme)
         return q
 
-    coarse, middle, fine = end(32), end(64), end(128)
+    coarse, middle, fine = end(20), end(40), end(80)
     measured = np.log2(np.linalg.norm(coarse - middle) / np.linalg.norm(middle - fine))
     assert measured == pytest.approx(order, abs=0.2)
 

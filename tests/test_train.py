@@ -5,6 +5,7 @@ import csv
 import errno
 import hashlib
 import html
+import io
 import itertools
 import json
 import math
@@ -15,6 +16,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -50,13 +52,19 @@ def finished(tmp_path_factory):
     return folder
 
 
+@pytest.fixture
+def short_swims(monkeypatch):
+    """Swims that are given up after 20 s: what is measured of them stands in the folder of `finished`."""
+    monkeypatch.setattr("agents.training.options.TIME_LIMIT", 20.0)
+
+
 OWN_ROBOT = """
 from seastar_gym import Scene, Seastar
 scene = Scene(Seastar(nodes_per_limb=7, youngs_modulus=1.1e6))
 """
 
 
-def test_a_robot_of_a_file_is_trained_compared_and_continued(tmp_path, capsys):
+def test_a_robot_of_a_file_is_trained_compared_and_continued(tmp_path, capsys, short_swims):
     file, intervals, folder = tmp_path / "own.py", tmp_path / "intervals.json", tmp_path / "run"
     file.write_text(OWN_ROBOT)
     intervals.write_text('{"robot.youngs_modulus": [9e5, 1.2e6]}')
@@ -173,7 +181,14 @@ def test_the_exported_policy_is_the_model_s(finished):
     assert [trained for trained, *_ in policy.training["progress"]] == [256, 512]
 
 
-def test_one_option_puts_the_policy_in_the_box(finished, tmp_path, monkeypatch):
+@pytest.fixture
+def short_cards(monkeypatch):
+    """Cards that are written in a second: test_cards.py looks at whole ones."""
+    monkeypatch.setattr("agents.cards.FIDELITIES", ("fast",))
+    monkeypatch.setattr("agents.cards.HELD_OUT_PATHS", 1)
+
+
+def test_one_option_puts_the_policy_in_the_box(finished, tmp_path, monkeypatch, short_cards):
     shutil.copytree(finished, tmp_path / "tiny")
     monkeypatch.setattr(shipping, "SHIPPED", tmp_path / "box" / "seastar.safetensors")
     assert train.main(["--resume", str(tmp_path / "tiny")]) == 0
@@ -201,17 +216,45 @@ def test_a_finished_run_can_be_trained_for_more_strokes(finished, tmp_path, caps
         assert "cannot continue with another" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("request_to_stop", [signal.SIGINT, signal.SIGTERM])
-def test_ctrl_c_leaves_a_usable_model_and_says_how_to_go_on(tmp_path, request_to_stop):
-    folder = tmp_path / "stopped"
-    command = [sys.executable, "train.py", *TINY, "--strokes", "10000000", "--out", str(folder)]
+ENDLESS = [*TINY, "--strokes", "10000000", "--out"]
+
+
+def first_checkpoint(folder):
+    deadline = time.monotonic() + 120
+    while not (folder / "progress.csv").exists() and time.monotonic() < deadline:
+        time.sleep(0.1)
+
+
+def stopped_process(folder):
+    """Exit code and output of a training that gets a Ctrl-C after its first checkpoint."""
+    command = [sys.executable, "train.py", *ENDLESS, str(folder)]
     with subprocess.Popen(command, cwd=REPOSITORY, stdout=subprocess.PIPE, text=True) as process:
-        deadline = time.monotonic() + 120
-        while not (folder / "progress.csv").exists() and time.monotonic() < deadline:
-            time.sleep(0.1)
-        os.kill(process.pid, request_to_stop)
+        first_checkpoint(folder)
+        os.kill(process.pid, signal.SIGINT)
         output, _ = process.communicate(timeout=60)
-    assert process.returncode == 130
+    return process.returncode, output
+
+
+def terminated_here(folder):
+    """Exit code and output of a training in this process that is terminated after its first checkpoint."""
+
+    def terminate():
+        first_checkpoint(folder)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    asking = threading.Thread(target=terminate)
+    asking.start()
+    with contextlib.redirect_stdout(io.StringIO()) as output:
+        code = train.main([*ENDLESS, str(folder)])
+    asking.join()
+    return code, output.getvalue()
+
+
+@pytest.mark.parametrize("stopped", [stopped_process, terminated_here])
+def test_ctrl_c_leaves_a_usable_model_and_says_how_to_go_on(tmp_path, stopped, short_swims):
+    folder = tmp_path / "stopped"
+    code, output = stopped(folder)
+    assert code == 130
     assert f"python train.py --resume {folder}" in output
     assert not list(folder.rglob("*.part"))
     policy = policies.load(folder / "policy.safetensors")
@@ -220,17 +263,6 @@ def test_ctrl_c_leaves_a_usable_model_and_says_how_to_go_on(tmp_path, request_to
     assert f"Stopped after {trained} strokes" in output
     assert train.main(["--resume", str(folder), "--strokes", str(trained + 128)]) == 0
     assert "Learned against scripted" in (folder / "evaluation" / "report.html").read_text()
-
-
-def test_a_kill_leaves_the_last_checkpoint(tmp_path):
-    folder = tmp_path / "killed"
-    command = [sys.executable, "train.py", *TINY, "--strokes", "10000000", "--out", str(folder)]
-    with subprocess.Popen(command, cwd=REPOSITORY, stdout=subprocess.DEVNULL) as process:
-        deadline = time.monotonic() + 120
-        while not (folder / "progress.csv").exists() and time.monotonic() < deadline:
-            time.sleep(0.1)
-        process.kill()
-    assert load(folder / "model.zip").actions == "pairs"
 
 
 @pytest.mark.parametrize(
@@ -411,7 +443,7 @@ def test_a_folder_that_cannot_be_is_refused_in_a_sentence(out, tmp_path, capsys,
         ("replace", 3, errno.ENOSPC),
     ],
 )
-def test_a_disk_that_refuses_is_said_in_a_sentence(call, at, code, tmp_path, capsys, monkeypatch):
+def test_a_disk_that_refuses_is_said_in_a_sentence(call, at, code, tmp_path, capsys, monkeypatch, short_swims):
     calls, done = itertools.count(1), getattr(os, call)
 
     def refuse(*arguments, **options):
@@ -453,7 +485,7 @@ def box(tmp_path, monkeypatch):
     return file
 
 
-def test_a_worse_policy_goes_into_the_box_only_when_asked_twice(finished, tmp_path, box, capsys):
+def test_a_worse_policy_goes_into_the_box_only_when_asked_twice(finished, tmp_path, box, capsys, short_cards):
     folder = tmp_path / "tiny"
     shutil.copytree(finished, folder)
     before = box.read_bytes()
@@ -470,7 +502,8 @@ def test_a_worse_policy_goes_into_the_box_only_when_asked_twice(finished, tmp_pa
     assert "not recorded" not in card
 
 
-def test_a_policy_no_worse_than_that_in_the_box_needs_no_second_word(finished, box):
+def test_a_policy_no_worse_than_that_in_the_box_needs_no_second_word(finished, box, monkeypatch):
+    monkeypatch.setattr(shipping, "HELD_OUT_PATHS", 2)
     policies.save(policies.load(finished / "policy.safetensors"), box)
     assert shipping.why_not(policies.load(finished / "policy.safetensors"), saved_options(finished)) is None
 
@@ -542,7 +575,7 @@ def test_efficiency_that_is_damaged_is_refused(tmp_path):
         efficiency.read(tmp_path)
 
 
-def test_several_seeds_are_runs_of_their_own(tmp_path, capsys):
+def test_several_seeds_are_runs_of_their_own(tmp_path, capsys, short_swims):
     assert train.main([*TINY, "--strokes", "128", "--seeds", "3", "4", "--out", str(tmp_path)]) == 0
     assert {file.name for file in tmp_path.iterdir()} == {"seed_3", "seed_4"}
     trained = [policies.load(tmp_path / f"seed_{seed}" / "policy.safetensors").training["seed"] for seed in (3, 4)]
@@ -566,7 +599,7 @@ def test_the_short_form_of_the_training_command_goes_all_the_way(tmp_path):
     assert (tmp_path / "quick" / "evaluation" / "learned.mp4").stat().st_size > 10_000
 
 
-def test_a_timed_training_is_evaluated_and_kept_in_its_own_decisions(tmp_path, monkeypatch):
+def test_a_timed_training_is_evaluated_and_kept_in_its_own_decisions(tmp_path, monkeypatch, short_cards):
     """Its policy file says the decision period, and the script that it is compared with is the lagged one."""
     folder = tmp_path / "timed"
     arguments = [*TINY, "--strokes", "256", "--decision-period", "0.5", "--out", str(folder)]
@@ -580,6 +613,7 @@ def test_a_timed_training_is_evaluated_and_kept_in_its_own_decisions(tmp_path, m
     assert "--decision-period 0.5" in (folder / "evaluation" / "report.html").read_text()
     assert saved_options(folder).ppo.decision_period == 0.5
     monkeypatch.setattr(shipping, "SHIPPED", tmp_path / "box" / "seastar.safetensors")
+    monkeypatch.setattr(shipping, "HELD_OUT_PATHS", 2)
     assert train.main(["--resume", str(folder), "--ship"]) == 0
     shipped = policies.in_the_box(0.5, tmp_path / "box" / "seastar.safetensors")
     assert policies.load(shipped).decision_period == 0.5

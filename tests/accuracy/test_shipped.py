@@ -367,6 +367,7 @@ def test_errors_in_time_are_known_of_the_measured_times_and_between_them():
         assert timed_certificate(period).settings == Certificate.load(file_of(period)).settings
     between, around = timed_certificate(0.3), [timed_certificate(period) for period in (0.2, 0.5)]
     for setting, *others in zip(between.settings, *(each.settings for each in around), strict=True):
+        assert {each.resolution for each in others} == {setting.resolution}
         worst = {name: max(getattr(each, name) for each in others) for name in ("space_error", "time_error")}
         assert {name: getattr(setting, name) for name in worst} == worst
         assert setting.errors["random"] == sum(worst.values())

@@ -151,6 +151,8 @@ def test_the_box_has_a_policy_of_every_task_that_is_kept(id):
     assert task_of(env) == policy.description.task
     learned = load_agent("learned", env)
     np.testing.assert_array_equal(learned.weights["0.weight"], policy.weights["0.weight"])
-    swum = swim_episodes(id, learned, [1000, 1001, 1002, 1003], fidelity="fast")
-    rest = swim_episodes(id, load_agent("rest", env), [1000, 1001, 1002, 1003], fidelity="fast")
+    swum, rest = (
+        swim_episodes(id, agent, [1000, 1001, 1002, 1003], fidelity="fast", max_decisions=100)
+        for agent in (learned, load_agent("rest", env))
+    )
     assert swum.returns.mean() > rest.returns.mean()

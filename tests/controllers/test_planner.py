@@ -130,9 +130,3 @@ def test_a_waypoint_that_is_not_the_last_is_passed_and_not_arrived_at():
     ends = planner._swim_all(planner._swim_all(states)).positions[:, 0].reshape(21, 21, 2)
     way = np.hypot(*np.moveaxis(ends - after, -1, 0))
     assert way[chosen].min() == pytest.approx(way.min(), abs=1e-6)
-
-
-@pytest.mark.parametrize("arguments", [(0, 1), (1, 0)])
-def test_a_search_of_nothing_is_refused(arguments):
-    with pytest.raises(ValueError, match="whole number from 1"):
-        Budget(*arguments)

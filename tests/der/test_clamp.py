@@ -17,7 +17,7 @@ from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes
-from slopes import plain, rows
+from slopes import hessian, plain, rows
 
 GAMMA = 1e-3
 ROBOT = Seastar(3, 4, limbs=(Limb(radius=(2e-3, 1e-3)), Limb(length=0.08), Limb()), discretisation="continuum")
@@ -53,7 +53,10 @@ SCENES = {
 
 
 def eliminated(rods: Rods, q: np.ndarray, start: np.ndarray, v_hat: np.ndarray) -> tuple[Work, tuple]:
-    """Memory and (Phi, Newton decrement, pivot) of a stage at q that began at `start`, where its fluid is frozen."""
+    """Memory and (Phi, Newton decrement, pivot) of a stage at q that began at `start`, where its fluid is frozen.
+
+    q: Nodes of one robot, or of N_LANES.
+    """
     work = make_work(rods, 1)
     work = work._replace(pivots=0.0 * work.q, root_pivots=np.zeros((2 * rods.n_limbs + 2, N_LANES)))
     turns = TURNS[: rods.n_limbs]
@@ -63,14 +66,22 @@ def eliminated(rods: Rods, q: np.ndarray, start: np.ndarray, v_hat: np.ndarray) 
     freeze_fluid.plain(rods, work)
     freeze_strains.plain(rods, work, work.q_hat)
     work.q[:] = rows(q)
-    return work, tuple(plain(one)[0] for one in factorise.plain(rods, work, stage, None))
+    return work, plain(factorise.plain(rods, work, stage, None))
 
 
-def potential(rods: Rods, q: np.ndarray, start: np.ndarray, v_hat: np.ndarray) -> tuple[float, float]:
-    """(Phi, Newton decrement) [J], see `eliminated`."""
-    _, (phi, decrement, pivot) = eliminated(rods, q, start, v_hat)
-    assert pivot > 0.0
-    return phi, decrement
+def potentials(rods: Rods, shapes: np.ndarray, start: np.ndarray, v_hat: np.ndarray) -> np.ndarray:
+    """Phi [J] of many shapes, see `eliminated`."""
+    groups = np.resize(shapes, (-(-len(shapes) // N_LANES), N_LANES, *start.shape))
+    found = [eliminated(rods, group, start, v_hat)[1] for group in groups]
+    assert all((pivot > 0.0).all() for _, _, pivot in found)
+    return np.concatenate([phi for phi, *_ in found])[: len(shapes)]
+
+
+def slopes(rods: Rods, shape: np.ndarray, start: np.ndarray, v_hat: np.ndarray, step: float) -> np.ndarray:
+    """Derivatives of Phi in all entries of a shape."""
+    moves = step * np.eye(shape.size).reshape(-1, *shape.shape)
+    ahead, behind = (potentials(rods, shape + sign * moves, start, v_hat) for sign in (1.0, -1.0))
+    return (ahead - behind) / (2.0 * step)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -79,38 +90,22 @@ def test_the_newton_decrement_is_that_of_the_differences_of_the_potential(name):
     robot, rods, rng = SCENES[name].robot, make_rods(SCENES[name]), np.random.default_rng(0)
     shape = robot.nodes() + 1e-4 * rng.standard_normal((robot.n_nodes, 2))
     start, v_hat = shape + 1e-4 * rng.standard_normal(shape.shape), 0.02 * rng.standard_normal(shape.shape)
-    size, step = shape.size, 1e-6
-    moves = step * np.eye(size).reshape(size, *shape.shape)
-    at = {}
-
-    def phi(i: int, j: int, a: int, b: int) -> float:
-        key = tuple(sorted([(i, a), (j, b)]))
-        if key not in at:
-            at[key] = potential(rods, shape + a * moves[i] + b * moves[j], start, v_hat)[0]
-        return at[key]
-
-    gradient = np.array([phi(i, i, 1, 0) - phi(i, i, -1, 0) for i in range(size)]) / (2.0 * step)
-    hessian = np.array(
-        [[phi(i, j, 1, 1) - phi(i, j, 1, -1) - phi(i, j, -1, 1) + phi(i, j, -1, -1) for j in range(size)]
-         for i in range(size)]
-    ) / (4.0 * step**2)  # fmt: skip
-    _, decrement = potential(rods, shape, start, v_hat)
-    assert decrement == pytest.approx(gradient @ np.linalg.solve(hessian, gradient), rel=2e-4)
+    gradient = slopes(rods, shape, start, v_hat, 1e-6)
+    curvature = hessian(lambda shapes: potentials(rods, shapes, start, v_hat), shape, 1e-6)
+    _, (_, decrement, pivot) = eliminated(rods, shape, start, v_hat)
+    assert pivot[0] > 0.0
+    assert decrement[0] == pytest.approx(gradient @ np.linalg.solve(curvature, gradient), rel=2e-4)
 
 
 @pytest.mark.parametrize("name", ["plain", "damping"])
 def test_the_kept_elimination_solves_for_the_gradient_as_the_newton_step_did(name):
     rods, rng = make_rods(SCENES[name]), np.random.default_rng(1)
     start, v_hat = SHAPE + 1e-4 * rng.standard_normal(SHAPE.shape), 0.02 * rng.standard_normal(SHAPE.shape)
-    moves = 1e-7 * np.eye(SHAPE.size).reshape(SHAPE.size, *SHAPE.shape)
-    slopes = [
-        potential(rods, SHAPE + move, start, v_hat)[0] - potential(rods, SHAPE - move, start, v_hat)[0]
-        for move in moves
-    ]
+    gradient = slopes(rods, SHAPE, start, v_hat, 1e-7)
     work, _ = eliminated(rods, SHAPE, start, v_hat)
     step, again = np.zeros_like(work.q), np.zeros_like(work.q)
     substitute_star.plain(rods, work, step)
-    solve_again.plain(rods, work, np.tile(np.array(slopes)[:, None] / 2e-7, N_LANES), again)
+    solve_again.plain(rods, work, np.tile(gradient[:, None], N_LANES), again)
     np.testing.assert_allclose(again, step, rtol=0.0, atol=1e-5 * np.abs(step).max())
 
 

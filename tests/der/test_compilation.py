@@ -237,11 +237,10 @@ def test_a_folder_that_is_lost_within_a_process_does_no_harm(fresh):
 
 def test_a_real_kernel_whose_files_are_damaged_gives_the_same_bits(copy):
     energy, *_ = copy.run()
-    for damage in ("cut off", "garbage"):
-        for file in copy.cache.rglob("*energies*"):
-            DAMAGE[damage](file)
-        assert copy.run() == [energy, 0, 1]
-        assert copy.run() == [energy, 1, 0]
+    for file, damage in zip(copy.cache.rglob("*energies*"), ("cut off", "garbage"), strict=True):
+        DAMAGE[damage](file)
+    assert copy.run() == [energy, 0, 1]
+    assert copy.run() == [energy, 1, 0]
 
 
 # Whoever waits is told

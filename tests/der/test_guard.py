@@ -3,7 +3,6 @@ through their poles are seen."""
 
 from types import SimpleNamespace
 
-import numba
 import numpy as np
 import pytest
 
@@ -28,6 +27,7 @@ from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.terms.fluid import add_work_of_current, freeze_fluid
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.rods import make_rods
+from seastar_gym.simd.compilation import entry_point
 from seastar_gym.simd.lanes import N_LANES, borrow, load, select, splat, store
 from seastar_gym.simd.rows import aligned_rows
 from stages import robot_and_star, turn_limbs
@@ -53,7 +53,7 @@ FRAME = np.random.default_rng(6).uniform(-1.0, 1.0, (2, N_LANES))
 """Velocity that every lane is seen from [m/s]."""
 
 
-@numba.njit(error_model="numpy")
+@entry_point
 def allowed(rods, work, scheme, actuation, q, v, frame, result):
     rows, memory, tableau, rotation = borrow(rods), borrow(work), borrow(scheme), borrow(actuation)
     start, end = splat(0.25), splat(0.75)
@@ -62,7 +62,7 @@ def allowed(rods, work, scheme, actuation, q, v, frame, result):
     store(borrow(result), 0, allowed_energy(rows, memory, tableau, rotation, start, end, q_rows, v_rows, seen_from))
 
 
-@numba.njit(error_model="numpy")
+@entry_point
 def hold(rods, work, scheme, q, v, frame, robots, limit, largest_cut, result):
     rows, memory, tableau = borrow(rods), borrow(work), borrow(scheme)
     out, one = borrow(result), splat(1.0)
@@ -77,7 +77,7 @@ def hold(rods, work, scheme, q, v, frame, robots, limit, largest_cut, result):
     store(out, 2, select(cut, one, 0.0))
 
 
-@numba.njit(error_model="numpy")
+@entry_point
 def worked(rods, work, q, v, frame, result):
     """Work of the current, then of loads, in a step of 10 ms to (q, v); the fluid is frozen at work.q."""
     rows, memory, out, h = borrow(rods), borrow(work), borrow(result), splat(0.01)
@@ -87,7 +87,7 @@ def worked(rods, work, q, v, frame, result):
     store(out, 1, add_work_of_loads(rows, memory, borrow(q), h, seen_from, splat(0.0)))
 
 
-@numba.njit(error_model="numpy")
+@entry_point
 def jump(rods, work, scheme, q, v, q_1, robots, result):
     """Put (q, v) aside, move to q_1, look for poles, and put the robots back that came through one."""
     rows, memory, tableau, q_rows, v_rows = borrow(rods), borrow(work), borrow(scheme), borrow(q), borrow(v)

@@ -50,15 +50,6 @@ def test_results_are_written_into_the_rows_of_a_memory(batches, dtype):
     assert rows.truncated.any(axis=1).tolist() == [False, True, False]
 
 
-def test_what_was_returned_is_not_touched_again(batches):
-    batch, _ = batches
-    first = batch.step(np.zeros((N, 5), int))
-    kept = [part.copy() for part in first[:4]]
-    batch.step(np.tile([0, 1, 0, 0, 2], (N, 1)))
-    for part, before in zip(first[:4], kept, strict=True):
-        np.testing.assert_array_equal(part, before)
-
-
 @pytest.mark.parametrize(
     "name, wrong",
     [

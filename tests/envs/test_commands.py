@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from seastar_gym.envs.commands import LIMB_COMMANDS, action_space, choices, command_table, to_commands
+from seastar_gym.envs.commands import LIMB_COMMANDS, action_space, command_table, to_commands
 
 
 def test_a_limb_is_left_alone_actuated_anticlockwise_or_actuated_clockwise():
@@ -38,11 +38,6 @@ def test_pairs_table_lists_rest_and_every_plus_minus_pair_once(n_limbs):
     assert np.all((table[1:] == 1.0).sum(axis=1) == 1) and np.all((table[1:] == -1.0).sum(axis=1) == 1)
     assert np.all(np.abs(table[1:]).sum(axis=1) == 2.0)
     assert len({tuple(row) for row in table}) == len(table) == 1 + n_limbs * (n_limbs - 1)
-
-
-def test_a_table_of_too_many_commands_is_refused_before_it_is_made():
-    with pytest.raises(ValueError, match=r"3\^9 = 19,683 actions for 9 limbs"):
-        command_table("joint", 9)
 
 
 def test_tables_cannot_be_changed():
@@ -105,20 +100,3 @@ def test_actions_beyond_the_last_are_refused_with_a_sentence(actions, largest):
         action[1] = bad
         with pytest.raises(ValueError, match=rf'^With actions="{actions}" an action is from 0 to {largest}, .*\.$'):
             to_commands(actions, 5, action, 2)
-
-
-@pytest.mark.parametrize("name", ["", "Limbs", "binary", None, 3])
-def test_unknown_kinds_of_actions_are_refused_with_the_known_ones(name):
-    with pytest.raises(ValueError, match=r"'limbs', 'joint', 'pairs'.*\.$"):
-        action_space(name, 5)
-
-
-def test_continuous_actions_have_neither_table_nor_choices():
-    for refused in (command_table, choices):
-        with pytest.raises(ValueError, match=r"^actions=\"continuous\" has no finite number .*\.$"):
-            refused("continuous", 5)
-
-
-def test_limbs_have_no_table():
-    with pytest.raises(ValueError, match=r"LIMB_COMMANDS\.$"):
-        command_table("limbs", 5)

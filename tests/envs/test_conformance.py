@@ -12,7 +12,8 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
 import seastar_gym
-from episodes import assert_same, assert_same_steps, both, swim_together, swum
+from episodes import assert_same, assert_same_steps, both, break_robot, swim_together, swum
+from seastar_gym import SolverStatus
 from seastar_gym.envs.reward import pulses_of
 
 IDS = tuple(sorted(id for id in gym.registry if id.startswith("Seastar")))
@@ -125,7 +126,8 @@ def test_the_reward_is_the_sum_of_its_terms_in_info(id):
     env.action_space.seed(1)
     for _ in range(3):
         action = env.action_space.sample()
-        _, reward, _, _, info = env.step(action)
+        _, reward, terminated, truncated, info = env.step(action)
+        assert type(reward) is float and type(terminated) is type(truncated) is bool
         assert [name for name in info if name.startswith("reward_")] == names
         assert reward == pytest.approx(sum(info[name] for name in names), abs=1e-12)
         table = env.unwrapped.command_table
@@ -135,14 +137,18 @@ def test_the_reward_is_the_sum_of_its_terms_in_info(id):
 
 
 @pytest.mark.parametrize("id", IDS)
-def test_info_has_the_same_names_types_and_shapes_on_a_reset_and_on_a_step(id):
+def test_info_has_the_same_names_types_and_shapes_on_a_reset_on_a_step_and_on_a_failure(id):
     env = made(id)
-    infos = [env.reset(seed=0)[1], env.step(env.action_space.sample())[4], env.reset()[1]]
+    infos = [env.reset(seed=0)[1], env.step(env.action_space.sample())[4]]
+    break_robot(env.unwrapped, SolverStatus.NOT_FINITE)
+    infos += [env.step(env.action_space.sample())[4], env.reset()[1]]
+    assert infos[2]["solver_message"]
     for info in infos:
         assert list(info) == list(infos[0])
         for name, value in info.items():
             assert type(value) is type(infos[0][name]) and np.shape(value) == np.shape(infos[0][name]), name
             assert type(value) in (int, float, bool, str, np.ndarray), name
+    assert infos[1]["hub_position"].shape == (2,) and infos[1]["hub_position"].dtype == np.float64
 
 
 @pytest.mark.parametrize("id", IDS)

@@ -5,7 +5,6 @@ from functools import partial
 import numpy as np
 import pytest
 
-from refusals import assert_refused
 from seastar_gym import Scene, Seastar
 from seastar_gym.envs import paths
 from seastar_gym.envs.options import SwimOptions
@@ -264,12 +263,6 @@ def test_a_longer_path_of_another_robot_leaves_the_way_to_go_as_it_is():
     task.reset(np.array([False, True]), generators, [*path, [0.3, 0.3], [0.4, 0.3]])
     after = task._measure_way_to_go(np.zeros((2, 2)))
     assert after[0] == before[0] and after[1] == pytest.approx(before[1] + 0.3)
-
-
-def test_waypoints_are_as_large_as_the_farthest_place_at_most():
-    SeastarSwimEnv(waypoint_radius=paths.FARTHEST)
-    with assert_refused("waypoint_radius must be at most 1e"):
-        SeastarSwimEnv(waypoint_radius=1.001 * paths.FARTHEST)
 
 
 def test_a_fidelity_of_a_scene_that_nobody_measured_promises_nothing():

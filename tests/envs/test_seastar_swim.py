@@ -173,35 +173,9 @@ def test_a_fidelity_that_contradicts_the_numerics_of_a_scene_is_refused():
             make(scene=Scene(numerics=Numerics()), fidelity="fast")
 
 
-def test_types_of_a_step_are_plain():
-    env = fast()
-    env.reset(seed=0)
-    observation, reward, terminated, truncated, info = env.step(STRAIGHT)
-    assert observation.dtype == np.float32
-    assert type(reward) is float and type(terminated) is bool and type(truncated) is bool
-    assert set(info) == FACTS | OF_A_STROKE
-    for name, value in info.items():
-        if name == "hub_position":
-            assert value.shape == (2,) and value.dtype == np.float64
-        else:
-            assert type(value) in (int, float, bool, str), name
-
-
-@pytest.mark.parametrize("draws", [None, DomainRandomization({"limb_strengths": Uniform(0.5, 1.0)})])
-def test_info_has_the_same_names_types_and_shapes_on_a_reset_on_a_step_and_on_a_failure(draws):
-    env = fast(randomization=draws)
-    infos = [env.reset(seed=0)[1], env.step(STRAIGHT)[4]]
-    break_robot(env, SolverStatus.NOT_CONVERGED)
-    infos += [env.step(STRAIGHT)[4], env.reset()[1]]
-    for info in infos[1:]:
-        assert list(info) == list(infos[0])
-        for name, value in info.items():
-            assert type(value) is type(infos[0][name]), name
-            assert np.shape(value) == np.shape(infos[0][name]), name
-
-
 def test_a_reset_tells_of_a_stroke_that_has_not_happened():
     info = fast().reset(seed=0)[1]
+    assert set(info) == FACTS | OF_A_STROKE
     assert info["smallest_opening_angle"] == pytest.approx(2 * np.pi / 5)
     assert info["is_success"] is False and info["solver_message"] == ""
     assert not any(info[name] for name in OF_A_STROKE - {"smallest_opening_angle"})
@@ -513,8 +487,8 @@ def test_what_is_no_action_is_refused_and_changes_nothing(action):
         ({"waypoint_radius": 1e300}, "waypoint_radius"),
         ({"waypoint_radius": np.array([0.01])}, "waypoint_radius"),
         ({"waypoint_radius": True}, "waypoint_radius"),
-        ({"path": [[0.1, 0.0], [0.1, 0.0]]}, "the same point"),
-        ({"path": [[0.0, 0.0]]}, "origin"),
+        ({"path": [[0.1, 0.0], [0.1, 0.0]]}, "are the same point"),
+        ({"path": [[0.0, 0.0]]}, "must lead away from the origin"),
         ({"path": [[1e300, 0.0]]}, "within"),
         ({"path": [[True, False]]}, "numbers"),
         ({"path": [[10**400, 0]]}, "numbers"),
@@ -532,9 +506,8 @@ def test_what_is_no_action_is_refused_and_changes_nothing(action):
 def test_arguments_that_mean_nothing_are_refused_with_a_sentence(arguments, words):
     for make in (SeastarSwimEnv, SeastarSwimVectorEnv):
         if make is SeastarSwimEnv or not {"render_mode", "frames_per_stroke"} & {*arguments}:  # a batch has its own
-            with pytest.raises(ValueError, match=words) as caught:
+            with assert_refused(words):
                 make(**arguments)
-            assert str(caught.value).endswith(".") and "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("name", ["progress", "waypoint", "effort"])
@@ -559,9 +532,8 @@ def test_reset_options_that_mean_nothing_are_refused_and_the_episode_goes_on(opt
     env.reset(seed=0)
     env.step(STRAIGHT)
     before, waypoints = env.simulator.positions, env.waypoints
-    with pytest.raises(ValueError, match=words) as caught:
+    with assert_refused(words):
         env.reset(options=options)
-    assert str(caught.value).endswith(".")
     np.testing.assert_array_equal(env.simulator.positions, before)
     np.testing.assert_array_equal(env.waypoints, waypoints)
     assert env.step(STRAIGHT)[4]["time"] == 2.0

@@ -6,7 +6,6 @@ import pickle
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium.utils.env_match import check_environments_match
 from gymnasium.vector import AutoresetMode
 
 from episodes import assert_same_infos, assert_same_steps, both, break_robot
@@ -47,12 +46,11 @@ def swim_both(batch, singles, n_strokes: int, seed: int = 0) -> list[tuple]:
 @pytest.mark.parametrize(
     "arguments",
     [
-        {"max_episode_steps": 4, "path": "random", "random_heading": True},
         {"max_episode_steps": 5, "path": SHORT_PATH, "waypoint_radius": 0.003},
         {"max_episode_steps": 2, "path": SHORT_PATH, "waypoint_radius": 0.003},  # both ends at once
         {"path": SHORT_PATH, "reward": RewardWeights(100.0, 3.0, 0.2)},
     ],
-    ids=["random", "short", "both", "weights"],
+    ids=["short", "both", "weights"],
 )
 def test_a_batch_gives_the_bits_of_single_environments_across_resets(autoreset_mode, arguments):
     batch, singles = both(ID, N_LANES + 1, autoreset_mode, **arguments)
@@ -80,13 +78,6 @@ def test_a_batch_without_autoreset_gives_the_bits_of_single_environments():
         found = batch.step(actions)
         assert_same_steps(found, singles.step(actions))
         over = found[2] | found[3]
-
-
-def test_gymnasiums_comparison_of_environments_passes():
-    """It compares flags as numbers, so it takes batches of one; infos are compared above."""
-    for autoreset_mode in (NEXT_STEP, SAME_STEP):
-        batch, singles = both(ID, 1, autoreset_mode, path="random", random_heading=True, max_episode_steps=3)
-        check_environments_match(singles, batch, num_steps=10, info_comparison="keys-superset")
 
 
 @pytest.mark.parametrize("threads", [1, 2])
@@ -453,9 +444,8 @@ def test_what_is_no_action_is_refused_and_changes_nothing(actions):
 def test_reset_options_that_mean_nothing_are_refused(options, words):
     batch = native()
     batch.reset(seed=0)
-    with pytest.raises(ValueError, match=words) as caught:
+    with assert_refused(words):
         batch.reset(options=options)
-    assert str(caught.value).endswith(".")
 
 
 def test_a_list_of_seeds_has_one_for_every_robot():
@@ -466,12 +456,11 @@ def test_a_list_of_seeds_has_one_for_every_robot():
 @pytest.mark.parametrize(
     "arguments, words",
     [
-        ({"num_envs": 0}, "whole number"),
-        ({"num_envs": 2.5}, "whole number"),
+        *(({"num_envs": value}, "num_envs must be a whole number") for value in (0, 2.5)),
         *(({"max_episode_steps": value}, "max_episode_steps") for value in (0, -1, np.nan, np.inf, 2.5, True, "4")),
         ({"threads": 0}, "threads"),
-        ({"render_mode": "human"}, "rgb_array"),
-        ({"autoreset_mode": "sometimes"}, "sometimes"),
+        ({"render_mode": "human"}, "The batch draws with render_mode=\"rgb_array\""),
+        ({"autoreset_mode": "sometimes"}, "autoreset_mode must be one of .*sometimes"),
     ],
     ids=str,
 )

@@ -152,7 +152,7 @@ def test_the_command_line_writes_a_row_for_every_set_and_agent(tmp_path, capsys)
 def test_named_paths_on_two_fidelities(tmp_path, capsys):
     file = tmp_path / "trials.csv"
     command = ["--agents", "rest", "--sets", "nominal", "--fidelity", "fast", "balanced", "--out", str(file)]
-    assert main([*command, "--num-threads", "1"]) == 0
+    assert main([*command, "--seconds", "20", "--num-threads", "1"]) == 0
     with file.open(newline="", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     assert [row["fidelity"] for row in rows] == ["fast"] * 4 + ["balanced"] * 4

@@ -1,7 +1,8 @@
 """train.py with an end: `python killed_training.py FATE N FOLDER ARGUMENTS..`.
 
 FATE happens when it touches a file of FOLDER for the Nth time: "kill" ends the process at once, as `kill -9` does;
-"full" says that the disk is full, then and ever after. With N = 0 nothing happens. The number of touches is printed.
+"full" says that the disk is full, then and ever after. With N = 0 nothing happens. Touches that either may come of are
+counted and printed.
 """
 
 import errno
@@ -10,6 +11,8 @@ import signal
 import sys
 from pathlib import Path
 
+SECONDS = 20.0
+"""After which swims are given up."""
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT
 
 
@@ -17,17 +20,19 @@ def main() -> int:
     fate, at, folder, *arguments = sys.argv[1:]
     sys.path.insert(0, str(Path(__file__).parents[2]))
     import train  # takes seconds, and touches no file of the folder
+    from agents.training import options
 
-    touches = 0
+    options.TIME_LIMIT = SECONDS
+
+    touches = {"kill": 0, "full": 0}
 
     def watch(event: str, details: tuple[object, ...]) -> None:
-        nonlocal touches
         if event not in ("open", "os.mkdir", "os.rename", "os.remove") or not str(details[0]).startswith(folder):
             return
-        if fate == "full" and (event == "os.remove" or (event == "open" and not int(str(details[2])) & WRITING)):
-            return
-        touches += 1
-        if not 0 < int(at) <= touches:
+        reads = event == "os.remove" or (event == "open" and not int(str(details[2])) & WRITING)
+        touches["kill"] += 1
+        touches["full"] += not reads
+        if (fate == "full" and reads) or not 0 < int(at) <= touches[fate]:
             return
         if fate == "kill":
             os.kill(os.getpid(), signal.SIGKILL)
@@ -35,7 +40,7 @@ def main() -> int:
 
     sys.addaudithook(watch)
     code = train.main(arguments)
-    print(f"touches: {touches}")
+    print("touches:", *touches.values())
     return code
 
 

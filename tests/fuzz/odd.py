@@ -148,19 +148,27 @@ SIMULATOR_CALLS: Calls = {
 }  # fmt: skip
 
 
-def check_odd_call(name: str, argument: str, value: Callable[[], Any]) -> None:
-    """Call a simulator with one odd argument; what it refuses changes nothing."""
+def begin() -> None:
+    """Bring what has a state into one that can be lost."""
+    for env in (ENV, VECTOR_ENV):
+        env.reset(seed=0, options={"path": "line"})
     SIMULATOR.set_scene(Scene(numerics=FAST))
     SIMULATOR.set_limb_strengths(1.0)
     SIMULATOR.reset()
     SIMULATOR.stroke([[0.0, 1.0, 0.0, 0.0, -1.0]] * 2)
+
+
+def check_odd_call(name: str, argument: str, value: Callable[[], Any]) -> None:
+    """Call a simulator that has begun with one odd argument; what it refuses changes nothing."""
     before = SIMULATOR.get_state()
     call, arguments = SIMULATOR_CALLS[name]
     where = f"Simulator.{name}({argument}={value()!r})"
     if assert_taken_or_refused(lambda: call(**{**arguments, argument: value()}), where):
         for one, other in zip(SIMULATOR.get_state(), before, strict=True):
             np.testing.assert_array_equal(one, other, err_msg=where)
+        return
     assert np.isfinite(SIMULATOR.positions).all() and np.isfinite(SIMULATOR.time).all(), where
+    begin()
 
 
 ENV = SeastarSwimEnv(fidelity="fast", path="line")
@@ -179,9 +187,8 @@ ENV_CALLS: Calls = {
 
 
 def check_odd_env_call(name: str, argument: str, value: Callable[[], Any]) -> None:
-    """Call an environment with one odd argument; it can be used afterwards."""
+    """Call an environment that has begun with one odd argument; it can be used afterwards."""
     env = ENV if name.startswith("SeastarSwimEnv") else VECTOR_ENV
-    env.reset(seed=0, options={"path": "line"})
     call, arguments = ENV_CALLS[name]
     assert_taken_or_refused(lambda: call(**{**arguments, argument: value()}), f"{name}({argument}={value()!r})")
     env.reset(seed=0)

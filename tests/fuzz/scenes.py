@@ -73,7 +73,7 @@ COMPILED: tuple[Terms, ...] = (
 )  # fmt: skip
 """The sets that other tests compile, too."""
 
-MOST_STEPS = 20
+MOST_STEPS = 10
 """Of half a stroke."""
 
 TAME_PEAK = 1.0

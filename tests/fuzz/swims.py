@@ -1,5 +1,6 @@
 """Swims of the chapter's robot: presets against the reference, and environments alone and in a batch."""
 
+from functools import lru_cache
 from random import Random
 from typing import Any
 
@@ -19,11 +20,12 @@ N_STROKES, N_ROBOTS = 10, 16
 # --- presets ---------------------------------------------------------------------------------------------------------
 
 
-def hub_paths(fidelity: Fidelity, commands: np.ndarray) -> np.ndarray:
-    """Hub positions [m] from rest, shape (n_strokes + 1, n_robots, 2)."""
-    simulator = Simulator(Scene.preset(fidelity), commands.shape[1])
+@lru_cache(maxsize=8)
+def hub_paths(fidelity: Fidelity, seed: int) -> np.ndarray:
+    """Hub positions [m] from rest by ternary commands, shape (n_strokes + 1, N_ROBOTS, 2)."""
+    simulator = Simulator(Scene.preset(fidelity), N_ROBOTS)
     path = [simulator.hub_position()]
-    for command in commands:
+    for command in ternary_commands(seed):
         assert not simulator.stroke(command).status.any()
         path.append(simulator.hub_position())
     return np.array(path)
@@ -44,8 +46,7 @@ def ternary_commands(seed: int) -> np.ndarray:
 
 def check_preset(fidelity: Fidelity, seed: int) -> None:
     """A preset's path errs by no more than is promised of it, and of the reference."""
-    commands = ternary_commands(seed)
-    errors = path_errors(hub_paths(fidelity, commands), hub_paths("reference", commands))
+    errors = path_errors(hub_paths(fidelity, seed), hub_paths("reference", seed))
     known = [chapters_certificate().of(Scene.preset(name)) for name in (fidelity, "reference")]
     promised = sum(each.errors["random"] for each in known)
     assert errors.max() <= promised, f"{fidelity} errs by {errors.max():.4f}, promised are {promised:.4f}"

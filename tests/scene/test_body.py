@@ -123,11 +123,6 @@ def test_the_rim_of_a_polygon_is_met_in_the_direction_of_a_limb():
     np.testing.assert_allclose(roots, [(0.03, 0.0), (0.0, 0.015), (-0.03, 0.0), (0.0, -0.015)], atol=1e-15)
 
 
-def test_scenes_with_a_body_are_written_and_read_back():
-    scene = Scene(Seastar(4, 5, body=Body.rectangle(0.06, 0.03, mass=np.array([0.1, 0.2]), attachments=CORNERS)))
-    assert Scene.from_dict(scene.to_dict()) == scene
-
-
 def test_a_disc_with_a_star_is_symmetric_and_others_are_not():
     assert Seastar(body=Body(radius=0.02)).is_symmetric
     assert Seastar(6, body=Body(outline=HEXAGON)).is_symmetric

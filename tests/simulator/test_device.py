@@ -19,13 +19,14 @@ from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, StrokeRep
 from seastar_gym.scene.numerics import SchemeName
 from seastar_gym.simd import cuda
 from seastar_gym.simulator import device_batch
-from seastar_gym.simulator.device_batch import DEVICES, DeviceBatch, program_of
+from seastar_gym.simulator.device_batch import DEVICES, DeviceBatch
 from seastar_gym.sweep.axes import Choices
 from seastar_gym.sweep.command import main as sweep_command
 from seastar_gym.sweep.designs import Sweep
 from seastar_gym.sweep.swimming import swim
 from strokes import assert_same, finished
 from studies.gpu import EVERYTHING, compared, scenes
+from studies.gpu_code import code_of
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="devices have compiled code alone")
 
@@ -233,7 +234,7 @@ CODES = {scheme: replace(SMALL, numerics=Numerics(scheme, 0.005)) for scheme in 
 
 @pytest.mark.parametrize("scene", [*CODES.values(), scenes()[f"sdirk2, {EVERYTHING}"]], ids=[*CODES, "everything"])
 def test_the_code_for_gpus_rounds_every_operation_by_itself_and_calls_nothing(scene):
-    code = cuda.ptx_of(program_of(scene))
+    code = code_of(scene)
     found = set(OF_DOUBLES.findall(code))
     assert {"add.rn.f64", "mul.rn.f64", "fma.rn.f64", "div.rn.f64", "sqrt.rn.f64"} <= found
     assert {name for name in found - ROUNDED_TO_NEAREST if not EXACT.fullmatch(name)} == set()

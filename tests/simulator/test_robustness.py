@@ -166,29 +166,6 @@ def test_a_number_that_is_none_ends_its_own_robots_stroke_and_touches_no_other(s
     assert not sick.stroke(commands[0]).status.any()
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_robots_in_trouble_move_to_the_same_bits_alone_in_a_batch_and_on_two_threads(scheme):
-    n_robots, scene = 11, Scene(TEN, numerics=Numerics(scheme, 0.01))  # groups of 8 or 4 lanes, the last not full
-    batches = [rattled(Simulator(scene, n_robots, threads), 1.0) for threads in (1, 2)]
-    state = batches[0].get_state()
-    singles = [Simulator(scene) for _ in range(n_robots)]
-    for k, single in enumerate(singles):
-        single.set_state(state.of_robots(slice(k, k + 1)))
-    halvings = 0
-    for command in ternary(2, n_robots):
-        reports = [batch.stroke(command) for batch in batches]
-        alone = [single.stroke(command[k : k + 1]) for k, single in enumerate(singles)]
-        halvings += reports[0].halvings.sum()
-        for name in ("positions", "velocities"):
-            one = np.concatenate([getattr(single, name) for single in singles])
-            for batch in batches:
-                np.testing.assert_array_equal(getattr(batch, name), one)
-        for report in reports:
-            for found, wanted in zip(report, zip(*alone, strict=True), strict=True):
-                np.testing.assert_array_equal(found, np.concatenate(wanted))
-    assert halvings > 0
-
-
 # What stays, stays in trouble too
 
 

@@ -171,22 +171,6 @@ def test_any_number_of_threads_gives_the_same_bits(threads):
             np.testing.assert_array_equal(a, b)
 
 
-def test_a_neighbour_that_halves_its_steps_changes_no_other_robots_bits():
-    """Two iterations suffice for a robot that swims, not for one whose nodes fly about."""
-    scene, n_robots = scene_of("implicit-midpoint", 5e-3, max_iterations=3), N_LANES
-    calm, mixed = Simulator(scene, n_robots), Simulator(scene, n_robots)
-    velocities = np.zeros((n_robots, 46, 2))
-    velocities[1] = random_velocities(1, 1.0)[0]
-    set_motion(mixed, velocities)
-    others = np.arange(n_robots) != 1
-    for command in random_commands(n_robots, 4):
-        calm_report, report = calm.stroke(command), mixed.stroke(command)
-        assert_same_bits(calm.get_state().of_robots(others), mixed.get_state().of_robots(others))
-        for name, calm_one, one in zip(report._fields, calm_report, report, strict=True):
-            np.testing.assert_array_equal(calm_one[others], one[others], err_msg=name)
-    assert report.halvings[1] > 0
-
-
 def wild_swim() -> list[np.ndarray]:
     """Two strokes of nine robots, six of which fly about: positions, velocities and counts."""
     simulator, velocities = Simulator(scene_of("sdirk3", 0.02), 9), random_velocities(9, 0.1)

@@ -159,7 +159,7 @@ def finished(tmp_path, n_cells, process):
 
 
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGKILL])
-def test_a_stopped_sweep_goes_on_where_it_was(stop, tmp_path):
+def test_a_stopped_sweep_goes_on_where_it_was(stop, tmp_path, monkeypatch):
     """Ctrl-C goes to all processes of a terminal, a kill to one."""
     words = "robot.limb_length=0.05:0.15:400", "--robots", "1", "--measured", "1", "--settling", "0", "--workers", "1"
     process = command(tmp_path, *words)
@@ -176,11 +176,16 @@ def test_a_stopped_sweep_goes_on_where_it_was(stop, tmp_path):
     names = set(Parts(tmp_path).names())
     assert len(names) >= 3
     assert all(Parts(tmp_path).file(name).read_bytes()[-4:] == b"PAR1" for name in names)
-    again = command(tmp_path, *words)
-    finished(tmp_path, len(names) + 3, again)
-    again.send_signal(signal.SIGINT)
-    again.communicate(timeout=60)
-    assert names < set(Parts(tmp_path).names())
+    kept = []
+
+    def interrupt(tally):
+        kept.append(tally.kept)
+        if tally.done == 3:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("seastar_gym.sweep.command.bar_of", lambda *_: interrupt)
+    assert main([*words[:-2], "--executor", "here", "--out", str(tmp_path)]) == INTERRUPTED
+    assert {*kept} == {len(names)} and len(names | {*Parts(tmp_path).names()}) == len(names) + 3
 
 
 def test_what_was_done_is_told_with_what_was_not(tmp_path):

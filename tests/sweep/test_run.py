@@ -34,7 +34,7 @@ def jobs(tmp_path):
 EXECUTORS = {
     "here": lambda tmp_path: Here(),
     "one process": lambda tmp_path: Processes(1),
-    "three processes": lambda tmp_path: Processes(3),
+    "two processes": lambda tmp_path: Processes(2),
     "ray": ray_tasks,
     "slurm": jobs,
 }
@@ -210,7 +210,7 @@ def test_results_are_the_same_bits_on_every_executor(tmp_path, sweep):
     run(sweep.cells(), tmp_path / "here", Here())
     expected = bits(tmp_path / "here")
     assert len(expected) == 4
-    for name in ("one process", "three processes"):
+    for name in ("one process", "two processes"):
         run(sweep.cells(), tmp_path / name, EXECUTORS[name](tmp_path))
         assert bits(tmp_path / name) == expected, name
 

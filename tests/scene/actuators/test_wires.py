@@ -12,7 +12,7 @@ PEAK = WIRES.peak_angle
 SMALL = 1e-12
 
 
-def march(wires: SmaWires, given: list[tuple[float, float]], until: float, dt: float = 1e-5) -> np.ndarray:
+def march(wires: SmaWires, given: list[tuple[float, float]], until: float, dt: float = 1e-4) -> np.ndarray:
     """Contractions (x_+, x_-) at the end, by tiny steps. given: Times [s] and commands, whole multiples of dt."""
     x, left, due = np.zeros(2), np.zeros(2), {round(t / dt): c for t, c in given}
     for k in range(round(until / dt)):
