@@ -189,7 +189,7 @@ class Scene:
         sections = [limb.section for limb in limbs]
         of_discs = [r for section in sections if isinstance(section, Disc) for r in as_tuple(section.radius)]
         others = {shown(section) for section in sections if not isinstance(section, Disc)}
-        named = [f"radii of {_span(of_discs)} m"] * bool(of_discs) + [*others]
+        named = [f"radii of {_span(of_discs)} m", *others] if of_discs else [*others]
         return (
             f"for limbs {_span(limb.length for limb in limbs)} m long, with {', '.join(named)}, "
             f"Young's moduli of {_span(E for limb in limbs for E in limb.youngs_modulus)} Pa "
