@@ -60,8 +60,8 @@ def placeholders(root: Path = ROOT) -> list[str]:
             "The address of the repository is not known: fill in repository under [tool.hatch.metadata.hooks.custom] "
             "in pyproject.toml. README's links are relative without it, and lead nowhere on a package index."
         )
-    if "OWNER" in (root / "docs" / "third_party.md").read_text(encoding="utf-8"):
-        wrong.append("docs/third_party.md still says OWNER: write whose repository it is.")
+    if "OWNER" in (root / ".ci" / "release.md").read_text(encoding="utf-8"):
+        wrong.append(".ci/release.md still says OWNER: write whose repository it is.")
     if "repository-code:" not in (root / "CITATION.cff").read_text(encoding="utf-8"):
         wrong.append("CITATION.cff has no repository-code: add the address of the repository.")
     return wrong

@@ -92,7 +92,7 @@ paths that no training draws. A swim ends after {TIME_LIMIT:g} s. Energy is per 
 ## Limits
 
 * It knows the chapter's robot, with its drag, its mass and its actuators. In other physics the order of policies can be
-  another one (docs/fidelities.md).
+  another one (docs/training.md).
 * It sees the whole state, without noise. It was not trained on noise, currents or weak limbs; docs/results.md has swims
   with them.
 * It sees two waypoints, 0.1 to 0.2 m apart in its training, and does not plan beyond them.

@@ -17,6 +17,7 @@ from typing import Any
 import tyro
 
 from seastar_gym.command import command_parser
+from seastar_gym.extras import require_extra
 from studies.frame import DOCS, Results, Study, require_known
 from studies.pages import check, draw, fill, show
 from studies.provenance import provenance
@@ -59,6 +60,8 @@ def run(study: Study, given: Sequence[str], doc: str) -> int:
     out = Path(getattr(options, "out", "."))
     file = study.place(out, study.file) if study.file else None
     command = prog if study.settings else shlex.join([*prog.split(), *given])
+    if study.extra:
+        require_extra(f"Runs of {prog}", study.extra, *study.packages)
     about = provenance(command, *study.packages)
     results = Results(about, file, study.settings(options) if study.settings else None)
     failed = study.run(options, results)

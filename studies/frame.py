@@ -39,6 +39,7 @@ class Study:
     pages: By their names, whole pages in Markdown.
     drawn: Names of pictures in docs/ that only a run draws.
     packages: Packages whose versions count, beside those of every study.
+    extra: What brings them, where a run needs more than the module does.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Study:
     pages: Mapping[str, Callable[[Any], str]] = field(default_factory=dict)
     drawn: tuple[str, ...] = ()
     packages: tuple[str, ...] = ()
+    extra: str = ""
 
     def place(self, out: Path, name: str) -> Path:
         """Where a file of the study goes: into the folder `out`, or beside the file `out`, by its name."""

@@ -106,7 +106,7 @@ def test_every_base_dependency_is_imported_by_the_package():
     ("folders", "extras"),
     [
         (["seastar_gym"], ["render", "studies", "train", "ray", "slurm", "data", "gpu"]),
-        (["studies"], ["train", "sweep", "test", "data"]),
+        (["studies"], ["train", "sweep", "test", "data", "mujoco"]),
         (["agents", "train.py"], ["train", "rllib"]),
         (["tests"], ["test", "browser", "ray", "learners"]),
         (["docs"], ["docs", "learners"]),
@@ -267,10 +267,10 @@ def test_a_wheel_has_the_addresses(tmp_path, monkeypatch):
 
 
 def test_a_release_without_an_address_is_refused_with_sentences(tmp_path):
-    (tmp_path / "docs").mkdir()
+    (tmp_path / ".ci").mkdir()
     for name, without, filled in (
         ("pyproject.toml", 'repository = ""', f'repository = "{ADDRESS}"'),
-        ("docs/third_party.md", "OWNER", "someone"),
+        (".ci/release.md", "OWNER", "someone"),
         ("CITATION.cff", "license: MIT\n", f"license: MIT\nrepository-code: {ADDRESS}\n"),
     ):
         text = (ROOT / name).read_text(encoding="utf-8")
@@ -278,7 +278,7 @@ def test_a_release_without_an_address_is_refused_with_sentences(tmp_path):
     assert contents["placeholders"](tmp_path) == []
     project = (tmp_path / "pyproject.toml").read_text(encoding="utf-8")
     (tmp_path / "pyproject.toml").write_text(project.replace(ADDRESS, ""), encoding="utf-8")
-    (tmp_path / "docs" / "third_party.md").write_text("https://github.com/OWNER/seastar-gym", encoding="utf-8")
+    (tmp_path / ".ci" / "release.md").write_text("https://github.com/OWNER/seastar-gym", encoding="utf-8")
     (tmp_path / "CITATION.cff").write_text("title: seastar-gym", encoding="utf-8")
     address, owner, citation = contents["placeholders"](tmp_path)
     assert "fill in repository" in address and "OWNER" in owner and "repository-code" in citation

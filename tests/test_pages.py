@@ -164,6 +164,31 @@ def test_links_lead_to_files(page):
     assert not missing
 
 
+def anchors(page: Path) -> set[str]:
+    """Anchors of a page's headings, as GitHub and the site name them."""
+    titles = re.findall(r"^#+ (.+)$", FENCED.sub("", page.read_text(encoding="utf-8")), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_links_lead_to_headings(page):
+    text = FENCED.sub("", page.read_text(encoding="utf-8"))
+    named = [(page.parent / target if target else page, anchor[1:]) for target, anchor in LINK.findall(text) if anchor]
+    assert [(target.name, anchor) for target, anchor in named if anchor not in anchors(target)] == []
+
+
+SAID = re.compile(r"docs/(\w+\.md)")
+
+
+def test_pages_that_the_code_names_are_there():
+    """In docstrings, model cards and sentences of the programs."""
+    files = [file for room in ("seastar_gym", "agents", "studies", ".ci") for file in (ROOT / room).rglob("*.*")]
+    texts = {file: file.read_text("utf-8") for file in files if file.suffix in {".py", ".md", ".yml", ".html"}}
+    named = {(file.name, page) for file, text in texts.items() for page in SAID.findall(text)}
+    assert len(named) > 10
+    assert [(file, page) for file, page in named if not (ROOT / "docs" / page).is_file()] == []
+
+
 def test_the_files_that_the_page_on_extending_names_are_there():
     page = ROOT / "docs" / "extending.md"
     named = re.findall(r"`((?:seastar_gym|tests|der|model)/[\w/]+\.py)`", page.read_text(encoding="utf-8"))

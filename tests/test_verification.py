@@ -1,7 +1,9 @@
 """The simulator against exact solutions and published codes, and those solutions against independent formulas."""
 
 import functools
+import json
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +15,7 @@ from continuum_oracle import Continuum
 from oracle import Star, elastic_hessian, inertia_matrix
 from seastar_gym import Numerics, Scene, Seastar, Simulator, Water
 from seastar_gym.model.rods import make_rods
-from studies.verification import drag, exact, frequencies, published, waves
+from studies.verification import drag, exact, frequencies, mujoco, published, waves
 from studies.verification import page as verification_page
 from studies.verification import study as verification
 from studies.verification.unactuated import IN_LINE, let_pass, pause
@@ -185,3 +187,35 @@ def test_a_row_is_written_with_its_unit_and_difference():
     assert not row.holds
     shown = verification_page.Section("Speeds", "How.", [row])
     assert "| speed [m/s] | 2.00000 | 2.00100 | +1.0e-03 (+5.0e-04) |" in verification_page.as_page([shown])
+
+
+# Beside MuJoCo
+
+
+def beside_mujoco() -> dict:
+    """The committed errors and times: by case, setting and code."""
+    return json.loads(PAGE.with_name("mujoco.json").read_text(encoding="utf-8"))
+
+
+def test_our_error_beside_mujoco_is_that_of_the_page():
+    wanted = np.cos(2.0 * np.pi * np.arange(mujoco.PERIODS * mujoco.SAMPLES + 1) / mujoco.SAMPLES)
+    numerics = Numerics("implicit-midpoint", mujoco.period() / 50, 1e-10)
+    committed, _, _ = beside_mujoco()["ringing"]["50"]["implicit-midpoint"]
+    assert mujoco.our_ringing(numerics, wanted).error == pytest.approx(committed, rel=1e-3)
+
+
+def test_the_page_says_of_mujoco_what_was_measured():
+    found = beside_mujoco()
+    for row in found["ringing"].values():
+        (damped, own_time, _), (other, other_time, _) = row["implicit-euler"], row["mujoco"]
+        assert damped <= other and own_time < 0.2 * other_time
+        assert row["implicit-midpoint"][0] < 0.1 * other
+    loaded = found["tip load"]
+    assert loaded["40"]["implicit-euler"][0] < loaded["20"]["mujoco"][0] < loaded["40"]["mujoco"][0]
+    assert found["free fall"]["20"]["implicit-midpoint"][0] < mujoco.ROUNDING
+
+
+@pytest.mark.skipif(find_spec("mujoco") is None, reason="MuJoCo is not installed: the extra mujoco has it")
+def test_mujoco_s_error_is_that_of_the_page():
+    committed, _, _ = beside_mujoco()["tip load"]["10"]["mujoco"]
+    assert mujoco.loaded(10)[mujoco.MUJOCO].error == pytest.approx(committed, rel=1e-2)

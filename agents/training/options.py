@@ -60,7 +60,7 @@ class Options(Lengths):
     """Turn every robot at random at the start of an episode."""
     fidelity: Fidelity = "fast"
     """Accuracy of the simulation, in the training and in the comparison. Policies that were trained at "fast" swim as
-    well at "reference" as others (docs/fidelities.md). A scene that names its numerics is swum with those."""
+    well at "reference" as others (docs/training.md). A scene that names its numerics is swum with those."""
     scene: Path | None = None
     """File of the robot's scene: JSON, or Python that defines `scene`, which is executed; by default the chapter's."""
     intervals: Path | None = None

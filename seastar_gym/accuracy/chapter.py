@@ -10,7 +10,7 @@ small       random and repeated commands of a tenth of the amplitude, whose path
 straight    the straight swim alone
 
 Speeds are of `Certificate.machine`. An error bounds 95 % of random sequences with the confidence that `confidence`
-returns, so it is no bound for all: docs/accuracy.md says how many of fresh ones exceed it.
+returns, so it is no bound for all: docs/numerics.md says how many of fresh ones exceed it.
 """
 
 from collections.abc import Mapping

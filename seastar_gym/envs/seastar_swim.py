@@ -181,7 +181,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     the chapter's robot alone, at a fidelity and with decisions of 0.1 to 0.5 s, and no `batch_real_time_factor`. That
     was measured before, too, of robots that fill the lanes of a processor: one robot alone is slower (docs/speed.md).
     `error_estimate` is of the very swim, of any robot: the true error since the reset, of space and time, lies below it
-    in about 95 % of strokes (docs/error_bars.md); NaN after a failure.
+    in about 95 % of strokes (docs/numerics.md); NaN after a failure.
     With `randomization`, `info` has the drawn numbers by their names, too.
 
     ## Starting state

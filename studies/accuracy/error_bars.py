@@ -7,7 +7,7 @@ true error is at most the estimate. From the calibration's seed comes the factor
 each robot; with the factors that the package has, the sequences of another seed tell the coverage, the class with the
 lowest, and the median of estimate over true error.
 
-Writes the numbers as JSON, a page with the tables, and a picture.
+Writes the numbers as JSON and a picture.
 """
 
 import math
@@ -29,7 +29,6 @@ from seastar_gym.scene.numerics import PRESETS, Resolution
 from seastar_gym.simulator import Simulator
 from seastar_gym.simulator.error_bars import factor
 from studies.frame import Results, Study
-from studies.provenance import footer
 from studies.style import FAINT, INK, PERCENT, subplots
 
 Floats = NDArray[np.float64]
@@ -150,47 +149,26 @@ def rows_of(results: Mapping[str, Any]) -> list[Row]:
     return [Row(**row) for row in results["rows"]]
 
 
-def as_markdown(results: Mapping[str, Any]) -> str:
-    """Page with the tables."""
-    rows, costs, samples = rows_of(results), results["costs"], results["samples"]
+def of_robots(results: Mapping[str, Any]) -> str:
+    """Table of coverage and sharpness at the fidelities in Markdown."""
+    rows = rows_of(results)
     lines = [
-        "# Error bars while it runs",
-        "",
-        "Written by `python -m studies.accuracy.error_bars`; its docstring (`--help`) tells what is measured, and "
-        "`seastar_gym/simulator/error_bars.py` what the estimate is. `Simulator(scene, error_bars=True)` gives "
-        '`StrokeReport.error_estimate` [m], `gym.make("SeastarSwim-v0", error_bars=True)` gives '
-        '`info["error_estimate"]`.',
-        "",
-        f"Ten strokes from rest, {samples} sequences of each of {len(CLASSES)} classes of commands: "
-        f"{10 * samples * len(CLASSES)} strokes for each robot, fidelity and seed. Strokes of a sequence are not "
-        "independent. Coverage holds over this mixture of commands; no class has a coverage of its own that is "
-        "promised.",
-        "",
-        "## Robots",
-        "",
         "| robot | fidelity | true error [um] | coverage | lowest class | estimate / true error | factor needed |",
         "|---|---|---:|---:|---|---:|---:|",
         *(_line(row) for row in rows if row.setting in FIDELITIES),
         "",
-        "Medians of true errors and of ratios. The factor needed would cover 95 % of the calibration's strokes, which "
-        "are of another seed; the package's factors were chosen with those and a third seed's in view, before those of "
-        "this table were drawn. " + _shortfall(rows),
-        "",
-        "![Coverage and sharpness over robots](error_bars.png)",
-        "",
-        "## Settings",
-        "",
-        "Worst of the robots, and the time of a stroke of the chapter's robot with error bars over that without. A "
-        "twin has equal steps, half as long as the longest, so errors of adapted steps are told too large.",
-        "",
+        _shortfall(rows),
+    ]
+    return "\n".join(lines)
+
+
+def of_settings(results: Mapping[str, Any]) -> str:
+    """Table of factors, coverage and costs of all settings in Markdown."""
+    rows, costs = rows_of(results), results["costs"]
+    lines = [
         "| setting | factor | needed | lowest coverage | estimate / true error | cost |",
         "|---|---:|---:|---:|---:|---:|",
         *(_summary(name, [row for row in rows if row.setting == name], costs[name]) for name in SETTINGS),
-        "",
-        "---",
-        "",
-        footer(results, "error_bars.json"),
-        "",
     ]
     return "\n".join(lines)
 
@@ -198,7 +176,7 @@ def as_markdown(results: Mapping[str, Any]) -> str:
 def _shortfall(rows: list[Row]) -> str:
     """Sentence on the robots and settings that fall short of the coverage that is wanted."""
     short = [f"{row.robot} at {row.setting} ({PERCENT * row.coverage:.1f} %)" for row in rows if row.coverage < LEVEL]
-    return f"Below {PERCENT * LEVEL:.0f} %, here and in the settings below: {'; '.join(short) or 'none'}."
+    return f"Below {PERCENT * LEVEL:.0f} %, here and at the settings below: {'; '.join(short) or 'none'}."
 
 
 def _line(row: Row) -> str:
@@ -247,8 +225,8 @@ class Options:
     """Sequences per class."""
     seeds: tuple[int, int] = (1000, 3000)
     """Of calibration and test."""
-    out: Path = Path("docs/error_bars.md")
-    """Folder of the files, or the page."""
+    out: Path = Path("docs")
+    """Folder of the files, or the file of the numbers."""
 
 
 def run(options: Options, results: Results) -> str | None:
@@ -267,6 +245,6 @@ STUDY = Study(
     Options,
     "error_bars.json",
     pictures={"error_bars.png": lambda results, file: draw(rows_of(results), file)},
-    pages={"error_bars.md": as_markdown},
+    tables={"error_bars robots": of_robots, "error_bars settings": of_settings},
     drawn=("error_bars.png",),
 )

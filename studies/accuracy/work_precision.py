@@ -7,8 +7,8 @@ with 73 nodes per limb of the continuum's discretisation and the implicit midpoi
 that path: the whole error, which is smaller than the promised sum of space and time where the two cancel. The straight
 swim of the chapter's robot stands beside, with four published codes.
 
-Times are processor times of one thread per robot and stroke, the best of several strokes of a batch. Writes a page, a
-picture and the numbers (JSON). A robot whose numbers are in the file is not swum again.
+Times are processor times of one thread per robot and stroke, the best of several strokes of a batch. Writes the
+numbers (JSON) and a picture. A robot whose numbers are in the file is not swum again.
 """
 
 import time
@@ -27,7 +27,7 @@ from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.numerics import PRESETS, Resolution
 from seastar_gym.simulator import Simulator
 from studies.accuracy.settings import MS
-from studies.accuracy.work_precision_page import as_page, draw
+from studies.accuracy.work_precision_page import draw, of_presets, of_settings
 from studies.frame import InDocs, Results, Study
 from studies.speed.terms import SILICONE
 
@@ -118,7 +118,6 @@ def run(_: InDocs, results: Results) -> None:
     results.read()
     if results and {name: results.get(name) for name in results.about} != results.about:
         raise ValueError(f"{results.file} has numbers of another machine or version: give another --out.")
-    results["file"] = "work_precision.json"
     cells = {
         ("problems", name): partial(examine, physics, straight=physics.is_chapters)
         for name, physics in PROBLEMS.items()
@@ -126,11 +125,10 @@ def run(_: InDocs, results: Results) -> None:
     results.fill(cells, lambda found: f"{len(found)} rows")
 
 
-PICTURE = "work_precision_problems.png"
 STUDY = Study(
     "accuracy.work_precision",
     run,
     file="work_precision.json",
-    pictures={PICTURE: draw},
-    pages={"work_precision.md": lambda results: as_page(results, PICTURE)},
+    pictures={"work_precision_problems.png": draw},
+    tables={"work_precision presets": of_presets, "work_precision": of_settings},
 )

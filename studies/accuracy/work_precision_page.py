@@ -1,14 +1,14 @@
-"""Page and picture of the work-precision study."""
+"""Tables and picture of the work-precision study."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
+from seastar_gym.scene.numerics import Fidelity
 from studies.accuracy.pictures import CHAPTERS, OTHERS, OURS, PUBLISHED, published_error
-from studies.provenance import footer
 from studies.style import DPI, INK, MS, PERCENT, as_numbers, as_percent, subplots
 
 if TYPE_CHECKING:
@@ -20,22 +20,6 @@ Column = Literal["largest_error", "median_error", "straight_error"]
 
 SETTLED = 0.01
 """Problems whose limit errs by more have no largest errors that mean anything: their medians are told instead."""
-
-USES = {
-    "fast": "Searches, first trainings, demonstrations: what counts is the number of strokes",
-    "balanced": "Everything else, to begin with: trainings that are kept, trials, tables",
-    "accurate": "Numbers that are published, and differences between robots or gaits of a few per cent",
-    "reference": "The truth that others are compared with, a few swims at a time",
-    "chapter": "Repeating the chapter's figures and those of codes with its discretisation; for nothing else",
-}
-"""What every preset is for."""
-LEFT_OUT = (
-    "Left out are settings of ours: implicit Euler and SDIRK3 with the continuum's discretisation, adapted steps, "
-    "other Newton tolerances, error bars. Left out are codes that were not given these scenes: "
-    "PyElastica, Elastica (C++), SoRoSim, SOFA, MuJoCo and every code that solves the water, too. The four published "
-    "codes were given the chapter's robot only, in the straight swim, and two of them, dismech-python and DDG_Tutorial "
-    "(Octave), have errors that are taken from the other two, whose scheme and discretisation they share."
-)
 
 
 def label(row: Row) -> str:
@@ -128,43 +112,34 @@ def _draw_published(axes: Axes, limit: float) -> None:
                       textcoords="offset points", color=INK, va="center", ha=side)  # fmt: skip
 
 
-def as_page(results: Mapping[str, Any], picture: str) -> str:
-    """Page in Markdown."""
+def of_presets(results: Mapping[str, Any]) -> str:
+    """Table of the presets in Markdown, and what is concluded from all settings."""
     problems = results["problems"]
     lines = [
-        "# Work and precision on six robots", "",
-        "Written by `python -m studies.accuracy.work_precision`; its docstring (`--help`) tells what is measured. "
-        "Times are measured beside other work of the machine.", "",
-        f"![Error over processor time per stroke]({picture})", "",
-        "A line is what no other measured setting of its discretisation beats. Letters are the presets. Errors are "
-        "whole ones, not the promised sums of space and time ([accuracy.md](accuracy.md)): they are smaller where "
-        "the two cancel. " + _doubt(problems), "",
-        "## Use this when", "",
-        "Errors are those of the worst sequence, for robots whose worst sequences have a limit.", "",
-        "| preset | use it for | error, chapter's robot | error, others | time per stroke, chapter's robot [ms] |",
-        "|---|---|---:|---:|---:|",
-        *(_use(preset, problems) for preset in USES), "",
-        _conclusion(problems), "",
-        "## What is left out", "", LEFT_OUT, "",
-        "## Numbers", "",
-        f"Error of the worst and of the median sequence, and processor time per stroke [ms] "
-        f"([data]({results['file']})).", "",
-        f"| N | scheme and step | {' | '.join(problems)} |", "|---|---|" + "---:|" * len(problems),
-        *_rows(problems), "", "---", "", footer(results, results["file"]), "",
+        "| preset | error, chapter's robot | error, others | time per stroke, chapter's robot [ms] |",
+        "|---|---:|---:|---:|",
+        *(_use(preset, problems) for preset in get_args(Fidelity)), "", f"{_conclusion(problems)} {_doubt(problems)}",
     ]  # fmt: skip
     return "\n".join(lines)
+
+
+def of_settings(results: Mapping[str, Any]) -> str:
+    """Table of all settings in Markdown."""
+    problems = results["problems"]
+    head = [f"| N | scheme and step | {' | '.join(problems)} |", "|---|---|" + "---:|" * len(problems)]
+    return "\n".join([*head, *_rows(problems)])
 
 
 def _doubt(problems: Mapping[str, Any]) -> str:
     """Sentences on the error of the limits."""
     clear = [found["limit_error"] for found in problems.values() if settled(found)]
-    said = f"The limit itself errs by at most {PERCENT * max(clear):.2g} %." if clear else ""
+    said = f"The reference solution itself errs by at most {PERCENT * max(clear):.2g} %." if clear else ""
     for name, found in problems.items():
         if not settled(found):
             said += (
                 f" Not so for {name}, where {PERCENT * found['limit_error']:.2g} % are in doubt on the worst sequence: "
-                "while limbs press on each other, paths depend on the mesh and the step, and no refinement settles "
-                "them; why is not known. There medians are drawn."
+                "while limbs press on each other, paths depend on the mesh and the step, and no refinement converges; "
+                "why is not known. The picture shows medians there."
             )
     return said.strip()
 
@@ -177,7 +152,7 @@ def _use(preset: str, problems: Mapping[str, Any]) -> str:
     first, *others = (_of(preset, found) for found in problems.values() if settled(found))
     errors = sorted(error(row) for row in others)
     span = f"{errors[0]:.2g} to {errors[-1]:.2g} %" if errors else ""
-    return f"| `{preset}` | {USES[preset]} | {error(first):.2g} % | {span} | {first['ms_per_stroke']:.2g} |"
+    return f"| `{preset}` | {error(first):.2g} % | {span} | {first['ms_per_stroke']:.2g} |"
 
 
 def _conclusion(problems: Mapping[str, Any]) -> str:
@@ -190,10 +165,10 @@ def _conclusion(problems: Mapping[str, Any]) -> str:
             ours = [row for row in found["settings"] if row not in chapters and error(row) <= error(best)]
             gains.append(best["ms_per_stroke"] / min(row["ms_per_stroke"] for row in ours) if ours else 0.0)
     if not gains or not all(gains):
-        return "On some robot no setting of ours reaches the least error of the chapter's discretisation."
+        return "On some robot no setting of the continuum's discretisation reaches the least error of the chapter's."
     return (
-        "The least error that the chapter's discretisation reaches here, with up to 37 nodes, ours reaches "
-        f"{min(gains):.0f} to {max(gains):.0f} times faster, on every robot whose worst sequence has a limit."
+        "On every robot whose worst sequence converges, the continuum's discretisation reaches the least error of the "
+        f"chapter's, with up to 37 nodes, {min(gains):.0f} to {max(gains):.0f} times faster."
     )
 
 

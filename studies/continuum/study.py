@@ -5,7 +5,7 @@ nodes per limb. The error is the hub's largest distance, at ends of strokes, fro
 with 73 nodes, as a fraction of that path's length; of all commands the worst. Time steps of 1 ms add about the same
 error to both, which cancels. Orders are slopes of a line through the logarithms of errors and edge lengths.
 
-Writes the errors as JSON, a page with their table, and a picture.
+Writes the errors as JSON and a picture.
 """
 
 import math
@@ -25,7 +25,6 @@ from seastar_gym.simulator import Simulator
 from studies.continuum.scenes import NAMES, scene
 from studies.frame import InDocs, Results, Study
 from studies.kept import rounded
-from studies.provenance import footer
 from studies.style import DPI, INK, PERCENT, as_percent, subplots
 
 Floats = NDArray[np.float64]
@@ -112,38 +111,15 @@ def rows_of(results: Mapping[str, Any]) -> list[Row]:
     return [Row(**{**row, "errors": np.array(row["errors"])}) for row in results["rows"]]
 
 
-def as_markdown(results: Mapping[str, Any]) -> str:
-    """Page with the table of errors and orders."""
-    rows = rows_of(results)
-    head = f"| scene | discretisation | {' | '.join(f'N = {n}' for n in NODES)} | order |"
+def table(results: Mapping[str, Any]) -> str:
+    """Table of errors and orders in Markdown."""
     lines = [
-        "# Errors of space",
-        "",
-        "How far the hub is from where it is with infinitely many nodes. Every scene swims ten strokes from rest with",
-        "several commands, each repeated. The error is the hub's largest distance from the reference at ends of",
-        "strokes, in per cent of the path, of all commands the worst. The reference has",
-        f"{REFERENCE_NODES} nodes per limb.",
-        "",
-        "The order is fitted to 10, 19 and 37 nodes. It says nothing where an error changes its sign between them, as",
-        "with twelve limbs. Steps of 1 ms are part of the smallest errors of undamped limbs. Contact is of first order",
-        "in time and in space. `python -m studies.continuum` makes this page.",
-        "",
-        head,
+        f"| scene | discretisation | {' | '.join(f'N = {n}' for n in NODES)} | order |",
         f"|---|---|{'---:|' * (len(NODES) + 1)}",
-        *(
-            f"| {row.name} | {row.discretisation} | "
-            + " | ".join(f"{PERCENT * each:.2g}" for each in row.errors)
-            + f" | {row.order:.1f} |"
-            for row in rows
-        ),
-        "",
-        "![Errors over the number of nodes](continuum.png)",
-        "",
-        "---",
-        "",
-        footer(results, "continuum.json"),
-        "",
     ]
+    for row in rows_of(results):
+        errors = " | ".join(f"{PERCENT * each:.2g}" for each in row.errors)
+        lines.append(f"| {row.name} | {row.discretisation} | {errors} | {row.order:.1f} |")
     return "\n".join(lines)
 
 
@@ -187,5 +163,5 @@ STUDY = Study(
     run,
     file="continuum.json",
     pictures={"continuum.png": lambda results, file: draw(rows_of(results), file)},
-    pages={"continuum.md": as_markdown},
+    tables={"continuum": table},
 )

@@ -1,4 +1,4 @@
-"""Pictures and costs of scenes that differ from the default; writes `gallery.md` and `gallery.json`.
+"""Pictures and costs of scenes that differ from the default; writes `gallery.json`.
 
 A picture shows the robot at rest (grey), at the end of heating (blue) and its hub's path. The cost is the processor
 time of a stroke of random commands relative to that of the default scene. Scenes take turns, stroke by stroke, so that
@@ -22,7 +22,6 @@ from seastar_gym.scene.actuators.thermal import ThermalSma
 from seastar_gym.scene.limb import Limb
 from seastar_gym.simulator import Simulator
 from studies.frame import Results, Study
-from studies.provenance import footer
 from studies.style import INK, subplots
 
 Floats = NDArray[np.float64]
@@ -151,26 +150,14 @@ def draw(exhibit: Exhibit, file: Path, strokes: int = STROKES) -> None:
     figure.savefig(file, dpi=320, bbox_inches="tight", pad_inches=0.02)
 
 
-def page(results: Mapping[str, Any]) -> str:
-    """Page of the gallery in Markdown."""
-    lines = [
-        "# Gallery",
-        "",
-        "Scenes that differ from the default. The robot is grey at rest and blue at the end of the first heating, and",
-        f"its hub's path over {STROKES} strokes is red. The bar is 50 mm long. The cost is the processor time of a",
-        "stroke of random commands relative to the default scene in the same run, to within a few per cent",
-        f"({ROBOTS} robots, one thread, ten nodes per limb, numerics of `balanced`). Thin tips take more Newton",
-        "iterations, and some of these a regularised matrix. [Films of the tasks](environments.md#films-of-the-tasks)",
-        "are with the environments.",
-        "",
-        "| | scene | cost | Newton iterations per step |",
-        "|---|---|---:|---:|",
-    ]
+def table(results: Mapping[str, Any]) -> str:
+    """Table of scenes in Markdown: pictures, code and costs."""
+    lines = ["| | scene | cost | Newton iterations per step |", "|---|---|---:|---:|"]
     for exhibit in exhibits():
         picture, found = f"![{exhibit.name}](gallery/{_file_name(exhibit)})", results["scenes"][exhibit.name]
         numbers = f"{found['cost']:.2f} | {found['iterations_per_step']:.2f}"
         lines.append(f"| {picture} | **{exhibit.name}**<br>`{exhibit.code}` | {numbers} |")
-    return "\n".join([*lines, "", "---", "", footer(results, "gallery.json"), ""])
+    return "\n".join(lines)
 
 
 def _file_name(exhibit: Exhibit) -> str:
@@ -209,4 +196,4 @@ def run(options: Options, results: Results) -> None:
         results.update(measured())
 
 
-STUDY = Study("scenes.gallery", run, Options, "gallery.json", pages={"gallery.md": page})
+STUDY = Study("scenes.gallery", run, Options, "gallery.json", tables={"gallery": table})

@@ -27,6 +27,8 @@ SECTIONS: dict[str, Callable[[], Section]] = {
     "published": published_codes,
 }
 """Sections of the page by name, in their order."""
+BESIDE = "\n## Beside MuJoCo"
+"""What begins that part of the page which is kept: `studies.verification.mujoco` fills it."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,8 @@ def run(options: Options, _: Results) -> str | None:
     """Compute all sections, write the page and show it."""
     sections = [section() for section in tqdm(SECTIONS.values(), unit="section")]
     options.out.parent.mkdir(parents=True, exist_ok=True)
-    options.out.write_text(as_page(sections), encoding="utf-8")
+    before = options.out.read_text(encoding="utf-8") if options.out.exists() else ""
+    options.out.write_text(as_page(sections) + "".join(before.partition(BESIDE)[1:]), encoding="utf-8")
     show(as_page(sections))
     print(f"Written: {options.out}")
     outside = [row.quantity for section in sections for row in section.rows if not row.holds]

@@ -103,7 +103,7 @@ def test_help_says_what_may_be_executed(command, capsys):
 
 
 def test_the_documentation_says_what_may_be_executed():
-    text = " ".join((Path(__file__).parents[2] / "docs" / "results.md").read_text(encoding="utf-8").split())
+    text = " ".join((Path(__file__).parents[2] / "docs" / "controllers.md").read_text(encoding="utf-8").split())
     assert "module:function" in text and "load only files that you trust" in text
 
 

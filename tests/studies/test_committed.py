@@ -132,7 +132,7 @@ def test_footers_say_command_versions_and_machine_and_what_is_not_known():
     assert footer({"command": "x", "machine": "y"}, "luck.json").endswith("Not recorded by that run: versions.*")
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/choosing.md"])
+@pytest.mark.parametrize("page", ["README.md", "docs/accuracy.md"])
 def test_errors_on_a_page_are_those_that_info_tells(page):
     """Largest and typical errors of random and of repeated commands, every second and every 0.2 s, and the speed."""
     blocks = [block[3] for block in BLOCK.finditer((DOCS.parent / page).read_text(encoding="utf-8"))]

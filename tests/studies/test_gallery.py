@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from studies.provenance import provenance
 from studies.scenes import gallery
 
 
 @pytest.mark.slow
 def test_the_gallery_has_a_picture_and_a_cost_of_every_scene(tmp_path):
     gallery.draw_all(tmp_path, strokes=1)
-    text = gallery.page({**provenance("python"), **gallery.measured(rounds=1, n_robots=8)})
+    text = gallery.table(gallery.measured(rounds=1, n_robots=8))
     for exhibit in gallery.exhibits():
         assert f"**{exhibit.name}**" in text
         picture = tmp_path / "gallery" / f"{exhibit.name.replace(' ', '_')}.png"

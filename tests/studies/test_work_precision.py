@@ -40,7 +40,7 @@ def test_the_front_has_what_no_other_setting_beats():
 
 
 def test_largest_errors_are_told_of_robots_whose_worst_sequences_have_a_limit():
-    rows = [row(1.0, 0.1, preset=name) for name in page.USES] + [row(2.0, 0.2, "chapter"), row(1.0, 0.05)]
+    rows = [row(1.0, 0.1, preset=name) for name in PRESETS] + [row(2.0, 0.2, "chapter"), row(1.0, 0.05)]
     problems = {"a": {"limit_error": 1e-4, "settings": rows}, "contact": {"limit_error": 0.3, "settings": rows}}
     assert "Not so for contact, where 30 % are in doubt" in page._doubt(problems)
     assert "2 to 2 times faster" in page._conclusion(problems)
@@ -62,18 +62,18 @@ def small(monkeypatch):
     monkeypatch.setattr(study, "PROBLEMS", {"chapter's robot": Scene(), "short": Scene(Seastar(limb_length=0.05))})
 
 
-def test_page_and_picture_are_written_and_nothing_is_measured_twice(small, tmp_path, monkeypatch, capsys):
-    out = tmp_path / "page.md"
+def test_tables_and_picture_are_made_and_nothing_is_measured_twice(small, tmp_path, monkeypatch, capsys):
+    out = tmp_path / "page.json"
     command = ["accuracy.work_precision", "--out", str(out)]
     assert main(command) == 0
-    found = json.loads(out.with_suffix(".json").read_text())
+    found = json.loads(out.read_text())
     assert set(found["problems"]) == {"chapter's robot", "short"}
-    assert found["machine"] in out.read_text() and found["versions"]["numba"] in out.read_text()
     for name in PRESETS:
-        assert f"| `{name}` |" in out.read_text()
+        assert f"| `{name}` |" in study.STUDY.tables["work_precision presets"](found)
+    assert study.STUDY.tables["work_precision"](found).count("\n| 5") == len(study.SETTINGS)
     assert (tmp_path / "page_problems.png").stat().st_size > 20_000
     monkeypatch.setattr(study, "examine", lambda *_, **__: pytest.fail("measured twice"))
     assert main(command) == 0
     found["versions"]["numba"] = "0.1"
-    out.with_suffix(".json").write_text(json.dumps(found))
+    out.write_text(json.dumps(found))
     assert main(command) == 2 and "another machine or version" in capsys.readouterr().err
