@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from seastar_gym.scene import Attachment as Attachment
     from seastar_gym.scene import Body as Body
     from seastar_gym.scene import Contact as Contact
+    from seastar_gym.scene import Disc as Disc
     from seastar_gym.scene import GridCurrent as GridCurrent
     from seastar_gym.scene import Limb as Limb
     from seastar_gym.scene import Limited as Limited
@@ -39,12 +40,15 @@ if TYPE_CHECKING:
     from seastar_gym.scene import Numerics as Numerics
     from seastar_gym.scene import Scene as Scene
     from seastar_gym.scene import Seastar as Seastar
+    from seastar_gym.scene import Section as Section
     from seastar_gym.scene import ShearCurrent as ShearCurrent
     from seastar_gym.scene import SmaLimb as SmaLimb
     from seastar_gym.scene import SmaPulse as SmaPulse
     from seastar_gym.scene import SmaWires as SmaWires
     from seastar_gym.scene import Stiffening as Stiffening
+    from seastar_gym.scene import Strip as Strip
     from seastar_gym.scene import ThermalSma as ThermalSma
+    from seastar_gym.scene import Tube as Tube
     from seastar_gym.scene import UniformCurrent as UniformCurrent
     from seastar_gym.scene import Vortex as Vortex
     from seastar_gym.scene import Water as Water

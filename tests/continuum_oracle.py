@@ -45,7 +45,7 @@ class Continuum(Star):
     @cached_property
     def edge_mass(self) -> Array:
         """A sixth of the edge's mass."""
-        return self.density * np.pi * self.edge_radii**2 * self.edge_lengths / 6.0
+        return self.density * self.edge_areas * self.edge_lengths / 6.0
 
     @cached_property
     def drag_places(self) -> tuple[Array, Array]:
@@ -53,7 +53,7 @@ class Continuum(Star):
         middles = np.zeros((len(self.edges), self.n_nodes))
         for row, ends in zip(middles, self.edges, strict=True):
             row[list(ends)] = 0.5
-        whole = 0.5 * self.fluid_density * self.isotropic_coefficient * 2.0 * self.edge_radii * self.edge_lengths
+        whole = 0.5 * self.fluid_density * self.isotropic_coefficient * self.edge_diameters * self.edge_lengths
         return np.vstack([np.eye(self.n_nodes), middles]), np.concatenate([self.drag / 3.0, 2.0 / 3.0 * whole])
 
     def cross_places(self, edge: int) -> list[tuple[int, float]]:

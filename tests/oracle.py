@@ -39,6 +39,7 @@ class Star:
     current: Velocities of the fluid [m/s] at places [m], both of shape (n, 2), or None if it is at rest.
     loads: Dead loads (node, F_x, F_y) [N]. gravity: Acceleration of free fall [m/s^2], less buoyancy.
     held_nodes: Nodes that keep their velocity.
+    strip: Width in the plane and height [m], and area of the fluid that moves along [m2], of limbs that are no discs.
     """
 
     n_limbs: int = 5
@@ -57,6 +58,7 @@ class Star:
     loads: tuple[tuple[int, float, float], ...] = ()
     gravity: tuple[float, float] = (0.0, 0.0)
     held_nodes: tuple[int, ...] = ()
+    strip: tuple[float, float, float] | None = None
 
     @property
     def n_nodes(self) -> int:
@@ -69,13 +71,25 @@ class Star:
         return self.limb_length / (self.nodes_per_limb - 1)
 
     @property
+    def area(self) -> float:
+        """Area of the cross section [m2]."""
+        return np.pi * self.rod_radius**2 if self.strip is None else self.strip[0] * self.strip[1]
+
+    @property
+    def diameter(self) -> float:
+        """Diameter that flow across sees [m]."""
+        return 2.0 * self.rod_radius if self.strip is None else self.strip[1]
+
+    @property
     def EA(self) -> float:
         """Axial stiffness [N] (13.2)."""
-        return self.youngs_modulus * np.pi * self.rod_radius**2
+        return self.youngs_modulus * self.area
 
     @property
     def EI(self) -> float:
-        """Bending stiffness [N m2] (13.3), with I = pi r0^4 / 4."""
+        """Bending stiffness [N m2] (13.3), with I = pi r0^4 / 4, or h w^3 / 12 of a strip."""
+        if self.strip is not None:
+            return self.youngs_modulus * self.strip[1] * self.strip[0] ** 3 / 12.0
         return self.youngs_modulus * np.pi * self.rod_radius**4 / 4.0
 
     @property
@@ -187,7 +201,7 @@ class Star:
     @cached_property
     def masses(self) -> Array:
         """Lumped masses [kg], shape (n_nodes,)."""
-        return self.density * np.pi * self.rod_radius**2 * self.voronoi_lengths
+        return self.density * self.area * self.voronoi_lengths
 
     @cached_property
     def forces(self) -> Array:
@@ -218,7 +232,7 @@ class Star:
     def drag(self) -> Array:
         """1/2 rho_f C_d D dl_i of (13.8) [kg/m], shape (n_nodes,); C_t for C_d where there is one."""
         per_speed = 0.5 * self.fluid_density * self.isotropic_coefficient
-        return per_speed * 2.0 * self.rod_radius * self.voronoi_lengths
+        return per_speed * self.diameter * self.voronoi_lengths
 
     @cached_property
     def drag_places(self) -> tuple[Array, Array]:
@@ -236,21 +250,31 @@ class Star:
         return np.zeros(len(self.edges))
 
     @cached_property
-    def edge_radii(self) -> Array:
-        """Radius in the middle of every edge [m]."""
-        return np.full(len(self.edges), self.rod_radius)
+    def edge_diameters(self) -> Array:
+        """Diameter that flow across sees in the middle of every edge [m]."""
+        return np.full(len(self.edges), self.diameter)
+
+    @cached_property
+    def edge_areas(self) -> Array:
+        """Area of the cross section in the middle of every edge [m2]."""
+        return np.full(len(self.edges), self.area)
+
+    @cached_property
+    def added_areas(self) -> Array:
+        """Area of the fluid that moves along across every edge, for C_a = 1 [m2]."""
+        return self.edge_areas if self.strip is None else np.full(len(self.edges), self.strip[2])
 
     @cached_property
     def cross_drag(self) -> Array:
         """1/2 rho_f (C_d - C_t) D l/2 of half an edge [kg/m]: what flow across it adds to the drag of each end."""
         along = self.tangential_drag_coefficient
         more = 0.0 if along is None else self.drag_coefficient - along
-        return 0.5 * self.fluid_density * more * 2.0 * self.edge_radii * self.edge_lengths / 2.0
+        return 0.5 * self.fluid_density * more * self.edge_diameters * self.edge_lengths / 2.0
 
     @cached_property
     def added_mass(self) -> Array:
-        """rho_f C_a pi r^2 l/2 of half an edge [kg]: fluid that each end carries along across the edge."""
-        volumes = np.pi * self.edge_radii**2 * self.edge_lengths
+        """rho_f C_a A l/2 of half an edge [kg], A = pi r^2: fluid that each end carries along across the edge."""
+        volumes = self.added_areas * self.edge_lengths
         return self.fluid_density * self.added_mass_coefficient * volumes / 2.0
 
     @cached_property
@@ -296,8 +320,12 @@ class Shaped(Star):
         return np.array([self.lengths[limb] / (self.nodes_per_limb - 1) for limb, _ in self._limb_edges])
 
     @cached_property
-    def edge_radii(self) -> Array:
-        return np.array([self.radius(limb, i + 0.5) for limb, i in self._limb_edges])
+    def edge_diameters(self) -> Array:
+        return np.array([2.0 * self.radius(limb, i + 0.5) for limb, i in self._limb_edges])
+
+    @cached_property
+    def edge_areas(self) -> Array:
+        return np.pi * self.edge_diameters**2 / 4.0
 
     @cached_property
     def edge_EA(self) -> Array:

@@ -1,6 +1,5 @@
 """Limbs cut into edges and nodes: what the coefficients of all terms are made from."""
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -9,14 +8,33 @@ from numpy.typing import ArrayLike, NDArray
 Floats = NDArray[np.float64]
 
 
+class Sections(NamedTuple):
+    """Cross sections at places of limbs: of every edge in its middle, or of the nodes of every limb from hub to tip.
+
+    area: Of the material [m^2]. displaced: Of the fluid that it takes the place of [m^2]. inert: Area of the robot's
+        density that weighs as much [m^2].
+    EI: Bending stiffness [N m^2]. thickness: Radius of the disc with the same EI/EA [m].
+    width: Diameter that flow across sees [m]. added: Area of the fluid that moves along across [m^2].
+    reach: Distance from the centre line at which limbs touch [m].
+    """
+
+    area: Floats
+    displaced: Floats
+    inert: Floats
+    EI: Floats
+    thickness: Floats
+    width: Floats
+    added: Floats
+    reach: Floats
+
+
 class Mesh(NamedTuple):
-    """Lengths, radii and moduli of a robot's edges and nodes, in the order of star.py.
+    """Lengths, cross sections and moduli of a robot's edges and nodes, in the order of star.py.
 
     n_limbs, nodes_per_limb: Numbers of limbs, and of nodes of a limb with the hub.
     l: Natural length, per edge [m]. dl: Voronoi length, per node [m]; the hub has half of every root edge.
     root_edges: Natural length of the root edges, per limb [m]. limb_lengths: Lengths of the limbs [m].
-    radius_at_edges: Radius in the middle of every edge [m].
-    radius_at_nodes: Radius at the nodes of every limb from hub to tip [m], the hub once per limb.
+    at_edges, at_nodes: Cross sections, shape (n_edges,), and (n_limbs, nodes_per_limb) with the hub once per limb.
     modulus_at_edges, modulus_at_nodes: Young's modulus likewise [Pa].
     natural_turn: Natural angle of the hinges within every limb [rad].
     """
@@ -27,17 +45,15 @@ class Mesh(NamedTuple):
     dl: Floats
     root_edges: Floats
     limb_lengths: list[float]
-    radius_at_edges: list[float]
-    radius_at_nodes: list[list[float]]
-    modulus_at_edges: list[float]
-    modulus_at_nodes: list[list[float]]
+    at_edges: Sections
+    at_nodes: Sections
+    modulus_at_edges: Floats
+    modulus_at_nodes: Floats
     natural_turn: list[float]
 
-    def per_node(self, of_radius: Callable[[float], float]) -> Floats:
-        """A function of the radius, per node; at the hub the mean of what the limbs have there."""
-        values = [[of_radius(r) for r in radii] for radii in self.radius_at_nodes]
-        hub = mean([of_limb[0] for of_limb in values], self.root_edges)
-        return np.array([hub, *(value for of_limb in values for value in of_limb[1:])])
+    def per_node(self, at_nodes: Floats) -> Floats:
+        """Numbers per node from those at the nodes of every limb; at the hub the mean of what the limbs have there."""
+        return np.concatenate([[mean(at_nodes[:, 0], self.root_edges)], at_nodes[:, 1:].ravel()])
 
     def per_half_edge(self, of_edges: Floats) -> Floats:
         """Numbers per edge as those of the inner and the outer edge of every node in turn, shape (2 n_nodes,).

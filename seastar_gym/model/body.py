@@ -1,5 +1,6 @@
 """Coefficients of a body, for the kernels in der/terms/body.py."""
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 from seastar_gym.der.mesh import Mesh
 from seastar_gym.der.terms import body as term
 from seastar_gym.der.terms.contact import Rim
+from seastar_gym.der.terms.gravity import heaviness
 from seastar_gym.scene.body import GIVEN_DRAG, Body
 from seastar_gym.scene.fluid import Water
 from seastar_gym.scene.outline import Outline
@@ -48,8 +50,7 @@ class OnBody(NamedTuple):
 
     def drag(self, mesh: Mesh, per_node: Floats) -> Floats:
         """Drag coefficients [kg/m]: the hub's are the body's, and those of half root edges belong to the roots."""
-        radii = np.array([radii[0] for radii in mesh.radius_at_nodes])
-        halves = radii * mesh.root_edges
+        halves = mesh.at_nodes.width[:, 0] * mesh.root_edges
         return self._with_hub(per_node, self.isotropic_drag, per_node[0] * halves / halves.sum())
 
     def loads(self, per_node: Floats | None) -> Floats | None:
@@ -110,7 +111,7 @@ def weight_moment(
     assert body is not None
     own = body.mass_at(robot.density) * np.array(body.centre)
     displaced = water.density * body.volume * np.array(body.shape.centre)
-    of_roots = (robot.density - water.density) * term.half_volumes(mesh) @ arms
+    of_roots = heaviness(mesh.at_nodes, partial(term.half_volumes, mesh), robot.density, water.density) @ arms
     return np.concatenate([gravity, own - displaced + of_roots])
 
 

@@ -5,15 +5,16 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.der.mesh import Mesh, mean
-from seastar_gym.scene.limb import LimbShape, along
+from seastar_gym.der.mesh import Mesh, Sections, mean
+from seastar_gym.scene.limb import LimbShape
+from seastar_gym.scene.profile import along
 from seastar_gym.scene.shape import turn_per_hinge
 
 Floats = NDArray[np.float64]
 
 
-def make_mesh(limbs: Sequence[LimbShape], nodes_per_limb: int) -> Mesh:
-    """Mesh of limbs with nodes_per_limb - 1 edges of equal lengths each."""
+def make_mesh(limbs: Sequence[LimbShape], nodes_per_limb: int, density: float) -> Mesh:
+    """Mesh of limbs of a density [kg/m^3] with nodes_per_limb - 1 edges of equal lengths each."""
     n_limbs, n_edges = len(limbs), nodes_per_limb - 1
     root_edges = np.array([limb.length / n_edges for limb in limbs])
     l = np.repeat(root_edges, n_edges)  # noqa: E741
@@ -26,12 +27,18 @@ def make_mesh(limbs: Sequence[LimbShape], nodes_per_limb: int) -> Mesh:
         dl=np.concatenate([[0.5 * n_limbs * mean(root_edges)], l * np.tile(edges_at_node, n_limbs)]),
         root_edges=root_edges,
         limb_lengths=[limb.length for limb in limbs],
-        radius_at_edges=[r for limb in limbs for r in along(limb.radius, at_edges)],
-        radius_at_nodes=[along(limb.radius, at_nodes) for limb in limbs],
-        modulus_at_edges=[E for limb in limbs for E in along(limb.youngs_modulus, at_edges)],
-        modulus_at_nodes=[along(limb.youngs_modulus, at_nodes) for limb in limbs],
+        at_edges=sections(limbs, density, at_edges, (-1,)),
+        at_nodes=sections(limbs, density, at_nodes, (n_limbs, nodes_per_limb)),
+        modulus_at_edges=np.concatenate([along(limb.youngs_modulus, at_edges) for limb in limbs]),
+        modulus_at_nodes=np.array([along(limb.youngs_modulus, at_nodes) for limb in limbs]),
         natural_turn=[turn_per_hinge(limb, nodes_per_limb) for limb in limbs],
     )
+
+
+def sections(limbs: Sequence[LimbShape], density: float, share: Floats, shape: tuple[int, ...]) -> Sections:
+    """Cross sections of all limbs at fractions of their lengths, as arrays of a shape."""
+    columns = np.array([cut for limb in limbs for cut in limb.cuts(density, share)]).T
+    return Sections(*columns.reshape(len(columns), *shape))
 
 
 def nodes_along(nodes_per_limb: int) -> Floats:

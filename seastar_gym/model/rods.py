@@ -49,7 +49,7 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
     # Limbs that begin apart have no opening angle that could close: negative angles are not noted.
     hub_angles = [-1.0 if robot.has_body else natural_hub_angle(limb.gap, robot.hub_hinge) for limb in limbs]
     C_d, C_t, C_a = water.drag_coefficient, water.tangential_drag_coefficient, water.added_mass_coefficient
-    mesh = make_mesh(limbs, robot.nodes_per_limb)
+    mesh = make_mesh(limbs, robot.nodes_per_limb, robot.density)
     continuum = robot.discretisation == "continuum"
     C_along = C_d if C_t is None else C_t
     at_nodes, in_middle = drag.coefficients(mesh, water.density, C_along), None

@@ -20,12 +20,14 @@ from seastar_gym.scene.limb import Limb
 from seastar_gym.scene.numerics import Numerics
 from seastar_gym.scene.robot import Seastar, relaxation_time
 from seastar_gym.scene.scene import Scene
+from seastar_gym.scene.section import Disc, Section, Strip, Tube
 
 __all__ = [
     "AlongLimb",
     "Attachment",
     "Body",
     "Contact",
+    "Disc",
     "GridCurrent",
     "Limb",
     "Limited",
@@ -33,12 +35,15 @@ __all__ = [
     "Numerics",
     "Scene",
     "Seastar",
+    "Section",
     "ShearCurrent",
     "SmaLimb",
     "SmaPulse",
     "SmaWires",
     "Stiffening",
+    "Strip",
     "ThermalSma",
+    "Tube",
     "UniformCurrent",
     "Vortex",
     "Water",

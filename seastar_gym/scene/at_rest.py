@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.limb import LimbShape, along
+from seastar_gym.scene.limb import LimbShape
 from seastar_gym.scene.outline import Outline
 from seastar_gym.scene.shape import lines_cross, rest_positions
 
@@ -13,6 +13,8 @@ Floats = NDArray[np.float64]
 
 FEW, MANY = 12, 60
 """Nodes of a limb that are looked at: limbs at rest are arcs."""
+WEIGHTLESS = 1.0
+"""Density of limbs [kg/m^3], which says nothing of where they touch."""
 CLOSE = 1e-3, 1e-2, 0.1
 """Shares of the first edge that are looked at, too: an edge may begin within a flat body and end beyond it."""
 
@@ -34,7 +36,8 @@ def touching_at_rest(
     nodes = rest_positions(limbs, n, tangent=True)[1:].reshape(len(limbs), n - 1, 2)
     places = [np.concatenate([[limb.root], own]) for limb, own in zip(limbs, nodes, strict=True)]
     thickness = [
-        np.minimum(along(limb.radius, share), 0.5 * opening_angle * limb.length * share) for limb in limbs
+        np.minimum([cut.reach for cut in limb.cuts(WEIGHTLESS, share)], 0.5 * opening_angle * limb.length * share)
+        for limb in limbs
     ]
     for limb, (own, thick) in enumerate(zip(places, thickness, strict=True)):
         near = np.array(CLOSE)[:, None]

@@ -1,18 +1,17 @@
 """`Limb`: a limb that differs from the robot's others, with profiles along its length."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.checks import is_finite_number, require_numbers, shown
-from seastar_gym.scene.number import Numbers, PerRobot, check_numbers, declared, finite, positive
+from seastar_gym.scene.checks import is_finite_number, shown
+from seastar_gym.scene.number import Numbers, check_numbers, finite, positive
+from seastar_gym.scene.profile import Profile, as_tuple, check_profiles
+from seastar_gym.scene.section import AnySection, Cut, cuts
 from seastar_gym.scene.serial import register_part
-
-Profile = float | tuple[float, ...]
-"""Number, or numbers at equally spaced points from hub to tip (both included), linear in between."""
 
 
 @register_part
@@ -24,6 +23,8 @@ class Limb:
         discretisation it is that of the root edge, which differs in curved limbs.
     length: Length of the limb [m].
     radius: Radius [m], a number or a profile along the limb. For example, radius=(root, tip) is a taper.
+    section: Cross section of a limb that is no solid disc: `Strip`, `Tube` or `Section`; also `Disc`, which is what
+        `radius` means. At most one of the two is named.
     youngs_modulus: Young's modulus [Pa], a number or a profile along the limb.
     natural_curvature: Curvature of the limb at rest [1/m]. Positive values bend it anti-clockwise towards its tip.
     joint_stiffness: Stiffness of a joint that turns between hub and limb [N m/rad]. None means a rigid clamp.
@@ -37,6 +38,7 @@ class Limb:
     youngs_modulus: Annotated[Profile | Numbers | None, positive("Pa", "A limb's ")] = None
     natural_curvature: Annotated[Numbers, finite("1/m")] = 0.0
     joint_stiffness: Annotated[Numbers | None, positive("N m/rad", "A limb's ")] = None
+    section: AnySection | None = None
 
     def __post_init__(self) -> None:
         if self.direction is not None and not (is_finite_number(self.direction) and 0 <= self.direction < 2 * math.pi):
@@ -44,13 +46,14 @@ class Limb:
                 f"A limb's direction must be from 0 to below 2 pi [rad], for all robots, not {shown(self.direction)}."
             )
         check_numbers(self)
-        for name, profile in (("radius", self.radius), ("youngs_modulus", self.youngs_modulus)):
-            if not isinstance(profile, tuple) or isinstance(profile, PerRobot):
-                continue
-            unit = declared(Limb)[name].number.unit
-            require_numbers(f"A limb's {name}", profile, unit)
-            if not profile or min(profile) <= 0.0:
-                raise ValueError(f"A limb's {name} must be positive all along it [{unit}], not {shown(profile)}.")
+        check_profiles(self)
+        if not isinstance(self.section, AnySection | None):
+            raise ValueError(f"A limb's section must be a Disc, Strip, Tube or Section, not {shown(self.section)}.")
+        if self.section is not None and self.radius is not None:
+            raise ValueError("A limb has either a radius or a section.")
+
+
+Floats = NDArray[np.float64]
 
 
 class LimbShape(NamedTuple):
@@ -62,30 +65,28 @@ class LimbShape(NamedTuple):
     direction: float
     gap: float
     length: float
-    radius: tuple[float, ...]
+    section: AnySection
     youngs_modulus: tuple[float, ...]
     natural_curvature: float
     root: tuple[float, float] = (0.0, 0.0)
     joint_stiffness: float | None = None
 
-    def extreme_edges(self, nodes_per_limb: int) -> list[tuple[float, float, float, float]]:
-        """Bounds of (l^2 [m^2], EA/l [N/m], EI/l [N m], volume [m^3]) over the edges: smallest and largest values."""
+    def cuts(self, density: float, share: Floats) -> list[Cut]:
+        """Cross sections at fractions of the length from hub to tip; density: The robot's [kg/m^3]."""
+        return cuts(self.section, self.youngs_modulus, density, share)
+
+    def corners(self, density: float) -> list[Cut]:
+        """Cross sections where profiles have their points: bounds of those in between."""
+        profiles = [getattr(self.section, field.name) for field in fields(self.section)] + [self.youngs_modulus]
+        points = {len(as_tuple(profile)) for profile in profiles if profile is not None}
+        share = np.unique(np.concatenate([np.linspace(0.0, 1.0, n) for n in points]))
+        return self.cuts(density, share)
+
+    def extreme_edges(self, nodes_per_limb: int, density: float) -> list[tuple[float, float, float, float]]:
+        """(l^2 [m^2], EA/l [N/m], EI/l [N m], mass [kg]) of edges with the cross sections of `corners`."""
         l = self.length / (nodes_per_limb - 1)  # noqa: E741
-        found = []
-        for choose in (min, max):
-            r, E = choose(self.radius), choose(self.youngs_modulus)
-            area = math.pi * r**2
-            found.append((l**2, E * area / l, E * math.pi * r**4 / 4.0 / l, area * l))
-        return found
-
-
-def as_tuple(profile: Profile) -> tuple[float, ...]:
-    """Profile as a tuple of numbers."""
-    return profile if isinstance(profile, tuple) else (profile,)
-
-
-def along(profile: tuple[float, ...], share: NDArray[np.float64]) -> list[float]:
-    """Values of a profile at fractions of the length from hub to tip."""
-    if len(profile) == 1:
-        return [*profile] * len(share)
-    return np.interp(share, np.linspace(0.0, 1.0, len(profile)), profile).tolist()
+        return [
+            (l**2, E * cut.area / l, cut.EI / l, density * cut.inert * l)
+            for cut in self.corners(density)
+            for E in (min(self.youngs_modulus), max(self.youngs_modulus))
+        ]

@@ -120,7 +120,8 @@ def declared(kind: Hashable) -> dict[str, Declared]:
         for number in getattr(hints.get(field.name), "__metadata__", ()):
             kinds = get_args(hints[field.name].__origin__)
             is_profile = any(get_origin(each) is tuple for each in kinds)
-            found[field.name] = Declared(number, {float, Any} <= {*kinds}, field.default is None, is_profile)
+            is_optional = field.default is None or type(None) in kinds
+            found[field.name] = Declared(number, {float, Any} <= {*kinds}, is_optional, is_profile)
     return {name: each for name, each in found.items() if isinstance(each.number, Number)}
 
 

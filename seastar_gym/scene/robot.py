@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from seastar_gym.scene.along import AlongLimb, Stiffening
 from seastar_gym.scene.body import Body
 from seastar_gym.scene.checks import MOST_LIMBS, require_choice, require_number, shown
-from seastar_gym.scene.limb import Limb, LimbShape, as_tuple
+from seastar_gym.scene.limb import Limb, LimbShape
 from seastar_gym.scene.number import (
     Numbers,
     UnnamedChoice,
@@ -26,6 +26,8 @@ from seastar_gym.scene.number import (
     whole,
 )
 from seastar_gym.scene.per_robot import batch_size, chosen
+from seastar_gym.scene.profile import as_tuple
+from seastar_gym.scene.section import Disc
 from seastar_gym.scene.serial import register_part
 from seastar_gym.scene.shape import limbs_that_may_touch, rest_positions, turn_per_hinge
 from seastar_gym.scene.symmetry import PointGroup, point_group
@@ -185,7 +187,7 @@ class Seastar:
                 direction=direction,
                 gap=gap,
                 length=robot.limb_length if limb.length is None else limb.length,
-                radius=as_tuple(robot.rod_radius if limb.radius is None else limb.radius),
+                section=limb.section or Disc(robot.rod_radius if limb.radius is None else limb.radius),
                 youngs_modulus=as_tuple(robot.youngs_modulus if limb.youngs_modulus is None else limb.youngs_modulus),
                 natural_curvature=limb.natural_curvature,
                 root=root,

@@ -31,7 +31,9 @@ from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.fluid import Water
 from seastar_gym.scene.numerics import DEFAULT, DEFAULT_FIDELITY, MAX_STEPS, PRESETS, Fidelity, Numerics
 from seastar_gym.scene.per_robot import batch_size, chosen
+from seastar_gym.scene.profile import as_tuple
 from seastar_gym.scene.robot import Seastar
+from seastar_gym.scene.section import Disc
 from seastar_gym.scene.serial import from_dict, register_part, to_dict
 from seastar_gym.scene.shape import cross_at_rest, n_hub_hinges, natural_hub_angle, turn_per_hinge
 
@@ -184,9 +186,12 @@ class Scene:
         """Numbers that stiffnesses and masses are made of, in words."""
         robots = [chosen(self.robot, choose) for choose in (min, max)]
         limbs = [limb for robot in robots for limb in robot.limb_shapes()]
+        sections = [limb.section for limb in limbs]
+        of_discs = [r for section in sections if isinstance(section, Disc) for r in as_tuple(section.radius)]
+        others = {shown(section) for section in sections if not isinstance(section, Disc)}
+        named = [f"radii of {_span(of_discs)} m", *others] if of_discs else [*others]
         return (
-            f"for limbs {_span(limb.length for limb in limbs)} m long, "
-            f"with radii of {_span(r for limb in limbs for r in limb.radius)} m, "
+            f"for limbs {_span(limb.length for limb in limbs)} m long, with {', '.join(named)}, "
             f"Young's moduli of {_span(E for limb in limbs for E in limb.youngs_modulus)} Pa "
             f"and densities of {_span(robot.density for robot in robots)} kg/m^3"
         )
@@ -196,9 +201,8 @@ class Scene:
         robot = chosen(self.robot, choose)
         numbers = []
         for limb in robot.limb_shapes():
-            for squared_length, EA_over_l, EI_over_l, volume in limb.extreme_edges(robot.nodes_per_limb):
-                half, hub = 0.5 * robot.density * volume, robot.n_limbs * robot.density * volume
-                numbers += [squared_length, EA_over_l, EI_over_l, half, hub]
+            for squared_length, EA_over_l, EI_over_l, mass in limb.extreme_edges(robot.nodes_per_limb, robot.density):
+                numbers += [squared_length, EA_over_l, EI_over_l, 0.5 * mass, robot.n_limbs * mass]
         found = np.array([*numbers, *(1.0 / number for number in numbers)])
         return bool((np.isfinite(found) & (found > 0.0)).all())
 
@@ -337,7 +341,7 @@ def _has_sound_body(robot: Seastar) -> bool:
     """Whether mass, inertia about the hub, with halves of root edges, and drag of turning are finite, of one robot."""
     body, limbs = cast(Body, robot.body), robot.limb_shapes()
     mass, (x, y), widest = body.mass_at(robot.density), body.centre, max(body.shape.widths)
-    roots = [0.5 * robot.density * limb.extreme_edges(robot.nodes_per_limb)[0][3] for limb in limbs]
+    roots = [0.5 * limb.extreme_edges(robot.nodes_per_limb, robot.density)[0][3] for limb in limbs]
     arms = [limb.root[0] * limb.root[0] + limb.root[1] * limb.root[1] for limb in limbs]
     inertia = body.inertia_at(robot.density) + mass * (x * x + y * y) + float(np.dot(roots, arms))
     numbers = np.array([mass, inertia, 1.0 / inertia, *arms, widest**4 * body.height])

@@ -138,8 +138,8 @@ def draw(exhibit: Exhibit, file: Path, strokes: int = STROKES) -> None:
     for nodes, colour in zip(shapes, (REST, HEATED), strict=True):
         limbs = nodes[1:].reshape(robot.n_limbs, -1, 2)
         for limb, shape in zip(limbs, robot.limb_shapes(), strict=True):
-            radius = np.interp(share, np.linspace(0.0, 1.0, len(shape.radius)), shape.radius)
-            axes.fill(*1e3 * outline(np.concatenate([nodes[:1], limb]), radius).T, color=colour, linewidth=0.5)
+            reach = [cut.reach for cut in shape.cuts(robot.density, share)]
+            axes.fill(*1e3 * outline(np.concatenate([nodes[:1], limb]), np.array(reach)).T, color=colour, linewidth=0.5)
     axes.plot(*1e3 * np.array(hub).T, color=PATH, linewidth=1.2)
     axes.plot([-120.0, -70.0], [-116.0, -116.0], color=INK, linewidth=1.5)
     axes.text(-95.0, -112.0, "50 mm", color=INK, fontsize=8, ha="center")

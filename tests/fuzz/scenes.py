@@ -28,6 +28,7 @@ from seastar_gym import (
     Numerics,
     Scene,
     Seastar,
+    Section,
     ShearCurrent,
     Simulator,
     SmaLimb,
@@ -35,7 +36,9 @@ from seastar_gym import (
     SmaWires,
     State,
     Stiffening,
+    Strip,
     ThermalSma,
+    Tube,
     UniformCurrent,
     Vortex,
     Water,
@@ -213,10 +216,22 @@ def draw_limb(draw: Draw, direction: float | None) -> Limb:
             return draw.each(lambda: draw.around(value, decades))
         return tuple(draw.around(value, decades) for _ in range(draw.rng.randint(1, 4)))
 
+    def section() -> Strip | Tube | Section:
+        kind, tube = draw.rng.choice(["strip", "tube", "measured"]), draw.around(2e-3, 0.5)
+        if kind == "strip":
+            return Strip(profile(2e-3, 0.5), profile(4e-3, 0.7))
+        if kind == "tube":
+            return Tube(tube, draw.each(lambda: tube * draw.rng.uniform(0.2, 0.95)))
+        mass = draw.each(lambda: draw.around(8e-3, 0.5)) if draw.maybe(0.5) else None
+        EI = draw.each(lambda: draw.around(5e-6, 1.0))
+        return Section(profile(8e-6, 0.5), None, profile(4e-3, 0.5), bending_stiffness=EI, mass_per_length=mass)
+
+    round_limb = draw.maybe(0.3)
     return Limb(
         direction=direction,
         length=draw.each(lambda: draw.around(0.1, 0.5)) if draw.maybe(0.3) else None,
-        radius=profile(1.6e-3, 0.7) if draw.maybe(0.3) else None,
+        radius=profile(1.6e-3, 0.7) if round_limb else None,
+        section=section() if not round_limb and draw.maybe(0.4) else None,
         youngs_modulus=profile(1e6, 2.0) if draw.maybe(0.3) else None,
         natural_curvature=draw.each(lambda: draw.rng.uniform(-8.0, 8.0)) if draw.maybe(0.3) else 0.0,
     )

@@ -14,6 +14,7 @@ from seastar_gym import (
     Attachment,
     Body,
     Contact,
+    Disc,
     FailBlind,
     GridCurrent,
     Limb,
@@ -27,13 +28,16 @@ from seastar_gym import (
     RewardWeights,
     Scene,
     Seastar,
+    Section,
     ShearCurrent,
     SmaLimb,
     SmaPulse,
     SmaWires,
     Station,
     Stiffening,
+    Strip,
     ThermalSma,
+    Tube,
     UniformCurrent,
     Vortex,
     Water,
@@ -50,7 +54,8 @@ POSITIVE = {
     SmaLimb: "rise middle time_constant heating_time period", Limited: "largest_angle largest_rate",
     ThermalSma: "heating_time cooling_time time_constant steady_rise", Numerics: "step newton_tolerance",
     ObstTrap: "longest_way", Prey: "robot_speed catch_radius", Prizes: "side radius seconds robot_speed",
-    Station: "tolerance",
+    Station: "tolerance", Disc: "radius", Strip: "width height", Tube: "outer inner",
+    Section: "area second_moment projected_width added_area bending_stiffness mass_per_length half_width",
 }  # fmt: skip
 NOT_NEGATIVE = {
     Seastar: "relaxation_time", Body: "radius mass inertia drag_coefficient drag_along drag_across drag_turning "
@@ -79,6 +84,7 @@ WHOLE = {
 PARTS = {
     Attachment: Attachment(0.0, 0.0, 0.0), ShearCurrent: ShearCurrent(1.0), Vortex: Vortex(1.0), GridCurrent: WAVES,
     Limited: Limited(SmaPulse()), MeasuredCurve: CURVE, Numerics: Numerics("implicit-midpoint"),
+    Disc: Disc(1e-3), Strip: Strip(1e-3, 4e-3), Tube: Tube(2e-3, 1e-3), Section: Section(1e-5, 1e-11, 4e-3),
 }  # fmt: skip
 """Parts of which a number is changed, where they need arguments."""
 

@@ -11,7 +11,7 @@ import oracle
 from continuum_oracle import Continuum, ContinuumShaped
 from currents import CURRENTS, velocity
 from oracle import Array, Star
-from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, UniformCurrent, Water
+from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Strip, UniformCurrent, Water
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene.robot import HubHinge
 from stages import random_shape
@@ -48,6 +48,14 @@ def alike(n_limbs: int, nodes_per_limb: int, **terms: Any) -> tuple[Seastar, Sta
     """A robot of equal limbs for the kernels and for the oracle."""
     own = {name: terms[name] for name in ("relaxation_time",) if name in terms}
     return Seastar(n_limbs, nodes_per_limb, **own), Continuum(n_limbs, nodes_per_limb, **terms)
+
+
+def stripped(n_limbs: int, nodes_per_limb: int, **terms: Any) -> tuple[Seastar, Star]:
+    """A robot whose limbs are strips for the kernels and for the oracle."""
+    limbs = (Limb(section=Strip(2e-3, 4e-3)),) * n_limbs
+    added = 1.36 * np.pi * 2e-3**2  # twice as high as wide, see DNV-RP-C205
+    star = Continuum(n_limbs, nodes_per_limb, strip=(2e-3, 4e-3, added), **terms)
+    return Seastar(n_limbs, nodes_per_limb, limbs=limbs, relaxation_time=terms.get("relaxation_time")), star
 
 
 def hinged(hub: HubHinge, n_limbs: int, nodes_per_limb: int, **terms: Any) -> tuple[Seastar, Star]:
@@ -154,6 +162,10 @@ def cases() -> Iterator[Any]:
     for name, terms in {"drag": ACROSS, "mass": MASS, "drag and mass": EVERY}.items():
         yield case(name, alike(5, 4, **terms), "implicit-euler", 1, fluid=Water(**terms))
         yield case(f"{name}-unlike", shaped(UNLIKE, 4, (0.0,) * 4, **terms), "implicit-euler", 1, fluid=Water(**terms))
+    yield case("strips", stripped(5, 10), "implicit-midpoint")
+    terms = {"fluid_density": 900.0, "relaxation_time": TAU, **EVERY, **PULLED, **flowing("shear")}
+    fluid = Water(900.0, **EVERY, current=CURRENTS["shear"])
+    yield case("every term-strips", stripped(4, 5, **terms), "implicit-euler", 1, fluid=fluid, **PULLED)
     for scheme in ("implicit-euler", "sdirk2", "implicit-midpoint"):
         for shape in ((1, 5), (2, 4), (5, 2), (5, 5)):
             yield case(f"damped-{shape}", alike(*shape, relaxation_time=TAU), scheme)

@@ -47,13 +47,13 @@ def coefficients(
     """Scales of a robot in a fluid (density or drag coefficient zero: vacuum), from its shortest, thinnest and stiffest
     edges, and its masses per node [kg].
     """
-    shortest, thinnest = float(mesh.root_edges.min()), min(map(min, mesh.radius_at_nodes))
+    shortest, thinnest = float(mesh.root_edges.min()), float(mesh.at_nodes.thickness.min())
     slenderness = min(1.0, (shortest / thinnest) ** 2 / SLENDER)
-    rate = max(map(max, mesh.modulus_at_nodes)) / (density * shortest**2) * slenderness
+    rate = float(mesh.modulus_at_nodes.max()) / (density * shortest**2) * slenderness
     length = mean(mesh.limb_lengths)
     energy = PREDICTABLE_STRAIN * mean(stretching.EA) * mesh.n_limbs * length
-    area = mesh.per_node(lambda r: np.pi * r**2)
-    broadside = mean(mesh.per_node(lambda r: drag_per_length(fluid_density, C_d, r)))
+    area = mesh.per_node(mesh.at_nodes.inert)
+    broadside = mean(mesh.per_node(drag_per_length(fluid_density, C_d, mesh.at_nodes.width)))
     stiffness_over_mass = float((stretching.EA_over_l / (density * area * mesh.dl)[1:]).max())
     edges = mesh.nodes_per_limb - 1
     return Scales(

@@ -1,8 +1,8 @@
 """Added mass, as in Morison's equation: fluid that an edge accelerates across itself weighs on its nodes.
 
-Half an edge adds m_a n n^T, m_a = rho_f C_a pi r_0^2 l/2, to the mass of each of its nodes, n its normal where the
-stage's first guess has it, off by the square of the step: a constant of the minimisation. What the turning of n, and a
-current's own acceleration, would add is left out.
+Half an edge adds m_a n n^T, m_a = rho_f C_a A_a l/2, to the mass of each of its nodes, n its normal where the stage's
+first guess has it, off by the square of the step: a constant of the minimisation. A_a is that of the cross section, pi
+r_0^2 of a disc. What the turning of n, and a current's own acceleration, would add is left out.
 
 The continuum's discretisation takes it as consistently as the robot's own mass: velocities are linear along an edge, so
 it has m_a/3 ((d_head - d_tail) n)^2/2 less than the lumped masses, d = v - v_hat.
@@ -20,7 +20,7 @@ from seastar_gym.simd.lanes import add_product, load, splat, store, subtract_pro
 
 
 def coefficients(mesh: Mesh, density: float, C_a: float | None) -> NDArray[np.float64] | None:
-    """m_a = rho_f C_a pi r_0^2 l/2, per half edge as in drag.py [kg]; None for none."""
+    """m_a = rho_f C_a A_a l/2, A_a = pi r_0^2 of a disc, per half edge as in drag.py [kg]; None for none."""
     if C_a is None:
         return None
     return mesh.per_half_edge(half_edges(mesh, density, C_a))
@@ -28,8 +28,7 @@ def coefficients(mesh: Mesh, density: float, C_a: float | None) -> NDArray[np.fl
 
 def half_edges(mesh: Mesh, density: float, C_a: float) -> NDArray[np.float64]:
     """m_a of every edge [kg]."""
-    area = np.array([np.pi * r**2 for r in mesh.radius_at_edges])
-    return density * C_a * area * 0.5 * mesh.l
+    return density * C_a * mesh.at_edges.added * 0.5 * mesh.l
 
 
 def edge_coefficients(mesh: Mesh, density: float, C_a: float | None) -> NDArray[np.float64] | None:

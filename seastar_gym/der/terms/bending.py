@@ -35,19 +35,13 @@ GREGORY = (5.0 / 12.0, 13.0 / 12.0)
 
 
 def coefficients(mesh: Mesh, gregory: bool = False) -> Bending:
-    """Bending stiffnesses and natural moments, with modulus and radius at the nodes.
+    """Bending stiffnesses and natural moments, with cross sections at the nodes.
 
     gregory: Whether the first two hinges of a limb have Gregory's weights, and the first is the clamp of a rigid hub,
         as in the continuum's discretisation. Otherwise the first is a hub hinge.
     """
     n_edges = mesh.nodes_per_limb - 1
-    EI = np.array(
-        [
-            E * np.pi * r**4 / 4.0
-            for moduli, radii in zip(mesh.modulus_at_nodes, mesh.radius_at_nodes, strict=True)
-            for E, r in zip(moduli[:-1], radii[:-1], strict=True)
-        ]
-    )
+    EI = mesh.at_nodes.EI[:, :-1].ravel()
     dl = mesh.l * np.tile(hinge_weights(n_edges, gregory), mesh.n_limbs)
     EI_over_dl, dl_over_EI = EI / dl, dl / EI
     EI_kappa_bar = 2.0 * EI_over_dl * np.tan(0.5 * np.repeat(mesh.natural_turn, n_edges))

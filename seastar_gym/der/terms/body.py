@@ -105,7 +105,7 @@ def coefficients(
     mass, centre, inertia: Of the body alone [kg], [m], and about its centre of mass, with the fluid's [kg m^2].
     weight: As in `Body`, of the body alone.
     """
-    places, halves = np.array(arms), half_volumes(mesh)
+    places, halves = np.array(arms), half_volumes(mesh, mesh.at_nodes.inert)
     own = mass * np.square(centre).sum() + inertia
     of_roots = density * halves @ np.square(places).sum(axis=1)
     return Body(
@@ -122,10 +122,9 @@ def coefficients(
     )
 
 
-def half_volumes(mesh: Mesh) -> Floats:
-    """Volume of the inner halves of root edges, per limb [m^3]."""
-    area = np.array([np.pi * radii[0] ** 2 for radii in mesh.radius_at_nodes])
-    return area * 0.5 * mesh.root_edges
+def half_volumes(mesh: Mesh, area: Floats) -> Floats:
+    """Volume of the inner halves of root edges, per limb [m^3]; area: At the nodes of every limb [m^2]."""
+    return area[:, 0] * 0.5 * mesh.root_edges
 
 
 def with_corners(body: Body, corners: Floats) -> Body:

@@ -142,8 +142,8 @@ def coefficients(
     """
     share = np.arange(mesh.nodes_per_limb) / (mesh.nodes_per_limb - 1)
     thickness, stiffness = [0.0], [0.0]
-    for length, radii, moduli in zip(mesh.limb_lengths, mesh.radius_at_nodes, mesh.modulus_at_nodes, strict=True):
-        thickness += [min(r, 0.5 * opening_angle * length * s) for r, s in zip(radii, share, strict=True)][1:]
+    for length, reaches, moduli in zip(mesh.limb_lengths, mesh.at_nodes.reach, mesh.modulus_at_nodes, strict=True):
+        thickness += [min(r, 0.5 * opening_angle * length * s) for r, s in zip(reaches, share, strict=True)][1:]
         stiffness += [OF_CYLINDERS * E if modulus is None else modulus for E in moduli][1:]
     corners, radius = Rim(np.zeros((0, 2)), 0.0) if rim is None else rim
     beyond = [] if rim is None else [0.0] * (1 + mesh.n_limbs)

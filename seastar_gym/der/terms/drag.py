@@ -21,14 +21,14 @@ from seastar_gym.simd.lanes import absolute, add_product, load, select, sqrt
 Floats = NDArray[np.float64]
 
 
-def drag_per_length(density: float, coefficient: float, radius: float) -> float:
-    """1/2 rho_f C_d D of (13.8), per length and squared speed, of a limb of that radius [kg/m^2]."""
-    return 0.5 * density * coefficient * 2.0 * radius
+def drag_per_length(density: float, coefficient: float, width: Floats) -> Floats:
+    """1/2 rho_f C_d D of (13.8), per length and squared speed, of limbs of these widths D [kg/m^2]."""
+    return 0.5 * density * coefficient * width
 
 
 def coefficients(mesh: Mesh, density: float, C: float) -> Floats:
     """c = 1/2 rho_f C D dl of flow in any direction, per node [kg/m]."""
-    return mesh.per_node(lambda r: drag_per_length(density, C, r)) * mesh.dl
+    return mesh.per_node(drag_per_length(density, C, mesh.at_nodes.width)) * mesh.dl
 
 
 def simpson_coefficients(mesh: Mesh, density: float, C: float) -> tuple[Floats, Floats]:
@@ -36,7 +36,7 @@ def simpson_coefficients(mesh: Mesh, density: float, C: float) -> tuple[Floats, 
 
     That per edge is an eighth of what the middle has, see middle_slopes.
     """
-    in_middle = np.array([drag_per_length(density, C, r) for r in mesh.radius_at_edges]) * mesh.l * (2.0 / 3.0)
+    in_middle = drag_per_length(density, C, mesh.at_edges.width) * mesh.l * (2.0 / 3.0)
     return coefficients(mesh, density, C) / 3.0, in_middle / 8.0
 
 
@@ -52,8 +52,8 @@ def cross_coefficients(mesh: Mesh, density: float, C_d: float, C_t: float | None
 
 def across_half_edges(mesh: Mesh, density: float, C_d: float, C_t: float) -> Floats:
     """c_n of every edge [kg/m]."""
-    added = [drag_per_length(density, C_d, r) - drag_per_length(density, C_t, r) for r in mesh.radius_at_edges]
-    return np.array(added) * 0.5 * mesh.l
+    width = mesh.at_edges.width
+    return (drag_per_length(density, C_d, width) - drag_per_length(density, C_t, width)) * 0.5 * mesh.l
 
 
 def simpson_cross_coefficients(

@@ -18,7 +18,7 @@ simulator takes back at its end, and the kernels need not know of it. With more,
 
 def coefficients(mesh: Mesh, density: float, held_nodes: Sequence[int] = ()) -> NDArray[np.float64]:
     """Lumped mass, per node [kg]."""
-    mass: NDArray[np.float64] = density * mesh.per_node(lambda r: np.pi * r**2) * mesh.dl
+    mass: NDArray[np.float64] = density * mesh.per_node(mesh.at_nodes.inert) * mesh.dl
     hold(mass, held_nodes)
     return mass
 
@@ -34,8 +34,7 @@ def edge_coefficients(mesh: Mesh, density: float) -> NDArray[np.float64]:
     An edge whose halves weigh a and b may have less than a b/(a + b) less, or its kinetic energy would not be positive.
     Only limbs that taper by a lot from one node to the next come to that.
     """
-    area = np.array([np.pi * r**2 for r in mesh.radius_at_edges])
-    at_nodes = np.pi * np.square(mesh.radius_at_nodes)
+    area, at_nodes = mesh.at_edges.inert, mesh.at_nodes.inert
     tail, head = at_nodes[:, :-1].ravel(), at_nodes[:, 1:].ravel()
     most = MOST_TAKEN * density * (0.5 * mesh.l) / (1.0 / tail + 1.0 / head)
     return np.minimum(density * area * mesh.l / 6.0, most)

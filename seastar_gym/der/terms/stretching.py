@@ -18,8 +18,8 @@ class Stretching(NamedTuple):
 
 
 def coefficients(mesh: Mesh) -> Stretching:
-    """Stretching stiffnesses, with modulus and radius in the middle of the edges."""
-    EA = np.array([E * (np.pi * r**2) for E, r in zip(mesh.modulus_at_edges, mesh.radius_at_edges, strict=True)])
+    """Stretching stiffnesses, with modulus and cross section in the middle of the edges."""
+    EA = mesh.modulus_at_edges * mesh.at_edges.area
     return Stretching(EA, EA / mesh.l, mesh.l / EA)
 
 
