@@ -40,8 +40,7 @@ on the split "train". Numbers are means. Their 95 % intervals are those of a boo
 seed, over episodes. Where a learner has several seeds, the mean of each is given. What is missing, or has swum fewer
 episodes, is swum by the same command, which goes on where it was broken off; `--seeds 0 1 2` adds seeds.
 
-Rows of 16 episodes are older: their runs recorded no versions. Learners of 64 episodes are of one seed, unless the
-table has more.
+Learners have one to three seeds, and differ from seed to seed: the last column has each.
 
 A task is kept if the best that was found is at least 20 % better than greedy, and if PPO leaves at least a third of
 that after {decisions:,} decisions. *Bound* is the best mean of all agents of a row: what can be reached, not a proof
@@ -56,11 +55,11 @@ Comparisons are over the episodes that all agents of a task have swum.
 | adaptive | remembers: goes by the wires, the drift, .. that have explained the past best; keeps a map of discs |
 | prior | besides, is told how `ObstTrap` draws horseshoes: it swims around the most probable one, too |
 | informed | is told what is hidden: the wires, the water, the course of the prey, the dead limbs, all discs |
-| turn, then swim | of `SeastarSwimHeading-v0`: a wave of single limbs turns, then the policy in the box swims |
+| turn, then swim | of `SeastarSwimHeading-v0`: a wave of single limbs turns, then the bundled policy swims |
 | PPO | tuned for this robot and symmetric: the project's hyperparameters, horizons of `agents.tasks.learning.OWN` |
 | PPO, memory | the same, and tips, last commands and targets of the last eight observations |
 | PPO, told the way | PPO of `ObstTrap`, by a reward that measures the way around all discs |
-| in the box | the policy that comes with the package, one seed: PPO with memory, after six times as many decisions |
+| in the box | the bundled policy, one training: PPO with memory, after six times as many decisions |
 
 To the planner, wires are as they should be, the water is still, prey swim straight on, all limbs are alive, and the
 way between the discs that it sees is the straight one. The current of `Station` is hardly hidden: it shows in the
@@ -73,7 +72,7 @@ In `SeastarSwimHeading-v0` nothing is hidden, either, and its agents are other o
 random paths with random headings, those of the seeds from 1000 on, that no training draws, within 300 s. *Turn, then
 swim* decides every 0.2 s, as its wave asks for, the others every 0.5 s, among them PPO of `studies.learning.heading`.
 
-Policies in the box are in `seastar_gym/controllers/policies/tasks`, each with a card. `python -m agents.tasks` trains
+Bundled policies are in `seastar_gym/controllers/policies/tasks`, each with a card. `python -m agents.tasks` trains
 them, that of `ObstTrap` by the reward that measures the way around all discs. To watch one, type
 `seastar swim --task SeastarPrey-v0 --agent learned`.
 
