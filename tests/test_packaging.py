@@ -126,7 +126,7 @@ def test_importing_the_package_leaves_out_what_it_does_not_need():
 
 @pytest.mark.parametrize(
     "code, most",
-    [("import seastar_gym", 4), ("from seastar_gym.controllers import load; load()", 40)],
+    [("import seastar_gym", 4), ("from seastar_gym.controllers import load; load()", 41)],
     ids=["the package", "a policy"],
 )
 def test_what_needs_no_compiler_loads_none(code, most):

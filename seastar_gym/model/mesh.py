@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.der.mesh import Mesh, Sections, mean
 from seastar_gym.scene.limb import LimbShape
-from seastar_gym.scene.profile import along
+from seastar_gym.scene.number import along
 from seastar_gym.scene.shape import turn_per_hinge
 
 Floats = NDArray[np.float64]

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.scene.checks import require_numbers, shown
-from seastar_gym.scene.number import Numbers, check_numbers, not_negative, positive, within
-from seastar_gym.scene.profile import Profile, along, as_tuple
+from seastar_gym.scene.number import Numbers, Profile, along, as_tuple, check_numbers, not_negative, positive, within
 from seastar_gym.scene.serial import register_part
 
 Floats = NDArray[np.float64]

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.scene.checks import is_finite_number, shown
-from seastar_gym.scene.number import Numbers, check_numbers, finite, positive
-from seastar_gym.scene.profile import Profile, as_tuple, check_profiles
+from seastar_gym.scene.number import Numbers, Profile, as_tuple, check_numbers, finite, positive
 from seastar_gym.scene.section import AnySection, Cut, cuts
 from seastar_gym.scene.serial import register_part
 
@@ -46,7 +45,6 @@ class Limb:
                 f"A limb's direction must be from 0 to below 2 pi [rad], for all robots, not {shown(self.direction)}."
             )
         check_numbers(self)
-        check_profiles(self)
         if not isinstance(self.section, AnySection | None):
             raise ValueError(f"A limb's section must be a Disc, Strip, Tube or Section, not {shown(self.section)}.")
         if self.section is not None and self.radius is not None:

@@ -3,7 +3,7 @@
     density: Annotated[Numbers, not_negative("kg/m^3")] = 1000.0
 
 `check_numbers` refuses what was not declared. Numbers of the type `Numbers` may differ from robot to robot, see
-per_robot.py. Results of sweeps have the units.
+per_robot.py; those of the type `Profile` may differ along a limb. Results of sweeps have the units.
 """
 
 from collections.abc import Callable, Hashable
@@ -12,12 +12,14 @@ from functools import cache, partial
 from typing import Any, NamedTuple, TypeAlias, get_args, get_origin, get_type_hints
 
 import numpy as np
+from numpy.typing import NDArray
 
 from seastar_gym.scene.checks import (
     as_float,
     require_count,
     require_finite,
     require_number,
+    require_numbers,
     require_range,
     require_within,
     shown,
@@ -28,6 +30,8 @@ Numbers: TypeAlias = float | Any
 
 Typed as Any for the latter, so that code for the scene of one robot may read a float.
 """
+Profile: TypeAlias = float | tuple[float, ...]
+"""Number, or positive numbers at equally spaced points of a limb from hub to tip (both included), linear in between."""
 Range: TypeAlias = tuple[float, float]
 """Smallest and largest number of a uniform draw."""
 
@@ -128,17 +132,38 @@ def declared(kind: Hashable) -> dict[str, Declared]:
 def check_numbers(part: Any, whose: str = "") -> None:
     """Refuse numbers of a part that are not as it declares, and store those of each robot as `PerRobot`.
 
-    Profiles along a limb are left to the part. whose: Beginning of the names in sentences, such as "Prey.".
+    whose: Beginning of the names in sentences, such as "Prey.".
     """
     for name, (number, is_per_robot, is_optional, may_be_profile) in declared(part.__class__).items():
         value = getattr(part, name)
-        if (value is None and is_optional) or (type(value) is tuple and may_be_profile):
+        if value is None and is_optional:
+            continue
+        if type(value) is tuple and may_be_profile:
+            _require_profile(f"{whose or number.whose}{name}", value, number.unit)
             continue
         if is_per_robot and isinstance(value, np.ndarray | tuple):
             value = _of_robots(name, value)
             object.__setattr__(part, name, value)
         for one in value if isinstance(value, PerRobot) else (value,):
             number.require(f"{whose or number.whose}{name}", one)
+
+
+def _require_profile(name: str, profile: tuple[float, ...], unit: str) -> None:
+    require_numbers(name, profile, unit)
+    if not profile or min(profile) <= 0.0:
+        raise ValueError(f"{name} must be positive all along it [{unit}], not {shown(profile)}.")
+
+
+def as_tuple(profile: Profile) -> tuple[float, ...]:
+    """Profile as a tuple of numbers."""
+    return profile if isinstance(profile, tuple) else (profile,)
+
+
+def along(profile: tuple[float, ...], share: NDArray[np.float64]) -> list[float]:
+    """Values of a profile at fractions of the length from hub to tip."""
+    if len(profile) == 1:
+        return [*profile] * len(share)
+    return np.interp(share, np.linspace(0.0, 1.0, len(profile)), profile).tolist()
 
 
 def _of_robots(name: str, value: Any) -> PerRobot:

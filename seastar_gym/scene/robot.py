@@ -19,6 +19,7 @@ from seastar_gym.scene.number import (
     Numbers,
     UnnamedChoice,
     UnnamedCount,
+    as_tuple,
     check_numbers,
     is_named,
     not_negative,
@@ -26,7 +27,6 @@ from seastar_gym.scene.number import (
     whole,
 )
 from seastar_gym.scene.per_robot import batch_size, chosen
-from seastar_gym.scene.profile import as_tuple
 from seastar_gym.scene.section import Disc
 from seastar_gym.scene.serial import register_part
 from seastar_gym.scene.shape import limbs_that_may_touch, rest_positions, turn_per_hinge

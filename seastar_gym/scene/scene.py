@@ -29,9 +29,9 @@ from seastar_gym.scene.checks import (
 )
 from seastar_gym.scene.contact import Contact
 from seastar_gym.scene.fluid import Water
+from seastar_gym.scene.number import as_tuple
 from seastar_gym.scene.numerics import DEFAULT, DEFAULT_FIDELITY, MAX_STEPS, PRESETS, Fidelity, Numerics
 from seastar_gym.scene.per_robot import batch_size, chosen
-from seastar_gym.scene.profile import as_tuple
 from seastar_gym.scene.robot import Seastar
 from seastar_gym.scene.section import Disc
 from seastar_gym.scene.serial import from_dict, register_part, to_dict

@@ -11,8 +11,7 @@ from typing import Annotated, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from seastar_gym.scene.number import Numbers, PerRobot, check_numbers, positive
-from seastar_gym.scene.profile import Profile, along, as_tuple, check_profiles
+from seastar_gym.scene.number import Numbers, PerRobot, Profile, along, as_tuple, check_numbers, positive
 from seastar_gym.scene.serial import register_part
 
 BROADSIDE = ((0.1, 2.23), (0.2, 1.98), (0.5, 1.70), (1.0, 1.51), (2.0, 1.36), (5.0, 1.21), (10.0, 1.14))
@@ -54,7 +53,6 @@ class Disc:
 
     def __post_init__(self) -> None:
         check_numbers(self)
-        check_profiles(self)
 
     def cut(self, E: float, density: float, radius: float) -> Cut:
         """Numbers at a place with Young's modulus E [Pa], in a robot of a density [kg/m^3]."""
@@ -76,7 +74,6 @@ class Strip:
 
     def __post_init__(self) -> None:
         check_numbers(self)
-        check_profiles(self)
 
     def cut(self, E: float, density: float, width: float, height: float) -> Cut:
         """Numbers at a place with Young's modulus E [Pa], in a robot of a density [kg/m^3]."""
@@ -98,7 +95,6 @@ class Tube:
 
     def __post_init__(self) -> None:
         check_numbers(self)
-        check_profiles(self)
         if not _is_less(self.inner, self.outer):
             raise ValueError("A tube's inner radius must be smaller than its outer one [m], all along it.")
 
@@ -134,7 +130,6 @@ class Section:
 
     def __post_init__(self) -> None:
         check_numbers(self)
-        check_profiles(self)
         if (self.second_moment is None) == (self.bending_stiffness is None):
             raise ValueError("A section has either a second_moment [m^4] or a bending_stiffness [N m^2].")
 
