@@ -12,6 +12,8 @@ from seastar_gym.scene.number import Numbers, Profile, as_tuple, check_numbers, 
 from seastar_gym.scene.section import AnySection, Cut, cuts
 from seastar_gym.scene.serial import register_part
 
+Floats = NDArray[np.float64]
+
 
 @register_part
 @dataclass(frozen=True)
@@ -51,9 +53,6 @@ class Limb:
             raise ValueError("A limb has either a radius or a section.")
 
 
-Floats = NDArray[np.float64]
-
-
 class LimbShape(NamedTuple):
     """Limb with all values filled in, see Limb.
 
@@ -74,7 +73,7 @@ class LimbShape(NamedTuple):
         return cuts(self.section, self.youngs_modulus, density, share)
 
     def corners(self, density: float) -> list[Cut]:
-        """Cross sections where profiles have their points: bounds of those in between."""
+        """Cross sections where profiles have their points."""
         profiles = [getattr(self.section, field.name) for field in fields(self.section)] + [self.youngs_modulus]
         points = {len(as_tuple(profile)) for profile in profiles if profile is not None}
         share = np.unique(np.concatenate([np.linspace(0.0, 1.0, n) for n in points]))

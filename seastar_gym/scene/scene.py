@@ -85,8 +85,8 @@ class Scene:
         self._check_hub_hinges()
         self._check_strengths()
         self._check_holds_and_loads()
-        self._check_contact()
         self._check_coefficients()
+        self._check_contact()
         self._check_body()
 
     def _check_strengths(self) -> None:

@@ -17,7 +17,7 @@ from seastar_gym.scene.serial import register_part
 BROADSIDE = ((0.1, 2.23), (0.2, 1.98), (0.5, 1.70), (1.0, 1.51), (2.0, 1.36), (5.0, 1.21), (10.0, 1.14))
 """Added mass of rectangles over that of the circle about their height, by height over width.
 
-DNV-RP-C205, table D-1; 1 for a thin plate.
+After DNV-RP-C205, within 3 % of a potential flow (tests/scene/test_section.py); 1 for a thin plate.
 """
 
 

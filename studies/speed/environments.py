@@ -15,6 +15,7 @@ import numpy as np
 
 import seastar_gym  # noqa: F401, registers the ids
 from studies.frame import Results, Study
+from studies.kept import rounded
 
 DECISIONS = 256
 """Decisions of a round, at least."""
@@ -114,7 +115,7 @@ def table(results: Mapping[str, Any]) -> str:
 
 
 def _two(number: float) -> str:
-    return f"{float(f'{number:.2g}'):,.0f}"
+    return f"{rounded(number, 2):,.0f}"
 
 
 STUDY = Study(
