@@ -773,16 +773,18 @@ def pulse(t: float, peak_angle: float = np.pi / 5.0, heating_time: float = 0.1, 
 
 
 def step(
-    star: Star, q: Array, v: Array, t: float, h: float, command: ArrayLike, scheme: str, **pulse_shape: float
+    star: Star, q: Array, v: Array, t: float, h: float, command: ArrayLike, scheme: str, damping: float = 0.0,
+    **pulse_shape: float,
 ) -> tuple[Array, Array]:
     """State at t + h from the state (q, v) at t [s], with delta_psi taken at the times of the stages.
 
     ``pulse_shape`` goes to ``pulse``. A stage starts from q_hat, v_hat, the state advanced by the velocities and
-    accelerations of the stages before it. The last stage is the new state; the implicit midpoint extrapolates it.
+    accelerations of the stages before it. The last stage is the new state; the implicit midpoint extrapolates it, from
+    theta = (1 + damping)/2 of the step.
     """
     velocities: list[Array] = []
     accelerations: list[Array] = []
-    for *row, diagonal in TABLEAUS[scheme]:
+    for *row, diagonal in TABLEAUS[scheme] if damping == 0.0 else [[0.5 * (1.0 + damping)]]:
         q_hat = q + h * sum(a * v_j for a, v_j in zip(row, velocities, strict=True))
         v_hat = v + h * sum(a * a_j for a, a_j in zip(row, accelerations, strict=True))
         delta_psi = np.asarray(command) * pulse(t + (sum(row) + diagonal) * h, **pulse_shape)
@@ -790,7 +792,7 @@ def step(
         velocities.append(v_new)
         accelerations.append((v_new - v_hat) / (diagonal * h))
     if scheme == "implicit-midpoint":
-        return 2.0 * q_new - q, 2.0 * v_new - v
+        return q + (q_new - q) / diagonal, v + (v_new - v) / diagonal
     return q_new, v_new
 
 

@@ -24,7 +24,8 @@ class Setting:
     time, of the steps with the same nodes. The sum is told also where the two cancel. In a current, the path is the way
     through the water, and robots begin at rest in the water.
 
-    nodes_per_limb, scheme, step [s], newton_tolerance, path_tolerance, discretisation: See `Numerics` and `Seastar`.
+    nodes_per_limb, scheme, step [s], newton_tolerance, path_tolerance, damping, discretisation: See `Numerics` and
+        `Seastar`.
     errors: Sum of the errors of space and time, by class of commands, see `Certificate`.
     typical: The same, the median of all sequences of a class. {} where medians were not measured.
     space_error, time_error: Largest errors of all classes that the certificate promises.
@@ -51,6 +52,7 @@ class Setting:
     end_error: float = math.nan
     path_tolerance: float | None = None
     discretisation: str = "continuum"
+    damping: float = 0.0
 
     def __post_init__(self) -> None:
         require_choice("discretisation", self.discretisation, get_args(Discretisation))
@@ -73,8 +75,9 @@ class Setting:
     def resolution(self) -> Resolution:
         """Discretisation, nodes per limb and numerics."""
         numerics = Numerics(
-            cast(SchemeName, self.scheme), self.step, self.newton_tolerance, path_tolerance=self.path_tolerance
-        )
+            cast(SchemeName, self.scheme), self.step, self.newton_tolerance,
+            path_tolerance=self.path_tolerance, damping=self.damping,
+        )  # fmt: skip
         return Resolution(cast(Discretisation, self.discretisation), self.nodes_per_limb, numerics)
 
     @property

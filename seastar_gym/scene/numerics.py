@@ -1,6 +1,6 @@
 """`Numerics`: scheme, step and tolerances of time stepping, chosen by value or by preset."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Literal, NamedTuple, get_args
 
 from seastar_gym.scene.checks import require_choice, require_flag, shown
@@ -38,6 +38,9 @@ class Numerics:
         SolverStatus.ITERATION_LIMIT.
     path_tolerance: Error of the hub's path as a fraction of its length, from 0.001 to 0.02, by which steps are adapted
         (up to `step`). Only for the scheme "implicit-midpoint". None means steps of equal length.
+    damping: Numerical damping of the scheme "implicit-midpoint", from 0 to 0.5. Without any, oscillations that are too
+        fast for the steps never decay, and on fine meshes they may gather energy. Their amplitude falls by a fraction
+        of twice the damping in every step, slow oscillations are hardly damped, see der/stepping/schemes.py.
     named: Whether these numerics were chosen. False only for those of a `Scene` that was given none, which a fidelity
         may replace. It does not count in comparisons.
     """
@@ -47,6 +50,7 @@ class Numerics:
     newton_tolerance: Annotated[float, positive("limb lengths")] = 1e-8
     max_iterations: Annotated[int, whole(2, 10_000)] = 60
     path_tolerance: Annotated[float | None, within(0.001, 0.02)] = None
+    damping: Annotated[float, within(0.0, 0.5)] = 0.0
     named: bool = field(default=True, kw_only=True, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -57,7 +61,9 @@ class Numerics:
             raise ValueError(f"newton_tolerance must be at most 0.01 limb lengths, not {shown(self.newton_tolerance)}.")
         if self.path_tolerance is not None and self.scheme != "implicit-midpoint":
             raise ValueError(f'path_tolerance needs the scheme "implicit-midpoint", not {shown(self.scheme)}.')
-        if not self.named and self not in (DEFAULT, Numerics()):  # the latter in older files
+        if self.damping > 0.0 and self.scheme != "implicit-midpoint":
+            raise ValueError(f'damping needs the scheme "implicit-midpoint", not {shown(self.scheme)}.')
+        if not self.named and self not in (DEFAULT, *OLD_DEFAULTS):
             object.__setattr__(self, "named", True)
 
     @classmethod
@@ -82,11 +88,20 @@ class Resolution(NamedTuple):
     numerics: Numerics
 
 
+DAMPING = 0.003
+"""`Numerics.damping` of all fidelities but "chapter": the least that was tried with which energies of long swims do not
+grow (`python -m studies.accuracy.numerical_damping`)."""
+
+
+def _midpoint(step: float, newton_tolerance: float) -> Numerics:
+    return Numerics("implicit-midpoint", step, newton_tolerance, damping=DAMPING)
+
+
 PRESETS: dict[Fidelity, Resolution] = {
-    "fast": Resolution("continuum", 7, Numerics("implicit-midpoint", 5e-3, newton_tolerance=1e-5)),
-    "balanced": Resolution("continuum", NODES["continuum"], Numerics("implicit-midpoint", 5e-3, newton_tolerance=1e-5)),
-    "accurate": Resolution("continuum", 19, Numerics("implicit-midpoint", 1e-3, newton_tolerance=1e-6)),
-    "reference": Resolution("continuum", 37, Numerics("implicit-midpoint", 0.3e-3)),
+    "fast": Resolution("continuum", 7, _midpoint(5e-3, 1e-5)),
+    "balanced": Resolution("continuum", NODES["continuum"], _midpoint(5e-3, 1e-5)),
+    "accurate": Resolution("continuum", 19, _midpoint(1e-3, 1e-6)),
+    "reference": Resolution("continuum", 37, _midpoint(0.3e-3, 1e-8)),
     "chapter": Resolution("chapter", NODES["chapter"], Numerics("implicit-euler", 3e-3)),
 }
 """Chosen from the front that `python -m studies.accuracy` measures."""
@@ -94,3 +109,5 @@ PRESETS: dict[Fidelity, Resolution] = {
 DEFAULT_FIDELITY: Fidelity = "balanced"
 DEFAULT = PRESETS[DEFAULT_FIDELITY].numerics
 """Numerics of a `Scene` that is given none."""
+OLD_DEFAULTS = Numerics(), replace(DEFAULT, damping=0.0)
+"""Numerics that a `Scene` was given by default once, in files of that time."""

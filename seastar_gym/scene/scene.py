@@ -7,7 +7,7 @@ of a batch.
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from operator import itemgetter
 from os import PathLike
@@ -315,8 +315,9 @@ class Scene:
     @property
     def is_chapters(self) -> bool:
         """Whether all is the chapter's except numerics, nodes per limb and discretisation."""
-        robot = Seastar(nodes_per_limb=self.robot.nodes_per_limb, discretisation=self.robot.discretisation)
-        return self == Scene(robot, numerics=self.numerics)
+        chapters = Scene(Seastar(nodes_per_limb=self.robot.nodes_per_limb, discretisation=self.robot.discretisation))
+        compared = (each.name for each in fields(self) if each.compare and each.name != "numerics")
+        return all(getattr(self, name) == getattr(chapters, name) for name in compared)
 
     def to_dict(self) -> dict[str, Any]:
         """Scene as plain data for JSON, see serial.py. ValueError if it could not be read back."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from seastar_gym.der.energy import energies
 from seastar_gym.der.rods import Work, make_work
 from seastar_gym.der.stepping.report import MOMENTS, PEAK_MOMENT, REPORT_ROWS, SMALLEST_HUB_T, WORK
-from seastar_gym.der.stepping.schemes import SCHEMES
+from seastar_gym.der.stepping.schemes import SCHEMES, scheme_of
 from seastar_gym.der.stepping.stroke import advance
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.coefficients import Coefficients
@@ -55,7 +55,7 @@ class Batch:
     def __init__(self, scene: Scene, n_robots: int, threads: int, effort: bool):
         self._scene, self.n_robots = scene, n_robots
         n_groups, n_limbs, n_rows = -(-n_robots // N_LANES), scene.robot.n_limbs, 2 * scene.robot.n_nodes
-        self._scheme = SCHEMES[scene.numerics.scheme]
+        self._scheme = scheme_of(scene.numerics.scheme, scene.numerics.damping)
         self.make_coefficients(scene)
         self.n_node_rows = n_rows
         body = self.coefficients.rods(0).body

@@ -130,7 +130,8 @@ class Row:
         numerics = self.resolution.numerics
         adapted = numerics.path_tolerance
         how = "" if adapted is None else f", adapted to {100 * adapted:g} %"
-        return f"{numerics.scheme} {1e3 * numerics.step:g} ms{how}"
+        bare = self.mesh[0] == "continuum" and numerics.scheme == "implicit-midpoint" and numerics.damping == 0.0
+        return f"{numerics.scheme} {1e3 * numerics.step:g} ms{how}{', undamped' if bare else ''}"
 
     def total(self, column: Column) -> float:
         """Measured error of space and of time, added."""
@@ -162,9 +163,10 @@ class Study:
 
 
 def no_coarser(other: Numerics, numerics: Numerics) -> bool:
-    """Whether `other` has the scheme of `numerics` and no larger step or tolerance."""
+    """Whether `other` has the scheme of `numerics`, no less damping, and no larger step or tolerance."""
     return (
         other.scheme == numerics.scheme
+        and other.damping >= numerics.damping
         and (other.path_tolerance is None) == (numerics.path_tolerance is None)
         and other.step <= numerics.step
         and other.newton_tolerance <= numerics.newton_tolerance

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import get_args
 
 from seastar_gym.scene import Numerics
-from seastar_gym.scene.numerics import PRESETS, Fidelity, Resolution, SchemeName
+from seastar_gym.scene.numerics import DAMPING, PRESETS, Fidelity, Resolution, SchemeName
 from seastar_gym.scene.robot import Discretisation
 
 MS = 1e-3
@@ -13,9 +13,11 @@ STEPS: dict[SchemeName, tuple[float, ...]] = {
     "implicit-euler": (20, 10, 5, 3, 1),
     "sdirk2": (50, 30, 20, 15, 10, 5),
     "sdirk3": (30, 20, 10),
-    "implicit-midpoint": (10, 8, 6, 5, 4, 3, 2, 1, 0.5, 0.3, 0.1),
+    "implicit-midpoint": (10, 8, 6, 5, 4, 3, 2, 1.5, 1, 0.7, 0.5, 0.3, 0.1),
 }
 """Time steps [ms] of every scheme."""
+UNDAMPED = (5, 1)
+"""Time steps [ms] at which the midpoint rule is measured without `Numerics.damping`, too."""
 ADAPTED = (0.02, 0.01, 0.005)
 """Path tolerances of the settings with adapted steps."""
 LARGEST_ADAPTED = 5 * MS
@@ -49,7 +51,7 @@ class Plan:
     fine: float = 0.05 * MS
     opinion: tuple[int, float] = (37, 0.1 * MS)
     meshes: tuple[Mesh, ...] = (
-        *(("continuum", n) for n in (6, 7, 8, 10, 12, 13, 19, 37)), *(("chapter", n) for n in (10, 37, 73)),
+        *(("continuum", n) for n in (6, 7, 8, 10, 11, 12, 13, 19, 25, 28, 37)), *(("chapter", n) for n in (10, 37, 73)),
     )  # fmt: skip
     shortest: float = 0.1 * MS
     finest: int = 19
@@ -70,8 +72,15 @@ def presets() -> dict[str, Resolution]:
 def tolerances(step: float) -> tuple[float, ...]:
     """Newton tolerances that are measured with a time step [s]: short steps bring small updates, so need small ones."""
     if step >= 5 * MS:
-        return 1e-5, 1e-6
+        return 3e-5, 1e-5, 1e-6
     return (1e-6, 1e-7) if step >= 1 * MS else (1e-8,)
+
+
+def dampings(discretisation: Discretisation, scheme: SchemeName, step: float) -> tuple[float, ...]:
+    """Numbers `Numerics.damping` that are measured with a scheme and a time step [ms]: schemes that damp have none."""
+    if discretisation == "chapter" or scheme != "implicit-midpoint":
+        return (0.0,)
+    return (DAMPING, 0.0) if step in UNDAMPED else (DAMPING,)
 
 
 def settings(plan: Plan) -> list[Resolution]:
@@ -85,11 +94,16 @@ def _numerics(plan: Plan, mesh: Mesh) -> list[Numerics]:
     discretisation, nodes = mesh
     shortest = max(plan.shortest, 0.1 * MS if nodes == 10 else 0.3 * MS if discretisation == "continuum" else 1 * MS)
     fixed = [
-        Numerics(scheme, step * MS, tolerance)
+        Numerics(scheme, step * MS, tolerance, damping=damping)
         for scheme, steps in STEPS.items()
         for step in steps
+        for damping in dampings(discretisation, scheme, step)
         for tolerance in tolerances(step * MS)
         if step * MS >= shortest and (nodes <= plan.finest or tolerance == tolerances(step * MS)[-1])
     ]
-    adapted = [Numerics("implicit-midpoint", LARGEST_ADAPTED, 1e-7, path_tolerance=tolerance) for tolerance in ADAPTED]
+    damping = dampings(discretisation, "implicit-midpoint", LARGEST_ADAPTED / MS)[0]
+    adapted = [
+        Numerics("implicit-midpoint", LARGEST_ADAPTED, 1e-7, path_tolerance=tolerance, damping=damping)
+        for tolerance in ADAPTED
+    ]
     return fixed + (adapted if nodes <= plan.finest else [])

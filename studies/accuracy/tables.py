@@ -93,13 +93,14 @@ def write_csv(found: Study, path: Path) -> None:
     with path.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow([
-            "discretisation", "nodes_per_limb", "scheme", "step_s", "newton_tolerance", "path_tolerance",
+            "discretisation", "nodes_per_limb", "scheme", "step_s", "newton_tolerance", "path_tolerance", "damping",
             *(f"space_{name}" for name in names), *(f"time_{name}" for name in names),
             *(f"promise_{name.replace('heading', 'heading_deg')}" for name in columns), *COSTS,
         ])  # fmt: skip
         for row in found.rows:
             n = row.resolution.numerics
-            key = [n.scheme, n.step, n.newton_tolerance, "" if n.path_tolerance is None else n.path_tolerance]
+            adapted = "" if n.path_tolerance is None else n.path_tolerance
+            key = [n.scheme, n.step, n.newton_tolerance, adapted, n.damping]
             sums = [row.promise(column) for column in columns]
             costs = [getattr(row, name) for name in COSTS]
             writer.writerow([*row.mesh, *key, *map(_cell, (*row.space, *row.time, *sums, *costs))])
@@ -126,7 +127,7 @@ def as_setting(row: Row) -> Setting:
         },
         typical=as_typical(row), space_error=space, time_error=time, speed=two_digits(row.speed),
         heading_error=up(row.promise("heading")), end_error=up(row.promise("end")),
-        path_tolerance=numerics.path_tolerance, discretisation=discretisation,
+        path_tolerance=numerics.path_tolerance, discretisation=discretisation, damping=numerics.damping,
     )  # fmt: skip
 
 

@@ -91,7 +91,7 @@ def setting(resolution: Resolution, space: Floats, time: Floats) -> Setting:
         nodes_per_limb, numerics.scheme, numerics.step, numerics.newton_tolerance,
         errors={"random": of_space + of_time, "repeated": up(repeated.max() + repeated_in_time.max())},
         typical={name: up(float(each)) for name, each in zip(("random", "repeated"), medians, strict=True)},
-        space_error=of_space, time_error=of_time, discretisation=discretisation,
+        space_error=of_space, time_error=of_time, discretisation=discretisation, damping=numerics.damping,
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from seastar_gym.der.potential import assemble_hub, solve_hub, sweep_limb
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.newton import take_step
-from seastar_gym.der.stepping.schemes import SCHEMES
+from seastar_gym.der.stepping.schemes import scheme_of
 from seastar_gym.der.stepping.stages import begin_stage, end_step
 from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
 from seastar_gym.model.rods import make_rods
@@ -122,7 +122,7 @@ def _moving_robot(scene: Scene, counting: PlainKernels) -> tuple[Any, ...]:
     command[0, 1], command[0, -1] = 1.0, -1.0
     stroke = simulator.stroke_in_parts(command, 20)
     next(stroke)
-    scheme, rods = SCHEMES[scene.numerics.scheme], make_rods(scene)
+    scheme, rods = scheme_of(scene.numerics.scheme, scene.numerics.damping), make_rods(scene)
     work = counting(make_work)(rods, scheme.n_stages)
     angles = 0.5 * scene.actuator.peak_angle * command.T
     q, v = simulator.positions.reshape(-1, 1), simulator.velocities.reshape(-1, 1)

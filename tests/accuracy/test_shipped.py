@@ -128,11 +128,16 @@ def test_space_errors_fall_with_the_nodes():
 
 
 def test_no_stored_setting_is_worse_than_another_of_its_mesh_in_everything():
+    """Those without numerical damping are stored for scenes that name them, such as those of bundled policies."""
+
     def figures(row: Setting) -> tuple[float, ...]:
         return -row.speed, row.errors["random"], row.errors["repeated"]
 
     for row in SETTINGS:
-        alike = [each for each in TABLE.settings if each.resolution[:2] == row.resolution[:2]]
+        alike = [
+            each for each in TABLE.settings
+            if each.resolution[:2] == row.resolution[:2] and each.damping == row.damping
+        ]  # fmt: skip
         better = [each for each in alike if all(np.array(figures(each)) < figures(row))]
         assert not better, f"{better[0]} beats {row}"
 
@@ -273,9 +278,10 @@ def test_runs_at_a_fidelity_and_at_reference_differ_by_no_more_than_promised(nam
         off = path_errors(swim(batch, Scene.preset(name)), reference_swim)
         allowed = path_error(name) + path_error("reference")
         assert off.max() <= allowed
-        # The worst is not far below, or the promise would be worth little.
+        # The worst is not far below, or the promise would be worth little. At "balanced", errors of space and of time
+        # cancel, and the promise is their sum.
         if batch is batches[0]:
-            assert off.max() > allowed / 4.0
+            assert off.max() > allowed / (8.0 if name == "balanced" else 4.0)
 
 
 @pytest.mark.parametrize("error", [0.05, 0.01])
@@ -351,9 +357,18 @@ def test_presets_gather_no_energy_over_long_swims(name):
 def test_nineteen_nodes_gather_energy_with_steps_of_5_ms_but_not_of_half():
     """The midpoint rule damps nothing: some meshes resonate with some steps, long after a promise ends."""
     scene = Scene.preset("balanced")
-    nineteen = replace(scene, robot=replace(scene.robot, nodes_per_limb=19))
+    undamped = replace(scene.numerics, damping=0.0)
+    nineteen = replace(scene, robot=replace(scene.robot, nodes_per_limb=19), numerics=undamped)
     assert energy_growth(nineteen) > 10.0
-    assert energy_growth(replace(nineteen, numerics=replace(scene.numerics, step=2.5e-3))) < 1.5
+    assert energy_growth(replace(nineteen, numerics=replace(undamped, step=2.5e-3))) < 1.5
+
+
+@pytest.mark.parametrize("stiffness", [0.1, 1.0, 10.0])
+def test_with_the_damping_of_the_fidelities_no_mesh_of_other_robots_gathers_energy(stiffness):
+    numerics = Numerics.preset("balanced")
+    for nodes in (7, 19):
+        robot = Seastar(nodes_per_limb=nodes, youngs_modulus=stiffness * 1e6)
+        assert energy_growth(Scene(robot, numerics=numerics)) < 1.5
 
 
 def test_errors_in_time_stand_in_a_file_of_their_period(tmp_path):

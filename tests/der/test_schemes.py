@@ -13,22 +13,23 @@ from scipy.linalg import eigh
 import oracle
 from continuum_oracle import Continuum
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaPulse, State
-from seastar_gym.der.stepping.schemes import SCHEMES
+from seastar_gym.der.stepping.schemes import SCHEMES, scheme_of
 
 ORDERS = {"implicit-euler": 1, "sdirk2": 2, "sdirk3": 3, "implicit-midpoint": 2}
 ROBOT = Seastar(nodes_per_limb=4)
 
 
-def matrix(scheme: str) -> np.ndarray:
+def matrix(scheme: str, damping: float = 0.0) -> np.ndarray:
     """The tableau's A."""
-    tableau = SCHEMES[scheme]
+    tableau = scheme_of(scheme, damping)
     return tableau.a.reshape(tableau.n_stages, tableau.n_stages)
 
 
-def stability(scheme: str, z: complex) -> complex:
+def stability(scheme: str, z: complex, damping: float = 0.0) -> complex:
     """R(z) = 1 + z b (1 - z A)^-1 1: what a step does to y' = (z/h) y."""
-    ones = np.ones(SCHEMES[scheme].n_stages)
-    return complex(1.0 + z * SCHEMES[scheme].b @ np.linalg.solve(np.diag(ones) - z * matrix(scheme), ones))
+    tableau = scheme_of(scheme, damping)
+    ones = np.ones(tableau.n_stages)
+    return complex(1.0 + z * tableau.b @ np.linalg.solve(np.diag(ones) - z * matrix(scheme, damping), ones))
 
 
 # Tableaux
@@ -56,6 +57,23 @@ def test_implicit_midpoint_alone_keeps_the_amplitude_of_every_oscillation():
         assert max(abs(stability(scheme, 1j * y)) for scheme in set(SCHEMES) - {"implicit-midpoint"}) < 1.0
 
 
+@pytest.mark.parametrize("damping", [0.002, 0.1, 0.5])
+def test_numerical_damping_is_that_of_the_theta_method(damping):
+    """Slow oscillations lose d x^2/2 of their amplitude per step, fast ones 2 d, and all as the docstring says."""
+    theta = 0.5 * (1.0 + damping)
+    for x in np.logspace(-4, 6, 40):
+        squared = (1.0 + (1.0 - theta) ** 2 * x**2) / (1.0 + theta**2 * x**2)
+        assert abs(stability("implicit-midpoint", 1j * x, damping)) ** 2 == pytest.approx(squared, rel=1e-12)
+    slow, fast = (abs(stability("implicit-midpoint", 1j * x, damping)) for x in (1e-2, 1e6))
+    assert 1.0 - slow == pytest.approx(damping * 1e-4 / 2.0, rel=1e-3)
+    assert fast == pytest.approx((1.0 - damping) / (1.0 + damping), rel=1e-9)
+
+
+def test_damping_that_is_none_is_the_scheme_itself():
+    for name, scheme in SCHEMES.items():
+        assert scheme_of(name, 0.0) is scheme
+
+
 # Oscillations
 
 
@@ -68,12 +86,14 @@ def modes():
     return np.sqrt(np.maximum(squared, 0.0)), shapes, mass
 
 
-def oscillate(scheme: str, modes, mode: int, h: float, n_steps: int, amplitude: float = 1e-7) -> complex:
+def oscillate(
+    scheme: str, modes, mode: int, h: float, n_steps: int, amplitude: float = 1e-7, damping: float = 0.0
+) -> complex:
     """Factor of v + i omega q after n_steps, for a mode started at its largest swing; amplitude of the swing [m]."""
     omega, shapes, mass = modes
     shape = shapes[:, mode] * amplitude / np.abs(shapes[:, mode]).max()
     actuator = SmaPulse(0.0, heating_time=h * (n_steps // 2), cooling_time=h * (n_steps - n_steps // 2))
-    numerics = Numerics(scheme, h, newton_tolerance=1e-14)
+    numerics = Numerics(scheme, h, newton_tolerance=1e-14, damping=damping)
     simulator = Simulator(Scene(ROBOT, None, actuator, numerics))
     rest = ROBOT.nodes()
     simulator.set_state(State((rest + shape.reshape(-1, 2))[None], np.zeros((1, *rest.shape)), np.zeros(1)))
@@ -94,6 +114,14 @@ def test_a_step_does_to_a_vibration_what_the_stability_function_says(scheme, mod
     n_steps = 4
     factor = oscillate(scheme, modes, mode, y / modes[0][mode], n_steps)
     assert abs(factor - stability(scheme, 1j * y) ** n_steps) < 2e-4
+
+
+@pytest.mark.parametrize("cycles_per_step", [0.02, 0.2, 2.0, 20.0])
+@pytest.mark.parametrize("mode", [-1, 20, 5], ids=["stiffest", "middle", "softest-bending"])
+def test_a_damped_step_does_to_a_vibration_what_the_stability_function_says(modes, mode, cycles_per_step):
+    y, damping, n_steps = 2.0 * np.pi * cycles_per_step, 0.1, 4
+    factor = oscillate("implicit-midpoint", modes, mode, y / modes[0][mode], n_steps, damping=damping)
+    assert abs(factor - stability("implicit-midpoint", 1j * y, damping) ** n_steps) < 2e-4
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

@@ -85,7 +85,7 @@ PARTS: Calls = {
                                     steady_rise=200.0, water_temperature=20.0, austenite_start=23.0,
                                     austenite_finish=70.0, martensite_start=56.0, martensite_finish=21.0)),
     "Numerics": (Numerics, dict(scheme="implicit-midpoint", step=3e-3, newton_tolerance=1e-8, max_iterations=60,
-                                path_tolerance=0.01)),
+                                path_tolerance=0.01, damping=0.002)),
     "Numerics.preset": (Numerics.preset, dict(fidelity="fast")),
     "Scene.preset": (Scene.preset, dict(fidelity="fast")),
     "Scene.for_error": (Scene.for_error, dict(error=0.1, any_gait=True, robot=None, certificate=None)),

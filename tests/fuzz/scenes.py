@@ -327,6 +327,7 @@ def draw_numerics(draw: Draw) -> Numerics:
         newton_tolerance=min(tolerance, 1e-2),
         max_iterations=draw.rng.choice([2, 5, 60, 60, 60]) if draw.wild else 60,
         path_tolerance=draw.rng.uniform(1e-3, 0.02) if adapted else None,
+        damping=draw.rng.choice([0.0, 0.002, 0.5]) if scheme == "implicit-midpoint" else 0.0,
     )
 
 

@@ -73,7 +73,8 @@ FINITE = {
 }  # fmt: skip
 RANGES = {Prey: "speed radius", Station: "current distance", ObstTrap: "distance"}
 WITHIN = {
-    (AlongLimb, "share"): (0.0, 1.0), (Numerics, "path_tolerance"): (1e-3, 0.02), (RewardWeights, "aim"): (0.0, 1.0),
+    (AlongLimb, "share"): (0.0, 1.0), (Numerics, "path_tolerance"): (1e-3, 0.02),
+    (Numerics, "damping"): (0.0, 0.5), (RewardWeights, "aim"): (0.0, 1.0),
     (Miswired, "swap_probability"): (0.0, 1.0),
 }  # fmt: skip
 NODES = 2, 10_000

@@ -52,6 +52,13 @@ def test_a_scene_refuses_parts_of_another_kind(name, value):
         Scene(**{name: value})
 
 
+@pytest.mark.parametrize("scheme", ["implicit-euler", "sdirk2", "sdirk3"])
+def test_numerical_damping_is_for_the_implicit_midpoint_rule(scheme):
+    with assert_refused("damping", "implicit-midpoint", scheme):
+        Numerics(scheme, damping=0.002)
+    assert Numerics(scheme, damping=0).damping == 0.0
+
+
 def test_a_path_tolerance_is_for_the_implicit_midpoint_rule():
     with assert_refused("path_tolerance", "implicit-midpoint", "sdirk2"):
         Numerics("sdirk2", path_tolerance=0.01)

@@ -65,10 +65,12 @@ def hinged(hub: HubHinge, n_limbs: int, nodes_per_limb: int, **terms: Any) -> tu
     return robot, Star(n_limbs, nodes_per_limb, hub_hinge=hub, **terms)
 
 
-def make_scene(robot: Seastar, fluid: Water | None = Water(), scheme: str = "implicit-euler", **parts: Any) -> Scene:
+def make_scene(
+    robot: Seastar, fluid: Water | None = Water(), scheme: str = "implicit-euler", damping: float = 0.0, **parts: Any
+) -> Scene:
     """The scene, with a short stroke of four steps and a tight tolerance."""
     pulse = SmaPulse(0.0 if robot.n_limbs == 1 else PEAK, 2.0 * H, 2.0 * H)
-    return Scene(robot, fluid, pulse, Numerics(scheme, H, newton_tolerance=1e-13), **parts)
+    return Scene(robot, fluid, pulse, Numerics(scheme, H, newton_tolerance=1e-13, damping=damping), **parts)
 
 
 def moving(star: Star, seed: int = 3) -> tuple[Array, Array, Array]:
@@ -93,7 +95,8 @@ def assert_steps_agree(scene: Scene, star: Star, n_steps: int = 4) -> None:
     stroke = simulator.stroke_in_parts(command[None], 4)
     for k in range(n_steps):
         next(stroke)
-        q, v = oracle.step(star, q, v, k * H, H, command, scene.numerics.scheme, **PULSE)
+        numerics = scene.numerics
+        q, v = oracle.step(star, q, v, k * H, H, command, numerics.scheme, numerics.damping, **PULSE)
     np.testing.assert_allclose(simulator.positions[0], q, rtol=0.0, atol=1e-12 * star.limb_length)
     np.testing.assert_allclose(simulator.velocities[0], v, rtol=0.0, atol=1e-10 * np.abs(v).max())
 
@@ -185,6 +188,23 @@ def cases() -> Iterator[Any]:
 def test_steps_are_those_of_the_oracle(twins, scheme, n_steps, parts):
     robot, star = twins
     assert_steps_agree(make_scene(robot, scheme=scheme, **parts), star, n_steps)
+
+
+@pytest.mark.parametrize("damping", [0.002, 0.3])
+@pytest.mark.parametrize(
+    "twins, parts",
+    [
+        (alike(5, 10), {}),
+        (hinged("opening", 4, 4, drag_coefficient=0.0), {"fluid": None}),
+        (alike(5, 5, relaxation_time=TAU), {}),
+        (shaped(UNLIKE[:3], 5, CURVED[:3]), {}),
+        (alike(5, 4, fluid_density=900.0, **HELD, **PULLED), {"fluid": Water(900.0), **HELD, **PULLED}),
+    ],
+    ids=["plain", "vacuum", "damped", "unlike and curved", "held and pulled"],
+)
+def test_steps_with_numerical_damping_are_those_of_the_oracle(twins, parts, damping):
+    robot, star = twins
+    assert_steps_agree(make_scene(robot, scheme="implicit-midpoint", damping=damping, **parts), star)
 
 
 def test_limbs_that_touch_push_each_other_as_the_oracle_says():

@@ -2,6 +2,16 @@
 
 A stage i of a step h from (q_0, v_0) is implicit Euler with gamma = a_ii h, from
 q_hat = q_0 + h sum_{j<i} a_ij V_j and v_hat = v_0 + h sum_{j<i} a_ij A_j.
+
+The implicit midpoint rule keeps the amplitude of every oscillation, also of those that a step cannot resolve. With a
+damping d its stage is at theta = (1 + d)/2 of the step, the theta method. An oscillation with the angular frequency w
+then keeps, in every step, the share |R| of its amplitude,
+
+    |R|^2 = (1 + (1 - theta)^2 x^2) / (1 + theta^2 x^2),    x = w h.
+
+Those that a step resolves, x << 1, lose d x^2/2 per step, which is d x/2 per radian and below the midpoint rule's own
+error of phase, x^2/12 per radian, from x = 6 d on. Those that it does not, x >> 1, lose 2 d per step. The method is
+algebraically stable for d >= 0: two solutions of a dissipative problem never move apart.
 """
 
 from typing import NamedTuple
@@ -52,3 +62,8 @@ SCHEMES = {
     ),
     "implicit-midpoint": _scheme([[0.5]], [1.0]),  # order 2, keeps the amplitude of every oscillation
 }
+
+
+def scheme_of(name: str, damping: float) -> Scheme:
+    """Scheme of this name; damping: Of the implicit midpoint rule, see above, 0 for other schemes."""
+    return SCHEMES[name] if damping == 0.0 else _scheme([[0.5 * (1.0 + damping)]], [1.0])
