@@ -6,21 +6,21 @@ ends of strokes tell, without a swim of short steps to compare with. They are re
 robot off.
 """
 
+import warnings
+
 import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.accuracy.commands import CLASSES, STROKES
-from seastar_gym.accuracy.water import kinetic_energy, with_the_water
+from seastar_gym.accuracy.water import with_the_water
 from seastar_gym.scene import Scene
+from seastar_gym.simulator.growth import ENOUGH, WINDOW
+from seastar_gym.simulator.water import kinetic_energy
 
 Floats = NDArray[np.float64]
 
 LONG = 200
 """Strokes of a long swim."""
-WINDOW = 20
-"""First and last strokes whose largest energies are compared."""
-ENOUGH = 20.0
-"""Growth at which nothing more is to be learned."""
 NOISE = 1e-6
 """Share of the largest early energy of all swims, below which an energy is noise. Equal limbs that all turn alike end
 their strokes at rest, with 1e-20 to 1e-28 of it, which is rounding; other swims of 2 to 6 equal limbs have at least
@@ -43,7 +43,12 @@ def energy_growths(
 
     strokes: Length of the swims. enough: Growth of any of them, also by failure, at which all end.
     """
-    commands = long_swims(scene.robot.n_limbs, samples, seed)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "The kinetic energy", RuntimeWarning)  # it is told by the result
+        return _energy_growths(scene, long_swims(scene.robot.n_limbs, samples, seed), strokes, enough)
+
+
+def _energy_growths(scene: Scene, commands: Floats, strokes: int, enough: float | None) -> Floats:
     n = commands.shape[1]
     simulator, energies, failed = with_the_water(scene, n), np.empty((strokes, n)), np.zeros(n, bool)
     for stroke in range(strokes):

@@ -154,6 +154,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     | `space_error`            | float      | 1    | part of `path_error` that more nodes per limb would remove       |
     | `time_error`             | float      | 1    | part of it that shorter time steps would remove                  |
     | `error_estimate`         | float      | m    | estimate of the hub's error, only with `error_bars`              |
+    | `energy_growth`          | float      | 1    | of the kinetic energy since the first 20 strokes, see below      |
     | `batch_real_time_factor` | float      | 1    | simulated time per computing time, of a large batch on one core  |
     | `heading`                | float      | rad  | direction of the body frame in the world, only with `headings`   |
     | `heading_error`          | float      | rad  | turn to the asked heading, -pi to pi, only with `headings`       |
@@ -182,6 +183,8 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     was measured before, too, of robots that fill the lanes of a processor: one robot alone is slower (docs/speed.md).
     `error_estimate` is of the very swim, of any robot: the true error since the reset, of space and time, lies below it
     in about 95 % of strokes (docs/numerics.md); NaN after a failure.
+    `energy_growth` is 1 in the first 20 strokes; well above 1, time stepping gathers energy (docs/numerics.md). The
+    chapter's scene at a fidelity, which gathers none, has no such entry.
     With `randomization`, `info` has the drawn numbers by their names, too.
 
     ## Starting state

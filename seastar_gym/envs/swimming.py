@@ -34,6 +34,7 @@ from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Mirror, complete
 from seastar_gym.simd.rows import to_rows
 from seastar_gym.simulator import Simulator, SolverStatus, StrokeReport
+from seastar_gym.simulator.growth import is_watched
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -339,6 +340,7 @@ class Swimming(ABC):
             **({"action_mask": self.action_masks().astype(np.int8)} if self._can_be_masked else {}),
             **(self._errors() if self._tells_errors else {}),
             **({"error_estimate": self.simulator.error_estimate} if self.options.error_bars else {}),
+            **({"energy_growth": self.simulator.energy_growth} if is_watched(self.scene) else {}),
             **{name: values.copy() for name, values in self.drawn.items()},
         }
 

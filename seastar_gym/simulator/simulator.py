@@ -23,10 +23,12 @@ from seastar_gym.simulator.clock import Clock
 from seastar_gym.simulator.device_batch import DEVICES, DeviceBatch
 from seastar_gym.simulator.drive import Drive, checked_commands
 from seastar_gym.simulator.error_bars import ErrorBars, twin_scene
+from seastar_gym.simulator.growth import EnergyGrowth, is_watched
 from seastar_gym.simulator.lock import BROKEN_OFF, StrokeLock
 from seastar_gym.simulator.report import StrokeReport, make_report
 from seastar_gym.simulator.schedule import ends_of_parts, require_duration
 from seastar_gym.simulator.state import State, checked_state
+from seastar_gym.simulator.water import kinetic_energy
 
 Floats = NDArray[np.float64]
 
@@ -80,11 +82,13 @@ class Simulator:
         self._drive = Drive(scene.actuator, self.n_robots, scene.robot.n_limbs, scene.numerics.step)
         self._clock = Clock(self.n_robots)
         self._lock = StrokeLock()
+        watched = is_watched(scene) and device == "cpu"
+        self._growth: EnergyGrowth | None = EnergyGrowth(self.n_robots, scene.actuator.period) if watched else None
         self._bars: ErrorBars | None = None
         if error_bars:
-            self._bars = ErrorBars(
-                Simulator(twin_scene(scene), self.n_robots, self.threads, device=device), self.n_robots
-            )
+            twin = Simulator(twin_scene(scene), self.n_robots, self.threads, device=device)
+            twin._growth = None
+            self._bars = ErrorBars(twin, self.n_robots)
         self.set_limb_strengths(scene.limb_strengths or 1.0)
 
     def _make_batch(self, effort: bool) -> Batch:
@@ -161,14 +165,15 @@ class Simulator:
         drive = {name: getattr(self._drive, name) for name in ("state", "strengths", "commands", "phase")}
         arguments = (self.scene, self.n_robots, self.threads, False, self._batch.effort.size > 0, self.device)
         rows = self._batch.rows()
-        return {"arguments": arguments, "rows": rows, "clock": self._clock, "drive": drive, "bars": self._bars}
+        watched = {"bars": self._bars, "growth": self._growth}
+        return {"arguments": arguments, "rows": rows, "clock": self._clock, "drive": drive, **watched}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__init__(*state["arguments"])  # type: ignore[misc]
         self._batch.put_rows(state["rows"])
         self._clock.put(state["clock"])
         vars(self._drive).update(state["drive"])
-        self._bars = state["bars"]
+        self._bars, self._growth = state["bars"], state["growth"]
 
     def reset(self, mask: ArrayLike | None = None, heading: ArrayLike = 0.0) -> None:
         """Put robots at rest, with the hub at the origin and limb 1 in the direction `heading`.
@@ -189,6 +194,8 @@ class Simulator:
             self._clock.set(chosen, 0.0)
             if self._bars is not None:
                 self._bars.reset(chosen, angles)
+            if self._growth is not None:
+                self._growth.reset(chosen)
 
     def get_state(self) -> State:
         """Copy of the state. After `set_state` with it, intervals give the same bits, if none was under way."""
@@ -214,6 +221,8 @@ class Simulator:
             write_rows(self._batch.rotations, self._drive.rotations())
             if self._bars is not None:
                 self._bars.lose()
+            if self._growth is not None:
+                self._growth.reset()
 
     @property
     def actuators(self) -> Floats:
@@ -290,6 +299,13 @@ class Simulator:
         0 at rest after a reset. NaN without `error_bars`, and until the next reset after `set_state` or a failure.
         """
         return np.full(self.n_robots, np.nan) if self._bars is None else self._bars.estimate
+
+    @property
+    def energy_growth(self) -> Floats:
+        """Kinetic energy relative to the water over the largest in the first strokes, shape (n_robots,), as in the last
+        StrokeReport. NaN where it is not watched, 1 in the first strokes.
+        """
+        return np.full(self.n_robots, np.nan) if self._growth is None else self._growth.growth
 
     def hub_position(self) -> Floats:
         """Position of the hub [m], world frame, shape (n_robots, 2)."""
@@ -407,6 +423,8 @@ class Simulator:
     def _begin_interval(self, duration: float, commands: Floats | None) -> None:
         self._batch.begin(*self._drive.begin(duration, commands))
         self._clock.begin(duration)
+        if self._growth is not None:
+            self._growth.begin(duration, commands)
         if self._bars is not None:
             self._bars.twin.advance(duration, commands)
 
@@ -418,5 +436,7 @@ class Simulator:
         write_rows(self._batch.rotations, self._drive.rotations())
         if self._bars is not None:
             self._bars.compare(self.hub_position(), failed)
-        hub_hinge, drive = self.scene.robot.hub_hinge, self._drive
-        return make_report(rows, hub_hinge, self.error_estimate, drive.heating_time, drive.heating_power)
+        if self._growth is not None:
+            self._growth.end(lambda: kinetic_energy(self), self.time)
+        rows |= {"error_estimate": self.error_estimate, "energy_growth": self.energy_growth}
+        return make_report(rows, self.scene.robot.hub_hinge, self._drive.heating_time, self._drive.heating_power)

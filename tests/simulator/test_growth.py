@@ -1,0 +1,158 @@
+"""Whoever chooses numerics of his own is told when they gather energy, and only then."""
+
+import pickle
+import warnings
+from dataclasses import replace
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaWires, UniformCurrent, Water
+from seastar_gym.accuracy.endurance import long_swims
+from seastar_gym.simulator.growth import ENOUGH, EVERY, WINDOW, EnergyGrowth, is_watched
+from seastar_gym.simulator.water import kinetic_energy
+
+RESONANT = Scene(Seastar(nodes_per_limb=12), numerics=Numerics("implicit-midpoint", 10e-3, 1e-5))
+"""Gathers energy within some 60 strokes."""
+GAITS = long_swims(5, 8, 1)
+CALM = Numerics("implicit-midpoint", 5e-3, 1e-5)
+FAST = Scene.preset("fast")
+
+
+def swim(scene: Scene, strokes: int, commands: np.ndarray = GAITS, **options) -> tuple[Simulator, np.ndarray]:
+    """Simulator after strokes of these commands in turn, and the growth after every stroke."""
+    simulator = Simulator(scene, commands.shape[1], **options)
+    return simulator, np.array([simulator.stroke(commands[k % len(commands)]).energy_growth for k in range(strokes)])
+
+
+def test_numerics_that_gather_energy_are_told_once():
+    with pytest.warns(RuntimeWarning, match="gather energy") as told:
+        simulator, growth = swim(RESONANT, 80)
+    assert len([each for each in told if "kinetic energy" in str(each.message)]) == 1
+    assert (growth[:WINDOW] == 1.0).all() and (growth[WINDOW:] != 1.0).all()
+    assert growth.max() >= ENOUGH
+    np.testing.assert_array_equal(simulator.energy_growth, growth[-1])
+
+
+@pytest.mark.filterwarnings("error")
+def test_numerical_damping_keeps_the_same_robot_calm():
+    damped = replace(RESONANT, numerics=replace(RESONANT.numerics, damping=0.005))
+    assert swim(damped, 80)[1].max() < 1.5
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("first", [0.1, 0.0], ids=["gentle", "at rest"])
+def test_commands_that_grow_are_no_growth(first):
+    """Energies go with the square of commands, and the first strokes begin with the first command."""
+    rng = np.random.default_rng(0)
+    commands = rng.integers(-1, 2, (60, 16, 5)).astype(float)
+    commands[:25] *= first
+    growth = swim(Scene(Seastar(nodes_per_limb=7), numerics=CALM), 60, commands)[1]
+    assert growth.max() < 5.0
+    assert (growth[: WINDOW + 25 if first == 0.0 else WINDOW] == 1.0).all()
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_robot_that_drifts_with_the_water_has_no_energy_of_that():
+    fluid = Water(current=UniformCurrent(0.5, 0.0))
+    scenes = [Scene(Seastar(nodes_per_limb=7), each, numerics=CALM) for each in (Water(), fluid)]
+    rng = np.random.default_rng(1)
+    commands = rng.integers(-1, 2, (30, 4, 5)).astype(float)
+    still = swim(scenes[0], 30, commands)[1]
+    drifting = Simulator(scenes[1], 4)
+    state = drifting.get_state()
+    drifting.set_state(state._replace(velocities=state.velocities + [0.5, 0.0]))
+    carried = np.array([drifting.stroke(each).energy_growth for each in commands])
+    np.testing.assert_allclose(carried[WINDOW:], still[WINDOW:], rtol=1e-3)
+
+
+def test_currents_of_each_robot_are_taken_off_its_own_energy():
+    """Robots at rest in water of their own, and one over ground."""
+    u_x = np.array([0.5, -0.2, 0.0, 0.1, 0.3, 0.0, 0.0, 0.2, 0.7])
+    simulator = Simulator(Scene(Seastar(nodes_per_limb=5), Water(current=UniformCurrent(u_x, 0.1)), numerics=CALM), 9)
+    state = simulator.get_state()
+    velocities = np.broadcast_to(np.stack([u_x, np.full(9, 0.1)], axis=1)[:, None], state.velocities.shape).copy()
+    velocities[6] = 0.0
+    simulator.set_state(state._replace(velocities=velocities))
+    found, over_ground = kinetic_energy(simulator), simulator.kinetic_energy()
+    np.testing.assert_allclose(np.delete(found, 6), 0.0, atol=1e-20)
+    np.testing.assert_allclose(found[6], over_ground[2], rtol=1e-12)  # whose water has the same speed
+    np.testing.assert_array_equal(simulator.velocities, velocities)
+
+
+@pytest.mark.filterwarnings("error")
+def test_equal_limbs_that_all_turn_alike_and_end_at_rest_have_no_growth_of_rounding():
+    growth = swim(Scene(Seastar(nodes_per_limb=5), numerics=CALM), 40, np.ones((1, 1, 5)))[1]
+    assert growth.max() == 1.0 and growth[WINDOW:].max() < 1.0
+
+
+def test_fidelities_of_the_chapters_robot_are_not_watched_and_everything_else_is():
+    assert not is_watched(FAST) and np.isnan(swim(FAST, 25)[1]).all()
+    others = [
+        replace(FAST, numerics=CALM), replace(FAST, robot=replace(FAST.robot, nodes_per_limb=8)),
+        replace(FAST, robot=replace(FAST.robot, youngs_modulus=1e7)),
+    ]  # fmt: skip
+    assert all(map(is_watched, others))
+
+
+def test_watching_changes_no_bit():
+    simulator, _ = swim(RESONANT, 30)
+    blind = Simulator(RESONANT, GAITS.shape[1])
+    blind._growth = None
+    for k in range(30):
+        blind.stroke(GAITS[k % len(GAITS)])
+    np.testing.assert_array_equal(simulator.positions, blind.positions)
+    np.testing.assert_array_equal(simulator.velocities, blind.velocities)
+
+
+def test_a_reset_and_a_new_state_begin_anew_and_a_pickle_goes_on():
+    simulator, growth = swim(replace(RESONANT, numerics=CALM), 25)
+    again = pickle.loads(pickle.dumps(simulator))
+    np.testing.assert_array_equal(again.energy_growth, growth[-1])
+    for k in range(25, 25 + EVERY):
+        one, other = (each.stroke(GAITS[k % len(GAITS)]).energy_growth for each in (simulator, again))
+        np.testing.assert_array_equal(one, other)
+    simulator.reset(np.arange(GAITS.shape[1]) == 3)
+    assert np.flatnonzero(simulator.energy_growth == 1.0).tolist() == [3]
+    simulator.set_state(simulator.get_state())
+    assert (simulator.energy_growth == 1.0).all()
+
+
+def test_energies_are_taken_once_in_a_period_however_short_the_decisions():
+    watch, taken = EnergyGrowth(2, 1.0), []
+
+    def energy() -> np.ndarray:
+        taken.append(1)
+        return np.array([1.0, 4.0])
+
+    for k in range(1, 10 * (WINDOW + 2) + 1):
+        watch.begin(0.1, np.array([[1.0], [-2.0]]))
+        watch.end(energy, np.full(2, 0.1 * k))
+    assert len(taken) == WINDOW + 1  # and then every fifth
+    np.testing.assert_allclose(watch.growth, 1.0)
+
+
+def test_the_twin_of_error_bars_is_not_watched():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        simulator, _ = swim(FAST, 2, error_bars=True)
+    assert np.isnan(simulator.energy_growth).all() and np.isnan(simulator._bars.twin.energy_growth).all()
+
+
+def test_info_has_the_growth_where_it_is_watched():
+    own = gym.make("SeastarSwim-v0", scene=replace(FAST, numerics=CALM))
+    _, info = own.reset(seed=0)
+    assert info["energy_growth"] == 1.0
+    for _ in range(WINDOW + 1):
+        info = own.step([2, 1, 0, 2, 1])[4]
+    assert 0.0 < info["energy_growth"] < 2.0 and info["energy_growth"] != 1.0
+    assert "energy_growth" not in gym.make("SeastarSwim-v0", fidelity="fast").reset(seed=0)[1]
+
+
+def test_wires_are_watched_too():
+    scene = Scene(Seastar(nodes_per_limb=5), actuator=SmaWires(), numerics=CALM)
+    simulator = Simulator(scene, 2)
+    for k in range(5 * (WINDOW + 1)):
+        report = simulator.advance(0.2, np.full((2, 5), (-1.0) ** k))
+    assert np.isfinite(report.energy_growth).all() and (report.energy_growth != 1.0).all()
