@@ -15,7 +15,6 @@ from seastar_gym.accuracy.commands import CLASSES, STROKES
 from seastar_gym.accuracy.water import with_the_water
 from seastar_gym.scene import Scene
 from seastar_gym.simulator.growth import ENOUGH, WINDOW
-from seastar_gym.simulator.water import kinetic_energy
 
 Floats = NDArray[np.float64]
 
@@ -53,7 +52,7 @@ def _energy_growths(scene: Scene, commands: Floats, strokes: int, enough: float 
     simulator, energies, failed = with_the_water(scene, n), np.empty((strokes, n)), np.zeros(n, bool)
     for stroke in range(strokes):
         failed |= simulator.stroke(commands[stroke % STROKES]).status > 0
-        energies[stroke] = kinetic_energy(simulator)
+        energies[stroke] = simulator.kinetic_energy(relative_to_water=True)
         growth = _growth(energies[:WINDOW], energies[stroke : stroke + 1]) if stroke >= WINDOW else np.zeros(n)
         growth[failed] = np.inf
         if enough is not None and growth.max() >= enough:

@@ -192,14 +192,18 @@ class Batch:
         for name, values in moved.items():
             getattr(self, name)[:] = values
 
-    def energies(self) -> tuple[Floats, Floats]:
-        """Elastic energy at the present rotations (13.14) and kinetic energy [J], shape (n_robots,) each."""
+    def energies(self, v: Floats | None = None) -> tuple[Floats, Floats]:
+        """Elastic energy at the present rotations (13.14) and kinetic energy [J], shape (n_robots,) each.
+
+        v: Velocities as those of the batch, to take in place of them.
+        """
+        v = self.v if v is None else v
         work, actuation = self.memory[0]
         both = np.zeros((2, len(self.q), 1, N_LANES))
         for group in range(len(self.q)):
             actuation.delta_psi_start[:] = actuation.delta_psi_end[:] = self.rotations[group]
             rods = self.coefficients.rods(group)
-            energies(rods, work, actuation, self.q[group], self.v[group], both[0, group], both[1, group])
+            energies(rods, work, actuation, self.q[group], v[group], both[0, group], both[1, group])
         return self.read(both[0])[:, 0], self.read(both[1])[:, 0]
 
     def begin(self, times: Floats, peaks: Floats, shape: Floats) -> None:

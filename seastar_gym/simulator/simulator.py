@@ -28,7 +28,7 @@ from seastar_gym.simulator.lock import BROKEN_OFF, StrokeLock
 from seastar_gym.simulator.report import StrokeReport, make_report
 from seastar_gym.simulator.schedule import ends_of_parts, require_duration
 from seastar_gym.simulator.state import State, checked_state
-from seastar_gym.simulator.water import kinetic_energy
+from seastar_gym.simulator.water import relative_velocities
 
 Floats = NDArray[np.float64]
 
@@ -335,9 +335,12 @@ class Simulator:
         """Stretching and bending energy (13.14) at the present actuation [J], shape (n_robots,)."""
         return self._batch.energies()[0]
 
-    def kinetic_energy(self) -> Floats:
-        """Kinetic energy [J], shape (n_robots,)."""
-        return self._batch.energies()[1]
+    def kinetic_energy(self, relative_to_water: bool = False) -> Floats:
+        """Kinetic energy [J], shape (n_robots,).
+
+        relative_to_water: With the velocity of every node less that of the water there.
+        """
+        return self._batch.energies(relative_velocities(self._batch) if relative_to_water else None)[1]
 
     def stroke(self, commands: ArrayLike) -> StrokeReport:
         """Advance all robots by one actuation period.
@@ -437,6 +440,6 @@ class Simulator:
         if self._bars is not None:
             self._bars.compare(self.hub_position(), failed)
         if self._growth is not None:
-            self._growth.end(lambda: kinetic_energy(self), self.time)
+            self._growth.end(lambda: self.kinetic_energy(relative_to_water=True), self.time)
         rows |= {"error_estimate": self.error_estimate, "energy_growth": self.energy_growth}
         return make_report(rows, self.scene.robot.hub_hinge, self._drive.heating_time, self._drive.heating_power)

@@ -1,10 +1,10 @@
-"""A robot relative to the water: the current at places, and the kinetic energy that is no drift.
+"""A robot relative to the water: the current at places, and velocities that are no drift.
 
 A uniform current is a translation: what swims in it has the errors of still water, though it is carried off. Where the
 water differs from place to place, the current is that at every node.
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,8 @@ from seastar_gym.der.terms.current import current_velocity
 from seastar_gym.model.currents import current_rows
 from seastar_gym.scene import Scene
 from seastar_gym.simd.numpy_lanes import Lanes
-
-if TYPE_CHECKING:
-    from seastar_gym.simulator.simulator import Simulator
+from seastar_gym.simd.rows import aligned_rows
+from seastar_gym.simulator.batch import Batch
 
 Floats = NDArray[np.float64]
 
@@ -30,20 +29,18 @@ def velocity(scene: Scene, places: Floats) -> Floats:
     return np.stack([np.broadcast_to(each.numbers, places.shape[:-1]) for each in found], axis=-1)
 
 
-def kinetic_energy(simulator: "Simulator") -> Floats:
-    """Kinetic energy relative to the water at every node [J], shape (n_robots,)."""
-    if current_of(simulator.scene) is None:
-        return simulator.kinetic_energy()
-    over_ground, n_rows = simulator.v.copy(), 2 * simulator.scene.robot.n_nodes
-    try:
-        for group, (q, v) in enumerate(zip(simulator.q, simulator.v, strict=True)):
-            current = simulator.coefficients.rods(group).current
-            water = current_velocity.plain(current, Lanes(q[0:n_rows:2]), Lanes(q[1:n_rows:2]))
-            for axis, speed in enumerate(water):
-                v[axis:n_rows:2] -= speed.numbers
-        return simulator.kinetic_energy()
-    finally:
-        simulator.v[:] = over_ground
+def relative_velocities(batch: Batch) -> Floats:
+    """Velocities of a batch, rows as its own, less those of the water at every node [m/s]."""
+    relative = aligned_rows(*batch.v.shape)
+    relative[:] = batch.v
+    for group, (q, v) in enumerate(zip(batch.q, relative, strict=True)):
+        current = batch.coefficients.rods(group).current
+        if current is None:
+            return relative
+        x, y = (Lanes(q[axis : batch.n_node_rows : 2]) for axis in (0, 1))
+        for axis, water in enumerate(current_velocity.plain(current, x, y)):
+            v[axis : batch.n_node_rows : 2] -= water.numbers
+    return relative
 
 
 def current_of(scene: Scene) -> Any:

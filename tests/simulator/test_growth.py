@@ -11,7 +11,6 @@ import pytest
 from seastar_gym import Numerics, Scene, Seastar, Simulator, SmaWires, UniformCurrent, Water
 from seastar_gym.accuracy.endurance import long_swims
 from seastar_gym.simulator.growth import ENOUGH, EVERY, WINDOW, EnergyGrowth, is_watched
-from seastar_gym.simulator.water import kinetic_energy
 
 RESONANT = Scene(Seastar(nodes_per_limb=12), numerics=Numerics("implicit-midpoint", 10e-3, 1e-5))
 """Gathers energy within some 60 strokes."""
@@ -75,7 +74,7 @@ def test_currents_of_each_robot_are_taken_off_its_own_energy():
     velocities = np.broadcast_to(np.stack([u_x, np.full(9, 0.1)], axis=1)[:, None], state.velocities.shape).copy()
     velocities[6] = 0.0
     simulator.set_state(state._replace(velocities=velocities))
-    found, over_ground = kinetic_energy(simulator), simulator.kinetic_energy()
+    found, over_ground = simulator.kinetic_energy(relative_to_water=True), simulator.kinetic_energy()
     np.testing.assert_allclose(np.delete(found, 6), 0.0, atol=1e-20)
     np.testing.assert_allclose(found[6], over_ground[2], rtol=1e-12)  # whose water has the same speed
     np.testing.assert_array_equal(simulator.velocities, velocities)
