@@ -70,7 +70,8 @@ def test_what_is_added_is_the_change_of_the_way_saved(fitted):
         added += more - rewards
     np.testing.assert_allclose(added, 200.0 * (shaped.gain(after) - shaped.gain(before)), atol=1e-9)
     swum = np.linalg.norm(plain.simulator.hub_position(), axis=1)
-    assert swum.min() > 1e-3 and np.abs(shaped.gain(after)).max() < 3e-4  # at rest again: nothing is left to come
+    assert swum.min() > 1e-3
+    assert np.abs(shaped.gain(after)).max() < swum.min() / 7.0  # at rest, but for the fit
 
 
 def test_progress_counts_before_the_way_is_swum(fitted):
