@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from seastar_gym.envs.randomization import Normal as Normal
     from seastar_gym.envs.randomization import Uniform as Uniform
     from seastar_gym.envs.reward import RewardWeights as RewardWeights
+    from seastar_gym.envs.sight import Sight as Sight
     from seastar_gym.envs.symmetry import SymmetryReduction as SymmetryReduction
     from seastar_gym.envs.symmetry import VectorSymmetryReduction as VectorSymmetryReduction
     from seastar_gym.envs.tasks.fail_blind import FailBlind as FailBlind

@@ -24,6 +24,9 @@ those of every limb, such as its last command.
 Further entries of a task stand after those of the limbs, before the waypoints. If headings are asked for
 (`headings.py`), they are cosine and sine of the turn to the heading at the current waypoint, and of that to the heading
 at the next. A task may show nothing of the limbs' shape: its observation then begins with the numbers of the limbs.
+
+With a `Sight`, fewer stations may be seen, or none, and further entries after those of the task say what follows from
+the last two pictures, and the age of the last one, see `entries_of` in sight.py.
 """
 
 from collections.abc import Mapping
@@ -61,18 +64,20 @@ class Layout:
 
     n_limbs: Number of limbs. of_limb: Numbers of every limb besides its stations: the memory of its actuator, and what
     a task adds. entries: Further entries, asked headings first. shows_limbs: Whether the stations of the limbs and the
-    hub's velocity are seen.
+    hub's velocity are seen. stations: Number of stations that are seen of a limb, evenly spaced, the last at the tip.
     """
 
     n_limbs: int = 5
     of_limb: int = 0
     entries: tuple[Entry, ...] = ()
     shows_limbs: bool = True
+    stations: int = N_STATIONS
 
     def __post_init__(self) -> None:
         require_limbs(self.n_limbs)
         require_count("of_limb", self.of_limb, 0, MOST_REMEMBERED)
         require_flag("shows_limbs", self.shows_limbs)
+        require_count("stations", self.stations, 1, N_STATIONS)
         known = isinstance(self.entries, tuple) and all(isinstance(entry, str) for entry in self.entries)
         if not known or not set(self.entries) <= set(get_args(Entry)):
             raise ValueError(f"entries must be a tuple of {', '.join(get_args(Entry))}, not {shown(self.entries)}.")
@@ -84,7 +89,7 @@ class Layout:
 
     @cached_property
     def _places(self) -> tuple[slice, ...]:
-        along_limbs, hub = (2 * N_STATIONS * self.n_limbs, 2) if self.shows_limbs else (0, 0)
+        along_limbs, hub = (2 * self.stations * self.n_limbs, 2) if self.shows_limbs else (0, 0)
         further = sum(SIZES[entry] for entry in self.entries)
         ends = np.cumsum([along_limbs, along_limbs, hub, self.n_limbs * self.of_limb, further, 2, 2]).tolist()
         return tuple(map(slice, [0, *ends[:-1]], ends))
@@ -153,7 +158,7 @@ class Layout:
     @property
     def tips(self) -> list[int]:
         """Places of the positions of the limbs' tips: x and y, limb after limb."""
-        return [2 * N_STATIONS * limb + k for limb in range(1, self.n_limbs + 1) for k in (-2, -1)]
+        return [2 * self.stations * limb + k for limb in range(1, self.n_limbs + 1) for k in (-2, -1)]
 
     def begins(self, kind: Entry) -> NDArray[np.intp]:
         """Where the entries of a kind begin, among the numbers of the further entries."""

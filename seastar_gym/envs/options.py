@@ -14,8 +14,9 @@ from seastar_gym.accuracy.certificate import Certificate
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.headings import Headings
 from seastar_gym.envs.paths import FARTHEST, make_path
-from seastar_gym.envs.randomization import DomainRandomization
+from seastar_gym.envs.randomization import ACTION_DELAY, DomainRandomization
 from seastar_gym.envs.reward import RewardWeights
+from seastar_gym.envs.sight import Drawn, Sight, require_action_delay
 from seastar_gym.scene import Scene, SmaWires
 from seastar_gym.scene.checks import as_float, require_flag, require_kind, require_number, shown
 from seastar_gym.scene.numerics import Fidelity
@@ -34,7 +35,8 @@ Init = TypeVar("Init", bound=Callable[..., None])
 class SwimOptions:
     """Arguments of the environments, but for pictures; `SeastarSwimEnv` documents them.
 
-    `scene`, `reward`, `randomization` and `headings` may be given as plain data, and are parts then.
+    `scene`, `reward`, `randomization`, `headings`, `sight` and a distribution as `action_delay` may be given as plain
+    data, and are parts then.
     """
 
     path: Path = "pentagon"
@@ -51,9 +53,14 @@ class SwimOptions:
     observe_actuators: bool = True
     headings: Headings | None = None
     device: str = "cpu"
+    sight: Sight | None = None
+    action_delay: Drawn = 0.0
 
     def __post_init__(self) -> None:
-        parts = {"scene": Scene, "reward": RewardWeights, "randomization": DomainRandomization, "headings": Headings}
+        parts = {
+            "scene": Scene, "reward": RewardWeights, "randomization": DomainRandomization, "headings": Headings,
+            "sight": Sight, "action_delay": object,
+        }  # fmt: skip
         for name, kind in parts.items():
             object.__setattr__(self, name, read(getattr(self, name), kind))
         object.__setattr__(self, "waypoint_radius", as_float(self.waypoint_radius))
@@ -61,6 +68,9 @@ class SwimOptions:
         require_kind("reward", self.reward, RewardWeights, "RewardWeights")
         require_kind("randomization", self.randomization, DomainRandomization | None, "a DomainRandomization or None")
         require_kind("headings", self.headings, Headings | None, "Headings or None")
+        require_kind("sight", self.sight, Sight | None, "a Sight or None")
+        object.__setattr__(self, "action_delay", as_float(self.action_delay))
+        self._check_late()
         require_flag("random_heading", self.random_heading)
         require_flag("observe_actuators", self.observe_actuators)
         require_number("waypoint_radius", self.waypoint_radius, "m")
@@ -71,6 +81,25 @@ class SwimOptions:
             object.__setattr__(self, "path", waypoints)
         if self.headings is not None:
             self.headings.of_path(waypoints, np.random.default_rng(0))  # likewise
+
+    def _check_late(self) -> None:
+        """Refuse distributions of what there is not, or beyond what it may be."""
+        own = () if self.sight is None else tuple(self.sight.numbers)
+        for name, drawn in self.late.items():
+            if name == ACTION_DELAY:
+                require_action_delay(drawn)
+            elif name in own and self.sight is not None:
+                replace(self.sight, **{name.removeprefix("sight."): drawn})
+            else:
+                known = ", ".join([*own, ACTION_DELAY])
+                raise ValueError(f"The environment has no number {shown(name)} to draw: it has {known}.")
+
+    @property
+    def late(self) -> dict[str, Drawn]:
+        """Numbers of the sight and of the delay of actions, or their distributions; `randomization` comes first."""
+        own = {} if self.sight is None else self.sight.numbers
+        drawn = {} if self.randomization is None else self.randomization.late
+        return {**own, ACTION_DELAY: self.action_delay, **drawn}
 
     @property
     def modelled(self) -> Scene:

@@ -17,6 +17,8 @@ from seastar_gym.scene.serial import register_part
 
 LIMB_STRENGTHS = "limb_strengths"
 """Share of its commanded rotation that a limb makes: 0 for one that has failed; drawn for every limb."""
+ACTION_DELAY = "action_delay"
+"""Time from a decision to when wires are heated by it [s]."""
 WIDEST = 3.0
 """Standard deviations: draws of `Normal` farther out are made again."""
 
@@ -104,7 +106,8 @@ class DomainRandomization:
 
     distributions: By name: "limb_strengths", or a number that the scene has and that may differ from robot to robot, as
         in "robot.youngs_modulus", "robot.limb_length", "fluid.drag_coefficient", "fluid.current.u_x",
-        "actuator.peak_angle".
+        "actuator.peak_angle". Numbers of the environment's `Sight`, as in "sight.delay", and "action_delay" are drawn
+        after the others.
     """
 
     def __init__(self, distributions: Mapping[str, Distribution]):
@@ -127,12 +130,17 @@ class DomainRandomization:
     def __hash__(self) -> int:
         return hash(tuple(self.distributions.items()))
 
+    @property
+    def late(self) -> dict[str, "Distribution"]:
+        """Distributions of what is no number of a scene: of a sight, and of the delay of actions."""
+        return {name: one for name, one in self.distributions.items() if name == ACTION_DELAY or _is_of_sight(name)}
+
     def first_values(self, scene: Scene, n_robots: int) -> dict[str, NDArray[np.float64]]:
         """The numbers before the first draw, shape (n_robots,), that of limbs (n_robots, n_limbs): their upper bounds.
 
         Refuses names that the scene does not have, and bounds that it does not allow.
         """
-        numbers = [name for name in self.distributions if name != LIMB_STRENGTHS]
+        numbers = [name for name in self.distributions if name != LIMB_STRENGTHS and name not in self.late]
         known = [name for name, value in numbers_of(scene).items() if value is not None]
         for name in numbers:
             if name not in known:
@@ -153,9 +161,13 @@ class DomainRandomization:
 
     def draw(self, values: dict[str, NDArray[np.float64]], robot: int, rng: np.random.Generator) -> None:
         """Draw all numbers of a robot, in place."""
-        for name, distribution in self.distributions.items():
+        for name in (name for name in self.distributions if name in values):
             for place in np.ndindex(values[name].shape[1:]):
-                values[name][(robot, *place)] = distribution.draw(rng)
+                values[name][(robot, *place)] = self.distributions[name].draw(rng)
+
+
+def _is_of_sight(name: object) -> bool:
+    return isinstance(name, str) and name.startswith("sight.")
 
 
 def _why_not(scene: Scene, name: str, known: Sequence[str]) -> str:

@@ -10,7 +10,9 @@ is scored:
     _goal_facts(hub)            entries of info that belong to the task
 """
 
+import contextlib
 import functools
+import math
 import operator
 from abc import ABC, abstractmethod
 from collections.abc import Generator
@@ -22,22 +24,29 @@ from numpy.typing import NDArray
 
 from seastar_gym.accuracy.info import errors_in_info, read_certificate
 from seastar_gym.envs.commands import checked_decision_period, unless_strokes
-from seastar_gym.envs.layout import HEADINGS, VELOCITY_SCALE, Entry, Layout
+from seastar_gym.envs.lag import Lag, Piece
+from seastar_gym.envs.layout import HEADINGS, N_STATIONS, VELOCITY_SCALE, Entry, Layout
 from seastar_gym.envs.masks import action_masks, can_be_masked, masked_limbs
 from seastar_gym.envs.observation import body_axes, observe, to_float32
 from seastar_gym.envs.options import SwimOptions
-from seastar_gym.envs.randomization import LIMB_STRENGTHS, drawn_scene
+from seastar_gym.envs.randomization import ACTION_DELAY, LIMB_STRENGTHS, drawn_scene
 from seastar_gym.envs.reward import pulses_of
 from seastar_gym.envs.scenery import NOTHING, Scenery
+from seastar_gym.envs.sight import Lateness, Sees, bounds_of, entries_of, stations_seen
 from seastar_gym.envs.stations import stations_of
+from seastar_gym.envs.tracker import Tracker
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Mirror, complete
 from seastar_gym.simd.rows import to_rows
 from seastar_gym.simulator import Simulator, SolverStatus, StrokeReport
 from seastar_gym.simulator.growth import is_watched
+from seastar_gym.simulator.report import report_of_pieces
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+
+ROUNDING = 1e-9
+"""Fraction of a time that is no time."""
 
 
 class Outcome(NamedTuple):
@@ -123,6 +132,13 @@ class Swimming(ABC):
         self.waypoint_index = np.zeros(n_robots, np.int64)  # the waypoint to swim to; 0 in tasks without
         self.last_commands = np.zeros((n_robots, scene.robot.n_limbs))
         self._energy = np.zeros(n_robots)  # since the reset [J]
+        delay, n_limbs = options.late[ACTION_DELAY], scene.robot.n_limbs
+        self._lateness = Lateness(options.late, n_robots)
+        is_late = options.sight is not None or bounds_of(delay)[1] > 0.0
+        self._lag = Lag(delay, self.decision_period, scene.actuator, n_robots, n_limbs) if is_late else None
+        self._tracker: Tracker | None = None
+        if options.sight is not None:
+            self._tracker = Tracker(options.sight.rate, self._sees, n_limbs, self._lateness.values)
 
     @abstractmethod
     def _draw(self, robot: int, rng: np.random.Generator, asked: Any) -> None:
@@ -156,8 +172,19 @@ class Swimming(ABC):
     def layout(self) -> Layout:
         """What one robot's observation consists of."""
         asked = HEADINGS if self.options.headings is not None else ()
-        bare = Layout.of(self.scene, self.options.observe_actuators, asked + self.entries)
-        return replace(bare, of_limb=bare.of_limb + self.observes_commands, shows_limbs=self.shows_limbs)
+        of_sight = () if self.options.sight is None else entries_of(self._sees)
+        bare = Layout.of(self.scene, self.options.observe_actuators, asked + self.entries + of_sight)
+        shown = len(stations_seen(self._sees))
+        return replace(
+            bare, of_limb=bare.of_limb + self.observes_commands, shows_limbs=shown > 0, stations=shown or N_STATIONS
+        )
+
+    @property
+    def _sees(self) -> Sees | int:
+        """What is seen of the robots, see `Sight`."""
+        if not self.shows_limbs:
+            return "pose"
+        return "nodes" if self.options.sight is None else self.options.sight.sees
 
     @functools.cached_property
     def _without_more(self) -> Layout:
@@ -181,32 +208,75 @@ class Swimming(ABC):
                 headings[robot] = generators[robot].uniform(-np.pi, np.pi)
             if self._draws is not None:
                 self._draws.draw(self.drawn, int(robot), generators[robot])
+            self._lateness.draw(int(robot), generators[robot])
         if self.drawn:
             self.simulator.set_scene(drawn_scene(self._drawn_from, self.drawn), robots)
             strengths = np.asarray(self.scene.limb_strengths or 1.0) * self.drawn.get(LIMB_STRENGTHS, 1.0)
             self.simulator.set_limb_strengths(strengths)
         self.simulator.reset(robots, headings)
         self._energy[robots], self.last_commands[robots] = 0.0, 0.0
+        if self._lag is not None:
+            self._lag.begin(robots, self._lateness.values[ACTION_DELAY])
+        if self._tracker is not None:
+            self._tracker.begin(robots, generators, self._pictures(), self._lengths())
         self._begin(robots)
 
     def observe(self) -> NDArray[np.float32]:
         """Observations, shape (n_robots, size), a fresh array; see layout.py."""
-        simulator = self.simulator
-        target_rows = to_rows(self._targets())
-        own, robot = simulator.coefficients, simulator.scene.robot
-        bare = self._without_more
-        out = np.empty((len(target_rows), bare.size, target_rows.shape[2]))
-        places = stations_of(robot)
-        observe(own.rest, own.limb_length, simulator.q, simulator.v, places, target_rows, VELOCITY_SCALE, out)
-        seen = to_float32(out, self.n_robots)
-        if self._is_bare:
-            return seen
-        at = self.layout
+        at, tracker = self.layout, self._tracker
+        if tracker is None and self._is_bare:
+            return self._seen_now()
         found = np.empty((self.n_robots, at.size), np.float32)
-        found[:, at.stations_and_hub] = seen[:, : at.stations_and_hub.stop]
-        found[:, at.actuators], found[:, at.further] = self._remembered(), self._wanted()
-        found[:, at.waypoints] = seen[:, bare.waypoints]
+        found[:, at.actuators] = self._remembered()
+        if tracker is None:
+            seen = self._seen_now()
+            found[:, at.stations_and_hub] = seen[:, : at.stations_and_hub.stop]
+            found[:, at.further], found[:, at.waypoints] = self._wanted(), seen[:, self._without_more.waypoints]
+            return found
+        if at.shows_limbs:
+            found[:, at.stations_and_hub] = tracker.of_limbs(self._lengths())
+        found[:, at.further] = np.concatenate([self._wanted(), tracker.entries(self.simulator.time)], axis=1)
+        away = self._targets().reshape(-1, 2, 2) - tracker.hub[:, None]
+        found[:, at.waypoints] = self._in_body_frame(away / self._lengths()[:, None, None]).reshape(-1, 4)
         return found
+
+    def _seen_now(self) -> NDArray[np.float32]:
+        """Observations of what the kernel fills, without delay, shape (n_robots, k)."""
+        return to_float32(self._kernels_rows(self._targets()), self.n_robots)
+
+    def _kernels_rows(self, targets: Floats) -> Floats:
+        """Rows that the kernel fills, shape (n_groups, k, N_LANES). targets: World frame [m], shape (n_robots, 4)."""
+        simulator, target_rows = self.simulator, to_rows(targets)
+        own = simulator.coefficients
+        out = np.empty((len(target_rows), self._without_more.size, target_rows.shape[2]))
+        places = stations_of(simulator.scene.robot)
+        observe(own.rest, own.limb_length, simulator.q, simulator.v, places, target_rows, VELOCITY_SCALE, out)
+        return out
+
+    def _pictures(self) -> Floats:
+        """What pictures of the robots would show now, shape (n_robots, k), see tracker.py."""
+        assert self._tracker is not None
+        rows = self._kernels_rows(np.zeros((self.n_robots, 4)))
+        of_robots = rows.transpose(0, 2, 1).reshape(-1, rows.shape[1])[: self.n_robots]
+        pose = [self.simulator.hub_position(), self._axes().T]
+        return np.concatenate([*pose, of_robots[:, self._tracker.columns]], axis=1)
+
+    def _lengths(self) -> Floats:
+        """Lengths of every robot's limbs, the unit of its observations [m], shape (n_robots,)."""
+        rows = self.simulator.coefficients.limb_length
+        return np.broadcast_to(rows, (len(self.simulator.q), *rows.shape[1:])).reshape(-1)[: self.n_robots]
+
+    def seen_hub(self) -> Floats:
+        """Hubs as robots are seen by who decides [m], shape (n_robots, 2), a copy."""
+        return self.simulator.hub_position() if self._tracker is None else self._tracker.hub
+
+    def seen_heading(self) -> Floats:
+        """Headings as robots are seen by who decides [rad], shape (n_robots,)."""
+        c, s = self._seen_axes()
+        return np.asarray(np.arctan2(s, c))
+
+    def _seen_axes(self) -> Floats:
+        return self._axes() if self._tracker is None else self._tracker.axes
 
     def _remembered(self) -> Floats:
         """Numbers of the limbs that stand before the targets, shape (n_robots, k), limb after limb."""
@@ -242,8 +312,8 @@ class Swimming(ABC):
         return np.asarray(np.arctan2(s, c))
 
     def _in_body_frame(self, vectors: Floats) -> Floats:
-        """Vectors of the world frame, shape (n_robots, ..., 2), as robots see them."""
-        c, s = (part.reshape(-1, *[1] * (vectors.ndim - 2)) for part in self._axes())
+        """Vectors of the world frame, shape (n_robots, ..., 2), in the frames in which robots are seen."""
+        c, s = (part.reshape(-1, *[1] * (vectors.ndim - 2)) for part in self._seen_axes())
         x, y = vectors[..., 0], vectors[..., 1]
         return np.stack([c * x + s * y, c * y - s * x], axis=-1)
 
@@ -272,14 +342,43 @@ class Swimming(ABC):
     def step(self, commands: Floats) -> Outcome:
         """Advance every robot by one decision."""
         followed = self.followed(commands)
-        report = self.simulator.advance(self.decision_period, self._wired(followed))
+        if self._lag is None:
+            report = self.simulator.advance(self.decision_period, self._wired(followed))
+        else:
+            report = _result(self._swim(self._lag, followed))
         return self._judge(commands, followed, report)
 
     def step_in_parts(self, commands: Floats, parts: int) -> Generator[float, None, Outcome]:
         """One decision in `parts` parts; yields the time since it began [s] after each, and returns the Outcome."""
         followed = self.followed(commands)
-        report = yield from self.simulator.advance_in_parts(self.decision_period, self._wired(followed), parts)
+        if self._lag is None:
+            report = yield from self.simulator.advance_in_parts(self.decision_period, self._wired(followed), parts)
+        else:
+            ends = self.decision_period * np.arange(1, parts + 1) / parts
+            report = yield from _at_ends(self._swim(self._lag, followed), ends.tolist())
         return self._judge(commands, followed, report)
+
+    def _swim(self, lag: Lag, commands: Floats) -> Generator[float, None, StrokeReport]:
+        """One decision whose commands are late; yields the time since it began [s] after about every time step."""
+        reports = []
+        for piece in lag.pieces(commands):
+            reports.append((yield from self._swim_piece(piece)))
+        lag.send(commands)
+        return report_of_pieces(reports)
+
+    def _swim_piece(self, piece: Piece) -> Generator[float, None, StrokeReport]:
+        """Piece of a decision, in which pictures are taken."""
+        n_steps = math.ceil(piece.duration / self.scene.numerics.step)
+        steps = self.simulator.advance_in_parts(piece.duration, self._wired(piece.commands), n_steps)
+        with contextlib.closing(steps):
+            while True:
+                try:
+                    since = next(steps)
+                except StopIteration as over:
+                    return over.value
+                if self._tracker is not None and self._tracker.is_due(self.simulator.time).any():
+                    self._tracker.take(self.simulator.time, self._pictures(), self._lengths())
+                yield piece.begin + since
 
     def warmth(self) -> Floats | None:
         """Contractions or temperatures of wires + and -, 0 to 1, shape (n_robots, n_limbs, 2); None without wires."""
@@ -294,6 +393,8 @@ class Swimming(ABC):
         hub = self.simulator.hub_position()
         self._energy += report.energy
         self.last_commands = followed
+        if self._tracker is not None:
+            self._tracker.look(self.simulator.time)
         score = self._score(hub, pulses_of(report.heating_time, followed))
         info = {
             **self.facts(hub),
@@ -341,7 +442,9 @@ class Swimming(ABC):
             **(self._errors() if self._tells_errors else {}),
             **({"error_estimate": self.simulator.error_estimate} if self.options.error_bars else {}),
             **({"energy_growth": self.simulator.energy_growth} if is_watched(self.scene) else {}),
+            **({} if self._tracker is None else {"sight_age": self._tracker.age(self.simulator.time)}),
             **{name: values.copy() for name, values in self.drawn.items()},
+            **self._lateness.drawn,
         }
 
     def _errors_of(self, scene: Scene) -> dict[str, float]:
@@ -355,6 +458,28 @@ class Swimming(ABC):
             errors = {name: np.where(strong, known.get(name, np.nan), np.nan) for name in self._names_of_errors}
             self._known = scene, strengths.tobytes(), errors
         return {name: values.copy() for name, values in self._known[2].items()}
+
+
+def _result(steps: Generator[float, None, StrokeReport]) -> StrokeReport:
+    """What a generator returns in the end."""
+    try:
+        next(_at_ends(steps, []))
+    except StopIteration as over:
+        return over.value
+    raise AssertionError("It has no ends to stop at.")
+
+
+def _at_ends(steps: Generator[float, None, StrokeReport], ends: list[float]) -> Generator[float, None, StrokeReport]:
+    """Yields only the first of the increasing times that is not before each of the ends."""
+    with contextlib.closing(steps):
+        while True:
+            try:
+                time = next(steps)
+            except StopIteration as over:
+                return over.value
+            if ends and time >= ends[0] * (1.0 - ROUNDING):
+                ends = [end for end in ends if end * (1.0 - ROUNDING) > time]
+                yield time
 
 
 def _messages(status: NDArray[np.int64]) -> NDArray[Any]:

@@ -89,7 +89,7 @@ class SwimTask(Swimming):
     def _wanted(self) -> Floats:
         if self._asked is None:
             return super()._wanted()
-        return self._asked.seen(self.waypoint_index, self.heading())
+        return self._asked.seen(self.waypoint_index, self.seen_heading())
 
     def _score(self, hub: Floats, pulses: Floats) -> Score:
         reached = self._pass_waypoints(hub)

@@ -1,8 +1,8 @@
 """`StrokeReport`: the solver's status and counts for every robot after an interval of time, such as a stroke."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,6 +90,24 @@ class StrokeReport(NamedTuple):
     work: Floats
     peak_moment: Floats
     energy_growth: Floats
+
+
+LARGEST, LAST = ("status", "peak_moment"), ("error_estimate", "energy_growth")
+"""Fields of which a whole has the largest, or the last, of its pieces; most others it has the sum of."""
+
+
+def report_of_pieces(pieces: Sequence[StrokeReport]) -> StrokeReport:
+    """Report of an interval that was advanced in pieces, one after the other."""
+
+    def whole(name: str) -> NDArray[Any]:
+        values = np.stack([getattr(piece, name) for piece in pieces])
+        if name in LAST:
+            return np.asarray(values[-1])
+        if name == "smallest_opening_angle":
+            return np.asarray(values.min(axis=0))
+        return np.asarray(values.max(axis=0) if name in LARGEST else values.sum(axis=0))
+
+    return StrokeReport(*map(whole, StrokeReport._fields))
 
 
 def make_report(

@@ -20,6 +20,7 @@ from seastar_gym import (
     RewardWeights,
     Scene,
     Seastar,
+    Sight,
     SmaPulse,
     SymmetryReduction,
     Uniform,
@@ -48,7 +49,13 @@ ARGUMENTS = {
     "continuous": {"actions": "continuous", "decision_period": np.float64(0.3), "fidelity": "fast"},
     "headings": {"headings": Headings((0.1, 1 / 3, 0.0, 1.0, 2.0)), "fidelity": "fast"},
     "one heading": {"headings": Headings(0.1, 1 / 3), "fidelity": "fast"},
+    "sight": {
+        "sight": Sight(1e2 / 3, Uniform(0.1, 1 / 3), dropout=0.1, sees=np.int64(3)), "decision_period": 0.5,
+        "fidelity": "fast", "action_delay": Uniform(0.0, 1 / 3),
+    },
+    "a delay": {"sight": Sight(), "action_delay": np.float64(1.0), "fidelity": "fast"},
     "plain": {
+        "sight": to_dict(Sight(delay=Uniform(0.1, 1 / 3))),
         "headings": to_dict(Headings("random")),
         "scene": SCENE.to_dict(),
         "reward": to_dict(RewardWeights(1.0)),
@@ -72,7 +79,7 @@ def test_an_environment_comes_back_from_its_spec(arguments):
     assert_same(swum(env, 3), swum(other, 3))
 
 
-@pytest.mark.parametrize("arguments", ["scene", "waypoints", "reward", "randomization", "plain"])
+@pytest.mark.parametrize("arguments", ["scene", "waypoints", "reward", "randomization", "sight", "plain"])
 def test_a_native_batch_comes_back_from_its_spec(arguments):
     more = {"num_envs": 3, "autoreset_mode": AutoresetMode.SAME_STEP, "threads": 1, "max_episode_steps": 2}
     batch = gym.make_vec(ID, **more, **ARGUMENTS[arguments])

@@ -111,7 +111,7 @@ class Symmetry:
         """Observations of the robots carried by the elements: a fresh array of the same shape and type."""
         observations, elements = np.asarray(observations), np.asarray(elements, dtype=np.intp)
         self._require_fit(observations)
-        at, order = self.layout, _vector_order(self.group, self.layout.shows_limbs)
+        at, order = self.layout, _vector_order(self.group, self.layout.shows_limbs, self.layout.stations)
         if not self.mirror and not at.entries:
             return self._carry_vectors(observations, elements, order)
         hub = at.stations_and_hub.stop
@@ -225,14 +225,14 @@ def _from_axis(vectors: NDArray[np.float64], axis: float | None) -> NDArray[np.f
 
 
 @cache
-def _vector_order(group: Group, shows_limbs: bool) -> NDArray[np.intp]:
+def _vector_order(group: Group, shows_limbs: bool, stations: int) -> NDArray[np.intp]:
     """Order of vectors, shape (2 n_turns, k): vector i after element g was vector order[g, i] before."""
     n_limbs, n_turns = n_limbs_of(group), n_turns_of(group)
-    at = Layout(n_limbs, shows_limbs=shows_limbs)
-    n_stations = at.velocities.start // 2
-    stations = np.arange(n_stations).reshape(n_limbs, -1)[limb_order(group)].reshape(2 * n_turns, n_stations)
+    at = Layout(n_limbs, shows_limbs=shows_limbs, stations=stations)
+    n_places = at.velocities.start // 2
+    places = np.arange(n_places).reshape(n_limbs, -1)[limb_order(group)].reshape(2 * n_turns, n_places)
     others = np.tile(np.arange(at.hub_velocity.start, at.size, 2) // 2, (2 * n_turns, 1))
-    return read_only(np.concatenate([stations, n_stations + stations, others], axis=1))
+    return read_only(np.concatenate([places, n_places + places, others], axis=1))
 
 
 class Recollection:

@@ -7,6 +7,7 @@ from gymnasium.vector import AutoresetMode
 from seastar_gym.envs.commands import Actions
 from seastar_gym.envs.options import Plain, SwimOptions, read
 from seastar_gym.envs.seastar_swim import RenderMode, SeastarSwimEnv
+from seastar_gym.envs.sight import Drawn, Sight
 from seastar_gym.envs.tasks.challenge import Challenge
 from seastar_gym.envs.tasks.fail_blind import FailBlind
 from seastar_gym.envs.tasks.miswired import Miswired
@@ -48,6 +49,19 @@ def name_of(challenge: Challenge | None) -> str | None:
     return next((name for name, known in CHALLENGES.items() if known == challenge), None)
 
 
+def _options(
+    actions: Actions,
+    fidelity: Fidelity | None,
+    decision_period: float | None,
+    sight: Sight | Plain | None,
+    action_delay: Drawn | Plain,
+) -> SwimOptions:
+    return SwimOptions(
+        actions=actions, fidelity=fidelity, decision_period=decision_period,
+        sight=sight, action_delay=action_delay,  # type: ignore[arg-type]  # plain data, too
+    )  # fmt: skip
+
+
 class SeastarTaskEnv(SeastarSwimEnv):
     """Environment of one of the tasks whose headroom is measured, for the chapter's robot.
 
@@ -83,6 +97,8 @@ class SeastarTaskEnv(SeastarSwimEnv):
     actions: How commands are written, see `SeastarSwimEnv`.
     fidelity: Accuracy of the simulation, see `SeastarSwimEnv`.
     decision_period: Time between decisions [s]. None means a stroke.
+    sight, action_delay: Camera through which the robot is seen, and delay of actions, see `SeastarSwimEnv`. What a task
+        shows besides the robot, such as prey, is not late.
     render_mode: See `SeastarSwimEnv`. Pictures show what the robot is not told.
     frames_per_stroke: Number of pictures of a decision, see `SeastarSwimEnv`.
     """
@@ -98,10 +114,12 @@ class SeastarTaskEnv(SeastarSwimEnv):
         decision_period: float | None = None,
         render_mode: RenderMode | None = None,
         frames_per_stroke: int | None = None,
+        sight: Sight | Plain | None = None,
+        action_delay: Drawn | Plain = 0.0,
     ):
         self._set_pictures(render_mode, frames_per_stroke)
         self.challenge = read_challenge(task)
-        options = SwimOptions(actions=actions, fidelity=fidelity, decision_period=decision_period)
+        options = _options(actions, fidelity, decision_period, sight, action_delay)
         self._begin_with(self.challenge.swimming(options, 1, 1, split), frames_per_stroke)
 
 
@@ -129,8 +147,10 @@ class SeastarTaskVectorEnv(SeastarSwimVectorEnv):
         render_mode: Literal["rgb_array"] | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
+        sight: Sight | Plain | None = None,
+        action_delay: Drawn | Plain = 0.0,
     ):
         self._set_batch(num_envs, max_episode_steps, render_mode, autoreset_mode)
         self.challenge = read_challenge(task)
-        options = SwimOptions(actions=actions, fidelity=fidelity, decision_period=decision_period)
+        options = _options(actions, fidelity, decision_period, sight, action_delay)
         self._begin_with(self.challenge.swimming(options, num_envs, threads, split))

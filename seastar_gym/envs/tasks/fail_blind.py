@@ -116,16 +116,16 @@ class FailBlindTask(Numbered, SwimTask):
 
     def _begin(self, robots: Flags) -> None:
         super()._begin(robots)
-        self._hub[robots] = self.simulator.hub_position()[robots]
-        self._before[robots] = self.heading()[robots]
+        self._hub[robots] = self.seen_hub()[robots]
+        self._before[robots] = self.seen_heading()[robots]
         self._way[robots], self._turn[robots] = 0.0, 0.0
 
     def _score(self, hub: Floats, pulses: Floats) -> Score:
-        heading, c, s = self.heading(), np.cos(self._before), np.sin(self._before)
-        x, y = (hub - self._hub).T
+        place, heading, c, s = self.seen_hub(), self.seen_heading(), np.cos(self._before), np.sin(self._before)
+        x, y = (place - self._hub).T
         self._way = np.stack([c * x + s * y, c * y - s * x], axis=1)
         self._turn = wrapped(heading - self._before)
-        self._hub, self._before = hub.copy(), heading
+        self._hub, self._before = place, heading
         return super()._score(hub, pulses)
 
     def _wanted(self) -> Floats:

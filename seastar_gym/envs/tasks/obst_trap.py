@@ -242,7 +242,7 @@ class ObstTrapTask(Numbered, SwimTask):
         return Score(terms, score.success & ~touches, score.over | touches)
 
     def _wanted(self) -> Floats:
-        hub = self.simulator.hub_position()
+        hub = self.seen_hub()
         order = np.argsort(rims(hub, self.discs), axis=1, kind="stable")[:, :SEEN]
         nearest = np.take_along_axis(self.discs, order[..., None], axis=1)
         seen = np.concatenate([self._in_body_frame(nearest[..., :2] - hub[:, None]), nearest[..., 2:]], axis=-1)

@@ -146,13 +146,13 @@ class PrizesTask(Numbered, Swimming):
         return np.take_along_axis(np.where(np.isinf(far)[..., None], 0.0, seen), order, axis=1)
 
     def _targets(self) -> Floats:
-        hub = self.simulator.hub_position()
+        hub = self.seen_hub()
         near = self._nearest_first(hub)
         second = np.where(near[:, 1, 2:] > 0.0, near[:, 1, :2], near[:, 0, :2])
         return np.concatenate([hub + near[:, 0, :2], hub + second], axis=1)
 
     def _wanted(self) -> Floats:
-        near = self._nearest_first(self.simulator.hub_position())
+        near = self._nearest_first(self.seen_hub())
         places = self._in_body_frame(near[..., :2]) / self.scene.robot.limb_length
         seen = np.concatenate([places, near[..., 2:]], axis=-1).reshape(self.n_robots, -1)
         return np.column_stack([seen, self._share_left()])
