@@ -109,7 +109,7 @@ def describe(env: BatchVecEnv, hidden: tuple[int, ...]) -> Description:
     layout = batch.layout
     return about._replace(
         task=task_of(batch), limb_mirror=observed_mirror(batch), entries=layout.entries,
-        shows_limbs=layout.shows_limbs, past=past,
+        shows_limbs=layout.shows_limbs, past=past, stations=layout.stations,
     )  # fmt: skip
 
 

@@ -157,7 +157,7 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         "load_scene": dict(file=None),
         "timed_certificate": dict(decision_period=0.2),
         "make_path": dict(path="random", rng=rng(0)),
-        "Layout": dict(n_limbs=5, of_limb=0, entries=(), shows_limbs=True),
+        "Layout": dict(n_limbs=5, of_limb=0, entries=(), shows_limbs=True, stations=9),
         "Recollection": dict(symmetry=symmetry_for(5), past=1),
         "Symmetry": dict(group=5, mirror=(), layout=named("Layout")(5), actions="limbs"),
         "VectorMemory": dict(env=batch(), past=1),

@@ -16,10 +16,13 @@ from seastar_gym.cli.screen import Show, rate, screen
 from seastar_gym.command import answered, command_parser
 from seastar_gym.controllers.contract import Policy, actions_in
 from seastar_gym.controllers.roster import HELP, load_agent
+from seastar_gym.envs.options import read
+from seastar_gym.envs.sight import Sight
 from seastar_gym.evaluation.path_file import PATH_HELP, load_path
 from seastar_gym.evaluation.rollout import rollout
 from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in
 from seastar_gym.evaluation.tasks import make_task, require_seen
+from seastar_gym.files import read_json
 from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.numerics import Fidelity
 from seastar_gym.scene.scene_file import load_scene
@@ -43,10 +46,23 @@ def parser() -> argparse.ArgumentParser:
         "--decision-period", type=float,
         help=f"time between decisions [s] (default: the task's; {LEARNED_PERIOD:g} for the learned policy on a path)",
     )  # fmt: skip
+    found.add_argument(
+        "--sight", help="what a camera sees, pose, nodes or 1, 3 or 9 markers per limb, or a file of a Sight"
+    )
+    found.add_argument("--action-delay", type=float, help="time from a decision to the heat of wires [s]")
     found.add_argument("--seconds", type=float, help="simulated time after which the swim ends")
     found.add_argument("--random-heading", action="store_true", help="turn the robot at random at the start")
     found.add_argument("--seed", type=int, default=0, help=f"seed of what is drawn at random {default}")
     return found
+
+
+def sight(text: str | None) -> Sight | None:
+    """Sight of which a word says what it sees, or that a JSON file has as `to_dict` writes it; None for none."""
+    if text is None:
+        return None
+    if text.endswith(".json"):
+        return read(read_json(text), Sight)
+    return Sight(sees=int(text) if text.isdigit() else text)  # type: ignore[arg-type]  # which it checks
 
 
 def decision_period(options: argparse.Namespace) -> float | None:
@@ -61,6 +77,7 @@ def arguments_of(options: argparse.Namespace) -> dict[str, Any]:
         if getattr(options, name) is not None:
             require_number(f"--{name.replace('_', '-')}", getattr(options, name), "1")
     asked: dict[str, Any] = {"fidelity": options.fidelity, "decision_period": decision_period(options)}
+    asked |= {"sight": sight(options.sight), "action_delay": options.action_delay}
     if options.path is not None:
         asked["path"] = load_path(options.path)
     if options.scene is not None:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, cast, get_args
 
 from seastar_gym.envs import TASKS
 from seastar_gym.envs.commands import Actions, Discrete, checked_decision_period, choices
-from seastar_gym.envs.layout import OBSERVATION_LAYOUT, Entry, Layout, memory_size
+from seastar_gym.envs.layout import N_STATIONS, OBSERVATION_LAYOUT, Entry, Layout, memory_size
 from seastar_gym.envs.symmetry import Recollection, Symmetry, memory_mirror, symmetry_of
 from seastar_gym.envs.symmetry.symmetry import MOST_PAST
 from seastar_gym.scene import Scene
@@ -32,8 +32,8 @@ class Description(NamedTuple):
     None means strokes.
     task: Name of the challenge that the policy was trained for, such as "miswired". None means waypoints.
     limb_mirror: What a mirror does to the numbers that are observed of every limb. None means those of the actuators.
-    entries, shows_limbs: Of the observations, see `Layout`. past: Number of past observations that the policy sees, see
-    `Recollection`.
+    entries, shows_limbs, stations: Of the observations, see `Layout`. past: Number of past observations that the
+    policy sees, see `Recollection`.
     """
 
     actions: Actions
@@ -46,6 +46,7 @@ class Description(NamedTuple):
     entries: tuple[Entry, ...] = ()
     shows_limbs: bool = True
     past: int = 0
+    stations: int = N_STATIONS
 
     def to_json(self, **more: Any) -> str:
         """Description as text; `more` adds entries for people to read."""
@@ -63,9 +64,10 @@ class Description(NamedTuple):
     def _written(self) -> dict[str, Any]:
         """Entries as they are written, but for the scene."""
         facts = self._asdict()
-        kinds, shows_limbs = facts.pop("entries"), facts.pop("shows_limbs")
+        kinds, shows_limbs, stations = (facts.pop(name) for name in ("entries", "shows_limbs", "stations"))
         rows = [WRITTEN_AS.get(kind, kind) for kind in kinds] if isinstance(kinds, tuple) else kinds
-        return {**facts, "own": {"kinds": rows, "with_stations": shows_limbs}}
+        fewer = {} if stations == N_STATIONS else {"stations": stations}
+        return {**facts, "own": {"kinds": rows, "with_stations": shows_limbs, **fewer}}
 
     @classmethod
     def from_json(cls, text: str | bytes) -> "Description":
@@ -102,7 +104,7 @@ class Description(NamedTuple):
         if decision_period is not None:
             checked_decision_period(decision_period, scene)
         seen = _seen(facts)
-        if seen[-1] and not symmetry:
+        if facts.get("past") and not symmetry:
             raise ValueError("A policy without symmetry has no past.")
         return cls(cast(Discrete, actions), symmetry, scene, tuple(hidden), decision_period, *seen)
 
@@ -122,7 +124,7 @@ class Description(NamedTuple):
     def layout(self) -> Layout:
         """Layout of an observation of the environment."""
         of_limb = memory_size(self.scene.actuator) if self.limb_mirror is None else len(self.limb_mirror)
-        return Layout(self.scene.robot.n_limbs, of_limb, self.entries, self.shows_limbs)
+        return Layout(self.scene.robot.n_limbs, of_limb, self.entries, self.shows_limbs, self.stations)
 
     @property
     def observation_size(self) -> int:
@@ -170,15 +172,15 @@ CHALLENGES = tuple(dict.fromkeys(about[0] for about in TASKS.values()))
 """Names of challenges that policies are trained for."""
 
 
-def _seen(facts: Mapping[str, Any]) -> tuple[str | None, Mirror | None, tuple[Entry, ...], bool, int]:
+def _seen(facts: Mapping[str, Any]) -> tuple[str | None, Mirror | None, tuple[Entry, ...], bool, int, int]:
     """Entries on what a policy of a task sees. ValueError where one is wrong."""
     task, mirror, own, past = (facts.get(name) for name in SEEN)
     if task is not None and (not isinstance(task, str) or task not in CHALLENGES):
         raise ValueError(f"Its task must be one of {', '.join(CHALLENGES)}, not {shown(task)}.")
     if past is not None:
         require_count("its past", past, 0, MOST_PAST)
-    entries, shows_limbs = ((), True) if own is None else _own(own)
-    return task, None if mirror is None else _mirror(mirror), entries, shows_limbs, past or 0
+    entries, shows_limbs, stations = ((), True, N_STATIONS) if own is None else _own(own)
+    return task, None if mirror is None else _mirror(mirror), entries, shows_limbs, past or 0, stations
 
 
 def _rows(mirror: object) -> object:
@@ -200,16 +202,17 @@ def _mirror(rows: object) -> Mirror:
     return tuple((index, sign) for index, sign in rows)
 
 
-def _own(own: object) -> tuple[tuple[Entry, ...], bool]:
-    """Further entries of an observation, and whether it shows the limbs."""
-    facts = own if isinstance(own, dict) else {}
-    if set(facts) != {"kinds", "with_stations"} or not isinstance(facts["with_stations"], bool):
+def _own(own: object) -> tuple[tuple[Entry, ...], bool, int]:
+    """Further entries of an observation, whether it shows the limbs, and at how many stations each."""
+    facts = {"stations": N_STATIONS, **own} if isinstance(own, dict) else {}
+    if set(facts) != {"kinds", "with_stations", "stations"} or not isinstance(facts["with_stations"], bool):
         raise ValueError(f"Its own must be an object with kinds and with_stations, not {shown(own)}.")
     kinds = facts["kinds"]
     known = isinstance(kinds, list) and all(isinstance(kind, str) and kind in KINDS for kind in kinds)
     if not known or len(kinds) > MOST_NUMBERS:
         raise ValueError(f"The kinds of its own numbers must be of {', '.join(KINDS)}, not {shown(kinds)}.")
-    return tuple(KINDS[kind] for kind in kinds), facts["with_stations"]
+    require_count("its stations", facts["stations"], 1, N_STATIONS)
+    return tuple(KINDS[kind] for kind in kinds), facts["with_stations"], facts["stations"]
 
 
 def read_facts(text: str | bytes) -> dict[str, Any]:

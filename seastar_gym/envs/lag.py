@@ -15,7 +15,7 @@ from seastar_gym.scene.actuators.heating import WirePair
 Floats = NDArray[np.float64]
 
 GRID = 0.01
-"""Drawn delays are rounded up to whole multiples of this time [s], so that all robots of a batch swim the same steps."""
+"""Drawn delays are rounded up to multiples of this time [s], so that all robots of a batch swim the same steps."""
 ROUNDING = 1e-9
 
 

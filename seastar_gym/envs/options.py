@@ -89,7 +89,7 @@ class SwimOptions:
             if name == ACTION_DELAY:
                 require_action_delay(drawn)
             elif name in own and self.sight is not None:
-                replace(self.sight, **{name.removeprefix("sight."): drawn})
+                replace(self.sight, **{name.removeprefix("sight."): drawn})  # type: ignore[arg-type]
             else:
                 known = ", ".join([*own, ACTION_DELAY])
                 raise ValueError(f"The environment has no number {shown(name)} to draw: it has {known}.")

@@ -120,6 +120,29 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     So an observation has 196 numbers in the timed environments, 200 with headings. Nothing else tells the future of the
     robot, unless decisions are shorter than pulses. `seastar_gym.envs.observation.Layout` names all these places.
 
+    ## Sight and delays
+    A camera sees less, and late. With `sight`, a `Sight`, an observation follows from the last two pictures that were
+    seen when decisions were made: places and waypoints are relative to the hub and the heading of the last one, and
+    velocities are differences of the two. Further entries stand after all others, before the waypoints:
+
+    | `Sight.sees`                 | stations and hub, index          | further entries, in this order                |
+    |------------------------------|----------------------------------|-----------------------------------------------|
+    | `"pose"`                     | none                             | velocity of the hub; rate of turn; age        |
+    | 1, 3 or 9 markers, k = 10    | 0..k m-1 places, k m..2 k m-1    | rate of turn; age                             |
+    | times their number m         | velocities, 2 k m..2 k m+1 hub   |                                               |
+    | `"nodes"`                    | all, as in the table above       | age                                           |
+
+    | entry                                                                         | unit      | range       |
+    |-------------------------------------------------------------------------------|-----------|-------------|
+    | mean velocity of the hub between the two pictures: x, y                       | 0.025 m/s | (-inf, inf) |
+    | mean rate of turn between them, anti-clockwise positive                       | rad/s     | (-inf, inf) |
+    | age of the last picture                                                       | s         | 0..         |
+
+    The frame is that of the last picture. k = 10 is that of five limbs. The memory of the actuators is what the driver
+    knows by its own commands; it is not late. `action_delay` is the time from a decision to when wires are heated by
+    it. Rewards and the end of an episode are by the true place. `info` has `sight_age`, and numbers that are drawn by
+    their names, such as `sight.delay` and `action_delay`.
+
     ## Reward
     The sum of these terms, with the weights of `RewardWeights`; each term is in `info`, too:
 
@@ -218,6 +241,9 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     observe_actuators: Whether observations have the memory of the actuators.
     headings: Headings that are asked for at the waypoints, a `Headings`: along the legs, at random, or given angles.
         None asks for none.
+    sight: Camera through which robots are seen, a `Sight`. None means that all nodes are seen, without delay.
+    action_delay: Time from a decision to when wires are heated by it [s], or a distribution of it, which is drawn at
+        the start of every episode and rounded up to 0.01 s. Other actuators than wires take whole decisions only.
     device: Where robots swim: "cpu", or "cuda" for an NVIDIA GPU, to the same bits, see `Simulator`. It is for
         batches of thousands.
     render_mode: "rgb_array": `render` returns a picture of the end of the decision. "rgb_array_list": `render` returns
@@ -226,7 +252,7 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     frames_per_stroke: Number of pictures of a decision, at equal intervals; the last shows its end. None means ten per
         second of simulated time, and one at least.
 
-    `scene`, `reward`, `randomization` and `headings` may be given as plain data, as `Scene.to_dict` and
+    `scene`, `reward`, `randomization`, `headings` and `sight` may be given as plain data, as `Scene.to_dict` and
     `seastar_gym.scene.serial.to_dict` write them. `env.spec` has them so:
     `gym.make(EnvSpec.from_json(env.spec.to_json()))` is the same environment.
     """

@@ -94,7 +94,7 @@ def require_action_delay(value: object) -> None:
 
 
 def entries_of(sees: Sees | int) -> tuple[Entry, ...]:
-    """Further entries of an observation: velocity of the hub and rate of turn, as far as not seen otherwise, and age."""
+    """Further entries of an observation: velocity of the hub and rate of turn, if not seen otherwise, and age."""
     known: dict[Sees | int, tuple[Entry, ...]] = {"nodes": ("scalar",), "pose": ("vector", "pseudoscalar", "scalar")}
     return known.get(sees, ("pseudoscalar", "scalar"))
 

@@ -67,7 +67,7 @@ class Tracker:
         generators: Random generator of every robot, which gives that of its pictures. rows: Shape (n_robots, k).
         lengths: Lengths of limbs [m], shape (n_robots,).
         """
-        for robot in np.flatnonzero(robots):
+        for robot in np.flatnonzero(robots).tolist():
             self._generators[robot] = np.random.default_rng(generators[robot].integers(2**63))
         self._seen_at[robots], self._next[robots], self._n_kept[robots] = np.inf, 1, 0
         first = -np.ceil((self._numbers["sight.delay"] + self._numbers["sight.jitter"]) * self.rate - SAME_TIME)
@@ -91,10 +91,10 @@ class Tracker:
         """Take pictures of the robots in a mask, some of which are lost."""
         delay, jitter, dropout = (self._numbers[f"sight.{name}"] for name in ("delay", "jitter", "dropout"))
         lost, late = np.ones((2, len(rows)))
-        for robot in np.flatnonzero(robots):
+        for robot in np.flatnonzero(robots).tolist():
             lost[robot], late[robot] = self._generators[robot].random(2)
         blurred = self._blurred(robots, rows, lengths)
-        for robot in np.flatnonzero(robots & (lost >= dropout)):
+        for robot in np.flatnonzero(robots & (lost >= dropout)).tolist():
             seen_after = max(0.0, delay[robot] + jitter[robot] * (2.0 * late[robot] - 1.0))
             self.keep(robot, time[robot], time[robot] + seen_after, blurred[robot])
 
@@ -108,12 +108,12 @@ class Tracker:
         """Pictures with the errors of the robots in a mask."""
         noise, turn_noise = (self._numbers[f"sight.{name}"][:, None] for name in ("noise", "turn_noise"))
         errors = np.zeros((len(rows), 3 + self.n_places))
-        for robot in np.flatnonzero(robots):
+        for robot in np.flatnonzero(robots).tolist():
             errors[robot] = self._generators[robot].standard_normal(errors.shape[1])
         turn, of_hub, of_places = turn_noise * errors[:, :1], noise * errors[:, 1:3], noise * errors[:, 3:]
         c, s = rows[:, 2:3], rows[:, 3:4]
         found, at = rows.copy(), slice(POSE, POSE + self.n_places)
-        found[:, :2] += np.concatenate(_turned(*of_hub.T[..., None], c, -s), axis=1)
+        found[:, :2] += np.concatenate(_turned(of_hub[:, :1], of_hub[:, 1:], c, -s), axis=1)
         found[:, 2:4] = np.concatenate(_turned(c, s, np.cos(turn), -np.sin(turn)), axis=1)
         places = rows[:, at] + (of_places - np.tile(of_hub, self.n_places // 2)) / lengths[:, None]
         x, y = _turned(places[:, ::2], places[:, 1::2], np.cos(turn), np.sin(turn))

@@ -30,6 +30,7 @@ from seastar_gym import (
     Seastar,
     Section,
     ShearCurrent,
+    Sight,
     SmaLimb,
     SmaPulse,
     SmaWires,
@@ -54,7 +55,7 @@ POSITIVE = {
     SmaLimb: "rise middle time_constant heating_time period", Limited: "largest_angle largest_rate",
     ThermalSma: "heating_time cooling_time time_constant steady_rise", Numerics: "step newton_tolerance",
     ObstTrap: "longest_way", Prey: "robot_speed catch_radius", Prizes: "side radius seconds robot_speed",
-    Station: "tolerance", Disc: "radius", Strip: "width height", Tube: "outer inner",
+    Sight: "rate", Station: "tolerance", Disc: "radius", Strip: "width height", Tube: "outer inner",
     Section: "area second_moment projected_width added_area bending_stiffness mass_per_length half_width",
 }  # fmt: skip
 NOT_NEGATIVE = {
