@@ -241,11 +241,11 @@ class SeastarSwimEnv(TaskEnv, gym.Env[Observation, Any]):
     observe_actuators: Whether observations have the memory of the actuators.
     headings: Headings that are asked for at the waypoints, a `Headings`: along the legs, at random, or given angles.
         None asks for none.
+    device: Where robots swim: "cpu", or "cuda" for an NVIDIA GPU, to the same bits, see `Simulator`. It is for
+        batches of thousands.
     sight: Camera through which robots are seen, a `Sight`. None means that all nodes are seen, without delay.
     action_delay: Time from a decision to when wires are heated by it [s], or a distribution of it, which is drawn at
         the start of every episode and rounded up to 0.01 s. Other actuators than wires take whole decisions only.
-    device: Where robots swim: "cpu", or "cuda" for an NVIDIA GPU, to the same bits, see `Simulator`. It is for
-        batches of thousands.
     render_mode: "rgb_array": `render` returns a picture of the end of the decision. "rgb_array_list": `render` returns
         `frames_per_stroke` pictures of the decision. "human": a window shows as many;
         without a display nobody sees them, and a warning says so.

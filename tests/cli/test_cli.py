@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from seastar_gym import Scene, Seastar
+from seastar_gym import Scene, Seastar, Sight
 from seastar_gym.cli import compile, play, screen
 from seastar_gym.cli.main import COMMANDS, main
 from seastar_gym.controllers import learned
+from seastar_gym.scene.serial import to_dict
 
 ROOT = Path(__file__).resolve().parents[2]
 PREY = learned.of_task("prey", None)
@@ -116,6 +117,14 @@ def test_without_options_the_policy_of_the_picture_on_top_swims(more, seconds, t
     assert f"0 of 5 waypoints in {seconds}." in capsys.readouterr().out
 
 
+def test_a_swim_is_seen_through_a_camera_in_a_file(path, tmp_path, no_display, capsys):
+    sight = tmp_path / "sight.json"
+    sight.write_text(json.dumps(to_dict(Sight(delay=0.1, sees=1))))
+    arguments = ["--agent", "straight", "--path", path, "--fidelity", "fast", "--film", str(tmp_path / "swim.gif")]
+    assert main(["swim", *arguments, "--sight", str(sight), "--action-delay", "1"]) == 0
+    assert "straight: 1 of 1 waypoints in" in capsys.readouterr().out
+
+
 def test_a_window_shows_a_swim_until_it_is_closed(path, dummy_window, monkeypatch, capsys):
     arguments = ["swim", "--agent", "straight", "--path", path, "--fidelity", "fast", "--speed", "100"]
     assert main(arguments) == 0
@@ -142,6 +151,9 @@ def test_a_window_shows_a_swim_until_it_is_closed(path, dummy_window, monkeypatc
         (["swim", "--agent", str(PREY), "--film", "x.gif"], "was trained for the task prey, the environment's is"),
         (["swim", "--speed", "-1"], "--speed must be"),
         (["swim", "--scene", "none.json"], "none.json is no file."),
+        (["swim", "--sight", "7"], "Sight.sees must be"),
+        (["swim", "--sight", "none.json"], "There is no file none.json."),
+        (["swim", "--sight", "pose", "--film", "x.gif"], "196"),
         (["evaluate", "--scene", "none.py"], "none.py is no file."),
         (["evaluate", "--seconds", "0"], "--seconds must be"),
     ],

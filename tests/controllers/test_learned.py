@@ -368,6 +368,8 @@ def test_a_policy_with_memory_sees_the_past_in_the_limbs_of_the_present():
 
 def test_a_description_of_a_task_survives_its_text_and_shapes_the_network():
     assert Description.from_json(TASK.to_json()) == TASK
+    marked = TASK._replace(stations=3)
+    assert Description.from_json(marked.to_json()) == marked and marked.observation_size == TASK.observation_size - 120
     size = 182 + 5 + 3 + 4
     assert TASK.observation_size == size and TASK.input_size == size + 2 * (10 + size - 180)
     assert TASK.shapes()["0.weight"] == (8, TASK.input_size) and TASK.distributions == (1, 243)
@@ -391,6 +393,7 @@ def test_a_description_of_a_task_survives_its_text_and_shapes_the_network():
         ({"entries": ("colour",)}, "must be of scalar, turn, vector"),
         ({"entries": ("scalar",) * 1001}, "must be of scalar, turn, vector"),
         ({"shows_limbs": 1}, "must be an object with kinds and with_stations"),
+        ({"stations": 10}, "its stations must be a whole number from 1 to 9"),
         ({"task": "chess"}, "its task must be one of miswired, prey"),
         ({"past": 1001}, "its past must be a whole number from 0 to 1000"),
         ({"symmetry": False}, "without symmetry has no past"),

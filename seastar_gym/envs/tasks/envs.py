@@ -97,10 +97,11 @@ class SeastarTaskEnv(SeastarSwimEnv):
     actions: How commands are written, see `SeastarSwimEnv`.
     fidelity: Accuracy of the simulation, see `SeastarSwimEnv`.
     decision_period: Time between decisions [s]. None means a stroke.
-    sight, action_delay: Camera through which the robot is seen, and delay of actions, see `SeastarSwimEnv`. What a task
-        shows besides the robot, such as prey, is not late.
     render_mode: See `SeastarSwimEnv`. Pictures show what the robot is not told.
     frames_per_stroke: Number of pictures of a decision, see `SeastarSwimEnv`.
+    sight: Camera through which the robot is seen, see `SeastarSwimEnv`. What a task shows besides the robot, such as
+        prey, is not late.
+    action_delay: Time from a decision to when wires are heated by it [s], see `SeastarSwimEnv`.
     """
 
     _option = "instance"
