@@ -25,19 +25,18 @@ from numpy.typing import NDArray
 from seastar_gym.accuracy.info import errors_in_info, read_certificate
 from seastar_gym.envs.commands import checked_decision_period, unless_strokes
 from seastar_gym.envs.lag import Lag, Piece
-from seastar_gym.envs.layout import HEADINGS, N_STATIONS, VELOCITY_SCALE, Entry, Layout
+from seastar_gym.envs.layout import HEADINGS, N_STATIONS, Entry, Layout
 from seastar_gym.envs.masks import action_masks, can_be_masked, masked_limbs
-from seastar_gym.envs.observation import body_axes, observe, to_float32
+from seastar_gym.envs.observation import to_float32
 from seastar_gym.envs.options import SwimOptions
+from seastar_gym.envs.pictures import axes_of, lengths_of, observed_rows
 from seastar_gym.envs.randomization import ACTION_DELAY, LIMB_STRENGTHS, drawn_scene
 from seastar_gym.envs.reward import pulses_of
 from seastar_gym.envs.scenery import NOTHING, Scenery
 from seastar_gym.envs.sight import Lateness, Sees, bounds_of, entries_of, stations_seen
-from seastar_gym.envs.stations import stations_of
 from seastar_gym.envs.tracker import Tracker
 from seastar_gym.scene import Scene
 from seastar_gym.scene.actuators.actuator import Mirror, complete
-from seastar_gym.simd.rows import to_rows
 from seastar_gym.simulator import Simulator, SolverStatus, StrokeReport
 from seastar_gym.simulator.growth import is_watched
 from seastar_gym.simulator.report import report_of_pieces
@@ -218,7 +217,7 @@ class Swimming(ABC):
         if self._lag is not None:
             self._lag.begin(robots, self._lateness.values[ACTION_DELAY])
         if self._tracker is not None:
-            self._tracker.begin(robots, generators, self._pictures(), self._lengths())
+            self._tracker.begin(robots, generators, self.simulator)
         self._begin(robots)
 
     def observe(self) -> NDArray[np.float32]:
@@ -234,37 +233,15 @@ class Swimming(ABC):
             found[:, at.further], found[:, at.waypoints] = self._wanted(), seen[:, self._without_more.waypoints]
             return found
         if at.shows_limbs:
-            found[:, at.stations_and_hub] = tracker.of_limbs(self._lengths())
+            found[:, at.stations_and_hub] = tracker.of_limbs(lengths_of(self.simulator))
         found[:, at.further] = np.concatenate([self._wanted(), tracker.entries(self.simulator.time)], axis=1)
         away = self._targets().reshape(-1, 2, 2) - tracker.hub[:, None]
-        found[:, at.waypoints] = self._in_body_frame(away / self._lengths()[:, None, None]).reshape(-1, 4)
+        found[:, at.waypoints] = self._in_body_frame(away / lengths_of(self.simulator)[:, None, None]).reshape(-1, 4)
         return found
 
     def _seen_now(self) -> NDArray[np.float32]:
         """Observations of what the kernel fills, without delay, shape (n_robots, k)."""
-        return to_float32(self._kernels_rows(self._targets()), self.n_robots)
-
-    def _kernels_rows(self, targets: Floats) -> Floats:
-        """Rows that the kernel fills, shape (n_groups, k, N_LANES). targets: World frame [m], shape (n_robots, 4)."""
-        simulator, target_rows = self.simulator, to_rows(targets)
-        own = simulator.coefficients
-        out = np.empty((len(target_rows), self._without_more.size, target_rows.shape[2]))
-        places = stations_of(simulator.scene.robot)
-        observe(own.rest, own.limb_length, simulator.q, simulator.v, places, target_rows, VELOCITY_SCALE, out)
-        return out
-
-    def _pictures(self) -> Floats:
-        """What pictures of the robots would show now, shape (n_robots, k), see tracker.py."""
-        assert self._tracker is not None
-        rows = self._kernels_rows(np.zeros((self.n_robots, 4)))
-        of_robots = rows.transpose(0, 2, 1).reshape(-1, rows.shape[1])[: self.n_robots]
-        pose = [self.simulator.hub_position(), self._axes().T]
-        return np.concatenate([*pose, of_robots[:, self._tracker.columns]], axis=1)
-
-    def _lengths(self) -> Floats:
-        """Lengths of every robot's limbs, the unit of its observations [m], shape (n_robots,)."""
-        rows = self.simulator.coefficients.limb_length
-        return np.broadcast_to(rows, (len(self.simulator.q), *rows.shape[1:])).reshape(-1)[: self.n_robots]
+        return to_float32(observed_rows(self.simulator, self._targets()), self.n_robots)
 
     def seen_hub(self) -> Floats:
         """Hubs as robots are seen by who decides [m], shape (n_robots, 2), a copy."""
@@ -276,7 +253,7 @@ class Swimming(ABC):
         return np.asarray(np.arctan2(s, c))
 
     def _seen_axes(self) -> Floats:
-        return self._axes() if self._tracker is None else self._tracker.axes
+        return axes_of(self.simulator) if self._tracker is None else self._tracker.axes
 
     def _remembered(self) -> Floats:
         """Numbers of the limbs that stand before the targets, shape (n_robots, k), limb after limb."""
@@ -299,16 +276,9 @@ class Swimming(ABC):
         """Further entries of the observation, such as asked headings, shape (n_robots, k)."""
         return np.zeros((self.n_robots, 0))
 
-    def _axes(self) -> Floats:
-        """Cosine and sine of every robot's heading, shape (2, n_robots): the same bits for one robot and for many."""
-        simulator = self.simulator
-        out = np.empty((len(simulator.q), 2, simulator.q.shape[2]))
-        body_axes(simulator.coefficients.rest, simulator.q, stations_of(simulator.scene.robot), out)
-        return out.transpose(1, 0, 2).reshape(2, -1)[:, : self.n_robots]
-
     def heading(self) -> Floats:
         """Direction of every robot's body frame [rad], shape (n_robots,): the same bits for one robot and for many."""
-        c, s = self._axes()
+        c, s = axes_of(self.simulator)
         return np.asarray(np.arctan2(s, c))
 
     def _in_body_frame(self, vectors: Floats) -> Floats:
@@ -376,8 +346,8 @@ class Swimming(ABC):
                     since = next(steps)
                 except StopIteration as over:
                     return over.value
-                if self._tracker is not None and self._tracker.is_due(self.simulator.time).any():
-                    self._tracker.take(self.simulator.time, self._pictures(), self._lengths())
+                if self._tracker is not None:
+                    self._tracker.take(self.simulator)
                 yield piece.begin + since
 
     def warmth(self) -> Floats | None:

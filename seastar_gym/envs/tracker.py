@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from seastar_gym.envs.headings import wrapped
 from seastar_gym.envs.layout import N_STATIONS, VELOCITY_SCALE
+from seastar_gym.envs.pictures import lengths_of, pictures_of
 from seastar_gym.envs.sight import Sees, stations_seen
+from seastar_gym.simulator import Simulator
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -61,12 +63,12 @@ class Tracker:
         self.now = Pictures(np.zeros((n_robots, size)), np.zeros(n_robots))
         self.before = Pictures(np.zeros((n_robots, size)), np.zeros(n_robots))
 
-    def begin(self, robots: Flags, generators: list[np.random.Generator], rows: Floats, lengths: Floats) -> None:
+    def begin(self, robots: Flags, generators: list[np.random.Generator], simulator: Simulator) -> None:
         """Begin the episodes of the robots in a mask, which have been at rest.
 
-        generators: Random generator of every robot, which gives that of its pictures. rows: Shape (n_robots, k).
-        lengths: Lengths of limbs [m], shape (n_robots,).
+        generators: Random generator of every robot, which gives that of its pictures.
         """
+        rows, lengths = pictures_of(simulator, self.columns), lengths_of(simulator)
         for robot in np.flatnonzero(robots).tolist():
             self._generators[robot] = np.random.default_rng(generators[robot].integers(2**63))
         self._seen_at[robots], self._next[robots], self._n_kept[robots] = np.inf, 1, 0
@@ -77,18 +79,20 @@ class Tracker:
         self.look(np.zeros(len(rows)))
         self.before.put(robots, self.now)
 
-    def is_due(self, time: Floats) -> Flags:
-        """Robots of which a picture is to be taken, shape (n_robots,). time: Since the episodes began [s]."""
-        return self._next <= time * self.rate + SAME_TIME
-
-    def take(self, time: Floats, rows: Floats, lengths: Floats) -> None:
-        """Take the pictures that are due; arguments as of `is_due` and `begin`."""
-        due = self.is_due(time)
-        self._take(due, rows, time, lengths)
+    def take(self, simulator: Simulator) -> None:
+        """Take the pictures that are due."""
+        time = simulator.time
+        due = self._next <= time * self.rate + SAME_TIME
+        if not due.any():
+            return
+        self._take(due, pictures_of(simulator, self.columns), time, lengths_of(simulator))
         self._next[due] = np.floor(time * self.rate + SAME_TIME)[due].astype(np.int64) + 1
 
     def _take(self, robots: Flags, rows: Floats, time: Floats, lengths: Floats) -> None:
-        """Take pictures of the robots in a mask, some of which are lost."""
+        """Take pictures of the robots in a mask at a time [s], some of which are lost.
+
+        rows: What they show without errors, shape (n_robots, k). lengths: Of limbs [m], shape (n_robots,).
+        """
         delay, jitter, dropout = (self._numbers[f"sight.{name}"] for name in ("delay", "jitter", "dropout"))
         lost, late = np.ones((2, len(rows)))
         for robot in np.flatnonzero(robots).tolist():
