@@ -1,0 +1,228 @@
+"""`PlantSwim`: the environment in which policies drive a plant."""
+
+import contextlib
+import math
+from collections.abc import Generator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from seastar_gym.envs.lag import Lag
+from seastar_gym.envs.options import SwimOptions
+from seastar_gym.envs.pictures import lengths_of
+from seastar_gym.envs.seastar_swim import Observation, RenderMode, SeastarSwimEnv
+from seastar_gym.envs.sight import Sight
+from seastar_gym.envs.swimming import Flags, Floats
+from seastar_gym.envs.task import SwimTask
+from seastar_gym.envs.tracker import Pictures
+from seastar_gym.plant.guard import Guard, Limits
+from seastar_gym.plant.logs import Logs
+from seastar_gym.plant.plant import Plant, PlantError, Sighting
+from seastar_gym.scene.checks import shown
+from seastar_gym.simulator import StrokeReport
+
+
+class PlantTask(SwimTask):
+    """Task of a robot in a tank. Its simulator swims along, and is put where the robot was seen after every decision.
+
+    plant: What is driven. limits: Of its guard. logs: Folder of logs; None: none.
+    """
+
+    def __init__(self, plant: Plant, limits: Limits, options: SwimOptions, logs: Path | None):
+        sight = Sight() if options.sight is None else options.sight
+        if sight.sees == "nodes":
+            raise ValueError('A tracker sees no nodes: use Sight(sees="pose"), or markers.')
+        if options.action_delay != 0.0 or options.randomization is not None or options.random_heading:
+            raise ValueError("A plant is late and at random by itself: leave action_delay, randomization and headings.")
+        SwimTask.__init__(self, replace(options, sight=Sight(sees=sight.sees)), 1, 1)
+        self.pulse = getattr(self.scene.actuator, "heating_time", math.nan)
+        if not self.pulse <= limits.longest_pulse:
+            raise ValueError(
+                f"A full command heats a wire for {self.pulse:g} s, the guard allows {limits.longest_pulse:g} s: use an "
+                "actuator with a shorter heating_time, such as SmaWires(heating_time=0.08), or other Limits."
+            )
+        if plant.n_limbs != self.scene.robot.n_limbs:
+            raise ValueError(f"The plant has {plant.n_limbs} limbs, the scene's robot {self.scene.robot.n_limbs}.")
+        self._can_be_masked = True
+        self.guard = Guard(plant, limits)
+        n_markers = sight.sees if isinstance(sight.sees, int) else 0
+        self.logs = None if logs is None else Logs(logs, self.scene.robot, n_markers)
+        self.stopped = ""
+        self._late = 0.0  # of the last decision [s]
+        self._begun = 0.0  # time of the plant's clock that is time 0 of the episode [s]
+        self._origin = Sighting(0.0, 0.0, (0.0, 0.0, 0.0))
+        self._noted = -math.inf  # when the last picture that is known was taken [s]
+
+    def reset(self, robots: Flags, generators: list[np.random.Generator], asked: Any = None) -> None:
+        """Begin an episode where the robot lies. PlantError: it is not seen."""
+        self.stopped = ""
+        seen = self._origin = self.guard.begin()
+        super().reset(robots, generators, asked)
+        self.simulator.reset(heading=seen.pose[2])
+        self._begun = self.guard.now()
+        self._note(seen)
+        first = Pictures(self._row(seen)[None], np.array([seen.captured_at - self._begun]))
+        for known in (self._known_pictures.now, self._known_pictures.before):
+            known.put(robots, first)
+        self._begin(robots)
+
+    @property
+    def _known_pictures(self) -> Any:
+        assert self._tracker is not None
+        return self._tracker
+
+    def _row(self, seen: Sighting) -> Floats:
+        """Sighting as a picture, see tracker.py: relative to where the robot began."""
+        (x, y, heading), (x_0, y_0, _) = seen.pose, self._origin.pose
+        c, s = math.cos(heading), math.sin(heading)
+        n_places = len(self._known_pictures.columns)
+        if not n_places:
+            return np.array([x - x_0, y - y_0, c, s])
+        if seen.markers is None or seen.markers.size != n_places:
+            n_seen = 0 if seen.markers is None else seen.markers.size // 2
+            raise self.guard.refuse(f"The tracker sees {n_seen} markers, not {n_places // 2}: all wires are stopped.")
+        away = (seen.markers.reshape(-1, 2) - [x, y]) @ np.array([[c, -s], [s, c]]) / lengths_of(self.simulator)[0]
+        return np.array([x - x_0, y - y_0, c, s, *away.ravel()])
+
+    def _note(self, seen: Sighting) -> None:
+        """Know a sighting, and write it down."""
+        if seen.captured_at == self._noted:
+            return
+        self._noted = seen.captured_at
+        taken_at = seen.captured_at - self._begun
+        self._known_pictures.keep(0, taken_at, taken_at, self._row(seen))
+        if self.logs is not None:
+            self.logs.sighting(seen)
+
+    def _deaf_wires(self) -> Flags:
+        return self.guard.resting()[None]
+
+    def _swim(self, lag: Lag, commands: Floats) -> Generator[float, None, StrokeReport]:
+        """One decision, on the plant's clock; yields the time since it began [s] after about every time step."""
+        n_steps = math.ceil(self.decision_period / self.scene.numerics.step)
+        self._attempt(lambda: self._begin_decision(commands[0]))
+        planned = self._begun + float(self.simulator.time[0])
+        steps = self.simulator.advance_in_parts(self.decision_period, commands, n_steps)
+        with contextlib.closing(steps), self._stopped_if_interrupted():
+            while True:
+                try:
+                    since = next(steps)
+                except StopIteration as over:
+                    report: StrokeReport = over.value
+                    break
+                self._attempt(lambda: self._attend(planned + since))  # noqa: B023 - it is called now
+                yield since
+        self._known_pictures.look(self.simulator.time)
+        self._put_where_seen()
+        return report
+
+    @contextlib.contextmanager
+    def _stopped_if_interrupted(self) -> Generator[None]:
+        try:
+            yield
+        except BaseException:
+            self.guard.plant.stop()
+            raise
+
+    def _attempt(self, work: Any) -> None:
+        """Do something to the plant, unless it was stopped; what stops it is told in info."""
+        if self.stopped:
+            return
+        try:
+            work()
+        except PlantError as why:
+            self.guard.refuse(str(why))
+            self.stopped = str(why)
+
+    def _begin_decision(self, commands: Floats) -> None:
+        """Heat wires, now; where that is late, the episode's clock waits."""
+        planned = self._begun + float(self.simulator.time[0])
+        self.guard.look()
+        self._late = self.guard.now() - planned
+        if self.simulator.time[0] == 0.0 and self.logs is not None:
+            self.logs.begin(self._origin, self.guard.now())
+        if self._late > 0.0:
+            self._begun += self._late
+            for known in (self._known_pictures.now, self._known_pictures.before):
+                known.taken_at[:] -= self._late
+        for share in np.unique(np.abs(commands[commands != 0.0])).tolist():
+            limbs = np.where(np.abs(commands) == share, np.sign(commands), 0.0).astype(int)
+            self.guard.heat(limbs.tolist(), share * self.pulse)
+        if self.logs is not None:
+            self.logs.decision(commands)
+
+    def _attend(self, until: float) -> None:
+        """Wait until a time of the plant's clock [s], and note what is seen."""
+        self.guard.wait_until(until)
+        if self.guard.newest is not None:
+            self._note(self.guard.newest)
+
+    def _put_where_seen(self) -> None:
+        """Put the simulated robot where the real one was seen last, with the limbs that it has."""
+        state, hub, turn = self.simulator.get_state(), self.simulator.hub_position(), self.seen_heading() - self.heading()
+        c, s = np.cos(turn[0]), np.sin(turn[0])
+        turned = np.array([[c, s], [-s, c]])
+        orientation = None if state.orientation is None else state.orientation + turn
+        self.simulator.set_state(
+            state._replace(
+                positions=(state.positions - hub[:, None]) @ turned + self.seen_hub()[:, None],
+                velocities=state.velocities @ turned,
+                orientation=orientation,
+            )
+        )
+
+    def facts(self, hub: Floats | None = None) -> dict[str, NDArray[Any]]:
+        """What is known of the robot now, how late the last decision was [s], and why the plant was stopped."""
+        late, message = np.array([self._late]), np.array([self.stopped], dtype=object)
+        return {**super().facts(hub), "late": late, "plant_message": message}
+
+
+class PlantSwim(SeastarSwimEnv):
+    """Environment of a robot in a tank, for policies that were trained with the same `sight`.
+
+    Actions, observations, rewards and `info` are those of `SeastarSwimEnv` with that `sight`; the origin is where the
+    hub was seen when the episode began, the axes are those of the tank. Places in rewards and in `info` are those
+    that were seen last. Decisions come on the plant's clock: a step returns when the next decision is due.
+
+    `info` has `late`, how late the last decision was [s], for which the episode's clock waits, and `plant_message`. The
+    guard ends an episode with `truncated` and a sentence in `plant_message`: then all wires are stopped. Wires that
+    have to rest are masked, as deaf ones are.
+
+    ## Arguments besides those of `SeastarSwimEnv`
+    plant: What is driven, see `seastar_gym.plant.plant`.
+    limits: Of the guard, a `Limits`.
+    logs: Folder of tracking.csv, commands.csv and poses.csv; None: none.
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        limits: Limits | None = None,
+        logs: Path | str | None = None,
+        render_mode: RenderMode | None = None,
+        frames_per_stroke: int | None = None,
+        **options: Any,
+    ):
+        self._set_pictures(render_mode, frames_per_stroke)
+        if not hasattr(plant, "sight"):
+            raise ValueError(f"plant must be a Plant, not {shown(plant)}.")
+        folder = None if logs is None else Path(logs)
+        self._plant_task = PlantTask(plant, limits or Limits(), SwimOptions(**options), folder)
+        self._begin_with(self._plant_task, frames_per_stroke)
+
+    def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Swim for one decision; returns observation, reward, terminated, truncated and info."""
+        observation, reward, terminated, _, info = super().step(action)
+        truncated = bool(info["plant_message"])
+        self._running = self._running and not truncated
+        return observation, reward, terminated, truncated, info
+
+    def close(self) -> None:
+        """Stop the plant, and close its logs and the window."""
+        self._plant_task.guard.plant.stop()
+        if self._plant_task.logs is not None:
+            self._plant_task.logs.close()
+        super().close()

@@ -1,0 +1,56 @@
+"""Processes of a tank: who heats the wires, who tracks, who drives. Their files are given as numbers of descriptors."""
+
+import os
+import sys
+import time
+
+import numpy as np
+
+from seastar_gym import Scene, Sight, Simulator, SmaWires
+from seastar_gym.plant.guard import Limits
+from seastar_gym.plant.lines import LinePlant, Server
+from seastar_gym.plant.simulated import SimulatedPlant
+from seastar_gym.plant.swim import PlantSwim
+
+PULSE = 2.0
+"""Length of pulses that go on for long unless somebody stops them [s]."""
+SCENE = Scene(actuator=SmaWires(heating_time=PULSE)).at("fast")
+
+
+def heat(wires: str, tracker: str, hot: str) -> None:
+    """Simulated wires; writes the times at which they are heated [s] into a file."""
+    plant = SimulatedPlant(Simulator(SCENE), Sight(delay=0.05), paced=True)
+    plant.simulator.advance(0.5)
+    plant = SimulatedPlant(Simulator(SCENE), Sight(delay=0.05), paced=True)
+    server = Server(plant, open(int(wires), "r+b", 0), open(int(tracker), "wb", 0))
+    with open(hot, "w", encoding="utf-8") as times:
+        print("ready", flush=True)
+        while True:
+            server.turn()
+            if plant.heated().any():
+                print(f"{time.monotonic():.4f}", file=times, flush=True)
+            time.sleep(0.004)
+
+
+def track(read: str, write: str) -> None:
+    """A tracker that passes on what it sees."""
+    while data := os.read(int(read), 4096):
+        os.write(int(write), data)
+
+
+def drive(wires: str, tracker: str) -> None:
+    """Heat all limbs whenever they have rested, as long as the plant goes."""
+    simulator = Simulator(SCENE)
+    simulator.advance(0.5)
+    plant = LinePlant(open(int(wires), "r+b", 0), open(int(tracker), "rb", 0))
+    env = PlantSwim(plant, Limits(PULSE, 0.0), scene=SCENE, decision_period=0.5, actions="continuous")
+    env.reset()
+    while True:
+        *_, truncated, info = env.step(np.ones(5, np.float32))
+        print(info["plant_message"] or "swims", flush=True)
+        if truncated:
+            return
+
+
+if __name__ == "__main__":
+    {"heat": heat, "track": track, "drive": drive}[sys.argv[1]](*sys.argv[2:])
