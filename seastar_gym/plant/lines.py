@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import reduce
 from operator import xor
-from typing import BinaryIO
+from typing import Protocol
 
 import numpy as np
 
@@ -26,7 +26,14 @@ HELLO = 2.0
 """Time within which a plant answers the first line [s]."""
 
 
-class BadLine(ValueError):
+class Channel(Protocol):
+    """Anything that has a file descriptor, such as a file, a serial port, the end of a pipe or a socket."""
+
+    def fileno(self) -> int:
+        """Number of the descriptor."""
+
+
+class LineError(ValueError):
     """A line that is none of this protocol."""
 
 
@@ -36,11 +43,11 @@ def sealed(line: str) -> bytes:
 
 
 def opened(line: bytes) -> list[str]:
-    """Words of a line. BadLine: its checksum, or anything else of it, is wrong."""
+    """Words of a line. LineError: its checksum, or anything else of it, is wrong."""
     text = line.decode("ascii", "replace").rstrip("\r")
     body, star, checksum = text.rpartition("*")
     if not star or checksum != f"{_checksum(body):02X}":
-        raise BadLine(f"A line was garbled: {text[:60]!r}.")
+        raise LineError(f"A line was garbled: {text[:60]!r}.")
     return body.split(" ")
 
 
@@ -49,9 +56,9 @@ def _checksum(line: str) -> int:
 
 
 class Lines:
-    """Lines over a file that is read without waiting. file: Open for reading and writing bytes, unbuffered."""
+    """Lines over a file that is read without waiting."""
 
-    def __init__(self, file: BinaryIO):
+    def __init__(self, file: Channel):
         self._file, self._rest = file, b""
         os.set_blocking(file.fileno(), False)
 
@@ -67,13 +74,13 @@ class Lines:
             raise PlantError(f"The line to the plant is broken: {(broken.strerror or 'unknown').lower()}.") from None
 
     def received(self) -> Iterator[list[str]]:
-        """Words of every line since the last call. BadLine: one was garbled. PlantError: the other end has gone."""
+        """Words of every line since the last call. LineError: one was garbled. PlantError: the other end has gone."""
         while chunk := self._read():
             self._rest += chunk
         *whole, self._rest = self._rest.split(b"\n")
         if len(self._rest) > LONGEST_LINE:
             self._rest = b""
-            raise BadLine(f"A line has more than {LONGEST_LINE} bytes.")
+            raise LineError(f"A line has more than {LONGEST_LINE} bytes.")
         for line in whole:
             yield opened(line)
 
@@ -92,13 +99,13 @@ class Lines:
 
 
 def sighting_of(words: list[str], seen_at: float, n_limbs: int) -> Sighting:
-    """Sighting of the words "sight", time, x, y, heading and places of markers. BadLine: they are none."""
+    """Sighting of the words "sight", time, x, y, heading and places of markers. LineError: they are none."""
     try:
         captured_at, x, y, heading, *rest = map(float, words[1:])
     except ValueError:
-        raise BadLine(f"A sighting needs numbers: a time, x, y and a heading, not {' '.join(words)[:60]!r}.") from None
+        raise LineError(f"A sighting needs numbers: a time, x, y and a heading.") from None
     if len(rest) % (2 * n_limbs):
-        raise BadLine(f"A sighting has {len(rest)} numbers of markers, which do not suit {n_limbs} limbs.")
+        raise LineError(f"A sighting has {len(rest)} numbers of markers, which do not suit {n_limbs} limbs.")
     markers = np.array(rest).reshape(n_limbs, -1, 2) if rest else None
     return Sighting(captured_at, seen_at, (x, y, heading), markers)
 
@@ -117,7 +124,7 @@ class LinePlant:
     PlantError: nobody answers, or in another version.
     """
 
-    def __init__(self, wires: BinaryIO, tracker: BinaryIO | None = None, clock: Callable[[], float] = time.monotonic):
+    def __init__(self, wires: Channel, tracker: Channel | None = None, clock: Callable[[], float] = time.monotonic):
         self._wires, self.now = Lines(wires), clock
         self._tracker = None if tracker is None else Lines(tracker)
         self._seen: Sighting | None = None
@@ -135,7 +142,7 @@ class LinePlant:
         time.sleep(seconds)
 
     def sight(self) -> Sighting | None:
-        """The newest sighting, None as long as there is none; says that the driver lives. PlantError: it has stopped."""
+        """The newest sighting, None before there is one; says that the driver lives. PlantError: it has stopped."""
         self._wires.send("beat")
         self._take(self._wires)
         if self._tracker is not None:
@@ -146,7 +153,7 @@ class LinePlant:
         try:
             for words in lines.received():
                 self._understand(words)
-        except BadLine as bad:
+        except LineError as bad:
             raise PlantError(str(bad)) from None
 
     def _understand(self, words: list[str]) -> None:
@@ -162,7 +169,7 @@ class LinePlant:
             case ["sight", *_]:
                 pass  # of a tracker that was there before
             case _:
-                raise BadLine(f"A plant says no {' '.join(words)[:60]!r}.")
+                raise LineError(f"A plant says no {' '.join(words)[:60]!r}.")
 
     def heat(self, limbs: Sequence[int], seconds: float) -> None:
         """Heat wires, see `Plant`."""
@@ -183,7 +190,7 @@ class Server:
     plant: What is driven. wires: File of the driver. tracker: File that sightings go to; None: the same.
     """
 
-    def __init__(self, plant: Plant, wires: BinaryIO, tracker: BinaryIO | None = None):
+    def __init__(self, plant: Plant, wires: Channel, tracker: Channel | None = None):
         self.plant, self._wires = plant, Lines(wires)
         self._tracker = self._wires if tracker is None else Lines(tracker)
         self._heard_at = plant.now()
@@ -225,13 +232,14 @@ class Server:
             case ["heat", milliseconds, signs] if self._is_pulse(milliseconds, signs):
                 self.plant.heat(["-0+".index(sign) - 1 for sign in signs], int(milliseconds) / 1000.0)
             case _:
-                raise BadLine(f"There is no {' '.join(words)[:60]!r} to do.")
+                raise LineError(f"There is no {' '.join(words)[:60]!r} to do.")
 
     def _is_pulse(self, milliseconds: str, signs: str) -> bool:
-        return self._greeted and milliseconds.isdigit() and len(signs) == self.plant.n_limbs and set(signs) <= set("-0+")
+        says_all = milliseconds.isdigit() and len(signs) == self.plant.n_limbs
+        return self._greeted and says_all and set(signs) <= set("-0+")
 
 
-def serve(plant: SimulatedPlant, wires: BinaryIO, tracker: BinaryIO | None = None, seconds: float = np.inf) -> None:
+def serve(plant: SimulatedPlant, wires: Channel, tracker: Channel | None = None, seconds: float = np.inf) -> None:
     """Be the other end of a `LinePlant` for so many seconds."""
     server, until = Server(plant, wires, tracker), plant.now() + seconds
     while plant.now() < until:

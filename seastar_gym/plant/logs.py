@@ -6,10 +6,14 @@
     poses.csv      time of the picture, time at which it was known [s], x, y [m], heading [rad]: in the tank
 """
 
+import errno
 import math
-from collections.abc import Iterable
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from io import FileIO
 from pathlib import Path
-from typing import IO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,13 +35,11 @@ class Logs:
     def __init__(self, folder: Path, robot: Seastar, n_markers: int):
         self._nodes = nodes_of(robot, n_markers)
         self._origin, self._begun = Sighting(0.0, 0.0, (0.0, 0.0, 0.0)), math.inf
-        try:
+        self._files: dict[str, FileIO] = {}
+        with self._told_in_a_sentence():
             folder.mkdir(parents=True, exist_ok=True)
-            self._files: dict[str, IO[str]] = {
-                name: (folder / f"{name}.csv").open("w", encoding="utf-8") for name in ("tracking", "commands", "poses")
-            }
-        except OSError as failure:
-            raise PlantError(refused_by_disk(failure)) from None
+            for name in ("tracking", "commands", "poses"):
+                self._files[name] = FileIO(folder / f"{name}.csv", "w")
         places = [f"{axis}{node}" for node in [0, *self._nodes.values()] for axis in "xy"]
         self._write("tracking", ["time", *places])
         self._write("poses", ["captured_at", "seen_at", "x", "y", "heading"])
@@ -67,20 +69,25 @@ class Logs:
         self._write("commands", [f"{command:g}" for command in commands.tolist()])
 
     def _write(self, name: str, fields: Iterable[str]) -> None:
+        line, file = (",".join(fields) + "\n").encode("ascii"), self._files[name]
+        with self._told_in_a_sentence(file.name):
+            if file.write(line) != len(line):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    @contextmanager
+    def _told_in_a_sentence(self, file: Any = None) -> Iterator[None]:
+        """Context in which the disk may refuse; the files are closed then."""
         try:
-            self._files[name].write(",".join(fields) + "\n")
-            self._files[name].flush()
+            yield
         except OSError as failure:
-            failure.filename = failure.filename or self._files[name].name
+            self.close()
+            failure.filename = failure.filename or file
             raise PlantError(refused_by_disk(failure)) from None
 
     def close(self) -> None:
         """Close the files; may be called again."""
         for file in self._files.values():
-            try:
-                file.close()
-            except OSError:
-                continue  # what was left unwritten was refused before
+            file.close()
 
 
 def nodes_of(robot: Seastar, n_markers: int) -> dict[int, int]:

@@ -39,7 +39,7 @@ class Plant(Protocol):
         """Return after so many seconds on this clock."""
 
     def sight(self) -> Sighting | None:
-        """The newest sighting, None as long as there is none; says that the driver lives. PlantError: it has stopped."""
+        """The newest sighting, None before there is one; says that the driver lives. PlantError: it has stopped."""
 
     def heat(self, limbs: Sequence[int], seconds: float) -> None:
         """Heat a wire of every limb from now on: 1 the one for +, -1 the one for -, 0 none, for so many seconds.

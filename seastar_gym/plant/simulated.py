@@ -78,15 +78,16 @@ class SimulatedPlant:
         markers = None
         if len(row) > POSE:
             places = row[POSE:].reshape(self.n_limbs, -1, 2) * self.simulator.scene.robot.limb_length
-            markers = np.stack([c * places[..., 0] - s * places[..., 1], s * places[..., 0] + c * places[..., 1]], axis=-1)
-            markers += [x, y]
+            markers = places @ np.array([[c, s], [-s, c]]) + [x, y]
         heading = float(np.arctan2(s, c))
         return Sighting(self._begun + taken_at, self.now(), (float(x), float(y), heading), markers)
 
     def heat(self, limbs: Sequence[int], seconds: float) -> None:
         """Heat wires, see `Plant`; from the next time step on. ValueError: for longer than the wires can be."""
         self.move_on()
-        longest = float(self.simulator.scene.actuator.heating_time)
+        actuator = self.simulator.scene.actuator
+        assert isinstance(actuator, WirePair)
+        longest = float(actuator.heating_time)
         if not 0.0 <= seconds <= longest * (1.0 + ROUNDING):
             raise ValueError(f"These wires can be heated for 0 to {longest:g} s at a time, not {seconds:.3g} s.")
         signs = np.asarray(limbs, np.float64)
@@ -98,9 +99,9 @@ class SimulatedPlant:
         if not self.heated().any():
             return
         self._commands = np.zeros((1, self.n_limbs))
-        state = self.simulator.get_state()
-        state.actuators[..., -2:] = 0.0
-        self.simulator.set_state(state)
+        state, actuators = self.simulator.get_state(), self.simulator.actuators
+        actuators[..., -2:] = 0.0
+        self.simulator.set_state(state._replace(actuators=actuators))
 
     def heated(self) -> NDArray[np.bool_]:
         """Wires that are heated now, for + and -, shape (n_limbs, 2)."""

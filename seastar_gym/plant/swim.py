@@ -41,15 +41,15 @@ class PlantTask(SwimTask):
         self.pulse = getattr(self.scene.actuator, "heating_time", math.nan)
         if not self.pulse <= limits.longest_pulse:
             raise ValueError(
-                f"A full command heats a wire for {self.pulse:g} s, the guard allows {limits.longest_pulse:g} s: use an "
-                "actuator with a shorter heating_time, such as SmaWires(heating_time=0.08), or other Limits."
+                f"A full command heats a wire for {self.pulse:g} s, the guard allows {limits.longest_pulse:g} s: use "
+                "an actuator with a shorter heating_time, such as SmaWires(heating_time=0.08), or other Limits."
             )
         if plant.n_limbs != self.scene.robot.n_limbs:
             raise ValueError(f"The plant has {plant.n_limbs} limbs, the scene's robot {self.scene.robot.n_limbs}.")
         self._can_be_masked = True
         self.guard = Guard(plant, limits)
-        n_markers = sight.sees if isinstance(sight.sees, int) else 0
-        self.logs = None if logs is None else Logs(logs, self.scene.robot, n_markers)
+        self._folder = logs
+        self.logs: Logs | None = None
         self.stopped = ""
         self._late = 0.0  # of the last decision [s]
         self._begun = 0.0  # time of the plant's clock that is time 0 of the episode [s]
@@ -59,6 +59,7 @@ class PlantTask(SwimTask):
     def reset(self, robots: Flags, generators: list[np.random.Generator], asked: Any = None) -> None:
         """Begin an episode where the robot lies. PlantError: it is not seen."""
         self.stopped = ""
+        self._open_logs()
         seen = self._origin = self.guard.begin()
         super().reset(robots, generators, asked)
         self.simulator.reset(heading=seen.pose[2])
@@ -68,6 +69,19 @@ class PlantTask(SwimTask):
         for known in (self._known_pictures.now, self._known_pictures.before):
             known.put(robots, first)
         self._begin(robots)
+
+    def _open_logs(self) -> None:
+        """Begin the logs of an episode, which take the place of those of the last one."""
+        self.close_logs()
+        if self._folder is not None:
+            n_markers = len(self._known_pictures.columns) // (2 * self.scene.robot.n_limbs)
+            self.logs = Logs(self._folder, self.scene.robot, n_markers)
+
+    def close_logs(self) -> None:
+        """Close the logs, if there are any."""
+        if self.logs is not None:
+            self.logs.close()
+            self.logs = None
 
     @property
     def _known_pictures(self) -> Any:
@@ -162,7 +176,8 @@ class PlantTask(SwimTask):
 
     def _put_where_seen(self) -> None:
         """Put the simulated robot where the real one was seen last, with the limbs that it has."""
-        state, hub, turn = self.simulator.get_state(), self.simulator.hub_position(), self.seen_heading() - self.heading()
+        state, hub = self.simulator.get_state(), self.simulator.hub_position()
+        turn = self.seen_heading() - self.heading()
         c, s = np.cos(turn[0]), np.sin(turn[0])
         turned = np.array([[c, s], [-s, c]])
         orientation = None if state.orientation is None else state.orientation + turn
@@ -194,7 +209,8 @@ class PlantSwim(SeastarSwimEnv):
     ## Arguments besides those of `SeastarSwimEnv`
     plant: What is driven, see `seastar_gym.plant.plant`.
     limits: Of the guard, a `Limits`.
-    logs: Folder of tracking.csv, commands.csv and poses.csv; None: none.
+    logs: Folder of tracking.csv, commands.csv and poses.csv of the last episode, see `seastar_gym.plant.logs`; None:
+        none.
     """
 
     def __init__(
@@ -223,6 +239,5 @@ class PlantSwim(SeastarSwimEnv):
     def close(self) -> None:
         """Stop the plant, and close its logs and the window."""
         self._plant_task.guard.plant.stop()
-        if self._plant_task.logs is not None:
-            self._plant_task.logs.close()
+        self._plant_task.close_logs()
         super().close()

@@ -3,6 +3,7 @@
 import os
 import sys
 import time
+from io import FileIO
 
 import numpy as np
 
@@ -19,10 +20,9 @@ SCENE = Scene(actuator=SmaWires(heating_time=PULSE)).at("fast")
 
 def heat(wires: str, tracker: str, hot: str) -> None:
     """Simulated wires; writes the times at which they are heated [s] into a file."""
+    Simulator(SCENE).advance(0.5)  # which compiles
     plant = SimulatedPlant(Simulator(SCENE), Sight(delay=0.05), paced=True)
-    plant.simulator.advance(0.5)
-    plant = SimulatedPlant(Simulator(SCENE), Sight(delay=0.05), paced=True)
-    server = Server(plant, open(int(wires), "r+b", 0), open(int(tracker), "wb", 0))
+    server = Server(plant, FileIO(int(wires), "r+"), FileIO(int(tracker), "w"))
     with open(hot, "w", encoding="utf-8") as times:
         print("ready", flush=True)
         while True:
@@ -40,9 +40,8 @@ def track(read: str, write: str) -> None:
 
 def drive(wires: str, tracker: str) -> None:
     """Heat all limbs whenever they have rested, as long as the plant goes."""
-    simulator = Simulator(SCENE)
-    simulator.advance(0.5)
-    plant = LinePlant(open(int(wires), "r+b", 0), open(int(tracker), "rb", 0))
+    Simulator(SCENE).advance(0.5)
+    plant = LinePlant(FileIO(int(wires), "r+"), FileIO(int(tracker), "r"))
     env = PlantSwim(plant, Limits(PULSE, 0.0), scene=SCENE, decision_period=0.5, actions="continuous")
     env.reset()
     while True:

@@ -1,0 +1,387 @@
+"""Plants: lines, guard, the environment around them and its logs; whatever is wrong is said, and wires are stopped."""
+
+import socket
+import threading
+from collections import deque
+
+import numpy as np
+import pytest
+
+from refusals import assert_refused
+from seastar_gym import DomainRandomization, Scene, Seastar, Sight, Simulator, SmaPulse, SmaWires, Uniform
+from seastar_gym.controllers import learned
+from seastar_gym.controllers.description import Description
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
+from seastar_gym.evaluation.rollout import rollout
+from seastar_gym.identify.measurement import Measurement
+from seastar_gym.identify.trajectories import trajectory
+from seastar_gym.plant import lines
+from seastar_gym.plant.guard import FIRST, Guard, Limits
+from seastar_gym.plant.lines import LineError, LinePlant, Server, opened, sealed
+from seastar_gym.plant.logs import nodes_of
+from seastar_gym.plant.plant import PlantError, Sighting
+from seastar_gym.plant.simulated import SimulatedPlant
+from seastar_gym.plant.swim import PlantSwim
+
+SCENE = Scene(actuator=SmaWires(heating_time=0.08, period=0.5)).at("fast")
+OPTIONS = {"scene": SCENE, "decision_period": 0.5, "actions": "pairs"}
+
+
+def simulated(sight=None, heading=0.0, **arguments):
+    simulator = Simulator(SCENE)
+    simulator.reset(heading=heading)
+    return SimulatedPlant(simulator, sight, **arguments)
+
+
+class Scripted:
+    """Plant whose clock and sightings are what a test says; 30 pictures a second unless it says otherwise."""
+
+    n_limbs = 5
+
+    def __init__(self):
+        self.time, self.stops, self.pulses, self.shift, self.pose = 0.0, 0, [], 0.0, (0.0, 0.0, 0.0)
+        self.last = np.inf
+
+    def now(self):
+        return self.time
+
+    def wait(self, seconds):
+        self.time += seconds
+
+    def sight(self):
+        taken_at = np.floor(min(self.time, self.last) * 30.0) / 30.0
+        return Sighting(taken_at + self.shift, self.time, self.pose)
+
+    def heat(self, limbs, seconds):
+        self.pulses.append((limbs, seconds))
+
+    def stop(self):
+        self.stops += 1
+
+
+def guarded(**limits):
+    plant = Scripted()
+    guard = Guard(plant, Limits(**limits))
+    guard.begin()
+    plant.stops = 0
+    return plant, guard
+
+
+# The guard
+
+
+def jump_back(plant):
+    plant.time -= 0.05
+
+
+def tracker_goes_back(plant):
+    plant.shift = -0.2
+
+
+def tracker_is_ahead(plant):
+    plant.shift = 1.0
+
+
+def not_a_number(plant):
+    plant.time, plant.pose = plant.time + 0.1, (0.0, np.nan, 0.0)
+
+
+def lose_sight(plant):
+    plant.last = plant.time
+    plant.time += 0.13
+
+
+def sleep(plant):
+    plant.shift -= 0.6
+    plant.time += 1.0
+
+
+@pytest.mark.parametrize(
+    "happens, words",
+    [(jump_back, "clock has jumped"), (tracker_goes_back, "clock has gone back"), (not_a_number, "not finite"),
+     (tracker_is_ahead, "in the future"), (lose_sight, "No new picture for 0.12 s"), (sleep, "s old")],
+)  # fmt: skip
+def test_whatever_is_wrong_stops_all_wires_for_good(happens, words):
+    plant, guard = guarded()
+    guard.wait_until(0.5)
+    guard.heat([1, 0, 0, -1, 0], 0.1)
+    happens(plant)
+    with pytest.raises(PlantError, match=words) as refused:
+        guard.look()
+    assert plant.stops >= 1 and str(refused.value).endswith(".")
+    plant.shift, plant.pose, plant.last = 0.0, (0.0, 0.0, 0.0), np.inf
+    plant.time += 1.0
+    with pytest.raises(PlantError, match=words):
+        guard.heat([1, 0, 0, 0, 0], 0.01)
+    assert len(plant.pulses) == 1
+    guard.begin()
+    guard.heat([1, 0, 0, 0, 0], 0.01)
+
+
+def test_pulses_are_as_short_and_wires_rest_as_long_as_they_have_to():
+    plant, guard = guarded(longest_pulse=0.1, shortest_rest=0.2)
+    guard.heat([1, -1, 0, 0, 0], 0.1)
+    assert guard.resting().sum() == 2 and guard.resting()[0, 0] and guard.resting()[1, 1]
+    guard.wait_until(0.25)
+    guard.heat([-1, 1, 0, 0, 0], 0.1)  # the other wires
+    with pytest.raises(PlantError, match=r"within 0\.2 s of its last pulse"):
+        guard.heat([1, 0, 0, 0, 0], 0.05)
+    guard.begin()
+    guard.wait_until(1.0)
+    assert not guard.resting().any()
+    for seconds in (0.11, -0.1, np.nan):
+        with pytest.raises(PlantError, match=r"from 0 to 0\.1 s"):
+            guard.heat([1, 0, 0, 0, 0], seconds)
+        guard.begin()
+    assert len(plant.pulses) == 2 and plant.stops >= 4
+
+
+def test_a_robot_that_is_not_seen_does_not_begin():
+    plant = Scripted()
+    plant.sight = lambda: None
+    env = PlantSwim(plant, **OPTIONS)
+    with pytest.raises(PlantError, match=f"not seen the robot for {FIRST:g} s"):
+        env.reset()
+    assert plant.stops >= 2
+
+
+# Lines
+
+
+def test_a_line_comes_back_and_a_garbled_one_does_not():
+    line = sealed("heat 80 +0-00")
+    assert opened(line.rstrip(b"\n")) == ["heat", "80", "+0-00"]
+    for k in range(len(line) - 1):
+        with pytest.raises(LineError, match="garbled"):
+            opened((line[:k] + bytes([line[k] ^ 1]) + line[k + 1 :]).rstrip(b"\n"))
+
+
+@pytest.fixture
+def ends():
+    pair = socket.socketpair()
+    yield pair
+    for end in pair:
+        end.close()
+
+
+def joined(ends, plant):
+    """A `LinePlant`, and the `Server` of a plant at the other end."""
+    server, over = Server(plant, ends[0]), threading.Event()
+
+    def turn():
+        while not over.is_set():
+            server.turn()
+
+    thread = threading.Thread(target=turn)
+    thread.start()
+    try:
+        return LinePlant(ends[1], clock=plant.now), server
+    finally:
+        over.set()
+        thread.join()
+
+
+def test_a_plant_is_heated_and_seen_over_a_line(ends):
+    plant = simulated(Sight(delay=0.05, sees=1), heading=0.3, paced=True)
+    far, server = joined(ends, plant)
+    far.heat([1, 0, -1, 0, 0], 0.08)
+    server.turn(), plant.wait(0.02)
+    assert plant.heated().tolist() == [[True, False], [False, False], [False, True], [False, False], [False, False]]
+    far.sight(), far.stop(), server.turn()
+    assert not plant.heated().any()
+    for _ in range(20):
+        far.sight(), plant.wait(0.01), server.turn()
+    ours, theirs = plant.sight(), far.sight()
+    assert theirs.captured_at == pytest.approx(ours.captured_at, abs=1e-5) and ours.captured_at > plant.now() - 0.2
+    np.testing.assert_allclose(theirs.pose, ours.pose, atol=1e-6)
+    np.testing.assert_allclose(theirs.markers, ours.markers, atol=1e-6)
+    assert theirs.markers.shape == (5, 1, 2)
+
+
+def test_silence_and_bad_lines_stop_the_wires(ends):
+    plant = simulated(paced=True)
+    far, server = joined(ends, plant)
+    for bad in (b"heat 80 +0000\n", sealed("heat 80 +000"), sealed("heat -1 +0000"), sealed("fly"), b"\xff\n",
+                sealed("heat 999 +0000"), b"x" * 5000):  # fmt: skip
+        far.heat([1, 1, 1, 1, 1], 0.08)
+        server.turn(), plant.wait(0.01)
+        assert plant.heated()[:, 0].all()
+        ends[1].send(bad)
+        server.turn()
+        assert not plant.heated().any()
+        with pytest.raises(PlantError, match="The plant has stopped: ") as refused:
+            far.sight()
+        assert str(refused.value).endswith(".") and "\n" not in str(refused.value)
+        server.turn()
+    far.heat([1, 0, 0, 0, 0], 0.08)
+    server.turn(), plant.wait(0.005)
+    assert plant.heated().any()
+    server._heard_at -= lines.SILENCE
+    server.turn()
+    assert not plant.heated().any()
+
+
+@pytest.mark.parametrize(
+    "said, words",
+    [("hello 2 5", "speaks version 2"), ("sight 1 2 3", "needs numbers"), ("sight 1 2 3 four", "needs numbers"),
+     ("sight 1 2 3 4 5 6", "do not suit 5 limbs"), ("error It burns.", "The plant has stopped: It burns."),
+     ("what", "says no 'what'"), ("hello 1 0", "speaks version 1")],
+)  # fmt: skip
+def test_what_a_driver_does_not_understand_is_said_in_a_sentence(said, words, ends):
+    far, _ = joined(ends, simulated(paced=True))
+    ends[0].send(sealed(said))
+    with pytest.raises(PlantError, match=words) as refused:
+        far.sight()
+    assert str(refused.value).endswith(".") or said == "hello 1 0"
+
+
+def test_a_line_that_is_closed_or_full_is_said_to_be(ends, monkeypatch):
+    monkeypatch.setattr(lines, "HELLO", 0.05)
+    with pytest.raises(PlantError, match=r"did not answer within 0\.05 s"):
+        LinePlant(ends[1])
+    far, _ = joined(ends, simulated(paced=True))
+    with pytest.raises(PlantError, match="takes no more lines"):
+        deque((far.sight() for _ in range(100_000)), maxlen=0)
+    ends[0].close()
+    with pytest.raises(PlantError, match="is broken: "):
+        far.sight()
+    far.stop()
+
+
+# The environment
+
+
+@pytest.mark.parametrize("sees", ["pose", 3])
+def test_a_simulated_plant_is_seen_as_the_environment_sees_its_robot(sees):
+    """To what pieces of 5 ms differ from decisions of 0.5 s, see `Simulator.advance`."""
+    sight = Sight(delay=0.05, sees=sees)
+    ours = PlantSwim(simulated(sight), Limits(shortest_rest=0.0), sight=sight, **OPTIONS)
+    theirs = SeastarSwimEnv(sight=sight, **OPTIONS)
+    first, _ = theirs.reset(seed=0)
+    found, _ = ours.reset(seed=0)
+    assert ours.observation_space == theirs.observation_space
+    np.testing.assert_allclose(found, first, atol=1e-6)
+    for action in (3, 8, 3, 12, 0):
+        np.testing.assert_allclose(ours.step(action)[0], theirs.step(action)[0], atol=0.02)
+
+
+def test_policies_drive_a_plant_unchanged(tmp_path):
+    plant = PlantSwim(simulated(), **OPTIONS)
+    layout = plant.layout
+    about = Description("pairs", True, SCENE, (8,), 0.5, entries=layout.entries, shows_limbs=False)
+    rng = np.random.default_rng(0)
+    policy = learned.LearnedPolicy(
+        about, {name: rng.normal(size=shape).astype(np.float32) for name, shape in about.shapes().items()}, {}
+    )
+    learned.save(policy, tmp_path / "policy.safetensors")
+    loaded = learned.load(tmp_path / "policy.safetensors")
+    found = rollout(plant, loaded, seeds=0, until=4, record=("hub_position",))
+    assert np.abs(np.diff(found.entries["hub_position"][:5, 0], axis=0)).max() > 1e-4
+
+
+def test_a_policy_of_stable_baselines_drives_a_plant():
+    sb3 = pytest.importorskip("stable_baselines3")
+    env = PlantSwim(simulated(), **OPTIONS)
+    model = sb3.PPO("MlpPolicy", env, n_steps=4, batch_size=4, n_epochs=1, device="cpu").learn(4)
+    observation, _ = env.reset()
+    assert env.step(model.predict(observation)[0])[0].shape == observation.shape
+
+
+def test_a_plant_that_stops_truncates_the_episode_with_a_sentence():
+    plant = simulated()
+    env = PlantSwim(plant, **OPTIONS)
+    env.reset(), env.step(3)
+    see = plant.sight()
+    plant.sight = lambda: see
+    *_, terminated, truncated, info = env.step(8)
+    assert truncated and not terminated and "No new picture" in info["plant_message"] and not plant.heated().any()
+    with pytest.raises(Exception, match="reset"):
+        env.step(0)
+
+
+def test_decisions_that_are_late_make_the_clock_wait():
+    plant = simulated(Sight(rate=100.0))
+    env = PlantSwim(plant, Limits(oldest=2.0), **OPTIONS)
+    _, info = env.reset()
+    plant.wait(0.3)
+    info = env.step(3)[4]
+    assert info["late"] == pytest.approx(0.3) and info["time"] == 0.5 and plant.now() == pytest.approx(0.8, abs=0.06)
+    assert env.step(8)[4]["late"] == pytest.approx(0.0, abs=1e-9)
+    assert info["sight_age"] == pytest.approx(0.0, abs=0.011)
+
+
+def test_wires_that_have_to_rest_are_masked():
+    env = PlantSwim(simulated(), Limits(shortest_rest=0.6), **OPTIONS)
+    env.reset()
+    heated = [env.step(action)[4] for action in (3, 3, 3)]
+    assert [info["masked_limbs"] for info in heated] == [0, 2, 0]
+    assert [info["limbs_heated"] for info in heated] == [2, 0, 2]
+    assert not any(info["plant_message"] for info in heated)
+
+
+def test_logs_are_what_identify_reads(tmp_path):
+    """The robot begins turned; its logs are in the frame in which it lay."""
+    sight = Sight(rate=50.0, delay=0.1, sees=1)
+    env = PlantSwim(simulated(sight, heading=1.0), logs=tmp_path, sight=sight, **OPTIONS)
+    env.reset()
+    for action in (3, 8, 12, 0, 5):
+        env.step(action)
+    env.close()
+    measured = Measurement.from_csv(tmp_path / "tracking.csv", tmp_path / "commands.csv")
+    assert measured.nodes == (0, 6, 12, 18, 24, 30) and measured.commands.shape == (5, 5)
+    expected = trajectory(measured.time, measured.nodes, measured.commands, SCENE)
+    assert np.abs(measured.positions - expected).max() < 1e-3 < np.abs(expected - expected[0]).max() / 10
+    poses = np.loadtxt(tmp_path / "poses.csv", delimiter=",", skiprows=1)
+    assert poses[0, 4] == pytest.approx(1.0, abs=1e-6) and (poses[:, 0] < poses[:, 1]).all() and len(poses) > 100
+
+
+def test_markers_between_nodes_are_not_tracked():
+    assert nodes_of(Seastar(nodes_per_limb=10), 9) == {k: k + 1 for k in range(45)}
+    assert list(nodes_of(Seastar(nodes_per_limb=7), 3).values())[:4] == [2, 4, 6, 8]
+    assert nodes_of(Seastar(nodes_per_limb=5), 3) == {2: 4, 5: 8, 8: 12, 11: 16, 14: 20}
+
+
+@pytest.mark.parametrize("name", ["tracking", "commands", "poses"])
+def test_a_full_disk_stops_the_wires_in_a_sentence(name, tmp_path):
+    (tmp_path / f"{name}.csv").symlink_to("/dev/full")
+    plant = simulated()
+    if name == "commands":
+        env = PlantSwim(plant, logs=tmp_path, **OPTIONS)
+        env.reset()
+        info = env.step(3)[4]
+        assert "no space left on device" in info["plant_message"] and info["plant_message"].endswith(".")
+        env.close()
+    else:
+        with pytest.raises(PlantError, match=r"no space left on device\.$"):
+            PlantSwim(plant, logs=tmp_path, **OPTIONS).reset()
+    assert not plant.heated().any()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [({"sight": Sight(sees="nodes")}, "sees no nodes"), ({"action_delay": 0.5}, "late"),
+     ({"randomization": DomainRandomization({"robot.density": Uniform(1.0, 2.0)})}, "randomization"),
+     ({"random_heading": True}, "at random"), ({"limits": Limits(0.05)}, "the guard allows 0.05 s"),
+     ({"scene": Scene(Seastar(n_limbs=4), actuator=SmaWires(heating_time=0.08))}, "has 5 limbs"),
+     ({"plant": 3}, "must be a Plant")],
+)  # fmt: skip
+def test_what_no_plant_can_do_is_refused(arguments, words):
+    with assert_refused(words):
+        PlantSwim(**{"plant": Scripted(), **OPTIONS, **arguments})
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [({"simulator": Simulator(SCENE, 2)}, "one robot with wires"), ({"sight": Sight(sees="nodes")}, "sees no nodes"),
+     ({"simulator": Simulator(Scene(actuator=SmaPulse()))}, "one robot with wires"), ({"seed": -1}, "seed"),
+     ({"paced": 1}, "paced"), ({"simulator": SCENE}, "a Simulator"), ({"sight": 30}, "a Sight")],
+)  # fmt: skip
+def test_what_cannot_be_simulated_is_refused(arguments, words):
+    with assert_refused(words):
+        SimulatedPlant(**{"simulator": Simulator(SCENE), **arguments})
+
+
+@pytest.mark.parametrize("name", ["longest_pulse", "patience", "oldest"])
+def test_limits_are_positive(name):
+    with assert_refused(f"Limits.{name}"):
+        Limits(**{name: 0.0})
