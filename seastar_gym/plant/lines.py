@@ -103,7 +103,7 @@ def sighting_of(words: list[str], seen_at: float, n_limbs: int) -> Sighting:
     try:
         captured_at, x, y, heading, *rest = map(float, words[1:])
     except ValueError:
-        raise LineError(f"A sighting needs numbers: a time, x, y and a heading.") from None
+        raise LineError("A sighting needs numbers: a time, x, y and a heading.") from None
     if len(rest) % (2 * n_limbs):
         raise LineError(f"A sighting has {len(rest)} numbers of markers, which do not suit {n_limbs} limbs.")
     markers = np.array(rest).reshape(n_limbs, -1, 2) if rest else None

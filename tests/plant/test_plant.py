@@ -182,7 +182,7 @@ def joined(ends, plant):
 
 
 def test_a_plant_is_heated_and_seen_over_a_line(ends):
-    plant = simulated(Sight(delay=0.05, sees=1), heading=0.3, paced=True)
+    plant = simulated(Sight(delay=0.05, sees=1), heading=0.3)
     far, server = joined(ends, plant)
     far.heat([1, 0, -1, 0, 0], 0.08)
     server.turn(), plant.wait(0.02)
@@ -199,7 +199,7 @@ def test_a_plant_is_heated_and_seen_over_a_line(ends):
 
 
 def test_silence_and_bad_lines_stop_the_wires(ends):
-    plant = simulated(paced=True)
+    plant = simulated()
     far, server = joined(ends, plant)
     for bad in (b"heat 80 +0000\n", sealed("heat 80 +000"), sealed("heat -1 +0000"), sealed("fly"), b"\xff\n",
                 sealed("heat 999 +0000"), b"x" * 5000):  # fmt: skip
@@ -228,7 +228,7 @@ def test_silence_and_bad_lines_stop_the_wires(ends):
      ("what", "says no 'what'"), ("hello 1 0", "speaks version 1")],
 )  # fmt: skip
 def test_what_a_driver_does_not_understand_is_said_in_a_sentence(said, words, ends):
-    far, _ = joined(ends, simulated(paced=True))
+    far, _ = joined(ends, simulated())
     ends[0].send(sealed(said))
     with pytest.raises(PlantError, match=words) as refused:
         far.sight()
@@ -239,7 +239,7 @@ def test_a_line_that_is_closed_or_full_is_said_to_be(ends, monkeypatch):
     monkeypatch.setattr(lines, "HELLO", 0.05)
     with pytest.raises(PlantError, match=r"did not answer within 0\.05 s"):
         LinePlant(ends[1])
-    far, _ = joined(ends, simulated(paced=True))
+    far, _ = joined(ends, simulated())
     with pytest.raises(PlantError, match="takes no more lines"):
         deque((far.sight() for _ in range(100_000)), maxlen=0)
     ends[0].close()
