@@ -2,8 +2,12 @@
 
 The trajectory is a CSV file with a line of names, `time,x0,y0,x9,y9,..`, and then one line for every time: the time [s]
 and the coordinates [m] of any nodes. Node 0 is the hub, node j (N - 1) the tip of limb j. The robot begins at rest with
-its hub at the origin and limb 1 along +x. Empty fields are nodes that were not seen. A second CSV file has one line for
-every stroke, with one command per limb.
+its hub at the origin and limb 1 along +x. Empty fields are nodes that were not seen. A last column `theta` is the
+orientation of a body [rad]. `seastar track2csv` makes this file from those of trackers.
+
+A second CSV file has one line for every stroke, with one command per limb. Strokes follow one another from time 0, or
+begin when a first column says [s], under a line of names, `time,limb1,..`. With `--delay`, the two files may be of
+clocks that differ.
 
 Parameters are positive numbers of the scene, by name: fluid.drag_coefficient, robot.youngs_modulus, robot.limb_length,
 robot.limbs.0.length, actuator.peak_angle, or actuator.angles.2, a point of a measured curve. Their first guesses are
@@ -23,13 +27,15 @@ from pathlib import Path
 from seastar_gym.extras import require_extra
 from seastar_gym.files import save_figure, write_json
 from seastar_gym.identify.fit import Estimate, identify
-from seastar_gym.identify.measurement import Measurement
+from seastar_gym.identify.measurement import ARM, ORIENTATION, Measurement
 from seastar_gym.identify.trajectories import synthetic
 from seastar_gym.scene import Numerics
 from seastar_gym.scene.scene_file import load_scene
 
 TRUTH = {"fluid.drag_coefficient": 1.3, "robot.youngs_modulus": 1.4e6, "actuator.peak_angle": 0.55}
 """Parameters of the synthetic data."""
+LABELS = {0: "hub", ORIENTATION: f"orientation, at {1e3 * ARM:.0f} mm"}
+"""Names of what is tracked, other than nodes, in the picture."""
 STEP = 5e-3
 """Time step where neither the scene nor the command line names one [s]."""
 
@@ -41,7 +47,7 @@ def draw(estimate: Estimate, measurement: Measurement, file: Path) -> None:
     figure, (paths, over_time) = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained")
     fitted = measurement.positions - estimate.residuals
     for k, node in enumerate(measurement.nodes):
-        (line,) = paths.plot(*1e3 * fitted[:, k].T, label="hub" if node == 0 else f"node {node}")
+        (line,) = paths.plot(*1e3 * fitted[:, k].T, label=LABELS.get(node, f"node {node}"))
         paths.plot(*1e3 * measurement.positions[:, k].T, ".", color=line.get_color(), markersize=3, alpha=0.4)
         over_time.plot(measurement.time, 1e3 * estimate.residuals[:, k], ".", color=line.get_color(), markersize=3)
     paths.set(xlabel="x [mm]", ylabel="y [mm]", title="dots: measured, lines: fitted", aspect="equal")
@@ -60,6 +66,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("trajectory", nargs="?", type=Path, help="CSV file with a first line time,x0,y0,..")
     parser.add_argument("commands", nargs="?", type=Path, help="CSV file with one line of commands per stroke")
+    delay = "fit how late the trajectory's clock is, too, up to this many seconds either way (default: not at all)"
+    parser.add_argument("--delay", type=float, metavar="LARGEST", help=delay)
     names = f"names of the parameters to fit (default: {' '.join(TRUTH)})"
     parser.add_argument("--fit", nargs="+", default=list(TRUTH), metavar="PARAMETER", help=names)
     parser.add_argument("--scene", type=Path, help="file of the robot's scene, .py or .json (default: the chapter's)")
@@ -85,7 +93,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         else:
             measurement = Measurement.from_csv(options.trajectory, options.commands)
         begin = time.perf_counter()
-        estimate = identify(scene, options.fit, measurement)
+        estimate = identify(scene, options.fit, measurement, largest_delay=options.delay)
         print(estimate.report(), f"{time.perf_counter() - begin:.1f} s", sep="\n")
         if options.picture is not None:
             draw(estimate, measurement, options.picture)

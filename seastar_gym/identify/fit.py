@@ -5,6 +5,9 @@ in which one parameter has changed a little. These scenes and the scene itself a
 one batch. Intervals are those of `covariance.py`, whose residuals may depend on those before them.
 Combinations of parameters, singular vectors of the Jacobian, whose relative error is above UNTOLD are not determined by
 the data, and the estimate says so.
+
+A delay between the logs, of a camera whose clock is not that of the commands, is one more parameter, fitted as it is
+[s]: simulated trajectories are interpolated at the times of the pictures less the delay.
 """
 
 import math
@@ -18,11 +21,11 @@ from scipy.optimize import OptimizeResult, least_squares
 from scipy.stats import t as student
 
 from seastar_gym.identify.covariance import uncertainty_of
-from seastar_gym.identify.measurement import Measurement
+from seastar_gym.identify.measurement import ORIENTATION, Measurement
 from seastar_gym.identify.parameters import get_parameter, with_parameters
-from seastar_gym.identify.trajectories import trajectories
+from seastar_gym.identify.trajectories import LONGEST_DELAY, delayed_trajectories, trajectories
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import is_finite_number, require_kind, shown
+from seastar_gym.scene.checks import is_finite_number, require_kind, require_within, shown
 
 Floats = NDArray[np.float64]
 
@@ -34,6 +37,20 @@ SHARE = 0.3
 """Component of such a combination, a unit vector, above which a parameter belongs to it."""
 LARGEST_FACTOR = 20.0
 """Largest factor between a parameter and its first guess."""
+DELAYS_APART = 0.02
+"""Distance between delays that are tried for a first guess [s]."""
+SHORTEST_DELAY = 1e-3
+"""Least bound of a delay that is fitted [s]."""
+DELAY = "the delay"
+"""Name of the delay in sentences."""
+
+
+class Delay(NamedTuple):
+    """Time by which the clock of the pictures is ahead of that of the commands, and its confidence interval [s]."""
+
+    value: float
+    lower: float
+    upper: float
 
 
 class Estimate(NamedTuple):
@@ -42,10 +59,11 @@ class Estimate(NamedTuple):
     names: Names of the p parameters.
     values: Estimates in the scene's units, shape (p,).
     lower, upper: Ends of the confidence intervals, shape (p,).
-    correlation: Correlation of the estimates, shape (p, p).
+    correlation: Correlation of the estimates, shape (p, p); with a delay (p + 1, p + 1), and it is the last.
     untold: Groups of parameters that the data do not determine, or only in combination; their intervals mean nothing.
     residuals: Measured minus fitted positions [m], shape (n, n_nodes_seen, 2).
     scene: Scene with the fitted values.
+    delay: Delay between the logs. None where it was not fitted.
     """
 
     names: tuple[str, ...]
@@ -56,6 +74,7 @@ class Estimate(NamedTuple):
     untold: tuple[tuple[str, ...], ...]
     residuals: Floats
     scene: Scene
+    delay: Delay | None = None
 
     @property
     def root_mean_square(self) -> float:
@@ -67,17 +86,27 @@ class Estimate(NamedTuple):
         lines = [f"residuals: {1e3 * self.root_mean_square:.3g} mm root mean square"]
         rows = zip(self.names, self.values, self.lower, self.upper, strict=True)
         lines += [f"{name} = {value:.5g}   [{lower:.5g}, {upper:.5g}]" for name, value, lower, upper in rows]
+        if self.delay is not None:
+            lines.append("delay = {:.4f} s   [{:.4f}, {:.4f}]".format(*self.delay))
         for group in self.untold:
             what = f"{group[0]} from the data" if len(group) == 1 else f"{' and '.join(group)} apart by these data"
             lines.append(f"Cannot tell {what}: measure something else, or fix {'it' if len(group) == 1 else 'one'}.")
         return "\n".join(lines)
 
 
-def identify(scene: Scene, parameters: Sequence[str], measurement: Measurement, confidence: float = 0.95) -> Estimate:
+def identify(
+    scene: Scene,
+    parameters: Sequence[str],
+    measurement: Measurement,
+    confidence: float = 0.95,
+    largest_delay: float | None = None,
+) -> Estimate:
     """Fit parameters of a scene to a measurement.
 
     parameters: Names of positive numbers of the scene, such as "fluid.density". The scene's values are the first guess.
     confidence: Probability that the truth lies within a confidence interval.
+    largest_delay: Fit the delay between pictures and commands, too, from minus to plus this [s]. None means that they
+        share a clock.
     """
     require_kind("scene", scene, Scene, "a Scene")
     require_kind("measurement", measurement, Measurement, "a Measurement")
@@ -85,13 +114,18 @@ def identify(scene: Scene, parameters: Sequence[str], measurement: Measurement, 
         raise ValueError(f"parameters must be names of numbers, such as fluid.density, not {shown(parameters)}.")
     if not is_finite_number(confidence) or not 0.0 < confidence < 1.0:
         raise ValueError(f"confidence must be between 0 and 1, not {shown(confidence)}.")
-    residuals = Residuals(scene, tuple(parameters), measurement)
-    bound = math.log(LARGEST_FACTOR)
-    start = np.zeros(len(parameters))
+    if largest_delay is not None:
+        require_within("largest_delay", largest_delay, SHORTEST_DELAY, LONGEST_DELAY)
+    residuals = Residuals(scene, tuple(parameters), measurement, largest_delay is not None)
+    start = np.zeros(len(parameters) + residuals.delayed)
+    bound = np.full(len(start), math.log(LARGEST_FACTOR))
     try:
         residuals.scenes(start)
     except ValueError as impossible:
         raise ValueError(f"A first guess needs room for small changes: {impossible}") from impossible
+    if largest_delay is not None:
+        start[-1], bound[-1] = residuals.likely_delay(largest_delay), largest_delay
+    residuals.trajectory(start)  # refuses times and commands that do not fit, which steps below may not
     fit = least_squares(residuals, start, residuals.jacobian, (-bound, bound), xtol=1e-6, ftol=1e-8)
     return estimate_of(fit, residuals, confidence)
 
@@ -101,69 +135,85 @@ class Residuals:
 
     names: Names of the p parameters.
     guess: First guess of the parameters, shape (p,).
+    delayed: Whether a delay [s] follows the logarithms.
     seen: Whether each coordinate was measured, shape (n, n_nodes_seen, 2).
     """
 
-    def __init__(self, scene: Scene, names: tuple[str, ...], measurement: Measurement):
-        self.names, self.measurement, self._scene = names, measurement, scene
+    def __init__(self, scene: Scene, names: tuple[str, ...], measurement: Measurement, delayed: bool = False):
+        self.names, self.measurement, self.delayed, self._scene = names, measurement, delayed, scene
         self.guess = np.array([get_parameter(scene, name) for name in names])
-        robot = scene.robot
+        robot, n_fitted = scene.robot, len(names) + delayed
         if measurement.commands.shape[1] != robot.n_limbs or max(measurement.nodes) >= robot.n_nodes:
             raise ValueError(
                 f"Commands and nodes must be those of a robot of {robot.n_limbs} limbs and {robot.n_nodes} nodes."
             )
+        if ORIENTATION in measurement.nodes and robot.body is None:
+            raise ValueError("An orientation is that of a body: give the scene a robot.body, or leave theta out.")
         self.seen = np.isfinite(measurement.positions)
-        if self.seen.sum() <= len(names):
-            raise ValueError(f"{self.seen.sum()} coordinates are too few for {len(names)} parameters.")
-        self._changes = DIFFERENCE * np.vstack([np.zeros(len(names)), np.eye(len(names))])
+        if self.seen.sum() <= n_fitted:
+            raise ValueError(f"{self.seen.sum()} coordinates are too few for {n_fitted} parameters.")
+        self._changes = DIFFERENCE * np.vstack([np.zeros(n_fitted), np.eye(n_fitted)])
         self._simulate = lru_cache(maxsize=1)(self._trajectories)  # for residuals and Jacobian at once
 
-    def scenes(self, logarithms: ArrayLike) -> list[Scene]:
-        """Scene with these parameters, and scenes in which one of them is changed a little; p + 1 scenes."""
-        values = (self.guess * np.exp(logarithms - change) for change in self._changes)
+    def scenes(self, fitted: ArrayLike) -> list[Scene]:
+        """Scene with these parameters, and scenes in which one of what is fitted is changed a little."""
+        p = len(self.names)
+        values = self.guess * np.exp((np.asarray(fitted) - self._changes)[:, :p])
         return [with_parameters(self._scene, self.names, row) for row in values]
 
-    def _trajectories(self, *logarithms: float) -> Floats:
-        return trajectories(self.scenes(logarithms), self.measurement)
+    def _delays(self, fitted: ArrayLike) -> Floats:
+        """Delays of these scenes [s]."""
+        return (np.asarray(fitted) - self._changes)[:, -1] if self.delayed else np.zeros(len(self._changes))
 
-    def trajectory(self, logarithms: Floats) -> Floats:
+    def _trajectories(self, *fitted: float) -> Floats:
+        return trajectories(self.scenes(fitted), self.measurement, self._delays(fitted))
+
+    def trajectory(self, fitted: Floats) -> Floats:
         """Simulated positions [m], shape (n, n_nodes_seen, 2)."""
-        return np.asarray(self._simulate(*logarithms)[0])
+        return np.asarray(self._simulate(*fitted)[0])
 
-    def __call__(self, logarithms: Floats) -> Floats:
+    def likely_delay(self, largest: float) -> float:
+        """Delay up to `largest` by which the scene as it is fits best, of some that are DELAYS_APART [s]."""
+        delays = np.linspace(-largest, largest, 2 * math.ceil(largest / DELAYS_APART) + 1)[1:-1]
+        found = delayed_trajectories(self._scene, self.measurement, delays)
+        errors = np.nansum((found - self.measurement.positions) ** 2, axis=(1, 2, 3))
+        return float(delays[np.argmin(errors)])
+
+    def __call__(self, fitted: Floats) -> Floats:
         """Residuals of the coordinates that were measured [m]; infinite where the simulation is impossible."""
         try:
-            self.scenes(logarithms)
+            found = (self.trajectory(fitted) - self.measurement.positions)[self.seen]
         except ValueError:  # beyond what can be modelled: least_squares takes a shorter step
             return np.full(self.seen.sum(), np.inf)
-        found = (self.trajectory(logarithms) - self.measurement.positions)[self.seen]
         return np.where(np.isfinite(found), found, np.inf)
 
-    def jacobian(self, logarithms: Floats) -> Floats:
-        """Derivative of the residuals by the logarithms [m], shape (n_seen, p)."""
-        here, *changed = self._simulate(*logarithms)
+    def jacobian(self, fitted: Floats) -> Floats:
+        """Derivative of the residuals by what is fitted, shape (n_seen, p), or (n_seen, p + 1) with a delay."""
+        here, *changed = self._simulate(*fitted)
         return np.stack([(here - other)[self.seen] / DIFFERENCE for other in changed], axis=1)
 
 
 def estimate_of(fit: OptimizeResult, residuals: Residuals, confidence: float) -> Estimate:
     """Estimates with confidence intervals, from a least-squares fit of the residuals."""
-    names, guess = residuals.names, residuals.guess
-    freedom = residuals.seen.sum() - len(names)
+    names, guess, p = residuals.names, residuals.guess, len(residuals.names)
+    freedom = residuals.seen.sum() - len(fit.x)
     times = residuals.measurement.time[np.nonzero(residuals.seen)[0]]
     known = uncertainty_of(fit.jac, fit.fun, times)
     half = student.ppf(0.5 + 0.5 * confidence, freedom) * np.sqrt(np.diag(known.covariance))
+    fitted = [*names, DELAY][: len(fit.x)]
     with np.errstate(over="ignore"):
         return Estimate(
             names=names,
-            values=guess * np.exp(fit.x),
-            lower=guess * np.exp(fit.x - half),
-            upper=guess * np.exp(fit.x + half),
+            values=guess * np.exp(fit.x[:p]),
+            lower=guess * np.exp((fit.x - half)[:p]),
+            upper=guess * np.exp((fit.x + half)[:p]),
             correlation=known.correlation,
             untold=tuple(
-                tuple(name for name, part in zip(names, direction, strict=True) if abs(part) > SHARE)
+                tuple(name for name, part in zip(fitted, direction, strict=True) if abs(part) > SHARE)
                 for direction, error in zip(known.combinations, known.errors, strict=True)
                 if error > UNTOLD
             ),
             residuals=residuals.measurement.positions - residuals.trajectory(fit.x),
             scene=residuals.scenes(fit.x)[0],
+            delay=Delay(*(fit.x[p] + half[p] * np.array([0.0, -1.0, 1.0])).tolist()) if len(fit.x) > p else None,
         )

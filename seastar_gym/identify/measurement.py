@@ -18,25 +18,33 @@ FARTHEST = 1e3
 """Largest coordinate [m]. Squares of much larger ones would have no float."""
 NODE = re.compile("[0-9]{1,5}")
 """Number of a node in the name of a column."""
+ORIENTATION = -1
+"""What stands among the nodes for the orientation of the body."""
+ARM = 0.02
+"""Distance at which a body's orientation counts like a position [m], about the radius of a tag."""
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """Measured positions of some nodes of a robot.
+    """Measured positions of some nodes of a robot, and the orientation of its body.
 
-    time: Time since the first stroke began [s], shape (n,).
+    time: When pictures were taken [s], shape (n,), since the first stroke began or as `command_times`.
     positions: Node positions [m], shape (n, n_nodes_seen, 2). NaN where a node was not seen.
-    nodes: Indices of the nodes, shape (n_nodes_seen,).
+    nodes: Indices of the nodes, shape (n_nodes_seen,). ORIENTATION stands for the orientation theta of the body, whose
+        position is ARM (cos theta, sin theta).
     commands: Commands of every stroke, shape (n_strokes, n_limbs).
+    command_times: When commands were given [s], shape (n_strokes,). None for strokes one after the other, from time 0.
+        Before the first of them, the robot is at rest.
     """
 
     time: Floats
     positions: Floats
     nodes: tuple[int, ...]
     commands: Floats
+    command_times: Floats | None = None
 
     def __post_init__(self) -> None:
-        for name in ("time", "positions", "commands"):
+        for name in ("time", "positions", "commands", *(["command_times"] if self.command_times is not None else [])):
             array = getattr(self, name)
             require_unmasked(name, array)
             if not isinstance(array, np.ndarray) or array.dtype.kind not in "iuf":
@@ -51,26 +59,18 @@ class Measurement:
             raise ValueError("commands must have one row per stroke with one number per limb.")
         if not np.isfinite(self.time).all() or self.time.min() < 0.0 or (np.diff(self.time) < 0.0).any():
             raise ValueError("Times must be finite, not negative, and in order [s].")
+        if self.command_times is not None:
+            require_command_times(self.command_times, len(self.commands))
 
     @classmethod
     def from_csv(cls, trajectory: str | Path, commands: str | Path) -> "Measurement":
         """Measurement from two CSV files, whose form `python -m seastar_gym.identify --help` shows."""
         require_file("trajectory", trajectory)
         require_file("commands", commands)
-        names, *rows = read_rows(trajectory) or [Row(str(trajectory), ())]
-        nodes = tuple(int(name[1:]) for name in names.fields[1::2] if NODE.fullmatch(name[1:]))
-        expected = ("time", *(f"{axis}{node}" for node in nodes for axis in "xy"))
-        if not (nodes and rows) or names.fields != expected:
-            raise ValueError(f"{trajectory}: the first line must be time,x0,y0,.. and there must be others below it.")
-        for row in rows:
-            if len(row.fields) != len(expected):
-                raise row.refused(f"the line must have {len(expected)} fields, as the first one, not {len(row.fields)}")
-            if not row.fields[0]:
-                raise row.refused("there is no time")
-        numbers = np.array([row.numbers(empty_allowed=True) for row in rows])
-        commanded = np.array(read_numbers(commands, "one number per limb, every line as many"))
+        time, positions, nodes = _read_trajectory(trajectory)
+        command_times, commanded = _read_commands(commands)
         try:
-            return cls(numbers[:, 0], numbers[:, 1:].reshape(len(numbers), len(nodes), 2), nodes, commanded)
+            return cls(time, positions, nodes, commanded, command_times)
         except ValueError as unfit:
             raise ValueError(f"{trajectory}: {unfit}") from None
 
@@ -78,9 +78,72 @@ class Measurement:
         """Write two CSV files that `from_csv` reads."""
         require_file("trajectory", trajectory)
         require_file("commands", commands)
-        names = ["time", *(f"{axis}{node}" for node in self.nodes for axis in "xy")]
-        numbers = np.column_stack([self.time, self.positions.reshape(len(self.time), -1)])
-        lines = [names, *(["" if math.isnan(x) else f"{x:.7g}" for x in row] for row in numbers.tolist())]
-        write_atomically(trajectory, "".join(",".join(line) + "\n" for line in lines))
-        with beside(commands) as part:
-            np.savetxt(part, self.commands, "%g", ",")
+        write_trajectory(trajectory, self.time, self.positions, self.nodes)
+        if self.command_times is None:
+            with beside(commands) as part:
+                np.savetxt(part, self.commands, "%g", ",")
+            return
+        lines = [["time", *(f"limb{limb + 1}" for limb in range(self.commands.shape[1]))]]
+        timed = zip(self.command_times.tolist(), self.commands.tolist(), strict=True)
+        lines += [[repr(when), *(f"{share:g}" for share in row)] for when, row in timed]
+        write_atomically(commands, "".join(",".join(line) + "\n" for line in lines))
+
+
+def require_command_times(times: Floats, n_strokes: int) -> None:
+    """ValueError unless times are finite, one for every stroke, and increase [s]."""
+    if times.shape != (n_strokes,) or not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
+        raise ValueError(f"command_times must be {n_strokes} finite times that increase [s], one for every command.")
+
+
+def write_trajectory(file: str | Path, time: Floats, positions: Floats, nodes: tuple[int, ...]) -> None:
+    """Write a CSV file of a trajectory, see `Measurement`."""
+    names, columns = ["time"], [time]
+    for node, of_node in zip(nodes, np.moveaxis(positions, 1, 0), strict=True):
+        if node == ORIENTATION:
+            names, columns = [*names, "theta"], [*columns, np.arctan2(of_node[:, 1], of_node[:, 0])]
+        else:
+            names, columns = [*names, f"x{node}", f"y{node}"], [*columns, *of_node.T]
+    rows = np.column_stack(columns).tolist()
+    lines = [[repr(when), *("" if math.isnan(x) else f"{x:.7g}" for x in row)] for when, *row in rows]
+    write_atomically(file, "".join(",".join(line) + "\n" for line in [names, *lines]))
+
+
+def _read_trajectory(file: str | Path) -> tuple[Floats, Floats, tuple[int, ...]]:
+    """Times [s], positions [m] and nodes of a trajectory, see `Measurement`."""
+    names, *rows = read_rows(file) or [Row(str(file), ())]
+    turns = names.fields[-1:] == ("theta",)
+    columns = names.fields[1 : len(names.fields) - turns]
+    nodes = tuple(int(name[1:]) for name in columns[::2] if NODE.fullmatch(name[1:]))
+    expected = ("time", *(f"{axis}{node}" for node in nodes for axis in "xy"), *(["theta"] if turns else []))
+    if not ((nodes or turns) and rows) or names.fields != expected:
+        raise ValueError(f"{file}: the first line must be time,x0,y0,.. and there must be others below it.")
+    for row in rows:
+        if len(row.fields) != len(expected):
+            raise row.refused(f"the line must have {len(expected)} fields, as the first one, not {len(row.fields)}")
+        if not row.fields[0]:
+            raise row.refused("there is no time")
+    numbers = np.array([row.numbers(empty_allowed=True) for row in rows])
+    positions = numbers[:, 1 : 1 + len(columns)].reshape(len(numbers), len(nodes), 2)
+    if turns:
+        positions = np.concatenate([positions, pointer(numbers[:, -1])[:, None]], axis=1)
+        nodes = (*nodes, ORIENTATION)
+    return numbers[:, 0], positions, nodes
+
+
+def pointer(theta: Floats) -> Floats:
+    """What stands for orientations [rad] among positions [m]: shape (..., 2), for angles of shape (...)."""
+    return ARM * np.stack([np.cos(theta), np.sin(theta)], axis=-1)
+
+
+def _read_commands(file: str | Path) -> tuple[Floats | None, Floats]:
+    """Times [s] and commands of a file whose first line begins with "time"; None and commands of any other."""
+    names, *rows = read_rows(file) or [Row(str(file), ())]
+    if names.fields[:1] != ("time",):
+        return None, np.array(read_numbers(file, "one number per limb, every line as many"))
+    for row in rows:
+        if len(row.fields) != len(names.fields):
+            raise row.refused(f"the line must have {len(names.fields)} fields, as the first one, not {len(row.fields)}")
+    if len(names.fields) < 2 or not rows:
+        raise ValueError(f"{file}: after time there must be one column per limb, and lines below the first.")
+    numbers = np.array([row.numbers() for row in rows])
+    return numbers[:, 0], numbers[:, 1:]

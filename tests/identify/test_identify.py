@@ -486,7 +486,7 @@ def test_what_no_measurement_can_be_simulated_with_is_refused(change):
 def test_the_command_takes_a_scene_with_its_own_steps_or_those_it_is_given(tmp_path, monkeypatch):
     steps = []
 
-    def fitted(scene, names, measurement):
+    def fitted(scene, names, measurement, largest_delay):
         steps.append(scene.numerics.step)
         raise ValueError("enough")
 

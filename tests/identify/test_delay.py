@@ -1,0 +1,181 @@
+"""Logs whose clocks differ, commands at any time and orientations are fitted, too."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from refusals import assert_refused
+from seastar_gym import Body, Numerics, Scene, Seastar, SmaWires
+from seastar_gym.identify import Measurement, identify, synthetic, trajectory, with_parameters
+from seastar_gym.identify.command import main
+from seastar_gym.identify.measurement import ARM, ORIENTATION, pointer
+from seastar_gym.scene.scene_file import load_scene
+from seastar_gym.simulator import Simulator
+
+SCENE = Scene(Seastar(nodes_per_limb=4), numerics=Numerics("implicit-midpoint", 0.02, newton_tolerance=1e-6))
+ROUND = replace(SCENE, robot=Seastar(nodes_per_limb=4, body=Body(radius=0.02)))
+TRUTH = {"actuator.peak_angle": 0.5, "fluid.drag_coefficient": 1.2}
+LATE = 0.073
+COMMANDS = np.array([[0.0, 1.0, 0.0, 0.0, -1.0], [1.0, 0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0, -1.0]])
+
+
+def late(seed: int, delay: float = LATE) -> Measurement:
+    """Pictures at 30 Hz, by a clock that is ahead, with 1 mm of noise."""
+    return synthetic(SCENE, TRUTH, n_strokes=3, rate=30.0, seed=seed, delay=delay)
+
+
+@pytest.mark.parametrize("delay", [LATE, -0.05])
+def test_a_delay_of_two_pictures_is_found_with_the_parameters(delay):
+    """Pictures are 33 ms apart, and the interval of the delay is a third of that wide, whichever clock is ahead."""
+    estimate = identify(SCENE, list(TRUTH), late(0, delay), largest_delay=0.5)
+    found = estimate.delay
+    assert found.lower < delay < found.upper < found.lower + 0.01
+    assert estimate.root_mean_square == pytest.approx(1e-3, rel=0.05) and not estimate.untold
+    assert ((estimate.lower < list(TRUTH.values())) & (list(TRUTH.values()) < estimate.upper)).all()
+    assert estimate.names == tuple(TRUTH) and estimate.correlation.shape == (3, 3)
+    assert f"delay = {found.value:.4f} s   [{found.lower:.4f}, {found.upper:.4f}]" in estimate.report()
+
+
+def test_the_interval_of_the_delay_holds_it_as_often_as_it_says():
+    """Of 24 measurements; at 95 %, fewer than 20 would be one chance in a hundred."""
+    fits = [identify(SCENE, list(TRUTH), late(seed), largest_delay=0.2).delay for seed in range(24)]
+    assert sum(fit.lower < LATE < fit.upper for fit in fits) >= 20
+    half = np.mean([0.5 * (fit.upper - fit.lower) for fit in fits])
+    assert half / (1.96 * np.std([fit.value for fit in fits], ddof=1)) == pytest.approx(1.0, abs=0.4)
+
+
+def test_a_delay_that_is_ignored_biases_the_fit():
+    """Drag is fitted 75 % too high, and its interval does not hold the truth."""
+    ignored = identify(SCENE, list(TRUTH), late(0))
+    assert ignored.values[1] > 1.5 * TRUTH["fluid.drag_coefficient"] and ignored.lower[1] > 1.2
+    assert ignored.root_mean_square > 1.5e-3 and ignored.delay is None
+
+
+def test_a_delay_of_seconds_is_found():
+    found = identify(SCENE, list(TRUTH), late(1, 1.37), largest_delay=2.0).delay
+    assert found.value == pytest.approx(1.37, abs=0.01) and found.lower < 1.37 < found.upper
+
+
+def test_a_delay_that_nothing_shows_cannot_be_told():
+    still = late(0)
+    still = replace(still, positions=np.zeros_like(still.positions), commands=0.0 * still.commands)
+    untold = identify(SCENE, ["actuator.peak_angle"], still, largest_delay=0.1).untold
+    assert {name for group in untold for name in group} == {"actuator.peak_angle", "the delay"}
+
+
+@pytest.mark.parametrize("largest", [0.0, -0.1, 61.0, math.nan, "0.1"])
+def test_what_is_no_largest_delay_is_refused(largest):
+    with assert_refused("largest_delay must be from 0.001 to 60"):
+        identify(SCENE, list(TRUTH), late(0), largest_delay=largest)
+
+
+def test_the_command_line_fits_a_delay(tmp_path, capsys):
+    files = [str(tmp_path / name) for name in ("path.csv", "commands.csv")]
+    late(0).to_csv(*files)
+    (tmp_path / "mine.py").write_text(
+        "from seastar_gym import Numerics, Scene, Seastar\n"
+        'scene = Scene(Seastar(nodes_per_limb=4), numerics=Numerics("implicit-midpoint", 0.02))\n'
+    )
+    given = ["--scene", str(tmp_path / "mine.py"), "--fit", *TRUTH, "--delay", "0.5", "--out", str(tmp_path / "f.json")]
+    assert main([*files, *given]) == 0
+    assert "delay = 0.07" in capsys.readouterr().out
+    assert load_scene(tmp_path / "f.json").actuator.peak_angle == pytest.approx(0.5, rel=0.02)
+
+
+def test_strokes_at_their_own_times_are_those_without_times():
+    time = np.linspace(0.0, 3.0, 31)
+    plain = trajectory(time, (0, 3), COMMANDS, SCENE)
+    np.testing.assert_allclose(trajectory(time, (0, 3), COMMANDS, SCENE, np.arange(3.0)), plain, atol=1e-12)
+    timed = trajectory(time + 5.0, (0, 3), COMMANDS, SCENE, np.arange(3.0) + 5.0)
+    np.testing.assert_allclose(timed, plain, atol=1e-9)
+
+
+def test_between_strokes_and_before_and_after_them_the_robot_coasts():
+    times = np.array([1.0, 2.5])
+    found = trajectory(np.array([0.0, 1.0, 2.5, 4.0]), (0,), COMMANDS[:2], SCENE, times)[:, 0]
+    simulator = Simulator(SCENE)
+    simulator.stroke(COMMANDS[:1])
+    simulator.advance(0.5)
+    before = simulator.hub_position()[0]
+    simulator.stroke(COMMANDS[1:2])
+    simulator.advance(0.5)
+    np.testing.assert_array_equal(found[:2], 0.0)
+    np.testing.assert_allclose(found[2:], [before, simulator.hub_position()[0]], atol=1e-7)
+
+
+def test_commands_come_at_any_time_where_actuators_remember():
+    scene = replace(SCENE, actuator=SmaWires())
+    when = np.array([0.0, 0.213, 0.5])
+    found = trajectory(np.array([0.5, 0.9]), (0,), COMMANDS, scene, when)[:, 0]
+    simulator = Simulator(scene)
+    for duration, command in zip((0.213, 0.287, 0.4), COMMANDS, strict=True):
+        simulator.advance(duration, command[None])
+    assert np.linalg.norm(found[0]) > 1e-4
+    np.testing.assert_allclose(found[1], simulator.hub_position()[0], atol=1e-5)
+
+
+def test_commands_in_the_middle_of_a_stroke_are_refused_where_limbs_would_jump():
+    measurement = replace(late(0), commands=COMMANDS, command_times=np.array([0.0, 0.5, 2.0]))
+    with assert_refused("With these commands limbs would jump"):
+        identify(SCENE, list(TRUTH), measurement)
+
+
+def test_an_orientation_is_simulated_and_fitted():
+    """The place and the orientation of a tag on the body tell two numbers, and so does its orientation alone."""
+    time = np.arange(90) / 30.0
+    turning = np.array([[1.0, 0.0, 1.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 1.0, 0.0]])
+    built = with_parameters(ROUND, list(TRUTH), list(TRUTH.values()))
+    exact = trajectory(time, (0, ORIENTATION), turning, built)
+    simulator = Simulator(built)
+    simulator.stroke(turning[:1])
+    np.testing.assert_allclose(exact[30, 1], pointer(simulator.orientation()[0]), atol=1e-9)
+    assert abs(simulator.orientation()[0]) > 0.01
+    seen = exact + np.random.default_rng(0).normal(0.0, 3e-4, exact.shape)
+    for nodes, positions in (((0, ORIENTATION), seen), ((ORIENTATION,), seen[:, 1:])):
+        found = identify(ROUND, list(TRUTH), Measurement(time, positions, nodes, turning))
+        assert ((found.lower < list(TRUTH.values())) & (list(TRUTH.values()) < found.upper)).all()
+        assert found.upper[0] < 1.2 * found.lower[0] and not found.untold
+
+
+def test_an_orientation_needs_a_body():
+    seen = np.zeros((3, 1, 2)) + [ARM, 0.0]
+    with assert_refused("An orientation is that of a body"):
+        identify(SCENE, list(TRUTH), Measurement(np.arange(3.0), seen, (ORIENTATION,), COMMANDS))
+    with assert_refused("A node must be a whole number from 0 to 15"):
+        trajectory(np.zeros(1), (ORIENTATION,), COMMANDS, SCENE)
+
+
+def test_times_and_orientations_are_read_as_they_were_written(tmp_path):
+    """Times of a clock that counts since 1970 keep their microseconds."""
+    files = tmp_path / "path.csv", tmp_path / "commands.csv"
+    time = 1.7e9 + np.array([0.0, 0.033333, 0.066667])
+    theta = np.array([0.1, np.nan, -3.0])
+    positions = np.stack([np.arange(6.0).reshape(3, 2), pointer(theta)], axis=1)
+    measurement = Measurement(time, positions, (0, ORIENTATION), COMMANDS, 1.7e9 + np.array([0.0, 1.25, 2.5]))
+    measurement.to_csv(*files)
+    found = Measurement.from_csv(*files)
+    np.testing.assert_allclose(found.time - 1.7e9, time - 1.7e9, atol=1e-6)
+    np.testing.assert_allclose(found.positions, positions, rtol=1e-6)
+    np.testing.assert_array_equal(found.commands, COMMANDS)
+    np.testing.assert_array_equal(found.command_times, measurement.command_times)
+    assert files[0].read_text().startswith("time,x0,y0,theta\n1700000000.0,0,1,0.1\n")
+    assert files[1].read_text().startswith("time,limb1,limb2,")
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        ("time\n0\n", "commands.csv: after time there must be one column per limb"),
+        ("time,a\n", "commands.csv: after time there must be one column per limb"),
+        ("time,a,b\n0,1\n", "commands.csv, line 2: the line must have 3 fields"),
+        ("time,a\n0,\n", "commands.csv, line 2: '' is no number"),
+        ("time,a\n0,1\n0,1\n", "command_times must be 2 finite times that increase"),
+    ],
+)
+def test_files_of_commands_that_cannot_be_read_are_refused(tmp_path, text, words):
+    (tmp_path / "path.csv").write_text("time,x0,y0\n0,0,0\n")
+    (tmp_path / "commands.csv").write_text(text)
+    with assert_refused(words):
+        Measurement.from_csv(tmp_path / "path.csv", tmp_path / "commands.csv")
