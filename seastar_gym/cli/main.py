@@ -27,6 +27,7 @@ COMMANDS = {
     "certify": Command("seastar_gym.accuracy.command", "measure what speed costs a scene in accuracy"),
     "sweep": Command("seastar_gym.sweep.command", "simulate thousands of designs, here or on a cluster"),
     "compile": Command("seastar_gym.cli.compile", "compile the simulator before it is needed, as for a container"),
+    "track2csv": Command("seastar_gym.identify.tracks.command", "make what identify reads from a tracker's file"),
     "identify": Command("seastar_gym.identify.command", "fit numbers of a scene to measured trajectories"),
 }
 

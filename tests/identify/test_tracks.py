@@ -1,0 +1,345 @@
+"""Files of trackers, with their headers as the tools write them, become trajectories that `identify` reads."""
+
+import math
+import sys
+
+import numpy as np
+import pytest
+
+from refusals import assert_refused
+from seastar_gym import Body, Scene, Seastar
+from seastar_gym.cli.main import main
+from seastar_gym.identify import Measurement, identify, trajectory, with_parameters
+from seastar_gym.identify.measurement import ORIENTATION, pointer
+from seastar_gym.identify.tracks.deeplabcut import read_deeplabcut
+from seastar_gym.identify.tracks.motive import read_motive
+from seastar_gym.identify.tracks.plane import homography, in_metres, mapped, read_homography, scaled, turned
+from seastar_gym.identify.tracks.pose import read_pose
+from seastar_gym.identify.tracks.sleap import read_sleap
+from seastar_gym.identify.tracks.track import Seen, Track, from_rest, seen_nodes
+
+POSE = "time,x,y,theta\n0,0.1,0.2,0.3\n0.033,,,\n0.067,nan,NaN,nan\n0.1,0.11,0.2,0.31\n"
+DEEPLABCUT = """\
+scorer,DLC_resnet50_seastarMar1shuffle1_50000,DLC_resnet50_seastarMar1shuffle1_50000,\
+DLC_resnet50_seastarMar1shuffle1_50000,DLC_resnet50_seastarMar1shuffle1_50000,\
+DLC_resnet50_seastarMar1shuffle1_50000,DLC_resnet50_seastarMar1shuffle1_50000
+bodyparts,hub,hub,hub,tip one,tip one,tip one
+coords,x,y,likelihood,x,y,likelihood
+0,100.5,200.25,0.99,300.0,200.0,0.98
+1,101.0,201.0,0.3,301.0,201.0,0.97
+2,,,,302.0,202.0,0.6
+"""
+SEVERAL = """\
+scorer,s,s,s,s,s,s
+individuals,a,a,a,b,b,b
+bodyparts,hub,hub,hub,hub,hub,hub
+coords,x,y,likelihood,x,y,likelihood
+0,1,2,1.0,3,4,1.0
+"""
+SLEAP = """\
+track,frame_idx,instance.score,hub.x,hub.y,hub.score,tip.x,tip.y,tip.score
+track_0,0,0.93,101.5,55.25,0.97,140.0,60.0,0.88
+track_0,3,0.51,103.0,57.0,0.20,141.0,61.0,0.30
+track_0,1,0.90,102.0,56.0,0.9,,,
+"""
+MOTIVE = """\
+Format Version,1.23,Take Name,Take 1,Take Notes,,Capture Frame Rate,120.000000,Export Frame Rate,120.000000,\
+Capture Start Time,2024-03-01 10.00.00.000 AM,Capture Start Frame,0,Total Frames in Take,3,Total Exported Frames,3,\
+Rotation Type,Quaternion,Length Units,Millimeters,Coordinate Space,Global
+
+,Type,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,\
+Rigid Body Marker,Rigid Body Marker,Rigid Body Marker,Rigid Body Marker,Marker,Marker,Marker
+,Name,Seastar,Seastar,Seastar,Seastar,Seastar,Seastar,Seastar,Seastar,\
+"Seastar:Marker 001","Seastar:Marker 001","Seastar:Marker 001","Seastar:Marker 001",\
+"Seastar:Marker 001","Seastar:Marker 001","Seastar:Marker 001"
+,ID,1,1,1,1,1,1,1,1,2,2,2,2,2,2,2
+,,Rotation,Rotation,Rotation,Rotation,Position,Position,Position,Mean Marker Error,\
+Position,Position,Position,Marker Quality,Position,Position,Position
+Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,,X,Y,Z,,X,Y,Z
+0,0.000000,0.0,0.0,0.0,1.0,10.0,500.0,20.0,0.1,1,2,3,1.0,1.5,500.0,-3.5
+1,0.008333,,,,,,,,,,,,,,,
+2,0.016667,0.0,0.5,0.0,0.8660254,11.0,500.0,19.0,0.1,1,2,3,1.0,1.5,500.0,-4.5
+"""
+MOTIVE_WITH_PARENTS = """\
+Format Version,1.25,Take Name,Take 2,Capture Frame Rate,120.0,Rotation Type,Quaternion,Length Units,Meters
+,Type,,Marker,Marker,Marker
+,Name,,Tip,Tip,Tip
+,ID,,"4CF0B31A","4CF0B31A","4CF0B31A"
+,Parent,,,,
+,,,Position,Position,Position
+Frame,Time (Seconds),TimeCode,X,Y,Z
+0,0.000000,15:26:46:12.02,0.25,0.5,1.0
+"""
+
+
+def written(folder, name, text):
+    (folder / name).write_text(text)
+    return folder / name
+
+
+def test_a_file_of_poses_is_read_and_lost_pictures_are_nan(tmp_path):
+    track = read_pose(written(tmp_path, "pose.csv", POSE))
+    assert track.time.tolist() == [0.0, 0.033, 0.067, 0.1]
+    np.testing.assert_array_equal(track.points["tag"], [[0.1, 0.2], [np.nan] * 2, [np.nan] * 2, [0.11, 0.2]])
+    np.testing.assert_array_equal(track.orientations["tag"], [0.3, np.nan, np.nan, 0.31])
+    assert read_pose(written(tmp_path, "place.csv", "time,x,y\n0,1,2\n")).orientations == {}
+
+
+def test_a_file_of_deeplabcut_is_read_and_unlikely_points_were_not_seen(tmp_path):
+    file = written(tmp_path, "dlc.csv", DEEPLABCUT)
+    track = read_deeplabcut(file, 30.0)
+    np.testing.assert_allclose(track.time, [0.0, 1 / 30, 2 / 30])
+    np.testing.assert_array_equal(track.points["hub"], [[100.5, 200.25], [np.nan] * 2, [np.nan] * 2])
+    np.testing.assert_array_equal(track.points["tip one"], [[300.0, 200.0], [301.0, 201.0], [302.0, 202.0]])
+    assert read_deeplabcut(file, 30.0, likelihood=0.2).points["hub"][1].tolist() == [101.0, 201.0]
+
+
+def test_one_of_several_animals_of_deeplabcut_is_named(tmp_path):
+    file = written(tmp_path, "dlc.csv", SEVERAL)
+    assert read_deeplabcut(file, 30.0, "b").points["hub"].tolist() == [[3.0, 4.0]]
+    for wrong in (None, "c"):
+        with assert_refused("has the individuals a, b: name one"):
+            read_deeplabcut(file, 30.0, wrong)
+
+
+def test_a_file_of_sleap_is_read_in_the_order_of_its_pictures(tmp_path):
+    track = read_sleap(written(tmp_path, "sleap.csv", SLEAP), 10.0)
+    np.testing.assert_allclose(track.time, [0.0, 0.1, 0.3])
+    np.testing.assert_array_equal(track.points["hub"], [[101.5, 55.25], [102.0, 56.0], [103.0, 57.0]])
+    np.testing.assert_array_equal(track.points["tip"], [[140.0, 60.0], [np.nan] * 2, [141.0, 61.0]])
+
+
+def test_an_hdf5_file_of_sleap_is_read(tmp_path):
+    h5py = pytest.importorskip("h5py", reason="h5py is not installed (extra data)")
+    tracks = np.arange(24.0).reshape(2, 2, 2, 3)
+    with h5py.File(tmp_path / "sleap.h5", "w") as file:
+        file["tracks"], file["node_names"], file["track_names"] = tracks, [b"hub", b"tip"], [b"a", b"b"]
+    track = read_sleap(tmp_path / "sleap.h5", 10.0, "b")
+    np.testing.assert_array_equal(track.points["tip"], tracks[1, :, 1].T)
+    assert track.time.tolist() == [0.0, 0.1, 0.2]
+    with assert_refused("has the individuals a, b"):
+        read_sleap(tmp_path / "sleap.h5", 10.0)
+    written(tmp_path, "no.h5", "no HDF5")
+    with assert_refused("no.h5 is no analysis file of SLEAP"):
+        read_sleap(tmp_path / "no.h5", 10.0)
+
+
+def test_hdf5_without_h5py_says_what_to_install(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    monkeypatch.setattr("seastar_gym.extras.find_spec", lambda name: None)
+    given = ["--from", "sleap", "--out", str(tmp_path / "out.csv"), "--rate", "30", "--metres-per-pixel", "0.001"]
+    assert main(["track2csv", str(tmp_path / "sleap.h5"), *given]) == 2
+    assert capsys.readouterr().err == 'HDF5 files of SLEAP need h5py: pip install "seastar-gym[data]".\n'
+
+
+def test_a_file_of_motive_is_read_from_above_in_metres(tmp_path):
+    """Half a turn about the upward axis is one to the left; the measured marker is taken, not the solver's."""
+    track = read_motive(written(tmp_path, "motive.csv", MOTIVE))
+    np.testing.assert_allclose(track.time, [0.0, 0.008333, 0.016667])
+    np.testing.assert_allclose(track.points["Seastar"], [[0.01, -0.02], [np.nan] * 2, [0.011, -0.019]])
+    np.testing.assert_allclose(track.points["Seastar:Marker 001"], [[0.0015, 0.0035], [np.nan] * 2, [0.0015, 0.0045]])
+    np.testing.assert_allclose(track.orientations["Seastar"], [0.0, np.nan, math.pi / 3], atol=1e-7)
+    upright = read_motive(tmp_path / "motive.csv", "z")
+    np.testing.assert_allclose(upright.points["Seastar"][0], [0.01, 0.5])
+
+
+def test_a_file_of_motive_with_parents_and_time_codes_is_read(tmp_path):
+    track = read_motive(written(tmp_path, "motive.csv", MOTIVE_WITH_PARENTS))
+    np.testing.assert_allclose(track.points["Tip"], [[0.25, -1.0]])
+
+
+@pytest.mark.parametrize("up", ["y", "z"])
+def test_a_rigid_body_turns_as_its_points_do(up, tmp_path):
+    """Anti-clockwise from above, whichever axis is up: a marker on the body's x-axis is where its heading says."""
+    angle = 0.7
+    axis = {"y": (0.0, math.sin(angle / 2), 0.0), "z": (0.0, 0.0, math.sin(angle / 2))}[up]
+    x = {"y": (math.cos(angle), 0.0, -math.sin(angle)), "z": (math.cos(angle), math.sin(angle), 0.0)}[up]
+    rows = MOTIVE.splitlines()
+    numbers = [0, 0.0, *axis, math.cos(angle / 2), 0.0, 0.0, 0.0, 0.1, 0, 0, 0, 1.0, *x]
+    file = written(tmp_path, "motive.csv", "\n".join([*rows[:7], ",".join(map(str, numbers))]))
+    track = read_motive(file, up)
+    marker = track.points["Seastar:Marker 001"][0] - track.points["Seastar"][0]
+    assert math.atan2(marker[1], marker[0]) == pytest.approx(angle)
+    assert track.orientations["Seastar"][0] == pytest.approx(angle)
+
+
+def pixels_of(metres):
+    """Pixels of a camera that looks down from the side, shape (n, 2)."""
+    matrix = np.array([[2000.0, 300.0, 640.0], [100.0, -1800.0, 480.0], [0.1, 0.4, 1.0]])
+    return mapped(matrix, metres)
+
+
+def test_four_points_tell_the_plane_of_a_camera_that_looks_from_the_side(tmp_path):
+    corners = np.array([[0.0, 0.0], [0.4, 0.0], [0.4, 0.3], [0.0, 0.3]])
+    rng = np.random.default_rng(0)
+    inside = rng.uniform(0.0, 0.3, (20, 2))
+    found = homography(pixels_of(corners), corners)
+    np.testing.assert_allclose(mapped(found, pixels_of(inside)), inside, atol=1e-12)
+    many = homography(pixels_of(inside), inside)
+    np.testing.assert_allclose(mapped(many, pixels_of(corners)), corners, atol=1e-12)
+    lines = [",".join(f"{x:.12g}" for x in row) for row in np.hstack([pixels_of(corners), corners])]
+    file = written(tmp_path, "corners.csv", "u,v,x,y\n" + "\n".join(lines) + "\n")
+    np.testing.assert_allclose(mapped(read_homography(file), pixels_of(inside)), inside, atol=1e-9)
+
+
+def test_directions_are_mapped_as_short_lines_are():
+    corners = np.array([[0.0, 0.0], [0.4, 0.0], [0.4, 0.3], [0.0, 0.3]])
+    plane = homography(pixels_of(corners), corners)
+    points, angles = np.array([[600.0, 400.0], [900.0, 300.0]]), np.array([0.4, -2.0])
+    ahead = points + 1e-4 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    x, y = (mapped(plane, ahead) - mapped(plane, points)).T
+    np.testing.assert_allclose(turned(plane, points, angles), np.arctan2(y, x), atol=1e-6)
+
+
+def test_pictures_have_y_down():
+    track = in_metres(Track(np.zeros(1), {"tag": np.array([[100.0, 200.0]])}, {"tag": np.array([0.5])}), scaled(1e-3))
+    np.testing.assert_allclose(track.points["tag"], [[0.1, -0.2]])
+    np.testing.assert_allclose(track.orientations["tag"], [-0.5])
+
+
+@pytest.mark.parametrize(
+    "points, words",
+    [
+        ([[0, 0], [1, 0], [0, 1]], "needs four points or more, not 3"),
+        ([[0, 0], [1, 0], [2, 0], [0, 1]], "no three of four may be on one line"),
+        ([[1, 1]] * 4, "they are all the same"),
+    ],
+)
+def test_points_that_tell_no_plane_are_refused(points, words):
+    with assert_refused(words):
+        homography(np.array(points, float), np.array(points, float))
+
+
+def test_a_robot_that_begins_anywhere_is_brought_to_the_origin():
+    """By two nodes or more, or by a tag."""
+    robot = Seastar(nodes_per_limb=4, body=Body(radius=0.02))
+    scene, nodes = Scene(robot), (3, 6, 9)
+    c, s = math.cos(2.5), math.sin(2.5)
+    rotation = np.array([[c, s], [-s, c]])
+    shape, place = robot.nodes(), np.array([0.3, -0.2])
+    time, moved = np.arange(4.0), np.linspace(0.0, 0.1, 4)[:, None, None]
+    for seen in (nodes, (0, ORIENTATION)):
+        before = np.stack([pointer(np.zeros(4)) if k == ORIENTATION else shape[k] + moved[:, 0] for k in seen], axis=1)
+        lab = before @ rotation + np.where(np.array(seen)[:, None] == ORIENTATION, 0.0, place)
+        lab[1, 0] = np.nan
+        found = from_rest(Seen(lab, seen), time, 0.0, scene)
+        np.testing.assert_allclose(found.positions[[0, 2, 3]], before[[0, 2, 3]], atol=1e-12)
+    still = np.tile(shape[list(nodes)] @ rotation, (4, 1, 1)) + 1e-3 * np.array([1, -1, 1, -1])[:, None, None]
+    found = from_rest(Seen(still, nodes), time, 5.0, scene)
+    np.testing.assert_allclose(found.positions.mean(axis=0), shape[list(nodes)], atol=1e-12)
+
+
+def test_what_tells_no_beginning_is_refused():
+    with assert_refused("does not tell the direction of limb 1"):
+        from_rest(Seen(np.zeros((2, 1, 2)), (0,)), np.arange(2.0), 0.0, Scene())
+    lost = np.array([[[np.nan, np.nan]], [[0.0, 0.0]]])
+    with assert_refused("No node was seen while the robot was at rest, in the first 0 s"):
+        from_rest(Seen(lost, (0,)), np.arange(2.0), 0.0, Scene())
+
+
+def test_points_that_are_not_there_are_refused():
+    track = Track(np.zeros(1), {"a": np.zeros((1, 2)), "b": np.zeros((1, 2))}, {})
+    with assert_refused("There is no point c: the file has a, b."):
+        seen_nodes(track, {"c": 0})
+    with assert_refused("Two points cannot be one node: a=0, b=0."):
+        seen_nodes(track, {"a": 0, "b": 0})
+
+
+@pytest.mark.parametrize(
+    "read, text, words",
+    [
+        (read_pose, "time,x\n0,1\n", "the first line must be time,x,y,theta"),
+        (read_pose, "time,x,y\n", "the first line must be time,x,y,theta"),
+        (read_pose, "time,x,y\n0,1\n", "line 2: the line must have 3 fields"),
+        (read_pose, "time,x,y\n,1,2\n", "line 2: there is no time"),
+        (read_pose, "time,x,y\n0,one,2\n", "line 2: 'one' is no number"),
+        (lambda file: read_deeplabcut(file, 1.0), POSE, "has no lines scorer, bodyparts and coords"),
+        (lambda file: read_deeplabcut(file, 1.0), DEEPLABCUT[:-1] + ",9\n", "line 6: the line must have 7 fields"),
+        (lambda file: read_deeplabcut(file, 1.0), "scorer,s\nbodyparts,a\ncoords,x\n0,1\n", "x, y and likelihood"),
+        (lambda file: read_sleap(file, 1.0), POSE, "the first line must be track,frame_idx,instance.score"),
+        (lambda file: read_sleap(file, 1.0), SLEAP[:-1] + "1\n" + "track_0,4\n", "line 5: the line must have 9 fields"),
+        (read_motive, POSE, "has no types, names and Position"),
+        (read_motive, MOTIVE.replace("Millimeters", "Feet"), "line 1: Format Version and Length Units must be there"),
+        (read_motive, MOTIVE.replace("Z,W,", "Z,,"), "export it with the rotation type Quaternion"),
+    ],
+)
+def test_files_of_another_form_are_refused_by_their_names(tmp_path, read, text, words):
+    with assert_refused(words):
+        read(written(tmp_path, "file.csv", text))
+
+
+def test_files_of_a_tracker_end_in_a_fit(tmp_path, capsys):
+    """A robot swims, a camera sees it from the side, DeepLabCut loses it now and then, and its drag is found."""
+    scene = Scene.preset("fast")
+    time, n = np.arange(75) / 25.0, scene.robot.nodes_per_limb - 1
+    nodes, commands = (0, n, 2 * n), np.array([[0.0, 1.0, 0.0, 0.0, -1.0]] * 3)
+    truth = {"fluid.drag_coefficient": 1.3, "actuator.peak_angle": 0.55}
+    swum = trajectory(time, nodes, commands, with_parameters(scene, list(truth), list(truth.values())))
+    c, s = math.cos(1.0), math.sin(1.0)
+    lab = swum @ np.array([[c, s], [-s, c]]) + [0.2, 0.1]
+    corners = np.array([[0.0, 0.0], [0.4, 0.0], [0.4, 0.3], [0.0, 0.3]])
+    np.savetxt(tmp_path / "corners.csv", np.hstack([pixels_of(corners), corners]), "%.10g", ",")
+    pixels = np.stack([pixels_of(lab[:, k]) for k in range(3)], axis=1)
+    pixels[1:] += np.random.default_rng(0).normal(0.0, 1.0, pixels[1:].shape)  # half a millimetre
+    sure = np.where(np.random.default_rng(1).random((75, 3)) < 0.1, 0.2, 0.95)
+    sure[0] = 1.0
+    rows = np.concatenate([pixels, sure[:, :, None]], axis=2).reshape(75, 9)
+    heads = [f"scorer{',s' * 9}", "bodyparts" + "".join(f",{part}" * 3 for part in ("mid", "one", "two"))]
+    lines = [*heads, "coords" + ",x,y,likelihood" * 3]
+    lines += [",".join(map(repr, [k, *row])) for k, row in enumerate(rows.tolist())]
+    file = written(tmp_path, "dlc.csv", "\n".join(lines) + "\n")
+    np.savetxt(tmp_path / "commands.csv", commands, "%g", ",")
+    (tmp_path / "mine.py").write_text('from seastar_gym import Scene\nscene = Scene.preset("fast")\n')
+    given = ["--from", "deeplabcut", "--rate", "25", "--homography", str(tmp_path / "corners.csv")]
+    given += ["--nodes", "mid=hub", "one=tip1", f"two={2 * n}", "--scene", str(tmp_path / "mine.py")]
+    assert main(["track2csv", str(file), *given, "--out", str(tmp_path / "track.csv")]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith(f"{tmp_path / 'track.csv'}: 75 pictures in 2.96 s, ") and "% of their points not" in said
+    estimate = identify(scene, list(truth), Measurement.from_csv(tmp_path / "track.csv", tmp_path / "commands.csv"))
+    assert ((estimate.lower < list(truth.values())) & (list(truth.values()) < estimate.upper)).all()
+    assert estimate.root_mean_square < 1e-3 and (estimate.upper < 1.1 * estimate.lower).all()
+
+
+def converted(tmp_path, text, *given):
+    """Exit code and the trajectory of a command with this file."""
+    code = main(["track2csv", str(written(tmp_path, "file.csv", text)), "--out", str(tmp_path / "out.csv"), *given])
+    return code, (tmp_path / "out.csv").read_text() if code == 0 else None
+
+
+def test_poses_become_the_hub_and_its_orientation(tmp_path):
+    code, text = converted(tmp_path, POSE, "--from", "pose")
+    lines = [line.split(",") for line in text.splitlines()]
+    assert code == 0 and lines[0] == ["time", "x0", "y0", "theta"] and lines[2][1:] == ["", "", ""]
+    assert [float(x) for x in lines[1]] == pytest.approx([0.0] * 4, abs=1e-12)
+    c, s = math.cos(0.3), math.sin(0.3)
+    assert [float(x) for x in lines[4]] == pytest.approx([0.1, 0.01 * c, -0.01 * s, 0.01], rel=1e-6)
+    code, text = converted(tmp_path, POSE, "--from", "pose", "--aligned")
+    assert text.splitlines()[1] == "0.0,0.1,0.2,0.3"
+
+
+def test_a_marker_of_motive_may_be_any_node(tmp_path):
+    given = ["--from", "motive", "--nodes", "Seastar:Marker 001=tip1", "Seastar=hub"]
+    code, text = converted(tmp_path, MOTIVE, *given)
+    assert code == 0 and text.startswith("time,x0,y0,x11,y11,theta\n")
+
+
+@pytest.mark.parametrize(
+    "text, given, words",
+    [
+        (DEEPLABCUT, ["--from", "deeplabcut"], "Files of deeplabcut have no times: give --rate"),
+        (DEEPLABCUT, ["--from", "deeplabcut", "--rate", "30"], "in pixels: give --metres-per-pixel or --homography"),
+        (SLEAP, ["--from", "sleap", "--rate", "0"], "--rate must be a positive, finite number"),
+        (SLEAP, ["--from", "sleap", "--rate", "9", "--metres-per-pixel", "1e-3"], "Say which points are which nodes"),
+        (POSE, ["--from", "pose", "--metres-per-pixel", "1", "--homography", "x"], "or --homography, not both"),
+        (POSE, ["--from", "pose", "--nodes", "tag"], "--nodes must be such as nose=hub"),
+        (POSE, ["--from", "pose", "--nodes", "tag=tip6"], "tag=tip6: the robot has 5 limbs and 56 nodes"),
+        (POSE, ["--from", "pose", "--rest", "-1"], "--rest must be"),
+        (POSE, ["--from", "pose", "--likelihood", "2"], "--likelihood must be from 0 to 1"),
+        (POSE.replace("0.1,0.11", "0.05,0.11"), ["--from", "pose"], "Times must be finite, not negative, and in order"),
+        (POSE.replace("0.11", "2000"), ["--from", "pose"], "within 1000 m of the origin"),
+    ],
+)
+def test_the_command_says_what_is_wrong_in_a_sentence(tmp_path, capsys, text, given, words):
+    assert converted(tmp_path, text, *given) == (2, None)
+    said = capsys.readouterr().err
+    assert words in said and said.count("\n") == 1
