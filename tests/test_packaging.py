@@ -105,7 +105,7 @@ def test_every_base_dependency_is_imported_by_the_package():
 @pytest.mark.parametrize(
     ("folders", "extras"),
     [
-        (["seastar_gym"], ["render", "studies", "train", "ray", "slurm", "data", "gpu"]),
+        (["seastar_gym"], ["render", "studies", "train", "ray", "slurm", "data", "export", "gpu"]),
         (["studies"], ["train", "sweep", "test", "data", "mujoco"]),
         (["agents", "train.py"], ["train", "rllib"]),
         (["tests"], ["test", "browser", "ray", "learners"]),

@@ -24,6 +24,7 @@ COMMANDS = {
     "benchmark": Command("seastar_gym.benchmark.command", "measure agents on registered tasks over ten seeds"),
     "data": Command("seastar_gym.data.command", "write Minari datasets of agents on registered tasks"),
     "train": Command("seastar_gym.cli.train", "train a policy, in a checkout of the repository"),
+    "export": Command("seastar_gym.cli.export", "write a learned policy as a file of C or ONNX"),
     "certify": Command("seastar_gym.accuracy.command", "measure what speed costs a scene in accuracy"),
     "sweep": Command("seastar_gym.sweep.command", "simulate thousands of designs, here or on a cluster"),
     "compile": Command("seastar_gym.cli.compile", "compile the simulator before it is needed, as for a container"),

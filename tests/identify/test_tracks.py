@@ -126,7 +126,6 @@ def test_an_hdf5_file_of_sleap_is_read(tmp_path):
 
 def test_hdf5_without_h5py_says_what_to_install(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "h5py", None)
-    monkeypatch.setattr("seastar_gym.extras.find_spec", lambda name: None)
     given = ["--from", "sleap", "--out", str(tmp_path / "out.csv"), "--rate", "30", "--metres-per-pixel", "0.001"]
     assert main(["track2csv", str(tmp_path / "sleap.h5"), *given]) == 2
     assert capsys.readouterr().err == 'HDF5 files of SLEAP need h5py: pip install "seastar-gym[data]".\n'

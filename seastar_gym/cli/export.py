@@ -1,0 +1,71 @@
+"""Writes a learned policy as one file of C, or of ONNX, for robots and computers without Python.
+
+The policy is one in the box, by its name (learned, seastar-0.2s, or that of a task such as prey or miswired-0.5s), or a
+file: .safetensors, or a model.zip of train.py. The most probable action is taken.
+
+C is C99 with <math.h>, without allocation. seastar_observe makes the observation from the last positions of tracked
+points and the waypoints, seastar_act the commands. Points of a limb are evenly spaced; by default they are the nodes of
+the policy's scene. ONNX begins with the observation, and remembers nothing: past observations are an input.
+"""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from seastar_gym.command import answered, command_parser
+from seastar_gym.controllers import learned, learner_zip
+from seastar_gym.controllers.export.c_code import to_c
+from seastar_gym.controllers.export.onnx_graph import to_onnx
+from seastar_gym.controllers.learned import SHIPPED, TASKS, LearnedPolicy
+from seastar_gym.files import write_atomically
+
+FORMATS = ("c", "onnx")
+
+
+def parser() -> argparse.ArgumentParser:
+    """Parser of the options."""
+    found = command_parser("seastar export", __doc__)
+    found.add_argument("policy", help="name or file of a learned policy")
+    found.add_argument("--to", choices=FORMATS, required=True, help="format of the file that is written")
+    found.add_argument("--out", type=Path, help="file that is written (default: POLICY.c or POLICY.onnx)")
+    points = "tracked points per limb with the hub, of c (default: the nodes of the policy's scene)"
+    found.add_argument("--points", type=int, help=points)
+    return found
+
+
+def in_the_box() -> dict[str, Path]:
+    """Files of the policies in the box by their names."""
+    files = [*sorted(SHIPPED.parent.glob("*.safetensors")), *sorted(TASKS.glob("*.safetensors"))]
+    return {"learned": SHIPPED, **{file.stem: file for file in files}}
+
+
+def load_policy(name: str) -> LearnedPolicy:
+    """Policy of a name or a file."""
+    known = in_the_box()
+    if name in known:
+        return learned.load(known[name])
+    if name.endswith(".zip"):
+        return learner_zip.load(name)
+    if not name.endswith(SHIPPED.suffix):
+        raise ValueError(
+            f"{name} is no learned policy: name a file, .safetensors or the model.zip of train.py, or one of "
+            f"{', '.join(known)}."
+        )
+    return learned.load(name)
+
+
+def export(options: argparse.Namespace) -> str:
+    """Write the file; returns a sentence on it."""
+    policy, name = load_policy(options.policy), Path(options.policy).stem
+    out = Path(f"{name}.{options.to}") if options.out is None else options.out
+    if options.to == "onnx" and options.points is not None:
+        raise ValueError("--points is for c: ONNX begins with the observation.")
+    data = to_c(policy, name, options.points) if options.to == "c" else to_onnx(policy, name)
+    write_atomically(out, data)
+    return f"{out}: {len(data) / 1000:.0f} kB, {policy.description.observation_size} numbers seen."
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command line; returns the exit code."""
+    options = parser().parse_args(arguments)
+    return answered(lambda: print(export(options)))

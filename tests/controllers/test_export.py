@@ -1,0 +1,396 @@
+"""Exported policies see, decide and remember as those of Python do."""
+
+import ctypes
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from refusals import assert_refused
+from seastar_gym import Body, Limb, Numerics, Scene, Seastar, SmaWires
+from seastar_gym.cli.export import in_the_box, load_policy
+from seastar_gym.cli.main import main
+from seastar_gym.controllers import learned
+from seastar_gym.controllers.description import Description
+from seastar_gym.controllers.export import tables
+from seastar_gym.controllers.export.c_code import CODE, to_c
+from seastar_gym.controllers.export.onnx_graph import to_onnx
+from seastar_gym.controllers.learned import LearnedPolicy
+from seastar_gym.envs.commands import to_commands
+from seastar_gym.envs.layout import VELOCITY_SCALE, Layout
+
+ROOT = Path(__file__).resolve().parents[2]
+N_SWUM, N_DRAWN = 5000, 5000
+ROBOTS = 50
+CARRIED = 3e-7
+"""Error of turned and mirrored numbers over the largest."""
+ROUNDING = 1.5e-6
+"""Error of logits over the largest: sums of some hundred numbers, each rounded to 6e-8, in another order."""
+TASKS = {"learned": "SeastarSwim-v0", "seastar-0.2s": "SeastarSwim-v0", "fail-blind": "SeastarFailBlind-v0",
+         "miswired-0.5s": "SeastarMiswiredTimed-v0", "fast-prizes-0.5s": "SeastarPrizesTimed-v0"}  # fmt: skip
+"""Policies of every kind, with memory and without, with limbs and without, and ids of what they swim."""
+
+needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler cc")
+
+
+def drawn(description: Description, seed: int = 0) -> LearnedPolicy:
+    """Policy with random weights."""
+    rng = np.random.default_rng(seed)
+    shapes = description.shapes().items()
+    weights = {name: (rng.normal(size=shape) / np.sqrt(shape[-1])).astype(np.float32) for name, shape in shapes}
+    return LearnedPolicy(description, weights)
+
+
+def four(*lengths: float) -> Seastar:
+    """Robot of four limbs of these lengths [m]."""
+    return Seastar(4, 5, limbs=tuple(Limb(length=length) for length in lengths), discretisation="continuum")
+
+
+OWN = {
+    "limbs": Description("limbs", True, Scene(actuator=SmaWires()), (16,)),
+    "no-symmetry": Description("pairs", False, Scene(), (16, 8)),
+    "three-limbs": Description("limbs", True, Scene(Seastar(n_limbs=3, nodes_per_limb=4)), (8,), past=2),
+    "two-long-limbs-opposite": Description("joint", True, Scene(four(0.12, 0.1, 0.12, 0.1)), ()),
+    "two-long-limbs-adjacent": Description("pairs", True, Scene(four(0.12, 0.12, 0.1, 0.1)), (16,), past=1),
+    "limbs-all-unlike": Description("limbs", True, Scene(four(0.12, 0.1, 0.11, 0.09)), (16,)),
+}
+"""Policies of kinds that are not in the box: without symmetry, with half a turn and a mirror, with a mirror that is not
+along limb 1, with nothing, and of a network without hidden layers."""
+
+
+def policy_of(name: str) -> LearnedPolicy:
+    return drawn(OWN[name]) if name in OWN else load_policy(name)
+
+
+class Compiled:
+    """Functions of an exported policy, compiled as a shared library; robots have their own memory each."""
+
+    def __init__(self, policy: LearnedPolicy, folder, points: int | None = None):
+        text = to_c(policy, "tested", points)
+        (folder / "policy.c").write_text(text)
+        flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic", "-shared", "-fPIC"]
+        library = folder / "policy.so"
+        subprocess.run(["cc", *flags, str(folder / "policy.c"), "-o", str(library), "-lm"], check=True)
+        self._c, self.policy = ctypes.CDLL(str(library)), policy
+        self.defined = {name: int(number) for name, number in re.findall(r"#define SEASTAR_(\w+) (\d+)$", text, re.M)}
+        past = max(1, self.defined["PAST"]) * self.defined["SIZE"]
+        self._robot = type("Robot", (ctypes.Structure,), {"_fields_": [("begun", ctypes.c_int),
+                                                                      ("past", ctypes.c_float * past)]})  # fmt: skip
+
+    def robots(self, n: int) -> list:
+        """Robots at the beginning of an episode."""
+        robots = [self._robot() for _ in range(n)]
+        for robot in robots:
+            robot.begun = 1
+            self.begin(robot)
+        return robots
+
+    def begin(self, robot) -> None:
+        self._c.seastar_begin(ctypes.byref(robot))
+
+    def remember(self, robot, past: np.ndarray) -> None:
+        """Give a robot past observations, shape (past, size)."""
+        robot.begun = 1
+        robot.past[:] = past.ravel().tolist()
+
+    def seen(self, robot, observation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Input of the network, and its logits."""
+        shown = np.zeros(self.defined["INPUTS"], np.float32)
+        logits = np.zeros(self.defined["OUTPUTS"], np.float32)
+        self._c.seastar_input(ctypes.byref(robot), _float(observation), _float(shown))
+        self._c.seastar_logits(_float(shown), _float(logits))
+        return shown, logits
+
+    def act(self, robot, observation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Action and commands."""
+        action = np.zeros(self.defined["NUMBERS"], np.int32)
+        commands = np.full(self.defined["LIMBS"], np.nan, np.float32)
+        to_action = action.ctypes.data_as(ctypes.POINTER(ctypes.c_int))
+        self._c.seastar_act(ctypes.byref(robot), _float(observation), to_action, _float(commands))
+        return action, commands
+
+    def observe(self, *arguments: np.ndarray | float | None) -> np.ndarray:
+        """Observation from positions and velocities, or from a history, its length and an interval."""
+        out = np.zeros(self.defined["SIZE"], np.float32)
+        moving = isinstance(arguments[1], np.ndarray)
+        function = self._c.seastar_observe_moving if moving else self._c.seastar_observe
+        function(*map(_argument, arguments), _float(out))
+        return out
+
+
+def _float(array: np.ndarray):
+    assert array.dtype == np.float32 and array.flags.c_contiguous
+    return array.ctypes.data_as(ctypes.POINTER(ctypes.c_float))
+
+
+def _argument(value: np.ndarray | float | None):
+    """Positions, a length of time or a count as C takes it."""
+    if not isinstance(value, np.ndarray):
+        return ctypes.c_double(value) if isinstance(value, float) else value
+    assert value.dtype == np.float64 and value.flags.c_contiguous
+    return value.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
+
+
+def environment(name: str, policy: LearnedPolicy, n: int = ROBOTS):
+    """Batch of environments of a policy."""
+    task, scene = TASKS[name], replace(policy.scene, numerics=Numerics.preset("fast"))
+    arguments = {"scene": scene, "decision_period": policy.decision_period, "path": "random", "random_heading": True,
+                 "actions": policy.actions} if task == "SeastarSwim-v0" else {"fidelity": "fast"}  # fmt: skip
+    return gym.make_vec(task, n, vectorization_mode="vector_entry_point", threads=1, **arguments)
+
+
+def input_of(policy: LearnedPolicy, observations: np.ndarray, past: np.ndarray | None) -> np.ndarray:
+    """What the network of Python sees, shape (n, inputs)."""
+    if policy.recollection is not None:
+        return policy.recollection.shown(observations, past)[0]
+    return observations if policy.reduction is None else policy.reduction.reduce(observations)[0]
+
+
+def random_observations(policy: LearnedPolicy, n: int, seed: int = 0) -> np.ndarray:
+    """Observations of nowhere, some with waypoints on the boundaries of sectors, or at the hub."""
+    rng, size = np.random.default_rng(seed), policy.description.observation_size
+    observations = rng.normal(size=(n, size)).astype(np.float32)
+    angle = np.pi / policy.scene.robot.n_limbs * rng.integers(0, 10, n // 5)
+    observations[: n // 5, -4:-2] = 2.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    observations[: n // 10, -2:] = observations[: n // 10, -4:-2]
+    observations[:3, -4:-2] = 0.0
+    return observations
+
+
+def check(compiled: Compiled, robots: list, observations: np.ndarray, past, chosen: np.ndarray) -> int:
+    """Assert that C sees and does what Python does, one after the other.
+
+    past: What robots remember, shape (n, past, size). chosen: Actions of Python. Returns how many decisions were nearer
+    than rounding.
+    """
+    policy, n_limbs = compiled.policy, compiled.policy.scene.robot.n_limbs
+    expected = input_of(policy, observations, past)
+    each = zip(robots, observations, strict=True)
+    done = [(*compiled.seen(*one), *compiled.act(*one)) for one in each]
+    seen, logits, actions, commands = map(np.array, zip(*done, strict=True))
+    assert (np.abs(seen - expected) <= CARRIED * np.abs(expected).max(axis=1, keepdims=True)).all()
+    close = require_rounding(policy, expected, logits.reshape(len(logits), *policy.description.distributions))
+    np.testing.assert_array_equal(actions[~close], chosen.reshape(actions.shape)[~close])
+    meant = to_commands(policy.actions, n_limbs, actions.reshape(chosen.shape), len(chosen))
+    np.testing.assert_array_equal(commands, meant)
+    return int(close.sum())
+
+
+def require_rounding(policy: LearnedPolicy, shown: np.ndarray, logits: np.ndarray) -> np.ndarray:
+    """Assert that logits are those of numpy but for rounding; returns where it could change an action, shape (n,)."""
+    expected = policy.logits(shown)
+    error = ROUNDING * np.abs(expected).max()
+    assert np.abs(logits - expected).max() <= error
+    first, second = np.sort(expected, axis=2)[..., :-3:-1].transpose(2, 0, 1)
+    return (first - second <= 2.0 * error).any(axis=1)
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", TASKS)
+def test_c_decides_as_numpy_does_in_swims(name, tmp_path):
+    """The policy swims, and C sees, remembers and decides the same, over 5,000 observations."""
+    policy = policy_of(name)
+    compiled, env = Compiled(policy, tmp_path), environment(name, policy)
+    begun, ended, state, swum = np.ones(ROBOTS, bool), np.zeros(ROBOTS, bool), None, []
+    observations, _ = env.reset(seed=0)
+    for _ in range(N_SWUM // ROBOTS):
+        past = None
+        if policy.recollection is not None:
+            at_first = np.repeat(observations[:, None], policy.description.past, axis=1)
+            past = at_first if state is None else np.where(begun[:, None, None], at_first, state[0])
+        chosen, state = policy.predict(observations, state, begun, deterministic=True)
+        swum.append((observations.copy(), past, chosen, begun))
+        observations, _, terminated, truncated, _ = env.step(chosen)
+        begun, ended = ended, terminated | truncated  # the next episode begins a step after the end of the last
+    columns = zip(*swum, strict=True)
+    observations, past, chosen, begun = (None if of[0] is None else np.concatenate(of) for of in columns)
+    robots, places = compiled.robots(ROBOTS + N_SWUM), np.tile(np.arange(ROBOTS), N_SWUM // ROBOTS)
+    for decision in np.flatnonzero(begun):  # every episode has a robot of its own
+        places[decision::ROBOTS] = ROBOTS + decision
+    close = check(compiled, [robots[place] for place in places], observations, past, chosen)
+    assert close < 0.002 * N_SWUM
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", [*TASKS, *OWN])
+def test_c_decides_as_numpy_does_for_random_observations(name, tmp_path):
+    """Over 5,000, whatever robots remember, and with waypoints on the boundaries of sectors."""
+    policy = policy_of(name)
+    compiled, past, state = Compiled(policy, tmp_path), None, None
+    observations, robots = random_observations(policy, N_DRAWN), compiled.robots(N_DRAWN)
+    if policy.recollection is not None:
+        shape = N_DRAWN, policy.description.past, observations.shape[1]
+        past = np.random.default_rng(1).normal(size=shape).astype(np.float32)
+        state = (past,)
+        for robot, before in zip(robots, past, strict=True):
+            compiled.remember(robot, before)
+    chosen, later = policy.predict(observations, state, deterministic=True)
+    assert check(compiled, robots, observations, past, chosen) < 0.002 * N_DRAWN
+    if past is not None:
+        np.testing.assert_array_equal(np.array(robots[7].past).reshape(shape[1:]), later[0][7])
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["learned", "seastar-0.2s", "miswired-0.5s"])
+def test_c_sees_what_the_environment_shows(name, tmp_path):
+    """From positions and velocities, to float32's rounding; from a short history, to the error of differences."""
+    policy, layout = policy_of(name), policy_of(name).description.layout
+    env = environment(name, policy, 4)
+    task = env.unwrapped._task
+    compiled = Compiled(policy, tmp_path, task.scene.robot.nodes_per_limb)
+    env.reset(seed=3)
+    env.action_space.seed(0)
+    for _ in range(3):
+        observations = env.step(env.action_space.sample())[0]
+    simulator, targets = task.simulator, task._targets()
+    x, v = simulator.positions, simulator.velocities
+    for robot, expected in enumerate(observations):
+        limbs = expected[layout.actuators].astype(float) if layout.of_limb else None
+        rest = limbs, None, np.ascontiguousarray(targets[robot])
+        found = compiled.observe(x[robot], v[robot], *rest)
+        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6)
+        history = np.stack([x[robot], x[robot] - 1e-3 * v[robot], x[robot] - 2e-3 * v[robot]])
+        for n in (2, 3):
+            np.testing.assert_allclose(compiled.observe(history, n, 1e-3, *rest), expected, rtol=1e-5, atol=1e-5)
+        still = compiled.observe(history, 1, 1e-3, *rest)
+        assert (still[layout.velocities] == 0.0).all() and (still[layout.hub_velocity] == 0.0).all()
+
+
+@needs_compiler
+def test_velocities_of_three_pictures_are_of_second_order(tmp_path):
+    """Of a robot that speeds up as t^2, they are exact."""
+    compiled, nodes = Compiled(policy_of("learned"), tmp_path), policy_of("learned").scene.robot.nodes()
+    history = np.stack([nodes + [0.01 * (1.0 - 0.1 * k) ** 2, 0.0] for k in range(3)])
+    targets = np.zeros((2, 2))
+    velocity = Layout().hub_velocity
+    three, two = (compiled.observe(history, n, 0.1, None, None, targets)[velocity] for n in (3, 2))
+    np.testing.assert_allclose(VELOCITY_SCALE * three, [0.02, 0.0], atol=1e-8)
+    np.testing.assert_allclose(VELOCITY_SCALE * two, [0.019, 0.0], atol=1e-8)
+
+
+@needs_compiler
+def test_fewer_points_may_be_tracked(tmp_path):
+    """With the hub and two points of every limb, a straight robot is seen as with all nodes."""
+    policy = policy_of("learned")
+    full = Compiled(policy, tmp_path)
+    (tmp_path / "few").mkdir()
+    few = Compiled(policy, tmp_path / "few", points=3)
+    robot, targets = policy.scene.robot, np.array([[0.1, 0.2], [0.3, 0.1]])
+    all_of_it, some = (replace(robot, nodes_per_limb=n).nodes() for n in (robot.nodes_per_limb, 3))
+    still = [shape.copy() * 0.0 for shape in (all_of_it, some)]
+    expected = full.observe(all_of_it, still[0], None, None, targets)
+    np.testing.assert_allclose(few.observe(some, still[1], None, None, targets), expected, atol=1e-6)
+    assert few.defined["POINTS"] == 11
+
+
+@needs_compiler
+def test_the_program_of_the_page_runs(tmp_path):
+    (program,) = re.findall(r"```c\n(.*?)```", (ROOT / "docs" / "controllers.md").read_text(encoding="utf-8"), re.S)
+    (tmp_path / "main.c").write_text(program)
+    (tmp_path / "policy.c").write_text(to_c(policy_of("seastar-0.2s"), "seastar-0.2s", 3))
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic"]
+    subprocess.run(["cc", *flags, str(tmp_path / "main.c"), "-o", str(tmp_path / "main"), "-lm"], check=True)
+    done = subprocess.run([str(tmp_path / "main")], check=True, capture_output=True, text=True)
+    commands = [float(word) for word in done.stdout.split()]
+    assert len(commands) == 5 and set(commands) <= {-1.0, 0.0, 1.0}
+
+
+def test_the_code_allocates_nothing_and_keeps_nothing():
+    text = to_c(policy_of("seastar-0.2s"), "*/ int x; /*\nname")
+    assert "alloc(" not in text and "*/ int x" not in text
+    kept = [line for line in text.splitlines() if line.startswith("static") and "(" not in line]
+    assert kept and all(line.startswith("static const") for line in kept)
+    assert "static" not in CODE.read_text().replace("static void at_", "").replace("static void body_", "").replace(
+        "static float *write_", "").replace("static int element_", "").replace("static float carried", "")  # fmt: skip
+
+
+def test_every_policy_in_the_box_can_be_exported():
+    for name in in_the_box():
+        assert "seastar_act" in to_c(load_policy(name), name)
+
+
+def test_matrices_of_elements_have_two_numbers_in_a_column_at_most():
+    for name in [*TASKS, *OWN]:
+        matrices = tables.carried(policy_of(name).description)
+        assert ((matrices != 0.0).sum(axis=1) <= 2).all()
+
+
+def test_a_robot_with_limbs_on_a_body_is_refused_by_c():
+    scene = Scene(Seastar(nodes_per_limb=4, body=Body.rectangle(0.03, 0.03)))
+    with assert_refused("cannot be exported to C, only to ONNX"):
+        to_c(drawn(Description("pairs", True, scene, (4,))), "body")
+
+
+@pytest.mark.parametrize("points", [1, 1001, 2.5])
+def test_what_is_no_number_of_points_is_refused(points):
+    with assert_refused("points per limb must be a whole number from 2 to 1000"):
+        to_c(policy_of("learned"), "learned", points)
+
+
+@pytest.mark.parametrize("name", [*TASKS, *OWN])
+def test_onnx_decides_as_numpy_does(name):
+    """Over 10,000 random observations, and some on the boundaries of sectors."""
+    pytest.importorskip("onnx", reason="onnx is not installed (extra export)")
+    runtime = pytest.importorskip("onnxruntime", reason="onnxruntime is not installed (extra export)")
+    policy = policy_of(name)
+    session = runtime.InferenceSession(to_onnx(policy, name), providers=["CPUExecutionProvider"])
+    names, close = [output.name for output in session.get_outputs()], 0
+    for seed in range(10):
+        observations, past, state = random_observations(policy, 1000, seed), None, None
+        given = {"observation": observations}
+        if policy.recollection is not None:
+            shape = len(observations), policy.description.past, observations.shape[1]
+            past = np.random.default_rng(seed).normal(size=shape).astype(np.float32)
+            given["past"], state = past, (past,)
+        found = dict(zip(names, session.run(None, given), strict=True))
+        chosen, later = policy.predict(observations, state, deterministic=True)
+        near = require_rounding(policy, input_of(policy, observations, past), found["logits"])
+        np.testing.assert_array_equal(found["action"][~near], chosen[~near])
+        close += int(near.sum())
+        n_limbs = policy.scene.robot.n_limbs
+        np.testing.assert_array_equal(found["commands"], to_commands(policy.actions, n_limbs, found["action"], 1000))
+        if past is not None:
+            np.testing.assert_array_equal(found["later"], later[0])
+    assert close < 20
+
+
+def test_onnx_of_a_robot_with_limbs_on_a_body_is_written(tmp_path):
+    pytest.importorskip("onnx", reason="onnx is not installed (extra export)")
+    scene = Scene(Seastar(nodes_per_limb=4, body=Body.rectangle(0.03, 0.03)))
+    learned.save(drawn(Description("pairs", True, scene, (4,))), tmp_path / "mine.safetensors")
+    assert main(["export", str(tmp_path / "mine.safetensors"), "--to", "onnx", "--out", str(tmp_path / "m.onnx")]) == 0
+    assert (tmp_path / "m.onnx").stat().st_size > 1000
+
+
+def test_the_command_writes_a_file(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", "learned", "--to", "c", "--points", "3"]) == 0
+    assert capsys.readouterr().out.startswith("learned.c: ")
+    assert "#define SEASTAR_POINTS 11\n" in (tmp_path / "learned.c").read_text()
+
+
+@pytest.mark.parametrize(
+    "given, words",
+    [
+        (["greedy", "--to", "c"], "greedy is no learned policy: name a file, .safetensors or the model.zip"),
+        (["none.safetensors", "--to", "c"], "There is no trained policy at none.safetensors"),
+        (["none.zip", "--to", "c"], "There is no trained policy at none.zip"),
+        (["learned", "--to", "onnx", "--points", "3"], "--points is for c"),
+    ],
+)
+def test_the_command_says_what_is_wrong_in_a_sentence(given, words, capsys):
+    assert main(["export", *given]) == 2
+    said = capsys.readouterr().err
+    assert words in said and said.count("\n") == 1
+
+
+def test_onnx_without_its_package_says_what_to_install(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "onnx", None)
+    assert main(["export", "learned", "--to", "onnx"]) == 2
+    assert capsys.readouterr().err == 'ONNX files need onnx: pip install "seastar-gym[export]".\n'
