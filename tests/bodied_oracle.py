@@ -204,25 +204,26 @@ class Touching(Rigid):
 
     def pair(self, ends: Array, i: int, j: int, k: int, share: float, side: float, stiffness: float) -> Pair:
         e = ends[k] - ends[j]
-        normal, t, share = side * np.array([-e[1], e[0]]) / np.linalg.norm(e), self.thickness, min(max(share, 0.0), 1.0)
-        return Pair(i, j, k, share, normal, t[i] + (1.0 - share) * t[j] + share * t[k], stiffness)
+        normal, t, near = side * np.array([-e[1], e[0]]) / np.linalg.norm(e), self.thickness, min(max(share, 0.0), 1.0)
+        return Pair(i, j, k, share, normal, t[i] + (1.0 - near) * t[j] + near * t[k], stiffness)
 
     def limb_at_limb(self, ends: Array, start: Array, limb: int, other: int) -> list[Pair]:
         """Nodes on the side of an edge on which they were, if they were beside it, and in front of its end."""
         star, found = self.star, []
         for edge in range(1, star.nodes_per_limb):
             tail, head = star.node(other, edge - 1), star.node(other, edge)
-            last = np.inf if edge == star.nodes_per_limb - 1 else 1.05
+            is_last = edge == star.nodes_per_limb - 1  # its tip is round
             for i in range(1, star.nodes_per_limb):
                 node = star.node(limb, i)
                 share = along(ends, node, tail, head)
                 before = start if -1.0 <= along(start, node, tail, head) <= 1.0 else ends
                 side = 1.0 if height(before, node, tail, head) > 0.0 else -1.0
-                pair = self.pair(ends, node, tail, head, share, side, self.stiffness(node, 0.5))
-                if share > 1.0:
+                weight = oracle.share_of_edge(min(share, 1.0) if is_last else share, edge, star.nodes_per_limb - 1)
+                pair = self.pair(ends, node, tail, head, share, side, weight * self.stiffness(node, 0.5))
+                if is_last and share > 1.0:
                     way = ends[node] - ends[head]
-                    pair = replace(pair, normal=way / np.linalg.norm(way))
-                if -0.05 < share < last:
+                    pair = replace(pair, share=1.0, normal=way / np.linalg.norm(way))
+                if weight > 0.0:
                     found.append(pair)
         return found
 

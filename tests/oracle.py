@@ -829,6 +829,12 @@ class Touch:
         return max(0.0, self.thickness - float(self.gradient @ ends.ravel()))
 
 
+def share_of_edge(s: float, edge: int, last: int) -> float:
+    """Share of a node's stiffness at edges 1 to `last` of a limb, s along the edge: it passes on around hinges."""
+    full = 0.0 if edge == 1 else 0.25, 1.0 if edge == last else 0.75
+    return float(np.interp(s, [-0.25, *full, 1.25], [0.0, 1.0, 1.0, 0.0]))
+
+
 def touches(star: Star, ends: Array, start: Array, opening_angle: float) -> list[Touch]:
     """Nodes of a limb that meet edges of its neighbours, at `ends`, in a step that began at `start`."""
     thickness = np.zeros(star.n_nodes)
@@ -848,11 +854,12 @@ def touches(star: Star, ends: Array, start: Array, opening_angle: float) -> list
                 wide = thickness[node] + (1.0 - share) * thickness[tail] + share * thickness[head]
                 o, before = start[head] - start[tail], start[node] - start[tail]
                 began = side * (o[0] * before[1] - o[1] * before[0]) / np.linalg.norm(o)
-                if -0.05 < s < 1.05 and began > -wide:
+                weight = share_of_edge(s, edge, star.nodes_per_limb - 1)
+                if weight > 0.0 and began > -wide:
                     gradient = np.zeros((star.n_nodes, 2))
                     gradient[node] += normal
-                    gradient[tail] -= (1.0 - share) * normal
-                    gradient[head] -= share * normal
-                    k = np.pi / 6.0 * star.youngs_modulus * 0.5 * star.voronoi_lengths[node]
+                    gradient[tail] -= (1.0 - s) * normal
+                    gradient[head] -= s * normal
+                    k = weight * np.pi / 6.0 * star.youngs_modulus * 0.5 * star.voronoi_lengths[node]
                     found.append(Touch(gradient.ravel(), wide, k))
     return found

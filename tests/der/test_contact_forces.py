@@ -16,7 +16,6 @@ from seastar_gym.der.terms.contact import (
     those_apart,
 )
 from seastar_gym.der.terms.crossing import edges_cross
-from seastar_gym.der.terms.near_pairs import OVERHANG
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
@@ -51,8 +50,7 @@ def test_forces_neither_push_nor_turn_the_robot():
     size = np.abs(force).max()
     np.testing.assert_allclose(force.sum(axis=1), 0.0, atol=1e-12 * size)
     spin = q[..., 0] * force[..., 1] - q[..., 1] * force[..., 0]
-    # Nodes beyond an edge's end, by up to OVERHANG of it, push its end.
-    assert np.all(np.abs(spin.sum(axis=1)) <= OVERHANG * 0.1 / 3.0 * np.abs(force).sum(axis=(1, 2)))
+    assert np.all(np.abs(spin.sum(axis=1)) <= 1e-12 * np.abs(spin).sum(axis=1))
     assert np.abs(force[:, 7:]).max() == 0.0  # nodes of the limbs that touch nobody
 
 

@@ -12,7 +12,7 @@ H of the star's step.
 
 from seastar_gym.der.linear.star_solution import solve_again, substitute_star
 from seastar_gym.der.terms.body import carry_roots, gather_roots
-from seastar_gym.der.terms.contact import SLOT_ROWS, STIFFNESS, add_gap_gradient, gap, n_listed
+from seastar_gym.der.terms.contact import PRESSED, SLOT_ROWS, add_gap_gradient, gap, n_listed
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, any_lane, load, select, splat, store, subtract_product
 
@@ -25,7 +25,7 @@ def add_contact_product(rods, work, p, sign, rows):
     """rows += sign C K C^T p. Both have the nodes' coordinates and, with a body, its angle; roots follow."""
     carry_roots(rods, work, p)
     for slot in range(n_listed(work)):
-        k = load(work.contact.slots, SLOT_ROWS * slot + STIFFNESS)
+        k = load(work.contact.slots, SLOT_ROWS * slot + PRESSED)
         add_gap_gradient(rods, work, slot, sign * k * gap(rods, work, slot, p), rows)
     gather_roots(rods, work, rows)
 

@@ -52,9 +52,9 @@ from seastar_gym.simd.lanes import (
 )
 from seastar_gym.simd.rows import aligned_rows
 
-SLOT_ROWS = 6
-N_X, N_Y, SHARE, OFFSET, THICKNESS, STIFFNESS = range(SLOT_ROWS)
-"""Rows of a listed pair of node and edge, see contact.py."""
+SLOT_ROWS = 7
+N_X, N_Y, SHARE, OFFSET, THICKNESS, STIFFNESS, PRESSED = range(SLOT_ROWS)
+"""Rows of a listed pair of node and edge. STIFFNESS: [N/m]. PRESSED: That of the Hessian, 0 where they do not touch."""
 
 
 MOST_NEAR_EDGES, SHORT_CHAIN = 3, 24
@@ -298,10 +298,9 @@ def add_contact(rods, work, stage, convex, energy):
         g = add_product(load(work.contact.slots, row + OFFSET), lead, gap(rods, work, slot, work.q))
         depth = load(work.contact.slots, row + THICKNESS) - g
         depth = positive_part(depth)
-        i, _, head = members(rods, work, slot)
-        k = select(depth > 0.0, stiffness_at(rods, i, head), 0.0)
+        k = select(depth > 0.0, load(work.contact.slots, row + STIFFNESS), 0.0)
         twice = add_product(twice, k * depth, depth)
-        store(work.contact.slots, row + STIFFNESS, lead * k)
+        store(work.contact.slots, row + PRESSED, lead * k)
         touching = select(depth > 0.0, 1.0, touching)
         add_gap_gradient(rods, work, slot, k * depth, work.contact.force)
     store(work.contact.touching, 0, touching)
@@ -331,8 +330,8 @@ def add_contact_energy(rods, work, q, energy):
     if rods.contact is None:
         return energy
     for slot in range(n_listed(work)):
-        i, _, head = members(rods, work, slot)
-        depth = load(work.contact.slots, SLOT_ROWS * slot + THICKNESS) - gap(rods, work, slot, q)
+        row = SLOT_ROWS * slot
+        depth = load(work.contact.slots, row + THICKNESS) - gap(rods, work, slot, q)
         depth = positive_part(depth)
-        energy = add_product(energy, 0.5 * stiffness_at(rods, i, head) * depth, depth)
+        energy = add_product(energy, 0.5 * load(work.contact.slots, row + STIFFNESS) * depth, depth)
     return energy

@@ -8,13 +8,16 @@ from seastar_gym.der.terms.contact import (
     N_X,
     N_Y,
     OFFSET,
+    PRESSED,
     SHARE,
     SLOT_ROWS,
     STIFFNESS,
     THICKNESS,
     gap_at_rest,
     looked_at,
+    members,
     n_listed,
+    stiffness_at,
 )
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import (
@@ -31,7 +34,7 @@ from seastar_gym.simd.lanes import (
     subtract_product,
 )
 
-OVERHANG = 0.05  # of an edge: so far beyond its ends it still meets nodes, which leaves no wedge at a bent hinge
+OVERHANG = 0.25  # of an edge: so far from its ends, on either side, it shares nodes with the next, see share_of_edge
 MARGIN = 2.0  # times the thickness: pairs nearer than that are listed, and those that approach faster
 OUT_OF_TOUCH = 1e300  # [m]
 
@@ -185,6 +188,20 @@ def list_pairs(rods, work, stage, q_0, reach, limb, other, side, end, robots):
 
 
 @kernel
+def share_of_edge(rods, e, s):
+    """Share of a node's stiffness that it has at an edge, s: where it stands along the edge.
+
+    Around a hinge it passes linearly from one edge to the next: both together are one node. From the ends of a limb it
+    falls to zero beyond them, but not where tips are round.
+    """
+    edges = rods.edges_per_limb
+    behind = (s + OVERHANG) * ((1.0 if e % edges == 0 else 0.5) / OVERHANG)
+    ahead = (last_share(rods, e) - s) * ((1.0 if e % edges == edges - 1 else 0.5) / OVERHANG)
+    share = select(behind < ahead, behind, ahead)
+    return select(share < 1.0, share, 1.0)
+
+
+@kernel
 def last_share(rods, e):
     """Share of an edge up to which it meets nodes; on a body tips are round, and meet those in front of them, too."""
     edges = rods.edges_per_limb
@@ -198,7 +215,7 @@ def list_pair_on_its_side(rods, work, stage, q_0, i, e, s, facing):
     The side is that of the step's beginning, if the node was beside the edge then, or at most the edge's length behind.
     Otherwise it is that of the first guess.
     """
-    j, k, ends = tail_node(rods, e), e + 1, work.contact.ends
+    j, k, ends, edges = tail_node(rods, e), e + 1, work.contact.ends, rods.edges_per_limb
     fx, fy = edge_vector(q_0, j, k)
     hx, hy = edge_vector(q_0, j, i)
     squared = add_product(fx * fx, fy, fy)
@@ -212,17 +229,24 @@ def list_pair_on_its_side(rods, work, stage, q_0, i, e, s, facing):
     side = select(select(was_beside, g_0, g) > 0.0, scale, -scale)
     tx, ty = edge_vector(ends, k, i)
     size = sqrt(add_product(tx * tx, ty, ty))
-    in_front = (s > 1.0) & (size > 0.0)
+    in_front = (s > (np.inf if e % edges < edges - 1 else 1.0)) & (size > 0.0)
     nx, ny = select(in_front, tx / size, -ey * side), select(in_front, ty / size, ex * side)
     g = select(in_front, size, add_product(dx * nx, dy, ny))
     ux, uy = edge_vector(q_0, k, i)
     g_0 = select(in_front, sqrt(add_product(ux * ux, uy, uy)), absolute(g_0))
-    s = select(s > 0.0, select(s < 1.0, s, 1.0), 0.0)
-    tail = load(rods.contact.thickness, j)
-    d = load(rods.contact.thickness, i) + add_product(tail, s, load(rods.contact.thickness, k) - tail)
+    share, d = share_of_edge(rods, e, s), thickness_of_pair(rods, i, j, k, s)
+    s = select(in_front, 1.0, s)
     near = facing & (g < MARGIN * d + absolute(g - g_0))
     if any_lane(near):
-        put_on_list(rods, work, stage, i, e, nx, ny, s, d, near)
+        put_on_list(rods, work, stage, i, e, nx, ny, s, d, share, near)
+
+
+@kernel
+def thickness_of_pair(rods, i, j, k, s):
+    """Distance at which node i touches the edge from j to k [m], s: where along it, or at its nearer end."""
+    s = select(s > 0.0, select(s < 1.0, s, 1.0), 0.0)
+    tail = load(rods.contact.thickness, j)
+    return load(rods.contact.thickness, i) + add_product(tail, s, load(rods.contact.thickness, k) - tail)
 
 
 @kernel
@@ -232,17 +256,19 @@ def list_pair(rods, work, stage, q_0, i, e, side, nx, ny, s, g, facing):
     ex, ey = edge_vector(q_0, j, k)
     dx, dy = edge_vector(q_0, j, i)
     g_0 = side * subtract_product(ex * dy, ey, dx) / sqrt(add_product(ex * ex, ey, ey))
-    s = select(s > 0.0, select(s < 1.0, s, 1.0), 0.0)
-    tail = load(rods.contact.thickness, j)
-    d = load(rods.contact.thickness, i) + add_product(tail, s, load(rods.contact.thickness, k) - tail)
+    share, d = share_of_edge(rods, e, s), thickness_of_pair(rods, i, j, k, s)
     near = facing & (g_0 > -d) & (g < MARGIN * d + absolute(g - g_0))
     if any_lane(near):
-        put_on_list(rods, work, stage, i, e, nx, ny, s, d, near)
+        put_on_list(rods, work, stage, i, e, nx, ny, s, d, share, near)
 
 
 @kernel
-def put_on_list(rods, work, stage, i, e, nx, ny, s, d, near):
-    """List node i and edge e for the robots in the mask: normal (nx, ny), share s of the edge, thickness d [m]."""
+def put_on_list(rods, work, stage, i, e, nx, ny, s, d, share, near):
+    """List node i and edge e for the robots in the mask.
+
+    The edge's point is at s along it, its normal (nx, ny), the thickness d [m], and the pair has a share of the node's
+    stiffness.
+    """
     # Every robot has a share of the list of its own, so that nobody takes another's place.
     own = load(work.contact.own, 0)
     full = near & (own >= work.contact.share)
@@ -262,7 +288,9 @@ def put_on_list(rods, work, stage, i, e, nx, ny, s, d, near):
     store(work.contact.slots, row + SHARE, select(near, s, 0.0))
     store(work.contact.slots, row + THICKNESS, select(near, d, -OUT_OF_TOUCH))
     store(work.contact.slots, row + OFFSET, select(near, gap_at_rest(rods, work, stage, slot), 0.0))
-    store(work.contact.slots, row + STIFFNESS, 0.0)
+    _, _, head = members(rods, work, slot)
+    store(work.contact.slots, row + STIFFNESS, select(near, share * stiffness_at(rods, i, head), 0.0))
+    store(work.contact.slots, row + PRESSED, 0.0)
 
 
 @kernel
@@ -299,7 +327,7 @@ def list_node_at_disc(rods, work, stage, q_0, i, robots):
     g, g_0 = size - rim, sqrt(add_product(dx * dx, dy, dy)) - rim
     near = robots & (size > 0.0) & (g_0 > -d) & (g < MARGIN * d + absolute(g - g_0))
     if any_lane(near):
-        put_on_list(rods, work, stage, i, rods.n_edges, nx, ny, splat(0.0), d + rim, near)
+        put_on_list(rods, work, stage, i, rods.n_edges, nx, ny, splat(0.0), d + rim, splat(1.0), near)
 
 
 @kernel
@@ -350,7 +378,7 @@ def list_node_at_sides(rods, work, stage, q_0, i, robots):
             near = beside & (beyond | (over > 0.0) | (over >= height)) & (g < MARGIN * d + absolute(g - g_0))
             if any_lane(near):
                 s = select(s < 1.0, s, 1.0)
-                put_on_list(rods, work, stage, i, rods.n_edges + side, nx, ny, s, d, near)
+                put_on_list(rods, work, stage, i, rods.n_edges + side, nx, ny, s, d, splat(1.0), near)
 
 
 @kernel
@@ -376,4 +404,4 @@ def list_corner(rods, work, stage, q_0, corner, e, robots):
     d = add_product(tail, s, load(rods.contact.thickness, k) - tail)
     near = facing & (g - rim < MARGIN * d + absolute(g - absolute(g_0)))
     if any_lane(near):
-        put_on_list(rods, work, stage, i, e, nx, ny, s, d + rim, near)
+        put_on_list(rods, work, stage, i, e, nx, ny, s, d + rim, splat(1.0), near)
