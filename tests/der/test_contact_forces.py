@@ -6,6 +6,8 @@ import pytest
 from hubs import TEN
 from seastar_gym import Scene
 from seastar_gym.der.terms.contact import (
+    SLOT_ROWS,
+    STIFFNESS,
     add_contact,
     add_contact_energy,
     add_gap_gradient,
@@ -16,10 +18,11 @@ from seastar_gym.der.terms.contact import (
     those_apart,
 )
 from seastar_gym.der.terms.crossing import edges_cross
+from seastar_gym.der.terms.near_pairs import freeze_contact, share_of_edge
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask
-from slopes import NO_RODS, NO_WORK, plain, rows, slope
+from slopes import NO_RODS, NO_WORK, nodes, plain, rows, slope
 from touching import touching_limbs
 
 EVERYONE = Mask(np.ones(N_LANES, bool))
@@ -52,6 +55,42 @@ def test_forces_neither_push_nor_turn_the_robot():
     spin = q[..., 0] * force[..., 1] - q[..., 1] * force[..., 0]
     assert np.all(np.abs(spin.sum(axis=1)) <= 1e-12 * np.abs(spin).sum(axis=1))
     assert np.abs(force[:, 7:]).max() == 0.0  # nodes of the limbs that touch nobody
+
+
+def listed_stiffness(touching, q) -> np.ndarray:
+    """Stiffness of all listed pairs of every node at positions q [N/m], shape (n_nodes, N_LANES)."""
+    rods, work = touching.rods, touching.work
+    work.q[:] = rows(q)
+    freeze_contact.plain(rods, work, touching.stage, rows(q))
+    total = np.zeros((rods.n_nodes, N_LANES))
+    for slot in range(n_listed.plain(work)):
+        total[members.plain(rods, work, slot)[0]] += work.contact.slots[SLOT_ROWS * slot + STIFFNESS]
+    return total
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.04, 0.2, 0.25, 0.5, 0.7, 0.75, 0.97])
+def test_a_node_counts_once_wherever_along_a_limb_it_stands(shift):
+    """Limb 2 lies beside limb 1, so many edges nearer to the hub; both of its nodes meet edges of limb 1."""
+    touching = touching_limbs()
+    q = nodes(touching.q_0)[0]
+    length = 0.1 / 3.0
+    q[1:4] = np.outer([1.0, 2.0, 3.0], [length, 0.0])
+    q[4:7] = q[1:4] + [-shift * length, 3e-3]
+    found = listed_stiffness(touching, q)
+    whole = touching.rods.contact.stiffness
+    np.testing.assert_allclose(found[5:7], np.broadcast_to(whole[5:7, None], (2, N_LANES)), rtol=1e-9)
+
+
+def test_edges_of_a_hinge_share_a_node_and_a_limb_ends_beyond_its_ends():
+    rods = touching_limbs().rods
+
+    def share(edge, s):
+        return max(0.0, float(plain(share_of_edge.plain(rods, edge, Lanes(s)))))
+
+    for s in np.linspace(-0.5, 0.5, 21):
+        assert share(0, 1.0 + s) + share(1, s) == pytest.approx(1.0)
+    assert [share(2, 1.0), share(2, 1.125), share(2, 1.25)] == pytest.approx([1.0, 0.5, 0.0])
+    assert [share(0, 0.0), share(0, -0.125), share(0, -0.25)] == pytest.approx([1.0, 0.5, 0.0])
 
 
 def test_a_gap_is_linear_and_its_gradient_what_is_added_to_rows():

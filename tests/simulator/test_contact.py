@@ -183,6 +183,25 @@ def test_schemes_agree_on_limbs_that_meet():
     assert np.linalg.norm(fine) < 0.02 * np.linalg.norm(swim("sdirk2", 5e-4))
 
 
+@pytest.mark.parametrize("damping", [0.0, 0.003])
+def test_paths_of_pressed_limbs_converge_with_the_nodes(damping):
+    """Twice the nodes, an error at most a third as large, and with 19 nodes within 2 % of the path; without numerical
+    damping, too: contact itself feeds no energy to the limbs.
+    """
+    commands = np.array([[0.0, 1.0, -1.0, 1.0, -1.0], [1.0, -1.0, 0.0, 0.0, 0.0]])
+
+    def swim(nodes):
+        numerics = Numerics("implicit-midpoint", 2e-3, newton_tolerance=1e-8, damping=damping)
+        simulator = Simulator(Scene(Seastar(nodes_per_limb=nodes), numerics=numerics, contact=Contact()), 2)
+        for _ in range(2):
+            simulator.stroke(commands)
+        return simulator.hub_position()
+
+    limit = swim(37)
+    coarse, fine = (np.linalg.norm(swim(nodes) - limit, axis=1) for nodes in (10, 19))
+    assert np.all(fine < 0.02 * np.linalg.norm(limit, axis=1)) and np.all(fine < coarse / 3.0)
+
+
 @pytest.mark.parametrize(("speed", "stopped"), [(5.0, False), (100.0, True)])
 @pytest.mark.parametrize("numerics", [Numerics("sdirk2", 0.02), Numerics("implicit-midpoint", 5e-3)], ids=str)
 def test_neighbours_thrown_at_each_other_bounce_or_stop_but_never_cross(numerics, speed, stopped):

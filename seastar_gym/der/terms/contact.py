@@ -5,7 +5,10 @@ on which the node's limb belongs. Where g is below d, their thicknesses' sum, el
 
     V = k (d - g)^2 / 2,    k the contact modulus times half the node's Voronoi length,
 
-half, because the nodes of either limb meet the edges of the other. Who is near whom, n and s are taken from the first
+half, because the nodes of either limb meet the edges of the other. A node that stands at a hinge meets both of its
+edges, and V is shared among them so that it counts once wherever it stands: otherwise limbs that slide along each other
+gain energy at every hinge, which no mesh and no step resolves. The shared edges are continued beyond their ends, s may
+be below 0 and above 1, so that forces turn nobody. Who is near whom, n and s are taken from the first
 guess of a stage, see fluid.py: g is linear in the places, V convex in them, k c c^T its Hessian, c the gradient of g,
 and the forces on node and edge cancel. That Hessian couples limbs, so it is not in the star's matrix, see coupled.py.
 

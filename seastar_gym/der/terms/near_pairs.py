@@ -151,6 +151,12 @@ def view_node(work, node, wx, wy):
 
 
 @kernel
+def lower_end(a, b):
+    """The lower end of an edge with ends at a and b, continued by OVERHANG."""
+    return select(a < b, subtract_product(a, OVERHANG, b - a), subtract_product(b, OVERHANG, a - b))
+
+
+@kernel
 def list_pairs(rods, work, stage, q_0, reach, limb, other, side, end, robots):
     """List the nodes of a limb that are near edges of another, which has it on its left (side 1) or right (-1).
 
@@ -161,12 +167,12 @@ def list_pairs(rods, work, stage, q_0, reach, limb, other, side, end, robots):
     for e in range(other * edges, other * edges + edges):
         j, k = tail_node(rods, e), e + 1
         forth_j, forth_k = -side * load(seen, 2 * j), -side * load(seen, 2 * k)
-        begin = select(forth_j < forth_k, forth_j, forth_k) - reach
+        begin = lower_end(forth_j, forth_k) - reach
         reached = robots & (end > begin)
         if not any_lane(reached):
             continue
         z_j, z_k = load(seen, 2 * j + 1), load(seen, 2 * k + 1)
-        lowest, highest = select(z_j < z_k, z_j, z_k) - reach, select(z_j < z_k, z_k, z_j) + reach
+        lowest, highest = lower_end(z_j, z_k) - reach, reach - lower_end(-z_j, -z_k)
         ex, ey = edge_vector(ends, j, k)
         inverse = 1.0 / add_product(ex * ex, ey, ey)
         scale = side * sqrt(inverse)
