@@ -63,6 +63,7 @@ PARTS = {
     "grid": {"fluid": Water(current=WAVES)},
     "contact": {"contact": Contact(1e5 / 3, 0.2)},
     "contact of each robot": {"contact": Contact(1e5 * EACH)},
+    "layers of each robot": {"contact": Contact(layer=5e-3 * EACH)},
     "loads": {"loads": ((9, 0.0, 1e-3 / 3), (18, -1e-4, 0.0))},
     "held nodes": {"held_nodes": (3, 0)},
     "hub hinges": {"robot": Seastar(nodes_per_limb=8, discretisation="chapter")},

@@ -99,7 +99,9 @@ def make_rods(scene: Scene, index: int = 0) -> Rods:
         load=loads,
         contact=None
         if touch is None
-        else contact.coefficients(mesh, robot.limbs_that_may_touch(), touch.modulus, touch.opening_angle, rim),
+        else contact.coefficients(
+            mesh, robot.limbs_that_may_touch(), touch.modulus, touch.opening_angle, rim, touch.layer
+        ),
         scales=scales.coefficients(mesh, stretched, robot.density, water.density, C_d, mass, scene.held_nodes),
         body=None if on_body is None else on_body.coefficients,
     )

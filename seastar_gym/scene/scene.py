@@ -114,6 +114,8 @@ class Scene:
     def _check_contact(self) -> None:
         if self.contact is None:
             return
+        if self.contact.layer is not None:
+            self._check_layer(as_tuple(self.contact.layer))
         if self.robot.body is not None and self.robot.has_body:
             self._check_contact_with_body(self.robot.body, self.contact)
             return
@@ -132,6 +134,18 @@ class Scene:
                 raise ValueError(
                     "Limbs of this robot cross at rest, so contact cannot keep them apart: bend them less."
                 )
+
+    def _check_layer(self, layers: tuple[float, ...]) -> None:
+        """Refuse layers of contact whose modulus overflows or vanishes."""
+        robots = [chosen(self.robot, choose) for choose in (min, max)]
+        EI = [cut.EI for robot in robots for limb in robot.limb_shapes() for cut in limb.corners(robot.density)]
+        with np.errstate(all="ignore"):
+            moduli = 4.0 * np.array(EI)[:, None] / np.array(layers) ** 4
+        if not (np.isfinite(moduli) & (moduli > 0.0)).all():
+            raise ValueError(
+                f"Contact.layer={_span(layers)} m has a modulus that overflows or vanishes in double "
+                "precision: use a length closer to the limbs' radius."
+            )
 
     def _check_contact_with_body(self, body: Body, contact: Contact) -> None:
         from seastar_gym.scene.at_rest import touching_at_rest  # few scenes need it

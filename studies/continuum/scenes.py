@@ -27,6 +27,7 @@ PARTS: dict[str, dict[str, Any]] = {
     "drag along limbs": {"fluid": Water(tangential_drag_coefficient=0.1)},
     "added mass": {"fluid": Water(added_mass_coefficient=1.0)},
     "contact": {"contact": Contact()},
+    "contact, layer of 10 mm": {"contact": Contact(layer=10e-3)},
 }
 """Other parts of a scene than the robot."""
 

@@ -73,7 +73,7 @@ PARTS: Calls = {
     "GridCurrent": (GridCurrent, dict(corner=(0.0, 0.0), spacing=0.1, velocities=np.ones((2, 2, 2)))),
     "GridCurrent.from_function": (GridCurrent.from_function, dict(
         function=lambda x, y: (0.0 * x, y), x=(0.0, 1.0), y=(0.0, 1.0), spacing=0.5)),
-    "Contact": (Contact, dict(modulus=1e5, opening_angle=0.2)),
+    "Contact": (Contact, dict(layer=5e-3, opening_angle=0.2)),
     "SmaPulse": (SmaPulse, dict(peak_angle=0.5, heating_time=0.1, cooling_time=0.9)),
     "SmaWires": (SmaWires, dict(peak_angle=0.5, heating_time=0.1, cooling_time=0.9, period=0.5, deaf=False,
                                 heating_power=5.0)),

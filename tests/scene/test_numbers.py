@@ -50,7 +50,7 @@ from seastar_gym.scene.serial import KINDS
 NOT_A_NUMBER = [math.nan, math.inf, -math.inf, "0.1", None, True, 1j, [0.1]]
 POSITIVE = {
     Seastar: "limb_length rod_radius youngs_modulus density", Limb: "length radius youngs_modulus joint_stiffness",
-    Body: "height", Vortex: "core_radius", GridCurrent: "spacing", Contact: "modulus opening_angle",
+    Body: "height", Vortex: "core_radius", GridCurrent: "spacing", Contact: "modulus opening_angle layer",
     Stiffening: "ratio width", SmaPulse: "heating_time cooling_time", SmaWires: "heating_time cooling_time period",
     SmaLimb: "rise middle time_constant heating_time period", Limited: "largest_angle largest_rate",
     ThermalSma: "heating_time cooling_time time_constant steady_rise", Numerics: "step newton_tolerance",

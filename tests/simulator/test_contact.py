@@ -8,7 +8,8 @@ import pytest
 import oracle
 from hubs import TEN
 from refusals import assert_refused
-from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
+from seastar_gym import Contact, Limb, Numerics, Scene, Seastar, Simulator, SmaPulse, Strip, Water
+from seastar_gym.model.mesh import make_mesh
 from seastar_gym.model.rods import make_rods
 from strokes import finished
 
@@ -226,6 +227,22 @@ def test_a_long_limb_meets_one_beyond_its_neighbour():
     assert len(make_rods(Scene(TEN, contact=Contact())).contact.pairs) == 10
 
 
+def test_the_modulus_of_a_layer_is_that_of_a_beam_on_an_elastic_foundation():
+    """k = 4 EI/layer^4 of every limb's own bending stiffness; the default's layer is the fourth root of six radii."""
+    limbs = (Limb(), Limb(youngs_modulus=2e6), Limb(section=Strip(3e-3, 8e-3)), Limb(radius=(2e-3, 1e-3)), Limb())
+    robot, layer = Seastar(nodes_per_limb=10, limbs=limbs), 5e-3
+    mesh = make_mesh(robot.limb_shapes(), 10, robot.density)
+    found = make_rods(Scene(robot, contact=Contact(layer=layer))).contact.stiffness[1:].reshape(5, 9)
+    modulus = 2.0 * found / mesh.dl[1:].reshape(5, 9)
+    np.testing.assert_allclose(4.0 * mesh.at_nodes.EI[:, 1:] / modulus, layer**4, rtol=1e-12)
+    assert modulus[2] == pytest.approx(4.0 * 1e6 * 8e-3 * 3e-3**3 / 12.0 / layer**4)
+    by_layer, default = (
+        make_rods(Scene(TEN, contact=each)).contact.stiffness
+        for each in (Contact(layer=6.0**0.25 * TEN.rod_radius), Contact())
+    )
+    np.testing.assert_allclose(by_layer, default, rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
@@ -233,6 +250,9 @@ def test_a_long_limb_meets_one_beyond_its_neighbour():
         (lambda: Scene(TEN, contact=Contact(opening_angle=1.3)), "touch at rest"),
         (lambda: Scene(robot=Seastar(n_limbs=1), actuator=SmaPulse(peak_angle=0.0), contact=Contact()), "half a turn"),
         (lambda: Scene(robot=CROSSED, contact=Contact()), "cross at rest"),
+        (lambda: Contact(modulus=1e5, layer=5e-3), "either a modulus [Pa] or a layer [m]"),
+        (lambda: Scene(TEN, contact=Contact(layer=1e-90)), "Contact.layer=1e-90 m has a modulus that overflows"),
+        (lambda: Scene(TEN, contact=Contact(layer=1e90)), "Contact.layer=1e+90 m has a modulus that overflows"),
     ],
 )
 def test_bad_contact_is_refused_in_one_sentence(make, sentence):

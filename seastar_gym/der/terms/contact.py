@@ -137,17 +137,19 @@ def coefficients(
     modulus: float | None,
     opening_angle: float,
     rim: Rim | None = None,
+    layer: float | None = None,
 ) -> Contact:
     """Thickness and stiffness of every node; half of the latter, because nodes of both limbs push.
 
-    pairs: (right, left) limbs that may touch, counted from 0. modulus: Force per length and depth [Pa]; None for that
-    of elastic cylinders. opening_angle: Angle at which the cones near the hub touch [rad]. rim: Of a body, or None.
+    pairs: (right, left) limbs that may touch, counted from 0. modulus, layer: See moduli_at_nodes. opening_angle: Angle
+    at which the cones near the hub touch [rad]. rim: Of a body, or None.
     """
     share = np.arange(mesh.nodes_per_limb) / (mesh.nodes_per_limb - 1)
     thickness, stiffness = [0.0], [0.0]
-    for length, reaches, moduli in zip(mesh.limb_lengths, mesh.at_nodes.reach, mesh.modulus_at_nodes, strict=True):
+    at_nodes = moduli_at_nodes(mesh, modulus, layer)
+    for length, reaches, moduli in zip(mesh.limb_lengths, mesh.at_nodes.reach, at_nodes, strict=True):
         thickness += [min(r, 0.5 * opening_angle * length * s) for r, s in zip(reaches, share, strict=True)][1:]
-        stiffness += [OF_CYLINDERS * E if modulus is None else modulus for E in moduli][1:]
+        stiffness += moduli.tolist()[1:]
     corners, radius = Rim(np.zeros((0, 2)), 0.0) if rim is None else rim
     beyond = [] if rim is None else [0.0] * (1 + mesh.n_limbs)
     reach = radius + np.hypot(*corners.T).max(initial=0.0) + max(mesh.limb_lengths) / (mesh.nodes_per_limb - 1)
@@ -161,6 +163,18 @@ def coefficients(
         rim=np.array([radius]),
         reach=np.array([reach]),
     )
+
+
+def moduli_at_nodes(mesh: Mesh, modulus: float | None, layer: float | None) -> np.ndarray:
+    """Force per length and depth at the nodes of every limb [Pa], shape (n_limbs, nodes_per_limb).
+
+    modulus: The same for all [Pa]. layer: Of a beam on an elastic foundation [m]. Both None for elastic cylinders.
+    """
+    if layer is not None:
+        return 4.0 * mesh.at_nodes.EI / layer**4
+    if modulus is not None:
+        return np.full_like(mesh.modulus_at_nodes, modulus)
+    return OF_CYLINDERS * mesh.modulus_at_nodes
 
 
 def memory(contact: Contact | None, n_limbs: int, edges: int, n_points: int) -> ContactWork | None:
