@@ -12,21 +12,24 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
-from seastar_gym import Numerics, Scene
+from seastar_gym import Numerics, Scene, Sight, Simulator, SmaWires
 from symmetries import symmetry_for
 
 PAGE = Path(__file__).parents[1] / "docs" / "reference_modules.md"
 NAMES = re.compile(r"^<!-- site: names (\S+) (.*) -->$", re.MULTILINE)
 
 FAST = Scene(numerics=Numerics.preset("fast"))
+WIRES = Scene(actuator=SmaWires(), numerics=Numerics.preset("fast"))
 PATH = np.array([[0.03, 0.0]])
 MADE_BY_THE_PACKAGE = {
     "Setting", "Episode", "Episodes", "Estimate", "Outcome", "Score", "Swim", "Tally",
     "Actuator", "ActuatorBase", "Executor", "Policy", "Challenge", "Numbered", "Swimming",
+    "Plant", "PlantError", "Sighting",
 }  # fmt: skip
 """Records that functions return, protocols, and bases of classes of one's own."""
-UNCALLED = {*MADE_BY_THE_PACKAGE, "Here", "RayTasks", "SlurmArrays", "chapters_certificate"}
-"""What takes no arguments, or needs Ray or submitit, is not called either."""
+UNCALLED = {*MADE_BY_THE_PACKAGE, "Here", "RayTasks", "SlurmArrays", "chapters_certificate",
+            "LinePlant", "open_serial", "serve"}  # fmt: skip
+"""What takes no arguments, or needs Ray, submitit or a serial line, is not called either."""
 
 
 def documented() -> dict[str, str]:
@@ -158,6 +161,10 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         "timed_certificate": dict(decision_period=0.2),
         "make_path": dict(path="random", rng=rng(0)),
         "Layout": dict(n_limbs=5, of_limb=0, entries=(), shows_limbs=True, stations=9),
+        "Limits": dict(longest_pulse=0.12, shortest_rest=0.1, patience=0.12, oldest=0.5),
+        "SimulatedPlant": dict(simulator=Simulator(WIRES), sight=Sight(), seed=0, paced=False),
+        "PlantSwim": dict(plant=named("SimulatedPlant")(Simulator(WIRES)), limits=named("Limits")(), logs=None,
+                          render_mode=None, frames_per_stroke=None, decision_period=0.5, scene=WIRES),
         "Recollection": dict(symmetry=symmetry_for(5), past=1),
         "Symmetry": dict(group=5, mirror=(), layout=named("Layout")(5), actions="limbs"),
         "VectorMemory": dict(env=batch(), past=1),

@@ -66,7 +66,7 @@ class Description(NamedTuple):
         facts = self._asdict()
         kinds, shows_limbs, stations = (facts.pop(name) for name in ("entries", "shows_limbs", "stations"))
         rows = [WRITTEN_AS.get(kind, kind) for kind in kinds] if isinstance(kinds, tuple) else kinds
-        fewer = {} if stations == N_STATIONS else {"stations": stations}
+        fewer = {} if is_whole_number(stations) and stations == N_STATIONS else {"stations": stations}
         return {**facts, "own": {"kinds": rows, "with_stations": shows_limbs, **fewer}}
 
     @classmethod

@@ -6,15 +6,17 @@ docs/plant.md has the table of all lines. Every line ends with the checksum of N
 import errno
 import os
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from functools import reduce
+from io import FileIO
 from operator import xor
 from typing import Protocol
 
 import numpy as np
 
 from seastar_gym.plant.plant import Plant, PlantError, Sighting
-from seastar_gym.plant.simulated import SimulatedPlant
+from seastar_gym.scene.checks import shown
 
 VERSION = "1"
 """Version of the lines."""
@@ -31,6 +33,26 @@ class Channel(Protocol):
 
     def fileno(self) -> int:
         """Number of the descriptor."""
+
+
+def open_serial(device: str, baud: int = 115200) -> FileIO:
+    """Serial line of this rate, without echo and without waiting. PlantError: there is none."""
+    import termios
+    import tty
+
+    try:
+        line = FileIO(os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK), "r+")
+    except OSError as refused:
+        raise PlantError(f"{device} cannot be opened: {(refused.strerror or 'unknown error').lower()}.") from None
+    try:
+        tty.setraw(line.fileno())
+        settings = termios.tcgetattr(line)
+        settings[4] = settings[5] = getattr(termios, f"B{baud}")
+        termios.tcsetattr(line, termios.TCSANOW, settings)
+    except termios.error:
+        line.close()
+        raise PlantError(f"{device} is no serial line.") from None
+    return line
 
 
 class LineError(ValueError):
@@ -59,7 +81,9 @@ class Lines:
     """Lines over a file that is read without waiting."""
 
     def __init__(self, file: Channel):
-        self._file, self._rest = file, b""
+        if not callable(getattr(file, "fileno", None)):
+            raise ValueError(f"A line needs something with a descriptor, such as a socket, not {shown(file)}.")
+        self._file, self._rest, self._whole = file, b"", deque[bytes]()
         os.set_blocking(file.fileno(), False)
 
     def send(self, line: str) -> None:
@@ -81,8 +105,9 @@ class Lines:
         if len(self._rest) > LONGEST_LINE:
             self._rest = b""
             raise LineError(f"A line has more than {LONGEST_LINE} bytes.")
-        for line in whole:
-            yield opened(line)
+        self._whole.extend(whole)
+        while self._whole:
+            yield opened(self._whole.popleft())
 
     def _read(self) -> bytes:
         try:
@@ -135,7 +160,16 @@ class LinePlant:
             if clock() > until:
                 raise PlantError(f"The plant did not answer within {HELLO:g} s: is it connected, and switched on?")
             time.sleep(0.005)
-            self._take(self._wires)
+            self._listen()
+
+    def _listen(self) -> None:
+        """Hear the answer among what is left of earlier drives."""
+        try:
+            for words in self._wires.received():
+                if words[0] == "hello":
+                    self._understand(words)
+        except LineError:
+            return  # the beginning of a line that was under way
 
     def wait(self, seconds: float) -> None:
         """Return after so many seconds."""
@@ -154,7 +188,8 @@ class LinePlant:
             for words in lines.received():
                 self._understand(words)
         except LineError as bad:
-            raise PlantError(str(bad)) from None
+            if self._seen is not None or lines is self._wires:  # before, it is the beginning of a line under way
+                raise PlantError(str(bad)) from None
 
     def _understand(self, words: list[str]) -> None:
         match words:
@@ -164,10 +199,8 @@ class LinePlant:
                 raise PlantError(f"The plant speaks version {version[:20]} of the lines, this is version {VERSION}.")
             case ["error", *words]:
                 raise PlantError(f"The plant has stopped: {' '.join(words)}")
-            case ["sight", *_] if self.n_limbs:
-                self._seen = sighting_of(words, self.now(), self.n_limbs)
             case ["sight", *_]:
-                pass  # of a tracker that was there before
+                self._seen = sighting_of(words, self.now(), self.n_limbs)
             case _:
                 raise LineError(f"A plant says no {' '.join(words)[:60]!r}.")
 
@@ -239,7 +272,7 @@ class Server:
         return self._greeted and says_all and set(signs) <= set("-0+")
 
 
-def serve(plant: SimulatedPlant, wires: Channel, tracker: Channel | None = None, seconds: float = np.inf) -> None:
+def serve(plant: Plant, wires: Channel, tracker: Channel | None = None, seconds: float = np.inf) -> None:
     """Be the other end of a `LinePlant` for so many seconds."""
     server, until = Server(plant, wires, tracker), plant.now() + seconds
     while plant.now() < until:

@@ -21,7 +21,7 @@ from seastar_gym.envs.tracker import Pictures
 from seastar_gym.plant.guard import Guard, Limits
 from seastar_gym.plant.logs import Logs
 from seastar_gym.plant.plant import Plant, PlantError, Sighting
-from seastar_gym.scene.checks import shown
+from seastar_gym.scene.checks import require_file, require_kind, shown
 from seastar_gym.simulator import StrokeReport
 
 
@@ -51,14 +51,14 @@ class PlantTask(SwimTask):
         self._folder = logs
         self.logs: Logs | None = None
         self.stopped = ""
-        self._late = 0.0  # of the last decision [s]
+        self._late, self.latest = 0.0, 0.0  # the last decision, and the latest but for the first [s]
         self._begun = 0.0  # time of the plant's clock that is time 0 of the episode [s]
         self._origin = Sighting(0.0, 0.0, (0.0, 0.0, 0.0))
         self._noted = -math.inf  # when the last picture that is known was taken [s]
 
     def reset(self, robots: Flags, generators: list[np.random.Generator], asked: Any = None) -> None:
         """Begin an episode where the robot lies. PlantError: it is not seen."""
-        self.stopped = ""
+        self.stopped, self._late, self.latest = "", 0.0, 0.0
         self._open_logs()
         seen = self._origin = self.guard.begin()
         super().reset(robots, generators, asked)
@@ -156,6 +156,8 @@ class PlantTask(SwimTask):
         planned = self._begun + float(self.simulator.time[0])
         self.guard.look()
         self._late = self.guard.now() - planned
+        if self.simulator.time[0] > 0.0:
+            self.latest = max(self.latest, self._late)
         if self.simulator.time[0] == 0.0 and self.logs is not None:
             self.logs.begin(self._origin, self.guard.now())
         if self._late > 0.0:
@@ -225,9 +227,23 @@ class PlantSwim(SeastarSwimEnv):
         self._set_pictures(render_mode, frames_per_stroke)
         if not hasattr(plant, "sight"):
             raise ValueError(f"plant must be a Plant, not {shown(plant)}.")
+        limits = Limits() if limits is None else limits
+        require_kind("limits", limits, Limits, "Limits")
+        if logs is not None:
+            require_file("logs", logs)
         folder = None if logs is None else Path(logs)
-        self._plant_task = PlantTask(plant, limits or Limits(), SwimOptions(**options), folder)
+        self._plant_task = PlantTask(plant, limits, SwimOptions(**options), folder)
         self._begin_with(self._plant_task, frames_per_stroke)
+
+    @property
+    def stopped(self) -> str:
+        """Why the guard stopped the plant, in a sentence; empty if it did not."""
+        return self._plant_task.stopped
+
+    @property
+    def latest(self) -> float:
+        """How late the latest decision of the episode was, but for the first [s]."""
+        return self._plant_task.latest
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Swim for one decision; returns observation, reward, terminated, truncated and info."""

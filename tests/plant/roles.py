@@ -9,7 +9,7 @@ import numpy as np
 
 from seastar_gym import Scene, Sight, Simulator, SmaWires
 from seastar_gym.plant.guard import Limits
-from seastar_gym.plant.lines import LinePlant, Server
+from seastar_gym.plant.lines import LinePlant, Server, serve
 from seastar_gym.plant.simulated import SimulatedPlant
 from seastar_gym.plant.swim import PlantSwim
 
@@ -51,5 +51,13 @@ def drive(wires: str, tracker: str) -> None:
             return
 
 
+def tank(line: str) -> None:
+    """A simulated plant with its tracker on one line, whose wires are those of the chapter."""
+    scene = Scene(actuator=SmaWires()).at("fast")
+    Simulator(scene).advance(0.5)
+    print("ready", flush=True)
+    serve(SimulatedPlant(Simulator(scene), Sight(delay=0.05), paced=True), FileIO(int(line), "r+"))
+
+
 if __name__ == "__main__":
-    {"heat": heat, "track": track, "drive": drive}[sys.argv[1]](*sys.argv[2:])
+    {"heat": heat, "track": track, "drive": drive, "tank": tank}[sys.argv[1]](*sys.argv[2:])
