@@ -133,6 +133,18 @@ class Tracker:
         self.before.put(newer, self.now)
         self.now.put(newer, found)
 
+    def wait(self, seconds: float) -> None:
+        """Let the episodes' clock wait for so long: pictures are that much older on it."""
+        for times in (self._taken_at, self._seen_at, self.now.taken_at, self.before.taken_at):
+            times -= seconds
+
+    def restart(self, pictures: Pictures) -> None:
+        """Know these pictures, and none before."""
+        everyone = np.ones(len(pictures.rows), bool)
+        self._seen_at[:] = np.inf
+        self.now.put(everyone, pictures)
+        self.before.put(everyone, pictures)
+
     @property
     def hub(self) -> Floats:
         """Hubs as they are seen [m], shape (n_robots, 2), a copy."""

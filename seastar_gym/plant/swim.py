@@ -17,7 +17,7 @@ from seastar_gym.envs.seastar_swim import Observation, RenderMode, SeastarSwimEn
 from seastar_gym.envs.sight import Sight
 from seastar_gym.envs.swimming import Flags, Floats
 from seastar_gym.envs.task import SwimTask
-from seastar_gym.envs.tracker import Pictures
+from seastar_gym.envs.tracker import Pictures, Tracker
 from seastar_gym.plant.guard import Guard, Limits
 from seastar_gym.plant.logs import Logs
 from seastar_gym.plant.plant import Plant, PlantError, Sighting
@@ -58,16 +58,14 @@ class PlantTask(SwimTask):
 
     def reset(self, robots: Flags, generators: list[np.random.Generator], asked: Any = None) -> None:
         """Begin an episode where the robot lies. PlantError: it is not seen."""
-        self.stopped, self._late, self.latest = "", 0.0, 0.0
+        self.stopped, self._late, self.latest, self._noted = "", 0.0, 0.0, -math.inf
         self._open_logs()
         seen = self._origin = self.guard.begin()
         super().reset(robots, generators, asked)
         self.simulator.reset(heading=seen.pose[2])
         self._begun = self.guard.now()
         self._note(seen)
-        first = Pictures(self._row(seen)[None], np.array([seen.captured_at - self._begun]))
-        for known in (self._known_pictures.now, self._known_pictures.before):
-            known.put(robots, first)
+        self._known_pictures.restart(Pictures(self._row(seen)[None], np.array([seen.captured_at - self._begun])))
         self._begin(robots)
 
     def _open_logs(self) -> None:
@@ -84,7 +82,7 @@ class PlantTask(SwimTask):
             self.logs = None
 
     @property
-    def _known_pictures(self) -> Any:
+    def _known_pictures(self) -> Tracker:
         assert self._tracker is not None
         return self._tracker
 
@@ -117,10 +115,10 @@ class PlantTask(SwimTask):
     def _swim(self, lag: Lag, commands: Floats) -> Generator[float, None, StrokeReport]:
         """One decision, on the plant's clock; yields the time since it began [s] after about every time step."""
         n_steps = math.ceil(self.decision_period / self.scene.numerics.step)
-        self._attempt(lambda: self._begin_decision(commands[0]))
-        planned = self._begun + float(self.simulator.time[0])
         steps = self.simulator.advance_in_parts(self.decision_period, commands, n_steps)
         with contextlib.closing(steps), self._stopped_if_interrupted():
+            self._attempt(lambda: self._begin_decision(commands[0]))
+            planned = self._begun + float(self.simulator.time[0])
             while True:
                 try:
                     since = next(steps)
@@ -162,8 +160,7 @@ class PlantTask(SwimTask):
             self.logs.begin(self._origin, self.guard.now())
         if self._late > 0.0:
             self._begun += self._late
-            for known in (self._known_pictures.now, self._known_pictures.before):
-                known.taken_at[:] -= self._late
+            self._known_pictures.wait(self._late)
         for share in np.unique(np.abs(commands[commands != 0.0])).tolist():
             limbs = np.where(np.abs(commands) == share, np.sign(commands), 0.0).astype(int)
             self.guard.heat(limbs.tolist(), share * self.pulse)
