@@ -12,7 +12,6 @@ is scored:
 
 import contextlib
 import functools
-import math
 import operator
 from abc import ABC, abstractmethod
 from collections.abc import Generator
@@ -315,7 +314,7 @@ class Swimming(ABC):
         if self._lag is None:
             report = self.simulator.advance(self.decision_period, self._wired(followed))
         else:
-            report = _result(self._swim(self._lag, followed))
+            report = _result(self._swim(self._lag, followed, []))
         return self._judge(commands, followed, report)
 
     def step_in_parts(self, commands: Floats, parts: int) -> Generator[float, None, Outcome]:
@@ -324,22 +323,24 @@ class Swimming(ABC):
         if self._lag is None:
             report = yield from self.simulator.advance_in_parts(self.decision_period, self._wired(followed), parts)
         else:
-            ends = self.decision_period * np.arange(1, parts + 1) / parts
-            report = yield from _at_ends(self._swim(self._lag, followed), ends.tolist())
+            ends = (self.decision_period * np.arange(1, parts + 1) / parts).tolist()
+            report = yield from _at_ends(self._swim(self._lag, followed, ends), ends)
         return self._judge(commands, followed, report)
 
-    def _swim(self, lag: Lag, commands: Floats) -> Generator[float, None, StrokeReport]:
-        """One decision whose commands are late; yields the time since it began [s] after about every time step."""
+    def _swim(self, lag: Lag, commands: Floats, ends: list[float]) -> Generator[float, None, StrokeReport]:
+        """One decision whose commands are late; yields times since it began [s], those at `ends` among them."""
         reports = []
         for piece in lag.pieces(commands):
-            reports.append((yield from self._swim_piece(piece)))
+            reports.append((yield from self._swim_piece(piece, np.array(ends) - piece.begin)))
         lag.send(commands)
         return report_of_pieces(reports)
 
-    def _swim_piece(self, piece: Piece) -> Generator[float, None, StrokeReport]:
-        """Piece of a decision, in which pictures are taken."""
-        n_steps = math.ceil(piece.duration / self.scene.numerics.step)
-        steps = self.simulator.advance_in_parts(piece.duration, self._wired(piece.commands), n_steps)
+    def _swim_piece(self, piece: Piece, ends: Floats) -> Generator[float, None, StrokeReport]:
+        """Piece of a decision, in which pictures are taken. ends: Times at which it pauses, too [s]."""
+        pauses = ends[(ends > 0.0) & (ends < piece.duration)]
+        if self._tracker is not None:
+            pauses = np.append(pauses, self._tracker.due_times(self.simulator.time, piece.duration))
+        steps = self.simulator.advance_pausing(piece.duration, self._wired(piece.commands), pauses)
         with contextlib.closing(steps):
             while True:
                 try:

@@ -79,14 +79,21 @@ class Tracker:
         self.look(np.zeros(len(rows)))
         self.before.put(robots, self.now)
 
+    def due_times(self, time: Floats, duration: float) -> Floats:
+        """When pictures of any robot are due in an interval [s], since it begins at these times [s]; shape (n,)."""
+        last = np.floor((time + duration + SAME_TIME) * self.rate)
+        most = int((last - self._next).max(initial=-1.0)) + 1
+        due = (self._next[:, None] + np.arange(most)) / self.rate - time[:, None] - SAME_TIME
+        return np.unique(due[due <= duration])
+
     def take(self, simulator: Simulator) -> None:
         """Take the pictures that are due."""
         time = simulator.time
-        due = self._next <= time * self.rate + SAME_TIME
+        due = self._next / self.rate <= time + SAME_TIME
         if not due.any():
             return
         self._take(due, pictures_of(simulator, self.columns), time, lengths_of(simulator))
-        self._next[due] = np.floor(time * self.rate + SAME_TIME)[due].astype(np.int64) + 1
+        self._next[due] = np.floor((time + SAME_TIME) * self.rate)[due].astype(np.int64) + 1
 
     def _take(self, robots: Flags, rows: Floats, time: Floats, lengths: Floats) -> None:
         """Take pictures of the robots in a mask at a time [s], some of which are lost.
@@ -98,15 +105,15 @@ class Tracker:
         for robot in np.flatnonzero(robots).tolist():
             lost[robot], late[robot] = self._generators[robot].random(2)
         blurred = self._blurred(robots, rows, lengths)
-        for robot in np.flatnonzero(robots & (lost >= dropout)).tolist():
-            seen_after = max(0.0, delay[robot] + jitter[robot] * (2.0 * late[robot] - 1.0))
-            self.keep(robot, time[robot], time[robot] + seen_after, blurred[robot])
+        seen_at = time + np.maximum(delay + jitter * (2.0 * late - 1.0), 0.0)
+        self.keep(robots & (lost >= dropout), Pictures(blurred, time), seen_at)
 
-    def keep(self, robot: int, taken_at: float, seen_at: float, row: Floats) -> None:
-        """Keep a picture of a robot that is seen at a time [s]."""
-        at = self._n_kept[robot] % self._rows.shape[1]
-        self._rows[robot, at], self._taken_at[robot, at], self._seen_at[robot, at] = row, taken_at, seen_at
-        self._n_kept[robot] += 1
+    def keep(self, robots: Flags, pictures: Pictures, seen_at: Floats) -> None:
+        """Keep pictures of the robots in a mask, which are seen at these times [s], shape (n_robots,)."""
+        at = np.flatnonzero(robots), (self._n_kept % self._rows.shape[1])[robots]
+        self._rows[at], self._taken_at[at] = pictures.rows[robots], pictures.taken_at[robots]
+        self._seen_at[at] = seen_at[robots]
+        self._n_kept += robots
 
     def _blurred(self, robots: Flags, rows: Floats, lengths: Floats) -> Floats:
         """Pictures with the errors of the robots in a mask."""

@@ -65,7 +65,7 @@ class PlantTask(SwimTask):
         self.simulator.reset(heading=seen.pose[2])
         self._begun = self.guard.now()
         self._note(seen)
-        self._known_pictures.restart(Pictures(self._row(seen)[None], np.array([seen.captured_at - self._begun])))
+        self._known_pictures.restart(self._picture(seen))
         self._begin(robots)
 
     def _open_logs(self) -> None:
@@ -86,6 +86,10 @@ class PlantTask(SwimTask):
         assert self._tracker is not None
         return self._tracker
 
+    def _picture(self, seen: Sighting) -> Pictures:
+        """Sighting on the episode's clock, which is known at once."""
+        return Pictures(self._row(seen)[None], np.array([seen.captured_at - self._begun]))
+
     def _row(self, seen: Sighting) -> Floats:
         """Sighting as a picture, see tracker.py: relative to where the robot began."""
         (x, y, heading), (x_0, y_0, _) = seen.pose, self._origin.pose
@@ -104,15 +108,14 @@ class PlantTask(SwimTask):
         if seen.captured_at == self._noted:
             return
         self._noted = seen.captured_at
-        taken_at = seen.captured_at - self._begun
-        self._known_pictures.keep(0, taken_at, taken_at, self._row(seen))
+        self._known_pictures.keep(np.ones(1, bool), self._picture(seen), np.zeros(1))
         if self.logs is not None:
             self.logs.sighting(seen)
 
     def _deaf_wires(self) -> Flags:
         return self.guard.resting()[None]
 
-    def _swim(self, lag: Lag, commands: Floats) -> Generator[float, None, StrokeReport]:
+    def _swim(self, lag: Lag, commands: Floats, ends: list[float]) -> Generator[float, None, StrokeReport]:
         """One decision, on the plant's clock; yields the time since it began [s] after about every time step."""
         n_steps = math.ceil(self.decision_period / self.scene.numerics.step)
         steps = self.simulator.advance_in_parts(self.decision_period, commands, n_steps)

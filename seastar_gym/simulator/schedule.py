@@ -59,5 +59,9 @@ def interval_times(corners: Sequence[float], step: float, begin: float, duration
 
 def ends_of_parts(times: np.ndarray, parts: int) -> np.ndarray:
     """Steps with which about equal parts of an interval end, whose steps end at these times [s] since it began."""
-    wanted = times[-1] * np.arange(1, parts + 1) / parts
+    return ends_at(times, times[-1] * np.arange(1, parts + 1) / parts)
+
+
+def ends_at(times: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Steps at whose ends these times [s] are first reached; other arguments as of `ends_of_parts`."""
     return np.unique(np.clip(np.searchsorted(times, wanted * (1.0 - ROUNDING)), 1, len(times) - 1))

@@ -1,7 +1,7 @@
 """`Simulator`: a batch of robots of one scene, advanced by intervals of time, such as strokes."""
 
 import os
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -13,7 +13,7 @@ from seastar_gym.der.rods import Work
 from seastar_gym.der.terms.hub import Actuation
 from seastar_gym.model.coefficients import Coefficients
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import as_array, as_floats, require_choice, require_count, require_flag, shown
+from seastar_gym.scene.checks import as_array, as_finite, as_floats, require_choice, require_count, require_flag, shown
 from seastar_gym.scene.numerics import MAX_STEPS
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.rows import write_rows
@@ -26,7 +26,7 @@ from seastar_gym.simulator.error_bars import ErrorBars, twin_scene
 from seastar_gym.simulator.growth import EnergyGrowth, is_watched
 from seastar_gym.simulator.lock import BROKEN_OFF, StrokeLock
 from seastar_gym.simulator.report import StrokeReport, make_report
-from seastar_gym.simulator.schedule import ends_of_parts, require_duration
+from seastar_gym.simulator.schedule import ends_at, ends_of_parts, require_duration
 from seastar_gym.simulator.state import State, checked_state
 from seastar_gym.simulator.water import relative_velocities
 
@@ -380,9 +380,26 @@ class Simulator:
     ) -> Generator[float, None, StrokeReport]:
         """Advance as `advance` does, to the same bits, and pause as `stroke_in_parts` does."""
         require_count("parts", parts, 1, MAX_STEPS)
+        return (yield from self._advance_pausing(duration, commands, lambda times: ends_of_parts(times, parts)))
+
+    def advance_pausing(
+        self, duration: float, commands: ArrayLike | None, pauses: ArrayLike
+    ) -> Generator[float, None, StrokeReport]:
+        """Advance as `advance` does, to the same bits, and pause as `stroke_in_parts` does, at certain times.
+
+        pauses: Times since the interval began [s], shape (n,). A pause comes at the end of the time step in which its
+            time lies; the last one is at the end of the interval.
+        """
+        wanted = np.append(as_finite("pauses", pauses, (None,)), duration)
+        return (yield from self._advance_pausing(duration, commands, lambda times: ends_at(times, wanted)))
+
+    def _advance_pausing(
+        self, duration: float, commands: ArrayLike | None, ends_of: Callable[[Floats], NDArray[np.intp]]
+    ) -> Generator[float, None, StrokeReport]:
+        """Advance, and pause at steps that follow from the ends of all steps [s]."""
         with self._whole_interval(duration, commands) as interval:
             times = self._batch.times - self._batch.times[0]
-            for begin, end in pairwise([0, *ends_of_parts(times, parts)]):
+            for begin, end in pairwise([0, *ends_of(times)]):
                 self._batch.advance(begin, end)
                 self._clock.show(self._batch.covered())
                 self._drive.advance(end)
