@@ -25,7 +25,8 @@ assert [Path(file).stem for file in strangers] == ["seastar"], f"the wheel insta
 
 command = Path(sys.executable).parent / "seastar"
 told = subprocess.run([command, "--help"], capture_output=True, text=True, check=True).stdout
-assert all(name in told for name in ("swim", "play", "evaluate", "benchmark", "data", "train", "certify", "identify"))
+commands = "swim", "play", "evaluate", "benchmark", "data", "train", "export", "certify", "track2csv", "identify"
+assert all(name in told for name in commands)
 for arguments, missing in (
     ("swim --film swim.mp4", "[render]"),
     ("data", "[data]"),

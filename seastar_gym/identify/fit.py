@@ -41,6 +41,8 @@ DELAYS_APART = 0.02
 """Distance between delays that are tried for a first guess [s]."""
 SHORTEST_DELAY = 1e-3
 """Least bound of a delay that is fitted [s]."""
+NEAR_END = 0.99
+"""Share of the largest delay above which the best one may lie beyond."""
 DELAY = "the delay"
 """Name of the delay in sentences."""
 
@@ -127,6 +129,8 @@ def identify(
         start[-1], bound[-1] = residuals.likely_delay(largest_delay), largest_delay
     residuals.trajectory(start)  # refuses times and commands that do not fit, which steps below may not
     fit = least_squares(residuals, start, residuals.jacobian, (-bound, bound), xtol=1e-6, ftol=1e-8)
+    if largest_delay is not None and abs(fit.x[-1]) > NEAR_END * largest_delay:
+        raise ValueError(f"The best delay is {fit.x[-1]:.4g} s, at the end of what was tried: allow a larger one.")
     return estimate_of(fit, residuals, confidence)
 
 

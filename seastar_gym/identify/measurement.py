@@ -49,7 +49,8 @@ class Measurement:
             require_unmasked(name, array)
             if not isinstance(array, np.ndarray) or array.dtype.kind not in "iuf":
                 raise ValueError(f"{name} must be an array of numbers, not {shown(array)}.")
-        if not isinstance(self.nodes, tuple) or not all(map(is_whole_number, self.nodes)) or self.time.ndim != 1:
+        whole = isinstance(self.nodes, tuple) and all(map(is_whole_number, self.nodes))
+        if not whole or min(self.nodes, default=0) < ORIENTATION or self.time.ndim != 1:
             raise ValueError(f"nodes must be a tuple of whole numbers, not {shown(self.nodes)}, and time a single row.")
         if self.positions.shape != (len(self.time), len(self.nodes), 2) or not np.isfinite(self.positions).any():
             raise ValueError(f"{len(self.time)} times and {len(self.nodes)} nodes do not fit the positions measured.")

@@ -58,6 +58,12 @@ def test_a_delay_of_seconds_is_found():
     assert found.value == pytest.approx(1.37, abs=0.01) and found.lower < 1.37 < found.upper
 
 
+@pytest.mark.parametrize("delay", [0.4, -0.4])
+def test_a_delay_beyond_what_was_tried_is_no_estimate(delay):
+    with assert_refused("at the end of what was tried: allow a larger one"):
+        identify(SCENE, list(TRUTH), late(1, delay), largest_delay=0.2)
+
+
 def test_a_delay_that_nothing_shows_cannot_be_told():
     still = late(0)
     still = replace(still, positions=np.zeros_like(still.positions), commands=0.0 * still.commands)

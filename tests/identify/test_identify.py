@@ -436,6 +436,7 @@ def test_what_is_no_trajectory_is_refused(arguments, words):
     [
         ({"nodes": [0]}, "nodes must be a tuple of whole numbers"),
         ({"nodes": (0.0,)}, "nodes must be a tuple of whole numbers"),
+        ({"nodes": (-2,)}, "nodes must be a tuple of whole numbers"),
         ({"time": np.zeros((1, 1))}, "time a single row"),
         ({"positions": np.full((1, 1, 2), np.nan)}, "do not fit the positions"),
         ({"positions": np.full((1, 1, 2), 1001.0)}, "within 1000 m"),

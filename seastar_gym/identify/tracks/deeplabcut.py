@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from seastar_gym.identify.tracks.track import Track, chosen_individual, numbers_of
+from seastar_gym.identify.tracks.track import Track, chosen_individual, seen_numbers
 from seastar_gym.scene.csv_rows import Row, read_rows
 
 HEADERS = ("scorer", "individuals", "bodyparts", "coords")
@@ -61,4 +61,4 @@ def _frame(row: Row, n_fields: int) -> list[float]:
     """Number of a picture and its coordinates."""
     if len(row.fields) != n_fields:
         raise row.refused(f"the line must have {n_fields} fields, as the headers, not {len(row.fields)}")
-    return numbers_of(row)
+    return seen_numbers(row)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from seastar_gym.identify.tracks.track import Track, numbers_of
+from seastar_gym.identify.tracks.track import Track, seen_numbers
 from seastar_gym.scene.csv_rows import Row, read_rows
 
 TAG = "tag"
@@ -23,7 +23,7 @@ def read_pose(file: str | Path) -> Track:
     for row in rows:
         if len(row.fields) != len(names.fields):
             raise row.refused(f"the line must have {len(names.fields)} fields, as the first one, not {len(row.fields)}")
-    numbers = np.array([numbers_of(row) for row in rows])
+    numbers = np.array([seen_numbers(row) for row in rows])
     if np.isnan(numbers[:, 0]).any():
         raise rows[int(np.isnan(numbers[:, 0]).argmax())].refused("there is no time")
     turns = {TAG: numbers[:, 3]} if len(names.fields) == 4 else {}

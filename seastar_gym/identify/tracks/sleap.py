@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.extras import require_extra
-from seastar_gym.identify.tracks.track import Track, chosen_individual, numbers_of
+from seastar_gym.identify.tracks.track import Track, chosen_individual, seen_numbers
 from seastar_gym.scene.checks import require_file
 from seastar_gym.scene.csv_rows import Row, read_rows
 
@@ -41,7 +41,7 @@ def _read_csv(file: str | Path, rate: float, individual: str | None) -> Track:
     for row in rows:
         if len(row.fields) != len(names.fields):
             raise row.refused(f"the line must have {len(names.fields)} fields, as the first one, not {len(row.fields)}")
-    numbers = np.array([numbers_of(row._replace(fields=("0", *row.fields[1:]))) for row in rows])
+    numbers = np.array([seen_numbers(row._replace(fields=("0", *row.fields[1:]))) for row in rows])
     numbers = numbers[np.argsort(numbers[:, 1], kind="stable")]
     points = {part: numbers[:, [columns[f"{part}.x"], columns[f"{part}.y"]]] for part in parts}
     return Track(numbers[:, 1] / rate, points, {})

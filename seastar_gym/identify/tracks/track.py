@@ -38,7 +38,7 @@ class Seen(NamedTuple):
     nodes: tuple[int, ...]
 
 
-def numbers_of(row: Row) -> list[float]:
+def seen_numbers(row: Row) -> list[float]:
     """Numbers of a line; NaN for an empty field and for the words nan and none."""
     empty = (field if NAN.fullmatch(field) is None else "" for field in row.fields)
     return row._replace(fields=tuple(empty)).numbers(empty_allowed=True)
