@@ -11,6 +11,7 @@ from seastar_gym import Body, Numerics, Scene, Seastar, SmaWires
 from seastar_gym.identify import Measurement, identify, synthetic, trajectory, with_parameters
 from seastar_gym.identify.command import main
 from seastar_gym.identify.measurement import ARM, ORIENTATION, pointer
+from seastar_gym.identify.trajectories import batch_of_trajectories
 from seastar_gym.scene.scene_file import load_scene
 from seastar_gym.simulator import Simulator
 
@@ -111,6 +112,15 @@ def test_between_strokes_and_before_and_after_them_the_robot_coasts():
     np.testing.assert_allclose(found[2:], [before, simulator.hub_position()[0]], atol=1e-7)
 
 
+def test_pictures_whose_clock_is_behind_see_the_robot_coast_after_its_last_stroke():
+    simulator = Simulator(SCENE)
+    for command in COMMANDS:
+        simulator.stroke(command[None])
+    simulator.advance(0.5)
+    found = batch_of_trajectories(np.array([0.0, 3.0]), (0,), COMMANDS, [SCENE], delays=[-0.5])[0, 1, 0]
+    np.testing.assert_allclose(found, simulator.hub_position()[0], atol=1e-7)
+
+
 def test_commands_come_at_any_time_where_actuators_remember():
     scene = replace(SCENE, actuator=SmaWires())
     when = np.array([0.0, 0.213, 0.5])
@@ -143,6 +153,16 @@ def test_an_orientation_is_simulated_and_fitted():
         found = identify(ROUND, list(TRUTH), Measurement(time, positions, nodes, turning))
         assert ((found.lower < list(TRUTH.values())) & (list(TRUTH.values()) < found.upper)).all()
         assert found.upper[0] < 1.2 * found.lower[0] and not found.untold
+
+
+def test_an_orientation_turns_between_time_steps_by_the_spin():
+    simulator = Simulator(ROUND)
+    simulator.advance(0.5, COMMANDS[1:2])
+    around = 0.5 + np.array([-1e-5, 1e-5])
+    before, after = trajectory(around, (ORIENTATION,), COMMANDS[1:2], ROUND)[:, 0]
+    angle = np.arctan2(after[1], after[0]) - np.arctan2(before[1], before[0])
+    assert abs(simulator.spin()[0]) > 1e-3
+    assert angle / 2e-5 == pytest.approx(simulator.spin()[0], rel=1e-3)
 
 
 def test_an_orientation_needs_a_body():
