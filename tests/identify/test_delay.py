@@ -156,10 +156,10 @@ def test_an_orientation_is_simulated_and_fitted():
 
 
 def test_an_orientation_turns_between_time_steps_by_the_spin():
-    simulator = Simulator(ROUND)
-    simulator.advance(0.5, COMMANDS[1:2])
+    simulator, unlike = Simulator(ROUND), np.array([[1.0, 0.0, 1.0, 0.0, 0.0]])
+    simulator.advance(0.5, unlike)
     around = 0.5 + np.array([-1e-5, 1e-5])
-    before, after = trajectory(around, (ORIENTATION,), COMMANDS[1:2], ROUND)[:, 0]
+    before, after = trajectory(around, (ORIENTATION,), unlike, ROUND)[:, 0]
     angle = np.arctan2(after[1], after[0]) - np.arctan2(before[1], before[0])
     assert abs(simulator.spin()[0]) > 1e-3
     assert angle / 2e-5 == pytest.approx(simulator.spin()[0], rel=1e-3)
