@@ -21,6 +21,10 @@ NAMES = re.compile(r"^<!-- site: names (\S+) (.*) -->$", re.MULTILINE)
 FAST = Scene(numerics=Numerics.preset("fast"))
 WIRES = Scene(actuator=SmaWires(), numerics=Numerics.preset("fast"))
 PATH = np.array([[0.03, 0.0]])
+MOTIVE = (
+    "Format Version,1.23,Length Units,Meters\n,Type,Marker,Marker,Marker\n,Name,a,a,a\n,,Position,Position,Position\n"
+    "Frame,Time (Seconds),X,Y,Z\n0,0,1,2,3\n"
+)
 MADE_BY_THE_PACKAGE = {
     "Setting", "Episode", "Episodes", "Estimate", "Outcome", "Score", "Swim", "Tally",
     "Actuator", "ActuatorBase", "Executor", "Policy", "Challenge", "Numbered", "Swimming",
@@ -100,6 +104,13 @@ def goal_form() -> Any:
 
 def folder() -> Path:
     return Path(tempfile.mkdtemp())
+
+
+def tracked(text: str) -> Path:
+    """File of a tracker."""
+    file = folder() / "track.csv"
+    file.write_text(text)
+    return file
 
 
 def filmed(file: Any, fps: Any) -> None:
@@ -188,10 +199,11 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
                      max_strokes=1, seed=0, reset_options=None, watch=None),
         "swim_many": dict(agent="a", policy=straight(), path=PATH, n_swims=1, scene=FAST, max_strokes=1,
                           waypoint_radius=0.01, seed=0, threads=1, decision_period=None),
-        "Measurement": dict(time=np.zeros(1), positions=np.zeros((1, 1, 2)), nodes=(0,), commands=np.zeros((1, 5))),
+        "Measurement": dict(time=np.zeros(1), positions=np.zeros((1, 1, 2)), nodes=(0,), commands=np.zeros((1, 5)),
+                            command_times=None),
         "get_parameter": dict(scene=FAST, name="fluid.density"),
-        "synthetic": dict(scene=FAST, truth={}, n_strokes=1, rate=2.0, noise=1e-3, seed=0),
-        "trajectory": dict(time=np.zeros(1), nodes=(0,), commands=np.zeros((1, 5)), scene=FAST),
+        "synthetic": dict(scene=FAST, truth={}, n_strokes=1, rate=2.0, noise=1e-3, seed=0, delay=0.0),
+        "trajectory": dict(time=np.zeros(1), nodes=(0,), commands=np.zeros((1, 5)), scene=FAST, command_times=None),
         "with_parameters": dict(scene=FAST, names=["fluid.density"], values=[900.0]),
         "Choices": dict(name="robot.n_limbs", values=(3, 4), labels=()),
         "Range": dict(name="robot.limb_length", low=0.1, high=0.2, is_log=False),
@@ -206,6 +218,13 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
         "make_model": dict(env=training_env(), hyperparameters=training(), seed=0, device="cpu"),
         "make_training_env": dict(hyperparameters=training(), path=PATH, random_heading=False, fidelity=None,
                                   scene=FAST, threads=1, actions="pairs", randomization=None),
+        "read_deeplabcut": dict(file=tracked("scorer,s,s,s\nbodyparts,a,a,a\ncoords,x,y,likelihood\n0,1,2,1\n"),
+                                rate=30.0, individual=None, likelihood=0.6),
+        "read_motive": dict(file=tracked(MOTIVE), up="y"),
+        "read_pose": dict(file=tracked("time,x,y\n0,1,2\n")),
+        "read_sleap": dict(file=tracked("track,frame_idx,instance.score,a.x,a.y\n,0,1,2,3\n"), rate=30.0,
+                           individual=None),
+        "to_c": dict(policy=learned(), name="a", points_per_limb=None),
         "policy_of": dict(model=named("make_model")(training_env(), training(), 0)),
     }.items():  # fmt: skip
         yield name, named(name), arguments
@@ -213,7 +232,7 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, Any]]]:
     yield "Description", lambda **entries: named("Description")(**entries).check(), {**about._asdict(), "scene": FAST}
     yield "Description", about.from_json, dict(text=about.to_json())
     yield "identify", partial(named("identify"), FAST), dict(
-        parameters=["x"], measurement=measurement(), confidence=0.9)  # fmt: skip
+        parameters=["x"], measurement=measurement(), confidence=0.9, largest_delay=None)  # fmt: skip
     yield "identify", lambda scene: named("identify")(scene, ["x"], measurement()), dict(scene=FAST)
     yield "Measurement", named("Measurement").from_csv, dict(trajectory="a.csv", commands="b.csv")
     yield "Measurement", measurement().to_csv, dict(trajectory=folder() / "a.csv", commands=folder() / "b.csv")

@@ -211,6 +211,8 @@ def synthetic(
         get_parameter(scene, name)  # refuses what the scene has not
     commands = rng.integers(-1, 2, (n_strokes, robot.n_limbs)).astype(float)
     times = np.arange(math.floor(n_strokes * scene.actuator.period * rate)) / rate
+    if not len(times):
+        raise ValueError(f"{n_strokes} strokes at {rate:g} Hz are less than one time.")
     nodes = (0, *((robot.nodes_per_limb - 1) * (np.arange(robot.n_limbs) + 1)).tolist())
     robot_as_built = with_parameters(scene, list(truth), list(truth.values()))
     (exact,) = batch_of_trajectories(times, nodes, commands, [robot_as_built], delays=[delay])

@@ -102,6 +102,11 @@ def test_one_of_several_animals_of_deeplabcut_is_named(tmp_path):
             read_deeplabcut(file, 30.0, wrong)
 
 
+def test_an_individual_of_a_file_that_names_none_is_refused(tmp_path):
+    with assert_refused("dlc.csv names no individuals: leave --individual out"):
+        read_deeplabcut(written(tmp_path, "dlc.csv", DEEPLABCUT), 30.0, "a")
+
+
 def test_a_file_of_sleap_is_read_in_the_order_of_its_pictures(tmp_path):
     track = read_sleap(written(tmp_path, "sleap.csv", SLEAP), 10.0)
     np.testing.assert_allclose(track.time, [0.0, 0.1, 0.3])
@@ -327,13 +332,13 @@ def test_a_marker_of_motive_may_be_any_node(tmp_path):
     [
         (DEEPLABCUT, ["--from", "deeplabcut"], "Files of deeplabcut have no times: give --rate"),
         (DEEPLABCUT, ["--from", "deeplabcut", "--rate", "30"], "in pixels: give --metres-per-pixel or --homography"),
-        (SLEAP, ["--from", "sleap", "--rate", "0"], "--rate must be a positive, finite number"),
+        (SLEAP, ["--from", "sleap", "--rate", "0"], "rate must be a positive, finite number"),
         (SLEAP, ["--from", "sleap", "--rate", "9", "--metres-per-pixel", "1e-3"], "Say which points are which nodes"),
         (POSE, ["--from", "pose", "--metres-per-pixel", "1", "--homography", "x"], "or --homography, not both"),
         (POSE, ["--from", "pose", "--nodes", "tag"], "--nodes must be such as nose=hub"),
         (POSE, ["--from", "pose", "--nodes", "tag=tip6"], "tag=tip6: the robot has 5 limbs and 56 nodes"),
         (POSE, ["--from", "pose", "--rest", "-1"], "--rest must be"),
-        (POSE, ["--from", "pose", "--likelihood", "2"], "--likelihood must be from 0 to 1"),
+        (DEEPLABCUT, ["--from", "deeplabcut", "--rate", "9", "--likelihood", "2"], "likelihood must be from 0 to 1"),
         (POSE.replace("0.1,0.11", "0.05,0.11"), ["--from", "pose"], "Times must be finite, not negative, and in order"),
         (POSE.replace("0.11", "2000"), ["--from", "pose"], "within 1000 m of the origin"),
     ],

@@ -12,7 +12,7 @@ from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.envs.layout import N_STATIONS, SIZES, VELOCITY_SCALE
 from seastar_gym.envs.stations import at_stations, weights
 from seastar_gym.envs.symmetry.symmetry import BOUNDARY_WIDTH
-from seastar_gym.scene.checks import require_count
+from seastar_gym.scene.checks import require_count, require_kind
 from seastar_gym.version import __version__
 
 CODE = Path(__file__).with_name("policy.c")
@@ -29,6 +29,8 @@ def to_c(policy: LearnedPolicy, name: str, points_per_limb: int | None = None) -
     name: Of the policy, for the first line.
     points_per_limb: Tracked points of a limb with the hub, evenly spaced. None means the nodes of the policy's scene.
     """
+    require_kind("policy", policy, LearnedPolicy, "a LearnedPolicy")
+    require_kind("name", name, str, "text")
     robot, n = policy.scene.robot, points_per_limb
     if robot.has_body:
         raise ValueError("A robot whose limbs begin on a body cannot be exported to C, only to ONNX.")

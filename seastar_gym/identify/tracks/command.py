@@ -24,7 +24,7 @@ from seastar_gym.identify.tracks.pose import read_pose
 from seastar_gym.identify.tracks.sleap import read_sleap
 from seastar_gym.identify.tracks.track import Track, from_rest, seen_nodes
 from seastar_gym.scene import Scene
-from seastar_gym.scene.checks import require_number, require_within
+from seastar_gym.scene.checks import require_number
 from seastar_gym.scene.scene_file import load_scene
 
 Options = argparse.Namespace
@@ -68,7 +68,6 @@ def _rate(options: Options) -> float:
     """Pictures per second [Hz]."""
     if options.rate is None:
         raise ValueError(f"Files of {options.format} have no times: give --rate, pictures per second.")
-    require_number("--rate", options.rate, "Hz")
     return float(options.rate)
 
 
@@ -108,7 +107,6 @@ def convert(options: Options) -> str:
     """Write the trajectory; returns a sentence on it."""
     scene = load_scene(options.scene)
     require_number("--rest", options.rest, "s", zero_allowed=True)
-    require_within("--likelihood", options.likelihood, 0.0, 1.0)
     track = metres(READERS[options.format](options), options)
     seen = seen_nodes(track, assigned(options.nodes, track, scene))
     if not options.aligned:

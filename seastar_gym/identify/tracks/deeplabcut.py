@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from seastar_gym.identify.tracks.track import Track, chosen_individual, seen_numbers
+from seastar_gym.scene.checks import require_file, require_number, require_within
 from seastar_gym.scene.csv_rows import Row, read_rows
 
 HEADERS = ("scorer", "individuals", "bodyparts", "coords")
@@ -26,6 +27,9 @@ def read_deeplabcut(
     individual: Name of one of several animals.
     likelihood: Points of a lower likelihood were not seen.
     """
+    require_file("file", file)
+    require_number("rate", rate, "Hz")
+    require_within("likelihood", likelihood, 0.0, 1.0)
     headers: dict[str, tuple[str, ...]] = {}
     rows = read_rows(file)
     while rows and rows[0].fields[0] in HEADERS:
@@ -45,7 +49,7 @@ def _columns(
     file: str | Path, headers: dict[str, tuple[str, ...]], individual: str | None
 ) -> dict[str, Sequence[int]]:
     """Columns of x, y and likelihood of every part of one animal."""
-    animals = headers.get("individuals", (individual,) * len(headers["coords"]))
+    animals = headers.get("individuals", (None,) * len(headers["coords"]))
     chosen = chosen_individual(file, list(dict.fromkeys(animals)), individual)
     found: dict[str, dict[str, int]] = {}
     each = zip(animals, headers["bodyparts"], headers["coords"], strict=False)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from seastar_gym.identify.tracks.track import Track, seen_numbers
-from seastar_gym.scene.checks import require_choice
+from seastar_gym.scene.checks import require_choice, require_file
 from seastar_gym.scene.csv_rows import Row, read_rows
 
 Floats = NDArray[np.float64]
@@ -31,6 +31,7 @@ Up = Literal["y", "z"]
 
 def read_motive(file: str | Path, up: Up = "y") -> Track:
     """Track in metres of a file of Motive. up: Axis that points up."""
+    require_file("file", file)
     require_choice("up", up, ("y", "z"))
     rows = read_rows(file)
     at = next((k for k, row in enumerate(rows) if _is_axes(row)), 0)

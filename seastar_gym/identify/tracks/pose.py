@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from seastar_gym.identify.tracks.track import Track, seen_numbers
+from seastar_gym.scene.checks import require_file
 from seastar_gym.scene.csv_rows import Row, read_rows
 
 TAG = "tag"
@@ -17,6 +18,7 @@ COLUMNS = ("time", "x", "y", "theta")
 
 def read_pose(file: str | Path) -> Track:
     """Track of a file of poses."""
+    require_file("file", file)
     names, *rows = read_rows(file) or [Row(str(file), ())]
     if names.fields not in (COLUMNS, COLUMNS[:3]) or not rows:
         raise ValueError(f"{file}: the first line must be time,x,y,theta or time,x,y, and there must be others below.")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.extras import require_extra
 from seastar_gym.identify.tracks.track import Track, chosen_individual, seen_numbers
-from seastar_gym.scene.checks import require_file
+from seastar_gym.scene.checks import require_file, require_number
 from seastar_gym.scene.csv_rows import Row, read_rows
 
 FIRST = ("track", "frame_idx", "instance.score")
@@ -27,6 +27,7 @@ def read_sleap(file: str | Path, rate: float, individual: str | None = None) -> 
     individual: Name of one of several tracks.
     """
     require_file("file", file)
+    require_number("rate", rate, "Hz")
     return (_read_hdf5 if Path(file).suffix in ENDINGS else _read_csv)(file, rate, individual)
 
 

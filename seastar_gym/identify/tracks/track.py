@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from seastar_gym.identify.measurement import ORIENTATION, pointer
 from seastar_gym.scene import Scene
+from seastar_gym.scene.checks import require_kind
 from seastar_gym.scene.csv_rows import Row
 
 Floats = NDArray[np.float64]
@@ -46,10 +47,13 @@ def seen_numbers(row: Row) -> list[float]:
 
 def chosen_individual(file: str | Path, known: Sequence[str | None], individual: str | None) -> str | None:
     """One of the animals of a file: that of a name, or the only one."""
+    require_kind("individual", individual, str | None, "a name, or None")
     if individual in known:
         return individual
     if individual is None and len(known) == 1:
         return known[0]
+    if known == [None]:
+        raise ValueError(f"{file} names no individuals: leave --individual out.")
     names = ", ".join(str(name) for name in known)
     raise ValueError(f"{file} has the individuals {names}: name one of them with --individual.")
 
