@@ -24,6 +24,7 @@ from seastar_gym.controllers.export.onnx_graph import to_onnx
 from seastar_gym.controllers.learned import LearnedPolicy
 from seastar_gym.envs.commands import to_commands
 from seastar_gym.envs.layout import VELOCITY_SCALE, Layout
+from seastar_gym.envs.stations import heading_of
 
 ROOT = Path(__file__).resolve().parents[2]
 N_SWUM, N_DRAWN = 5000, 5000
@@ -35,6 +36,9 @@ ROUNDING = 1.5e-6
 TASKS = {"learned": "SeastarSwim-v0", "seastar-0.2s": "SeastarSwim-v0", "fail-blind": "SeastarFailBlind-v0",
          "miswired-0.5s": "SeastarMiswiredTimed-v0", "fast-prizes-0.5s": "SeastarPrizesTimed-v0"}  # fmt: skip
 """Policies of every kind, with memory and without, with limbs and without, and ids of what they swim."""
+QUICK = ("learned", "miswired-0.5s")
+SWUM = [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in TASKS]
+"""Policies that swim, those that are not quick with --slow only."""
 
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler cc")
 
@@ -123,6 +127,12 @@ class Compiled:
         function(*map(_argument, arguments), _float(out))
         return out
 
+    def observe_pose(self, *arguments: np.ndarray) -> np.ndarray:
+        """Observation from a pose."""
+        out = np.zeros(self.defined["SIZE"], np.float32)
+        self._c.seastar_observe_pose(*map(_argument, arguments), _float(out))
+        return out
+
 
 def _float(array: np.ndarray):
     assert array.dtype == np.float32 and array.flags.c_contiguous
@@ -192,7 +202,7 @@ def require_rounding(policy: LearnedPolicy, shown: np.ndarray, logits: np.ndarra
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", TASKS)
+@pytest.mark.parametrize("name", SWUM)
 def test_c_decides_as_numpy_does_in_swims(name, tmp_path):
     """The policy swims, and C sees, remembers and decides the same, over 5,000 observations."""
     policy = policy_of(name)
@@ -260,6 +270,23 @@ def test_c_sees_what_the_environment_shows(name, tmp_path):
             np.testing.assert_allclose(compiled.observe(history, n, 1e-3, *rest), expected, rtol=1e-5, atol=1e-5)
         still = compiled.observe(history, 1, 1e-3, *rest)
         assert (still[layout.velocities] == 0.0).all() and (still[layout.hub_velocity] == 0.0).all()
+
+
+@needs_compiler
+def test_a_policy_that_does_not_see_its_limbs_needs_a_pose_alone(tmp_path):
+    policy, env = policy_of("fail-blind"), environment("fail-blind", policy_of("fail-blind"), 4)
+    task, layout = env.unwrapped._task, policy.description.layout
+    compiled = Compiled(policy, tmp_path)
+    env.reset(seed=3)
+    env.action_space.seed(0)
+    for _ in range(3):
+        observations = env.step(env.action_space.sample())[0]
+    for hub, theta, target, expected in zip(
+        task.simulator.hub_position(), heading_of(task.simulator), task._targets(), observations, strict=True
+    ):
+        limbs, further = expected[layout.actuators].astype(float), expected[layout.further].astype(float)
+        found = compiled.observe_pose(np.array([*hub, theta]), limbs, further, np.ascontiguousarray(target))
+        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6)
 
 
 @needs_compiler
@@ -332,8 +359,7 @@ def test_the_code_allocates_nothing_and_keeps_nothing():
     assert "alloc(" not in text and "*/ int x" not in text
     kept = [line for line in text.splitlines() if line.startswith("static") and "(" not in line]
     assert kept and all(line.startswith("static const") for line in kept)
-    assert "static" not in CODE.read_text().replace("static void at_", "").replace("static void body_", "").replace(
-        "static float *write_", "").replace("static int element_", "").replace("static float carried", "")  # fmt: skip
+    assert all("(" in line for line in CODE.read_text(encoding="utf-8").splitlines() if "static" in line)
 
 
 def test_every_policy_in_the_box_can_be_exported():

@@ -50,6 +50,18 @@ static void body_axis(const double *positions, double *c, double *s)
     *s = norm > 0.0 ? *s / norm : 0.0;
 }
 
+/* Write what stands behind the stations and the hub's velocity: numbers of the limbs and of the task, and waypoints. */
+static void write_tail(float *out, const double *hub, double c, double s, const double *limbs, const double *further,
+                       const double *targets)
+{
+    for (int k = 0; k < SEASTAR_LIMBS * SEASTAR_OF_LIMB; k++)
+        *out++ = (float)limbs[k];
+    for (int k = 0; k < SEASTAR_FURTHER; k++)
+        *out++ = (float)further[k];
+    for (int k = 0; k < 2; k++)
+        out = write_turned(out, targets[2 * k] - hub[0], targets[2 * k + 1] - hub[1], c, s, SEASTAR_LIMB_LENGTH);
+}
+
 /* Observation of a robot whose velocities are known.
 
    positions, velocities: of the tracked points in the world frame [m], [m/s], [SEASTAR_POINTS][2]: the hub, then the
@@ -73,14 +85,19 @@ void seastar_observe_moving(const double *positions, const double *velocities, c
                 }
         out = write_turned(out, velocities[0], velocities[1], c, s, SEASTAR_VELOCITY_SCALE);
     }
-    for (int k = 0; k < SEASTAR_LIMBS * SEASTAR_OF_LIMB; k++)
-        *out++ = (float)limbs[k];
-    for (int k = 0; k < SEASTAR_FURTHER; k++)
-        *out++ = (float)further[k];
-    for (int k = 0; k < 2; k++)
-        out = write_turned(out, targets[2 * k] - positions[0], targets[2 * k + 1] - positions[1], c, s,
-                           SEASTAR_LIMB_LENGTH);
+    write_tail(out, positions, c, s, limbs, further, targets);
 }
+
+#if !SEASTAR_SHOWS_LIMBS
+/* Observation of a policy that does not see its limbs, by a pose; other arguments as those of seastar_observe_moving.
+
+   pose: place of the hub in the world frame [m] and direction of limb 1 at rest [rad], x, y, theta. */
+void seastar_observe_pose(const double *pose, const double *limbs, const double *further, const double *targets,
+                          float *observation)
+{
+    write_tail(observation, pose, cos(pose[2]), sin(pose[2]), limbs, further, targets);
+}
+#endif
 
 /* Observation of a robot by its last positions; other arguments as those of seastar_observe_moving.
 
