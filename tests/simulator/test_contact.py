@@ -192,7 +192,7 @@ def test_paths_of_pressed_limbs_converge_with_the_nodes(damping):
     commands = np.array([[0.0, 1.0, -1.0, 1.0, -1.0], [1.0, -1.0, 0.0, 0.0, 0.0]])
 
     def swim(nodes):
-        numerics = Numerics("implicit-midpoint", 2e-3, newton_tolerance=1e-8, damping=damping)
+        numerics = Numerics("implicit-midpoint", 1e-3, newton_tolerance=1e-8, damping=damping)
         simulator = Simulator(Scene(Seastar(nodes_per_limb=nodes), numerics=numerics, contact=Contact()), 2)
         for _ in range(2):
             simulator.stroke(commands)

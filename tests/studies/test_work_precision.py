@@ -5,9 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from seastar_gym import Numerics, Scene, Seastar
+from seastar_gym import Contact, Numerics, Scene, Seastar
 from seastar_gym.accuracy.commands import PROMISED
 from seastar_gym.scene.numerics import PRESETS, Resolution
+from studies.accuracy import contact
 from studies.accuracy import work_precision as study
 from studies.accuracy import work_precision_page as page
 from studies.command import main
@@ -77,3 +78,13 @@ def test_tables_and_picture_are_made_and_nothing_is_measured_twice(small, tmp_pa
     found["versions"]["numba"] = "0.1"
     out.write_text(json.dumps(found))
     assert main(command) == 2 and "another machine or version" in capsys.readouterr().err
+
+
+def test_contacts_are_told_by_error_softness_and_the_speed_that_stops_a_robot():
+    """Softer limbs store less energy before they would pass through each other."""
+    assert contact.survives(Contact(), 5.0) and not contact.survives(Contact(layer=10e-3), 10.0)
+    assert set(contact.STEPS) == {*contact.NODES, contact.LIMIT}
+    numbers = {"19": 0.05, "37": None, "10": 0.1}
+    row = {"largest": numbers, "median": numbers, "away": [0.01, 0.2], "speed": 5.0, "cost": 2.5}
+    told = contact.STUDY.tables["contact"]({"contacts": {"Contact()": row}})
+    assert "| `Contact()` | 10 %, 10 % | 5 %, 5 % | fails, fails | 20 %, 1 % | 5 | x 2.5 |" in told
