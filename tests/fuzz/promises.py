@@ -258,7 +258,8 @@ def check_energy(case: Case) -> None:
     if fluid is not None:
         fluid = replace(fluid, current=None, added_mass_coefficient=None)
     tolerance = min(scene.numerics.newton_tolerance, Numerics().newton_tolerance)
-    numerics = replace(scene.numerics, scheme="implicit-euler", newton_tolerance=tolerance, path_tolerance=None)
+    kept = {"step": scene.numerics.step, "max_iterations": scene.numerics.max_iterations}
+    numerics = Numerics("implicit-euler", newton_tolerance=tolerance, **kept)
     scene = replace(scene, fluid=fluid, numerics=numerics, loads=(), contact=None)
     simulator = make(case._replace(scene=scene))
     at_rest = np.zeros_like(case.commands[0])
