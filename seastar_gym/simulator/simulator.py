@@ -390,8 +390,12 @@ class Simulator:
         pauses: Times since the interval began [s], shape (n,). A pause comes at the end of the time step in which its
             time lies; the last one is at the end of the interval.
         """
-        wanted = np.append(as_finite("pauses", pauses, (None,)), duration)
-        return (yield from self._advance_pausing(duration, commands, lambda times: ends_at(times, wanted)))
+        wanted = as_finite("pauses", pauses, (None,))
+
+        def ends_of(times: Floats) -> NDArray[np.intp]:
+            return ends_at(times, np.append(wanted, times[-1]))
+
+        return (yield from self._advance_pausing(duration, commands, ends_of))
 
     def _advance_pausing(
         self, duration: float, commands: ArrayLike | None, ends_of: Callable[[Floats], NDArray[np.intp]]

@@ -142,6 +142,8 @@ SIMULATOR_CALLS: Calls = {
     "advance": (SIMULATOR.advance, dict(duration=0.2, commands=np.zeros((2, 5)))),
     "advance_in_parts": (lambda **given: list(SIMULATOR.advance_in_parts(**given)),
                          dict(duration=0.2, commands=None, parts=2)),
+    "advance_pausing": (lambda **given: list(SIMULATOR.advance_pausing(**given)),
+                        dict(duration=0.2, commands=None, pauses=[0.05, 0.1])),
     "reset": (SIMULATOR.reset, dict(mask=[True, False], heading=0.1)),
     "set_state": (SIMULATOR.set_state, dict(state=SIMULATOR.get_state())),
     "State": (lambda **fields: SIMULATOR.set_state(SIMULATOR.get_state()._replace(**fields)),

@@ -23,8 +23,9 @@ from seastar_gym import (
     ThermalSma,
     Water,
 )
+from seastar_gym.simulator.report import report_of_pieces
 from seastar_gym.simulator.schedule import interval_times, step_times
-from strokes import assert_same, assert_same_bits, ternary
+from strokes import assert_same, assert_same_bits, finished, ternary
 
 FAST = Scene.preset("fast")
 TIGHT = replace(FAST, numerics=Numerics("implicit-midpoint", 0.01, newton_tolerance=1e-11))
@@ -44,6 +45,32 @@ HALF = np.array([[0.3, 0.5, 0.0, -0.7, -1.0]])
 
 def scene_with(actuator, scene: Scene = FAST) -> Scene:
     return replace(scene, actuator=actuator)
+
+
+# --- pauses ---------------------------------------------------------------------------------------------------------
+
+
+def test_an_interval_pauses_at_the_ends_of_the_steps_in_which_times_lie_and_no_bit_changes():
+    ours, whole = (Simulator(scene_with(SmaWires()), 2) for _ in range(2))
+    commands = np.repeat(LEFT_RIGHT, 2, axis=0)
+    paused, report = finished(ours.advance_pausing(0.2, commands, [0.0123, 0.05, 0.012, 0.3]))
+    assert paused == pytest.approx([0.015, 0.05, 0.2])
+    np.testing.assert_array_equal(report, whole.advance(0.2, commands))
+    assert ours.positions.tobytes() == whole.positions.tobytes()
+    paused, _ = finished(ours.advance_pausing(0.2, commands, []))
+    assert paused == pytest.approx([0.2])
+
+
+def test_the_report_of_pieces_counts_what_the_whole_does():
+    pieces = Simulator(scene_with(SmaWires()), 2)
+    commands = np.repeat(LEFT_RIGHT, 2, axis=0)
+    reports = [pieces.advance(0.06, commands), pieces.advance(0.3), pieces.advance(0.14)]
+    found, whole = report_of_pieces(reports), Simulator(scene_with(SmaWires()), 2).advance(0.5, commands)
+    for name in ("status", "steps", "heating_time", "energy", "covered"):
+        np.testing.assert_allclose(getattr(found, name), getattr(whole, name), rtol=1e-12, err_msg=name)
+    np.testing.assert_allclose(found.smallest_opening_angle, whole.smallest_opening_angle, rtol=1e-4)
+    failed = reports[1]._replace(status=np.array([0, 2]))
+    assert report_of_pieces([reports[0], failed, reports[2]]).status.tolist() == [0, 2]
 
 
 # --- strokes ---------------------------------------------------------------------------------------------------------
