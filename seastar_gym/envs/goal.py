@@ -36,6 +36,8 @@ class GoalForm(gym.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
         swim = env.unwrapped
         if not isinstance(swim, SeastarSwimEnv):
             raise ValueError(f"GoalForm needs an environment of waypoints, not {swim}.")
+        if swim._task.options.sight is not None:
+            raise ValueError("GoalForm tells where the hub is, which no camera knows: leave out sight.")
         self._swim = swim
         self._length = float(swim.scene.robot.limb_length)
         self._radius = float(swim._task.waypoint_radius) / self._length

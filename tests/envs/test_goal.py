@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from refusals import assert_refused
+from seastar_gym import Sight
 from seastar_gym.envs.goal import GoalForm
 from seastar_gym.envs.layout import Layout
 
@@ -53,3 +54,5 @@ def test_rewards_of_many_goals_at_once(env):
 def test_other_environments_are_refused():
     with assert_refused("GoalForm needs an environment of waypoints"):
         GoalForm(gym.make("CartPole-v1"))
+    with assert_refused("which no camera knows"):
+        GoalForm(gym.make("SeastarSwim-v0", fidelity="fast", sight=Sight()))
