@@ -104,13 +104,11 @@ def describe(env: BatchVecEnv, hidden: tuple[int, ...]) -> Description:
     in_strokes = batch.decision_period == batch.scene.actuator.period
     about = Description(batch.actions, symmetry, batch.scene, hidden, None if in_strokes else batch.decision_period)
     past = 0 if memory is None else memory.recollection.past
+    at = batch.layout
+    about = about._replace(past=past, entries=at.entries, shows_limbs=at.shows_limbs, stations=at.stations)
     if not isinstance(batch, SeastarTaskVectorEnv):
-        return about._replace(past=past)
-    layout = batch.layout
-    return about._replace(
-        task=task_of(batch), limb_mirror=observed_mirror(batch), entries=layout.entries,
-        shows_limbs=layout.shows_limbs, past=past, stations=layout.stations,
-    )  # fmt: skip
+        return about
+    return about._replace(task=task_of(batch), limb_mirror=observed_mirror(batch))
 
 
 def policy_of(model: PPO) -> LearnedPolicy:
