@@ -196,7 +196,7 @@ def test_a_batch_gives_the_bits_of_single_environments_across_resets(sees, mode)
 
 @pytest.mark.parametrize(
     "id", ["SeastarSwim-v0", "SeastarSwimHeading-v0", "SeastarFailBlind-v0", "SeastarPrizesTimed-v0",
-           "SeastarObstTrap-v0", "SeastarMiswiredTimed-v0", "SeastarPreyTimed-v0"],
+           "SeastarObstTrap-v0", "SeastarMiswiredTimed-v0", "SeastarPreyTimed-v0", "SeastarStation-v0"],
 )  # fmt: skip
 def test_every_task_can_be_seen_through_a_camera(id):
     period = env_of(id).unwrapped.decision_period
