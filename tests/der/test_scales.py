@@ -5,6 +5,7 @@ import pytest
 
 from seastar_gym import Contact, Scene, Seastar, SmaPulse, Water
 from seastar_gym.der.rods import make_work
+from seastar_gym.der.terms.contact import SLOT_ROWS
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 
@@ -35,4 +36,4 @@ def test_every_node_has_room_for_all_edges_of_another_limb_or_for_three_where_th
     rods = make_rods(Scene(Seastar(5, edges + 1), actuator=SmaPulse(0.1), contact=Contact()))
     work, nodes = make_work(rods, 1).contact, 2 * rods.contact.n_pairs * edges
     assert work.share == nodes * near
-    assert len(work.slots) == 6 * nodes * min(edges, near * N_LANES)
+    assert len(work.slots) == SLOT_ROWS * nodes * min(edges, near * N_LANES)
