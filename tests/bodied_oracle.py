@@ -205,7 +205,7 @@ class Touching(Rigid):
     def pair(self, ends: Array, i: int, j: int, k: int, share: float, side: float, stiffness: float) -> Pair:
         e = ends[k] - ends[j]
         normal, t, near = side * np.array([-e[1], e[0]]) / np.linalg.norm(e), self.thickness, min(max(share, 0.0), 1.0)
-        return Pair(i, j, k, share, normal, t[i] + (1.0 - near) * t[j] + near * t[k], stiffness)
+        return Pair(i, j, k, near, normal, t[i] + (1.0 - near) * t[j] + near * t[k], stiffness)
 
     def limb_at_limb(self, ends: Array, start: Array, limb: int, other: int) -> list[Pair]:
         """Nodes on the side of an edge on which they were, if they were beside it, and in front of its end."""
@@ -218,11 +218,12 @@ class Touching(Rigid):
                 share = along(ends, node, tail, head)
                 before = start if -1.0 <= along(start, node, tail, head) <= 1.0 else ends
                 side = 1.0 if height(before, node, tail, head) > 0.0 else -1.0
-                weight = oracle.share_of_edge(min(share, 1.0) if is_last else share, edge, star.nodes_per_limb - 1)
+                along_edge = min(share, 1.0) if is_last else share
+                weight = oracle.share_of_edge(along_edge, edge, star.nodes_per_limb - 1, 0.05)
                 pair = self.pair(ends, node, tail, head, share, side, weight * self.stiffness(node, 0.5))
-                if is_last and share > 1.0:
+                if share > 1.0:
                     way = ends[node] - ends[head]
-                    pair = replace(pair, share=1.0, normal=way / np.linalg.norm(way))
+                    pair = replace(pair, normal=way / np.linalg.norm(way))
                 if weight > 0.0:
                     found.append(pair)
         return found

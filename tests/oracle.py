@@ -829,10 +829,10 @@ class Touch:
         return max(0.0, self.thickness - float(self.gradient @ ends.ravel()))
 
 
-def share_of_edge(s: float, edge: int, last: int) -> float:
+def share_of_edge(s: float, edge: int, last: int, overhang: float = 0.25) -> float:
     """Share of a node's stiffness at edges 1 to `last` of a limb, s along the edge: it passes on around hinges."""
-    full = 0.0 if edge == 1 else 0.25, 1.0 if edge == last else 0.75
-    return float(np.interp(s, [-0.25, *full, 1.25], [0.0, 1.0, 1.0, 0.0]))
+    full = 0.0 if edge == 1 else overhang, 1.0 if edge == last else 1.0 - overhang
+    return float(np.interp(s, [-overhang, *full, 1.0 + overhang], [0.0, 1.0, 1.0, 0.0]))
 
 
 def touches(star: Star, ends: Array, start: Array, opening_angle: float) -> list[Touch]:

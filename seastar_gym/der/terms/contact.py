@@ -8,9 +8,10 @@ on which the node's limb belongs. Where g is below d, their thicknesses' sum, el
 half, because the nodes of either limb meet the edges of the other. A node that stands at a hinge meets both of its
 edges, and V is shared among them so that it counts once wherever it stands: otherwise limbs that slide along each other
 gain energy at every hinge, which no mesh and no step resolves. The shared edges are continued beyond their ends, s may
-be below 0 and above 1, so that forces turn nobody. Who is near whom, n and s are taken from the first
-guess of a stage, see fluid.py: g is linear in the places, V convex in them, k c c^T its Hessian, c the gradient of g,
-and the forces on node and edge cancel. That Hessian couples limbs, so it is not in the star's matrix, see coupled.py.
+be below 0 and above 1, so that forces turn nobody; but not on a body, where s is kept within. Who is near whom, n and s
+are taken from the first guess of a stage, see fluid.py: g is linear in the places, V convex in them, k c c^T its
+Hessian, c the gradient of g, and the forces on node and edge cancel. That Hessian couples limbs, so it is not in the
+star's matrix, see coupled.py.
 
 A body's outline is a polygon with sides in place of edges, whose corners meet the edges of limbs. A node that meets it
 has k of its whole length, since nobody meets it in turn, and an edge that meets a corner that of half the length at its

@@ -35,6 +35,7 @@ from seastar_gym.simd.lanes import (
 )
 
 OVERHANG = 0.25  # of an edge: so far from its ends, on either side, it shares nodes with the next, see share_of_edge
+OVERHANG_ON_BODY = 0.05  # limbs may curl sharply there, and pass beside the lines of their edges
 MARGIN = 2.0  # times the thickness: pairs nearer than that are listed, and those that approach faster
 OUT_OF_TOUCH = 1e300  # [m]
 
@@ -151,9 +152,15 @@ def view_node(work, node, wx, wy):
 
 
 @kernel
-def lower_end(a, b):
-    """The lower end of an edge with ends at a and b, continued by OVERHANG."""
-    return select(a < b, subtract_product(a, OVERHANG, b - a), subtract_product(b, OVERHANG, a - b))
+def overhang(rods):
+    """Share of an edge by which it is continued beyond its ends."""
+    return OVERHANG if rods.body is None else OVERHANG_ON_BODY
+
+
+@kernel
+def lower_end(rods, a, b):
+    """The lower end of an edge with ends at a and b, continued by its overhang."""
+    return select(a < b, subtract_product(a, overhang(rods), b - a), subtract_product(b, overhang(rods), a - b))
 
 
 @kernel
@@ -167,12 +174,12 @@ def list_pairs(rods, work, stage, q_0, reach, limb, other, side, end, robots):
     for e in range(other * edges, other * edges + edges):
         j, k = tail_node(rods, e), e + 1
         forth_j, forth_k = -side * load(seen, 2 * j), -side * load(seen, 2 * k)
-        begin = lower_end(forth_j, forth_k) - reach
+        begin = lower_end(rods, forth_j, forth_k) - reach
         reached = robots & (end > begin)
         if not any_lane(reached):
             continue
         z_j, z_k = load(seen, 2 * j + 1), load(seen, 2 * k + 1)
-        lowest, highest = lower_end(z_j, z_k) - reach, reach - lower_end(-z_j, -z_k)
+        lowest, highest = lower_end(rods, z_j, z_k) - reach, reach - lower_end(rods, -z_j, -z_k)
         ex, ey = edge_vector(ends, j, k)
         inverse = 1.0 / add_product(ex * ex, ey, ey)
         scale = side * sqrt(inverse)
@@ -184,7 +191,7 @@ def list_pairs(rods, work, stage, q_0, reach, limb, other, side, end, robots):
                 dx, dy = edge_vector(ends, j, i)
                 s = add_product(dx * ex, dy, ey) * inverse
                 g = add_product(dx * nx, dy, ny)
-                facing = facing & (s > -OVERHANG) & (s < last_share(rods, e))
+                facing = facing & (s > -overhang(rods)) & (s < last_share(rods, e))
                 if any_lane(facing):
                     # Limbs that begin at one point have sides that they keep; those on a body may go round tips.
                     if rods.body is None:
@@ -201,8 +208,8 @@ def share_of_edge(rods, e, s):
     falls to zero beyond them, but not where tips are round.
     """
     edges = rods.edges_per_limb
-    behind = (s + OVERHANG) * ((1.0 if e % edges == 0 else 0.5) / OVERHANG)
-    ahead = (last_share(rods, e) - s) * ((1.0 if e % edges == edges - 1 else 0.5) / OVERHANG)
+    behind = (s + overhang(rods)) * ((1.0 if e % edges == 0 else 0.5) / overhang(rods))
+    ahead = (last_share(rods, e) - s) * ((1.0 if e % edges == edges - 1 else 0.5) / overhang(rods))
     share = select(behind < ahead, behind, ahead)
     return select(share < 1.0, share, 1.0)
 
@@ -211,7 +218,7 @@ def share_of_edge(rods, e, s):
 def last_share(rods, e):
     """Share of an edge up to which it meets nodes; on a body tips are round, and meet those in front of them, too."""
     edges = rods.edges_per_limb
-    return splat(np.inf if rods.body is not None and e % edges == edges - 1 else 1.0 + OVERHANG)
+    return splat(np.inf if rods.body is not None and e % edges == edges - 1 else 1.0 + overhang(rods))
 
 
 @kernel
@@ -221,7 +228,7 @@ def list_pair_on_its_side(rods, work, stage, q_0, i, e, s, facing):
     The side is that of the step's beginning, if the node was beside the edge then, or at most the edge's length behind.
     Otherwise it is that of the first guess.
     """
-    j, k, ends, edges = tail_node(rods, e), e + 1, work.contact.ends, rods.edges_per_limb
+    j, k, ends = tail_node(rods, e), e + 1, work.contact.ends
     fx, fy = edge_vector(q_0, j, k)
     hx, hy = edge_vector(q_0, j, i)
     squared = add_product(fx * fx, fy, fy)
@@ -235,13 +242,13 @@ def list_pair_on_its_side(rods, work, stage, q_0, i, e, s, facing):
     side = select(select(was_beside, g_0, g) > 0.0, scale, -scale)
     tx, ty = edge_vector(ends, k, i)
     size = sqrt(add_product(tx * tx, ty, ty))
-    in_front = (s > (np.inf if e % edges < edges - 1 else 1.0)) & (size > 0.0)
+    in_front = (s > 1.0) & (size > 0.0)
     nx, ny = select(in_front, tx / size, -ey * side), select(in_front, ty / size, ex * side)
     g = select(in_front, size, add_product(dx * nx, dy, ny))
     ux, uy = edge_vector(q_0, k, i)
     g_0 = select(in_front, sqrt(add_product(ux * ux, uy, uy)), absolute(g_0))
     share, d = share_of_edge(rods, e, s), thickness_of_pair(rods, i, j, k, s)
-    s = select(in_front, 1.0, s)
+    s = select(s > 0.0, select(s < 1.0, s, 1.0), 0.0)
     near = facing & (g < MARGIN * d + absolute(g - g_0))
     if any_lane(near):
         put_on_list(rods, work, stage, i, e, nx, ny, s, d, share, near)
