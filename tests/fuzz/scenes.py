@@ -344,8 +344,10 @@ def draw_loads(draw: Draw, robot: Seastar) -> tuple[tuple[int, float, float], ..
 
 
 def draw_contact(draw: Draw, robot: Seastar) -> Contact:
-    modulus = draw.each(lambda: draw.around(1e5, 2.0)) if draw.maybe(0.5) else None
-    return Contact(modulus, draw.rng.uniform(0.02, 0.98 if draw.wild else 0.4) * robot.opening_angle)
+    angle = draw.rng.uniform(0.02, 0.98 if draw.wild else 0.4) * robot.opening_angle
+    if draw.maybe(0.3):
+        return Contact(opening_angle=angle, layer=draw.each(lambda: draw.around(5e-3, 2.0)))
+    return Contact(draw.each(lambda: draw.around(1e5, 2.0)) if draw.maybe(0.5) else None, angle)
 
 
 def draw_parts(draw: Draw, terms: Terms) -> Scene:
