@@ -56,7 +56,8 @@ def load_policy(name: str) -> LearnedPolicy:
 
 def export(options: argparse.Namespace) -> str:
     """Write the file; returns a sentence on it."""
-    policy, name = load_policy(options.policy), Path(options.policy).stem
+    policy = load_policy(options.policy)
+    name = Path(options.policy).name.removesuffix(SHIPPED.suffix).removesuffix(".zip")
     out = Path(f"{name}.{options.to}") if options.out is None else options.out
     if options.to == "onnx" and options.points is not None:
         raise ValueError("--points is for c: ONNX begins with the observation.")

@@ -425,6 +425,8 @@ def test_the_command_writes_a_file(tmp_path, monkeypatch, capsys):
     assert main(["export", "learned", "--to", "c", "--points", "3"]) == 0
     assert capsys.readouterr().out.startswith("learned.c: ")
     assert "#define SEASTAR_POINTS 11\n" in (tmp_path / "learned.c").read_text()
+    assert main(["export", "seastar-0.2s", "--to", "c"]) == 0
+    assert "Policy seastar-0.2s" in Path("seastar-0.2s.c").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
