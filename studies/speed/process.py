@@ -14,7 +14,7 @@ import gymnasium as gym
 import numpy as np
 
 from seastar_gym.der.stepping import stroke
-from seastar_gym.envs import observation, swimming
+from seastar_gym.envs import observation, pictures
 from seastar_gym.gaits import STRAIGHT
 from seastar_gym.scene import Scene
 from seastar_gym.simulator import Simulator, batch
@@ -71,7 +71,7 @@ def step_of_one(id: str, n: int, unwrapped: bool = False) -> tuple[float, float]
         return call
 
     advance, observe = timed(stroke.advance), timed(observation.observe)
-    with patch.object(batch, "advance", advance), patch.object(swimming, "observe", observe):
+    with patch.object(batch, "advance", advance), patch.object(pictures, "observe", observe):
         start = time.thread_time()
         for action in actions:
             env.step(action)
