@@ -69,6 +69,10 @@ def installed_with(found: list[Requirement]) -> set[str]:
     return {name for name, _ in seen}
 
 
+WITH_ROS = "rclpy", "geometry_msgs", "std_msgs"
+"""Packages that no package index has: they come with ROS 2."""
+
+
 def imports_of(*paths: Path) -> set[str]:
     """Distributions that these files and folders import from outside this project, at the top or later."""
     files = [file for path in paths for file in ([path] if path.is_file() else sorted(path.rglob("*.py")))]
@@ -81,7 +85,7 @@ def imports_of(*paths: Path) -> set[str]:
             modules.add(node.module)
     beside = {path.stem for folder in ("tests", "docs") for path in (ROOT / folder).rglob("*.py")}
     folders = {path.stem for path in (ROOT / "tests").rglob("*")}
-    own = {"seastar_gym", "agents", "studies", "train", *beside, *folders}
+    own = {"seastar_gym", "agents", "studies", "train", *beside, *folders, *WITH_ROS}
     packages = {module.partition(".")[0] for module in modules} - sys.stdlib_module_names - own
     return {canonicalize_name(DISTRIBUTION_OF.get(package, package)) for package in packages}
 
