@@ -76,8 +76,6 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "A command of zero has another colour.",
     ("seastar_gym/envs/symmetry/group.py", "return (2 * k - (first - second) % 2) % (2 * n_turns_of(group))"):
         "Sums and differences are odd together.",
-    ("seastar_gym/accuracy/water.py", "rows = to_rows(water.reshape(simulator.n_robots, -2))"):
-        "Any negative length is the one that numpy finds.",
 }  # fmt: skip
 """Reasons why mutants, (file, line after the change), behave as the original does."""
 PRELOADED = ("numba", "pyarrow.dataset", "scipy.optimize", "scipy.stats")

@@ -22,14 +22,13 @@ from seastar_gym.accuracy.certificate import CLASSES_VERSION, MOST_SAMPLES, Cert
 from seastar_gym.accuracy.commands import ACTIONS, CLASSES, PROMISED, STROKES, draw_classes
 from seastar_gym.accuracy.endurance import energy_growth
 from seastar_gym.accuracy.setting import Setting, at, physics
-from seastar_gym.accuracy.water import carried, with_the_water
+from seastar_gym.accuracy.water import carried, velocity, with_the_water
 from seastar_gym.scene import Numerics, Scene
 from seastar_gym.scene.checks import require_count, require_seed, shown
 from seastar_gym.scene.numerics import DAMPING, Resolution
 from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simulator import Simulator
-from seastar_gym.simulator.water import velocity
 from seastar_gym.version import __version__
 
 Floats = NDArray[np.float64]

@@ -1,13 +1,31 @@
-"""Swims through the water: from rest in it, and how far it carries a hub."""
+"""A robot as the water sees it: its start and its way relative to the current.
+
+A uniform current is a translation: what swims in it has the errors of still water, though it is carried off. Where the
+water differs from place to place, the current is that at the hub.
+"""
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.der.terms.current import current_velocity
+from seastar_gym.model.currents import current_rows
 from seastar_gym.scene import Scene
+from seastar_gym.simd.numpy_lanes import Lanes
 from seastar_gym.simulator import Simulator
-from seastar_gym.simulator.water import current_of, velocity
 
 Floats = NDArray[np.float64]
+
+
+def velocity(scene: Scene, places: Floats) -> Floats:
+    """Velocity of the water [m/s] at places [m], shape (..., 2). The first call in a process loads the plain kernels,
+    so it is no call for a thread."""
+    current = _current(scene)
+    if current is None:
+        return np.zeros_like(places)
+    found = current_velocity.plain(current_rows(current), Lanes(places[..., 0]), Lanes(places[..., 1]))
+    return np.stack([np.broadcast_to(each.numbers, places.shape[:-1]) for each in found], axis=-1)
 
 
 def with_the_water(
@@ -15,7 +33,7 @@ def with_the_water(
 ) -> Simulator:
     """Robots at rest in the water: with the hub at the origin, and with the velocity of the water there."""
     simulator = Simulator(scene, n_robots, threads, error_bars)
-    if current_of(scene) is not None:
+    if _current(scene) is not None:
         state = simulator.get_state()
         simulator.set_state(state._replace(velocities=state.velocities + velocity(scene, np.zeros(2))))
     return simulator
@@ -28,3 +46,7 @@ def carried(scene: Scene, hub: Floats) -> Floats:
     """
     at_ends = velocity(scene, np.concatenate([np.zeros((1, *hub.shape[1:])), hub]))
     return scene.actuator.period * 0.5 * (at_ends[:-1] + at_ends[1:])
+
+
+def _current(scene: Scene) -> Any:
+    return None if scene.fluid is None else scene.fluid.current
