@@ -104,7 +104,8 @@ PRESETS: dict[Fidelity, Resolution] = {
     "reference": Resolution("continuum", 37, _midpoint(0.3e-3, 1e-8)),
     "chapter": Resolution("chapter", NODES["chapter"], Numerics("implicit-euler", 3e-3)),
 }
-"""Chosen from the front that `python -m studies.accuracy` measures."""
+"""`fast` and `balanced` lie on or near the front that `python -m studies.accuracy` measures. `accurate` and `reference`
+keep the steps of earlier versions: longer steps on finer meshes reach their errors faster, see `Scene.for_error`."""
 
 DEFAULT_FIDELITY: Fidelity = "balanced"
 DEFAULT = PRESETS[DEFAULT_FIDELITY].numerics
