@@ -16,7 +16,7 @@ from seastar_gym.command import answered, command_parser
 from seastar_gym.controllers import learned, learner_zip
 from seastar_gym.controllers.export.c_code import to_c
 from seastar_gym.controllers.export.onnx_graph import to_onnx
-from seastar_gym.controllers.learned import SHIPPED, TASKS, LearnedPolicy
+from seastar_gym.controllers.learned import SHIPPED, LearnedPolicy
 from seastar_gym.files import write_atomically
 
 FORMATS = ("c", "onnx")
@@ -33,15 +33,9 @@ def parser() -> argparse.ArgumentParser:
     return found
 
 
-def in_the_box() -> dict[str, Path]:
-    """Files of the policies in the box by their names."""
-    files = [*sorted(SHIPPED.parent.glob("*.safetensors")), *sorted(TASKS.glob("*.safetensors"))]
-    return {"learned": SHIPPED, **{file.stem: file for file in files}}
-
-
 def load_policy(name: str) -> LearnedPolicy:
     """Policy of a name or a file."""
-    known = in_the_box()
+    known = {"learned": SHIPPED, **learned.by_name()}
     if name in known:
         return learned.load(known[name])
     if name.endswith(".zip"):

@@ -245,6 +245,11 @@ def in_the_box(decision_period: float | None, shipped: Path = SHIPPED, task: str
     return _of_period(shipped, decision_period)
 
 
+def by_name() -> dict[str, Path]:
+    """Files of all policies in the box by their names."""
+    return {file.stem: file for folder in (SHIPPED.parent, TASKS) for file in sorted(folder.glob(f"*{SHIPPED.suffix}"))}
+
+
 def of_task(task: str, decision_period: float | None, folder: Path = TASKS) -> Path:
     """File of the policy of a task, by the name of its challenge, whether it is there or not."""
     return _of_period(folder / f"{task}{SHIPPED.suffix}", decision_period)

@@ -40,6 +40,7 @@ decisions [s], None for strokes, and the name of the task, None for waypoints.""
 
 HELP = (
     f"Agents: {', '.join(AGENTS)} (learned is the policy in the box for the task and the time between decisions); "
+    "policies in the box by name, such as seastar-0.2s; "
     f"scripted gaits, {', '.join(GAITS)}, random, or a pair of limbs such as 4+,1-; files of policies (.safetensors, "
     "or a model.zip of train.py or of plain Stable-Baselines3); module:function, which gets an environment and returns "
     "anything with predict. A model.zip of plain Stable-Baselines3 and module:function execute the code of whoever "
@@ -154,9 +155,10 @@ def files_of(name: str, decision_period: float | None = None) -> list[Path]:
     """
     if foreign.is_function(name):
         return [foreign.module_file(name)]
-    if name != "learned" and not _is_file(name):
+    known = learned.by_name()
+    if name != "learned" and name not in known and not _is_file(name):
         return []
-    file = learned.in_the_box(decision_period) if name == "learned" else Path(name)
+    file = learned.in_the_box(decision_period) if name == "learned" else known.get(name, Path(name))
     return [file, file.with_suffix(".json")] if file.suffix == ".safetensors" else [file]
 
 
@@ -174,6 +176,8 @@ def _load_agent(
 ) -> Policy:
     if name in AGENTS:
         return AGENTS[name](scene, decision_period, task)
+    if name in learned.by_name():
+        return learned.load(learned.by_name()[name])
     if foreign.is_function(name):
         return foreign.call_function(name, make_env())
     return _load_file(name) if _is_file(name) else _scripted(name, seed, decision_period, scene.robot.n_limbs)

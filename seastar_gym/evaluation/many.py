@@ -5,6 +5,7 @@ import numpy as np
 from seastar_gym.controllers.contract import Policy, actions_of, require_fit, require_policy
 from seastar_gym.envs.options import Path as SwimPath
 from seastar_gym.envs.options import SwimOptions
+from seastar_gym.envs.sight import Drawn, Sight
 from seastar_gym.evaluation.disturbances import Disturbance, DisturbedTask
 from seastar_gym.evaluation.rollout import MOST_DECISIONS, TaskBatch, rollout
 from seastar_gym.evaluation.swim import RECORDED, TIME_LIMIT, Swim, decisions_in, swims_of
@@ -30,11 +31,14 @@ def swim_many(
     seed: int = 0,
     threads: int | None = None,
     decision_period: float | None = None,
+    sight: Sight | None = None,
+    action_delay: Drawn = 0.0,
 ) -> list[Swim]:
     """Swims of `n_swims` robots side by side, each to its last waypoint or for `max_strokes` strokes, or decisions.
 
     The path "random" has random headings. max_strokes: None means 400, or the decisions of 400 s. waypoint_radius:
-    Radius of the waypoints [m]. decision_period: Time between decisions [s]. None means a stroke.
+    Radius of the waypoints [m]. decision_period: Time between decisions [s]. None means a stroke. sight,
+    action_delay: As of the environments.
     """
     require_kind("agent", agent, str, "a text")
     require_policy(policy)
@@ -49,7 +53,7 @@ def swim_many(
     with_heading = isinstance(path, str) and path == "random"
     options = SwimOptions(
         path, actions, scene=scene, waypoint_radius=waypoint_radius, random_heading=with_heading,
-        decision_period=decision_period,
+        decision_period=decision_period, sight=sight, action_delay=action_delay,
     )  # fmt: skip
     task = DisturbedTask(disturbance, np.random.default_rng([seed, n_swims]), options, n_swims, threads)
     batch, limit = TaskBatch(task), max_strokes or decisions_in(TIME_LIMIT, decision_period)

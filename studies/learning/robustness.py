@@ -14,13 +14,12 @@ from typing import Any
 import numpy as np
 
 from seastar_gym.controllers.learned import LearnedPolicy, in_the_box, load
-from seastar_gym.envs.options import SwimOptions, make_scene
-from seastar_gym.envs.sight import Drawn, Sight
-from seastar_gym.envs.task import SwimTask
-from seastar_gym.evaluation.many import HELD_OUT_SEED
-from seastar_gym.evaluation.rollout import TaskBatch, rollout
+from seastar_gym.envs.layout import Layout
+from seastar_gym.envs.options import make_scene
+from seastar_gym.envs.sight import Sight
+from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
 from seastar_gym.evaluation.statistics import mean_with_interval
-from seastar_gym.evaluation.swim import TIME_LIMIT, decisions_in
+from seastar_gym.evaluation.swim import TIME_LIMIT
 from seastar_gym.scene.numerics import Fidelity
 from studies.accuracy.page import markdown
 from studies.frame import InDocs, Results, Study
@@ -31,8 +30,6 @@ PERIODS: dict[str, float | None] = {"1 s": None, "0.5 s": 0.5, "0.2 s": 0.2}
 """Time between decisions [s], None for strokes, by what the table calls it."""
 RATE = 20.0
 """Pictures per second [Hz]: decisions and delays are whole multiples of the time between two."""
-WAYPOINTS = 4
-"""Numbers at the end of an observation that tell of waypoints; the age of a picture stands before them."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +40,8 @@ class Condition:
     modulus: Over that of the training. moves: Whether velocities are seen; otherwise they are zero.
     """
 
-    delay: Drawn = 0.0
-    action_delay: Drawn = 0.0
+    delay: float = 0.0
+    action_delay: float = 0.0
     noise: float = 0.0
     modulus: float = 1.0
     moves: bool = True
@@ -64,16 +61,17 @@ CONDITIONS = {
 
 
 class Seeing:
-    """A policy under a condition: without the age of what is seen, which it does not know."""
+    """A policy under a condition: without the age of what is seen, which it does not know. layout: That it knows."""
 
-    def __init__(self, policy: LearnedPolicy, condition: Condition, velocities: slice):
-        self.policy, self.condition, self.velocities = policy, condition, velocities
+    def __init__(self, policy: LearnedPolicy, condition: Condition, layout: Layout):
+        self.policy, self.actions, self.condition = policy, policy.actions, condition
+        self.age, self.velocities = layout.waypoints.start, slice(layout.velocities.start, layout.hub_velocity.stop)
 
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
     ) -> tuple[Any, Any]:
         """As the policy does."""
-        seen = np.delete(observation, observation.shape[1] - WAYPOINTS - 1, axis=1)
+        seen = np.delete(observation, self.age, axis=1)
         if not self.condition.moves:
             seen[:, self.velocities] = 0.0
         return self.policy.predict(seen, state, episode_start, deterministic)
@@ -84,22 +82,15 @@ def examine(name: str, condition: Condition) -> dict[str, Any] | None:
     period = PERIODS[name]
     if period is None and condition.action_delay:
         return None
-    policy = load(in_the_box(period))
     scene = make_scene(None, FIDELITY, period)
     scene = replace(scene, robot=replace(scene.robot, youngs_modulus=condition.modulus * scene.robot.youngs_modulus))
-    sight = Sight(RATE, condition.delay, noise=condition.noise, sees="nodes")
-    options = SwimOptions(
-        "random", policy.actions, scene=scene, random_heading=True, decision_period=period, sight=sight,
-        action_delay=condition.action_delay,
+    swims = swim_many(
+        "learned", Seeing(load(in_the_box(period)), condition, Layout.of(scene)), "random", N_PATHS, scene,
+        seed=HELD_OUT_SEED, decision_period=period, action_delay=condition.action_delay,
+        sight=Sight(RATE, condition.delay, noise=condition.noise, sees="nodes"),
     )  # fmt: skip
-    task = SwimTask(options, N_PATHS, None)
-    batch, at = TaskBatch(task), task.layout
-    batch.np_random = tuple(np.random.default_rng([HELD_OUT_SEED, path]) for path in range(N_PATHS))
-    seeing = Seeing(policy, condition, slice(at.velocities.start, at.hub_velocity.stop))
-    found = rollout(batch, seeing, until=decisions_in(TIME_LIMIT, period), record=["time"])
-    times = np.where(found.success, found.last("time"), TIME_LIMIT)
-    batch.close()
-    return {"times": times.round(1).tolist(), "arrived": int(found.success.sum())}
+    times = [float(swim.time[-1]) if swim.finished else TIME_LIMIT for swim in swims]
+    return {"times": np.round(times, 1).tolist(), "arrived": sum(swim.finished for swim in swims)}
 
 
 def table(results: Mapping[str, Any]) -> str:

@@ -14,7 +14,7 @@ import pytest
 
 from refusals import assert_refused
 from seastar_gym import Body, Limb, Numerics, Scene, Seastar, Simulator, SmaWires
-from seastar_gym.cli.export import in_the_box, load_policy
+from seastar_gym.cli.export import load_policy
 from seastar_gym.cli.main import main
 from seastar_gym.controllers import learned
 from seastar_gym.controllers.description import Description
@@ -363,7 +363,7 @@ def test_the_code_allocates_nothing_and_keeps_nothing():
 
 
 def test_every_policy_in_the_box_can_be_exported():
-    for name in in_the_box():
+    for name in learned.by_name():
         assert "seastar_act" in to_c(load_policy(name), name)
 
 

@@ -61,6 +61,9 @@ def test_what_a_policy_is_made_of_has_files():
     assert files_of("learned", 0.5) == [in_the_box(0.5), in_the_box(0.5).with_suffix(".json")]
     assert files_of("runs/mine.safetensors") == [Path("runs/mine.safetensors"), Path("runs/mine.json")]
     assert files_of("model.zip") == [Path("model.zip")] and files_of("runs/mine") == [Path("runs/mine")]
+    named = in_the_box(0.2)
+    assert files_of("seastar-0.2s") == [named, named.with_suffix(".json")]
+    assert load_agents(["seastar-0.2s"], decision_period=0.2)["seastar-0.2s"].decision_period == 0.2
     assert [files_of(name) for name in ("greedy", "planner", "straight", "4+,1-")] == [[]] * 4
     assert files_of("json.decoder:JSONDecoder") == [Path(json.decoder.__file__)]
     for nothing in ("nowhere_at_all:make", "sys:exit", "nowhere.at_all:make"):
