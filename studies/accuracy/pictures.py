@@ -174,7 +174,7 @@ def convergence(found: Study) -> Figure:
         for column, line, what in (("path", "-", "worst path"), ("gait", "--", "gaits"), ("straight", ":", "straight")):
             values = [PERCENT * getattr(by_nodes[n], column) for n in edges]
             space.loglog(edges - 1, values, f"o{line}", ms=4, lw=1.4, color=colour, label=f"{name}, {what}")
-    space.set_xticks([n - 1 for n in nodes], ["" if n == 12 else str(n) for n in nodes])
+    space.set_xticks([n - 1 for n in nodes], ["" if n in (11, 12) else str(n) for n in nodes])
     space.minorticks_off()
     space.set(xlabel="nodes per limb N", ylabel="error of space")
     space.set_title("Space: against infinitely many nodes", fontsize=10.5, loc="left")
