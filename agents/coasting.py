@@ -97,16 +97,21 @@ class CoastingProgress(gym.vector.VectorWrapper):
     def reset(self, **arguments: Any) -> tuple[Any, dict[str, Any]]:
         """Begin episodes."""
         observations, info = self.env.reset(**arguments)
-        self._gain = self.gain(observations)
+        self._gain = self.gain(self._true(observations))
         return observations, info
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """One decision of every robot."""
         observations, rewards, terminated, truncated, info = self.env.step(actions)
-        gain = self.gain(observations)
+        gain = self.gain(self._true(observations))
         more = np.where(terminated | truncated, 0.0, gain - self._gain)
         self._gain = gain
         return observations, rewards + self.weights.progress * more, terminated, truncated, info
+
+    def _true(self, observations: Floats) -> Floats:
+        """What would be observed of robots that are seen as they are, see `privileged_observations`."""
+        batch = self.env.unwrapped
+        return observations if batch.layout == self.coasting.layout else batch.privileged_observations()
 
     def gain(self, observations: Floats) -> Floats:
         """Way to go that coasting would save [m], shape (n_robots,)."""

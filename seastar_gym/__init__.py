@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from seastar_gym.envs.tasks.obst_trap import ObstTrap as ObstTrap
     from seastar_gym.envs.tasks.prey import Prey as Prey
     from seastar_gym.envs.tasks.prizes import Prizes as Prizes
+    from seastar_gym.envs.tasks.sim_to_real import SimToReal as SimToReal
     from seastar_gym.envs.tasks.station import Station as Station
     from seastar_gym.scene import AlongLimb as AlongLimb
     from seastar_gym.scene import Attachment as Attachment

@@ -14,6 +14,8 @@ from seastar_gym.scene.numerics import Fidelity
 
 EPISODES = 64
 """Held-out episodes of a card."""
+IMITATION = "imitation"
+"""Learner that imitates the bundled policy of waypoints, which sees the true state, see `agents.distillation`."""
 FIDELITIES: tuple[Fidelity, ...] = ("fast", "balanced")
 
 
@@ -26,13 +28,19 @@ def card(id: str, policy: LearnedPolicy, file: Path) -> str:
     told = ""
     if "told the way" in str(policy.training.get("learner")):
         told = " Its training's reward measured the way around all discs, `ObstTrap(potential=\"geodesic\")`."
+    if policy.training.get("learner") == IMITATION:
+        told = (
+            " It imitates the bundled policy of waypoints, which sees the true state.\n`docs/plant.md` says what "
+            "delays and softer limbs cost it, and what other seeds make of it."
+        )
     past = f" and the most telling numbers of the last {about.past}" if about.past else ""
     env = env_of(id)
     measure = measure_of(env)
     return f"""# Model card: {file.stem}
 
 A policy of the chapter's robot for `{id}`. What it sees and is rewarded for stands in the docstring of
-`{type(env.challenge).__name__}`.{told} It was trained in simulation, and no real robot has swum by it.
+`{type(env.challenge).__name__}`.{told}
+It was trained in simulation, and no real robot has swum by it.
 
 | | |
 |---|---|

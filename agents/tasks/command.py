@@ -19,8 +19,8 @@ import numpy as np
 import tyro
 
 from agents.ppo import policy_of
-from agents.tasks.card import write_card
-from agents.tasks.learning import LEARNERS, train
+from agents.tasks.card import IMITATION, write_card
+from agents.tasks.learning import ENOUGH, LEARNERS, imitate, train
 from agents.training.folder import versions_and_machine
 from seastar_gym import TASKS, SmaPulse
 from seastar_gym.controllers import learned
@@ -29,9 +29,9 @@ from seastar_gym.evaluation.tasks import swim_episodes
 from seastar_gym.scene.checks import require_count
 from seastar_gym.scene.numerics import Fidelity
 
-RECIPES: dict[str, str] = {
-    id: "PPO, memory, told the way" if about[0] == "obst-trap" else "PPO, memory" for id, about in TASKS.items()
-}
+OTHERS = {"obst-trap": "PPO, memory, told the way", "sim-to-real": IMITATION}
+"""Learners of challenges that a memory alone does not serve best."""
+RECIPES: dict[str, str] = {id: OTHERS.get(about[0], "PPO, memory") for id, about in TASKS.items()}
 """Learner of every task that has a policy in the box."""
 VALIDATION = 64
 """Episodes of the split "train" by which seeds are compared."""
@@ -75,9 +75,15 @@ def file_of(id: str, folder: Path = learned.TASKS) -> Path:
 def trained(id: str, seed: int, options: Options) -> tuple[LearnedPolicy, dict[str, Any]]:
     """Policy of a seed, and what is to be told of its training."""
     began = time.process_time()
-    model = train(id, LEARNERS[RECIPES[id]], seed, options.decisions, options.fidelity, options.num_threads)
-    policy = swims(policy_of(model), id)
-    return policy, {"strokes": model.num_timesteps, "seed": seed, "seconds": round(time.process_time() - began, 1)}
+    decisions, fidelity, threads = options.decisions, options.fidelity, options.num_threads
+    if RECIPES[id] == IMITATION:
+        decisions = min(decisions, ENOUGH)
+        policy = imitate(id, seed, decisions, fidelity, threads)
+    else:
+        model = train(id, LEARNERS[RECIPES[id]], seed, decisions, fidelity, threads)
+        decisions, policy = model.num_timesteps, policy_of(model)
+    facts = {"strokes": decisions, "seed": seed, "seconds": round(time.process_time() - began, 1)}
+    return swims(policy, id), facts
 
 
 def swims(policy: LearnedPolicy, id: str) -> LearnedPolicy:

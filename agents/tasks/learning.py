@@ -4,14 +4,18 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import gymnasium as gym
+import numpy as np
 import torch
 from gymnasium.vector import AutoresetMode
 from stable_baselines3 import PPO
 
+from agents.coasting import CoastingProgress, fit_coasting
+from agents.distillation import distil
 from agents.hyperparameters import Hyperparameters
 from agents.ppo import make_model
 from seastar_gym import TASKS
 from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
+from seastar_gym.controllers.learned import LearnedPolicy, in_the_box, load
 from seastar_gym.envs.symmetry import VectorMemory, VectorSymmetryReduction
 from seastar_gym.envs.tasks.obst_trap import ObstTrap
 from seastar_gym.evaluation.tasks import make_batch
@@ -21,6 +25,8 @@ Batch = gym.vector.VectorEnv[Any, Any, Any]
 
 PAST = 8
 """Past observations that a learner with memory sees."""
+ENOUGH = 98_304
+"""Length of an imitation [decisions], after which more gain nothing."""
 OWN: dict[str, dict[str, Any]] = {
     "miswired": {"discount": 0.9},
     "prey": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
@@ -30,6 +36,7 @@ OWN: dict[str, dict[str, Any]] = {
     "obst-trap": {"discount": 0.95},
     "prizes": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
     "fast-prizes": {"discount": 0.98, "rollout": 64, "gae_lambda": 0.95},
+    "sim-to-real": {"discount": 0.3, "gae_lambda": 0.95},
 }
 """Hyperparameters that differ from the project's, by challenge: prey and prizes are met after many seconds."""
 
@@ -43,9 +50,15 @@ class Learner(NamedTuple):
     """Whether waypoints are turned and mirrored into one sector."""
     told_the_way: bool = False
     """Whether its reward measures the way around all discs of `ObstTrap`; it swims the task as it is."""
+    coasting: bool = False
+    """Whether its reward measures progress by where the hub would come to rest, see `agents.coasting`."""
 
     def wrap(self, batch: Batch) -> Batch:
         """The batch as the learner sees it."""
+        if self.coasting:
+            inner: Any = batch.unwrapped
+            coasting = fit_coasting(inner.scene, inner.decision_period, np.random.default_rng(0))
+            batch = CoastingProgress(batch, coasting, inner.challenge.reward)
         if self.past:
             return VectorMemory(batch, self.past)
         return VectorSymmetryReduction(batch) if self.symmetric else batch
@@ -58,6 +71,7 @@ class Learner(NamedTuple):
 LEARNERS: dict[str, Learner] = {
     "PPO": Learner(),
     "PPO, memory": Learner(PAST),
+    "PPO, memory, coasting": Learner(PAST, coasting=True),
     "PPO, told the way": Learner(told_the_way=True),
     "PPO, memory, told the way": Learner(PAST, told_the_way=True),
 }
@@ -98,3 +112,14 @@ def train(id: str, learner: Learner, seed: int, decisions: int, fidelity: Fideli
     model.learn(decisions)
     env.close()
     return model
+
+
+def imitate(id: str, seed: int, decisions: int, fidelity: Fidelity, threads: int | None) -> LearnedPolicy:
+    """Policy with memory after so many decisions of learning from the bundled one of waypoints, which sees all."""
+    torch.set_num_threads(1)
+    batch = make_batch(
+        id, Hyperparameters().num_envs, split="train", fidelity=fidelity, threads=threads,
+        autoreset_mode=AutoresetMode.SAME_STEP,
+    )  # fmt: skip
+    period = float(batch.unwrapped.decision_period)  # type: ignore[attr-defined]
+    return distil(load(in_the_box(period)), VectorMemory(batch, PAST), decisions, seed)

@@ -190,9 +190,15 @@ class LearnedPolicy:
 
 
 def require_task(task: str, challenge: "Challenge | None") -> None:
-    """ValueError unless a challenge is that of a task of this name, with any numbers."""
-    from seastar_gym.envs.tasks.envs import CHALLENGES, name_of  # whoever has a challenge has imported them
+    """ValueError unless a challenge is that of a task of this name, with any numbers.
 
+    A policy of `SimToReal` swims along waypoints, also those of a plant.
+    """
+    from seastar_gym.envs.tasks.envs import CHALLENGES, name_of  # whoever has a challenge has imported them
+    from seastar_gym.envs.tasks.sim_to_real import SimToReal
+
+    if challenge is None and isinstance(CHALLENGES[task], SimToReal):
+        return
     if not isinstance(challenge, type(CHALLENGES[task])):
         other = "waypoints" if challenge is None else name_of(challenge) or type(challenge).__name__
         raise ValueError(f"The policy was trained for the task {task}, the environment's is {other}.")

@@ -51,6 +51,7 @@ TASKS: dict[str, tuple[str, "Actions", float, float, float]] = {
     "SeastarObstTrapTimed-v0": ("obst-trap", "pairs", 0.5, 200.0, 94.0),
     "SeastarPrizes-v0": ("prizes", "pairs", 1.0, 201.0, 80.0),
     "SeastarPrizesTimed-v0": ("fast-prizes", "pairs", 0.5, 115.5, 76.0),
+    "SeastarSwimSimToReal-v0": ("sim-to-real", "pairs", 0.2, 300.0, 145.0),
 }
 """Name of the challenge, actions, time between decisions [s], time limit [s] and reward threshold of tasks, by id."""
 

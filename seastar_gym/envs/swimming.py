@@ -238,6 +238,14 @@ class Swimming(ABC):
         found[:, at.waypoints] = self._in_body_frame(away / lengths_of(self.simulator)[:, None, None]).reshape(-1, 4)
         return found
 
+    def privileged_observations(self) -> NDArray[np.float32]:
+        """What would be observed without a `Sight`, in the layout `Layout.of(scene)`, shape (n_robots, size)."""
+        bare, seen, at = self._without_more, self._seen_now(), Layout.of(self.scene)
+        found = np.empty((self.n_robots, at.size), np.float32)
+        found[:, at.stations_and_hub], found[:, at.waypoints] = seen[:, bare.stations_and_hub], seen[:, bare.waypoints]
+        found[:, at.actuators] = self._observed_wires()
+        return found
+
     def _seen_now(self) -> NDArray[np.float32]:
         """Observations of what the kernel fills, without delay, shape (n_robots, k)."""
         return to_float32(observed_rows(self.simulator, self._targets()), self.n_robots)

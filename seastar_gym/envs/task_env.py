@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
+from numpy.typing import NDArray
 
 from seastar_gym.envs.commands import Actions, action_space, command_table
 from seastar_gym.envs.headings import Headings
@@ -82,6 +83,13 @@ class TaskEnv(PlainSpec):
     def randomization(self) -> DomainRandomization | None:
         """Distributions of the numbers that are drawn for every episode."""
         return self._task.options.randomization
+
+    def privileged_observations(self) -> NDArray[np.float32]:
+        """What would be observed now without a `Sight`: the true state, for rewards and critics of a training.
+
+        Shape (n_robots, size), in the layout of `SeastarSwim-v0` in this scene, `Layout.of(scene)`.
+        """
+        return self._task.privileged_observations()
 
     @property
     def simulator(self) -> Simulator:

@@ -49,13 +49,13 @@ def swim_many(
         require_count("max_strokes", max_strokes, 1, MOST_DECISIONS)
     require_count("seed", seed, 0, LARGEST_SEED)
     actions = actions_of(policy, scene.robot.n_limbs)
-    require_fit(policy, scene, actions, decision_period)
     with_heading = isinstance(path, str) and path == "random"
     options = SwimOptions(
         path, actions, scene=scene, waypoint_radius=waypoint_radius, random_heading=with_heading,
         decision_period=decision_period, sight=sight, action_delay=action_delay,
     )  # fmt: skip
     task = DisturbedTask(disturbance, np.random.default_rng([seed, n_swims]), options, n_swims, threads)
+    require_fit(policy, scene, actions, decision_period, task.layout.size)
     batch, limit = TaskBatch(task), max_strokes or decisions_in(TIME_LIMIT, decision_period)
     batch.np_random = tuple(np.random.default_rng([seed, swim]) for swim in range(n_swims))
     swims = swims_of(agent, rollout(batch, policy, until=limit, record=RECORDED))

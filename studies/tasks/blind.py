@@ -1,11 +1,13 @@
-"""Controllers of `FailBlind`: robots with dead limbs that see their way alone."""
+"""Controllers of `FailBlind` and `SimToReal`: robots that see their way alone."""
 
 import itertools
 
 import numpy as np
 
-from seastar_gym.controllers.greedy import turned
+from seastar_gym.controllers.greedy import turned, waypoints_of
+from seastar_gym.controllers.planner import state_of
 from seastar_gym.envs.commands import command_table
+from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.randomization import LIMB_STRENGTHS
 from seastar_gym.envs.stations import body_heading
 from seastar_gym.envs.tasks.fail_blind import MOST_DEAD
@@ -72,3 +74,18 @@ class LimbsKnown:
 def live_commands(strengths: Floats) -> Floats:
     """All commands of the limbs that are not dead, shape (3^k, n_limbs)."""
     return np.array(list(itertools.product(*((0.0, 1.0, -1.0) if one else (0.0,) for one in strengths))))
+
+
+class StateKnown:
+    """Agent that simulates pairs of limbs two decisions ahead, from the true state, of a robot with nominal numbers."""
+
+    def __init__(self, robots: Robots):
+        self._robots, self._layout = robots, Layout.of(robots.scene)
+        self._ahead = Ahead(robots, command_table("pairs", robots.scene.robot.n_limbs), depth=2)
+
+    def act(self, observations: Floats32, info: Info) -> Actions:
+        """Actions of all robots."""
+        scene, seen = self._robots.scene, self._robots.inner.privileged_observations()
+        target, after = waypoints_of(seen, scene, self._layout)
+        best = self._ahead.best(state_of(seen, scene, self._layout), lambda hub, _: route(hub, target, after))
+        return self._robots.actions_of(self._ahead.commands[best])

@@ -27,11 +27,12 @@ from seastar_gym.envs.tasks.miswired import Miswired
 from seastar_gym.envs.tasks.obst_trap import ObstTrap
 from seastar_gym.envs.tasks.prey import LOOK_AHEAD, Prey
 from seastar_gym.envs.tasks.prizes import Prizes
+from seastar_gym.envs.tasks.sim_to_real import SimToReal
 from seastar_gym.envs.tasks.station import Station
 from seastar_gym.evaluation.rollout import Batch, Info
 from seastar_gym.simulator import State
 from studies.tasks.ahead import Ahead, Odometer, Robots, few_commands
-from studies.tasks.blind import BlindPlanner, FailureGuess, LimbsKnown
+from studies.tasks.blind import BlindPlanner, FailureGuess, LimbsKnown, StateKnown
 from studies.tasks.episodes import Agent
 from studies.tasks.greedy import Actions, Floats, Floats32, Greedy, GreedyOnRoute, length, route
 from studies.tasks.hypotheses import Guess
@@ -236,6 +237,7 @@ MAKERS: dict[type, dict[str, Callable[[Robots], Agent]]] = {
         "informed": lambda robots: ClearPlanner(robots, all_discs),
     },
     Prizes: {"greedy": MostPerMetre, "planner": PlannedMostPerMetre, "informed": BestRound},
+    SimToReal: {"greedy": GreedyOnRoute, "planner": BlindPlanner, "informed": StateKnown},
 }
 """Functions that make controllers, by challenge and name. Of prizes nothing is hidden, so nobody adapts to it."""
 

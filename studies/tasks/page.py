@@ -19,6 +19,7 @@ UNITS = {
     "obst-trap": "seconds to the goal, the time limit if it is not reached",
     "prizes": "worth of the prizes taken in 200 s",
     "fast-prizes": "worth of the prizes taken in 115 s",
+    "sim-to-real": "seconds to the last waypoint, the time limit if it is not reached",
     "heading": "seconds to the last waypoint, 300 if it is not reached",
 }
 """Measures in words, by challenge."""
@@ -27,6 +28,7 @@ SHORT = {
     "station": "mean distance from the station [mm]",
     "fail-blind": "seconds to the last waypoint",
     "obst-trap": "seconds to the goal",
+    "sim-to-real": "seconds to the last waypoint",
     "heading": "seconds to the last waypoint",
 }
 """What the picture says in their place."""
@@ -59,6 +61,7 @@ Comparisons are over the episodes that all agents of a task have swum.
 | PPO | tuned for this robot and symmetric: the project's hyperparameters, horizons of `agents.tasks.learning.OWN` |
 | PPO, memory | the same, and tips, last commands and targets of the last eight observations |
 | PPO, told the way | PPO of `ObstTrap`, by a reward that measures the way around all discs |
+| PPO, memory, coasting | PPO of `SimToReal` with a memory; its reward measures where the robot would come to rest |
 | in the box | the bundled policy, one training: PPO with memory, after six times as many decisions |
 
 To the planner, wires are as they should be, the water is still, prey swim straight on, all limbs are alive, and the
@@ -66,15 +69,16 @@ way between the discs that it sees is the straight one. The current of `Station`
 velocities over ground (R2 = 0.97 after one decision at rest), so that the task is to keep a place in it. Of prizes
 nothing is hidden: there, the planner swims to the prize of most worth per metre as greedy does, and *informed* is the
 best round through those that are left, planned before every decision. Contracts of the tasks stand in the docstrings of
-`Miswired`, `Prey`, `Station`, `FailBlind`, `ObstTrap` and `Prizes`.
+`Miswired`, `Prey`, `Station`, `FailBlind`, `ObstTrap`, `Prizes` and `SimToReal`.
 
 In `SeastarSwimHeading-v0` nothing is hidden, either, and its agents are other ones, so that it is not judged. They swim
 random paths with random headings, those of the seeds from 1000 on, that no training draws, within 300 s. *Turn, then
 swim* decides every 0.2 s, as its wave asks for, the others every 0.5 s, among them PPO of `studies.learning.heading`.
 
 Bundled policies are in `seastar_gym/controllers/policies/tasks`, each with a card. `python -m agents.tasks` trains
-them, that of `ObstTrap` by the reward that measures the way around all discs. To watch one, type
-`seastar swim --task SeastarPrey-v0 --agent learned`.
+them, that of `ObstTrap` by the reward that measures the way around all discs. That of `SimToReal` is an imitation of
+the bundled policy of waypoints, which sees the true state: 98,304 decisions of supervised learning, by no reward. To
+watch one, type `seastar swim --task SeastarPrey-v0 --agent learned`.
 
 {verdicts}In `ObstTrap`, the reward's way to the goal is the straight one, which leads into the horseshoe. That a
 learner does not arrive by this reward says little about other rewards: *told the way* is one. `Prizes` keeps draws

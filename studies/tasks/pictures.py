@@ -21,6 +21,7 @@ SHOWN: dict[str, tuple[str, str, int] | tuple[str, str, int, int]] = {
     "prey": ("SeastarPrey-v0", "adaptive", 60),
     "station": ("SeastarStation-v0", "adaptive", 60),
     "prizes": ("SeastarPrizes-v0", "informed", 110),
+    "sim-to-real": ("SeastarSwimSimToReal-v0", "informed", 200),
 }
 """Id, controller, number of strokes and, if not the first, of the episode, by name of the challenge."""
 

@@ -36,7 +36,7 @@ IDS: dict[str, str] = {id: about[0] for id, about in TASKS.items()} | {heading.I
 IN_THE_BOX = "in the box"
 """Agent that swims the policy that the package brings for a task."""
 AGENTS = (*CONTROLLERS, heading.RULE, *ALL_LEARNERS, IN_THE_BOX)
-DEFAULT_LEARNERS = ("PPO", "PPO, memory", "PPO, told the way")
+DEFAULT_LEARNERS = ("PPO", "PPO, memory", "PPO, told the way", "PPO, memory, coasting")
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,10 @@ def has_cell(id: str, agent: str) -> bool:
         return is_swum(agent, CHALLENGES[IDS[id]])
     if agent == IN_THE_BOX:
         return True
-    return not ALL_LEARNERS[agent].told_the_way or IDS[id] == "obst-trap"
+    learner, challenge = ALL_LEARNERS[agent], IDS[id]
+    if learner.coasting:
+        return challenge == "sim-to-real"
+    return not learner.told_the_way or challenge == "obst-trap"
 
 
 def swum(id: str, agent: str, seed: int, options: Options) -> Episodes:

@@ -23,6 +23,7 @@ from seastar_gym import (
     Prizes,
     RewardWeights,
     Scene,
+    SimToReal,
     SmaPulse,
     SmaWires,
     Station,
@@ -38,7 +39,7 @@ from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.serial import from_dict
 
 TYPES = {"float": float, "int": int, "bool": bool, "str": str}
-CHALLENGED = (Miswired, Prey, Station, FailBlind, ObstTrap, Prizes)
+CHALLENGED = (Miswired, Prey, Station, FailBlind, ObstTrap, Prizes, SimToReal)
 TASK_IDS = tuple(seastar_gym.TASKS)
 
 
@@ -203,7 +204,7 @@ def places_of(at):
     return at.stations_and_hub, at.actuators, at.further, at.waypoints
 
 
-@pytest.mark.parametrize("kind", [kind for kind in CHALLENGED if kind is not Prey])
+@pytest.mark.parametrize("kind", [kind for kind in CHALLENGED if kind not in (Prey, SimToReal)])
 @pytest.mark.parametrize("column, period", [(0, 1.0), (1, 0.5)])
 def test_the_observation_of_a_task_is_that_of_the_table(kind, column, period):
     env = SeastarTaskEnv(task=kind(), fidelity="fast", decision_period=period)
@@ -214,6 +215,16 @@ def test_the_observation_of_a_task_is_that_of_the_table(kind, column, period):
     places = [row[min(column, len(row) - 4)] for row in cells]
     documented = [tuple(map(int, place.split(".."))) for place in places if place]
     assert documented == [(place.start, place.stop - 1) for place in places_of(at) if place.start < place.stop]
+    assert env.observation_space.shape == (at.size,)
+
+
+def test_what_a_camera_sees_of_a_task_is_that_of_the_table():
+    """A vector, a rate and an age stand in lines of their own there."""
+    env = gym.make("SeastarSwimSimToReal-v0", fidelity="fast")
+    rows = [row["index"].split("..") for row in table("Observation", SimToReal) if row["index"]]
+    (wires, velocity, turn, age, ways), at = [[*map(int, row)] for row in rows], env.unwrapped.layout
+    assert wires == [at.actuators.start, at.actuators.stop - 1] and [*velocity, *turn, *age] == [10, 11, 12, 13]
+    assert at.further == slice(10, 14) and ways == [at.waypoints.start, at.waypoints.stop - 1]
     assert env.observation_space.shape == (at.size,)
 
 
@@ -231,6 +242,7 @@ def test_ids_are_declared_as_recorded():
     assert limits == {
         "SeastarSwim-v0": 400, "SeastarSwimContinuous-v0": 400, "SeastarSwimTimed-v0": 400,
         "SeastarSwimTimedModerate-v0": 1000, "SeastarSwimTimedHard-v0": 2000, "SeastarSwimHeading-v0": 600,
+        "SeastarSwimSimToReal-v0": 1500,
     }  # fmt: skip
     assert gym.spec("SeastarSwimContinuous-v0").kwargs == {"actions": "continuous"}
     heading = gym.spec("SeastarSwimHeading-v0").kwargs

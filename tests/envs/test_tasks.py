@@ -2,6 +2,7 @@
 
 import copy
 import itertools
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
@@ -12,16 +13,23 @@ import seastar_gym
 from episodes import assert_same, swum
 from refusals import assert_refused
 from seastar_gym import (
+    DomainRandomization,
     FailBlind,
     Miswired,
     ObstTrap,
     Prey,
     Prizes,
     RewardWeights,
+    Scene,
+    Sight,
+    SimToReal,
     Station,
     SymmetryReduction,
+    Uniform,
     VectorSymmetryReduction,
 )
+from seastar_gym.envs.layout import Layout
+from seastar_gym.envs.randomization import drawn_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import limb_order, symmetry_in, transform_commands
 from seastar_gym.envs.tasks.course import CHASE, Courses, Pursuit, draw_course
@@ -30,11 +38,10 @@ from seastar_gym.envs.tasks.envs import CHALLENGES, SeastarTaskEnv, SeastarTaskV
 from seastar_gym.envs.tasks.obst_trap import FIRST, LAST, draw_discs, draw_horseshoe, draw_kind
 from seastar_gym.envs.tasks.prizes import draw_prizes
 from seastar_gym.envs.tasks.rounds import best_round, distances, greedy_round
-from seastar_gym.scene.per_robot import with_numbers
 
 IDS = tuple(seastar_gym.TASKS)
 CONTINUOUS = "SeastarSwimContinuous-v0"
-KINDS = (Miswired, Prey, Station, FailBlind, ObstTrap, Prizes)
+KINDS = (Miswired, Prey, Station, FailBlind, ObstTrap, Prizes, SimToReal)
 HIDDEN = {
     "miswired": ["wiring"],
     "prey": ["course"],
@@ -44,6 +51,7 @@ HIDDEN = {
     "obst-trap": ["discs"],
     "prizes": [],
     "fast-prizes": [],
+    "sim-to-real": ["robot.youngs_modulus", "fluid.drag_coefficient", "limb_strengths", "sight.delay"],
 }
 """Entries of info that the robot is not told, by challenge."""
 
@@ -95,6 +103,7 @@ def test_a_batch_takes_one_number_or_one_for_each_robot(id):
         FailBlind(1),
         ObstTrap(scattered=1, potential="geodesic"),
         Prizes(side=0.6, gain=0.1),
+        SimToReal(Sight(20.0, 0.2), DomainRandomization({"robot.density": Uniform(990.0, 1010.0)})),
     ],
 )
 def test_numbers_of_ones_own_are_in_the_spec(task):
@@ -122,8 +131,8 @@ def test_what_is_hidden_is_not_observed(id):
         far = np.argsort(np.hypot(*task.discs[0, :, :2].T) - task.discs[0, :, 2])[6:]
         task.discs[0, far, 0] += 0.2
     else:
-        task.drawn[name] = task.drawn[name] + 0.001
-        task.simulator.set_scene(with_numbers(task.simulator.scene, task.drawn))
+        task.drawn[name] = task.drawn[name] * 1.1 + 0.001
+        task.simulator.set_scene(drawn_scene(task.simulator.scene, task.drawn))
     np.testing.assert_allclose(task.observe()[0], observation, atol=1e-6)
 
 
@@ -180,6 +189,8 @@ def test_pictures_show_what_is_hidden(id):
         task.discs[:, 9, 1] += 0.03
     elif "Prizes" in id:
         task.prizes[:, 2, 2] = 3.0
+    elif "SimToReal" in id:
+        task.drawn["robot.youngs_modulus"] = task.drawn["robot.youngs_modulus"] * 1.1
     else:
         task.drawn["fluid.current.u_x"] = task.drawn["fluid.current.u_x"] + 0.002
     assert not np.array_equal(env.render(), first)
@@ -210,6 +221,11 @@ def test_pictures_tell_in_words_what_is_hidden():
     env.reset(options={"instance": 1})
     env._task.drawn, env._task._distance = current, np.array([0.0123])
     assert env._task.scenery(0)[4:] == ("12.3 mm off", "current of 5.0 mm/s")
+    env = made("SeastarSwimSimToReal-v0").unwrapped
+    env.reset(options={"instance": 1})
+    env._task.drawn["robot.youngs_modulus"] = np.array([7.9e5])
+    env._task._lateness.values["sight.delay"] = np.array([0.123])
+    assert env._task.scenery(0).note == "modulus 0.79 MPa, seen 123 ms late"
     prizes = np.zeros((1, 10, 3))
     prizes[0, :3, 2] = 4.0, 1.0, 2.0
     assert told("SeastarPrizes-v0", prizes=prizes, taken=[5.0]) == ("5 taken, 7 left", "", ["4", "1", "2"])
@@ -777,10 +793,50 @@ def test_an_episode_ends_when_all_prizes_are_taken():
     assert info["taken"] == pytest.approx(info["reward_prize"] / 5.0)
 
 
+# SimToReal
+
+
+def test_sim_to_real_is_waypoints_seen_by_its_camera_or_another():
+    env, layout = made("SeastarSwimSimToReal-v0"), Layout(5, 2, ("vector", "pseudoscalar", "scalar"), False)
+    assert env.unwrapped.layout == layout and env.unwrapped.observation_space.shape == (18,)
+    _, info = env.reset(options={"instance": 5})
+    assert 0.05 <= info["sight.delay"] <= 0.15 <= info["sight_age"] + 0.1
+    assert 0.6e6 <= info["robot.youngs_modulus"] <= 1.3e6 and 0.7 <= info["fluid.drag_coefficient"] <= 1.4
+    assert ((info["limb_strengths"] >= 0.8) & (info["limb_strengths"] <= 1.0)).all()
+    own = made("SeastarSwimSimToReal-v0", sight=Sight(10.0, 0.0, sees=3))
+    observation, info = own.reset(options={"instance": 5})
+    assert len(observation) == own.unwrapped.layout.size > 70 and "sight.delay" not in info
+
+
+def test_drawn_strengths_of_limbs_leave_the_task_its_symmetry():
+    """They have one distribution for all limbs; strengths that are given do not."""
+    assert symmetry_in(made("SeastarSwimSimToReal-v0").unwrapped).group == 5
+    weak = SeastarSwimEnv(scene=replace(Scene(), limb_strengths=(1.0, 1.0, 0.5, 1.0, 1.0)))
+    with assert_refused("its limbs are not equally strong"):
+        symmetry_in(weak)
+
+
+def test_privileged_observations_are_those_without_a_camera():
+    """Of a twin that swims the same episode unseen."""
+    arguments = {"fidelity": "fast", "decision_period": 0.2, "path": "random", "random_heading": True}
+    seen, plain = SeastarSwimEnv(sight=Sight(delay=0.1, noise=1e-3), **arguments), SeastarSwimEnv(**arguments)
+    seen.reset(seed=3)
+    observation, _ = plain.reset(seed=3)
+    for action in ([0, 1, 0, 2, 0], [1, 0, 0, 0, 0], [0, 0, 0, 0, 0]):
+        np.testing.assert_array_equal(seen.privileged_observations(), observation[None])
+        np.testing.assert_array_equal(plain.privileged_observations(), observation[None])
+        seen.step(action)
+        observation, *_ = plain.step(action)
+
+
 # Symmetry
 
 
-@pytest.mark.parametrize("id", [id for id in IDS if CHALLENGES[seastar_gym.TASKS[id][0]].__class__ in KINDS[3:]])
+OF_THEIR_OWN = (FailBlind, ObstTrap, Prizes)
+"""Challenges that show more than robots, and are seen without noise; test_sight.py turns what a camera sees."""
+
+
+@pytest.mark.parametrize("id", [id for id in IDS if isinstance(CHALLENGES[seastar_gym.TASKS[id][0]], OF_THEIR_OWN)])
 def test_what_a_task_shows_of_its_own_is_carried_by_the_symmetry(id):
     """A robot turned by fifths of a turn, in a world that may be mirrored, swims and sees as the symmetry says."""
     env, other = made(id).unwrapped, made(id).unwrapped

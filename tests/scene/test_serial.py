@@ -113,7 +113,7 @@ def test_every_part_of_the_package_is_in_the_table():
     scenes = [Scene(actuator=actuator) for actuator in ACTUATORS.values()] + [Scene(**part) for part in PARTS.values()]
     seen = {kind for scene in scenes for kind in KINDS if f'"kind": "{kind}"' in json.dumps(scene.to_dict())}
     of_environments = {"RewardWeights", "Headings", "DomainRandomization", "Uniform", "LogUniform", "Normal", "Sight"}
-    of_environments |= {"Miswired", "Prey", "Station", "FailBlind", "ObstTrap", "Prizes"}
+    of_environments |= {"Miswired", "Prey", "Station", "FailBlind", "ObstTrap", "Prizes", "SimToReal"}
     assert {name for name, kind in KINDS.items() if kind.__module__.startswith("seastar_gym")} == seen | of_environments
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from seastar_gym.envs.randomization import LIMB_STRENGTHS, DomainRandomization
+from seastar_gym.envs.randomization import DomainRandomization
 from seastar_gym.envs.symmetry.group import memory_mirror, symmetry_of
 from seastar_gym.envs.symmetry.symmetry import Recollection, Symmetry
 from seastar_gym.envs.task_env import TaskEnv
@@ -27,7 +27,10 @@ else:
 
 
 def require_symmetry(scene: Scene, randomization: DomainRandomization | None = None) -> None:
-    """ValueError for scenes, and draws of their numbers, that every turn and mirror would change."""
+    """ValueError for scenes, and draws of their numbers, that every turn and mirror would change.
+
+    Drawn strengths of limbs are no reason: they have the same distribution for every limb.
+    """
     why = next(_asymmetries(scene, () if randomization is None else randomization.distributions), None)
     if why is not None:
         raise ValueError(f"This scene has neither the symmetry of the regular polygon nor a lesser one: {why}.")
@@ -53,7 +56,7 @@ def _asymmetries(scene: Scene, drawn: Iterable[str]) -> Iterator[str]:
     if scene.fluid is not None and scene.fluid.current is not None:
         yield "its water has a current"
     for name in drawn:
-        if name == LIMB_STRENGTHS or name.startswith("robot.limbs."):
+        if name.startswith("robot.limbs."):
             yield f"{name} is drawn for every limb by itself"
 
 
@@ -119,6 +122,11 @@ class VectorSymmetryReduction(_VectorWrapper):
         super().__init__(env)
         self._symmetry = symmetry_in(env)
         self._elements = np.zeros(env.num_envs, np.intp)
+
+    @property
+    def elements(self) -> NDArray[np.intp]:
+        """Elements that brought the last observations into sector 0, shape (num_envs,), a copy."""
+        return self._elements.copy()
 
     def _reduced(self, observations: NDArray[np.float32]) -> NDArray[np.floating[Any]]:
         reduced, self._elements = self._symmetry.reduce(observations)

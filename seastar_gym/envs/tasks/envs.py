@@ -15,6 +15,7 @@ from seastar_gym.envs.tasks.numbered import Split
 from seastar_gym.envs.tasks.obst_trap import ObstTrap
 from seastar_gym.envs.tasks.prey import Prey
 from seastar_gym.envs.tasks.prizes import Prizes
+from seastar_gym.envs.tasks.sim_to_real import SimToReal
 from seastar_gym.envs.tasks.station import Station
 from seastar_gym.envs.vector import SeastarSwimVectorEnv
 from seastar_gym.scene.checks import require_choice, shown
@@ -29,6 +30,7 @@ CHALLENGES: dict[str, Challenge] = {
     "obst-trap": ObstTrap(),
     "prizes": Prizes(),
     "fast-prizes": Prizes(seconds=115.0, robot_speed=0.007),
+    "sim-to-real": SimToReal(),
 }
 """Challenges by name."""
 
@@ -77,6 +79,7 @@ class SeastarTaskEnv(SeastarSwimEnv):
     | `SeastarObstTrapTimed-v0` | `"obst-trap"`   | 0.5                 | `"pairs"` | 200            | 94        |
     | `SeastarPrizes-v0`        | `"prizes"`      | 1.0                 | `"pairs"` | 201            | 80        |
     | `SeastarPrizesTimed-v0`   | `"fast-prizes"` | 0.5                 | `"pairs"` | 115.5          | 76        |
+    | `SeastarSwimSimToReal-v0` | `"sim-to-real"` | 0.2                 | `"pairs"` | 300            | 145       |
 
     `Prizes` ends by itself a decision before its time limit.
 
@@ -84,7 +87,7 @@ class SeastarTaskEnv(SeastarSwimEnv):
     not told what is hidden; for `Station`, a little more.
 
     What a task asks for, observes and rewards stands in the docstring of its challenge: `Miswired`, `Prey`, `Station`,
-    `FailBlind`, `ObstTrap`, `Prizes`. Actions, masks and everything else are those of `SeastarSwimEnv`.
+    `FailBlind`, `ObstTrap`, `Prizes`, `SimToReal`. Actions, masks and everything else are those of `SeastarSwimEnv`.
 
     ## Splits
     An episode is a number, and what is drawn for it follows from its split and its number alone. A reset draws the
@@ -99,8 +102,8 @@ class SeastarTaskEnv(SeastarSwimEnv):
     decision_period: Time between decisions [s]. None means a stroke.
     render_mode: See `SeastarSwimEnv`. Pictures show what the robot is not told.
     frames_per_stroke: Number of pictures of a decision, see `SeastarSwimEnv`.
-    sight: Camera through which the robot is seen, see `SeastarSwimEnv`. What a task shows besides the robot, such as
-        prey, is not late.
+    sight: Camera through which the robot is seen, see `SeastarSwimEnv`; `SimToReal` has one of its own. What a task
+        shows besides the robot, such as prey, is not late.
     action_delay: Time from a decision to when wires are heated by it [s], see `SeastarSwimEnv`.
     """
 
