@@ -518,7 +518,6 @@ ASYMMETRIC = {
     "uniform current": (Scene(STAR, Water(current=UniformCurrent(2e-3))), None, "current"),
     "shear": (Scene(STAR, Water(current=ShearCurrent(0.05))), None, "current"),
     "vortex": (Scene(STAR, Water(current=Vortex(1e-3))), None, "current"),
-    "drawn strengths": (Scene(STAR), WEAK_LIMBS, "limb_strengths is drawn"),
     "drawn lengths": (Scene(TAPERED), OWN_LENGTHS, "robot.limbs.1.length is drawn"),
 }
 """Scene, draws, and words of the refusal."""
@@ -556,6 +555,13 @@ def test_a_scene_that_is_not_symmetric_is_refused_with_its_reason(name):
         SymmetryReduction(SeastarSwimEnv(**arguments))
     with assert_refused("symmetry of the regular polygon", words):
         VectorSymmetryReduction(SeastarSwimVectorEnv(2, **arguments))
+
+
+def test_strengths_that_are_drawn_alike_for_all_limbs_leave_the_symmetry_as_it_is():
+    arguments = {"scene": Scene(STAR, numerics=FAST), "randomization": WEAK_LIMBS}
+    seen, _ = SymmetryReduction(SeastarSwimEnv(**arguments)).reset(seed=3)
+    batch, _ = VectorSymmetryReduction(SeastarSwimVectorEnv(2, **arguments)).reset(seed=3)
+    np.testing.assert_array_equal(batch[0], seen)
 
 
 def test_a_refusal_names_the_body_if_there_is_one_and_limbs_of_one_number_are_alike():
