@@ -1,9 +1,11 @@
-"""What policies lose that were trained without delays, on one robot: late pictures, late commands, noise, softer limbs.
+"""What policies lose to delays, noise and softer limbs, one change at a time: those that see everything, and that of
+`SimToReal`, which sees what a camera sees.
 
     python -m studies.learning.robustness
 
-The bundled policies swim the held-out random paths at "fast", all in the same robots, under one condition after the
-other. A swim that does not arrive within the limit counts with the limit.
+The bundled policies swim held-out random paths at "fast", all in the same robots, under one condition after the other.
+Ten more trainings say what a seed makes of the policy for the camera. A swim that does not arrive within the limit
+counts with the limit.
 """
 
 from collections.abc import Callable, Mapping
@@ -13,6 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from agents.tasks.learning import ENOUGH, imitate
+from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.learned import LearnedPolicy, in_the_box, load
 from seastar_gym.envs.layout import Layout
 from seastar_gym.envs.options import make_scene
@@ -20,24 +24,28 @@ from seastar_gym.envs.sight import Sight
 from seastar_gym.evaluation.many import HELD_OUT_SEED, swim_many
 from seastar_gym.evaluation.statistics import mean_with_interval
 from seastar_gym.evaluation.swim import TIME_LIMIT
+from seastar_gym.scene import Scene
 from seastar_gym.scene.numerics import Fidelity
 from studies.accuracy.page import markdown
 from studies.frame import InDocs, Results, Study
 
-N_PATHS = 64
+N_PATHS = 200
 FIDELITY: Fidelity = "fast"
-PERIODS: dict[str, float | None] = {"1 s": None, "0.5 s": 0.5, "0.2 s": 0.2}
+CAMERA = "0.2 s, camera"
+PERIODS: dict[str, float | None] = {"1 s": None, "0.5 s": 0.5, "0.2 s": 0.2, CAMERA: 0.2}
 """Time between decisions [s], None for strokes, by what the table calls it."""
 RATE = 20.0
 """Pictures per second [Hz]: decisions and delays are whole multiples of the time between two."""
+ID = "SeastarSwimSimToReal-v0"
+SEEDS = range(10)
 
 
 @dataclass(frozen=True)
 class Condition:
-    """What is otherwise than in the training.
+    """What is otherwise than nominal.
 
     delay: Of all that is seen [s]. action_delay: Of commands [s], which only wires can take. noise: Of seen places [m].
-    modulus: Over that of the training. moves: Whether velocities are seen; otherwise they are zero.
+    modulus: Over the nominal one. moves: Whether velocities are seen; otherwise they are zero.
     """
 
     delay: float = 0.0
@@ -48,7 +56,7 @@ class Condition:
 
 
 CONDITIONS = {
-    "as trained": Condition(),
+    "nominal robot, seen at once": Condition(),
     "seen 50 ms late": Condition(delay=0.05),
     "seen 100 ms late": Condition(delay=0.1),
     "seen 150 ms late": Condition(delay=0.15),
@@ -57,7 +65,10 @@ CONDITIONS = {
     "velocities seen as zero": Condition(moves=False),
     "limbs of 0.7 of the modulus": Condition(modulus=0.7),
     "limbs of 0.5 of the modulus": Condition(modulus=0.5),
+    "100 ms late, and 0.7 of the modulus": Condition(delay=0.1, modulus=0.7),
 }
+OF_SEEDS = ("seen 50 ms late", "seen 100 ms late", "seen 150 ms late", "100 ms late, and 0.7 of the modulus")
+"""Conditions that are told of every seed."""
 
 
 class Seeing:
@@ -77,33 +88,61 @@ class Seeing:
         return self.policy.predict(seen, state, episode_start, deterministic)
 
 
-def examine(name: str, condition: Condition) -> dict[str, Any] | None:
-    """Times [s] of the swims of the policy of a period, and how many arrive; None where it does not apply."""
-    period = PERIODS[name]
-    if period is None and condition.action_delay:
-        return None
+def robot_of(condition: Condition, period: float | None) -> Scene:
+    """Scene of a condition."""
     scene = make_scene(None, FIDELITY, period)
-    scene = replace(scene, robot=replace(scene.robot, youngs_modulus=condition.modulus * scene.robot.youngs_modulus))
+    return replace(scene, robot=replace(scene.robot, youngs_modulus=condition.modulus * scene.robot.youngs_modulus))
+
+
+def swum(policy: Policy, condition: Condition, period: float | None, sees: str) -> dict[str, Any]:
+    """Times [s] of the swims of a policy, and how many arrive. sees: As of a `Sight`."""
+    sight = Sight(RATE, condition.delay, noise=condition.noise, sees=sees)  # type: ignore[arg-type]
     swims = swim_many(
-        "learned", Seeing(load(in_the_box(period)), condition, Layout.of(scene)), "random", N_PATHS, scene,
-        seed=HELD_OUT_SEED, decision_period=period, action_delay=condition.action_delay,
-        sight=Sight(RATE, condition.delay, noise=condition.noise, sees="nodes"),
+        "learned", policy, "random", N_PATHS, robot_of(condition, period), seed=HELD_OUT_SEED,
+        decision_period=period, action_delay=condition.action_delay, sight=sight,
     )  # fmt: skip
     times = [float(swim.time[-1]) if swim.finished else TIME_LIMIT for swim in swims]
     return {"times": np.round(times, 1).tolist(), "arrived": sum(swim.finished for swim in swims)}
 
 
+def examine(name: str, condition: Condition) -> dict[str, Any] | None:
+    """Swims of the bundled policy of a column; None where a condition does not apply."""
+    period = PERIODS[name]
+    if (period is None and condition.action_delay) or (name == CAMERA and not condition.moves):
+        return None
+    if name == CAMERA:
+        return swum(load(in_the_box(period, task="sim-to-real")), condition, period, "pose")
+    layout = Layout.of(robot_of(condition, period))
+    return swum(Seeing(load(in_the_box(period)), condition, layout), condition, period, "nodes")
+
+
+def examine_seed(seed: int) -> dict[str, Any]:
+    """Mean times [s] of a training for the camera by condition, and how many arrive."""
+    policy = imitate(ID, seed, ENOUGH, FIDELITY, None)
+    found = {name: swum(policy, CONDITIONS[name], PERIODS[CAMERA], "pose") for name in OF_SEEDS}
+    return {name: {"mean": float(np.mean(one["times"])), "arrived": one["arrived"]} for name, one in found.items()}
+
+
 def table(results: Mapping[str, Any]) -> str:
     """Mean times, their intervals over paths, and how many arrive."""
-    periods = list(results["policies"])
     lines = []
-    for condition in results["policies"][periods[0]]:
+    for condition in CONDITIONS:
         cells = [condition]
-        for period in periods:
-            found = results["policies"][period][condition]
+        for column in PERIODS:
+            found = results["policies"][column][condition]
             cells.append("–" if found is None else _cell(found["times"], found["arrived"]))
         lines.append(cells)
-    return markdown(["", *(f"decisions every {period} [s]" for period in periods)], lines)
+    return markdown(["", *(f"decisions every {column} [s]" for column in PERIODS)], lines)
+
+
+def seeds(results: Mapping[str, Any]) -> str:
+    """Mean times of ten trainings for the camera: smallest, mean and largest."""
+    lines = []
+    for name in OF_SEEDS:
+        found = [one[name] for one in results["seeds"].values()]
+        means, lost = [one["mean"] for one in found], sum(N_PATHS - one["arrived"] for one in found)
+        lines.append([name, f"{min(means):.1f}", f"{np.mean(means):.1f}", f"{max(means):.1f}", str(lost)])
+    return markdown(["", "best seed [s]", "mean [s]", "worst seed [s]", "swims that do not arrive"], lines)
 
 
 def _cell(times: list[float], arrived: int) -> str:
@@ -115,12 +154,19 @@ def run(_: InDocs, results: Results) -> None:
     """Swim what is missing."""
     results.read()
     cells: dict[tuple[str, ...], Callable[[], Any]] = {
-        ("policies", period, name): partial(examine, period, condition)
-        for period in PERIODS
+        ("policies", column, name): partial(examine, column, condition)
+        for column in PERIODS
         for name, condition in CONDITIONS.items()
     }
     results.fill(cells, lambda found: "does not apply" if found is None else f"{np.mean(found['times']):.1f} s")
-    print(table(results))
+    trainings: dict[tuple[str, ...], Callable[[], Any]] = {
+        ("seeds", str(seed)): partial(examine_seed, seed) for seed in SEEDS
+    }
+    results.fill(trainings, lambda found: f"{found['seen 100 ms late']['mean']:.1f} s")
+    print(f"{table(results)}\n\n{seeds(results)}")
 
 
-STUDY = Study("learning.robustness", run, file="robustness.json", tables={"robustness": table})
+STUDY = Study(
+    "learning.robustness", run, file="robustness.json", tables={"robustness": table, "robustness seeds": seeds},
+    packages=("torch",),
+)  # fmt: skip
