@@ -10,15 +10,15 @@ from continuum_oracle import Continuum
 from hubs import robot_with
 from oracle import Star
 from seastar_gym import Scene, Seastar, SmaPulse, Water
-from seastar_gym.der.linear.coupled import solve_coupled
+from seastar_gym.der.body.body import freeze_body, move_roots, place_roots
+from seastar_gym.der.contact.coupled import solve_coupled
+from seastar_gym.der.contact.near_pairs import freeze_contact
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import Rods, Work, make_work
 from seastar_gym.der.stepping.newton import move_along
 from seastar_gym.der.stepping.stages import Stage
-from seastar_gym.der.terms.body import freeze_body, move_roots, place_roots
 from seastar_gym.der.terms.damping import freeze_strains
 from seastar_gym.der.terms.fluid import freeze_fluid
-from seastar_gym.der.terms.near_pairs import freeze_contact
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.compilation import entry_point
 from seastar_gym.simd.lanes import N_LANES, any_lane, borrow, load, splat, store

@@ -63,6 +63,8 @@ def test_the_sources_keep_their_contracts(sources):
         ("seastar_gym/simulator/clock.py", "seastar_gym.simulator.simulator"),
         ("seastar_gym/der/terms/stretching.py", "seastar_gym.der.terms.damping"),
         ("seastar_gym/der/terms/bending.py", "seastar_gym.der.potential"),
+        ("seastar_gym/der/terms/bending.py", "seastar_gym.der.contact.contact"),
+        ("seastar_gym/der/body/forces.py", "seastar_gym.der.terms.fluid"),
         ("seastar_gym/scene/limb.py", "numba"),
         ("seastar_gym/identify/fit.py", "torch"),
         ("seastar_gym/controllers/learned.py", "stable_baselines3"),

@@ -6,10 +6,10 @@ import numpy as np
 
 from oracle import Star
 from seastar_gym import Contact, Scene, Seastar, SmaPulse
+from seastar_gym.der.contact.near_pairs import freeze_contact
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.stages import Stage
 from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
-from seastar_gym.der.terms.near_pairs import freeze_contact
 from seastar_gym.model.rods import make_rods
 from seastar_gym.scene.robot import Discretisation
 from seastar_gym.simd.lanes import N_LANES

@@ -18,7 +18,7 @@ dl             dl               m       Voronoi length
 E, A, I        EA, EI           N, N m2 Young's modulus, area, second moment of area
 C_d            c                kg/m    drag 1/2 rho_f C_d D dl of a node (13.8)
 M              m, mass          kg      lumped masses
-g, d           g, d             m       gap between a node and an edge of another limb, and where they touch; contact.py
+g, d           g, d             m       gap between a node and an edge of another limb, and where they touch; contact/
 h, gamma       h, gamma         s       time step; coefficient of a stage times h
 Phi            phi, energy      J       incremental potential of a stage, see potential.py
 

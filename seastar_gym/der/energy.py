@@ -1,11 +1,11 @@
 """Elastic and kinetic energy of a lane group, and the moments that resist its actuators."""
 
+from seastar_gym.der.body.body import move_roots
+from seastar_gym.der.body.forces import add_turning_energy
 from seastar_gym.der.geometry import half_angle
 from seastar_gym.der.star import edge_of
 from seastar_gym.der.terms.along import natural_moment, natural_tangent, stiffening_rate
 from seastar_gym.der.terms.bending import bending_energy, moment
-from seastar_gym.der.terms.body import move_roots
-from seastar_gym.der.terms.body_forces import add_turning_energy
 from seastar_gym.der.terms.clamp import add_clamp_moments, clamp_energy
 from seastar_gym.der.terms.hub import set_natural_hub_angles
 from seastar_gym.der.terms.inertia import kinetic_energy

@@ -27,6 +27,9 @@ full one, with its quadratic convergence, is used wherever its pivots allow it.
 
 import numpy as np
 
+from seastar_gym.der.body.body import begin_body, tail_motion
+from seastar_gym.der.body.forces import add_body, pass_to_hub
+from seastar_gym.der.contact.contact import add_contact, contact_force
 from seastar_gym.der.geometry import EDGE_ROWS, convex_part, edge_geometry, half_angle
 from seastar_gym.der.linear.rigid_hub import solve_rigid_hub
 from seastar_gym.der.linear.star_matrix import (
@@ -43,10 +46,7 @@ from seastar_gym.der.star import load_root_edge, root_place, tail_node
 from seastar_gym.der.terms.added_mass import add_fluid_inertia, less_edge_fluid_inertia
 from seastar_gym.der.terms.along import bending_compliance, bending_stiffness, natural_moment
 from seastar_gym.der.terms.bending import bending_energy, bending_slopes, moment
-from seastar_gym.der.terms.body import begin_body, tail_motion
-from seastar_gym.der.terms.body_forces import add_body, pass_to_hub
 from seastar_gym.der.terms.clamp import assemble_clamps
-from seastar_gym.der.terms.contact import add_contact, contact_force
 from seastar_gym.der.terms.damping import damped_energy, damped_stiffness, damped_stress
 from seastar_gym.der.terms.drag import add_cross_flow, add_middle_drag, drag_slopes
 from seastar_gym.der.terms.inertia import less_edge_inertia

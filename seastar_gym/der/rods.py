@@ -7,13 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from seastar_gym.der.body import body
+from seastar_gym.der.body.body import Body
+from seastar_gym.der.contact import contact
 from seastar_gym.der.geometry import EDGE_ROWS
 from seastar_gym.der.linear.star_matrix import NODE_ROWS, RING_ROWS, ROOT_ROWS
 from seastar_gym.der.stepping.scales import Scales
-from seastar_gym.der.terms import body, contact
 from seastar_gym.der.terms.along import ALONG_ROWS, Along
 from seastar_gym.der.terms.bending import Bending
-from seastar_gym.der.terms.body import Body
 from seastar_gym.der.terms.clamp import Clamp
 from seastar_gym.der.terms.current import Current
 from seastar_gym.der.terms.hub import Hub

@@ -7,7 +7,7 @@ the hub hinge from limb j to limb j + 1, whose first edge is the root edge of li
 limb has none: hinges that are not there have no stiffness. With a rigid hub, the hinge of a root edge is its clamp.
 
 Where the hub is a body with a size, root edges start at its rim. Behind the nodes then stand the place of the body's
-angle and, limb by limb, the places of the roots, which follow from hub and angle, see terms/body.py. In scenes with
+angle and, limb by limb, the places of the roots, which follow from hub and angle, see body/body.py. In scenes with
 contact, the corners of its outline follow, which move as the roots do and have no numbers of their own.
 """
 

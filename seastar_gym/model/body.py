@@ -1,4 +1,4 @@
-"""Coefficients of a body, for the kernels in der/terms/body.py."""
+"""Coefficients of a body, for the kernels in der/body/body.py."""
 
 from functools import partial
 from typing import NamedTuple
@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.der.body import body as term
+from seastar_gym.der.contact.contact import Rim
 from seastar_gym.der.mesh import Mesh
-from seastar_gym.der.terms import body as term
-from seastar_gym.der.terms.contact import Rim
 from seastar_gym.der.terms.gravity import heaviness
 from seastar_gym.scene.body import GIVEN_DRAG, Body
 from seastar_gym.scene.fluid import Water
@@ -22,7 +22,7 @@ GAUSS = np.polynomial.legendre.leggauss(4)
 
 
 class Drag(NamedTuple):
-    """Drag of a body: coefficient of all directions alike [kg/m], and strips as in der/terms/body_forces.py."""
+    """Drag of a body: coefficient of all directions alike [kg/m], and strips as in der/body/forces.py."""
 
     isotropic: float
     strips: Floats

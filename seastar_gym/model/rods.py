@@ -6,6 +6,7 @@ from operator import itemgetter
 
 import numpy as np
 
+from seastar_gym.der.contact import contact
 from seastar_gym.der.rods import Rods
 from seastar_gym.der.stepping import scales
 from seastar_gym.der.stepping.scales import Limits
@@ -14,7 +15,6 @@ from seastar_gym.der.terms import (
     along,
     bending,
     clamp,
-    contact,
     damping,
     drag,
     gravity,

@@ -12,7 +12,7 @@ from seastar_gym.scene.serial import register_part
 class Contact:
     """Contact: limbs that touch push each other apart, without friction, and so do limbs and a body.
 
-    See der/terms/contact.py. A body is as hard as a limb that touches it. Limbs do not meet it by their root edges.
+    See der/contact/contact.py. A body is as hard as a limb that touches it. Limbs do not meet it by their root edges.
 
     modulus: Force per length of limb and per depth of overlap [Pa]. None means pi/6 of Young's modulus, the value of
         incompressible elastic cylinders side by side: pi/4 E*, 1/E* = 2 (1 - 0.5^2)/E (Popov, Contact Mechanics and

@@ -8,6 +8,7 @@ import pytest
 from bodied_oracle import Apart, Rigid, crossed, turned
 from currents import CURRENTS, velocity
 from seastar_gym import Attachment, Body, Numerics, Scene, Seastar, Simulator, SmaPulse, Water
+from seastar_gym.der.body.body import freeze_body, place_roots
 from seastar_gym.der.geometry import rotation
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import make_work
@@ -15,7 +16,6 @@ from seastar_gym.der.stepping.momentum import settle_momentum
 from seastar_gym.der.stepping.newton import minimise, take_step
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stages import Stage
-from seastar_gym.der.terms.body import freeze_body, place_roots
 from seastar_gym.der.terms.fluid import freeze_fluid
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES

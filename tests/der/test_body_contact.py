@@ -8,15 +8,15 @@ import pytest
 from bodied_oracle import Apart, Touching, turned
 from fuzz.frames import mirrored_body, swapped
 from seastar_gym import Attachment, Body, Contact, Scene, Seastar, SmaPulse, Water
-from seastar_gym.der.linear.coupled import solve_coupled
+from seastar_gym.der.body.body import begin_body, place_roots
+from seastar_gym.der.contact.contact import add_contact, n_listed
+from seastar_gym.der.contact.coupled import solve_coupled
+from seastar_gym.der.contact.crossing import those_uncrossed
+from seastar_gym.der.contact.near_pairs import freeze_contact
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.newton import move_along
 from seastar_gym.der.stepping.stages import Stage
-from seastar_gym.der.terms.body import begin_body, place_roots
-from seastar_gym.der.terms.contact import add_contact, n_listed
-from seastar_gym.der.terms.crossing import those_uncrossed
-from seastar_gym.der.terms.near_pairs import freeze_contact
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask

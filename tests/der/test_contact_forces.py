@@ -5,7 +5,7 @@ import pytest
 
 from hubs import TEN
 from seastar_gym import Scene
-from seastar_gym.der.terms.contact import (
+from seastar_gym.der.contact.contact import (
     SLOT_ROWS,
     STIFFNESS,
     add_contact,
@@ -17,8 +17,8 @@ from seastar_gym.der.terms.contact import (
     n_listed,
     those_apart,
 )
-from seastar_gym.der.terms.crossing import edges_cross
-from seastar_gym.der.terms.near_pairs import freeze_contact, share_of_edge
+from seastar_gym.der.contact.crossing import edges_cross
+from seastar_gym.der.contact.near_pairs import freeze_contact, share_of_edge
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seastar_gym.der.linear.coupled import add_contact_product, dot, solve_coupled
+from seastar_gym.der.contact.coupled import add_contact_product, dot, solve_coupled
 from seastar_gym.der.linear.star_solution import solve_again, substitute_star
 from seastar_gym.der.potential import factorise
 from seastar_gym.simd.lanes import N_LANES

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from seastar_gym import Contact, Scene, Seastar, SmaPulse
+from seastar_gym.der.contact.crossing import edges_cross, on_their_sides, those_uncrossed
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.stages import Stage
-from seastar_gym.der.terms.crossing import edges_cross, on_their_sides, those_uncrossed
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask

@@ -6,9 +6,9 @@ import pytest
 import oracle
 from hubs import HUBS
 from seastar_gym import AlongLimb, Body, Limb, Scene, Seastar, SmaPulse, Stiffening
+from seastar_gym.der.body.body import place_roots
 from seastar_gym.der.energy import elastic_energy, energies, fill_moments
 from seastar_gym.der.rods import make_work
-from seastar_gym.der.terms.body import place_roots
 from seastar_gym.der.terms.hub import Actuation, set_natural_hub_angles
 from seastar_gym.der.terms.inertia import kinetic_energy
 from seastar_gym.model.rods import make_rods

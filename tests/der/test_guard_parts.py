@@ -6,6 +6,7 @@ import pytest
 import oracle
 from continuum_oracle import Continuum
 from seastar_gym import Scene, Seastar, UniformCurrent, Water
+from seastar_gym.der.contact.contact import add_contact_energy
 from seastar_gym.der.rods import make_work
 from seastar_gym.der.stepping.guard import (
     add_held_energy,
@@ -18,7 +19,6 @@ from seastar_gym.der.stepping.guard import (
 from seastar_gym.der.stepping.rigid_motion import cut_velocities, rigid_motion
 from seastar_gym.der.stepping.schemes import SCHEMES
 from seastar_gym.der.stepping.stages import Stage
-from seastar_gym.der.terms.contact import add_contact_energy
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 from seastar_gym.simd.numpy_lanes import Lanes, Mask

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from seastar_gym import Contact, Scene, Seastar, SmaPulse, Water
+from seastar_gym.der.contact.contact import SLOT_ROWS
 from seastar_gym.der.rods import make_work
-from seastar_gym.der.terms.contact import SLOT_ROWS
 from seastar_gym.model.rods import make_rods
 from seastar_gym.simd.lanes import N_LANES
 

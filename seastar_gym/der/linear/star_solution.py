@@ -1,5 +1,6 @@
 """Solutions of an eliminated star of chains, see star_matrix.py, for its own right-hand side and for another one."""
 
+from seastar_gym.der.body.body import tail_solution
 from seastar_gym.der.linear.rigid_hub import substitute_rigid_hub
 from seastar_gym.der.linear.star_matrix import (
     NODE_ROWS,
@@ -11,7 +12,6 @@ from seastar_gym.der.linear.star_matrix import (
     substitute_node,
     substitute_ring,
 )
-from seastar_gym.der.terms.body import tail_solution
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, splat, store, subtract_product
 

@@ -24,8 +24,8 @@ energy; 0.02 % did up to PREDICTABLE_STRAIN, 0.1 % up to ten times and 0.5 % up 
 more than 100 radii feel more of the curvature of drag, about l rho_f C_d/(pi r rho_m), than CURVATURE allows for.
 """
 
+from seastar_gym.der.contact.contact import those_apart
 from seastar_gym.der.geometry import larger
-from seastar_gym.der.terms.contact import those_apart
 from seastar_gym.simd.compilation import inlined_kernel, kernel
 from seastar_gym.simd.lanes import load, select, splat
 

@@ -37,6 +37,9 @@ folded over itself. Such steps are refused, too, while they are not very short: 
 over at no such cost.
 """
 
+from seastar_gym.der.body.body import move_roots, place_roots
+from seastar_gym.der.body.forces import add_turning_energy, add_turning_momentum
+from seastar_gym.der.contact.contact import add_contact_energy
 from seastar_gym.der.energy import elastic_energy
 from seastar_gym.der.geometry import edge_vector, half_angle, larger
 from seastar_gym.der.motion import node_motion
@@ -44,10 +47,7 @@ from seastar_gym.der.star import edge_of, hinge_edges, is_clamped, tail_node
 from seastar_gym.der.stepping.rigid_motion import cut_velocities, rigid_motion
 from seastar_gym.der.terms.added_mass import add_fluid_energy, less_edge_fluid_energy
 from seastar_gym.der.terms.along import add_moved_energy, bending_stiffness
-from seastar_gym.der.terms.body import move_roots, place_roots
-from seastar_gym.der.terms.body_forces import add_turning_energy, add_turning_momentum
 from seastar_gym.der.terms.clamp import moved_clamp_energy
-from seastar_gym.der.terms.contact import add_contact_energy
 from seastar_gym.der.terms.fluid import fluid_velocity
 from seastar_gym.der.terms.hub import set_natural_hub_angles
 from seastar_gym.der.terms.inertia import kinetic_energy

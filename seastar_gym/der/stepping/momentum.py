@@ -8,18 +8,18 @@ move of the whole robot is then off by that share of the last Newton step, which
 So where that can be seen, at any step in vacuum and in a fluid at very long ones, the whole robot takes one Newton step
 of its own after the others: from the residual summed over the nodes, and its slope. In vacuum it is exact.
 
-A body whose centre of mass is not the hub has the momentum b = omega J_S because it turns, too (body.py). Stages take
+A body whose centre of mass is not the hub has the momentum b = omega J_S because it turns, too (body/). Stages take
 its rate as d_theta J*_S - gamma omega*^2 A*_S from their first guess, which is off by the scheme's error. Here the rate
 is B = (b - b_hat)/gamma, of the angle that the stage has found, with b_hat = b_0 + h sum_{j<i} a_ij B_j: b follows the
 tableau as velocities do, and what nodes get is what b loses. The implicit midpoint rule ends with b of the angle and
 velocity that it extrapolates to, so that its B is the difference of b over the whole step.
 """
 
+from seastar_gym.der.body.body import place_roots, root_motion, tail_motion
+from seastar_gym.der.body.forces import add_body, add_turning_rate, begin_turning, end_turning
 from seastar_gym.der.motion import node_motion
 from seastar_gym.der.potential import node_slopes
 from seastar_gym.der.star import root_place
-from seastar_gym.der.terms.body import place_roots, root_motion, tail_motion
-from seastar_gym.der.terms.body_forces import add_body, add_turning_rate, begin_turning, end_turning
 from seastar_gym.der.terms.drag import middle_slopes
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import any_lane, load, select, splat, store

@@ -4,13 +4,13 @@ Every robot of a lane group has its own state of the search: a robot that has co
 frozen by a mask, and nothing that one robot needs (a regularised matrix, a shorter step) changes another robot's bits.
 """
 
+from seastar_gym.der.body.body import place_roots, tail_solution
+from seastar_gym.der.contact.contact import n_listed
+from seastar_gym.der.contact.coupled import solve_coupled
 from seastar_gym.der.geometry import larger
-from seastar_gym.der.linear.coupled import solve_coupled
 from seastar_gym.der.linear.star_matrix import load_pair, store_pair, substitute_node
 from seastar_gym.der.potential import factorise
 from seastar_gym.der.stepping.foresight import foreseeable_length, predictable
-from seastar_gym.der.terms.body import place_roots, tail_solution
-from seastar_gym.der.terms.contact import n_listed
 from seastar_gym.simd.compilation import inlined_kernel, kernel
 from seastar_gym.simd.lanes import absolute, add_product, any_lane, load, select, splat, sqrt
 

@@ -1,10 +1,10 @@
 """The rigid motion that has a robot's momentum and angular momentum, and what its velocities are about it."""
 
+from seastar_gym.der.body.body import move_roots
+from seastar_gym.der.body.forces import add_mass_moment, add_spin, cut_spin, spin_rate
 from seastar_gym.der.geometry import edge_vector
 from seastar_gym.der.star import tail_node
 from seastar_gym.der.terms.added_mass import fluid_momentum
-from seastar_gym.der.terms.body import move_roots
-from seastar_gym.der.terms.body_forces import add_mass_moment, add_spin, cut_spin, spin_rate
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, select, splat, store, subtract_product
 

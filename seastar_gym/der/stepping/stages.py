@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from seastar_gym.der.terms.body import move_roots, place_roots
+from seastar_gym.der.body.body import move_roots, place_roots
 from seastar_gym.simd.compilation import inlined_kernel, kernel
 from seastar_gym.simd.lanes import add_product, load, load_number, select, splat, sqrt, store
 
@@ -10,7 +10,7 @@ from seastar_gym.simd.lanes import add_product, load, load_number, select, splat
 class Stage(NamedTuple):
     """An implicit stage: q_hat [m] and v_hat [m/s], rows per coordinate, gamma [s] and its reciprocal, lanes.
 
-    ahead: Whether the scheme asks in the middle of a step, so that contact has to look ahead, see contact.py.
+    ahead: Whether the scheme asks in the middle of a step, so that contact has to look ahead, see contact/contact.py.
     """
 
     q_hat: Any

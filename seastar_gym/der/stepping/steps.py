@@ -2,6 +2,10 @@
 
 from typing import Any, NamedTuple
 
+from seastar_gym.der.body.body import freeze_body
+from seastar_gym.der.body.forces import add_work_on_body
+from seastar_gym.der.contact.crossing import those_uncrossed
+from seastar_gym.der.contact.near_pairs import freeze_contact
 from seastar_gym.der.stepping.guard import (
     LARGEST_CUT,
     add_work_of_loads,
@@ -32,13 +36,9 @@ from seastar_gym.der.stepping.stages import (
     start_standing,
     step_error,
 )
-from seastar_gym.der.terms.body import freeze_body
-from seastar_gym.der.terms.body_forces import add_work_on_body
-from seastar_gym.der.terms.crossing import those_uncrossed
 from seastar_gym.der.terms.damping import freeze_strains
 from seastar_gym.der.terms.fluid import add_work_of_current, freeze_fluid
 from seastar_gym.der.terms.hub import set_natural_hub_angles
-from seastar_gym.der.terms.near_pairs import freeze_contact
 from seastar_gym.simd.compilation import inlined_kernel, kernel
 from seastar_gym.simd.lanes import any_lane, load, load_number, select, splat, store
 

@@ -1,10 +1,10 @@
 """A whole sequence of time intervals for many robots, in one compiled call."""
 
+from seastar_gym.der.body.body import move_roots
 from seastar_gym.der.energy import fill_moments
 from seastar_gym.der.geometry import larger
 from seastar_gym.der.stepping.interval import cover_interval
 from seastar_gym.der.stepping.report import MOMENTS, NEWTON_ITERATIONS, PEAK_MOMENT, WORK
-from seastar_gym.der.terms.body import move_roots
 from seastar_gym.simd.compilation import entry_point, kernel
 from seastar_gym.simd.lanes import absolute, add_product, borrow, load, load_number, select, splat, store
 

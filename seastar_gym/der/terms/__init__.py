@@ -7,5 +7,6 @@ freeze_...                    what a stage takes from the first guess of its ite
 ..._energy, add_work_of_...   energy and work, for the guard
 
 model/rods.py gathers the coefficients, potential.py adds up the slopes, energy.py the energies, fluid.py freezes. A
-constant force needs `coefficients` alone, as gravity.py shows; docs/extending.md tells how a term is added.
+constant force needs `coefficients` alone, as gravity.py shows; docs/extending.md tells how a term is added. What the
+chapter does without has rooms of its own, with the same functions: a body (der/body) and contact (der/contact).
 """

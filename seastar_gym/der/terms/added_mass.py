@@ -11,10 +11,10 @@ it has m_a/3 ((d_head - d_tail) n)^2/2 less than the lumped masses, d = v - v_ha
 import numpy as np
 from numpy.typing import NDArray
 
+from seastar_gym.der.body.forces import body_added_mass
 from seastar_gym.der.geometry import edge_vector
 from seastar_gym.der.mesh import Mesh
 from seastar_gym.der.star import root_place, tail_node
-from seastar_gym.der.terms.body_forces import body_added_mass
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, splat, store, subtract_product
 

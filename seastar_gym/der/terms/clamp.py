@@ -27,11 +27,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from seastar_gym.der.body.body import add_to_system, angle
 from seastar_gym.der.geometry import convex_part, rotation, tangent
 from seastar_gym.der.mesh import Mesh
 from seastar_gym.der.star import load_root_edge, root_direction
 from seastar_gym.der.terms.along import bending_stiffness, stiffening_rate, turned, turned_at_hub
-from seastar_gym.der.terms.body import add_to_system, angle
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, load, select, splat, sqrt, store, subtract_product
 

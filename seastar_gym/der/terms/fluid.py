@@ -4,11 +4,11 @@ The first guess is off by the square of the step, so schemes keep their order up
 the potential stays one that is minimised, with an exact Hessian.
 """
 
+from seastar_gym.der.body.forces import add_power_on_strips, freeze_turning_mass
 from seastar_gym.der.geometry import edge_vector
 from seastar_gym.der.motion import relative
 from seastar_gym.der.star import tail_node
 from seastar_gym.der.terms.added_mass import freeze_added_mass
-from seastar_gym.der.terms.body_forces import add_power_on_strips, freeze_turning_mass
 from seastar_gym.der.terms.current import current_velocity
 from seastar_gym.der.terms.drag import add_cross_flow, drag_slopes, middle_drag_slopes
 from seastar_gym.simd.compilation import kernel

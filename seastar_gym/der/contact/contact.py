@@ -38,10 +38,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from seastar_gym.der.body.body import push_body_at_roots
 from seastar_gym.der.geometry import edge_vector, positive_part
 from seastar_gym.der.mesh import Mesh
 from seastar_gym.der.star import corner_place, tail_node
-from seastar_gym.der.terms.body import push_body_at_roots
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import (
     N_LANES,
@@ -108,7 +108,7 @@ class ContactWork(NamedTuple):
     ends: Positions at which contact is looked for [m]. seen: These positions along the gap between two limbs and
         across it.
     force: Forces of contact [N].
-    x, r, z, p, Hp, w: Vectors of the conjugate gradients, see linear/coupled.py.
+    x, r, z, p, Hp, w: Vectors of the conjugate gradients, see coupled.py.
     """
 
     share: float

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from seastar_gym.der.contact.contact import edge_ends
+from seastar_gym.der.contact.near_pairs import across_gap, height_over_body
 from seastar_gym.der.geometry import edge_vector
 from seastar_gym.der.star import corner_place, tail_node
-from seastar_gym.der.terms.contact import edge_ends
-from seastar_gym.der.terms.near_pairs import across_gap, height_over_body
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, any_lane, load, load_number, select, splat, store, subtract_product
 

@@ -10,9 +10,9 @@ As no gradient g is kept, the Newton decrement g x is that of the star's step, g
 H of the star's step.
 """
 
+from seastar_gym.der.body.body import carry_roots, gather_roots
+from seastar_gym.der.contact.contact import PRESSED, SLOT_ROWS, add_gap_gradient, gap, n_listed
 from seastar_gym.der.linear.star_solution import solve_again, substitute_star
-from seastar_gym.der.terms.body import carry_roots, gather_roots
-from seastar_gym.der.terms.contact import PRESSED, SLOT_ROWS, add_gap_gradient, gap, n_listed
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import add_product, any_lane, load, select, splat, store, subtract_product
 

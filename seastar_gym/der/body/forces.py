@@ -9,9 +9,7 @@ Fluid that moves along has the mass P = R P_0 R^T, which turns with the body. It
 -omega P' w and gives the torque w . P' w/2 (Munk's), P' = dP/dtheta: constants of a stage.
 """
 
-from seastar_gym.der.geometry import convex_part, rotation
-from seastar_gym.der.motion import relative
-from seastar_gym.der.terms.body import (
+from seastar_gym.der.body.body import (
     F_X,
     F_Y,
     G_X,
@@ -28,6 +26,8 @@ from seastar_gym.der.terms.body import (
     angle,
     turned,
 )
+from seastar_gym.der.geometry import convex_part, rotation
+from seastar_gym.der.motion import relative
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import absolute, add_product, load, load_number, select, splat, store, subtract_product
 

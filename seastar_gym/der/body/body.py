@@ -45,7 +45,7 @@ class Body(NamedTuple):
     n_arms, arm: a_k, (x, y) per limb and, in scenes with contact, per corner of the outline [m]; how many there are.
     inertia: I, with the fluid that turns along [kg m^2]. moment: S, (x, y) [kg m].
     added_mass: Mass of fluid that moves along, xx, xy, yy [kg]; None without.
-    n_strips, strips: Drag of flow onto strips of the outline, see body_forces.py: n_x, n_y [1], m [m], c [kg/m] each.
+    n_strips, strips: Drag of flow onto strips of the outline, see forces.py: n_x, n_y [1], m [m], c [kg/m] each.
     weight: Acceleration of free fall (x, y) [m/s^2] and the moment of mass less that of the fluid displaced, (x, y)
         [kg m]; None without gravity.
     """

@@ -2,9 +2,7 @@
 
 import numpy as np
 
-from seastar_gym.der.geometry import edge_vector
-from seastar_gym.der.star import corner_place, root_direction, root_place, tail_node
-from seastar_gym.der.terms.contact import (
+from seastar_gym.der.contact.contact import (
     N_X,
     N_Y,
     OFFSET,
@@ -19,6 +17,8 @@ from seastar_gym.der.terms.contact import (
     n_listed,
     stiffness_at,
 )
+from seastar_gym.der.geometry import edge_vector
+from seastar_gym.der.star import corner_place, root_direction, root_place, tail_node
 from seastar_gym.simd.compilation import kernel
 from seastar_gym.simd.lanes import (
     absolute,
