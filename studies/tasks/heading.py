@@ -3,10 +3,16 @@
 from collections.abc import Callable
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import torch
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
+from stable_baselines3 import PPO
 
+from agents.hyperparameters import Hyperparameters
+from agents.ppo import make_model
+from seastar_gym.adapters.stable_baselines3 import BatchVecEnv
 from seastar_gym.controllers import learned
 from seastar_gym.controllers.contract import Policy
 from seastar_gym.controllers.planner import Budget, Planner
@@ -19,7 +25,6 @@ from seastar_gym.evaluation.rollout import Episodes
 from seastar_gym.evaluation.tasks import make_batch
 from seastar_gym.gaits import turning_wave
 from seastar_gym.scene.numerics import Fidelity
-from studies.learning import heading
 from studies.tasks.episodes import swim_to_the_end
 
 ID = "SeastarSwimHeading-v0"
@@ -66,6 +71,18 @@ def _turn_then_swim(batch: Any) -> Policy:
 RULES: dict[str, Callable[[Any], Policy]] = {"rest": _rest, "planner": _planner, RULE: _turn_then_swim}
 
 
+def trained(decisions: int, seed: int) -> PPO:
+    """Learner on random paths with random headings, by pairs of limbs at "fast"; it sees reduced observations."""
+    hyperparameters = Hyperparameters(decision_period=PERIOD)
+    env: Any = gym.make_vec(
+        ID, hyperparameters.num_envs, "vector_entry_point", path="random", fidelity="fast", headings=HEADINGS,
+        autoreset_mode=AutoresetMode.SAME_STEP, max_episode_steps=800,
+    )  # fmt: skip
+    model = make_model(BatchVecEnv(VectorSymmetryReduction(env)), hyperparameters, seed)
+    model.learn(decisions)
+    return model
+
+
 def swum(agent: str, seed: int, decisions: int, n: int, fidelity: Fidelity, threads: int | None) -> Episodes:
     """Held-out episodes of an agent; PPO learns before, with a seed and for so many decisions, on other paths."""
     is_rule = agent == RULE
@@ -76,7 +93,7 @@ def swum(agent: str, seed: int, decisions: int, n: int, fidelity: Fidelity, thre
     )  # fmt: skip
     if agent == "PPO":
         torch.set_num_threads(1)
-        swimmer: Policy = heading.train(heading.Options(decisions=decisions, seed=seed))
+        swimmer: Policy = trained(decisions, seed)
         batch = VectorSymmetryReduction(batch)
     else:
         swimmer = RULES[agent](batch.unwrapped)

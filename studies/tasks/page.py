@@ -73,7 +73,7 @@ best round through those that are left, planned before every decision. Contracts
 
 In `SeastarSwimHeading-v0` nothing is hidden, either, and its agents are other ones, so that it is not judged. They swim
 random paths with random headings, those of the seeds from 1000 on, that no training draws, within 300 s. *Turn, then
-swim* decides every 0.2 s, as its wave asks for, the others every 0.5 s, among them PPO of `studies.learning.heading`.
+swim* decides every 0.2 s, as its wave asks for, the others every 0.5 s, among them PPO on random headings.
 
 Bundled policies are in `seastar_gym/controllers/policies/tasks`, each with a card. `python -m agents.tasks` trains
 them, that of `ObstTrap` by the reward that measures the way around all discs. That of `SimToReal` is an imitation of

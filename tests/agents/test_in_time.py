@@ -22,8 +22,7 @@ from studies.learning.in_time import study, trainings
 from studies.learning.in_time.shares import ChosenCommands, shares_of_pairs
 from studies.learning.in_time.study import Options
 from studies.learning.in_time.tables import as_markdown, pulses_per_metre
-from studies.learning.in_time.trainings import TRAININGS, Training, learn
-from studies.learning.reduced import ReducedPolicy
+from studies.learning.in_time.trainings import TRAININGS, ReducedPolicy, Training, learn
 from symmetries import assert_equivariant
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"

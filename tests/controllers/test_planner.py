@@ -130,3 +130,15 @@ def test_a_waypoint_that_is_not_the_last_is_passed_and_not_arrived_at():
     ends = planner._swim_all(planner._swim_all(states)).positions[:, 0].reshape(21, 21, 2)
     way = np.hypot(*np.moveaxis(ends - after, -1, 0))
     assert way[chosen].min() == pytest.approx(way.min(), abs=1e-6)
+
+
+def test_the_planner_turns_to_either_side_and_keeps_a_heading_that_is_met():
+    ends = []
+    for asked in (0.6, -0.6, 0.0):
+        headings = Headings(asked)
+        env = SeastarSwimEnv([[0.005, 0.0]], "pairs", "fast", decision_period=0.5, headings=headings)
+        planner = Planner(decision_period=0.5, headings=headings, budget=Budget(2, 4, 0.5), threads=1)
+        done = swim("planner", planner, env, max_strokes=30)
+        assert done.finished
+        ends.append(done.time[-1])
+    assert ends[0] > 2.0 and ends[1] > 2.0 and ends[2] == 0.5

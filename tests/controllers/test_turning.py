@@ -9,7 +9,11 @@ from seastar_gym import Headings, Scene
 from seastar_gym.controllers.turning import TurnThenSwim
 from seastar_gym.envs.commands import command_table
 from seastar_gym.envs.layout import HEADINGS, Layout
+from seastar_gym.envs.options import make_scene
+from seastar_gym.envs.seastar_swim import SeastarSwimEnv
 from seastar_gym.envs.symmetry import transform_commands
+from seastar_gym.evaluation.swim import swim
+from seastar_gym.gaits import turning_wave
 
 AT = Layout.of(Scene(), entries=HEADINGS)
 CLOCKWISE = np.array([[1, -1, 0, 0, 0], [0, 0, 1, -1, 0], [0, 0, 0, 0, 1]], float)
@@ -68,3 +72,23 @@ def test_the_swimmer_sees_nothing_of_headings():
     commands_of(agent(swimmer), [0.1, 1.0])
     (shown,) = swimmer.shown
     np.testing.assert_array_equal(shown, np.delete(seen(0.1), AT.headings))
+
+
+class Resting:
+    """Swimmer that rests; it sees observations without headings."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=False):
+        assert observation.shape == (196,)
+        return 0, None
+
+
+@pytest.mark.parametrize("asked", [0.5, -0.5])
+def test_a_robot_turns_to_the_side_that_is_asked_for_and_then_swims(asked):
+    scene, headings = make_scene(None, "fast", 0.2), Headings(asked)
+    policy = TurnThenSwim(turning_wave(0.2), Resting(), "pairs", scene, headings, 0.2)
+    env = SeastarSwimEnv([[0.3, 0.0]], "joint", "fast", decision_period=0.2, headings=headings)
+    done = swim("turn", policy, env, max_strokes=40)
+    heated = done.limbs_heated > 0
+    last = int(np.flatnonzero(heated)[-1])
+    assert heated[:last].all() and 10 < last < 30 and not heated[last + 1 :].any()
+    assert env._task.facts()["heading"][0] == pytest.approx(asked, abs=headings.tolerance)

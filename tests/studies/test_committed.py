@@ -10,6 +10,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
+from seastar_gym import Certificate, Scene
 from seastar_gym.controllers.greedy import measure_gaits
 from seastar_gym.envs.options import make_scene
 from seastar_gym.envs.seastar_swim import SeastarSwimEnv
@@ -162,3 +163,36 @@ def test_the_page_that_swims_has_the_strokes_of_the_simulator():
 def test_measured_errors_are_of_this_version(name):
     results = read(name)
     assert results.get("version", results.get("versions", {}).get("seastar-gym")) == __version__
+
+
+def test_the_page_compares_the_same_rule_with_strokes_and_wires():
+    """In seconds and joules, beyond the way without a turn; other controllers are named."""
+    swims = read("heading.json")["swims"]
+    said = " ".join((DOCS / "gaits.md").read_text(encoding="utf-8").split())
+    for name, sentence in {
+        "strokes": "takes {} s and {} J more than to swim straight with the chapter's strokes",
+        "wires": "and {} s and {} J more with wires every 0.2 s",
+        "planner": "the planner takes {} s and {} J more",
+        "learned": "the learned policy {} s and {} J",
+    }.items():
+        more = [swims[name][what][-1] - swims[name][what][0] for what in ("seconds", "joules")]
+        assert sentence.format(*(f"{round(each):g}" for each in more)) in said
+
+
+def test_the_page_of_designs_tells_what_mass_in_the_hub_does():
+    found = read("hub.json")
+    page = (DOCS / "designs.md").read_text(encoding="utf-8")
+    straight = found["mm_per_s"]["fine"]["point"]["1-,3+"]["1"]
+    for share in (0.0, 0.5, 0.9):
+        assert f"{straight[found['shares'].index(share)]:.2f}" in page
+
+
+def test_the_certificate_of_the_worked_example_is_that_of_the_fitted_scene_and_of_the_trainings():
+    folder = DOCS / "worked_example"
+    found = json.loads((folder / "results.json").read_text(encoding="utf-8"))
+    certificate = Certificate.load(folder / "certificate.json")
+    certificate.require_valid(Scene.from_dict(found["fit"]["scene"]))
+    chosen = certificate.of(certificate.for_error(found["settings"]["error"]))
+    assert str(chosen) == found["certificate"]["setting"] and certificate.samples == found["settings"]["samples"]
+    assert chosen.error(certificate.promised) == found["certificate"]["error"]
+    assert chosen.speed == found["certificate"]["times_real_time"]

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.noise import NormalActionNoise
@@ -20,7 +21,6 @@ from seastar_gym.envs.reward import RewardWeights
 from seastar_gym.envs.symmetry import Symmetry
 from seastar_gym.scene.numerics import Fidelity
 from studies.learning.in_time.shares import ChosenCommands, shares_of_pairs
-from studies.learning.reduced import ReducedPolicy
 
 COMMON = Hyperparameters(discount=0.9, rollout=32, num_envs=64, gae_lambda=0.95)
 """Hyperparameters of the trainings, but for what differs."""
@@ -37,6 +37,25 @@ SAC_SETTINGS: dict[str, Any] = {
 """Settings of SAC and TD3. An update follows every decision of the batch, with so many gradient steps."""
 EXPLORATION = 0.3
 """Standard deviation of the noise of TD3's actions, of a whole pulse or the peak angle [1]."""
+
+
+class ReducedPolicy:
+    """Policy for the plain environment, from the model that a learner behind the symmetry reduction has learned.
+
+    symmetry: Of the robot, with the environment's actions.
+    table: Commands that the model's actions are the numbers of. None means that they are the environment's.
+    """
+
+    def __init__(self, model: Policy, symmetry: Symmetry, table: NDArray[np.float64] | None = None):
+        self.model, self.symmetry, self.table, self.actions = model, symmetry, table, symmetry.actions
+
+    def predict(
+        self, observation: NDArray[Any], state: Any = None, episode_start: Any = None, deterministic: bool = False
+    ) -> tuple[NDArray[Any], None]:
+        """Actions for observations of shape (size,) or (n, size), and None: the policy has no state."""
+        reduced, elements = self.symmetry.reduce(observation)
+        chosen, _ = self.model.predict(reduced.astype(np.float32), None, None, deterministic)
+        return self.symmetry.restore(chosen if self.table is None else self.table[chosen], elements), None
 
 
 @dataclass(frozen=True)
