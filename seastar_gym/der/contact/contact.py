@@ -47,11 +47,13 @@ from seastar_gym.simd.lanes import (
     N_LANES,
     WIDTH,
     add_product,
+    any_lane,
     load,
     load_number,
     select,
     splat,
     store,
+    store_number,
     subtract_product,
 )
 from seastar_gym.simd.rows import aligned_rows
@@ -66,6 +68,10 @@ MOST_NEAR_EDGES, SHORT_CHAIN = 3, 24
 fewer. In longer ones a node that is not crumpled is near to one or two, and a corner to as many of every limb."""
 NEAR_SIDES = 2
 """Sides of a body that a node can be near to, in the mean over the nodes of chains that are not short."""
+MARGIN = 2.0
+"""Times the thickness: pairs nearer than that are listed, and those that approach faster."""
+OUT_OF_TOUCH = 1e300
+"""Thickness of a pair that does not touch, with the other sign [m]."""
 
 
 class Contact(NamedTuple):
@@ -285,6 +291,37 @@ def gap_at_rest(rods, work, stage, slot):
             -3.0 * gap(rods, work, slot, stage.q_hat), stage.gamma, gap(rods, work, slot, stage.v_hat)
         )
     return splat(0.0)
+
+
+@kernel
+def put_on_list(rods, work, stage, i, e, nx, ny, s, d, share, near):
+    """List node i and edge e for the robots in the mask.
+
+    The edge's point is at s along it, its normal (nx, ny), the thickness d [m], and the pair has a share of the node's
+    stiffness.
+    """
+    # Every robot has a share of the list of its own, so that nobody takes another's place.
+    own = load(work.contact.own, 0)
+    full = near & (own >= work.contact.share)
+    store(work.contact.missed, 0, select(full, 1.0, load(work.contact.missed, 0)))
+    near = near & ~full
+    if not any_lane(near):
+        return
+    store(work.contact.own, 0, select(near, own + 1.0, own))
+    slot = n_listed(work)
+    store_number(work.contact.listed, 0, slot + 1.0)
+    store_number(work.contact.listed, 2 * slot + 1, float(i))
+    store_number(work.contact.listed, 2 * slot + 2, float(e))
+    row = SLOT_ROWS * slot
+    # Others, whose edge may have no direction, meet nothing here that is not zero.
+    store(work.contact.slots, row + N_X, select(near, nx, 0.0))
+    store(work.contact.slots, row + N_Y, select(near, ny, 0.0))
+    store(work.contact.slots, row + SHARE, select(near, s, 0.0))
+    store(work.contact.slots, row + THICKNESS, select(near, d, -OUT_OF_TOUCH))
+    store(work.contact.slots, row + OFFSET, select(near, gap_at_rest(rods, work, stage, slot), 0.0))
+    _, _, head = members(rods, work, slot)
+    store(work.contact.slots, row + STIFFNESS, select(near, share * stiffness_at(rods, i, head), 0.0))
+    store(work.contact.slots, row + PRESSED, 0.0)
 
 
 @kernel

@@ -3,7 +3,8 @@
 import numpy as np
 
 from seastar_gym.der.contact.contact import edge_ends
-from seastar_gym.der.contact.near_pairs import across_gap, height_over_body
+from seastar_gym.der.contact.near_body import height_over_body
+from seastar_gym.der.contact.near_pairs import across_gap
 from seastar_gym.der.geometry import edge_vector
 from seastar_gym.der.star import corner_place, tail_node
 from seastar_gym.simd.compilation import kernel
