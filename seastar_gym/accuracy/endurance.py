@@ -32,30 +32,21 @@ def energy_growth(scene: Scene, samples: int = 8, seed: int = 0) -> float:
     Robots repeat one command, or two in turn, `samples` of each, and swim the alternation of mirrored pairs. A setting
     that gathers no energy has about 1, one that resonates ten and more; at `ENOUGH` the swims end.
     """
-    return float(np.max(energy_growths(scene, samples, seed, LONG, ENOUGH)))
-
-
-def energy_growths(
-    scene: Scene, samples: int = 8, seed: int = 0, strokes: int = LONG, enough: float | None = None
-) -> Floats:
-    """Growth of the energy of each long swim, shape (1 + 2 samples,), see `energy_growth`; inf for those that fail.
-
-    strokes: Length of the swims. enough: Growth of any of them, also by failure, at which all end.
-    """
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "The kinetic energy", RuntimeWarning)  # it is told by the result
-        return _energy_growths(scene, long_swims(scene.robot.n_limbs, samples, seed), strokes, enough)
+        return float(_energy_growths(scene, long_swims(scene.robot.n_limbs, samples, seed)).max())
 
 
-def _energy_growths(scene: Scene, commands: Floats, strokes: int, enough: float | None) -> Floats:
+def _energy_growths(scene: Scene, commands: Floats) -> Floats:
+    """Growth of the energy of each long swim, shape (1 + 2 samples,)."""
     n = commands.shape[1]
-    simulator, energies, failed = with_the_water(scene, n), np.empty((strokes, n)), np.zeros(n, bool)
-    for stroke in range(strokes):
+    simulator, energies, failed = with_the_water(scene, n), np.empty((LONG, n)), np.zeros(n, bool)
+    for stroke in range(LONG):
         failed |= simulator.stroke(commands[stroke % STROKES]).status > 0
         energies[stroke] = simulator.kinetic_energy(relative_to_water=True)
         growth = _growth(energies[:WINDOW], energies[stroke : stroke + 1]) if stroke >= WINDOW else np.zeros(n)
         growth[failed] = np.inf
-        if enough is not None and growth.max() >= enough:
+        if growth.max() >= ENOUGH:
             return growth
     return np.where(failed, np.inf, _growth(energies[:WINDOW], energies[-WINDOW:]))
 

@@ -4,9 +4,6 @@ The atlas varies eight quantities against the time step: Young's modulus, rod ra
 initial velocities and shifts, and the peak angle. Each of its cells is a scene at a time step. Prints a summary, and
 writes all cells as CSV, what pictures and summary show of them as JSON, and three pictures: what the solver needed to
 converge, Newton iterations per step, and the error of the hub's path.
-
-`--long` simulates 10,000 strokes of random commands by 256 robots instead. `--growth` measures by how much the kinetic
-energy of 17 gaits grows over 200 strokes of the implicit midpoint rule, with some nodes, steps and stiffnesses.
 """
 
 import csv
@@ -31,7 +28,6 @@ from studies.frame import Results, Study
 from studies.kept import rounded
 from studies.stability.cases import QUICK_STEPS, STEPS, SWEEPS, Sweep, format_value, quick_sweeps
 from studies.stability.cells import Cell, commands_of, converged_displacements, run_cell, stroke_duration
-from studies.stability.long_run import growth_table, long_run, long_table
 from studies.stability.pictures import draw as draw_cells
 
 Floats = NDArray[np.float64]
@@ -168,30 +164,19 @@ class Options:
     """Run a coarser grid, in a fraction of the time."""
     scheme: SchemeName = "implicit-euler"
     """Scheme of the atlas."""
-    long: bool = False
-    """Simulate a long run of random commands instead."""
-    growth: bool = False
-    """Measure the energy that long swims gather instead."""
     out: Path = Path("runs/stability")
     """Folder of the files, or the file of the numbers."""
 
 
 def run(options: Options, results: Results) -> None:
-    """Run the atlas or a long run, and print its table."""
-    console = Console()
-    if options.long:
-        console.print(long_table(long_run(1000 if options.quick else 10_000)))
-        return
-    if options.growth:
-        console.print(growth_table())
-        return
+    """Run the atlas."""
     sweeps, steps = (quick_sweeps(), QUICK_STEPS) if options.quick else (SWEEPS, STEPS)
     start = time.perf_counter()
     cells = atlas(sweeps, steps, options.scheme)
     options.out.mkdir(parents=True, exist_ok=True)
     write_csv(cells, options.out / "stability.csv")
     results.update(as_data(cells, options.scheme))
-    console.print(f"{time.perf_counter() - start:.0f} s. Written, too: {options.out / 'stability.csv'}")
+    Console().print(f"{time.perf_counter() - start:.0f} s. Written, too: {options.out / 'stability.csv'}")
 
 
 def sweeps_of(cells: Sequence[Cell]) -> list[Sweep]:

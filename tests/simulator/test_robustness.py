@@ -264,6 +264,18 @@ def energies(numerics: Numerics, fluid: Water | None, speed: float, n_steps: int
     return np.array(found) / found[0]
 
 
+def test_random_strokes_keep_strains_and_speeds_small():
+    """What is left of the motion at the ends of strokes does not grow."""
+    scene = Scene(Seastar(nodes_per_limb=10), numerics=Numerics.preset("fast"))
+    simulator = Simulator(scene, 16, threads=1)
+    for commands in ternary(20, 16):
+        simulator.stroke(commands)
+        limbs = simulator.positions[:, 1:].reshape(16, 5, -1, 2)
+        strains = np.linalg.norm(np.diff(limbs, axis=2), axis=-1) / scene.robot.edge_length - 1.0
+        assert np.abs(strains).max() < 0.05 and 0.0 < np.abs(simulator.velocities).max() < 1.0
+    assert not simulator.failed.any()
+
+
 FLUIDS = pytest.mark.parametrize("fluid", [None, Water()], ids=["vacuum", "water"])
 WILD_STEPS = (1e-5, 1e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0)
 WILD_SPEEDS = (0.1, 1.0, 10.0, 100.0)

@@ -12,7 +12,6 @@ from PIL import Image
 from studies.command import main
 from studies.kept import as_json
 from studies.stability import cells as stability_cells
-from studies.stability import long_run
 from studies.stability import study as stability
 from studies.stability.cases import SWEEPS, format_step, format_value, quick_sweeps
 
@@ -121,21 +120,6 @@ def test_values_and_steps_are_written_as_a_reader_expects_them():
     sweep = SWEEPS[0]
     assert [format_value(sweep, value) for value in (None, 1e11, 1.6, 0.01)] == ["vacuum", "10¹¹", "1.6", "0.01"]
     assert [format_step(step) for step in (1e-5, 3e-3, 0.3, 1.0)] == ["10 µs", "3 ms", "300 ms", "1 s"]
-
-
-def test_a_long_run_keeps_strain_and_speed_bounded():
-    run = stability.long_run(strokes=20, robots=16, threads=1, progress=False)
-    assert run.failed == 0 and 0.0 < run.strain < 0.05 and 0.0 < run.speed < 1.0
-    assert run.strain_late <= run.strain and run.speed_late <= run.speed
-    assert stability.long_table(run).row_count == 13
-
-
-def test_growth_is_the_energy_of_late_strokes_over_that_of_early_ones():
-    """Short swims of few nodes: nothing grows, and implicit midpoint gaits repeat themselves."""
-    setting = long_run.Resonance(4, 5e-3)
-    found = long_run.growths(setting, strokes=40)
-    assert found.shape == (17,) and np.all(found < 1.5) and np.median(found) == pytest.approx(1.0, abs=0.1)
-    assert long_run.growth_table((setting,), strokes=21).row_count == 1
 
 
 def test_the_study_writes_its_files_and_prints_its_table(monkeypatch, tmp_path, capsys):

@@ -12,9 +12,6 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-MOST_PRIZES = 12
-"""The programme has 2^n n numbers."""
-
 
 class _Sets(NamedTuple):
     """Sets of n prizes as numbers whose bit k says whether prize k is among them."""
